@@ -1,0 +1,51 @@
+"""Named failures; bad input is a `ValueError` or a `TypeError` instead."""
+
+from __future__ import annotations
+
+from typing import Any
+
+__all__ = ["ContactError", "ConvergenceError", "NoEquilibriumError"]
+
+
+class ContactError(RuntimeError):
+    """A well-posed input for which no solution was reached."""
+
+
+class ConvergenceError(ContactError):
+    """The active-set iteration did not settle.
+
+    Parameters
+    ----------
+    message
+        What was iterated, how far it came and what to try.
+    iterate
+        The last iterate, so that it can be inspected or used as a start.
+    """
+
+    def __init__(self, message: str, *, iterate: Any = None) -> None:
+        super().__init__(message)
+        self.iterate = iterate
+
+
+class NoEquilibriumError(ContactError):
+    """The load drives a rigid motion which neither support nor contact resists (HH81 Rem. 3.7).
+
+    Parameters
+    ----------
+    message
+        The body, the motion, the work and what would hold the body.
+    body
+        Name of the body that is driven away.
+    motion
+        The rigid motion, as the raising function describes it.
+    work
+        Work of the load on that motion (any consistent units).
+    """
+
+    def __init__(
+        self, message: str, *, body: str = "", motion: Any = None, work: float = float("nan")
+    ) -> None:
+        super().__init__(message)
+        self.body = body
+        self.motion = motion
+        self.work = work
