@@ -1,0 +1,1 @@
+"""Experiments with published or exact answers: studies, benchmarks and exact solutions."""

@@ -1,0 +1,399 @@
+"""Exact solutions: Hooke's law, equilibrium, contact conditions and known values."""
+
+from __future__ import annotations
+
+import functools
+import math
+from types import SimpleNamespace
+
+import ngsolve as ng
+import numpy as np
+import pytest
+from netgen.occ import Compound, OCCGeometry, WorkPlane
+from ngsolve.meshes import MakeStructured2DMesh
+
+from drivers.exact import hertz, patch, relative_energy_error, transition, transition_cutoff
+from drivers.exact_curved import curved, rings
+from drivers.westergaard import effective_modulus, hooke
+from ngcontact.material import Elastic
+
+UPPER, LOWER = Elastic(E=1.0, nu=0.3), Elastic(E=3.0, nu=0.2)
+MATERIALS = {"upper": UPPER, "lower": LOWER, "outer": UPPER, "inner": LOWER}
+SIDE = {"upper": 1, "lower": -1}
+HALVES = {"upper": (-1, 1, 0, 1), "lower": (-1, 1, -1, 0)}
+RINGS = {"outer": (0.8, 1.3, 0.7, 1.3), "inner": (0.4, 0.65, -0.65, -0.4)}  # boxes inside the rings
+
+# Solution and, per body, a box on which it holds. The curved contact lines lie inside their boxes:
+# the fields continue analytically across them.
+CASES = {
+    "transition": (transition(UPPER, LOWER, c=1.3, bending=0.1), HALVES),
+    "hertz": (hertz(UPPER, LOWER, radius=5.0, half_width=0.3), HALVES),
+    "patch": (patch(UPPER, LOWER, p0=1.0, p1=0.5), HALVES),
+    "cutoff": (transition_cutoff(UPPER, LOWER, c=1.3), HALVES),
+    "curved": (curved(UPPER, LOWER), dict.fromkeys(SIDE, (-0.5, 0.5, -0.3, 0.3))),
+    "rings": (rings(UPPER, LOWER, qn=0.4, qi=0.2, n=4, delta=0.01), RINGS),
+}
+BODIES = [(name, body) for name, (_, boxes) in CASES.items() for body in boxes]
+ON_LINE = np.unique(np.r_[np.linspace(-1, 1, 41), -0.3, 0.3])  # with all ends of contact
+
+
+@functools.cache  # and mesh points do not keep their mesh alive
+def grid(box):
+    """20 x 8 quadrilaterals on a box, graded towards y = 0 if the box ends there.
+
+    Two of the lower and upper half's rows lie beyond |y| = 1/2, where the cut-off begins.
+    """
+    x0, x1, y0, y1 = box
+    power = math.log(1 / 2) / math.log(3 / 4)
+
+    def place(s, t):
+        if y0 == 0:
+            t = t**power
+        elif y1 == 0:
+            t = 1 - (1 - t) ** power
+        return x0 + (x1 - x0) * s, y0 + (y1 - y0) * t
+
+    return MakeStructured2DMesh(quads=True, nx=20, ny=8, mapping=place)
+
+
+def at(field, box, x, y):
+    """Values at points of a box: (points,) + the shape of the field."""
+    values = np.asarray(field(grid(box)(np.asarray(x, float), np.asarray(y, float))))
+    return values.reshape(np.size(x), *field.dims)
+
+
+def two_blocks(maxh):
+    """Mesh of the blocks (-1, 1) x (0, 1), "upper", and (-1, 1) x (-1, 0), "lower"."""
+    blocks = []
+    for body, y0 in (("upper", 0), ("lower", -1)):
+        block = WorkPlane().MoveTo(-1, y0).Rectangle(2, 1).Face()
+        block.faces.name = body
+        blocks.append(block)
+    return ng.Mesh(OCCGeometry(Compound(blocks), dim=2).GenerateMesh(maxh=maxh))
+
+
+def discrete(mesh, stress, order=2):
+    """Stand-in for a `Solution`, with what the error measurement reads."""
+    problem = SimpleNamespace(materials=MATERIALS, model="plane strain")
+    return SimpleNamespace(mesh=mesh, stress=stress, problem=problem, order=order)
+
+
+def interpolated(exact, mesh, order):
+    """Discrete solution whose displacement interpolates the exact one."""
+    u = ng.GridFunction(ng.VectorH1(mesh, order=order))
+    u.Set(mesh.MaterialCF(exact.displacement), dual=True)
+    stress = {body: hooke(MATERIALS[body], ng.Grad(u)) for body in exact.displacement}
+    return discrete(mesh, mesh.MaterialCF(stress), order)
+
+
+@pytest.mark.parametrize(("name", "body"), BODIES)
+def test_stress_is_hookes_law_of_the_displacement(name, body):
+    exact, boxes = CASES[name]
+    x0, x1, y0, y1 = box = boxes[body]
+    rng, h = np.random.default_rng(0), 5e-4
+    x = rng.uniform(x0 + 0.05, x1 - 0.05, 100)
+    x = x[np.abs(np.abs(x) - 0.25) > 3 * h]  # the curved solution has kinks there
+    y = rng.uniform(y0 + 0.05, y1 - 0.05, x.size)
+
+    def difference(dx, dy):  # of order 4
+        near, far = (
+            at(exact.displacement[body], box, x + k * dx, y + k * dy)
+            - at(exact.displacement[body], box, x - k * dx, y - k * dy)
+            for k in (1, 2)
+        )
+        return (8 * near - far) / (12 * h)
+
+    grad = np.stack([difference(h, 0), difference(0, h)], axis=-1)
+    material = MATERIALS[body]
+    mu = material.E / (2 * (1 + material.nu))
+    lam = 2 * mu * material.nu / (1 - 2 * material.nu)
+    trace = np.trace(grad, axis1=1, axis2=2)[:, None, None]
+    expected = mu * (grad + grad.transpose(0, 2, 1)) + lam * trace * np.eye(2)
+    stress = at(exact.stress[body], box, x, y)
+    # h^4 and round-off / h leave 1e-9; near a tip, 0.05 away, h^4 u^(5) is 1e-8 of the stress
+    np.testing.assert_allclose(stress, expected, rtol=0, atol=1e-7 * np.abs(stress).max())
+
+
+@pytest.mark.parametrize(("name", "body"), BODIES)
+def test_virtual_work_balances(name, body):
+    exact, boxes = CASES[name]
+    mesh = grid(boxes[body])
+    stress, x, y = exact.stress[body], ng.x, ng.y
+    traction = stress * ng.specialcf.normal(2)
+    # the first two are rigid: loads and tractions alone
+    for v in ((1, 0), (-y, x), (x * x, x * y), (y * y, x), (x * y * y, y)):
+        v = ng.CF(v)
+        dv = ng.CF((v.Diff(x), v.Diff(y)), dims=(2, 2)).trans
+        work = ng.CF((ng.InnerProduct(stress, dv), ng.InnerProduct(exact.force[body], v)))
+        inner, loads = ng.Integrate(work, mesh, order=20)
+        outer = ng.Integrate(ng.InnerProduct(traction, v), mesh, ng.BND, order=20)
+        size = ng.Integrate(ng.Norm(stress), mesh, order=4)
+        # measured: quadrature at the tips, where stress ~ r^(1/2), leaves at most 1e-8
+        assert abs(inner - loads - outer) < 1e-7 * size
+
+
+@pytest.mark.parametrize("name", ["transition", "hertz", "patch", "cutoff"])
+def test_conditions_on_the_contact_line(name):
+    exact, x = CASES[name][0], ON_LINE
+    u, stress = (
+        {body: at(field[body], HALVES[body], x, 0 * x) for body in SIDE}
+        for field in (exact.displacement, exact.stress)
+    )
+    p, gap = exact.pressure(x), exact.gap(x)
+    initial = at(exact.initial_gap, HALVES["upper"], x, 0 * x)
+    assert np.all(p >= 0)
+    assert np.all(gap >= 0)
+    assert np.all(p * gap == 0)
+    assert p.max() > 0
+    scale = np.abs(u["lower"]).max()  # below: round-off
+    np.testing.assert_allclose(
+        initial + (u["upper"] - u["lower"])[:, 1], gap, rtol=0, atol=1e-13 * scale
+    )
+    for body in SIDE:
+        # p has an infinite slope at the end of contact: round-off in x counts by its square root
+        np.testing.assert_allclose(stress[body][:, 1, 1], -p, rtol=0, atol=1e-7 * p.max())
+        np.testing.assert_allclose(stress[body][:, 0, 1], 0, atol=1e-7 * p.max())
+
+
+@pytest.mark.parametrize("y", [0.0, -0.0, 1e-17, -1e-17])
+@pytest.mark.parametrize("body", ["upper", "lower"])
+def test_vertices_on_the_contact_line_belong_to_their_body(body, y):
+    side, material = SIDE[body], MATERIALS[body]
+    mesh = MakeStructured2DMesh(
+        quads=False, nx=8, ny=1, mapping=lambda s, t: (2 * s - 1, y + (t if side > 0 else t - 1))
+    )
+    u = ng.GridFunction(ng.VectorH1(mesh, order=1))
+    u.Set(transition(UPPER, LOWER).displacement[body], dual=True)
+    points = np.array([v.point for v in mesh.vertices])
+    line = np.abs(points[:, 1]) < 1e-9
+    x, values = points[line, 0], np.reshape(u.vec.FV().NumPy(), (2, -1)).T[line]
+    assert x.size == 9
+    assert 0 in x
+    # Z = i sqrt(z) on y = 0: Re W = (2/3) (-x)^(3/2) in contact, Im W = (2/3) x^(3/2) outside
+    along = (
+        (1 - 2 * material.nu) * (1 + material.nu) / material.E * 2 / 3 * np.maximum(-x, 0) ** 1.5
+    )
+    across = 2 * (1 - material.nu**2) / material.E * 2 / 3 * np.maximum(x, 0) ** 1.5
+    np.testing.assert_allclose(values, np.transpose([along, side * across]), rtol=0, atol=1e-14)
+
+
+def boundary_work(exact, body, box):
+    """Integral of the traction times the displacement over the boundary: A(u, u) if F = 0."""
+    traction = exact.stress[body] * ng.specialcf.normal(2)
+    work = ng.InnerProduct(traction, exact.displacement[body])
+    return ng.Integrate(work, grid(box), ng.BND, order=30)
+
+
+def test_transition_energies():
+    exact = transition(UPPER, LOWER)
+    assert effective_modulus(UPPER, LOWER) == pytest.approx(0.813008130081, abs=1e-12)
+    assert exact.gap(1.0) == pytest.approx(1.64, rel=1e-14)
+    # Clapeyron; the twelve digits of the reference values
+    energies = [boundary_work(exact, body, HALVES[body]) for body in ("upper", "lower")]
+    assert energies == pytest.approx([1.293180760825, 0.520333087196], abs=2e-12)
+
+
+def test_bending_moves_the_contact_line_only():
+    straight, bent = transition(UPPER, LOWER), transition(UPPER, LOWER, bending=0.4)
+    x = ON_LINE
+    for body in SIDE:
+        moved, still = (at(e.displacement[body], HALVES[body], x, 0 * x) for e in (bent, straight))
+        expected = np.transpose([0 * x, -0.2 * x**2])
+        np.testing.assert_allclose(moved - still, expected, rtol=0, atol=1e-15)
+    np.testing.assert_array_equal(bent.pressure(x), straight.pressure(x))
+
+
+def test_hertz_known_values():
+    exact = hertz(UPPER, LOWER, radius=5.0, half_width=0.3)
+    assert exact.p0 == pytest.approx(0.024390243902, rel=1e-10)
+    assert exact.P == pytest.approx(0.011493631659, rel=1e-10)
+    s, w = np.polynomial.chebyshev.chebgauss(50)  # exact for sqrt(1 - s^2) times a polynomial
+    total = 0.3 * np.sum(w * np.sqrt(1 - s**2) * exact.pressure(0.3 * s))
+    assert total == pytest.approx(exact.P, rel=1e-12)
+    # reference by x = a sin(t) in contact; here the quadrature of its ends leaves 5e-6 (measured)
+    energies = [boundary_work(exact, body, HALVES[body]) for body in ("upper", "lower")]
+    assert energies == pytest.approx([1.3069965e-4, 4.949773e-5], rel=1e-5)
+
+
+def test_hertz_stress_below_the_centre():
+    exact, a = CASES["hertz"][0], 0.3
+    y = np.linspace(0.01, 0.9, 20)
+    stress = at(exact.stress["lower"], HALVES["lower"], 0 * y, -y)
+    root = np.sqrt(1 + (y / a) ** 2)
+    along = -exact.p0 * ((a**2 + 2 * y**2) / (a**2 * root) - 2 * y / a)  # Johnson 1985, (4.46)
+    # round-off: Z is the difference of w and z
+    np.testing.assert_allclose(stress[:, 0, 0], along, rtol=0, atol=1e-13 * exact.p0)
+    np.testing.assert_allclose(stress[:, 1, 1], -exact.p0 / root, rtol=0, atol=1e-13 * exact.p0)
+
+
+def test_patch_at_constant_pressure_is_linear():
+    exact, mesh = patch(UPPER, LOWER, p0=2.0), two_blocks(0.7)
+    assert relative_energy_error(interpolated(exact, mesh, 1), exact) < 1e-13  # round-off
+
+
+def test_cutoff_is_homogeneous_far_from_the_contact_line():
+    exact, whole = transition_cutoff(UPPER, LOWER), transition(UPPER, LOWER)
+    x = np.linspace(-1, 1, 21)
+    for body, side in SIDE.items():
+        box = HALVES[body]
+        for field in (exact.displacement, exact.stress):
+            # round-off of 1 - (35 - 84 + 70 - 20)
+            assert np.abs(at(field[body], box, x, 0 * x + side)).max() < 1e-12
+        for y in (0.1, 0.49):
+            assert np.all(at(exact.force[body], box, x, 0 * x + side * y) == 0)
+            np.testing.assert_array_equal(
+                at(exact.displacement[body], box, x, 0 * x + side * y),
+                at(whole.displacement[body], box, x, 0 * x + side * y),
+            )
+        assert np.abs(at(exact.force[body], box, x, 0 * x + side * 0.7)).min() > 0.01
+
+
+def test_curved_tractions_and_gap():
+    exact, boxes = CASES["curved"]
+    x = np.unique(np.r_[np.linspace(-0.5, 0.5, 41), -0.25, 0.25])
+    p, gap, u = exact.pressure(x), exact.gap(x), {}
+    assert np.all(p >= 0)
+    assert np.all(gap >= 0)
+    assert np.all(p * gap == 0)
+    for body, side in SIDE.items():
+        y, slope = exact.curve[body](x), exact.slope[body](x)
+        np.testing.assert_allclose(y, side * x**2 / (2 if side > 0 else 4), rtol=1e-15)
+        np.testing.assert_allclose(slope, np.gradient(y, x, edge_order=2), rtol=0, atol=1e-13)
+        normal = -side * np.transpose([-slope, 1 + 0 * x])  # outward, length ds / d eta
+        traction = np.einsum("kij,kj->ki", at(exact.stress[body], boxes[body], x, y), normal)
+        # (3.10'), (3.11') of HH81 per unit eta, to round-off
+        np.testing.assert_allclose(traction, np.transpose([0 * x, side * p]), rtol=0, atol=1e-14)
+        u[body] = at(exact.displacement[body], boxes[body], x, y)[:, 1]
+    initial = at(exact.initial_gap, boxes["upper"], x, 0 * x)
+    np.testing.assert_allclose(
+        initial, exact.curve["upper"](x) - exact.curve["lower"](x), atol=1e-15
+    )
+    np.testing.assert_allclose(initial + u["upper"] - u["lower"], gap, rtol=0, atol=1e-15)
+    s, w = np.polynomial.legendre.leggauss(4)  # exact: p is a polynomial of degree 4 in contact
+    total = exact.half_width * np.sum(w * exact.pressure(exact.half_width * s))
+    assert total == pytest.approx(exact.P, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("load", "mean", "wave"),
+    [
+        ({}, 1.0282485876, 0),
+        ({"qn": 0.3}, 1.0282485876, 0.4139552814),
+        ({"q0": 0.0, "delta": 0.01}, 0.0042372881, 0),
+        ({"qn": 0.4, "qi": 0.2, "n": 4}, 1.0463276836, 0.2908511488),
+    ],
+)
+def test_rings_known_pressures_and_conditions(load, mean, wave):
+    exact = rings(UPPER, LOWER, **load)
+    assert (exact.P0, exact.Pn) == pytest.approx((mean, wave), abs=1e-10)  # printed digits
+    theta = np.linspace(-math.pi, math.pi, 37)
+    radial = np.transpose([np.cos(theta), np.sin(theta)])
+    box, n = (-2.1, 2.1, -2.1, 2.1), load.get("n", 2)
+    u, traction = {}, {}
+    for body, r in (("inner", 0.5), ("inner", 1.0), ("outer", 1.0), ("outer", 2.0)):
+        x, y = r * radial.T
+        u[body, r] = np.sum(at(exact.displacement[body], box, x, y) * radial, axis=1)
+        traction[body, r] = np.einsum("kij,kj->ki", at(exact.stress[body], box, x, y), radial)
+    pressures = {
+        ("inner", 0.5): load.get("qi", 0.0) + 0 * theta,
+        ("inner", 1.0): exact.pressure(theta),
+        ("outer", 1.0): exact.pressure(theta),
+        ("outer", 2.0): load.get("q0", 1.0) + load.get("qn", 0.0) * np.cos(n * theta),
+    }
+    for circle, pressure in pressures.items():  # normal traction, no shear
+        expected = -pressure[:, None] * radial
+        np.testing.assert_allclose(traction[circle], expected, rtol=0, atol=1e-12)  # round-off
+    jump = at(exact.initial_gap, box, *radial.T) + u["outer", 1.0] - u["inner", 1.0]
+    np.testing.assert_allclose(jump, exact.gap(theta), rtol=0, atol=1e-13)
+
+
+def test_rings_shrink_fit_in_closed_form():
+    hole, joint, rim, delta = 0.3, 0.8, 1.1, 1e-3
+    exact = rings(UPPER, LOWER, radii=(hole, joint, rim), q0=0.0, delta=delta)
+    compliance = 0.0
+    for material, other, sign in ((UPPER, rim, 1), (LOWER, hole, -1)):
+        plane, ratio = material.E / (1 - material.nu**2), material.nu / (1 - material.nu)
+        shape = (other**2 + joint**2) / abs(other**2 - joint**2)
+        compliance += (shape + sign * ratio) / plane
+    assert exact.P0 == pytest.approx(delta / joint / compliance, rel=1e-12)
+
+
+def test_solutions_scale_with_the_units():
+    length, modulus, box = 1e-3, 2e11, (-1, 1, 0, 1)
+    x, y = np.random.default_rng(1).uniform(0.1, 0.9, (2, 20))
+    stiff = [Elastic(modulus * m.E, m.nu) for m in (UPPER, LOWER)]
+    for one, other in (
+        (
+            hertz(UPPER, LOWER, radius=5, half_width=0.3),
+            hertz(*stiff, radius=5 * length, half_width=0.3 * length),
+        ),
+        (
+            rings(UPPER, LOWER, qn=0.3),
+            rings(*stiff, radii=(0.5 * length, length, 2 * length), q0=modulus, qn=0.3 * modulus),
+        ),
+    ):
+        body, tiny = next(iter(one.stress)), tuple(length * e for e in box)
+        for quantity, unit in (("stress", modulus), ("displacement", length)):
+            expected = at(getattr(one, quantity)[body], box, x, y)
+            scaled = at(getattr(other, quantity)[body], tiny, length * x, length * y) / unit
+            # round-off, growing with the conditioning of the coefficients
+            size = np.abs(expected).max()
+            np.testing.assert_allclose(scaled, expected, rtol=0, atol=1e-12 * size)
+
+
+def test_relative_energy_error_measures_both_bodies():
+    exact, mesh = transition(UPPER, LOWER), two_blocks(0.3)
+    whole = mesh.MaterialCF(exact.stress)
+    assert relative_energy_error(discrete(mesh, whole), exact) == 0
+    scaled = relative_energy_error(discrete(mesh, 1.01 * whole), exact)
+    assert scaled == pytest.approx(0.01, rel=1e-10)
+    half = mesh.MaterialCF({"upper": 0 * exact.stress["upper"], "lower": exact.stress["lower"]})
+    share = math.sqrt(1.293180760825 / (1.293180760825 + 0.520333087196))
+    # quadrature of r near the tip
+    assert relative_energy_error(discrete(mesh, half), exact) == pytest.approx(share, rel=1e-6)
+
+
+def test_relative_energy_error_of_interpolants():
+    linear = patch(UPPER, LOWER, p0=1.0, p1=0.5)
+    quadratic = interpolated(linear, two_blocks(0.5), 2)
+    assert relative_energy_error(quadratic, linear) < 1e-13  # round-off
+    exact = transition(UPPER, LOWER)
+    sizes = 0.2, 0.1, 0.05
+    meshes = [two_blocks(h) for h in sizes]
+    errors = [relative_energy_error(interpolated(exact, mesh, 2), exact) for mesh in meshes]
+    # u ~ r^(3/2): order 2 on uniform meshes is limited to h^(3/2)
+    rate = np.polyfit(np.log(sizes), np.log(errors), 1)[0]
+    assert rate == pytest.approx(1.5, abs=0.1)
+
+
+def test_relative_energy_error_refuses():
+    exact, mesh = patch(UPPER, LOWER), two_blocks(1.0)
+    solution = discrete(mesh, mesh.MaterialCF(exact.stress))
+    with pytest.raises(ValueError, match="inner"):
+        relative_energy_error(solution, rings(UPPER, LOWER))
+    solution.problem.model = "plane stress"
+    with pytest.raises(ValueError, match="plane stress"):
+        relative_energy_error(solution, exact)
+
+
+@pytest.mark.parametrize(
+    ("function", "data", "message"),
+    [
+        (transition, {"c": 0.0}, "c = 0.0"),
+        (transition, {"c": math.nan}, "c = nan"),
+        (transition_cutoff, {"c": -1.0}, "c = -1.0"),
+        (transition_cutoff, {"height": 0.5, "plateau": 0.5}, "plateau = 0.5"),
+        (hertz, {"radius": -1.0, "half_width": 0.1}, "radius = -1.0"),
+        (hertz, {"radius": 1.0, "half_width": math.inf}, "half_width = inf"),
+        (curved, {"radii": (1.0, 0.0)}, r"radii\[1\] = 0.0"),
+        (curved, {"opening": 0.0}, "opening = 0.0"),
+        (rings, {"radii": (1.0, 0.5, 2.0)}, "radii"),
+        (rings, {"n": 1}, "n = 1"),
+        (rings, {"n": 2.5}, "n = 2.5"),
+        (rings, {"qi": math.nan}, "separate"),
+        (rings, {"qn": 2.0}, "separate"),
+    ],
+)
+def test_bad_data_are_refused(function, data, message):
+    with pytest.raises(ValueError, match=message):
+        function(UPPER, LOWER, **data)
