@@ -1,0 +1,74 @@
+"""Lagrange interpolation at Gauss-Lobatto points of the unit segment."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@lru_cache
+def gauss_lobatto(order: int) -> Array:
+    """Gauss-Lobatto points of degree `order` on [0, 1], ends included.
+
+    Parameters
+    ----------
+    order : int
+        Polynomial degree, at least 1.
+
+    Returns
+    -------
+    ndarray (order + 1,)
+        0, the zeros of the derivative of the Legendre polynomial of that degree, 1. Their
+        interpolatory weights are positive at every degree.
+    """
+    interior = legendre.Legendre.basis(order).deriv().roots()
+    return np.concatenate([[0.0], (1 + np.sort(interior.real)) / 2, [1.0]])
+
+
+@lru_cache
+def gauss(order: int) -> tuple[Array, Array]:
+    """Gauss points and weights on [0, 1], exact for polynomials of degree `order`."""
+    points, weights = legendre.leggauss(order // 2 + 1)
+    return (1 + points) / 2, weights / 2
+
+
+@lru_cache
+def _coefficients(order: int) -> Array:
+    """Monomial coefficients (lowest first) in 2s - 1 of the Lagrange polynomials, as columns."""
+    return np.linalg.inv(np.vander(2 * gauss_lobatto(order) - 1, increasing=True))
+
+
+def lagrange(order: int, s: Array) -> Array:
+    """Values of the Lagrange polynomials at the Gauss-Lobatto points of degree `order`.
+
+    Parameters
+    ----------
+    order : int
+        Polynomial degree.
+    s : ndarray (k,)
+        Parameters in [0, 1].
+
+    Returns
+    -------
+    ndarray (k, order + 1)
+        Column i is the polynomial that is 1 at point i and 0 at the others. At those points
+        the rows are unit vectors exactly.
+    """
+    s = np.atleast_1d(s)
+    values = np.vander(2 * s - 1, order + 1, increasing=True) @ _coefficients(order)
+    at, node = np.nonzero(s[:, None] == gauss_lobatto(order))
+    values[at] = 0.0
+    values[at, node] = 1.0
+    return values
+
+
+def lagrange_derivative(order: int, s: Array) -> Array:
+    """Derivatives with respect to s of the polynomials of `lagrange`, (k, order + 1)."""
+    powers = np.vander(2 * np.atleast_1d(s) - 1, order, increasing=True)
+    factors = 2.0 * np.arange(1, order + 1)
+    return (powers * factors) @ _coefficients(order)[1:]

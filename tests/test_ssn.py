@@ -1,0 +1,223 @@
+"""The quadratic program solver against brute force over all active sets and known cycles."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from ngcontact import ssn
+from ngcontact.errors import ConvergenceError
+from ngcontact.ssn import Program, minimise, solve_qp
+
+# Symmetric positive definite matrices S and loads d of 0 <= force, S force - d >= 0 on which the
+# plain method cycles: T-cyc-1 for ever from the empty set, T-cyc-2 on round-off in a tie.
+CYCLES = {
+    "T-cyc-1": ([[5, -2, -3], [-2, 5, 2], [-3, 2, 2]], [-5, 1, 3], [0, 0, 1.5]),
+    "T-cyc-1 moved": ([[5, -2, -3], [-2, 5, 2], [-3, 2, 2]], [-5.01, 1.02, 3], [0, 0, 1.5]),
+    "T-cyc-2": ([[18, 6, -12], [6, 10, -8], [-12, -8, 19]], [0, 4, 1], [0, 2 / 3, 1 / 3]),
+}
+
+
+def primal(S, d):
+    """Data of the program whose dual is 1/2 x'Sx - d'x over x >= 0: A = S^-1, B = I, g = 0."""
+    A = np.linalg.inv(S)
+    A = (A + A.T) / 2
+    return A, A @ np.asarray(d, dtype=float), np.eye(len(d)), np.zeros(len(d))
+
+
+def brute_force(A, f, B, g):
+    """The one active set whose solution satisfies all KKT conditions."""
+    n, m = A.shape[0], g.size
+    best = None
+    for active in product([False, True], repeat=m):
+        rows = np.flatnonzero(active)
+        K = np.block([[A, B[rows].T], [B[rows], np.zeros((rows.size, rows.size))]])
+        try:
+            z = np.linalg.solve(K, np.concatenate([f, g[rows]]))
+        except np.linalg.LinAlgError:
+            continue
+        violation = max((B @ z[:n] - g).max(initial=0.0), (-z[n:]).max(initial=0.0))
+        if best is None or violation < best[0]:
+            best = violation, z[:n]
+    return best[1]
+
+
+def kkt_residual(A, f, B, g, result):
+    """Largest violation of the KKT conditions relative to the size of the terms."""
+    u, force = result.u, result.force
+    slack = g - B @ u
+    load = max(np.abs(f).max(), np.abs(A @ u).max(), np.abs(B.T @ force).max(), 1e-300)
+    length = max(np.abs(u).max(), np.abs(g).max(), 1e-300)
+    return max(
+        np.abs(A @ u + B.T @ force - f).max() / load,
+        -slack.min() / length,
+        -force.min() / max(np.abs(force).max(), 1e-300),
+        np.abs(force @ slack) / max(np.abs(force).max() * length, 1e-300),
+    )
+
+
+def random_problem(rng, m):
+    n = m + int(rng.integers(0, 4))
+    X = rng.normal(size=(n, n + 1))
+    return X @ X.T, rng.normal(size=n), rng.normal(size=(m, n)), rng.normal(size=m)
+
+
+@pytest.mark.parametrize("name", CYCLES)
+def test_known_cycles_end(name):
+    S, d, force = CYCLES[name]
+    result = solve_qp(*primal(S, d))
+    # The condition of S is below 100: 1e-12 is 50 times the round-off of S^-1.
+    np.testing.assert_allclose(result.force, force, atol=1e-12)
+    assert result.steps[-1] == 0
+
+
+def test_plain_method_cycles(monkeypatch):
+    """The safeguard is what ends it: with endless patience the plain method cycles."""
+    monkeypatch.setattr(ssn, "PATIENCE", 10**9)
+    S, d, _ = CYCLES["T-cyc-1 moved"]
+    with pytest.raises(ConvergenceError, match="did not settle") as failure:
+        solve_qp(*primal(S, d))
+    assert failure.value.iterate.u.shape == (3,)
+
+
+@pytest.mark.parametrize("m", range(1, 9))
+def test_random_problems_against_brute_force(m):
+    rng = np.random.default_rng(m)
+    for _ in range(125):  # 1000 problems in all
+        data = random_problem(rng, m)
+        result = solve_qp(*data)
+        # Normal matrices of this size have conditions up to 1e6: round-off 1e-10 and below.
+        assert kkt_residual(*data, result) < 1e-9
+        np.testing.assert_allclose(result.u, brute_force(*data), rtol=1e-6, atol=1e-8)
+
+
+@settings(max_examples=200, deadline=None)
+@given(st.integers(1, 40), st.integers(0, 2**32 - 1))
+def test_optimality_conditions_hold(m, seed):
+    rng = np.random.default_rng(seed)
+    data = random_problem(rng, m)
+    start = rng.random(m) < 0.5
+    result = solve_qp(*data, active=start)
+    condition = np.linalg.cond(data[0])
+    assert kkt_residual(*data, result) < 1e-13 * max(condition, 1e3)  # round-off of the solve
+
+
+def test_equations_are_met():
+    rng = np.random.default_rng(0)
+    A, f, B, g = random_problem(rng, 4)
+    E, e = rng.normal(size=(1, A.shape[0])), np.array([0.3])
+    result = solve_qp(A, f, B, g, E, e)
+    residual = A @ result.u + B.T @ result.force + E.T @ result.multiplier - f
+    assert np.abs(residual).max() < 1e-10  # entries of order 1, condition below 1e4
+    assert abs(E @ result.u - e) < 1e-12
+    assert (result.force >= 0).all()
+    assert (B @ result.u <= g + 1e-12).all()
+
+
+def membrane(n=60, load=-1.0, height=-0.02):
+    """An obstacle problem with one unknown per row: K, b, bounds of -u <= height."""
+    h = 1 / (n + 1)
+    K = sp.diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(n, n), format="csr") / h
+    return K, np.full(n, load * h), np.full(n, -height)
+
+
+def counting_factor(K, calls):
+    """Dense factor of principal submatrices that records each request."""
+
+    def factor(free):
+        calls.append(free.copy())
+        inverse = np.zeros(K.shape)
+        inverse[np.ix_(free, free)] = np.linalg.inv(K.toarray()[np.ix_(free, free)])
+        return lambda right: inverse @ right
+
+    return factor
+
+
+@pytest.mark.parametrize("border", [0, 5, 1000])
+def test_bordering_equals_refactorising(monkeypatch, border):
+    """Unit rows: bordered systems give the solution that a new factor for each set gives."""
+    monkeypatch.setattr(ssn, "BORDER", border)
+    K, b, g = membrane()
+    n = g.size
+    flip = sp.identity(n, format="csr")
+    program = Program(
+        K=K, b=-b, R=flip, g=g, equality=np.zeros(n, dtype=bool),
+        fixed=np.zeros(n, dtype=bool), values=np.zeros(n), unknown=np.arange(n),
+    )
+    calls = []
+    start = np.zeros(n, dtype=bool)
+    start[::2] = True
+    result = minimise(program, counting_factor(K, calls), start)
+    reference = solve_qp(K, -b, flip, g)
+    np.testing.assert_array_equal(result.active, reference.active)
+    np.testing.assert_allclose(result.u, reference.u, rtol=1e-11)
+    np.testing.assert_allclose(result.force, reference.force, atol=1e-11 * reference.force.max())
+    assert len(calls) == result.factorizations
+    if border == 1000:
+        assert result.factorizations == 1
+    # Free boundary of -u'' = -1 over the obstacle -0.02: contact where x is in [0.2, 0.8].
+    contact = np.flatnonzero(result.active) + 1
+    assert abs(contact[0] / (n + 1) - 0.2) <= 1 / (n + 1)
+    assert abs(contact[-1] / (n + 1) - 0.8) <= 1 / (n + 1)
+
+
+def test_given_values_and_equalities_with_unit_rows():
+    K, b, g = membrane(n=9)
+    n = g.size
+    rows = np.array([3, 6])
+    R = sp.identity(n, format="csr")[rows]
+    fixed, values = np.zeros(n, dtype=bool), np.zeros(n)
+    fixed[0], values[0] = True, 0.01
+    program = Program(
+        K=K, b=b, R=R, g=np.array([0.05, 1.0]), equality=np.array([True, False]),
+        fixed=fixed, values=values, unknown=rows,
+    )
+    result = minimise(program, counting_factor(K, []))
+    assert result.u[0] == 0.01
+    assert result.u[3] == 0.05
+    assert result.active.tolist() == [True, False]
+    assert result.force[0] < 0  # pulled up to the bound: an equality may pull
+    free = np.ones(n, dtype=bool)
+    free[[0, 3]] = False
+    assert np.abs((b - K @ result.u)[free]).max() < 1e-13 * abs(K).max()
+
+
+def test_zero_load_takes_one_step():
+    result = solve_qp(np.eye(3), np.zeros(3), np.eye(3), np.zeros(3), active=np.ones(3, dtype=bool))
+    assert result.steps == [0]
+    assert not result.u.any()
+    assert not result.force.any()
+
+
+@pytest.mark.parametrize("scale", [1e-300, 1e-9, 1e9, 1e150])
+def test_active_set_does_not_depend_on_units(scale):
+    K, b, g = membrane()
+    plain = solve_qp(K, -b, sp.identity(g.size), g)
+    scaled = solve_qp(K, -b * scale, sp.identity(g.size), g * scale)
+    np.testing.assert_array_equal(plain.active, scaled.active)
+    assert plain.steps == scaled.steps
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"A": [[1.0, 0.5], [0.0, 1.0]]}, "not symmetric"),
+        ({"A": [[1.0, 0.0], [0.0, -1.0]]}, "not positive definite"),
+        ({"A": [[1.0, 2.0], [2.0, 1.0]]}, "not positive definite"),
+        ({"A": [[1.0, 0.0]]}, "must be square"),
+        ({"f": [1.0]}, "f has shape"),
+        ({"f": [1.0, np.nan]}, "f has entries"),
+        ({"B": [[1.0]]}, "B has 1 columns"),
+        ({"g": [1.0, 2.0]}, "g has shape"),
+        ({"active": np.array([1])}, "active is"),
+    ],
+)
+def test_bad_input(change, message):
+    data = {"A": np.eye(2), "f": [1.0, 1.0], "B": [[1.0, 0.0]], "g": [1.0]} | change
+    with pytest.raises(ValueError, match=message):
+        solve_qp(**data)
