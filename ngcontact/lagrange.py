@@ -40,7 +40,8 @@ def gauss(order: int) -> tuple[Array, Array]:
 @lru_cache
 def _coefficients(order: int) -> Array:
     """Monomial coefficients (lowest first) in 2s - 1 of the Lagrange polynomials, as columns."""
-    return np.linalg.inv(np.vander(2 * gauss_lobatto(order) - 1, increasing=True))
+    inverse: Array = np.linalg.inv(np.vander(2 * gauss_lobatto(order) - 1, increasing=True))
+    return inverse
 
 
 def lagrange(order: int, s: Array) -> Array:
@@ -60,7 +61,7 @@ def lagrange(order: int, s: Array) -> Array:
         the rows are unit vectors exactly.
     """
     s = np.atleast_1d(s)
-    values = np.vander(2 * s - 1, order + 1, increasing=True) @ _coefficients(order)
+    values: Array = np.vander(2 * s - 1, order + 1, increasing=True) @ _coefficients(order)
     at, node = np.nonzero(s[:, None] == gauss_lobatto(order))
     values[at] = 0.0
     values[at, node] = 1.0

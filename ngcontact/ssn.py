@@ -13,62 +13,20 @@ This module knows matrices only. The factorisation is an argument.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
+from .bordered import Array, Factor, Mask, Program, SingularError, Solve, Systems
 from .errors import ConvergenceError
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Solve = Callable[[Array], Array]
-Factor = Callable[[Mask], Solve]
 
 log = logging.getLogger("ngcontact")
 
 TIE = 1e-13  # relative size below which a force or a slack keeps its state
 WIDEST_TIE = 1e-9  # ... and to which that grows, tenfold, each time an active set comes back
 PATIENCE = 10  # full switches allowed without fewer violated rows (Judice, Pires 1994)
-BORDER = 16  # changed rows up to which a bordered solve is cheaper than a factorisation
-
-
-@dataclass(frozen=True, eq=False)
-class Program:
-    """Minimise 1/2 y'Ky - b'y subject to R y <= g and given values of some unknowns.
-
-    Attributes
-    ----------
-    K : sparse (n, n)
-        Symmetric, positive definite on the unknowns that are not `fixed`.
-    b : ndarray (n,)
-        Load.
-    R : sparse (m, n)
-        Rows, linearly independent on the unknowns that are not `fixed`.
-    g : ndarray (m,)
-        Bounds.
-    equality : ndarray of bool (m,)
-        Rows that hold with equality, R y = g.
-    fixed : ndarray of bool (n,)
-        Unknowns with given values.
-    values : ndarray (n,)
-        The given values; only those of `fixed` unknowns are read.
-    unknown : ndarray of int (m,), optional
-        Set when row j is the unit vector of unknown `unknown[j]`: an active row is then an
-        unknown that leaves the system, and every factorised matrix is a principal submatrix.
-    """
-
-    K: sp.csr_matrix
-    b: Array
-    R: sp.csr_matrix
-    g: Array
-    equality: Mask
-    fixed: Mask
-    values: Array
-    unknown: NDArray[np.intp] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,114 +58,6 @@ class Minimiser:
     back_solves: int = 0
 
 
-class _Systems:
-    """The linear systems of one program for changing active sets.
-
-    One set, the base, is factorised. Another set is reached by bordering that factor with one
-    row and column for each row of R that changed state, and by the Schur complement of the
-    border (Gill, Murray, Saunders, Wright 1990), at one back-solve for each change.
-    """
-
-    def __init__(self, program: Program, factor: Factor) -> None:
-        self.program = program
-        self.factor = factor
-        self.factorizations = 0
-        self.back_solves = 0
-        self.base: Mask | None = None
-
-    def _refactorise(self, active: Mask) -> None:
-        p = self.program
-        self.base = active.copy() if p.unknown is not None else np.zeros_like(active)
-        self.free = ~p.fixed
-        if p.unknown is not None:
-            self.free[p.unknown[active]] = False
-        self._solve = self.factor(self.free)
-        self.factorizations += 1
-        self.columns: dict[int, tuple[Array, Array]] = {}
-
-    def _back_solve(self, right: Array) -> Array:
-        self.back_solves += 1
-        return self._solve(np.where(self.free, right, 0.0))
-
-    def _column(self, j: int) -> tuple[Array, Array]:
-        """Border column of row j and the base solution for it, both (n,)."""
-        if j not in self.columns:
-            p = self.program
-            if self.base[j]:
-                column = p.K[p.unknown[j]].toarray().ravel()
-            else:
-                column = p.R[j].toarray().ravel()
-            self.columns[j] = column, self._back_solve(column)
-        return self.columns[j]
-
-    def _border(self, changed: NDArray[np.intp]) -> None:
-        """Columns, their base solutions and the Schur complement for the changed rows."""
-        n = self.program.b.size
-        pairs = [self._column(j) for j in changed]
-        self.C = np.array([c for c, _ in pairs]).reshape(-1, n).T
-        self.X = np.array([x for _, x in pairs]).reshape(-1, n).T
-        released = self.base[changed]
-        D = np.zeros((changed.size, changed.size))
-        if released.any():
-            at = self.program.unknown[changed[released]]
-            D[:, released] = self.C[at].T
-            D[released] = self.C[at]
-        self.schur = self.C.T @ self.X - D
-
-    def _bordered_solve(self, right: Array, below: Array) -> tuple[Array, Array]:
-        x = self._back_solve(right)
-        if below.size == 0:
-            return x, below
-        z = np.linalg.lstsq(self.schur, self.C.T @ x - below, rcond=1e-14)[0]
-        return x - self.X @ z, z
-
-    def solve(self, active: Mask) -> tuple[Array, Array]:
-        """Minimiser and multipliers for one active set, rows of the set held at their bound."""
-        p = self.program
-        if self.base is None or (
-            p.unknown is not None and np.count_nonzero(active != self.base) > BORDER
-        ):
-            self._refactorise(active)
-        changed = np.flatnonzero(active != self.base)
-        self._border(changed)
-        released = self.base[changed]
-
-        y = np.where(p.fixed, p.values, 0.0)
-        if p.unknown is not None:
-            y[p.unknown[self.base]] = p.g[self.base]
-        force = np.zeros(p.g.size)
-        scale = 0.0
-        for refinement in range(2):
-            residual = p.b - p.K @ y - p.R.T @ force
-            below = p.g[changed] - p.R[changed] @ y
-            if released.any():
-                below[released] = residual[p.unknown[changed[released]]]
-            size = np.abs(residual[self.free]).max(initial=0.0)
-            if refinement and size <= 1e-14 * scale:
-                break
-            scale = max(size, scale)
-            x, z = self._bordered_solve(residual, below)
-            y += x
-            if released.any():
-                y[p.unknown[changed[released]]] += z[released]
-            force[changed[~released]] += z[~released]
-        if p.unknown is not None:
-            y[p.unknown[active]] = p.g[active]
-            force[:] = 0.0
-            force[active] = (p.b - p.K @ y)[p.unknown[active]]
-        return y, force
-
-    def stiffness(self) -> Array:
-        """Force per displacement at each row: an upper bound, or infinity where unknown."""
-        p = self.program
-        if p.unknown is not None:
-            return p.K.diagonal()[p.unknown]
-        stiffness = np.full(p.g.size, np.inf)
-        for j, (column, solution) in self.columns.items():
-            stiffness[j] = 1 / (column @ solution)
-        return stiffness
-
-
 def minimise(program: Program, factor: Factor, active: Mask | None = None) -> Minimiser:
     """Solve a quadratic program by semismooth Newton steps.
 
@@ -230,66 +80,75 @@ def minimise(program: Program, factor: Factor, active: Mask | None = None) -> Mi
     Raises
     ------
     ConvergenceError
-        The step limit was reached; `iterate` holds the last `Minimiser`. Round-off of a matrix
-        that is not positive definite is the only known way there.
+        A system is singular, or the step limit was reached, to which only a matrix that is not
+        positive definite is known to lead. `iterate` holds the last `Minimiser`.
     """
     p = program
-    systems = _Systems(p, factor)
-    active = p.equality.copy() if active is None else active | p.equality
+    systems = Systems(p, factor)
+    state = p.equality.copy() if active is None else p.equality | active
     size = np.asarray(abs(p.R).sum(axis=1)).ravel()
+    y, force = np.where(p.fixed, p.values, 0.0), np.zeros(p.g.size)
     seen: set[bytes] = set()
     steps: list[int] = []
     fewest, patience, tie = p.g.size + 1, PATIENCE, TIE
+
+    def iterate() -> Minimiser:
+        return Minimiser(
+            u=y,
+            force=force,
+            active=state,
+            steps=steps,
+            factorizations=systems.factorizations,
+            back_solves=systems.back_solves,
+        )
+
     limit = 100 + 20 * p.g.size
     for _ in range(limit):
-        y, force = systems.solve(active)
+        try:
+            y, force = systems.solve(state)
+        except SingularError as singular:
+            raise ConvergenceError(
+                f"Newton step {len(steps) + 1}: {singular}", iterate=iterate()
+            ) from None
         length = tie * size * np.abs(y).max(initial=0.0)
         slack = p.g - p.R @ y
         # Ties keep their state: hysteresis against cycling on round-off.
         with np.errstate(invalid="ignore"):
-            pulling = force < -length * np.where(active, systems.stiffness(), 0.0)
+            pulling = force < -length * np.where(state, systems.stiffness(), 0.0)
             penetrating = slack < -length - tie * np.abs(p.g)
-        wrong = np.where(active, pulling, penetrating) & ~p.equality
-        count = np.count_nonzero(wrong)
+        wrong = np.where(state, pulling, penetrating) & ~p.equality
+        count = int(np.count_nonzero(wrong))
         if count < fewest:
             fewest, patience = count, PATIENCE
         else:
             patience -= 1
-        if patience < 0:  # Murty's least-index rule until fewer rows are violated
+        if count and patience < 0:  # Murty's least-index rule until fewer rows are violated
             wrong[: np.flatnonzero(wrong)[-1]] = False
         steps.append(int(np.count_nonzero(wrong)))
-        log.debug("Newton step %d: %d active, %d change", len(steps), active.sum(), steps[-1])
+        log.debug("Newton step %d: %d active, %d change", len(steps), state.sum(), steps[-1])
         if count == 0:
-            break
-        if (key := active.tobytes()) in seen:
+            return iterate()
+        if (key := state.tobytes()) in seen:
             tie = min(10 * tie, WIDEST_TIE)
         seen.add(key)
-        active = active ^ wrong
-    result = Minimiser(
-        u=y,
-        force=force,
-        active=active,
-        steps=steps,
-        factorizations=systems.factorizations,
-        back_solves=systems.back_solves,
+        state = state ^ wrong
+    raise ConvergenceError(
+        f"the active set did not settle in {limit} Newton steps ({count} rows still change); "
+        "check that the matrix is symmetric and positive definite",
+        iterate=iterate(),
     )
-    if count:
-        raise ConvergenceError(
-            f"the active set did not settle in {limit} Newton steps ({count} rows still change); "
-            "check that the matrix is symmetric and positive definite",
-            iterate=result,
-        )
-    return result
 
 
 def _matrix(name: str, M: object, columns: int | None) -> sp.csr_matrix:
     """`M` as a CSR matrix, checked."""
-    M = sp.csr_matrix(M, dtype=float)
-    if columns is not None and M.shape[1] != columns:
-        raise ValueError(f"{name} has {M.shape[1]} columns; it must have {columns}, one per unknown")
-    if not np.isfinite(M.data).all():
+    matrix = sp.csr_matrix(M, dtype=float)
+    if columns is not None and matrix.shape[1] != columns:
+        raise ValueError(
+            f"{name} has {matrix.shape[1]} columns; it must have {columns}, one per unknown"
+        )
+    if not np.isfinite(matrix.data).all():
         raise ValueError(f"{name} has entries that are NaN or infinite; all must be finite numbers")
-    return M
+    return matrix
 
 
 def _vector(name: str, v: object, size: int) -> Array:
@@ -367,8 +226,12 @@ def solve_qp(
         raise ValueError(f"active is {active!r}; it must be {m} booleans, one per row of B")
 
     def factor(free: Mask) -> Solve:
-        lu = splu(A.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                  options={"SymmetricMode": True})
+        lu = splu(
+            A.tocsc(),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
         if (lu.U.diagonal() <= 0).any() or (lu.perm_r != lu.perm_c).any():
             raise ValueError("A is not positive definite; all its eigenvalues must be positive")
         return lu.solve

@@ -10,9 +10,10 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ngcontact import ssn
+from ngcontact import bordered, ssn
+from ngcontact.bordered import Program
 from ngcontact.errors import ConvergenceError
-from ngcontact.ssn import Program, minimise, solve_qp
+from ngcontact.ssn import minimise, solve_qp
 
 # Symmetric positive definite matrices S and loads d of 0 <= force, S force - d >= 0 on which the
 # plain method cycles: T-cyc-1 for ever from the empty set, T-cyc-2 on round-off in a tie.
@@ -141,13 +142,19 @@ def counting_factor(K, calls):
 @pytest.mark.parametrize("border", [0, 5, 1000])
 def test_bordering_equals_refactorising(monkeypatch, border):
     """Unit rows: bordered systems give the solution that a new factor for each set gives."""
-    monkeypatch.setattr(ssn, "BORDER", border)
+    monkeypatch.setattr(bordered, "BORDER", border)
     K, b, g = membrane()
     n = g.size
     flip = sp.identity(n, format="csr")
     program = Program(
-        K=K, b=-b, R=flip, g=g, equality=np.zeros(n, dtype=bool),
-        fixed=np.zeros(n, dtype=bool), values=np.zeros(n), unknown=np.arange(n),
+        K=K,
+        b=-b,
+        R=flip,
+        g=g,
+        equality=np.zeros(n, dtype=bool),
+        fixed=np.zeros(n, dtype=bool),
+        values=np.zeros(n),
+        unknown=np.arange(n),
     )
     calls = []
     start = np.zeros(n, dtype=bool)
@@ -174,8 +181,14 @@ def test_given_values_and_equalities_with_unit_rows():
     fixed, values = np.zeros(n, dtype=bool), np.zeros(n)
     fixed[0], values[0] = True, 0.01
     program = Program(
-        K=K, b=b, R=R, g=np.array([0.05, 1.0]), equality=np.array([True, False]),
-        fixed=fixed, values=values, unknown=rows,
+        K=K,
+        b=b,
+        R=R,
+        g=np.array([0.05, 1.0]),
+        equality=np.array([True, False]),
+        fixed=fixed,
+        values=values,
+        unknown=rows,
     )
     result = minimise(program, counting_factor(K, []))
     assert result.u[0] == 0.01

@@ -1,0 +1,177 @@
+"""Contact problems with exact solutions, ready to solve: the cases of the studies and tests.
+
+Every function returns a `Case`. Materials are those of all reference figures: E = 1, nu = 0.3 for
+the body ' (upper, outer) and E = 3, nu = 0.2 for the body '' (lower, inner).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+
+from drivers.exact import Exact, hertz, patch, transition, transition_cutoff
+from drivers.exact_curved import Curved, curved, rings
+from geometries import blocks, graphs
+from geometries import rings as ring_geometry
+from ngcontact import Contact, Elastic, Problem, Solution
+
+FIRST = Elastic(E=1.0, nu=0.3)
+SECOND = Elastic(E=3.0, nu=0.2)
+BLOCKS = {"upper": FIRST, "lower": SECOND}
+OUTSIDE = {"upper": "top|upper_left|upper_right", "lower": "bottom|lower_left|lower_right"}
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A problem and its exact solution.
+
+    Attributes
+    ----------
+    problem : Problem
+        The continuous problem.
+    exact : Exact
+        Its solution.
+    """
+
+    problem: Problem
+    exact: Exact
+
+
+def _on_outside(exact: Exact) -> dict[str, ng.CoefficientFunction]:
+    """Exact displacement on the outer boundary of both blocks."""
+    return {OUTSIDE[body]: u for body, u in exact.displacement.items()}
+
+
+def one_transition() -> Case:
+    """S1: blocks that part at the origin, pressure (-x)^(1/2), gap x^(3/2); bounded zone."""
+    exact = transition(FIRST, SECOND)
+    problem = Problem(
+        geometry=blocks(),
+        materials=BLOCKS,
+        displacement=_on_outside(exact),
+        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
+    )
+    return Case(problem, exact)
+
+
+def hertz_contact(radius: float = 5.0, half_width: float = 0.3) -> Case:
+    """S3: blocks with the gap x^2 / 2R as data, Hertz's pressure; enlarging zone."""
+    exact = hertz(FIRST, SECOND, radius=radius, half_width=half_width)
+    contact = Contact(
+        secondary="lower_contact",
+        primary="upper_contact",
+        direction=(0, 1),
+        gap=exact.initial_gap,
+    )
+    problem = Problem(
+        geometry=blocks(), materials=BLOCKS, displacement=_on_outside(exact), contact=[contact]
+    )
+    return Case(problem, exact)
+
+
+def pressure_patch(p1: float = 0.0) -> Case:
+    """S6: full contact under the pressure 1 + p1 x of blocks clamped above and below."""
+    exact = patch(FIRST, SECOND, p0=1.0, p1=p1)
+    ends = {"top": exact.displacement["upper"], "bottom": exact.displacement["lower"]}
+    problem = Problem(
+        geometry=blocks(),
+        materials=BLOCKS,
+        displacement=ends,
+        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
+    )
+    return Case(problem, exact)
+
+
+def polygonal_patch(p: float = 1.0) -> Case:
+    """Uniform stress -p I across a zone with a convex and a re-entrant corner, one material."""
+    line = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
+    strain = p * (1 - FIRST.nu - 2 * FIRST.nu**2) / FIRST.E
+    u = ng.CF((-strain * ng.x, -strain * ng.y))
+    stress = ng.CF((-p, 0, 0, -p), dims=(2, 2))
+    bodies = ("upper", "lower")
+    exact = Exact(
+        displacement=dict.fromkeys(bodies, u),
+        stress=dict.fromkeys(bodies, stress),
+        force=dict.fromkeys(bodies, ng.CF((0, 0))),
+        pressure=lambda x: np.full(np.shape(x), p),
+        gap=lambda x: np.zeros(np.shape(x)),
+        initial_gap=ng.CF(0),
+    )
+    problem = Problem(
+        geometry=blocks(line=line),
+        materials=dict.fromkeys(bodies, FIRST),
+        displacement={"top": u, "bottom": u},
+        traction={"upper_left|upper_right|lower_left|lower_right": p},
+        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
+    )
+    return Case(problem, exact)
+
+
+def clamped_transition() -> Case:
+    """S7: as S1 with homogeneous data, tractions on the sides, body forces; clamped both ends."""
+    exact = transition_cutoff(FIRST, SECOND)
+    side = {"left": ng.CF((-1, 0)), "right": ng.CF((1, 0))}
+    traction = {
+        f"{body}_{name}": stress * normal
+        for body, stress in exact.stress.items()
+        for name, normal in side.items()
+    }
+    problem = Problem(
+        geometry=blocks(),
+        materials=BLOCKS,
+        displacement={"top": (0, 0), "bottom": (0, 0)},
+        traction=traction,
+        force=exact.force,
+        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
+    )
+    return Case(problem, exact)
+
+
+def curved_lines() -> Case:
+    """S8: two parabolas that face each other, tractions along xi; enlarging zone."""
+    exact: Curved = curved(FIRST, SECOND)
+    geometry = graphs(
+        upper=lambda x: float(exact.curve["upper"](x)),
+        lower=lambda x: float(exact.curve["lower"](x)),
+        a=-0.6,
+        b=0.6,
+        height=0.6,
+    )
+    problem = Problem(
+        geometry=geometry,
+        materials=BLOCKS,
+        displacement=_on_outside(exact),
+        force=exact.force,
+        contact=[Contact(secondary="lower_contact", primary="upper_contact", direction=(0, 1))],
+    )
+    return Case(problem, exact)
+
+
+def ring_in_ring(qn: float = 0.3, n: int = 2) -> Case:
+    """S9: a quarter of concentric rings under 1 + qn cos(n theta), guided on the cuts."""
+    exact = rings(FIRST, SECOND, qn=qn, n=n)
+    load = 1 + qn * ng.cos(n * ng.atan2(ng.y, ng.x))
+    problem = Problem(
+        geometry=ring_geometry(quarter=True),
+        materials={"outer": FIRST, "inner": SECOND},
+        sliding="inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y",
+        traction={"rim": load},
+        contact=[Contact(secondary="outer_contact", primary="inner_contact")],
+    )
+    return Case(problem, exact)
+
+
+def harmonics(solution: Solution, radius: float, n: int) -> tuple[float, float]:
+    """Mean P0 and amplitude Pn of cos(n theta), n even, of the pressure on a quarter circle.
+
+    From the nodal forces: the sums of force and of force times cos(n theta) stand for the
+    integrals of p and of p cos(n theta) over the arc.
+    """
+    theta = np.arctan2(solution.points[:, 1], solution.points[:, 0])
+    arc = radius * math.pi / 2
+    mean = solution.force.sum() / arc
+    amplitude = 2 * (solution.force * np.cos(n * theta)).sum() / arc
+    return float(mean), float(amplitude)

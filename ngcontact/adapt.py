@@ -1,0 +1,190 @@
+"""Solve on one mesh, or on a sequence of adaptively refined ones."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+
+import ngsolve as ng
+
+from .discrete import carried_active_set, discretise, first_active_set, minimise_energy
+from .mark import doerfler
+from .mesh import first_mesh
+from .problem import Problem
+from .refine import refined
+from .solution import Solution
+from .space import check_element, curve
+
+ROUND_OFF = 1e-12  # relative estimate at which refinement stops: the solution is exact
+
+log = logging.getLogger("ngcontact")
+
+
+def solve(
+    problem: Problem,
+    mesh: ng.Mesh | None = None,
+    *,
+    maxh: float | None = None,
+    order: int = 1,
+    element: str = "isoparametric",
+    start: Solution | None = None,
+) -> Solution:
+    """Solve a contact problem on one mesh, HH81 (P_1h) or (P_2h).
+
+    Parameters
+    ----------
+    problem : Problem
+        The continuous problem.
+    mesh : ng.Mesh, optional
+        The mesh; made from the geometry, with matched nodes on facing lines, when left out.
+    maxh : float, optional
+        Largest element size for making the mesh, a length; only without `mesh`.
+    order : int
+        Polynomial degree, 1 to 4.
+    element : str
+        "isoparametric": geometry of degree `order`. "superparametric": Zlamal's (2.8), geometry
+        of degree `order` + 1. "physical": (2.4), linear in physical coordinates on curved
+        elements, order 1 only.
+    start : Solution, optional
+        Of the same pairs on any mesh: its active set warms the start.
+
+    Returns
+    -------
+    Solution
+
+    Raises
+    ------
+    ValueError, TypeError
+        Bad input, before any assembly.
+    ConvergenceError
+        The active set did not settle; carries the last iterate.
+    """
+    check_element(order, element)
+    if mesh is not None and maxh is not None:
+        raise ValueError(f"maxh={maxh} has no effect on a given mesh; give one of mesh and maxh")
+    if start is not None and not isinstance(start, Solution):
+        raise TypeError(f"start={start!r} is not a Solution")
+    if start is not None and len(start.discrete.lines) != len(problem.contact):
+        raise ValueError(
+            f"start has {len(start.discrete.lines)} contact pairs, the problem "
+            f"{len(problem.contact)}; a warm start needs the same pairs"
+        )
+    mesh = first_mesh(problem, maxh) if mesh is None else mesh
+    problem.check(mesh)
+    return _solve_checked(problem, mesh, order, element, start)
+
+
+def _solve_checked(
+    problem: Problem, mesh: ng.Mesh, order: int, element: str, start: Solution | None
+) -> Solution:
+    """`solve` on a mesh of which names and values are known to be right."""
+    mesh, curved = curve(mesh, order, element)
+    discrete = discretise(problem, mesh, order, element)
+    if start is None:
+        active = first_active_set(discrete)
+    else:
+        active = carried_active_set(discrete, start.discrete.lines, start.active)
+    minimiser = minimise_energy(discrete, active)
+    displacement = ng.GridFunction(discrete.space.V)
+    displacement.vec.FV().NumPy()[:] = discrete.space.basis @ (discrete.basis.T @ minimiser.u)
+    solution = Solution(
+        problem=problem,
+        mesh=mesh,
+        order=order,
+        element=element,
+        displacement=displacement,
+        discrete=discrete,
+        minimiser=minimiser,
+        work={
+            "assemblies": 1,
+            "factorizations": minimiser.factorizations,
+            "back_solves": minimiser.back_solves,
+            "gap_searches": sum(line.searches for line in discrete.lines),
+            "curved_elements": curved,
+            "estimates": 0,
+        },
+    )
+    log.info("%s", solution)
+    return solution
+
+
+def adapt(
+    problem: Problem,
+    *,
+    maxh: float | None = None,
+    order: int = 3,
+    element: str = "isoparametric",
+    theta: float = 0.5,
+    tolerance: float | None = None,
+    max_dofs: int = 100_000,
+) -> Iterator[Solution]:
+    """Solve, estimate, mark, refine: one `Solution` per level.
+
+    Parameters
+    ----------
+    problem : Problem
+        The continuous problem.
+    maxh : float, optional
+        Largest element size of the first mesh; an eighth of the geometry when left out.
+    order, element
+        As in `solve`.
+    theta : float
+        Doerfler's share of the squared indicators that is marked, in (0, 1].
+    tolerance : float, optional
+        Relative estimated error in the energy norm at which to stop.
+    max_dofs : int
+        Number of unknowns that no level exceeds.
+
+    Yields
+    ------
+    Solution
+        Every one stays valid.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Bad input, before any assembly; also a first mesh of more than `max_dofs` unknowns.
+    ConvergenceError
+        The active set of a level did not settle.
+    """
+    check_element(order, element)
+    if not 0 < theta <= 1:
+        raise ValueError(f"theta={theta} must lie in (0, 1]; 0.5 is usual")
+    if tolerance is not None and not tolerance > 0:
+        raise ValueError(f"tolerance={tolerance} must be positive, like 1e-3, or None")
+    mesh = first_mesh(problem, maxh)
+    problem.check(mesh)
+    return _levels(problem, mesh, order, element, theta, tolerance, max_dofs)
+
+
+def _levels(
+    problem: Problem,
+    mesh: ng.Mesh,
+    order: int,
+    element: str,
+    theta: float,
+    tolerance: float | None,
+    max_dofs: int,
+) -> Iterator[Solution]:
+    """Levels of `adapt` on checked input."""
+    solution: Solution | None = None
+    while True:
+        if unknowns(mesh, order) > max_dofs:
+            if solution is None:
+                raise ValueError(
+                    f"the first mesh has {unknowns(mesh, order)} unknowns, more than "
+                    f"max_dofs={max_dofs}; give a larger maxh or max_dofs"
+                )
+            return
+        solution = _solve_checked(problem, mesh, order, element, solution)
+        yield solution
+        error = solution.relative_error_estimate
+        if error <= max(tolerance or 0.0, ROUND_OFF):
+            return
+        mesh = refined(problem, solution.mesh, doerfler(solution.indicators, theta))
+
+
+def unknowns(mesh: ng.Mesh, order: int) -> int:
+    """Number of unknowns of the displacement on a mesh."""
+    inner = (order - 1) * (order - 2) // 2
+    return 2 * (mesh.nv + (order - 1) * mesh.nedge + inner * mesh.ne)

@@ -1,0 +1,183 @@
+"""Linear systems of a quadratic program for changing active sets, from few factorisations.
+
+NumPy and SciPy only; the factorisation is an argument.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+Solve = Callable[[Array], Array]
+Factor = Callable[[Mask], Solve]
+
+BORDER = 16  # changed rows up to which a bordered solve is cheaper than a factorisation
+REFINED = 1e-14  # residual, relative to the first, above which a second solve removes it
+UNSOLVED = 1e-6  # ... and above which the matrix is singular to working precision
+
+
+class SingularError(ArithmeticError):
+    """A factorised matrix does not solve its system: some motion meets no resistance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Program:
+    """Minimise 1/2 y'Ky - b'y subject to R y <= g and given values of some unknowns.
+
+    Attributes
+    ----------
+    K : sparse (n, n)
+        Symmetric, positive definite on the unknowns that are not `fixed`.
+    b : ndarray (n,)
+        Load.
+    R : sparse (m, n)
+        Rows, linearly independent on the unknowns that are not `fixed`.
+    g : ndarray (m,)
+        Bounds.
+    equality : ndarray of bool (m,)
+        Rows that hold with equality, R y = g.
+    fixed : ndarray of bool (n,)
+        Unknowns with given values.
+    values : ndarray (n,)
+        The given values; only those of `fixed` unknowns are read.
+    unknown : ndarray of int (m,), optional
+        Given when row j is the unit vector of unknown `unknown[j]`: an active row is then an
+        unknown that leaves the system, and every factorised matrix is a principal submatrix.
+    """
+
+    K: sp.csr_matrix
+    b: Array
+    R: sp.csr_matrix
+    g: Array
+    equality: Mask
+    fixed: Mask
+    values: Array
+    unknown: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+
+    @property
+    def unit_rows(self) -> bool:
+        """Whether every row is a single unknown."""
+        return len(self.unknown) == len(self.g)
+
+
+class Systems:
+    """The linear systems of one program for changing active sets.
+
+    One set, the base, is factorised. Another set is reached by bordering that factor with one
+    row and column for each row of R that changed state, and by the Schur complement of the
+    border (Gill, Murray, Saunders, Wright 1990), at one back-solve for each change.
+    """
+
+    def __init__(self, program: Program, factor: Factor) -> None:
+        self.program = program
+        self.factor = factor
+        self.factorizations = 0
+        self.back_solves = 0
+        self.base = np.zeros(len(program.g), dtype=bool)
+        self.free = ~program.fixed
+        self.columns: dict[int, tuple[Array, Array]] = {}
+
+    def _refactorise(self, active: Mask) -> None:
+        p = self.program
+        self.base = active.copy() if p.unit_rows else np.zeros_like(active)
+        self.free = ~p.fixed
+        if p.unit_rows:
+            self.free[p.unknown[active]] = False
+        self._solve = self.factor(self.free)
+        self.factorizations += 1
+        self.columns.clear()
+
+    def _back_solve(self, right: Array) -> Array:
+        self.back_solves += 1
+        return self._solve(np.where(self.free, right, 0.0))
+
+    def _column(self, j: int) -> tuple[Array, Array]:
+        """Border column of row j and the base solution for it, both (n,)."""
+        if j not in self.columns:
+            p = self.program
+            if self.base[j]:
+                column = p.K[p.unknown[j]].toarray().ravel()
+            else:
+                column = p.R[j].toarray().ravel()
+            self.columns[j] = column, self._back_solve(column)
+        return self.columns[j]
+
+    def _border(self, changed: Index) -> None:
+        """Columns, their base solutions and the Schur complement for the changed rows."""
+        n = self.program.b.size
+        pairs = [self._column(j) for j in changed]
+        self.C = np.array([c for c, _ in pairs]).reshape(-1, n).T
+        self.X = np.array([x for _, x in pairs]).reshape(-1, n).T
+        released = self.base[changed]
+        D = np.zeros((changed.size, changed.size))
+        if released.any():
+            at = self.program.unknown[changed[released]]
+            D[:, released] = self.C[at].T
+            D[released] = self.C[at]
+        self.schur = self.C.T @ self.X - D
+
+    def _bordered_solve(self, right: Array, below: Array) -> tuple[Array, Array]:
+        x = self._back_solve(right)
+        if below.size == 0:
+            return x, below
+        z = np.linalg.lstsq(self.schur, self.C.T @ x - below, rcond=1e-14)[0]
+        return x - self.X @ z, z
+
+    def solve(self, active: Mask) -> tuple[Array, Array]:
+        """Minimiser and multipliers for one active set, rows of the set held at their bound."""
+        p = self.program
+        if self.factorizations == 0 or (
+            p.unit_rows and np.count_nonzero(active != self.base) > BORDER
+        ):
+            self._refactorise(active)
+        changed = np.flatnonzero(active != self.base)
+        self._border(changed)
+        released = self.base[changed]
+
+        y = np.where(p.fixed, p.values, 0.0)
+        if p.unit_rows:
+            y[p.unknown[self.base]] = p.g[self.base]
+        force = np.zeros(p.g.size)
+        scale = 0.0
+        for refinement in range(2):
+            residual = p.b - p.K @ y - p.R.T @ force
+            below = p.g[changed] - p.R[changed] @ y
+            if released.any():
+                below[released] = residual[p.unknown[changed[released]]]
+            size = np.abs(residual[self.free]).max(initial=0.0)
+            if refinement and size <= REFINED * scale:
+                break
+            scale = max(size, scale)
+            x, z = self._bordered_solve(residual, below)
+            y += x
+            if released.any():
+                y[p.unknown[changed[released]]] += z[released]
+            force[changed[~released]] += z[~released]
+        residual = p.b - p.K @ y - p.R.T @ force
+        if not np.abs(residual[self.free]).max(initial=0.0) <= UNSOLVED * scale:
+            raise SingularError(
+                "the system for the current active set is singular: a body can move without "
+                "resistance from supports or active contact"
+            )
+        if p.unit_rows:
+            y[p.unknown[active]] = p.g[active]
+            force[:] = 0.0
+            force[active] = (p.b - p.K @ y)[p.unknown[active]]
+        return y, force
+
+    def stiffness(self) -> Array:
+        """Force per displacement at each row: an upper bound, or infinity where unknown."""
+        p = self.program
+        if p.unit_rows:
+            return p.K.diagonal()[p.unknown]
+        stiffness = np.full(p.g.size, np.inf)
+        for j, (column, solution) in self.columns.items():
+            stiffness[j] = 1 / (column @ solution)
+        return stiffness

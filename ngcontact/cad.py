@@ -1,0 +1,121 @@
+"""The exact boundary curves of an OCC geometry: positions, tangents, projections.
+
+Netgen hands out one CAD edge for each boundary region of a two-dimensional mesh, in the same
+order. Everything here is in the edge's own parameter; arrays of points are (k, 2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import ngsolve as ng
+import numpy as np
+from netgen.occ import OCCGeometry, TopoDS_Shape
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+SAMPLES = 65  # points of an edge from which a projection starts
+NEWTON_STEPS = 30
+MISSED = 1e-9  # distance, relative to the edge, beyond which a level counts as not reached
+ROUND_OFF = 1e-12  # relative to the edge's size: OCC keeps coordinates to about 1e-15
+
+
+class CadEdge:
+    """One CAD edge as a parametrised plane curve.
+
+    Attributes
+    ----------
+    name : str
+        The boundary name.
+    start, stop : float
+        Parameter interval.
+    straight : bool
+        Whether the edge is a straight segment with a constant derivative.
+    """
+
+    def __init__(self, edge: TopoDS_Shape) -> None:
+        self._edge = edge
+        self.name = edge.name or ""
+        self.start, self.stop = edge.parameter_interval
+        self._t = np.linspace(self.start, self.stop, SAMPLES)
+        self._x = self.point(self._t)
+        self.size = float(np.abs(np.ptp(self._x, axis=0)).max())
+        chord = self._x[0] + np.linspace(0, 1, SAMPLES)[:, None] * (self._x[-1] - self._x[0])
+        self.straight = bool(np.abs(self._x - chord).max() <= ROUND_OFF * self.size)
+
+    def point(self, t: Array) -> Array:
+        """Points (k, 2) at the parameters `t` (k,)."""
+        values = (self._edge.Value(float(ti)) for ti in t)
+        return np.array([(p.x, p.y) for p in values]).reshape(-1, 2)
+
+    def derivative(self, t: Array) -> Array:
+        """Derivatives (k, 2) with respect to the parameter."""
+        values = (self._edge.Tangent(float(ti)) for ti in t)
+        return np.array([(v.x, v.y) for v in values]).reshape(-1, 2)
+
+    def _newton(self, t: Array, step: Callable[[Array], Array]) -> Array:
+        """Iterate t - step(t), kept inside the interval, until it stands still."""
+        length = abs(self.stop - self.start)
+        for _ in range(NEWTON_STEPS):
+            new = np.clip(t - step(t), self.start, self.stop)
+            moved = np.abs(new - t).max(initial=0.0)
+            t = new
+            if moved <= 1e-15 * length:
+                break
+        return t
+
+    def project(self, points: Array) -> Array:
+        """Parameters (k,) of the closest points of the edge to `points` (k, 2) near it."""
+        if self.straight:
+            along = self._x[-1] - self._x[0]
+            s = (points - self._x[0]) @ along / (along @ along)
+            return self.start + np.clip(s, 0, 1) * (self.stop - self.start)
+        nearest = ((points[:, None] - self._x) ** 2).sum(axis=2).argmin(axis=1)
+
+        def step(t: Array) -> Array:
+            tangent = self.derivative(t)
+            return ((self.point(t) - points) * tangent).sum(axis=1) / (tangent**2).sum(axis=1)
+
+        return self._newton(self._t[nearest], step)
+
+    def normal(self, points: Array) -> Array:
+        """Unit normals (k, 2) at the projections of `points`, to the right of the tangent."""
+        t = np.full(len(points), self.start) if self.straight else self.project(points)
+        tangent = self.derivative(t)
+        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+        return np.column_stack([tangent[:, 1], -tangent[:, 0]])
+
+    def level(self, axis: Array, values: Array, near: Array) -> Array:
+        """Parameters (k,) where the coordinate along `axis` (2,) takes `values` (k,).
+
+        Of several such points the one Newton's method reaches from the projections of the points
+        `near` (k, 2); NaN where it reaches none.
+        """
+
+        def step(t: Array) -> Array:
+            slope = self.derivative(t) @ axis
+            return (self.point(t) @ axis - values) / np.where(slope == 0, np.inf, slope)
+
+        t = self._newton(self.project(near), step)
+        missed = np.abs(self.point(t) @ axis - values) > MISSED * self.size
+        return np.where(missed, np.nan, t)
+
+    def samples(self, count: int = SAMPLES) -> tuple[Array, Array, Array]:
+        """Parameters (count,), points (count, 2) and derivatives (count, 2) along the edge."""
+        t = np.linspace(self.start, self.stop, count)
+        return t, self.point(t), self.derivative(t)
+
+
+def cad_edges(mesh: ng.Mesh) -> list[CadEdge] | None:
+    """CAD edges by boundary region number, or None for a mesh without an OCC geometry."""
+    geometry = mesh.ngmesh.GetGeometry()
+    if not isinstance(geometry, OCCGeometry):
+        return None
+    edges = list(geometry.shape.edges)
+    names = mesh.GetBoundaries()
+    if tuple(edge.name or "default" for edge in edges) != tuple(
+        name or "default" for name in names
+    ):
+        return None
+    return [CadEdge(edge) for edge in edges]

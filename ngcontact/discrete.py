@@ -1,0 +1,196 @@
+"""The discrete problems (P_1h), (P_2h) of HH81 on one mesh, and their solution."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from .bordered import Program
+from .constraint import Basis, change_of_basis
+from .gap import ContactLine, contact_line, without
+from .lagrange import lagrange
+from .problem import Problem, boundary_mask
+from .projection import snap
+from .rows import Conditions, Rows
+from .space import Space, assemble, cholesky
+from .ssn import Minimiser, minimise
+from .trace import Trace, boundary_trace
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+TOUCHING = 1e-12  # gap, relative to the zone, up to which points start active
+
+
+@dataclass(frozen=True, eq=False)
+class Discrete:
+    """One discrete problem.
+
+    Attributes
+    ----------
+    problem : Problem
+    space : Space
+    lines : list of ContactLine
+        One for each contact pair, with the points that carry rows.
+    conditions : Conditions
+        Gamma_u and Gamma_0 at nodes.
+    B : sparse (m, 2n)
+        Contact rows on node values, all pairs in order.
+    basis : Basis
+        Unknowns in which rows and prescribed values are single unknowns.
+    program : Program
+        The quadratic program in those unknowns.
+    """
+
+    problem: Problem
+    space: Space
+    lines: list[ContactLine]
+    conditions: Conditions
+    B: sp.csr_matrix
+    basis: Basis
+    program: Program
+
+
+def _prescribed(problem: Problem, trace: Trace) -> Conditions:
+    """Gamma_u: interpolated displacement components at the nodes."""
+    n = trace.space.ndof
+    given = np.zeros((2, n), dtype=bool)
+    value = np.zeros((2, n))
+    for pattern, components in problem.displacement.items():
+        segment, s = trace.at_nodes(trace.select(boundary_mask(trace.mesh, pattern)))
+        node = trace.nodes[segment[:: trace.order + 1]].ravel()
+        for axis, function in enumerate(components):
+            if function is not None:
+                given[axis, node] = True
+                value[axis, node] = trace.evaluate(function, segment, s)[:, 0]
+    axes, nodes = np.nonzero(given)
+    return Conditions(node=nodes, direction=np.eye(2)[axes], value=value[axes, nodes])
+
+
+def _guided(problem: Problem, trace: Trace) -> Conditions:
+    """Gamma_0: zero normal displacement at the nodes, with the exact normals."""
+    if problem.sliding is None:
+        return Conditions(np.zeros(0, dtype=np.intp), np.zeros((0, 2)), np.zeros(0))
+    segment, s = trace.at_nodes(trace.select(boundary_mask(trace.mesh, str(problem.sliding))))
+    node = trace.nodes[segment[:: trace.order + 1]].ravel()
+    number, normal = trace.number_points(segment, node, trace.exact_normal(segment, s))
+    _, first = np.unique(number, return_index=True)
+    return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))
+
+
+def _rows(line: ContactLine, trace: Trace) -> Rows:
+    """Rows of one contact line."""
+    share = lagrange(trace.order, snap(line.partner_s, trace.order))
+    share[line.partner < 0] = 0.0
+    return Rows(
+        node=line.node,
+        direction=line.direction,
+        partner=trace.nodes[line.partner],
+        share=share,
+        g=line.gap,
+    )
+
+
+def _joined(rows: list[Rows], order: int) -> Rows:
+    """Rows of all lines together."""
+    if rows:
+        return Rows(
+            *(np.concatenate([getattr(r, name) for r in rows]) for name in Rows.__annotations__)
+        )
+    none = np.zeros(0, dtype=np.intp)
+    shape = (0, order + 1)
+    return Rows(none, np.zeros((0, 2)), np.zeros(shape, np.intp), np.zeros(shape), np.zeros(0))
+
+
+def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Discrete:
+    """Assemble the discrete problem on a mesh that is curved to the element's degree.
+
+    Raises
+    ------
+    ValueError
+        A pair of which no point faces; prescribed displacements that violate a contact row.
+    """
+    trace = boundary_trace(mesh, order)
+    lines = [contact_line(trace, contact) for contact in problem.contact]
+    space = assemble(problem, trace, element)
+    n = space.basis.shape[1] // 2
+    prescribed, guided = _prescribed(problem, trace), _guided(problem, trace)
+    conditions = Conditions(
+        *(
+            np.concatenate([getattr(c, name) for c in (prescribed, guided)])
+            for name in Conditions.__annotations__
+        )
+    )
+    rows = _joined([_rows(line, trace) for line in lines], order)
+    basis = change_of_basis(n, conditions, rows)
+
+    kept = np.zeros(len(rows.g), dtype=bool)
+    kept[basis.kept] = True
+    starts = np.cumsum([0, *(len(line.node) for line in lines)])
+    lines = [
+        without(line, np.flatnonzero(~kept[start : start + len(line.node)]))
+        for line, start in zip(lines, starts[:-1], strict=True)
+    ]
+    equality = np.concatenate(
+        [np.zeros(0, dtype=bool), *(np.full(len(x.node), x.contact.bilateral) for x in lines)]
+    )
+    T = space.basis @ basis.T
+    m = len(basis.unknown)
+    R = sp.csr_matrix((np.ones(m), (np.arange(m), basis.unknown)), (m, 2 * n))
+    program = Program(
+        K=(T.T @ space.A @ T).tocsr(),
+        b=T.T @ space.f,
+        R=R,
+        g=rows.g[basis.kept],
+        equality=equality,
+        fixed=basis.fixed,
+        values=basis.values,
+        unknown=basis.unknown,
+    )
+    return Discrete(
+        problem=problem,
+        space=space,
+        lines=lines,
+        conditions=conditions,
+        B=rows.matrix(n)[basis.kept],
+        basis=basis,
+        program=program,
+    )
+
+
+def first_active_set(discrete: Discrete) -> Mask:
+    """Cold start: the points that touch before the load, or of each pair the nearest ones."""
+    active = []
+    for line in discrete.lines:
+        size = np.ptp(line.position, axis=0).max(initial=0.0)
+        nearest = max(line.gap.min(initial=np.inf), 0.0)
+        active.append(line.gap <= nearest + TOUCHING * size)
+    return np.concatenate([np.zeros(0, dtype=bool), *active])
+
+
+def carried_active_set(discrete: Discrete, lines: list[ContactLine], active: Mask) -> Mask:
+    """Warm start: the state of the nearest contact point of the same pair on another mesh."""
+    start, carried = 0, []
+    for number, new in enumerate(discrete.lines):
+        old = lines[number]
+        states = active[start : start + len(old.node)]
+        start += len(old.node)
+        if len(old.node) == 0 or len(new.node) == 0:
+            carried.append(np.zeros(len(new.node), dtype=bool))
+            continue
+        # Two points at a corner are told apart by their directions.
+        size = np.ptp(old.position, axis=0).max(initial=0.0)
+        tree = cKDTree(np.column_stack([old.position, size * 1e-6 * old.direction]))
+        _, nearest = tree.query(np.column_stack([new.position, size * 1e-6 * new.direction]))
+        carried.append(states[nearest])
+    return np.concatenate([np.zeros(0, dtype=bool), *carried])
+
+
+def minimise_energy(discrete: Discrete, active: Mask) -> Minimiser:
+    """Exact minimiser of L over K_h."""
+    return minimise(discrete.program, cholesky(discrete.program.K), active)

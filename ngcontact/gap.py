@@ -1,0 +1,213 @@
+"""Contact points C_j on Gamma_K: partner points, directions, gaps eps(C_j), weights.
+
+HH81 (2.3), (2.5): on a bounded zone the direction is the outward normal of the secondary body
+and a corner of the contact line carries two points, one per side. HH81 (2.10): on an enlarging
+zone the direction is the fixed xi.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import ngsolve as ng
+import numpy as np
+from numpy.typing import NDArray
+
+from .lagrange import gauss, lagrange
+from .problem import Contact, boundary_mask
+from .projection import Partners, cast, coincident
+from .trace import Trace
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+GRAZING = 1e-8  # cosine between normal and direction from which a point faces the other body
+
+
+@dataclass(frozen=True, eq=False)
+class ContactLine:
+    """The secondary side of one pair and its m contact points.
+
+    Attributes
+    ----------
+    contact : Contact
+        The pair.
+    segments : ndarray of int (k,)
+        Segments of the secondary boundary.
+    facing : ndarray of int (q,)
+        Segments of the primary boundary.
+    rows : ndarray of int (k, order + 1)
+        Contact point at each node of each segment, -1 where none is.
+    faces : ndarray of bool (k,)
+        Segments that face the primary with all their nodes.
+    node : ndarray of int (m,)
+        Node of the secondary.
+    position, direction : ndarray (m, 2)
+        Contact points, and unit vectors towards the facing body.
+    gap : ndarray (m,)
+        Distance eps(C_j) along the direction before deformation.
+    weight : ndarray (m,)
+        Integral of the point's basis function over s (P1) or eta (P2), one-sided at corners.
+    partner : ndarray of int (m,)
+        Segment of the primary, -1 for a rigid obstacle.
+    partner_s : ndarray (m,)
+        Parameter on it.
+    searches : int
+        1 if partner points had to be searched, 0 if all of them are nodes at the same place.
+    """
+
+    contact: Contact
+    segments: Index
+    facing: Index
+    rows: Index
+    faces: NDArray[np.bool_]
+    node: Index
+    position: Array
+    direction: Array
+    gap: Array
+    weight: Array
+    partner: Index
+    partner_s: Array
+    searches: int
+
+
+def partners(
+    trace: Trace, facing: Index, points: Array, directions: Array
+) -> tuple[Index, Array, Array, int]:
+    """Segment, parameter and distance of the points of `facing` opposite to `points`."""
+    curve, side = trace.curve[facing], trace.side[facing]
+    found = coincident(points, directions, curve, side, trace.order)
+    rest = np.flatnonzero(found.segment < 0)
+    if rest.size:
+        other: Partners = cast(points[rest], directions[rest], curve, side)
+        found.segment[rest] = other.segment
+        found.s[rest], found.distance[rest] = other.s, other.distance
+    segment = np.where(found.segment < 0, -1, facing[found.segment] if facing.size else -1)
+    return segment, found.s, found.distance, int(rest.size > 0)
+
+
+def prescribed_gap(
+    contact: Contact, trace: Trace, segment: Index, s: Array, position: Array
+) -> Array:
+    """Values (k,) of `Contact.gap` at points of the secondary."""
+    if isinstance(contact.gap, ng.CoefficientFunction):
+        return trace.evaluate(contact.gap, segment, s)[:, 0]
+    if callable(contact.gap):
+        return np.asarray(contact.gap(position[:, 0], position[:, 1]), dtype=float)
+    return np.full(len(s), contact.gap, dtype=float)
+
+
+def jacobian(trace: Trace, contact: Contact, segment: Index, s: Array) -> Array:
+    """Change of the integration variable - arc length (P1) or eta (P2) - with s, (k,)."""
+    derivative = trace.derivative(segment, s)
+    if contact.direction is None:
+        return np.linalg.norm(derivative, axis=1)
+    dx, dy = contact.direction
+    return np.abs(derivative[:, 0] * -dy + derivative[:, 1] * dx)
+
+
+def _segment_weights(trace: Trace, contact: Contact, segments: Index) -> Array:
+    """Integrals (k, order + 1) of the basis functions over each segment."""
+    s, w = gauss(trace.order + 2 * trace.geometry_order)
+    k = len(segments)
+    scale = jacobian(trace, contact, np.repeat(segments, len(s)), np.tile(s, k)).reshape(k, -1)
+    return (scale * w) @ lagrange(trace.order, s)
+
+
+def contact_line(trace: Trace, contact: Contact) -> ContactLine:
+    """Contact points of one pair.
+
+    Raises
+    ------
+    ValueError
+        No point of the secondary faces the primary.
+    """
+    mesh = trace.mesh
+    segments = trace.select(boundary_mask(mesh, contact.secondary))
+    facing = segments[:0]
+    if contact.primary is not None:
+        facing = trace.select(boundary_mask(mesh, contact.primary))
+    segment, s = trace.at_nodes(segments)
+    node = trace.nodes[segments].ravel()
+    normal = trace.exact_normal(segment, s)
+    if contact.direction is None:
+        candidate = np.ones(len(node), dtype=bool)
+    else:
+        candidate = normal @ np.array(contact.direction) > GRAZING
+
+    number = np.full(len(node), -1)
+    # A fixed direction asks for one point at a node, whatever the normals there.
+    alike = None if contact.direction is None else np.tile(contact.direction, (len(node), 1))
+    number[candidate], direction = trace.number_points(
+        segment[candidate], node[candidate], (normal if alike is None else alike)[candidate]
+    )
+    points, first = np.unique(number[candidate], return_index=True)
+    m = len(points)
+    first = np.flatnonzero(candidate)[first]
+    position = trace.point(segment[first], s[first])
+
+    if contact.primary is None:
+        partner, partner_s, distance, searches = np.full(m, -1), np.zeros(m), np.zeros(m), 0
+        keep = np.ones(m, dtype=bool)
+    else:
+        partner, partner_s, distance, searches = partners(trace, facing, position, direction)
+        keep = partner >= 0
+    if not keep.any():
+        raise ValueError(
+            f'no point of the secondary "{contact.secondary}" faces the primary '
+            f'"{contact.primary}" along direction={contact.direction}: the direction points from '
+            "the secondary body to the primary one"
+        )
+    if contact.gap is not None:
+        distance = prescribed_gap(contact, trace, segment[first], s[first], position)
+
+    rows = number.reshape(len(segments), -1)
+    weight = np.zeros(m)
+    met = np.append(keep, False)[rows]
+    np.add.at(weight, rows[met], _segment_weights(trace, contact, segments)[met])
+    line = ContactLine(
+        contact=contact,
+        segments=segments,
+        facing=facing,
+        rows=rows,
+        faces=met.all(axis=1),
+        node=node[first],
+        position=position,
+        direction=direction,
+        gap=distance,
+        weight=weight,
+        partner=partner,
+        partner_s=partner_s,
+        searches=searches,
+    )
+    return without(line, np.flatnonzero(~keep))
+
+
+def without(line: ContactLine, dropped: Index) -> ContactLine:
+    """The line without some of its points; the segments still face the primary."""
+    m = len(line.node)
+    keep = np.ones(m, dtype=bool)
+    keep[dropped] = False
+    renumber = np.full(m + 1, -1)
+    renumber[:-1][keep] = np.arange(np.count_nonzero(keep))
+    arrays = ("node", "position", "direction", "gap", "weight", "partner", "partner_s")
+    kept = {name: getattr(line, name)[keep] for name in arrays}
+    return replace(line, rows=renumber[line.rows], **kept)
+
+
+def at_quadrature(line: ContactLine, trace: Trace, order: int) -> tuple[Index, Index, Array, Array]:
+    """Quadrature points on the segments of `line` that face the primary.
+
+    Returns
+    -------
+    local, segment : ndarray of int (k,)
+        Row of `line.rows` and segment number of each point.
+    s, weight : ndarray (k,)
+        Parameter and quadrature weight in s (P1) or eta (P2).
+    """
+    s, w = gauss(order)
+    inside = np.flatnonzero(line.faces)
+    local = np.repeat(inside, len(s))
+    segment = line.segments[local]
+    s, w = np.tile(s, len(inside)), np.tile(w, len(inside))
+    return local, segment, s, w * jacobian(trace, line.contact, segment, s)

@@ -1,0 +1,167 @@
+"""First meshes whose nodes on facing contact lines match, HH81 (2.3), (2.10)."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import netgen.occ as occ
+import ngsolve as ng
+import numpy as np
+from numpy.typing import NDArray
+
+from .cad import CadEdge
+from .problem import Contact, Problem
+
+Array = NDArray[np.float64]
+
+COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given
+TURN = 0.5  # largest turn (radians) of a curve along one contact segment
+STEEPEST = 0.5  # cosine between a curve's normal and the direction below which nodes go unmatched
+COINCIDENT = 1e-6  # distance, relative to an edge, up to which two edges are one contact line
+FINE = 513  # samples on which a division is laid out
+
+
+@dataclass(eq=False)
+class _Edge:
+    """A CAD edge with the nodes that contact asks for."""
+
+    shape: occ.TopoDS_Shape
+    curve: CadEdge
+    maxh: float
+
+    def __post_init__(self) -> None:
+        self.nodes: list[float] = []
+
+    def add(self, t: Array) -> None:
+        self.nodes.extend(t.tolist())
+
+    def partition(self) -> list[float]:
+        """Interior nodes as fractions of the parameter interval, the rest filled up evenly."""
+        start, stop = self.curve.start, self.curve.stop
+        fractions = np.sort((np.array(self.nodes) - start) / (stop - start))
+        apart = 1e-9
+        inside = fractions[(fractions > apart) & (fractions < 1 - apart)]
+        inside = inside[np.diff(inside, prepend=-1.0) > apart]
+        wanted = (np.array([min(self.nodes), max(self.nodes)]) - start) / (stop - start)
+        result = inside.tolist()
+        t, x, _ = self.curve.samples(FINE)
+        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
+        grid = (t - start) / (stop - start)
+        for low, high in ((0.0, wanted[0]), (wanted[1], 1.0)):
+            if high - low > apart:
+                s0, s1 = np.interp([low, high], grid, arc)
+                count = int(np.ceil((s1 - s0) / self.maxh * (1 - 1e-9)))
+                fill = np.interp(np.linspace(s0, s1, count + 1)[1:-1], arc, grid)
+                result.extend(fill.tolist())
+        return sorted(result)
+
+
+def _edges(shape: occ.TopoDS_Shape, pattern: str, maxh: float) -> list[_Edge]:
+    """Edges of matching name whose division the user has not fixed."""
+    return [
+        _Edge(edge, CadEdge(edge), min(maxh, edge.maxh))
+        for edge in shape.edges
+        if re.fullmatch(pattern, edge.name or "") and edge.partition is None
+    ]
+
+
+def _facing_runs(faces: NDArray[np.bool_]) -> Iterator[slice]:
+    """Longest runs of neighbouring samples that face the other curve."""
+    bounds = np.flatnonzero(np.diff(np.concatenate([[False], faces, [False]]).astype(int)))
+    for first, last in bounds.reshape(-1, 2):
+        if last - first > 1:
+            yield slice(first, last)
+
+
+def _opposite(contact: Contact, x: Array, other: CadEdge) -> tuple[Array, Array]:
+    """Parameters on `other` opposite to points `x` (NaN where there are none), and the points."""
+    if contact.direction is None:
+        t = other.project(x)
+        distance = np.linalg.norm(other.point(t) - x, axis=1)
+        t = np.where(distance <= COINCIDENT * other.size, t, np.nan)
+    else:
+        dx, dy = contact.direction
+        across = np.array([-dy, dx])
+        _, samples, _ = other.samples()
+        height = samples @ across
+        order = np.argsort(height)
+        near = np.column_stack(
+            [np.interp(x @ across, height[order], samples[order, i]) for i in (0, 1)]
+        )
+        t = other.level(across, x @ across, near)
+    return t, other.point(np.where(np.isnan(t), other.start, t))
+
+
+def _divide(contact: Contact, secondary: _Edge, primary: _Edge) -> None:
+    """Lay a common division {C_j} on the parts of two edges that face each other."""
+    t, x, slope = secondary.curve.samples(FINE)
+    other, y = _opposite(contact, x, primary.curve)
+    faces = ~np.isnan(other)
+    if contact.direction is not None:
+        slope_there = primary.curve.derivative(np.where(faces, other, primary.curve.start))
+        for tangent in (slope, slope_there):
+            across = tangent @ np.array([-contact.direction[1], contact.direction[0]])
+            faces &= np.abs(across) >= STEEPEST * np.linalg.norm(tangent, axis=1)
+    maxh = min(secondary.maxh, primary.maxh)
+    for run in _facing_runs(faces):
+        density = np.zeros(np.count_nonzero(faces[run]) - 1)
+        for points in (x[run], y[run]):
+            steps = np.diff(points, axis=0)
+            angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+            turn = np.abs(np.gradient(angle)) if len(angle) > 1 else np.zeros(1)
+            density = np.maximum(density, np.linalg.norm(steps, axis=1) / maxh)
+            density = np.maximum(density, turn / TURN)
+        total = np.concatenate([[0.0], np.cumsum(density)])
+        count = max(1, int(np.ceil(total[-1] * (1 - 1e-9))))
+        nodes = np.interp(np.linspace(0, total[-1], count + 1), total, t[run])
+        there, _ = _opposite(contact, secondary.curve.point(nodes), primary.curve)
+        met = ~np.isnan(there)
+        secondary.add(nodes[met])
+        primary.add(there[met])
+
+
+def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
+    """Mesh of the problem's geometry with matching nodes on facing contact lines.
+
+    Parameters
+    ----------
+    problem : Problem
+        A Mesh as its geometry is returned as it is.
+    maxh : float, optional
+        Largest element size, a length; an eighth of the largest extent when left out.
+
+    Raises
+    ------
+    ValueError, TypeError
+        `maxh` is not a positive finite number.
+    """
+    if isinstance(problem.geometry, ng.Mesh):
+        return problem.geometry
+    shape = problem.geometry.shape
+    low, high = shape.bounding_box
+    extent = max(high.x - low.x, high.y - low.y)
+    if maxh is None:
+        maxh = extent / COARSE
+    if isinstance(maxh, bool) or not isinstance(maxh, int | float | np.number):
+        raise TypeError(f"maxh={maxh!r} is not a number; give a length like {extent / COARSE:g}")
+    if not (np.isfinite(maxh) and maxh > 0):
+        raise ValueError(f"maxh={maxh} must be positive and finite, like {extent / COARSE:g}")
+    edges: list[_Edge] = []
+    for contact in problem.contact:
+        if contact.primary is not None:
+            secondaries = _edges(shape, contact.secondary, maxh)
+            primaries = _edges(shape, contact.primary, maxh)
+            for secondary in secondaries:
+                for primary in primaries:
+                    _divide(contact, secondary, primary)
+            edges += secondaries + primaries
+    placed = [edge for edge in edges if edge.nodes]
+    try:
+        for edge in placed:
+            edge.shape.partition = edge.partition()
+        return ng.Mesh(occ.OCCGeometry(shape, dim=2).GenerateMesh(maxh=maxh))
+    finally:
+        for edge in placed:  # the geometry is the user's
+            edge.shape.partition = None

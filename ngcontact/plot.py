@@ -1,0 +1,269 @@
+"""Picture of a solution: deformed bodies with von Mises stress, contact pressure."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import ngsolve as ng
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import KDTree
+
+from .output import (
+    check_path,
+    lattice,
+    neighbour_tree,
+    nodes_of,
+    plane_and_normal_stress,
+    replacing,
+    von_mises,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+_PAIR_COLOURS = ("#1f4e9c", "#c1440e", "#2a7f3f", "#7b3294", "#7f6a00", "#00707a")
+_MOST_TRIANGLES = 200_000
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What is drawn of the bodies: triangles and lines that follow the curved elements.
+
+    ``moved`` (k, 2) are the nodes after `scale` times the displacement and ``stress`` (k,) is
+    von Mises; ``triangles`` (t, 3) and the element edges ``edges`` (e, n + 1), of which
+    ``outline`` (e,) bound a body, number the nodes. ``zone`` (c, 2) are the points in contact.
+    """
+
+    moved: Array
+    stress: Array
+    triangles: Integers
+    edges: Integers
+    outline: NDArray[np.bool_]
+    zone: Array
+    scale: float
+
+
+def plot_solution(
+    solution: Any, path: str | os.PathLike[str] | None = None, scale: float | None = None
+) -> Figure:
+    """Picture of the deformed bodies with von Mises stress, and of the contact pressure.
+
+    A close-up stands between the two if the zone in contact is small. The pressure is drawn over
+    eta (P2) or the arc position (P1). Lengths and stresses in the consistent units of the data.
+
+    Parameters
+    ----------
+    solution : Solution
+        What to draw.
+    path : path, optional
+        A ``.png`` to write, without any window. None shows the picture on the screen.
+    scale : float, optional
+        Factor on the displacement. None chooses one that lets the deformation be seen, but not
+        so large that bodies which close a gap would seem to run into each other.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The picture.
+
+    Raises
+    ------
+    ValueError, OSError
+        If `scale` is not a finite number or `path` cannot be written (`check_path`), before any
+        work.
+    """
+    if scale is not None and not np.isfinite(scale):
+        raise ValueError(f"scale = {scale}: give a finite factor, or None to have one chosen")
+    if path is None:
+        from matplotlib import pyplot
+
+        figure = pyplot.figure(figsize=(13, 5), layout="constrained")
+        _draw(figure, solution, scale)
+        pyplot.show()
+        return figure
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    target = check_path(path, ".png")
+    figure = Figure(figsize=(13, 5), layout="constrained")
+    _draw(figure, solution, scale)
+    with replacing(target) as (draft,):
+        FigureCanvasAgg(figure).print_figure(draft, format="png", dpi=150)
+    return figure
+
+
+def contact_lines(solution: Any) -> list[tuple[int, Integers, Array]]:
+    """Contact points in order along their lines: (pair, rows, coordinate) for every line.
+
+    ``rows`` index ``solution.points``. The coordinate is eta, across the fixed direction xi
+    (P2), or without one (P1) the arc position, a sum of chords. A pair whose points lie on
+    separate pieces of boundary gives several lines, one behind the other.
+    """
+    lines = []
+    for pair in np.unique(solution.pair).tolist():
+        rows = np.flatnonzero(solution.pair == pair)
+        points = solution.points[rows]
+        direction = solution.problem.contact[pair].direction
+        if direction is None:
+            lines += [(pair, rows[order], s) for order, s in _arcs(points)]
+        else:
+            dx, dy = np.asarray(direction, dtype=float) / np.hypot(*direction)
+            eta = points @ (-dy, dx)
+            order = np.argsort(eta, kind="stable")
+            lines.append((pair, rows[order], eta[order]))
+    return lines
+
+
+def _arcs(points: Array) -> list[tuple[Integers, Array]]:
+    """Order and arc position of points on curves: walks along the tree of neighbours."""
+    tree = neighbour_tree(points)
+    count, piece = connected_components(tree, directed=False)
+    arcs: list[tuple[Integers, Array]] = []
+    start = 0.0
+    for k in range(count):
+        members = np.flatnonzero(piece == k)
+        s = dijkstra(tree, directed=False, indices=members[0])[members]
+        s = dijkstra(tree, directed=False, indices=members[np.argmax(s)])[members]
+        s = start + (s.max() - s if s[0] > s[-1] else s)  # run as the points are numbered
+        order = np.argsort(s, kind="stable")
+        arcs.append((members[order], s[order]))
+        start = s.max()
+    return arcs
+
+
+def _subdivision(order: int) -> tuple[list[list[int]], list[list[int]]]:
+    """Small triangles (order^2, 3) and sides (3, order + 1) of a lattice triangle."""
+    number = {(b, c): k for k, (_, b, c) in enumerate(lattice(order).tolist())}
+    triangles = [
+        [number[b + db, c + dc] for db, dc in corners]
+        for b, c in number
+        for corners in (((0, 0), (1, 0), (0, 1)), ((1, 0), (1, 1), (0, 1)))
+        if all((b + db, c + dc) in number for db, dc in corners)
+    ]
+    steps = range(order + 1)
+    bottom, left = [number[k, 0] for k in steps], [number[0, k] for k in steps]
+    return triangles, [bottom, [number[order - k, k] for k in steps], left]
+
+
+def _scene(solution: Any, scale: float | None) -> Scene:
+    """Evaluate a solution for the picture."""
+    mesh, u = solution.mesh, solution.displacement
+    order = max(mesh.GetCurveOrder(), solution.order)
+    if order > 1:  # enough to look smooth on coarse meshes, no more than can be seen on fine ones
+        order = int(np.clip(np.sqrt(_MOST_TRIANGLES / mesh.ne), 1, 2 * order))
+    nodes = nodes_of(mesh, order)
+    triangles, sides = _subdivision(order)
+    edges = nodes.cells[:, sides].reshape(-1, order + 1)
+    ends = np.sort(edges[:, [0, -1]], axis=1)
+    _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
+    place = nodes.values(ng.CF((ng.x, ng.y)))
+    move = nodes.values(ng.CF((u[0], u[1])))
+    active = solution.points[solution.active]
+    at = KDTree(place).query(active)[1].astype(int)
+    if scale is None:
+        body = np.empty(len(place), dtype=np.int64)
+        body[nodes.cells] = nodes.body[:, None]
+        scale = _chosen_scale(place, move, active, body)
+    return Scene(
+        moved=place + scale * move,
+        stress=von_mises(nodes.values(plane_and_normal_stress(solution))),
+        triangles=nodes.cells[:, triangles].reshape(-1, 3),
+        edges=edges[first],
+        outline=count == 1,
+        zone=place[at] + scale * move[at],
+        scale=scale,
+    )
+
+
+def _chosen_scale(place: Array, move: Array, active: Array, body: Integers) -> float:
+    """Factor 1, 2, 5, 10, ... on the displacement: seen, yet no false overlap of the bodies.
+
+    Contact closes an initial gap e; drawn at a factor s it overlaps by (s - 1) e. The gap is
+    taken to the nearest node of another body, which errs on the side of a smaller factor.
+    """
+    size = np.ptp(place, axis=0).max()
+    largest = np.linalg.norm(move, axis=1).max()
+    wanted = 0.04 * size / largest if largest > 0 else 1.0
+    if len(active) and np.ptp(body) > 0:
+        own = body[KDTree(place).query(active)[1]]
+        gaps = [KDTree(place[body != k]).query(active[own == k])[0].max() for k in np.unique(own)]
+        overlap = 0.002 * size
+        wanted = min(wanted, 1 + overlap / max(*gaps, 1e-12 * size))
+    if wanted < 2:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= wanted))
+
+
+def _frame(scene: Scene) -> tuple[Array, Array] | None:
+    """Corners of a close-up of the zone in contact, None if the whole picture shows it."""
+    size = np.ptp(scene.moved, axis=0).max()
+    if len(scene.zone) == 0:
+        return None
+    low, high = scene.zone.min(axis=0), scene.zone.max(axis=0)
+    half = max(0.9 * (high - low).max(), 0.02 * size)
+    middle = (low + high) / 2
+    return (middle - half, middle + half) if half < 0.2 * size else None
+
+
+def _draw(figure: Figure, solution: Any, scale: float | None) -> None:
+    """Bodies on the left, a close-up of the contact if needed, the pressure on the right."""
+    from matplotlib.patches import Rectangle
+
+    scene = _scene(solution, scale)
+    frame = _frame(scene)
+    top = scene.stress.max()
+    if frame is not None:  # peaks at supports and corners shall not take the colours away
+        seen = np.all((scene.moved >= frame[0]) & (scene.moved <= frame[1]), axis=1)
+        top = max(scene.stress[seen].max(initial=0), np.quantile(scene.stress, 0.995))
+    figure.set_size_inches(13 if frame is None else 17, 5)
+    bodies, *close, profile = figure.subplots(1, 2 if frame is None else 3)
+    shading = [_draw_bodies(axes, scene, top) for axes in (bodies, *close)][0]
+    factor = "" if scene.scale == 1 else f", displacement × {scene.scale:g}"
+    bodies.set_title("deformed bodies" + factor)
+    if frame is not None:
+        low, high = frame
+        bodies.add_patch(Rectangle(low, *(high - low), fill=False, color="crimson", lw=1.2))
+        close[0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title="zone in contact")
+        close[0].spines[:].set_color("crimson")
+    extend = "max" if top < scene.stress.max() else "neither"
+    figure.colorbar(shading, ax=[bodies, *close], label="von Mises stress", extend=extend)
+    _draw_pressure(profile, solution)
+
+
+def _draw_bodies(axes: Axes, scene: Scene, top: float) -> Any:
+    """Von Mises stress on the deformed bodies, thin element edges, body outlines."""
+    from matplotlib.collections import LineCollection
+
+    shading = axes.tripcolor(
+        *scene.moved.T, scene.triangles, scene.stress, shading="gouraud", vmin=0, vmax=top
+    )
+    curves = scene.moved[scene.edges]
+    axes.add_collection(LineCollection(curves[~scene.outline], colors="w", lw=0.25, alpha=0.5))
+    axes.add_collection(LineCollection(curves[scene.outline], colors="k", lw=0.8))
+    axes.set_aspect("equal")
+    axes.set(xlabel="x", ylabel="y")
+    return shading
+
+
+def _draw_pressure(axes: Axes, solution: Any) -> None:
+    """Pressure along the contact lines, points in contact full and the others hollow."""
+    lines = contact_lines(solution)
+    for pair, rows, s in lines:
+        colour = _PAIR_COLOURS[pair % len(_PAIR_COLOURS)]
+        p, active = solution.pressure[rows], solution.active[rows]
+        axes.plot(s, p, color=colour, lw=1, alpha=0.6)
+        for state, fill in ((active, colour), (~active, "w")):
+            axes.plot(s[state], p[state], "o", ms=4, mec=colour, mfc=fill, ls="none")
+    directed = {contact.direction is not None for contact in solution.problem.contact}
+    axes.set_xlabel(" or ".join({True: "η", False: "arc position"}[d] for d in sorted(directed)))
+    axes.set(ylabel="contact pressure", title="contact pressure")
+    axes.grid(alpha=0.3)

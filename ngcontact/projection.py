@@ -1,0 +1,174 @@
+"""Where the ray from a contact point meets the facing curve. NumPy only.
+
+Curves are segments (q, degree + 1, 2) given by their points at the Gauss-Lobatto parameters, as
+in `trace.Trace.curve`; `side` (q,) is +1 where the outward normal lies to the right.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from .lagrange import gauss_lobatto, lagrange, lagrange_derivative
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+MATCHED = 1e-9  # distance, relative to a segment's length, below which two points are one
+NEWTON_STEPS = 20
+PAIRS_AT_ONCE = 4_000_000  # bound on the memory of the candidate search
+
+
+@dataclass(frozen=True, eq=False)
+class Partners:
+    """Partner points of k contact points.
+
+    Attributes
+    ----------
+    segment : ndarray of int (k,)
+        Facing segment, -1 where none is met.
+    s : ndarray (k,)
+        Parameter on it.
+    distance : ndarray (k,)
+        Distance along the direction, negative where the curves overlap.
+    """
+
+    segment: Index
+    s: Array
+    distance: Array
+
+
+def _normals(curve: Array, side: Array, segment: Index, s: Array) -> Array:
+    """Outward normals (k, 2), not normalised."""
+    degree = curve.shape[1] - 1
+    tangent = np.einsum("ki,kid->kd", lagrange_derivative(degree, s), curve[segment])
+    return np.column_stack([tangent[:, 1], -tangent[:, 0]]) * side[segment, None]
+
+
+def _none(size: int) -> Partners:
+    return Partners(np.full(size, -1), np.zeros(size), np.full(size, np.inf))
+
+
+def coincident(points: Array, directions: Array, curve: Array, side: Array, order: int) -> Partners:
+    """Partners among the Gauss-Lobatto nodes of degree `order` that lie at the points themselves.
+
+    Parameters
+    ----------
+    points, directions : ndarray (k, 2)
+        Contact points and unit vectors towards the facing body.
+    curve, side : ndarray
+        The facing segments.
+    order : int
+        Degree of the displacement on them.
+
+    Returns
+    -------
+    Partners
+        Segment -1 where no node is within `MATCHED` of the point, or the curve does not face it.
+    """
+    found = _none(len(points))
+    if len(curve) == 0 or len(points) == 0:
+        return found
+    nodes = gauss_lobatto(order)
+    degree = curve.shape[1] - 1
+    at = np.einsum("ji,qid->qjd", lagrange(degree, nodes), curve)
+    lengths = np.linalg.norm(curve[:, -1] - curve[:, 0], axis=1)
+    tree = cKDTree(at.reshape(-1, 2))
+    # A vertex belongs to two segments; the ray may face only one of them.
+    distances, numbers = tree.query(points, k=2, distance_upper_bound=MATCHED * lengths.max())
+    for column in (1, 0):
+        near = np.flatnonzero(np.isfinite(distances[:, column]))
+        segment, local = np.divmod(numbers[near, column], order + 1)
+        normal = _normals(curve, side, segment, nodes[local])
+        faces = (normal * directions[near]).sum(axis=1) < 0
+        faces &= distances[near, column] <= MATCHED * lengths[segment]
+        near, segment, local = near[faces], segment[faces], local[faces]
+        found.segment[near] = segment
+        found.s[near] = nodes[local]
+        offset = at[segment, local] - points[near]
+        found.distance[near] = (offset * directions[near]).sum(axis=1)
+    return found
+
+
+def _candidates(points: Array, across: Array, curve: Array) -> tuple[Index, Index, Array]:
+    """Pairs (point, segment) whose ray passes between the ends, and the crossing of the chord."""
+    ends = curve[:, [0, -1]]
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    block = max(1, PAIRS_AT_ONCE // max(1, len(curve)))
+    pairs = []
+    for first in range(0, len(points), block):
+        t = across[first : first + block]
+        here = (points[first : first + block] * t).sum(axis=1)
+        h0 = t @ ends[:, 0].T - here[:, None]
+        h1 = t @ ends[:, 1].T - here[:, None]
+        slack = MATCHED * lengths
+        hit = (np.minimum(h0, h1) <= slack) & (np.maximum(h0, h1) >= -slack)
+        point, segment = np.nonzero(hit)
+        a, b = h0[point, segment], h1[point, segment]
+        s = np.clip(np.divide(a, a - b, out=np.full(a.shape, 0.5), where=a != b), 0, 1)
+        pairs.append((point + first, segment, s))
+    point, segment, s = (np.concatenate(part) for part in zip(*pairs, strict=True))
+    return point, segment, s
+
+
+def cast(points: Array, directions: Array, curve: Array, side: Array) -> Partners:
+    """Nearest points, along given directions, of a curve whose outward normal opposes them.
+
+    The scalar equation (x(s) - x) x d = 0 is solved by Newton's method on every segment whose
+    ends lie on different sides of the ray, HH81 (2.10): A_j and B_j on one perpendicular.
+
+    Parameters
+    ----------
+    points : ndarray (k, 2)
+        Where the rays pass; both senses count, so overlapping bodies give negative distances.
+    directions : ndarray (k, 2)
+        Unit vectors towards the facing body.
+    curve, side : ndarray
+        The facing segments.
+
+    Returns
+    -------
+    Partners
+        Of least absolute distance; parameters within `MATCHED` of an end are that end.
+    """
+    found = _none(len(points))
+    if len(curve) == 0 or len(points) == 0:
+        return found
+    across = np.column_stack([-directions[:, 1], directions[:, 0]])
+    point, segment, s = _candidates(points, across, curve)
+    degree = curve.shape[1] - 1
+    for _ in range(NEWTON_STEPS):
+        offset = np.einsum("ki,kid->kd", lagrange(degree, s), curve[segment]) - points[point]
+        slope = np.einsum("ki,kid->kd", lagrange_derivative(degree, s), curve[segment])
+        miss = (offset * across[point]).sum(axis=1)
+        rate = (slope * across[point]).sum(axis=1)
+        new = np.clip(s - np.divide(miss, rate, out=np.zeros_like(miss), where=rate != 0), 0, 1)
+        moved = np.abs(new - s).max(initial=0.0)
+        s = new
+        if moved <= 1e-15:
+            break
+    s = np.where(s < MATCHED, 0.0, np.where(s > 1 - MATCHED, 1.0, s))
+    offset = np.einsum("ki,kid->kd", lagrange(degree, s), curve[segment]) - points[point]
+    miss = np.abs((offset * across[point]).sum(axis=1))
+    lengths = np.linalg.norm(curve[segment, -1] - curve[segment, 0], axis=1)
+    normal = _normals(curve, side, segment, s)
+    faces = (normal * directions[point]).sum(axis=1) < 0
+    faces &= miss <= 2 * MATCHED * lengths
+    point, segment, s, offset = point[faces], segment[faces], s[faces], offset[faces]
+    distance = (offset * directions[point]).sum(axis=1)
+    order = np.lexsort((np.abs(distance), point))  # by point, nearest first
+    point, first = np.unique(point[order], return_index=True)
+    best = order[first]
+    found.segment[point], found.s[point] = segment[best], s[best]
+    found.distance[point] = distance[best]
+    return found
+
+
+def snap(s: Array, order: int) -> Array:
+    """Parameters moved to the Gauss-Lobatto points of degree `order` that they match."""
+    nodes = gauss_lobatto(order)
+    nearest = nodes[np.abs(s[:, None] - nodes).argmin(axis=1)]
+    return np.where(np.abs(s - nearest) <= MATCHED, nearest, s)

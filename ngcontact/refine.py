@@ -1,0 +1,140 @@
+"""Local refinement that keeps facing contact lines matched, HH81 (2.10)."""
+
+from __future__ import annotations
+
+import logging
+
+import ngsolve as ng
+import numpy as np
+from numpy.typing import NDArray
+
+from .gap import contact_line
+from .problem import Contact, Problem
+from .trace import Trace, boundary_trace
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+ROUNDS = 12  # refinements after which a facing segment that still lags stays unmatched
+
+log = logging.getLogger("ngcontact")
+
+
+def matched_vertices(trace: Trace, contact: Contact) -> dict[int, int]:
+    """Vertices of the secondary and, at the same C_j, of the primary; `trace` is of degree 1."""
+    if contact.primary is None:
+        return {}
+    line = contact_line(trace, contact)
+    end = np.isin(line.partner_s, (0.0, 1.0))
+    partner = trace.nodes[line.partner[end], line.partner_s[end].astype(int)]
+    return dict(zip(line.node[end].tolist(), partner.tolist(), strict=True))
+
+
+def _boundary_edges(trace: Trace) -> dict[tuple[int, int], int]:
+    """Element at each boundary segment, by its vertices."""
+    ends = np.sort(trace.nodes[:, [0, -1]], axis=1)
+    return {(a, b): el for (a, b), el in zip(ends.tolist(), trace.element.tolist(), strict=True)}
+
+
+def _children(mesh: ng.Mesh, first: int) -> dict[tuple[int, int], int]:
+    """New vertex on each bisected edge, by the edge's vertices."""
+    parents = ((v, mesh.GetParentVertices(v)) for v in range(first, mesh.nv))
+    return {(min(a, b), max(a, b)): v for v, (a, b) in parents}
+
+
+def _match_children(
+    pairs: dict[int, int],
+    children: dict[tuple[int, int], int],
+    segments: dict[tuple[int, int], int],
+) -> list[int]:
+    """Add to `pairs` the new vertices on facing segments; elements at segments that lag."""
+    back = {b: a for a, b in pairs.items()}
+    lagging = []
+    for (a, b), child in sorted(children.items(), key=lambda item: item[1]):
+        for here, there in ((pairs, back), (back, pairs)):
+            if a in here and b in here and child not in here:
+                key = (min(here[a], here[b]), max(here[a], here[b]))
+                if key in children:
+                    here[child], there[children[key]] = children[key], child
+                elif key in segments:
+                    lagging.append(segments[key])
+    return lagging
+
+
+def _move_to_common_eta(trace: Trace, contact: Contact, pairs: dict[int, int], first: int) -> None:
+    """Move new pairs of vertices along their exact curves to their mean eta."""
+    new = [(a, b) for a, b in pairs.items() if a >= first or b >= first]
+    if contact.direction is None or trace.edges is None or not new:
+        return
+    coordinates = trace.mesh.ngmesh.Coordinates()
+    xy = np.array(coordinates)[:, :2]
+    across = np.array([-contact.direction[1], contact.direction[0]])
+    vertices = np.array(new)
+    eta = (xy[vertices] @ across).mean(axis=1)
+    region = {}
+    for ends, number in zip(trace.nodes[:, [0, -1]].tolist(), trace.region.tolist(), strict=True):
+        region.update(dict.fromkeys(ends, number))
+    moved = xy.copy()
+    for side in (0, 1):
+        numbers = np.array([region[v] for v in vertices[:, side]])
+        for number in np.unique(numbers):
+            at = np.flatnonzero(numbers == number)
+            edge, v = trace.edges[number], vertices[at, side]
+            t = edge.level(across, eta[at], xy[v])
+            reached = ~np.isnan(t)
+            moved[v[reached]] = edge.point(t[reached])
+    coordinates[:, :2] = _without_inversion(trace.mesh, xy, moved)
+
+
+def _without_inversion(mesh: ng.Mesh, old: Array, new: Array) -> Array:
+    """The new positions, but the old ones at triangles they would turn over."""
+    triangles = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.intp) - 1
+    while True:
+        a, b, c = (new[triangles[:, i]] for i in range(3))
+        area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+        turned = np.unique(triangles[area <= 0])
+        if not (new[turned] != old[turned]).any():
+            return new
+        new = new.copy()
+        new[turned] = old[turned]
+
+
+def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.Mesh:
+    """Refined copy of a mesh, straight-sided, with matched contact lines kept matched.
+
+    Parameters
+    ----------
+    problem : Problem
+        Its contact pairs say which lines face each other.
+    mesh : ng.Mesh
+        Stays as it is.
+    marked : ndarray of bool (ne,), optional
+        Elements to refine; all when left out.
+
+    Returns
+    -------
+    ng.Mesh
+        To be curved by the caller. Facing segments have the same number of new nodes, and the
+        new nodes of an enlarging zone are moved along their curves to common C_j.
+    """
+    trace = boundary_trace(mesh, 1)
+    pairs = [matched_vertices(trace, contact) for contact in problem.contact]
+    copy = ng.Mesh(mesh.ngmesh.Copy())
+    first = copy.nv
+    flags = np.ones(copy.ne, dtype=bool) if marked is None else np.asarray(marked)
+    for _ in range(ROUNDS):
+        copy.ngmesh.Elements2D().NumPy()["refine"] = flags
+        copy.Refine()
+        trace = boundary_trace(copy, 1)
+        segments = _boundary_edges(trace)
+        children = _children(copy, first)
+        lagging = [i for pair in pairs for i in _match_children(pair, children, segments)]
+        if not lagging:
+            break
+        flags = np.zeros(copy.ne, dtype=bool)
+        flags[lagging] = True
+    else:
+        log.warning("%d facing contact segments stay unmatched", len(lagging))
+    for contact, pair in zip(problem.contact, pairs, strict=True):
+        _move_to_common_eta(trace, contact, pair, first)
+    return ng.Mesh(copy.ngmesh.Copy())  # numbers only the edges that are left

@@ -1,0 +1,66 @@
+"""Conditions at nodes: prescribed displacements and contact rows. NumPy and SciPy only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Conditions:
+    """Conditions a.u(x_i) = value at nodes, those of Gamma_u before those of Gamma_0.
+
+    Attributes
+    ----------
+    node : ndarray of int (k,)
+    direction : ndarray (k, 2)
+        Unit vectors.
+    value : ndarray (k,)
+    """
+
+    node: Index
+    direction: Array
+    value: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Contact rows d.(u(x_i) - trace of the facing body) <= g, m of them.
+
+    Attributes
+    ----------
+    node : ndarray of int (m,)
+        Node of the secondary.
+    direction : ndarray (m, 2)
+    partner : ndarray of int (m, q)
+        Nodes of the facing segment; any nodes for a rigid obstacle.
+    share : ndarray (m, q)
+        Basis functions of those nodes at the partner point; zero for a rigid obstacle.
+    g : ndarray (m,)
+    """
+
+    node: Index
+    direction: Array
+    partner: Index
+    share: Array
+    g: Array
+
+    def matrix(self, n: int) -> sp.csr_matrix:
+        """B (m, 2n) on node values: x components first, then y."""
+        m, q = self.partner.shape
+        node = np.column_stack([self.node, self.partner])
+        share = np.column_stack([np.ones(m), -self.share])
+        cols = np.concatenate([node, node + n], axis=1)
+        vals = np.concatenate(
+            [share * self.direction[:, :1], share * self.direction[:, 1:]], axis=1
+        )
+        rows = np.repeat(np.arange(m), 2 * (q + 1))
+        B = sp.coo_matrix((vals.ravel(), (rows, cols.ravel())), (m, 2 * n)).tocsr()
+        B.eliminate_zeros()
+        return B

@@ -1,0 +1,255 @@
+"""What a user reads: displacement, pressure, gap, forces, certificates."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+import ngsolve as ng
+import numpy as np
+from numpy.typing import NDArray
+
+from .discrete import Discrete
+from .estimate import Estimate, estimate
+from .output import write_solution
+from .problem import Problem, boundary_mask
+from .space import strain
+from .ssn import Minimiser
+from .transition import transition_points
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Exact minimiser u_h of L over K_h on one mesh: HH81 (P_1h), (P_2h).
+
+    Contact quantities are arrays over the m contact points, all pairs in order.
+
+    Attributes
+    ----------
+    problem : Problem
+        What was solved.
+    mesh : ng.Mesh
+        The (curved) mesh.
+    order : int
+        Polynomial degree of the displacement.
+    element : str
+        "isoparametric", "superparametric" or "physical".
+    displacement : ng.GridFunction
+        u_h on a VectorH1 space; "unknowns" means ``displacement.space.ndof``.
+    discrete : Discrete
+        The algebraic problem.
+    minimiser : Minimiser
+        Its solution.
+    work : dict
+        Counts of assemblies, factorizations, back_solves, gap_searches, curved_elements and
+        estimates spent on this solution.
+    """
+
+    problem: Problem
+    mesh: ng.Mesh
+    order: int
+    element: str
+    displacement: ng.GridFunction
+    discrete: Discrete
+    minimiser: Minimiser
+    work: dict[str, int] = field(default_factory=dict)
+
+    @cached_property
+    def stress(self) -> ng.CoefficientFunction:
+        """In-plane stress, a (2, 2) CoefficientFunction, any consistent units."""
+        e = strain(self.displacement)
+        law = {body: law.voigt(self.problem.model) for body, law in self.problem.materials.items()}
+        s = [self.mesh.MaterialCF({body: (C * e)[i] for body, C in law.items()}) for i in range(3)]
+        return ng.CF((s[0], s[2], s[2], s[1]), dims=(2, 2))
+
+    def _points(self, name: str, shape: tuple[int, ...]) -> Array:
+        """An array of the contact lines, all pairs in order."""
+        arrays = [getattr(line, name) for line in self.discrete.lines]
+        return np.concatenate([np.zeros(shape), *arrays])
+
+    @cached_property
+    def points(self) -> Array:
+        """Contact points C_j on the secondary before deformation, (m, 2)."""
+        return self._points("position", (0, 2))
+
+    @cached_property
+    def pair(self) -> NDArray[np.intp]:
+        """Number of the pair in ``problem.contact`` of each point, (m,)."""
+        counts = [len(line.node) for line in self.discrete.lines]
+        return np.repeat(np.arange(len(counts)), counts)
+
+    @cached_property
+    def gap(self) -> Array:
+        """Gap after deformation along the direction of each point, (m,); >= 0 to round-off."""
+        program = self.discrete.program
+        return program.g - self.minimiser.u[program.unknown]
+
+    @property
+    def force(self) -> Array:
+        """Nodal contact forces lambda_j (force per unit thickness), (m,)."""
+        return self.minimiser.force
+
+    @cached_property
+    def pressure(self) -> Array:
+        """-T_n per unit length (P1), -T_xi per unit eta (P2): force over weight, (m,)."""
+        return self.force / self._points("weight", (0,))
+
+    @property
+    def active(self) -> Mask:
+        """Points in contact, (m,)."""
+        return self.minimiser.active
+
+    @property
+    def steps(self) -> list[int]:
+        """Changes of the active set after each linear system; the last one is 0."""
+        return self.minimiser.steps
+
+    def contact_force(self, pair: int = 0) -> Array:
+        """Resultant of the contact forces of a pair on its secondary body, (2,)."""
+        directions = self._points("direction", (0, 2))
+        at = self.pair == self._pair_number(pair)
+        return -(self.force[at, None] * directions[at]).sum(axis=0)
+
+    def _pair_number(self, pair: int) -> int:
+        count = len(self.discrete.lines)
+        if not 0 <= pair < count:
+            raise ValueError(f"pair={pair} is not a contact pair; the problem has {count} of them")
+        return pair
+
+    @cached_property
+    def _nodal_reaction(self) -> Array:
+        """Force of the supports on the nodes, (n, 2): A u - f + B' force."""
+        d = self.discrete
+        residual = d.space.A @ self.displacement.vec.FV().NumPy() - d.space.f
+        return (d.space.basis.T @ residual + d.B.T @ self.force).reshape(2, -1).T
+
+    @cached_property
+    def reactions(self) -> dict[str, Array]:
+        """Resultant (2,) of every boundary of Gamma_u and Gamma_0 on its body.
+
+        A node shared by several of them counts for the first, in the order of `displacement` and
+        then `sliding`; a name that several bodies share gives the sum over them.
+        """
+        trace = self.discrete.space.trace
+        names = np.array(self.mesh.GetBoundaries())
+        patterns = [
+            *self.problem.displacement,
+            *([] if self.problem.sliding is None else [str(self.problem.sliding)]),
+        ]
+        counted = np.zeros(len(self._nodal_reaction), dtype=bool)
+        result: dict[str, Array] = {}
+        for pattern in patterns:
+            mask = boundary_mask(self.mesh, pattern)
+            for name in dict.fromkeys(names[mask]):
+                nodes = np.unique(trace.nodes[trace.select(mask & (names == name))])
+                nodes = nodes[~counted[nodes]]
+                counted[nodes] = True
+                result[str(name)] = self._nodal_reaction[nodes].sum(axis=0)
+        return result
+
+    def transitions(self, pair: int = 0) -> Array:
+        """Points (k, 2) where contact of a pair turns from binding to non-binding."""
+        number = self._pair_number(pair)
+        at = self.pair == number
+        return transition_points(
+            self.discrete.lines[number], self.pressure[at], self.gap[at], self.active[at]
+        )
+
+    @cached_property
+    def energy(self) -> float:
+        """Total potential energy L(u_h) of HH81 (2.6), per unit thickness."""
+        u = self.displacement.vec.FV().NumPy()
+        d = self.discrete.space
+        return float(u @ (d.A @ u) / 2 - d.f @ u)
+
+    @cached_property
+    def _estimate(self) -> Estimate:
+        self.work["estimates"] += 1
+        return estimate(self)
+
+    @property
+    def estimated(self) -> bool:
+        """Whether the error estimate has been computed already."""
+        return "_estimate" in self.__dict__
+
+    @property
+    def indicators(self) -> Array:
+        """Local error indicators eta_T in the energy norm, (ne,)."""
+        return self._estimate.indicators
+
+    @property
+    def estimate_parts(self) -> dict[str, Array]:
+        """Squared contributions (ne,) to the indicators by origin."""
+        return self._estimate.parts
+
+    @property
+    def error_estimate(self) -> float:
+        """Estimated error in the energy norm, A(u - u_h, u - u_h)^(1/2)."""
+        return float(np.sqrt((self.indicators**2).sum()))
+
+    @property
+    def relative_error_estimate(self) -> float:
+        """Estimated error over the energy norm of u_h; 0 where both vanish."""
+        u = self.displacement.vec.FV().NumPy()
+        norm = float(np.sqrt(max(u @ (self.discrete.space.A @ u), 0.0)))
+        return self.error_estimate / norm if norm > 0 else 0.0
+
+    @cached_property
+    def residuals(self) -> dict[str, float]:
+        """Dimensionless residuals of the Karush-Kuhn-Tucker conditions.
+
+        `equilibrium`: unbalanced force over the largest force; `penetration`: negative gap over
+        the largest displacement or closed gap; `tension`: negative over largest contact force;
+        `complementarity`: sum of force times gap over force times length.
+        """
+        p, y, force = self.discrete.program, self.minimiser.u, self.force
+        residual = p.b - p.K @ y - p.R.T @ force
+        load = max(np.abs(x).max(initial=0.0) for x in (p.b, residual[p.fixed], force))
+        length = max(np.abs(y).max(initial=0.0), np.abs(p.g[self.active]).max(initial=0.0))
+        largest = np.abs(force).max(initial=0.0)
+        one_sided = force[~p.equality]
+
+        def over(value: float, scale: float) -> float:
+            return float(value / scale) if value > 0 else 0.0
+
+        return {
+            "equilibrium": over(np.abs(residual[~p.fixed]).max(initial=0.0), load),
+            "penetration": over(-self.gap.min(initial=0.0), length),
+            "tension": over(-one_sided.min(initial=0.0), largest),
+            "complementarity": over(np.abs(force * self.gap).sum(), largest * length),
+        }
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write `path` (.vtu) and, beside it, ``<stem>_contact.vtp``."""
+        return write_solution(path, self)
+
+    def plot(self, path: str | os.PathLike[str] | None = None) -> None:
+        """Picture of the deformed bodies and the pressure; a file when `path` (.png) is given."""
+        from .plot import plot_solution  # matplotlib loads only for a picture
+
+        plot_solution(self, path)
+
+    def draw(self) -> object:
+        """Draw the displacement in a notebook with NGSolve's webgui."""
+        from ngsolve.webgui import Draw  # needs the optional webgui packages
+
+        return Draw(self.displacement, self.mesh, deformation=True)
+
+    def __str__(self) -> str:
+        """One line: unknowns, active points, steps, force, and the estimate where it is known."""
+        parts = [
+            f"order {self.order}",
+            f"{self.displacement.space.ndof:7d} unknowns",
+            f"{np.count_nonzero(self.active):4d}/{self.active.size} active",
+            f"{len(self.steps)} steps",
+        ]
+        if self.estimated:
+            parts.append(f"estimate {self.relative_error_estimate:.2e}")
+        if self.discrete.lines:
+            parts.append(f"force {np.linalg.norm(self.contact_force()):.6g}")
+        return ", ".join(parts)

@@ -1,0 +1,193 @@
+"""The finite element spaces V_h of HH81 (2.2), (2.4), (2.9): space, stiffness A, load f."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .bordered import Factor, Mask, Solve
+from .cad import cad_edges
+from .problem import Problem
+from .trace import Trace, edge_bubbles, nodal_basis
+
+Array = NDArray[np.float64]
+
+ORDERS = (1, 2, 3, 4)
+ELEMENTS = ("isoparametric", "superparametric", "physical")
+# Loads and variable moduli may be as rough as r^(-1/2): quadrature orders above the default.
+LOAD_BONUS = 6
+MODULUS_BONUS = 4
+
+
+def check_element(order: int, element: str) -> None:
+    """Raise unless the element is one of `ELEMENTS` with an order it is available in."""
+    if element not in ELEMENTS:
+        raise ValueError(f"element={element!r} is not available; choose one of {ELEMENTS}")
+    orders = (1,) if element == "physical" else ORDERS
+    if isinstance(order, bool) or not isinstance(order, int | np.integer):
+        raise TypeError(f"order={order!r} is not an integer; element={element!r} has {orders}")
+    if order not in orders:
+        raise ValueError(f"order={order} is not available; element={element!r} has {orders}")
+
+
+def geometry_order(order: int, element: str) -> int:
+    """Degree of the curved elements: Zlamal's (2.8) maps P_order by geometry one degree up."""
+    return order if element == "isoparametric" else order + 1
+
+
+def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
+    """Mesh curved to the element's degree, and the number of elements at curved edges.
+
+    A mesh without an OCC geometry, without curved edges, or curved to that degree already is
+    used as it is; otherwise the result is a copy.
+    """
+    degree = geometry_order(order, element)
+    edges = cad_edges(mesh)
+    if edges is None:
+        return mesh, 0
+    region = mesh.ngmesh.Elements1D().NumPy()["index"] - 1
+    curved = np.array([not edge.straight for edge in edges])[region]
+    count = int(np.count_nonzero(curved))
+    if count == 0 or mesh.GetCurveOrder() == degree:
+        return mesh, count
+    copy = ng.Mesh(mesh.ngmesh.Copy())
+    copy.Curve(degree)
+    return copy, count
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """V_h with the assembled forms (3.1), (3.2).
+
+    Attributes
+    ----------
+    V : ng.FESpace
+        Vector space of N unknowns for each component.
+    trace : Trace
+        Its boundary nodes.
+    basis : sparse (2N, 2n)
+        From n node values (and unknowns elsewhere) for each component to the unknowns of V.
+    A : sparse (2N, 2N)
+        Stiffness.
+    f : ndarray (2N,)
+        Load.
+    """
+
+    V: ng.FESpace
+    trace: Trace
+    basis: sp.csr_matrix
+    A: sp.csr_matrix
+    f: Array
+
+
+def strain(u: ng.CoefficientFunction) -> ng.CoefficientFunction:
+    """Voigt strain (e_xx, e_yy, 2 e_xy) of a displacement or trial function."""
+    grad = ng.Grad(u)
+    return ng.CF((grad[0, 0], grad[1, 1], grad[0, 1] + grad[1, 0]))
+
+
+def _physical_basis(V: ng.FESpace, trace: Trace) -> sp.csr_matrix:
+    """P1 in physical coordinates (2.4) inside the quadratic isoparametric space, (N, nv).
+
+    On a curved element a linear function of x has the edge function coefficients that its
+    values at the edge's interior nodes ask for; those values come from all three vertices.
+    """
+    mesh = trace.mesh
+    if V.ndof == 2 * mesh.nv:
+        return sp.identity(mesh.nv, format="csr")
+    xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
+    corners = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.intp) - 1
+    triangles = corners[trace.element]
+    middle = trace.curve[:, 1] if trace.geometry_order == 2 else trace.curve.mean(axis=1)
+    # Barycentric coordinates of the edge's node in the straight triangle, affinely extended.
+    sides = xy[triangles[:, 1:]] - xy[triangles[:, :1]]
+    bary = np.linalg.solve(sides.transpose(0, 2, 1), (middle - xy[triangles[:, 0]])[..., None])
+    bary = np.column_stack([1 - bary.sum(axis=1), bary[..., 0]])
+    value = bary - np.where((triangles[:, :, None] == trace.nodes[:, None, :]).any(axis=2), 0.5, 0)
+    numbers = np.array(
+        [
+            V.GetDofNrs(el.edges[0])[0] if V.GetDofNrs(el.edges[0]) else -1
+            for el in mesh.Elements(ng.BND)
+        ]
+    )
+    on = numbers >= 0
+    bubble = 1 / edge_bubbles(ng.H1(mesh, order=2))[0, 0]
+    rows = np.repeat(numbers[on], 3)
+    edges = sp.coo_matrix(
+        ((bubble * value[on]).ravel(), (rows, triangles[on].ravel())), (V.ndof // 2, mesh.nv)
+    )
+    return (sp.eye(V.ndof // 2, mesh.nv) + edges).tocsr()
+
+
+def _vector_space(mesh: ng.Mesh, order: int, element: str) -> ng.FESpace:
+    if element != "physical" or mesh.GetCurveOrder() == 1:
+        return ng.VectorH1(mesh, order=order)
+    full = ng.VectorH1(mesh, order=2)
+    half = full.ndof // 2
+    active = np.zeros(half, dtype=bool)
+    active[: mesh.nv] = True
+    boundary = [el.edges[0].nr for el in mesh.Elements(ng.BND)]
+    active[mesh.nv + np.array(boundary)] = True
+    return ng.Compress(full, active_dofs=ng.BitArray(np.tile(active, 2)))
+
+
+def assemble(problem: Problem, trace: Trace, element: str) -> Space:
+    """Space, stiffness and load of a problem on the mesh of `trace`, curved as `element` asks."""
+    mesh = trace.mesh
+    V = _vector_space(mesh, trace.order, element)
+    if element == "physical":
+        scalar = _physical_basis(V, trace)
+    else:
+        scalar = nodal_basis(trace)
+    u, v = V.TnT()
+    a = ng.BilinearForm(V, symmetric=True)
+    for body, law in problem.materials.items():
+        C = law.voigt(problem.model)
+        varies = any(isinstance(value, ng.CoefficientFunction) for value in vars(law).values())
+        bonus = MODULUS_BONUS if varies else 0
+        region = mesh.Materials(body)
+        a += ng.InnerProduct(C * strain(u), strain(v)) * ng.dx(
+            definedon=region, bonus_intorder=bonus
+        )
+    f = ng.LinearForm(V)
+    for body, F in problem.force.items():
+        f += F * v * ng.dx(definedon=mesh.Materials(body), bonus_intorder=LOAD_BONUS)
+    for boundary in problem.traction:
+        P = problem.traction_vector(boundary)
+        region = mesh.Boundaries(boundary)
+        f += P * v.Trace() * ng.ds(definedon=region, bonus_intorder=LOAD_BONUS)
+    a.Assemble()
+    f.Assemble()
+    values, columns, starts = a.mat.CSR()
+    size = V.ndof
+    A = sp.csr_matrix((np.array(values), np.array(columns), np.array(starts)), (size, size))
+    return Space(
+        V=V,
+        trace=trace,
+        basis=sp.block_diag([scalar, scalar], format="csr"),
+        A=A,
+        f=f.vec.FV().NumPy().copy(),
+    )
+
+
+def cholesky(K: sp.csr_matrix) -> Factor:
+    """NGSolve's sparse Cholesky factorisation as the `factor` argument of `ssn.minimise`."""
+    K = K.tocoo()
+    matrix = ng.la.SparseMatrixd.CreateFromCOO(K.row, K.col, K.data, *K.shape)
+    right, solution = matrix.CreateColVector(), matrix.CreateRowVector()
+
+    def factor(free: Mask) -> Solve:
+        inverse = matrix.Inverse(ng.BitArray(free), inverse="sparsecholesky")
+
+        def solve(b: Array) -> Array:
+            right.FV().NumPy()[:] = b
+            solution.data = inverse * right
+            return solution.FV().NumPy().copy()
+
+        return solve
+
+    return factor

@@ -1,0 +1,256 @@
+"""Boundary segments of a mesh with nodes at Gauss-Lobatto points.
+
+All conditions on the boundary - Gamma_u, Gamma_0, Gamma_K - are posed at these nodes. A node is
+named by the number of a scalar unknown of the finite element space: on boundary edges the
+hierarchical edge unknowns of NGSolve are exchanged for values at the interior Gauss-Lobatto
+points, so that every condition at a node concerns the two unknowns of that node alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import ngsolve as ng
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .cad import CadEdge, cad_edges
+from .lagrange import gauss_lobatto, lagrange, lagrange_derivative
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+CORNER = 1e-5  # turn (radians) from which two CAD edges meet at a corner; below, rows coincide
+CORNER_WITHOUT_CAD = np.deg2rad(30)  # ... and two segments of one name on a mesh without CAD
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """Segments of the whole boundary, k of them, each from s = 0 to s = 1.
+
+    Attributes
+    ----------
+    mesh : ng.Mesh
+        The (curved) mesh.
+    space : ng.FESpace
+        Scalar H1 space whose unknowns number the nodes.
+    order : int
+        Degree of the displacement on a segment.
+    geometry_order : int
+        Degree of the curve of a segment.
+    region : ndarray of int (k,)
+        Boundary region number.
+    nodes : ndarray of int (k, order + 1)
+        Node numbers from s = 0 to s = 1: scalar unknowns of the space.
+    element : ndarray of int (k,)
+        Volume element the segment belongs to.
+    body : ndarray of int (k,)
+        Material region number of that element.
+    curve : ndarray (k, geometry_order + 1, 2)
+        The curve at its Gauss-Lobatto points.
+    side : ndarray (k,)
+        +1 where the outward normal lies to the right of the direction of s, else -1.
+    edges : list of CadEdge or None
+        CAD edges by region number.
+    """
+
+    mesh: ng.Mesh
+    space: ng.FESpace
+    order: int
+    geometry_order: int
+    region: Index
+    nodes: Index
+    element: Index
+    body: Index
+    curve: Array
+    side: Array
+    edges: list[CadEdge] | None
+
+    def point(self, segment: Index, s: Array) -> Array:
+        """Points (k, 2) of the mesh's curves at parameters s (k,) of the segments (k,)."""
+        return np.einsum("ki,kid->kd", lagrange(self.geometry_order, s), self.curve[segment])
+
+    def derivative(self, segment: Index, s: Array) -> Array:
+        """Derivatives (k, 2) of `point` with respect to s."""
+        weights = lagrange_derivative(self.geometry_order, s)
+        return np.einsum("ki,kid->kd", weights, self.curve[segment])
+
+    def normal(self, segment: Index, s: Array) -> Array:
+        """Outward unit normals (k, 2) of the mesh's curves."""
+        return _right(self.derivative(segment, s)) * self.side[segment, None]
+
+    def exact_normal(self, segment: Index, s: Array) -> Array:
+        """Outward unit normals (k, 2) of the CAD edges; of the mesh where there are none."""
+        normals = self.normal(segment, s)
+        if self.edges is not None:
+            points = self.point(segment, s)
+            for region in np.unique(self.region[segment]):
+                at = self.region[segment] == region
+                exact = self.edges[region].normal(points[at])
+                sign = np.where((exact * normals[at]).sum(axis=1) < 0, -1.0, 1.0)
+                normals[at] = exact * sign[:, None]
+        return normals
+
+    def at_nodes(self, segments: Index) -> tuple[Index, Array]:
+        """Every node of the segments, segment by segment: (segment, s), both (k (order + 1),)."""
+        s = np.tile(gauss_lobatto(self.order), len(segments))
+        return np.repeat(segments, self.order + 1), s
+
+    def lengths(self, segments: Index) -> Array:
+        """Chord lengths (k,)."""
+        return np.linalg.norm(self.curve[segments, -1] - self.curve[segments, 0], axis=1)
+
+    def select(self, regions: NDArray[np.bool_]) -> Index:
+        """Segments whose region number is set in the mask `regions`."""
+        return np.flatnonzero(regions[self.region])
+
+    @cached_property
+    def _mesh_points(self) -> NDArray:
+        return self.mesh.MapToAllElements(ng.IntegrationRule([(0.5, 0, 0)], [1]), ng.BND)
+
+    def mesh_points(self, segment: Index, s: Array) -> NDArray:
+        """NGSolve boundary points at parameters s (k,) of the segments (k,)."""
+        points = self._mesh_points[segment].copy()
+        points["x"] = 1 - s  # NGSolve's segment runs from the second vertex to the first
+        return points
+
+    def evaluate(self, function: ng.CoefficientFunction, segment: Index, s: Array) -> Array:
+        """Values (k, dim) of a CoefficientFunction at parameters s of the segments."""
+        values = np.asarray(function(self.mesh_points(segment, s)))
+        return values.reshape(len(segment), -1)
+
+    def number_points(self, segment: Index, node: Index, vector: Array) -> tuple[Index, Array]:
+        """Number the nodes of several segments: once each, twice at a corner.
+
+        Parameters
+        ----------
+        segment, node : ndarray of int (k,)
+            Nodes segment by segment; shared ones occur twice.
+        vector : ndarray (k, 2)
+            Unit vector belonging to the node on that segment, such as the normal.
+
+        Returns
+        -------
+        number : ndarray of int (k,)
+            Point of each entry.
+        vector : ndarray (m, 2)
+            Unit vector of each point, the mean of those of its entries.
+        """
+        _, number = np.unique(node, return_inverse=True)
+        order = np.argsort(number, kind="stable")
+        first, second = order[:-1], order[1:]
+        shared = number[first] == number[second]
+        first, second = first[shared], second[shared]
+        turn = np.linalg.norm(vector[first] - vector[second], axis=1)
+        second = second[self._corner(segment[first], segment[second], turn)]
+        number[second] = number.max(initial=-1) + 1 + np.arange(second.size)
+        mean = np.zeros((number.max(initial=-1) + 1, 2))
+        np.add.at(mean, number, vector)
+        return number, mean / np.linalg.norm(mean, axis=1)[:, None]
+
+    def _corner(self, first: Index, second: Index, turn: Array) -> NDArray[np.bool_]:
+        """Whether pairs of adjacent segments, whose normals differ by `turn`, form corners."""
+        if self.edges is not None:
+            return turn > CORNER
+        names = np.array(self.mesh.GetBoundaries())
+        named = names[self.region[first]] != names[self.region[second]]
+        return (turn > CORNER_WITHOUT_CAD) | (named & (turn > CORNER))
+
+
+def _right(vectors: Array) -> Array:
+    """Unit vectors to the right of `vectors` (k, 2)."""
+    right = np.column_stack([vectors[:, 1], -vectors[:, 0]])
+    return right / np.linalg.norm(right, axis=1)[:, None]
+
+
+def _neighbour(segments: Index, triangles: Index, vertices: int) -> Index:
+    """Number of a triangle at each segment."""
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    keys = sides[:, 0] * vertices + sides[:, 1]
+    order = np.argsort(keys)
+    low, high = np.sort(segments, axis=1).T
+    return order[np.searchsorted(keys[order], low * vertices + high)] // 3
+
+
+def boundary_trace(mesh: ng.Mesh, order: int) -> Trace:
+    """Trace of the displacements of degree `order` on the boundary of `mesh`."""
+    ngmesh = mesh.ngmesh
+    triangles = ngmesh.Elements2D().NumPy()
+    corners = triangles["nodes"][:, :3].astype(np.intp) - 1
+    elements = list(mesh.Elements(ng.BND))
+    ends = np.array([[v.nr for v in el.vertices] for el in elements]).reshape(-1, 2)
+    nodes = ends
+    space = ng.H1(mesh, order=order)
+    if order > 1:
+        # From the end with the lower number, as NGSolve orients its edges.
+        interior = np.array([space.GetDofNrs(el.edges[0]) for el in elements])
+        interior = np.where((ends[:, 0] < ends[:, 1])[:, None], interior, interior[:, ::-1])
+        nodes = np.column_stack([ends[:, 0], interior, ends[:, 1]])
+
+    degree = max(1, mesh.GetCurveOrder())
+    rule = ng.IntegrationRule([(1 - s, 0, 0) for s in gauss_lobatto(degree)], [1] * (degree + 1))
+    curve = np.asarray(ng.CF((ng.x, ng.y))(mesh.MapToAllElements(rule, ng.BND)))
+    curve = curve.reshape(-1, degree + 1, 2)
+
+    element = _neighbour(ends, corners, mesh.nv)
+    xy = np.array(ngmesh.Coordinates())[:, :2]
+    opposite = xy[corners[element]].mean(axis=1) - xy[ends[:, 0]]
+    right = _right(xy[ends[:, 1]] - xy[ends[:, 0]])
+    return Trace(
+        mesh=mesh,
+        space=space,
+        order=order,
+        geometry_order=degree,
+        region=np.array([el.index for el in elements], dtype=np.intp),
+        nodes=nodes,
+        element=element,
+        body=triangles["index"][element].astype(np.intp) - 1,
+        curve=curve,
+        side=np.where((opposite * right).sum(axis=1) > 0, -1.0, 1.0),
+        edges=cad_edges(mesh),
+    )
+
+
+def edge_bubbles(space: ng.FESpace) -> Array:
+    """Values (order - 1, order - 1) of the edge functions of an H1 space at the interior nodes.
+
+    Row i is the i-th interior Gauss-Lobatto point from the end with the lower vertex number,
+    column j the j-th edge function.
+    """
+    mesh, order = space.mesh, space.globalorder
+    element = ng.ElementId(ng.VOL, 0)
+    vertices = [v.nr for v in mesh[element].vertices]
+    edge = mesh[element].edges[0]
+    low, high = sorted(v.nr for v in mesh[edge].vertices)
+    reference = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+    start, stop = reference[vertices.index(low)], reference[vertices.index(high)]
+    numbers = list(space.GetDofNrs(element))
+    columns = [numbers.index(d) for d in space.GetDofNrs(edge)]
+    shape = space.GetFE(element)
+    points = [start + s * (stop - start) for s in gauss_lobatto(order)[1:-1]]
+    values = np.array([shape.CalcShape(float(px), float(py), 0.0).NumPy() for px, py in points])
+    return values[:, columns]
+
+
+def nodal_basis(trace: Trace) -> sp.csr_matrix:
+    """Matrix (n, n) from boundary node values and other unknowns to NGSolve's scalar unknowns."""
+    order, size = trace.order, trace.space.ndof
+    if order == 1:
+        return sp.identity(size, format="csr")
+    bubbles = np.linalg.inv(edge_bubbles(trace.space))
+    low_first = trace.nodes[:, 0] < trace.nodes[:, -1]
+    nodes = np.where(low_first[:, None], trace.nodes, trace.nodes[:, ::-1])
+    _, first = np.unique(nodes[:, 1], return_index=True)
+    nodes = nodes[first]
+    # Edge function coefficients: bubbles (values - linear part).
+    s = gauss_lobatto(order)[1:-1]
+    local = bubbles @ np.column_stack([s - 1, np.eye(order - 1), -s])
+    rows = np.repeat(nodes[:, 1:-1, None], order + 1, axis=2)
+    cols = np.repeat(nodes[:, None, :], order - 1, axis=1)
+    values = np.broadcast_to(local, rows.shape)
+    diagonal = np.ones(size)
+    diagonal[nodes[:, 1:-1].ravel()] = 0.0
+    edges = sp.coo_matrix((values.ravel(), (rows.ravel(), cols.ravel())), shape=(size, size))
+    return (sp.diags(diagonal) + edges).tocsr()
