@@ -40,8 +40,8 @@ def gauss(order: int) -> tuple[Array, Array]:
 @lru_cache
 def _coefficients(order: int) -> Array:
     """Monomial coefficients (lowest first) in 2s - 1 of the Lagrange polynomials, as columns."""
-    inverse: Array = np.linalg.inv(np.vander(2 * gauss_lobatto(order) - 1, increasing=True))
-    return inverse
+    vandermonde = np.vander(2 * gauss_lobatto(order) - 1, increasing=True)
+    return np.asarray(np.linalg.inv(vandermonde), dtype=np.float64)
 
 
 def lagrange(order: int, s: Array) -> Array:

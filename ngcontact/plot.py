@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-_PAIR_COLOURS = ("#1f4e9c", "#c1440e", "#2a7f3f", "#7b3294", "#7f6a00", "#00707a")
 _MOST_TRIANGLES = 200_000
 
 
@@ -85,7 +84,7 @@ def plot_solution(
     if path is None:
         from matplotlib import pyplot
 
-        figure = pyplot.figure(figsize=(13, 5), layout="constrained")
+        figure = pyplot.figure(layout="constrained")
         _draw(figure, solution, scale)
         pyplot.show()
         return figure
@@ -93,7 +92,7 @@ def plot_solution(
     from matplotlib.figure import Figure
 
     target = check_path(path, ".png")
-    figure = Figure(figsize=(13, 5), layout="constrained")
+    figure = Figure(layout="constrained")
     _draw(figure, solution, scale)
     with replacing(target) as (draft,):
         FigureCanvasAgg(figure).print_figure(draft, format="png", dpi=150)
@@ -171,7 +170,7 @@ def _scene(solution: Any, scale: float | None) -> Scene:
     if scale is None:
         body = np.empty(len(place), dtype=np.int64)
         body[nodes.cells] = nodes.body[:, None]
-        scale = _chosen_scale(place, move, active, body)
+        scale = _chosen_scale(solution, place, move, body)
     return Scene(
         moved=place + scale * move,
         stress=von_mises(nodes.values(plane_and_normal_stress(solution))),
@@ -183,24 +182,26 @@ def _scene(solution: Any, scale: float | None) -> Scene:
     )
 
 
-def _chosen_scale(place: Array, move: Array, active: Array, body: Integers) -> float:
+def _chosen_scale(solution: Any, place: Array, move: Array, body: Integers) -> float:
     """Factor 1, 2, 5, 10, ... on the displacement: seen, yet no false overlap of the bodies.
 
-    Contact closes an initial gap e; drawn at a factor s it overlaps by (s - 1) e. The gap is
-    taken to the nearest node of another body, which errs on the side of a smaller factor.
+    Contact turns a gap e into `gap`; a factor s draws it as e - s (e - gap). For e, the distance
+    to the nearest node of another body errs on the side of a smaller factor.
     """
     size = np.ptp(place, axis=0).max()
     largest = np.linalg.norm(move, axis=1).max()
-    wanted = 0.04 * size / largest if largest > 0 else 1.0
-    if len(active) and np.ptp(body) > 0:
-        own = body[KDTree(place).query(active)[1]]
-        gaps = [KDTree(place[body != k]).query(active[own == k])[0].max() for k in np.unique(own)]
-        overlap = 0.002 * size
-        wanted = min(wanted, 1 + overlap / max(*gaps, 1e-12 * size))
-    if wanted < 2:
-        return 1.0
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return float(power * max(step for step in (1, 2, 5) if step * power <= wanted))
+    factor = 0.04 * size / largest if largest > 0 else 1.0
+    points, gap = solution.points, solution.gap
+    if solution.active.any() and np.ptp(body) > 0:
+        overlap = 0.01 * max(np.ptp(points[solution.active], axis=0).max(), 0.01 * size)
+        own = body[KDTree(place).query(points)[1]]
+        for k in np.unique(own):
+            initial = KDTree(place[body != k]).query(points[own == k])[0]
+            closed = np.maximum(initial - gap[own == k], 1e-12 * size)
+            factor = min(factor, ((initial + overlap) / closed).min())
+    power = 10.0 ** np.floor(np.log10(factor))
+    steps = [step for step in (1, 2, 5) if step * power <= factor]
+    return float(max(1.0, steps[-1] * power))
 
 
 def _frame(scene: Scene) -> tuple[Array, Array] | None:
@@ -224,9 +225,12 @@ def _draw(figure: Figure, solution: Any, scale: float | None) -> None:
     if frame is not None:  # peaks at supports and corners shall not take the colours away
         seen = np.all((scene.moved >= frame[0]) & (scene.moved <= frame[1]), axis=1)
         top = max(scene.stress[seen].max(initial=0), np.quantile(scene.stress, 0.995))
-    figure.set_size_inches(13 if frame is None else 17, 5)
-    bodies, *close, profile = figure.subplots(1, 2 if frame is None else 3)
-    shading = [_draw_bodies(axes, scene, top) for axes in (bodies, *close)][0]
+    width, height = np.ptp(scene.moved, axis=0)
+    ratios = [np.clip(width / height, 0.6, 2), *([] if frame is None else [1]), 1.2]
+    figure.set_size_inches(2 + 4.5 * sum(ratios), 5)
+    grid = {"width_ratios": ratios}
+    bodies, *close, profile = figure.subplots(1, len(ratios), gridspec_kw=grid)
+    shading, *_ = [_draw_bodies(axes, scene, top) for axes in (bodies, *close)]
     factor = "" if scene.scale == 1 else f", displacement × {scene.scale:g}"
     bodies.set_title("deformed bodies" + factor)
     if frame is not None:
@@ -256,14 +260,25 @@ def _draw_bodies(axes: Axes, scene: Scene, top: float) -> Any:
 
 def _draw_pressure(axes: Axes, solution: Any) -> None:
     """Pressure along the contact lines, points in contact full and the others hollow."""
-    lines = contact_lines(solution)
+    lines, contact = contact_lines(solution), solution.problem.contact
+    touching = []
     for pair, rows, s in lines:
-        colour = _PAIR_COLOURS[pair % len(_PAIR_COLOURS)]
-        p, active = solution.pressure[rows], solution.active[rows]
-        axes.plot(s, p, color=colour, lw=1, alpha=0.6)
-        for state, fill in ((active, colour), (~active, "w")):
-            axes.plot(s[state], p[state], "o", ms=4, mec=colour, mfc=fill, ls="none")
-    directed = {contact.direction is not None for contact in solution.problem.contact}
-    axes.set_xlabel(" or ".join({True: "η", False: "arc position"}[d] for d in sorted(directed)))
-    axes.set(ylabel="contact pressure", title="contact pressure")
+        colour, active, p = f"C{pair % 10}", solution.active[rows], solution.pressure[rows]
+        label = f"pair {pair}: {contact[pair].secondary}"
+        axes.plot(s, p, color=colour, lw=1, label=label if len(contact) > 1 else None)
+        for state, fill, name in ((active, colour, "in contact"), (~active, "w", "open")):
+            label = name if pair == lines[0][0] else None
+            axes.plot(s[state], p[state], "o", ms=4, mec=colour, mfc=fill, label=label)
+        touching.append(s[active])
+    places = np.concatenate([np.empty(0), *touching])
+    if len(places):  # keep the zone in contact in sight on a long boundary
+        every = np.concatenate([s for *_, s in lines])
+        low, high = places.min(), places.max()
+        margin = max(0.75 * (high - low), 0.02 * np.ptp(every))
+        edge = 0.03 * margin
+        axes.set_xlim(max(low - margin, every.min()) - edge, min(high + margin, every.max()) + edge)
+    if lines:
+        axes.legend()
+    names = {"arc position" if pair.direction is None else "η" for pair in contact}
+    axes.set(xlabel=" or ".join(sorted(names)), ylabel="contact pressure", title="contact pressure")
     axes.grid(alpha=0.3)

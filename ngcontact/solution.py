@@ -122,8 +122,8 @@ class Solution:
         return pair
 
     @cached_property
-    def _nodal_reaction(self) -> Array:
-        """Force of the supports on the nodes, (n, 2): A u - f + B' force."""
+    def nodal_reaction(self) -> Array:
+        """Forces (n, 2) of the supports on the nodes: A u - f + B' force, zero at free nodes."""
         d = self.discrete
         residual = d.space.A @ self.displacement.vec.FV().NumPy() - d.space.f
         return (d.space.basis.T @ residual + d.B.T @ self.force).reshape(2, -1).T
@@ -141,7 +141,7 @@ class Solution:
             *self.problem.displacement,
             *([] if self.problem.sliding is None else [str(self.problem.sliding)]),
         ]
-        counted = np.zeros(len(self._nodal_reaction), dtype=bool)
+        counted = np.zeros(len(self.nodal_reaction), dtype=bool)
         result: dict[str, Array] = {}
         for pattern in patterns:
             mask = boundary_mask(self.mesh, pattern)
@@ -149,7 +149,7 @@ class Solution:
                 nodes = np.unique(trace.nodes[trace.select(mask & (names == name))])
                 nodes = nodes[~counted[nodes]]
                 counted[nodes] = True
-                result[str(name)] = self._nodal_reaction[nodes].sum(axis=0)
+                result[str(name)] = self.nodal_reaction[nodes].sum(axis=0)
         return result
 
     def transitions(self, pair: int = 0) -> Array:
