@@ -127,7 +127,8 @@ def print_table(name: str, case: Case, element: str, order: int, maxh: float, le
     print(f"\n{name}, {element}, order {order}")
     print("unknowns  error      rate  steps  identities")
     rows = []
-    for solution, row in study(case, order=order, element=element, maxh=maxh, levels=levels):
+    for solved, row in study(case, order=order, element=element, maxh=maxh, levels=levels):
+        solution = solved
         rows.append(row)
         print(
             f"{row.unknowns:8d}  {row.error:.3e}  {row.rate:4.2f}  {row.steps:5d}  "

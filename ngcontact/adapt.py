@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Iterator
+from numbers import Real
 
 import ngsolve as ng
 
@@ -83,7 +84,7 @@ def _solve_checked(
     if start is None:
         active = first_active_set(discrete)
     else:
-        active = carried_active_set(discrete, start.discrete.lines, start.active)
+        active = carried_active_set(discrete, start.discrete, start.minimiser)
     minimiser = minimise_energy(discrete, active)
     displacement = ng.GridFunction(discrete.space.V)
     displacement.vec.FV().NumPy()[:] = discrete.space.basis @ (discrete.basis.T @ minimiser.u)
@@ -148,13 +149,28 @@ def adapt(
         The active set of a level did not settle.
     """
     check_element(order, element)
-    if not 0 < theta <= 1:
+    if not 0 < _number("theta", theta) <= 1:
         raise ValueError(f"theta={theta} must lie in (0, 1]; 0.5 is usual")
-    if tolerance is not None and not tolerance > 0:
+    if tolerance is not None and not _number("tolerance", tolerance) > 0:
         raise ValueError(f"tolerance={tolerance} must be positive, like 1e-3, or None")
+    if not _number("max_dofs", max_dofs) > 0:
+        raise ValueError(f"max_dofs={max_dofs} must be positive, like 100_000")
     mesh = first_mesh(problem, maxh)
     problem.check(mesh)
+    mesh, _ = curve(mesh, order, element)
+    if unknowns(mesh, order, element) > max_dofs:
+        raise ValueError(
+            f"the first mesh has {unknowns(mesh, order, element)} unknowns, more than "
+            f"max_dofs={max_dofs}; give a larger maxh or max_dofs"
+        )
     return _levels(problem, mesh, order, element, theta, tolerance, max_dofs)
+
+
+def _number(name: str, value: object) -> float:
+    """`value`, or a TypeError unless it is a real number."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise TypeError(f"{name}={value!r} is not a number")
+    return float(value)
 
 
 def _levels(
@@ -168,23 +184,20 @@ def _levels(
 ) -> Iterator[Solution]:
     """Levels of `adapt` on checked input."""
     solution: Solution | None = None
-    while True:
-        if unknowns(mesh, order) > max_dofs:
-            if solution is None:
-                raise ValueError(
-                    f"the first mesh has {unknowns(mesh, order)} unknowns, more than "
-                    f"max_dofs={max_dofs}; give a larger maxh or max_dofs"
-                )
-            return
+    while unknowns(mesh, order, element) <= max_dofs:
         solution = _solve_checked(problem, mesh, order, element, solution)
-        yield solution
         error = solution.relative_error_estimate
+        log.info("%s", solution)
+        yield solution
         if error <= max(tolerance or 0.0, ROUND_OFF):
             return
         mesh = refined(problem, solution.mesh, doerfler(solution.indicators, theta))
+        mesh, _ = curve(mesh, order, element)
 
 
-def unknowns(mesh: ng.Mesh, order: int) -> int:
-    """Number of unknowns of the displacement on a mesh."""
+def unknowns(mesh: ng.Mesh, order: int, element: str) -> int:
+    """Number of unknowns of the displacement on a mesh that is curved to the element's degree."""
     inner = (order - 1) * (order - 2) // 2
-    return 2 * (mesh.nv + (order - 1) * mesh.nedge + inner * mesh.ne)
+    # Functions linear in physical coordinates are kept in a space with boundary edge functions.
+    edges = mesh.GetNE(ng.BND) if element == "physical" and mesh.GetCurveOrder() > 1 else 0
+    return 2 * (mesh.nv + (order - 1) * mesh.nedge + edges + inner * mesh.ne)

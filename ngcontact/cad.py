@@ -32,6 +32,8 @@ class CadEdge:
         Parameter interval.
     straight : bool
         Whether the edge is a straight segment with a constant derivative.
+    closed : bool
+        Whether the edge ends where it starts.
     """
 
     def __init__(self, edge: TopoDS_Shape) -> None:
@@ -43,6 +45,7 @@ class CadEdge:
         self.size = float(np.abs(np.ptp(self._x, axis=0)).max())
         chord = self._x[0] + np.linspace(0, 1, SAMPLES)[:, None] * (self._x[-1] - self._x[0])
         self.straight = bool(np.abs(self._x - chord).max() <= ROUND_OFF * self.size)
+        self.closed = bool(np.abs(self._x[-1] - self._x[0]).max() <= MISSED * self.size)
 
     def point(self, t: Array) -> Array:
         """Points (k, 2) at the parameters `t` (k,)."""
@@ -77,7 +80,13 @@ class CadEdge:
             tangent = self.derivative(t)
             return ((self.point(t) - points) * tangent).sum(axis=1) / (tangent**2).sum(axis=1)
 
-        return self._newton(self._t[nearest], step)
+        t = self._newton(self._t[nearest], step)
+        if self.closed and (at_seam := np.isin(nearest, (0, SAMPLES - 1))).any():
+            # Newton's method does not cross the seam: the other end may be the right start.
+            other = self._newton(np.where(at_seam, self._t[SAMPLES - 1 - nearest], t), step)
+            miss, other_miss = (((self.point(s) - points) ** 2).sum(axis=1) for s in (t, other))
+            t = np.where(other_miss < miss, other, t)
+        return t
 
     def normal(self, points: Array) -> Array:
         """Unit normals (k, 2) at the projections of `points`, to the right of the tangent."""
@@ -112,7 +121,7 @@ def cad_edges(mesh: ng.Mesh) -> list[CadEdge] | None:
     geometry = mesh.ngmesh.GetGeometry()
     if not isinstance(geometry, OCCGeometry):
         return None
-    edges = list(geometry.shape.edges)
+    edges = list(dict.fromkeys(geometry.shape.edges))  # an edge between two faces occurs twice
     names = mesh.GetBoundaries()
     if tuple(edge.name or "default" for edge in edges) != tuple(
         name or "default" for name in names

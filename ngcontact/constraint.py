@@ -23,6 +23,7 @@ Mask = NDArray[np.bool_]
 PIVOT = 0.05  # least share of a row at the node whose unknown it becomes, if another is possible
 INDEPENDENT = 1e-6  # sine below which two conditions at one node are the same
 SATISFIED = 1e-8  # interpolation error of prescribed values, relative to the largest
+ROUND_OFF = 1e-13  # of measured gaps, relative to the largest coordinate
 LONGEST_CHAIN = 50  # bodies in a row whose contact lines share nodes
 
 
@@ -108,14 +109,21 @@ class _Hosts:
         self.taken.setdefault(node, []).append(np.where(self.fixed[node], 0.0, coefficients))
 
 
+def _at(Bz: sp.csr_matrix, row: Index, node: Index) -> Array:
+    """Coefficients (k, 2) of rows (k,) at nodes (k,)."""
+    n = Bz.shape[1] // 2
+    if row.size == 0:  # SciPy answers an empty index with a sparse matrix
+        return np.zeros((0, 2))
+    return np.column_stack([np.ravel(Bz[row, node]), np.ravel(Bz[row, node + n])])
+
+
 def _assign(rows: Rows, Bz: sp.csr_matrix, fixed: Mask) -> Index:
     """Host node of every row, -1 where all of a row's unknowns are prescribed."""
     n = len(fixed)
     host = rows.node.copy()
-    at = np.arange(len(host))
-    local = np.column_stack([np.ravel(Bz[at, host]), np.ravel(Bz[at, host + n])])
+    local = _at(Bz, np.arange(len(host)), host)
     free = np.where(fixed[host], 0.0, local)
-    lonely = np.bincount(host, minlength=n)[host] == 1 if len(host) else at < 0
+    lonely = np.bincount(host, minlength=n)[host] == 1
     regular = lonely & (np.linalg.norm(free, axis=1) > PIVOT)
     hosts = _Hosts(fixed)
     for j in np.flatnonzero(regular) if not regular.all() else ():
@@ -137,20 +145,21 @@ def _assign(rows: Rows, Bz: sp.csr_matrix, fixed: Mask) -> Index:
 
 
 def _check_prescribed(
-    rows: Rows, Bz: sp.csr_matrix, fixed: Mask, values: Array, drop: Index
+    rows: Rows, Bz: sp.csr_matrix, fixed: Mask, values: Array, drop: Index, length: float
 ) -> None:
     """Raise unless the rows that find no free unknown hold for the prescribed values."""
     size = np.abs(values).max(initial=0.0)
     for j in drop:
-        columns = Bz[j].indices
+        columns, entries = Bz[j].indices, Bz[j].data
         where = f"the contact row at node {rows.node[j]} with direction {rows.direction[j]}"
-        if not fixed[columns].all():
+        if (np.abs(entries[~fixed[columns]]) > INDEPENDENT).any():
             raise ValueError(
                 f"{where} depends on other contact rows there; leave one of the pairs out, or end "
                 "one of the contact boundaries before that point"
             )
-        value = float(Bz[j].data @ values[columns])
-        if value > rows.g[j] + SATISFIED * max(size, abs(rows.g[j])):
+        value = float(entries @ values[columns])
+        allowed = SATISFIED * max(size, abs(rows.g[j])) + ROUND_OFF * length
+        if value > rows.g[j] + allowed:
             raise ValueError(
                 f"{where} is violated by prescribed displacements on both sides: they close the "
                 f"gap by {value:g} where it is {rows.g[j]:g}; prescribe displacements without "
@@ -158,7 +167,7 @@ def _check_prescribed(
             )
 
 
-def change_of_basis(n: int, conditions: Conditions, rows: Rows) -> Basis:
+def change_of_basis(n: int, conditions: Conditions, rows: Rows, length: float = 0.0) -> Basis:
     """Basis in which prescribed conditions and contact rows are single unknowns.
 
     Parameters
@@ -169,6 +178,8 @@ def change_of_basis(n: int, conditions: Conditions, rows: Rows) -> Basis:
         Gamma_u and Gamma_0.
     rows : Rows
         Gamma_K.
+    length : float
+        Largest coordinate, to whose round-off the gaps are known.
 
     Raises
     ------
@@ -180,7 +191,7 @@ def change_of_basis(n: int, conditions: Conditions, rows: Rows) -> Basis:
     Bz = (rows.matrix(n) @ R).tocsr()
     flat_fixed, flat_values = fixed.T.ravel(), values.T.ravel()
     host = _assign(rows, Bz, fixed)
-    _check_prescribed(rows, Bz, flat_fixed, flat_values, np.flatnonzero(host < 0))
+    _check_prescribed(rows, Bz, flat_fixed, flat_values, np.flatnonzero(host < 0), length)
     kept = np.flatnonzero(host >= 0)
     host = host[kept]
 
@@ -192,8 +203,7 @@ def change_of_basis(n: int, conditions: Conditions, rows: Rows) -> Basis:
     unknown = host + n * slot
 
     # Local systems M z = y; what the rows contain of other unknowns moves to the right.
-    at = np.stack([np.ravel(Bz[kept, host]), np.ravel(Bz[kept, host + n])], axis=1)
-    local = np.where(fixed[host], 0.0, at)
+    local = np.where(fixed[host], 0.0, _at(Bz, kept, host))
     M = np.tile(np.eye(2), (n, 1, 1))
     M[host, slot] = local
     alone = np.bincount(host, minlength=n) == 1

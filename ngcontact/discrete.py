@@ -20,10 +20,12 @@ from .rows import Conditions, Rows
 from .space import Space, assemble, cholesky
 from .ssn import Minimiser, minimise
 from .trace import Trace, boundary_trace
+from .transition import transitions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
+SEPARATION = 1e-6  # of the directions at a corner, relative to the zone
 TOUCHING = 1e-12  # gap, relative to the zone, up to which points start active
 
 
@@ -127,7 +129,7 @@ def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Dis
         )
     )
     rows = _joined([_rows(line, trace) for line in lines], order)
-    basis = change_of_basis(n, conditions, rows)
+    basis = change_of_basis(n, conditions, rows, float(np.abs(trace.curve).max()))
 
     kept = np.zeros(len(rows.g), dtype=bool)
     kept[basis.kept] = True
@@ -173,22 +175,33 @@ def first_active_set(discrete: Discrete) -> Mask:
     return np.concatenate([np.zeros(0, dtype=bool), *active])
 
 
-def carried_active_set(discrete: Discrete, lines: list[ContactLine], active: Mask) -> Mask:
-    """Warm start: the state of the nearest contact point of the same pair on another mesh."""
-    start, carried = 0, []
-    for number, new in enumerate(discrete.lines):
-        old = lines[number]
-        states = active[start : start + len(old.node)]
-        start += len(old.node)
+def carried_active_set(discrete: Discrete, previous: Discrete, state: Minimiser) -> Mask:
+    """Warm start: the state of the nearest contact point of the same pair on another mesh.
+
+    At orders above 1 the points around a transition are told by the side of it they lie on: it is
+    located more closely than the nodes of either mesh.
+    """
+    slack = previous.program.g - state.u[previous.program.unknown]
+    start, carried = 0, [np.zeros(0, dtype=bool)]
+    for new, old in zip(discrete.lines, previous.lines, strict=True):
+        at = slice(start, start + len(old.node))
+        start = at.stop
         if len(old.node) == 0 or len(new.node) == 0:
             carried.append(np.zeros(len(new.node), dtype=bool))
             continue
         # Two points at a corner are told apart by their directions.
-        size = np.ptp(old.position, axis=0).max(initial=0.0)
-        tree = cKDTree(np.column_stack([old.position, size * 1e-6 * old.direction]))
-        _, nearest = tree.query(np.column_stack([new.position, size * 1e-6 * new.direction]))
-        carried.append(states[nearest])
-    return np.concatenate([np.zeros(0, dtype=bool), *carried])
+        size = SEPARATION * np.ptp(old.position, axis=0).max(initial=0.0)
+        tree = cKDTree(np.column_stack([old.position, size * old.direction]))
+        _, nearest = tree.query(np.column_stack([new.position, size * new.direction]))
+        active = state.active[at][nearest]
+        if discrete.space.trace.order > 1:
+            ends = transitions(old, slack[at], state.active[at])
+            for inner, outer, place in zip(ends.inner, ends.outer, ends.position, strict=True):
+                around = (nearest == inner) | (nearest == outer)
+                inwards = old.position[inner] - old.position[outer]
+                active[around] = (new.position[around] - place) @ inwards >= 0
+        carried.append(active)
+    return np.concatenate(carried)
 
 
 def minimise_energy(discrete: Discrete, active: Mask) -> Minimiser:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import netgen.occ as occ
 import ngsolve as ng
@@ -32,25 +33,22 @@ class _Edge:
     maxh: float
 
     def __post_init__(self) -> None:
-        self.nodes: list[float] = []
-
-    def add(self, t: Array) -> None:
-        self.nodes.extend(t.tolist())
+        self.runs: list[Array] = []
 
     def partition(self) -> list[float]:
-        """Interior nodes as fractions of the parameter interval, the rest filled up evenly."""
+        """Interior nodes as fractions of the parameter interval, between runs filled up evenly."""
         start, stop = self.curve.start, self.curve.stop
-        fractions = np.sort((np.array(self.nodes) - start) / (stop - start))
+        runs = [(nodes - start) / (stop - start) for nodes in self.runs]
+        nodes = np.sort(np.concatenate(runs))
         apart = 1e-9
-        inside = fractions[(fractions > apart) & (fractions < 1 - apart)]
+        inside = nodes[(nodes > apart) & (nodes < 1 - apart)]
         inside = inside[np.diff(inside, prepend=-1.0) > apart]
-        wanted = (np.array([min(self.nodes), max(self.nodes)]) - start) / (stop - start)
         result = inside.tolist()
         t, x, _ = self.curve.samples(FINE)
         arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
         grid = (t - start) / (stop - start)
-        for low, high in ((0.0, wanted[0]), (wanted[1], 1.0)):
-            if high - low > apart:
+        for low, high in pairwise([0.0, *inside.tolist(), 1.0]):
+            if not any(run.min() < (low + high) / 2 < run.max() for run in runs):
                 s0, s1 = np.interp([low, high], grid, arc)
                 count = int(np.ceil((s1 - s0) / self.maxh * (1 - 1e-9)))
                 fill = np.interp(np.linspace(s0, s1, count + 1)[1:-1], arc, grid)
@@ -58,13 +56,9 @@ class _Edge:
         return sorted(result)
 
 
-def _edges(shape: occ.TopoDS_Shape, pattern: str, maxh: float) -> list[_Edge]:
-    """Edges of matching name whose division the user has not fixed."""
-    return [
-        _Edge(edge, CadEdge(edge), min(maxh, edge.maxh))
-        for edge in shape.edges
-        if re.fullmatch(pattern, edge.name or "") and edge.partition is None
-    ]
+def _named(edges: list[_Edge], pattern: str) -> list[_Edge]:
+    """Edges whose name matches."""
+    return [edge for edge in edges if re.fullmatch(pattern, edge.curve.name)]
 
 
 def _facing_runs(faces: NDArray[np.bool_]) -> Iterator[slice]:
@@ -96,7 +90,13 @@ def _opposite(contact: Contact, x: Array, other: CadEdge) -> tuple[Array, Array]
 
 def _divide(contact: Contact, secondary: _Edge, primary: _Edge) -> None:
     """Lay a common division {C_j} on the parts of two edges that face each other."""
-    t, x, slope = secondary.curve.samples(FINE)
+    t, _, _ = secondary.curve.samples(FINE)
+    ends = primary.curve.point(np.array([primary.curve.start, primary.curve.stop]))
+    ends, _ = _opposite(contact, ends, secondary.curve)
+    ends = ends[~np.isnan(ends)]  # where the facing parts end inside the secondary
+    apart = np.abs(t[:, None] - ends).min(axis=1, initial=np.inf)
+    t = np.sort(np.concatenate([t[apart > (t[1] - t[0]) / 2], ends]))
+    x, slope = secondary.curve.point(t), secondary.curve.derivative(t)
     other, y = _opposite(contact, x, primary.curve)
     faces = ~np.isnan(other)
     if contact.direction is not None:
@@ -118,8 +118,9 @@ def _divide(contact: Contact, secondary: _Edge, primary: _Edge) -> None:
         nodes = np.interp(np.linspace(0, total[-1], count + 1), total, t[run])
         there, _ = _opposite(contact, secondary.curve.point(nodes), primary.curve)
         met = ~np.isnan(there)
-        secondary.add(nodes[met])
-        primary.add(there[met])
+        if met.any():
+            secondary.runs.append(nodes[met])
+            primary.runs.append(there[met])
 
 
 def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
@@ -148,16 +149,17 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
         raise TypeError(f"maxh={maxh!r} is not a number; give a length like {extent / COARSE:g}")
     if not (np.isfinite(maxh) and maxh > 0):
         raise ValueError(f"maxh={maxh} must be positive and finite, like {extent / COARSE:g}")
-    edges: list[_Edge] = []
+    edges = [
+        _Edge(edge, CadEdge(edge), min(maxh, edge.maxh))
+        for edge in shape.edges
+        if edge.partition is None  # a division the user has not fixed
+    ]
     for contact in problem.contact:
         if contact.primary is not None:
-            secondaries = _edges(shape, contact.secondary, maxh)
-            primaries = _edges(shape, contact.primary, maxh)
-            for secondary in secondaries:
-                for primary in primaries:
+            for secondary in _named(edges, contact.secondary):
+                for primary in _named(edges, contact.primary):
                     _divide(contact, secondary, primary)
-            edges += secondaries + primaries
-    placed = [edge for edge in edges if edge.nodes]
+    placed = [edge for edge in edges if edge.runs]
     try:
         for edge in placed:
             edge.shape.partition = edge.partition()

@@ -63,10 +63,7 @@ def lattice(order: int) -> NDArray[np.int64]:
 
 
 def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
-    """Nodes of the Lagrange triangles of the given order on a mesh of triangles.
-
-    Raises ``ValueError`` if the mesh has other elements than triangles.
-    """
+    """Nodes of the Lagrange triangles of a mesh; ``ValueError`` if it has other elements."""
     weights = lattice(order)
     # NGSolve's reference triangle has its vertices at (1, 0), (0, 1), (0, 0).
     places = [(a / order, b / order, 0.0) for a, b, _ in weights]
@@ -90,7 +87,7 @@ def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
     return Nodes(cells.reshape(-1, len(weights)), body, names, at)
 
 
-def plane_and_normal_stress(solution: Any) -> ng.CoefficientFunction:
+def full_stress(solution: Any) -> ng.CoefficientFunction:
     """Stress components xx, yy, xy and zz, the one normal to the plane.
 
     zz is 0 in plane stress and nu (xx + yy) in plane strain. A material without Poisson's ratio
@@ -166,12 +163,11 @@ def write_solution(path: str | os.PathLike[str], solution: Any) -> Path:
 
     The cells are Lagrange triangles of the order of the geometry or of the displacement,
     whichever is higher. Point data: ``displacement``, ``stress`` (xx, yy, xy; means inside each
-    body) and ``von_mises`` (see `plane_and_normal_stress`). Cell data: ``body``, whose names
+    body) and ``von_mises`` (see `full_stress`). Cell data: ``body``, whose names
     are the field data ``body_names``, and ``indicators`` if they have been computed already.
     Contact points: ``pressure``, ``gap``, ``force``, ``active`` and ``pair``. Any consistent
-    units. Returns the path. A file appears complete or not at all.
-
-    Raises ``ValueError`` and ``OSError`` as `check_path` does, before any work.
+    units. Returns the path. A file appears complete or not at all. Raises ``ValueError`` and
+    ``OSError`` as `check_path` does, before any work.
     """
     target = check_path(path, ".vtu")
     beside = check_path(target.with_name(f"{target.stem}_contact.vtp"), ".vtp")
@@ -220,7 +216,7 @@ def _bodies(solution: Any) -> pyvista.UnstructuredGrid:
     grid = pyvista.UnstructuredGrid(cells, kinds, nodes.values(ng.CF((ng.x, ng.y, 0))))
     u = solution.displacement
     grid.point_data["displacement"] = nodes.values(ng.CF((u[0], u[1], 0)))
-    stress = nodes.values(plane_and_normal_stress(solution))
+    stress = nodes.values(full_stress(solution))
     grid.point_data["stress"] = stress[:, :3]
     for k, component in enumerate(("xx", "yy", "xy")):
         grid.GetPointData().GetAbstractArray("stress").SetComponentName(k, component)

@@ -12,15 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
-from .output import (
-    check_path,
-    lattice,
-    neighbour_tree,
-    nodes_of,
-    plane_and_normal_stress,
-    replacing,
-    von_mises,
-)
+from .output import check_path, full_stress, lattice, neighbour_tree, nodes_of, replacing, von_mises
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,7 +20,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
-
 _MOST_TRIANGLES = 200_000
 
 
@@ -57,27 +48,12 @@ def plot_solution(
 
     A close-up stands between the two if the zone in contact is small. The pressure is drawn over
     eta (P2) or the arc position (P1). Lengths and stresses in the consistent units of the data.
+    With a `path` (``.png``) the picture is written there without any window, otherwise it is
+    shown on the screen. `scale` multiplies the displacement; None chooses a factor that lets the
+    deformation be seen, but not so large that bodies seem to run into each other.
 
-    Parameters
-    ----------
-    solution : Solution
-        What to draw.
-    path : path, optional
-        A ``.png`` to write, without any window. None shows the picture on the screen.
-    scale : float, optional
-        Factor on the displacement. None chooses one that lets the deformation be seen, but not
-        so large that bodies which close a gap would seem to run into each other.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-        The picture.
-
-    Raises
-    ------
-    ValueError, OSError
-        If `scale` is not a finite number or `path` cannot be written (`check_path`), before any
-        work.
+    Raises ``ValueError`` if `scale` is not a finite number, and ``ValueError`` or ``OSError`` as
+    `check_path` does, before any work.
     """
     if scale is not None and not np.isfinite(scale):
         raise ValueError(f"scale = {scale}: give a finite factor, or None to have one chosen")
@@ -173,7 +149,7 @@ def _scene(solution: Any, scale: float | None) -> Scene:
         scale = _chosen_scale(solution, place, move, body)
     return Scene(
         moved=place + scale * move,
-        stress=von_mises(nodes.values(plane_and_normal_stress(solution))),
+        stress=von_mises(nodes.values(full_stress(solution))),
         triangles=nodes.cells[:, triangles].reshape(-1, 3),
         edges=edges[first],
         outline=count == 1,
@@ -193,22 +169,21 @@ def _chosen_scale(solution: Any, place: Array, move: Array, body: Integers) -> f
     factor = 0.04 * size / largest if largest > 0 else 1.0
     points, gap = solution.points, solution.gap
     if solution.active.any() and np.ptp(body) > 0:
-        overlap = 0.01 * max(np.ptp(points[solution.active], axis=0).max(), 0.01 * size)
+        overlap = 0.003 * max(np.ptp(points[solution.active], axis=0).max(), 0.01 * size)
         own = body[KDTree(place).query(points)[1]]
         for k in np.unique(own):
             initial = KDTree(place[body != k]).query(points[own == k])[0]
             closed = np.maximum(initial - gap[own == k], 1e-12 * size)
             factor = min(factor, ((initial + overlap) / closed).min())
     power = 10.0 ** np.floor(np.log10(factor))
-    steps = [step for step in (1, 2, 5) if step * power <= factor]
-    return float(max(1.0, steps[-1] * power))
+    return float(max(1.0, *(k * power for k in (0.5, 1, 2, 5) if k * power <= factor)))
 
 
 def _frame(scene: Scene) -> tuple[Array, Array] | None:
     """Corners of a close-up of the zone in contact, None if the whole picture shows it."""
-    size = np.ptp(scene.moved, axis=0).max()
     if len(scene.zone) == 0:
         return None
+    size = np.ptp(scene.moved, axis=0).max()
     low, high = scene.zone.min(axis=0), scene.zone.max(axis=0)
     half = max(0.9 * (high - low).max(), 0.02 * size)
     middle = (low + high) / 2
@@ -228,14 +203,14 @@ def _draw(figure: Figure, solution: Any, scale: float | None) -> None:
     width, height = np.ptp(scene.moved, axis=0)
     ratios = [np.clip(width / height, 0.6, 2), *([] if frame is None else [1]), 1.2]
     figure.set_size_inches(2 + 4.5 * sum(ratios), 5)
-    grid = {"width_ratios": ratios}
-    bodies, *close, profile = figure.subplots(1, len(ratios), gridspec_kw=grid)
+    bodies, *close, profile = figure.subplots(1, len(ratios), width_ratios=ratios)
     shading, *_ = [_draw_bodies(axes, scene, top) for axes in (bodies, *close)]
     factor = "" if scene.scale == 1 else f", displacement × {scene.scale:g}"
     bodies.set_title("deformed bodies" + factor)
     if frame is not None:
         low, high = frame
-        bodies.add_patch(Rectangle(low, *(high - low), fill=False, color="crimson", lw=1.2))
+        box = Rectangle((low[0], low[1]), *(high - low), fill=False, color="crimson", lw=1.2)
+        bodies.add_patch(box)
         close[0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title="zone in contact")
         close[0].spines[:].set_color("crimson")
     extend = "max" if top < scene.stress.max() else "neither"
@@ -246,15 +221,14 @@ def _draw(figure: Figure, solution: Any, scale: float | None) -> None:
 def _draw_bodies(axes: Axes, scene: Scene, top: float) -> Any:
     """Von Mises stress on the deformed bodies, thin element edges, body outlines."""
     from matplotlib.collections import LineCollection
+    from matplotlib.tri import Triangulation
 
-    shading = axes.tripcolor(
-        *scene.moved.T, scene.triangles, scene.stress, shading="gouraud", vmin=0, vmax=top
-    )
-    curves = scene.moved[scene.edges]
-    axes.add_collection(LineCollection(curves[~scene.outline], colors="w", lw=0.25, alpha=0.5))
-    axes.add_collection(LineCollection(curves[scene.outline], colors="k", lw=0.8))
-    axes.set_aspect("equal")
-    axes.set(xlabel="x", ylabel="y")
+    mesh = Triangulation(scene.moved[:, 0], scene.moved[:, 1], scene.triangles)
+    shading = axes.tripcolor(mesh, scene.stress, shading="gouraud", vmin=0, vmax=top)
+    inner, outer = (list(scene.moved[scene.edges[at]]) for at in (~scene.outline, scene.outline))
+    axes.add_collection(LineCollection(inner, colors="w", lw=0.25, alpha=0.5))
+    axes.add_collection(LineCollection(outer, colors="k", lw=0.8))
+    axes.set(aspect="equal", xlabel="x", ylabel="y")
     return shading
 
 
@@ -264,21 +238,23 @@ def _draw_pressure(axes: Axes, solution: Any) -> None:
     touching = []
     for pair, rows, s in lines:
         colour, active, p = f"C{pair % 10}", solution.active[rows], solution.pressure[rows]
-        label = f"pair {pair}: {contact[pair].secondary}"
-        axes.plot(s, p, color=colour, lw=1, label=label if len(contact) > 1 else None)
+        title = f"pair {pair}: {contact[pair].secondary}" if len(contact) > 1 else None
+        axes.plot(s, p, color=colour, lw=1, label=title)
         for state, fill, name in ((active, colour, "in contact"), (~active, "w", "open")):
-            label = name if pair == lines[0][0] else None
+            label = name if state.any() and pair == lines[0][0] else None
             axes.plot(s[state], p[state], "o", ms=4, mec=colour, mfc=fill, label=label)
         touching.append(s[active])
-    places = np.concatenate([np.empty(0), *touching])
-    if len(places):  # keep the zone in contact in sight on a long boundary
-        every = np.concatenate([s for *_, s in lines])
+    if len(lines) > 0:
+        axes.legend()
+    if (
+        solution.active.any() and len(solution.points) > 1
+    ):  # keep the zone in contact in sight on a long boundary
+        places, every = np.concatenate(touching), np.concatenate([s for *_, s in lines])
         low, high = places.min(), places.max()
         margin = max(0.75 * (high - low), 0.02 * np.ptp(every))
-        edge = 0.03 * margin
-        axes.set_xlim(max(low - margin, every.min()) - edge, min(high + margin, every.max()) + edge)
-    if lines:
-        axes.legend()
+        low, high = max(low - margin, every.min()), min(high + margin, every.max())
+        axes.set_xlim(low - 0.03 * margin, high + 0.03 * margin)
+    axes.axhline(0, color="0.6", lw=0.8, zorder=0)
     names = {"arc position" if pair.direction is None else "η" for pair in contact}
     axes.set(xlabel=" or ".join(sorted(names)), ylabel="contact pressure", title="contact pressure")
     axes.grid(alpha=0.3)

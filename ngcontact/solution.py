@@ -17,7 +17,7 @@ from .output import write_solution
 from .problem import Problem, boundary_mask
 from .space import strain
 from .ssn import Minimiser
-from .transition import transition_points
+from .transition import transitions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -156,9 +156,7 @@ class Solution:
         """Points (k, 2) where contact of a pair turns from binding to non-binding."""
         number = self._pair_number(pair)
         at = self.pair == number
-        return transition_points(
-            self.discrete.lines[number], self.pressure[at], self.gap[at], self.active[at]
-        )
+        return transitions(self.discrete.lines[number], self.gap[at], self.active[at]).position
 
     @cached_property
     def energy(self) -> float:
@@ -228,11 +226,14 @@ class Solution:
         """Write `path` (.vtu) and, beside it, ``<stem>_contact.vtp``."""
         return write_solution(path, self)
 
-    def plot(self, path: str | os.PathLike[str] | None = None) -> None:
-        """Picture of the deformed bodies and the pressure; a file when `path` (.png) is given."""
+    def plot(self, path: str | os.PathLike[str] | None = None, scale: float | None = None) -> None:
+        """Picture of the deformed bodies and the pressure; a file when `path` (.png) is given.
+
+        `scale` magnifies the displacement; chosen to be seen when left out.
+        """
         from .plot import plot_solution  # matplotlib loads only for a picture
 
-        plot_solution(self, path)
+        plot_solution(self, path, scale)
 
     def draw(self) -> object:
         """Draw the displacement in a notebook with NGSolve's webgui."""

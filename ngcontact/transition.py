@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from .gap import ContactLine
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+# Stencil of the fit, by measurement on Hertz contact at orders 1 to 4: the two points next to the
+# contact carry the error of the element in which it ends.
+SKIPPED = 2
+FEWEST = 8  # points of the fit, or three per order and two if that is more
+DEGREE = 3  # of the fit, 2 at order 1
 
 
-def _links(line: ContactLine) -> tuple[dict[int, list[int]], NDArray[np.intp]]:
+def _neighbours(line: ContactLine) -> tuple[dict[int, list[int]], Index]:
     """Neighbours of every contact point along the line, and all links (l, 2) of two points."""
     pairs = np.stack([line.rows[:, :-1].ravel(), line.rows[:, 1:].ravel()], axis=1)
     links = pairs[(pairs >= 0).all(axis=1)]
@@ -21,47 +31,86 @@ def _links(line: ContactLine) -> tuple[dict[int, list[int]], NDArray[np.intp]]:
     return neighbours, links
 
 
-def _root(near: float, far: float, length: float) -> float:
-    """Distance beyond `near` at which the line through (-length, far), (0, near) vanishes."""
-    return near * length / (far - near) if far > near else float("inf")
+def _run(start: int, before: int, neighbours: dict[int, list[int]], active: Mask) -> list[int]:
+    """Points from `start` on, away from `before`, as long as they share the state of `start`."""
+    run, last = [start], before
+    while True:
+        onward = [i for i in neighbours[run[-1]] if i != last]
+        if not onward or active[onward[0]] != active[start] or onward[0] in run:
+            return run
+        last = run[-1]
+        run.append(onward[0])
 
 
-def transition_points(
-    line: ContactLine, pressure: Array, gap: Array, active: NDArray[np.bool_]
-) -> Array:
-    """Points (k, 2) between neighbours of which one is active.
+def _closing_point(distance: Array, gap: Array, order: int) -> float | None:
+    """Distance at which the gap closes, by a fit of gap^(2/3) over the open points, or None.
 
-    Near a frictionless transition p behaves like the square root of the distance on the binding
-    side, the gap like its 3/2 power on the other. The zeros of the lines through p^2 and through
-    gap^(2/3) at the two nearest points of each side are averaged, each kept between the last
-    active and the first open point.
+    `distance` (k,) grows away from the contact, whose last point has distance 0.
+    """
+    chosen = slice(SKIPPED, SKIPPED + max(FEWEST, 3 * order + 2))
+    x, y = distance[chosen], np.maximum(gap[chosen], 0.0) ** (2 / 3)
+    if len(x) < 2 or y[-1] <= 0:
+        return None
+    fit = np.polynomial.Polynomial.fit(x, y, min(DEGREE, order + 1, len(x) - 1))
+    roots = fit.roots()
+    roots = roots[np.abs(roots.imag) <= 1e-12 * np.abs(roots)].real
+    # The last active point may lie on the open side by the error of one element.
+    roots = roots[(roots >= -distance[0]) & (roots <= x[0])]
+    return float(roots.max()) if len(roots) else None
+
+
+@dataclass(frozen=True, eq=False)
+class Transitions:
+    """Places where contact of one pair turns from binding to non-binding, k of them.
+
+    Attributes
+    ----------
+    inner, outer : ndarray of int (k,)
+        The last active and the first open contact point.
+    position : ndarray (k, 2)
+        The transition itself.
+    """
+
+    inner: Index
+    outer: Index
+    position: Array
+
+
+def transitions(line: ContactLine, gap: Array, active: Mask) -> Transitions:
+    """Transitions between neighbours of which one is active.
+
+    Near a frictionless transition the gap grows like the 3/2 power of the distance, so that
+    gap^(2/3) is a smooth function of it with a simple zero at the transition. That zero is found
+    from a cubic fitted to the open points near by, the nearest ones left out. Without enough of
+    them - contact that opens at a few points only - it is the middle between the two points.
 
     Parameters
     ----------
     line : ContactLine
         The pair.
-    pressure, gap : ndarray (m,)
-        At its points.
+    gap : ndarray (m,)
+        At its points, after deformation.
     active : ndarray of bool (m,)
         Points in contact.
     """
-    neighbours, links = _links(line)
-    x = line.position
-    found = []
-    for a, b in links[active[links[:, 0]] != active[links[:, 1]]].tolist():
-        inner, outer = (a, b) if active[a] else (b, a)
-        step = float(np.linalg.norm(x[outer] - x[inner]))
-        fractions: list[float] = []
-        for at, state, value in (
-            (inner, True, np.maximum(pressure, 0) ** 2),
-            (outer, False, np.maximum(gap, 0) ** (2 / 3)),
-        ):
-            behind = [i for i in neighbours[at] if active[i] == state and i not in (inner, outer)]
-            if behind:
-                length = float(np.linalg.norm(x[at] - x[behind[0]]))
-                root = _root(float(value[at]), float(value[behind[0]]), length)
-                fraction = min(root / step, 1.0)
-                fractions.append(fraction if state else 1 - fraction)
-        mean = float(np.mean(fractions)) if fractions else 0.5
-        found.append(x[inner] + mean * (x[outer] - x[inner]))
-    return np.array(found).reshape(-1, 2)
+    neighbours, links = _neighbours(line)
+    x, order = line.position, line.rows.shape[1] - 1
+    ends, found = [], []
+    for link in links[active[links[:, 0]] != active[links[:, 1]]].tolist():
+        inner, outer = sorted(link, key=lambda i: not active[i])
+        opened = _run(outer, inner, neighbours, active)
+        if len(opened) > 1 and any(active[i] for i in neighbours[opened[-1]]):
+            opened = opened[: (len(opened) + 1) // 2]  # the other half belongs to its other end
+        steps = np.linalg.norm(np.diff(x[[inner, *opened]], axis=0), axis=1)
+        distance = np.cumsum(steps)
+        at = _closing_point(distance, gap[opened], order)
+        if at is None:
+            at = distance[0] / 2
+        closed = _run(inner, outer, neighbours, active)[:2]
+        path = np.array([*closed[::-1], *opened])
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x[path], axis=0), axis=1))])
+        at += along[len(closed) - 1]
+        ends.append((inner, outer))
+        found.append([np.interp(at, along, x[path, axis]) for axis in (0, 1)])
+    inner_outer = np.array(ends, dtype=np.intp).reshape(-1, 2)
+    return Transitions(inner_outer[:, 0], inner_outer[:, 1], np.array(found).reshape(-1, 2))

@@ -1,0 +1,44 @@
+"""The README's example, its links and its commands."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text()
+
+
+def test_example_runs(tmp_path, monkeypatch, capsys):
+    [code] = re.findall(r"```python\n(.*?)```", README, re.DOTALL)
+    assert len([line for line in code.splitlines() if line.strip()]) <= 15
+    monkeypatch.chdir(tmp_path)
+    exec(compile(code, "README.md", "exec"), {})
+    assert (tmp_path / "hertz.vtu").exists()
+    # Hertz at the force of that press: half-width 0.029 R, peak pressure 851 MPa, see the demo.
+    peak, half_width = map(
+        float, re.search(r"pressure (\S+) half-width (\S+)", capsys.readouterr().out).groups()
+    )
+    assert abs(peak / 851e6 - 1) < 0.01
+    assert abs(half_width / 0.029 - 1) < 0.01
+
+
+def test_links_lead_somewhere():
+    links = re.findall(r"\]\(([^)#:]+)\)", README)
+    assert links
+    missing = [link for link in links if not (ROOT / link).exists()]
+    assert not missing
+
+
+def test_commands_are_targets():
+    targets = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    commands = re.findall(r"^make (\w+)", README, re.MULTILINE)
+    assert commands == ["demo", "test"]
+    assert set(commands) <= set(targets)
+
+
+def test_every_module_has_a_place_in_the_theory():
+    theory = (ROOT / "docs" / "theory.md").read_text()
+    modules = {path.stem for path in (ROOT / "ngcontact").glob("[a-z]*.py")}
+    named = set(re.findall(r"`(\w+)`", theory))
+    assert modules - {"errors"} <= named
