@@ -14,7 +14,7 @@ import numpy as np
 
 from drivers.exact import Exact, hertz, patch, transition, transition_cutoff
 from drivers.exact_curved import Curved, curved, rings
-from geometries import blocks, graphs
+from geometries import blocks, disc, disc_on_block, graphs, punch
 from geometries import rings as ring_geometry
 from ngcontact import Contact, Elastic, Problem, Solution
 
@@ -162,6 +162,42 @@ def ring_in_ring(qn: float = 0.3, n: int = 2) -> Case:
         contact=[Contact(secondary="outer_contact", primary="inner_contact")],
     )
     return Case(problem, exact)
+
+
+def flat_punch() -> Problem:
+    """Block a million times stiffer than the foundation it is pressed into: r^(-1/2) at corners."""
+    return Problem(
+        geometry=punch(),
+        materials={"punch": Elastic(E=1e6, nu=0.3), "foundation": FIRST},
+        displacement={"foundation_bottom": (0, 0), "punch_top": (0, -0.01)},
+        contact=[Contact(secondary="punch_contact", primary="foundation_contact")],
+    )
+
+
+def pressed_disc() -> Problem:
+    """Disc on a block, both free to find their contact zone; a/R = 0.03."""
+    return Problem(
+        geometry=disc_on_block(),
+        materials={"disc": FIRST, "block": SECOND},
+        displacement={"block_bottom": (0, 0), "disc_top": (0, -0.002)},
+        sliding="axis",
+        contact=[Contact(secondary="disc_arc", primary="block_top", direction=(0, -1))],
+    )
+
+
+def disc_on_rigid_plane() -> Problem:
+    """Problem A: quarter disc pressed by 0.005 R on a rigid plane; E = 200, nu = 0.3.
+
+    References: contact force of the whole disc 0.4465326(2), peak pressure 5.5919(1), half-width
+    0.05082(1), strain energy of the half 5.221032(1)e-4.
+    """
+    return Problem(
+        geometry=disc(),
+        materials={"disc": Elastic(E=200.0, nu=0.3)},
+        displacement={"top": (None, -0.005)},
+        sliding="axis",
+        contact=[Contact(secondary="arc", direction=(0, -1), gap=ng.y)],
+    )
 
 
 def harmonics(solution: Solution, radius: float, n: int) -> tuple[float, float]:

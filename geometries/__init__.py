@@ -1,4 +1,4 @@
-"""Gallery of problem geometries: two named bodies in the plane, ready for contact.
+"""Gallery of problem geometries: named bodies in the plane, ready for contact.
 
 Every function returns a netgen ``OCCGeometry`` of dimension 2. The bodies are a compound of
 separate faces, so that the mesh keeps distinct, coincident nodes where they touch. The names of
@@ -6,7 +6,7 @@ bodies and boundaries stand in the docstring of each function. Lengths are in an
 """
 
 from geometries.curved import graphs
-from geometries.round import disc_on_block, disc_on_disc, rings
+from geometries.round import disc, disc_on_block, disc_on_disc, rings
 from geometries.straight import blocks, punch
 
-__all__ = ["blocks", "disc_on_block", "disc_on_disc", "graphs", "punch", "rings"]
+__all__ = ["blocks", "disc", "disc_on_block", "disc_on_disc", "graphs", "punch", "rings"]

@@ -79,6 +79,47 @@ def rings(
     )
 
 
+def disc(radius: float = 1.0, symmetric: bool = True) -> OCCGeometry:
+    """Lower half of a disc that touches the line y = 0 at the origin, for a rigid foundation.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the disc about (0, `radius`), any consistent unit of length.
+    symmetric : bool
+        Only the part with x >= 0.
+
+    Returns
+    -------
+    OCCGeometry
+        The body, with a vertex at the origin.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If `radius` is not positive, or `symmetric` is not a truth value.
+
+    Notes
+    -----
+    ====================  ==================================================
+    body                  where
+    ====================  ==================================================
+    ``disc``              y <= `radius`, inside the circle
+    ====================  ==================================================
+
+    ====================  ==================================================
+    boundary              where
+    ====================  ==================================================
+    ``top``               y = `radius`
+    ``arc``               the circle
+    ``axis``              x = 0 (only if `symmetric`)
+    ====================  ==================================================
+    """
+    radius = positive("radius", radius)
+    outline = _half_disc(radius, True, flag("symmetric", symmetric), arc="arc", flat="top")
+    return compound(body("disc", outline))
+
+
 def disc_on_block(
     radius: float = 1.0,
     width: float | None = None,

@@ -13,7 +13,7 @@ import pytest
 from netgen.occ import OCCGeometry
 
 import geometries
-from geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
+from geometries import blocks, disc, disc_on_block, disc_on_disc, graphs, punch, rings
 
 PI = math.pi
 LINE = ((-1.0, 0.0), (-0.2, 0.3), (0.5, -0.1), (1.0, 0.2))  # a convex and a re-entrant corner
@@ -85,6 +85,8 @@ CASES = [
         RINGS | CUTS,
         8,
     ),
+    Case("disc", disc, {"disc": PI / 4}, {"top", "arc", "axis"}, 3),
+    Case("disc", lambda: disc(radius=2, symmetric=False), {"disc": 2 * PI}, {"top", "arc"}, 3),
     Case(
         "disc_on_block", disc_on_block, {"disc": PI / 4, "block": 4.0}, DISC_ON_BLOCK | {"axis"}, 7
     ),
@@ -231,12 +233,11 @@ def test_faces_look_up(case: Case) -> None:
 @every_case
 def test_bodies_share_no_vertex(case: Case) -> None:
     mesh = mesh_of(case.make(), order=1)
-    upper, lower = (
+    bodies = [
         {v.nr for element in mesh.Materials(name).Elements() for v in element.vertices}
         for name in case.areas
-    )
-    assert upper.isdisjoint(lower)
-    assert len(upper) + len(lower) == mesh.nv
+    ]
+    assert len(set.union(*bodies)) == sum(len(body) for body in bodies) == mesh.nv
 
 
 # --- curves -------------------------------------------------------------------------------------
@@ -441,6 +442,7 @@ def test_geometry_scales_with_the_unit_of_length(unit: float) -> None:
         (lambda: disc_on_block(width=0), ValueError, "width = 0: expected a positive"),
         (lambda: disc_on_block(height=math.inf), ValueError, "height = inf: expected a finite"),
         (lambda: disc_on_block(symmetric=1), TypeError, "symmetric = 1: expected True or False"),
+        (lambda: disc(radius=0.0), ValueError, "radius = 0.0: expected a positive"),
         (lambda: disc_on_disc(radius=0.0), ValueError, "radius = 0.0: expected a positive"),
         (lambda: disc_on_disc(lower_radius=-1), ValueError, "lower_radius = -1: expected a pos"),
         (lambda: disc_on_disc(symmetric=None), TypeError, "symmetric = None: expected True"),
