@@ -13,18 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 
+from .host import INDEPENDENT, assign, check_prescribed, coefficients_at
 from .rows import Conditions, Rows
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
-
-PIVOT = 0.05  # least share of a row at the node whose unknown it becomes, if another is possible
-INDEPENDENT = 1e-6  # sine below which two conditions at one node are the same
-SATISFIED = 1e-8  # interpolation error of prescribed values, relative to the largest
-ROUND_OFF = 1e-13  # of measured gaps, relative to the largest coordinate
-LONGEST_CHAIN = 50  # bodies in a row whose contact lines share nodes
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,86 +81,66 @@ def _blocks(blocks: Array) -> sp.csr_matrix:
     return matrix
 
 
-class _Hosts:
-    """Assignment of rows to the nodes whose unknowns they become."""
+def _local_systems(
+    host: Index, coefficients: Array, fixed: Mask
+) -> tuple[Index, Array, sp.csr_matrix]:
+    """Make each row's part at its host an unknown there.
 
-    def __init__(self, fixed: Mask) -> None:
-        self.fixed = fixed
-        self.taken: dict[int, list[Array]] = {}
+    Parameters
+    ----------
+    host : ndarray of int (k,)
+        Host node of each row.
+    coefficients : ndarray (k, 2)
+        Of the row at its host, in the host's frame.
+    fixed : ndarray of bool (n, 2)
+        Prescribed slots.
 
-    def fits(self, node: int, coefficients: Array, least: float) -> bool:
-        """Whether the row with these coefficients at `node` finds a free direction there."""
-        free = np.where(self.fixed[node], 0.0, coefficients)
-        rows = self.taken.get(node, [])
-        size = np.linalg.norm(free)
-        if size <= least or len(rows) + np.count_nonzero(self.fixed[node]) >= 2:
-            return False
-        if not rows:
-            return True
-        sine = abs(rows[0][0] * free[1] - rows[0][1] * free[0])
-        return sine > INDEPENDENT * size * np.linalg.norm(rows[0])
-
-    def take(self, node: int, coefficients: Array) -> None:
-        """Let the row with these coefficients have a free direction at `node`."""
-        self.taken.setdefault(node, []).append(np.where(self.fixed[node], 0.0, coefficients))
-
-
-def _at(Bz: sp.csr_matrix, row: Index, node: Index) -> Array:
-    """Coefficients (k, 2) of rows (k,) at nodes (k,)."""
-    n = Bz.shape[1] // 2
-    if row.size == 0:  # SciPy answers an empty index with a sparse matrix
-        return np.zeros((0, 2))
-    return np.column_stack([np.ravel(Bz[row, node]), np.ravel(Bz[row, node + n])])
-
-
-def _assign(rows: Rows, Bz: sp.csr_matrix, fixed: Mask) -> Index:
-    """Host node of every row, -1 where all of a row's unknowns are prescribed."""
+    Returns
+    -------
+    unknown : ndarray of int (k,)
+        Slot of the row: the first free one of its host, the second for a second row.
+    local : ndarray (k, 2)
+        The coefficients at free slots.
+    G : sparse (2n, 2n)
+        Inverse of the 2 x 2 systems of rows, completed by the direction across a single row.
+    """
     n = len(fixed)
-    host = rows.node.copy()
-    local = _at(Bz, np.arange(len(host)), host)
-    free = np.where(fixed[host], 0.0, local)
-    lonely = np.bincount(host, minlength=n)[host] == 1
-    regular = lonely & (np.linalg.norm(free, axis=1) > PIVOT)
-    hosts = _Hosts(fixed)
-    for j in np.flatnonzero(regular) if not regular.all() else ():
-        hosts.take(host[j], local[j])
-    for j in np.flatnonzero(~regular):
-        columns = np.unique(Bz[j].indices % n)
-        entries = Bz[j].toarray().ravel()
-        choices = [(np.hypot(entries[i], entries[i + n]), i) for i in columns if i != rows.node[j]]
-        ranked = [rows.node[j], *(i for _, i in sorted(choices, reverse=True))]
-        coefficients = {i: np.array([entries[i], entries[i + n]]) for i in ranked}
-        for i, least in [(i, x) for x in (PIVOT, INDEPENDENT) for i in ranked]:
-            if hosts.fits(i, coefficients[i], least):
-                hosts.take(i, coefficients[i])
-                host[j] = i
-                break
-        else:
-            host[j] = -1
-    return host
+    order = np.argsort(host, kind="stable")
+    again = np.zeros(len(host), dtype=bool)
+    again[1:] = host[order][1:] == host[order][:-1]
+    slot = np.empty(len(host), dtype=np.intp)
+    slot[order] = again | fixed[host[order], 0]
+    local = np.where(fixed[host], 0.0, coefficients)
+    M = np.tile(np.eye(2), (n, 1, 1))
+    M[host, slot] = local
+    single = (np.bincount(host, minlength=n)[host] == 1) & ~fixed[host].any(axis=1)
+    across = np.column_stack([-local[single, 1], local[single, 0]])
+    M[host[single], 1] = across / np.linalg.norm(across, axis=1)[:, None]
+    inverse = np.tile(np.eye(2), (n, 1, 1))
+    inverse[host] = np.linalg.inv(M[host])
+    return host + n * slot, local, _blocks(inverse)
 
 
-def _check_prescribed(
-    rows: Rows, Bz: sp.csr_matrix, fixed: Mask, values: Array, drop: Index, length: float
-) -> None:
-    """Raise unless the rows that find no free unknown hold for the prescribed values."""
-    size = np.abs(values).max(initial=0.0)
-    for j in drop:
-        columns, entries = Bz[j].indices, Bz[j].data
-        where = f"the contact row at node {rows.node[j]} with direction {rows.direction[j]}"
-        if (np.abs(entries[~fixed[columns]]) > INDEPENDENT).any():
-            raise ValueError(
-                f"{where} depends on other contact rows there; leave one of the pairs out, or end "
-                "one of the contact boundaries before that point"
-            )
-        value = float(entries @ values[columns])
-        allowed = SATISFIED * max(size, abs(rows.g[j])) + ROUND_OFF * length
-        if value > rows.g[j] + allowed:
-            raise ValueError(
-                f"{where} is violated by prescribed displacements on both sides: they close the "
-                f"gap by {value:g} where it is {rows.g[j]:g}; prescribe displacements without "
-                "interference"
-            )
+def _without_rings(N: sp.csr_matrix, G: sp.csr_matrix) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Equations H = G + N H solved for the unknowns that refer to each other in rings."""
+    _, group = connected_components(N, connection="strong")
+    ring = np.flatnonzero(np.bincount(group)[group] > 1)
+    if ring.size == 0:
+        return N, G
+    inside = N[ring][:, ring]
+    block = np.eye(ring.size) - inside.toarray()
+    if np.linalg.cond(block) > 1 / INDEPENDENT:
+        raise ValueError(
+            "contact rows depend on each other in a ring; leave one of the contact pairs out, or "
+            "give each pair of boundaries once"
+        )
+    size = N.shape[0]
+    place = sp.identity(size, format="csr")[:, ring]
+    change = sp.csr_matrix(np.linalg.inv(block) - np.eye(ring.size))
+    S = sp.identity(size) + place @ change @ place.T
+    N = (S @ (N - place @ inside @ place.T)).tocsr()
+    N.eliminate_zeros()
+    return N, (S @ G).tocsr()
 
 
 def change_of_basis(n: int, conditions: Conditions, rows: Rows, length: float = 0.0) -> Basis:
@@ -190,49 +166,25 @@ def change_of_basis(n: int, conditions: Conditions, rows: Rows, length: float = 
     R = _blocks(frame)
     Bz = (rows.matrix(n) @ R).tocsr()
     flat_fixed, flat_values = fixed.T.ravel(), values.T.ravel()
-    host = _assign(rows, Bz, fixed)
-    _check_prescribed(rows, Bz, flat_fixed, flat_values, np.flatnonzero(host < 0), length)
+    host = assign(rows, Bz, fixed)
+    check_prescribed(rows, Bz, flat_fixed, flat_values, np.flatnonzero(host < 0), length)
     kept = np.flatnonzero(host >= 0)
     host = host[kept]
+    unknown, local, G = _local_systems(host, coefficients_at(Bz, kept, host), fixed)
 
-    # Slot of each row at its host: the first free one, the second for a second row.
-    order = np.argsort(host, kind="stable")
-    slot = np.empty(len(host), dtype=np.intp)
-    again = np.concatenate([[False], host[order][1:] == host[order][:-1]])[: len(host)]
-    slot[order] = np.where(again | fixed[host[order], 0], 1, 0)
-    unknown = host + n * slot
-
-    # Local systems M z = y; what the rows contain of other unknowns moves to the right.
-    local = np.where(fixed[host], 0.0, _at(Bz, kept, host))
-    M = np.tile(np.eye(2), (n, 1, 1))
-    M[host, slot] = local
-    alone = np.bincount(host, minlength=n) == 1
-    single = alone[host] & ~fixed[host].any(axis=1)
-    turned = np.column_stack([-local[single, 1], local[single, 0]])
-    M[host[single], 1] = turned / np.linalg.norm(turned, axis=1)[:, None]
-    inverse = np.tile(np.eye(2), (n, 1, 1))
-    inverse[host] = np.linalg.inv(M[host])
-    G = _blocks(inverse)
-
-    free_here = (
-        np.repeat(np.arange(len(host)), 2),
-        np.concatenate([host[:, None], host[:, None] + n], axis=1).ravel(),
-    )
-    rest = Bz[kept] - sp.coo_matrix((local.ravel(), free_here), (len(host), 2 * n)).tocsr()
-    place = sp.coo_matrix((np.ones(len(host)), (unknown, np.arange(len(host)))), (2 * n, len(host)))
-    N = -(G @ place.tocsr() @ rest)
+    # What the rows contain of other unknowns moves to the right: z = G y + N z.
+    k = np.arange(len(host))
+    hosted = np.concatenate([host, host + n])
+    rest = Bz[kept] - sp.csr_matrix((local.T.ravel(), (np.tile(k, 2), hosted)), (len(k), 2 * n))
+    place = sp.csr_matrix((np.ones(len(k)), (unknown, k)), (2 * n, len(k)))
+    N = -(G @ place @ rest)
     N.eliminate_zeros()
+    N, G = _without_rings(N, G)
     H, term = G, N @ G
-    for _ in range(LONGEST_CHAIN):
-        term.eliminate_zeros()
-        if term.nnz == 0:
-            break
+    while term.nnz:  # as often as bodies in a row have contact lines that share nodes
         H = H + term
         term = N @ term
-    else:
-        raise ValueError(
-            "contact pairs refer to each other in a ring; swap secondary and primary of one pair"
-        )
+        term.eliminate_zeros()
     return Basis(
         T=(R @ H).tocsr(), fixed=flat_fixed, values=flat_values, unknown=unknown, kept=kept
     )

@@ -192,9 +192,9 @@ def carried_active_set(discrete: Discrete, previous: Discrete, state: Minimiser)
         # Two points at a corner are told apart by their directions.
         size = SEPARATION * np.ptp(old.position, axis=0).max(initial=0.0)
         tree = cKDTree(np.column_stack([old.position, size * old.direction]))
-        _, nearest = tree.query(np.column_stack([new.position, size * new.direction]))
+        away, nearest = tree.query(np.column_stack([new.position, size * new.direction]))
         active = state.active[at][nearest]
-        if discrete.space.trace.order > 1:
+        if discrete.space.trace.order > 1 and away.max() > size:  # not the same points
             ends = transitions(old, slack[at], state.active[at])
             for inner, outer, place in zip(ends.inner, ends.outer, ends.position, strict=True):
                 around = (nearest == inner) | (nearest == outer)

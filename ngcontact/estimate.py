@@ -39,6 +39,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 DATA_BONUS = 4  # quadrature order above that of the discrete terms, for the loads
+ROUND_OFF = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,6 +70,7 @@ class _Residuals:
         self.mu = self._shear_moduli()
         self.boundary_stress = ng.BoundaryFromVolumeCF(solution.stress)
         self.edge_weight = self.diameter / (2 * self.mu * self.order)
+        self.in_contact = np.zeros(len(self.trace.region), dtype=bool)
         self.parts: dict[str, Array] = {}
 
     def _shear_moduli(self) -> Array:
@@ -125,15 +127,11 @@ class _Residuals:
             self.parts[name] = weight * integral.vec.FV().NumPy()
 
     def on_supports_and_loads(self) -> None:
-        """Gamma_tau, Gamma_0, Gamma_u: every boundary segment that is not in contact."""
+        """Gamma_tau, Gamma_0, Gamma_u: every segment that `on_contact` has not seen."""
         problem, trace, mesh = self.solution.problem, self.trace, self.mesh
         rule, rule_weight = gauss(2 * self.order + DATA_BONUS)
         q = len(rule)
-        in_contact = np.zeros(len(trace.region), dtype=bool)
-        for line in self.solution.discrete.lines:
-            in_contact[line.segments[line.faces]] = True
-            in_contact[np.unique(line.partner[line.partner >= 0])] = True
-        segments = np.flatnonzero(~in_contact)
+        segments = np.flatnonzero(~self.in_contact)
         segment, s = np.repeat(segments, q), np.tile(rule, len(segments))
         ds = np.linalg.norm(trace.derivative(segment, s), axis=1) * np.tile(
             rule_weight, len(segments)
@@ -172,6 +170,7 @@ class _Residuals:
             return
         pi = (lagrange(self.order, s) * _nodal_pressure(line, pressure, self.order)[local]).sum(1)
         full = np.asarray(np.append(active, True)[line.rows].all(axis=1))[local]
+        self.in_contact[segment] = True
         normal = trace.normal(segment, s)
         d = normal if contact.direction is None else np.tile(contact.direction, (len(s), 1))
         x = trace.point(segment, s)
@@ -196,10 +195,14 @@ class _Residuals:
         stretch, along, across = side(segment, s, d, pi)
         element = trace.element[segment]
         u = trace.evaluate(solution.displacement, segment, s)
+        noise = ROUND_OFF * np.abs(u).max()
+        if contact.gap is None:
+            noise += ROUND_OFF * np.abs(x).max()
         sides = [(np.arange(len(s)), element, stretch, along, across)]
         if contact.primary is not None:
             at = np.flatnonzero(met)
             there, there_s = facing[at], facing_s[at]
+            self.in_contact[there] = True
             other = side(there, there_s, d[at], -pi[at])
             u[at] -= trace.evaluate(solution.displacement, there, there_s)
             sides.append((at, trace.element[there], *other))
@@ -211,6 +214,7 @@ class _Residuals:
             self.add("tangential", element, weight * (across**2).sum(axis=1))
             self.add("pressure", element, weight * along**2)
         gap = np.where(met, distance - (u * d).sum(axis=1), 0.0)
+        gap[np.abs(gap) <= noise] = 0.0  # its root counts: 1e-16 would be an estimate of 1e-8
         share = 1 / len(sides)
         for at, element, *_ in sides:
             closed = np.maximum(pi[at], 0) * np.maximum(gap[at], 0)
@@ -246,9 +250,9 @@ def estimate(solution: Solution) -> Estimate:
     """Residual error estimate of a solution."""
     residuals = _Residuals(solution)
     residuals.inside()
-    residuals.on_supports_and_loads()
     for number, line in enumerate(solution.discrete.lines):
         at = solution.pair == number
         residuals.on_contact(line, solution.pressure[at], solution.active[at])
+    residuals.on_supports_and_loads()
     total = np.sum(list(residuals.parts.values()), axis=0)
     return Estimate(indicators=np.sqrt(np.maximum(total, 0.0)), parts=residuals.parts)

@@ -254,3 +254,5 @@ class Solution:
         if self.discrete.lines:
             parts.append(f"force {np.linalg.norm(self.contact_force()):.6g}")
         return ", ".join(parts)
+
+    __repr__ = __str__  # instead of all arrays

@@ -21,6 +21,7 @@ ELEMENTS = ("isoparametric", "superparametric", "physical")
 # Loads and variable moduli may be as rough as r^(-1/2): quadrature orders above the default.
 LOAD_BONUS = 6
 MODULUS_BONUS = 4
+ROUND_OFF = 1e-12  # of coordinates, relative to the geometry's size
 
 
 def check_element(order: int, element: str) -> None:
@@ -39,11 +40,19 @@ def geometry_order(order: int, element: str) -> int:
     return order if element == "isoparametric" else order + 1
 
 
+def _straightened(mesh: ng.Mesh) -> bool:
+    """Whether elements miss their own curved boundary, as after NGSolve's `Refine`."""
+    position = ng.CF((ng.x, ng.y))
+    off = ng.BoundaryFromVolumeCF(position) - position
+    missed, size = (ng.Integrate(ng.InnerProduct(x, x), mesh, ng.BND) for x in (off, position))
+    return bool(missed > ROUND_OFF**2 * size)
+
+
 def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
     """Mesh curved to the element's degree, and the number of elements at curved edges.
 
     A mesh without an OCC geometry, without curved edges, or curved to that degree already is
-    used as it is; otherwise the result is a copy.
+    used as it is; otherwise, also after `Refine` has straightened it, the result is a copy.
     """
     degree = geometry_order(order, element)
     edges = cad_edges(mesh)
@@ -52,7 +61,7 @@ def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
     region = mesh.ngmesh.Elements1D().NumPy()["index"] - 1
     curved = np.array([not edge.straight for edge in edges])[region]
     count = int(np.count_nonzero(curved))
-    if count == 0 or mesh.GetCurveOrder() == degree:
+    if count == 0 or (mesh.GetCurveOrder() == degree and not _straightened(mesh)):
         return mesh, count
     copy = ng.Mesh(mesh.ngmesh.Copy())
     copy.Curve(degree)

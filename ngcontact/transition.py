@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from .gap import ContactLine
 
@@ -18,6 +19,7 @@ Mask = NDArray[np.bool_]
 SKIPPED = 2
 FEWEST = 8  # points of the fit, or three per order and two if that is more
 DEGREE = 3  # of the fit, 2 at order 1
+SAMPLES = 65  # places at which the fit is evaluated to bracket its zero
 
 
 def _neighbours(line: ContactLine) -> tuple[dict[int, list[int]], Index]:
@@ -52,11 +54,14 @@ def _closing_point(distance: Array, gap: Array, order: int) -> float | None:
     if len(x) < 2 or y[-1] <= 0:
         return None
     fit = np.polynomial.Polynomial.fit(x, y, min(DEGREE, order + 1, len(x) - 1))
-    roots = fit.roots()
-    roots = roots[np.abs(roots.imag) <= 1e-12 * np.abs(roots)].real
-    # The last active point may lie on the open side by the error of one element.
-    roots = roots[(roots >= -distance[0]) & (roots <= x[0])]
-    return float(roots.max()) if len(roots) else None
+    # The last active point may lie on the open side by the error of one element. The zero is
+    # bracketed: the roots of a companion matrix are lost where leading coefficients are round-off.
+    places, step = np.linspace(-distance[0], x[0], SAMPLES, retstep=True)
+    below = np.flatnonzero(fit(places) <= 0)
+    if len(below) == 0 or below[-1] == SAMPLES - 1:
+        return None
+    low = places[below[-1]]
+    return float(low + step * brentq(lambda t: fit(low + step * t), 0, 1, xtol=1e-15))
 
 
 @dataclass(frozen=True, eq=False)

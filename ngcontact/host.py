@@ -1,0 +1,104 @@
+"""Which node hosts a contact row: the node of which one unknown becomes the row's value.
+
+The node of the secondary, unless its displacement is prescribed there or other rows took its
+directions; then a node of the facing segment. NumPy and SciPy only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .rows import Rows
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+PIVOT = 0.05  # least share of a row at the node whose unknown it becomes, if another is possible
+INDEPENDENT = 1e-6  # sine below which two conditions at one node are the same
+SATISFIED = 1e-8  # interpolation error of prescribed values, relative to the largest
+ROUND_OFF = 1e-13  # of measured gaps, relative to the largest coordinate
+
+
+class _Hosts:
+    """Assignment of rows to the nodes whose unknowns they become."""
+
+    def __init__(self, fixed: Mask) -> None:
+        self.fixed = fixed
+        self.taken: dict[int, list[Array]] = {}
+
+    def fits(self, node: int, coefficients: Array, least: float) -> bool:
+        """Whether the row with these coefficients at `node` finds a free direction there."""
+        free = np.where(self.fixed[node], 0.0, coefficients)
+        rows = self.taken.get(node, [])
+        size = np.linalg.norm(free)
+        if size <= least or len(rows) + np.count_nonzero(self.fixed[node]) >= 2:
+            return False
+        if not rows:
+            return True
+        sine = abs(rows[0][0] * free[1] - rows[0][1] * free[0])
+        return sine > INDEPENDENT * size * np.linalg.norm(rows[0])
+
+    def take(self, node: int, coefficients: Array) -> None:
+        """Let the row with these coefficients have a free direction at `node`."""
+        self.taken.setdefault(node, []).append(np.where(self.fixed[node], 0.0, coefficients))
+
+
+def coefficients_at(Bz: sp.csr_matrix, row: Index, node: Index) -> Array:
+    """Coefficients (k, 2) of rows (k,) at nodes (k,)."""
+    n = Bz.shape[1] // 2
+    if row.size == 0:  # SciPy answers an empty index with a sparse matrix
+        return np.zeros((0, 2))
+    return np.column_stack([np.ravel(Bz[row, node]), np.ravel(Bz[row, node + n])])
+
+
+def assign(rows: Rows, Bz: sp.csr_matrix, fixed: Mask) -> Index:
+    """Host node of every row, -1 where all of a row's unknowns are prescribed."""
+    n = len(fixed)
+    host = rows.node.copy()
+    local = coefficients_at(Bz, np.arange(len(host)), host)
+    free = np.where(fixed[host], 0.0, local)
+    lonely = np.bincount(host, minlength=n)[host] == 1
+    regular = lonely & (np.linalg.norm(free, axis=1) > PIVOT)
+    hosts = _Hosts(fixed)
+    for j in np.flatnonzero(regular) if not regular.all() else ():
+        hosts.take(host[j], local[j])
+    for j in np.flatnonzero(~regular):
+        columns = np.unique(Bz[j].indices % n)
+        entries = Bz[j].toarray().ravel()
+        choices = [(np.hypot(entries[i], entries[i + n]), i) for i in columns if i != rows.node[j]]
+        ranked = [rows.node[j], *(i for _, i in sorted(choices, reverse=True))]
+        coefficients = {i: np.array([entries[i], entries[i + n]]) for i in ranked}
+        for i, least in [(i, x) for x in (PIVOT, INDEPENDENT) for i in ranked]:
+            if hosts.fits(i, coefficients[i], least):
+                hosts.take(i, coefficients[i])
+                host[j] = i
+                break
+        else:
+            host[j] = -1
+    return host
+
+
+def check_prescribed(
+    rows: Rows, Bz: sp.csr_matrix, fixed: Mask, values: Array, drop: Index, length: float
+) -> None:
+    """Raise unless the rows that find no free unknown hold for the prescribed values."""
+    size = np.abs(values).max(initial=0.0)
+    for j in drop:
+        columns, entries = Bz[j].indices, Bz[j].data
+        where = f"the contact row at node {rows.node[j]} with direction {rows.direction[j]}"
+        if (np.abs(entries[~fixed[columns]]) > INDEPENDENT).any():
+            raise ValueError(
+                f"{where} depends on other contact rows there; leave one of the pairs out, or end "
+                "one of the contact boundaries before that point"
+            )
+        value = float(entries @ values[columns])
+        allowed = SATISFIED * max(size, abs(rows.g[j])) + ROUND_OFF * length
+        if value > rows.g[j] + allowed:
+            raise ValueError(
+                f"{where} is violated by prescribed displacements on both sides: they close the "
+                f"gap by {value:g} where it is {rows.g[j]:g}; prescribe displacements without "
+                "interference"
+            )

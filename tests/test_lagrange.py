@@ -1,0 +1,94 @@
+"""Lagrange interpolation at Gauss-Lobatto points: nodes, weights, polynomial exactness."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ngcontact.lagrange import gauss, gauss_lobatto, lagrange, lagrange_derivative
+
+ORDERS = [1, 2, 3, 4, 5]
+ROOT5, ROOT21 = np.sqrt(1 / 5), np.sqrt(3 / 7)
+# Textbook nodes and weights on [-1, 1].
+TABLE = {
+    1: ([-1, 1], [1, 1]),
+    2: ([-1, 0, 1], [1 / 3, 4 / 3, 1 / 3]),
+    3: ([-1, -ROOT5, ROOT5, 1], [1 / 6, 5 / 6, 5 / 6, 1 / 6]),
+    4: ([-1, -ROOT21, 0, ROOT21, 1], [1 / 10, 49 / 90, 32 / 45, 49 / 90, 1 / 10]),
+}
+S = np.linspace(0, 1, 23)
+
+
+def weights(order):
+    """Integrals of the Lagrange polynomials over [0, 1]."""
+    s, w = gauss(order)
+    return w @ lagrange(order, s)
+
+
+@pytest.mark.parametrize("order", TABLE)
+def test_nodes_and_weights_are_those_of_the_tables(order):
+    nodes, table = TABLE[order]
+    # Both are computed from roots of a polynomial with coefficients of order 10.
+    np.testing.assert_allclose(2 * gauss_lobatto(order) - 1, nodes, atol=1e-15)
+    np.testing.assert_allclose(2 * weights(order), table, rtol=1e-14)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_nodes_include_the_ends_and_weights_are_positive(order):
+    nodes = gauss_lobatto(order)
+    assert nodes.shape == (order + 1,)
+    assert nodes[0] == 0
+    assert nodes[-1] == 1
+    assert (np.diff(nodes) > 0).all()
+    assert (weights(order) > 0).all()
+    np.testing.assert_allclose(nodes + nodes[::-1], 1, atol=2e-16)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_weights_integrate_polynomials_of_degree_2p_minus_1(order):
+    nodes, w = gauss_lobatto(order), weights(order)
+    for degree in range(2 * order):
+        assert w @ nodes**degree == pytest.approx(1 / (degree + 1), rel=1e-14)
+    assert w @ nodes ** (2 * order) != pytest.approx(1 / (2 * order + 1), rel=1e-6)
+
+
+@pytest.mark.parametrize("order", range(12))
+def test_gauss_rule_is_exact_for_its_order(order):
+    s, w = gauss(order)
+    for degree in range(order + 1):
+        assert w @ s**degree == pytest.approx(1 / (degree + 1), rel=1e-14)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_partition_of_unity_and_its_derivative(order):
+    # Sums of order + 1 monomials with coefficients up to 40 at order 5.
+    np.testing.assert_allclose(lagrange(order, S).sum(axis=1), 1, atol=2e-14)
+    np.testing.assert_allclose(lagrange_derivative(order, S).sum(axis=1), 0, atol=2e-13)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_rows_at_the_nodes_are_unit_vectors_exactly(order):
+    assert (lagrange(order, gauss_lobatto(order)) == np.eye(order + 1)).all()
+    again = np.tile(gauss_lobatto(order), 2)
+    assert (lagrange(order, again) == np.tile(np.eye(order + 1), (2, 1))).all()
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_interpolation_reproduces_polynomials_of_its_degree(order):
+    nodes = gauss_lobatto(order)
+    for degree in range(order + 1):
+        values = nodes**degree
+        np.testing.assert_allclose(lagrange(order, S) @ values, S**degree, atol=2e-14)
+        slope = degree * S ** max(degree - 1, 0)
+        np.testing.assert_allclose(lagrange_derivative(order, S) @ values, slope, atol=2e-13)
+    # ... and no more: the error of s^(p+1) is the node polynomial.
+    error = S ** (order + 1) - lagrange(order, S) @ nodes ** (order + 1)
+    expected = np.prod(S[:, None] - nodes, axis=1)
+    np.testing.assert_allclose(error, expected, atol=2e-14)
+
+
+def test_one_parameter_gives_one_row():
+    assert lagrange(2, 0.5).tolist() == [[0.0, 1.0, 0.0]]
+    assert lagrange(3, np.array(0.3)).shape == (1, 4)
+    assert lagrange(2, np.zeros(0)).shape == (0, 3)
+    np.testing.assert_allclose(lagrange_derivative(2, 0.0), [[-3, 4, -1]], atol=1e-14)

@@ -1,0 +1,362 @@
+"""First meshes: matched nodes on facing lines, sizes, and the user's geometry left alone."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import netgen.occ as occ
+import ngsolve as ng
+import numpy as np
+import pytest
+from netgen.occ import OCCGeometry
+
+from geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
+from geometries.region import body, compound, polygon
+from ngcontact import Contact, Elastic, Problem
+from ngcontact.mesh import first_mesh
+from ngcontact.problem import boundary_mask
+from ngcontact.trace import boundary_trace
+
+SOFT = Elastic(E=1.0, nu=0.3)
+LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
+ROUND_OFF = 1e-12  # of coordinates of size 1; the bound of the published method's matched nodes
+MATCHED_PART = 0.86  # of a radius: the steepest part of a circle stays unmatched by design
+
+
+def wave(x: float) -> float:
+    return 0.02 + 0.01 * math.sin(9 * x)
+
+
+def valley(x: float) -> float:
+    return -0.2 * math.cos(3 * x)
+
+
+def swell(x: float) -> float:
+    return 0.2 * math.sin(4 * x)
+
+
+def parabola(x: float) -> float:
+    return x * x / 2
+
+
+def hill(x: float) -> float:
+    return -x * x / 4
+
+
+def arc(radius: float) -> Callable[[float], float]:
+    """Lower half of the circle about (0, radius), or upper one for a negative radius."""
+    return lambda x: radius - math.copysign(math.sqrt(max(radius**2 - x * x, 0.0)), radius)
+
+
+@dataclass(frozen=True)
+class Pair:
+    """A geometry, its bodies and pair; the height of both lines over x, matched for |x| < part."""
+
+    geometry: Callable[[], OCCGeometry]
+    bodies: tuple[str, str]
+    contact: Contact
+    curves: tuple[Callable[[float], float], Callable[[float], float]] | None = None
+    part: float = math.inf
+
+    def problem(self) -> Problem:
+        return pressed(self.geometry(), self.bodies, self.contact)
+
+
+BLOCKS = ("upper", "lower")
+UP = Contact("lower_contact", "upper_contact", direction=(0, 1))
+BOUNDED = {
+    "blocks": Pair(blocks, BLOCKS, Contact("upper_contact", "lower_contact")),
+    "polygon": Pair(lambda: blocks(line=LINE), BLOCKS, Contact("lower_contact", "upper_contact")),
+    "one graph": Pair(
+        lambda: graphs(swell, swell), BLOCKS, Contact("lower_contact", "upper_contact")
+    ),
+    "punch": Pair(punch, ("punch", "foundation"), Contact("punch_contact", "foundation_contact")),
+    "rings": Pair(rings, ("inner", "outer"), Contact("outer_contact", "inner_contact")),
+    "quarter rings": Pair(
+        lambda: rings(quarter=True), ("inner", "outer"), Contact("inner_contact", "outer_contact")
+    ),
+}
+ENLARGING = {
+    "blocks": Pair(blocks, BLOCKS, UP, (lambda x: 0.0, lambda x: 0.0)),
+    "graphs": Pair(lambda: graphs(parabola, hill, -0.6, 0.6, 0.6), BLOCKS, UP, (hill, parabola)),
+    "waves": Pair(lambda: graphs(wave, valley), BLOCKS, UP, (valley, wave)),
+    "disc on block": Pair(
+        disc_on_block,
+        ("disc", "block"),
+        Contact("disc_arc", "block_top", direction=(0, -1)),
+        (arc(1.0), lambda x: 0.0),
+        MATCHED_PART,
+    ),
+    "whole disc on block": Pair(
+        lambda: disc_on_block(symmetric=False),
+        ("disc", "block"),
+        Contact("block_top", "disc_arc", direction=(0, 1)),
+        (lambda x: 0.0, arc(1.0)),
+        MATCHED_PART,
+    ),
+    "disc on disc": Pair(
+        lambda: disc_on_disc(lower_radius=2.0),
+        BLOCKS,
+        Contact("upper_arc", "lower_arc", direction=(0, -1)),
+        (arc(1.0), arc(-2.0)),
+        MATCHED_PART,
+    ),
+    "whole disc on disc": Pair(
+        lambda: disc_on_disc(radius=2.0, lower_radius=1.0, symmetric=False),
+        BLOCKS,
+        Contact("upper_arc", "lower_arc", direction=(0, -1)),
+        (arc(2.0), arc(-1.0)),
+        MATCHED_PART,
+    ),
+}
+SIZES = (None, 1.0, 0.4, 0.11)
+
+
+def pressed(geometry, bodies, *contact):
+    return Problem(geometry=geometry, materials=dict.fromkeys(bodies, SOFT), contact=contact)
+
+
+def vertices(mesh, pattern):
+    """Vertices (k, 2) of the boundaries of that name."""
+    trace = boundary_trace(mesh, 1)
+    numbers = np.unique(trace.nodes[trace.select(boundary_mask(mesh, pattern))])
+    return np.array(mesh.ngmesh.Coordinates())[numbers, :2]
+
+
+def lengths(mesh, pattern):
+    """Chords of the segments of the boundaries of that name."""
+    trace = boundary_trace(mesh, 1)
+    return trace.lengths(trace.select(boundary_mask(mesh, pattern)))
+
+
+def unmatched(a, b):
+    """Largest distance from a point of one set to the nearest one of the other, both ways."""
+    a, b = (v.reshape(len(v), -1) for v in (a, b))
+    distance = np.linalg.norm(a[:, None] - b, axis=2)
+    return max(distance.min(axis=0).max(), distance.min(axis=1).max())
+
+
+@pytest.mark.parametrize("maxh", SIZES)
+@pytest.mark.parametrize("name", BOUNDED)
+def test_vertices_coincide_on_a_bounded_zone(name, maxh):
+    if name == "punch" and maxh is not None:
+        maxh = max(maxh, 0.4)  # the foundation is large
+    pair = BOUNDED[name]
+    mesh = first_mesh(pair.problem(), maxh)
+    here, there = (vertices(mesh, side) for side in (pair.contact.secondary, pair.contact.primary))
+    assert len(here) >= 2
+    assert unmatched(here, there) < ROUND_OFF
+
+
+@pytest.mark.parametrize("maxh", SIZES)
+@pytest.mark.parametrize("name", ENLARGING)
+def test_vertices_have_common_eta_on_an_enlarging_zone(name, maxh):
+    pair = ENLARGING[name]
+    mesh = first_mesh(pair.problem(), maxh)
+    eta = []
+    for side, curve in zip(
+        (pair.contact.secondary, pair.contact.primary), pair.curves, strict=True
+    ):
+        points = vertices(mesh, side)
+        x, y = points[np.abs(points[:, 0]) < pair.part].T
+        # The spline of a graph is good to 1e-12 here; circles and lines are exact.
+        assert np.abs(y - [curve(v) for v in x]).max() < ROUND_OFF
+        eta.append(x)
+    assert len(eta[0]) >= 2
+    assert unmatched(*eta) < ROUND_OFF
+
+
+@pytest.mark.parametrize("maxh", [0.4, 0.11])
+def test_contact_segments_keep_the_size_and_resolve_the_curvature(maxh):
+    mesh = first_mesh(ENLARGING["disc on block"].problem(), maxh)
+    chords = lengths(mesh, "disc_arc")
+    assert chords.max() < maxh * (1 + 1e-6)
+    on_matched_part = np.abs(vertices(mesh, "disc_arc")[:, 0]) < MATCHED_PART
+    assert np.count_nonzero(on_matched_part) >= math.radians(60) / 0.5  # at most half a radian each
+
+
+def test_contact_edges_are_filled_outside_of_the_facing_part():
+    mesh = first_mesh(ENLARGING["disc on block"].problem(), 0.2)
+    free = vertices(mesh, "block_top")
+    assert free[:, 0].max() == 2.0
+    assert lengths(mesh, "block_top").max() < 0.2 * (1 + 1e-6)
+
+
+def test_the_default_size_is_an_eighth_of_the_largest_extent():
+    mesh = first_mesh(pressed(blocks(width=4.0), BLOCKS, *[BOUNDED["blocks"].contact]))
+    assert lengths(mesh, "upper_contact|lower_contact|top|bottom") == pytest.approx(4 / 8)
+
+
+def test_a_mesh_is_the_same_every_time():
+    pair = ENLARGING["disc on disc"]
+    first, second = (
+        np.array(first_mesh(pair.problem(), 0.3).ngmesh.Coordinates()) for _ in range(2)
+    )
+    assert (first == second).all()
+
+
+@pytest.mark.parametrize("unit", [1e-3, 1e4])
+def test_matching_does_not_depend_on_the_unit_of_length(unit):
+    pair = pressed(
+        disc_on_disc(radius=unit, lower_radius=2 * unit),
+        BLOCKS,
+        Contact("upper_arc", "lower_arc", direction=(0, -1)),
+    )
+    mesh = first_mesh(pair, 0.3 * unit)
+    eta = [vertices(mesh, side)[:, 0] / unit for side in ("upper_arc", "lower_arc")]
+    assert unmatched(*(x[x < MATCHED_PART] for x in eta)) < ROUND_OFF
+
+
+def test_names_of_bodies_and_boundaries_survive():
+    geometry = disc_on_block()
+    direct = ng.Mesh(geometry.GenerateMesh(maxh=0.4))
+    mesh = first_mesh(ENLARGING["disc on block"].problem(), 0.4)
+    assert mesh.GetMaterials() == direct.GetMaterials() == ("disc", "block")
+    assert mesh.GetBoundaries() == direct.GetBoundaries()
+
+
+# --- the facing part of an edge ends where the other edge ends ---
+
+
+def low(name="lower_contact"):
+    """Block from x = -1 to 1 below y = 0, its top one edge."""
+    corners = [(1.0, 0.0), (-1.0, 0.0), (-1.0, -1.0), (1.0, -1.0)]
+    return body("lower", polygon(corners, [name, "sides", "bottom", "sides"]))
+
+
+def high(name, left, right, contact):
+    """Block from x = left to right above y = 0."""
+    corners = [(left, 0.0), (right, 0.0), (right, 1.0), (left, 1.0)]
+    return body(name, polygon(corners, [contact, "sides", f"{name}_top", "sides"]))
+
+
+@pytest.mark.parametrize("direction", [None, 1])
+@pytest.mark.parametrize("wide_is_secondary", [True, False])
+def test_a_line_inside_a_longer_one_has_its_ends_among_the_nodes(wide_is_secondary, direction):
+    geometry = compound(high("upper", -0.47, 0.33, "upper_contact"), low())
+    names = ["lower_contact", "upper_contact"] if wide_is_secondary else None
+    secondary, primary = names or ["upper_contact", "lower_contact"]
+    xi = None if direction is None else (0, 1 if wide_is_secondary else -1)
+    mesh = first_mesh(pressed(geometry, BLOCKS, Contact(secondary, primary, direction=xi)), 0.4)
+    short, wide = (np.sort(vertices(mesh, n)[:, 0]) for n in ("upper_contact", "lower_contact"))
+    assert unmatched(short, wide[(wide > -0.5) & (wide < 0.35)]) < ROUND_OFF
+    assert np.diff(wide).min() > 0.2  # two halves of 0.8 and two of at most 0.4: no slivers
+    assert np.diff(wide).max() < 0.4 * (1 + 1e-6)
+
+
+def test_a_corner_of_the_primary_meets_a_node_of_the_secondary():
+    corners = [(-1.0, 0.0), (0.1, 0.05), (1.0, 0.0), (1.0, 1.0), (-1.0, 1.0)]
+    kinked = body(
+        "upper", polygon(corners, ["upper_contact"] * 2 + ["sides", "upper_top", "sides"])
+    )
+    mesh = first_mesh(pressed(compound(kinked, low()), BLOCKS, UP), 0.4)
+    upper, lower = (vertices(mesh, n)[:, 0] for n in ("upper_contact", "lower_contact"))
+    assert unmatched(upper, lower) < ROUND_OFF
+    assert np.diff(np.sort(lower)).min() > 0.2  # no slivers beside the corner
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_two_bodies_on_one_edge_are_both_matched(together):
+    geometry = compound(
+        high("first", -0.9, -0.7, "first_contact"),
+        high("second", 0.5, 0.8, "second_contact"),
+        low(),
+    )
+    names = ["first_contact|second_contact"] if together else ["first_contact", "second_contact"]
+    pairs = [Contact(name, "lower_contact") for name in names]
+    mesh = first_mesh(pressed(geometry, ("first", "second", "lower"), *pairs), 0.3)
+    x = vertices(mesh, "lower_contact")[:, 0]
+    for name, low_end, high_end in (("first", -0.9, -0.7), ("second", 0.5, 0.8)):
+        inside = x[(x > low_end - 0.01) & (x < high_end + 0.01)]
+        assert unmatched(inside, vertices(mesh, f"{name}_contact")[:, 0]) < ROUND_OFF
+    # The free part between the two bodies, 1.2 long, is divided as well.
+    assert lengths(mesh, "lower_contact").max() < 0.3 * (1 + 1e-6)
+
+
+# --- what the user has set ---
+
+
+def test_the_geometry_is_left_as_it_was():
+    geometry = disc_on_block()
+    problem = pressed(geometry, ("disc", "block"), ENLARGING["disc on block"].contact)
+    before = np.array(ng.Mesh(geometry.GenerateMesh(maxh=0.3)).ngmesh.Coordinates())
+    matched = np.array(first_mesh(problem, 0.3).ngmesh.Coordinates())
+    assert all(edge.partition is None for edge in geometry.shape.edges)
+    after = np.array(ng.Mesh(geometry.GenerateMesh(maxh=0.3)).ngmesh.Coordinates())
+    assert before.shape != matched.shape
+    assert (before == after).all()
+
+
+def test_the_geometry_is_left_as_it_was_when_meshing_fails(monkeypatch):
+    problem = BOUNDED["blocks"].problem()
+
+    def fail(shape, dim):
+        assert any(edge.partition is not None for edge in shape.edges)
+        raise RuntimeError("no mesh")
+
+    monkeypatch.setattr(occ, "OCCGeometry", fail)
+    with pytest.raises(RuntimeError, match="no mesh"):
+        first_mesh(problem, 0.3)
+    assert all(edge.partition is None for edge in problem.geometry.shape.edges)
+
+
+def test_partitions_of_the_user_are_honoured():
+    geometry = blocks()
+    fractions = {"upper_contact": [0.2, 0.5, 0.6], "top": [0.125]}
+    for edge in geometry.shape.edges:
+        if edge.name in fractions:
+            edge.partition = fractions[edge.name]
+    mesh = first_mesh(pressed(geometry, BLOCKS, BOUNDED["blocks"].contact), 0.7)
+    for name, inner in fractions.items():
+        x = np.sort(vertices(mesh, name)[:, 0])
+        x = (x - x[0]) / (x[-1] - x[0])
+        x = x if name == "upper_contact" else 1 - x[::-1]  # the top runs to the left
+        assert x == pytest.approx([0, *inner, 1], abs=ROUND_OFF)
+    kept = {edge.name: list(edge.partition) for edge in geometry.shape.edges if edge.partition}
+    assert kept == fractions
+
+
+@pytest.mark.parametrize("name", ["upper_contact", "lower_contact"])
+def test_the_size_of_one_edge_holds_on_the_facing_one(name):
+    geometry = blocks()
+    for edge in geometry.shape.edges:
+        if edge.name == name:
+            edge.maxh = 0.1
+    mesh = first_mesh(pressed(geometry, BLOCKS, BOUNDED["blocks"].contact), 0.5)
+    for side in ("upper_contact", "lower_contact"):
+        assert lengths(mesh, side) == pytest.approx(0.1)
+    assert lengths(mesh, "top").min() > 0.2
+
+
+def test_a_mesh_is_returned_as_it_is():
+    mesh = ng.Mesh(blocks().GenerateMesh(maxh=0.5))
+    assert first_mesh(pressed(mesh, BLOCKS, BOUNDED["blocks"].contact)) is mesh
+
+
+def test_nothing_is_placed_for_a_rigid_obstacle():
+    geometry = disc_on_block()
+    contact = Contact("disc_arc", direction=(0, -1), gap=ng.y)
+    mesh = first_mesh(pressed(geometry, ("disc", "block"), contact), 0.3)
+    direct = ng.Mesh(geometry.GenerateMesh(maxh=0.3))
+    assert mesh.nv == direct.nv
+
+
+@pytest.mark.parametrize(
+    ("maxh", "error"),
+    [
+        (0, ValueError),
+        (-0.1, ValueError),
+        (math.nan, ValueError),
+        (math.inf, ValueError),
+        ("0.1", TypeError),
+        (True, TypeError),
+        (0.1j, TypeError),
+    ],
+)
+def test_a_bad_size_is_refused_with_its_value(maxh, error):
+    value = repr(maxh) if error is TypeError else str(maxh)
+    with pytest.raises(error, match=f"maxh={value}.*0.25") as caught:
+        first_mesh(BOUNDED["blocks"].problem(), maxh)
+    assert "maxh" in str(caught.value)

@@ -1,0 +1,281 @@
+"""Rays from contact points to facing curves: exact roots on lines and parabolas."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ngcontact import projection
+from ngcontact.lagrange import gauss_lobatto, lagrange
+from ngcontact.projection import MATCHED, cast, coincident, snap
+
+UP, DOWN = np.array([0.0, 1.0]), np.array([0.0, -1.0])
+RNG = np.random.default_rng(7)
+
+
+def graph(f, knots, degree=1):
+    """Segments of y = f(x) from left to right, x linear in s."""
+    knots = np.asarray(knots, dtype=float)
+    x = knots[:-1, None] + np.diff(knots)[:, None] * gauss_lobatto(degree)
+    return np.stack([x, f(x)], axis=2)
+
+
+def upward(curve):
+    """Sides for a body below a curve that runs to the right: the outward normal points up."""
+    return -np.ones(len(curve))
+
+
+def rays(points, direction):
+    points = np.atleast_2d(np.asarray(points, dtype=float))
+    return points, np.tile(direction, (len(points), 1))
+
+
+def at(curve, found):
+    """Partner points."""
+    degree = curve.shape[1] - 1
+    return np.einsum("ki,kid->kd", lagrange(degree, found.s), curve[found.segment])
+
+
+def circle(radius=1.0, count=12, degree=2, centre=(0.0, 0.0)):
+    """A closed curve, counterclockwise; its points are on the circle at equal angles."""
+    turns = np.linspace(0, 2 * math.pi, count + 1)
+    theta = turns[:-1, None] + np.diff(turns)[:, None] * gauss_lobatto(degree)
+    return np.asarray(centre) + radius * np.stack([np.cos(theta), np.sin(theta)], axis=2)
+
+
+# ------------------------------------------------------------------------------------- lines
+
+
+def test_vertical_rays_on_a_line():
+    curve = graph(lambda x: 0.5 * x, [-1, 0, 1, 3])
+    x = np.array([-0.75, 0.25, 0.5, 2.5])
+    points, directions = rays(np.column_stack([x, 4 + 0 * x]), DOWN)
+    found = cast(points, directions, curve, upward(curve))
+    assert found.segment.tolist() == [0, 1, 1, 2]
+    np.testing.assert_allclose(found.s, [0.25, 0.25, 0.5, 0.75], atol=1e-15)
+    np.testing.assert_allclose(found.distance, 4 - 0.5 * x, rtol=1e-15)
+
+
+def test_oblique_rays_on_a_line():
+    curve = graph(lambda x: 0.5 * x, [-1, 0.2, 3])
+    for angle in (-100, -80, -60, -120):
+        d = np.array([math.cos(math.radians(angle)), math.sin(math.radians(angle))])
+        target = np.column_stack([RNG.uniform(-0.9, 2.9, 20), np.zeros(20)])
+        target[:, 1] = 0.5 * target[:, 0]
+        length = RNG.uniform(-0.5, 2, 20)  # overlap included
+        found = cast(*rays(target - length[:, None] * d, d), curve, upward(curve))
+        np.testing.assert_allclose(at(curve, found), target, atol=1e-14)
+        np.testing.assert_allclose(found.distance, length, atol=1e-14)
+
+
+def test_overlap_is_a_negative_distance():
+    curve = graph(lambda x: 0 * x, [0, 1])
+    found = cast(*rays([[0.5, -0.25], [0.25, 0.125]], DOWN), curve, upward(curve))
+    assert found.distance.tolist() == [-0.25, 0.125]
+
+
+def test_rays_that_meet_nothing():
+    curve = graph(lambda x: 0 * x, [0, 1])
+    points, directions = rays([[-0.1, 1.0], [1.1, 1.0], [0.5, 1.0]], DOWN)
+    found = cast(points, directions, curve, upward(curve))
+    assert found.segment.tolist() == [-1, -1, 0]
+    assert np.isinf(found.distance[:2]).all()
+    # From behind, and along the curve, no point faces.
+    assert (cast(points, -directions, curve, upward(curve)).segment == -1).all()
+    assert (cast(*rays(points, [1.0, 0.0]), curve, upward(curve)).segment == -1).all()
+
+
+def test_nothing_given():
+    curve = graph(lambda x: 0 * x, [0, 1])
+    none = np.zeros((0, 2))
+    for search in (
+        lambda x, d, c, n: cast(x, d, c, n),
+        lambda x, d, c, n: coincident(x, d, c, n, 1),
+    ):
+        assert search(none, none, curve, upward(curve)).segment.shape == (0,)
+        found = search(*rays([0.0, 0.0], DOWN), curve[:0], np.zeros(0))
+        assert found.segment.tolist() == [-1]
+
+
+# --------------------------------------------------------------------------------- parabolas
+
+
+@pytest.mark.parametrize("degree", [2, 3, 4])
+def test_vertical_rays_on_a_parabola(degree):
+    """The curve is exact at degree 2 and above: partner at the same x, distance by subtraction."""
+    curve = graph(lambda x: x**2 / 2, [-1, -0.3, 0.4, 1], degree)
+    x = RNG.uniform(-1, 1, 200)
+    y = RNG.uniform(-1, 2, 200)
+    found = cast(*rays(np.column_stack([x, y]), DOWN), curve, upward(curve))
+    np.testing.assert_allclose(at(curve, found), np.column_stack([x, x**2 / 2]), atol=2e-15)
+    np.testing.assert_allclose(found.distance, y - x**2 / 2, atol=4e-15)
+
+
+def test_oblique_rays_on_a_parabola_solve_the_quadratic():
+    curve = graph(lambda x: x**2, np.linspace(-1, 1, 5), 2)
+    d = np.array([0.6, -0.8])
+    points = np.column_stack([RNG.uniform(-1, 0, 50), np.full(50, 0.9)])
+    found = cast(*rays(points, d), curve, upward(curve))
+    # y0 - 0.8 t = (x0 + 0.6 t)^2, both roots face where the normal (-2x, 1) opposes d.
+    x0, y0 = points.T
+    a, b, c = 0.36, 1.2 * x0 + 0.8, x0**2 - y0
+    root = np.sqrt(b**2 - 4 * a * c)
+    expected = (-b + root) / (2 * a)
+    np.testing.assert_allclose(found.distance, expected, atol=1e-14)
+    np.testing.assert_allclose(at(curve, found), points + expected[:, None] * d, atol=1e-14)
+
+
+def test_parametrisation_need_not_be_linear():
+    """A quadratic segment whose middle node is off the middle: eta(s) = 0.4 s + 0.6 s^2."""
+    s = gauss_lobatto(2)
+    eta = 0.4 * s + 0.6 * s**2
+    curve = np.stack([eta, 0.1 * s], axis=1)[None]
+    wanted = RNG.random(40)
+    x = 0.4 * wanted + 0.6 * wanted**2
+    found = cast(*rays(np.column_stack([x, np.ones(40)]), DOWN), curve, upward(curve))
+    np.testing.assert_allclose(found.s, wanted, atol=1e-14)
+    np.testing.assert_allclose(found.distance, 1 - 0.1 * wanted, atol=1e-14)
+
+
+# ---------------------------------------------------------------------------- closed curves
+
+
+def test_far_side_of_a_closed_curve_is_not_taken():
+    """Inside a disc that overlaps: up and down are equally good rays, the facing side counts."""
+    curve = circle()
+    side = np.ones(len(curve))  # counterclockwise: outward is to the right
+    points, directions = rays([[0.1, -0.9], [0.1, 0.2], [0.1, 1.7]], DOWN)
+    found = cast(points, directions, curve, side)
+    partner = at(curve, found)
+    assert (partner[:, 1] > 0.9).all()
+    np.testing.assert_allclose(partner[:, 0], 0.1, atol=1e-14)
+    np.testing.assert_allclose(found.distance, points[:, 1] - partner[:, 1], atol=1e-14)
+    # A hole faces with its far side.
+    hole = cast(points, directions, curve, -side)
+    assert (at(curve, hole)[:, 1] < -0.9).all()
+    assert (hole.distance[:2] > 0).all()
+
+
+def test_nearest_of_several_facing_curves():
+    upper = graph(lambda x: 0 * x, [0, 1])
+    lower = graph(lambda x: 0 * x - 1, [0, 1])
+    curve = np.concatenate([lower, upper])
+    points, directions = rays([[0.5, 0.2], [0.5, -0.2], [0.5, -0.8], [0.5, -1.1]], DOWN)
+    found = cast(points, directions, curve, upward(curve))
+    assert found.segment.tolist() == [1, 1, 0, 0]
+    np.testing.assert_allclose(found.distance, [0.2, -0.2, 0.2, -0.1], atol=1e-15)
+
+
+# ---------------------------------------------------------------------------------- vertices
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_rays_through_vertices_find_the_vertex(degree):
+    knots = np.array([-1, -0.3, 0.1, 0.7, 1])
+    curve = graph(lambda x: x**2 / 2, knots, degree)
+    for shift in (0.0, 1e-11, -1e-11):  # within MATCHED of the segments' lengths
+        points, directions = rays(np.column_stack([knots + shift, np.ones(5)]), DOWN)
+        found = cast(points, directions, curve, upward(curve))
+        assert (found.segment >= 0).all()
+        assert np.isin(found.s, (0.0, 1.0)).all()
+        np.testing.assert_allclose(at(curve, found)[:, 0], knots, atol=1e-15)
+        np.testing.assert_allclose(found.distance, 1 - knots**2 / 2, atol=1e-15)
+    beyond = cast(*rays([[1 + 1e-6, 1.0]], DOWN), curve, upward(curve))
+    assert beyond.segment.tolist() == [-1]
+
+
+def test_vertex_at_the_end_of_the_facing_side():
+    """Only one of the two segments at the vertex faces the ray: that one is taken."""
+    corner = np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [1.0, -1.0]]])
+    found = cast(*rays([[1.0, 0.5]], DOWN), corner, -np.ones(2))
+    assert (found.segment.tolist(), found.s.tolist()) == ([0], [1.0])
+    found = cast(*rays([[1.5, 0.0]], [-1.0, 0.0]), corner, -np.ones(2))
+    assert (found.segment.tolist(), found.s.tolist()) == ([1], [0.0])
+
+
+def test_blocks_of_points_give_the_same(monkeypatch):
+    curve = graph(lambda x: x**2 / 2, np.linspace(-1, 1, 9), 2)
+    points, directions = rays(RNG.uniform(-1, 1, (57, 2)), DOWN)
+    whole = cast(points, directions, curve, upward(curve))
+    monkeypatch.setattr(projection, "PAIRS_AT_ONCE", 40)
+    parts = cast(points, directions, curve, upward(curve))
+    assert (whole.segment == parts.segment).all()
+    assert (whole.s == parts.s).all()
+    assert (whole.distance == parts.distance).all()
+
+
+def test_scale_does_not_matter():
+    curve = graph(lambda x: x**2 / 2, [-1, 0.25, 1], 2)
+    points, directions = rays(RNG.uniform(-1, 1, (20, 2)), DOWN)
+    one = cast(points, directions, curve, upward(curve))
+    for scale in (2.0**-40, 2.0**40):
+        other = cast(scale * points, directions, scale * curve, upward(curve))
+        assert (other.segment == one.segment).all()
+        assert (other.distance == scale * one.distance).all()
+
+
+# -------------------------------------------------------------------------------- coincident
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_coincident_nodes(order):
+    curve = graph(lambda x: 0.3 * x, [0, 0.4, 1])
+    normal = np.array([-0.3, 1.0]) / math.hypot(0.3, 1)
+    nodes = np.einsum("ji,qid->qjd", lagrange(1, gauss_lobatto(order)), curve)
+    nodes = np.unique(nodes.reshape(-1, 2), axis=0)
+    lift = np.zeros(len(nodes))
+    lift[::2] = 1e-11
+    points = nodes + lift[:, None] * normal
+    found = coincident(points, np.tile(-normal, (len(nodes), 1)), curve, upward(curve), order)
+    np.testing.assert_allclose(at(curve, found), nodes, atol=1e-15)
+    assert np.isin(found.s, gauss_lobatto(order)).all()
+    # The gap is a subtraction of coordinates, not zero by decree.
+    np.testing.assert_allclose(found.distance, lift, atol=1e-16)
+
+
+def test_points_off_the_nodes_do_not_coincide():
+    curve = graph(lambda x: 0 * x, [0, 1])
+    points, directions = rays([[0.5, 0.0], [0.0, 1e-8], [1.0, 0.0]], DOWN)
+    found = coincident(points, directions, curve, upward(curve), 1)
+    assert found.segment.tolist() == [-1, -1, 0]
+    assert found.s[2] == 1.0
+    assert coincident(points, directions, curve, upward(curve), 2).segment.tolist() == [0, -1, 0]
+
+
+def test_coincident_nodes_must_face():
+    curve = graph(lambda x: 0 * x, [0, 1])
+    points, directions = rays([[0.0, 0.0]], UP)
+    assert coincident(points, directions, curve, upward(curve), 1).segment.tolist() == [-1]
+
+
+def test_coincident_vertex_of_two_segments():
+    """At a corner the row of each side has its partner on the segment that opposes it."""
+    corner = np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [1.0, -1.0]]])
+    points = np.ones((2, 2)) * [1.0, 0.0]
+    found = coincident(points, np.array([[0.0, -1.0], [-1.0, 0.0]]), corner, -np.ones(2), 1)
+    assert found.segment.tolist() == [0, 1]
+    assert found.s.tolist() == [1.0, 0.0]
+    assert found.distance.tolist() == [0.0, 0.0]
+
+
+def test_matched_is_relative_to_the_segment():
+    """Beside a short segment a long one does not widen the tolerance."""
+    curve = graph(lambda x: 0 * x, [0, 1e-4, 1])
+    points, directions = rays([[0.0, 5e-10], [0.0, 5e-14], [1.0, 5e-10]], DOWN)
+    found = coincident(points, directions, curve, upward(curve), 1)
+    assert found.segment.tolist() == [-1, 0, 1]
+
+
+# -------------------------------------------------------------------------------------- snap
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_snap(order):
+    nodes = gauss_lobatto(order)
+    assert (snap(nodes, order) == nodes).all()
+    assert (snap(nodes + 0.9 * MATCHED, order) == nodes).all()
+    away = nodes + 1.1 * MATCHED
+    assert (snap(away, order) == away).all()
+    assert snap(np.zeros(0), order).shape == (0,)

@@ -1,0 +1,504 @@
+"""The spaces V_h against independent assemblies, linear fields, rigid motions and bars."""
+
+from __future__ import annotations
+
+import math
+
+import ngsolve as ng
+import numpy as np
+import pytest
+import scipy.sparse as sp
+from ngsolve.meshes import MakeStructured2DMesh
+
+from geometries import blocks, disc, graphs, rings
+from ngcontact import Elastic, Hooke, Problem, solve
+from ngcontact.lagrange import gauss
+from ngcontact.space import assemble, check_element, cholesky, curve, geometry_order
+from ngcontact.trace import boundary_trace
+
+ORDERS = [1, 2, 3, 4]
+STEEL = Elastic(E=2.0, nu=0.3)
+GRADIENT = np.array([[0.3, -1.1], [0.4, 0.7]])
+LINEAR = ng.CF((0.3 * ng.x - 1.1 * ng.y + 0.2, 0.4 * ng.x + 0.7 * ng.y - 0.5))
+STRAIN = np.array([0.3, 0.7, -0.7])
+
+
+def space_of(mesh, element="physical", order=1, **data):
+    """Space of a problem with one law for all bodies unless `materials` says otherwise."""
+    data = {"materials": dict.fromkeys(mesh.GetMaterials(), STEEL), **data}
+    mesh, _ = curve(mesh, order, element)
+    return assemble(Problem(geometry=mesh, **data), boundary_trace(mesh, order), element)
+
+
+def mesh_of(geometry, maxh=0.5):
+    return ng.Mesh(geometry.GenerateMesh(maxh=maxh))
+
+
+CURVED = {
+    "disc": lambda: mesh_of(disc(symmetric=False)),
+    "rings": lambda: mesh_of(rings(quarter=True), maxh=0.4),
+    "graphs": lambda: mesh_of(graphs(lambda x: 0.2 * math.sin(4 * x), lambda x: x**2 / 2 - 0.8)),
+    # Corner elements have two curved sides.
+    "coarse": lambda: mesh_of(disc(), maxh=2.0),
+}
+every_curved = pytest.mark.parametrize("make", CURVED.values(), ids=list(CURVED))
+
+
+class Quadrature:
+    """Points and weights on the triangles bounded by the parabolas of a mesh of degree 2."""
+
+    def __init__(self, trace, count=8):
+        mesh = trace.mesh
+        vertices = np.array(mesh.ngmesh.Coordinates())[:, :2]
+        self.triangles = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
+        self.corners = vertices[self.triangles]
+        middles = (self.corners + np.roll(self.corners, -1, axis=1)) / 2
+        for k, element in enumerate(trace.element):
+            ends = trace.nodes[k]
+            [side] = [
+                i
+                for i in range(3)
+                if {self.triangles[element, i], self.triangles[element, (i + 1) % 3]} == set(ends)
+            ]
+            middles[element, side] = trace.point(np.array([k]), np.array([0.5]))[0]
+        # Quadratic map of the unit triangle, by a product rule on the square.
+        t, w = np.polynomial.legendre.leggauss(count)
+        t, w = (1 + t) / 2, w / 2
+        a, b = (g.ravel() for g in np.meshgrid(t, t, indexing="ij"))
+        r, s, w = a, b * (1 - a), np.outer(w * (1 - t), w).ravel()
+        q = 1 - r - s
+        values = [
+            q * (2 * q - 1),
+            r * (2 * r - 1),
+            s * (2 * s - 1),
+            4 * q * r,
+            4 * r * s,
+            4 * s * q,
+        ]
+        zero = 0 * r
+        by_r = [1 - 4 * q, 4 * r - 1, zero, 4 * (q - r), 4 * s, -4 * s]
+        by_s = [1 - 4 * q, zero, 4 * s - 1, -4 * r, 4 * r, 4 * (q - s)]
+        nodes = np.concatenate([self.corners, middles], axis=1)
+        self.points = np.einsum("iq,tid->tqd", values, nodes)
+        x_r, x_s = (np.einsum("iq,tid->tqd", d, nodes) for d in (by_r, by_s))
+        self.weights = w * (x_r[..., 0] * x_s[..., 1] - x_r[..., 1] * x_s[..., 0])
+
+    def barycentric(self, element, x):
+        """Linear functions (k, 3) of the straight triangles (k,), also outside of them."""
+        corners = self.corners[element]
+        matrix = np.concatenate([corners.transpose(0, 2, 1), np.ones((len(corners), 1, 3))], axis=1)
+        right = np.concatenate([x, np.ones((len(x), 1))], axis=1)
+        return np.linalg.solve(matrix, right[..., None])[..., 0]
+
+    def strain_matrices(self):
+        """G (t, 3, 6): Voigt strain from the vertices' x components, then y."""
+        unit = np.eye(2)
+        gradient = np.stack(
+            [
+                self.barycentric(np.arange(len(self.corners)), self.corners[:, 0] + e)
+                - self.barycentric(np.arange(len(self.corners)), self.corners[:, 0])
+                for e in unit
+            ],
+            axis=1,
+        )
+        zero = np.zeros_like(gradient[:, :1])
+        dx, dy = gradient[:, :1], gradient[:, 1:]
+        return np.block([[dx, zero], [zero, dy], [dy, dx]])
+
+
+def independent_stiffness(quadrature, C, vertices):
+    """Sum of G' (integral of C over the curved element) G; C maps points (q, 2) to (q, 3, 3)."""
+    A = np.zeros((2 * vertices, 2 * vertices))
+    G = quadrature.strain_matrices()
+    for element, corners in enumerate(quadrature.triangles):
+        law = np.einsum("q,qij->ij", quadrature.weights[element], C(quadrature.points[element]))
+        dofs = np.concatenate([corners, corners + vertices])
+        A[np.ix_(dofs, dofs)] += G[element].T @ law @ G[element]
+    return A
+
+
+def isotropic(E, nu):
+    scale = E / ((1 + nu) * (1 - 2 * nu))
+    return scale * np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, (1 - 2 * nu) / 2]])
+
+
+def field(space, values):
+    """Function of V_h with these node values."""
+    u = ng.GridFunction(space.V)
+    u.vec.FV().NumPy()[:] = space.basis @ values
+    return u
+
+
+def strains(u, mesh):
+    """Voigt strain (k, 3) inside all elements."""
+    rule = ng.IntegrationRule([(0.2, 0.3), (0.6, 0.1), (0.1, 0.85)], [1, 1, 1])
+    grad = ng.Grad(u)
+    e = ng.CF((grad[0, 0], grad[1, 1], grad[0, 1] + grad[1, 0]))
+    return np.asarray(e(mesh.MapToAllElements(rule, ng.VOL))).reshape(-1, 3)
+
+
+# ------------------------------------------------------------------- the element of HH81 (2.4)
+
+
+@every_curved
+def test_physical_element_reproduces_linear_fields(make):
+    space = space_of(make())
+    mesh = space.trace.mesh
+    assert mesh.GetCurveOrder() == 2
+    xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
+    values = xy @ GRADIENT.T + [0.2, -0.5]
+    u = field(space, values.T.ravel())
+    np.testing.assert_allclose(strains(u, mesh), np.tile(STRAIN, (3 * mesh.ne, 1)), atol=1e-13)
+    assert math.sqrt(ng.Integrate(ng.InnerProduct(u - LINEAR, u - LINEAR), mesh)) < 1e-14
+
+
+@every_curved
+def test_physical_strain_is_constant_in_each_element(make):
+    space = space_of(make())
+    rng = np.random.default_rng(0)
+    u = field(space, rng.normal(size=space.basis.shape[1]))
+    e = strains(u, space.trace.mesh).reshape(-1, 3, 3)
+    np.testing.assert_allclose(e, np.repeat(e[:, :1], 3, axis=1), atol=1e-12 * np.abs(e).max())
+
+
+@every_curved
+def test_physical_stiffness_with_constant_modulus(make):
+    space = space_of(make())
+    A = (space.basis.T @ space.A @ space.basis).toarray()
+    quadrature = Quadrature(space.trace)
+    C = isotropic(2.0, 0.3)
+    expected = independent_stiffness(
+        quadrature, lambda x: np.tile(C, (len(x), 1, 1)), space.trace.mesh.nv
+    )
+    np.testing.assert_allclose(A, expected, atol=1e-13 * np.abs(expected).max())
+    # As |T_curved| G' C G: the areas are what the curves change.
+    area = quadrature.weights.sum(axis=1)
+    assert area.sum() == pytest.approx(ng.Integrate(ng.CF(1), space.trace.mesh), rel=1e-13)
+    c = quadrature.corners
+    side_a, side_b = c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]
+    straight = (side_a[:, 0] * side_b[:, 1] - side_a[:, 1] * side_b[:, 0]) / 2
+    assert np.abs(area / straight - 1).max() > 1e-3
+    scaled = np.zeros_like(expected)
+    for t, (G, corners) in enumerate(
+        zip(quadrature.strain_matrices(), quadrature.triangles, strict=True)
+    ):
+        dofs = np.concatenate([corners, corners + space.trace.mesh.nv])
+        scaled[np.ix_(dofs, dofs)] += area[t] * G.T @ C @ G
+    np.testing.assert_allclose(A, scaled, atol=1e-13 * np.abs(expected).max())
+
+
+@every_curved
+def test_physical_stiffness_with_variable_modulus(make):
+    """Polynomial entries, so that the quadrature of both sides is exact."""
+    mesh = make()
+    E = 2 + 0.3 * ng.x - 0.2 * ng.y + 0.1 * ng.x * ng.y
+    space = space_of(mesh, materials=dict.fromkeys(mesh.GetMaterials(), Elastic(E, 0.3)))
+    A = (space.basis.T @ space.A @ space.basis).toarray()
+
+    def law(x):
+        values = 2 + 0.3 * x[:, 0] - 0.2 * x[:, 1] + 0.1 * x[:, 0] * x[:, 1]
+        return values[:, None, None] * isotropic(1.0, 0.3)
+
+    expected = independent_stiffness(Quadrature(space.trace), law, space.trace.mesh.nv)
+    np.testing.assert_allclose(A, expected, atol=1e-13 * np.abs(expected).max())
+
+
+@every_curved
+def test_physical_load_of_a_body_force(make):
+    mesh = make()
+    F = (0.7, -0.4)
+    space = space_of(mesh, force=dict.fromkeys(mesh.GetMaterials(), F))
+    nv = space.trace.mesh.nv
+    quadrature = Quadrature(space.trace)
+    expected = np.zeros(nv)
+    for element, corners in enumerate(quadrature.triangles):
+        x = quadrature.points[element]
+        functions = quadrature.barycentric(np.full(len(x), element), x)
+        expected[corners] += quadrature.weights[element] @ functions
+    load = (space.basis.T @ space.f).reshape(2, nv)
+    np.testing.assert_allclose(load, np.outer(F, expected), atol=1e-14)
+
+
+def test_physical_load_of_a_traction_reaches_the_inner_vertex():
+    mesh = mesh_of(disc(symmetric=False))
+    P = (0.7, -0.4)
+    space = space_of(mesh, traction={"arc": P})
+    trace, nv = space.trace, space.trace.mesh.nv
+    quadrature = Quadrature(trace)
+    s, w = gauss(12)
+    expected = np.zeros(nv)
+    inner_loads = []
+    for k in np.flatnonzero(np.array(trace.mesh.GetBoundaries())[trace.region] == "arc"):
+        segment, element = np.full(len(s), k), int(trace.element[k])
+        x = trace.point(segment, s)
+        speed = np.linalg.norm(trace.derivative(segment, s), axis=1)
+        functions = quadrature.barycentric(np.full(len(s), element), x)
+        corners = quadrature.triangles[element]
+        expected[corners] += (w * speed) @ functions
+        inner = ~np.isin(corners, trace.nodes[k])
+        inner_loads.append(((w * speed) @ functions[:, inner])[0])
+    load = (space.basis.T @ space.f).reshape(2, nv)
+    np.testing.assert_allclose(load, np.outer(P, expected), atol=1e-11)  # the speed is a root
+    # Outside the straight triangle the function of the inner vertex is negative.
+    assert max(inner_loads) < -1e-3
+    assert expected.sum() == pytest.approx(math.pi, rel=1e-3)  # length of the arc
+
+
+@every_curved
+def test_physical_rigid_motions_have_no_energy(make):
+    space = space_of(make())
+    xy = np.array(space.trace.mesh.ngmesh.Coordinates())[:, :2]
+    zero, one = np.zeros(len(xy)), np.ones(len(xy))
+    for motion in ([one, zero], [zero, one], [-xy[:, 1], xy[:, 0]]):
+        assert (np.abs(space.A @ (space.basis @ np.concatenate(motion))) < 1e-13).all()
+
+
+def test_physical_element_on_straight_meshes_is_the_linear_one():
+    mesh = mesh_of(blocks())
+    physical, linear = space_of(mesh), space_of(mesh, "isoparametric")
+    assert physical.trace.mesh is mesh
+    assert physical.V.ndof == linear.V.ndof == 2 * mesh.nv
+    assert abs(physical.A - linear.A).max() == 0
+    assert abs(physical.basis - linear.basis).max() == 0
+
+
+# -------------------------------------------------------------------- the mapped polynomials
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@every_curved
+def test_isoparametric_elements_reproduce_linear_fields(make, order):
+    space = space_of(make(), "isoparametric", order)
+    mesh = space.trace.mesh
+    assert mesh.GetCurveOrder() == order
+    u = ng.GridFunction(space.V)
+    u.Set(LINEAR)
+    # Gradients of the solution of a projection: its condition grows with the order.
+    np.testing.assert_allclose(strains(u, mesh), np.tile(STRAIN, (3 * mesh.ne, 1)), atol=1e-11)
+    energy = u.vec.FV().NumPy() @ (space.A @ u.vec.FV().NumPy())
+    area = ng.Integrate(ng.CF(1), mesh, order=2 * order)
+    assert energy == pytest.approx(area * STRAIN @ isotropic(2.0, 0.3) @ STRAIN, rel=1e-12)
+
+
+def rigid_energies(make, element, order):
+    """Energies of both translations and a rotation, relative to the largest of their size."""
+    space = space_of(make(), element, order)
+    u = ng.GridFunction(space.V)
+    energies = []
+    for motion in ((1, 0), (0, 1), (0.3 - ng.y, ng.x + 1.1)):
+        u.Set(ng.CF(motion))
+        vector = u.vec.FV().NumPy()
+        energies.append(vector @ (space.A @ vector) / abs(space.A).max() / (vector @ vector))
+    return np.abs(energies)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@every_curved
+def test_isoparametric_rigid_motions_have_no_energy(make, order):
+    assert rigid_energies(make, "isoparametric", order).max() < 1e-15
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_superparametric_rotations_have_a_little_energy(order):
+    """P_order mapped by degree order + 1 contains constants, not the coordinates."""
+    *translations, rotation = rigid_energies(CURVED["disc"], "superparametric", order)
+    assert max(translations) < 1e-15
+    assert 1e-13 < rotation < 1e-3  # measured 2.7e-5 at order 1 to 1.0e-9 at order 4
+
+
+@pytest.mark.parametrize("element", ["isoparametric", "superparametric"])
+def test_nodal_basis_of_the_space(element):
+    """Node values of the boundary, per component, x first."""
+    for order in ORDERS:
+        space = space_of(CURVED["rings"](), element, order)
+        n = space.trace.space.ndof
+        assert space.basis.shape == (space.V.ndof, 2 * n) == (2 * n, 2 * n)
+        values = np.random.default_rng(order).normal(size=2 * n)
+        u = field(space, values)
+        segment, s = space.trace.at_nodes(np.arange(len(space.trace.region)))
+        node = space.trace.nodes.ravel()
+        found = space.trace.evaluate(u, segment, s)
+        np.testing.assert_allclose(found, values.reshape(2, n)[:, node].T, atol=1e-13)
+
+
+def test_stiffness_is_symmetric():
+    for element, order in (("physical", 1), ("isoparametric", 3), ("superparametric", 2)):
+        A = space_of(CURVED["rings"](), element, order).A
+        assert abs(A - A.T).max() < 1e-14 * abs(A).max()
+
+
+# ---------------------------------------------------------------------------------- curving
+
+
+def test_geometry_order():
+    assert [geometry_order(p, "isoparametric") for p in ORDERS] == ORDERS
+    assert [geometry_order(p, "superparametric") for p in ORDERS] == [2, 3, 4, 5]
+    assert geometry_order(1, "physical") == 2
+
+
+def test_curve_copies_only_where_it_must():
+    straight = mesh_of(blocks())
+    assert curve(straight, 3, "isoparametric") == (straight, 0)
+    no_cad = MakeStructured2DMesh(quads=False, nx=2, ny=2)
+    assert curve(no_cad, 3, "isoparametric") == (no_cad, 0)
+    mesh = mesh_of(disc())
+    curved, count = curve(mesh, 2, "isoparametric")
+    assert curved is not mesh
+    assert (mesh.GetCurveOrder(), curved.GetCurveOrder()) == (1, 2)
+    names = np.array(mesh.GetBoundaries())
+    index = mesh.ngmesh.Elements1D().NumPy()["index"] - 1
+    assert count == np.count_nonzero(names[index] == "arc") > 0
+    assert curve(curved, 2, "isoparametric") == (curved, count)
+    assert curve(curved, 1, "superparametric") == (curved, count)
+    assert curve(curved, 1, "isoparametric")[0].GetCurveOrder() == 1
+    assert curved.GetCurveOrder() == 2
+
+
+@pytest.mark.parametrize("order", [2, 3])
+def test_elements_that_refinement_straightened_are_curved_again(order):
+    """NGSolve's Refine leaves the curve order as it was, and the elements straight."""
+    mesh = mesh_of(disc())
+    mesh.Curve(order)
+    mesh.Refine()
+    assert mesh.GetCurveOrder() == order
+    again, _ = curve(mesh, order, "isoparametric")
+    assert again is not mesh
+    area = ng.Integrate(ng.CF(1), again, order=2 * order)
+    flux = ng.CF((ng.x, ng.y)) * ng.specialcf.normal(2) / 2
+    assert area == pytest.approx(ng.Integrate(flux, again, ng.BND, order=2 * order), rel=1e-13)
+    assert area == pytest.approx(math.pi / 4, rel=1e-3)
+    assert ng.Integrate(ng.CF(1), mesh, order=2 * order) != pytest.approx(area, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("order", "element", "error", "match"),
+    [
+        (1, "mortar", ValueError, "element='mortar' is not available; choose one of"),
+        (5, "isoparametric", ValueError, "order=5 is not available"),
+        (0, "isoparametric", ValueError, "order=0"),
+        (2, "physical", ValueError, "order=2 is not available; element='physical' has"),
+        (1.0, "isoparametric", TypeError, "order=1.0 is not an integer"),
+        (True, "isoparametric", TypeError, "order=True"),
+    ],
+)
+def test_elements_that_do_not_exist(order, element, error, match):
+    with pytest.raises(error, match=match):
+        check_element(order, element)
+
+
+def test_elements_that_exist():
+    for order in (*ORDERS, np.int64(2)):
+        check_element(order, "isoparametric")
+        check_element(order, "superparametric")
+    check_element(1, "physical")
+
+
+# --------------------------------------------------------------------------------- materials
+
+
+def square(order=1, **data):
+    """Unit square without contact, solved; the exact solution is linear."""
+    mesh = MakeStructured2DMesh(quads=False, nx=3, ny=3)
+    return solve(Problem(geometry=mesh, **data), order=order)
+
+
+def error(solution, exact):
+    difference = solution.displacement - exact
+    return math.sqrt(ng.Integrate(ng.InnerProduct(difference, difference), solution.mesh))
+
+
+@pytest.mark.parametrize("order", [1, 3])
+@pytest.mark.parametrize(
+    ("model", "along", "across"),
+    [
+        ("plane stress", 1 / 2, -0.3 / 2),
+        ("plane strain", (1 - 0.3**2) / 2, -0.3 * (1 + 0.3) / 2),
+    ],
+)
+def test_bar_in_tension(model, along, across, order):
+    """Stress 1 in x, E = 2, nu = 0.3: the lateral strain is free in the plane only."""
+    solution = square(
+        order,
+        materials={"dom": STEEL},
+        sliding="left|bottom",
+        traction={"right": (1, 0)},
+        model=model,
+    )
+    assert error(solution, ng.CF((along * ng.x, across * ng.y))) < 1e-14
+    stress = solution.stress(solution.mesh(0.3, 0.4))
+    np.testing.assert_allclose(stress, [1, 0, 0, 0], atol=1e-13)
+    assert solution.energy == pytest.approx(-along / 2, rel=1e-13)
+    assert len(solution.force) == 0
+
+
+ANISOTROPIC = np.array([[5.0, 1.2, 0.4], [1.2, 2.0, -0.3], [0.4, -0.3, 0.9]])
+
+
+@pytest.mark.parametrize("model", ["plane strain", "plane stress"])
+def test_anisotropic_bar(model):
+    """Uniform tension along x of a law that couples it with shear."""
+    strain = np.linalg.solve(ANISOTROPIC, [1.0, 0.0, 0.0])
+    assert abs(strain[2]) > 0.05
+    exact = ng.CF((strain[0] * ng.x + strain[2] * ng.y, strain[1] * ng.y))
+    solution = square(
+        materials={"dom": Hooke(ANISOTROPIC)},
+        displacement={"bottom": exact},
+        traction={"right": (1, 0), "left": (-1, 0)},
+        model=model,
+    )
+    assert error(solution, exact) < 1e-14
+    np.testing.assert_allclose(solution.stress(solution.mesh(0.6, 0.7)), [1, 0, 0, 0], atol=1e-13)
+
+
+def test_general_law_of_an_isotropic_body():
+    mesh = CURVED["rings"]()
+    names = mesh.GetMaterials()
+    C = isotropic(2.0, 0.3)
+    # Functions are integrated with more points than numbers.
+    for special, general in [
+        (STEEL, Hooke(C)),
+        (Elastic(ng.CF(2.0), 0.3), Hooke(ng.CF(tuple(C.ravel()), dims=(3, 3)))),
+    ]:
+        one, other = (
+            space_of(mesh, "isoparametric", 2, materials=dict.fromkeys(names, law)).A
+            for law in (special, general)
+        )
+        assert abs(one - other).max() < 1e-14 * abs(one).max()
+
+
+def test_bodies_have_their_own_laws():
+    mesh = CURVED["rings"]()
+    laws = {"inner": Elastic(1.0, 0.2), "outer": Elastic(5.0, 0.4)}
+    space = space_of(mesh, "isoparametric", 1, materials=laws)
+    u = ng.GridFunction(space.V)
+    u.Set(LINEAR)
+    vector = u.vec.FV().NumPy()
+    energy = sum(
+        ng.Integrate(ng.CF(1), space.trace.mesh.Materials(body))
+        * (STRAIN @ isotropic(law.E, law.nu) @ STRAIN)
+        for body, law in laws.items()
+    )
+    assert vector @ (space.A @ vector) == pytest.approx(energy, rel=1e-12)
+
+
+def test_pressure_and_traction_loads():
+    """A number is a pressure against the outward normal: the total of -p n over an arc."""
+    mesh = mesh_of(disc(symmetric=False), maxh=0.4)
+    for order in ORDERS:
+        space = space_of(mesh, "isoparametric", order, traction={"arc": 0.3})
+        n = space.trace.space.ndof
+        u = np.zeros(2 * n)
+        u[n : n + mesh.nv] = 1
+        # The vertex functions add up to one: a translation. The ends of the arc are exact.
+        assert u @ space.f == pytest.approx(0.3 * 2.0, rel=1e-12)
+
+
+def test_factorisation_of_principal_parts():
+    rng = np.random.default_rng(2)
+    space = space_of(mesh_of(blocks()), "isoparametric", 2)
+    free = rng.random(space.V.ndof) < 0.7
+    K = space.A + abs(space.A).max() * sp.identity(space.V.ndof)
+    right = rng.normal(size=space.V.ndof)
+    solution = cholesky(K.tocsr())(free)(right)
+    assert (solution[~free] == 0).all()
+    np.testing.assert_allclose((K @ solution)[free], right[free], atol=1e-13 * np.abs(right).max())

@@ -1,0 +1,167 @@
+"""Ends of the contact zone: exact on model data, inside elements on discrete solutions."""
+
+from __future__ import annotations
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from drivers import cases
+from ngcontact import adapt, solve
+from ngcontact.transition import transitions
+
+
+def line(x, order=1, y=None):
+    """Contact points on a polygon through (x, y), `order` + 1 of them on each segment."""
+    position = np.column_stack([x, np.zeros(len(x)) if y is None else y])
+    first = np.arange(0, len(x) - 1, order)[:, None]
+    return SimpleNamespace(position=position, rows=first + np.arange(order + 1))
+
+
+def opening(distance):
+    """Gap distance^(3/2) outside of the contact zone, and where there is contact."""
+    return np.maximum(distance, 0) ** 1.5, distance < 0
+
+
+def sorted_by_x(points):
+    return points[points[:, 0].argsort()]
+
+
+# gap^(2/3) is linear in the data, and so is every fit: exact up to the round-off of the fit.
+EXACT = 1e-12
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+@pytest.mark.parametrize("end", [0.31, 0.4999, 0.5001, 0.6])
+def test_the_model_end_is_found_exactly(end, order):
+    x = np.linspace(0, 1, 13) ** 1.3
+    found = transitions(line(x, order), *opening(x - end))
+    assert found.position == pytest.approx(np.array([[end, 0.0]]), abs=EXACT)
+    [inner], [outer] = found.inner, found.outer
+    assert x[inner] < end < x[outer]
+    assert outer == inner + 1
+
+
+def test_a_smooth_factor_of_the_gap_does_no_harm():
+    # gap = d^(3/2) (1 + d) has a smooth 2/3 power: the error is that of a cubic, O(h^4).
+    errors = []
+    for count in (41, 81, 161):
+        x = np.linspace(0, 1, count)
+        gap, active = opening(x - 0.437)
+        found = transitions(line(x, 2), gap * (1 + x - 0.437), active)
+        errors.append(abs(found.position[0, 0] - 0.437))
+    rates = np.log2(np.array(errors[:-1]) / errors[1:])
+    assert errors[-1] < 1e-6
+    assert rates.mean() > 3
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1e9])
+def test_the_end_does_not_depend_on_units(unit):
+    x = np.linspace(0, 1, 21)
+    gap, active = opening(x - 0.437)
+    found = transitions(line(unit * x), unit * gap, active)
+    assert found.position == pytest.approx(unit * np.array([[0.437, 0.0]]), abs=EXACT * unit)
+
+
+def test_the_direction_of_the_line_does_not_matter():
+    x = np.linspace(0, 1, 21)
+    gap, active = opening(x - 0.437)
+    there = transitions(line(x), gap, active)
+    back = transitions(line(x[::-1]), gap[::-1], active[::-1])
+    assert back.position == pytest.approx(there.position, abs=EXACT)
+
+
+def test_both_ends_of_a_zone_on_an_inclined_line():
+    x, a, slope = np.linspace(-1, 1, 41), 0.333, 0.2
+    found = transitions(line(x, y=slope * x), *opening(np.abs(x) - a))
+    expected = np.array([[-a, -slope * a], [a, slope * a]])
+    assert sorted_by_x(found.position) == pytest.approx(expected, abs=EXACT)
+
+
+def test_two_zones_have_four_ends():
+    x = np.linspace(0, 4, 161)
+    # Contact in |x - 1| < 0.43 and |x - 3| < 0.43; between them each end has its half.
+    found = transitions(line(x), *opening(np.abs(np.abs(x - 2) - 1) - 0.43))
+    expected = [0.57, 1.43, 2.57, 3.43]
+    assert np.sort(found.position[:, 0]) == pytest.approx(expected, abs=EXACT)
+
+
+@pytest.mark.parametrize("state", [True, False])
+def test_no_end_without_a_change(state):
+    found = transitions(line(np.linspace(0, 1, 9)), np.ones(9), np.full(9, state))
+    assert found.position.shape == (0, 2)
+    assert len(found.inner) == len(found.outer) == 0
+
+
+def test_points_of_separate_lines_are_not_neighbours():
+    # Two contact lines of one pair: the first in contact, the second open.
+    x = np.arange(4.0)
+    lines = SimpleNamespace(position=np.column_stack([x, 0 * x]), rows=np.array([[0, 1], [2, 3]]))
+    active = np.array([True, True, False, False])
+    assert len(transitions(lines, ~active * 1.0, active).position) == 0
+
+
+def test_points_without_a_row_are_no_neighbours():
+    # Gamma_K ends on Gamma_u, where the row is dropped: -1.
+    x = np.linspace(0, 1, 5)
+    short = SimpleNamespace(
+        position=np.column_stack([x, 0 * x]), rows=np.array([[-1, 0], [0, 1], [1, 2], [3, 4]])
+    )
+    active = np.array([True, True, True, False, False])
+    assert len(transitions(short, ~active * 1.0, active).position) == 0
+
+
+def test_a_closed_line_has_no_first_point():
+    count, end = 60, 0.733
+    angle = np.linspace(0, 2 * math.pi, count, endpoint=False)
+    ring = SimpleNamespace(
+        position=np.column_stack([np.cos(angle), np.sin(angle)]),
+        rows=np.column_stack([np.arange(count), np.roll(np.arange(count), -1)]),
+    )
+    from_zero = np.abs((angle + math.pi) % (2 * math.pi) - math.pi)
+    found = transitions(ring, *opening(from_zero - end)).position
+    # Distances are chords, shorter than arcs by h^2 / 24 of them; the end is on a chord of
+    # the circle, h^2 / 8 inside.
+    h = 2 * math.pi / count
+    expected = np.array([[math.cos(end), -math.sin(end)], [math.cos(end), math.sin(end)]])
+    assert found[found[:, 1].argsort()] == pytest.approx(expected, abs=h**2 / 8)
+
+
+@pytest.mark.parametrize("active", [[1, 0, 0, 0], [0, 0, 0, 1], [0, 1, 0, 0], [1, 0, 1, 1]])
+@pytest.mark.parametrize("gap", [0.0, 1.0])
+def test_the_middle_where_few_points_are_open(active, gap):
+    active, x = np.array(active, dtype=bool), np.arange(4.0)
+    changes = np.flatnonzero(active[1:] != active[:-1])
+    found = transitions(line(x), gap * ~active, active)
+    assert np.sort(found.position[:, 0]) == pytest.approx(x[changes] + 0.5)
+
+
+def test_an_end_stays_next_to_the_last_active_point():
+    # Data that extrapolate far off, to the left or to the right, or have no zero at all.
+    x = np.linspace(0, 1, 21)
+    active = x < 0.42
+    for gap in (np.ones(21), 5 - x, x**3, (1 - x) ** 2, np.zeros(21)):
+        [place] = transitions(line(x), gap * ~active, active).position
+        assert 0.35 <= place[0] <= 0.6
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_transition_of_two_blocks(order):
+    # S1: the gap ~ x^(3/2) closes at the origin. Spacing of the points: 0.125 / order.
+    solution = solve(cases.one_transition().problem, maxh=0.13, order=order)
+    [(x, y)] = solution.transitions()
+    assert y == pytest.approx(0, abs=1e-14)
+    # Nodes resolve half a spacing; measured 3.6e-4, 2.0e-4 and 1.9e-4 at the orders 1, 2, 3.
+    assert abs(x) < 1e-3
+
+
+@pytest.mark.parametrize(("order", "allowed"), [(1, 1e-2), (2, 2.5e-3), (3, 2e-3)])
+def test_half_width_of_hertz_contact(order, allowed):
+    # S3, a = 0.3; measured 1.8e-3, 1.2e-3 and 7e-4 of a.
+    *_, solution = adapt(cases.hertz_contact().problem, maxh=0.28, order=order, max_dofs=4000)
+    ends = sorted_by_x(solution.transitions())
+    assert ends == pytest.approx(np.array([[-0.3, 0.0], [0.3, 0.0]]), abs=0.3 * allowed)
+    # Inside of elements, not snapped to nodes.
+    assert np.abs(ends[:, :1] - solution.points[:, 0]).min() > 0
