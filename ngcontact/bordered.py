@@ -121,13 +121,18 @@ class Systems:
             at = self.program.unknown[changed[released]]
             D[:, released] = self.C[at].T
             D[released] = self.C[at]
-        self.schur = self.C.T @ self.X - D
+        schur = self.C.T @ self.X - D
+        # Forces and displacements side by side: only after scaling can small pivots be told.
+        size = np.sqrt(np.abs(np.diagonal(schur)))
+        self.size = np.where(size > 0, size, 1.0)
+        self.schur = schur / np.outer(self.size, self.size)
 
     def _bordered_solve(self, right: Array, below: Array) -> tuple[Array, Array]:
         x = self._back_solve(right)
         if below.size == 0:
             return x, below
-        z = np.linalg.lstsq(self.schur, self.C.T @ x - below, rcond=1e-14)[0]
+        z = np.linalg.lstsq(self.schur, (self.C.T @ x - below) / self.size, rcond=1e-14)[0]
+        z /= self.size
         return x - self.X @ z, z
 
     def solve(self, active: Mask) -> tuple[Array, Array]:
@@ -160,16 +165,17 @@ class Systems:
             if released.any():
                 y[p.unknown[changed[released]]] += z[released]
             force[changed[~released]] += z[~released]
-        residual = p.b - p.K @ y - p.R.T @ force
-        if not np.abs(residual[self.free]).max(initial=0.0) <= UNSOLVED * scale:
-            raise SingularError(
-                "the system for the current active set is singular: a body can move without "
-                "resistance from supports or active contact"
-            )
         if p.unit_rows:
             y[p.unknown[active]] = p.g[active]
             force[:] = 0.0
             force[active] = (p.b - p.K @ y)[p.unknown[active]]
+        residual = (p.b - p.K @ y - p.R.T @ force)[~p.fixed]
+        scale = max(scale, np.abs(force).max(initial=0.0) if p.unit_rows else 0.0)
+        if not np.abs(residual).max(initial=0.0) <= UNSOLVED * scale:
+            raise SingularError(
+                "the system for the current active set is singular: a body can move without "
+                "resistance from supports or active contact"
+            )
         return y, force
 
     def stiffness(self) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import ngsolve as ng
 import numpy as np
@@ -23,6 +23,7 @@ from .trace import Trace, boundary_trace
 from .transition import transitions
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
 SEPARATION = 1e-6  # of the directions at a corner, relative to the zone
@@ -95,6 +96,7 @@ def _rows(line: ContactLine, trace: Trace) -> Rows:
         partner=trace.nodes[line.partner],
         share=share,
         g=line.gap,
+        equality=np.full(len(line.node), line.contact.bilateral),
     )
 
 
@@ -106,7 +108,46 @@ def _joined(rows: list[Rows], order: int) -> Rows:
         )
     none = np.zeros(0, dtype=np.intp)
     shape = (0, order + 1)
-    return Rows(none, np.zeros((0, 2)), np.zeros(shape, np.intp), np.zeros(shape), np.zeros(0))
+    return Rows(
+        node=none,
+        direction=np.zeros((0, 2)),
+        partner=np.zeros(shape, dtype=np.intp),
+        share=np.zeros(shape),
+        g=np.zeros(0),
+        equality=np.zeros(0, dtype=bool),
+    )
+
+
+def _kept(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
+    """The lines with the points that carry the rows `kept` of all lines together."""
+    dropped = np.ones(sum(len(line.node) for line in lines), dtype=bool)
+    dropped[kept] = False
+    stops = np.cumsum([len(line.node) for line in lines])
+    parts = np.split(dropped, stops[:-1]) if lines else []
+    return [without(x, np.flatnonzero(part)) for x, part in zip(lines, parts, strict=True)]
+
+
+def _merged(lines: list[ContactLine], rows: Rows, n: int) -> tuple[list[ContactLine], Rows]:
+    """Lines and rows with one row for each left side: the tightest of those that repeat it."""
+    number = rows.repeated(n)
+    first = np.unique(number)
+    if len(first) == len(number):
+        return lines, rows
+    g, weight = rows.g.copy(), np.concatenate([line.weight for line in lines])
+    equality = np.zeros(len(g), dtype=bool)
+    np.logical_or.at(equality, number, rows.equality)
+    # An equality is the tightest; what another pair at that node asks for follows or is refused.
+    tight = np.where(rows.equality | ~equality[number], rows.g, np.inf)
+    g[first] = np.inf
+    np.minimum.at(g, number, tight)
+    repeated = number != np.arange(len(number))
+    np.add.at(weight, number[repeated], weight[repeated])
+    stops = np.cumsum([len(line.node) for line in lines])
+    lines = [
+        replace(line, weight=part)
+        for line, part in zip(lines, np.split(weight, stops[:-1]), strict=True)
+    ]
+    return _kept(lines, first), replace(rows, g=g, equality=equality).select(first)
 
 
 def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Discrete:
@@ -128,28 +169,17 @@ def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Dis
             for name in Conditions.__annotations__
         )
     )
-    rows = _joined([_rows(line, trace) for line in lines], order)
+    lines, rows = _merged(lines, _joined([_rows(line, trace) for line in lines], order), n)
     basis = change_of_basis(n, conditions, rows, float(np.abs(trace.curve).max()))
-
-    kept = np.zeros(len(rows.g), dtype=bool)
-    kept[basis.kept] = True
-    starts = np.cumsum([0, *(len(line.node) for line in lines)])
-    lines = [
-        without(line, np.flatnonzero(~kept[start : start + len(line.node)]))
-        for line, start in zip(lines, starts[:-1], strict=True)
-    ]
-    equality = np.concatenate(
-        [np.zeros(0, dtype=bool), *(np.full(len(x.node), x.contact.bilateral) for x in lines)]
-    )
+    lines, rows = _kept(lines, basis.kept), rows.select(basis.kept)
     T = space.basis @ basis.T
     m = len(basis.unknown)
-    R = sp.csr_matrix((np.ones(m), (np.arange(m), basis.unknown)), (m, 2 * n))
     program = Program(
         K=(T.T @ space.A @ T).tocsr(),
         b=T.T @ space.f,
-        R=R,
-        g=rows.g[basis.kept],
-        equality=equality,
+        R=sp.csr_matrix((np.ones(m), (np.arange(m), basis.unknown)), (m, 2 * n)),
+        g=rows.g,
+        equality=rows.equality,
         fixed=basis.fixed,
         values=basis.values,
         unknown=basis.unknown,
@@ -159,7 +189,7 @@ def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Dis
         space=space,
         lines=lines,
         conditions=conditions,
-        B=rows.matrix(n)[basis.kept],
+        B=rows.matrix(n),
         basis=basis,
         program=program,
     )
@@ -192,8 +222,12 @@ def carried_active_set(discrete: Discrete, previous: Discrete, state: Minimiser)
         # Two points at a corner are told apart by their directions.
         size = SEPARATION * np.ptp(old.position, axis=0).max(initial=0.0)
         tree = cKDTree(np.column_stack([old.position, size * old.direction]))
-        away, nearest = tree.query(np.column_stack([new.position, size * new.direction]))
-        active = state.active[at][nearest]
+        places = np.column_stack([new.position, size * new.direction])
+        distance, near = tree.query(places, k=[1, min(2, len(old.node))])
+        away, nearest = distance[:, 0], near[:, 0]
+        # A new point in the middle of two: active if one of them is, whatever round-off says.
+        tied = distance[:, 1] <= (1 + 1e-6) * away
+        active = state.active[at][nearest] | (tied & state.active[at][near[:, 1]])
         if discrete.space.trace.order > 1 and away.max() > size:  # not the same points
             ends = transitions(old, slack[at], state.active[at])
             for inner, outer, place in zip(ends.inner, ends.outer, ends.position, strict=True):

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .gap import ContactLine, at_quadrature, partners, prescribed_gap
-from .lagrange import gauss, lagrange
+from .lagrange import gauss, gauss_lobatto, lagrange
 from .problem import boundary_mask
 from .trace import Trace
 
@@ -70,7 +70,7 @@ class _Residuals:
         self.mu = self._shear_moduli()
         self.boundary_stress = ng.BoundaryFromVolumeCF(solution.stress)
         self.edge_weight = self.diameter / (2 * self.mu * self.order)
-        self.in_contact = np.zeros(len(self.trace.region), dtype=bool)
+        self.in_contact = self.trace.inner.copy()
         self.parts: dict[str, Array] = {}
 
     def _shear_moduli(self) -> Array:
@@ -127,7 +127,7 @@ class _Residuals:
             self.parts[name] = weight * integral.vec.FV().NumPy()
 
     def on_supports_and_loads(self) -> None:
-        """Gamma_tau, Gamma_0, Gamma_u: every segment that `on_contact` has not seen."""
+        """Gamma_tau, Gamma_0, Gamma_u: every outer segment `on_contact` has not seen."""
         problem, trace, mesh = self.solution.problem, self.trace, self.mesh
         rule, rule_weight = gauss(2 * self.order + DATA_BONUS)
         q = len(rule)
@@ -178,7 +178,8 @@ class _Residuals:
         if contact.primary is None:
             facing, distance = np.full(len(s), -1), np.zeros(len(s))
         else:
-            facing, facing_s, distance, _ = partners(trace, line.facing, x, d)
+            facing, facing_s, distance, _ = partners(trace, line.facing, segment, x, d)
+            self.in_contact[_met_from_behind(trace, line)] = True
             met = facing >= 0
         if contact.gap is not None:
             distance = prescribed_gap(contact, trace, segment, s, x)
@@ -202,7 +203,6 @@ class _Residuals:
         if contact.primary is not None:
             at = np.flatnonzero(met)
             there, there_s = facing[at], facing_s[at]
-            self.in_contact[there] = True
             other = side(there, there_s, d[at], -pi[at])
             u[at] -= trace.evaluate(solution.displacement, there, there_s)
             sides.append((at, trace.element[there], *other))
@@ -218,8 +218,10 @@ class _Residuals:
         share = 1 / len(sides)
         for at, element, *_ in sides:
             closed = np.maximum(pi[at], 0) * np.maximum(gap[at], 0)
-            self.add("complementarity", element, share * dc[at] * closed)
             depth = np.maximum(-gap[at], 0)
+            if contact.bilateral:  # apart is as wrong as into each other
+                closed, depth = np.zeros(len(at)), np.abs(gap[at])
+            self.add("complementarity", element, share * dc[at] * closed)
             scale = share * self.mu[element] / self.diameter[element]
             self.add("penetration", element, scale * dc[at] * depth**2)
 
@@ -231,6 +233,18 @@ def _diameters(mesh: ng.Mesh) -> Array:
     return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
 
 
+def _met_from_behind(trace: Trace, line: ContactLine) -> Index:
+    """Segments of the primary whose middle faces the secondary, (q,)."""
+    middle = np.full(len(line.facing), 0.5)
+    x = trace.point(line.facing, middle)
+    if line.contact.direction is None:
+        d = trace.normal(line.facing, middle)
+    else:
+        d = np.tile(-np.array(line.contact.direction), (len(x), 1))
+    back, *_ = partners(trace, line.segments, line.facing, x, d)
+    return line.facing[back >= 0]
+
+
 def _nodal_pressure(line: ContactLine, pressure: Array, order: int) -> Array:
     """Pressure (k, order + 1) at the nodes of each segment.
 
@@ -238,7 +252,7 @@ def _nodal_pressure(line: ContactLine, pressure: Array, order: int) -> Array:
     """
     values = np.append(pressure, 0.0)[line.rows]
     for k in np.flatnonzero((line.rows < 0).any(axis=1) & line.faces):
-        nodes = np.arange(order + 1) / order
+        nodes = gauss_lobatto(order)
         known = line.rows[k] >= 0
         if known.any():
             fit = np.polynomial.Polynomial.fit(nodes[known], values[k, known], known.sum() - 1)

@@ -7,6 +7,7 @@ zone the direction is the fixed xi.
 
 from __future__ import annotations
 
+import logging
 from dataclasses import dataclass, replace
 
 import ngsolve as ng
@@ -21,6 +22,9 @@ from .trace import Trace
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
+log = logging.getLogger("ngcontact")
+
+FINER = 0.7  # ratio of segment lengths from which a primary counts as finer
 GRAZING = 1e-8  # cosine between normal and direction from which a point faces the other body
 
 
@@ -71,15 +75,45 @@ class ContactLine:
     searches: int
 
 
+def _beyond_own_body(
+    trace: Trace, own: Index, points: Array, directions: Array, found: Partners
+) -> NDArray[np.bool_]:
+    """Whether bodies overlap so far that the partner lies on the other side of the own body.
+
+    Overlap puts a partner behind the point, inside the own body; one that the backward ray meets
+    only after it has left that body belongs to a far side.
+    """
+    beyond = np.zeros(len(points), dtype=bool)
+    behind = (found.segment >= 0) & (found.distance < 0)
+    for body in np.unique(trace.body[own[behind]]):
+        at = np.flatnonzero(behind & (trace.body[own] == body))
+        rim = np.flatnonzero(trace.body == body)
+        leaves = cast(points[at], -directions[at], trace.curve[rim], -trace.side[rim], ahead=True)
+        beyond[at] = (leaves.segment >= 0) & (-found.distance[at] > leaves.distance)
+    return beyond
+
+
 def partners(
-    trace: Trace, facing: Index, points: Array, directions: Array
+    trace: Trace, facing: Index, own: Index, points: Array, directions: Array
 ) -> tuple[Index, Array, Array, int]:
-    """Segment, parameter and distance of the points of `facing` opposite to `points`."""
+    """Points of the segments `facing` opposite to `points`, which lie on the segments `own`.
+
+    Returns
+    -------
+    segment : ndarray of int (k,)
+        -1 where there is none.
+    s, distance : ndarray (k,)
+    searches : int
+        0 if all of them are nodes at the same place.
+    """
     curve, side = trace.curve[facing], trace.side[facing]
     found = coincident(points, directions, curve, side, trace.order)
     rest = np.flatnonzero(found.segment < 0)
     if rest.size:
         other: Partners = cast(points[rest], directions[rest], curve, side)
+        other.segment[
+            _beyond_own_body(trace, own[rest], points[rest], directions[rest], other)
+        ] = -1
         found.segment[rest] = other.segment
         found.s[rest], found.distance[rest] = other.s, other.distance
     segment = np.where(found.segment < 0, -1, facing[found.segment] if facing.size else -1)
@@ -150,7 +184,9 @@ def contact_line(trace: Trace, contact: Contact) -> ContactLine:
         partner, partner_s, distance, searches = np.full(m, -1), np.zeros(m), np.zeros(m), 0
         keep = np.ones(m, dtype=bool)
     else:
-        partner, partner_s, distance, searches = partners(trace, facing, position, direction)
+        partner, partner_s, distance, searches = partners(
+            trace, facing, segment[first], position, direction
+        )
         keep = partner >= 0
     if not keep.any():
         raise ValueError(
@@ -164,13 +200,18 @@ def contact_line(trace: Trace, contact: Contact) -> ContactLine:
     rows = number.reshape(len(segments), -1)
     weight = np.zeros(m)
     met = np.append(keep, False)[rows]
-    np.add.at(weight, rows[met], _segment_weights(trace, contact, segments)[met])
+    faces = met.all(axis=1)
+    shares = _segment_weights(trace, contact, segments)
+    np.add.at(weight, rows[faces], shares[faces])
+    # A point whose segments face the primary in part only has nothing better than those parts.
+    partly = met & (np.append(weight, 1.0)[rows] == 0)
+    np.add.at(weight, rows[partly], shares[partly])
     line = ContactLine(
         contact=contact,
         segments=segments,
         facing=facing,
         rows=rows,
-        faces=met.all(axis=1),
+        faces=faces,
         node=node[first],
         position=position,
         direction=direction,
@@ -180,7 +221,23 @@ def contact_line(trace: Trace, contact: Contact) -> ContactLine:
         partner_s=partner_s,
         searches=searches,
     )
-    return without(line, np.flatnonzero(~keep))
+    line = without(line, np.flatnonzero(~keep))
+    _warn_of_finer_primary(trace, line)
+    return line
+
+
+def _warn_of_finer_primary(trace: Trace, line: ContactLine) -> None:
+    """Contact points miss pressure between them where the primary has the shorter segments."""
+    if line.searches and line.faces.any():
+        coarse = np.median(trace.lengths(line.segments[line.faces]))
+        fine = np.median(trace.lengths(line.partner[line.partner >= 0]))
+        if fine < FINER * coarse:
+            log.warning(
+                'the facing meshes of "%s" and "%s" do not match and the primary is finer: swap '
+                "them, the finer side carries the contact points",
+                line.contact.secondary,
+                line.contact.primary,
+            )
 
 
 def without(line: ContactLine, dropped: Index) -> ContactLine:

@@ -96,7 +96,8 @@ def check_prescribed(
             )
         value = float(entries @ values[columns])
         allowed = SATISFIED * max(size, abs(rows.g[j])) + ROUND_OFF * length
-        if value > rows.g[j] + allowed:
+        excess = value - rows.g[j]
+        if (abs(excess) if rows.equality[j] else excess) > allowed:
             raise ValueError(
                 f"{where} is violated by prescribed displacements on both sides: they close the "
                 f"gap by {value:g} where it is {rows.g[j]:g}; prescribe displacements without "

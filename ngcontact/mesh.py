@@ -61,12 +61,27 @@ def _named(edges: list[_Edge], pattern: str) -> list[_Edge]:
     return [edge for edge in edges if re.fullmatch(pattern, edge.curve.name)]
 
 
-def _facing_runs(faces: NDArray[np.bool_]) -> Iterator[slice]:
-    """Longest runs of neighbouring samples that face the other curve."""
+def _facing_runs(faces: NDArray[np.bool_], stops: NDArray[np.intp]) -> Iterator[slice]:
+    """Longest runs of neighbouring samples that face the other curve, cut at `stops`."""
     bounds = np.flatnonzero(np.diff(np.concatenate([[False], faces, [False]]).astype(int)))
     for first, last in bounds.reshape(-1, 2):
-        if last - first > 1:
-            yield slice(first, last)
+        inside = stops[(stops > first) & (stops < last - 1)]
+        for start, stop in pairwise([first, *inside.tolist(), last - 1]):
+            if stop > start:
+                yield slice(start, stop + 1)
+
+
+def _nearest_crossing(samples: Array, x: Array, across: Array, along: Array) -> Array:
+    """Points (k, 2) where a polyline crosses the lines through `x` (k, 2), the nearest of each."""
+    height = samples @ across - (x @ across)[:, None]
+    low, high = height[:, :-1], height[:, 1:]
+    share = np.clip(np.divide(low, low - high, out=np.zeros_like(low), where=low != high), 0, 1)
+    points = samples[:-1] + share[..., None] * np.diff(samples, axis=0)
+    distance = np.abs((points - x[:, None]) @ along)
+    # Lines that the polyline just misses are left to Newton's method from its nearest end.
+    miss = np.where(low * high <= 0, 0.0, np.minimum(np.abs(low), np.abs(high)))
+    best = np.lexsort((distance, miss), axis=1)[:, 0]
+    return points[np.arange(len(x)), best]
 
 
 def _opposite(contact: Contact, x: Array, other: CadEdge) -> tuple[Array, Array]:
@@ -79,11 +94,7 @@ def _opposite(contact: Contact, x: Array, other: CadEdge) -> tuple[Array, Array]
         dx, dy = contact.direction
         across = np.array([-dy, dx])
         _, samples, _ = other.samples()
-        height = samples @ across
-        order = np.argsort(height)
-        near = np.column_stack(
-            [np.interp(x @ across, height[order], samples[order, i]) for i in (0, 1)]
-        )
+        near = _nearest_crossing(samples, x, across, np.array([dx, dy]))
         t = other.level(across, x @ across, near)
     return t, other.point(np.where(np.isnan(t), other.start, t))
 
@@ -105,7 +116,7 @@ def _divide(contact: Contact, secondary: _Edge, primary: _Edge) -> None:
             across = tangent @ np.array([-contact.direction[1], contact.direction[0]])
             faces &= np.abs(across) >= STEEPEST * np.linalg.norm(tangent, axis=1)
     maxh = min(secondary.maxh, primary.maxh)
-    for run in _facing_runs(faces):
+    for run in _facing_runs(faces, np.searchsorted(t, np.sort(ends))):
         density = np.zeros(np.count_nonzero(faces[run]) - 1)
         for points in (x[run], y[run]):
             steps = np.diff(points, axis=0)

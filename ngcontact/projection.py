@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 MATCHED = 1e-9  # distance, relative to a segment's length, below which two points are one
+GRAZING = 1e-9  # cosine between ray and normal up to which the ray does not meet the curve
 NEWTON_STEPS = 20
 PAIRS_AT_ONCE = 4_000_000  # bound on the memory of the candidate search
 
@@ -114,7 +115,9 @@ def _candidates(points: Array, across: Array, curve: Array) -> tuple[Index, Inde
     return point, segment, s
 
 
-def cast(points: Array, directions: Array, curve: Array, side: Array) -> Partners:
+def cast(
+    points: Array, directions: Array, curve: Array, side: Array, ahead: bool = False
+) -> Partners:
     """Nearest points, along given directions, of a curve whose outward normal opposes them.
 
     The scalar equation (x(s) - x) x d = 0 is solved by Newton's method on every segment whose
@@ -128,6 +131,8 @@ def cast(points: Array, directions: Array, curve: Array, side: Array) -> Partner
         Unit vectors towards the facing body.
     curve, side : ndarray
         The facing segments.
+    ahead : bool
+        Only points in the sense of the direction.
 
     Returns
     -------
@@ -155,10 +160,14 @@ def cast(points: Array, directions: Array, curve: Array, side: Array) -> Partner
     miss = np.abs((offset * across[point]).sum(axis=1))
     lengths = np.linalg.norm(curve[segment, -1] - curve[segment, 0], axis=1)
     normal = _normals(curve, side, segment, s)
-    faces = (normal * directions[point]).sum(axis=1) < 0
+    # A ray along a straight boundary, such as a symmetry plane, does not meet it.
+    grazing = GRAZING * np.linalg.norm(normal, axis=1)
+    faces = (normal * directions[point]).sum(axis=1) < -grazing
     faces &= miss <= 2 * MATCHED * lengths
-    point, segment, s, offset = point[faces], segment[faces], s[faces], offset[faces]
     distance = (offset * directions[point]).sum(axis=1)
+    if ahead:
+        faces &= distance >= -MATCHED * lengths
+    point, segment, s, distance = point[faces], segment[faces], s[faces], distance[faces]
     order = np.lexsort((np.abs(distance), point))  # by point, nearest first
     point, first = np.unique(point[order], return_index=True)
     best = order[first]

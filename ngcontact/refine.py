@@ -36,9 +36,10 @@ def _boundary_edges(trace: Trace) -> dict[tuple[int, int], int]:
     return {(a, b): el for (a, b), el in zip(ends.tolist(), trace.element.tolist(), strict=True)}
 
 
-def _children(mesh: ng.Mesh, first: int) -> dict[tuple[int, int], int]:
-    """New vertex on each bisected edge, by the edge's vertices."""
-    parents = ((v, mesh.GetParentVertices(v)) for v in range(first, mesh.nv))
+def _children(trace: Trace, first: int) -> dict[tuple[int, int], int]:
+    """New vertex on each bisected boundary segment, by the segment's vertices."""
+    new = np.unique(trace.nodes[trace.nodes >= first])
+    parents = ((v, trace.mesh.GetParentVertices(v)) for v in new.tolist())
     return {(min(a, b), max(a, b)): v for v, (a, b) in parents}
 
 
@@ -127,7 +128,7 @@ def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.M
         copy.Refine()
         trace = boundary_trace(copy, 1)
         segments = _boundary_edges(trace)
-        children = _children(copy, first)
+        children = _children(trace, first)
         lagging = [i for pair in pairs for i in _match_children(pair, children, segments)]
         if not lagging:
             break

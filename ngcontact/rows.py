@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+REPEATED = 1e-9  # difference of coefficients, each at most 1, below which two rows are one
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +46,8 @@ class Rows:
     share : ndarray (m, q)
         Basis functions of those nodes at the partner point; zero for a rigid obstacle.
     g : ndarray (m,)
+    equality : ndarray of bool (m,)
+        Rows that hold with equality, Remark 3.3.
     """
 
     node: Index
@@ -50,6 +55,7 @@ class Rows:
     partner: Index
     share: Array
     g: Array
+    equality: Mask
 
     def matrix(self, n: int) -> sp.csr_matrix:
         """B (m, 2n) on node values: x components first, then y."""
@@ -64,3 +70,23 @@ class Rows:
         B = sp.coo_matrix((vals.ravel(), (rows, cols.ravel())), (m, 2 * n)).tocsr()
         B.eliminate_zeros()
         return B
+
+    def select(self, rows: Index) -> Rows:
+        """Some of the rows."""
+        return Rows(*(getattr(self, name)[rows] for name in Rows.__annotations__))
+
+    def repeated(self, n: int) -> Index:
+        """Number (m,) of an earlier row with the same left side, or the row's own number.
+
+        Where two contact lines meet smoothly, both ask for the row of their common node.
+        """
+        number = np.arange(len(self.node))
+        order = np.argsort(self.node, kind="stable")
+        alike = self.node[order][1:] == self.node[order][:-1]
+        if not alike.any():
+            return number
+        B = self.matrix(n)
+        for first, second in zip(order[:-1][alike], order[1:][alike], strict=True):
+            if abs(B[first] - B[second]).max() <= REPEATED:
+                number[second] = number[first]
+        return number

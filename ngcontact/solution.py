@@ -132,13 +132,13 @@ class Solution:
     def reactions(self) -> dict[str, Array]:
         """Resultant (2,) of every boundary of Gamma_u and Gamma_0 on its body.
 
-        A node shared by several of them counts for the first, in the order of `displacement` and
-        then `sliding`; a name that several bodies share gives the sum over them.
+        A node shared by several of them counts for the last entry of `displacement`, then for
+        `sliding`; a name that several bodies share gives the sum over them.
         """
         trace = self.discrete.space.trace
         names = np.array(self.mesh.GetBoundaries())
         patterns = [
-            *self.problem.displacement,
+            *reversed(list(self.problem.displacement)),  # at a common node the last one is in force
             *([] if self.problem.sliding is None else [str(self.problem.sliding)]),
         ]
         counted = np.zeros(len(self.nodal_reaction), dtype=bool)
@@ -164,6 +164,17 @@ class Solution:
         u = self.displacement.vec.FV().NumPy()
         d = self.discrete.space
         return float(u @ (d.A @ u) / 2 - d.f @ u)
+
+    @cached_property
+    def energy_norm(self) -> float:
+        """A(u_h, u_h)^(1/2), from the strains: large rigid motions do not cancel in them."""
+        e = strain(self.displacement)
+        total = 0.0
+        for body, law in self.problem.materials.items():
+            density = ng.InnerProduct(law.voigt(self.problem.model) * e, e)
+            order = 2 * self.order + 2
+            total += ng.Integrate(density, self.mesh.Materials(body), order=order)
+        return float(np.sqrt(total))
 
     @cached_property
     def _estimate(self) -> Estimate:
@@ -193,21 +204,23 @@ class Solution:
     @property
     def relative_error_estimate(self) -> float:
         """Estimated error over the energy norm of u_h; 0 where both vanish."""
-        u = self.displacement.vec.FV().NumPy()
-        norm = float(np.sqrt(max(u @ (self.discrete.space.A @ u), 0.0)))
-        return self.error_estimate / norm if norm > 0 else 0.0
+        if self.error_estimate == 0:
+            return 0.0
+        return self.error_estimate / self.energy_norm if self.energy_norm > 0 else float("inf")
 
     @cached_property
     def residuals(self) -> dict[str, float]:
         """Dimensionless residuals of the Karush-Kuhn-Tucker conditions.
 
-        `equilibrium`: unbalanced force over the largest force; `penetration`: negative gap over
-        the largest displacement or closed gap; `tension`: negative over largest contact force;
+        `equilibrium`: unbalanced force over the largest force or term of a force; `penetration`:
+        negative gap over the largest displacement or closed gap; `tension`: negative over largest
+        contact force;
         `complementarity`: sum of force times gap over force times length.
         """
         p, y, force = self.discrete.program, self.minimiser.u, self.force
         residual = p.b - p.K @ y - p.R.T @ force
-        load = max(np.abs(x).max(initial=0.0) for x in (p.b, residual[p.fixed], force))
+        terms = abs(p.K) @ np.abs(y)
+        load = max(np.abs(x).max(initial=0.0) for x in (p.b, terms, force))
         length = max(np.abs(y).max(initial=0.0), np.abs(p.g[self.active]).max(initial=0.0))
         largest = np.abs(force).max(initial=0.0)
         one_sided = force[~p.equality]

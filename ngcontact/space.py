@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from .bordered import Factor, Mask, Solve
 from .cad import cad_edges
-from .problem import Problem
+from .problem import Problem, boundary_mask
 from .trace import Trace, edge_bubbles, nodal_basis
 
 Array = NDArray[np.float64]
@@ -144,6 +144,18 @@ def _vector_space(mesh: ng.Mesh, order: int, element: str) -> ng.FESpace:
     return ng.Compress(full, active_dofs=ng.BitArray(np.tile(active, 2)))
 
 
+def _check_normals(trace: Trace, boundary: str) -> None:
+    """Raise unless NGSolve's normals, the direction of pressures, point outwards."""
+    segments = trace.select(boundary_mask(trace.mesh, boundary))
+    s = np.full(len(segments), 0.5)
+    normal = trace.evaluate(ng.specialcf.normal(2), segments, s)
+    if ((normal * trace.normal(segments, s)).sum(axis=1) < 0).any():
+        raise ValueError(
+            f'the normals of the boundary "{boundary}" point into the body; its segments must run '
+            "with the body on their left"
+        )
+
+
 def assemble(problem: Problem, trace: Trace, element: str) -> Space:
     """Space, stiffness and load of a problem on the mesh of `trace`, curved as `element` asks."""
     mesh = trace.mesh
@@ -168,6 +180,7 @@ def assemble(problem: Problem, trace: Trace, element: str) -> Space:
     for boundary in problem.traction:
         P = problem.traction_vector(boundary)
         region = mesh.Boundaries(boundary)
+        _check_normals(trace, boundary)
         f += P * v.Trace() * ng.ds(definedon=region, bonus_intorder=LOAD_BONUS)
     a.Assemble()
     f.Assemble()

@@ -90,7 +90,7 @@ def minimise(program: Program, factor: Factor, active: Mask | None = None) -> Mi
     y, force = np.where(p.fixed, p.values, 0.0), np.zeros(p.g.size)
     seen: set[bytes] = set()
     steps: list[int] = []
-    fewest, patience, tie = p.g.size + 1, PATIENCE, TIE
+    fewest, patience, tie, extent = p.g.size + 1, PATIENCE, TIE, 0.0
 
     def iterate() -> Minimiser:
         return Minimiser(
@@ -110,11 +110,16 @@ def minimise(program: Program, factor: Factor, active: Mask | None = None) -> Mi
             raise ConvergenceError(
                 f"Newton step {len(steps) + 1}: {singular}", iterate=iterate()
             ) from None
-        length = tie * size * np.abs(y).max(initial=0.0)
+        stiffness = systems.stiffness()
+        # Displacements met so far: all of them may vanish while forces tie.
+        with np.errstate(divide="ignore", invalid="ignore"):
+            extents = np.abs(y).max(initial=0.0), np.nanmax(np.abs(force) / stiffness, initial=0.0)
+        extent = max(extent, *extents)
+        length = tie * size * extent
         slack = p.g - p.R @ y
         # Ties keep their state: hysteresis against cycling on round-off.
         with np.errstate(invalid="ignore"):
-            pulling = force < -length * np.where(state, systems.stiffness(), 0.0)
+            pulling = force < -length * np.where(state, stiffness, 0.0)
             penetrating = slack < -length - tie * np.abs(p.g)
         wrong = np.where(state, pulling, penetrating) & ~p.equality
         count = int(np.count_nonzero(wrong))

@@ -22,7 +22,8 @@ from .lagrange import gauss_lobatto, lagrange, lagrange_derivative
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-CORNER = 1e-5  # turn (radians) from which two CAD edges meet at a corner; below, rows coincide
+CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two rows at a smaller
+# one would be dependent to 1 / turn^2
 CORNER_WITHOUT_CAD = np.deg2rad(30)  # ... and two segments of one name on a mesh without CAD
 
 
@@ -48,6 +49,8 @@ class Trace:
         Volume element the segment belongs to.
     body : ndarray of int (k,)
         Material region number of that element.
+    inner : ndarray of bool (k,)
+        Segments between two elements: lines inside a body.
     curve : ndarray (k, geometry_order + 1, 2)
         The curve at its Gauss-Lobatto points.
     side : ndarray (k,)
@@ -64,6 +67,7 @@ class Trace:
     nodes: Index
     element: Index
     body: Index
+    inner: NDArray[np.bool_]
     curve: Array
     side: Array
     edges: list[CadEdge] | None
@@ -165,13 +169,18 @@ def _right(vectors: Array) -> Array:
     return right / np.linalg.norm(right, axis=1)[:, None]
 
 
-def _neighbour(segments: Index, triangles: Index, vertices: int) -> Index:
-    """Number of a triangle at each segment."""
+def _neighbours(
+    segments: Index, triangles: Index, vertices: int
+) -> tuple[Index, NDArray[np.bool_]]:
+    """Number of a triangle at each segment, and whether there is another one."""
     sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     keys = sides[:, 0] * vertices + sides[:, 1]
     order = np.argsort(keys)
     low, high = np.sort(segments, axis=1).T
-    return order[np.searchsorted(keys[order], low * vertices + high)] // 3
+    wanted = low * vertices + high
+    first = np.searchsorted(keys[order], wanted)
+    last = np.searchsorted(keys[order], wanted, side="right")
+    return order[first] // 3, last - first > 1
 
 
 def boundary_trace(mesh: ng.Mesh, order: int) -> Trace:
@@ -194,7 +203,7 @@ def boundary_trace(mesh: ng.Mesh, order: int) -> Trace:
     curve = np.asarray(ng.CF((ng.x, ng.y))(mesh.MapToAllElements(rule, ng.BND)))
     curve = curve.reshape(-1, degree + 1, 2)
 
-    element = _neighbour(ends, corners, mesh.nv)
+    element, inner = _neighbours(ends, corners, mesh.nv)
     xy = np.array(ngmesh.Coordinates())[:, :2]
     opposite = xy[corners[element]].mean(axis=1) - xy[ends[:, 0]]
     right = _right(xy[ends[:, 1]] - xy[ends[:, 0]])
@@ -207,6 +216,7 @@ def boundary_trace(mesh: ng.Mesh, order: int) -> Trace:
         nodes=nodes,
         element=element,
         body=triangles["index"][element].astype(np.intp) - 1,
+        inner=inner,
         curve=curve,
         side=np.where((opposite * right).sum(axis=1) > 0, -1.0, 1.0),
         edges=cad_edges(mesh),

@@ -47,6 +47,7 @@ def rows(*entries, g=None):
         partner=np.array(partner, dtype=int).reshape(m, 2),
         share=np.array(share, dtype=float).reshape(m, 2),
         g=np.zeros(m) if g is None else np.array(g, dtype=float),
+        equality=np.zeros(m, dtype=bool),
     )
 
 
@@ -438,6 +439,7 @@ def random_contact(rng, secondary, primary, order=2):
         partner=np.array(primary)[first[:, None] + np.arange(order + 1)],
         share=lagrange(order, s),
         g=rng.normal(size=m),
+        equality=np.zeros(m, dtype=bool),
     )
 
 

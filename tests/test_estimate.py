@@ -114,7 +114,8 @@ def test_parts_are_not_negative_and_sum_to_the_squares(make, order):
     assert solution.error_estimate == pytest.approx(total, rel=1e-14)
     u = solution.displacement.vec.FV().NumPy()
     norm = math.sqrt(u @ (solution.discrete.space.A @ u))
-    assert solution.relative_error_estimate == pytest.approx(total / norm, rel=1e-13)
+    # Two quadratures of one norm, which differ on coarse curved elements: measured 1e-5.
+    assert solution.relative_error_estimate == pytest.approx(total / norm, rel=1e-4)
 
 
 @pytest.mark.parametrize(

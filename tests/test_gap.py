@@ -266,10 +266,10 @@ def test_points_without_an_opposite_carry_no_row():
             np.testing.assert_allclose(x, expected, atol=1e-15)
             np.testing.assert_allclose(line.gap, 0.1, rtol=1e-14)
             assert np.count_nonzero(line.faces) == 2
-            # Half of the adjacent segments, also beyond the outermost points.
+            # Half of the adjacent segments that face the lower line with both ends.
             if order == 1:
                 weight = line.weight[np.argsort(line.position[:, 0])]
-                np.testing.assert_allclose(weight, [0.4, 0.45, 0.5], rtol=1e-14)
+                np.testing.assert_allclose(weight, [0.25, 0.45, 0.2], rtol=1e-14)
 
 
 # -------------------------------------------------------------------------- refused, or bodies

@@ -225,7 +225,7 @@ def test_a_solution_without_pairs():
 # --- exact discrete identities ---
 
 
-@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_optimality_conditions(name, order):
     solution = solve(PROBLEMS[name](), maxh=0.4, order=order)
@@ -261,7 +261,7 @@ def test_every_body_is_in_equilibrium(name, order):
         assert np.abs(loads + reaction + contact).max() < EXACT * size
 
 
-@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize("name", PROBLEMS)
 def test_energy_identity(name, order):
     """Work of loads, supports and gaps: u'Au = f'u + r'u - g'force, r the nodal reactions."""
@@ -284,7 +284,7 @@ def test_energy_of_homogeneous_data_is_minus_the_strain_energy():
 
 def test_energy_of_an_exact_solution():
     # S1 has no loads: L(u) = A(u, u) / 2, known by Clapeyron's theorem. The error of the energy is
-    # of the second order of that of u, 1.4e-2: measured 4e-5.
+    # of the second order of that of u, 1e-2: measured 1.1e-4.
     solution = solve(cases.one_transition().problem, maxh=0.28, order=2)
     assert solution.energy == pytest.approx((1.293180760825 + 0.520333087196) / 2, rel=2e-4)
 
@@ -573,23 +573,31 @@ def test_a_bilateral_gap_is_kept_closed_to_its_value():
     assert solution.force.max() < 0
 
 
-def test_an_interference_presses():
+@pytest.mark.parametrize("measured", [False, True])
+def test_an_interference_presses(measured):
     # Shrink fit: p = delta / R1 / [compliances of the two rings], in plane strain.
     delta, (r0, r1, r2) = 0.001, (0.5, 1.0, 2.0)
     problem = Problem(
-        geometry=rings(quarter=True),
+        geometry=rings(quarter=True, interference=delta if measured else 0.0),
         materials={"outer": SOFT, "inner": STIFF},
         sliding="inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y",
-        contact=[Contact("outer_contact", "inner_contact", gap=-delta)],
+        contact=[Contact("outer_contact", "inner_contact", gap=None if measured else -delta)],
     )
     solution = solve(problem, maxh=0.3, order=3)
     outer = ((r2**2 + r1**2) / (r2**2 - r1**2) + 0.3 / 0.7) / (1.0 / (1 - 0.3**2))
     inner = ((r1**2 + r0**2) / (r1**2 - r0**2) - 0.2 / 0.8) / (3.0 / (1 - 0.2**2))
     assert solution.active.all()
-    # Order 3 at this size: measured 6e-3 at an end of the zone, 2e-6 in the mean.
+    # The rays of the points on the cuts run along the cuts.
+    angle = np.degrees(np.arctan2(*solution.points.T[::-1]))
+    assert angle.min() == pytest.approx(0, abs=1e-9)
+    assert angle.max() == pytest.approx(90, abs=1e-9)
+    # Order 3 at this size: measured 6.5e-3 at an end of the zone, 1e-5 in the mean. Overlapping
+    # circles have radii that differ by 1e-3.
     expected = delta / r1 / (outer + inner)
     assert solution.pressure == pytest.approx(expected, rel=1e-2)
-    assert solution.force.sum() == pytest.approx(expected * math.pi / 2, rel=1e-4)
+    assert solution.force.sum() == pytest.approx(
+        expected * math.pi / 2, rel=3e-3 if measured else 1e-4
+    )
 
 
 def test_a_rigid_obstacle_along_the_normal():
@@ -729,7 +737,7 @@ def test_a_guide_on_a_circle_holds_the_exact_normal(order):
     x, u = nodes_on(solution, "rim")
     assert np.abs(u).max() > 1e-5
     # Not in the mesh's normals: nodes lie on the circle, so that x / 2 is the exact one.
-    assert np.abs((u * x).sum(axis=1)).max() < 1e-14 * np.abs(u).max() * 2
+    assert np.abs((u * x).sum(axis=1)).max() < 1e-13 * np.abs(u).max()
     assert max(solution.residuals.values()) < EXACT
 
 
@@ -759,8 +767,8 @@ def test_a_body_guided_on_its_circular_rim_can_rotate(order):
 @pytest.mark.parametrize(
     ("order", "unknowns", "force", "peak", "width", "energy"),
     [
-        (2, 2500, 2e-4, 5e-3, 4e-3, 2e-4),
-        (3, 3000, 3e-5, 3e-4, 3e-3, 2e-5),
+        (2, 2500, 2e-4, 5e-3, 2e-3, 2e-4),
+        (3, 3000, 2e-5, 2e-4, 1e-3, 1e-5),
     ],
 )
 def test_problem_a(order, unknowns, force, peak, width, energy):
@@ -769,7 +777,7 @@ def test_problem_a(order, unknowns, force, peak, width, energy):
     x >= 0, x^2 + (y - 1)^2 <= 1, y <= 1; E = 200, nu = 0.3, plane strain; u_x = 0 on x = 0,
     u_y = -0.005 and u_x free on y = 1; plane y = 0, direction (0, -1), gap y. References: force of
     the whole disc 0.4465326(2), greatest pressure 5.5919(1), half-width 0.05082(1), strain energy
-    of the half 5.221032(1)e-4. Measured: 5e-5, 2e-3, 8e-4, 5e-5 and 5e-6, 2e-5, 2e-3, 2e-6.
+    of the half 5.221032(1)e-4. Measured: 5e-5, 2e-3, 2e-4, 5e-5 and 5e-6, 2e-5, 3e-5, 2e-6.
     """
     problem = Problem(
         geometry=disc(),
@@ -791,7 +799,7 @@ def test_problem_a(order, unknowns, force, peak, width, energy):
 
 @pytest.mark.parametrize(
     ("order", "unknowns", "energy", "end", "peak"),
-    [(2, 2500, 2e-4, 3e-3, 5e-3), (3, 3000, 5e-5, 1e-3, 5e-4)],
+    [(2, 2500, 2e-4, 2e-3, 5e-3), (3, 3000, 3e-5, 5e-4, 3e-4)],
 )
 def test_problem_b(order, unknowns, energy, end, peak):
     """Problem B, see `partly_open`: strain energy 7.164124(1)e-4, end of contact x = 1.5453(1),
@@ -830,9 +838,9 @@ def test_two_discs_touch_as_one_on_a_plane():
         contact=[Contact("arc", direction=(0, -1), gap=ng.y)],
     )
     first, second = (
-        list(adapt(p, order=3, max_dofs=n))[-1] for p, n in ((pair, 4000), (single, 2500))
+        list(adapt(p, order=3, max_dofs=n))[-1] for p, n in ((pair, 3000), (single, 1500))
     )
-    # Errors of either: some 1e-5 of the force, 1e-3 of the peak.
+    # Up to the errors of either: measured 4e-6, 4e-5 and 3e-5.
     assert first.contact_force()[1] == pytest.approx(second.contact_force()[1], rel=1e-4)
-    assert first.pressure.max() == pytest.approx(second.pressure.max(), rel=5e-3)
+    assert first.pressure.max() == pytest.approx(second.pressure.max(), rel=5e-4)
     assert first.energy == pytest.approx(2 * second.energy, rel=1e-4)

@@ -1,0 +1,214 @@
+"""The public surface: names, signatures, import without side effects, everything tested."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import logging
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import drivers
+import geometries
+import ngcontact
+
+ROOT = Path(__file__).parents[1]
+PUBLIC = [
+    "Contact",
+    "ContactError",
+    "ConvergenceError",
+    "Elastic",
+    "Hooke",
+    "NoEquilibriumError",
+    "Problem",
+    "Solution",
+    "adapt",
+    "solve",
+    "solve_qp",
+    "write_series",
+]
+REQUIRED = inspect.Parameter.empty
+SIGNATURES = {
+    "Contact": {
+        "secondary": REQUIRED,
+        "primary": None,
+        "direction": None,
+        "gap": None,
+        "bilateral": False,
+    },
+    "solve": {
+        "problem": REQUIRED,
+        "mesh": None,
+        "maxh": None,
+        "order": 1,
+        "element": "isoparametric",
+        "start": None,
+    },
+    "adapt": {
+        "problem": REQUIRED,
+        "maxh": None,
+        "order": None,  # the measured best, whichever it is
+        "element": "isoparametric",
+        "theta": 0.5,
+        "tolerance": None,
+        "max_dofs": 100_000,
+    },
+    "solve_qp": {
+        "A": REQUIRED,
+        "f": REQUIRED,
+        "B": REQUIRED,
+        "g": REQUIRED,
+        "E": None,
+        "e": None,
+        "active": None,
+    },
+    "write_series": {"path": REQUIRED, "solutions": REQUIRED},
+}
+MEMBERS = {
+    *("problem", "mesh", "order", "element", "displacement", "stress", "work"),
+    *("points", "pair", "gap", "pressure", "force", "active", "steps"),
+    *("contact_force", "reactions", "transitions", "energy", "residuals"),
+    *("indicators", "error_estimate", "relative_error_estimate"),
+    *("write", "plot", "draw"),
+}
+
+
+def run_python(code):
+    """What a fresh interpreter prints on standard output and error."""
+    result = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    return result.stdout, result.stderr
+
+
+def test_the_public_names_are_the_documented_ones():
+    assert sorted(ngcontact.__all__) == PUBLIC
+    public = {name for name in vars(ngcontact) if not name.startswith("_")}
+    modules = {name for name in public if inspect.ismodule(getattr(ngcontact, name))}
+    assert public - modules == set(PUBLIC)
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_public_names_explain_themselves(name):
+    documentation = inspect.getdoc(getattr(ngcontact, name))
+    assert documentation
+    assert documentation.splitlines()[0].endswith((".", ":"))
+
+
+@pytest.mark.parametrize("name", SIGNATURES)
+def test_signatures(name):
+    parameters = inspect.signature(getattr(ngcontact, name)).parameters
+    defaults = {key: parameter.default for key, parameter in parameters.items()}
+    expected = SIGNATURES[name]
+    assert list(defaults) == list(expected)
+    if name == "adapt":
+        assert defaults["order"] in (1, 2, 3, 4)
+        defaults["order"] = None
+    assert defaults == expected
+
+
+@pytest.mark.parametrize("name", ["solve", "adapt"])
+def test_options_are_given_by_name(name):
+    parameters = inspect.signature(getattr(ngcontact, name)).parameters
+    positional = [
+        key for key, p in parameters.items() if p.kind is inspect.Parameter.POSITIONAL_OR_KEYWORD
+    ]
+    assert positional == {"solve": ["problem", "mesh"], "adapt": ["problem"]}[name]
+    assert not any(
+        p.kind in (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
+        for p in parameters.values()
+    )
+
+
+def test_members_of_a_solution():
+    fields = {field.name for field in dataclasses.fields(ngcontact.Solution)}
+    assert set(dir(ngcontact.Solution)) | fields >= MEMBERS
+
+
+def test_data_are_frozen():
+    contact = ngcontact.Contact("left", "right")
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        contact.secondary = "other"
+    assert contact == contact
+    assert contact != ngcontact.Contact("left", "right")  # holds arrays: no equality by value
+
+
+def test_failures_have_one_base():
+    assert issubclass(ngcontact.ContactError, RuntimeError)
+    for error in (ngcontact.ConvergenceError, ngcontact.NoEquilibriumError):
+        assert issubclass(error, ngcontact.ContactError)
+    assert ngcontact.ConvergenceError("stopped", iterate=3).iterate == 3
+    driven = ngcontact.NoEquilibriumError("moves", body="upper", motion=(1, 0), work=2.0)
+    assert (driven.body, driven.motion, driven.work) == ("upper", (1, 0), 2.0)
+    assert str(driven) == "moves"
+
+
+def test_import_is_silent_and_light():
+    heavy = "('pyvista', 'vtk', 'vtkmodules', 'matplotlib', 'IPython', 'webgui_jupyter_widgets')"
+    out, err = run_python(
+        f"import sys, ngcontact; print([name for name in {heavy} if name in sys.modules])"
+    )
+    assert out.strip() == "[]"
+    assert err == ""
+
+
+def test_import_leaves_logging_and_threads_to_the_caller():
+    assert logging.getLogger("ngcontact").handlers == []
+    out, _ = run_python(
+        "import threading, logging, ngcontact; "
+        "print(threading.active_count(), len(logging.getLogger().handlers))"
+    )
+    assert out.split() == ["1", "0"]
+
+
+def imports(path, at_import=False):
+    """Pairs (module, name) of every import in a file; name '' for `import module`.
+
+    `at_import` leaves out those for annotations and those inside functions.
+    """
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    found = set()
+    for node in tree.body if at_import else ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {(alias.name, "") for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            found |= {("." * node.level + (node.module or ""), a.name) for a in node.names}
+    return found
+
+
+@pytest.mark.parametrize("module", ["ssn", "bordered", "mark", "projection", "lagrange", "rows"])
+def test_the_algebra_knows_arrays_only(module):
+    names = {name.split(".")[0] for name, _ in imports(ROOT / "ngcontact" / f"{module}.py")}
+    assert not names & {"ngsolve", "netgen", "pyngcore"}
+
+
+def test_modules_do_not_import_each_other_in_circles():
+    graph = {}
+    for path in (ROOT / "ngcontact").glob("*.py"):
+        graph[path.stem] = {
+            name.lstrip(".").removeprefix("ngcontact.")
+            for name, _ in imports(path, at_import=True)
+            if name.startswith((".", "ngcontact."))
+        }
+    order = []
+    while graph:
+        free = sorted(name for name, needs in graph.items() if not needs & set(graph))
+        assert free, f"circle among {sorted(graph)}"
+        order += free
+        for name in free:
+            del graph[name]
+    assert order[-1] == "__init__"
+
+
+def test_every_driver_and_every_geometry_is_tested():
+    used = set().union(*(imports(p) for p in Path(__file__).parent.glob("test_*.py")))
+    named = {name for module, name in used if module == "drivers"}
+    named |= {module.removeprefix("drivers.") for module, _ in used if "drivers." in module}
+    modules = {path.stem for path in Path(drivers.__file__).parent.glob("*.py")}
+    assert modules - {"__init__"} <= named
+    functions = {name for module, name in used if module.startswith("geometries")}
+    assert set(geometries.__all__) <= functions
