@@ -111,6 +111,11 @@ def _physical_basis(V: ng.FESpace, trace: Trace) -> sp.csr_matrix:
     xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
     corners = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.intp) - 1
     triangles = corners[trace.element]
+    if trace.geometry_order > 2:
+        raise ValueError(
+            f"the mesh is curved to degree {trace.geometry_order}; element='physical' lives on "
+            "meshes curved to degree 2: call mesh.Curve(2)"
+        )
     middle = trace.curve[:, 1] if trace.geometry_order == 2 else trace.curve.mean(axis=1)
     # Barycentric coordinates of the edge's node in the straight triangle, affinely extended.
     sides = xy[triangles[:, 1:]] - xy[triangles[:, :1]]

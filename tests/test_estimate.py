@@ -8,6 +8,7 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
+from netgen.occ import Glue, OCCGeometry, WorkPlane, Y
 
 from drivers import cases
 from drivers.exact import patch as patch_solution
@@ -561,3 +562,43 @@ def test_curved_contact_needs_no_pair_of_equal_curves():
     )
     coarse, fine = (solve(problem, maxh=h, order=2) for h in (0.4, 0.1))
     assert fine.relative_error_estimate < coarse.relative_error_estimate / 6
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_lines_inside_a_body_are_no_boundary(order):
+    """A bar glued from two parts under its exact load: no residual on the line between them."""
+    lower, upper = (
+        WorkPlane().Rectangle(1, 1).Face(),
+        WorkPlane().MoveTo(0, 1).Rectangle(1, 1).Face(),
+    )
+    lower.faces.name, upper.faces.name = "lower", "upper"
+    lower.edges.name = upper.edges.name = "side"
+    lower.edges.Min(Y).name, upper.edges.Max(Y).name = "bottom", "top"
+    lower.edges.Max(Y).name = upper.edges.Min(Y).name = "between"
+    bar = Problem(
+        geometry=OCCGeometry(Glue([lower, upper]), dim=2),
+        materials={"lower|upper": Elastic(E=1.0, nu=0.3)},
+        displacement={"bottom": (-0.39 * ng.x, 0)},
+        traction={"top": (0, 1)},
+    )
+    solution = solve(bar, maxh=0.3, order=order)
+    # Uniaxial tension in plane strain: u = (-nu (1 + nu) x, (1 - nu^2) y) / E is in V_h.
+    assert solution.error_estimate < 1e-12
+
+
+def test_a_finer_primary_is_covered_by_contact():
+    """Segments of the primary without a contact point opposite are no free boundary."""
+    shape = blocks().shape
+    for edge in shape.edges:
+        if edge.name == "lower_contact":
+            edge.partition = np.linspace(0, 1, 16)[1:-1].tolist()
+        if edge.name == "upper_contact":
+            edge.partition = [1 / 3, 2 / 3]
+    case = cases.pressure_patch()
+    mesh = ng.Mesh(OCCGeometry(shape, dim=2).GenerateMesh(maxh=0.7))
+    solution = solve(case.problem, mesh, order=1)
+    sides = solution.estimate_parts["traction"]
+    trace = solution.discrete.space.trace
+    below = trace.element[trace.select(boundary_mask(mesh, "lower_contact"))]
+    corners = trace.element[trace.select(boundary_mask(mesh, "lower_left|lower_right"))]
+    assert sides[np.setdiff1d(below, corners)].max() == 0

@@ -7,7 +7,7 @@ import math
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import OCCGeometry
+from netgen.occ import Compound, OCCGeometry, Vec, WorkPlane
 
 from geometries import blocks, disc, disc_on_block, graphs, rings
 from geometries.region import body, compound, polygon
@@ -387,3 +387,22 @@ def test_quadrature_on_the_line(direction):
     measure = LENGTHS if direction is None else SIDES[:, 0]
     assert weight.sum() == pytest.approx(measure.sum(), rel=1e-14)
     assert weight @ x[:, 0] == pytest.approx(measure @ middle, abs=1e-14)
+
+
+def test_the_far_side_of_the_own_body_has_no_partner():
+    """Whole discs: the ray inwards from the far side leaves the disc before it meets the other."""
+    upper = WorkPlane().Circle(0, 1, 1).Face()
+    lower = WorkPlane().Circle(0, -1, 1).Face()
+    for face, name in ((upper, "upper"), (lower, "lower")):
+        face.faces.name, face.edges.name = name, f"{name}_rim"
+    geometry = OCCGeometry(Compound([upper, lower]), dim=2)
+    for direction in (None, (0, -1)):
+        line = contact_line(
+            trace_of(geometry, 2, maxh=0.4), Contact("upper_rim", "lower_rim", direction)
+        )
+        assert (line.position[:, 1] < 1).all()
+        assert line.gap.min() > -1e-3  # the chords of the mesh overlap by O(h^3) at most
+    # Overlap that is meant stays: the same discs 0.01 into each other.
+    moved = OCCGeometry(Compound([upper.Move(Vec(0, -0.01, 0)), lower]), dim=2)
+    line = contact_line(trace_of(moved, 2, maxh=0.4), Contact("upper_rim", "lower_rim", (0, -1)))
+    assert line.gap.min() == pytest.approx(-0.01, rel=0.05)

@@ -363,3 +363,21 @@ def test_a_bad_size_is_refused_with_its_value(maxh, error):
     with pytest.raises(error, match=f"maxh={value}.*0.25") as caught:
         first_mesh(BOUNDED["blocks"].problem(), maxh)
     assert "maxh" in str(caught.value)
+
+
+def test_whole_circles_are_divided_on_the_facing_side():
+    """A full circle is no graph over eta: nodes match where the discs face, areas stay right."""
+    upper, lower = (occ.WorkPlane().Circle(0, y, 1).Face() for y in (1, -1))
+    for face, name in ((upper, "upper"), (lower, "lower")):
+        face.faces.name, face.edges.name = name, f"{name}_rim"
+    discs = Problem(
+        geometry=OCCGeometry(occ.Compound([upper, lower]), dim=2),
+        materials={"upper|lower": Elastic(E=1.0, nu=0.3)},
+        contact=[Contact("upper_rim", "lower_rim", direction=(0, -1))],
+    )
+    mesh = first_mesh(discs, maxh=0.4)
+    assert mesh.ne < 200  # measured 95
+    mesh.Curve(3)
+    for name in ("upper", "lower"):
+        # Area of a disc by cubic curves of chord 0.4: O(h^4), measured 3e-5.
+        assert ng.Integrate(ng.CF(1), mesh.Materials(name)) == pytest.approx(math.pi, rel=1e-3)

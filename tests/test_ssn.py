@@ -234,3 +234,34 @@ def test_bad_input(change, message):
     data = {"A": np.eye(2), "f": [1.0, 1.0], "B": [[1.0, 0.0]], "g": [1.0]} | change
     with pytest.raises(ValueError, match=message):
         solve_qp(**data)
+
+
+@pytest.mark.parametrize("stiffness", [1e-9, 1.0, 2.1e11])
+def test_bordered_systems_do_not_depend_on_the_stiffness(stiffness):
+    """Added rows border with compliances, released rows with stiffnesses: both must count."""
+    rng = np.random.default_rng(5)
+    n, m = 12, 6
+    for _ in range(50):
+        X = rng.normal(size=(n, n + 2))
+        K, b, g = sp.csr_matrix(X @ X.T), rng.normal(size=n), 0.3 * rng.normal(size=m)
+        rows = sp.identity(n, format="csr")[:m]
+        program = Program(
+            K=stiffness * K,
+            b=stiffness * b,
+            R=rows,
+            g=g,
+            equality=np.zeros(m, dtype=bool),
+            fixed=np.zeros(n, dtype=bool),
+            values=np.zeros(n),
+            unknown=np.arange(m),
+        )
+        result = minimise(program, counting_factor(program.K, []), rng.random(m) < 0.5)
+        reference = solve_qp(K, b, rows, g)
+        np.testing.assert_array_equal(result.active, reference.active)
+        # Condition of these matrices up to 1e5: round-off 1e-10.
+        np.testing.assert_allclose(result.u, reference.u, atol=1e-9)
+
+
+def test_rows_of_any_length():
+    result = solve_qp(np.eye(2), [2.0, 2.0], [[1.0, 0.0], [0.0, 1e-7]], [0.25, 0.25e-7])
+    np.testing.assert_allclose(result.u, 0.25, rtol=1e-12)
