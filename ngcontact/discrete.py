@@ -8,7 +8,6 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from .bordered import Program
 from .constraint import Basis, change_of_basis
@@ -20,14 +19,10 @@ from .rows import Conditions, Rows
 from .space import Space, assemble, cholesky
 from .ssn import Minimiser, minimise
 from .trace import Trace, boundary_trace
-from .transition import transitions
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
-
-SEPARATION = 1e-6  # of the directions at a corner, relative to the zone
-TOUCHING = 1e-12  # gap, relative to the zone, up to which points start active
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,49 +188,6 @@ def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Dis
         basis=basis,
         program=program,
     )
-
-
-def first_active_set(discrete: Discrete) -> Mask:
-    """Cold start: the points that touch before the load, or of each pair the nearest ones."""
-    active = []
-    for line in discrete.lines:
-        size = np.ptp(line.position, axis=0).max(initial=0.0)
-        nearest = max(line.gap.min(initial=np.inf), 0.0)
-        active.append(line.gap <= nearest + TOUCHING * size)
-    return np.concatenate([np.zeros(0, dtype=bool), *active])
-
-
-def carried_active_set(discrete: Discrete, previous: Discrete, state: Minimiser) -> Mask:
-    """Warm start: the state of the nearest contact point of the same pair on another mesh.
-
-    At orders above 1 the points around a transition are told by the side of it they lie on: it is
-    located more closely than the nodes of either mesh.
-    """
-    slack = previous.program.g - state.u[previous.program.unknown]
-    start, carried = 0, [np.zeros(0, dtype=bool)]
-    for new, old in zip(discrete.lines, previous.lines, strict=True):
-        at = slice(start, start + len(old.node))
-        start = at.stop
-        if len(old.node) == 0 or len(new.node) == 0:
-            carried.append(np.zeros(len(new.node), dtype=bool))
-            continue
-        # Two points at a corner are told apart by their directions.
-        size = SEPARATION * np.ptp(old.position, axis=0).max(initial=0.0)
-        tree = cKDTree(np.column_stack([old.position, size * old.direction]))
-        places = np.column_stack([new.position, size * new.direction])
-        distance, near = tree.query(places, k=[1, min(2, len(old.node))])
-        away, nearest = distance[:, 0], near[:, 0]
-        # A new point in the middle of two: active if one of them is, whatever round-off says.
-        tied = distance[:, 1] <= (1 + 1e-6) * away
-        active = state.active[at][nearest] | (tied & state.active[at][near[:, 1]])
-        if discrete.space.trace.order > 1 and away.max() > size:  # not the same points
-            ends = transitions(old, slack[at], state.active[at])
-            for inner, outer, place in zip(ends.inner, ends.outer, ends.position, strict=True):
-                around = (nearest == inner) | (nearest == outer)
-                inwards = old.position[inner] - old.position[outer]
-                active[around] = (new.position[around] - place) @ inwards >= 0
-        carried.append(active)
-    return np.concatenate(carried)
 
 
 def minimise_energy(discrete: Discrete, active: Mask) -> Minimiser:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 
 from .bordered import Factor, Mask, Solve
 from .cad import cad_edges
+from .nodal import edge_bubbles, nodal_basis
 from .problem import Problem, boundary_mask
-from .trace import Trace, edge_bubbles, nodal_basis
+from .trace import Trace
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,6 @@ from functools import cached_property
 
 import ngsolve as ng
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .cad import CadEdge, cad_edges
@@ -221,46 +220,3 @@ def boundary_trace(mesh: ng.Mesh, order: int) -> Trace:
         side=np.where((opposite * right).sum(axis=1) > 0, -1.0, 1.0),
         edges=cad_edges(mesh),
     )
-
-
-def edge_bubbles(space: ng.FESpace) -> Array:
-    """Values (order - 1, order - 1) of the edge functions of an H1 space at the interior nodes.
-
-    Row i is the i-th interior Gauss-Lobatto point from the end with the lower vertex number,
-    column j the j-th edge function.
-    """
-    mesh, order = space.mesh, space.globalorder
-    element = ng.ElementId(ng.VOL, 0)
-    vertices = [v.nr for v in mesh[element].vertices]
-    edge = mesh[element].edges[0]
-    low, high = sorted(v.nr for v in mesh[edge].vertices)
-    reference = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
-    start, stop = reference[vertices.index(low)], reference[vertices.index(high)]
-    numbers = list(space.GetDofNrs(element))
-    columns = [numbers.index(d) for d in space.GetDofNrs(edge)]
-    shape = space.GetFE(element)
-    points = [start + s * (stop - start) for s in gauss_lobatto(order)[1:-1]]
-    values = np.array([shape.CalcShape(float(px), float(py), 0.0).NumPy() for px, py in points])
-    return values[:, columns]
-
-
-def nodal_basis(trace: Trace) -> sp.csr_matrix:
-    """Matrix (n, n) from boundary node values and other unknowns to NGSolve's scalar unknowns."""
-    order, size = trace.order, trace.space.ndof
-    if order == 1:
-        return sp.identity(size, format="csr")
-    bubbles = np.linalg.inv(edge_bubbles(trace.space))
-    low_first = trace.nodes[:, 0] < trace.nodes[:, -1]
-    nodes = np.where(low_first[:, None], trace.nodes, trace.nodes[:, ::-1])
-    _, first = np.unique(nodes[:, 1], return_index=True)
-    nodes = nodes[first]
-    # Edge function coefficients: bubbles (values - linear part).
-    s = gauss_lobatto(order)[1:-1]
-    local = bubbles @ np.column_stack([s - 1, np.eye(order - 1), -s])
-    rows = np.repeat(nodes[:, 1:-1, None], order + 1, axis=2)
-    cols = np.repeat(nodes[:, None, :], order - 1, axis=1)
-    values = np.broadcast_to(local, rows.shape)
-    diagonal = np.ones(size)
-    diagonal[nodes[:, 1:-1].ravel()] = 0.0
-    edges = sp.coo_matrix((values.ravel(), (rows.ravel(), cols.ravel())), shape=(size, size))
-    return (sp.diags(diagonal) + edges).tocsr()

@@ -430,6 +430,13 @@ def test_penetration_part(patch):
     assert value == pytest.approx((mu / h / 2 * 1e-4 * length).sum(), rel=1e-11)
 
 
+@pytest.mark.parametrize("gap", [0.01, -0.01])
+def test_a_bilateral_pair_must_neither_open_nor_overlap(patch, gap):
+    [value] = only(altered(patch, contact={"gap": gap, "bilateral": True}), "penetration")
+    h, mu, length = along(patch, LINE)
+    assert value == pytest.approx((mu / h / 2 * 1e-4 * length).sum(), rel=1e-11)
+
+
 def test_a_rigid_obstacle_gets_its_terms_on_one_side():
     problem = cases.pressure_patch().problem
     rigid = replace(

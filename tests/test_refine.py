@@ -248,6 +248,22 @@ def test_an_unmarked_facing_segment_is_divided_once_and_no_further():
     assert len(new["upper_contact"]) == 1
 
 
+def test_new_vertices_meet_halfway_between_those_of_the_two_lines():
+    """Of the block: the middle of a segment. Of the disc: that of a chord, thrown on the circle."""
+    problem = ENLARGING["disc on block"].problem()
+    mesh = first_mesh(problem, 0.4)
+    old = np.sort(vertices(mesh, "block_top")[:, 0])
+    old = old[old < 0.9]
+    ends = np.column_stack([old, 1 - np.sqrt(1 - old**2)])
+    chord = (ends[1:] + ends[:-1]) / 2 - [0, 1]
+    on_arc = chord[:, 0] / np.linalg.norm(chord, axis=1)
+    expected = (on_arc + (old[1:] + old[:-1]) / 2) / 2
+    for boundary in ("block_top", "disc_arc"):
+        x = np.sort(vertices(refined(problem, mesh), boundary)[:, 0])
+        new = x[1 : 2 * len(expected) : 2]
+        assert new == pytest.approx(expected, abs=ROUND_OFF)
+
+
 def test_nothing_marked_nothing_refined():
     problem = ENLARGING["disc on block"].problem()
     mesh = first_mesh(problem, 0.4)

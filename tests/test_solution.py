@@ -222,6 +222,15 @@ def test_a_solution_without_pairs():
         solution.contact_force()
 
 
+@pytest.mark.parametrize("name", ["missing/disc.vtu", "disc.txt"])
+def test_an_unwritable_path_is_refused_before_any_work(tmp_path, name):
+    solution = solve(partly_open(), maxh=0.5)
+    with pytest.raises((OSError, ValueError), match=name.split("/")[0]):
+        solution.write(tmp_path / name)
+    assert solution.work["estimates"] == 0  # the indicators are part of the file
+    assert list(tmp_path.iterdir()) == []
+
+
 # --- exact discrete identities ---
 
 

@@ -14,7 +14,8 @@ from ngsolve.meshes import MakeStructured2DMesh
 
 from geometries import blocks, disc_on_block, graphs, rings
 from ngcontact.lagrange import gauss, gauss_lobatto
-from ngcontact.trace import boundary_trace, nodal_basis
+from ngcontact.nodal import nodal_basis
+from ngcontact.trace import boundary_trace
 
 ORDERS = [1, 2, 3, 4]
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
