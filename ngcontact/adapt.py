@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from numbers import Real
 
 import ngsolve as ng
+import numpy as np
 
 from .active import carried_active_set, first_active_set
 from .discrete import discretise, minimise_energy
@@ -175,6 +176,13 @@ def _number(name: str, value: object) -> float:
     return float(value)
 
 
+def _at_round_off(solution: Solution) -> bool:
+    """Whether the estimate is round-off of terms that cancel, as where bodies move rigidly."""
+    u = np.abs(solution.displacement.vec.FV().NumPy())
+    terms = float(np.sqrt(u @ (abs(solution.discrete.space.A) @ u)))
+    return solution.error_estimate <= ROUND_OFF * terms
+
+
 def _levels(
     problem: Problem,
     mesh: ng.Mesh,
@@ -191,7 +199,7 @@ def _levels(
         error = solution.relative_error_estimate
         log.info("%s", solution)
         yield solution
-        if error <= max(tolerance or 0.0, ROUND_OFF):
+        if error <= max(tolerance or 0.0, ROUND_OFF) or _at_round_off(solution):
             return
         mesh = refined(problem, solution.mesh, doerfler(solution.indicators, theta))
         mesh, _ = curve(mesh, order, element)

@@ -147,9 +147,11 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
     Raises
     ------
     ValueError, TypeError
-        `maxh` is not a positive finite number.
+        `maxh` is not a positive finite number, or given for a geometry that is a Mesh.
     """
     if isinstance(problem.geometry, ng.Mesh):
+        if maxh is not None:
+            raise ValueError(f"maxh={maxh} has no effect: the geometry is a Mesh; leave maxh out")
         return problem.geometry
     shape = problem.geometry.shape
     low, high = shape.bounding_box

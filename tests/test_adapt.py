@@ -385,3 +385,15 @@ def test_the_warm_start_from_the_same_mesh_takes_one_step(order):
         assert again.steps == [0]
         assert (again.active == first.active).all()
         assert again.force == pytest.approx(first.force, abs=1e-10 * first.force.max())
+
+
+def test_bodies_that_only_move_rigidly_take_one_level():
+    """No strain, no contact: estimate and norm are both round-off, nothing is left to refine."""
+    lifted = Problem(
+        geometry=blocks(),
+        materials={"upper|lower": Elastic(E=1.0, nu=0.3)},
+        displacement={"bottom": (0, 0), "top": (0, 0.1)},
+        contact=[Contact("upper_contact", "lower_contact")],
+    )
+    [solution] = adapt(lifted, order=2, max_dofs=5000)
+    assert not solution.active.any()

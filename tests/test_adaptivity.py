@@ -92,7 +92,7 @@ def test_newton_steps_and_factorisations(name):
 def test_punch_regains_the_rate():
     """Corner r^(-1/2): N^-1/4 uniformly, N^-1/2 adaptively, both of order 1."""
     *_, finest = adapt(cases.flat_punch(), order=4, max_dofs=15_000)
-    norm = adaptive_study.energy_norm(finest)
+    norm = finest.energy_norm
 
     def error(solution):
         return np.sqrt(2 * (solution.energy - finest.energy)) / norm

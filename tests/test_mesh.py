@@ -383,3 +383,10 @@ def test_whole_circles_are_divided_on_the_facing_side():
     for name in ("upper", "lower"):
         # Area of a disc by cubic curves of chord 0.4: O(h^4), measured 3e-5.
         assert ng.Integrate(ng.CF(1), mesh.Materials(name)) == pytest.approx(math.pi, rel=1e-3)
+
+
+def test_a_mesh_has_its_size_already():
+    mesh = ng.Mesh(blocks().GenerateMesh(maxh=0.5))
+    problem = Problem(geometry=mesh, materials={"upper|lower": Elastic(E=1.0, nu=0.3)})
+    with pytest.raises(ValueError, match=r"maxh=0.1 has no effect"):
+        first_mesh(problem, maxh=0.1)
