@@ -228,16 +228,23 @@ def contact_line(trace: Trace, contact: Contact) -> ContactLine:
 
 def _warn_of_finer_primary(trace: Trace, line: ContactLine) -> None:
     """Contact points miss pressure between them where the primary has the shorter segments."""
-    if line.searches and line.faces.any():
-        coarse = np.median(trace.lengths(line.segments[line.faces]))
-        fine = np.median(trace.lengths(line.partner[line.partner >= 0]))
-        if fine < FINER * coarse:
-            log.warning(
-                'the facing meshes of "%s" and "%s" do not match and the primary is finer: swap '
-                "them, the finer side carries the contact points",
-                line.contact.secondary,
-                line.contact.primary,
-            )
+    if not (line.searches and line.faces.any()):
+        return
+
+    def length(segments: Index) -> float:
+        if line.contact.direction is None:
+            return float(np.median(trace.lengths(segments)))
+        dx, dy = line.contact.direction  # across it, as the points see them
+        chord = trace.curve[segments, -1] - trace.curve[segments, 0]
+        return float(np.median(np.abs(chord @ np.array([-dy, dx]))))
+
+    if length(line.partner[line.partner >= 0]) < FINER * length(line.segments[line.faces]):
+        log.warning(
+            'the facing meshes of "%s" and "%s" do not match and the primary is finer: swap '
+            "them, the finer side carries the contact points",
+            line.contact.secondary,
+            line.contact.primary,
+        )
 
 
 def without(line: ContactLine, dropped: Index) -> ContactLine:
