@@ -1,6 +1,7 @@
 # Two commands do everything; each makes the environment it needs.
 PYTHON ?= python3
 BIN := .venv/bin
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
 .PHONY: demo test clean
 

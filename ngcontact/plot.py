@@ -187,6 +187,9 @@ def _frame(scene: Scene) -> tuple[Array, Array] | None:
     low, high = scene.zone.min(axis=0), scene.zone.max(axis=0)
     half = max(0.9 * (high - low).max(), 0.02 * size)
     middle = (low + high) / 2
+    # At the rim of the picture, as on a symmetry plane, the window moves inwards.
+    inner, outer = scene.moved.min(axis=0) + 0.95 * half, scene.moved.max(axis=0) - 0.95 * half
+    middle = np.where(inner < outer, np.clip(middle, inner, outer), middle)
     return (middle - half, middle + half) if half < 0.2 * size else None
 
 
@@ -205,8 +208,7 @@ def _draw(figure: Figure, solution: Any, scale: float | None) -> None:
     figure.set_size_inches(2 + 4.5 * sum(ratios), 5)
     bodies, *close, profile = figure.subplots(1, len(ratios), width_ratios=ratios)
     shading, *_ = [_draw_bodies(axes, scene, top) for axes in (bodies, *close)]
-    factor = "" if scene.scale == 1 else f", displacement × {scene.scale:g}"
-    bodies.set_title("deformed bodies" + factor)
+    bodies.set_title(f"deformed bodies, displacement × {scene.scale:g}")
     if frame is not None:
         low, high = frame
         box = Rectangle((low[0], low[1]), *(high - low), fill=False, color="crimson", lw=1.2)
@@ -229,6 +231,8 @@ def _draw_bodies(axes: Axes, scene: Scene, top: float) -> Any:
     axes.add_collection(LineCollection(inner, colors="w", lw=0.25, alpha=0.5))
     axes.add_collection(LineCollection(outer, colors="k", lw=0.8))
     axes.set(aspect="equal", xlabel="x", ylabel="y")
+    axes.locator_params(nbins=5)
+    axes.ticklabel_format(scilimits=(-2, 4))
     return shading
 
 
@@ -244,7 +248,7 @@ def _draw_pressure(axes: Axes, solution: Any) -> None:
             label = name if state.any() and pair == lines[0][0] else None
             axes.plot(s[state], p[state], "o", ms=4, mec=colour, mfc=fill, label=label)
         touching.append(s[active])
-    if len(lines) > 0:
+    if len(contact) > 1 or not solution.active.all():
         axes.legend()
     if (
         solution.active.any() and len(solution.points) > 1
@@ -255,6 +259,9 @@ def _draw_pressure(axes: Axes, solution: Any) -> None:
         low, high = max(low - margin, every.min()), min(high + margin, every.max())
         axes.set_xlim(low - 0.03 * margin, high + 0.03 * margin)
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
-    names = {"arc position" if pair.direction is None else "η" for pair in contact}
+    names = {
+        "arc position" if pair.direction is None else "η, along the contact line"
+        for pair in contact
+    }
     axes.set(xlabel=" or ".join(sorted(names)), ylabel="contact pressure", title="contact pressure")
     axes.grid(alpha=0.3)
