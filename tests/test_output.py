@@ -460,7 +460,9 @@ def test_picture_shows_bodies_and_pressure(tmp_path, hertz):
         rows = slice(int((1 - y1) * height), int((1 - y0) * height))
         panel = image[rows, int(x0 * width) : int(x1 * width)]
         assert panel.std() > 0.03  # a blank panel: 0; measured: 0.1 and more
-    assert bodies.get_title() == "deformed bodies"  # contact closes a gap: true to scale
+    assert (
+        bodies.get_title() == "deformed bodies, displacement × 1"
+    )  # contact closes a gap: true to scale
     assert close.get_xlim()[0] < 0 < close.get_xlim()[1]
     drawn = {line.get_label(): line.get_xydata() for line in profile.lines}
     points = np.column_stack([hertz.points[:, 0], hertz.pressure])
