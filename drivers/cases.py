@@ -7,7 +7,7 @@ the body ' (upper, outer) and E = 3, nu = 0.2 for the body '' (lower, inner).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import ngsolve as ng
 import numpy as np
@@ -128,6 +128,13 @@ def clamped_transition() -> Case:
         contact=[Contact(secondary="upper_contact", primary="lower_contact")],
     )
     return Case(problem, exact)
+
+
+def guided_transition() -> Case:
+    """S7 as in the paper: Gamma_u above, Gamma_0 below, the lower block free to slide."""
+    case = clamped_transition()
+    problem = replace(case.problem, displacement={"top": (0, 0)}, sliding="bottom")
+    return Case(problem, case.exact)
 
 
 def curved_lines() -> Case:

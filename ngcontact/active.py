@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from .discrete import Discrete
-from .ssn import Minimiser
+from .newton import Minimiser
 from .transition import transitions
 
 Mask = NDArray[np.bool_]
@@ -17,13 +17,23 @@ TOUCHING = 1e-12  # gap, relative to the zone, up to which points start active
 
 
 def first_active_set(discrete: Discrete) -> Mask:
-    """Cold start: the points that touch before the load, or of each pair the nearest ones."""
-    active = []
+    """Cold start: the points that touch before the load, or of each pair the nearest ones.
+
+    Bodies that contact alone can hold are first placed, rigid, where the load presses them.
+    """
+    p = discrete.program
+    gap, carries = p.g, np.zeros(len(p.g), dtype=bool)
+    if (rigid := discrete.rigid) is not None:
+        gap, carries = gap - rigid.rows @ rigid.placing, rigid.carries
+    at_rest = not p.b.any() and not p.values[p.fixed].any()
+    start, active = 0, [np.zeros(0, dtype=bool)]
     for line in discrete.lines:
+        distance = gap[start : start + len(line.node)]
+        start += len(line.node)
         size = np.ptp(line.position, axis=0).max(initial=0.0)
-        nearest = max(line.gap.min(initial=np.inf), 0.0)
-        active.append(line.gap <= nearest + TOUCHING * size)
-    return np.concatenate([np.zeros(0, dtype=bool), *active])
+        nearest = 0.0 if at_rest else max(distance.min(initial=np.inf), 0.0)
+        active.append(distance <= nearest + TOUCHING * size)
+    return np.concatenate(active) | carries
 
 
 def carried_active_set(discrete: Discrete, previous: Discrete, state: Minimiser) -> Mask:

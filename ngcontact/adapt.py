@@ -11,12 +11,10 @@ import numpy as np
 
 from .active import carried_active_set, first_active_set
 from .discrete import discretise, minimise_energy
-from .errors import ConvergenceError
 from .mark import doerfler
 from .mesh import first_mesh
 from .problem import Problem
 from .refine import refined
-from .rigid import free_motion
 from .solution import Solution
 from .space import check_element, curve
 
@@ -90,13 +88,6 @@ def _solve_checked(
     else:
         active = carried_active_set(discrete, start.discrete, start.minimiser)
     minimiser = minimise_energy(discrete, active)
-    # A factorisation does not notice motions that the load happens not to drive.
-    if (motion := free_motion(discrete, minimiser.active)) is not None:
-        raise ConvergenceError(
-            f"{motion} without resistance from supports or active contact, so the displacement is "
-            "not determined; hold it by `displacement` or `sliding`",
-            iterate=minimiser,
-        )
     displacement = ng.GridFunction(discrete.space.V)
     displacement.vec.FV().NumPy()[:] = discrete.space.basis @ (discrete.basis.T @ minimiser.u)
     solution = Solution(

@@ -12,11 +12,14 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .kernel import Kernel, no_kernel
+
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 Solve = Callable[[Array], Array]
 Factor = Callable[[Mask], Solve]
+Columns = dict[int, tuple[Array, Array]]  # border columns and the base solutions for them
 
 BORDER = 16  # changed rows up to which a bordered solve is cheaper than a factorisation
 REFINED = 1e-14  # residual, relative to the first, above which a second solve removes it
@@ -34,7 +37,7 @@ class Program:
     Attributes
     ----------
     K : sparse (n, n)
-        Symmetric, positive definite on the unknowns that are not `fixed`.
+        Symmetric; on the unknowns that are not `fixed` positive definite but for the `kernel`.
     b : ndarray (n,)
         Load.
     R : sparse (m, n)
@@ -50,6 +53,8 @@ class Program:
     unknown : ndarray of int (m,), optional
         Given when row j is the unit vector of unknown `unknown[j]`: an active row is then an
         unknown that leaves the system, and every factorised matrix is a principal submatrix.
+    kernel : Kernel, optional
+        Null space of K, only with unit rows.
     """
 
     K: sp.csr_matrix
@@ -60,6 +65,7 @@ class Program:
     fixed: Mask
     values: Array
     unknown: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    kernel: Kernel = field(default_factory=lambda: no_kernel(0))
 
     @property
     def unit_rows(self) -> bool:
@@ -67,12 +73,21 @@ class Program:
         return len(self.unknown) == len(self.g)
 
 
+@dataclass(frozen=True, eq=False)
+class Anchor:
+    """Proximal term stiffness / 2 |y - at|^2 on the pins, which makes every system definite."""
+
+    stiffness: float
+    at: Array
+
+
 class Systems:
     """The linear systems of one program for changing active sets.
 
-    One set, the base, is factorised. Another set is reached by bordering that factor with one
-    row and column for each row of R that changed state, and by the Schur complement of the
-    border (Gill, Murray, Saunders, Wright 1990), at one back-solve for each change.
+    One set, the base, is factorised with all pins of the kernel held. Another set is reached by
+    bordering that factor with one row and column for each row of R that changed state and for
+    each pin, and by the Schur complement of the border (Gill, Murray, Saunders, Wright 1990), at
+    one back-solve for each.
     """
 
     def __init__(self, program: Program, factor: Factor) -> None:
@@ -82,45 +97,46 @@ class Systems:
         self.back_solves = 0
         self.base = np.zeros(len(program.g), dtype=bool)
         self.free = ~program.fixed
-        self.columns: dict[int, tuple[Array, Array]] = {}
+        self.released: Columns = {}  # by unknown
+        self.added: Columns = {}  # by row
 
     def _refactorise(self, active: Mask) -> None:
         p = self.program
         self.base = active.copy() if p.unit_rows else np.zeros_like(active)
         self.free = ~p.fixed
+        self.free[np.concatenate([p.kernel.held, p.kernel.pins])] = False
         if p.unit_rows:
             self.free[p.unknown[active]] = False
         self._solve = self.factor(self.free)
         self.factorizations += 1
-        self.columns.clear()
+        self.released.clear()
+        self.added.clear()
 
     def _back_solve(self, right: Array) -> Array:
         self.back_solves += 1
         return self._solve(np.where(self.free, right, 0.0))
 
-    def _column(self, j: int) -> tuple[Array, Array]:
-        """Border column of row j and the base solution for it, both (n,)."""
-        if j not in self.columns:
-            p = self.program
-            if self.base[j]:
-                column = p.K[p.unknown[j]].toarray().ravel()
-            else:
-                column = p.R[j].toarray().ravel()
-            self.columns[j] = column, self._back_solve(column)
-        return self.columns[j]
+    def _columns(self, known: Columns, M: sp.csr_matrix, rows: Index) -> None:
+        """Remember the missing border columns, rows of M, and the base solutions for them."""
+        for j in rows:
+            if j not in known:
+                column = M[j].toarray().ravel()
+                known[j] = column, self._back_solve(column)
 
-    def _border(self, changed: Index) -> None:
-        """Columns, their base solutions and the Schur complement for the changed rows."""
-        n = self.program.b.size
-        pairs = [self._column(j) for j in changed]
-        self.C = np.array([c for c, _ in pairs]).reshape(-1, n).T
-        self.X = np.array([x for _, x in pairs]).reshape(-1, n).T
-        released = self.base[changed]
-        D = np.zeros((changed.size, changed.size))
-        if released.any():
-            at = self.program.unknown[changed[released]]
-            D[:, released] = self.C[at].T
-            D[released] = self.C[at]
+    def _border(self, at: Index, rows: Index, anchor: Anchor | None) -> None:
+        """Schur complement of the unknowns released `at` and the added `rows`."""
+        p = self.program
+        self._columns(self.released, p.K, at)
+        self._columns(self.added, p.R, rows)
+        pairs = [self.released[j] for j in at] + [self.added[j] for j in rows]
+        self.C = np.array([c for c, _ in pairs]).reshape(-1, p.b.size).T
+        self.X = np.array([x for _, x in pairs]).reshape(-1, p.b.size).T
+        D = np.zeros((len(pairs), len(pairs)))
+        D[:, : at.size] = self.C[at].T
+        D[: at.size] = self.C[at]
+        if anchor is not None:
+            pins = np.arange(at.size - p.kernel.pins.size, at.size)
+            D[pins, pins] += anchor.stiffness
         schur = self.C.T @ self.X - D
         # Forces and displacements side by side: only after scaling can small pivots be told.
         size = np.sqrt(np.abs(np.diagonal(schur)))
@@ -135,16 +151,27 @@ class Systems:
         z /= self.size
         return x - self.X @ z, z
 
-    def solve(self, active: Mask) -> tuple[Array, Array]:
+    def residual(self, y: Array, force: Array, anchor: Anchor | None = None) -> Array:
+        """Unbalanced force b - K y - R' force, (n,), with the proximal term if there is one."""
+        p = self.program
+        residual = p.b - p.K @ y - p.R.T @ force
+        if anchor is not None:
+            pins = p.kernel.pins
+            residual[pins] -= anchor.stiffness * (y[pins] - anchor.at)
+        return residual
+
+    def solve(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
         """Minimiser and multipliers for one active set, rows of the set held at their bound."""
         p = self.program
         if self.factorizations == 0 or (
             p.unit_rows and np.count_nonzero(active != self.base) > BORDER
         ):
             self._refactorise(active)
-        changed = np.flatnonzero(active != self.base)
-        self._border(changed)
-        released = self.base[changed]
+        rows = np.flatnonzero(active & ~self.base)
+        at = p.kernel.pins
+        if p.unit_rows:
+            at = np.concatenate([p.unknown[self.base & ~active], at])
+        self._border(at, rows, anchor)
 
         y = np.where(p.fixed, p.values, 0.0)
         if p.unit_rows:
@@ -152,24 +179,22 @@ class Systems:
         force = np.zeros(p.g.size)
         scale = 0.0
         for refinement in range(2):
-            residual = p.b - p.K @ y - p.R.T @ force
-            below = p.g[changed] - p.R[changed] @ y
-            if released.any():
-                below[released] = residual[p.unknown[changed[released]]]
+            residual = self.residual(y, force, anchor)
+            below = np.concatenate([residual[at], p.g[rows] - p.R[rows] @ y])
             size = np.abs(residual[self.free]).max(initial=0.0)
+            size = max(size, np.abs(residual[at]).max(initial=0.0))
             if refinement and size <= REFINED * scale:
                 break
             scale = max(size, scale)
             x, z = self._bordered_solve(residual, below)
             y += x
-            if released.any():
-                y[p.unknown[changed[released]]] += z[released]
-            force[changed[~released]] += z[~released]
+            y[at] += z[: at.size]
+            force[rows] += z[at.size :]
         if p.unit_rows:
             y[p.unknown[active]] = p.g[active]
             force[:] = 0.0
-            force[active] = (p.b - p.K @ y)[p.unknown[active]]
-        residual = (p.b - p.K @ y - p.R.T @ force)[~p.fixed]
+            force[active] = self.residual(y, force)[p.unknown[active]]
+        residual = self.residual(y, force, anchor)[~p.fixed]
         scale = max(scale, np.abs(force).max(initial=0.0) if p.unit_rows else 0.0)
         if not np.abs(residual).max(initial=0.0) <= UNSOLVED * scale:
             raise SingularError(
@@ -184,6 +209,6 @@ class Systems:
         if p.unit_rows:
             return p.K.diagonal()[p.unknown]
         stiffness = np.full(p.g.size, np.inf)
-        for j, (column, solution) in self.columns.items():
+        for j, (column, solution) in self.added.items():
             stiffness[j] = 1 / (column @ solution)
         return stiffness

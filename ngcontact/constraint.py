@@ -38,6 +38,8 @@ class Basis:
         Unknown that equals the left side of each kept row.
     kept : ndarray of int (k,)
         Kept rows; the others are prescribed altogether and satisfied.
+    local : ndarray (n, 2, 2)
+        From the values of a node to its two unknowns, but for the rows.
     """
 
     T: sp.csr_matrix
@@ -45,6 +47,15 @@ class Basis:
     values: Array
     unknown: Index
     kept: Index
+    local: Array
+
+    def coordinates(self, values: Array, rows: Array) -> Array:
+        """Unknowns (2n, r) of node values (2n, r) with the values (k, r) of the kept rows."""
+        n = len(self.local)
+        y = np.einsum("nij,jnr->inr", self.local, values.reshape(2, n, -1)).reshape(2 * n, -1)
+        y[self.unknown] = rows
+        y[self.fixed] = 0.0
+        return y
 
 
 def _frames(n: int, conditions: Conditions) -> tuple[Array, Mask, Array]:
@@ -83,7 +94,7 @@ def _blocks(blocks: Array) -> sp.csr_matrix:
 
 def _local_systems(
     host: Index, coefficients: Array, fixed: Mask
-) -> tuple[Index, Array, sp.csr_matrix]:
+) -> tuple[Index, Array, Array, sp.csr_matrix]:
     """Make each row's part at its host an unknown there.
 
     Parameters
@@ -101,8 +112,10 @@ def _local_systems(
         Slot of the row: the first free one of its host, the second for a second row.
     local : ndarray (k, 2)
         The coefficients at free slots.
+    M : ndarray (n, 2, 2)
+        2 x 2 systems of rows, completed by the direction across a single row.
     G : sparse (2n, 2n)
-        Inverse of the 2 x 2 systems of rows, completed by the direction across a single row.
+        Their inverses.
     """
     n = len(fixed)
     order = np.argsort(host, kind="stable")
@@ -118,7 +131,7 @@ def _local_systems(
     M[host[single], 1] = across / np.linalg.norm(across, axis=1)[:, None]
     inverse = np.tile(np.eye(2), (n, 1, 1))
     inverse[host] = np.linalg.inv(M[host])
-    return host + n * slot, local, _blocks(inverse)
+    return host + n * slot, local, M, _blocks(inverse)
 
 
 def _without_rings(N: sp.csr_matrix, G: sp.csr_matrix) -> tuple[sp.csr_matrix, sp.csr_matrix]:
@@ -170,7 +183,7 @@ def change_of_basis(n: int, conditions: Conditions, rows: Rows, length: float = 
     check_prescribed(rows, Bz, flat_fixed, flat_values, np.flatnonzero(host < 0), length)
     kept = np.flatnonzero(host >= 0)
     host = host[kept]
-    unknown, local, G = _local_systems(host, coefficients_at(Bz, kept, host), fixed)
+    unknown, local, M, G = _local_systems(host, coefficients_at(Bz, kept, host), fixed)
 
     # What the rows contain of other unknowns moves to the right: z = G y + N z.
     k = np.arange(len(host))
@@ -186,5 +199,10 @@ def change_of_basis(n: int, conditions: Conditions, rows: Rows, length: float = 
         term = N @ term
         term.eliminate_zeros()
     return Basis(
-        T=(R @ H).tocsr(), fixed=flat_fixed, values=flat_values, unknown=unknown, kept=kept
+        T=(R @ H).tocsr(),
+        fixed=flat_fixed,
+        values=flat_values,
+        unknown=unknown,
+        kept=kept,
+        local=M @ frame.transpose(0, 2, 1),
     )

@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 from .bordered import Program
 from .constraint import Basis, change_of_basis
 from .gap import ContactLine, contact_line, without
+from .kernel import no_kernel
 from .lagrange import lagrange
+from .newton import Minimiser
 from .problem import Problem, boundary_mask
 from .projection import snap
+from .rigid import Rigid, rigid_motions
 from .rows import Conditions, Rows
 from .space import Space, assemble, cholesky
-from .ssn import Minimiser, minimise
+from .ssn import minimise
 from .trace import Trace, boundary_trace
 
 Array = NDArray[np.float64]
@@ -43,6 +46,8 @@ class Discrete:
         Unknowns in which rows and prescribed values are single unknowns.
     program : Program
         The quadratic program in those unknowns.
+    rigid : Rigid or None
+        Rigid motions that supports leave free, if there are any.
     """
 
     problem: Problem
@@ -52,6 +57,7 @@ class Discrete:
     B: sp.csr_matrix
     basis: Basis
     program: Program
+    rigid: Rigid | None
 
 
 def _prescribed(problem: Problem, trace: Trace) -> Conditions:
@@ -167,6 +173,12 @@ def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Dis
     lines, rows = _merged(lines, _joined([_rows(line, trace) for line in lines], order), n)
     basis = change_of_basis(n, conditions, rows, float(np.abs(trace.curve).max()))
     lines, rows = _kept(lines, basis.kept), rows.select(basis.kept)
+    B = rows.matrix(n)
+    rigid = None
+    found = rigid_motions(problem, space, conditions, basis, B, rows.g, rows.equality)
+    if found is not None:
+        rigid, f = found
+        space = replace(space, f=f)
     T = space.basis @ basis.T
     m = len(basis.unknown)
     program = Program(
@@ -178,18 +190,32 @@ def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Dis
         fixed=basis.fixed,
         values=basis.values,
         unknown=basis.unknown,
+        kernel=no_kernel(2 * n) if rigid is None else rigid.kernel,
     )
     return Discrete(
         problem=problem,
         space=space,
         lines=lines,
         conditions=conditions,
-        B=rows.matrix(n),
+        B=B,
         basis=basis,
         program=program,
+        rigid=rigid,
     )
 
 
 def minimise_energy(discrete: Discrete, active: Mask) -> Minimiser:
-    """Exact minimiser of L over K_h."""
-    return minimise(discrete.program, cholesky(discrete.program.K), active)
+    """Exact minimiser of L over K_h.
+
+    Bodies that contact alone can hold start from where they rest when rigid, so that the way
+    there costs no digits of the deformation.
+    """
+    p, rigid = discrete.program, discrete.rigid
+    factor = cholesky(p.K)
+    if rigid is None or not rigid.placing.any():
+        return minimise(p, factor, active)
+    result = minimise(replace(p, g=p.g - rigid.rows @ rigid.placing), factor, active)
+    u = result.u + rigid.motions @ rigid.placing
+    u -= p.kernel.lineal @ (p.kernel.conditions @ u)
+    u[p.unknown[result.active]] = p.g[result.active]
+    return replace(result, u=u)

@@ -1,84 +1,221 @@
-"""Rigid motions that supports and active contact rows leave free. No NGSolve beyond names."""
+"""Equilibrium of the load on the rigid motions that supports leave free.
+
+HH81 Remark 3.7: the energy has a minimiser only if the load does no work on a rigid motion that
+supports and contact admit.
+"""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from dataclasses import dataclass
 
-from .check import body_of_vertex
-from .discrete import Discrete
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.optimize import linprog, nnls
+
+from .constraint import Basis
+from .errors import NoEquilibriumError
+from .kernel import FREE, Kernel, kernel, null_space
+from .motions import (
+    Bodies,
+    RigidMotion,
+    body_of_unknown,
+    connected_bodies,
+    functionals,
+    node_values,
+    rigid_motion,
+    unsupported,
+)
+from .problem import Problem
+from .rows import Conditions
+from .space import LOAD_BONUS, Space, load_vector
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-FREE = 1e-8  # singular value, relative to the largest, below which a motion meets no resistance
+FINER = 5  # quadrature orders added to see the error of those of the loads
+QUADRATURE = 10.0  # times that error is work that may be quadrature
+ROUND_OFF = 1e-10  # ... and this, relative to the sum of its terms, round-off
+INEXACT = 1e-9  # force of a rigid motion, relative to its terms, that shows it is not in V_h
 
 
-def _bodies(discrete: Discrete) -> NDArray[np.intp]:
-    """Number of the connected body of each boundary segment, from 0 without gaps."""
-    trace = discrete.space.trace
-    piece = body_of_vertex(trace.mesh)[trace.nodes[:, 0]]
-    return np.unique(piece, return_inverse=True)[1]
+@dataclass(frozen=True, eq=False)
+class Rigid:
+    """The r rigid motions that supports leave free, and the load on them.
+
+    Attributes
+    ----------
+    combinations : ndarray (3 b, r)
+        Of the translations and the rotation of each of b bodies.
+    rows : ndarray (m, r)
+        Left sides of the contact rows.
+    work : ndarray (r,)
+        Of the load, before what quadrature left of it was taken out.
+    gram : ndarray (r, r)
+        Integrals of the products of the motions over the boundaries.
+    motions : ndarray (2n, r)
+        In the unknowns of the program.
+    kernel : Kernel
+        Their part that no row resists, and the rest.
+    placing : ndarray (r,)
+        Amounts by which the load moves the bodies until contact stops them, were they rigid.
+    carries : ndarray of bool (m,)
+        Rows that would carry the load there.
+    """
+
+    bodies: Bodies
+    combinations: Array
+    rows: Array
+    work: Array
+    gram: Array
+    motions: Array
+    kernel: Kernel
+    placing: Array
+    carries: Mask
+
+    def motion(self, amounts: Array) -> RigidMotion:
+        """One of the motions, by its amounts (r,)."""
+        multiplier = float(amounts @ self.work / (amounts @ self.gram @ amounts))
+        return rigid_motion(self.bodies, self.combinations @ amounts, multiplier)
+
+    def left_free(self, active: Mask) -> list[RigidMotion]:
+        """Motions that the rows `active` do not resist either."""
+        return [self.motion(x) for x in null_space(self.rows[active]).T]
 
 
-def _motions(discrete: Discrete) -> tuple[Array, Array, Array]:
-    """Rigid motions at the boundary nodes.
+def _placing(rows: Array, work: Array, g: Array, equality: Mask) -> tuple[Array, Mask]:
+    """Where the load presses rigid bodies: amounts (r,), and the rows (m,) that carry it.
+
+    No movement without load, and where bodies must deform to fit at all.
+    """
+    stay = np.zeros(len(work)), np.zeros(len(g), dtype=bool)
+    scale, force = np.abs(g).max(initial=0.0), np.abs(work).max(initial=0.0)
+    if scale == 0.0 or force == 0.0:
+        return stay
+    lineal = null_space(rows)
+    free = ~equality
+    result = linprog(
+        -work / force,
+        A_ub=rows[free] if free.any() else None,
+        b_ub=g[free] / scale if free.any() else None,
+        A_eq=np.vstack([rows[equality], lineal.T]),
+        b_eq=np.concatenate([g[equality] / scale, np.zeros(lineal.shape[1])]),
+        bounds=(None, None),
+        method="highs",
+    )
+    if result.status != 0:
+        return stay
+    carries = np.zeros(len(g), dtype=bool)
+    if free.any():
+        carries[free] = result.ineqlin.marginals < -FREE
+    return scale * result.x, carries
+
+
+def _residue(rows: Array, equality: Mask, work: Array) -> Array:
+    """What contact forces, not negative but on equalities, cannot balance of the work (r,)."""
+    scale = np.abs(work).max(initial=0.0)
+    if scale == 0.0:
+        return np.zeros_like(work)
+    G = np.vstack([rows, -rows[equality]]).T
+    if G.shape[1] == 0:
+        return work
+    force, _ = nnls(G, work / scale, maxiter=100 * G.shape[1])
+    return work - scale * (G @ force)
+
+
+def _check_work(
+    residue: Array, work: Array, finer: Array, terms: Array, motion: RigidMotion
+) -> None:
+    """Raise unless the work on what cannot be balanced is quadrature or round-off."""
+    amounts = residue / np.abs(residue).max()
+    done = float(amounts @ residue)  # what forces balance does no work on it
+    allowed = QUADRATURE * abs(float(amounts @ (work - finer)))
+    allowed += ROUND_OFF * float(np.abs(amounts) @ terms)
+    if done > allowed:
+        raise NoEquilibriumError(
+            f"no equilibrium: the load does the work {done:.6g} on a rigid {motion}, which "
+            "neither supports nor contact resist; hold that body by `displacement`, `sliding` or "
+            "a contact pair, or balance the load",
+            body=motion.bodies[0],
+            motion=motion,
+            work=done,
+        )
+
+
+def rigid_motions(
+    problem: Problem,
+    space: Space,
+    conditions: Conditions,
+    basis: Basis,
+    B: sp.csr_matrix,
+    g: Array,
+    equality: Mask,
+) -> tuple[Rigid, Array] | None:
+    """The rigid motions that supports leave free, and the load (2N,) in equilibrium on them.
+
+    Parameters
+    ----------
+    problem, space, conditions, basis
+        The discrete problem.
+    B : sparse (m, 2n)
+        Contact rows on node values.
+    g : ndarray (m,)
+        Their bounds.
+    equality : ndarray of bool (m,)
+        Rows that hold with equality.
 
     Returns
     -------
-    values : ndarray (2n, 3b)
-        For each of b bodies the translations along x and y and the rotation about its middle,
-        scaled to displacements of size 1; x components first, zero elsewhere.
-    middle : ndarray (b, 2)
-    size : ndarray (b,)
+    None
+        If supports alone hold all bodies.
+
+    Raises
+    ------
+    NoEquilibriumError
+        The load does work on a rigid motion that supports and contact admit.
+    ValueError
+        The elements do not contain the rotation of a free body.
     """
-    trace = discrete.space.trace
-    n = discrete.space.basis.shape[1] // 2
-    bodies = _bodies(discrete)
-    count = int(bodies.max()) + 1
-    body = np.repeat(bodies, trace.order + 1)
-    segment, s = trace.at_nodes(np.arange(len(trace.region)))
-    node, x = trace.nodes.ravel(), trace.point(segment, s)
-    values = np.zeros((2 * n, 3 * count))
-    middle, size = np.zeros((count, 2)), np.ones(count)
-    for b in range(count):
-        at, place = node[body == b], x[body == b]
-        middle[b] = (place.min(axis=0) + place.max(axis=0)) / 2
-        size[b] = np.ptp(place, axis=0).max() / 2
-        arm = (place - middle[b]) / size[b]
-        values[at, 3 * b] = 1.0
-        values[at + n, 3 * b + 1] = 1.0
-        values[at, 3 * b + 2] = -arm[:, 1]
-        values[at + n, 3 * b + 2] = arm[:, 0]
-    return values, middle, size
-
-
-def free_motion(discrete: Discrete, active: Mask) -> str | None:
-    """A rigid motion that the supports and the rows `active` do not resist, in words, or None."""
-    values, middle, size = _motions(discrete)
-    n = len(values) // 2
-    c = discrete.conditions
-    supports = c.direction[:, :1] * values[c.node] + c.direction[:, 1:] * values[c.node + n]
-    contact = discrete.B[np.flatnonzero(active)] @ values
-    resisted = np.concatenate([supports, contact])
-    if len(resisted) < values.shape[1]:
-        resisted = np.pad(resisted, ((0, values.shape[1] - len(resisted)), (0, 0)))
-    _, singular, directions = np.linalg.svd(resisted, full_matrices=False)
-    if singular[-1] > FREE * singular[0]:
+    trace = space.trace
+    bodies = connected_bodies(trace)
+    free = unsupported(trace, bodies, conditions)
+    if not any(x.shape[1] for x in free):
         return None
-    amounts = directions[-1].reshape(-1, 3)
-    b = int(np.abs(amounts).max(axis=1).argmax())
-    names = _names(discrete)
-    tx, ty, turn = amounts[b] / np.abs(amounts[b]).max()
-    if abs(turn) <= FREE:
-        return f'body "{names[b]}" can move along ({tx + 0.0:.3g}, {ty + 0.0:.3g})'
-    centre = middle[b] + size[b] / turn * np.array([-ty, tx])
-    centre[np.abs(centre) <= FREE * size[b]] = 0.0
-    return f'body "{names[b]}" can turn about ({centre[0]:.3g}, {centre[1]:.3g})'
-
-
-def _names(discrete: Discrete) -> dict[int, str]:
-    """Name of each body, by its number."""
-    trace = discrete.space.trace
-    materials = trace.mesh.GetMaterials()
-    return {int(b): materials[m] for b, m in zip(_bodies(discrete), trace.body, strict=True)}
+    combinations = np.asarray(sp.block_diag(free, format="csr").toarray())
+    of_unknown = body_of_unknown(space, bodies)
+    n = space.basis.shape[1] // 2
+    Z = node_values(space, bodies, of_unknown[:n]) @ combinations
+    in_v = space.basis @ Z
+    terms = (abs(space.A) @ np.abs(in_v)).max(axis=0)
+    if (np.abs(space.A @ in_v).max(axis=0) > INEXACT * terms).any():
+        raise ValueError(
+            "curved superparametric elements do not contain the rotation of a body that its "
+            'supports leave free; use element="isoparametric"'
+        )
+    rows = np.asarray(B @ Z)
+    work = in_v.T @ space.f
+    residue = _residue(rows, equality, work)
+    M = functionals(space, bodies, of_unknown) @ combinations
+    gram = in_v.T @ M
+    if residue.any():
+        finer = in_v.T @ load_vector(problem, space.V, LOAD_BONUS + FINER)
+        sizes = np.abs(in_v).T @ np.abs(space.f)
+        motion = rigid_motion(bodies, combinations @ residue / np.abs(residue).max(), 0.0)
+        _check_work(residue, work, finer, sizes, motion)
+    f = space.f - M @ np.linalg.solve(gram, residue)
+    lineal = null_space(rows)
+    motions = basis.coordinates(Z, rows)
+    means = basis.T.T @ (space.basis.T @ (M @ lineal))
+    placing, carries = _placing(rows, work - residue, g, equality)
+    rigid = Rigid(
+        bodies=bodies,
+        combinations=combinations,
+        rows=rows,
+        work=work,
+        gram=gram,
+        motions=motions,
+        kernel=kernel(motions, lineal, means.T, basis.unknown, basis.fixed),
+        placing=placing,
+        carries=carries,
+    )
+    return rigid, f

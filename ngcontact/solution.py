@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from .discrete import Discrete
 from .estimate import Estimate, estimate
+from .motions import RigidMotion
+from .newton import Minimiser
 from .output import write_solution
 from .problem import Problem, boundary_mask
 from .space import strain
-from .ssn import Minimiser
 from .transition import transitions
 
 Array = NDArray[np.float64]
@@ -152,6 +153,16 @@ class Solution:
                 result[str(name)] = self.nodal_reaction[nodes].sum(axis=0)
         return result
 
+    @cached_property
+    def free_motions(self) -> list[RigidMotion]:
+        """Rigid motions that neither supports nor active contact resist (HH81 Remark 3.7).
+
+        The displacement is determined but for these; of those that no contact point resists, it
+        is the one whose component along them vanishes in the mean over the body's boundary.
+        """
+        rigid = self.discrete.rigid
+        return [] if rigid is None else rigid.left_free(self.active)
+
     def transitions(self, pair: int = 0) -> Array:
         """Points (k, 2) where contact of a pair turns from binding to non-binding."""
         number = self._pair_number(pair)
@@ -262,6 +273,8 @@ class Solution:
             f"{np.count_nonzero(self.active):4d}/{self.active.size} active",
             f"{len(self.steps)} steps",
         ]
+        if self.free_motions:
+            parts.append(f"free: {'; '.join(map(str, self.free_motions))}")
         if self.estimated:
             parts.append(f"estimate {self.relative_error_estimate:.2e}")
         if self.discrete.lines:

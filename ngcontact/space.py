@@ -162,6 +162,20 @@ def _check_normals(trace: Trace, boundary: str) -> None:
         )
 
 
+def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
+    """f(v) of (3.2), (2N,), with quadrature `bonus` orders above the default."""
+    v = V.TestFunction()
+    f = ng.LinearForm(V)
+    for body, F in problem.force.items():
+        f += F * v * ng.dx(definedon=V.mesh.Materials(body), bonus_intorder=bonus)
+    for boundary in problem.traction:
+        P = problem.traction_vector(boundary)
+        region = V.mesh.Boundaries(boundary)
+        f += P * v.Trace() * ng.ds(definedon=region, bonus_intorder=bonus)
+    f.Assemble()
+    return f.vec.FV().NumPy().copy()
+
+
 def assemble(problem: Problem, trace: Trace, element: str) -> Space:
     """Space, stiffness and load of a problem on the mesh of `trace`, curved as `element` asks."""
     mesh = trace.mesh
@@ -180,16 +194,9 @@ def assemble(problem: Problem, trace: Trace, element: str) -> Space:
         a += ng.InnerProduct(C * strain(u), strain(v)) * ng.dx(
             definedon=region, bonus_intorder=bonus
         )
-    f = ng.LinearForm(V)
-    for body, F in problem.force.items():
-        f += F * v * ng.dx(definedon=mesh.Materials(body), bonus_intorder=LOAD_BONUS)
     for boundary in problem.traction:
-        P = problem.traction_vector(boundary)
-        region = mesh.Boundaries(boundary)
         _check_normals(trace, boundary)
-        f += P * v.Trace() * ng.ds(definedon=region, bonus_intorder=LOAD_BONUS)
     a.Assemble()
-    f.Assemble()
     values, columns, starts = a.mat.CSR()
     size = V.ndof
     A = sp.csr_matrix((np.array(values), np.array(columns), np.array(starts)), (size, size))
@@ -198,7 +205,7 @@ def assemble(problem: Problem, trace: Trace, element: str) -> Space:
         trace=trace,
         basis=sp.block_diag([scalar, scalar], format="csr"),
         A=A,
-        f=f.vec.FV().NumPy().copy(),
+        f=load_vector(problem, V, LOAD_BONUS),
     )
 
 

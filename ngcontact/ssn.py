@@ -7,55 +7,26 @@ minimiser (Hintermueller, Ito, Kunisch 2002, SIAM J. Optim. 13:865). The method 
 on positive definite problems that are not M-matrices; the block pivoting safeguard of Judice
 and Pires (1994, Comput. Oper. Res. 21:587) makes it finite for all of them.
 
+A positive semidefinite matrix, of bodies that supports do not hold, is met by exact proximal
+steps (Rockafellar 1976, SIAM J. Control Optim. 14:877): they end where the proximal force vanishes.
+
 This module knows matrices only. The factorisation is an argument.
 """
 
 from __future__ import annotations
 
-import logging
-from dataclasses import dataclass, field
-
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from .bordered import Array, Factor, Mask, Program, SingularError, Solve, Systems
+from .bordered import Anchor, Array, Factor, Mask, Program, Solve
 from .errors import ConvergenceError
+from .newton import Minimiser, Newton
 
-log = logging.getLogger("ngcontact")
-
-TIE = 1e-13  # relative size below which a force or a slack keeps its state
-WIDEST_TIE = 1e-9  # ... and to which that grows, tenfold, each time an active set comes back
-PATIENCE = 10  # full switches allowed without fewer violated rows (Judice, Pires 1994)
-
-
-@dataclass(frozen=True, eq=False)
-class Minimiser:
-    """Solution of a quadratic program.
-
-    Attributes
-    ----------
-    u : ndarray (n,)
-        Minimiser.
-    force : ndarray (m,)
-        Multipliers of the rows R u <= g, not negative.
-    multiplier : ndarray
-        Multipliers of the equations E u = e, of either sign.
-    active : ndarray of bool (m,)
-        Rows that hold with equality.
-    steps : list of int
-        Changes of the active set after each linear system; the last one is 0.
-    factorizations, back_solves : int
-        Work done.
-    """
-
-    u: Array
-    force: Array
-    active: Mask
-    steps: list[int]
-    multiplier: Array = field(default_factory=lambda: np.zeros(0))
-    factorizations: int = 0
-    back_solves: int = 0
+PROXIMAL = 1e-3  # of the stiffness at the pins, where contact leaves rigid motions free
+WEAKEST = 1e-4  # of that, to which it falls, tenfold at each proximal step
+RESTED = 1e-14  # force of the proximal term, relative to stiffness times displacement
+OUTER = 100  # proximal steps; most problems need less than five
 
 
 def minimise(program: Program, factor: Factor, active: Mask | None = None) -> Minimiser:
@@ -84,63 +55,29 @@ def minimise(program: Program, factor: Factor, active: Mask | None = None) -> Mi
         positive definite is known to lead. `iterate` holds the last `Minimiser`.
     """
     p = program
-    systems = Systems(p, factor)
     state = p.equality.copy() if active is None else p.equality | active
-    size = np.asarray(abs(p.R).sum(axis=1)).ravel()
-    y, force = np.where(p.fixed, p.values, 0.0), np.zeros(p.g.size)
-    seen: set[bytes] = set()
-    steps: list[int] = []
-    fewest, patience, tie, extent = p.g.size + 1, PATIENCE, TIE, 0.0
-
-    def iterate() -> Minimiser:
-        return Minimiser(
-            u=y,
-            force=force,
-            active=state,
-            steps=steps,
-            factorizations=systems.factorizations,
-            back_solves=systems.back_solves,
-        )
-
-    limit = 100 + 20 * p.g.size
-    for _ in range(limit):
-        try:
-            y, force = systems.solve(state)
-        except SingularError as singular:
-            raise ConvergenceError(
-                f"Newton step {len(steps) + 1}: {singular}", iterate=iterate()
-            ) from None
-        stiffness = systems.stiffness()
-        # Displacements met so far: all of them may vanish while forces tie.
-        with np.errstate(divide="ignore", invalid="ignore"):
-            extents = np.abs(y).max(initial=0.0), np.nanmax(np.abs(force) / stiffness, initial=0.0)
-        extent = max(extent, *extents)
-        length = tie * size * extent
-        slack = p.g - p.R @ y
-        # Ties keep their state: hysteresis against cycling on round-off.
-        with np.errstate(invalid="ignore"):
-            pulling = force < -length * np.where(state, stiffness, 0.0)
-            penetrating = slack < -length - tie * np.abs(p.g)
-        wrong = np.where(state, pulling, penetrating) & ~p.equality
-        count = int(np.count_nonzero(wrong))
-        if count < fewest:
-            fewest, patience = count, PATIENCE
-        else:
-            patience -= 1
-        if count and patience < 0:  # Murty's least-index rule until fewer rows are violated
-            wrong[: np.flatnonzero(wrong)[-1]] = False
-        steps.append(int(np.count_nonzero(wrong)))
-        log.debug("Newton step %d: %d active, %d change", len(steps), state.sum(), steps[-1])
-        if count == 0:
-            return iterate()
-        if (key := state.tobytes()) in seen:
-            tie = min(10 * tie, WIDEST_TIE)
-        seen.add(key)
-        state = state ^ wrong
+    newton = Newton(p, factor, state)
+    pins = p.kernel.pins
+    hardest = p.K.diagonal()[pins].max(initial=0.0)
+    anchor = Anchor(PROXIMAL * hardest, np.zeros(pins.size))
+    last = np.inf
+    for _ in range(OUTER):
+        if newton.resisted():
+            newton.settle(None)
+            if newton.resisted():
+                return newton.result()
+        newton.settle(anchor)
+        moved = newton.y[pins] - anchor.at
+        force = anchor.stiffness * float(np.abs(moved).max())
+        if force <= RESTED * hardest * newton.extent:
+            return newton.result()
+        at = newton.y[pins]
+        if force > last / 2 and not newton.resisted():  # a steady motion: go where it leads
+            at = at + newton.advance(moved) * moved
+        last = force
+        anchor = Anchor(max(anchor.stiffness / 10, WEAKEST * PROXIMAL * hardest), at)
     raise ConvergenceError(
-        f"the active set did not settle in {limit} Newton steps ({count} rows still change); "
-        "check that the matrix is symmetric and positive definite",
-        iterate=iterate(),
+        f"the rigid motions did not settle in {OUTER} proximal steps", iterate=newton.result()
     )
 
 

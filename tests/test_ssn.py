@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ngcontact import bordered, ssn
+from ngcontact import bordered, newton
 from ngcontact.bordered import Program
 from ngcontact.errors import ConvergenceError
 from ngcontact.ssn import minimise, solve_qp
@@ -79,7 +79,7 @@ def test_known_cycles_end(name):
 
 def test_plain_method_cycles(monkeypatch):
     """The safeguard is what ends it: with endless patience the plain method cycles."""
-    monkeypatch.setattr(ssn, "PATIENCE", 10**9)
+    monkeypatch.setattr(newton, "PATIENCE", 10**9)
     S, d, _ = CYCLES["T-cyc-1 moved"]
     with pytest.raises(ConvergenceError, match="did not settle") as failure:
         solve_qp(*primal(S, d))

@@ -1,0 +1,78 @@
+"""Numerical stability under stress: every module tries one kind of it.
+
+Each module has a function ``outcomes()`` that yields one `Outcome` per line of the table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from ngcontact import Solution
+
+RESIDUAL = 1e-10  # of the optimality conditions, dimensionless; round-off leaves 1e-16 to 1e-12
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One line of the table.
+
+    Attributes
+    ----------
+    case, varied : str
+        What was solved, and what was varied.
+    steps : int
+        Newton steps; 0 where an error was expected.
+    residual : float
+        Worst residual of the optimality conditions, see `Solution.residuals`.
+    error : float
+        Against the reference, dimensionless.
+    allowed : float
+        Largest error that passes.
+    """
+
+    case: str
+    varied: str
+    steps: int
+    residual: float
+    error: float
+    allowed: float
+
+    @property
+    def passed(self) -> bool:
+        """Whether both the residual and the error are small enough; NaN is not."""
+        return self.residual <= RESIDUAL and self.error <= self.allowed
+
+
+def solved(case: str, varied: str, solution: Solution, error: float, allowed: float) -> Outcome:
+    """Outcome of a solve whose `error` against a reference may reach `allowed`."""
+    return Outcome(
+        case=case,
+        varied=varied,
+        steps=len(solution.steps),
+        residual=max(solution.residuals.values()),
+        error=float(error),
+        allowed=allowed,
+    )
+
+
+def refused(
+    case: str, varied: str, kind: type[Exception], naming: str, run: Callable[[], object]
+) -> Outcome:
+    """Outcome of a call that must raise `kind` with a message that contains `naming`.
+
+    Its error is 0 if it does, infinite if it returns or the message says something else.
+    """
+    right = False
+    try:
+        run()
+    except kind as error:
+        right = naming in str(error)
+    return Outcome(
+        case=case,
+        varied=f"{varied}: {kind.__name__}",
+        steps=0,
+        residual=0.0,
+        error=0.0 if right else float("inf"),
+        allowed=0.0,
+    )

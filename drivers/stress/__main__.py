@@ -1,0 +1,37 @@
+"""Table of all stress cases; the exit status is 1 if one fails.
+
+    python -m drivers.stress [name ...]
+
+with the names of modules, such as ``held`` or ``scaling``, runs only these.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+import sys
+
+from drivers import stress
+
+
+def main(names: list[str]) -> int:
+    """Print the table of the modules `names`, of all of them without names."""
+    modules = sorted(m.name for m in pkgutil.iter_modules(stress.__path__) if m.name[0] != "_")
+    failed = count = 0
+    print(f"{'case':32} {'varied':44} {'steps':>5} {'residual':>9} {'error':>9} {'allowed':>9}")
+    for name in names or modules:
+        for outcome in importlib.import_module(f"drivers.stress.{name}").outcomes():
+            count += 1
+            failed += not outcome.passed
+            print(
+                f"{outcome.case:32} {outcome.varied:44} {outcome.steps:5d} {outcome.residual:9.1e} "
+                f"{outcome.error:9.1e} {outcome.allowed:9.1e} "
+                f"{'pass' if outcome.passed else 'FAIL'}",
+                flush=True,
+            )
+    print(f"{count} cases, {failed} failed")
+    return int(failed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

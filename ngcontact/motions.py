@@ -1,0 +1,166 @@
+"""Rigid motions of the bodies, explicit vectors: translations and rotations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
+
+from .check import body_of_vertex
+from .kernel import FREE, null_space
+from .rows import Conditions
+from .space import Space
+from .trace import Trace
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class RigidMotion:
+    """A rigid motion, of size 1 or so, of one or several bodies.
+
+    Attributes
+    ----------
+    bodies : tuple of str
+        What moves, the body that moves most first.
+    translation : ndarray (k, 2)
+        Of the middle of each of them.
+    rotation : ndarray (k,)
+        Angle, anticlockwise, about the middle.
+    middle : ndarray (k, 2)
+    multiplier : float
+        Of the condition that the integral of v.z ds over the boundary of the bodies vanishes, for
+        the motion z: what the quadrature of the load leaves, a force per length.
+    """
+
+    bodies: tuple[str, ...]
+    translation: Array
+    rotation: Array
+    middle: Array
+    multiplier: float = 0.0
+
+    def __str__(self) -> str:
+        """What the first body does."""
+        (tx, ty), turn, centre = self.translation[0], self.rotation[0], self.middle[0].copy()
+        size = max(abs(tx), abs(ty))
+        if turn == 0.0:
+            words = f"along ({tx / size + 0.0:.3g}, {ty / size + 0.0:.3g})"
+        else:
+            centre += np.array([-ty, tx]) / turn
+            words = f"about ({centre[0] + 0.0:.3g}, {centre[1] + 0.0:.3g})"
+        kind = "translation" if turn == 0.0 else "rotation"
+        others = "".join(f' with "{name}"' for name in self.bodies[1:])
+        return f'{kind} of "{self.bodies[0]}" {words}{others}'
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """The connected bodies: names (b,), middles (b, 2), half sizes (b,), number at segments."""
+
+    names: list[str]
+    middle: Array
+    size: Array
+    of_segment: Index
+
+
+def connected_bodies(trace: Trace) -> Bodies:
+    """The connected pieces of the mesh of `trace`."""
+    piece = body_of_vertex(trace.mesh)[trace.nodes[:, 0]]
+    number = np.unique(piece, return_inverse=True)[1]
+    materials = trace.mesh.GetMaterials()
+    names = {int(b): materials[m] for b, m in zip(number, trace.body, strict=True)}
+    ends = [trace.curve[number == b].reshape(-1, 2) for b in range(len(names))]
+    return Bodies(
+        names=[names[b] for b in range(len(names))],
+        middle=np.array([(x.min(axis=0) + x.max(axis=0)) / 2 for x in ends]),
+        size=np.array([np.ptp(x, axis=0).max() / 2 for x in ends]),
+        of_segment=number,
+    )
+
+
+def unsupported(trace: Trace, bodies: Bodies, c: Conditions) -> list[Array]:
+    """Motions (3, d) of each body - translations, rotation - that its supports leave free."""
+    order = trace.order + 1
+    position = np.zeros((trace.space.ndof, 2))
+    body = np.zeros(trace.space.ndof, dtype=np.intp)
+    segment, s = trace.at_nodes(np.arange(len(trace.region)))
+    position[trace.nodes.ravel()] = trace.point(segment, s)
+    body[trace.nodes.ravel()] = np.repeat(bodies.of_segment, order)
+    at = body[c.node]
+    arm = (position[c.node] - bodies.middle[at]) / bodies.size[at, None]
+    turn = arm[:, 0] * c.direction[:, 1] - arm[:, 1] * c.direction[:, 0]
+    resisted = np.column_stack([c.direction, turn])
+    return [null_space(resisted[at == b]) for b in range(len(bodies.names))]
+
+
+def rigid_motion(bodies: Bodies, amounts: Array, multiplier: float) -> RigidMotion:
+    """Motion by its amounts (3 b,) of the translations and rotations of all bodies."""
+    parts = amounts.reshape(-1, 3).copy()
+    parts[np.abs(parts) <= FREE * np.abs(parts).max()] = 0.0
+    size = np.abs(parts).max(axis=1)
+    moving = [int(b) for b in np.argsort(-size, kind="stable") if size[b] > 0]
+    return RigidMotion(
+        bodies=tuple(bodies.names[b] for b in moving),
+        translation=parts[moving, :2],
+        rotation=parts[moving, 2] / bodies.size[moving],
+        middle=bodies.middle[moving],
+        multiplier=multiplier,
+    )
+
+
+def body_of_unknown(space: Space, bodies: Bodies) -> Index:
+    """Number of the body that each unknown (2N,) of V_h belongs to."""
+    _, piece = connected_components(space.A, directed=False)
+    trace = space.trace
+    number = np.zeros(piece.max() + 1, dtype=np.intp)
+    half = len(piece) // 2
+    for component in (0, half):
+        number[piece[component + trace.nodes[:, 0]]] = bodies.of_segment
+    return number[piece]
+
+
+def node_values(space: Space, bodies: Bodies, of_node: Index) -> Array:
+    """Translations and rotation of each body, (2n, 3b), as values of nodes and unknowns."""
+    trace = space.trace
+    n = space.basis.shape[1] // 2
+    place = np.zeros((n, 2))
+    one = np.zeros(n)
+    one[: trace.mesh.nv] = 1.0
+    if n == trace.mesh.nv:
+        place[:] = np.array(trace.mesh.ngmesh.Coordinates())[:, :2]
+    else:
+        field = ng.GridFunction(trace.space)
+        for axis, x in enumerate((ng.x, ng.y)):
+            field.Set(x)
+            place[:, axis] = field.vec.FV().NumPy()
+        segment, s = trace.at_nodes(np.arange(len(trace.region)))
+        place[trace.nodes.ravel()] = trace.point(segment, s)
+        one[trace.nodes.ravel()] = 1.0
+    values = np.zeros((2 * n, 3 * len(bodies.names)))
+    for b, (middle, size) in enumerate(zip(bodies.middle, bodies.size, strict=True)):
+        at = np.flatnonzero(of_node == b)
+        arm = (place[at] - one[at, None] * middle) / size
+        values[at, 3 * b] = values[at + n, 3 * b + 1] = one[at]
+        values[at, 3 * b + 2], values[at + n, 3 * b + 2] = -arm[:, 1], arm[:, 0]
+    return values
+
+
+def functionals(space: Space, bodies: Bodies, of_unknown: Index) -> Array:
+    """Integrals (2N, 3b) of v.z over the boundary of each body, for its three motions z."""
+    v = space.V.TestFunction()
+    columns = []
+    for z in (ng.CF((1, 0)), ng.CF((0, 1)), ng.CF((-ng.y, ng.x))):
+        form = ng.LinearForm(space.V)
+        form += z * v.Trace() * ng.ds
+        form.Assemble()
+        columns.append(form.vec.FV().NumPy().copy())
+    x, y, turn = columns
+    result = np.zeros((len(x), 3 * len(bodies.names)))
+    for b, ((cx, cy), size) in enumerate(zip(bodies.middle, bodies.size, strict=True)):
+        parts = np.column_stack([x, y, (turn + cy * x - cx * y) / size])
+        result[:, 3 * b : 3 * b + 3] = np.where((of_unknown == b)[:, None], parts, 0.0)
+    return result
