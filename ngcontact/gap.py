@@ -26,6 +26,7 @@ log = logging.getLogger("ngcontact")
 
 FINER = 0.7  # ratio of segment lengths from which a primary counts as finer
 GRAZING = 1e-8  # cosine between normal and direction from which a point faces the other body
+ROUND_OFF = 4 * np.finfo(float).eps  # of a measured gap, relative to the coordinates
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,6 +117,8 @@ def partners(
         ] = -1
         found.segment[rest] = other.segment
         found.s[rest], found.distance[rest] = other.s, other.distance
+    # Points that only round-off keeps apart touch: no load is too small to be felt.
+    found.distance[np.abs(found.distance) <= ROUND_OFF * np.abs(points).max(initial=0.0)] = 0.0
     segment = np.where(found.segment < 0, -1, facing[found.segment] if facing.size else -1)
     return segment, found.s, found.distance, int(rest.size > 0)
 
@@ -202,6 +205,9 @@ def contact_line(trace: Trace, contact: Contact) -> ContactLine:
     met = np.append(keep, False)[rows]
     faces = met.all(axis=1)
     shares = _segment_weights(trace, contact, segments)
+    if contact.direction is None:  # what counts where two sides share a point at a small turn
+        cosine = (normal[candidate] * direction[number[candidate]]).sum(axis=1)
+        shares *= cosine.reshape(rows.shape)
     np.add.at(weight, rows[faces], shares[faces])
     # A point whose segments face the primary in part only has nothing better than those parts.
     partly = met & (np.append(weight, 1.0)[rows] == 0)

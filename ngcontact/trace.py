@@ -139,7 +139,8 @@ class Trace:
         number : ndarray of int (k,)
             Point of each entry.
         vector : ndarray (m, 2)
-            Unit vector of each point, the mean of those of its entries.
+            Unit vector of each point, the mean of those of its entries by segment length: the
+            forces of a uniform pressure on both segments add up along it.
         """
         _, number = np.unique(node, return_inverse=True)
         order = np.argsort(number, kind="stable")
@@ -150,7 +151,7 @@ class Trace:
         second = second[self._corner(segment[first], segment[second], turn)]
         number[second] = number.max(initial=-1) + 1 + np.arange(second.size)
         mean = np.zeros((number.max(initial=-1) + 1, 2))
-        np.add.at(mean, number, vector)
+        np.add.at(mean, number, vector * self.lengths(segment)[:, None])
         return number, mean / np.linalg.norm(mean, axis=1)[:, None]
 
     def _corner(self, first: Index, second: Index, turn: Array) -> NDArray[np.bool_]:

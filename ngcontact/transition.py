@@ -1,4 +1,10 @@
-"""Where contact turns from binding to non-binding, inside elements."""
+"""Where contact turns from binding to non-binding, inside elements and at corners.
+
+A corner of Gamma_K carries two contact points, one for each side: HH81 (2.3). Both rows hold at one
+node. When it touches the corner, its force splits between the two normals, and where these are
+nearly parallel the split is no measure of the pressure: a part of the force across the corner
+weighs 1 / turn in it, and one of the two rows may even be open.
+"""
 
 from __future__ import annotations
 
@@ -20,12 +26,62 @@ SKIPPED = 2
 FEWEST = 8  # points of the fit, or three per order and two if that is more
 DEGREE = 3  # of the fit, 2 at order 1
 SAMPLES = 65  # places at which the fit is evaluated to bracket its zero
+ALIKE = np.sqrt(0.5)  # cosine of the turn up to which both sides of a corner have one pressure
+
+
+def twins(line: ContactLine) -> Index:
+    """Pairs (t, 2) of contact points that share a node."""
+    order = np.argsort(line.node, kind="stable")
+    same = np.flatnonzero(np.diff(line.node[order]) == 0)
+    return np.column_stack([order[same], order[same + 1]])
+
+
+def in_contact(line: ContactLine, active: Mask) -> Mask:
+    """Active points (m,), and those open ones at corners inside the contact.
+
+    The node touches the other side of the corner, and the next point on this side is active: one
+    of the two rows is released where the node would rather slide off the corner.
+    """
+    state = active.copy()
+    corners = twins(line)
+    for i in corners[active[corners].sum(axis=1) == 1].ravel():
+        if not active[i]:
+            first, last = line.rows[:, :-1], line.rows[:, 1:]
+            next_to = np.concatenate([last[first == i], first[last == i]])
+            state[i] = (next_to >= 0).all() and active[next_to].all()
+    return state
+
+
+def nodal_pressure(line: ContactLine, force: Array, active: Mask) -> Array:
+    """Pressure (m,) of nodal forces: force over weight, one value on both sides of a corner.
+
+    A stress that is continuous at a corner without friction has both normals as eigenvectors, so
+    that both pressures are equal unless the sides are perpendicular. Up to a turn of 45 degrees
+    they are told together, from the part of the node's force along the sum of weight times normal:
+    what a uniform pressure on both sides exerts.
+    """
+    pressure = force / line.weight
+    corners = twins(line)
+    if corners.size == 0 or line.contact.direction is not None:
+        return pressure
+    inside = in_contact(line, active)[corners].all(axis=1)
+    normal = line.direction[corners]  # (t, 2, 2), row i the normal of side i
+    inside &= (normal[:, 0] * normal[:, 1]).sum(axis=1) >= ALIKE
+    corners, normal = corners[inside], normal[inside]
+    uniform = (line.weight[corners][:, :, None] * normal).sum(axis=1)
+    resultant = (force[corners][:, :, None] * normal).sum(axis=1)
+    shared = (resultant * uniform).sum(axis=1) / (uniform**2).sum(axis=1)
+    pressure[corners] = shared[:, None]
+    return pressure
 
 
 def _neighbours(line: ContactLine) -> tuple[dict[int, list[int]], Index]:
-    """Neighbours of every contact point along the line, and all links (l, 2) of two points."""
+    """Neighbours of every contact point along the line, and all links (l, 2) of two points.
+
+    The two points at a corner of the line are neighbours without a distance.
+    """
     pairs = np.stack([line.rows[:, :-1].ravel(), line.rows[:, 1:].ravel()], axis=1)
-    links = pairs[(pairs >= 0).all(axis=1)]
+    links = np.concatenate([pairs[(pairs >= 0).all(axis=1)], twins(line)])
     neighbours: dict[int, list[int]] = {}
     for a, b in links.tolist():
         neighbours.setdefault(a, []).append(b)
@@ -71,7 +127,7 @@ class Transitions:
     Attributes
     ----------
     inner, outer : ndarray of int (k,)
-        The last active and the first open contact point.
+        The last active and the first open contact point; at a corner the next but one.
     position : ndarray (k, 2)
         The transition itself.
     """
@@ -88,6 +144,7 @@ def transitions(line: ContactLine, gap: Array, active: Mask) -> Transitions:
     gap^(2/3) is a smooth function of it with a simple zero at the transition. That zero is found
     from a cubic fitted to the open points near by, the nearest ones left out. Without enough of
     them - contact that opens at a few points only - it is the middle between the two points.
+    Between the two points at a corner it is the corner.
 
     Parameters
     ----------
@@ -99,11 +156,16 @@ def transitions(line: ContactLine, gap: Array, active: Mask) -> Transitions:
         Points in contact.
     """
     neighbours, links = _neighbours(line)
+    active = in_contact(line, active)
     x, order = line.position, line.rows.shape[1] - 1
     ends, found = [], []
     for link in links[active[links[:, 0]] != active[links[:, 1]]].tolist():
         inner, outer = sorted(link, key=lambda i: not active[i])
         opened = _run(outer, inner, neighbours, active)
+        if line.node[inner] == line.node[outer]:  # the node touches one side of a corner only
+            ends.append((inner, opened[min(1, len(opened) - 1)]))
+            found.append(x[inner])
+            continue
         if len(opened) > 1 and any(active[i] for i in neighbours[opened[-1]]):
             opened = opened[: (len(opened) + 1) // 2]  # the other half belongs to its other end
         steps = np.linalg.norm(np.diff(x[[inner, *opened]], axis=0), axis=1)

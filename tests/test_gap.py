@@ -13,7 +13,7 @@ from geometries import blocks, disc, disc_on_block, graphs, rings
 from geometries.region import body, compound, polygon
 from ngcontact import Contact
 from ngcontact.gap import at_quadrature, contact_line, without
-from ngcontact.lagrange import lagrange
+from ngcontact.lagrange import gauss, lagrange
 from ngcontact.trace import boundary_trace
 
 ORDERS = [1, 2, 3, 4]
@@ -52,6 +52,11 @@ def polygonal(order, direction=None, **options):
 
 def at_corner(line, vertex):
     return np.flatnonzero(np.linalg.norm(line.position - vertex, axis=1) < 1e-12)
+
+
+def one_corner(turn, left=1.0, right=0.73):
+    slope = math.tan(turn / 2)
+    return [(-left, -left * slope), (0.0, 0.0), (right, -right * slope)]
 
 
 # ----------------------------------------------------------------------------- polygonal line
@@ -104,6 +109,39 @@ def test_matched_lines_touch_without_a_search(order):
     smooth = np.bincount(line.node)[line.node] == 1  # at a corner both sides share the node
     np.testing.assert_allclose(opposite[smooth], -line.direction[smooth], atol=1e-14)
     assert line.faces.all()
+
+
+@pytest.mark.parametrize("bare", [False, True])
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_uniform_pressure_is_that_of_the_weights_where_sides_share_a_point(order, bare):
+    # Below the turn that makes a corner one row stands for two sides of different lengths: weight
+    # times direction is the force of a unit pressure on both, exactly.
+    turn = math.radians(20) if bare else 4e-4
+    vertices = np.array(one_corner(turn))
+    mesh = ng.Mesh(blocks(line=vertices.tolist()).GenerateMesh(maxh=0.4))
+    if bare:
+        mesh = ng.Mesh(mesh.ngmesh.Copy())
+        mesh.ngmesh.SetGeometry(None)
+    trace = boundary_trace(mesh, order)
+    line = contact_line(trace, Contact("upper_contact", "lower_contact"))
+    assert (np.bincount(line.node) <= 1).all()
+    here = trace.select(np.array(mesh.GetBoundaries()) == "upper_contact")
+    lengths = trace.lengths(here)
+    assert lengths.max() > 1.05 * lengths.min()
+    along = vertices[-1] - vertices[0]
+    resultant = line.weight @ line.direction
+    np.testing.assert_allclose(resultant, [along[1], -along[0]], rtol=1e-14, atol=1e-15)
+    # At the vertex itself, from both segments there.
+    [point] = np.flatnonzero(np.linalg.norm(line.position, axis=1) < 1e-12)
+    s, w = gauss(order)
+    share = w @ lagrange(order, s)[:, 0]  # of a segment's length at its end
+    middle = trace.curve[here].mean(axis=1)[:, 0]
+    at = np.array(
+        [np.where(middle < 0, middle, -9).argmax(), np.where(middle > 0, middle, 9).argmin()]
+    )
+    normals = trace.normal(here[at], np.full(2, 0.5))
+    expected = share * (lengths[at] @ normals)
+    np.testing.assert_allclose(line.weight[point] * line.direction[point], expected, rtol=1e-13)
 
 
 @pytest.mark.parametrize("order", ORDERS)

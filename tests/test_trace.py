@@ -304,6 +304,27 @@ def test_corners_without_cad_by_name_or_thirty_degrees(names):
         np.testing.assert_allclose(vector[point], [math.cos(mean), math.sin(mean)], atol=1e-15)
 
 
+def test_the_mean_normal_of_a_shared_point_goes_by_length():
+    # 4e-4 is less than the turn of a corner; the segments there are not of one length.
+    slope = math.tan(2e-4)
+    geometry = blocks(line=[(-1, -slope), (0, 0), (0.73, -0.73 * slope)])
+    trace = boundary_trace(meshed(geometry, maxh=0.4), 1)
+    segments = named(trace, "upper_contact")
+    number, vector, at = numbered(trace, segments)
+    assert len(at) == len(segments) + 1
+    segment, s = trace.at_nodes(segments)
+    there = np.linalg.norm(trace.point(segment, s), axis=1) < 1e-12
+    [place] = np.unique(number[there])
+    assert abs(trace.lengths(segment[there]) @ [1, -1]) > 0.01
+    # Across the line from end to end: what both normals add up to by length.
+    ends = trace.curve[segment[there]].reshape(-1, 2)
+    left, right = ends[ends[:, 0].argmin()], ends[ends[:, 0].argmax()]
+    along = right - left
+    np.testing.assert_allclose(
+        vector[place], np.array([along[1], -along[0]]) / np.linalg.norm(along), rtol=1e-13
+    )
+
+
 def test_names_alone_do_not_make_a_corner():
     mesh, vertices = polygon("abcd", turns=np.deg2rad([0, 0, 120, 240]))
     trace = boundary_trace(mesh, 1)

@@ -5,19 +5,23 @@ from __future__ import annotations
 import math
 from types import SimpleNamespace
 
+import ngsolve as ng
 import numpy as np
 import pytest
 
 from drivers import cases
-from ngcontact import adapt, solve
-from ngcontact.transition import transitions
+from geometries import blocks
+from ngcontact import Contact, Problem, adapt, solve
+from ngcontact.transition import in_contact, nodal_pressure, transitions, twins
 
 
 def line(x, order=1, y=None):
     """Contact points on a polygon through (x, y), `order` + 1 of them on each segment."""
     position = np.column_stack([x, np.zeros(len(x)) if y is None else y])
     first = np.arange(0, len(x) - 1, order)[:, None]
-    return SimpleNamespace(position=position, rows=first + np.arange(order + 1))
+    return SimpleNamespace(
+        position=position, rows=first + np.arange(order + 1), node=np.arange(len(x))
+    )
 
 
 def opening(distance):
@@ -98,7 +102,9 @@ def test_no_end_without_a_change(state):
 def test_points_of_separate_lines_are_not_neighbours():
     # Two contact lines of one pair: the first in contact, the second open.
     x = np.arange(4.0)
-    lines = SimpleNamespace(position=np.column_stack([x, 0 * x]), rows=np.array([[0, 1], [2, 3]]))
+    lines = SimpleNamespace(
+        position=np.column_stack([x, 0 * x]), rows=np.array([[0, 1], [2, 3]]), node=np.arange(4)
+    )
     active = np.array([True, True, False, False])
     assert len(transitions(lines, ~active * 1.0, active).position) == 0
 
@@ -107,7 +113,9 @@ def test_points_without_a_row_are_no_neighbours():
     # Gamma_K ends on Gamma_u, where the row is dropped: -1.
     x = np.linspace(0, 1, 5)
     short = SimpleNamespace(
-        position=np.column_stack([x, 0 * x]), rows=np.array([[-1, 0], [0, 1], [1, 2], [3, 4]])
+        position=np.column_stack([x, 0 * x]),
+        rows=np.array([[-1, 0], [0, 1], [1, 2], [3, 4]]),
+        node=np.arange(5),
     )
     active = np.array([True, True, True, False, False])
     assert len(transitions(short, ~active * 1.0, active).position) == 0
@@ -119,6 +127,7 @@ def test_a_closed_line_has_no_first_point():
     ring = SimpleNamespace(
         position=np.column_stack([np.cos(angle), np.sin(angle)]),
         rows=np.column_stack([np.arange(count), np.roll(np.arange(count), -1)]),
+        node=np.arange(count),
     )
     from_zero = np.abs((angle + math.pi) % (2 * math.pi) - math.pi)
     found = transitions(ring, *opening(from_zero - end)).position
@@ -136,6 +145,72 @@ def test_the_middle_where_few_points_are_open(active, gap):
     changes = np.flatnonzero(active[1:] != active[:-1])
     found = transitions(line(x), gap * ~active, active)
     assert np.sort(found.position[:, 0]) == pytest.approx(x[changes] + 0.5)
+
+
+def at_a_corner(x, corner, order=1):
+    """Points on a line that turns at x[corner], which carries two of them: the right one last."""
+    nodes = np.append(np.arange(len(x)), corner)
+    rows = np.arange(0, len(x) - 1, order)[:, None] + np.arange(order + 1)
+    rows[rows[:, 0] == corner, 0] = len(x)
+    position = np.column_stack([x, -0.3 * np.maximum(x - x[corner], 0)])[nodes]
+    return SimpleNamespace(position=position, rows=rows, node=nodes)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_contact_that_ends_at_a_corner(order):
+    # Active left of the corner and there on its left side, open on its right side.
+    x, corner = np.linspace(0, 1, 13), 4
+    lines = at_a_corner(x, corner, order)
+    active = np.append(x < x[corner] + 1e-9, False)
+    gap = np.where(active, 0.0, 1e-3 + lines.position[:, 0] - x[corner])
+    for state, outer in ((active, corner + 1), (np.append(x > x[corner] + 1e-9, True), corner - 1)):
+        found = transitions(lines, np.where(state, 0.0, gap + 1e-3), state)
+        assert found.position.tolist() == [[x[corner], 0.0]]
+        # The warm start takes the way from `inner` to `outer` for the direction of the contact.
+        assert found.outer.tolist() == [outer]
+        assert lines.node[found.inner].tolist() == [corner]
+
+
+@pytest.mark.parametrize("end", [0.21, 0.41, 0.62])
+def test_contact_that_ends_next_to_a_corner(end):
+    # The fit does not mind that a point occurs twice; flat but for the corner at 1/3.
+    x, corner = np.linspace(0, 1, 25), 8
+    lines = at_a_corner(x, corner)
+    lines.position[:, 1] = 0
+    gap, active = opening(lines.position[:, 0] - end)
+    found = transitions(lines, gap, active)
+    assert found.position == pytest.approx(np.array([[end, 0.0]]), abs=EXACT)
+
+
+def test_no_end_at_a_corner_inside_the_contact():
+    x, corner = np.linspace(0, 1, 9), 4
+    lines = at_a_corner(x, corner)
+    active = np.ones(10, dtype=bool)
+    for i in (corner, 9):  # the node has slid off one side of the corner
+        one_side = active.copy()
+        one_side[i] = False
+        assert len(transitions(lines, ~one_side * 1e-6, one_side).position) == 0
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("turn", [1e-3, 1.0])
+def test_blocks_that_part_at_a_corner(turn, mirrored):
+    line_ = [(-1.0, 0.0), (0.0, 0.0), (1.0, 0.9 * math.tan(turn))]
+    x = ng.x
+    if mirrored:
+        line_, x = [(-a, b) for a, b in reversed(line_)], -ng.x
+    problem = Problem(
+        geometry=blocks(line=line_, height=2.0),
+        materials=cases.BLOCKS,
+        displacement={"top": (0, -0.02), "bottom": (0, 0)},
+        contact=[Contact("upper_contact", "lower_contact", gap=ng.IfPos(x, 0.3 * x, 0.0))],
+    )
+    solution = solve(problem, maxh=0.25, order=2)
+    assert solution.transitions() == pytest.approx(np.zeros((1, 2)), abs=1e-14)
+    again = solve(problem, maxh=0.125, order=2, start=solution)
+    cold = solve(problem, maxh=0.125, order=2)
+    assert (again.active == cold.active).all()
+    assert len(again.steps) <= len(cold.steps)
 
 
 def test_an_end_stays_next_to_the_last_active_point():
@@ -165,3 +240,105 @@ def test_half_width_of_hertz_contact(order, allowed):
     assert ends == pytest.approx(np.array([[-0.3, 0.0], [0.3, 0.0]]), abs=0.3 * allowed)
     # Inside of elements, not snapped to nodes.
     assert np.abs(ends[:, :1] - solution.points[:, 0]).min() > 0
+
+
+# -------------------------------------------------------- the two points at a corner
+
+TURN = 0.3
+
+
+def bent(turn=TURN, lengths=(1.0, 0.5)):
+    """Two segments that meet at node 1, where the points 1 and 2 are; weights of order 1."""
+    first, second = lengths
+    normals = np.array([[-math.sin(turn / 2), -1], [math.sin(turn / 2), -1]])
+    normals[:, 1] *= math.cos(turn / 2)
+    return SimpleNamespace(
+        contact=Contact("secondary", "primary"),
+        node=np.array([0, 1, 1, 2]),
+        rows=np.array([[0, 1], [2, 3]]),
+        direction=normals[[0, 0, 1, 1]],
+        weight=np.array([first, first, second, second]) / 2,
+    )
+
+
+def mask(text):
+    return np.array([c == "x" for c in text])
+
+
+def test_twins_share_a_node():
+    assert twins(bent()).tolist() == [[1, 2]]
+    straight = SimpleNamespace(node=np.arange(3))
+    assert twins(straight).shape == (0, 2)
+
+
+@pytest.mark.parametrize(
+    ("active", "expected"),
+    [
+        ("xx.x", "xxxx"),  # slid off one side of the corner, inside the contact
+        ("x.xx", "xxxx"),
+        ("xx..", "xx.."),  # the contact ends at the corner
+        ("..xx", "..xx"),
+        ("x..x", "x..x"),  # the corner itself is apart
+        ("xxxx", "xxxx"),
+        ("....", "...."),
+    ],
+)
+def test_a_point_that_touches_one_side_inside_the_contact(active, expected):
+    given = mask(active)
+    assert in_contact(bent(), given).tolist() == mask(expected).tolist()
+    assert given.tolist() == mask(active).tolist()  # the argument stays
+
+
+@pytest.mark.parametrize("turn", [1e-3, 0.3, -0.3])
+def test_a_uniform_pressure_is_told_whatever_the_split(turn):
+    line = bent(turn)
+    force = 2.0 * line.weight
+    assert nodal_pressure(line, force, mask("xxxx")) == pytest.approx([2, 2, 2, 2], rel=1e-14)
+    # The same force across the corner on one side more, on the other less: only its part along
+    # the sum of both weighted normals counts.
+    n, w = line.direction[[1, 2]], line.weight[[1, 2]]
+    along = w @ n
+    across = np.array([-along[1], along[0]])
+    force[[1, 2]] += np.linalg.solve(n.T, 0.01 * across * math.sin(abs(turn)))
+    told = nodal_pressure(line, force, mask("xxxx"))
+    assert told == pytest.approx([2, 2, 2, 2], rel=1e-12)
+    assert np.abs(force / line.weight - 2).max() > 1e-3
+
+
+def test_one_side_carries_all_inside_the_contact():
+    line = bent(1e-3)
+    force = np.array([0.5, 0.75, 0.0, 0.25])  # of a pressure of 1: 0.5 and 0.25 at the corner
+    # To the square of the turn: the whole force has the direction of one side.
+    assert nodal_pressure(line, force, mask("xx.x")) == pytest.approx([1, 1, 1, 1], rel=1e-6)
+
+
+def test_sides_keep_their_own_pressure():
+    sharp = bent(math.radians(60))
+    force = np.array([1.0, 2.0, 3.0, 4.0])
+    assert nodal_pressure(sharp, force, mask("xxxx")).tolist() == (force / sharp.weight).tolist()
+    force[2:] = 0  # contact that ends at the corner
+    line = bent()
+    assert nodal_pressure(line, force, mask("xx..")).tolist() == (force / line.weight).tolist()
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("turn", [6e-4, -6e-4, 1e-2, -1e-2])
+def test_blocks_pressed_together_at_an_almost_flat_corner(turn, order):
+    # The nearly parallel rows share the force by chance: one had twice the pressure, the other none
+    # and counted as an end of the contact.
+    slope = math.tan(turn / 2)
+    problem = Problem(
+        geometry=blocks(line=[(-1, -slope), (0, 0), (0.73, -0.73 * slope)]),
+        materials=cases.BLOCKS,
+        displacement={"top": (0, -0.1), "bottom": (0, 0)},
+        contact=[Contact("upper_contact", "lower_contact")],
+    )
+    solution = solve(problem, maxh=0.2, order=order)
+    x = solution.points[:, 0]
+    [contact] = solution.discrete.lines
+    pressure = nodal_pressure(contact, solution.force, solution.active)
+    assert np.count_nonzero(np.abs(x) < 1e-12) == 2
+    near = (np.abs(x) > 1e-12) & (np.abs(x) < 0.25)
+    # Measured: 1 % from the mean of the neighbours.
+    assert pressure[np.abs(x) < 1e-12] == pytest.approx(pressure[near].mean(), rel=0.03)
+    assert len(solution.transitions()) == 0
