@@ -195,7 +195,10 @@ class Systems:
             force[:] = 0.0
             force[active] = self.residual(y, force)[p.unknown[active]]
         residual = self.residual(y, force, anchor)[~p.fixed]
-        scale = max(scale, np.abs(force).max(initial=0.0) if p.unit_rows else 0.0)
+        # Where bounds alone drive the solution, forces come from rows or from elasticity.
+        pull = p.R.T @ force if not p.unit_rows else force
+        for terms in (pull, (p.K @ y)[~p.fixed]):
+            scale = max(scale, np.abs(terms).max(initial=0.0))
         if not np.abs(residual).max(initial=0.0) <= UNSOLVED * scale:
             raise SingularError(
                 "the system for the current active set is singular: a body can move without "

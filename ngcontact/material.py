@@ -98,7 +98,9 @@ class Elastic:
             normal = self.E / (1 - self.nu * self.nu)
             cross = normal * self.nu
         shear = self.E / (2 * (1 + self.nu))
-        return ng.CF((normal, cross, 0, cross, normal, 0, 0, 0, shear), dims=(3, 3))
+        # NGSolve takes numbers in a tuple slowly, and loses an interruption that comes meanwhile.
+        n, c, s, zero = (ng.CF(value) for value in (normal, cross, shear, 0.0))
+        return ng.CF((n, c, zero, c, n, zero, zero, zero, s), dims=(3, 3))
 
     def shear_modulus(self, model: str = "plane strain") -> ng.CoefficientFunction:
         """Return mu = E / 2 (1 + nu), the same in both models."""

@@ -102,8 +102,9 @@ def full_stress(solution: Any) -> ng.CoefficientFunction:
 
 def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
     """Von Mises stress (k,) of the components xx, yy, xy, zz (k, 4)."""
-    xx, yy, xy, zz = stress.T
-    return np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * xy**2)
+    size = float(np.abs(stress).max(initial=0.0)) or 1.0  # squares must stay in range
+    xx, yy, xy, zz = stress.T / size
+    return size * np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * xy**2)
 
 
 def neighbour_tree(points: NDArray[np.float64]) -> csr_array:

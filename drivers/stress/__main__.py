@@ -14,12 +14,16 @@ import sys
 from drivers import stress
 
 
+def modules() -> list[str]:
+    """Names of all modules with cases."""
+    return sorted(m.name for m in pkgutil.iter_modules(stress.__path__) if m.name[0] != "_")
+
+
 def main(names: list[str]) -> int:
     """Print the table of the modules `names`, of all of them without names."""
-    modules = sorted(m.name for m in pkgutil.iter_modules(stress.__path__) if m.name[0] != "_")
     failed = count = 0
     print(f"{'case':32} {'varied':44} {'steps':>5} {'residual':>9} {'error':>9} {'allowed':>9}")
-    for name in names or modules:
+    for name in names or modules():
         for outcome in importlib.import_module(f"drivers.stress.{name}").outcomes():
             count += 1
             failed += not outcome.passed

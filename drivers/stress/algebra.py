@@ -1,0 +1,180 @@
+"""Stress: quadratic programs on which active-set methods cycle, and random ones by the hundred.
+
+The matrices come from the dual 0 <= force, S force - d >= 0: `solve_qp` gets A = S^-1, B = I,
+g = 0, f = S^-1 d.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.stress import Outcome, refused
+from ngcontact import solve_qp
+from ngcontact.newton import Minimiser
+
+Array = NDArray[np.float64]
+Program = tuple[Array, Array, Array, Array]  # A, f, B, g
+Generator = np.random.Generator
+
+ROUND_OFF = 1e-14  # of a solve, times the condition number: 45 units, entries are summed by tens
+BRUTE = 8  # rows up to which all active sets are tried
+
+# The plain method cycles on the first two for ever, on the third in round-off of a tie.
+CYCLES = {
+    "T-cyc-1": ([[5, -2, -3], [-2, 5, 2], [-3, 2, 2]], [-5, 1, 3], [0, 0, 1.5]),
+    "T-cyc-1 moved": ([[5, -2, -3], [-2, 5, 2], [-3, 2, 2]], [-5.01, 1.02, 3], [0, 0, 1.5]),
+    "T-cyc-2": ([[18, 6, -12], [6, 10, -8], [-12, -8, 19]], [0, 4, 1], [0, 2 / 3, 1 / 3]),
+}
+# A P-matrix that is not symmetric: no energy belongs to it.
+NOT_SYMMETRIC = np.array([[1.0, 0.0, 2.0], [2.0, 1.0, 0.0], [0.0, 2.0, 1.0]])
+
+
+def dual(S: Array, d: Array) -> Program:
+    """The program whose multipliers minimise 1/2 x'Sx - d'x over x >= 0."""
+    A = np.asarray(np.linalg.inv(S), dtype=np.float64)
+    if np.array_equal(S, S.T):
+        A = (A + A.T) / 2
+    return A, A @ d, np.eye(len(d)), np.zeros(len(d))
+
+
+def independent(draw: Generator, m: int, n: int, integers: bool = False) -> Array:
+    """Rows (m, n) none of which is nearly a combination of the others."""
+    while True:
+        B = draw.integers(-2, 3, (m, n)).astype(float) if integers else draw.normal(size=(m, n))
+        if np.linalg.svd(B, compute_uv=False)[-1] > 0.05:
+            return B
+
+
+def random_program(draw: Generator, m: int) -> Program:
+    """Normal entries; as many unknowns as rows or a few more."""
+    n = m + int(draw.integers(1, 5))
+    X = draw.normal(size=(n, n + 1))
+    A = X @ X.T + np.eye(n) / n
+    return A, draw.normal(size=n), independent(draw, m, n), draw.normal(size=m)
+
+
+def tied_program(draw: Generator, m: int) -> tuple[Program, Array, Array]:
+    """Small integers with exact ties, force and slack both 0, and the minimiser and forces.
+
+    A is a matrix of half the rank plus a multiple of the identity.
+    """
+    n = m + int(draw.integers(1, 5))
+    X = draw.integers(-3, 4, (n, max(1, n // 2))).astype(float)
+    A = X @ X.T + int(draw.integers(1, 5)) * np.eye(n)
+    B = independent(draw, m, n, integers=True)
+    u = draw.integers(-2, 3, n).astype(float)
+    kind = draw.integers(0, 3, m)
+    force = np.where(kind == 0, draw.integers(1, 5, m), 0).astype(float)
+    slack = np.where(kind == 2, draw.integers(1, 4, m), 0).astype(float)
+    return (A, A @ u + B.T @ force, B, B @ u + slack), u, force
+
+
+def kkt_residual(program: Program, result: Minimiser) -> float:
+    """Largest violation of the optimality conditions relative to the size of the terms."""
+    A, f, B, g = program
+    u, force = result.u, result.force
+    slack = g - B @ u
+    tiny = np.finfo(float).tiny
+    load = max(np.abs(x).max() for x in (f, A @ u, B.T @ force)) + tiny
+    terms, free = np.abs(B), np.abs(np.linalg.solve(A, f))
+    # A minimiser at 0 is known to round-off of the one without the rows, no force to that of f.
+    length = max(np.abs(x).max() for x in (g, terms @ np.abs(u), terms @ free)) + tiny
+    largest = max(np.abs(force).max(), load / np.abs(B).max())
+    return float(
+        max(
+            np.abs(A @ u + B.T @ force - f).max() / load,
+            -slack.min() / length,
+            -force.min() / largest,
+            np.abs(force / largest * (slack / length)).max(),
+        )
+    )
+
+
+def brute_force(program: Program) -> Array:
+    """Minimiser (n,) of the active set that violates the optimality conditions least, of all."""
+    A, f, B, g = program
+    n, m = A.shape[0], g.size
+    best, found = np.inf, np.zeros(n)
+    for active in product([False, True], repeat=m):
+        rows = np.flatnonzero(active)
+        K = np.block([[A, B[rows].T], [B[rows], np.zeros((rows.size, rows.size))]])
+        z = np.linalg.solve(K, np.concatenate([f, g[rows]]))
+        violation = max((B @ z[:n] - g).max(), (-z[n:]).max(initial=0.0))
+        if violation < best:
+            best, found = violation, z[:n]
+    return found
+
+
+def condition(program: Program) -> float:
+    """Condition number of A or of B A^-1 B', whichever is larger."""
+    A, _, B, _ = program
+    rows = np.linalg.svd(np.linalg.solve(np.linalg.cholesky(A), B.T), compute_uv=False)
+    return float(max(np.linalg.cond(A), (rows[0] / rows[-1]) ** 2))
+
+
+def _off(value: Array, right: Array) -> float:
+    return float(np.abs(value - right).max() / max(np.abs(right).max(), 1.0))
+
+
+def _worst(outcomes: list[Outcome]) -> Outcome:
+    """The one that comes nearest to what is allowed, or exceeds it most."""
+    return max(outcomes, key=lambda o: (not o.passed, o.error / o.allowed))
+
+
+def cycles() -> Iterator[Outcome]:
+    """The known cycles in units from 1e-150 to 1e150: the worst of all first active sets."""
+    for name, (S, d, force) in CYCLES.items():
+        for unit in (1e-150, 1.0, 1e150):
+            program = dual(np.array(S, float), unit * np.array(d, float))
+            found = []
+            for first in product([False, True], repeat=3):
+                result = solve_qp(*program, active=np.array(first))
+                outcome = Outcome(
+                    case=name,
+                    varied=f"unit {unit:g}, first active set {''.join(str(int(x)) for x in first)}",
+                    steps=len(result.steps),
+                    residual=kkt_residual(program, result),
+                    error=_off(result.force / unit, np.array(force, float)),
+                    allowed=ROUND_OFF * condition(program),
+                )
+                found.append(outcome)
+            yield _worst(found)
+    data = dual(NOT_SYMMETRIC, -np.ones(3))
+    yield refused("T-cyc-0", "not symmetric", ValueError, "symmetric", lambda: solve_qp(*data))
+
+
+def random_programs(count: int = 60) -> Iterator[Outcome]:
+    """The worst of `count` programs for each number of rows, from random first active sets."""
+    for m in (1, 2, 3, 4, 5, 6, 7, BRUTE, 12, 20, 40):
+        draw = np.random.default_rng(m)
+        normal, tied = [], []
+        for _ in range(count):
+            program = random_program(draw, m)
+            result = solve_qp(*program, active=draw.random(m) < 0.5)
+            residual = kkt_residual(program, result)
+            right = brute_force(program) if m <= BRUTE else result.u
+            allowed = ROUND_OFF * condition(program)
+            error = max(_off(result.u, right), residual)
+            normal.append(
+                Outcome(f"normal, {m} rows", "worst", len(result.steps), residual, error, allowed)
+            )
+            program, u, force = tied_program(draw, m)
+            result = solve_qp(*program, active=draw.random(m) < 0.5)
+            residual = kkt_residual(program, result)
+            error = max(_off(result.u, u), _off(result.force, force))
+            allowed = ROUND_OFF * condition(program)
+            tied.append(
+                Outcome(f"tied, {m} rows", "worst", len(result.steps), residual, error, allowed)
+            )
+        yield _worst(normal)
+        yield _worst(tied)
+
+
+def outcomes() -> Iterator[Outcome]:
+    """Known cycles, then random programs."""
+    yield from cycles()
+    yield from random_programs()

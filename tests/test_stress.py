@@ -1,0 +1,37 @@
+"""The table of `python -m drivers.stress`: nothing in it may fail."""
+
+from __future__ import annotations
+
+import importlib
+import math
+
+import pytest
+
+from drivers.stress import __path__ as folder
+from drivers.stress import refused
+from drivers.stress.__main__ import main, modules
+
+# The slow ones run with the driver; what they found has tests with the modules concerned.
+QUICK = ("algebra", "gaps", "held", "shapes")
+
+
+def test_modules_are_found():
+    assert folder
+    assert set(QUICK) <= set(modules())
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_outcomes(name):
+    failed = [
+        x for x in importlib.import_module(f"drivers.stress.{name}").outcomes() if not x.passed
+    ]
+    assert not failed
+
+
+def test_the_exit_status_tells_of_failures(monkeypatch, capsys):
+    held = importlib.import_module("drivers.stress.held")
+    wrong = refused("nothing", "is refused", ValueError, "it", lambda: None)
+    assert math.isinf(wrong.error)
+    monkeypatch.setattr(held, "outcomes", lambda: iter([wrong]))
+    assert main(["held"]) == 1
+    assert "1 cases, 1 failed" in capsys.readouterr().out
