@@ -13,6 +13,7 @@ from .active import carried_active_set, first_active_set
 from .discrete import discretise, minimise_energy
 from .mark import doerfler
 from .mesh import first_mesh
+from .moduli import warn_of_locking
 from .problem import Problem
 from .refine import refined
 from .solution import Solution
@@ -74,6 +75,8 @@ def solve(
         )
     mesh = first_mesh(problem, maxh) if mesh is None else mesh
     problem.check(mesh)
+    if start is None:
+        warn_of_locking(problem, mesh, order)
     return _solve_checked(problem, mesh, order, element, start)
 
 
@@ -166,6 +169,7 @@ def adapt(
             f"the first mesh has {unknowns(mesh, order, element)} unknowns, more than "
             f"max_dofs={max_dofs}; give a larger maxh or max_dofs"
         )
+    warn_of_locking(problem, mesh, order)
     return _levels(problem, mesh, order, element, theta, tolerance, max_dofs)
 
 

@@ -13,6 +13,7 @@ from netgen.occ import Glue, OCCGeometry, WorkPlane, Y
 from drivers import cases
 from drivers.exact import patch as patch_solution
 from drivers.exact import relative_energy_error, transition
+from drivers.exact_curved import rings as ring_solution
 from geometries import blocks, rings
 from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.mesh import first_mesh
@@ -75,21 +76,56 @@ def test_effectivity_on_adaptive_meshes(name, order):
     assert max(found) / min(found) < 1.2
 
 
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize(("nu", "most"), [(0.0, 6), (0.4, 6), (0.499, math.inf)])
-def test_the_estimate_stays_above_the_error_towards_incompressibility(nu, most, order):
-    # Reliable for every nu with weights in 1 / mu. Above nu = 0.4 it overestimates: jumps of the
-    # stress grow with lambda, the energy with its root; measured 49 and 26 at 0.499.
-    soft = Elastic(E=1.0, nu=nu)
-    exact = transition(soft, soft)
+@pytest.mark.parametrize("order", [1, 2, 4])
+@pytest.mark.parametrize("contrast", [1e-6, 1e-3, 1e3, 1e12])
+def test_effectivity_does_not_depend_on_the_contrast_of_moduli(contrast, order):
+    # Measured 3.6 to 4.0. With the stiff body's modulus at penetrations it grows as the root of
+    # the contrast.
+    upper, lower = Elastic(E=1.0, nu=0.3), Elastic(E=contrast, nu=0.3)
+    exact = transition(upper, lower)
     problem = replace(
         cases.one_transition().problem,
-        materials={"upper": soft, "lower": soft},
+        materials={"upper": upper, "lower": lower},
         displacement={cases.OUTSIDE[body]: u for body, u in exact.displacement.items()},
     )
-    solution = solve(problem, maxh=0.15, order=order)
+    solution = solve(problem, maxh=0.28, order=order)
     # Both relative to norms that differ by the discretisation error alone.
-    assert 1 <= solution.relative_error_estimate / relative_energy_error(solution, exact) <= most
+    assert 1 <= solution.relative_error_estimate / relative_energy_error(solution, exact) <= 6
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("contrast", [1e-12, 1e-3, 1e6])
+def test_effectivity_of_curved_contact_of_unlike_rings(contrast, order):
+    # Measured 3.1 to 5.1.
+    outer, inner = Elastic(E=1.0, nu=0.3), Elastic(E=contrast, nu=0.3)
+    case, exact = cases.ring_in_ring(), ring_solution(outer, inner, qn=0.3, n=2)
+    problem = replace(case.problem, materials={"outer": outer, "inner": inner})
+    solution = solve(problem, maxh=0.15, order=order)
+    assert 1 <= solution.relative_error_estimate / relative_energy_error(solution, exact) <= 6
+
+
+@pytest.mark.parametrize(
+    ("modulus", "load"),
+    [(1e-170, 1e-173), (1e170, 1e167), (1.0, 1e-300), (1.0, 1e300), (1e170, 1e-130)],
+)
+@pytest.mark.parametrize("nu", [0.3, 0.4999])
+def test_squares_stay_in_range(nu, modulus, load):
+    # Energies under- or overflow, the indicators, their roots, do not.
+    def pressed(modulus, load):
+        law = {"upper": Elastic(E=modulus, nu=nu), "lower": Elastic(E=3 * modulus, nu=nu)}
+        return Problem(
+            geometry=blocks(),
+            materials=law,
+            displacement={"bottom": (0, 0)},
+            sliding="upper_left|lower_left",
+            traction={"top": load * (1 + 0.5 * ng.x)},
+            contact=[Contact("upper_contact", "lower_contact")],
+        )
+
+    one = solve(pressed(1.0, 1.0), maxh=0.7, order=2).indicators
+    other = solve(pressed(modulus, load), maxh=0.7, order=2).indicators
+    # Round-off of nearly incompressible bodies is larger: measured 2e-12.
+    assert other / load * math.sqrt(modulus) == pytest.approx(one, rel=1e-8)
 
 
 @pytest.mark.parametrize("order", [1, 3])
@@ -208,6 +244,19 @@ def along(solution, pattern):
     segments = trace.select(boundary_mask(solution.mesh, pattern))
     mu = np.array([MU[solution.mesh.GetMaterials()[body]] for body in trace.body[segments]])
     return diameters(solution.mesh)[trace.element[segments]], mu, trace.lengths(segments)
+
+
+def facing_pairs(solution):
+    """Of both bodies, (2, k), along the straight line of contact: diameter, shear modulus."""
+    trace, found = solution.discrete.space.trace, []
+    for pattern in ("upper_contact", "lower_contact"):
+        order = np.argsort(
+            trace.curve[trace.select(boundary_mask(solution.mesh, pattern))][..., 0].mean(axis=1)
+        )
+        h, mu, length = along(solution, pattern)
+        found.append((h[order], mu[order]))
+    h, mu = np.array(found).transpose(1, 0, 2)
+    return h, mu, length[order]
 
 
 def diameters(mesh):
@@ -387,8 +436,8 @@ def test_pressure_part_in_contact_is_the_jump_between_the_bodies(patch):
     normal = {"upper": 2 * MU["upper"] * 0.7 / 0.4, "lower": 2 * MU["lower"] * 0.8 / 0.6}
     difference = s * (normal["upper"] - normal["lower"])
     squeezed = altered(patch, u)
-    h, mu, length = along(patch, LINE)
-    expected = (h / (2 * mu) * difference**2 / 4 * length).sum()
+    h, mu, length = facing_pairs(patch)
+    expected = 2 * ((h / (2 * mu)).min(axis=0) * difference**2 / 4 * length).sum()
     assert squeezed.estimate_parts["pressure"].sum() == pytest.approx(expected, rel=1e-11)
 
 
@@ -415,26 +464,37 @@ def test_pressure_part_out_of_full_contact_is_the_distance_to_the_nodal_pressure
 
 
 def test_complementarity_part(patch):
-    # Pressure 1 across a gap of 0.01 that is not closed: the integral of pi_h gap, half each side.
-    [value] = only(altered(patch, contact={"gap": 0.01}), "complementarity")
-    assert value == pytest.approx(2 * 0.01, rel=1e-11)
-    parts = altered(patch, contact={"gap": 0.01}).estimate_parts["complementarity"]
+    # Pressure 1 across a gap of 0.01 beside points that are open: the integral of pi_h gap, half
+    # on each side.
+    active = np.zeros_like(patch.active)
+    opened = replace(patch, minimiser=replace(patch.minimiser, active=active))
+    parts = altered(opened, contact={"gap": 0.01}).estimate_parts["complementarity"]
+    assert parts.sum() == pytest.approx(2 * 0.01, rel=1e-11)
     upper = patch.mesh.ngmesh.Elements2D().NumPy()["index"] == 1
     assert parts[upper].sum() == pytest.approx(0.01, rel=1e-11)
 
 
+@pytest.mark.parametrize("gap", [0.01, 100.0])
+def test_complementarity_costs_no_more_than_closing_the_gap(patch, gap):
+    # In contact with all nodes: the lesser of pi_h gap and mu / h gap^2 of the softer side.
+    [value] = only(altered(patch, contact={"gap": gap}), "complementarity")
+    h, mu, length = facing_pairs(patch)
+    cost = (mu / h).min(axis=0) * gap**2
+    assert value == pytest.approx((np.minimum(gap, cost) * length).sum(), rel=1e-11)
+
+
 def test_penetration_part(patch):
-    # mu / h |depth|^2, half on each side.
+    # mu / h |depth|^2 of the softer side, half of it on each.
     [value] = only(altered(patch, contact={"gap": -0.01}), "penetration")
-    h, mu, length = along(patch, LINE)
-    assert value == pytest.approx((mu / h / 2 * 1e-4 * length).sum(), rel=1e-11)
+    h, mu, length = facing_pairs(patch)
+    assert value == pytest.approx(((mu / h).min(axis=0) * 1e-4 * length).sum(), rel=1e-11)
 
 
 @pytest.mark.parametrize("gap", [0.01, -0.01])
 def test_a_bilateral_pair_must_neither_open_nor_overlap(patch, gap):
     [value] = only(altered(patch, contact={"gap": gap, "bilateral": True}), "penetration")
-    h, mu, length = along(patch, LINE)
-    assert value == pytest.approx((mu / h / 2 * 1e-4 * length).sum(), rel=1e-11)
+    h, mu, length = facing_pairs(patch)
+    assert value == pytest.approx(((mu / h).min(axis=0) * 1e-4 * length).sum(), rel=1e-11)
 
 
 def test_a_rigid_obstacle_gets_its_terms_on_one_side():

@@ -1,0 +1,258 @@
+"""Estimates of nearly incompressible bodies: the pressure that balances the residuals best.
+
+Residuals contain kappa div u_h, weighted by 1 / mu; the error counts its square over kappa, the
+bulk modulus. So the stress is corrected by a pressure delta before residuals are taken. For every
+delta, from a(e, v) = r(v; sigma_h + delta I) - (delta, div v) and r(v_h; sigma_h) = 0, with the
+interpolant v_h of v, the squared error is at most a constant, which does not depend on kappa, times
+
+    eta(sigma_h + delta I)^2 + |delta|^2 / kappa + sup (delta, div v_h)^2 / mu |grad v_h|^2.
+
+The estimate is the minimum of this over polynomials of the displacement's degree on each element.
+It is at most a multiple of the error, as one of them is delta = p - p_h but for oscillation: then
+the last term measures the deviatoric error, because e is orthogonal to v_h.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .problem import Problem
+from .space import cholesky
+from .trace import Trace
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+Mask = NDArray[np.bool_]
+
+HELD = 1e6  # stiffness of supports in the last term, relative to the elements beside them
+FLOATING = 1e-9  # ... and of the bedding that keeps free bodies, relative to their size
+
+
+@dataclass(frozen=True, eq=False)
+class Share:
+    """What delta at n points of the boundary adds to residuals: `factor` (n, c) times it.
+
+    Attributes
+    ----------
+    at : ndarray of int (n,)
+        Numbers of the residuals.
+    segment, s : ndarray (n,)
+        Where delta counts.
+    factor : ndarray (n, c)
+        Its factor in each component of the residual.
+    """
+
+    at: Index
+    segment: Index
+    s: Array
+    factor: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Term:
+    """Squared residuals at k points of the boundary, linear in the corrected pressure.
+
+    Attributes
+    ----------
+    name : str
+        Part of the estimate.
+    element : ndarray of int (k,)
+        Element each point counts for.
+    weight : ndarray (k,)
+        Factor of its square.
+    residual : ndarray (k, c)
+        The residual of sigma_h.
+    shares : list of Share
+        How the residual changes with delta.
+    """
+
+    name: str
+    element: Index
+    weight: Array
+    residual: Array
+    shares: list[Share]
+
+
+def _csr(matrix: ng.BaseMatrix) -> sp.csr_matrix:
+    values, columns, starts = (np.array(x) for x in matrix.CSR())
+    return sp.csr_matrix((values, columns, starts), (matrix.height, matrix.width))
+
+
+class PressureCorrection:
+    """The minimising delta on the bodies `names`, of the displacement's degree on each element.
+
+    Moduli and residuals are dimensionless: relative to one modulus and one stress.
+
+    Parameters
+    ----------
+    problem, trace
+        The problem and the boundary.
+    names : list of str
+        Those bodies.
+
+    Attributes
+    ----------
+    pressure : ng.GridFunction
+        delta.
+    motion : ng.GridFunction
+        The v_h of the supremum, for which that term is mu |grad v_h|^2.
+    """
+
+    def __init__(self, problem: Problem, trace: Trace, names: list[str]) -> None:
+        self.problem, self.trace, self.mesh = problem, trace, trace.mesh
+        self.region = self.mesh.Materials("|".join(map(re.escape, names)))
+        self.space = ng.L2(self.mesh, order=trace.order, dgjumps=True)
+        self.functions = self.space.ndof // self.mesh.ne  # on an element; numbered one by one
+        self.V = ng.VectorH1(self.mesh, order=trace.order, definedon=self.region)
+        self.pressure = ng.GridFunction(self.space)
+        self.motion = ng.GridFunction(self.V)
+
+    def minimise(
+        self,
+        weights: tuple[Array, Array],
+        moduli: tuple[Array, Array],
+        residuals: tuple[ng.CoefficientFunction, ng.CoefficientFunction],
+        terms: list[Term],
+    ) -> None:
+        """Find delta.
+
+        Parameters
+        ----------
+        weights
+            Of the squared residuals in an element and on its edges, (ne,) each.
+        moduli
+            mu and kappa, (ne,) each.
+        residuals
+            (2,) in the elements and [sigma_h n] on their edges.
+        terms
+            Those on the boundary.
+        """
+        self.weights = [self._constant(w) for w in weights]
+        self.mu, self.kappa = (self._constant(m) for m in moduli)
+        (inner, f), (outer, g) = self._inside(*residuals), self._on_boundary(terms)
+        self._solve((inner + outer).tocsr(), f + g)
+
+    def _constant(self, values: Array) -> ng.GridFunction:
+        function = ng.GridFunction(ng.L2(self.mesh, order=0))
+        function.vec.FV().NumPy()[:] = values
+        return function
+
+    def _inside(
+        self, divergence: ng.CoefficientFunction, jump: ng.CoefficientFunction
+    ) -> tuple[sp.csr_matrix, Array]:
+        """Quadratic form and right side of the terms in elements and between them."""
+        d, t = self.space.TnT()
+        element, edge = self.weights
+        edge = (edge + edge.Other()) / 2
+        n = ng.specialcf.normal(2)
+        skeleton = ng.dx(skeleton=True, bonus_intorder=2)
+        a = ng.BilinearForm(self.space, symmetric=True)
+        a += (element * ng.Grad(d) * ng.Grad(t) + d * t / self.kappa) * ng.dx
+        a += edge * (d - d.Other()) * (t - t.Other()) * skeleton
+        f = ng.LinearForm(self.space)
+        f += -element * divergence * ng.Grad(t) * ng.dx(bonus_intorder=2)
+        f += -edge * (jump * n) * (t - t.Other()) * skeleton
+        a.Assemble()
+        f.Assemble()
+        return _csr(a.mat), f.vec.FV().NumPy().copy()
+
+    def _on_boundary(self, terms: list[Term]) -> tuple[sp.csr_matrix, Array]:
+        """The same of the boundary terms."""
+        shape = []
+        for j in range(self.functions):
+            function = ng.GridFunction(self.space)
+            function.vec.FV().NumPy()[j :: self.functions] = 1.0
+            shape.append(ng.BoundaryFromVolumeCF(function))
+        shapes = ng.CF(tuple(shape))
+        size = self.space.ndof
+        A, b = sp.csr_matrix((size, size)), np.zeros(size)
+        for term in terms:
+            k, c = term.residual.shape
+            rows = sp.csr_matrix((k * c, size))
+            for share in term.shares:
+                if len(share.at) == 0:
+                    continue
+                value = self.trace.evaluate(shapes, share.segment, share.s)
+                first = self.trace.element[share.segment] * self.functions
+                column = first[:, None, None] + np.arange(self.functions)
+                row = share.at[:, None, None] * c + np.arange(c)[:, None]
+                row, column = np.broadcast_arrays(row, column)
+                entries = share.factor[:, :, None] * value[:, None, :]
+                index = (row.ravel(), column.ravel())
+                rows += sp.csr_matrix((entries.ravel(), index), (k * c, size))
+            weight = np.repeat(term.weight, c)
+            A += rows.T @ rows.multiply(weight[:, None])
+            b -= rows.T @ (weight * term.residual.ravel())
+        return A, b
+
+    def _stiffness(self) -> sp.csr_matrix:
+        """Form of mu |grad v|^2, with v held where displacements are prescribed."""
+        problem, mesh = self.problem, self.mesh
+        u, v = self.V.TnT()
+        position = self.trace.curve.reshape(-1, 2)
+        bedding = FLOATING / float(np.ptp(position, axis=0).max()) ** 2
+        a = ng.BilinearForm(self.V, symmetric=True)
+        a += (
+            self.mu
+            * (ng.InnerProduct(ng.Grad(u), ng.Grad(v)) + bedding * u * v)
+            * ng.dx(definedon=self.region)
+        )
+        held = ng.BoundaryFromVolumeCF(HELD * self.mu) / ng.specialcf.mesh_size
+        for pattern, components in problem.displacement.items():
+            for axis, value in enumerate(components):
+                if value is not None:
+                    ds = ng.ds(definedon=mesh.Boundaries(pattern))
+                    a += held * u.Trace()[axis] * v.Trace()[axis] * ds
+        if problem.sliding is not None:
+            n = ng.specialcf.normal(2)
+            ds = ng.ds(definedon=mesh.Boundaries(str(problem.sliding)))
+            a += held * (u.Trace() * n) * (v.Trace() * n) * ds
+        a.Assemble()
+        return _csr(a.mat)
+
+    def _divergence(self) -> sp.csr_matrix:
+        """(q, div v) of pressures q and displacements v."""
+        pressures = ng.L2(self.mesh, order=self.trace.order)
+        q, v = pressures.TrialFunction(), self.V.TestFunction()
+        b = ng.BilinearForm(trialspace=pressures, testspace=self.V)
+        grad = ng.Grad(v)
+        b += q * (grad[0, 0] + grad[1, 1]) * ng.dx(definedon=self.region)
+        b.Assemble()
+        return _csr(b.mat)
+
+    def _solve(self, A: sp.csr_matrix, b: Array) -> None:
+        """Solve the optimality conditions of delta and of the v_h of the supremum.
+
+        [[A, B'], [B, -K]] is quasi-definite: it has a factorisation without pivots.
+        """
+        B, K = self._divergence(), self._stiffness()
+        size = self.space.ndof
+        regions = self.mesh.ngmesh.Elements2D().NumPy()["index"].astype(int) - 1
+        inside = np.array(self.region.Mask())[regions]
+        free = np.append(np.repeat(inside, self.functions), K.diagonal() > 0)
+        saddle = sp.bmat([[A, B.T], [B, -K]], format="csr")
+        right = np.append(b, np.zeros(K.shape[0]))
+        solution = np.where(free, cholesky(saddle)(free)(right), 0.0)
+        self.pressure.vec.FV().NumPy()[:] = solution[:size]
+        self.motion.vec.FV().NumPy()[:] = solution[size:]
+
+    def add_to(self, residual: Array, shares: list[Share]) -> None:
+        """Add what delta contributes to a residual (k, c) at the boundary."""
+        on_boundary = ng.BoundaryFromVolumeCF(self.pressure)
+        for share in shares:
+            if len(share.at):
+                delta = self.trace.evaluate(on_boundary, share.segment, share.s)
+                residual[share.at] += share.factor * delta
+
+    def squares(self) -> Array:
+        """Squares (ne,) of the two terms that delta itself adds."""
+        grad = ng.Grad(self.motion)
+        density = self.pressure**2 / self.kappa + self.mu * ng.InnerProduct(grad, grad)
+        values = ng.Integrate(density, self.region, element_wise=True)
+        return np.asarray(values)

@@ -1,0 +1,94 @@
+"""Sizes and moduli of elements, nearly incompressible bodies, units for squares."""
+
+from __future__ import annotations
+
+import logging
+import math
+
+import ngsolve as ng
+import numpy as np
+from numpy.typing import NDArray
+
+from .problem import Problem
+
+Array = NDArray[np.float64]
+
+# kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
+NEARLY_INCOMPRESSIBLE = 6.0
+# ... and from which order 1 locks: nu = 0.4545, where errors are 1.3 times those of nu = 0.3.
+LOCKING = 11.0
+
+log = logging.getLogger("ngcontact")
+
+
+def power_of_two(values: Array) -> float:
+    """The power of 2 below the largest of the values in size; 1 where all vanish."""
+    largest = float(np.abs(values).max(initial=0.0))
+    if not 0 < largest < math.inf:
+        return 1.0
+    return math.ldexp(1.0, max(math.frexp(largest)[1] - 1, -1000))  # its inverse is finite, too
+
+
+def root_of_squares(values: Array) -> float:
+    """Root of the sum of squares; the squares may be too large or too small for a float."""
+    unit = power_of_two(values)
+    return unit * float(np.sqrt(((values / unit) ** 2).sum()))
+
+
+def diameters(mesh: ng.Mesh) -> Array:
+    """Longest side of each triangle, (ne,)."""
+    triangles = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.intp) - 1
+    corners = np.array(mesh.ngmesh.Coordinates())[:, :2][triangles]
+    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+
+
+def middles(mesh: ng.Mesh) -> NDArray:
+    """Mesh points (ne,) in the middle of each element."""
+    return mesh.MapToAllElements(ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1]), ng.VOL)
+
+
+def shear_moduli(problem: Problem, mesh: ng.Mesh) -> Array:
+    """Shear modulus (ne,) in the middle of each element."""
+    mu = mesh.MaterialCF(
+        {body: law.shear_modulus(problem.model) for body, law in problem.materials.items()}
+    )
+    return np.asarray(mu(middles(mesh))).ravel()
+
+
+def bulk_moduli(problem: Problem, mesh: ng.Mesh) -> Array:
+    """Bulk modulus (ne,) in the middle of each element: the largest kappa <= e : C e / (tr e)^2.
+
+    lambda + mu of an isotropic law in plane strain. A Schur complement in C on volumetric,
+    deviatoric and shear strain, which does not cancel where C_11, C_12 and C_22 are nearly equal.
+    """
+    laws = {body: law.voigt(problem.model) for body, law in problem.materials.items()}
+    entries = [mesh.MaterialCF({body: C[i] for body, C in laws.items()}) for i in range(9)]
+    C = np.asarray(ng.CF(tuple(entries))(middles(mesh))).reshape(-1, 3, 3)
+    size = np.abs(C).max(axis=(1, 2))
+    T = np.array([[0.5, 0.5, 0.0], [0.5, -0.5, 0.0], [0.0, 0.0, 1.0]])
+    D = T @ (C / size[:, None, None]) @ T.T
+    bend = np.linalg.solve(D[:, 1:, 1:], D[:, 1:, :1])
+    return size * (D[:, 0, 0] - (D[:, :1, 1:] @ bend)[:, 0, 0])
+
+
+def nearly_incompressible(problem: Problem, mesh: ng.Mesh, limit: float) -> dict[str, float]:
+    """Largest kappa / mu of each body where it exceeds `limit`."""
+    ratio = bulk_moduli(problem, mesh) / shear_moduli(problem, mesh)
+    region = mesh.ngmesh.Elements2D().NumPy()["index"] - 1
+    most = dict.fromkeys(mesh.GetMaterials(), 0.0)
+    for number, name in enumerate(mesh.GetMaterials()):
+        most[name] = max(most[name], float(ratio[region == number].max(initial=0.0)))
+    return {name: value for name, value in most.items() if value > limit}
+
+
+def warn_of_locking(problem: Problem, mesh: ng.Mesh, order: int) -> None:
+    """Log a warning for every body that elements of order 1 are too stiff for."""
+    if order > 1:
+        return
+    for name, ratio in nearly_incompressible(problem, mesh, LOCKING).items():
+        log.warning(
+            'body "%s" is nearly incompressible, lambda / mu = %.3g: elements of order 1 lock; '
+            "use order=2 or higher",
+            name,
+            ratio - 1,
+        )

@@ -1,0 +1,121 @@
+"""Moduli of elements, and the warning of locking."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import replace
+
+import ngsolve as ng
+import numpy as np
+import pytest
+
+from drivers import cases
+from ngcontact import Elastic, Hooke
+from ngcontact.mesh import first_mesh
+from ngcontact.moduli import (
+    NEARLY_INCOMPRESSIBLE,
+    bulk_moduli,
+    diameters,
+    middles,
+    nearly_incompressible,
+    power_of_two,
+    root_of_squares,
+    shear_moduli,
+    warn_of_locking,
+)
+
+BODIES = ("upper", "lower")
+
+
+@pytest.fixture(scope="module")
+def mesh():
+    return first_mesh(cases.one_transition().problem, 0.7)
+
+
+def made_of(law, model="plane strain"):
+    problem = cases.one_transition().problem
+    return replace(problem, materials=dict.fromkeys(BODIES, law), model=model)
+
+
+@pytest.mark.parametrize("nu", [-0.9, 0.0, 0.3, 0.499, 0.499999])
+def test_bulk_modulus_of_an_isotropic_law(mesh, nu):
+    E = 2.5
+    mu, lam = E / (2 * (1 + nu)), E * nu / ((1 + nu) * (1 - 2 * nu))
+    # C holds lambda + 2 mu and lambda to round-off: mu is their difference.
+    tolerance = 1e-15 * (2 + lam / mu) + 1e-12
+    assert bulk_moduli(made_of(Elastic(E, nu)), mesh) == pytest.approx(lam + mu, rel=tolerance)
+    assert shear_moduli(made_of(Elastic(E, nu)), mesh) == pytest.approx(mu, rel=1e-14)
+
+
+def test_bulk_modulus_is_the_least_energy_of_a_unit_dilatation(mesh):
+    C = np.array([[5.0, 2.0, 0.7], [2.0, 3.0, -0.4], [0.7, -0.4, 1.1]])
+    trace = np.array([1.0, 1.0, 0.0])
+    expected = 1 / (trace @ np.linalg.solve(C, trace))
+    assert bulk_moduli(made_of(Hooke(C)), mesh) == pytest.approx(expected, rel=1e-13)
+    for strain in np.random.default_rng(1).normal(size=(50, 3)):
+        assert strain @ C @ strain >= expected * (trace @ strain) ** 2 * (1 - 1e-12)
+
+
+def test_bulk_modulus_follows_a_law_that_varies(mesh):
+    law = Elastic(E=2 + ng.x, nu=0.25)
+    x = np.asarray(ng.x(middles(mesh))).ravel()
+    assert bulk_moduli(made_of(law), mesh) == pytest.approx((2 + x) * 0.8, rel=1e-12)
+
+
+def test_nothing_is_nearly_incompressible_in_plane_stress(mesh):
+    law = Elastic(E=1.0, nu=0.499999)
+    assert nearly_incompressible(made_of(law), mesh, NEARLY_INCOMPRESSIBLE).keys() == set(BODIES)
+    assert not nearly_incompressible(made_of(law, "plane stress"), mesh, NEARLY_INCOMPRESSIBLE)
+
+
+def test_only_the_bodies_beyond_the_limit_count(mesh):
+    # kappa / mu = 1 / (1 - 2 nu) = 10 and, at x = 1 only, more than 6.
+    problem = replace(
+        made_of(Elastic(E=1.0, nu=0.45)),
+        materials={"upper": Elastic(E=1.0, nu=0.45), "lower": Elastic(E=1.0, nu=0.2)},
+    )
+    found = nearly_incompressible(problem, mesh, NEARLY_INCOMPRESSIBLE)
+    assert found == {"upper": pytest.approx(10, rel=1e-12)}
+    somewhere = Elastic(E=1.0, nu=0.3 + 0.199 * ng.IfPos(ng.x, ng.x, 0))
+    assert len(nearly_incompressible(made_of(somewhere), mesh, NEARLY_INCOMPRESSIBLE)) == 2
+
+
+@pytest.mark.parametrize(
+    ("nu", "order", "model", "warned"),
+    [
+        (0.499, 1, "plane strain", True),
+        (0.46, 1, "plane strain", True),
+        (0.45, 1, "plane strain", False),
+        (0.499, 2, "plane strain", False),
+        (0.499, 1, "plane stress", False),
+    ],
+)
+def test_locking_is_not_silent(mesh, caplog, nu, order, model, warned):
+    with caplog.at_level(logging.WARNING, logger="ngcontact"):
+        warn_of_locking(made_of(Elastic(E=1.0, nu=nu), model), mesh, order)
+    assert len(caplog.records) == (2 if warned else 0)
+    for record, body in zip(caplog.records, BODIES, strict=False):
+        assert f'"{body}"' in record.getMessage()
+        assert "order=2" in record.getMessage()
+
+
+def test_diameters_are_longest_sides():
+    mesh = ng.Mesh(cases.one_transition().problem.geometry.GenerateMesh(maxh=10))
+    x = np.array(mesh.ngmesh.Coordinates())[:, :2]
+    for element, h in zip(mesh.Elements(ng.VOL), diameters(mesh), strict=True):
+        a, b, c = (x[v.nr] for v in element.vertices)
+        sides = [np.linalg.norm(p - q) for p, q in ((a, b), (b, c), (c, a))]
+        assert h == pytest.approx(max(sides), rel=1e-14)
+
+
+@pytest.mark.parametrize("size", [1e-300, 1e-170, 1.0, 1e170, 1e300])
+def test_root_of_squares_that_are_out_of_range(size):
+    assert root_of_squares(np.array([3.0, -4.0]) * size) == pytest.approx(5 * size, rel=1e-14)
+    unit = power_of_two(np.array([0.0, -size]))
+    assert unit <= size < 2 * unit
+    assert np.frexp(unit)[0] == 0.5
+
+
+def test_root_of_squares_of_nothing():
+    assert root_of_squares(np.zeros(3)) == 0.0
+    assert root_of_squares(np.zeros(0)) == 0.0
