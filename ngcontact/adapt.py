@@ -11,6 +11,7 @@ import numpy as np
 
 from .active import carried_active_set, first_active_set
 from .discrete import discretise, minimise_energy
+from .errors import ConvergenceError
 from .mark import doerfler
 from .mesh import first_mesh
 from .moduli import warn_of_locking
@@ -183,7 +184,9 @@ def _number(name: str, value: object) -> float:
 def _at_round_off(solution: Solution) -> bool:
     """Whether the estimate is round-off of terms that cancel, as where bodies move rigidly."""
     u = np.abs(solution.displacement.vec.FV().NumPy())
-    terms = float(np.sqrt(u @ (abs(solution.discrete.space.A) @ u)))
+    size = float(u.max(initial=0.0)) or 1.0  # squares must stay in range
+    u /= size
+    terms = size * float(np.sqrt(u @ (abs(solution.discrete.space.A) @ u)))
     return solution.error_estimate <= ROUND_OFF * terms
 
 
@@ -201,6 +204,12 @@ def _levels(
     while unknowns(mesh, order, element) <= max_dofs:
         solution = _solve_checked(problem, mesh, order, element, solution)
         error = solution.relative_error_estimate
+        if not np.isfinite(solution.error_estimate):  # it would mark nothing, for ever
+            raise ConvergenceError(
+                f"the error estimate is {solution.error_estimate}, so nothing can be refined; "
+                "choose units in which the squares of loads and displacements are numbers",
+                iterate=solution.minimiser,
+            )
         log.info("%s", solution)
         yield solution
         if error <= max(tolerance or 0.0, ROUND_OFF) or _at_round_off(solution):

@@ -27,6 +27,8 @@ Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 
+SMALLEST, LARGEST = -306, 305  # powers of ten between which sums of products keep their digits
+
 
 @dataclass(frozen=True, eq=False)
 class Discrete:
@@ -151,13 +153,29 @@ def _merged(lines: list[ContactLine], rows: Rows, n: int) -> tuple[list[ContactL
     return _kept(lines, first), replace(rows, g=g, equality=equality).select(first)
 
 
+def _check_range(program: Program) -> None:
+    """Raise where double precision holds the data but neither the forces nor the displacements."""
+    p = program
+    stiffness, load = np.abs(p.K.data).max(initial=0.0), np.abs(p.b).max(initial=0.0)
+    given = max(np.abs(p.values).max(initial=0.0), -p.g.min(initial=0.0))
+    with np.errstate(divide="ignore"):
+        k, f, v = np.log10([stiffness, load, given])
+    for name, size in (("displacements", max(v, f - k)), ("forces", max(f, k + v))):
+        if not (size == -np.inf or SMALLEST < size < LARGEST):
+            raise ValueError(
+                f"moduli, loads and prescribed displacements make {name} of 1e{size:+.0f}, beyond "
+                f"the range of numbers (1e{SMALLEST} to 1e+{LARGEST}); choose other units"
+            )
+
+
 def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Discrete:
     """Assemble the discrete problem on a mesh that is curved to the element's degree.
 
     Raises
     ------
     ValueError
-        A pair of which no point faces; prescribed displacements that violate a contact row.
+        A pair of which no point faces; prescribed displacements that violate a contact row;
+        forces or displacements beyond the range of numbers.
     """
     trace = boundary_trace(mesh, order)
     lines = [contact_line(trace, contact) for contact in problem.contact]
@@ -192,6 +210,7 @@ def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Dis
         unknown=basis.unknown,
         kernel=no_kernel(2 * n) if rigid is None else rigid.kernel,
     )
+    _check_range(program)
     return Discrete(
         problem=problem,
         space=space,

@@ -214,9 +214,9 @@ class _Residuals:
         if contact.gap is not None:
             distance = prescribed_gap(contact, trace, segment, s, x)
         u = trace.evaluate(solution.displacement, segment, s)
-        noise = ROUND_OFF * np.abs(u).max()
+        noise = np.full(len(s), ROUND_OFF * np.abs(u).max())
         if contact.gap is None:
-            noise += ROUND_OFF * np.abs(x).max()
+            noise[distance != 0] += ROUND_OFF * np.abs(x).max()
         sides = [Side(trace, self.stress, direction, np.arange(len(s)), segment, s, d, pi)]
         if contact.primary is not None:
             at = np.flatnonzero(met)

@@ -174,18 +174,21 @@ class Solution:
         """Total potential energy L(u_h) of HH81 (2.6), per unit thickness."""
         u = self.displacement.vec.FV().NumPy()
         d = self.discrete.space
-        return float(u @ (d.A @ u) / 2 - d.f @ u)
+        size = _size(u)  # squares of displacements may leave the range where these do not
+        u, f = u / size, d.f / size
+        return float(u @ (d.A @ u) / 2 - f @ u) * size * size
 
     @cached_property
     def energy_norm(self) -> float:
         """A(u_h, u_h)^(1/2), from the strains: large rigid motions do not cancel in them."""
-        e = strain(self.displacement)
+        size = _size(self.displacement.vec.FV().NumPy())
+        e = strain(self.displacement) / size
         total = 0.0
         for body, law in self.problem.materials.items():
             density = ng.InnerProduct(law.voigt(self.problem.model) * e, e)
             order = 2 * self.order + 2
             total += ng.Integrate(density, self.mesh.Materials(body), order=order)
-        return float(np.sqrt(total))
+        return float(np.sqrt(total)) * size
 
     @cached_property
     def _estimate(self) -> Estimate:
@@ -210,7 +213,8 @@ class Solution:
     @property
     def error_estimate(self) -> float:
         """Estimated error in the energy norm, A(u - u_h, u - u_h)^(1/2)."""
-        return float(np.sqrt((self.indicators**2).sum()))
+        size = _size(self.indicators)
+        return float(np.sqrt(((self.indicators / size) ** 2).sum())) * size
 
     @property
     def relative_error_estimate(self) -> float:
@@ -243,7 +247,9 @@ class Solution:
             "equilibrium": over(np.abs(residual[~p.fixed]).max(initial=0.0), load),
             "penetration": over(-self.gap.min(initial=0.0), length),
             "tension": over(-one_sided.min(initial=0.0), largest),
-            "complementarity": over(np.abs(force * self.gap).sum(), largest * length),
+            "complementarity": float(
+                np.abs(force / (largest or 1.0) * (self.gap / (length or 1.0))).sum()
+            ),
         }
 
     def write(self, path: str | os.PathLike[str]) -> Path:
@@ -278,7 +284,12 @@ class Solution:
         if self.estimated:
             parts.append(f"estimate {self.relative_error_estimate:.2e}")
         if self.discrete.lines:
-            parts.append(f"force {np.linalg.norm(self.contact_force()):.6g}")
+            parts.append(f"force {np.hypot(*self.contact_force()):.6g}")
         return ", ".join(parts)
 
     __repr__ = __str__  # instead of all arrays
+
+
+def _size(values: Array) -> float:
+    """Largest absolute value, or 1 where all vanish."""
+    return float(np.abs(values).max(initial=0.0)) or 1.0
