@@ -201,8 +201,9 @@ class Systems:
             scale = max(scale, np.abs(terms).max(initial=0.0))
         if not np.abs(residual).max(initial=0.0) <= UNSOLVED * scale:
             raise SingularError(
-                "the system for the current active set is singular: a body can move without "
-                "resistance from supports or active contact"
+                "the system for the current active set is singular to working precision: a body "
+                "can move without resistance from supports or active contact, or the moduli of "
+                "the bodies are too many powers of ten apart"
             )
         return y, force
 

@@ -156,7 +156,13 @@ def _without_rings(N: sp.csr_matrix, G: sp.csr_matrix) -> tuple[sp.csr_matrix, s
     return N, (S @ G).tocsr()
 
 
-def change_of_basis(n: int, conditions: Conditions, rows: Rows, length: float = 0.0) -> Basis:
+def change_of_basis(
+    n: int,
+    conditions: Conditions,
+    rows: Rows,
+    length: float = 0.0,
+    stiffness: Array | None = None,
+) -> Basis:
     """Basis in which prescribed conditions and contact rows are single unknowns.
 
     Parameters
@@ -169,6 +175,8 @@ def change_of_basis(n: int, conditions: Conditions, rows: Rows, length: float = 
         Gamma_K.
     length : float
         Largest coordinate, to whose round-off the gaps are known.
+    stiffness : ndarray (n,), optional
+        Force per displacement at the nodes, by its order of magnitude; alike when left out.
 
     Raises
     ------
@@ -179,7 +187,7 @@ def change_of_basis(n: int, conditions: Conditions, rows: Rows, length: float = 
     R = _blocks(frame)
     Bz = (rows.matrix(n) @ R).tocsr()
     flat_fixed, flat_values = fixed.T.ravel(), values.T.ravel()
-    host = assign(rows, Bz, fixed)
+    host = assign(rows, Bz, fixed, np.ones(n) if stiffness is None else stiffness)
     check_prescribed(rows, Bz, flat_fixed, flat_values, np.flatnonzero(host < 0), length)
     kept = np.flatnonzero(host >= 0)
     host = host[kept]

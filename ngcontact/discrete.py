@@ -189,7 +189,8 @@ def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Dis
         )
     )
     lines, rows = _merged(lines, _joined([_rows(line, trace) for line in lines], order), n)
-    basis = change_of_basis(n, conditions, rows, float(np.abs(trace.curve).max()))
+    stiffness = space.stiffness()
+    basis = change_of_basis(n, conditions, rows, float(np.abs(trace.curve).max()), stiffness)
     lines, rows = _kept(lines, basis.kept), rows.select(basis.kept)
     B = rows.matrix(n)
     rigid = None

@@ -1,7 +1,9 @@
 """Which node hosts a contact row: the node of which one unknown becomes the row's value.
 
 The node of the secondary, unless its displacement is prescribed there or other rows took its
-directions; then a node of the facing segment. NumPy and SciPy only.
+directions; then a node of the facing segment. Between a stiff and a soft body the soft one's node:
+the row's force is the unbalanced force there, which round-off of the stiff one would drown.
+NumPy and SciPy only.
 """
 
 from __future__ import annotations
@@ -20,6 +22,7 @@ PIVOT = 0.05  # least share of a row at the node whose unknown it becomes, if an
 INDEPENDENT = 1e-6  # sine below which two conditions at one node are the same
 SATISFIED = 1e-8  # interpolation error of prescribed values, relative to the largest
 ROUND_OFF = 1e-13  # of measured gaps, relative to the largest coordinate
+CONTRAST = 1e3  # stiffness of the secondary over that facing it above which the latter hosts
 
 
 class _Hosts:
@@ -54,10 +57,30 @@ def coefficients_at(Bz: sp.csr_matrix, row: Index, node: Index) -> Array:
     return np.column_stack([np.ravel(Bz[row, node]), np.ravel(Bz[row, node + n])])
 
 
-def assign(rows: Rows, Bz: sp.csr_matrix, fixed: Mask) -> Index:
-    """Host node of every row, -1 where all of a row's unknowns are prescribed."""
+def _preferred(rows: Rows, stiffness: Array) -> Index:
+    """Node of the secondary, or the nearest one that faces it where that is much softer."""
+    nearest = np.abs(rows.share).argmax(axis=1)[:, None]
+    facing = np.take_along_axis(rows.partner, nearest, axis=1)[:, 0]
+    softer = CONTRAST * stiffness[facing] < stiffness[rows.node]
+    return np.where(softer & rows.share.any(axis=1), facing, rows.node)
+
+
+def assign(rows: Rows, Bz: sp.csr_matrix, fixed: Mask, stiffness: Array) -> Index:
+    """Host node of every row, -1 where all of a row's unknowns are prescribed.
+
+    Parameters
+    ----------
+    rows : Rows
+    Bz : sparse (m, 2n)
+        The rows in the frames of the nodes.
+    fixed : ndarray of bool (n, 2)
+        Prescribed directions.
+    stiffness : ndarray (n,)
+        Force per displacement, by its order of magnitude.
+    """
     n = len(fixed)
-    host = rows.node.copy()
+    preferred = _preferred(rows, stiffness)
+    host = preferred.copy()
     local = coefficients_at(Bz, np.arange(len(host)), host)
     free = np.where(fixed[host], 0.0, local)
     lonely = np.bincount(host, minlength=n)[host] == 1
@@ -68,8 +91,8 @@ def assign(rows: Rows, Bz: sp.csr_matrix, fixed: Mask) -> Index:
     for j in np.flatnonzero(~regular):
         columns = np.unique(Bz[j].indices % n)
         entries = Bz[j].toarray().ravel()
-        choices = [(np.hypot(entries[i], entries[i + n]), i) for i in columns if i != rows.node[j]]
-        ranked = [rows.node[j], *(i for _, i in sorted(choices, reverse=True))]
+        choices = [(np.hypot(entries[i], entries[i + n]), i) for i in columns if i != preferred[j]]
+        ranked = [preferred[j], *(i for _, i in sorted(choices, reverse=True))]
         coefficients = {i: np.array([entries[i], entries[i + n]]) for i in ranked}
         for i, least in [(i, x) for x in (PIVOT, INDEPENDENT) for i in ranked]:
             if hosts.fits(i, coefficients[i], least):

@@ -93,6 +93,11 @@ class Space:
     A: sp.csr_matrix
     f: Array
 
+    def stiffness(self) -> Array:
+        """Force per displacement of the nodes, (n,), by its order of magnitude."""
+        diagonal = self.basis.power(2).T @ self.A.diagonal()
+        return diagonal.reshape(2, -1).max(axis=0)
+
 
 def strain(u: ng.CoefficientFunction) -> ng.CoefficientFunction:
     """Voigt strain (e_xx, e_yy, 2 e_xy) of a displacement or trial function."""
