@@ -19,10 +19,10 @@ Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 Solve = Callable[[Array], Array]
 Factor = Callable[[Mask], Solve]
-Columns = dict[int, tuple[Array, Array]]  # border columns and the base solutions for them
 
 BORDER = 16  # changed rows up to which a bordered solve is cheaper than a factorisation
-REFINED = 1e-14  # residual, relative to the first, above which a second solve removes it
+REFINED = 1e-14  # residual, relative to the first, above which another solve removes it
+ROUGH = 1e-11  # ... before the active set is known to be the last
 UNSOLVED = 1e-6  # ... and above which the matrix is singular to working precision
 
 
@@ -87,7 +87,8 @@ class Systems:
     One set, the base, is factorised with all pins of the kernel held. Another set is reached by
     bordering that factor with one row and column for each row of R that changed state and for
     each pin, and by the Schur complement of the border (Gill, Murray, Saunders, Wright 1990), at
-    one back-solve for each.
+    one back-solve for each. Every solution corrects the one before, which leaves no residual
+    outside of the border: the next one costs the back-solves of its new columns alone.
     """
 
     def __init__(self, program: Program, factor: Factor) -> None:
@@ -97,8 +98,16 @@ class Systems:
         self.back_solves = 0
         self.base = np.zeros(len(program.g), dtype=bool)
         self.free = ~program.fixed
-        self.released: Columns = {}  # by unknown
-        self.added: Columns = {}  # by row
+        self._start()
+
+    def _start(self) -> None:
+        """First iterate: prescribed values, and the bounds of the base."""
+        p = self.program
+        self.y = np.where(p.fixed, p.values, 0.0)
+        if p.unit_rows:
+            self.y[p.unknown[self.base]] = p.g[self.base]
+        self.force = np.zeros(p.g.size)
+        self.scale = 0.0
 
     def _refactorise(self, active: Mask) -> None:
         p = self.program
@@ -109,103 +118,122 @@ class Systems:
             self.free[p.unknown[active]] = False
         self._solve = self.factor(self.free)
         self.factorizations += 1
-        self.released.clear()
-        self.added.clear()
+        self.place: dict[int, int] = {}  # of the base solution of an unknown, or of row ~j
+        self.known = np.zeros((0, p.b.size))  # base solutions
+        self._start()
 
     def _back_solve(self, right: Array) -> Array:
         self.back_solves += 1
         return self._solve(np.where(self.free, right, 0.0))
 
-    def _columns(self, known: Columns, M: sp.csr_matrix, rows: Index) -> None:
-        """Remember the missing border columns, rows of M, and the base solutions for them."""
-        for j in rows:
-            if j not in known:
-                column = M[j].toarray().ravel()
-                known[j] = column, self._back_solve(column)
-
-    def _border(self, at: Index, rows: Index, anchor: Anchor | None) -> None:
-        """Schur complement of the unknowns released `at` and the added `rows`."""
+    def _border(self) -> None:
+        """Border of the unknowns `at` released from the base and of the added `rows`."""
         p = self.program
-        self._columns(self.released, p.K, at)
-        self._columns(self.added, p.R, rows)
-        pairs = [self.released[j] for j in at] + [self.added[j] for j in rows]
-        self.C = np.array([c for c, _ in pairs]).reshape(-1, p.b.size).T
-        self.X = np.array([x for _, x in pairs]).reshape(-1, p.b.size).T
-        D = np.zeros((len(pairs), len(pairs)))
-        D[:, : at.size] = self.C[at].T
-        D[: at.size] = self.C[at]
-        if anchor is not None:
-            pins = np.arange(at.size - p.kernel.pins.size, at.size)
-            D[pins, pins] += anchor.stiffness
-        schur = self.C.T @ self.X - D
+        self.rows = np.flatnonzero(self.active & ~self.base)
+        self.at = p.kernel.pins
+        if p.unit_rows:
+            self.at = np.concatenate([p.unknown[self.base & ~self.active], self.at])
+        C = sp.vstack([p.K[self.at], p.R[self.rows]], format="csr")
+        keys = np.concatenate([self.at, ~self.rows]).tolist()
+        new = [i for i, key in enumerate(keys) if key not in self.place]
+        if new:
+            self.place.update({keys[i]: len(self.place) + k for k, i in enumerate(new)})
+            solutions = [self._back_solve(C[i].toarray().ravel()) for i in new]
+            self.known = np.vstack([self.known, *solutions])
+        self.solution = np.array([self.place[key] for key in keys], dtype=np.intp)
+        self.touched = np.unique(C.indices)  # few of the unknowns
+        self.C = C[:, self.touched].toarray()
+        D = np.zeros((len(keys), len(keys)))
+        D[:, : self.at.size] = C[:, self.at].toarray()
+        D[: self.at.size] = D[:, : self.at.size].T
+        if self.anchor is not None:
+            pins = np.arange(self.at.size - p.kernel.pins.size, self.at.size)
+            D[pins, pins] += self.anchor.stiffness
+        schur = self.C @ self.known[np.ix_(self.solution, self.touched)].T - D
         # Forces and displacements side by side: only after scaling can small pivots be told.
         size = np.sqrt(np.abs(np.diagonal(schur)))
         self.size = np.where(size > 0, size, 1.0)
         self.schur = schur / np.outer(self.size, self.size)
 
-    def _bordered_solve(self, right: Array, below: Array) -> tuple[Array, Array]:
-        x = self._back_solve(right)
-        if below.size == 0:
-            return x, below
-        z = np.linalg.lstsq(self.schur, (self.C.T @ x - below) / self.size, rcond=1e-14)[0]
-        z /= self.size
-        return x - self.X @ z, z
+    def _correct(self, residual: Array, tolerance: float) -> None:
+        """Add the bordered solution for a residual, one back-solve unless it is small outside."""
+        p = self.program
+        x = np.zeros(p.b.size)
+        if np.abs(residual[self.free]).max(initial=0.0) > tolerance * self.scale:
+            x = self._back_solve(residual)
+        below = np.concatenate([residual[self.at], p.g[self.rows] - p.R[self.rows] @ self.y])
+        if below.size:
+            right = (self.C @ x[self.touched] - below) / self.size
+            z = np.linalg.lstsq(self.schur, right, rcond=1e-14)[0] / self.size
+            amounts = np.zeros(len(self.known))
+            amounts[self.solution] = z
+            x -= amounts @ self.known
+            x[self.at] += z[: self.at.size]
+            self.force[self.rows] += z[self.at.size :]
+        self.y += x
+        if p.unit_rows:
+            self.y[p.unknown[self.active]] = p.g[self.active]
 
-    def residual(self, y: Array, force: Array, anchor: Anchor | None = None) -> Array:
+    def residual(self) -> Array:
         """Unbalanced force b - K y - R' force, (n,), with the proximal term if there is one."""
         p = self.program
-        residual = p.b - p.K @ y - p.R.T @ force
-        if anchor is not None:
+        residual = p.b - p.K @ self.y
+        if self.anchor is not None:
             pins = p.kernel.pins
-            residual[pins] -= anchor.stiffness * (y[pins] - anchor.at)
-        return residual
+            residual[pins] -= self.anchor.stiffness * (self.y[pins] - self.anchor.at)
+        if p.unit_rows:  # active unknowns take what is left there, others must balance
+            self.force[:] = 0.0
+            self.force[self.active] = residual[p.unknown[self.active]]
+            residual[p.unknown[self.active]] = 0.0
+            return residual
+        return residual - p.R.T @ self.force
 
     def solve(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
-        """Minimiser and multipliers for one active set, rows of the set held at their bound."""
-        p = self.program
-        if self.factorizations == 0 or (
-            p.unit_rows and np.count_nonzero(active != self.base) > BORDER
-        ):
-            self._refactorise(active)
-        rows = np.flatnonzero(active & ~self.base)
-        at = p.kernel.pins
-        if p.unit_rows:
-            at = np.concatenate([p.unknown[self.base & ~active], at])
-        self._border(at, rows, anchor)
+        """Minimiser and multipliers for one active set, rows of the set held at their bound.
 
-        y = np.where(p.fixed, p.values, 0.0)
+        The residual is 1e-11 of the first one; `refine` takes it to round-off.
+        """
+        p = self.program
+        changes = np.count_nonzero(active != self.base)
+        if self.factorizations == 0 or (p.unit_rows and changes > BORDER):
+            self._refactorise(active)
+        self.active, self.anchor = active, anchor
+        self._border()
+        self.force[~active] = 0.0
         if p.unit_rows:
-            y[p.unknown[self.base]] = p.g[self.base]
-        force = np.zeros(p.g.size)
-        scale = 0.0
-        for refinement in range(2):
-            residual = self.residual(y, force, anchor)
-            below = np.concatenate([residual[at], p.g[rows] - p.R[rows] @ y])
-            size = np.abs(residual[self.free]).max(initial=0.0)
-            size = max(size, np.abs(residual[at]).max(initial=0.0))
-            if refinement and size <= REFINED * scale:
-                break
-            scale = max(size, scale)
-            x, z = self._bordered_solve(residual, below)
-            y += x
-            y[at] += z[: at.size]
-            force[rows] += z[at.size :]
-        if p.unit_rows:
-            y[p.unknown[active]] = p.g[active]
-            force[:] = 0.0
-            force[active] = self.residual(y, force)[p.unknown[active]]
-        residual = self.residual(y, force, anchor)[~p.fixed]
+            self.y[p.unknown[self.base & active]] = p.g[self.base & active]
+        residual = self.residual()
+        self.scale = max(self.scale, self._size(residual))
+        self._correct(residual, ROUGH)
+        return self._settled(ROUGH)
+
+    def refine(self) -> tuple[Array, Array]:
+        """The last solution, its residual at round-off."""
+        return self._settled(REFINED)
+
+    def _size(self, residual: Array) -> float:
+        """Largest residual that the bordered system is to remove."""
+        parts = residual[self.free], residual[self.at]
+        return float(max(np.abs(part).max(initial=0.0) for part in parts))
+
+    def _settled(self, tolerance: float) -> tuple[Array, Array]:
+        """The iterate, corrected once more if its residual asks for it."""
+        p = self.program
+        residual = self.residual()
+        if self._size(residual) > tolerance * self.scale:
+            self._correct(residual, tolerance)
+            residual = self.residual()
         # Where bounds alone drive the solution, forces come from rows or from elasticity.
-        pull = p.R.T @ force if not p.unit_rows else force
-        for terms in (pull, (p.K @ y)[~p.fixed]):
-            scale = max(scale, np.abs(terms).max(initial=0.0))
-        if not np.abs(residual).max(initial=0.0) <= UNSOLVED * scale:
+        pull = self.force if p.unit_rows else p.R.T @ self.force
+        terms = (pull, (p.K @ self.y)[~p.fixed])
+        scale = max(self.scale, *(np.abs(x).max(initial=0.0) for x in terms))
+        if not np.abs(residual[~p.fixed]).max(initial=0.0) <= UNSOLVED * scale:
             raise SingularError(
                 "the system for the current active set is singular to working precision: a body "
                 "can move without resistance from supports or active contact, or the moduli of "
                 "the bodies are too many powers of ten apart"
             )
-        return y, force
+        return self.y.copy(), self.force.copy()
 
     def stiffness(self) -> Array:
         """Force per displacement at each row: an upper bound, or infinity where unknown."""
@@ -213,6 +241,7 @@ class Systems:
         if p.unit_rows:
             return p.K.diagonal()[p.unknown]
         stiffness = np.full(p.g.size, np.inf)
-        for j, (column, solution) in self.added.items():
-            stiffness[j] = 1 / (column @ solution)
+        for j in range(p.g.size):
+            if ~j in self.place:
+                stiffness[j] = 1 / float((p.R[j] @ self.known[self.place[~j]])[0])
         return stiffness

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .bordered import Program
+from .bordered import Factor, Program
 from .constraint import Basis, change_of_basis
 from .gap import ContactLine, contact_line, without
 from .kernel import no_kernel
@@ -19,7 +19,7 @@ from .problem import Problem, boundary_mask
 from .projection import snap
 from .rigid import Rigid, rigid_motions
 from .rows import Conditions, Rows
-from .space import Space, assemble, cholesky
+from .space import Space, assemble, cholesky, in_unknowns
 from .ssn import minimise
 from .trace import Trace, boundary_trace
 
@@ -48,6 +48,8 @@ class Discrete:
         Unknowns in which rows and prescribed values are single unknowns.
     program : Program
         The quadratic program in those unknowns.
+    factor : callable
+        Factorises its matrix.
     rigid : Rigid or None
         Rigid motions that supports leave free, if there are any.
     """
@@ -59,6 +61,7 @@ class Discrete:
     B: sp.csr_matrix
     basis: Basis
     program: Program
+    factor: Factor
     rigid: Rigid | None
 
 
@@ -200,8 +203,9 @@ def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Dis
         space = replace(space, f=f)
     T = space.basis @ basis.T
     m = len(basis.unknown)
+    K, matrix = in_unknowns(space, T)
     program = Program(
-        K=(T.T @ space.A @ T).tocsr(),
+        K=K,
         b=T.T @ space.f,
         R=sp.csr_matrix((np.ones(m), (np.arange(m), basis.unknown)), (m, 2 * n)),
         g=rows.g,
@@ -220,6 +224,7 @@ def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Dis
         B=B,
         basis=basis,
         program=program,
+        factor=cholesky(matrix),
         rigid=rigid,
     )
 
@@ -231,10 +236,9 @@ def minimise_energy(discrete: Discrete, active: Mask) -> Minimiser:
     there costs no digits of the deformation.
     """
     p, rigid = discrete.program, discrete.rigid
-    factor = cholesky(p.K)
     if rigid is None or not rigid.placing.any():
-        return minimise(p, factor, active)
-    result = minimise(replace(p, g=p.g - rigid.rows @ rigid.placing), factor, active)
+        return minimise(p, discrete.factor, active)
+    result = minimise(replace(p, g=p.g - rigid.rows @ rigid.placing), discrete.factor, active)
     u = result.u + rigid.motions @ rigid.placing
     u -= p.kernel.lineal @ (p.kernel.conditions @ u)
     u[p.unknown[result.active]] = p.g[result.active]

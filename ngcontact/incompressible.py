@@ -23,7 +23,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .problem import Problem
-from .space import cholesky
+from .space import cholesky, lower_half
 from .trace import Trace
 
 Array = NDArray[np.float64]
@@ -238,7 +238,7 @@ class PressureCorrection:
         free = np.append(np.repeat(inside, self.functions), K.diagonal() > 0)
         saddle = sp.bmat([[A, B.T], [B, -K]], format="csr")
         right = np.append(b, np.zeros(K.shape[0]))
-        solution = np.where(free, cholesky(saddle)(free)(right), 0.0)
+        solution = np.where(free, cholesky(lower_half(saddle))(free)(right), 0.0)
         self.pressure.vec.FV().NumPy()[:] = solution[:size]
         self.motion.vec.FV().NumPy()[:] = solution[size:]
 

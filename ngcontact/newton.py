@@ -17,6 +17,7 @@ from .kernel import FREE
 log = logging.getLogger("ngcontact")
 
 TIE = 1e-13  # relative size below which a force or a slack keeps its state
+CLEAR = 1e-9  # ... below which it is judged by the refined solution only
 WIDEST_TIE = 1e-9  # ... and to which that grows, tenfold, each time an active set comes back
 PATIENCE = 10  # full switches allowed without fewer violated rows (Judice, Pires 1994)
 
@@ -122,11 +123,14 @@ class Newton:
         for _ in range(limit):
             try:
                 self.y, self.force = self.systems.solve(self.state, anchor)
+                wrong = self._violated(CLEAR)
+                if not wrong.any():
+                    self.y, self.force = self.systems.refine()
+                    wrong = self._violated(tie)
             except SingularError as singular:
                 raise ConvergenceError(
                     f"Newton step {len(self.steps) + 1}: {singular}", iterate=self.result()
                 ) from None
-            wrong = self._violated(tie)
             count = int(np.count_nonzero(wrong))
             if count < fewest:
                 fewest, patience = count, PATIENCE

@@ -83,6 +83,8 @@ class Space:
         From n node values (and unknowns elsewhere) for each component to the unknowns of V.
     A : sparse (2N, 2N)
         Stiffness.
+    matrix : ng.BaseMatrix
+        The same for NGSolve.
     f : ndarray (2N,)
         Load.
     """
@@ -91,6 +93,7 @@ class Space:
     trace: Trace
     basis: sp.csr_matrix
     A: sp.csr_matrix
+    matrix: ng.BaseMatrix
     f: Array
 
     def stiffness(self) -> Array:
@@ -210,14 +213,38 @@ def assemble(problem: Problem, trace: Trace, element: str) -> Space:
         trace=trace,
         basis=sp.block_diag([scalar, scalar], format="csr"),
         A=A,
+        matrix=a.mat,
         f=load_vector(problem, V, LOAD_BONUS),
     )
 
 
-def cholesky(K: sp.csr_matrix) -> Factor:
+def lower_half(K: sp.csr_matrix) -> ng.BaseMatrix:
+    """Lower half of a symmetric matrix for NGSolve, all that its Cholesky factorisation reads."""
+    K = sp.tril(K, format="coo")
+    return ng.la.SparseMatrixd.CreateFromCOO(K.row, K.col, K.data, *K.shape)
+
+
+def in_unknowns(space: Space, T: sp.csr_matrix) -> tuple[sp.csr_matrix, ng.BaseMatrix]:
+    """Stiffness T'AT in the unknowns y of u = T y, for SciPy and its lower half for NGSolve.
+
+    T is the identity but for nodes on the boundary: only the change is multiplied and handed over
+    entry by entry, a small part of the price of the whole.
+    """
+    A = space.A
+    if T.shape[0] != T.shape[1]:  # fewer node values than edge unknowns: element="physical"
+        K = (T.T @ A @ T).tocsr()
+        return K, lower_half(K)
+    D = (T - sp.identity(len(space.f), format="csr")).tocsr()
+    D.eliminate_zeros()
+    if D.nnz == 0:
+        return A, space.matrix
+    AD = A @ D
+    change = (AD + AD.T + D.T @ AD).tocsr()
+    return A + change, (space.matrix + lower_half(change)).CreateSparseMatrix()
+
+
+def cholesky(matrix: ng.BaseMatrix) -> Factor:
     """NGSolve's sparse Cholesky factorisation as the `factor` argument of `ssn.minimise`."""
-    K = K.tocoo()
-    matrix = ng.la.SparseMatrixd.CreateFromCOO(K.row, K.col, K.data, *K.shape)
     right, solution = matrix.CreateColVector(), matrix.CreateRowVector()
 
     def factor(free: Mask) -> Solve:
