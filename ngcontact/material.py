@@ -181,6 +181,11 @@ class Hooke:
                 refuse_where(points, bad, matrices, f"{name}.C", right)
 
 
+def varies(law: Elastic | Hooke) -> bool:
+    """Whether a law is given by functions rather than by numbers."""
+    return any(isinstance(value, ng.CoefficientFunction) for value in vars(law).values())
+
+
 def _real_matrix(data: Any) -> np.ndarray:
     """Return a float copy of shape (3, 3)."""
     right = "give a 3x3 matrix of real numbers or a CoefficientFunction"

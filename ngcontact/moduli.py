@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Callable
 
 import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from .material import Elastic, Hooke, varies
 from .problem import Problem
 
 Array = NDArray[np.float64]
@@ -47,12 +49,23 @@ def middles(mesh: ng.Mesh) -> NDArray:
     return mesh.MapToAllElements(ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1]), ng.VOL)
 
 
+def _of_elements(problem: Problem, mesh: ng.Mesh, modulus: Callable[..., Array]) -> Array:
+    """modulus(law, points) (ne,) in the middle of each element; of one where a law is constant."""
+    region = mesh.ngmesh.Elements2D().NumPy()["index"] - 1
+    points, values = middles(mesh), np.zeros(mesh.ne)
+    for pattern, law in problem.materials.items():
+        at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
+        values[at] = modulus(law, points[at if varies(law) else at[:1]])
+    return values
+
+
 def shear_moduli(problem: Problem, mesh: ng.Mesh) -> Array:
     """Shear modulus (ne,) in the middle of each element."""
-    mu = mesh.MaterialCF(
-        {body: law.shear_modulus(problem.model) for body, law in problem.materials.items()}
-    )
-    return np.asarray(mu(middles(mesh))).ravel()
+
+    def modulus(law: Elastic | Hooke, points: NDArray) -> Array:
+        return np.asarray(law.shear_modulus(problem.model)(points)).ravel()
+
+    return _of_elements(problem, mesh, modulus)
 
 
 def bulk_moduli(problem: Problem, mesh: ng.Mesh) -> Array:
@@ -61,14 +74,16 @@ def bulk_moduli(problem: Problem, mesh: ng.Mesh) -> Array:
     lambda + mu of an isotropic law in plane strain. A Schur complement in C on volumetric,
     deviatoric and shear strain, which does not cancel where C_11, C_12 and C_22 are nearly equal.
     """
-    laws = {body: law.voigt(problem.model) for body, law in problem.materials.items()}
-    entries = [mesh.MaterialCF({body: C[i] for body, C in laws.items()}) for i in range(9)]
-    C = np.asarray(ng.CF(tuple(entries))(middles(mesh))).reshape(-1, 3, 3)
-    size = np.abs(C).max(axis=(1, 2))
-    T = np.array([[0.5, 0.5, 0.0], [0.5, -0.5, 0.0], [0.0, 0.0, 1.0]])
-    D = T @ (C / size[:, None, None]) @ T.T
-    bend = np.linalg.solve(D[:, 1:, 1:], D[:, 1:, :1])
-    return size * (D[:, 0, 0] - (D[:, :1, 1:] @ bend)[:, 0, 0])
+
+    def modulus(law: Elastic | Hooke, points: NDArray) -> Array:
+        C = np.asarray(law.voigt(problem.model)(points)).reshape(-1, 3, 3)
+        size = np.abs(C).max(axis=(1, 2))
+        T = np.array([[0.5, 0.5, 0.0], [0.5, -0.5, 0.0], [0.0, 0.0, 1.0]])
+        D = T @ (C / size[:, None, None]) @ T.T
+        bend = np.linalg.solve(D[:, 1:, 1:], D[:, 1:, :1])
+        return np.asarray(size * (D[:, 0, 0] - (D[:, :1, 1:] @ bend)[:, 0, 0]))
+
+    return _of_elements(problem, mesh, modulus)
 
 
 def nearly_incompressible(problem: Problem, mesh: ng.Mesh, limit: float) -> dict[str, float]:

@@ -130,16 +130,16 @@ def node_values(space: Space, bodies: Bodies, of_node: Index) -> Array:
     place = np.zeros((n, 2))
     one = np.zeros(n)
     one[: trace.mesh.nv] = 1.0
-    if n == trace.mesh.nv:
-        place[:] = np.array(trace.mesh.ngmesh.Coordinates())[:, :2]
+    if trace.geometry_order == 1:  # edge and inner functions have no part in straight elements
+        place[: trace.mesh.nv] = np.array(trace.mesh.ngmesh.Coordinates())[:, :2]
     else:
         field = ng.GridFunction(trace.space)
         for axis, x in enumerate((ng.x, ng.y)):
             field.Set(x)
             place[:, axis] = field.vec.FV().NumPy()
-        segment, s = trace.at_nodes(np.arange(len(trace.region)))
-        place[trace.nodes.ravel()] = trace.point(segment, s)
-        one[trace.nodes.ravel()] = 1.0
+    segment, s = trace.at_nodes(np.arange(len(trace.region)))
+    place[trace.nodes.ravel()] = trace.point(segment, s)
+    one[trace.nodes.ravel()] = 1.0
     values = np.zeros((2 * n, 3 * len(bodies.names)))
     for b, (middle, size) in enumerate(zip(bodies.middle, bodies.size, strict=True)):
         at = np.flatnonzero(of_node == b)

@@ -185,7 +185,7 @@ class Solution:
         e = strain(self.displacement) / size
         total = 0.0
         for body, law in self.problem.materials.items():
-            density = ng.InnerProduct(law.voigt(self.problem.model) * e, e)
+            density = ng.InnerProduct(law.voigt(self.problem.model) * e, e).Compile()
             order = 2 * self.order + 2
             total += ng.Integrate(density, self.mesh.Materials(body), order=order)
         return float(np.sqrt(total)) * size

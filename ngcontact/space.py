@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .bordered import Factor, Mask, Solve
 from .cad import cad_edges
+from .material import varies
 from .nodal import edge_bubbles, nodal_basis
 from .problem import Problem, boundary_mask
 from .trace import Trace
@@ -196,8 +197,7 @@ def assemble(problem: Problem, trace: Trace, element: str) -> Space:
     a = ng.BilinearForm(V, symmetric=True)
     for body, law in problem.materials.items():
         C = law.voigt(problem.model)
-        varies = any(isinstance(value, ng.CoefficientFunction) for value in vars(law).values())
-        bonus = MODULUS_BONUS if varies else 0
+        bonus = MODULUS_BONUS if varies(law) else 0
         region = mesh.Materials(body)
         a += ng.InnerProduct(C * strain(u), strain(v)) * ng.dx(
             definedon=region, bonus_intorder=bonus
