@@ -91,14 +91,25 @@ class Systems:
     outside of the border: the next one costs the back-solves of its new columns alone.
     """
 
+    _solve: Solve
+
     def __init__(self, program: Program, factor: Factor) -> None:
-        self.program = program
         self.factor = factor
-        self.factorizations = 0
-        self.back_solves = 0
+        self.factorised = False
         self.base = np.zeros(len(program.g), dtype=bool)
-        self.free = ~program.fixed
+        self.take(program)
+
+    def take(self, program: Program) -> None:
+        """Begin with another load, other values or bounds; a factorisation stays."""
+        self.program = program
+        self.factorizations = self.back_solves = 0
         self._start()
+
+    def forget(self) -> None:
+        """Give the memory of the factorisation back."""
+        if self.factorised:
+            self.factorised = False
+            del self._solve, self.known
 
     def _start(self) -> None:
         """First iterate: prescribed values, and the bounds of the base."""
@@ -117,6 +128,7 @@ class Systems:
         if p.unit_rows:
             self.free[p.unknown[active]] = False
         self._solve = self.factor(self.free)
+        self.factorised = True
         self.factorizations += 1
         self.place: dict[int, int] = {}  # of the base solution of an unknown, or of row ~j
         self.known = np.zeros((0, p.b.size))  # base solutions
@@ -195,7 +207,7 @@ class Systems:
         """
         p = self.program
         changes = np.count_nonzero(active != self.base)
-        if self.factorizations == 0 or (p.unit_rows and changes > BORDER):
+        if not self.factorised or (p.unit_rows and changes > BORDER):
             self._refactorise(active)
         self.active, self.anchor = active, anchor
         self._border()

@@ -9,17 +9,17 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .bordered import Factor, Program
+from .bordered import Program, Systems
 from .constraint import Basis, change_of_basis
-from .gap import ContactLine, contact_line, without
+from .gap import ContactLine
 from .kernel import no_kernel
-from .lagrange import lagrange
 from .newton import Minimiser
+from .pairs import joined, kept_lines, merged
 from .problem import Problem, boundary_mask
-from .projection import snap
+from .reuse import contact_lines, same_basis, same_stiffness
 from .rigid import Rigid, rigid_motions
-from .rows import Conditions, Rows
-from .space import Space, assemble, cholesky, in_unknowns
+from .rows import Conditions
+from .space import LOAD_BONUS, Space, assemble, cholesky, in_unknowns, load_vector
 from .ssn import minimise
 from .trace import Trace, boundary_trace
 
@@ -38,8 +38,10 @@ class Discrete:
     ----------
     problem : Problem
     space : Space
+    found : list of ContactLine
+        One for each contact pair.
     lines : list of ContactLine
-        One for each contact pair, with the points that carry rows.
+        The same with the points that carry rows.
     conditions : Conditions
         Gamma_u and Gamma_0 at nodes.
     B : sparse (m, 2n)
@@ -48,21 +50,25 @@ class Discrete:
         Unknowns in which rows and prescribed values are single unknowns.
     program : Program
         The quadratic program in those unknowns.
-    factor : callable
-        Factorises its matrix.
+    systems : Systems
+        Its linear systems, with the factorisation once there is one.
     rigid : Rigid or None
         Rigid motions that supports leave free, if there are any.
+    assembled : bool
+        False where the stiffness is that of an earlier problem.
     """
 
     problem: Problem
     space: Space
+    found: list[ContactLine]
     lines: list[ContactLine]
     conditions: Conditions
     B: sp.csr_matrix
     basis: Basis
     program: Program
-    factor: Factor
+    systems: Systems
     rigid: Rigid | None
+    assembled: bool
 
 
 def _prescribed(problem: Problem, trace: Trace) -> Conditions:
@@ -92,70 +98,6 @@ def _guided(problem: Problem, trace: Trace) -> Conditions:
     return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))
 
 
-def _rows(line: ContactLine, trace: Trace) -> Rows:
-    """Rows of one contact line."""
-    share = lagrange(trace.order, snap(line.partner_s, trace.order))
-    share[line.partner < 0] = 0.0
-    return Rows(
-        node=line.node,
-        direction=line.direction,
-        partner=trace.nodes[line.partner],
-        share=share,
-        g=line.gap,
-        equality=np.full(len(line.node), line.contact.bilateral),
-    )
-
-
-def _joined(rows: list[Rows], order: int) -> Rows:
-    """Rows of all lines together."""
-    if rows:
-        return Rows(
-            *(np.concatenate([getattr(r, name) for r in rows]) for name in Rows.__annotations__)
-        )
-    none = np.zeros(0, dtype=np.intp)
-    shape = (0, order + 1)
-    return Rows(
-        node=none,
-        direction=np.zeros((0, 2)),
-        partner=np.zeros(shape, dtype=np.intp),
-        share=np.zeros(shape),
-        g=np.zeros(0),
-        equality=np.zeros(0, dtype=bool),
-    )
-
-
-def _kept(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
-    """The lines with the points that carry the rows `kept` of all lines together."""
-    dropped = np.ones(sum(len(line.node) for line in lines), dtype=bool)
-    dropped[kept] = False
-    stops = np.cumsum([len(line.node) for line in lines])
-    parts = np.split(dropped, stops[:-1]) if lines else []
-    return [without(x, np.flatnonzero(part)) for x, part in zip(lines, parts, strict=True)]
-
-
-def _merged(lines: list[ContactLine], rows: Rows, n: int) -> tuple[list[ContactLine], Rows]:
-    """Lines and rows with one row for each left side: the tightest of those that repeat it."""
-    number = rows.repeated(n)
-    first = np.unique(number)
-    if len(first) == len(number):
-        return lines, rows
-    g, weight = rows.g.copy(), np.concatenate([line.weight for line in lines])
-    equality = np.zeros(len(g), dtype=bool)
-    np.logical_or.at(equality, number, rows.equality)
-    # An equality is the tightest; what another pair at that node asks for follows or is refused.
-    tight = np.where(rows.equality | ~equality[number], rows.g, np.inf)
-    g[first] = np.inf
-    np.minimum.at(g, number, tight)
-    repeated = number != np.arange(len(number))
-    np.add.at(weight, number[repeated], weight[repeated])
-    stops = np.cumsum([len(line.node) for line in lines])
-    lines = [
-        replace(line, weight=part)
-        for line, part in zip(lines, np.split(weight, stops[:-1]), strict=True)
-    ]
-    return _kept(lines, first), replace(rows, g=g, equality=equality).select(first)
-
-
 def _check_range(program: Program) -> None:
     """Raise where double precision holds the data but neither the forces nor the displacements."""
     p = program
@@ -171,8 +113,13 @@ def _check_range(program: Program) -> None:
             )
 
 
-def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Discrete:
+def discretise(
+    problem: Problem, mesh: ng.Mesh, order: int, element: str, previous: Discrete | None = None
+) -> Discrete:
     """Assemble the discrete problem on a mesh that is curved to the element's degree.
+
+    Of a `previous` problem with the same elements on the same mesh, what is the same is used
+    again: the stiffness if the bodies are, the factorisation if also the rows and supports are.
 
     Raises
     ------
@@ -180,9 +127,13 @@ def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Dis
         A pair of which no point faces; prescribed displacements that violate a contact row;
         forces or displacements beyond the range of numbers.
     """
-    trace = boundary_trace(mesh, order)
-    lines = [contact_line(trace, contact) for contact in problem.contact]
-    space = assemble(problem, trace, element)
+    trace = boundary_trace(mesh, order) if previous is None else previous.space.trace
+    found = contact_lines(problem, trace, [] if previous is None else previous.found)
+    if previous is not None and same_stiffness(problem, previous.problem):
+        f = load_vector(problem, previous.space.V, LOAD_BONUS)
+        space, assembled = replace(previous.space, f=f), False
+    else:
+        space, assembled = assemble(problem, trace, element), True
     n = space.basis.shape[1] // 2
     prescribed, guided = _prescribed(problem, trace), _guided(problem, trace)
     conditions = Conditions(
@@ -191,19 +142,23 @@ def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Dis
             for name in Conditions.__annotations__
         )
     )
-    lines, rows = _merged(lines, _joined([_rows(line, trace) for line in lines], order), n)
-    stiffness = space.stiffness()
-    basis = change_of_basis(n, conditions, rows, float(np.abs(trace.curve).max()), stiffness)
-    lines, rows = _kept(lines, basis.kept), rows.select(basis.kept)
+    lines, rows = merged(found, joined(found, trace), n)
+    length = float(np.abs(trace.curve).max())
+    basis = change_of_basis(n, conditions, rows, length, space.stiffness())
+    lines, rows = kept_lines(lines, basis.kept), rows.select(basis.kept)
     B = rows.matrix(n)
     rigid = None
-    found = rigid_motions(problem, space, conditions, basis, B, rows.g, rows.equality)
-    if found is not None:
-        rigid, f = found
+    loaded = rigid_motions(problem, space, conditions, basis, B, rows.g, rows.equality)
+    if loaded is not None:
+        rigid, f = loaded
         space = replace(space, f=f)
     T = space.basis @ basis.T
     m = len(basis.unknown)
-    K, matrix = in_unknowns(space, T)
+    systems = None
+    if previous is not None and not assembled and same_basis(basis, previous.basis):
+        K, systems = previous.program.K, previous.systems
+    else:
+        K, matrix = in_unknowns(space, T)
     program = Program(
         K=K,
         b=T.T @ space.f,
@@ -219,13 +174,15 @@ def discretise(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> Dis
     return Discrete(
         problem=problem,
         space=space,
+        found=found,
         lines=lines,
         conditions=conditions,
         B=B,
         basis=basis,
         program=program,
-        factor=cholesky(matrix),
+        systems=systems or Systems(program, cholesky(matrix)),
         rigid=rigid,
+        assembled=assembled,
     )
 
 
@@ -235,10 +192,12 @@ def minimise_energy(discrete: Discrete, active: Mask) -> Minimiser:
     Bodies that contact alone can hold start from where they rest when rigid, so that the way
     there costs no digits of the deformation.
     """
-    p, rigid = discrete.program, discrete.rigid
+    p, rigid, systems = discrete.program, discrete.rigid, discrete.systems
     if rigid is None or not rigid.placing.any():
-        return minimise(p, discrete.factor, active)
-    result = minimise(replace(p, g=p.g - rigid.rows @ rigid.placing), discrete.factor, active)
+        systems.take(p)
+        return minimise(systems, active)
+    systems.take(replace(p, g=p.g - rigid.rows @ rigid.placing))
+    result = minimise(systems, active)
     u = result.u + rigid.motions @ rigid.placing
     u -= p.kernel.lineal @ (p.kernel.conditions @ u)
     u[p.unknown[result.active]] = p.g[result.active]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .bordered import Anchor, Array, Factor, Mask, Program, SingularError, Systems
+from .bordered import Anchor, Array, Mask, SingularError, Systems
 from .errors import ConvergenceError
 from .kernel import FREE
 
@@ -54,9 +54,9 @@ class Minimiser:
 class Newton:
     """Newton iteration for one quadratic program with changing proximal terms."""
 
-    def __init__(self, program: Program, factor: Factor, state: Mask) -> None:
-        self.program = program
-        self.systems = Systems(program, factor)
+    def __init__(self, systems: Systems, state: Mask) -> None:
+        self.program = program = systems.program
+        self.systems = systems
         self.state = state
         self.y = np.where(program.fixed, program.values, 0.0)
         self.force = np.zeros(program.g.size)

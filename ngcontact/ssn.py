@@ -10,7 +10,7 @@ and Pires (1994, Comput. Oper. Res. 21:587) makes it finite for all of them.
 A positive semidefinite matrix, of bodies that supports do not hold, is met by exact proximal
 steps (Rockafellar 1976, SIAM J. Control Optim. 14:877): they end where the proximal force vanishes.
 
-This module knows matrices only. The factorisation is an argument.
+This module knows matrices only.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from .bordered import Anchor, Array, Factor, Mask, Program, Solve
+from .bordered import Anchor, Array, Mask, Program, Solve, Systems
 from .errors import ConvergenceError
 from .newton import Minimiser, Newton
 
@@ -29,16 +29,13 @@ RESTED = 1e-14  # force of the proximal term, relative to stiffness times displa
 OUTER = 100  # proximal steps; most problems need less than five
 
 
-def minimise(program: Program, factor: Factor, active: Mask | None = None) -> Minimiser:
+def minimise(systems: Systems, active: Mask | None = None) -> Minimiser:
     """Solve a quadratic program by semismooth Newton steps.
 
     Parameters
     ----------
-    program : Program
-        The problem.
-    factor : callable
-        ``factor(free)`` factorises K restricted to the unknowns of the mask `free` and returns
-        a function that solves with it; its result is zero outside of `free`.
+    systems : Systems
+        The program, with its factorisation where there is one already.
     active : ndarray of bool (m,), optional
         First active set; the equalities alone when left out.
 
@@ -54,9 +51,9 @@ def minimise(program: Program, factor: Factor, active: Mask | None = None) -> Mi
         A system is singular, or the step limit was reached, to which only a matrix that is not
         positive definite is known to lead. `iterate` holds the last `Minimiser`.
     """
-    p = program
+    p = systems.program
     state = p.equality.copy() if active is None else p.equality | active
-    newton = Newton(p, factor, state)
+    newton = Newton(systems, state)
     pins = p.kernel.pins
     hardest = p.K.diagonal()[pins].max(initial=0.0)
     anchor = Anchor(PROXIMAL * hardest, np.zeros(pins.size))
@@ -187,7 +184,8 @@ def solve_qp(
         fixed=np.zeros(n, dtype=bool),
         values=np.zeros(n),
     )
-    result = minimise(program, factor, np.concatenate([start, np.zeros(e.size, dtype=bool)]))
+    first = np.concatenate([start, np.zeros(e.size, dtype=bool)])
+    result = minimise(Systems(program, factor), first)
     return Minimiser(
         u=result.u,
         force=result.force[:m],

@@ -21,7 +21,7 @@ from drivers.stress.algebra import (
     tied_program,
 )
 from ngcontact import bordered, newton
-from ngcontact.bordered import Program
+from ngcontact.bordered import Program, Systems
 from ngcontact.errors import ConvergenceError
 from ngcontact.ssn import minimise, solve_qp
 
@@ -163,7 +163,7 @@ def test_bordering_equals_refactorising(monkeypatch, border):
     calls = []
     start = np.zeros(n, dtype=bool)
     start[::2] = True
-    result = minimise(program, counting_factor(K, calls), start)
+    result = minimise(Systems(program, counting_factor(K, calls)), start)
     reference = solve_qp(K, -b, flip, g)
     np.testing.assert_array_equal(result.active, reference.active)
     np.testing.assert_allclose(result.u, reference.u, rtol=1e-11)
@@ -194,7 +194,7 @@ def test_given_values_and_equalities_with_unit_rows():
         values=values,
         unknown=rows,
     )
-    result = minimise(program, counting_factor(K, []))
+    result = minimise(Systems(program, counting_factor(K, [])))
     assert result.u[0] == 0.01
     assert result.u[3] == 0.05
     assert result.active.tolist() == [True, False]
@@ -259,7 +259,7 @@ def test_bordered_systems_do_not_depend_on_the_stiffness(stiffness):
             values=np.zeros(n),
             unknown=np.arange(m),
         )
-        result = minimise(program, counting_factor(program.K, []), rng.random(m) < 0.5)
+        result = minimise(Systems(program, counting_factor(program.K, [])), rng.random(m) < 0.5)
         reference = solve_qp(K, b, rows, g)
         np.testing.assert_array_equal(result.active, reference.active)
         # Condition of these matrices up to 1e5: round-off 1e-10.

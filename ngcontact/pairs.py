@@ -1,0 +1,81 @@
+"""Contact rows of several pairs together, HH81 (2.3), (2.5), (2.10)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .gap import ContactLine, without
+from .lagrange import lagrange
+from .projection import snap
+from .rows import Rows
+from .trace import Trace
+
+Index = NDArray[np.intp]
+
+
+def _rows(line: ContactLine, trace: Trace) -> Rows:
+    """Rows of one contact line."""
+    share = lagrange(trace.order, snap(line.partner_s, trace.order))
+    share[line.partner < 0] = 0.0
+    return Rows(
+        node=line.node,
+        direction=line.direction,
+        partner=trace.nodes[line.partner],
+        share=share,
+        g=line.gap,
+        equality=np.full(len(line.node), line.contact.bilateral),
+    )
+
+
+def joined(lines: list[ContactLine], trace: Trace) -> Rows:
+    """Rows of all lines, in order."""
+    rows = [_rows(line, trace) for line in lines]
+    if rows:
+        return Rows(
+            *(np.concatenate([getattr(r, name) for r in rows]) for name in Rows.__annotations__)
+        )
+    none = np.zeros(0, dtype=np.intp)
+    shape = (0, trace.order + 1)
+    return Rows(
+        node=none,
+        direction=np.zeros((0, 2)),
+        partner=np.zeros(shape, dtype=np.intp),
+        share=np.zeros(shape),
+        g=np.zeros(0),
+        equality=np.zeros(0, dtype=bool),
+    )
+
+
+def kept_lines(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
+    """The lines with the points that carry the rows `kept` of all lines together."""
+    dropped = np.ones(sum(len(line.node) for line in lines), dtype=bool)
+    dropped[kept] = False
+    stops = np.cumsum([len(line.node) for line in lines])
+    parts = np.split(dropped, stops[:-1]) if lines else []
+    return [without(x, np.flatnonzero(part)) for x, part in zip(lines, parts, strict=True)]
+
+
+def merged(lines: list[ContactLine], rows: Rows, n: int) -> tuple[list[ContactLine], Rows]:
+    """Lines and rows with one row for each left side: the tightest of those that repeat it."""
+    number = rows.repeated(n)
+    first = np.unique(number)
+    if len(first) == len(number):
+        return lines, rows
+    g, weight = rows.g.copy(), np.concatenate([line.weight for line in lines])
+    equality = np.zeros(len(g), dtype=bool)
+    np.logical_or.at(equality, number, rows.equality)
+    # An equality is the tightest; what another pair at that node asks for follows or is refused.
+    tight = np.where(rows.equality | ~equality[number], rows.g, np.inf)
+    g[first] = np.inf
+    np.minimum.at(g, number, tight)
+    repeated = number != np.arange(len(number))
+    np.add.at(weight, number[repeated], weight[repeated])
+    stops = np.cumsum([len(line.node) for line in lines])
+    lines = [
+        replace(line, weight=part)
+        for line, part in zip(lines, np.split(weight, stops[:-1]), strict=True)
+    ]
+    return kept_lines(lines, first), replace(rows, g=g, equality=equality).select(first)

@@ -1,0 +1,57 @@
+"""What a problem on the same mesh as another one has in common with it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .constraint import Basis
+from .gap import ContactLine, contact_line
+from .material import Elastic, Hooke, varies
+from .problem import Contact, Problem
+from .trace import Trace
+
+
+def _same_law(one: Elastic | Hooke, other: Elastic | Hooke) -> bool:
+    """Whether two laws are the same numbers; functions may have changed unseen."""
+    if varies(one) or varies(other) or type(one) is not type(other):
+        return False
+    return all(np.array_equal(value, vars(other)[name]) for name, value in vars(one).items())
+
+
+def same_stiffness(problem: Problem, other: Problem) -> bool:
+    """Whether two problems have the same elastic bodies."""
+    laws, others = problem.materials, other.materials
+    return (
+        problem.model == other.model
+        and laws.keys() == others.keys()
+        and all(_same_law(law, others[body]) for body, law in laws.items())
+    )
+
+
+def _same_pair(one: Contact, other: Contact) -> bool:
+    """Whether two pairs have the same points and gaps; functions may have changed unseen."""
+    names = ("secondary", "primary", "direction", "bilateral")
+    same = all(getattr(one, name) == getattr(other, name) for name in names)
+    return same and one.gap is None and other.gap is None
+
+
+def contact_lines(problem: Problem, trace: Trace, known: list[ContactLine]) -> list[ContactLine]:
+    """The line of each pair, a known one where it is the same."""
+    lines = []
+    for contact in problem.contact:
+        same = (line for line in known if _same_pair(line.contact, contact))
+        line = next(same, None)
+        lines.append(contact_line(trace, contact) if line is None else replace(line, searches=0))
+    return lines
+
+
+def same_basis(one: Basis, other: Basis) -> bool:
+    """Whether rows and supports make the same unknowns; bounds and values may differ."""
+    return (
+        np.array_equal(one.fixed, other.fixed)
+        and np.array_equal(one.unknown, other.unknown)
+        and one.T.shape == other.T.shape
+        and (one.T != other.T).nnz == 0
+    )

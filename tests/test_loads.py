@@ -1,0 +1,116 @@
+"""Sequences of loads on one mesh: what is taken over, and that it is right."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import ngsolve as ng
+import numpy as np
+import pytest
+
+from drivers import cases
+from geometries import blocks
+from ngcontact import Contact, Elastic, Problem, Solution, adapt, solve
+
+STEEL = Elastic(E=200.0, nu=0.3)
+PAIR = Contact(secondary="upper_contact", primary="lower_contact")
+
+
+def pressed(load: float = 1.0, **changes: object) -> Problem:
+    """Blocks, the upper one held sideways only, under a pressure that grows to the right."""
+    problem = Problem(
+        geometry=blocks(),
+        materials={"upper": STEEL, "lower": STEEL},
+        displacement={"bottom": (0, 0)},
+        sliding="upper_left",
+        traction={"top": load * (1.5 + ng.x)},
+        contact=[PAIR],
+    )
+    return replace(problem, **changes)
+
+
+def same(one: Solution, other: Solution) -> None:
+    """Both solve the same discrete problem."""
+    np.testing.assert_array_equal(one.active, other.active)
+    u, v = (s.displacement.vec.FV().NumPy() for s in (one, other))
+    # Two orders of round-off: other factorisations of one matrix, condition 1e4.
+    np.testing.assert_allclose(u, v, rtol=0, atol=1e-11 * np.abs(v).max())
+
+
+@pytest.mark.parametrize("order", [1, 3])
+def test_another_load_costs_back_solves_only(order: int) -> None:
+    first = solve(pressed(), maxh=0.4, order=order)
+    for load in (2.0, 0.3, 1e-3):
+        problem = pressed(load, force={"upper": (0, -load)})
+        second = solve(problem, first.mesh, order=order, start=first)
+        work = second.work
+        assert (work["assemblies"], work["factorizations"], work["gap_searches"]) == (0, 0, 0)
+        assert 0 < work["back_solves"] <= 20
+        same(second, solve(problem, first.mesh, order=order))
+    assert first.work["assemblies"] == first.work["factorizations"] == 1
+
+
+def test_other_prescribed_displacements_cost_back_solves_only() -> None:
+    case = cases.disc_on_rigid_plane()
+    first = solve(case, maxh=0.3, order=2)
+    deeper = replace(case, displacement={"top": (None, -0.006)})
+    second = solve(deeper, first.mesh, order=2, start=first)
+    assert (second.work["assemblies"], second.work["factorizations"]) == (0, 0)
+    same(second, solve(deeper, first.mesh, order=2))
+
+
+def test_an_obstacle_that_moves_costs_back_solves_only() -> None:
+    level = ng.Parameter(0.0)  # the same function, of another value: gaps are never remembered
+    contact = Contact(secondary="arc", direction=(0, -1), gap=ng.y + level)
+    case = replace(cases.disc_on_rigid_plane(), contact=[contact])
+    first = solve(case, maxh=0.3, order=2)
+    level.Set(-0.001)
+    second = solve(case, first.mesh, order=2, start=first)
+    assert (second.work["assemblies"], second.work["factorizations"]) == (0, 0)
+    same(second, solve(case, first.mesh, order=2))
+    assert second.contact_force()[1] > 1.1 * first.contact_force()[1]
+
+
+def test_other_bodies_are_assembled() -> None:
+    E = ng.Parameter(200.0)
+    soft = {"upper": Elastic(E=E, nu=0.3), "lower": STEEL}
+    first = solve(pressed(materials=soft), maxh=0.4)
+    E.Set(20.0)
+    for problem in (
+        pressed(materials=soft),
+        pressed(materials={"upper": STEEL, "lower": Elastic(E=200.0, nu=0.2)}),
+        pressed(model="plane stress"),
+    ):
+        second = solve(problem, first.mesh, start=first)
+        assert (second.work["assemblies"], second.work["factorizations"]) == (1, 1)
+        same(second, solve(problem, first.mesh))
+
+
+def test_other_supports_and_pairs_are_factorised() -> None:
+    first = solve(pressed(), maxh=0.4)
+    for problem in (
+        pressed(displacement={"bottom": (0, 0), "upper_left": (0, None)}, sliding=None),
+        pressed(displacement={"bottom": (0, 0), "top": (None, -0.01)}, traction={}),
+        pressed(contact=[replace(PAIR, bilateral=True)]),
+    ):
+        second = solve(problem, first.mesh, start=first)
+        assert second.work["assemblies"] == 0
+        same(second, solve(problem, first.mesh))
+    held = pressed(displacement={"bottom": (0, 0), "top": (None, -0.01)}, traction={})
+    assert solve(held, first.mesh, start=first).work["factorizations"] == 1
+
+
+def test_other_elements_take_nothing_over() -> None:
+    first = solve(pressed(), maxh=0.4)
+    second = solve(pressed(2.0), first.mesh, order=2, start=first)
+    assert (second.work["assemblies"], second.work["factorizations"]) == (1, 1)
+    same(second, solve(pressed(2.0), first.mesh, order=2))
+
+
+def test_a_level_of_an_adaptive_run_starts_a_sequence() -> None:
+    *_, level = adapt(pressed(), order=2, max_dofs=3000)
+    second = solve(pressed(2.0), level.mesh, order=2, start=level)
+    assert (second.work["assemblies"], second.work["factorizations"]) == (0, 1)
+    third = solve(pressed(3.0), level.mesh, order=2, start=second)
+    assert (third.work["assemblies"], third.work["factorizations"]) == (0, 0)
+    same(third, solve(pressed(3.0), level.mesh, order=2))
