@@ -75,9 +75,9 @@ class Program:
 
 @dataclass(frozen=True, eq=False)
 class Anchor:
-    """Proximal term stiffness / 2 |y - at|^2 on the pins, which makes every system definite."""
+    """Proximal terms stiffness / 2 (y - at)^2 on the pins, which make every system definite."""
 
-    stiffness: float
+    stiffness: Array
     at: Array
 
 
@@ -239,7 +239,10 @@ class Systems:
         pull = self.force if p.unit_rows else p.R.T @ self.force
         terms = (pull, (p.K @ self.y)[~p.fixed])
         scale = max(self.scale, *(np.abs(x).max(initial=0.0) for x in terms))
-        if not np.abs(residual[~p.fixed]).max(initial=0.0) <= UNSOLVED * scale:
+        balanced = ~p.fixed
+        if self.anchor is not None:  # its force on the pins may turn what the held unknowns hold
+            balanced[p.kernel.held] = False
+        if not np.abs(residual[balanced]).max(initial=0.0) <= UNSOLVED * scale:
             raise SingularError(
                 "the system for the current active set is singular to working precision: a body "
                 "can move without resistance from supports or active contact, or the moduli of "

@@ -21,6 +21,7 @@ COARSE = 8  # elements along the largest extent of the geometry when no mesh siz
 TURN = 0.5  # largest turn (radians) of a curve along one contact segment
 STEEPEST = 0.5  # cosine between a curve's normal and the direction below which nodes go unmatched
 COINCIDENT = 1e-6  # distance, relative to an edge, up to which two edges are one contact line
+CLOSE = 0.1  # share of the spacing within which a later pair's node yields to one already there
 FINE = 513  # samples on which a division is laid out
 
 
@@ -39,7 +40,7 @@ class _Edge:
         """Interior nodes as fractions of the parameter interval, between runs filled up evenly."""
         start, stop = self.curve.start, self.curve.stop
         runs = [(nodes - start) / (stop - start) for nodes in self.runs]
-        nodes = np.sort(np.concatenate(runs))
+        nodes = np.sort(_apart(runs))
         apart = 1e-9
         inside = nodes[(nodes > apart) & (nodes < 1 - apart)]
         inside = inside[np.diff(inside, prepend=-1.0) > apart]
@@ -54,6 +55,31 @@ class _Edge:
                 fill = np.interp(np.linspace(s0, s1, count + 1)[1:-1], arc, grid)
                 result.extend(fill.tolist())
         return sorted(result)
+
+
+def _apart(runs: list[Array]) -> Array:
+    """Nodes of all runs, without those of later ones that would leave slivers of an edge."""
+    nodes = runs[0]
+    for run in runs[1:]:
+        spacing = np.diff(np.sort(run)).min(initial=1.0)
+        distance = np.abs(run[:, None] - nodes).min(axis=1)
+        nodes = np.concatenate([nodes, run[distance > CLOSE * spacing]])
+    return nodes
+
+
+def _require_complete(mesh: ng.Mesh) -> None:
+    """Raise where Netgen, which only prints a message, left a part of a body without elements."""
+    corners = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.int64)
+    sides = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    rim = np.sort(mesh.ngmesh.Elements1D().NumPy()["nodes"][:, :2].astype(np.int64), axis=1)
+    side, rim = (x @ np.array([mesh.nv + 1, 1]) for x in (sides, rim))
+    known, count = np.unique(side, return_counts=True)
+    missing = np.setxor1d(known[count == 1], rim[~np.isin(rim, known[count > 1])])
+    if missing.size:
+        raise ValueError(
+            f"Netgen left holes in the mesh, with {missing.size} sides; choose another maxh, or "
+            "name the parts of an edge that belong to several contact pairs apart"
+        )
 
 
 def _named(edges: list[_Edge], pattern: str) -> list[_Edge]:
@@ -147,7 +173,8 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
     Raises
     ------
     ValueError, TypeError
-        `maxh` is not a positive finite number, or given for a geometry that is a Mesh.
+        `maxh` is not a positive finite number, or given for a geometry that is a Mesh; Netgen
+        failed to fill a body.
     """
     if isinstance(problem.geometry, ng.Mesh):
         if maxh is not None:
@@ -176,7 +203,9 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
     try:
         for edge in placed:
             edge.shape.partition = edge.partition()
-        return ng.Mesh(occ.OCCGeometry(shape, dim=2).GenerateMesh(maxh=maxh))
+        mesh = ng.Mesh(occ.OCCGeometry(shape, dim=2).GenerateMesh(maxh=maxh))
     finally:
         for edge in placed:  # the geometry is the user's
             edge.shape.partition = None
+    _require_complete(mesh)
+    return mesh

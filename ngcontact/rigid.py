@@ -36,6 +36,7 @@ Mask = NDArray[np.bool_]
 FINER = 5  # quadrature orders added to see the error of those of the loads
 QUADRATURE = 10.0  # times that error is work that may be quadrature
 ROUND_OFF = 1e-10  # ... and this, relative to the sum of its terms, round-off
+NOISE = 1e-14  # work, relative to the sum of its terms or of all contact forces, that is none
 INEXACT = 1e-9  # force of a rigid motion, relative to its terms, that shows it is not in V_h
 
 
@@ -111,26 +112,29 @@ def _placing(rows: Array, work: Array, g: Array, equality: Mask) -> tuple[Array,
     return scale * result.x, carries
 
 
-def _residue(rows: Array, equality: Mask, work: Array) -> Array:
-    """What contact forces, not negative but on equalities, cannot balance of the work (r,)."""
+def _residue(rows: Array, equality: Mask, work: Array) -> tuple[Array, float]:
+    """What contact forces, not negative but on equalities, cannot balance of the work (r,).
+
+    Also the sum of these forces, whose round-off reaches bodies without load of their own.
+    """
     scale = np.abs(work).max(initial=0.0)
     if scale == 0.0:
-        return np.zeros_like(work)
+        return np.zeros_like(work), 0.0
     G = np.vstack([rows, -rows[equality]]).T
     if G.shape[1] == 0:
-        return work
+        return work, 0.0
     force, _ = nnls(G, work / scale, maxiter=100 * G.shape[1])
-    return work - scale * (G @ force)
+    return work - scale * (G @ force), scale * float(force.sum())
 
 
 def _check_work(
-    residue: Array, work: Array, finer: Array, terms: Array, motion: RigidMotion
+    residue: Array, work: Array, finer: Array, terms: Array, carried: float, motion: RigidMotion
 ) -> None:
     """Raise unless the work on what cannot be balanced is quadrature or round-off."""
     amounts = residue / np.abs(residue).max()
     done = float(amounts @ residue)  # what forces balance does no work on it
     allowed = QUADRATURE * abs(float(amounts @ (work - finer)))
-    allowed += ROUND_OFF * float(np.abs(amounts) @ terms)
+    allowed += ROUND_OFF * float(np.abs(amounts) @ terms) + NOISE * carried
     if done > allowed:
         raise NoEquilibriumError(
             f"no equilibrium: the load does the work {done:.6g} on a rigid {motion}, which "
@@ -194,19 +198,20 @@ def rigid_motions(
         )
     rows = np.asarray(B @ Z)
     work = in_v.T @ space.f
-    residue = _residue(rows, equality, work)
+    sizes = np.abs(in_v).T @ np.abs(space.f)
+    noise = np.where(np.abs(work) <= NOISE * sizes, work, 0.0)
+    residue, carried = _residue(rows, equality, work - noise)
     M = functionals(space, bodies, of_unknown) @ combinations
     gram = in_v.T @ M
     if residue.any():
         finer = in_v.T @ load_vector(problem, space.V, LOAD_BONUS + FINER)
-        sizes = np.abs(in_v).T @ np.abs(space.f)
         motion = rigid_motion(bodies, combinations @ residue / np.abs(residue).max(), 0.0)
-        _check_work(residue, work, finer, sizes, motion)
-    f = space.f - M @ np.linalg.solve(gram, residue)
+        _check_work(residue, work, finer, sizes, carried, motion)
+    f = space.f - M @ np.linalg.solve(gram, residue + noise)
     lineal = null_space(rows)
     motions = basis.coordinates(Z, rows)
     means = basis.T.T @ (space.basis.T @ (M @ lineal))
-    placing, carries = _placing(rows, work - residue, g, equality)
+    placing, carries = _placing(rows, work - noise - residue, g, equality)
     rigid = Rigid(
         bodies=bodies,
         combinations=combinations,

@@ -24,8 +24,9 @@ from .errors import ConvergenceError
 from .newton import Minimiser, Newton
 
 PROXIMAL = 1e-3  # of the stiffness at the pins, where contact leaves rigid motions free
-WEAKEST = 1e-4  # of that, to which it falls, tenfold at each proximal step
+WEAKEST = 1e-6  # of that, to which it falls, tenfold at each proximal step
 RESTED = 1e-14  # force of the proximal term, relative to stiffness times displacement
+STEADY = 0.9  # ratio of that force to the last from which a motion is steady, not slowing down
 OUTER = 100  # proximal steps; most problems need less than five
 
 
@@ -55,8 +56,9 @@ def minimise(systems: Systems, active: Mask | None = None) -> Minimiser:
     state = p.equality.copy() if active is None else p.equality | active
     newton = Newton(systems, state)
     pins = p.kernel.pins
-    hardest = p.K.diagonal()[pins].max(initial=0.0)
-    anchor = Anchor(PROXIMAL * hardest, np.zeros(pins.size))
+    hardness = p.K.diagonal()[pins]  # of bodies that may be very unlike
+    share = PROXIMAL
+    anchor = Anchor(share * hardness, np.zeros(pins.size))
     last = np.inf
     for _ in range(OUTER):
         if newton.resisted():
@@ -65,14 +67,16 @@ def minimise(systems: Systems, active: Mask | None = None) -> Minimiser:
                 return newton.result()
         newton.settle(anchor)
         moved = newton.y[pins] - anchor.at
-        force = anchor.stiffness * float(np.abs(moved).max())
-        if force <= RESTED * hardest * newton.extent:
+        force = anchor.stiffness * np.abs(moved)
+        if (force <= RESTED * hardness * newton.extent).all():
             return newton.result()
         at = newton.y[pins]
-        if force > last / 2 and not newton.resisted():  # a steady motion: go where it leads
+        # A steady motion: go where it leads.
+        if force.max() > STEADY * last and not newton.resisted():
             at = at + newton.advance(moved) * moved
-        last = force
-        anchor = Anchor(max(anchor.stiffness / 10, WEAKEST * PROXIMAL * hardest), at)
+        last = force.max()
+        share = max(share / 10, WEAKEST * PROXIMAL)
+        anchor = Anchor(share * hardness, at)
     raise ConvergenceError(
         f"the rigid motions did not settle in {OUTER} proximal steps", iterate=newton.result()
     )

@@ -13,7 +13,7 @@ import pytest
 from netgen.occ import OCCGeometry
 
 from geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
-from geometries.region import body, compound, polygon
+from geometries.region import body, compound, polygon, quarter_arc
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.mesh import first_mesh
 from ngcontact.problem import boundary_mask
@@ -390,3 +390,32 @@ def test_a_mesh_has_its_size_already():
     problem = Problem(geometry=mesh, materials={"upper|lower": Elastic(E=1.0, nu=0.3)})
     with pytest.raises(ValueError, match=r"maxh=0.1 has no effect"):
         first_mesh(problem, maxh=0.1)
+
+
+@pytest.mark.parametrize(("left", "right", "maxh"), [(1.139, 0.796, 0.3), (0.598, 0.785, 0.3)])
+def test_two_pairs_that_share_an_edge_leave_no_slivers_on_it(left, right, maxh):
+    """Nodes that both pairs ask for on one arc keep apart, and the bodies are filled."""
+    disc = [("arc", quarter_arc((0, 0), 1.0, k, (k + 1) % 4)) for k in range(4)]
+    down = [np.array([-np.sin(left), -np.cos(left)]), np.array([np.sin(right), -np.cos(right)])]
+    root = np.linalg.solve(np.array(down), [1.03, 1.03])
+    a = root + 8 * np.array([-np.cos(left), np.sin(left)])
+    b = root + 8 * np.array([np.cos(right), np.sin(right)])
+    low = root[1] - 1.5
+    notch = [tuple(root), tuple(a), (a[0], low), (b[0], low), tuple(b)]
+    names = ["left", "side", "bottom", "side", "right"]
+    problem = Problem(
+        geometry=compound(body("disc", disc), body("notch", polygon(notch, names))),
+        materials={"disc|notch": Elastic(E=1.0, nu=0.3)},
+        contact=[
+            Contact("arc", name, direction=tuple(d))
+            for name, d in zip(("left", "right"), down, strict=True)
+        ],
+    )
+    mesh = first_mesh(problem, maxh)
+    ends = mesh.ngmesh.Elements1D().NumPy()["nodes"][:, :2].astype(int) - 1
+    xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
+    sides = xy[ends[:, 1]] - xy[ends[:, 0]]
+    assert np.linalg.norm(sides, axis=1).min() > 1e-3 * maxh  # measured 4e-3, before 5e-4 and 8e-4
+    x, y = xy[ends].mean(axis=1).T
+    enclosed = (x * sides[:, 1] - y * sides[:, 0]).sum() / 2
+    assert ng.Integrate(1, mesh) == pytest.approx(enclosed, rel=1e-12)

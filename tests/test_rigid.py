@@ -12,11 +12,13 @@ from drivers import cases
 from drivers.exact import relative_energy_error
 from drivers.stress import held
 from geometries import blocks, rings
+from geometries.region import body, compound, polygon, quarter_arc
 from ngcontact import Contact, Elastic, NoEquilibriumError, Problem, adapt, solve
 from ngcontact.discrete import discretise, minimise_energy
 from ngcontact.rigid import rigid_motions
 
 STEEL = Elastic(E=1000.0, nu=0.3)
+WEIGHT = 0.1  # of a disc, per area
 ROUND_OFF = 1e-12  # of sums of forces and moments: the figure asked for; measured 4e-14
 WHOLE_RINGS = Problem(
     geometry=rings(interference=1e-3),
@@ -200,3 +202,106 @@ def test_stack_of_three():
     for pair, load in enumerate(loads):
         assert solution.contact_force(pair)[1] == pytest.approx(load, rel=ROUND_OFF)
     assert len(solution.free_motions) == 2
+
+
+def circle(centre, radius, name):
+    return [(name, quarter_arc(centre, radius, k, (k + 1) % 4)) for k in range(4)]
+
+
+def disc_in_ring(force=(0, 0), **more):
+    """A loose disc in a ring, 0.02 from it all around."""
+    bore = [("bore", quarter_arc((0, 0), 1.02, (4 - k) % 4, 3 - k)) for k in range(4)]
+    ring = body("ring", circle((0, 0), 2.0, "rim"), bore)
+    return Problem(
+        geometry=compound(body("disc", circle((0, 0), 1.0, "arc")), ring),
+        materials={"disc|ring": STEEL},
+        force={"disc": force},
+        contact=[Contact("arc", "bore")],
+        **more,
+    )
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_body_that_may_turn_from_every_first_active_set(order):
+    """The proximal force turns the disc, which its contact cannot: no singular system."""
+    problem = disc_in_ring((0, -WEIGHT), displacement={"rim": (0, 0)})
+    solution = solve(problem, maxh=0.4, order=order)
+    weight = WEIGHT * mesh_area(solution, "disc")
+    m = len(solution.points)
+    for carried in ([], [0], [m // 3, 2 * m // 3], range(m)):
+        active = np.zeros(m, dtype=bool)
+        active[list(carried)] = True
+        result = minimise_energy(solution.discrete, active)
+        directions = solution.discrete.lines[0].direction
+        np.testing.assert_allclose(
+            result.force @ directions,
+            [0, -weight],
+            atol=1e-10 * weight,  # measured 2e-13
+        )
+
+
+def test_a_moved_support_carries_an_unloaded_body_along():
+    """All that moves it is contact, of forces that vanish; the proximal force does not."""
+    for order in (1, 2):
+        problem = disc_in_ring(displacement={"rim": (0.3, 0.2)})
+        solution = solve(problem, maxh=0.4, order=order)
+        assert solution.gap.min() >= -1e-12
+        stiffness = np.abs(solution.discrete.program.K.data).max()
+        assert np.abs(solution.force).max() <= 1e-12 * 0.3 * stiffness  # round-off
+
+
+def test_round_off_of_a_balanced_load_closes_no_gap():
+    """Pressure on a free ring has no resultant but round-off: the loose disc stays loose."""
+    solution = solve(disc_in_ring(traction={"rim": 1.0}), maxh=0.4, order=2)
+    assert not solution.active.any()
+    assert solution.gap.min() > 0.8 * 0.02  # the ring shrinks by 0.0025
+    assert not solution.discrete.rigid.placing.any()
+
+
+def test_a_body_without_load_between_others():
+    """A disc passes the load of the cap on; round-off of that load is none of its own."""
+    disc = circle((0.0, 1.02), 1.0, "arc")
+    box = [(-2, -1), (2, -1), (2, 0), (-2, 0)]
+    cap = [(x, y + 3.04) for x, y in box]
+    problem = Problem(
+        geometry=compound(
+            body("disc", disc),
+            body("base", polygon(box, ["bottom", "side", "base_top", "side"])),
+            body("cap", polygon(cap, ["cap_below", "side", "top", "side"])),
+        ),
+        materials={"disc|base|cap": STEEL},
+        displacement={"bottom": (0, 0)},
+        traction={"top": 1.0},
+        contact=[
+            Contact("arc", "base_top", direction=(0, -1)),
+            Contact("arc", "cap_below", direction=(0, 1)),
+        ],
+    )
+    for order in (1, 2, 3):
+        solution = solve(problem, maxh=0.4, order=order)
+        below, above = solution.contact_force(0), solution.contact_force(1)
+        np.testing.assert_allclose([below[1], -above[1]], 4.0, rtol=1e-10)
+        assert len(solution.free_motions) == 2
+
+
+def test_a_stiff_loose_body_does_not_slow_a_soft_one():
+    """Proximal terms suit each body's own stiffness; those of the stiff one would be a million."""
+    block = polygon([(-2, -1), (2, -1), (2, 0), (-2, 0)], ["bottom", "side", "table", "side"])
+    problem = Problem(
+        geometry=compound(
+            body("disc", circle((0.3, 1.05), 1.0, "arc")),
+            body("loose", circle((0.3, 4.0), 0.7, "loose_arc")),
+            body("block", block),
+        ),
+        materials={"disc|block": Elastic(E=100.0, nu=0.3), "loose": Elastic(E=1e8, nu=0.3)},
+        displacement={"bottom": (0, 0)},
+        force={"disc": (0, -WEIGHT)},
+        contact=[
+            Contact("arc", "table", direction=(0, -1)),
+            Contact("loose_arc", "arc", direction=(0, -1)),
+        ],
+    )
+    solution = solve(problem, maxh=0.4, order=2)
+    weight = WEIGHT * mesh_area(solution, "disc")
+    assert solution.contact_force(0)[1] == pytest.approx(weight, rel=1e-8)
+    assert not solution.contact_force(1).any()
