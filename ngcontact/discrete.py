@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from .bordered import Program, Systems
 from .constraint import Basis, change_of_basis
+from .errors import ConvergenceError
 from .gap import ContactLine
 from .kernel import no_kernel
 from .newton import Minimiser
@@ -191,14 +192,29 @@ def minimise_energy(discrete: Discrete, active: Mask) -> Minimiser:
 
     Bodies that contact alone can hold start from where they rest when rigid, so that the way
     there costs no digits of the deformation.
+
+    Raises
+    ------
+    ConvergenceError
+        See `ssn.minimise`; carries the last iterate.
     """
     p, rigid, systems = discrete.program, discrete.rigid, discrete.systems
     if rigid is None or not rigid.placing.any():
         systems.take(p)
         return minimise(systems, active)
     systems.take(replace(p, g=p.g - rigid.rows @ rigid.placing))
-    result = minimise(systems, active)
-    u = result.u + rigid.motions @ rigid.placing
+    try:
+        result = minimise(systems, active)
+    except ConvergenceError as error:
+        error.iterate = _placed(p, rigid, error.iterate)
+        raise
+    result = _placed(p, rigid, result)
+    result.u[p.unknown[result.active]] = p.g[result.active]
+    return result
+
+
+def _placed(p: Program, rigid: Rigid, iterate: Minimiser) -> Minimiser:
+    """An iterate relative to where the bodies rest when rigid, with the way there added."""
+    u = iterate.u + rigid.motions @ rigid.placing
     u -= p.kernel.lineal @ (p.kernel.conditions @ u)
-    u[p.unknown[result.active]] = p.g[result.active]
-    return replace(result, u=u)
+    return replace(iterate, u=u)

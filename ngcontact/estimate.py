@@ -31,7 +31,7 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from .gap import ContactLine, at_quadrature, partners, prescribed_gap
+from .gap import ContactLine, at_quadrature, prescribed_gap
 from .incompressible import PressureCorrection, Share, Term
 from .lagrange import gauss, lagrange
 from .moduli import (
@@ -42,6 +42,7 @@ from .moduli import (
     power_of_two,
     shear_moduli,
 )
+from .partners import partners
 from .problem import boundary_mask
 from .sides import Side, met_from_behind, nodal_pressure, traction
 from .trace import Trace

@@ -12,7 +12,7 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from .cad import CadEdge
+from .cad import CadEdge, cad_edges
 from .problem import Contact, Problem
 
 Array = NDArray[np.float64]
@@ -23,6 +23,14 @@ STEEPEST = 0.5  # cosine between a curve's normal and the direction below which 
 COINCIDENT = 1e-6  # distance, relative to an edge, up to which two edges are one contact line
 CLOSE = 0.1  # share of the spacing within which a later pair's node yields to one already there
 FINE = 513  # samples on which a division is laid out
+
+# OCC's projections know absolute lengths: points within 1e-7 of the end of an arc go to that end,
+# on other curves 1e-10 over the speed counts as met. On edges of extent SMALLEST that changes no
+# more than 1e-8 of it as long as elements keep their shape.
+SMALLEST = 1e-2  # extent of an edge; measured: all but arcs of circles are wrong from 2e-3
+SHORTEST = 1e-6  # a segment of a curved edge; measured: elements of order 4 turn over at 5e-7
+SHORTEST_ON_SMALL = 1e-5  # ... of a smaller arc; measured: middles displaced from 5e-6, order 4
+UNIFORM = 1e-9  # relative change of speed along an arc of a circle
 
 
 @dataclass(eq=False)
@@ -209,3 +217,33 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
             edge.shape.partition = None
     _require_complete(mesh)
     return mesh
+
+
+def check_curves(mesh: ng.Mesh) -> None:
+    """Raise if curved edges are too small for OCC to curve the elements beside them.
+
+    Raises
+    ------
+    ValueError
+        Names the edge and its length; another unit of length mends it.
+    """
+    edges = cad_edges(mesh) or []
+    xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
+    segments = mesh.ngmesh.Elements1D().NumPy()
+    ends = xy[segments["nodes"][:, :2].astype(np.intp) - 1]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    for number, edge in enumerate(edges):
+        if edge.straight:
+            continue
+        speed = np.linalg.norm(edge.samples()[2], axis=1)
+        arc = bool(np.ptp(speed) <= UNIFORM * speed.max())
+        small = edge.size < SMALLEST
+        limit = SHORTEST_ON_SMALL if small else SHORTEST
+        shortest = float(length[segments["index"] == number + 1].min(initial=np.inf))
+        if shortest < limit or (small and not arc):
+            raise ValueError(
+                f'the curved edge "{edge.name}" has the extent {edge.size:g} and segments of '
+                f"{shortest:g}, on which the geometry kernel loses digits; choose a smaller unit "
+                f"of length: curved edges of {SMALLEST:g} and more may have segments down to "
+                f"{SHORTEST:g}"
+            )

@@ -3,42 +3,16 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import ngsolve as ng
 import numpy as np
-from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components, dijkstra
-from scipy.spatial import KDTree
 
-from .output import check_path, full_stress, lattice, neighbour_tree, nodes_of, replacing, von_mises
+from .output import check_path, replacing
+from .scene import Scene, close_up, contact_lines, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
-_MOST_TRIANGLES = 200_000
-
-
-@dataclass(frozen=True, eq=False)
-class Scene:
-    """What is drawn of the bodies: triangles and lines that follow the curved elements.
-
-    ``moved`` (k, 2) are the nodes after `scale` times the displacement and ``stress`` (k,) is
-    von Mises; ``triangles`` (t, 3) and the element edges ``edges`` (e, n + 1), of which
-    ``outline`` (e,) bound a body, number the nodes. ``zone`` (c, 2) are the points in contact.
-    """
-
-    moved: Array
-    stress: Array
-    triangles: Integers
-    edges: Integers
-    outline: NDArray[np.bool_]
-    zone: Array
-    scale: float
 
 
 def plot_solution(
@@ -75,130 +49,12 @@ def plot_solution(
     return figure
 
 
-def contact_lines(solution: Any) -> list[tuple[int, Integers, Array]]:
-    """Contact points in order along their lines: (pair, rows, coordinate) for every line.
-
-    ``rows`` index ``solution.points``. The coordinate is eta, across the fixed direction xi
-    (P2), or without one (P1) the arc position, a sum of chords. A pair whose points lie on
-    separate pieces of boundary gives several lines, one behind the other.
-    """
-    lines = []
-    for pair in np.unique(solution.pair).tolist():
-        rows = np.flatnonzero(solution.pair == pair)
-        points = solution.points[rows]
-        direction = solution.problem.contact[pair].direction
-        if direction is None:
-            lines += [(pair, rows[order], s) for order, s in _arcs(points)]
-        else:
-            dx, dy = np.asarray(direction, dtype=float) / np.hypot(*direction)
-            eta = points @ (-dy, dx)
-            order = np.argsort(eta, kind="stable")
-            lines.append((pair, rows[order], eta[order]))
-    return lines
-
-
-def _arcs(points: Array) -> list[tuple[Integers, Array]]:
-    """Order and arc position of points on curves: walks along the tree of neighbours."""
-    tree = neighbour_tree(points)
-    count, piece = connected_components(tree, directed=False)
-    arcs: list[tuple[Integers, Array]] = []
-    start = 0.0
-    for k in range(count):
-        members = np.flatnonzero(piece == k)
-        s = dijkstra(tree, directed=False, indices=members[0])[members]
-        s = dijkstra(tree, directed=False, indices=members[np.argmax(s)])[members]
-        s = start + (s.max() - s if s[0] > s[-1] else s)  # run as the points are numbered
-        order = np.argsort(s, kind="stable")
-        arcs.append((members[order], s[order]))
-        start = s.max()
-    return arcs
-
-
-def _subdivision(order: int) -> tuple[list[list[int]], list[list[int]]]:
-    """Small triangles (order^2, 3) and sides (3, order + 1) of a lattice triangle."""
-    number = {(b, c): k for k, (_, b, c) in enumerate(lattice(order).tolist())}
-    triangles = [
-        [number[b + db, c + dc] for db, dc in corners]
-        for b, c in number
-        for corners in (((0, 0), (1, 0), (0, 1)), ((1, 0), (1, 1), (0, 1)))
-        if all((b + db, c + dc) in number for db, dc in corners)
-    ]
-    steps = range(order + 1)
-    bottom, left = [number[k, 0] for k in steps], [number[0, k] for k in steps]
-    return triangles, [bottom, [number[order - k, k] for k in steps], left]
-
-
-def _scene(solution: Any, scale: float | None) -> Scene:
-    """Evaluate a solution for the picture."""
-    mesh, u = solution.mesh, solution.displacement
-    order = max(mesh.GetCurveOrder(), solution.order)
-    if order > 1:  # enough to look smooth on coarse meshes, no more than can be seen on fine ones
-        order = int(np.clip(np.sqrt(_MOST_TRIANGLES / mesh.ne), 1, 2 * order))
-    nodes = nodes_of(mesh, order)
-    triangles, sides = _subdivision(order)
-    edges = nodes.cells[:, sides].reshape(-1, order + 1)
-    ends = np.sort(edges[:, [0, -1]], axis=1)
-    _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
-    place = nodes.values(ng.CF((ng.x, ng.y)))
-    move = nodes.values(ng.CF((u[0], u[1])))
-    active = solution.points[solution.active]
-    at = KDTree(place).query(active)[1].astype(int)
-    if scale is None:
-        body = np.empty(len(place), dtype=np.int64)
-        body[nodes.cells] = nodes.body[:, None]
-        scale = _chosen_scale(solution, place, move, body)
-    return Scene(
-        moved=place + scale * move,
-        stress=von_mises(nodes.values(full_stress(solution))),
-        triangles=nodes.cells[:, triangles].reshape(-1, 3),
-        edges=edges[first],
-        outline=count == 1,
-        zone=place[at] + scale * move[at],
-        scale=scale,
-    )
-
-
-def _chosen_scale(solution: Any, place: Array, move: Array, body: Integers) -> float:
-    """Factor 1, 2, 5, 10, ... on the displacement: seen, yet no false overlap of the bodies.
-
-    Contact turns a gap e into `gap`; a factor s draws it as e - s (e - gap). For e, the distance
-    to the nearest node of another body errs on the side of a smaller factor.
-    """
-    size = np.ptp(place, axis=0).max()
-    largest = np.linalg.norm(move, axis=1).max()
-    factor = 0.04 * size / largest if largest > 0 else 1.0
-    points, gap = solution.points, solution.gap
-    if solution.active.any() and np.ptp(body) > 0:
-        overlap = 0.003 * max(np.ptp(points[solution.active], axis=0).max(), 0.01 * size)
-        own = body[KDTree(place).query(points)[1]]
-        for k in np.unique(own):
-            initial = KDTree(place[body != k]).query(points[own == k])[0]
-            closed = np.maximum(initial - gap[own == k], 1e-12 * size)
-            factor = min(factor, ((initial + overlap) / closed).min())
-    power = 10.0 ** np.floor(np.log10(factor))
-    return float(max(1.0, *(k * power for k in (0.5, 1, 2, 5) if k * power <= factor)))
-
-
-def _frame(scene: Scene) -> tuple[Array, Array] | None:
-    """Corners of a close-up of the zone in contact, None if the whole picture shows it."""
-    if len(scene.zone) == 0:
-        return None
-    size = np.ptp(scene.moved, axis=0).max()
-    low, high = scene.zone.min(axis=0), scene.zone.max(axis=0)
-    half = max(0.9 * (high - low).max(), 0.02 * size)
-    middle = (low + high) / 2
-    # At the rim of the picture, as on a symmetry plane, the window moves inwards.
-    inner, outer = scene.moved.min(axis=0) + 0.95 * half, scene.moved.max(axis=0) - 0.95 * half
-    middle = np.where(inner < outer, np.clip(middle, inner, outer), middle)
-    return (middle - half, middle + half) if half < 0.2 * size else None
-
-
 def _draw(figure: Figure, solution: Any, scale: float | None) -> None:
     """Bodies on the left, a close-up of the contact if needed, the pressure on the right."""
     from matplotlib.patches import Rectangle
 
-    scene = _scene(solution, scale)
-    frame = _frame(scene)
+    scene = picture(solution, scale)
+    frame = close_up(scene)
     top = scene.stress.max()
     if frame is not None:  # peaks at supports and corners shall not take the colours away
         seen = np.all((scene.moved >= frame[0]) & (scene.moved <= frame[1]), axis=1)

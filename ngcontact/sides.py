@@ -8,9 +8,10 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from .gap import ContactLine, partners
+from .gap import ContactLine
 from .incompressible import Share, Term
 from .lagrange import gauss_lobatto
+from .partners import partners
 from .trace import Trace
 
 Array = NDArray[np.float64]

@@ -11,12 +11,14 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from .balance import optimality, resultants
 from .discrete import Discrete
 from .estimate import Estimate, estimate
+from .moduli import power_of_two, root_of_squares
 from .motions import RigidMotion
 from .newton import Minimiser
 from .output import write_solution
-from .problem import Problem, boundary_mask
+from .problem import Problem
 from .space import strain
 from .transition import transitions
 
@@ -117,10 +119,14 @@ class Solution:
         return -(self.force[at, None] * directions[at]).sum(axis=0)
 
     def _pair_number(self, pair: int) -> int:
+        """`pair`, or an error unless it numbers a contact pair."""
         count = len(self.discrete.lines)
+        right = f"the pairs are numbered from 0 to {count - 1}" if count else "there is no contact"
+        if isinstance(pair, bool) or not isinstance(pair, int | np.integer):
+            raise TypeError(f"pair={pair!r} is not an integer; {right}")
         if not 0 <= pair < count:
-            raise ValueError(f"pair={pair} is not a contact pair; the problem has {count} of them")
-        return pair
+            raise ValueError(f"pair={pair} is not a contact pair; {right}")
+        return int(pair)
 
     @cached_property
     def nodal_reaction(self) -> Array:
@@ -136,22 +142,7 @@ class Solution:
         A node shared by several of them counts for the last entry of `displacement`, then for
         `sliding`; a name that several bodies share gives the sum over them.
         """
-        trace = self.discrete.space.trace
-        names = np.array(self.mesh.GetBoundaries())
-        patterns = [
-            *reversed(list(self.problem.displacement)),  # at a common node the last one is in force
-            *([] if self.problem.sliding is None else [str(self.problem.sliding)]),
-        ]
-        counted = np.zeros(len(self.nodal_reaction), dtype=bool)
-        result: dict[str, Array] = {}
-        for pattern in patterns:
-            mask = boundary_mask(self.mesh, pattern)
-            for name in dict.fromkeys(names[mask]):
-                nodes = np.unique(trace.nodes[trace.select(mask & (names == name))])
-                nodes = nodes[~counted[nodes]]
-                counted[nodes] = True
-                result[str(name)] = self.nodal_reaction[nodes].sum(axis=0)
-        return result
+        return resultants(self.problem, self.discrete.space.trace, self.nodal_reaction)
 
     @cached_property
     def free_motions(self) -> list[RigidMotion]:
@@ -172,22 +163,20 @@ class Solution:
     @cached_property
     def energy(self) -> float:
         """Total potential energy L(u_h) of HH81 (2.6), per unit thickness."""
-        u = self.displacement.vec.FV().NumPy()
-        d = self.discrete.space
-        size = _size(u)  # squares of displacements may leave the range where these do not
+        u, d = self.displacement.vec.FV().NumPy(), self.discrete.space
+        size = power_of_two(u)  # squares of displacements may leave the range where these do not
         u, f = u / size, d.f / size
         return float(u @ (d.A @ u) / 2 - f @ u) * size * size
 
     @cached_property
     def energy_norm(self) -> float:
         """A(u_h, u_h)^(1/2), from the strains: large rigid motions do not cancel in them."""
-        size = _size(self.displacement.vec.FV().NumPy())
+        size = power_of_two(self.displacement.vec.FV().NumPy())
         e = strain(self.displacement) / size
         total = 0.0
         for body, law in self.problem.materials.items():
             density = ng.InnerProduct(law.voigt(self.problem.model) * e, e).Compile()
-            order = 2 * self.order + 2
-            total += ng.Integrate(density, self.mesh.Materials(body), order=order)
+            total += ng.Integrate(density, self.mesh.Materials(body), order=2 * self.order + 2)
         return float(np.sqrt(total)) * size
 
     @cached_property
@@ -213,8 +202,7 @@ class Solution:
     @property
     def error_estimate(self) -> float:
         """Estimated error in the energy norm, A(u - u_h, u - u_h)^(1/2)."""
-        size = _size(self.indicators)
-        return float(np.sqrt(((self.indicators / size) ** 2).sum())) * size
+        return root_of_squares(self.indicators)
 
     @property
     def relative_error_estimate(self) -> float:
@@ -232,25 +220,7 @@ class Solution:
         contact force;
         `complementarity`: sum of force times gap over force times length.
         """
-        p, y, force = self.discrete.program, self.minimiser.u, self.force
-        residual = p.b - p.K @ y - p.R.T @ force
-        terms = abs(p.K) @ np.abs(y)
-        load = max(np.abs(x).max(initial=0.0) for x in (p.b, terms, force))
-        length = max(np.abs(y).max(initial=0.0), np.abs(p.g[self.active]).max(initial=0.0))
-        largest = np.abs(force).max(initial=0.0)
-        one_sided = force[~p.equality]
-
-        def over(value: float, scale: float) -> float:
-            return float(value / scale) if value > 0 else 0.0
-
-        return {
-            "equilibrium": over(np.abs(residual[~p.fixed]).max(initial=0.0), load),
-            "penetration": over(-self.gap.min(initial=0.0), length),
-            "tension": over(-one_sided.min(initial=0.0), largest),
-            "complementarity": float(
-                np.abs(force / (largest or 1.0) * (self.gap / (length or 1.0))).sum()
-            ),
-        }
+        return optimality(self.discrete.program, self.minimiser)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write `path` (.vtu) and, beside it, ``<stem>_contact.vtp``."""
@@ -288,8 +258,3 @@ class Solution:
         return ", ".join(parts)
 
     __repr__ = __str__  # instead of all arrays
-
-
-def _size(values: Array) -> float:
-    """Largest absolute value, or 1 where all vanish."""
-    return float(np.abs(values).max(initial=0.0)) or 1.0

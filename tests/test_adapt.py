@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from drivers import cases
-from drivers.exact import relative_energy_error
+from drivers.exact import patch, relative_energy_error
 from geometries import blocks, disc_on_block
 from ngcontact import Contact, ContactError, Elastic, NoEquilibriumError, Problem, adapt, solve
 from ngcontact.mesh import first_mesh
@@ -186,19 +186,8 @@ def test_it_stops_at_the_tolerance(tolerance):
     assert all(e > tolerance for e in estimates[:-1])
 
 
-@pytest.mark.parametrize(
-    ("make", "order"),
-    [
-        (cases.pressure_patch, 1),
-        (cases.pressure_patch, 3),
-        (lambda: cases.pressure_patch(p1=0.5), 2),
-        (lambda: cases.pressure_patch(p1=0.5), 4),
-        (cases.polygonal_patch, 1),
-        (cases.polygonal_patch, 2),
-    ],
-)
-def test_an_exact_solution_is_not_refined(make, order):
-    case = make()
+def test_an_exact_solution_is_not_refined(reproduced):
+    case, order = reproduced
     [solution] = adapt(case.problem, maxh=0.4, order=order)
     assert relative_energy_error(solution, case.exact) < 1e-11
 
@@ -396,3 +385,34 @@ def test_bodies_that_only_move_rigidly_take_one_level():
     )
     [solution] = adapt(lifted, order=2, max_dofs=5000)
     assert not solution.active.any()
+
+
+def nearly_exact(nu, part):
+    """A constant stress, and `part` of it times a smooth one that no element represents."""
+    material = Elastic(E=1.0, nu=nu)
+    exact = patch(material, material)
+    top = exact.displacement["upper"] + part * ng.CF((0, ng.sin(3 * ng.x)))
+    return Problem(
+        geometry=blocks(),
+        materials={"upper|lower": material},
+        displacement={"top": top, "bottom": exact.displacement["lower"]},
+        contact=[Contact("upper_contact", "lower_contact")],
+    )
+
+
+@pytest.mark.parametrize("nu", [0.3, 0.499999, 0.49999999])
+@pytest.mark.parametrize("order", [2, 3, 4])
+def test_an_exact_solution_takes_one_level(order, nu):
+    """Its estimate is round-off, which grows with kappa / mu: at 5e7 it is 6e-8 of the norm."""
+    [solution] = adapt(nearly_exact(nu, 0.0), maxh=0.3, order=order, max_dofs=6000)
+    assert solution.active.all()
+
+
+@pytest.mark.parametrize(("nu", "part", "tolerance"), [(0.3, 1e-7, 1e-9), (0.499999, 1e-4, 5e-6)])
+def test_small_errors_are_no_round_off(nu, part, tolerance):
+    """Real errors are refined away down to digits that round-off leaves."""
+    first, *_, last = adapt(
+        nearly_exact(nu, part), maxh=0.6, order=4, tolerance=tolerance, max_dofs=20_000
+    )
+    assert first.relative_error_estimate > 3 * tolerance
+    assert last.relative_error_estimate <= tolerance

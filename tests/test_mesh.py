@@ -10,12 +10,13 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 import pytest
+from conftest import coordinates, vertices
 from netgen.occ import OCCGeometry
 
 from geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
 from geometries.region import body, compound, polygon, quarter_arc
-from ngcontact import Contact, Elastic, Problem
-from ngcontact.mesh import first_mesh
+from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact.mesh import check_curves, first_mesh
 from ngcontact.problem import boundary_mask
 from ngcontact.trace import boundary_trace
 
@@ -116,18 +117,6 @@ SIZES = (None, 1.0, 0.4, 0.11)
 
 def pressed(geometry, bodies, *contact):
     return Problem(geometry=geometry, materials=dict.fromkeys(bodies, SOFT), contact=contact)
-
-
-def coordinates(mesh):
-    """Copy of all vertices; a view outlives no mesh."""
-    return np.array(mesh.ngmesh.Coordinates())[:, :2]
-
-
-def vertices(mesh, pattern):
-    """Vertices (k, 2) of the boundaries of that name."""
-    trace = boundary_trace(mesh, 1)
-    numbers = np.unique(trace.nodes[trace.select(boundary_mask(mesh, pattern))])
-    return coordinates(mesh)[numbers]
 
 
 def lengths(mesh, pattern):
@@ -419,3 +408,66 @@ def test_two_pairs_that_share_an_edge_leave_no_slivers_on_it(left, right, maxh):
     x, y = xy[ends].mean(axis=1).T
     enclosed = (x * sides[:, 1] - y * sides[:, 0]).sum() / 2
     assert ng.Integrate(1, mesh) == pytest.approx(enclosed, rel=1e-12)
+
+
+def scaled_mesh(geometry, size, degree):
+    """Curved mesh of a geometry of `size` times its own."""
+    shape = geometry.shape.Scale(occ.Pnt(0, 0, 0), size)
+    mesh = ng.Mesh(OCCGeometry(shape, dim=2).GenerateMesh(maxh=0.25 * size))
+    mesh.Curve(degree)
+    return mesh
+
+
+CURVED = {  # the smallest size of which check_curves accepts the mesh
+    "arcs": (disc_on_block(), 5e-5),
+    "splines": (graphs(lambda x: wave(x) + 0.01, hill), 1e-2),
+}
+
+
+@pytest.mark.parametrize("large", [False, True])
+@pytest.mark.parametrize("name", CURVED)
+def test_accepted_sizes_are_curved_as_size_1_is(name, large):
+    geometry, size = CURVED[name]
+    size = 1e8 if large else size  # Netgen meshes sizes to 3e8
+    one, other = (scaled_mesh(geometry, s, 5) for s in (1.0, size))
+    check_curves(other)
+    nodes = [boundary_trace(mesh, 4).curve for mesh in (one, other)]
+    # Round-off; measured 1e-15. At a fifth of the smallest size arcs are off by 3e-4.
+    assert np.abs(nodes[1] / size - nodes[0]).max() < ROUND_OFF
+
+
+@pytest.mark.parametrize("name", CURVED)
+def test_smaller_curves_ask_for_another_unit(name):
+    geometry, size = CURVED[name]
+    with pytest.raises(ValueError, match=r'curved edge ".*" has the extent .* unit of length'):
+        check_curves(scaled_mesh(geometry, size / 5, 2))
+
+
+def test_small_curves_are_refused_where_elements_are_curved():
+    shape = disc_on_block().shape.Scale(occ.Pnt(0, 0, 0), 1e-6)
+    contact = Contact("disc_arc", "block_top", direction=(0, -1))
+    problem = Problem(
+        geometry=OCCGeometry(shape, dim=2),
+        materials=dict.fromkeys(("disc", "block"), SOFT),
+        displacement={"block_bottom": (0, 0), "disc_top": (0, -1e-8)},
+        contact=[contact],
+    )
+    assert solve(problem, maxh=3e-7, order=1).active.any()  # straight sides, exact vertices
+    with pytest.raises(ValueError, match=r'"disc_arc".*unit of length'):
+        solve(problem, maxh=3e-7, order=2)
+
+
+def test_refinement_beyond_the_kernel_s_lengths_is_refused():
+    """Measured: elements beside the end of an arc turn over at 5e-7 units, order 4."""
+    mesh = ng.Mesh(disc_on_block().GenerateMesh(maxh=0.3))
+    for level in range(20):
+        if level == 18:
+            check_curves(mesh)  # segments of 1.2e-6: measured, elements still have their shape
+        corner = np.linalg.norm(coordinates(mesh) - [1.0, 1.0], axis=1).argmin()
+        elements = mesh.ngmesh.Elements2D().NumPy()
+        elements["refine"] = (elements["nodes"][:, :3].astype(int) - 1 == corner).any(axis=1)
+        mesh.Refine()
+        mesh = ng.Mesh(mesh.ngmesh.Copy())
+    with pytest.raises(ValueError, match=r'"disc_arc".* segments of [0-9.]+e-07'):
+        check_curves(mesh)
+    check_curves(ng.Mesh(blocks().GenerateMesh(maxh=0.3)))

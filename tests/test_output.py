@@ -1,4 +1,4 @@
-"""Files and pictures of a solution: ``ngcontact.output``, ``ngcontact.plot``."""
+"""Files and pictures of a solution: ``output``, ``scene`` and ``plot``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
 from ngcontact import Contact, Elastic, Hooke, Problem, output, solve
 from ngcontact.output import check_path, lattice, write_series, write_solution
-from ngcontact.plot import contact_lines, plot_solution
+from ngcontact.plot import plot_solution
+from ngcontact.scene import contact_lines
 
 MAXH = 0.4
 

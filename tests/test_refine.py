@@ -11,6 +11,7 @@ from itertools import pairwise
 import ngsolve as ng
 import numpy as np
 import pytest
+from conftest import coordinates, vertices
 from netgen.meshing import Element1D, Element2D, FaceDescriptor, Mesh, MeshPoint, Pnt
 from netgen.occ import OCCGeometry
 
@@ -99,17 +100,6 @@ ENLARGING = {
 ALL = {f"bounded {k}": v for k, v in BOUNDED.items()} | {
     f"enlarging {k}": v for k, v in ENLARGING.items()
 }
-
-
-def coordinates(mesh):
-    return np.array(mesh.ngmesh.Coordinates())[:, :2]
-
-
-def vertices(mesh, pattern):
-    """Vertices (k, 2) of the boundaries of that name."""
-    trace = boundary_trace(mesh, 1)
-    numbers = np.unique(trace.nodes[trace.select(boundary_mask(mesh, pattern))])
-    return coordinates(mesh)[numbers]
 
 
 def shapes(mesh):

@@ -13,7 +13,16 @@ from drivers.exact import relative_energy_error
 from drivers.stress import held
 from geometries import blocks, rings
 from geometries.region import body, compound, polygon, quarter_arc
-from ngcontact import Contact, Elastic, NoEquilibriumError, Problem, adapt, solve
+from ngcontact import (
+    Contact,
+    ConvergenceError,
+    Elastic,
+    NoEquilibriumError,
+    Problem,
+    adapt,
+    solve,
+)
+from ngcontact.bordered import SingularError, Systems
 from ngcontact.discrete import discretise, minimise_energy
 from ngcontact.rigid import rigid_motions
 
@@ -305,3 +314,26 @@ def test_a_stiff_loose_body_does_not_slow_a_soft_one():
     weight = WEIGHT * mesh_area(solution, "disc")
     assert solution.contact_force(0)[1] == pytest.approx(weight, rel=1e-8)
     assert not solution.contact_force(1).any()
+
+
+@pytest.mark.parametrize("stopped", [1, 2])
+def test_a_failure_carries_the_iterate_where_the_bodies_are(stopped, monkeypatch):
+    """The rows of the last system are closed; relative to the placing they would be 0.1 off."""
+    problem = pressed_blocks(0.1, direction=(0, -1), gap=0.02 * ng.x**2 + 0.1)
+    discrete = discretise(problem, solve(problem, maxh=0.3).mesh, 2, "isoparametric")
+    p = discrete.program
+    assert np.abs(discrete.rigid.rows @ discrete.rigid.placing).max() > 0.09
+    original, met = Systems.solve, []
+
+    def fail(self, active, anchor=None):
+        if len(met) == stopped:
+            raise SingularError("stopped")
+        met.append(active)
+        return original(self, active, anchor)
+
+    monkeypatch.setattr(Systems, "solve", fail)
+    with pytest.raises(ConvergenceError, match="stopped") as failure:
+        minimise_energy(discrete, np.ones(len(p.g), dtype=bool))
+    u, closed = failure.value.iterate.u, met[-1]
+    np.testing.assert_allclose(u[p.unknown[closed]], p.g[closed], rtol=ROUND_OFF)
+    assert np.abs(p.kernel.conditions @ u).max() <= ROUND_OFF * np.abs(u).max()

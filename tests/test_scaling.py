@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.motion import Motion, differences, posed, swapped
+from drivers.compared import differences
+from drivers.motion import Motion, posed, swapped
 from drivers.stress import scaling, symmetry
 from drivers.stress.interruption import while_writing
 from drivers.stress.symmetry import cornered, disc_scene, graph_scene, hertz_scene, parting

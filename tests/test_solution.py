@@ -194,14 +194,6 @@ def test_a_solution_is_shown_on_one_line():
     assert solution.work["estimates"] == 0
 
 
-@pytest.mark.parametrize("pair", [1, -1, 7])
-def test_a_pair_that_is_none_is_refused_with_its_number(pair):
-    solution = solve(partly_open(), maxh=0.5)
-    for read in (solution.contact_force, solution.transitions):
-        with pytest.raises(ValueError, match=f"pair={pair} .* has 1"):
-            read(pair)
-
-
 def test_a_solution_without_pairs():
     solution = solve(
         Problem(
@@ -218,8 +210,18 @@ def test_a_solution_without_pairs():
     # The weight of the quarter disc, up to the area of the curved mesh.
     assert solution.reactions["top"] == pytest.approx([0, math.pi / 4], abs=1e-3)
     assert max(solution.residuals.values()) < EXACT
-    with pytest.raises(ValueError, match=r"pair=0 .* has 0"):
+    with pytest.raises(ValueError, match=r"pair=0 .* there is no contact"):
         solution.contact_force()
+
+
+@pytest.mark.parametrize("method", ["contact_force", "transitions"])
+def test_a_pair_that_is_none_is_refused_with_its_value(method):
+    read = getattr(solve(partly_open(), maxh=0.5), method)
+    for error, values in ((ValueError, (1, -1, 7)), (TypeError, ("a", None, 0.0, True))):
+        for pair in values:
+            with pytest.raises(error, match=f"pair={pair!r} is .* numbered from 0 to 0"):
+                read(pair)
+    assert read(np.int32(0)).tolist() == read().tolist()
 
 
 @pytest.mark.parametrize("name", ["missing/disc.vtu", "disc.txt"])

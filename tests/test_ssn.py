@@ -131,6 +131,21 @@ def membrane(n=60, load=-1.0, height=-0.02):
     return K, np.full(n, load * h), np.full(n, -height)
 
 
+def first_unknowns_bounded(K, b, g):
+    """The program of bounds g on the first unknowns, none of them fixed."""
+    m, n = g.size, b.size
+    return Program(
+        K=K,
+        b=b,
+        R=sp.identity(n, format="csr")[:m],
+        g=g,
+        equality=np.zeros(m, dtype=bool),
+        fixed=np.zeros(n, dtype=bool),
+        values=np.zeros(n),
+        unknown=np.arange(m),
+    )
+
+
 def counting_factor(K, calls):
     """Dense factor of principal submatrices that records each request."""
 
@@ -150,16 +165,7 @@ def test_bordering_equals_refactorising(monkeypatch, border):
     K, b, g = membrane()
     n = g.size
     flip = sp.identity(n, format="csr")
-    program = Program(
-        K=K,
-        b=-b,
-        R=flip,
-        g=g,
-        equality=np.zeros(n, dtype=bool),
-        fixed=np.zeros(n, dtype=bool),
-        values=np.zeros(n),
-        unknown=np.arange(n),
-    )
+    program = first_unknowns_bounded(K, -b, g)
     calls = []
     start = np.zeros(n, dtype=bool)
     start[::2] = True
@@ -249,16 +255,7 @@ def test_bordered_systems_do_not_depend_on_the_stiffness(stiffness):
         X = rng.normal(size=(n, n + 2))
         K, b, g = sp.csr_matrix(X @ X.T), rng.normal(size=n), 0.3 * rng.normal(size=m)
         rows = sp.identity(n, format="csr")[:m]
-        program = Program(
-            K=stiffness * K,
-            b=stiffness * b,
-            R=rows,
-            g=g,
-            equality=np.zeros(m, dtype=bool),
-            fixed=np.zeros(n, dtype=bool),
-            values=np.zeros(n),
-            unknown=np.arange(m),
-        )
+        program = first_unknowns_bounded(stiffness * K, stiffness * b, g)
         result = minimise(Systems(program, counting_factor(program.K, [])), rng.random(m) < 0.5)
         reference = solve_qp(K, b, rows, g)
         np.testing.assert_array_equal(result.active, reference.active)

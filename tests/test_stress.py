@@ -7,7 +7,8 @@ import math
 
 import pytest
 
-from drivers.motion import Motion, differences, posed
+from drivers.compared import differences
+from drivers.motion import Motion, posed
 from drivers.stress import __path__ as folder
 from drivers.stress import refused
 from drivers.stress.__main__ import main, modules

@@ -17,7 +17,8 @@ from drivers.cases import (
     one_transition,
     pressed_disc,
 )
-from drivers.motion import Array, Motion, Scene, differences, moved_mesh, posed, swapped
+from drivers.compared import differences
+from drivers.motion import Array, Motion, Scene, moved_mesh, posed, swapped
 from drivers.stress import Outcome, solved
 from geometries import blocks
 from ngcontact import Contact, Elastic, Problem, Solution, solve

@@ -1,0 +1,61 @@
+"""Partner points: where the facing body is met from points of the secondary."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .projection import Partners, cast, coincident
+from .trace import Trace
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+ROUND_OFF = 4 * np.finfo(float).eps  # of a measured gap, relative to the coordinates
+
+
+def _beyond_own_body(
+    trace: Trace, own: Index, points: Array, directions: Array, found: Partners
+) -> NDArray[np.bool_]:
+    """Whether bodies overlap so far that the partner lies on the other side of the own body.
+
+    Overlap puts a partner behind the point, inside the own body; one that the backward ray meets
+    only after it has left that body belongs to a far side.
+    """
+    beyond = np.zeros(len(points), dtype=bool)
+    behind = (found.segment >= 0) & (found.distance < 0)
+    for body in np.unique(trace.body[own[behind]]):
+        at = np.flatnonzero(behind & (trace.body[own] == body))
+        rim = np.flatnonzero(trace.body == body)
+        leaves = cast(points[at], -directions[at], trace.curve[rim], -trace.side[rim], ahead=True)
+        beyond[at] = (leaves.segment >= 0) & (-found.distance[at] > leaves.distance)
+    return beyond
+
+
+def partners(
+    trace: Trace, facing: Index, own: Index, points: Array, directions: Array
+) -> tuple[Index, Array, Array, int]:
+    """Points of the segments `facing` opposite to `points`, which lie on the segments `own`.
+
+    Returns
+    -------
+    segment : ndarray of int (k,)
+        -1 where there is none.
+    s, distance : ndarray (k,)
+    searches : int
+        0 if all of them are nodes at the same place.
+    """
+    curve, side = trace.curve[facing], trace.side[facing]
+    found = coincident(points, directions, curve, side, trace.order)
+    rest = np.flatnonzero(found.segment < 0)
+    if rest.size:
+        other: Partners = cast(points[rest], directions[rest], curve, side)
+        other.segment[
+            _beyond_own_body(trace, own[rest], points[rest], directions[rest], other)
+        ] = -1
+        found.segment[rest] = other.segment
+        found.s[rest], found.distance[rest] = other.s, other.distance
+    # Points that only round-off keeps apart touch: no load is too small to be felt.
+    found.distance[np.abs(found.distance) <= ROUND_OFF * np.abs(points).max(initial=0.0)] = 0.0
+    segment = np.where(found.segment < 0, -1, facing[found.segment] if facing.size else -1)
+    return segment, found.s, found.distance, int(rest.size > 0)
