@@ -17,7 +17,7 @@ TOUCHING = 1e-12  # gap, relative to the zone, up to which points start active
 
 
 def first_active_set(discrete: Discrete) -> Mask:
-    """Cold start: the points that touch before the load, or of each pair the nearest ones.
+    """Cold start: the points that touch before the load.
 
     Bodies that contact alone can hold are first placed, rigid, where the load presses them.
     """
@@ -25,14 +25,12 @@ def first_active_set(discrete: Discrete) -> Mask:
     gap, carries = p.g, np.zeros(len(p.g), dtype=bool)
     if (rigid := discrete.rigid) is not None:
         gap, carries = gap - rigid.rows @ rigid.placing, rigid.carries
-    at_rest = not p.b.any() and not p.values[p.fixed].any()
     start, active = 0, [np.zeros(0, dtype=bool)]
     for line in discrete.lines:
         distance = gap[start : start + len(line.node)]
         start += len(line.node)
         size = np.ptp(line.position, axis=0).max(initial=0.0)
-        nearest = 0.0 if at_rest else max(distance.min(initial=np.inf), 0.0)
-        active.append(distance <= nearest + TOUCHING * size)
+        active.append(distance <= TOUCHING * size)
     return np.concatenate(active) | carries
 
 
@@ -59,7 +57,7 @@ def carried_active_set(discrete: Discrete, previous: Discrete, state: Minimiser)
         # A new point in the middle of two: active if one of them is, whatever round-off says.
         tied = distance[:, 1] <= (1 + 1e-6) * away
         active = state.active[at][nearest] | (tied & state.active[at][near[:, 1]])
-        if discrete.space.trace.order > 1 and away.max() > size:  # not the same points
+        if previous.space.trace.order > 1 and away.max() > size:  # not the same points
             ends = transitions(old, slack[at], state.active[at])
             for inner, outer, place in zip(ends.inner, ends.outer, ends.position, strict=True):
                 around = (nearest == inner) | (nearest == outer)

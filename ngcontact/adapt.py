@@ -5,16 +5,16 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from numbers import Real
 
 import ngsolve as ng
 import numpy as np
 
-from .active import carried_active_set, first_active_set
-from .discrete import discretise, minimise_energy
-from .errors import ConvergenceError
+from .errors import ContactError, ConvergenceError
+from .level import solve_level, unknowns
 from .mark import doerfler
-from .mesh import check_curves, first_mesh
+from .mesh import first_mesh
 from .moduli import bulk_moduli, shear_moduli, warn_of_locking
 from .problem import Problem
 from .refine import refined
@@ -23,6 +23,11 @@ from .space import check_element, curve
 
 ROUND_OFF = 1e-12  # relative estimate at which refinement stops: the solution is exact
 NOISE = 100 * np.finfo(float).eps  # of a stress, relative to its terms; measured 0.5 to 50 eps
+# A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
+LARGE = 20_000
+COARSE = 4  # elements of that run along the largest extent
+COARSE_ORDER = 3
+COARSE_DOFS = 1500
 
 log = logging.getLogger("ngcontact")
 
@@ -82,45 +87,28 @@ def solve(
     problem.check(mesh)
     if start is None:
         warn_of_locking(problem, mesh, order)
-    return _solve_checked(problem, mesh, order, element, start)
-
-
-def _solve_checked(
-    problem: Problem, mesh: ng.Mesh, order: int, element: str, start: Solution | None
-) -> Solution:
-    """`solve` on a mesh of which names and values are known to be right."""
-    mesh, curved = curve(mesh, order, element)
-    if curved and mesh.GetCurveOrder() > 1:  # straight sides have no middles to place
-        check_curves(mesh)
-    here = (mesh, order, element)
-    same = start is not None and (start.mesh, start.order, start.element) == here
-    discrete = discretise(problem, *here, start.discrete if start is not None and same else None)
-    if start is None:
-        active = first_active_set(discrete)
-    else:
-        active = carried_active_set(discrete, start.discrete, start.minimiser)
-    minimiser = minimise_energy(discrete, active)
-    displacement = ng.GridFunction(discrete.space.V)
-    displacement.vec.FV().NumPy()[:] = discrete.space.basis @ (discrete.basis.T @ minimiser.u)
-    solution = Solution(
-        problem=problem,
-        mesh=mesh,
-        order=order,
-        element=element,
-        displacement=displacement,
-        discrete=discrete,
-        minimiser=minimiser,
-        work={
-            "assemblies": int(discrete.assembled),
-            "factorizations": minimiser.factorizations,
-            "back_solves": minimiser.back_solves,
-            "gap_searches": sum(line.searches for line in discrete.lines),
-            "curved_elements": curved,
-            "estimates": 0,
-        },
-    )
+    coarse = _coarse_run(problem, mesh, order, element) if start is None else []
+    solution = solve_level(problem, mesh, order, element, coarse[-1] if coarse else start)
+    solution = replace(solution, coarse_levels=len(coarse))
     log.info("%s", solution)
     return solution
+
+
+def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> list[Solution]:
+    """A short adaptive run, to start a large mesh near its active set.
+
+    Empty where it would not pay: on small meshes, and without a CAD geometry to mesh coarsely.
+    """
+    given = isinstance(problem.geometry, ng.Mesh)
+    searched = any(not contact.bilateral for contact in problem.contact)
+    if given or not searched or unknowns(mesh, order, element) < LARGE:
+        return []
+    size = float(np.ptp(np.array(mesh.ngmesh.Coordinates()), axis=0).max()) / COARSE
+    try:
+        return list(adapt(problem, maxh=size, order=COARSE_ORDER, max_dofs=COARSE_DOFS))
+    except (ContactError, ValueError) as error:  # it decides nothing but the start
+        log.debug("no coarse run: %s", error)
+        return []
 
 
 def adapt(
@@ -217,7 +205,7 @@ def _levels(
     """Levels of `adapt` on checked input."""
     solution: Solution | None = None
     while unknowns(mesh, order, element) <= max_dofs:
-        solution = _solve_checked(problem, mesh, order, element, solution)
+        solution = solve_level(problem, mesh, order, element, solution)
         error = solution.relative_error_estimate
         if not np.isfinite(solution.error_estimate):  # it would mark nothing, for ever
             raise ConvergenceError(
@@ -232,11 +220,3 @@ def _levels(
             return
         mesh = refined(problem, solution.mesh, doerfler(solution.indicators, theta))
         mesh, _ = curve(mesh, order, element)
-
-
-def unknowns(mesh: ng.Mesh, order: int, element: str) -> int:
-    """Number of unknowns of the displacement on a mesh that is curved to the element's degree."""
-    inner = (order - 1) * (order - 2) // 2
-    # Functions linear in physical coordinates are kept in a space with boundary edge functions.
-    edges = mesh.GetNE(ng.BND) if element == "physical" and mesh.GetCurveOrder() > 1 else 0
-    return 2 * (mesh.nv + (order - 1) * mesh.nedge + edges + inner * mesh.ne)

@@ -50,7 +50,9 @@ class Solution:
         Its solution.
     work : dict
         Counts of assemblies, factorizations, back_solves, gap_searches, curved_elements and
-        estimates spent on this solution.
+        estimates spent on this solution, on its mesh.
+    coarse_levels : int
+        Levels of the coarse adaptive run that told `solve` the first active set of a large mesh.
     """
 
     problem: Problem
@@ -61,6 +63,7 @@ class Solution:
     discrete: Discrete
     minimiser: Minimiser
     work: dict[str, int] = field(default_factory=dict)
+    coarse_levels: int = 0
 
     @cached_property
     def stress(self) -> ng.CoefficientFunction:

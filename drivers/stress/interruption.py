@@ -217,6 +217,8 @@ def in_another_process() -> Iterator[Outcome]:
 
 def outcomes() -> Iterator[Outcome]:
     """In memory, while writing, and in another process where Ctrl-C can be sent to one."""
+    # A process started in the background of a shell ignores Ctrl-C, and so would its children.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     yield from in_memory()
     yield from while_writing()
     if sys.platform != "win32":

@@ -1,0 +1,56 @@
+"""Solution of a checked problem on one mesh."""
+
+from __future__ import annotations
+
+import ngsolve as ng
+
+from .active import carried_active_set, first_active_set
+from .discrete import discretise, minimise_energy
+from .mesh import check_curves
+from .problem import Problem
+from .solution import Solution
+from .space import curve
+
+
+def unknowns(mesh: ng.Mesh, order: int, element: str) -> int:
+    """Number of unknowns of the displacement on a mesh that is curved to the element's degree."""
+    inner = (order - 1) * (order - 2) // 2
+    # Functions linear in physical coordinates are kept in a space with boundary edge functions.
+    edges = mesh.GetNE(ng.BND) if element == "physical" and mesh.GetCurveOrder() > 1 else 0
+    return 2 * (mesh.nv + (order - 1) * mesh.nedge + edges + inner * mesh.ne)
+
+
+def solve_level(
+    problem: Problem, mesh: ng.Mesh, order: int, element: str, start: Solution | None
+) -> Solution:
+    """Solution on one mesh, of which names and values are known to be right."""
+    mesh, curved = curve(mesh, order, element)
+    if curved and mesh.GetCurveOrder() > 1:  # straight sides have no middles to place
+        check_curves(mesh)
+    here = (mesh, order, element)
+    same = start is not None and (start.mesh, start.order, start.element) == here
+    discrete = discretise(problem, *here, start.discrete if start is not None and same else None)
+    if start is None:
+        active = first_active_set(discrete)
+    else:
+        active = carried_active_set(discrete, start.discrete, start.minimiser)
+    minimiser = minimise_energy(discrete, active)
+    displacement = ng.GridFunction(discrete.space.V)
+    displacement.vec.FV().NumPy()[:] = discrete.space.basis @ (discrete.basis.T @ minimiser.u)
+    return Solution(
+        problem=problem,
+        mesh=mesh,
+        order=order,
+        element=element,
+        displacement=displacement,
+        discrete=discrete,
+        minimiser=minimiser,
+        work={
+            "assemblies": int(discrete.assembled),
+            "factorizations": minimiser.factorizations,
+            "back_solves": minimiser.back_solves,
+            "gap_searches": sum(line.searches for line in discrete.lines),
+            "curved_elements": curved,
+            "estimates": 0,
+        },
+    )
