@@ -1,12 +1,21 @@
-"""Contact of elastic bodies: Haslinger and Hlavacek (1981) for NGSolve."""
+"""Contact of elastic bodies: Haslinger and Hlavacek (1981) for NGSolve.
 
-from .adapt import adapt, solve
+What solves and writes is imported when it is first asked for: with SciPy it would take as long to
+load as NGSolve itself.
+"""
+
+import importlib as _importlib
+import typing as _typing
+
 from .errors import ContactError, ConvergenceError, NoEquilibriumError
 from .material import Elastic, Hooke
-from .output import write_series
 from .problem import Contact, Problem
-from .solution import Solution
-from .ssn import solve_qp
+
+if _typing.TYPE_CHECKING:
+    from .adaptive import adapt, solve
+    from .output import write_series
+    from .solution import Solution
+    from .ssn import solve_qp
 
 __all__ = [
     "Contact",
@@ -22,3 +31,25 @@ __all__ = [
     "solve_qp",
     "write_series",
 ]
+
+_MODULES = {
+    "Solution": "solution",
+    "adapt": "adaptive",
+    "solve": "adaptive",
+    "solve_qp": "ssn",
+    "write_series": "output",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Return a public name of a module that is not loaded yet."""
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(_importlib.import_module(f".{_MODULES[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return all names, loaded or not."""
+    return sorted({*globals(), *__all__})

@@ -13,8 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 import ngsolve as ng
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from ngcontact.material import refuse_where
 
@@ -56,6 +54,9 @@ def _mask(select: Callable[[str], ng.Region], pattern: str) -> np.ndarray:
 
 def body_of_vertex(mesh: ng.Mesh) -> np.ndarray:
     """Return the number of the connected piece of the mesh each vertex belongs to, int (nv,)."""
+    from scipy.sparse import coo_matrix  # not needed to state a problem
+    from scipy.sparse.csgraph import connected_components
+
     nodes = _nodes(mesh.ngmesh.Elements2D(), 3)
     size = len(mesh.ngmesh.Coordinates())
     start, end = nodes[:, [0, 1]].ravel(), nodes[:, [1, 2]].ravel()

@@ -19,7 +19,7 @@ from ngcontact import level as one_level
 from ngcontact.mesh import first_mesh
 
 SOFT = Elastic(E=1.0, nu=0.3)
-LOOP = import_module("ngcontact.adapt")  # the attribute of the package is the function
+LOOP = import_module("ngcontact.adaptive")
 DISCRETE = import_module("ngcontact.discrete")
 
 

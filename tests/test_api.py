@@ -87,7 +87,7 @@ def run_python(code):
 
 def test_the_public_names_are_the_documented_ones():
     assert sorted(ngcontact.__all__) == PUBLIC
-    public = {name for name in vars(ngcontact) if not name.startswith("_")}
+    public = {name for name in dir(ngcontact) if not name.startswith("_")}
     modules = {name for name in public if inspect.ismodule(getattr(ngcontact, name))}
     assert public - modules == set(PUBLIC)
 
@@ -148,7 +148,7 @@ def test_failures_have_one_base():
 
 
 def test_import_is_silent_and_light():
-    heavy = "('pyvista', 'vtk', 'vtkmodules', 'matplotlib', 'IPython', 'webgui_jupyter_widgets')"
+    heavy = "('scipy', 'pyvista', 'vtk', 'vtkmodules', 'matplotlib', 'IPython', 'webgui_jupyter_widgets')"
     out, err = run_python(
         f"import sys, ngcontact; print([name for name in {heavy} if name in sys.modules])"
     )
@@ -201,7 +201,7 @@ def test_modules_do_not_import_each_other_in_circles():
         order += free
         for name in free:
             del graph[name]
-    assert order[-1] == "__init__"
+    assert order.index("__init__") < order.index("adaptive")  # loaded when first asked for
 
 
 def test_every_driver_and_every_geometry_is_tested():
