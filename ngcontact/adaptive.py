@@ -187,7 +187,7 @@ def _at_round_off(solution: Solution) -> bool:
     u = np.abs(solution.displacement.vec.FV().NumPy())
     size = float(u.max(initial=0.0)) or 1.0  # squares must stay in range
     u /= size
-    terms = size * float(np.sqrt(u @ (abs(solution.discrete.space.A) @ u)))
+    terms = size * float(np.sqrt(solution.discrete.space.A.diagonal() @ u**2))
     problem, mesh = solution.problem, solution.mesh
     ratio = float((bulk_moduli(problem, mesh) / shear_moduli(problem, mesh)).max())
     return solution.error_estimate <= max(ROUND_OFF, NOISE * math.sqrt(ratio)) * terms

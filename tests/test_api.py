@@ -148,7 +148,15 @@ def test_failures_have_one_base():
 
 
 def test_import_is_silent_and_light():
-    heavy = "('scipy', 'pyvista', 'vtk', 'vtkmodules', 'matplotlib', 'IPython', 'webgui_jupyter_widgets')"
+    heavy = (
+        "scipy",
+        "pyvista",
+        "vtk",
+        "vtkmodules",
+        "matplotlib",
+        "IPython",
+        "webgui_jupyter_widgets",
+    )
     out, err = run_python(
         f"import sys, ngcontact; print([name for name in {heavy} if name in sys.modules])"
     )

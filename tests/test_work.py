@@ -1,0 +1,80 @@
+"""A scene pays only for what it contains: counts of the work done, never seconds."""
+
+from __future__ import annotations
+
+import ngsolve as ng
+import numpy as np
+import pytest
+
+from drivers import cases
+from drivers.benchmark.linear import uniform_mesh
+from drivers.benchmark.skip import two_blocks
+from ngcontact import adapt, solve
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_bodies_apart_cost_one_system(order):
+    solution = solve(two_blocks(gap=1.0), maxh=0.3, order=order)
+    assert not solution.active.any()
+    assert solution.steps == [0]
+    assert solution.work["factorizations"] == 1
+    assert solution.work["back_solves"] <= 2  # the load, and one refinement
+
+
+def test_a_third_body_is_not_factorised_again():
+    """The active set changes in several steps; the factor of all bodies is bordered."""
+    alone = solve(two_blocks(), maxh=0.2, order=2)
+    three = solve(two_blocks(third=True), maxh=0.2, order=2)
+    assert len(alone.steps) > 2
+    assert three.steps == alone.steps
+    for name in ("factorizations", "back_solves"):
+        assert three.work[name] == alone.work[name]
+    assert three.work["factorizations"] == 1
+
+
+def test_what_is_not_asked_for_is_not_done():
+    solution = solve(two_blocks(), maxh=0.3, order=2)
+    assert solution.work["estimates"] == 0
+    assert solution.work["curved_elements"] == 0
+    assert solution.work["gap_searches"] == 0
+    _ = solution.indicators, solution.error_estimate, solution.relative_error_estimate
+    assert solution.work["estimates"] == 1
+
+
+def test_a_cold_start_factorises_twice_at_most():
+    problem = cases.disc_on_rigid_plane()
+    for order in (1, 2):
+        mesh = uniform_mesh(problem, order, 18_000)
+        solution = solve(problem, mesh, order=order)
+        assert solution.coarse_levels == 0
+        assert len(solution.steps) > 2
+        assert solution.work["factorizations"] <= 2
+
+
+def test_a_large_cold_start_follows_a_coarse_run():
+    problem = cases.disc_on_rigid_plane()
+    mesh = uniform_mesh(problem, 2, 30_000)
+    solution = solve(problem, mesh, order=2)
+    assert solution.coarse_levels > 2
+    assert solution.work["assemblies"] == solution.work["factorizations"] == 1
+    assert len(solution.steps) <= 2
+    # A mesh that the user made as the geometry leaves nothing to mesh coarsely.
+    given = solve(cases.replace(problem, geometry=mesh), mesh, order=2)
+    assert given.coarse_levels == 0
+    np.testing.assert_array_equal(given.active, solution.active)
+    u, v = (s.displacement.vec.FV().NumPy() for s in (given, solution))
+    # Two factorisations of other active sets: round-off times the condition, about 1e5.
+    np.testing.assert_allclose(u, v, rtol=0, atol=1e-10 * np.abs(v).max())
+
+
+def test_levels_are_factorised_once():
+    for order in (1, 2, 4):
+        levels = list(adapt(two_blocks(), order=order, max_dofs=6000))
+        assert all(s.work["factorizations"] == 1 for s in levels[1:])
+        assert all(s.work["back_solves"] <= 12 for s in levels[2:])  # measured 4 at most
+
+
+def test_the_mesh_of_a_size_has_it():
+    for order in (1, 2):
+        mesh = uniform_mesh(two_blocks(), order, 10_000)
+        assert ng.VectorH1(mesh, order=order).ndof == pytest.approx(10_000, rel=0.25)
