@@ -20,7 +20,8 @@ Mask = NDArray[np.bool_]
 Solve = Callable[[Array], Array]
 Factor = Callable[[Mask], Solve]
 
-BORDER = 16  # changed rows up to which a bordered solve is cheaper than a factorisation
+BORDER = 16  # changed rows up to which a bordered solve is cheaper than a factorisation ...
+PATIENT = 4  # ... times this for every one before: the sets that follow change less and less
 REFINED = 1e-14  # residual, relative to the first, above which another solve removes it
 ROUGH = 1e-11  # ... before the active set is known to be the last
 UNSOLVED = 1e-6  # ... and above which the matrix is singular to working precision
@@ -207,7 +208,8 @@ class Systems:
         """
         p = self.program
         changes = np.count_nonzero(active != self.base)
-        if not self.factorised or (p.unit_rows and changes > BORDER):
+        most = BORDER * PATIENT ** max(self.factorizations - 1, 0)
+        if not self.factorised or (p.unit_rows and changes > most):
             self._refactorise(active)
         self.active, self.anchor = active, anchor
         self._border()
