@@ -16,6 +16,7 @@ from drivers.exact import Exact, hertz, patch, transition, transition_cutoff
 from drivers.exact_curved import Curved, curved, rings
 from geometries import blocks, disc, disc_on_block, graphs, punch
 from geometries import rings as ring_geometry
+from geometries.region import body, compound, polygon
 from ngcontact import Contact, Elastic, Problem, Solution
 
 FIRST = Elastic(E=1.0, nu=0.3)
@@ -204,6 +205,31 @@ def disc_on_rigid_plane() -> Problem:
         displacement={"top": (None, -0.005)},
         sliding="axis",
         contact=[Contact(secondary="arc", direction=(0, -1), gap=ng.y)],
+    )
+
+
+def partly_opening_block() -> Problem:
+    """Problem B: a block pressed on a clamped one over half its width; the other half lifts off.
+
+    E = 1000, nu = 0.3, pressure 1 on 0 <= x <= 1 of the top of the upper block. Boundaries are
+    those of `geometries.blocks`, but for ``pressed``, the loaded half of the top, and
+    ``upper_axis`` and ``lower_axis``, x = 0.
+    """
+    upper = polygon(
+        [(0, 0), (2, 0), (2, 1), (1, 1), (0, 1)],
+        ["upper_contact", "upper_right", "top", "pressed", "upper_axis"],
+    )
+    lower = polygon(
+        [(0, 0), (0, -1), (2, -1), (2, 0)],
+        ["lower_axis", "bottom", "lower_right", "lower_contact"],
+    )
+    return Problem(
+        geometry=compound(body("upper", upper), body("lower", lower)),
+        materials={"upper|lower": Elastic(E=1000.0, nu=0.3)},
+        displacement={"bottom": (0, 0)},
+        sliding="upper_axis|lower_axis",
+        traction={"pressed": 1.0},
+        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
     )
 
 

@@ -1,0 +1,106 @@
+"""Run time against error, measured beside other codes on one machine.
+
+python -m drivers.benchmark [tax] [levels] [growth] [accuracy] [skip] [stages]
+
+Everything when no part is named, about half an hour; prints Markdown tables and writes pictures to
+out/. The other codes need the optional group `bench` of dependencies; what is missing is said.
+"""
+
+from __future__ import annotations
+
+import datetime
+import importlib.metadata
+import os
+import platform
+import sys
+from pathlib import Path
+
+import ngsolve as ng
+
+from drivers.benchmark import accuracy, growth, levels, pictures, skip, stages, tables, tax
+from drivers.benchmark.problems import block, disc
+
+FOLDER = Path("out")
+PACKAGES = ("ngsolve", "numpy", "scipy", "scikit-fem", "KratosMultiphysics")
+
+
+def machine() -> str:
+    """Date, processor, threads and versions."""
+    versions = []
+    for name in PACKAGES:
+        try:
+            versions.append(f"{name} {importlib.metadata.version(name)}")
+        except importlib.metadata.PackageNotFoundError:
+            versions.append(f"{name} not installed")
+    return (
+        f"{datetime.date.today()}, {platform.machine()}, {os.cpu_count()} cores, one thread in "
+        f"NGSolve, Python {platform.python_version()}, {', '.join(versions)}"
+    )
+
+
+def contact_tax() -> None:
+    """Contact tax."""
+    print(tables.of_tax(tax.taxes([disc(), block()])))
+
+
+def adaptive_levels() -> None:
+    """Whole levels and imports."""
+    print(tables.of_levels(levels.all_levels([disc(), block()])))
+    plain, ours = levels.import_seconds()
+    print(f"\nimport: ngsolve {plain:.3f} s, ngcontact {ours:.3f} s, ratio {ours / plain:.3f}")
+
+
+def growth_of_time() -> None:
+    """Growth of time and memory."""
+    rows = list(growth.growths())
+    print(tables.of_growth(rows))
+    pictures.draw_growth(FOLDER / "benchmark_growth.png", rows)
+
+
+def time_to_accuracy() -> None:
+    """Time to accuracy."""
+    found = []
+    for common in (disc(), block()):
+        points, missing = accuracy.points(common)
+        found += points
+        for line in missing:
+            print(line)
+    print(tables.of_accuracy(found))
+    pictures.draw_accuracy(FOLDER / "benchmark_accuracy.png", found)
+
+
+def skipped() -> None:
+    """What scenes skip."""
+    print(tables.of_scenes(skip.scenes()))
+
+
+def time_by_stage() -> None:
+    """Where the time of a level goes."""
+    print(tables.of_stages(stages.all_stages([disc(), block()])))
+
+
+PARTS = {
+    "tax": contact_tax,
+    "levels": adaptive_levels,
+    "growth": growth_of_time,
+    "accuracy": time_to_accuracy,
+    "skip": skipped,
+    "stages": time_by_stage,
+}
+
+
+def main(names: list[str]) -> None:
+    """Run the parts named, or all."""
+    unknown = sorted(set(names) - set(PARTS))
+    if unknown:
+        raise SystemExit(f"no part is called {', '.join(unknown)}; choose from {', '.join(PARTS)}")
+    FOLDER.mkdir(exist_ok=True)
+    ng.SetNumThreads(1)
+    print(machine())
+    for name in names or PARTS:
+        print(f"\n## {PARTS[name].__doc__}\n", flush=True)
+        PARTS[name]()
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,82 @@
+"""Growth: seconds and peak memory against unknowns, each run in a process of its own.
+
+python -m drivers.benchmark.growth block 2 100000 contact
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+
+import ngsolve as ng
+
+from drivers.benchmark.linear import linear_solve, uniform_mesh
+from drivers.benchmark.problems import block, disc
+from ngcontact import solve
+
+SIZES = (10_000, 30_000, 100_000, 300_000, 1_000_000)
+ORDERS = (1, 2)
+COMMONS = {"disc": disc, "block": block}
+KINDS = ("linear", "contact")
+
+
+@dataclass(frozen=True)
+class Growth:
+    """One process.
+
+    Attributes
+    ----------
+    problem : str
+    kind : str
+        "linear" or "contact".
+    order, unknowns : int
+    seconds : float
+        Of the solve alone.
+    memory : float
+        Peak of the process, GB, its libraries and the mesh included.
+    """
+
+    problem: str
+    kind: str
+    order: int
+    unknowns: int
+    seconds: float
+    memory: float
+
+
+def measure(name: str, order: int, size: int, kind: str) -> Growth:
+    """Run here; `memory` is that of this process so far."""
+    problem = COMMONS[name]().problem
+    mesh = uniform_mesh(problem, order, size)
+    start = time.perf_counter()
+    if kind == "linear":
+        count = linear_solve(problem, mesh, order).unknowns
+    else:
+        count = solve(problem, mesh, order=order).displacement.space.ndof
+    seconds = time.perf_counter() - start
+    unit = 1e9 if sys.platform == "darwin" else 1e6  # bytes there, kilobytes elsewhere
+    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+    return Growth(name, kind, order, count, seconds, memory)
+
+
+def growths() -> Iterator[Growth]:
+    """All sizes, the kinds interleaved."""
+    for name in COMMONS:
+        for order in ORDERS:
+            for size in SIZES:
+                for kind in KINDS:
+                    words = [name, str(order), str(size), kind]
+                    command = [sys.executable, "-m", "drivers.benchmark.growth", *words]
+                    done = subprocess.run(command, check=True, capture_output=True, text=True)
+                    yield Growth(**json.loads(done.stdout.splitlines()[-1]))
+
+
+if __name__ == "__main__":
+    ng.SetNumThreads(1)
+    name, order, size, kind = sys.argv[1:]
+    print(json.dumps(asdict(measure(name, int(order), int(size), kind))))

@@ -1,0 +1,82 @@
+"""Overhead: one whole adaptive level over the linear solve of its mesh, and what a scene skips."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.benchmark.linear import linear_solve
+from drivers.benchmark.problems import Common
+from ngcontact import adapt
+
+TARGETS = (1_000, 10_000, 30_000)  # unknowns; the nearest level to each is shown
+ORDERS = (1, 2, 3, 4)
+ROUNDS = 5
+
+
+@dataclass(frozen=True)
+class Level:
+    """One level of an adaptive run: marking, refinement, curving, solution, estimate.
+
+    Attributes
+    ----------
+    problem : str
+    order, unknowns : int
+    seconds : float
+    ratio : float
+        Over the linear solve on its mesh.
+    """
+
+    problem: str
+    order: int
+    unknowns: int
+    seconds: float
+    ratio: float
+
+
+def levels(common: Common, order: int, rounds: int = ROUNDS) -> list[Level]:
+    """Medians over several equal runs, each after a warm-up, linear solves interleaved."""
+    problem, budget = common.problem, int(1.3 * TARGETS[-1])
+    seconds, linear = [], []
+    for number in range(rounds + 1):
+        clock, meshes = [time.perf_counter()], []
+        for solution in adapt(problem, order=order, max_dofs=budget):
+            clock.append(time.perf_counter())
+            meshes.append((solution.mesh, solution.displacement.space.ndof))
+        if number:
+            seconds.append(np.diff(clock))
+            linear.append([linear_solve(problem, mesh, order).seconds for mesh, _ in meshes])
+    level, base = np.median(seconds, axis=0), np.median(linear, axis=0)
+    count = np.array([n for _, n in meshes])
+    chosen = sorted({int(np.abs(np.log(count / target)).argmin()) for target in TARGETS})
+    return [
+        Level(common.name, order, int(count[i]), float(level[i]), float(level[i] / base[i]))
+        for i in chosen
+        if i > 0  # the first level meshes the geometry
+    ]
+
+
+def all_levels(commons: list[Common]) -> Iterator[Level]:
+    """All problems and orders."""
+    for common in commons:
+        for order in ORDERS:
+            yield from levels(common, order)
+
+
+def import_seconds(rounds: int = 7) -> tuple[float, float]:
+    """Medians of ``import ngsolve`` and ``import ngcontact`` in fresh processes, interleaved."""
+    script = "import time; t = time.perf_counter(); import {}; print(time.perf_counter() - t)"
+    times = [
+        [
+            float(subprocess.check_output([sys.executable, "-c", script.format(name)]))
+            for name in ("ngsolve", "ngcontact")
+        ]
+        for _ in range(rounds)
+    ]
+    plain, ours = np.median(times, axis=0)
+    return float(plain), float(ours)

@@ -1,0 +1,78 @@
+"""What a mesh costs without contact: NGSolve's own assembly, factorisation and back-solve."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+
+from ngcontact import Problem
+from ngcontact.level import unknowns
+from ngcontact.mesh import first_mesh
+from ngcontact.refine import refined
+from ngcontact.space import curve, strain
+
+START = 300  # unknowns of a first mesh, about; refinement is much quicker than meshing at size
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Seconds of one linear solve.
+
+    Attributes
+    ----------
+    assemble, factor, back_solve : float
+    unknowns : int
+    """
+
+    assemble: float
+    factor: float
+    back_solve: float
+    unknowns: int
+
+    @property
+    def seconds(self) -> float:
+        """All of it."""
+        return self.assemble + self.factor + self.back_solve
+
+
+def linear_solve(problem: Problem, mesh: ng.Mesh, order: int) -> Linear:
+    """Time the linear problem in which the contact boundaries are held in place of contact."""
+    clock = [time.perf_counter()]
+    held = [(name, part) for name, part in problem.displacement.items()]
+    x = [name for name, (ux, _) in held if ux is not None]
+    y = [name for name, (_, uy) in held if uy is not None]
+    x += [str(problem.sliding)] if problem.sliding else []
+    y += [contact.secondary for contact in problem.contact]
+    V = ng.VectorH1(mesh, order=order, dirichletx="|".join(x), dirichlety="|".join(y))
+    u, v = V.TnT()
+    a, f = ng.BilinearForm(V, symmetric=True), ng.LinearForm(V)
+    for body, law in problem.materials.items():
+        C = law.voigt(problem.model)
+        a += ng.InnerProduct(C * strain(u), strain(v)) * ng.dx(definedon=mesh.Materials(body))
+    for name in problem.traction:
+        load = problem.traction_vector(name)
+        f += load * v.Trace() * ng.ds(definedon=mesh.Boundaries(name))
+    a.Assemble()
+    f.Assemble()
+    clock.append(time.perf_counter())
+    inverse = a.mat.Inverse(V.FreeDofs(), inverse="sparsecholesky")
+    clock.append(time.perf_counter())
+    solution = f.vec.CreateVector()
+    solution.data = inverse * f.vec
+    clock.append(time.perf_counter())
+    assemble, factor, back_solve = np.diff(clock).tolist()
+    return Linear(assemble, factor, back_solve, V.ndof)
+
+
+def uniform_mesh(problem: Problem, order: int, size: int) -> ng.Mesh:
+    """Uniformly refined mesh of about `size` unknowns, curved to the order."""
+    trial = 0.25
+    count = unknowns(first_mesh(problem, trial), order, "isoparametric")
+    rounds = max(0, round(np.log(size / START) / np.log(4)))
+    mesh = first_mesh(problem, trial * float(np.sqrt(count * 4**rounds / size)))
+    for _ in range(rounds):
+        mesh = refined(problem, mesh)
+    return curve(mesh, order, "isoparametric")[0]

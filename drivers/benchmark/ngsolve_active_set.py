@@ -1,0 +1,74 @@
+"""NGSolve with a plain active set on nodal values, refactorised at each step; orders 1 and 2."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+
+import ngsolve as ng
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from drivers.benchmark import Run
+from drivers.benchmark.active_set import Solver, active_set
+from drivers.benchmark.meshes import Mesh, made
+from drivers.benchmark.ngsolve_plane import load, matrix, nodal, numbering
+from drivers.benchmark.plane import bounded
+from drivers.benchmark.problems import Common
+from drivers.benchmark.reading import read
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+ENGINE = "NGSolve active set"
+
+
+def runs(common: Common, kinds: Sequence[str], sizes: Sequence[int]) -> Iterator[Run]:
+    """Runs of orders 1 and 2 on meshes of the given kinds and numbers of unknowns."""
+    for kind in kinds:
+        for order in (1, 2):
+            for size in sizes:
+                yield run(common, kind, order, made(common, kind, order, size))
+
+
+def cholesky(K: sp.csr_matrix) -> Solver:
+    """NGSolve's sparse Cholesky factorisation for the active set."""
+    K = K.tocoo()
+    matrix = ng.la.SparseMatrixd.CreateFromCOO(K.row, K.col, K.data, *K.shape)
+    right, solution = matrix.CreateColVector(), matrix.CreateRowVector()
+
+    def solve(free: Mask, b: Array) -> Array:
+        inverse = matrix.Inverse(ng.BitArray(free), inverse="sparsecholesky")
+        right.FV().NumPy()[:] = b
+        solution.data = inverse * right
+        return solution.FV().NumPy().copy()
+
+    return solve
+
+
+def run(common: Common, kind: str, order: int, made: Mesh) -> Run:
+    """One run, on a mesh curved to the order of the elements."""
+    mesh = made.copy()
+    started = time.perf_counter()
+    mesh.Curve(order)
+    space = ng.VectorH1(mesh, order=order)
+    K, f = matrix(common, space), load(common, space).Assemble().vec.FV().NumPy().copy()
+    number = numbering(mesh, order)
+    basis = nodal(number)[0] if order == 2 else None
+    problem, line = bounded(common, K, f, number, basis)
+    v, force, steps = active_set(problem, cholesky(problem.K))
+    seconds = time.perf_counter() - started
+    return Run(
+        engine=ENGINE,
+        problem=common.name,
+        mesh_kind=kind,
+        order=order,
+        unknowns=space.ndof,
+        seconds_mesh=made.seconds,
+        seconds=seconds,
+        steps=steps,
+        energy=float(v @ (problem.K @ v)) / 2,
+        **asdict(read(common, line.x, force, v[line.at] + line.gap, order)),
+    )

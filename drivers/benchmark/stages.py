@@ -1,0 +1,74 @@
+"""Where the time of one warm adaptive level goes."""
+
+from __future__ import annotations
+
+import cProfile
+import pstats
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.benchmark.linear import uniform_mesh
+from drivers.benchmark.problems import Common
+from ngcontact import solve
+from ngcontact.mark import doerfler
+from ngcontact.refine import refined
+
+SIZES = (1_000, 10_000, 100_000, 1_000_000)
+ORDER = 2
+STAGES = {  # cumulative seconds of these functions; none calls another
+    "assembly": [("space", "assemble")],
+    "rows": [
+        ("gap", "contact_line"),
+        ("constraint", "change_of_basis"),
+        ("trace", "boundary_trace"),
+    ],
+    "rigid motions": [("rigid", "rigid_motions")],
+    "matrix": [("space", "in_unknowns")],
+    "factorisation": [("space", "factor")],
+    "back-solves": [("space", "solve")],
+    "estimate": [("estimate", "estimate")],
+    "refinement": [("refine", "refined")],
+}
+
+
+@dataclass(frozen=True)
+class Stages:
+    """Seconds of a level by stage; `rest` is what no stage contains."""
+
+    problem: str
+    unknowns: int
+    seconds: dict[str, float]
+
+
+def stages(common: Common, size: int) -> Stages:
+    """Profile one level: a solution started from a coarser one, its estimate, a refinement."""
+    problem = common.problem
+    mesh = uniform_mesh(problem, ORDER, size)
+    start = solve(problem, uniform_mesh(problem, ORDER, max(size // 4, 500)), order=ORDER)
+    profile = cProfile.Profile()
+    clock = time.perf_counter()
+    profile.enable()
+    solution = solve(problem, mesh, order=ORDER, start=start)
+    refined(problem, mesh, doerfler(solution.indicators, 0.5))
+    profile.disable()
+    clock = time.perf_counter() - clock
+    stats = pstats.Stats(profile)
+    spent = dict.fromkeys(STAGES, 0.0)
+    for (path, _, name), (*_, cumulative, callers) in stats.stats.items():  # type: ignore[attr-defined]
+        for stage, functions in STAGES.items():
+            if (Path(path).stem, name) in functions:
+                outside = [c for c in callers if Path(c[0]).stem != "refine"]
+                share = sum(callers[c][3] for c in outside) if stage == "rows" else cumulative
+                spent[stage] += share
+    spent["rest"] = clock - sum(spent.values())
+    return Stages(common.name, solution.displacement.space.ndof, spent)
+
+
+def all_stages(commons: list[Common]) -> Iterator[Stages]:
+    """All problems and sizes, after a warm-up."""
+    for common in commons:
+        stages(common, SIZES[0])
+        for size in SIZES:
+            yield stages(common, size)
