@@ -21,15 +21,15 @@ def draw_accuracy(path: Path, found: Sequence[Point]) -> None:
     problems = list(dict.fromkeys(p.problem for p in found))
     figure = Figure(figsize=(4 * len(QUANTITIES), 3.6 * len(problems)), layout="constrained")
     panels = figure.subplots(len(problems), len(QUANTITIES), sharex=True, squeeze=False)
-    lines: dict[tuple[str, str, int], list[Point]] = {}
+    lines: dict[tuple[str, str, int, str], list[Point]] = {}
     for p in found:
-        lines.setdefault((p.engine, p.mesh_kind, p.order), []).append(p)
+        lines.setdefault((p.engine, p.mesh_kind, p.order, p.variant), []).append(p)
     engines = [e for e in dict.fromkeys(p.engine for p in found) if e != OURS]
     for row, problem in zip(panels, problems, strict=True):
         for panel, name in zip(row, QUANTITIES, strict=True):
             panel.set_title(f"{problem}: {name.replace('_', '-')}", fontsize=10)
             panel.grid(which="major", alpha=0.3)
-            for (engine, kind, order), line in lines.items():
+            for (engine, kind, order, variant), line in lines.items():
                 mine = [p for p in line if p.problem == problem]
                 ours = engine == OURS
                 panel.loglog(
@@ -39,7 +39,7 @@ def draw_accuracy(path: Path, found: Sequence[Point]) -> None:
                     color="black" if ours else f"C{engines.index(engine)}",
                     lw=1.6 if ours else 1.0,
                     ms=4 if ours else 3,
-                    label=f"{engine}, {kind}, order {order}",
+                    label=f"{variant}, {kind}, order {order}",
                 )
             panel.set_ylim(FLOOR / 2, 1)
     for panel in panels[-1]:
