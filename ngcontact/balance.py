@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .bordered import Program
+from .matrix import terms
 from .newton import Minimiser
 from .problem import Problem, boundary_mask
 from .trace import Trace
@@ -38,8 +39,8 @@ def optimality(program: Program, minimiser: Minimiser) -> dict[str, float]:
     p, y, force, active = program, minimiser.u, minimiser.force, minimiser.active
     gap = p.g - y[p.unknown]
     residual = p.b - p.K @ y - p.R.T @ force
-    terms = abs(p.K) @ np.abs(y)
-    load = max(np.abs(x).max(initial=0.0) for x in (p.b, terms, force))
+    sizes = (p.b, terms(p.K, y), force)
+    load = max(np.abs(x).max(initial=0.0) for x in sizes)
     length = max(np.abs(y).max(initial=0.0), np.abs(p.g[active]).max(initial=0.0))
     largest = np.abs(force).max(initial=0.0)
     one_sided = force[~p.equality]

@@ -123,6 +123,7 @@ class Systems:
 
     def _refactorise(self, active: Mask) -> None:
         p = self.program
+        self.forget()  # two factorisations at a time would double the memory
         self.base = active.copy() if p.unit_rows else np.zeros_like(active)
         self.free = ~p.fixed
         self.free[np.concatenate([p.kernel.held, p.kernel.pins])] = False

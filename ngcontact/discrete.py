@@ -14,13 +14,14 @@ from .constraint import Basis, change_of_basis
 from .errors import ConvergenceError
 from .gap import ContactLine
 from .kernel import no_kernel
+from .matrix import cholesky, congruent
 from .newton import Minimiser
 from .pairs import joined, kept_lines, merged
 from .problem import Problem, boundary_mask
 from .reuse import contact_lines, same_basis, same_stiffness
 from .rigid import Rigid, rigid_motions
 from .rows import Conditions
-from .space import LOAD_BONUS, Space, assemble, cholesky, in_unknowns, load_vector
+from .space import LOAD_BONUS, Space, assemble, load_vector
 from .ssn import minimise
 from .trace import Trace, boundary_trace
 
@@ -159,7 +160,7 @@ def discretise(
     if previous is not None and not assembled and same_basis(basis, previous.basis):
         K, systems = previous.program.K, previous.systems
     else:
-        K, matrix = in_unknowns(space, T)
+        K, matrix = congruent(space.matrix, space.A, T)
     program = Program(
         K=K,
         b=T.T @ space.f,

@@ -22,8 +22,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .matrix import cholesky, lower_half, shared
 from .problem import Problem
-from .space import cholesky, lower_half
 from .trace import Trace
 
 Array = NDArray[np.float64]
@@ -77,11 +77,6 @@ class Term:
     weight: Array
     residual: Array
     shares: list[Share]
-
-
-def _csr(matrix: ng.BaseMatrix) -> sp.csr_matrix:
-    values, columns, starts = (np.array(x) for x in matrix.CSR())
-    return sp.csr_matrix((values, columns, starts), (matrix.height, matrix.width))
 
 
 class PressureCorrection:
@@ -160,7 +155,7 @@ class PressureCorrection:
         f += -edge * (jump * n) * (t - t.Other()) * skeleton
         a.Assemble()
         f.Assemble()
-        return _csr(a.mat), f.vec.FV().NumPy().copy()
+        return shared(a.mat), f.vec.FV().NumPy().copy()
 
     def _on_boundary(self, terms: list[Term]) -> tuple[sp.csr_matrix, Array]:
         """The same of the boundary terms."""
@@ -214,7 +209,7 @@ class PressureCorrection:
             ds = ng.ds(definedon=mesh.Boundaries(str(problem.sliding)))
             a += held * (u.Trace() * n) * (v.Trace() * n) * ds
         a.Assemble()
-        return _csr(a.mat)
+        return shared(a.mat)
 
     def _divergence(self) -> sp.csr_matrix:
         """(q, div v) of pressures q and displacements v."""
@@ -224,7 +219,7 @@ class PressureCorrection:
         grad = ng.Grad(v)
         b += q * (grad[0, 0] + grad[1, 1]) * ng.dx(definedon=self.region)
         b.Assemble()
-        return _csr(b.mat)
+        return shared(b.mat)
 
     def _solve(self, A: sp.csr_matrix, b: Array) -> None:
         """Solve the optimality conditions of delta and of the v_h of the supremum.

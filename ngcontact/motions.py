@@ -114,7 +114,8 @@ def rigid_motion(bodies: Bodies, amounts: Array, multiplier: float) -> RigidMoti
 
 def body_of_unknown(space: Space, bodies: Bodies) -> Index:
     """Number of the body that each unknown (2N,) of V_h belongs to."""
-    _, piece = connected_components(space.A, directed=False)
+    # The same components as of the undirected graph, without a transposed copy.
+    _, piece = connected_components(space.A, connection="strong")
     trace = space.trace
     number = np.zeros(piece.max() + 1, dtype=np.intp)
     half = len(piece) // 2

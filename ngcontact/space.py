@@ -9,9 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .bordered import Factor, Mask, Solve
 from .cad import cad_edges
 from .material import varies
+from .matrix import shared
 from .nodal import edge_bubbles, nodal_basis
 from .problem import Problem, boundary_mask
 from .trace import Trace
@@ -85,7 +85,7 @@ class Space:
     A : sparse (2N, 2N)
         Stiffness.
     matrix : ng.BaseMatrix
-        The same for NGSolve.
+        The same for NGSolve, in the same memory.
     f : ndarray (2N,)
         Load.
     """
@@ -205,56 +205,11 @@ def assemble(problem: Problem, trace: Trace, element: str) -> Space:
     for boundary in problem.traction:
         _check_normals(trace, boundary)
     a.Assemble()
-    values, columns, starts = a.mat.CSR()
-    size = V.ndof
-    A = sp.csr_matrix((np.array(values), np.array(columns), np.array(starts)), (size, size))
     return Space(
         V=V,
         trace=trace,
         basis=sp.block_diag([scalar, scalar], format="csr"),
-        A=A,
+        A=shared(a.mat),
         matrix=a.mat,
         f=load_vector(problem, V, LOAD_BONUS),
     )
-
-
-def lower_half(K: sp.csr_matrix) -> ng.BaseMatrix:
-    """Lower half of a symmetric matrix for NGSolve, all that its Cholesky factorisation reads."""
-    K = sp.tril(K, format="coo")
-    return ng.la.SparseMatrixd.CreateFromCOO(K.row, K.col, K.data, *K.shape)
-
-
-def in_unknowns(space: Space, T: sp.csr_matrix) -> tuple[sp.csr_matrix, ng.BaseMatrix]:
-    """Stiffness T'AT in the unknowns y of u = T y, for SciPy and its lower half for NGSolve.
-
-    T is the identity but for nodes on the boundary: only the change is multiplied and handed over
-    entry by entry, a small part of the price of the whole.
-    """
-    A = space.A
-    if T.shape[0] != T.shape[1]:  # fewer node values than edge unknowns: element="physical"
-        K = (T.T @ A @ T).tocsr()
-        return K, lower_half(K)
-    D = (T - sp.identity(len(space.f), format="csr")).tocsr()
-    D.eliminate_zeros()
-    if D.nnz == 0:
-        return A, space.matrix
-    AD = A @ D
-    change = (AD + AD.T + D.T @ AD).tocsr()
-    return A + change, (space.matrix + lower_half(change)).CreateSparseMatrix()
-
-
-def cholesky(matrix: ng.BaseMatrix) -> Factor:
-    """NGSolve's sparse Cholesky factorisation as the `factor` argument of `ssn.minimise`."""
-    right, solution = matrix.CreateColVector(), matrix.CreateRowVector()
-
-    def factor(free: Mask) -> Solve:
-        inverse = matrix.Inverse(ng.BitArray(free), inverse="sparsecholesky")
-
-        def solve(b: Array) -> Array:
-            right.FV().NumPy()[:] = b
-            solution.data = inverse * right
-            return solution.FV().NumPy().copy()
-
-        return solve
-
-    return factor

@@ -7,13 +7,12 @@ import math
 import ngsolve as ng
 import numpy as np
 import pytest
-import scipy.sparse as sp
 from ngsolve.meshes import MakeStructured2DMesh
 
 from geometries import blocks, disc, graphs, rings
 from ngcontact import Elastic, Hooke, Problem, solve
 from ngcontact.lagrange import gauss
-from ngcontact.space import assemble, check_element, cholesky, curve, geometry_order, lower_half
+from ngcontact.space import assemble, check_element, curve, geometry_order
 from ngcontact.trace import boundary_trace
 
 ORDERS = [1, 2, 3, 4]
@@ -491,14 +490,3 @@ def test_pressure_and_traction_loads():
         u[n : n + mesh.nv] = 1
         # The vertex functions add up to one: a translation. The ends of the arc are exact.
         assert u @ space.f == pytest.approx(0.3 * 2.0, rel=1e-12)
-
-
-def test_factorisation_of_principal_parts():
-    rng = np.random.default_rng(2)
-    space = space_of(mesh_of(blocks()), "isoparametric", 2)
-    free = rng.random(space.V.ndof) < 0.7
-    K = space.A + abs(space.A).max() * sp.identity(space.V.ndof)
-    right = rng.normal(size=space.V.ndof)
-    solution = cholesky(lower_half(K.tocsr()))(free)(right)
-    assert (solution[~free] == 0).all()
-    np.testing.assert_allclose((K @ solution)[free], right[free], atol=1e-13 * np.abs(right).max())

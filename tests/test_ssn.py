@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import weakref
+from collections.abc import Callable
+
 import daqp
 import numpy as np
 import pytest
@@ -156,6 +159,28 @@ def counting_factor(K, calls):
         return lambda right: inverse @ right
 
     return factor
+
+
+def test_one_factorisation_at_a_time(monkeypatch):
+    monkeypatch.setattr(bordered, "BORDER", 0)
+    rng = np.random.default_rng(7)
+    X = rng.normal(size=(12, 14))
+    program = first_unknowns_bounded(
+        sp.csr_matrix(X @ X.T), rng.normal(size=12), rng.normal(size=6)
+    )
+    dense = counting_factor(program.K, [])
+    alive: weakref.WeakSet[Callable] = weakref.WeakSet()
+    before = []
+
+    def factor(free):
+        before.append(len(alive))
+        solve = dense(free)
+        alive.add(solve)
+        return solve
+
+    minimise(Systems(program, factor), np.ones(6, dtype=bool))
+    assert len(before) > 1
+    assert not any(before)
 
 
 @pytest.mark.parametrize("border", [0, 5, 1000])

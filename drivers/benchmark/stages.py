@@ -25,9 +25,9 @@ STAGES = {  # cumulative seconds of these functions; none calls another
         ("trace", "boundary_trace"),
     ],
     "rigid motions": [("rigid", "rigid_motions")],
-    "matrix": [("space", "in_unknowns")],
-    "factorisation": [("space", "factor")],
-    "back-solves": [("space", "solve")],
+    "matrix": [("matrix", "congruent")],
+    "factorisation": [("matrix", "factor")],
+    "back-solves": [("matrix", "solve")],
     "estimate": [("estimate", "estimate")],
     "refinement": [("refine", "refined")],
 }

@@ -1,0 +1,82 @@
+"""Sparse symmetric matrices that NGSolve and SciPy share, and their factorisation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import ngsolve as ng
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .bordered import Factor, Mask, Solve
+
+Array = NDArray[np.float64]
+
+ROWS = 1 << 14  # that are copied at a time: the copy stays in the cache
+
+
+class _View:
+    """Buffer of NGSolve's memory; arrays made of it keep the owner alive, NGSolve's do not."""
+
+    def __init__(self, view: Any, owner: ng.BaseMatrix) -> None:
+        self.__array_interface__ = np.asarray(view).__array_interface__
+        self.owner = owner
+
+
+def shared(matrix: ng.BaseMatrix) -> sp.csr_matrix:
+    """The same matrix for SciPy, in the same memory: values and columns are not copied."""
+    values, columns, starts = (np.asarray(_View(x, matrix)) for x in matrix.CSR())
+    return sp.csr_matrix((values, columns, starts), (matrix.height, matrix.width))
+
+
+def lower_half(K: sp.csr_matrix) -> ng.BaseMatrix:
+    """Lower half of a symmetric matrix for NGSolve, all that its Cholesky factorisation reads."""
+    K = sp.tril(K, format="coo")
+    return ng.la.SparseMatrixd.CreateFromCOO(K.row, K.col, K.data, *K.shape)
+
+
+def congruent(
+    matrix: ng.BaseMatrix, A: sp.csr_matrix, T: sp.csr_matrix
+) -> tuple[sp.csr_matrix, ng.BaseMatrix]:
+    """Matrix T'AT of the unknowns y of u = T y, for SciPy and at least its lower half for NGSolve.
+
+    `A` is `matrix` for SciPy. T is the identity but for nodes on the boundary: only the change is
+    multiplied and handed over entry by entry, a small part of the price of the whole.
+    """
+    if T.shape[0] != T.shape[1]:  # fewer node values than edge unknowns: element="physical"
+        K = (T.T @ A @ T).tocsr()
+        return K, lower_half(K)
+    D = (T - sp.identity(T.shape[0], format="csr")).tocsr()
+    D.eliminate_zeros()
+    if D.nnz == 0:
+        return A, matrix
+    AD = A @ D
+    change = (AD + AD.T + D.T @ AD).tocoo()
+    added = ng.la.SparseMatrixd.CreateFromCOO(change.row, change.col, change.data, *change.shape)
+    total = (matrix + added).CreateSparseMatrix()
+    return shared(total), total
+
+
+def terms(A: sp.csr_matrix, x: Array) -> Array:
+    """|A| |x|, the size of the terms of A x, without a second matrix of that size."""
+    x = np.abs(x)
+    parts = [abs(A[start : start + ROWS]) @ x for start in range(0, A.shape[0], ROWS)]
+    return np.concatenate([np.zeros((0, *x.shape[1:])), *parts])
+
+
+def cholesky(matrix: ng.BaseMatrix) -> Factor:
+    """NGSolve's sparse Cholesky factorisation as the `factor` argument of `ssn.minimise`."""
+    right, solution = matrix.CreateColVector(), matrix.CreateRowVector()
+
+    def factor(free: Mask) -> Solve:
+        inverse = matrix.Inverse(ng.BitArray(free), inverse="sparsecholesky")
+
+        def solve(b: Array) -> Array:
+            right.FV().NumPy()[:] = b
+            solution.data = inverse * right
+            return solution.FV().NumPy().copy()
+
+        return solve
+
+    return factor

@@ -1,0 +1,98 @@
+"""Matrices shared by NGSolve and SciPy: same memory, same values, their owner lives on."""
+
+from __future__ import annotations
+
+import gc
+
+import ngsolve as ng
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from ngcontact import matrix
+from ngcontact.matrix import cholesky, congruent, lower_half, shared, terms
+
+SIZE = 40
+
+
+def definite(rng, size=SIZE):
+    """Sparse, symmetric, diagonally dominant."""
+    X = sp.random(size, size, density=4 / size, random_state=rng)
+    K = X + X.T
+    return (K + sp.diags(1 + np.asarray(abs(K).sum(axis=1)).ravel())).tocsr()
+
+
+def for_ngsolve(K):
+    K = K.tocoo()
+    return ng.la.SparseMatrixd.CreateFromCOO(K.row, K.col, K.data, *K.shape)
+
+
+@pytest.mark.parametrize("shape", [(SIZE, SIZE), (SIZE, 7)])
+def test_same_values_in_the_same_memory(shape):
+    K = sp.random(*shape, density=0.2, random_state=np.random.default_rng(0)).tocsr()
+    owner = for_ngsolve(K)
+    view = shared(owner)
+    np.testing.assert_array_equal(view.toarray(), K.toarray())
+    values, columns, _ = (np.asarray(x) for x in owner.CSR())
+    assert np.shares_memory(view.data, values)
+    assert np.shares_memory(view.indices, columns)
+
+
+def test_memory_outlives_the_matrix_of_ngsolve():
+    K = definite(np.random.default_rng(1))
+    parts = [shared(for_ngsolve(K)).data for _ in range(100)]
+    gc.collect()
+    others = [for_ngsolve(-K) for _ in range(200)]  # would take memory that had been given back
+    assert len(others) == 200
+    for part in parts:
+        np.testing.assert_array_equal(part, K.data)
+
+
+@pytest.mark.parametrize("changed", [0, 1, SIZE])
+def test_congruent_matrices(changed):
+    """T differs from the identity in that many rows."""
+    rng = np.random.default_rng(changed)
+    A = for_ngsolve(definite(rng))
+    T = np.eye(SIZE)
+    T[rng.permutation(SIZE)[:changed]] += rng.normal(size=(changed, SIZE))
+    K, total = congruent(A, shared(A), sp.csr_matrix(T))
+    expected = T.T @ shared(A).toarray() @ T
+    # Sums of at most SIZE^2 terms: 1e-13 is round-off.
+    np.testing.assert_allclose(K.toarray(), expected, atol=1e-13 * np.abs(expected).max())
+    assert np.shares_memory(K.data, np.asarray(total.CSR()[0]))
+    right, product = total.CreateRowVector(), total.CreateColVector()
+    right.FV().NumPy()[:] = rng.normal(size=SIZE)
+    product.data = total * right
+    reference = expected @ right.FV().NumPy()
+    allowed = 1e-13 * np.abs(reference).max()
+    np.testing.assert_allclose(product.FV().NumPy(), reference, atol=allowed)
+
+
+def test_congruent_matrix_of_fewer_unknowns():
+    rng = np.random.default_rng(3)
+    A = for_ngsolve(definite(rng))
+    T = sp.csr_matrix(rng.normal(size=(SIZE, 5)))
+    K, lower = congruent(A, shared(A), T)
+    expected = T.T @ shared(A).toarray() @ T
+    np.testing.assert_allclose(K.toarray(), expected, atol=1e-13 * np.abs(expected).max())
+    np.testing.assert_array_equal(shared(lower).toarray(), np.tril(K.toarray()))
+
+
+@pytest.mark.parametrize("columns", [(), (3,)])
+@pytest.mark.parametrize("rows", [1, SIZE - 1, SIZE, 7])
+def test_size_of_terms(monkeypatch, columns, rows):
+    monkeypatch.setattr(matrix, "ROWS", rows)
+    rng = np.random.default_rng(4)
+    A, x = definite(rng) - 2 * sp.identity(SIZE), rng.normal(size=(SIZE, *columns))
+    expected = np.abs(A.toarray()) @ np.abs(x)
+    np.testing.assert_allclose(terms(A.tocsr(), x), expected, rtol=1e-14)
+
+
+def test_factorisation_of_principal_parts():
+    rng = np.random.default_rng(2)
+    free = rng.random(SIZE) < 0.7
+    K = definite(rng)
+    right = rng.normal(size=SIZE)
+    solution = cholesky(lower_half(K))(free)(right)
+    assert (solution[~free] == 0).all()
+    np.testing.assert_allclose((K @ solution)[free], right[free], atol=1e-13 * np.abs(right).max())
