@@ -15,13 +15,14 @@ from .errors import ContactError, ConvergenceError
 from .level import solve_level, unknowns
 from .mark import doerfler
 from .mesh import first_mesh
-from .moduli import bulk_moduli, shear_moduli, warn_of_locking
+from .moduli import bulk_moduli, power_of_two, shear_moduli, warn_of_locking
 from .problem import Problem
 from .refine import refined
 from .solution import Solution
 from .space import check_element, curve
 
 ROUND_OFF = 1e-12  # relative estimate at which refinement stops: the solution is exact
+SMALL = 1e-4  # ... above which no round-off reaches
 NOISE = 100 * np.finfo(float).eps  # of a stress, relative to its terms; measured 0.5 to 50 eps
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
 LARGE = 20_000
@@ -184,10 +185,11 @@ def _at_round_off(solution: Solution) -> bool:
     Where div u cancels the terms of the stress are of size kappa |grad u|. The estimate divides
     them by the root of mu, their energy by the root of kappa only.
     """
-    u = np.abs(solution.displacement.vec.FV().NumPy())
-    size = float(u.max(initial=0.0)) or 1.0  # squares must stay in range
-    u /= size
-    terms = size * float(np.sqrt(solution.discrete.space.A.diagonal() @ u**2))
+    u = solution.displacement.vec.FV().NumPy()
+    size = power_of_two(u)  # squares must stay in range
+    terms = size * float(np.sqrt(solution.discrete.space.diagonal @ (u / size) ** 2))
+    if solution.error_estimate > SMALL * terms:  # as nearly always
+        return False
     problem, mesh = solution.problem, solution.mesh
     ratio = float((bulk_moduli(problem, mesh) / shear_moduli(problem, mesh)).max())
     return solution.error_estimate <= max(ROUND_OFF, NOISE * math.sqrt(ratio)) * terms

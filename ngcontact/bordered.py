@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -67,6 +68,11 @@ class Program:
     values: Array
     unknown: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
     kernel: Kernel = field(default_factory=lambda: no_kernel(0))
+
+    @cached_property
+    def diagonal(self) -> Array:
+        """Diagonal of K."""
+        return np.asarray(self.K.diagonal())
 
     @property
     def unit_rows(self) -> bool:
@@ -257,7 +263,7 @@ class Systems:
         """Force per displacement at each row: an upper bound, or infinity where unknown."""
         p = self.program
         if p.unit_rows:
-            return p.K.diagonal()[p.unknown]
+            return p.diagonal[p.unknown]
         stiffness = np.full(p.g.size, np.inf)
         for j in range(p.g.size):
             if ~j in self.place:

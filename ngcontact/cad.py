@@ -7,6 +7,7 @@ order. Everything here is in the edge's own parameter; arrays of points are (k, 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import ngsolve as ng
 import numpy as np
@@ -26,8 +27,6 @@ class CadEdge:
 
     Attributes
     ----------
-    name : str
-        The boundary name.
     start, stop : float
         Parameter interval.
     straight : bool
@@ -38,7 +37,6 @@ class CadEdge:
 
     def __init__(self, edge: TopoDS_Shape) -> None:
         self._edge = edge
-        self.name = edge.name or ""
         self.start, self.stop = edge.parameter_interval
         self._t = np.linspace(self.start, self.stop, SAMPLES)
         self._x = self.point(self._t)
@@ -46,6 +44,11 @@ class CadEdge:
         chord = self._x[0] + np.linspace(0, 1, SAMPLES)[:, None] * (self._x[-1] - self._x[0])
         self.straight = bool(np.abs(self._x - chord).max() <= ROUND_OFF * self.size)
         self.closed = bool(np.abs(self._x[-1] - self._x[0]).max() <= MISSED * self.size)
+
+    @property
+    def name(self) -> str:
+        """Boundary name."""
+        return self._edge.name or ""
 
     def point(self, t: Array) -> Array:
         """Points (k, 2) at the parameters `t` (k,)."""
@@ -116,15 +119,18 @@ class CadEdge:
         return t, self.point(t), self.derivative(t)
 
 
+@lru_cache(maxsize=1)  # for all meshes of one adaptive run
+def _edges(geometry: OCCGeometry) -> list[CadEdge]:
+    """Edges of a geometry; one between two faces occurs twice in the shape, here once."""
+    return [CadEdge(edge) for edge in dict.fromkeys(geometry.shape.edges)]
+
+
 def cad_edges(mesh: ng.Mesh) -> list[CadEdge] | None:
     """CAD edges by boundary region number, or None for a mesh without an OCC geometry."""
     geometry = mesh.ngmesh.GetGeometry()
     if not isinstance(geometry, OCCGeometry):
         return None
-    edges = list(dict.fromkeys(geometry.shape.edges))  # an edge between two faces occurs twice
-    names = mesh.GetBoundaries()
-    if tuple(edge.name or "default" for edge in edges) != tuple(
-        name or "default" for name in names
-    ):
+    edges, names = _edges(geometry), mesh.GetBoundaries()
+    if [edge.name or "default" for edge in edges] != [name or "default" for name in names]:
         return None
-    return [CadEdge(edge) for edge in edges]
+    return edges

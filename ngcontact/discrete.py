@@ -103,7 +103,7 @@ def _guided(problem: Problem, trace: Trace) -> Conditions:
 def _check_range(program: Program) -> None:
     """Raise where double precision holds the data but neither the forces nor the displacements."""
     p = program
-    stiffness, load = p.K.diagonal().max(initial=0.0), np.abs(p.b).max(initial=0.0)
+    stiffness, load = p.diagonal.max(initial=0.0), np.abs(p.b).max(initial=0.0)
     given = max(np.abs(p.values).max(initial=0.0), -p.g.min(initial=0.0))
     with np.errstate(divide="ignore"):
         k, f, v = np.log10([stiffness, load, given])

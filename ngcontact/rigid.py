@@ -190,7 +190,7 @@ def rigid_motions(
     n = space.basis.shape[1] // 2
     Z = node_values(space, bodies, of_unknown[:n]) @ combinations
     in_v = space.basis @ Z
-    terms = (space.A.diagonal()[:, None] * np.abs(in_v)).max(axis=0)
+    terms = (space.diagonal[:, None] * np.abs(in_v)).max(axis=0)
     if (np.abs(space.A @ in_v).max(axis=0) > INEXACT * terms).any():
         raise ValueError(
             "curved superparametric elements do not contain the rotation of a body that its "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import ngsolve as ng
 import numpy as np
@@ -97,9 +98,14 @@ class Space:
     matrix: ng.BaseMatrix
     f: Array
 
+    @cached_property
+    def diagonal(self) -> Array:
+        """Diagonal of A, (2N,)."""
+        return np.asarray(self.A.diagonal())
+
     def stiffness(self) -> Array:
         """Force per displacement of the nodes, (n,), by its order of magnitude."""
-        diagonal = self.basis.power(2).T @ self.A.diagonal()
+        diagonal = self.basis.power(2).T @ self.diagonal
         return diagonal.reshape(2, -1).max(axis=0)
 
 
