@@ -18,7 +18,7 @@ from .matrix import cholesky, congruent
 from .newton import Minimiser
 from .pairs import joined, kept_lines, merged
 from .problem import Problem, boundary_mask
-from .reuse import contact_lines, same_basis, same_stiffness
+from .reuse import contact_lines, same_basis, same_boundary, same_stiffness
 from .rigid import Rigid, rigid_motions
 from .rows import Conditions
 from .space import LOAD_BONUS, Space, assemble, load_vector
@@ -100,6 +100,24 @@ def _guided(problem: Problem, trace: Trace) -> Conditions:
     return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))
 
 
+def _conditions(problem: Problem, trace: Trace) -> Conditions:
+    """Gamma_u and Gamma_0."""
+    parts = _prescribed(problem, trace), _guided(problem, trace)
+    return Conditions(
+        *(np.concatenate([getattr(c, name) for c in parts]) for name in Conditions.__annotations__)
+    )
+
+
+def _space(
+    problem: Problem, trace: Trace, element: str, previous: Discrete | None
+) -> tuple[Space, bool]:
+    """Space with its forms, and whether its stiffness had to be assembled."""
+    if previous is not None and same_stiffness(problem, previous.problem):
+        f = load_vector(problem, previous.space.V, LOAD_BONUS)
+        return replace(previous.space, f=f), False
+    return assemble(problem, trace, element), True
+
+
 def _check_range(program: Program) -> None:
     """Raise where double precision holds the data but neither the forces nor the displacements."""
     p = program
@@ -129,21 +147,13 @@ def discretise(
         A pair of which no point faces; prescribed displacements that violate a contact row;
         forces or displacements beyond the range of numbers.
     """
-    trace = boundary_trace(mesh, order) if previous is None else previous.space.trace
+    trace = boundary_trace(mesh, order)
+    if previous is not None and not same_boundary(trace, previous.space.trace):
+        previous = None  # the mesh has been changed in place
     found = contact_lines(problem, trace, [] if previous is None else previous.found)
-    if previous is not None and same_stiffness(problem, previous.problem):
-        f = load_vector(problem, previous.space.V, LOAD_BONUS)
-        space, assembled = replace(previous.space, f=f), False
-    else:
-        space, assembled = assemble(problem, trace, element), True
+    space, assembled = _space(problem, trace, element, previous)
     n = space.basis.shape[1] // 2
-    prescribed, guided = _prescribed(problem, trace), _guided(problem, trace)
-    conditions = Conditions(
-        *(
-            np.concatenate([getattr(c, name) for c in (prescribed, guided)])
-            for name in Conditions.__annotations__
-        )
-    )
+    conditions = _conditions(problem, trace)
     lines, rows = merged(found, joined(found, trace), n)
     length = float(np.abs(trace.curve).max())
     basis = change_of_basis(n, conditions, rows, length, space.stiffness())
@@ -156,11 +166,11 @@ def discretise(
         space = replace(space, f=f)
     T = space.basis @ basis.T
     m = len(basis.unknown)
-    systems = None
     if previous is not None and not assembled and same_basis(basis, previous.basis):
         K, systems = previous.program.K, previous.systems
     else:
         K, matrix = congruent(space.matrix, space.A, T)
+        systems = None
     program = Program(
         K=K,
         b=T.T @ space.f,

@@ -13,6 +13,11 @@ from .problem import Contact, Problem
 from .trace import Trace
 
 
+def same_boundary(one: Trace, other: Trace) -> bool:
+    """Whether the boundaries of two meshes have the same nodes at the same places."""
+    return np.array_equal(one.nodes, other.nodes) and np.array_equal(one.curve, other.curve)
+
+
 def _same_law(one: Elastic | Hooke, other: Elastic | Hooke) -> bool:
     """Whether two laws are the same numbers; functions may have changed unseen."""
     if varies(one) or varies(other) or type(one) is not type(other):

@@ -107,6 +107,14 @@ def test_other_elements_take_nothing_over() -> None:
     same(second, solve(pressed(2.0), first.mesh, order=2))
 
 
+def test_a_mesh_changed_in_place_is_another_mesh() -> None:
+    first = solve(pressed(), maxh=0.4)
+    first.mesh.ngmesh.Coordinates()[:] *= 2.0
+    second = solve(pressed(), first.mesh, start=first)
+    assert (second.work["assemblies"], second.work["factorizations"]) == (1, 1)
+    same(second, solve(pressed(), first.mesh))
+
+
 def test_a_level_of_an_adaptive_run_starts_a_sequence() -> None:
     *_, level = adapt(pressed(), order=2, max_dofs=3000)
     second = solve(pressed(2.0), level.mesh, order=2, start=level)
