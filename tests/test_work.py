@@ -75,6 +75,7 @@ def test_levels_are_factorised_once():
 
 
 def test_the_mesh_of_a_size_has_it():
-    for order in (1, 2):
+    for order in (1, 2, 4):
         mesh = uniform_mesh(two_blocks(), order, 10_000)
-        assert ng.VectorH1(mesh, order=order).ndof == pytest.approx(10_000, rel=0.25)
+        # Trial meshes differ by a sixth in size; measured 5 %.
+        assert ng.VectorH1(mesh, order=order).ndof == pytest.approx(10_000, rel=0.15)

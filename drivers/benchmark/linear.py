@@ -9,7 +9,6 @@ import ngsolve as ng
 import numpy as np
 
 from ngcontact import Problem
-from ngcontact.level import unknowns
 from ngcontact.mesh import first_mesh
 from ngcontact.refine import refined
 from ngcontact.space import curve, strain
@@ -69,10 +68,23 @@ def linear_solve(problem: Problem, mesh: ng.Mesh, order: int) -> Linear:
 
 def uniform_mesh(problem: Problem, order: int, size: int) -> ng.Mesh:
     """Uniformly refined mesh of about `size` unknowns, curved to the order."""
-    trial = 0.25
-    count = unknowns(first_mesh(problem, trial), order, "isoparametric")
     rounds = max(0, round(np.log(size / START) / np.log(4)))
-    mesh = first_mesh(problem, trial * float(np.sqrt(count * 4**rounds / size)))
+    extent = np.ptp(np.array(first_mesh(problem).ngmesh.Coordinates()), axis=0).max()
+    trials = [first_mesh(problem, float(extent) / count) for count in np.linspace(2, 16, 29)]
+
+    def miss(mesh: ng.Mesh) -> float:
+        return abs(float(np.log(_refined_size(mesh, order, rounds) / size)))
+
+    mesh = min(trials, key=miss)
     for _ in range(rounds):
         mesh = refined(problem, mesh)
     return curve(mesh, order, "isoparametric")[0]
+
+
+def _refined_size(mesh: ng.Mesh, order: int, rounds: int) -> int:
+    """Unknowns after that many uniform refinements, each of which quarters all triangles."""
+    vertices, edges, elements = mesh.nv, mesh.nedge, mesh.ne
+    for _ in range(rounds):
+        vertices, edges, elements = vertices + edges, 2 * edges + 3 * elements, 4 * elements
+    inner = (order - 1) * (order - 2) // 2
+    return 2 * (vertices + (order - 1) * edges + inner * elements)
