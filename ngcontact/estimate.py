@@ -135,7 +135,8 @@ class _Residuals:
             delta = correction.pressure
             divergence += ng.Grad(delta)
             jump += (delta - delta.Other()) * ng.specialcf.normal(2)
-        self._inside(divergence, jump, weights)
+        constant = self.projected.space.globalorder == 0 and correction is None
+        self._inside(divergence, jump, weights, constant and not solution.problem.force)
         for term in self.terms:
             residual = term.residual.copy()
             if correction is not None:
@@ -147,6 +148,7 @@ class _Residuals:
         divergence: ng.CoefficientFunction,
         jump: ng.CoefficientFunction,
         weights: tuple[Array, Array],
+        divergence_free: bool,
     ) -> None:
         """Element and jump terms."""
         v = ng.L2(self.mesh, order=0).TestFunction()
@@ -157,6 +159,9 @@ class _Residuals:
             ("element", ng.InnerProduct(divergence, divergence) * v * volume, weights[0]),
             ("jump", ng.InnerProduct(jump, jump) * (v + v.Other()) * skeleton, weights[1] / 2),
         ):
+            if name == "element" and divergence_free:
+                self.parts[name] = np.zeros(self.mesh.ne)
+                continue
             integral = ng.LinearForm(v.space)
             integral += form
             integral.Assemble()

@@ -26,7 +26,7 @@ from .transition import transitions
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-CANCELLED = 1e-4  # energy relative to its terms up to which these cancel too many digits
+CANCELLED = 1e-6  # energy relative to its terms below which fewer than ten digits are left
 
 
 @dataclass(frozen=True, eq=False)
