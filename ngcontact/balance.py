@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .bordered import Program
 from .matrix import terms
 from .newton import Minimiser
 from .problem import Problem, boundary_mask
+from .program import Program
 from .trace import Trace
 
 Array = NDArray[np.float64]

@@ -6,17 +6,15 @@ NumPy and SciPy only; the factorisation is an argument.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .kernel import Kernel, no_kernel
+from .program import Program
 
 Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 Solve = Callable[[Array], Array]
 Factor = Callable[[Mask], Solve]
@@ -30,54 +28,6 @@ UNSOLVED = 1e-6  # ... and above which the matrix is singular to working precisi
 
 class SingularError(ArithmeticError):
     """A factorised matrix does not solve its system: some motion meets no resistance."""
-
-
-@dataclass(frozen=True, eq=False)
-class Program:
-    """Minimise 1/2 y'Ky - b'y subject to R y <= g and given values of some unknowns.
-
-    Attributes
-    ----------
-    K : sparse (n, n)
-        Symmetric; on the unknowns that are not `fixed` positive definite but for the `kernel`.
-    b : ndarray (n,)
-        Load.
-    R : sparse (m, n)
-        Rows, linearly independent on the unknowns that are not `fixed`.
-    g : ndarray (m,)
-        Bounds.
-    equality : ndarray of bool (m,)
-        Rows that hold with equality, R y = g.
-    fixed : ndarray of bool (n,)
-        Unknowns with given values.
-    values : ndarray (n,)
-        The given values; only those of `fixed` unknowns are read.
-    unknown : ndarray of int (m,), optional
-        Given when row j is the unit vector of unknown `unknown[j]`: an active row is then an
-        unknown that leaves the system, and every factorised matrix is a principal submatrix.
-    kernel : Kernel, optional
-        Null space of K, only with unit rows.
-    """
-
-    K: sp.csr_matrix
-    b: Array
-    R: sp.csr_matrix
-    g: Array
-    equality: Mask
-    fixed: Mask
-    values: Array
-    unknown: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
-    kernel: Kernel = field(default_factory=lambda: no_kernel(0))
-
-    @cached_property
-    def diagonal(self) -> Array:
-        """Diagonal of K."""
-        return np.asarray(self.K.diagonal())
-
-    @property
-    def unit_rows(self) -> bool:
-        """Whether every row is a single unknown."""
-        return len(self.unknown) == len(self.g)
 
 
 @dataclass(frozen=True, eq=False)

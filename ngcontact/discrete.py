@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from .bordered import Program, Systems
+from .bordered import Systems
 from .constraint import Basis, change_of_basis
 from .errors import ConvergenceError
 from .gap import ContactLine
@@ -18,6 +18,7 @@ from .matrix import cholesky, congruent
 from .newton import Minimiser
 from .pairs import joined, kept_lines, merged
 from .problem import Problem, boundary_mask
+from .program import Program
 from .reuse import contact_lines, same_basis, same_boundary, same_stiffness
 from .rigid import Rigid, rigid_motions
 from .rows import Conditions

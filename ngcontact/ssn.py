@@ -19,9 +19,10 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from .bordered import Anchor, Array, Mask, Program, Solve, Systems
+from .bordered import Anchor, Array, Mask, Solve, Systems
 from .errors import ConvergenceError
 from .newton import Minimiser, Newton
+from .program import Program
 
 PROXIMAL = 1e-3  # of the stiffness at the pins, where contact leaves rigid motions free
 WEAKEST = 1e-6  # of that, to which it falls, tenfold at each proximal step

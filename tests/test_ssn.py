@@ -24,8 +24,9 @@ from drivers.stress.algebra import (
     tied_program,
 )
 from ngcontact import bordered, newton
-from ngcontact.bordered import Program, Systems
+from ngcontact.bordered import Systems
 from ngcontact.errors import ConvergenceError
+from ngcontact.program import Program
 from ngcontact.ssn import minimise, solve_qp
 
 SIZES_AND_SEEDS = st.integers(1, 40), st.integers(0, 2**32 - 1)
