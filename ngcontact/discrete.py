@@ -22,7 +22,7 @@ from .program import Program
 from .reuse import contact_lines, same_basis, same_boundary, same_stiffness
 from .rigid import Rigid, rigid_motions
 from .rows import Conditions
-from .space import LOAD_BONUS, Space, assemble, load_vector
+from .space import LOAD_BONUS, Space, assemble, load_vector, node_basis
 from .ssn import minimise
 from .trace import Trace, boundary_trace
 
@@ -109,14 +109,27 @@ def _conditions(problem: Problem, trace: Trace) -> Conditions:
     )
 
 
+def _conditioned(problem: Problem, trace: Trace) -> Index:
+    """Segments on which conditions are posed: Gamma_u, Gamma_0, Gamma_K."""
+    sides = [side for pair in problem.contact for side in (pair.secondary, pair.primary)]
+    regions = np.zeros(len(trace.mesh.GetBoundaries()), dtype=bool)
+    for pattern in (*problem.displacement, problem.sliding, *sides):
+        if pattern is not None:
+            regions |= boundary_mask(trace.mesh, str(pattern))
+    return trace.select(regions)
+
+
 def _space(
     problem: Problem, trace: Trace, element: str, previous: Discrete | None
 ) -> tuple[Space, bool]:
     """Space with its forms, and whether its stiffness had to be assembled."""
+    nodal = _conditioned(problem, trace)
     if previous is not None and same_stiffness(problem, previous.problem):
-        f = load_vector(problem, previous.space.V, LOAD_BONUS)
-        return replace(previous.space, f=f), False
-    return assemble(problem, trace, element), True
+        V = previous.space.V
+        basis = node_basis(V, trace, nodal, element)
+        f = load_vector(problem, V, LOAD_BONUS)
+        return replace(previous.space, trace=trace, nodal=nodal, basis=basis, f=f), False
+    return assemble(problem, trace, element, nodal), True
 
 
 def _check_range(program: Program) -> None:
@@ -167,7 +180,12 @@ def discretise(
         space = replace(space, f=f)
     T = space.basis @ basis.T
     m = len(basis.unknown)
-    if previous is not None and not assembled and same_basis(basis, previous.basis):
+    if (
+        previous is not None
+        and not assembled
+        and np.array_equal(space.nodal, previous.space.nodal)
+        and same_basis(basis, previous.basis)
+    ):
         K, systems = previous.program.K, previous.systems
     else:
         K, matrix = congruent(space.matrix, space.A, T)

@@ -138,9 +138,9 @@ def node_values(space: Space, bodies: Bodies, of_node: Index) -> Array:
         for axis, x in enumerate((ng.x, ng.y)):
             field.Set(x)
             place[:, axis] = field.vec.FV().NumPy()
-    segment, s = trace.at_nodes(np.arange(len(trace.region)))
-    place[trace.nodes.ravel()] = trace.point(segment, s)
-    one[trace.nodes.ravel()] = 1.0
+    segment, s = trace.at_nodes(space.nodal)
+    nodes = trace.nodes[space.nodal].ravel()
+    place[nodes], one[nodes] = trace.point(segment, s), 1.0
     values = np.zeros((2 * n, 3 * len(bodies.names)))
     for b, (middle, size) in enumerate(zip(bodies.middle, bodies.size, strict=True)):
         at = np.flatnonzero(of_node == b)

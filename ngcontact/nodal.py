@@ -11,6 +11,7 @@ from .lagrange import gauss_lobatto
 from .trace import Trace
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 
 
 def edge_bubbles(space: ng.FESpace) -> Array:
@@ -34,14 +35,14 @@ def edge_bubbles(space: ng.FESpace) -> Array:
     return values[:, columns]
 
 
-def nodal_basis(trace: Trace) -> sp.csr_matrix:
-    """Matrix (n, n) from boundary node values and other unknowns to NGSolve's scalar unknowns."""
+def nodal_basis(trace: Trace, segments: Index) -> sp.csr_matrix:
+    """Matrix (n, n) from node values on the segments and other unknowns to NGSolve's unknowns."""
     order, size = trace.order, trace.space.ndof
     if order == 1:
         return sp.identity(size, format="csr")
     bubbles = np.linalg.inv(edge_bubbles(trace.space))
-    low_first = trace.nodes[:, 0] < trace.nodes[:, -1]
-    nodes = np.where(low_first[:, None], trace.nodes, trace.nodes[:, ::-1])
+    nodes = trace.nodes[segments]
+    nodes = np.where((nodes[:, 0] < nodes[:, -1])[:, None], nodes, nodes[:, ::-1])
     _, first = np.unique(nodes[:, 1], return_index=True)
     nodes = nodes[first]
     # Edge function coefficients: bubbles (values - linear part).

@@ -18,6 +18,7 @@ from .problem import Problem, boundary_mask
 from .trace import Trace
 
 Array = NDArray[np.float64]
+Index = NDArray[np.intp]
 
 ORDERS = (1, 2, 3, 4)
 ELEMENTS = ("isoparametric", "superparametric", "physical")
@@ -81,8 +82,10 @@ class Space:
         Vector space of N unknowns for each component.
     trace : Trace
         Its boundary nodes.
+    nodal : ndarray of int (k,)
+        Segments of the trace on which conditions are posed at nodes.
     basis : sparse (2N, 2n)
-        From n node values (and unknowns elsewhere) for each component to the unknowns of V.
+        From n node values there (and unknowns elsewhere) for each component to the unknowns of V.
     A : sparse (2N, 2N)
         Stiffness.
     matrix : ng.BaseMatrix
@@ -93,6 +96,7 @@ class Space:
 
     V: ng.FESpace
     trace: Trace
+    nodal: Index
     basis: sp.csr_matrix
     A: sp.csr_matrix
     matrix: ng.BaseMatrix
@@ -191,14 +195,20 @@ def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
     return f.vec.FV().NumPy().copy()
 
 
-def assemble(problem: Problem, trace: Trace, element: str) -> Space:
-    """Space, stiffness and load of a problem on the mesh of `trace`, curved as `element` asks."""
+def node_basis(V: ng.FESpace, trace: Trace, nodal: Index, element: str) -> sp.csr_matrix:
+    """`Space.basis` for node values on the segments `nodal`."""
+    scalar = _physical_basis(V, trace) if element == "physical" else nodal_basis(trace, nodal)
+    return sp.block_diag([scalar, scalar], format="csr")
+
+
+def assemble(problem: Problem, trace: Trace, element: str, nodal: Index | None = None) -> Space:
+    """Space, stiffness and load of a problem on the mesh of `trace`, curved as `element` asks.
+
+    Node values replace NGSolve's unknowns on the segments `nodal`, all when left out.
+    """
     mesh = trace.mesh
     V = _vector_space(mesh, trace.order, element)
-    if element == "physical":
-        scalar = _physical_basis(V, trace)
-    else:
-        scalar = nodal_basis(trace)
+    nodal = np.arange(len(trace.region)) if nodal is None else nodal
     u, v = V.TnT()
     a = ng.BilinearForm(V, symmetric=True)
     for body, law in problem.materials.items():
@@ -214,7 +224,8 @@ def assemble(problem: Problem, trace: Trace, element: str) -> Space:
     return Space(
         V=V,
         trace=trace,
-        basis=sp.block_diag([scalar, scalar], format="csr"),
+        nodal=nodal,
+        basis=node_basis(V, trace, nodal, element),
         A=shared(a.mat),
         matrix=a.mat,
         f=load_vector(problem, V, LOAD_BONUS),

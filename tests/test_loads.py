@@ -86,18 +86,19 @@ def test_other_bodies_are_assembled() -> None:
         same(second, solve(problem, first.mesh))
 
 
-def test_other_supports_and_pairs_are_factorised() -> None:
-    first = solve(pressed(), maxh=0.4)
+@pytest.mark.parametrize("order", [1, 3])
+def test_other_supports_and_pairs_are_factorised(order: int) -> None:
+    first = solve(pressed(), maxh=0.4, order=order)
     for problem in (
         pressed(displacement={"bottom": (0, 0), "upper_left": (0, None)}, sliding=None),
         pressed(displacement={"bottom": (0, 0), "top": (None, -0.01)}, traction={}),
         pressed(contact=[replace(PAIR, bilateral=True)]),
     ):
-        second = solve(problem, first.mesh, start=first)
+        second = solve(problem, first.mesh, order=order, start=first)
         assert second.work["assemblies"] == 0
-        same(second, solve(problem, first.mesh))
+        same(second, solve(problem, first.mesh, order=order))
     held = pressed(displacement={"bottom": (0, 0), "top": (None, -0.01)}, traction={})
-    assert solve(held, first.mesh, start=first).work["factorizations"] == 1
+    assert solve(held, first.mesh, order=order, start=first).work["factorizations"] == 1
 
 
 def test_other_elements_take_nothing_over() -> None:
