@@ -2,8 +2,8 @@
 
 python -m drivers.benchmark [tax] [levels] [growth] [accuracy] [skip] [stages]
 
-Everything when no part is named, about half an hour; prints Markdown tables and writes pictures to
-out/. The other codes need the optional group `bench` of dependencies; what is missing is said.
+Everything when no part is named, about half an hour; prints Markdown tables and writes them, with
+pictures, to out/. The other codes need the optional group `bench` of dependencies; what is missing is said.
 """
 
 from __future__ import annotations
@@ -38,45 +38,44 @@ def machine() -> str:
     )
 
 
-def contact_tax() -> None:
+def contact_tax() -> str:
     """Contact tax."""
-    print(tables.of_tax(tax.taxes([disc(), block()])))
+    return tables.of_tax(tax.taxes([disc(), block()]))
 
 
-def adaptive_levels() -> None:
+def adaptive_levels() -> str:
     """Whole levels and imports."""
-    print(tables.of_levels(levels.all_levels([disc(), block()])))
+    table = tables.of_levels(levels.all_levels([disc(), block()]))
     plain, ours = levels.import_seconds()
-    print(f"\nimport: ngsolve {plain:.3f} s, ngcontact {ours:.3f} s, ratio {ours / plain:.3f}")
+    return f"{table}\n\nimport: ngsolve {plain:.3f} s, ngcontact {ours:.3f} s"
 
 
-def growth_of_time() -> None:
+def growth_of_time() -> str:
     """Growth of time and memory."""
     rows = list(growth.growths())
-    print(tables.of_growth(rows))
     pictures.draw_growth(FOLDER / "benchmark_growth.png", rows)
+    return tables.of_growth(rows)
 
 
-def time_to_accuracy() -> None:
+def time_to_accuracy() -> str:
     """Time to accuracy."""
-    found = []
+    found, missing = [], set()
     for common in (disc(), block()):
-        points, missing = accuracy.points(common)
+        points, lines = accuracy.points(common)
         found += points
-        for line in missing:
-            print(line)
-    print(tables.of_accuracy(found))
+        missing |= set(lines)
     pictures.draw_accuracy(FOLDER / "benchmark_accuracy.png", found)
+    return "\n\n".join([tables.of_accuracy(found), *sorted(missing)])
 
 
-def skipped() -> None:
+def skipped() -> str:
     """What scenes skip."""
-    print(tables.of_scenes(skip.scenes()))
+    return tables.of_scenes(skip.scenes())
 
 
-def time_by_stage() -> None:
+def time_by_stage() -> str:
     """Where the time of a level goes."""
-    print(tables.of_stages(stages.all_stages([disc(), block()])))
+    return tables.of_stages(stages.all_stages([disc(), block()]))
 
 
 PARTS = {
@@ -96,10 +95,10 @@ def main(names: list[str]) -> None:
         raise SystemExit(f"no part is called {', '.join(unknown)}; choose from {', '.join(PARTS)}")
     FOLDER.mkdir(exist_ok=True)
     ng.SetNumThreads(1)
-    print(machine())
     for name in names or PARTS:
-        print(f"\n## {PARTS[name].__doc__}\n", flush=True)
-        PARTS[name]()
+        text = f"{machine()}\n\n## {PARTS[name].__doc__}\n\n{PARTS[name]()}\n"
+        (FOLDER / f"benchmark_{name}.md").write_text(text)  # other codes print what they like
+        print(text, flush=True)
 
 
 if __name__ == "__main__":
