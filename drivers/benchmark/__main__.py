@@ -3,7 +3,8 @@
 python -m drivers.benchmark [tax] [levels] [growth] [accuracy] [skip] [stages]
 
 Everything when no part is named, about half an hour; prints Markdown tables and writes them, with
-pictures, to out/. The other codes need the optional group `bench` of dependencies; what is missing is said.
+pictures, to out/. The other codes need the optional group `bench` of dependencies; what is missing
+is said.
 """
 
 from __future__ import annotations
