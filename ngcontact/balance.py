@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .check import boundary_mask
 from .matrix import terms
 from .newton import Minimiser
-from .problem import Problem, boundary_mask
+from .problem import Problem
 from .program import Program
 from .trace import Trace
 

@@ -10,6 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .bordered import Systems
+from .check import boundary_mask
 from .constraint import Basis, change_of_basis
 from .errors import ConvergenceError
 from .gap import ContactLine
@@ -17,7 +18,7 @@ from .kernel import no_kernel
 from .matrix import cholesky, congruent
 from .newton import Minimiser
 from .pairs import joined, kept_lines, merged
-from .problem import Problem, boundary_mask
+from .problem import Problem
 from .program import Program
 from .reuse import contact_lines, same_basis, same_boundary, same_stiffness
 from .rigid import Rigid, rigid_motions

@@ -31,6 +31,7 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from .check import boundary_mask
 from .gap import ContactLine, at_quadrature, prescribed_gap
 from .incompressible import PressureCorrection, Share, Term
 from .lagrange import gauss, lagrange
@@ -44,7 +45,6 @@ from .moduli import (
     shear_moduli,
 )
 from .partners import partners
-from .problem import boundary_mask
 from .sides import Side, met_from_behind, nodal_pressure, traction
 from .trace import Trace
 

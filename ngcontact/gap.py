@@ -14,9 +14,10 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from .check import boundary_mask
 from .lagrange import gauss, lagrange
 from .partners import partners
-from .problem import Contact, boundary_mask
+from .problem import Contact
 from .trace import Trace
 
 Array = NDArray[np.float64]

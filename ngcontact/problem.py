@@ -11,10 +11,7 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry
 
-from ngcontact.check import body_mask, boundary_mask, check_problem
 from ngcontact.material import Elastic, Hooke, require_model, scalar_data
-
-__all__ = ["Contact", "Problem", "body_mask", "boundary_mask"]
 
 Scalar: TypeAlias = float | ng.CoefficientFunction
 Vector: TypeAlias = Sequence[Scalar] | ng.CoefficientFunction
@@ -143,7 +140,9 @@ class Problem:
         return -load * ng.specialcf.normal(2) if load.dim == 1 else load
 
     def check(self, mesh: ng.Mesh) -> None:
-        """Refuse names and data that do not fit the mesh; see `check_problem`."""
+        """Refuse names and data that do not fit the mesh; see `check.check_problem`."""
+        from ngcontact.check import check_problem  # stating a problem does not need it
+
         check_problem(self, mesh)
 
 

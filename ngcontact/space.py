@@ -11,10 +11,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .cad import cad_edges
+from .check import boundary_mask
 from .material import varies
 from .matrix import shared
 from .nodal import edge_bubbles, nodal_basis
-from .problem import Problem, boundary_mask
+from .problem import Problem
 from .trace import Trace
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from drivers import cases
-from ngcontact.problem import boundary_mask
+from ngcontact.check import boundary_mask
 from ngcontact.trace import boundary_trace
 
 REPRODUCED = {  # by order: cases whose solution lies in the space

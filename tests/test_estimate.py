@@ -16,8 +16,8 @@ from drivers.exact import relative_energy_error, transition
 from drivers.exact_curved import rings as ring_solution
 from geometries import blocks, rings
 from ngcontact import Contact, Elastic, Problem, adapt, solve
+from ngcontact.check import boundary_mask
 from ngcontact.mesh import first_mesh
-from ngcontact.problem import boundary_mask
 from ngcontact.refine import refined
 
 # A(u, u) of the exact solutions over both bodies, from Clapeyron's theorem.

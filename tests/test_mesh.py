@@ -16,8 +16,8 @@ from netgen.occ import OCCGeometry
 from geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
 from geometries.region import body, compound, polygon, quarter_arc
 from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact.check import boundary_mask
 from ngcontact.mesh import check_curves, first_mesh
-from ngcontact.problem import boundary_mask
 from ngcontact.trace import boundary_trace
 
 SOFT = Elastic(E=1.0, nu=0.3)

@@ -12,10 +12,10 @@ import pytest
 from netgen.occ import Box, Compound, Glue, OCCGeometry, Pnt, WorkPlane, X, Y
 from ngsolve.meshes import MakeStructured2DMesh
 
-from ngcontact.check import body_of_vertex
+from ngcontact.check import body_mask, body_of_vertex, boundary_mask
 from ngcontact.errors import ContactError, ConvergenceError, NoEquilibriumError
 from ngcontact.material import Elastic, Hooke
-from ngcontact.problem import Contact, Problem, body_mask, boundary_mask
+from ngcontact.problem import Contact, Problem
 
 STEEL = Elastic(E=210e9, nu=0.3)
 NAN = ng.sqrt(-1 - ng.x * ng.x)  # not a number at every point

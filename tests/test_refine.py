@@ -17,8 +17,8 @@ from netgen.occ import OCCGeometry
 
 from geometries import blocks, disc_on_block, disc_on_disc, graphs, rings
 from ngcontact import Contact, Elastic, Problem
+from ngcontact.check import boundary_mask
 from ngcontact.mesh import first_mesh
-from ngcontact.problem import boundary_mask
 from ngcontact.refine import refined
 from ngcontact.space import curve
 from ngcontact.trace import boundary_trace

@@ -17,8 +17,8 @@ from drivers import cases
 from geometries import blocks, disc, disc_on_block, disc_on_disc, rings
 from geometries.region import body, compound, polygon
 from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
+from ngcontact.check import boundary_mask
 from ngcontact.mesh import first_mesh
-from ngcontact.problem import boundary_mask
 
 SOFT = Elastic(E=1.0, nu=0.3)
 STIFF = Elastic(E=3.0, nu=0.2)
