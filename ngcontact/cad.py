@@ -7,7 +7,7 @@ order. Everything here is in the edge's own parameter; arrays of points are (k, 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import ngsolve as ng
 import numpy as np
@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 SAMPLES = 65  # points of an edge from which a projection starts
 NEWTON_STEPS = 30
 MISSED = 1e-9  # distance, relative to the edge, beyond which a level counts as not reached
+UNIFORM = 1e-9  # relative change of speed along an arc of a circle
 ROUND_OFF = 1e-12  # relative to the edge's size: OCC keeps coordinates to about 1e-15
 
 
@@ -49,6 +50,12 @@ class CadEdge:
     def name(self) -> str:
         """Boundary name."""
         return self._edge.name or ""
+
+    @cached_property
+    def uniform(self) -> bool:
+        """Whether its speed is constant, as on arcs of circles."""
+        speed = np.linalg.norm(self.derivative(self._t), axis=1)
+        return bool(np.ptp(speed) <= UNIFORM * speed.max())
 
     def point(self, t: Array) -> Array:
         """Points (k, 2) at the parameters `t` (k,)."""

@@ -34,8 +34,8 @@ from numpy.typing import NDArray
 from .check import boundary_mask
 from .gap import ContactLine, at_quadrature, prescribed_gap
 from .incompressible import PressureCorrection, Share, Term
+from .interior import divergence_and_jump, integral, projected_stress
 from .lagrange import gauss, lagrange
-from .material import varies
 from .moduli import (
     NEARLY_INCOMPRESSIBLE,
     bulk_moduli,
@@ -90,15 +90,7 @@ class _Residuals:
         mu = shear_moduli(solution.problem, self.mesh)
         self.modulus = power_of_two(mu)
         self.mu = mu / self.modulus
-        # Differentiate the stress through a projection: right for any modulus, curved elements.
-        # Its jumps are had from that too, at a fifth of the time.
-        xx, xy, _, yy = solution.stress
-        exact = self.mesh.GetCurveOrder() == 1 and not any(
-            varies(law) for law in solution.problem.materials.values()
-        )
-        degree = self.order - 1 if exact else self.order
-        self.projected = ng.GridFunction(ng.L2(self.mesh, order=degree, dim=3))
-        self.projected.Set(ng.CF((xx, yy, xy)).Compile())
+        self.projected = projected_stress(solution)
         coefficients = self.projected.vec.FV().NumPy()
         self.unit = power_of_two(coefficients)
         coefficients /= self.unit
@@ -107,7 +99,7 @@ class _Residuals:
         self.edge_weight = self.diameter / (2 * self.mu * self.order)
         self.in_contact = self.trace.inner.copy()
         self.terms: list[Term] = []
-        self.parts: dict[str, Array] = {}
+        self.parts: dict[str, Array] = {"element": np.zeros(self.mesh.ne)}
 
     def add(self, name: str, element: Index, squares: Array) -> None:
         """Add squared terms at elements, repeated ones summed."""
@@ -117,13 +109,10 @@ class _Residuals:
     def finish(self) -> None:
         """Correct the pressure where that is needed, then square all residuals of the stress."""
         solution, p = self.solution, self.order
-        slope = ng.Grad(self.projected)
-        divergence = ng.CF((slope[0, 0] + slope[2, 1], slope[2, 0] + slope[1, 1]))
+        divergence, jump = divergence_and_jump(self.projected)
         if solution.problem.force:
             force = self.mesh.MaterialCF(solution.problem.force, default=ng.CF((0, 0)))
             divergence += force * (1 / self.unit)
-        xx, yy, xy = self.projected - self.projected.Other()
-        jump = ng.CF((xx, xy, xy, yy), dims=(2, 2)) * ng.specialcf.normal(2)
         weights = ((self.diameter / p) ** 2 / (2 * self.mu), self.edge_weight)
         names = nearly_incompressible(solution.problem, self.mesh, NEARLY_INCOMPRESSIBLE)
         correction = None
@@ -135,37 +124,17 @@ class _Residuals:
             delta = correction.pressure
             divergence += ng.Grad(delta)
             jump += (delta - delta.Other()) * ng.specialcf.normal(2)
-        constant = self.projected.space.globalorder == 0 and correction is None
-        self._inside(divergence, jump, weights, constant and not solution.problem.force)
+        data = DATA_BONUS if solution.problem.force else 0
+        constant = self.projected.space.globalorder == 0 and correction is None and data == 0
+        if not constant:  # else there is no divergence
+            squares = integral(self.mesh, divergence, 2 * p + data)
+            self.parts["element"] = weights[0] * squares
+        self.parts["jump"] = weights[1] / 2 * integral(self.mesh, jump, 2 * p, edges=True)
         for term in self.terms:
             residual = term.residual.copy()
             if correction is not None:
                 correction.add_to(residual, term.shares)
             self.add(term.name, term.element, term.weight * (residual**2).sum(axis=1))
-
-    def _inside(
-        self,
-        divergence: ng.CoefficientFunction,
-        jump: ng.CoefficientFunction,
-        weights: tuple[Array, Array],
-        divergence_free: bool,
-    ) -> None:
-        """Element and jump terms."""
-        v = ng.L2(self.mesh, order=0).TestFunction()
-        loaded = DATA_BONUS if self.solution.problem.force else 0
-        volume = ng.dx(bonus_intorder=2 * self.order + loaded)
-        skeleton = ng.dx(skeleton=True, bonus_intorder=2 * self.order)
-        for name, form, weight in (
-            ("element", ng.InnerProduct(divergence, divergence) * v * volume, weights[0]),
-            ("jump", ng.InnerProduct(jump, jump) * (v + v.Other()) * skeleton, weights[1] / 2),
-        ):
-            if name == "element" and divergence_free:
-                self.parts[name] = np.zeros(self.mesh.ne)
-                continue
-            integral = ng.LinearForm(v.space)
-            integral += form
-            integral.Assemble()
-            self.parts[name] = weight * integral.vec.FV().NumPy()
 
     def on_supports_and_loads(self) -> None:
         """Gamma_tau, Gamma_0, Gamma_u: every outer segment `on_contact` has not seen."""

@@ -14,10 +14,15 @@ from .space import curve
 
 def unknowns(mesh: ng.Mesh, order: int, element: str) -> int:
     """Number of unknowns of the displacement on a mesh that is curved to the element's degree."""
-    inner = (order - 1) * (order - 2) // 2
     # Functions linear in physical coordinates are kept in a space with boundary edge functions.
     edges = mesh.GetNE(ng.BND) if element == "physical" and mesh.GetCurveOrder() > 1 else 0
-    return 2 * (mesh.nv + (order - 1) * mesh.nedge + edges + inner * mesh.ne)
+    return unknowns_of(order, mesh.nv + edges, mesh.nedge, mesh.ne)
+
+
+def unknowns_of(order: int, vertices: int, edges: int, elements: int) -> int:
+    """Number of unknowns of a displacement of degree `order` on that many of each."""
+    inner = (order - 1) * (order - 2) // 2
+    return 2 * (vertices + (order - 1) * edges + inner * elements)
 
 
 def solve_level(

@@ -30,7 +30,6 @@ FINE = 513  # samples on which a division is laid out
 SMALLEST = 1e-2  # extent of an edge; measured: all but arcs of circles are wrong from 2e-3
 SHORTEST = 1e-6  # a segment of a curved edge; measured: elements of order 4 turn over at 5e-7
 SHORTEST_ON_SMALL = 1e-5  # ... of a smaller arc; measured: middles displaced from 5e-6, order 4
-UNIFORM = 1e-9  # relative change of speed along an arc of a circle
 
 
 @dataclass(eq=False)
@@ -235,12 +234,10 @@ def check_curves(mesh: ng.Mesh) -> None:
     for number, edge in enumerate(edges):
         if edge.straight:
             continue
-        speed = np.linalg.norm(edge.samples()[2], axis=1)
-        arc = bool(np.ptp(speed) <= UNIFORM * speed.max())
         small = edge.size < SMALLEST
         limit = SHORTEST_ON_SMALL if small else SHORTEST
         shortest = float(length[segments["index"] == number + 1].min(initial=np.inf))
-        if shortest < limit or (small and not arc):
+        if shortest < limit or (small and not edge.uniform):
             raise ValueError(
                 f'the curved edge "{edge.name}" has the extent {edge.size:g} and segments of '
                 f"{shortest:g}, on which the geometry kernel loses digits; choose a smaller unit "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -14,8 +13,9 @@ from numpy.typing import NDArray
 
 from .balance import optimality, resultants
 from .discrete import Discrete
+from .energy import energy_norm, potential_energy
 from .estimate import Estimate, estimate
-from .moduli import power_of_two, root_of_squares
+from .moduli import root_of_squares
 from .motions import RigidMotion
 from .newton import Minimiser
 from .output import write_solution
@@ -25,8 +25,6 @@ from .transition import transitions
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
-
-CANCELLED = 1e-6  # energy relative to its terms below which fewer than ten digits are left
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,26 +167,12 @@ class Solution:
     @cached_property
     def energy(self) -> float:
         """Total potential energy L(u_h) of HH81 (2.6), per unit thickness."""
-        u, d = self.displacement.vec.FV().NumPy(), self.discrete.space
-        size = power_of_two(u)  # squares of displacements may leave the range where these do not
-        u, f = u / size, d.f / size
-        return float(u @ (d.A @ u) / 2 - f @ u) * size * size
+        return potential_energy(self.discrete.space, self.displacement)
 
     @cached_property
     def energy_norm(self) -> float:
-        """A(u_h, u_h)^(1/2), from the strains where large rigid motions would cancel."""
-        u, space = self.displacement.vec.FV().NumPy(), self.discrete.space
-        size = power_of_two(u)
-        u = u / size
-        energy = float(u @ (space.A @ u))
-        if energy > CANCELLED * float(space.diagonal @ u**2):
-            return math.sqrt(energy) * size
-        e = strain(self.displacement) / size
-        total = 0.0
-        for body, law in self.problem.materials.items():
-            density = ng.InnerProduct(law.voigt(self.problem.model) * e, e).Compile()
-            total += ng.Integrate(density, self.mesh.Materials(body), order=2 * self.order + 2)
-        return float(np.sqrt(total)) * size
+        """A(u_h, u_h)^(1/2)."""
+        return energy_norm(self.problem, self.discrete.space, self.displacement)
 
     @cached_property
     def _estimate(self) -> Estimate:

@@ -1,4 +1,4 @@
-"""Overhead: one whole adaptive level over the linear solve of its mesh, and what a scene skips."""
+"""Overhead: one whole adaptive level over the linear solve of its mesh, and the import."""
 
 from __future__ import annotations
 

@@ -9,6 +9,7 @@ import ngsolve as ng
 import numpy as np
 
 from ngcontact import Problem
+from ngcontact.level import unknowns_of
 from ngcontact.mesh import first_mesh
 from ngcontact.refine import refined
 from ngcontact.space import curve, strain
@@ -86,5 +87,4 @@ def _refined_size(mesh: ng.Mesh, order: int, rounds: int) -> int:
     vertices, edges, elements = mesh.nv, mesh.nedge, mesh.ne
     for _ in range(rounds):
         vertices, edges, elements = vertices + edges, 2 * edges + 3 * elements, 4 * elements
-    inner = (order - 1) * (order - 2) // 2
-    return 2 * (vertices + (order - 1) * edges + inner * elements)
+    return unknowns_of(order, vertices, edges, elements)

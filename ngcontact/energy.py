@@ -1,0 +1,35 @@
+"""Energies of a displacement."""
+
+from __future__ import annotations
+
+import math
+
+import ngsolve as ng
+
+from .moduli import power_of_two
+from .problem import Problem
+from .space import Space, strain
+
+CANCELLED = 1e-6  # energy relative to its terms below which fewer than ten digits are left
+
+
+def potential_energy(space: Space, displacement: ng.GridFunction) -> float:
+    """L(u_h) of HH81 (2.6), per unit thickness."""
+    u = displacement.vec.FV().NumPy()
+    size = power_of_two(u)  # squares of displacements may leave the range where these do not
+    u, f = u / size, space.f / size
+    return float(u @ (space.A @ u) / 2 - f @ u) * size * size
+
+
+def energy_norm(problem: Problem, space: Space, displacement: ng.GridFunction) -> float:
+    """A(u_h, u_h)^(1/2), from the strains where large rigid motions would cancel."""
+    u, mesh, order = displacement.vec.FV().NumPy(), space.trace.mesh, space.trace.order
+    size = power_of_two(u)
+    u = u / size
+    energy = float(u @ (space.A @ u))
+    if energy <= CANCELLED * float(space.diagonal @ u**2):
+        e, energy = strain(displacement) / size, 0.0
+        for body, law in problem.materials.items():
+            density = ng.InnerProduct(law.voigt(problem.model) * e, e).Compile()
+            energy += ng.Integrate(density, mesh.Materials(body), order=2 * order + 2)
+    return math.sqrt(energy) * size
