@@ -8,6 +8,7 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from pyngcore import Array_D_S, Array_I_S
 
 from .bordered import Factor, Mask, Solve
 
@@ -30,10 +31,20 @@ def shared(matrix: ng.BaseMatrix) -> sp.csr_matrix:
     return sp.csr_matrix((values, columns, starts), (matrix.height, matrix.width))
 
 
+def handed_over(K: sp.spmatrix) -> ng.BaseMatrix:
+    """A copy of a SciPy matrix for NGSolve."""
+    K = K.tocoo()
+    entries = []
+    # NumPy arrays as arguments would be converted entry by entry, at ten times the price.
+    for kind, values in ((Array_I_S, K.row), (Array_I_S, K.col), (Array_D_S, K.data)):
+        entries.append(kind(len(values)))
+        entries[-1].NumPy()[:] = values
+    return ng.la.SparseMatrixd.CreateFromCOO(*entries, *K.shape)
+
+
 def lower_half(K: sp.csr_matrix) -> ng.BaseMatrix:
     """Lower half of a symmetric matrix for NGSolve, all that its Cholesky factorisation reads."""
-    K = sp.tril(K, format="coo")
-    return ng.la.SparseMatrixd.CreateFromCOO(K.row, K.col, K.data, *K.shape)
+    return handed_over(sp.tril(K))
 
 
 def congruent(
@@ -52,9 +63,8 @@ def congruent(
     if D.nnz == 0:
         return A, matrix
     AD = A @ D
-    change = (AD + AD.T + D.T @ AD).tocoo()
-    added = ng.la.SparseMatrixd.CreateFromCOO(change.row, change.col, change.data, *change.shape)
-    total = (matrix + added).CreateSparseMatrix()
+    change = AD + AD.T + D.T @ AD
+    total = (matrix + handed_over(change)).CreateSparseMatrix()
     return shared(total), total
 
 

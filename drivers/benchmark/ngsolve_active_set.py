@@ -18,6 +18,7 @@ from drivers.benchmark.ngsolve_plane import load, matrix, nodal, numbering
 from drivers.benchmark.plane import bounded
 from drivers.benchmark.problems import Common
 from drivers.benchmark.reading import read
+from ngcontact.matrix import lower_half
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -35,8 +36,7 @@ def runs(common: Common, kinds: Sequence[str], sizes: Sequence[int]) -> Iterator
 
 def cholesky(K: sp.csr_matrix) -> Solver:
     """NGSolve's sparse Cholesky factorisation for the active set."""
-    K = K.tocoo()
-    matrix = ng.la.SparseMatrixd.CreateFromCOO(K.row, K.col, K.data, *K.shape)
+    matrix = lower_half(K)
     right, solution = matrix.CreateColVector(), matrix.CreateRowVector()
 
     def solve(free: Mask, b: Array) -> Array:
