@@ -40,6 +40,7 @@ class CadEdge:
         self._edge = edge
         self.start, self.stop = edge.parameter_interval
         self._t = np.linspace(self.start, self.stop, SAMPLES)
+        self.straight = False  # as far as is known
         self._x = self.point(self._t)
         self.size = float(np.abs(np.ptp(self._x, axis=0)).max())
         chord = self._x[0] + np.linspace(0, 1, SAMPLES)[:, None] * (self._x[-1] - self._x[0])
@@ -59,11 +60,16 @@ class CadEdge:
 
     def point(self, t: Array) -> Array:
         """Points (k, 2) at the parameters `t` (k,)."""
+        if self.straight:  # without a call for every point
+            share = (np.asarray(t) - self.start) / (self.stop - self.start)
+            return self._x[0] + share[:, None] * (self._x[-1] - self._x[0])
         values = (self._edge.Value(float(ti)) for ti in t)
         return np.array([(p.x, p.y) for p in values]).reshape(-1, 2)
 
     def derivative(self, t: Array) -> Array:
         """Derivatives (k, 2) with respect to the parameter."""
+        if self.straight:
+            return np.tile((self._x[-1] - self._x[0]) / (self.stop - self.start), (len(t), 1))
         values = (self._edge.Tangent(float(ti)) for ti in t)
         return np.array([(v.x, v.y) for v in values]).reshape(-1, 2)
 
