@@ -10,6 +10,7 @@ from numbers import Real
 
 import ngsolve as ng
 import numpy as np
+from numpy.typing import NDArray
 
 from .errors import ContactError, ConvergenceError
 from .level import solve_level, unknowns
@@ -20,10 +21,12 @@ from .problem import Problem
 from .refine import refined
 from .solution import Solution
 from .space import check_element, curve
+from .transition import ending_segments, transitions
 
 ROUND_OFF = 1e-12  # relative estimate at which refinement stops: the solution is exact
 SMALL = 1e-4  # ... above which no round-off reaches
 NOISE = 100 * np.finfo(float).eps  # of a stress, relative to its terms; measured 0.5 to 50 eps
+END = 0.1  # size of elements in which contact ends, of its line, over the relative estimate
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
 LARGE = 20_000
 COARSE = 4  # elements of that run along the largest extent
@@ -129,7 +132,8 @@ def adapt(
     problem : Problem
         The continuous problem.
     maxh : float, optional
-        Largest element size of the first mesh; an eighth of the geometry when left out.
+        Largest element size of the first mesh; when left out an eighth of the geometry, half of
+        that on bounded contact zones.
     order, element
         As in `solve`. Order 4 reaches errors of 1e-3 to 1e-5 soonest (docs/adaptivity.md), order 3
         errors of a percent.
@@ -179,6 +183,26 @@ def _number(name: str, value: object) -> float:
     return float(value)
 
 
+def _marked(solution: Solution, theta: float) -> NDArray[np.bool_]:
+    """Elements (ne,) to refine: Doerfler's, and those in which contact ends.
+
+    The end of contact is known to the square of these elements' size, the energy to the square of
+    the relative error: both stay of one size.
+    """
+    marked = doerfler(solution.indicators, theta)
+    trace = solution.discrete.space.trace
+    for number, line in enumerate(solution.discrete.lines):
+        at = solution.pair == number
+        ends = transitions(line, solution.gap[at], solution.active[at])
+        segments = line.segments[ending_segments(line, ends)]
+        sides = trace.curve[segments]
+        length = np.linalg.norm(sides[:, -1] - sides[:, 0], axis=1)
+        extent = np.linalg.norm(np.ptp(line.position, axis=0)) if len(line.node) else 0.0
+        coarse = length > END * solution.relative_error_estimate * extent
+        marked[trace.element[segments[coarse]]] = True
+    return marked
+
+
 def _at_round_off(solution: Solution) -> bool:
     """Whether the estimate is round-off of terms that cancel, as where bodies move rigidly.
 
@@ -208,6 +232,8 @@ def _levels(
     solution: Solution | None = None
     while unknowns(mesh, order, element) <= max_dofs:
         solution = solve_level(problem, mesh, order, element, solution)
+        solution.discrete.systems.forget()  # a level's factorisation is of no use to the next one
+        yield solution
         error = solution.relative_error_estimate
         if not np.isfinite(solution.error_estimate):  # it would mark nothing, for ever
             raise ConvergenceError(
@@ -215,10 +241,8 @@ def _levels(
                 "choose units in which the squares of loads and displacements are numbers",
                 iterate=solution.minimiser,
             )
-        solution.discrete.systems.forget()  # a level's factorisation is of no use to the next one
         log.info("%s", solution)
-        yield solution
         if error <= max(tolerance or 0.0, ROUND_OFF) or _at_round_off(solution):
             return
-        mesh = refined(problem, solution.mesh, doerfler(solution.indicators, theta))
+        mesh = refined(problem, solution.mesh, _marked(solution, theta))
         mesh, _ = curve(mesh, order, element)

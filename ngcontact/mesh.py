@@ -17,7 +17,8 @@ from .problem import Contact, Problem
 
 Array = NDArray[np.float64]
 
-COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given
+COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given ...
+FINER = 2  # ... and that many times more on a bounded zone: contact may end anywhere on it
 TURN = 0.5  # largest turn (radians) of a curve along one contact segment
 STEEPEST = 0.5  # cosine between a curve's normal and the direction below which nodes go unmatched
 COINCIDENT = 1e-6  # distance, relative to an edge, up to which two edges are one contact line
@@ -92,6 +93,13 @@ def _require_complete(mesh: ng.Mesh) -> None:
 def _named(edges: list[_Edge], pattern: str) -> list[_Edge]:
     """Edges whose name matches."""
     return [edge for edge in edges if re.fullmatch(pattern, edge.curve.name)]
+
+
+def _bounded_zones(edges: list[_Edge], problem: Problem) -> list[_Edge]:
+    """Edges of bounded zones, which touch all along and may come apart anywhere."""
+    pairs = [pair for pair in problem.contact if pair.direction is None and not pair.bilateral]
+    lines = {line for pair in pairs for line in (pair.secondary, pair.primary) if line}
+    return [edge for edge in edges if any(_named([edge], line) for line in lines)]
 
 
 def _facing_runs(faces: NDArray[np.bool_], stops: NDArray[np.intp]) -> Iterator[slice]:
@@ -175,7 +183,8 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
     problem : Problem
         A Mesh as its geometry is returned as it is.
     maxh : float, optional
-        Largest element size, a length; an eighth of the largest extent when left out.
+        Largest element size, a length; when left out an eighth of the largest extent, half of that
+        on bounded contact zones.
 
     Raises
     ------
@@ -190,8 +199,8 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
     shape = problem.geometry.shape
     low, high = shape.bounding_box
     extent = max(high.x - low.x, high.y - low.y)
-    if maxh is None:
-        maxh = extent / COARSE
+    finer = FINER if maxh is None else 1
+    maxh = extent / COARSE if maxh is None else maxh
     if isinstance(maxh, bool) or not isinstance(maxh, int | float | np.number):
         raise TypeError(f"maxh={maxh!r} is not a number; give a length like {extent / COARSE:g}")
     if not (np.isfinite(maxh) and maxh > 0):
@@ -201,19 +210,26 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
         for edge in shape.edges
         if edge.partition is None  # a division the user has not fixed
     ]
+    for edge in (zones := _bounded_zones(edges, problem)):
+        edge.maxh = min(edge.maxh, maxh / finer)
     for contact in problem.contact:
         if contact.primary is not None:
             for secondary in _named(edges, contact.secondary):
                 for primary in _named(edges, contact.primary):
                     _divide(contact, secondary, primary)
     placed = [edge for edge in edges if edge.runs]
+    sizes = [edge.shape.maxh for edge in zones]
     try:
         for edge in placed:
             edge.shape.partition = edge.partition()
+        for edge in zones:
+            edge.shape.maxh = edge.maxh
         mesh = ng.Mesh(occ.OCCGeometry(shape, dim=2).GenerateMesh(maxh=maxh))
     finally:
         for edge in placed:  # the geometry is the user's
             edge.shape.partition = None
+        for edge, size in zip(zones, sizes, strict=True):
+            edge.shape.maxh = size
     _require_complete(mesh)
     return mesh
 

@@ -43,6 +43,19 @@ def _children(trace: Trace, first: int) -> dict[tuple[int, int], int]:
     return {(min(a, b), max(a, b)): v for v, (a, b) in parents}
 
 
+def _facing_elements(pairs: list[dict[int, int]], trace: Trace, flags: Mask) -> list[int]:
+    """Elements at segments that face those of flagged elements: marked late, they cost a round."""
+    segments = _boundary_edges(trace)
+    found = []
+    for pair in pairs:
+        for here in (pair, {b: a for a, b in pair.items()}):
+            for (a, b), element in segments.items():
+                if a in here and b in here and flags[element]:
+                    facing = min(here[a], here[b]), max(here[a], here[b])
+                    found.extend([segments[facing]] if facing in segments else [])
+    return found
+
+
 def _match_children(
     pairs: dict[int, int],
     children: dict[tuple[int, int], int],
@@ -122,7 +135,8 @@ def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.M
     pairs = [matched_vertices(trace, contact) for contact in problem.contact]
     copy = ng.Mesh(mesh.ngmesh.Copy())
     first = copy.nv
-    flags = np.ones(copy.ne, dtype=bool) if marked is None else np.asarray(marked)
+    flags = np.ones(copy.ne, dtype=bool) if marked is None else np.array(marked)
+    flags[_facing_elements(pairs, trace, flags)] = True
     for _ in range(ROUNDS):
         copy.ngmesh.Elements2D().NumPy()["refine"] = flags
         copy.Refine()

@@ -181,3 +181,12 @@ def transitions(line: ContactLine, gap: Array, active: Mask) -> Transitions:
         found.append([np.interp(at, along, x[path, axis]) for axis in (0, 1)])
     inner_outer = np.array(ends, dtype=np.intp).reshape(-1, 2)
     return Transitions(inner_outer[:, 0], inner_outer[:, 1], np.array(found).reshape(-1, 2))
+
+
+def ending_segments(line: ContactLine, ends: Transitions) -> Index:
+    """Numbers in `line.segments` of those in which contact ends; at corners, of those beside."""
+    inner = (line.rows[:, :, None] == ends.inner).any(axis=1)
+    outer = (line.rows[:, :, None] == ends.outer).any(axis=1)
+    both = inner & outer
+    at = np.where(both.any(axis=0), both, inner | outer)
+    return np.flatnonzero(at.any(axis=1))

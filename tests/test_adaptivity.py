@@ -26,10 +26,11 @@ def levels(name, strategy, order, unknowns):
 
 
 @pytest.mark.parametrize("name", ["one transition", "hertz a=0.3"])
-@pytest.mark.parametrize(("order", "unknowns"), [(1, 8000), (2, 12_000), (3, 24_000)])
+@pytest.mark.parametrize(("order", "unknowns"), [(1, 8000), (2, 12_000), (3, 40_000)])
 def test_optimal_rates(name, order, unknowns):
     _, rows = levels(name, "adaptive", order, unknowns)
-    # N^(-p/2). Order 4 needs 40k unknowns and stays in the driver.
+    # N^(-p/2), over the last factor 10 in N, which must not reach back to the first meshes of 2000
+    # unknowns at order 3. Order 4 needs 50k unknowns and stays in the driver.
     assert abs(rate(rows) / (-order / 2) - 1) < 0.1
 
 
@@ -60,14 +61,16 @@ def test_hertz_errors_by_the_estimator():
 
 @pytest.mark.parametrize(("order", "bound"), [(2, 1.5e-3), (3, 5e-4)])
 def test_half_width_inside_elements(order, bound):
-    solutions, rows = levels("hertz a=0.3", "adaptive", order, 5000)
+    solutions, rows = levels("hertz a=0.3", "adaptive", order, 7000)
     ends = np.abs(solutions[-1].transitions()[:, 0])
     assert len(ends) == 2
-    assert np.abs(ends / 0.3 - 1).max() < bound
+    # Required at 5000 unknowns, carried to the last level at the rate of the energy norm. Measured
+    # 2.4e-4 at 6660 and 1.8e-4 at 6592 unknowns.
+    assert np.abs(ends / 0.3 - 1).max() < bound * (5000 / rows[-1].unknowns) ** (order / 2)
     # Better than the element it lies in: nodes alone resolve the length of a link.
     points = np.sort(np.abs(solutions[-1].points[:, 0]))
     link = np.diff(points[np.searchsorted(points, 0.3) + np.array([-1, 0])]).max()
-    assert rows[-1].unknowns > 2500
+    assert rows[-1].unknowns > 5000
     assert np.abs(ends - 0.3).max() < link
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import netgen.occ as occ
 import ngsolve as ng
@@ -181,8 +181,18 @@ def test_contact_edges_are_filled_outside_of_the_facing_part():
 
 
 def test_the_default_size_is_an_eighth_of_the_largest_extent():
-    mesh = first_mesh(pressed(blocks(width=4.0), BLOCKS, *[BOUNDED["blocks"].contact]))
-    assert lengths(mesh, "upper_contact|lower_contact|top|bottom") == pytest.approx(4 / 8)
+    problem = pressed(blocks(width=4.0), BLOCKS, *[BOUNDED["blocks"].contact])
+    mesh = first_mesh(problem)
+    assert lengths(mesh, "top|bottom") == pytest.approx(4 / 8)
+    assert lengths(mesh, "upper_contact|lower_contact") == pytest.approx(4 / 16)
+    # The user's geometry is left as it was, and a size that is given holds everywhere.
+    assert lengths(first_mesh(problem, 0.5), "upper_contact|lower_contact") == pytest.approx(0.5)
+
+
+def test_only_zones_that_may_open_are_finer():
+    contact = replace(BOUNDED["blocks"].contact, bilateral=True)
+    mesh = first_mesh(pressed(blocks(width=4.0), BLOCKS, contact))
+    assert lengths(mesh, "upper_contact|lower_contact") == pytest.approx(4 / 8)
 
 
 def test_a_mesh_is_the_same_every_time():

@@ -12,7 +12,13 @@ import pytest
 from drivers import cases
 from geometries import blocks
 from ngcontact import Contact, Problem, adapt, solve
-from ngcontact.transition import in_contact, nodal_pressure, transitions, twins
+from ngcontact.transition import (
+    ending_segments,
+    in_contact,
+    nodal_pressure,
+    transitions,
+    twins,
+)
 
 
 def line(x, order=1, y=None):
@@ -180,6 +186,16 @@ def test_contact_that_ends_next_to_a_corner(end):
     gap, active = opening(lines.position[:, 0] - end)
     found = transitions(lines, gap, active)
     assert found.position == pytest.approx(np.array([[end, 0.0]]), abs=EXACT)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_contact_ends_in_one_segment_for_each_end(order):
+    x = np.linspace(0, 1, 8 * order + 1)
+    zone = line(x, order)
+    gap, active = opening(np.abs(x - 0.5) - 0.2)  # ends at 0.3 and 0.7, segments of 1 / 8
+    assert ending_segments(zone, transitions(zone, gap, active)).tolist() == [2, 5]
+    all_open = transitions(zone, np.ones(len(x)), np.zeros(len(x), dtype=bool))
+    assert ending_segments(zone, all_open).size == 0
 
 
 def test_no_end_at_a_corner_inside_the_contact():
