@@ -75,8 +75,8 @@ DISC = Reference(
     energy=5.22103207482e-4,  # (1)
 )
 
-# The same for the block. Half-width: levels of order 4 from 18 000 unknowns on give 1.545313, order 3
-# ends at 1.545312. Energy: order 4 agrees in 2e-12.
+# The same for the block. Half-width: levels of order 4 from 18 000 unknowns on give 1.545313, order
+# 3 ends at 1.545312. Energy: order 4 agrees in 2e-12.
 BLOCK = Reference(
     force=1.0,  # by equilibrium
     peak=0.975722,  # (1)
