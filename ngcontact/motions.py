@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse.csgraph import connected_components
 
 from .check import body_of_vertex
 from .kernel import FREE, null_space
@@ -59,18 +58,19 @@ class RigidMotion:
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """The connected bodies: names (b,), middles (b, 2), half sizes (b,), number at segments."""
+    """The connected bodies: names (b,), middles (b, 2), half sizes (b,), and whose what is."""
 
     names: list[str]
     middle: Array
     size: Array
     of_segment: Index
+    of_vertex: Index
 
 
 def connected_bodies(trace: Trace) -> Bodies:
     """The connected pieces of the mesh of `trace`."""
-    piece = body_of_vertex(trace.mesh)[trace.nodes[:, 0]]
-    number = np.unique(piece, return_inverse=True)[1]
+    piece = body_of_vertex(trace.mesh)
+    pieces, number = np.unique(piece[trace.nodes[:, 0]], return_inverse=True)
     materials = trace.mesh.GetMaterials()
     names = {int(b): materials[m] for b, m in zip(number, trace.body, strict=True)}
     ends = [trace.curve[number == b].reshape(-1, 2) for b in range(len(names))]
@@ -79,6 +79,7 @@ def connected_bodies(trace: Trace) -> Bodies:
         middle=np.array([(x.min(axis=0) + x.max(axis=0)) / 2 for x in ends]),
         size=np.array([np.ptp(x, axis=0).max() / 2 for x in ends]),
         of_segment=number,
+        of_vertex=np.searchsorted(pieces, piece),
     )
 
 
@@ -114,14 +115,8 @@ def rigid_motion(bodies: Bodies, amounts: Array, multiplier: float) -> RigidMoti
 
 def body_of_unknown(space: Space, bodies: Bodies) -> Index:
     """Number of the body that each unknown (2N,) of V_h belongs to."""
-    # The same components as of the undirected graph, without a transposed copy.
-    _, piece = connected_components(space.A, connection="strong")
-    trace = space.trace
-    number = np.zeros(piece.max() + 1, dtype=np.intp)
-    half = len(piece) // 2
-    for component in (0, half):
-        number[piece[component + trace.nodes[:, 0]]] = bodies.of_segment
-    return number[piece]
+    # Vertices come first, so that the first entry of a row is one of an element of its body.
+    return bodies.of_vertex[space.A.indices[space.A.indptr[:-1]]]
 
 
 def node_values(space: Space, bodies: Bodies, of_node: Index) -> Array:

@@ -6,7 +6,9 @@ supports and contact admit.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import scipy.sparse as sp
@@ -52,8 +54,8 @@ class Rigid:
         Left sides of the contact rows.
     work : ndarray (r,)
         Of the load, before what quadrature left of it was taken out.
-    gram : ndarray (r, r)
-        Integrals of the products of the motions over the boundaries.
+    gram : callable
+        Integrals (r, r) of the products of the motions over the boundaries, made when asked for.
     motions : ndarray (2n, r)
         In the unknowns of the program.
     kernel : Kernel
@@ -68,7 +70,7 @@ class Rigid:
     combinations: Array
     rows: Array
     work: Array
-    gram: Array
+    gram: Callable[[], Array]
     motions: Array
     kernel: Kernel
     placing: Array
@@ -76,7 +78,7 @@ class Rigid:
 
     def motion(self, amounts: Array) -> RigidMotion:
         """One of the motions, by its amounts (r,)."""
-        multiplier = float(amounts @ self.work / (amounts @ self.gram @ amounts))
+        multiplier = float(amounts @ self.work / (amounts @ self.gram() @ amounts))
         return rigid_motion(self.bodies, self.combinations @ amounts, multiplier)
 
     def left_free(self, active: Mask) -> list[RigidMotion]:
@@ -201,23 +203,31 @@ def rigid_motions(
     sizes = np.abs(in_v).T @ np.abs(space.f)
     noise = np.where(np.abs(work) <= NOISE * sizes, work, 0.0)
     residue, carried = _residue(rows, equality, work - noise)
-    M = functionals(space, bodies, of_unknown) @ combinations
-    gram = in_v.T @ M
+
+    @cache
+    def boundary() -> Array:
+        """Integrals (2N, r) of v.z over the boundaries for the motions z."""
+        return functionals(space, bodies, of_unknown) @ combinations
+
     if residue.any():
         finer = in_v.T @ load_vector(problem, space.V, LOAD_BONUS + FINER)
         motion = rigid_motion(bodies, combinations @ residue / np.abs(residue).max(), 0.0)
         _check_work(residue, work, finer, sizes, carried, motion)
-    f = space.f - M @ np.linalg.solve(gram, residue + noise)
+    f = space.f
+    if (left := residue + noise).any():
+        f = f - boundary() @ np.linalg.solve(in_v.T @ boundary(), left)
     lineal = null_space(rows)
     motions = basis.coordinates(Z, rows)
-    means = basis.T.T @ (space.basis.T @ (M @ lineal))
+    means = np.zeros((len(motions), 0))
+    if lineal.size:
+        means = basis.T.T @ (space.basis.T @ (boundary() @ lineal))
     placing, carries = _placing(rows, work - noise - residue, g, equality)
     rigid = Rigid(
         bodies=bodies,
         combinations=combinations,
         rows=rows,
         work=work,
-        gram=gram,
+        gram=lambda: in_v.T @ boundary(),
         motions=motions,
         kernel=kernel(motions, lineal, means.T, basis.unknown, basis.fixed),
         placing=placing,
