@@ -125,11 +125,11 @@ class _Residuals:
             divergence += ng.Grad(delta)
             jump += (delta - delta.Other()) * ng.specialcf.normal(2)
         data = DATA_BONUS if solution.problem.force else 0
-        constant = self.projected.space.globalorder == 0 and correction is None and data == 0
-        if not constant:  # else there is no divergence
-            squares = integral(self.mesh, divergence, 2 * p + data)
+        degree = self.projected.space.globalorder if correction is None else p
+        if degree or data:  # else there is no divergence
+            squares = integral(self.mesh, divergence, 2 * degree + data)
             self.parts["element"] = weights[0] * squares
-        self.parts["jump"] = weights[1] / 2 * integral(self.mesh, jump, 2 * p, edges=True)
+        self.parts["jump"] = weights[1] / 2 * integral(self.mesh, jump, 2 * degree, edges=True)
         for term in self.terms:
             residual = term.residual.copy()
             if correction is not None:
