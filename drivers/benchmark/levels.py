@@ -46,7 +46,6 @@ def levels(common: Common, order: int, rounds: int = ROUNDS) -> list[Level]:
     for number in range(rounds + 1):
         clock, meshes = [time.perf_counter()], []
         for solution in adapt(problem, order=order, max_dofs=budget):
-            solution.error_estimate  # made when asked for: part of this level, not of the next
             clock.append(time.perf_counter())
             meshes.append((solution.mesh, solution.displacement.space.ndof))
         if number:
