@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import netgen.occ as occ
 import ngsolve as ng
@@ -21,6 +21,7 @@ COARSE = 8  # elements along the largest extent of the geometry when no mesh siz
 FINER = 2  # ... and that many times more on a bounded zone: contact may end anywhere on it
 TURN = 0.5  # largest turn (radians) of a curve along one contact segment
 STEEPEST = 0.5  # cosine between a curve's normal and the direction below which nodes go unmatched
+NEARER = 0.01  # of an edge: what a polygon of its samples tells apart
 COINCIDENT = 1e-6  # distance, relative to an edge, up to which two edges are one contact line
 CLOSE = 0.1  # share of the spacing within which a later pair's node yields to one already there
 FINE = 513  # samples on which a division is laid out
@@ -140,8 +141,31 @@ def _opposite(contact: Contact, x: Array, other: CadEdge) -> tuple[Array, Array]
     return t, other.point(np.where(np.isnan(t), other.start, t))
 
 
-def _divide(contact: Contact, secondary: _Edge, primary: _Edge) -> None:
-    """Lay a common division {C_j} on the parts of two edges that face each other."""
+def _behind(contact: Contact, x: Array, y: Array, edges: list[_Edge]) -> NDArray[np.bool_]:
+    """Whether another point of `edges` lies between `x` (k, 2) and the points `y` they see.
+
+    On a far side of the own body, as behind the middle of a disc.
+    """
+    behind = np.zeros(len(x), dtype=bool)
+    if contact.direction is None:
+        return behind
+    dx, dy = contact.direction
+    across, along = np.array([-dy, dx]), np.array([dx, dy])
+    distance = np.abs((y - x) @ along)
+    for edge in edges:
+        _, samples, _ = edge.curve.samples()
+        nearest = _nearest_crossing(samples, y, across, along)
+        close = NEARER * edge.curve.size
+        met = np.abs((nearest - y) @ across) <= close
+        behind |= met & (np.abs((y - nearest) @ along) < distance - close)
+    return behind
+
+
+def _divide(contact: Contact, secondary: _Edge, primary: _Edge, beside: list[_Edge]) -> None:
+    """Lay a common division {C_j} on the parts of two edges that face each other.
+
+    `beside` are all edges of the secondary, this one included.
+    """
     t, _, _ = secondary.curve.samples(FINE)
     ends = primary.curve.point(np.array([primary.curve.start, primary.curve.stop]))
     ends, _ = _opposite(contact, ends, secondary.curve)
@@ -151,6 +175,7 @@ def _divide(contact: Contact, secondary: _Edge, primary: _Edge) -> None:
     x, slope = secondary.curve.point(t), secondary.curve.derivative(t)
     other, y = _opposite(contact, x, primary.curve)
     faces = ~np.isnan(other)
+    faces &= ~_behind(contact, x, y, beside)
     if contact.direction is not None:
         slope_there = primary.curve.derivative(np.where(faces, other, primary.curve.start))
         for tangent in (slope, slope_there):
@@ -214,9 +239,9 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
         edge.maxh = min(edge.maxh, maxh / finer)
     for contact in problem.contact:
         if contact.primary is not None:
-            for secondary in _named(edges, contact.secondary):
-                for primary in _named(edges, contact.primary):
-                    _divide(contact, secondary, primary)
+            sides = _named(edges, contact.secondary)
+            for secondary, primary in product(sides, _named(edges, contact.primary)):
+                _divide(contact, secondary, primary, sides)
     placed = [edge for edge in edges if edge.runs]
     sizes = [edge.shape.maxh for edge in zones]
     try:

@@ -18,6 +18,7 @@ from geometries.region import body, compound, polygon, quarter_arc
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.check import boundary_mask
 from ngcontact.mesh import check_curves, first_mesh
+from ngcontact.refine import matched_vertices
 from ngcontact.trace import boundary_trace
 
 SOFT = Elastic(E=1.0, nu=0.3)
@@ -418,6 +419,33 @@ def test_two_pairs_that_share_an_edge_leave_no_slivers_on_it(left, right, maxh):
     x, y = xy[ends].mean(axis=1).T
     enclosed = (x * sides[:, 1] - y * sides[:, 0]).sum() / 2
     assert ng.Integrate(1, mesh) == pytest.approx(enclosed, rel=1e-12)
+
+
+def test_two_pairs_on_one_circle_do_not_ask_for_nodes_on_its_far_sides():
+    """What lies behind a disc sees the other face through it, and would spoil the nodes there."""
+    disc = occ.Circle((0, 0), 1.0).Face()
+    disc.name, disc.edges.name = "disc", "rim"
+    deep = math.sqrt(2)
+    outline = [(0, -deep), (-2, 2 - deep), (-2, -3), (2, -3), (2, 2 - deep)]
+    notch = body("notch", polygon(outline, ["left", "side", "bottom", "side", "right"]))
+    problem = Problem(
+        geometry=OCCGeometry(occ.Compound([disc, *notch.faces]), dim=2),
+        materials={"disc|notch": SOFT},
+        contact=[
+            Contact("rim", "left", direction=(-1, -1)),
+            Contact("rim", "right", direction=(1, -1)),
+        ],
+    )
+    mesh = first_mesh(problem, 0.2)
+    rim = vertices(mesh, "rim")
+    for contact in problem.contact:
+        trace = boundary_trace(mesh, 1)
+        matched = coordinates(mesh)[list(matched_vertices(trace, contact))]
+        # Each matches up to 60 degrees from its direction; from 30 on the other's nodes are there.
+        facing = rim[rim @ contact.direction > math.cos(math.radians(29))]
+        assert len(facing) >= 3
+        distance = np.linalg.norm(facing[:, None] - matched, axis=2)
+        assert distance.min(axis=1).max() < ROUND_OFF
 
 
 def scaled_mesh(geometry, size, degree):
