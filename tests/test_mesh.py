@@ -436,7 +436,7 @@ def test_two_pairs_on_one_circle_do_not_ask_for_nodes_on_its_far_sides():
             Contact("rim", "right", direction=(1, -1)),
         ],
     )
-    mesh = first_mesh(problem, 0.2)
+    mesh = first_mesh(problem, 0.25)
     rim = vertices(mesh, "rim")
     for contact in problem.contact:
         trace = boundary_trace(mesh, 1)
