@@ -246,3 +246,8 @@ def _levels(
             return
         mesh = refined(problem, solution.mesh, _marked(solution, theta))
         mesh, _ = curve(mesh, order, element)
+    if tolerance is not None:
+        log.warning(
+            "the estimate is %.2e, more than tolerance=%g: the next level would exceed max_dofs=%g",
+            *(error, tolerance, max_dofs),
+        )

@@ -7,7 +7,6 @@ zone the direction is the fixed xi.
 
 from __future__ import annotations
 
-import logging
 from dataclasses import dataclass, replace
 
 import ngsolve as ng
@@ -23,9 +22,6 @@ from .trace import Trace
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-log = logging.getLogger("ngcontact")
-
-FINER = 0.7  # ratio of segment lengths from which a primary counts as finer
 GRAZING = 1e-8  # cosine between normal and direction from which a point faces the other body
 
 
@@ -180,30 +176,16 @@ def contact_line(trace: Trace, contact: Contact) -> ContactLine:
         partner_s=partner_s,
         searches=searches,
     )
-    line = without(line, np.flatnonzero(~keep))
-    _warn_of_finer_primary(trace, line)
-    return line
+    return without(line, np.flatnonzero(~keep))
 
 
-def _warn_of_finer_primary(trace: Trace, line: ContactLine) -> None:
-    """Contact points miss pressure between them where the primary has the shorter segments."""
-    if not (line.searches and line.faces.any()):
-        return
-
-    def length(segments: Index) -> float:
-        if line.contact.direction is None:
-            return float(np.median(trace.lengths(segments)))
-        dx, dy = line.contact.direction  # across it, as the points see them
-        chord = trace.curve[segments, -1] - trace.curve[segments, 0]
-        return float(np.median(np.abs(chord @ np.array([-dy, dx]))))
-
-    if length(line.partner[line.partner >= 0]) < FINER * length(line.segments[line.faces]):
-        log.warning(
-            'the facing meshes of "%s" and "%s" do not match and the primary is finer: swap '
-            "them, the finer side carries the contact points",
-            line.contact.secondary,
-            line.contact.primary,
-        )
+def unmatched(line: ContactLine) -> NDArray[np.bool_]:
+    """Points (m,) on no segment whose ends both face nodes of the primary."""
+    result = np.full(len(line.node), line.contact.primary is not None)
+    at_node = np.append(np.isin(line.partner_s, (0.0, 1.0)), True)  # without a point: no matter
+    points = line.rows[at_node[line.rows[:, [0, -1]]].all(axis=1)]
+    result[points[points >= 0]] = False
+    return result
 
 
 def without(line: ContactLine, dropped: Index) -> ContactLine:

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
+import logging
+
 import ngsolve as ng
+import numpy as np
 
 from .active import carried_active_set, first_active_set
-from .discrete import discretise, minimise_energy
+from .discrete import Discrete, discretise, minimise_energy
+from .gap import unmatched
 from .mesh import check_curves
+from .newton import Minimiser
 from .problem import Problem
 from .solution import Solution
 from .space import curve
+
+MANY = 0.2  # of the points in contact, that face no node, spoil the pressure
+
+log = logging.getLogger("ngcontact")
 
 
 def unknowns(mesh: ng.Mesh, order: int, element: str) -> int:
@@ -23,6 +32,31 @@ def unknowns_of(order: int, vertices: int, edges: int, elements: int) -> int:
     """Number of unknowns of a displacement of degree `order` on that many of each."""
     inner = (order - 1) * (order - 2) // 2
     return 2 * (vertices + (order - 1) * edges + inner * elements)
+
+
+def _unmatched_pairs(discrete: Discrete, minimiser: Minimiser) -> list[int]:
+    """Pairs of which many points in contact face no node."""
+    stops = np.cumsum([len(line.node) for line in discrete.lines])[:-1]
+    active = np.split(minimiser.active, stops) if discrete.lines else []
+    shares = [
+        unmatched(line)[at].mean() if at.any() else 0.0
+        for line, at in zip(discrete.lines, active, strict=True)
+    ]
+    return [pair for pair, share in enumerate(shares) if share > MANY]
+
+
+def _warn_of_unmatched(discrete: Discrete, minimiser: Minimiser, told: list[int]) -> None:
+    """Say once a run where pressures are not to be trusted."""
+    for pair in _unmatched_pairs(discrete, minimiser):
+        if pair not in told:
+            contact = discrete.lines[pair].contact
+            log.warning(
+                'the nodes of "%s" and "%s" do not match where they touch: forces and ends of '
+                "contact hold, pressures oscillate; leave the mesh to ngcontact, and give parts "
+                "of an edge that face different boundaries edges of their own",
+                contact.secondary,
+                contact.primary,
+            )
 
 
 def solve_level(
@@ -40,6 +74,8 @@ def solve_level(
     else:
         active = carried_active_set(discrete, start.discrete, start.minimiser)
     minimiser = minimise_energy(discrete, active)
+    told = [] if start is None else _unmatched_pairs(start.discrete, start.minimiser)
+    _warn_of_unmatched(discrete, minimiser, told)
     displacement = ng.GridFunction(discrete.space.V)
     displacement.vec.FV().NumPy()[:] = discrete.space.basis @ (discrete.basis.T @ minimiser.u)
     return Solution(

@@ -214,14 +214,16 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
     Raises
     ------
     ValueError, TypeError
-        `maxh` is not a positive finite number, or given for a geometry that is a Mesh; Netgen
-        failed to fill a body.
+        `maxh` is not a positive finite number, or given for a geometry that is a Mesh; the geometry
+        contains solids; Netgen failed to fill a body.
     """
     if isinstance(problem.geometry, ng.Mesh):
         if maxh is not None:
             raise ValueError(f"maxh={maxh} has no effect: the geometry is a Mesh; leave maxh out")
         return problem.geometry
     shape = problem.geometry.shape
+    if shape.solids:
+        raise ValueError("the geometry contains solids; bodies are faces in the plane z = 0")
     low, high = shape.bounding_box
     extent = max(high.x - low.x, high.y - low.y)
     finer = FINER if maxh is None else 1

@@ -326,6 +326,33 @@ def test_a_first_mesh_beyond_the_budget_is_refused_with_both_numbers():
         adapt(problem, maxh=0.28, order=3, max_dofs=1000)
 
 
+def test_a_tolerance_out_of_reach_is_told(caplog):
+    with caplog.at_level(logging.WARNING, logger="ngcontact"):
+        *_, last = adapt(cases.one_transition().problem, order=2, tolerance=1e-6, max_dofs=2000)
+    [record] = caplog.records
+    assert "tolerance=1e-06" in record.message
+    assert f"{last.relative_error_estimate:.2e}" in record.message
+    caplog.clear()
+    with caplog.at_level(logging.WARNING, logger="ngcontact"):
+        list(adapt(cases.one_transition().problem, order=2, tolerance=0.1, max_dofs=2000))
+    assert not caplog.records
+
+
+def test_nodes_that_do_not_match_are_told_once(caplog):
+    geometry = blocks()
+    for edge in geometry.shape.edges:
+        if edge.name == "upper_contact":
+            edge.partition = [0.13, 0.31, 0.77]
+    problem = replace(
+        unloaded(), geometry=geometry, displacement={"top": (0, -1), "bottom": (0, 0)}
+    )
+    with caplog.at_level(logging.WARNING, logger="ngcontact"):
+        levels = list(adapt(problem, order=2, max_dofs=3000))
+    assert len(levels) > 1
+    [record] = caplog.records
+    assert '"upper_contact" and "lower_contact" do not match' in record.message
+
+
 @pytest.mark.usefixtures("no_work")
 def test_names_are_checked_before_any_work():
     problem = cases.one_transition().problem

@@ -12,7 +12,7 @@ from netgen.occ import Compound, OCCGeometry, Vec, WorkPlane
 from geometries import blocks, disc, disc_on_block, graphs, rings
 from geometries.region import body, compound, polygon
 from ngcontact import Contact
-from ngcontact.gap import at_quadrature, contact_line, without
+from ngcontact.gap import at_quadrature, contact_line, unmatched, without
 from ngcontact.lagrange import gauss, lagrange
 from ngcontact.trace import boundary_trace
 
@@ -444,3 +444,16 @@ def test_the_far_side_of_the_own_body_has_no_partner():
     moved = OCCGeometry(Compound([upper.Move(Vec(0, -0.01, 0)), lower]), dim=2)
     line = contact_line(trace_of(moved, 2, maxh=0.4), Contact("upper_rim", "lower_rim", (0, -1)))
     assert line.gap.min() == pytest.approx(-0.01, rel=0.05)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_points_between_matched_vertices_are_matched(order):
+    contact = Contact("upper_contact", "lower_contact")
+    geometry = blocks()
+    assert not unmatched(contact_line(trace_of(geometry, order), contact)).any()
+    for edge in geometry.shape.edges:
+        if edge.name == "upper_contact":
+            edge.partition = [0.13, 0.31, 0.77]
+    trace = trace_of(OCCGeometry(geometry.shape, dim=2), order)
+    assert unmatched(contact_line(trace, contact)).all()  # though the ends face nodes
+    assert not unmatched(contact_line(trace, Contact("upper_contact", gap=0.0))).any()

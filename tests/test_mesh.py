@@ -421,6 +421,12 @@ def test_two_pairs_that_share_an_edge_leave_no_slivers_on_it(left, right, maxh):
     assert ng.Integrate(1, mesh) == pytest.approx(enclosed, rel=1e-12)
 
 
+def test_solids_are_no_bodies():
+    box = occ.Box((0, 0, 0), (1, 1, 1))
+    with pytest.raises(ValueError, match="contains solids"):
+        first_mesh(Problem(geometry=OCCGeometry(box), materials={"a": SOFT}))
+
+
 def test_two_pairs_on_one_circle_do_not_ask_for_nodes_on_its_far_sides():
     """What lies behind a disc sees the other face through it, and would spoil the nodes there."""
     disc = occ.Circle((0, 0), 1.0).Face()
