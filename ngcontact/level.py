@@ -52,8 +52,9 @@ def _warn_of_unmatched(discrete: Discrete, minimiser: Minimiser, told: list[int]
             contact = discrete.lines[pair].contact
             log.warning(
                 'the nodes of "%s" and "%s" do not match where they touch: forces and ends of '
-                "contact hold, pressures oscillate; leave the mesh to ngcontact, and give parts "
-                "of an edge that face different boundaries edges of their own",
+                "contact hold, pressures oscillate; leave the mesh to ngcontact, give a pair with "
+                "a gap a direction, and parts of an edge that face different boundaries edges of "
+                "their own",
                 contact.secondary,
                 contact.primary,
             )

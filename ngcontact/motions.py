@@ -10,9 +10,12 @@ from numpy.typing import NDArray
 
 from .check import body_of_vertex
 from .kernel import FREE, null_space
+from .problem import Problem
 from .rows import Conditions
 from .space import Space
 from .trace import Trace
+
+LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -111,6 +114,23 @@ def rigid_motion(bodies: Bodies, amounts: Array, multiplier: float) -> RigidMoti
         middle=bodies.middle[moving],
         multiplier=multiplier,
     )
+
+
+def work_of_load(problem: Problem, mesh: ng.Mesh, motion: RigidMotion) -> float:
+    """Work of the load on a rigid motion of bodies with names of their own, by the mesh's shape."""
+    z = {}
+    parts = zip(motion.bodies, motion.translation, motion.rotation, motion.middle, strict=True)
+    for name, (tx, ty), turn, (cx, cy) in parts:
+        z[name] = ng.CF((tx - turn * (ng.y - cy), ty + turn * (ng.x - cx)))
+    moved = mesh.MaterialCF(z, default=ng.CF((0, 0)))
+    work = 0.0
+    for name, force in problem.force.items():
+        power = ng.InnerProduct(force, moved)
+        work += ng.Integrate(power, mesh, definedon=mesh.Materials(name), order=LOAD_ORDER)
+    for name in problem.traction:
+        power = ng.InnerProduct(problem.traction_vector(name), ng.BoundaryFromVolumeCF(moved))
+        work += ng.Integrate(power, mesh, definedon=mesh.Boundaries(name), order=LOAD_ORDER)
+    return float(work)
 
 
 def body_of_unknown(space: Space, bodies: Bodies) -> Index:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 import pytest
+from netgen.occ import OCCGeometry
 
 from drivers import cases
 from drivers.exact import relative_energy_error
@@ -337,3 +339,33 @@ def test_a_failure_carries_the_iterate_where_the_bodies_are(stopped, monkeypatch
     u, closed = failure.value.iterate.u, met[-1]
     np.testing.assert_allclose(u[p.unknown[closed]], p.g[closed], rtol=ROUND_OFF)
     assert np.abs(p.kernel.conditions @ u).max() <= ROUND_OFF * np.abs(u).max()
+
+
+def shaft(load):
+    """Solid shaft in a wider bore, that may turn."""
+    turned = occ.Circle((0, 0), 0.99).Face()
+    turned.name, turned.edges.name = "shaft", "journal"
+    bearing = occ.MoveTo(-2, -2).Rectangle(4, 4).Face() - occ.Circle((0, 0), 1).Face()
+    bearing.name = "bearing"
+    for edge in bearing.edges:
+        edge.name = "bore" if edge.center.x**2 + edge.center.y**2 < 1 else "side"
+    bearing.edges.Min(occ.Y).name = "foot"
+    return Problem(
+        geometry=OCCGeometry(occ.Compound([turned, bearing]), dim=2),
+        materials={"shaft|bearing": Elastic(E=1e4, nu=0.3)},
+        displacement={"foot": (0, 0)},
+        force={"shaft": load},
+        contact=[Contact("journal", "bore")],
+    )
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_the_shape_of_a_mesh_does_no_work(order):
+    """The middle of a polygon is not quite that of its circle: weight does not turn the shaft."""
+    solution = solve(shaft((0, -1)), maxh=0.2, order=order)
+    [turning] = solution.free_motions
+    assert str(turning).startswith('rotation of "shaft" about')
+    weight = ng.Integrate(1, solution.mesh, definedon=solution.mesh.Materials("shaft"))
+    assert np.abs(solution.contact_force() - [0, weight]).max() < 1e-9 * weight
+    with pytest.raises(NoEquilibriumError, match="rotation"):
+        solve(shaft((0, -1 - 1e-4 * ng.x)), maxh=0.2, order=order)
