@@ -22,7 +22,7 @@ from drivers.benchmark import accuracy, growth, levels, pictures, skip, stages, 
 from drivers.benchmark.problems import block, disc
 
 FOLDER = Path("out")
-PACKAGES = ("ngsolve", "numpy", "scipy", "scikit-fem", "KratosMultiphysics")
+PACKAGES = ("ngsolve", "numpy", "scipy", "scikit-fem", "felupe", "KratosMultiphysics", "akantu")
 
 
 def machine() -> str:

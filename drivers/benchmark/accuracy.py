@@ -16,7 +16,14 @@ from drivers.benchmark.problems import Common, Reference
 from ngcontact import adapt
 
 PACKAGE = "drivers.benchmark"
-ENGINES = ("ngsolve_penalty", "ngsolve_active_set", "scikit", "kratos")
+ENGINES = (
+    "ngsolve_penalty",
+    "ngsolve_active_set",
+    "scikit",
+    "felupe_active_set",
+    "kratos",
+    "akantu_penalty",
+)
 OURS = "ngcontact"
 ORDERS = (2, 3, 4)
 BUDGET = {2: 100_000, 3: 60_000, 4: 40_000}
@@ -24,7 +31,8 @@ SIZES = {
     "uniform": (1_000, 4_000, 16_000, 64_000),
     "graded": (1_000, 4_000, 16_000, 64_000),
 }
-LARGEST = {"kratos": 16_000, "ngsolve_penalty": 16_000}  # more would take minutes a run
+# More would take minutes a run, and up to 18 s with Akantu.
+LARGEST = {"kratos": 16_000, "ngsolve_penalty": 16_000, "akantu_penalty": 4_000}
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 QUANTITIES = ("force", "peak", "half_width", "energy")
 TOGETHER = ("force", "peak", "half_width")

@@ -14,6 +14,7 @@ from netgen.occ import Compound, OCCGeometry, TopoDS_Shape
 from numpy.typing import NDArray
 
 from drivers.benchmark.problems import Common
+from drivers.benchmark.triangles import sides
 from geometries.region import body, polygon
 from ngcontact import Problem
 from ngcontact.mesh import first_mesh
@@ -93,8 +94,7 @@ class Mesh:
         corners = self.triangles[np.concatenate(own)]
         nodes = len(np.unique(corners))
         if order == 2:
-            sides = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
-            nodes += len(np.unique(sides, axis=0))
+            nodes += len(sides(corners)[0])
         return 2 * nodes
 
 

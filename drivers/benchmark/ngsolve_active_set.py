@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from functools import partial
 
 import ngsolve as ng
 import numpy as np
@@ -12,12 +11,11 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from drivers.benchmark import Run
-from drivers.benchmark.active_set import Solver, active_set
+from drivers.benchmark.active_set import Solver
+from drivers.benchmark.assembled import Assembled, solved
 from drivers.benchmark.meshes import Mesh, made
 from drivers.benchmark.ngsolve_plane import load, matrix, nodal, numbering
-from drivers.benchmark.plane import bounded
 from drivers.benchmark.problems import Common
-from drivers.benchmark.reading import read
 from ngcontact.matrix import lower_half
 
 Array = NDArray[np.float64]
@@ -34,7 +32,7 @@ def runs(common: Common, kinds: Sequence[str], sizes: Sequence[int]) -> Iterator
                 yield run(common, kind, order, made(common, kind, order, size))
 
 
-def cholesky(K: sp.csr_matrix) -> Solver:
+def cholesky(K: sp.csr_matrix, order: int) -> Solver:
     """NGSolve's sparse Cholesky factorisation for the active set."""
     matrix = lower_half(K)
     right, solution = matrix.CreateColVector(), matrix.CreateRowVector()
@@ -50,25 +48,14 @@ def cholesky(K: sp.csr_matrix) -> Solver:
 
 def run(common: Common, kind: str, order: int, made: Mesh) -> Run:
     """One run, on a mesh curved to the order of the elements."""
-    mesh = made.copy()
-    started = time.perf_counter()
+    assemble = partial(assembled, common, made.copy(), order)
+    return solved(ENGINE, common, kind, order, made, assemble, cholesky)
+
+
+def assembled(common: Common, mesh: ng.Mesh, order: int) -> Assembled:
+    """Stiffness and load, with values at the nodes of the boundary as unknowns."""
     mesh.Curve(order)
     space = ng.VectorH1(mesh, order=order)
     K, f = matrix(common, space), load(common, space).Assemble().vec.FV().NumPy().copy()
     number = numbering(mesh, order)
-    basis = nodal(number)[0] if order == 2 else None
-    problem, line = bounded(common, K, f, number, basis)
-    v, force, steps = active_set(problem, cholesky(problem.K))
-    seconds = time.perf_counter() - started
-    return Run(
-        engine=ENGINE,
-        problem=common.name,
-        mesh_kind=kind,
-        order=order,
-        unknowns=space.ndof,
-        seconds_mesh=made.seconds,
-        seconds=seconds,
-        steps=steps,
-        energy=float(v @ (problem.K @ v)) / 2,
-        **asdict(read(common, line.x, force, v[line.at] + line.gap, order)),
-    )
+    return Assembled(K, f, number, nodal(number)[0] if order == 2 else None)

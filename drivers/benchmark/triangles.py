@@ -1,4 +1,4 @@
-"""Forces and energy of linear triangles, for codes that give displacements only."""
+"""Sides of triangles; forces and energy of linear ones, for codes that give displacements only."""
 
 from __future__ import annotations
 
@@ -7,6 +7,24 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
+
+# Corners of a triangle that its sides join.
+SIDES = [[0, 1], [1, 2], [2, 0]]
+
+
+def sides(triangles: Indices) -> tuple[Indices, Indices]:
+    """End vertices (k, 2) of all sides, each once, and the sides (ne, 3) of the triangles."""
+    every = np.sort(triangles[:, SIDES], axis=2).reshape(-1, 2)
+    ends, number = np.unique(every, axis=0, return_inverse=True)
+    return ends, number.reshape(-1, 3)
+
+
+def which(ends: Indices, wanted: Indices) -> Indices:
+    """Numbers (m,) of the sides that join `wanted` (m, 2) among those that join `ends` (k, 2)."""
+    count = ends.max() + 1
+    keys, wanted = (np.sort(pairs, axis=1) @ [count, 1] for pairs in (ends, wanted))
+    sorter = np.argsort(keys)
+    return sorter[np.searchsorted(keys, wanted, sorter=sorter)]
 
 
 def forces(
