@@ -2,9 +2,9 @@
 
 python -m drivers.benchmark [tax] [levels] [growth] [accuracy] [skip] [stages]
 
-Everything when no part is named, about half an hour; prints Markdown tables and writes them, with
-pictures, to out/. The other codes need the optional group `bench` of dependencies; what is missing
-is said.
+Everything when no part is named, about 40 minutes, 20 of them for the accuracy; prints Markdown
+tables and writes them, with pictures, to out/. The other codes need the optional group `bench` of
+dependencies; those that are not installed are left out.
 """
 
 from __future__ import annotations
@@ -91,11 +91,15 @@ PARTS = {
 
 def main(names: list[str]) -> None:
     """Run the parts named, or all."""
+    if "--help" in names:
+        print(__doc__)
+        return
     unknown = sorted(set(names) - set(PARTS))
     if unknown:
         raise SystemExit(f"no part is called {', '.join(unknown)}; choose from {', '.join(PARTS)}")
     FOLDER.mkdir(exist_ok=True)
     ng.SetNumThreads(1)
+    print(machine(), flush=True)
     for name in names or PARTS:
         text = f"{machine()}\n\n## {PARTS[name].__doc__}\n\n{PARTS[name]()}\n"
         (FOLDER / f"benchmark_{name}.md").write_text(text)  # other codes print what they like

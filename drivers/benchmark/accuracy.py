@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -124,7 +125,8 @@ def points(common: Common, rounds: int = ROUNDS) -> tuple[list[Point], list[str]
     missing: dict[str, str] = {}
     collected: dict[str, list[list[Run]]] = {}
     adaptive_run(common, ORDERS[0])  # warm-up
-    for _ in range(rounds):
+    for number in range(rounds):
+        print(f"{common.name}: round {number + 1} of {rounds}", file=sys.stderr, flush=True)
         for order in ORDERS:
             collected.setdefault(f"{OURS} {order}", []).append(adaptive_run(common, order))
         for name in ENGINES:

@@ -5,49 +5,50 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from drivers.benchmark.accuracy import OURS, QUANTITIES, Point
+from drivers.benchmark.accuracy import OURS, QUANTITIES, Point, best_seconds, series
 from drivers.benchmark.growth import Growth
 
-FLOOR = 1e-9  # errors below it are those of the references
+BOUNDS = np.logspace(-1, -7, 61)  # errors below the last are those of the references
 LINES = {"uniform": "--", "graded": ":", "adaptive": "-"}
-MARKERS = "osD^v"
 
 
 def draw_accuracy(path: Path, found: Sequence[Point]) -> None:
-    """Errors against seconds: a row for each problem, a column for each quantity."""
+    """Seconds from which errors stay below a bound: problems in rows, quantities in columns.
+
+    One line for an engine and kind of mesh, of its best order and settings, as in the table.
+    """
     problems = list(dict.fromkeys(p.problem for p in found))
     figure = Figure(figsize=(4 * len(QUANTITIES), 3.6 * len(problems)), layout="constrained")
-    panels = figure.subplots(len(problems), len(QUANTITIES), sharex=True, squeeze=False)
-    lines: dict[tuple[str, str, int, str], list[Point]] = {}
-    for p in found:
-        lines.setdefault((p.engine, p.mesh_kind, p.order, p.variant), []).append(p)
+    panels = figure.subplots(
+        len(problems), len(QUANTITIES), sharex=True, sharey=True, squeeze=False
+    )
     engines = [e for e in dict.fromkeys(p.engine for p in found) if e != OURS]
     for row, problem in zip(panels, problems, strict=True):
+        mine = [p for p in found if p.problem == problem]
         for panel, name in zip(row, QUANTITIES, strict=True):
             panel.set_title(f"{problem}: {name.replace('_', '-')}", fontsize=10)
             panel.grid(which="major", alpha=0.3)
-            for (engine, kind, order, variant), line in lines.items():
-                mine = [p for p in line if p.problem == problem]
+            for engine, kind in series(found):
                 ours = engine == OURS
                 panel.loglog(
-                    [p.seconds for p in mine],
-                    [max(p.errors[name], FLOOR) for p in mine],
-                    LINES[kind] + MARKERS[order - 1],
+                    [best_seconds(mine, engine, kind, (name,), bound) for bound in BOUNDS],
+                    BOUNDS,
+                    LINES[kind],
                     color="black" if ours else f"C{engines.index(engine)}",
-                    lw=1.6 if ours else 1.0,
-                    ms=4 if ours else 3,
-                    label=f"{variant}, {kind}, order {order}",
+                    lw=2.2 if ours else 1.2,
+                    label=f"{engine}, {kind}",
                 )
-            panel.set_ylim(FLOOR / 2, 1)
     for panel in panels[-1]:
         panel.set_xlabel("seconds")
     for row in panels:
         row[0].set_ylabel("relative error")
     handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=8)
+    figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=8)
     FigureCanvasAgg(figure).print_png(path)
 
 
@@ -73,6 +74,9 @@ def draw_growth(path: Path, rows: Sequence[Growth]) -> None:
                 )
         panel.set_title(title, fontsize=10)
         panel.set_xlabel("unknowns")
+        panel.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        panel.yaxis.set_minor_formatter(NullFormatter())
         panel.grid(which="major", alpha=0.3)
     handles, labels = panels[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside right center", fontsize=8)
