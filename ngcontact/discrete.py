@@ -9,13 +9,15 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .ancestry import parents
 from .bordered import Systems
 from .check import boundary_mask
 from .constraint import Basis, change_of_basis
 from .errors import ConvergenceError
 from .gap import ContactLine
+from .iterative import linear_systems
 from .kernel import no_kernel
-from .matrix import cholesky, congruent
+from .matrix import congruent
 from .newton import Minimiser
 from .pairs import joined, kept_lines, merged
 from .problem import Problem
@@ -212,7 +214,8 @@ def discretise(
         B=B,
         basis=basis,
         program=program,
-        systems=systems or Systems(program, cholesky(matrix)),
+        systems=systems
+        or linear_systems(program, matrix, basis.T, parents(mesh), trace.nodes[space.nodal]),
         rigid=rigid,
         assembled=assembled,
     )

@@ -39,7 +39,7 @@ class Minimiser:
     steps : list of int
         Changes of the active set after each linear system; the last one is 0.
     factorizations, back_solves : int
-        Work done.
+        Work done; large problems without factorisation count V-cycles as back-solves.
     """
 
     u: Array

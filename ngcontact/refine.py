@@ -8,6 +8,7 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from .ancestry import copied
 from .gap import contact_line
 from .problem import Contact, Problem
 from .trace import Trace, boundary_trace
@@ -133,7 +134,7 @@ def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.M
     """
     trace = boundary_trace(mesh, 1)
     pairs = [matched_vertices(trace, contact) for contact in problem.contact]
-    copy = ng.Mesh(mesh.ngmesh.Copy())
+    copy = copied(mesh)
     first = copy.nv
     flags = np.ones(copy.ne, dtype=bool) if marked is None else np.array(marked)
     flags[_facing_elements(pairs, trace, flags)] = True
@@ -152,4 +153,4 @@ def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.M
         log.warning("%d facing contact segments stay unmatched", len(lagging))
     for contact, pair in zip(problem.contact, pairs, strict=True):
         _move_to_common_eta(trace, contact, pair, first)
-    return ng.Mesh(copy.ngmesh.Copy())  # numbers only the edges that are left
+    return copied(copy)  # numbers only the edges that are left

@@ -51,7 +51,8 @@ class Solution:
         Its solution.
     work : dict
         Counts of assemblies, factorizations, back_solves, gap_searches, curved_elements and
-        estimates spent on this solution, on its mesh.
+        estimates spent on this solution, on its mesh. Without factorisation V-cycles of
+        multigrid count as back_solves.
     coarse_levels : int
         Levels of the coarse adaptive run that told `solve` the first active set of a large mesh.
     """

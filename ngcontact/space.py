@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .ancestry import copied
 from .cad import cad_edges
 from .check import boundary_mask
 from .material import varies
@@ -68,7 +69,7 @@ def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
     count = int(np.count_nonzero(curved))
     if count == 0 or (mesh.GetCurveOrder() == degree and not _straightened(mesh)):
         return mesh, count
-    copy = ng.Mesh(mesh.ngmesh.Copy())
+    copy = copied(mesh)
     copy.Curve(degree)
     return copy, count
 

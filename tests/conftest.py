@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from drivers import cases
+from ngcontact.ancestry import parents
 from ngcontact.check import boundary_mask
+from ngcontact.discrete import discretise
+from ngcontact.hierarchy import coarsenings
+from ngcontact.mesh import first_mesh
+from ngcontact.refine import refined
+from ngcontact.space import curve
 from ngcontact.trace import boundary_trace
 
 REPRODUCED = {  # by order: cases whose solution lies in the space
     "constant pressure": (cases.pressure_patch, (1, 3)),
     "linear pressure": (lambda: cases.pressure_patch(p1=0.5), (2, 4)),
     "polygonal line": (cases.polygonal_patch, (1, 2)),
+}
+
+REFINED = {  # problems whose meshes are refined: a rigid obstacle, matched nodes, two curves
+    "disc": cases.disc_on_rigid_plane(),
+    "block": cases.partly_opening_block(),
+    "disc on block": replace(
+        cases.pressed_disc(), displacement={"block_bottom": (0, 0), "disc_top": (0, -0.05)}
+    ),
 }
 
 
@@ -39,3 +55,24 @@ def vertices(mesh, pattern):
     trace = boundary_trace(mesh, 1)
     numbers = np.unique(trace.nodes[trace.select(boundary_mask(mesh, pattern))])
     return coordinates(mesh)[numbers]
+
+
+def near_origin(mesh, radius=0.7):
+    """Elements with centres that near, (ne,)."""
+    triangles = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
+    return np.linalg.norm(coordinates(mesh)[triangles].mean(axis=1), axis=1) < radius
+
+
+def discrete(problem, order, rounds, maxh=0.5):
+    """Discrete problem on a mesh that was refined so often."""
+    mesh = first_mesh(problem, maxh)
+    for _ in range(rounds):
+        mesh = refined(problem, mesh)
+    return discretise(problem, curve(mesh, order, "isoparametric")[0], order, "isoparametric")
+
+
+def steps_of(problem, coarsest=100):
+    """Coarser spaces of a discrete problem."""
+    trace = problem.space.trace
+    nodes = trace.nodes[problem.space.nodal]
+    return coarsenings(problem.basis.T, parents(trace.mesh), nodes, coarsest)

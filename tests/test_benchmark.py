@@ -8,13 +8,21 @@ from functools import partial
 import numpy as np
 import pytest
 
-from drivers.benchmark import NotInstalledError, Run, needed, ngsolve_active_set, ngsolve_penalty
+from drivers.benchmark import (
+    NotInstalledError,
+    Run,
+    large,
+    needed,
+    ngsolve_active_set,
+    ngsolve_penalty,
+)
 from drivers.benchmark.assembled import solved
 from drivers.benchmark.meshes import KINDS, made
 from drivers.benchmark.problems import Common, block, disc
 from drivers.benchmark.reading import contact_end, peak, weights
+from drivers.benchmark.tables import of_large
 from drivers.benchmark.triangles import forces, sides, which
-from ngcontact import adapt
+from ngcontact import adapt, iterative
 
 COMMON = {"disc": disc(), "block": block()}
 QUANTITIES = ("force", "peak", "half_width", "energy")
@@ -209,3 +217,14 @@ def test_forces_of_a_uniform_strain():
     assert (force * u).sum() == pytest.approx(2 * energy, rel=1e-12)
     inside = np.setdiff1d(np.arange(len(x)), np.concatenate([*map(np.ravel, mesh.edges.values())]))
     assert np.abs(force[inside]).max() < 1e-12 * np.abs(force).max()
+
+
+def test_large_problems_take_the_path_asked_for(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(iterative, "LARGE", iterative.LARGE)  # measurements set another
+    rows = [large.measure("block", 1, 20_000, path) for path in large.PATHS]
+    assert len({row.unknowns for row in rows}) == 1
+    assert all(row.seconds > 0 and row.memory > 0 for row in rows)
+    one, other = rows
+    assert one.cycles < other.cycles
+    assert of_large(rows).count("\n") == 2
+    assert f"| {other.systems} | {other.cycles} |" in of_large(rows)

@@ -1,8 +1,8 @@
 """Run time against error, measured beside other codes on one machine.
 
-python -m drivers.benchmark [tax] [levels] [growth] [accuracy] [skip] [stages]
+python -m drivers.benchmark [tax] [levels] [growth] [large] [accuracy] [skip] [stages]
 
-Everything when no part is named, about 40 minutes, 20 of them for the accuracy; prints Markdown
+Everything when no part is named, about 55 minutes, 20 of them for the accuracy; prints Markdown
 tables and writes them, with pictures, to out/. The other codes need the optional group `bench` of
 dependencies; those that are not installed are left out.
 """
@@ -18,7 +18,7 @@ from pathlib import Path
 
 import ngsolve as ng
 
-from drivers.benchmark import accuracy, growth, levels, pictures, skip, stages, tables, tax
+from drivers.benchmark import accuracy, growth, large, levels, pictures, skip, stages, tables, tax
 from drivers.benchmark.problems import block, disc
 
 FOLDER = Path("out")
@@ -58,6 +58,11 @@ def growth_of_time() -> str:
     return tables.of_growth(rows)
 
 
+def large_problems() -> str:
+    """Large problems, direct and iterative."""
+    return tables.of_large(list(large.larges()))
+
+
 def time_to_accuracy() -> str:
     """Time to accuracy."""
     found, missing = [], set()
@@ -83,6 +88,7 @@ PARTS = {
     "tax": contact_tax,
     "levels": adaptive_levels,
     "growth": growth_of_time,
+    "large": large_problems,
     "accuracy": time_to_accuracy,
     "skip": skipped,
     "stages": time_by_stage,

@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
+from typing import Any
 
 import ngsolve as ng
 
@@ -59,9 +60,21 @@ def measure(name: str, order: int, size: int, kind: str) -> Growth:
     else:
         count = solve(problem, mesh, order=order).displacement.space.ndof
     seconds = time.perf_counter() - start
+    return Growth(name, kind, order, count, seconds, peak_memory())
+
+
+def peak_memory() -> float:
+    """Largest memory of this process so far, GB."""
     unit = 1e9 if sys.platform == "darwin" else 1e6  # bytes there, kilobytes elsewhere
-    memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
-    return Growth(name, kind, order, count, seconds, memory)
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
+
+
+def apart(module: str, *words: object) -> dict[str, Any]:
+    """What a module prints last, as JSON, when it runs in a process of its own."""
+    command = [sys.executable, "-m", module, *map(str, words)]
+    done = subprocess.run(command, check=True, capture_output=True, text=True)
+    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return found
 
 
 def growths() -> Iterator[Growth]:
@@ -70,10 +83,8 @@ def growths() -> Iterator[Growth]:
         for order in ORDERS:
             for size in SIZES:
                 for kind in KINDS:
-                    words = [name, str(order), str(size), kind]
-                    command = [sys.executable, "-m", "drivers.benchmark.growth", *words]
-                    done = subprocess.run(command, check=True, capture_output=True, text=True)
-                    yield Growth(**json.loads(done.stdout.splitlines()[-1]))
+                    words = name, order, size, kind
+                    yield Growth(**apart("drivers.benchmark.growth", *words))
 
 
 if __name__ == "__main__":

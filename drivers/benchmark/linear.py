@@ -70,7 +70,8 @@ def linear_solve(problem: Problem, mesh: ng.Mesh, order: int) -> Linear:
 def uniform_mesh(problem: Problem, order: int, size: int) -> ng.Mesh:
     """Uniformly refined mesh of about `size` unknowns, curved to the order."""
     rounds = max(0, round(np.log(size / START) / np.log(4)))
-    extent = np.ptp(np.array(first_mesh(problem).ngmesh.Coordinates()), axis=0).max()
+    first = first_mesh(problem)  # a view of its vertices does not keep it alive
+    extent = np.ptp(np.array(first.ngmesh.Coordinates()), axis=0).max()
     trials = [first_mesh(problem, float(extent) / count) for count in np.linspace(2, 16, 29)]
 
     def miss(mesh: ng.Mesh) -> float:

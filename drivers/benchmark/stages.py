@@ -28,6 +28,7 @@ STAGES = {  # cumulative seconds of these functions; none calls another
     "matrix": [("matrix", "congruent")],
     "factorisation": [("matrix", "factor")],
     "back-solves": [("matrix", "solve")],
+    "multigrid": [("iterative", "prepare"), ("multigrid", "solve")],
     "estimate": [("estimate", "estimate")],
     "refinement": [("refine", "refined")],
 }

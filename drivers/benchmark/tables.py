@@ -9,6 +9,7 @@ import numpy as np
 
 from drivers.benchmark.accuracy import OURS, TOGETHER, TOLERANCES, Point, best_seconds, series
 from drivers.benchmark.growth import Growth
+from drivers.benchmark.large import Large
 from drivers.benchmark.levels import Level
 from drivers.benchmark.skip import Scene
 from drivers.benchmark.stages import Stages
@@ -76,6 +77,22 @@ def of_growth(rows: Sequence[Growth]) -> str:
         lines.append((*key, "exponent", *(f"{e:.2f}" for e in exponents), "", "", "", ""))
     titles = ("problem", "order", "unknowns", "linear, s", "contact, s", "linear, GB")
     return table((*titles, "contact, GB", "time", "memory"), lines)
+
+
+def of_large(rows: Sequence[Large]) -> str:
+    """Direct and iterative beside each other."""
+    direct, iterative = ([r for r in rows if r.path == path] for path in ("direct", "iterative"))
+    titles = ("problem", "order", "unknowns", "direct, s", "iterative, s", "direct, GB")
+    return table(
+        (*titles, "iterative, GB", "systems", "V-cycles"),
+        (
+            (
+                *(d.problem, d.order, d.unknowns, seconds(d.seconds), seconds(i.seconds)),
+                *(f"{d.memory:.2f}", f"{i.memory:.2f}", i.systems, i.cycles),
+            )
+            for d, i in zip(direct, iterative, strict=True)
+        ),
+    )
 
 
 def of_accuracy(found: Sequence[Point]) -> str:

@@ -1,0 +1,35 @@
+"""Parents of the vertices of refined meshes; NGSolve forgets them when a mesh is copied."""
+
+from __future__ import annotations
+
+import ngsolve as ng
+import numpy as np
+from numpy.typing import NDArray
+
+Index = NDArray[np.int32]
+
+KEPT = "_ngcontact_parents"  # attribute of a mesh: it lives as long as the mesh
+
+
+def parents(mesh: ng.Mesh) -> Index:
+    """Ends of the edges that refinement halved, (nv, 2); -1 for vertices of the first mesh.
+
+    Both have lower numbers than the vertex itself.
+    """
+    kept: Index = getattr(mesh, KEPT, np.zeros((0, 2), dtype=np.int32))
+    known = len(kept)
+    if known > mesh.nv:  # another mesh has been loaded into this one
+        known, kept = 0, kept[:0]
+    if known < mesh.nv and mesh.GetParentVertices(mesh.nv - 1)[0] < 0:  # nothing was refined here
+        new = np.full((mesh.nv - known, 2), -1, dtype=np.int32)
+    else:
+        pairs = [mesh.GetParentVertices(v) for v in range(known, mesh.nv)]
+        new = np.array(pairs, dtype=np.int32).reshape(-1, 2)
+    return np.concatenate([kept, new])
+
+
+def copied(mesh: ng.Mesh) -> ng.Mesh:
+    """Copy that keeps the names, the geometry and the parents; not curved."""
+    copy = ng.Mesh(mesh.ngmesh.Copy())
+    setattr(copy, KEPT, parents(mesh))
+    return copy

@@ -1,0 +1,154 @@
+"""Coarser spaces of a finite element space, in the unknowns of its contact rows and supports.
+
+Degree p contains degree 1 on the same mesh, and that the functions of degree 1 whose values at
+vertices made by refinement are the means of their parents'. NumPy and SciPy only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from .lagrange import gauss_lobatto
+
+Index = NDArray[np.integer]
+
+COARSEST = 10_000  # unknowns below which a factor costs less than what coarser spaces save
+SHARE = 0.5  # of the vertices that the next coarser space has at most
+ROUND_OFF = 1e-14  # of the entries of changes of basis, which are of size 1
+IN_A_ROW = 10  # bodies whose contact lines share nodes; more only where they refer to each other
+
+
+class RingError(ArithmeticError):
+    """Contact rows refer to each other in a ring: their unknowns have no local inverse."""
+
+
+@dataclass(frozen=True, eq=False)
+class Coarsening:
+    """The step to a coarser space.
+
+    Attributes
+    ----------
+    P : sparse (n, k)
+        From the k unknowns of the coarser space to the n of the finer one.
+    kept : ndarray of int (k,)
+        Unknowns of the finer space that mean the same.
+    """
+
+    P: sp.csr_matrix
+    kept: Index
+
+
+def refined_share(parents: Index) -> float:
+    """Share of the vertices (nv, 2) that refinement made."""
+    return float(np.count_nonzero(parents[:, 0] >= 0) / len(parents))
+
+
+def coarsenings(
+    T: sp.csr_matrix, parents: Index, nodes: Index, coarsest: int | None = None
+) -> list[Coarsening]:
+    """Coarser spaces, finest first, until one has `coarsest` unknowns or the first mesh is met.
+
+    Parameters
+    ----------
+    T : sparse (2n, 2n)
+        Node values and edge functions u = T y for the unknowns y: x of all nodes first, vertices
+        before all others.
+    parents : ndarray of int (nv, 2)
+        Ends of the edges halved by refinement, of lower number; -1 for vertices of the first mesh.
+    nodes : ndarray of int (k, p + 1)
+        Nodes of the segments where unknowns are node values.
+    coarsest : int, optional
+        `COARSEST` when left out.
+
+    Raises
+    ------
+    RingError
+        Contact rows refer to each other in a ring.
+    """
+    coarsest = COARSEST if coarsest is None else coarsest
+    n, vertices = T.shape[0] // 2, len(parents)
+    steps = [(_linear(n, vertices, nodes), np.arange(vertices))] if nodes.shape[1] > 2 else []
+    found = []
+    for P, kept in steps + _vertex_steps(parents, coarsest):
+        both = np.concatenate([kept, kept + P.shape[0]])
+        P = sp.block_diag([P, P], format="csr")
+        coarse = (T[both] @ P).tocsr()  # rows there refer to partners that stay
+        found.append(Coarsening((_inverse(T) @ (P @ coarse)).tocsr(), both))
+        T = coarse
+    return found
+
+
+def _depths(parents: Index) -> Index:
+    """How many generations of parents each vertex has, (nv,)."""
+    depth = np.zeros(len(parents), dtype=np.intp)
+    new = np.flatnonzero(parents[:, 0] >= 0)
+    while True:
+        deeper = 1 + depth[parents[new]].max(axis=1)
+        if np.array_equal(deeper, depth[new]):
+            return depth
+        depth[new] = deeper
+
+
+def _vertex_steps(parents: Index, coarsest: int) -> list[tuple[sp.csr_matrix, Index]]:
+    """Interpolation (n, k) of vertex values and the vertices that stay, finest first.
+
+    A step takes as many generations away as halve the vertices: work falls geometrically also
+    where refinement is local.
+    """
+    steps: list[tuple[sp.csr_matrix, Index]] = []
+    depth = _depths(parents)
+    counts = np.bincount(depth).cumsum()
+    while 2 * depth.size > coarsest:
+        few = np.flatnonzero(counts <= SHARE * depth.size)
+        if few.size == 0:
+            break
+        last, deepest = int(few[-1]), len(counts) - 1
+        kept, new = np.flatnonzero(depth <= last), np.flatnonzero(depth > last)
+        rows = np.concatenate([kept, np.repeat(new, 2)])
+        columns = np.concatenate([kept, parents[new].ravel()])
+        values = np.concatenate([np.ones(kept.size), np.full(2 * new.size, 0.5)])
+        means = sp.csr_matrix((values, (rows, columns)), (depth.size, depth.size))
+        P = means
+        for _ in range(deepest - last - 1):  # parents of parents
+            P = means @ P
+        steps.append((P[:, kept], kept))
+        number = np.full(depth.size, -1)
+        number[kept] = np.arange(kept.size)
+        parents = np.where(parents[kept] < 0, -1, number[parents[kept]])
+        depth, counts = depth[kept], counts[: last + 1]
+    return steps
+
+
+def _linear(n: int, vertices: int, nodes: Index) -> sp.csr_matrix:
+    """Functions of degree 1 among those of degree p, (n, nv): edge functions add to them."""
+    s = gauss_lobatto(nodes.shape[1] - 1)[1:-1]
+    _, first = np.unique(nodes[:, 1], return_index=True)  # segments between bodies occur twice
+    inner = nodes[first, 1:-1].ravel()
+    start, stop = np.repeat(nodes[first][:, [0, -1]], s.size, axis=0).T
+    rows = np.concatenate([np.arange(vertices), inner, inner])
+    columns = np.concatenate([np.arange(vertices), start, stop])
+    values = np.concatenate([np.ones(vertices), np.tile(1 - s, first.size), np.tile(s, first.size)])
+    return sp.csr_matrix((values, (rows, columns)), (n, vertices))
+
+
+def _inverse(T: sp.csr_matrix) -> sp.csr_matrix:
+    """Inverse of a change of basis: blocks of the nodes, and what rows contain of other nodes."""
+    n = T.shape[0] // 2
+    a, d = np.split(T.diagonal(), 2)
+    b, c = T.diagonal(n), T.diagonal(-n)
+    determinant = a * d - b * c
+    diagonal = np.concatenate([d, a]) / np.tile(determinant, 2)
+    blocks = sp.diags([diagonal, -b / determinant, -c / determinant], [0, n, -n], format="csr")
+    rest = sp.identity(2 * n, format="csr") - blocks @ T
+    rest.data[np.abs(rest.data) < ROUND_OFF] = 0.0
+    rest.eliminate_zeros()
+    inverse, term = blocks, rest @ blocks
+    for _ in range(IN_A_ROW):
+        if term.nnz == 0:
+            return inverse.tocsr()
+        inverse, term = inverse + term, rest @ term
+    raise RingError("contact rows refer to each other in a ring")

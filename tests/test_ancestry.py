@@ -1,0 +1,63 @@
+"""Parents of refined vertices: kept by copies, also of meshes that were refined in place."""
+
+from __future__ import annotations
+
+import ngsolve as ng
+import numpy as np
+import pytest
+from conftest import coordinates, near_origin
+
+from drivers import cases
+from ngcontact.ancestry import copied, parents
+from ngcontact.mesh import first_mesh
+from ngcontact.refine import refined
+from ngcontact.space import curve
+
+BLOCK = cases.partly_opening_block()  # straight, nodes matched
+
+
+def check_midpoints(mesh, old):
+    """Vertices after the first `old` ones lie in the middle of their parents."""
+    family, xy = parents(mesh), coordinates(mesh)
+    assert len(family) == mesh.nv
+    assert (family[:old] == -1).all()
+    new = np.arange(old, mesh.nv)
+    assert (family[new] >= 0).all()
+    assert (family[new] < new[:, None]).all()
+    # Round-off of coordinates of size 2.
+    np.testing.assert_allclose(xy[new], xy[family[new]].mean(axis=1), rtol=0, atol=1e-15)
+
+
+def test_a_first_mesh_has_no_parents():
+    mesh = first_mesh(BLOCK, 0.5)
+    np.testing.assert_array_equal(parents(mesh), np.full((mesh.nv, 2), -1))
+
+
+@pytest.mark.parametrize("local", [False, True])
+def test_vertices_lie_between_their_parents(local):
+    mesh = first = first_mesh(BLOCK, 0.5)
+    for _ in range(3):
+        mesh = refined(BLOCK, mesh, near_origin(mesh) if local else None)
+    check_midpoints(mesh, first.nv)
+    np.testing.assert_array_equal(parents(first), np.full((first.nv, 2), -1))
+
+
+def test_what_refinement_in_place_knows_is_kept():
+    mesh = ng.Mesh(first_mesh(BLOCK, 0.5).ngmesh.Copy())
+    old = mesh.nv
+    mesh.Refine()
+    mesh.Refine()
+    copy = copied(mesh)
+    check_midpoints(copy, old)
+    copy.Refine()
+    check_midpoints(copy, old)
+    check_midpoints(refined(BLOCK, copy), old)
+
+
+def test_curved_copies_keep_them():
+    problem = cases.disc_on_rigid_plane()
+    mesh = refined(problem, first_mesh(problem, 0.3))
+    bent, _ = curve(mesh, 2, "isoparametric")
+    assert bent is not mesh
+    np.testing.assert_array_equal(parents(bent), parents(mesh))
+    assert (parents(bent) >= 0).any()
