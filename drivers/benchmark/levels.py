@@ -14,7 +14,7 @@ from drivers.benchmark.linear import linear_solve
 from drivers.benchmark.problems import Common
 from ngcontact import adapt
 
-TARGETS = (1_000, 10_000, 30_000)  # unknowns; the nearest level to each is shown
+TARGETS = (1_000, 10_000, 30_000)  # unknowns; the first level of at least as many is shown
 ORDERS = (1, 2, 3, 4)
 ROUNDS = 5
 
@@ -41,7 +41,7 @@ class Level:
 
 def levels(common: Common, order: int, rounds: int = ROUNDS) -> list[Level]:
     """Medians over several equal runs, each after a warm-up, linear solves interleaved."""
-    problem, budget = common.problem, int(1.3 * TARGETS[-1])
+    problem, budget = common.problem, 2 * TARGETS[-1]
     seconds, linear = [], []
     for number in range(rounds + 1):
         clock, meshes = [time.perf_counter()], []
@@ -53,7 +53,7 @@ def levels(common: Common, order: int, rounds: int = ROUNDS) -> list[Level]:
             linear.append([linear_solve(problem, mesh, order).seconds for mesh, _ in meshes])
     level, base = np.median(seconds, axis=0), np.median(linear, axis=0)
     count = np.array([n for _, n in meshes])
-    chosen = sorted({int(np.abs(np.log(count / target)).argmin()) for target in TARGETS})
+    chosen = sorted({int(np.searchsorted(count, target)) for target in TARGETS})
     return [
         Level(common.name, order, int(count[i]), float(level[i]), float(level[i] / base[i]))
         for i in chosen

@@ -89,8 +89,8 @@ def near_incompressible(order: int) -> Iterator[Outcome]:
         finest, name = levels[-1], f"S1 order {order}"
         reference = reference or errors[-1]
         rate = math.log2(errors[-2] / errors[-1])
-        # Below 1 / 2 the issue asks for rate and constant; at 0.499999 for no blow-up, and order 2
-        # reaches the same constant there: measured 1.55 times nu = 0.3.
+        # Promised: below 1 / 2 rate and constant, at 0.499999 no blow-up. Order 2 reaches the same
+        # constant there: measured 1.55 times that of nu = 0.3.
         yield solved(name, f"nu={nu}: {RATE[order]} - rate", finest, RATE[order] - rate, 0.1)
         yield solved(name, f"nu={nu}: times nu=0.3", finest, errors[-1] / reference, 2.0)
         worst = max(outside(effectivity(solution, case.exact)) for solution in levels)
