@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from drivers import cases
+from geometries import blocks
 from ngcontact.ancestry import parents
 from ngcontact.check import boundary_mask
 from ngcontact.discrete import discretise
@@ -30,6 +31,15 @@ REFINED = {  # problems whose meshes are refined: a rigid obstacle, matched node
         cases.pressed_disc(), displacement={"block_bottom": (0, 0), "disc_top": (0, -0.05)}
     ),
 }
+
+
+def unmatched_blocks():
+    """Geometry of two blocks with a division of the upper line that the lower one has not."""
+    geometry = blocks()
+    for edge in geometry.shape.edges:
+        if edge.name == "upper_contact":
+            edge.partition = [0.13, 0.31, 0.77]
+    return geometry
 
 
 @pytest.fixture(

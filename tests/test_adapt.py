@@ -10,6 +10,7 @@ from importlib import import_module
 import ngsolve as ng
 import numpy as np
 import pytest
+from conftest import unmatched_blocks
 
 from drivers import cases
 from drivers.exact import patch, relative_energy_error
@@ -339,13 +340,8 @@ def test_a_tolerance_out_of_reach_is_told(caplog):
 
 
 def test_nodes_that_do_not_match_are_told_once(caplog):
-    geometry = blocks()
-    for edge in geometry.shape.edges:
-        if edge.name == "upper_contact":
-            edge.partition = [0.13, 0.31, 0.77]
-    problem = replace(
-        unloaded(), geometry=geometry, displacement={"top": (0, -1), "bottom": (0, 0)}
-    )
+    supports = {"top": (0, -1), "bottom": (0, 0)}
+    problem = replace(unloaded(), geometry=unmatched_blocks(), displacement=supports)
     with caplog.at_level(logging.WARNING, logger="ngcontact"):
         levels = list(adapt(problem, order=2, max_dofs=3000))
     assert len(levels) > 1

@@ -11,7 +11,7 @@ from itertools import pairwise
 import ngsolve as ng
 import numpy as np
 import pytest
-from conftest import coordinates, vertices
+from conftest import coordinates, unmatched_blocks, vertices
 from netgen.meshing import Element1D, Element2D, FaceDescriptor, Mesh, MeshPoint, Pnt
 from netgen.occ import OCCGeometry
 
@@ -354,12 +354,8 @@ def test_a_mesh_without_cad_stays_matched():
 
 
 def test_lines_that_never_matched_are_left_to_the_gap_search(caplog):
-    geometry = blocks()
-    for edge in geometry.shape.edges:
-        if edge.name == "upper_contact":
-            edge.partition = [0.13, 0.31, 0.77]
     problem = Problem(
-        geometry=geometry,
+        geometry=unmatched_blocks(),
         materials=dict.fromkeys(BLOCKS, SOFT),
         contact=[Contact("upper_contact", "lower_contact")],
     )
