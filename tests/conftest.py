@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from netgen.occ import OCCGeometry
 
 from drivers import cases
 from geometries import blocks
@@ -35,11 +36,11 @@ REFINED = {  # problems whose meshes are refined: a rigid obstacle, matched node
 
 def unmatched_blocks():
     """Geometry of two blocks with a division of the upper line that the lower one has not."""
-    geometry = blocks()
-    for edge in geometry.shape.edges:
+    shape = blocks().shape
+    for edge in shape.edges:
         if edge.name == "upper_contact":
             edge.partition = [0.13, 0.31, 0.77]
-    return geometry
+    return OCCGeometry(shape, dim=2)
 
 
 @pytest.fixture(
