@@ -147,7 +147,8 @@ def adapt(
     Yields
     ------
     Solution
-        Every one stays valid.
+        Every one stays valid. Its estimate is made when it is asked for, printing it included, or
+        when the next level is.
 
     Raises
     ------
@@ -231,7 +232,9 @@ def _levels(
     """Levels of `adapt` on checked input."""
     solution: Solution | None = None
     while unknowns(mesh, order, element) <= max_dofs:
-        solution = solve_level(problem, mesh, order, element, solution)
+        solution = replace(solve_level(problem, mesh, order, element, solution), adaptive=True)
+        solution.discrete.systems.forget()  # a level's factorisation is of no use to the next one
+        yield solution
         error = solution.relative_error_estimate
         if not np.isfinite(solution.error_estimate):  # it would mark nothing, for ever
             raise ConvergenceError(
@@ -239,9 +242,7 @@ def _levels(
                 "choose units in which the squares of loads and displacements are numbers",
                 iterate=solution.minimiser,
             )
-        solution.discrete.systems.forget()  # a level's factorisation is of no use to the next one
         log.info("%s", solution)
-        yield solution
         if error <= max(tolerance or 0.0, ROUND_OFF) or _at_round_off(solution):
             return
         mesh = refined(problem, solution.mesh, _marked(solution, theta))

@@ -26,6 +26,14 @@ ROUGH = 1e-11  # ... before the active set is known to be the last
 UNSOLVED = 1e-6  # ... and above which the matrix is singular to working precision
 
 
+def _row(C: sp.csr_matrix, i: int) -> Array:
+    """Row i of a sparse matrix, dense; what SciPy does for that takes as long as a back-solve."""
+    row = np.zeros(C.shape[1])
+    at = slice(C.indptr[i], C.indptr[i + 1])
+    row[C.indices[at]] = C.data[at]
+    return row
+
+
 class SingularError(ArithmeticError):
     """A factorised matrix does not solve its system: some motion meets no resistance."""
 
@@ -108,7 +116,7 @@ class Systems:
         new = [i for i, key in enumerate(keys) if key not in self.place]
         if new:
             self.place.update({keys[i]: len(self.place) + k for k, i in enumerate(new)})
-            solutions = [self._back_solve(C[i].toarray().ravel()) for i in new]
+            solutions = [self._back_solve(_row(C, i)) for i in new]
             self.known = np.vstack([self.known, *solutions])
         self.solution = np.array([self.place[key] for key in keys], dtype=np.intp)
         self.touched = np.unique(C.indices)  # few of the unknowns

@@ -55,6 +55,8 @@ class Solution:
         multigrid count as back_solves.
     coarse_levels : int
         Levels of the coarse adaptive run that told `solve` the first active set of a large mesh.
+    adaptive : bool
+        Whether it is a level of `adapt`, whose estimate is needed anyway.
     """
 
     problem: Problem
@@ -66,6 +68,7 @@ class Solution:
     minimiser: Minimiser
     work: dict[str, int] = field(default_factory=dict)
     coarse_levels: int = 0
+    adaptive: bool = False
 
     @cached_property
     def stress(self) -> ng.CoefficientFunction:
@@ -238,7 +241,10 @@ class Solution:
         return Draw(self.displacement, self.mesh, deformation=True)
 
     def __str__(self) -> str:
-        """One line: unknowns, active points, steps, force, and the estimate where it is known."""
+        """One line: unknowns, active points, steps, force, and the estimate of adaptive levels.
+
+        Of others, too, once it is known.
+        """
         parts = [
             f"order {self.order}",
             f"{self.displacement.space.ndof:7d} unknowns",
@@ -247,7 +253,7 @@ class Solution:
         ]
         if self.free_motions:
             parts.append(f"free: {'; '.join(map(str, self.free_motions))}")
-        if self.estimated:
+        if self.estimated or self.adaptive:
             parts.append(f"estimate {self.relative_error_estimate:.2e}")
         if self.discrete.lines:
             parts.append(f"force {np.hypot(*self.contact_force()):.6g}")

@@ -46,6 +46,7 @@ def levels(common: Common, order: int, rounds: int = ROUNDS) -> list[Level]:
     for number in range(rounds + 1):
         clock, meshes = [time.perf_counter()], []
         for solution in adapt(problem, order=order, max_dofs=budget):
+            str(solution)  # asks for the estimate: part of this level, not of the next
             clock.append(time.perf_counter())
             meshes.append((solution.mesh, solution.displacement.space.ndof))
         if number:
