@@ -241,10 +241,7 @@ class Solution:
         return Draw(self.displacement, self.mesh, deformation=True)
 
     def __str__(self) -> str:
-        """One line: unknowns, active points, steps, force, and the estimate of adaptive levels.
-
-        Of others, too, once it is known.
-        """
+        """One line: unknowns, active points, steps, force; the estimate if adaptive or known."""
         parts = [
             f"order {self.order}",
             f"{self.displacement.space.ndof:7d} unknowns",
