@@ -134,7 +134,7 @@ def _residue(rows: Array, equality: Mask, work: Array) -> tuple[Array, float]:
 
 
 def _work_by_shape(problem: Problem, mesh: ng.Mesh, motion: RigidMotion) -> float:
-    """What the degree of the curved elements changes of the load's work on a motion."""
+    """What curved sides change of the load's work: the centre of a disc is not that of its mesh."""
     if cad_edges(mesh) is None or len(set(motion.bodies)) < len(motion.bodies):
         return 0.0
     copy = ng.Mesh(mesh.ngmesh.Copy())
@@ -151,10 +151,7 @@ def _check_work(
     motion: RigidMotion,
     by_shape: Callable[[], float],
 ) -> None:
-    """Raise unless the work on what cannot be balanced is quadrature, round-off or of the shape.
-
-    A load whose resultant meets the centre of a round body misses that of the mesh.
-    """
+    """Raise unless the work on what cannot be balanced is quadrature, round-off or of the shape."""
     amounts = residue / np.abs(residue).max()
     done = float(amounts @ residue)  # what forces balance does no work on it
     allowed = QUADRATURE * abs(float(amounts @ (work - finer)))
