@@ -21,7 +21,7 @@ from .problem import Problem
 from .refine import refined
 from .solution import Solution
 from .space import check_element, curve
-from .transition import ending_segments, transitions
+from .transition import ending_segments
 
 ROUND_OFF = 1e-12  # relative estimate at which refinement stops: the solution is exact
 SMALL = 1e-4  # ... above which no round-off reaches
@@ -192,9 +192,7 @@ def _marked(solution: Solution, theta: float) -> NDArray[np.bool_]:
     """
     marked = doerfler(solution.indicators, theta)
     trace = solution.discrete.space.trace
-    for number, line in enumerate(solution.discrete.lines):
-        at = solution.pair == number
-        ends = transitions(line, solution.gap[at], solution.active[at])
+    for line, ends in zip(solution.discrete.lines, solution.ends, strict=True):
         segments = line.segments[ending_segments(line, ends)]
         sides = trace.curve[segments]
         length = np.linalg.norm(sides[:, -1] - sides[:, 0], axis=1)

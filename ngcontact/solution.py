@@ -21,7 +21,7 @@ from .newton import Minimiser
 from .output import write_solution
 from .problem import Problem
 from .space import strain
-from .transition import transitions
+from .transition import Transitions, transitions_of
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -80,8 +80,7 @@ class Solution:
 
     def _points(self, name: str, shape: tuple[int, ...]) -> Array:
         """An array of the contact lines, all pairs in order."""
-        arrays = [getattr(line, name) for line in self.discrete.lines]
-        return np.concatenate([np.zeros(shape), *arrays])
+        return np.concatenate([np.zeros(shape), *(getattr(x, name) for x in self.discrete.lines)])
 
     @cached_property
     def points(self) -> Array:
@@ -164,9 +163,12 @@ class Solution:
 
     def transitions(self, pair: int = 0) -> Array:
         """Points (k, 2) where contact of a pair turns from binding to non-binding."""
-        number = self._pair_number(pair)
-        at = self.pair == number
-        return transitions(self.discrete.lines[number], self.gap[at], self.active[at]).position
+        return self.ends[self._pair_number(pair)].position
+
+    @cached_property
+    def ends(self) -> list[Transitions]:
+        """The transitions of each pair, with the contact points beside them."""
+        return transitions_of(self.discrete.lines, self.gap, self.active)
 
     @cached_property
     def energy(self) -> float:

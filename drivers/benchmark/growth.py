@@ -28,27 +28,31 @@ KINDS = ("linear", "contact")
 
 
 @dataclass(frozen=True)
-class Growth:
-    """One process.
+class Process:
+    """What one process measures.
 
     Attributes
     ----------
     problem : str
-    kind : str
-        "linear" or "contact".
     order, unknowns : int
     seconds : float
-        Of the solve alone.
+        Of the solve alone; of a contact solve that knows nothing, with its coarse run.
     memory : float
         Peak of the process, GB, its libraries and the mesh included.
     """
 
     problem: str
-    kind: str
     order: int
     unknowns: int
     seconds: float
     memory: float
+
+
+@dataclass(frozen=True)
+class Growth(Process):
+    """One process of a `kind`, "linear" or "contact"."""
+
+    kind: str
 
 
 def measure(name: str, order: int, size: int, kind: str) -> Growth:
@@ -61,7 +65,7 @@ def measure(name: str, order: int, size: int, kind: str) -> Growth:
     else:
         count = solve(problem, mesh, order=order).displacement.space.ndof
     seconds = time.perf_counter() - start
-    return Growth(name, kind, order, count, seconds, peak_memory())
+    return Growth(name, order, count, seconds, peak_memory(), kind)
 
 
 def peak_memory() -> float:

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass
 
 import ngsolve as ng
 
-from drivers.benchmark.growth import COMMONS, apart, peak_memory
+from drivers.benchmark.growth import COMMONS, Process, apart, peak_memory
 from drivers.benchmark.linear import uniform_mesh
 from ngcontact import iterative, solve
 
@@ -23,27 +23,17 @@ PATHS = {"direct": sys.maxsize, "iterative": 0}  # with the size from which the 
 
 
 @dataclass(frozen=True)
-class Large:
-    """One process.
+class Large(Process):
+    """One process that takes one of the `PATHS`.
 
     Attributes
     ----------
-    problem, path : str
-    order, unknowns : int
-    seconds : float
-        Of a contact solve that knows nothing, its coarse run included.
-    memory : float
-        Peak of the process, GB, its libraries and the mesh included.
+    path : str
     systems, cycles : int
         Linear systems, and V-cycles or back-solves for all of them.
     """
 
-    problem: str
     path: str
-    order: int
-    unknowns: int
-    seconds: float
-    memory: float
     systems: int
     cycles: int
 
@@ -59,7 +49,7 @@ def measure(name: str, order: int, size: int, path: str) -> Large:
     if (path == "direct") != (solution.work["factorizations"] > 0):
         raise RuntimeError(f"{name}, order {order}, {size} unknowns did not stay {path}")
     return Large(
-        *(name, path, order, solution.displacement.space.ndof, seconds, peak_memory()),
+        *(name, order, solution.displacement.space.ndof, seconds, peak_memory(), path),
         systems=len(solution.steps),
         cycles=solution.work["back_solves"],
     )
