@@ -26,7 +26,7 @@ ROUGH = 1e-11  # ... before the active set is known to be the last
 UNSOLVED = 1e-6  # ... and above which the matrix is singular to working precision
 
 
-def _row(C: sp.csr_matrix, i: int) -> Array:
+def _row(C: sp.csr_array, i: int) -> Array:
     """Row i of a sparse matrix, dense; what SciPy does for that takes as long as a back-solve."""
     row = np.zeros(C.shape[1])
     at = slice(C.indptr[i], C.indptr[i + 1])
@@ -225,5 +225,5 @@ class Systems:
         stiffness = np.full(p.g.size, np.inf)
         for j in range(p.g.size):
             if ~j in self.place:
-                stiffness[j] = 1 / float((p.R[j] @ self.known[self.place[~j]])[0])
+                stiffness[j] = 1 / float((p.R[[j]] @ self.known[self.place[~j]])[0])
         return stiffness

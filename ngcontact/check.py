@@ -54,13 +54,14 @@ def _mask(select: Callable[[str], ng.Region], pattern: str) -> np.ndarray:
 
 def body_of_vertex(mesh: ng.Mesh) -> np.ndarray:
     """Return the number of the connected piece of the mesh each vertex belongs to, int (nv,)."""
-    from scipy.sparse import coo_matrix  # not needed to state a problem
-    from scipy.sparse.csgraph import connected_components
+    from scipy.sparse.csgraph import connected_components  # not needed to state a problem
+
+    from ngcontact.triplets import from_triplets
 
     nodes = _nodes(mesh.ngmesh.Elements2D(), 3)
     size = len(mesh.ngmesh.Coordinates())
     start, end = nodes[:, [0, 1]].ravel(), nodes[:, [1, 2]].ravel()
-    graph = coo_matrix((np.ones(len(start), dtype=bool), (start, end)), shape=(size, size))
+    graph = from_triplets(np.ones(len(start), dtype=bool), start, end, (size, size))
     return connected_components(graph, directed=False)[1]
 
 

@@ -17,6 +17,7 @@ from scipy.sparse.csgraph import connected_components
 
 from .host import INDEPENDENT, assign, check_prescribed, coefficients_at
 from .rows import Conditions, Rows
+from .triplets import from_triplets
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -42,7 +43,7 @@ class Basis:
         From the values of a node to its two unknowns, but for the rows.
     """
 
-    T: sp.csr_matrix
+    T: sp.csr_array
     fixed: Mask
     values: Array
     unknown: Index
@@ -80,21 +81,21 @@ def _frames(n: int, conditions: Conditions) -> tuple[Array, Mask, Array]:
     return frame, fixed, values
 
 
-def _blocks(blocks: Array) -> sp.csr_matrix:
+def _blocks(blocks: Array) -> sp.csr_array:
     """Matrix (2n, 2n) of (n, 2, 2) node blocks in the numbering x first, then y."""
     n = len(blocks)
     i = np.arange(n)
     rows = np.concatenate([i, i, i + n, i + n])
     cols = np.concatenate([i, i + n, i, i + n])
     values = np.concatenate([blocks[:, 0, 0], blocks[:, 0, 1], blocks[:, 1, 0], blocks[:, 1, 1]])
-    matrix = sp.coo_matrix((values, (rows, cols)), (2 * n, 2 * n)).tocsr()
+    matrix = from_triplets(values, rows, cols, (2 * n, 2 * n))
     matrix.eliminate_zeros()
     return matrix
 
 
 def _local_systems(
     host: Index, coefficients: Array, fixed: Mask
-) -> tuple[Index, Array, Array, sp.csr_matrix]:
+) -> tuple[Index, Array, Array, sp.csr_array]:
     """Make each row's part at its host an unknown there.
 
     Parameters
@@ -134,7 +135,7 @@ def _local_systems(
     return host + n * slot, local, M, _blocks(inverse)
 
 
-def _without_rings(N: sp.csr_matrix, G: sp.csr_matrix) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+def _without_rings(N: sp.csr_array, G: sp.csr_array) -> tuple[sp.csr_array, sp.csr_array]:
     """Equations H = G + N H solved for the unknowns that refer to each other in rings."""
     _, group = connected_components(N, connection="strong")
     ring = np.flatnonzero(np.bincount(group)[group] > 1)
@@ -148,9 +149,9 @@ def _without_rings(N: sp.csr_matrix, G: sp.csr_matrix) -> tuple[sp.csr_matrix, s
             "give each pair of boundaries once"
         )
     size = N.shape[0]
-    place = sp.identity(size, format="csr")[:, ring]
-    change = sp.csr_matrix(np.linalg.inv(block) - np.eye(ring.size))
-    S = sp.identity(size) + place @ change @ place.T
+    place = sp.eye_array(size, format="csr")[:, ring]
+    change = sp.csr_array(np.linalg.inv(block) - np.eye(ring.size))
+    S = sp.eye_array(size) + place @ change @ place.T
     N = (S @ (N - place @ inside @ place.T)).tocsr()
     N.eliminate_zeros()
     return N, (S @ G).tocsr()
@@ -196,8 +197,8 @@ def change_of_basis(
     # What the rows contain of other unknowns moves to the right: z = G y + N z.
     k = np.arange(len(host))
     hosted = np.concatenate([host, host + n])
-    rest = Bz[kept] - sp.csr_matrix((local.T.ravel(), (np.tile(k, 2), hosted)), (len(k), 2 * n))
-    place = sp.csr_matrix((np.ones(len(k)), (unknown, k)), (2 * n, len(k)))
+    rest = Bz[kept] - from_triplets(local.T.ravel(), np.tile(k, 2), hosted, (len(k), 2 * n))
+    place = from_triplets(np.ones(len(k)), unknown, k, (2 * n, len(k)))
     N = -(G @ place @ rest)
     N.eliminate_zeros()
     N, G = _without_rings(N, G)

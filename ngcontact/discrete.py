@@ -28,6 +28,7 @@ from .rows import Conditions
 from .space import LOAD_BONUS, Space, assemble, load_vector, node_basis
 from .ssn import minimise
 from .trace import Trace, boundary_trace
+from .triplets import from_triplets
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -69,7 +70,7 @@ class Discrete:
     found: list[ContactLine]
     lines: list[ContactLine]
     conditions: Conditions
-    B: sp.csr_matrix
+    B: sp.csr_array
     basis: Basis
     program: Program
     systems: Systems
@@ -196,7 +197,7 @@ def discretise(
     program = Program(
         K=K,
         b=T.T @ space.f,
-        R=sp.csr_matrix((np.ones(m), (np.arange(m), basis.unknown)), (m, 2 * n)),
+        R=from_triplets(np.ones(m), np.arange(m), basis.unknown, (m, 2 * n)),
         g=rows.g,
         equality=rows.equality,
         fixed=basis.fixed,

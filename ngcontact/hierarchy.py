@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from .lagrange import gauss_lobatto
+from .triplets import from_triplets
 
 Index = NDArray[np.integer]
 
@@ -38,7 +39,7 @@ class Coarsening:
         Unknowns of the finer space that mean the same.
     """
 
-    P: sp.csr_matrix
+    P: sp.csr_array
     kept: Index
 
 
@@ -48,7 +49,7 @@ def refined_share(parents: Index) -> float:
 
 
 def coarsenings(
-    T: sp.csr_matrix, parents: Index, nodes: Index, coarsest: int | None = None
+    T: sp.csr_array, parents: Index, nodes: Index, coarsest: int | None = None
 ) -> list[Coarsening]:
     """Coarser spaces, finest first, until one has `coarsest` unknowns or the first mesh is met.
 
@@ -93,13 +94,13 @@ def _depths(parents: Index) -> Index:
         depth[new] = deeper
 
 
-def _vertex_steps(parents: Index, coarsest: int) -> list[tuple[sp.csr_matrix, Index]]:
+def _vertex_steps(parents: Index, coarsest: int) -> list[tuple[sp.csr_array, Index]]:
     """Interpolation (n, k) of vertex values and the vertices that stay, finest first.
 
     A step takes as many generations away as halve the vertices: work falls geometrically also
     where refinement is local.
     """
-    steps: list[tuple[sp.csr_matrix, Index]] = []
+    steps: list[tuple[sp.csr_array, Index]] = []
     depth = _depths(parents)
     counts = np.bincount(depth).cumsum()
     while 2 * depth.size > coarsest:
@@ -111,7 +112,7 @@ def _vertex_steps(parents: Index, coarsest: int) -> list[tuple[sp.csr_matrix, In
         rows = np.concatenate([kept, np.repeat(new, 2)])
         columns = np.concatenate([kept, parents[new].ravel()])
         values = np.concatenate([np.ones(kept.size), np.full(2 * new.size, 0.5)])
-        means = sp.csr_matrix((values, (rows, columns)), (depth.size, depth.size))
+        means = from_triplets(values, rows, columns, (depth.size, depth.size))
         P = means
         for _ in range(deepest - last - 1):  # parents of parents
             P = means @ P
@@ -123,7 +124,7 @@ def _vertex_steps(parents: Index, coarsest: int) -> list[tuple[sp.csr_matrix, In
     return steps
 
 
-def _linear(n: int, vertices: int, nodes: Index) -> sp.csr_matrix:
+def _linear(n: int, vertices: int, nodes: Index) -> sp.csr_array:
     """Functions of degree 1 among those of degree p, (n, nv): edge functions add to them."""
     s = gauss_lobatto(nodes.shape[1] - 1)[1:-1]
     _, first = np.unique(nodes[:, 1], return_index=True)  # segments between bodies occur twice
@@ -132,18 +133,20 @@ def _linear(n: int, vertices: int, nodes: Index) -> sp.csr_matrix:
     rows = np.concatenate([np.arange(vertices), inner, inner])
     columns = np.concatenate([np.arange(vertices), start, stop])
     values = np.concatenate([np.ones(vertices), np.tile(1 - s, first.size), np.tile(s, first.size)])
-    return sp.csr_matrix((values, (rows, columns)), (n, vertices))
+    return from_triplets(values, rows, columns, (n, vertices))
 
 
-def _inverse(T: sp.csr_matrix) -> sp.csr_matrix:
+def _inverse(T: sp.csr_array) -> sp.csr_array:
     """Inverse of a change of basis: blocks of the nodes, and what rows contain of other nodes."""
     n = T.shape[0] // 2
     a, d = np.split(T.diagonal(), 2)
     b, c = T.diagonal(n), T.diagonal(-n)
     determinant = a * d - b * c
     diagonal = np.concatenate([d, a]) / np.tile(determinant, 2)
-    blocks = sp.diags([diagonal, -b / determinant, -c / determinant], [0, n, -n], format="csr")
-    rest = sp.identity(2 * n, format="csr") - blocks @ T
+    blocks = sp.diags_array(
+        [diagonal, -b / determinant, -c / determinant], offsets=[0, n, -n], format="csr"
+    )
+    rest = sp.eye_array(2 * n, format="csr") - blocks @ T
     rest.data[np.abs(rest.data) < ROUND_OFF] = 0.0
     rest.eliminate_zeros()
     inverse, term = blocks, rest @ blocks

@@ -49,7 +49,7 @@ class _Hosts:
         self.taken.setdefault(node, []).append(np.where(self.fixed[node], 0.0, coefficients))
 
 
-def coefficients_at(Bz: sp.csr_matrix, row: Index, node: Index) -> Array:
+def coefficients_at(Bz: sp.csr_array, row: Index, node: Index) -> Array:
     """Coefficients (k, 2) of rows (k,) at nodes (k,)."""
     n = Bz.shape[1] // 2
     if row.size == 0:  # SciPy answers an empty index with a sparse matrix
@@ -65,7 +65,7 @@ def _preferred(rows: Rows, stiffness: Array) -> Index:
     return np.where(softer & rows.share.any(axis=1), facing, rows.node)
 
 
-def assign(rows: Rows, Bz: sp.csr_matrix, fixed: Mask, stiffness: Array) -> Index:
+def assign(rows: Rows, Bz: sp.csr_array, fixed: Mask, stiffness: Array) -> Index:
     """Host node of every row, -1 where all of a row's unknowns are prescribed.
 
     Parameters
@@ -89,8 +89,9 @@ def assign(rows: Rows, Bz: sp.csr_matrix, fixed: Mask, stiffness: Array) -> Inde
     for j in np.flatnonzero(regular) if not regular.all() else ():
         hosts.take(host[j], local[j])
     for j in np.flatnonzero(~regular):
-        columns = np.unique(Bz[j].indices % n)
-        entries = Bz[j].toarray().ravel()
+        row = Bz[[j]]
+        columns = np.unique(row.indices % n)
+        entries = row.toarray().ravel()
         choices = [(np.hypot(entries[i], entries[i + n]), i) for i in columns if i != preferred[j]]
         ranked = [preferred[j], *(i for _, i in sorted(choices, reverse=True))]
         coefficients = {i: np.array([entries[i], entries[i + n]]) for i in ranked}
@@ -105,12 +106,12 @@ def assign(rows: Rows, Bz: sp.csr_matrix, fixed: Mask, stiffness: Array) -> Inde
 
 
 def check_prescribed(
-    rows: Rows, Bz: sp.csr_matrix, fixed: Mask, values: Array, drop: Index, length: float
+    rows: Rows, Bz: sp.csr_array, fixed: Mask, values: Array, drop: Index, length: float
 ) -> None:
     """Raise unless the rows that find no free unknown hold for the prescribed values."""
     size = np.abs(values).max(initial=0.0)
     for j in drop:
-        columns, entries = Bz[j].indices, Bz[j].data
+        columns, entries = Bz[[j]].indices, Bz[[j]].data
         where = f"the contact row at node {rows.node[j]} with direction {rows.direction[j]}"
         if (np.abs(entries[~fixed[columns]]) > INDEPENDENT).any():
             raise ValueError(

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from .matrix import cholesky, lower_half, shared
 from .problem import Problem
 from .trace import Trace
+from .triplets import from_triplets
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -140,7 +141,7 @@ class PressureCorrection:
 
     def _inside(
         self, divergence: ng.CoefficientFunction, jump: ng.CoefficientFunction
-    ) -> tuple[sp.csr_matrix, Array]:
+    ) -> tuple[sp.csr_array, Array]:
         """Quadratic form and right side of the terms in elements and between them."""
         d, t = self.space.TnT()
         element, edge = self.weights
@@ -157,7 +158,7 @@ class PressureCorrection:
         f.Assemble()
         return shared(a.mat), f.vec.FV().NumPy().copy()
 
-    def _on_boundary(self, terms: list[Term]) -> tuple[sp.csr_matrix, Array]:
+    def _on_boundary(self, terms: list[Term]) -> tuple[sp.csr_array, Array]:
         """The same of the boundary terms."""
         shape = []
         for j in range(self.functions):
@@ -166,10 +167,10 @@ class PressureCorrection:
             shape.append(ng.BoundaryFromVolumeCF(function))
         shapes = ng.CF(tuple(shape))
         size = self.space.ndof
-        A, b = sp.csr_matrix((size, size)), np.zeros(size)
+        A, b = sp.csr_array((size, size)), np.zeros(size)
         for term in terms:
             k, c = term.residual.shape
-            rows = sp.csr_matrix((k * c, size))
+            rows = sp.csr_array((k * c, size))
             for share in term.shares:
                 if len(share.at) == 0:
                     continue
@@ -179,14 +180,13 @@ class PressureCorrection:
                 row = share.at[:, None, None] * c + np.arange(c)[:, None]
                 row, column = np.broadcast_arrays(row, column)
                 entries = share.factor[:, :, None] * value[:, None, :]
-                index = (row.ravel(), column.ravel())
-                rows += sp.csr_matrix((entries.ravel(), index), (k * c, size))
+                rows += from_triplets(entries.ravel(), row.ravel(), column.ravel(), (k * c, size))
             weight = np.repeat(term.weight, c)
             A += rows.T @ rows.multiply(weight[:, None])
             b -= rows.T @ (weight * term.residual.ravel())
         return A, b
 
-    def _stiffness(self) -> sp.csr_matrix:
+    def _stiffness(self) -> sp.csr_array:
         """Form of mu |grad v|^2, with v held where displacements are prescribed."""
         problem, mesh = self.problem, self.mesh
         u, v = self.V.TnT()
@@ -211,7 +211,7 @@ class PressureCorrection:
         a.Assemble()
         return shared(a.mat)
 
-    def _divergence(self) -> sp.csr_matrix:
+    def _divergence(self) -> sp.csr_array:
         """(q, div v) of pressures q and displacements v."""
         pressures = ng.L2(self.mesh, order=self.trace.order)
         q, v = pressures.TrialFunction(), self.V.TestFunction()
@@ -221,7 +221,7 @@ class PressureCorrection:
         b.Assemble()
         return shared(b.mat)
 
-    def _solve(self, A: sp.csr_matrix, b: Array) -> None:
+    def _solve(self, A: sp.csr_array, b: Array) -> None:
         """Solve the optimality conditions of delta and of the v_h of the supremum.
 
         [[A, B'], [B, -K]] is quasi-definite: it has a factorisation without pivots.
@@ -231,7 +231,7 @@ class PressureCorrection:
         regions = self.mesh.ngmesh.Elements2D().NumPy()["index"].astype(int) - 1
         inside = np.array(self.region.Mask())[regions]
         free = np.append(np.repeat(inside, self.functions), K.diagonal() > 0)
-        saddle = sp.bmat([[A, B.T], [B, -K]], format="csr")
+        saddle = sp.block_array([[A, B.T], [B, -K]], format="csr")
         right = np.append(b, np.zeros(K.shape[0]))
         solution = np.where(free, cholesky(lower_half(saddle))(free)(right), 0.0)
         self.pressure.vec.FV().NumPy()[:] = solution[:size]

@@ -134,7 +134,7 @@ class IterativeSystems(Systems):
 
 
 def linear_systems(
-    program: Program, matrix: ng.BaseMatrix, T: sp.csr_matrix, parents: Index, nodes: Index
+    program: Program, matrix: ng.BaseMatrix, T: sp.csr_array, parents: Index, nodes: Index
 ) -> Systems:
     """Systems of a discrete problem: by multigrid where it is large and has coarser spaces.
 

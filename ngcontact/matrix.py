@@ -25,13 +25,15 @@ class _View:
         self.owner = owner
 
 
-def shared(matrix: ng.BaseMatrix) -> sp.csr_matrix:
+def shared(matrix: ng.BaseMatrix) -> sp.csr_array:
     """The same matrix for SciPy, in the same memory: values and columns are not copied."""
     values, columns, starts = (np.asarray(_View(x, matrix)) for x in matrix.CSR())
-    return sp.csr_matrix((values, columns, starts), (matrix.height, matrix.width))
+    if len(values) <= np.iinfo(columns.dtype).max:  # SciPy has both of one type, or copies
+        starts = starts.astype(columns.dtype)
+    return sp.csr_array((values, columns, starts), (matrix.height, matrix.width))
 
 
-def handed_over(K: sp.spmatrix) -> ng.BaseMatrix:
+def handed_over(K: sp.sparray) -> ng.BaseMatrix:
     """A copy of a SciPy matrix for NGSolve."""
     K = K.tocoo()
     entries = []
@@ -42,14 +44,14 @@ def handed_over(K: sp.spmatrix) -> ng.BaseMatrix:
     return ng.la.SparseMatrixd.CreateFromCOO(*entries, *K.shape)
 
 
-def lower_half(K: sp.csr_matrix) -> ng.BaseMatrix:
+def lower_half(K: sp.csr_array) -> ng.BaseMatrix:
     """Lower half of a symmetric matrix for NGSolve, all that its Cholesky factorisation reads."""
     return handed_over(sp.tril(K))
 
 
 def congruent(
-    matrix: ng.BaseMatrix, A: sp.csr_matrix, T: sp.csr_matrix
-) -> tuple[sp.csr_matrix, ng.BaseMatrix]:
+    matrix: ng.BaseMatrix, A: sp.csr_array, T: sp.csr_array
+) -> tuple[sp.csr_array, ng.BaseMatrix]:
     """Matrix T'AT of the unknowns y of u = T y, for SciPy and at least its lower half for NGSolve.
 
     `A` is `matrix` for SciPy. T is the identity but for nodes on the boundary: only the change is
@@ -58,7 +60,7 @@ def congruent(
     if T.shape[0] != T.shape[1]:  # fewer node values than edge unknowns: element="physical"
         K = (T.T @ A @ T).tocsr()
         return K, lower_half(K)
-    D = (T - sp.identity(T.shape[0], format="csr")).tocsr()
+    D = (T - sp.eye_array(T.shape[0], format="csr")).tocsr()
     D.eliminate_zeros()
     if D.nnz == 0:
         return A, matrix
@@ -68,7 +70,7 @@ def congruent(
     return shared(total), total
 
 
-def terms(A: sp.csr_matrix, x: Array) -> Array:
+def terms(A: sp.csr_array, x: Array) -> Array:
     """|A| |x|, the size of the terms of A x, without a second matrix of that size."""
     x = np.abs(x)
     parts = [abs(A[start : start + ROWS]) @ x for start in range(0, A.shape[0], ROWS)]

@@ -35,7 +35,7 @@ class _Level:
         self.smoother = self.matrix.CreateSmoother(ng.BitArray(free))
 
 
-def _galerkin(matrix: ng.BaseMatrix, P: sp.csr_matrix, free: Mask, coarse: Mask) -> ng.BaseMatrix:
+def _galerkin(matrix: ng.BaseMatrix, P: sp.csr_array, free: Mask, coarse: Mask) -> ng.BaseMatrix:
     """Matrix of the coarser space, whose functions vanish at unknowns that are not free."""
     columns = P.tocoo()
     columns.data = columns.data * (free[columns.row] & coarse[columns.col])

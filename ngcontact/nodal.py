@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from .lagrange import gauss_lobatto
 from .trace import Trace
+from .triplets import from_triplets
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -35,11 +36,11 @@ def edge_bubbles(space: ng.FESpace) -> Array:
     return values[:, columns]
 
 
-def nodal_basis(trace: Trace, segments: Index) -> sp.csr_matrix:
+def nodal_basis(trace: Trace, segments: Index) -> sp.csr_array:
     """Matrix (n, n) from node values on the segments and other unknowns to NGSolve's unknowns."""
     order, size = trace.order, trace.space.ndof
     if order == 1:
-        return sp.identity(size, format="csr")
+        return sp.eye_array(size, format="csr")
     bubbles = np.linalg.inv(edge_bubbles(trace.space))
     nodes = trace.nodes[segments]
     nodes = np.where((nodes[:, 0] < nodes[:, -1])[:, None], nodes, nodes[:, ::-1])
@@ -53,5 +54,5 @@ def nodal_basis(trace: Trace, segments: Index) -> sp.csr_matrix:
     values = np.broadcast_to(local, rows.shape)
     diagonal = np.ones(size)
     diagonal[nodes[:, 1:-1].ravel()] = 0.0
-    edges = sp.coo_matrix((values.ravel(), (rows.ravel(), cols.ravel())), shape=(size, size))
-    return (sp.diags(diagonal) + edges).tocsr()
+    edges = from_triplets(values.ravel(), rows.ravel(), cols.ravel(), (size, size))
+    return (sp.diags_array(diagonal) + edges).tocsr()

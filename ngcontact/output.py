@@ -19,6 +19,8 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import KDTree
 
+from .triplets import from_triplets
+
 if TYPE_CHECKING:
     import pyvista
 
@@ -115,7 +117,7 @@ def neighbour_tree(points: NDArray[np.float64]) -> csr_array:
     other = neighbour != start
     # The two rows of a corner are at distance 0, which a sparse graph reads as "no edge".
     weight = np.maximum(distance[other], np.finfo(float).tiny)
-    graph = csr_array((weight, (start[other], neighbour[other])), shape=(len(points),) * 2)
+    graph = from_triplets(weight, start[other], neighbour[other], (len(points), len(points)))
     return minimum_spanning_tree(graph)
 
 

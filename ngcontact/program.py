@@ -43,9 +43,9 @@ class Program:
         Null space of K, only with unit rows.
     """
 
-    K: sp.csr_matrix
+    K: sp.csr_array
     b: Array
-    R: sp.csr_matrix
+    R: sp.csr_array
     g: Array
     equality: Mask
     fixed: Mask

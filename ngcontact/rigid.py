@@ -14,6 +14,7 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 from scipy.optimize import linprog, nnls
 
 from .cad import cad_edges
@@ -172,7 +173,7 @@ def rigid_motions(
     space: Space,
     conditions: Conditions,
     basis: Basis,
-    B: sp.csr_matrix,
+    B: sp.csr_array,
     g: Array,
     equality: Mask,
 ) -> tuple[Rigid, Array] | None:
@@ -206,7 +207,7 @@ def rigid_motions(
     free = unsupported(trace, bodies, conditions)
     if not any(x.shape[1] for x in free):
         return None
-    combinations = np.asarray(sp.block_diag(free, format="csr").toarray())
+    combinations = block_diag(*free)
     of_unknown = body_of_unknown(space, bodies)
     n = space.basis.shape[1] // 2
     Z = node_values(space, bodies, of_unknown[:n]) @ combinations

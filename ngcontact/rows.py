@@ -8,6 +8,8 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from .triplets import from_triplets
+
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 Mask = NDArray[np.bool_]
@@ -57,7 +59,7 @@ class Rows:
     g: Array
     equality: Mask
 
-    def matrix(self, n: int) -> sp.csr_matrix:
+    def matrix(self, n: int) -> sp.csr_array:
         """B (m, 2n) on node values: x components first, then y."""
         m, q = self.partner.shape
         node = np.column_stack([self.node, self.partner])
@@ -67,7 +69,7 @@ class Rows:
             [share * self.direction[:, :1], share * self.direction[:, 1:]], axis=1
         )
         rows = np.repeat(np.arange(m), 2 * (q + 1))
-        B = sp.coo_matrix((vals.ravel(), (rows, cols.ravel())), (m, 2 * n)).tocsr()
+        B = from_triplets(vals.ravel(), rows, cols.ravel(), (m, 2 * n))
         B.eliminate_zeros()
         return B
 
@@ -87,6 +89,6 @@ class Rows:
             return number
         B = self.matrix(n)
         for first, second in zip(order[:-1][alike], order[1:][alike], strict=True):
-            if abs(B[first] - B[second]).max() <= REPEATED:
+            if abs(B[[first]] - B[[second]]).max() <= REPEATED:
                 number[second] = number[first]
         return number

@@ -18,6 +18,7 @@ from .matrix import shared
 from .nodal import edge_bubbles, nodal_basis
 from .problem import Problem
 from .trace import Trace
+from .triplets import from_triplets
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -99,8 +100,8 @@ class Space:
     V: ng.FESpace
     trace: Trace
     nodal: Index
-    basis: sp.csr_matrix
-    A: sp.csr_matrix
+    basis: sp.csr_array
+    A: sp.csr_array
     matrix: ng.BaseMatrix
     f: Array
 
@@ -121,7 +122,7 @@ def strain(u: ng.CoefficientFunction) -> ng.CoefficientFunction:
     return ng.CF((grad[0, 0], grad[1, 1], grad[0, 1] + grad[1, 0]))
 
 
-def _physical_basis(V: ng.FESpace, trace: Trace) -> sp.csr_matrix:
+def _physical_basis(V: ng.FESpace, trace: Trace) -> sp.csr_array:
     """P1 in physical coordinates (2.4) inside the quadratic isoparametric space, (N, nv).
 
     On a curved element a linear function of x has the edge function coefficients that its
@@ -129,7 +130,7 @@ def _physical_basis(V: ng.FESpace, trace: Trace) -> sp.csr_matrix:
     """
     mesh = trace.mesh
     if V.ndof == 2 * mesh.nv:
-        return sp.identity(mesh.nv, format="csr")
+        return sp.eye_array(mesh.nv, format="csr")
     xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
     corners = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.intp) - 1
     triangles = corners[trace.element]
@@ -153,10 +154,10 @@ def _physical_basis(V: ng.FESpace, trace: Trace) -> sp.csr_matrix:
     on = numbers >= 0
     bubble = 1 / edge_bubbles(ng.H1(mesh, order=2))[0, 0]
     rows = np.repeat(numbers[on], 3)
-    edges = sp.coo_matrix(
-        ((bubble * value[on]).ravel(), (rows, triangles[on].ravel())), (V.ndof // 2, mesh.nv)
+    edges = from_triplets(
+        (bubble * value[on]).ravel(), rows, triangles[on].ravel(), (V.ndof // 2, mesh.nv)
     )
-    return (sp.eye(V.ndof // 2, mesh.nv) + edges).tocsr()
+    return (sp.eye_array(V.ndof // 2, mesh.nv) + edges).tocsr()
 
 
 def _vector_space(mesh: ng.Mesh, order: int, element: str) -> ng.FESpace:
@@ -197,7 +198,7 @@ def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
     return f.vec.FV().NumPy().copy()
 
 
-def node_basis(V: ng.FESpace, trace: Trace, nodal: Index, element: str) -> sp.csr_matrix:
+def node_basis(V: ng.FESpace, trace: Trace, nodal: Index, element: str) -> sp.csr_array:
     """`Space.basis` for node values on the segments `nodal`."""
     scalar = _physical_basis(V, trace) if element == "physical" else nodal_basis(trace, nodal)
     return sp.block_diag([scalar, scalar], format="csr")

@@ -15,14 +15,19 @@ This module knows matrices only.
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import ArrayLike
 from scipy.sparse.linalg import splu
 
 from .bordered import Anchor, Array, Mask, Solve, Systems
 from .errors import ConvergenceError
 from .newton import Minimiser, Newton
 from .program import Program
+
+Matrix: TypeAlias = sp.sparray | sp.spmatrix | ArrayLike  # a dense one may be a list of rows
 
 PROXIMAL = 1e-3  # of the stiffness at the pins, where contact leaves rigid motions free
 WEAKEST = 1e-6  # of that, to which it falls, tenfold at each proximal step
@@ -83,9 +88,11 @@ def minimise(systems: Systems, active: Mask | None = None) -> Minimiser:
     )
 
 
-def _matrix(name: str, M: object, columns: int | None) -> sp.csr_matrix:
-    """`M` as a CSR matrix, checked."""
-    matrix = sp.csr_matrix(M, dtype=float)
+def _matrix(name: str, M: Matrix, columns: int | None) -> sp.csr_array:
+    """`M` as a CSR array, checked."""
+    matrix = sp.csr_array(M if sp.issparse(M) else np.atleast_2d(M), dtype=float)
+    if matrix.ndim != 2:  # SciPy has sparse vectors, too
+        raise ValueError(f"{name} has shape {matrix.shape}; it must have rows and columns")
     if columns is not None and matrix.shape[1] != columns:
         raise ValueError(
             f"{name} has {matrix.shape[1]} columns; it must have {columns}, one per unknown"
@@ -106,13 +113,13 @@ def _vector(name: str, v: object, size: int) -> Array:
 
 
 def solve_qp(
-    A: sp.spmatrix,
-    f: Array,
-    B: sp.spmatrix,
-    g: Array,
-    E: sp.spmatrix | None = None,
-    e: Array | None = None,
-    active: Mask | None = None,
+    A: Matrix,
+    f: ArrayLike,
+    B: Matrix,
+    g: ArrayLike,
+    E: Matrix | None = None,
+    e: ArrayLike | None = None,
+    active: ArrayLike | None = None,
 ) -> Minimiser:
     """Minimise 1/2 u'Au - f'u subject to B u <= g and E u = e.
 
@@ -154,24 +161,23 @@ def solve_qp(
     >>> result.u.round(12).tolist(), result.force.round(12).tolist(), result.steps
     ([0.25, 1.0], [1.5], [1, 0])
     """
-    A = _matrix("A", A, None)
-    n = A.shape[1]
-    if A.shape[0] != n:
-        raise ValueError(f"A has shape {A.shape}; it must be square")
-    if abs(A - A.T).max() > 1e-10 * abs(A).max():
+    K = _matrix("A", A, None)
+    n = K.shape[1]
+    if K.shape[0] != n:
+        raise ValueError(f"A has shape {K.shape}; it must be square")
+    if abs(K - K.T).max() > 1e-10 * abs(K).max():
         raise ValueError("A is not symmetric; it must equal its transpose")
-    B = _matrix("B", B, n)
-    f, g = _vector("f", f, n), _vector("g", g, B.shape[0])
-    E = sp.csr_matrix((0, n)) if E is None else _matrix("E", E, n)
-    e = _vector("e", np.zeros(0) if e is None else e, E.shape[0])
-    m = g.size
+    rows, equations = _matrix("B", B, n), sp.csr_array((0, n)) if E is None else _matrix("E", E, n)
+    (m, _), (k, _) = rows.shape, equations.shape
+    load, bounds = _vector("f", f, n), _vector("g", g, m)
+    values = _vector("e", np.zeros(0) if e is None else e, k)
     start = np.zeros(m, dtype=bool) if active is None else np.asarray(active)
     if start.shape != (m,) or start.dtype != bool:
         raise ValueError(f"active is {active!r}; it must be {m} booleans, one per row of B")
 
     def factor(free: Mask) -> Solve:
         lu = splu(
-            A.tocsc(),
+            K.tocsc(),
             permc_spec="MMD_AT_PLUS_A",
             diag_pivot_thresh=0.0,
             options={"SymmetricMode": True},
@@ -181,15 +187,15 @@ def solve_qp(
         return lu.solve
 
     program = Program(
-        K=A,
-        b=f,
-        R=sp.vstack([B, E], format="csr"),
-        g=np.concatenate([g, e]),
-        equality=np.arange(m + e.size) >= m,
+        K=K,
+        b=load,
+        R=sp.vstack([rows, equations], format="csr"),
+        g=np.concatenate([bounds, values]),
+        equality=np.arange(m + k) >= m,
         fixed=np.zeros(n, dtype=bool),
         values=np.zeros(n),
     )
-    first = np.concatenate([start, np.zeros(e.size, dtype=bool)])
+    first = np.concatenate([start, np.zeros(k, dtype=bool)])
     result = minimise(Systems(program, factor), first)
     return Minimiser(
         u=result.u,
