@@ -22,8 +22,8 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from drivers import cases
-from drivers.exact import Exact, Hertz, relative_energy_error
+from drivers.reference import cases
+from drivers.reference.straight import Exact, Hertz, relative_energy_error
 from ngcontact import Problem, Solution, adapt, solve
 from ngcontact.mesh import first_mesh
 from ngcontact.refine import refined

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from drivers import cases
-from drivers.cases import Case
-from drivers.exact import relative_energy_error
-from drivers.exact_curved import Rings
+from drivers.reference import cases
+from drivers.reference.cases import Case
+from drivers.reference.curved import Rings
+from drivers.reference.straight import relative_energy_error
 from ngcontact import Solution, solve
 from ngcontact.mesh import first_mesh
 from ngcontact.refine import refined

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from netgen.occ import OCCGeometry
 
-from drivers import cases
+from drivers.reference import cases
 from geometries import blocks
 from ngcontact.ancestry import parents
 from ngcontact.check import boundary_mask

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 from conftest import unmatched_blocks
 
-from drivers import cases
-from drivers.exact import patch, relative_energy_error
+from drivers.reference import cases
+from drivers.reference.straight import patch, relative_energy_error
 from geometries import blocks, disc_on_block
 from ngcontact import Contact, ContactError, Elastic, NoEquilibriumError, Problem, adapt, solve
 from ngcontact import level as one_level

@@ -8,8 +8,9 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from drivers import adaptive_study, cases
+from drivers import adaptive_study
 from drivers.adaptive_study import STUDIES, error_measure, rate, run, share_near
+from drivers.reference import cases
 from ngcontact import adapt
 
 

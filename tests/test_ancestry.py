@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from conftest import coordinates, near_origin
 
-from drivers import cases
+from drivers.reference import cases
 from ngcontact.ancestry import copied, parents
 from ngcontact.mesh import first_mesh
 from ngcontact.refine import refined

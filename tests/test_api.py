@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-import drivers
 import geometries
 import ngcontact
 
@@ -213,10 +212,10 @@ def test_modules_do_not_import_each_other_in_circles():
 
 
 def test_every_driver_and_every_geometry_is_tested():
-    used = set().union(*(imports(p) for p in Path(__file__).parent.glob("test_*.py")))
-    named = {name for module, name in used if module == "drivers"}
-    named |= {module.removeprefix("drivers.") for module, _ in used if "drivers." in module}
-    modules = {path.stem for path in Path(drivers.__file__).parent.glob("*.py")}
-    assert modules - {"__init__"} <= named
+    used = set().union(*(imports(p) for p in Path(__file__).parent.rglob("test_*.py")))
+    named = {module for module, _ in used} | {f"{module}.{name}" for module, name in used}
+    paths = [*ROOT.glob("drivers/*.py"), *ROOT.glob("drivers/reference/*.py")]
+    modules = {".".join(path.relative_to(ROOT).with_suffix("").parts) for path in paths}
+    assert {name for name in modules if not name.endswith("__")} <= named
     functions = {name for module, name in used if module.startswith("geometries")}
     assert set(geometries.__all__) <= functions

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from drivers import cases
 from drivers.convergence import identities
+from drivers.reference import cases
 from geometries import blocks, rings
 from geometries.region import body, compound, polygon
 from ngcontact import Contact, Elastic, Problem, solve

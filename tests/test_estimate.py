@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from netgen.occ import Glue, OCCGeometry, WorkPlane, Y
 
-from drivers import cases
-from drivers.exact import patch as patch_solution
-from drivers.exact import relative_energy_error, transition
-from drivers.exact_curved import rings as ring_solution
+from drivers.reference import cases
+from drivers.reference.curved import rings as ring_solution
+from drivers.reference.straight import patch as patch_solution
+from drivers.reference.straight import relative_energy_error, transition
 from geometries import blocks, rings
 from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.check import boundary_mask

@@ -12,9 +12,15 @@ import pytest
 from netgen.occ import Compound, OCCGeometry, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
-from drivers.exact import hertz, patch, relative_energy_error, transition, transition_cutoff
-from drivers.exact_curved import curved, rings
-from drivers.westergaard import effective_modulus, hooke
+from drivers.reference.curved import curved, rings
+from drivers.reference.straight import (
+    hertz,
+    patch,
+    relative_energy_error,
+    transition,
+    transition_cutoff,
+)
+from drivers.reference.westergaard import effective_modulus, hooke
 from ngcontact.material import Elastic
 
 UPPER, LOWER = Elastic(E=1.0, nu=0.3), Elastic(E=3.0, nu=0.2)

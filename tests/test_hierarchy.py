@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 from conftest import REFINED, coordinates, discrete, near_origin, steps_of
 
-from drivers import cases
+from drivers.reference import cases
 from ngcontact.ancestry import parents
 from ngcontact.discrete import Discrete, discretise
 from ngcontact.hierarchy import RingError, coarsenings, refined_share

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers import cases
+from drivers.reference import cases
 from geometries import punch
 from ngcontact import Contact, ConvergenceError, Elastic, Problem, solve
 from ngcontact.discrete import discretise

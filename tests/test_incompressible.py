@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from netgen.occ import OCCGeometry, Rectangle
 
-from drivers import cases
-from drivers.exact import hertz, patch, relative_energy_error, transition
+from drivers.reference import cases
+from drivers.reference.straight import hertz, patch, relative_energy_error, transition
 from ngcontact import Elastic, Hooke, Problem, solve
 from ngcontact import estimate as estimate_module
 from ngcontact.moduli import root_of_squares

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from conftest import REFINED
 
-from drivers import cases
 from drivers.benchmark.linear import uniform_mesh
+from drivers.reference import cases
 from ngcontact import Elastic, Solution, adapt, hierarchy, iterative, solve
 from ngcontact.bordered import Systems
 from ngcontact.discrete import minimise_energy

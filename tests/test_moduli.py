@@ -9,7 +9,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from drivers import cases
+from drivers.reference import cases
 from ngcontact import Elastic, Hooke
 from ngcontact.mesh import first_mesh
 from ngcontact.moduli import (

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from netgen.occ import OCCGeometry
 
-from drivers import cases
-from drivers.exact import relative_energy_error
+from drivers.reference import cases
+from drivers.reference.straight import relative_energy_error
 from drivers.stress import held
 from geometries import blocks, rings
 from geometries.region import body, compound, polygon, quarter_arc

@@ -13,7 +13,7 @@ from netgen.meshing import Element1D, Element2D, FaceDescriptor, Mesh, MeshPoint
 from netgen.occ import Axis, OCCGeometry, Vec, WorkPlane
 from netgen.occ import Pnt as Point
 
-from drivers import cases
+from drivers.reference import cases
 from geometries import blocks, disc, disc_on_block, disc_on_disc, rings
 from geometries.region import body, compound, polygon
 from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve

@@ -9,7 +9,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from drivers import cases
+from drivers.reference import cases
 from geometries import blocks
 from ngcontact import Contact, Problem, adapt, solve
 from ngcontact.transition import (

@@ -6,9 +6,9 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from drivers import cases
 from drivers.benchmark.linear import uniform_mesh
 from drivers.benchmark.skip import two_blocks
+from drivers.reference import cases
 from ngcontact import adapt, solve
 
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.cases import disc_on_rigid_plane, partly_opening_block
+from drivers.reference.cases import disc_on_rigid_plane, partly_opening_block
 from ngcontact import Problem
 
 Array = NDArray[np.float64]

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from drivers import cases
 from drivers.benchmark.linear import uniform_mesh
+from drivers.reference import cases
 from geometries import blocks
 from geometries.region import body, compound, polygon
 from ngcontact import Contact, Elastic, Problem, Solution, solve

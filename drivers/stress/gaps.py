@@ -10,12 +10,12 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry
 
-from drivers import cases
-from drivers.exact import Exact, relative_energy_error
-from drivers.exact_curved import Rings, rings
+from drivers.reference import cases
+from drivers.reference.curved import Rings, rings
+from drivers.reference.straight import Exact, relative_energy_error
+from drivers.reference.westergaard import hooke, moduli
 from drivers.stress import Outcome, refused, solved
 from drivers.stress.shapes import interpolated, structured, touching
-from drivers.westergaard import hooke, moduli
 from geometries import blocks
 from geometries import rings as ring_geometry
 from geometries.region import body, compound, polygon

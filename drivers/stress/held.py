@@ -11,8 +11,8 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry
 
-from drivers import cases
-from drivers.exact import relative_energy_error
+from drivers.reference import cases
+from drivers.reference.straight import relative_energy_error
 from drivers.stress import Outcome, refused, solved
 from geometries import blocks
 from geometries.region import Loop, Point, body, compound, polygon, quarter_arc

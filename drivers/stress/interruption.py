@@ -17,7 +17,7 @@ import numpy as np
 import pyvista
 from numpy.typing import NDArray
 
-from drivers.cases import hertz_contact
+from drivers.reference.cases import hertz_contact
 from drivers.stress import Outcome
 from ngcontact import Problem, Solution, adapt, write_series
 
@@ -28,7 +28,7 @@ WAITS = (0.0, 0.05, 0.15, 0.4)  # seconds after the first level is on disk
 # What a user's script may look like; the run is far too long to finish.
 SCRIPT = """
 import sys
-from drivers.cases import hertz_contact
+from drivers.reference.cases import hertz_contact
 from ngcontact import adapt, write_series
 write_series(sys.argv[1], adapt(hertz_contact().problem, order=2, maxh=0.5, max_dofs=10**7))
 """

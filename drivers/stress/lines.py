@@ -11,11 +11,11 @@ import numpy as np
 from netgen.occ import OCCGeometry
 from numpy.typing import NDArray
 
-from drivers import cases
-from drivers.exact import patch, relative_energy_error
+from drivers.reference import cases
+from drivers.reference.straight import patch, relative_energy_error
+from drivers.reference.westergaard import effective_modulus, moduli
 from drivers.stress import Outcome, solved
 from drivers.stress.shapes import structured
-from drivers.westergaard import effective_modulus, moduli
 from geometries import blocks
 from ngcontact import Contact, Problem, Solution, adapt, solve
 from ngcontact.transition import nodal_pressure

@@ -1,7 +1,7 @@
 """Stress by materials: near incompressibility and contrasts of stiffness.
 
-S1, S9 and the flat punch of `drivers.cases` with other moduli. Errors in the energy norm are
-relative and of the exact stress; "times nu = 0.3" is the ratio to that of nu = 0.3 on the same
+S1, S9 and the flat punch of `drivers.reference.cases` with other moduli. Errors in the energy norm
+are relative and of the exact stress; "times nu = 0.3" is the ratio to that of nu = 0.3 on the same
 meshes (adaptive: at the same number of unknowns).
 """
 
@@ -15,11 +15,11 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 
-from drivers import cases
-from drivers.cases import Case
-from drivers.exact import Exact, relative_energy_error, transition
-from drivers.exact_curved import Rings
-from drivers.exact_curved import rings as ring_solution
+from drivers.reference import cases
+from drivers.reference.cases import Case
+from drivers.reference.curved import Rings
+from drivers.reference.curved import rings as ring_solution
+from drivers.reference.straight import Exact, relative_energy_error, transition
 from drivers.stress import Outcome, refused, solved
 from geometries import punch
 from ngcontact import ContactError, Elastic, Problem, Solution, adapt, solve

@@ -23,8 +23,8 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.cases import BLOCKS, FIRST, OUTSIDE, SECOND
-from drivers.exact import Exact, Hertz, hertz, patch, relative_energy_error, transition
+from drivers.reference.cases import BLOCKS, FIRST, OUTSIDE, SECOND
+from drivers.reference.straight import Exact, Hertz, hertz, patch, relative_energy_error, transition
 from drivers.stress import Outcome, solved
 from ngcontact import Contact, Problem, Solution, solve
 

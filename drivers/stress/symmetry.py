@@ -9,7 +9,9 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 
-from drivers.cases import (
+from drivers.compared import differences
+from drivers.motion import Array, Motion, Scene, moved_mesh, posed, swapped
+from drivers.reference.cases import (
     FIRST,
     SECOND,
     curved_lines,
@@ -17,8 +19,6 @@ from drivers.cases import (
     one_transition,
     pressed_disc,
 )
-from drivers.compared import differences
-from drivers.motion import Array, Motion, Scene, moved_mesh, posed, swapped
 from drivers.stress import Outcome, solved
 from geometries import blocks
 from ngcontact import Contact, Elastic, Problem, Solution, solve

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import ngsolve as ng
 import numpy as np
 
-from drivers.exact import Exact, hertz, patch, transition, transition_cutoff
-from drivers.exact_curved import Curved, curved, rings
+from drivers.reference.curved import Curved, curved, rings
+from drivers.reference.straight import Exact, hertz, patch, transition, transition_cutoff
 from geometries import blocks, disc, disc_on_block, graphs, punch
 from geometries import rings as ring_geometry
 from geometries.region import body, compound, polygon

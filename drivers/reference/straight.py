@@ -16,7 +16,7 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drivers.westergaard import (
+from drivers.reference.westergaard import (
     CF,
     SIDES,
     Field,

@@ -15,8 +15,8 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.exact import NO_FORCE, Exact, Profile, compiled, positive
-from drivers.westergaard import CF, hooke, moduli
+from drivers.reference.straight import NO_FORCE, Exact, Profile, compiled, positive
+from drivers.reference.westergaard import CF, hooke, moduli
 
 if TYPE_CHECKING:
     from ngcontact.material import Elastic
