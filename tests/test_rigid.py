@@ -12,7 +12,7 @@ from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
-from drivers.stress import held
+from drivers.stress.trials import held
 from geometries import blocks, rings
 from geometries.region import body, compound, polygon, quarter_arc
 from ngcontact import (

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from drivers.compared import differences
-from drivers.motion import Motion, posed, swapped
-from drivers.stress import scaling, symmetry
-from drivers.stress.interruption import while_writing
-from drivers.stress.symmetry import cornered, disc_scene, graph_scene, hertz_scene, parting
+from drivers.stress.differences import differences
+from drivers.stress.motion import Motion, posed, swapped
+from drivers.stress.trials import scaling, symmetry
+from drivers.stress.trials.interruption import while_writing
+from drivers.stress.trials.symmetry import cornered, disc_scene, graph_scene, hertz_scene, parting
 from ngcontact import ConvergenceError, Elastic, Solution, adapt, solve
 from ngcontact.output import von_mises
 from ngcontact.trace import boundary_trace

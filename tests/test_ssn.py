@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.stress.algebra import (
+from drivers.stress.trials.algebra import (
     CYCLES,
     NOT_SYMMETRIC,
     ROUND_OFF,

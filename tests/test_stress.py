@@ -7,12 +7,11 @@ import math
 
 import pytest
 
-from drivers.compared import differences
-from drivers.motion import Motion, posed
-from drivers.stress import __path__ as folder
 from drivers.stress import refused
 from drivers.stress.__main__ import main, modules
-from drivers.stress.symmetry import parting
+from drivers.stress.differences import differences
+from drivers.stress.motion import Motion, posed
+from drivers.stress.trials.symmetry import parting
 from ngcontact import solve
 
 # The slow ones run with the driver; what they found has tests with the modules concerned.
@@ -20,20 +19,18 @@ QUICK = ("algebra", "gaps", "held", "shapes")
 
 
 def test_modules_are_found():
-    assert folder
     assert set(QUICK) <= set(modules())
 
 
 @pytest.mark.parametrize("name", QUICK)
 def test_outcomes(name):
-    failed = [
-        x for x in importlib.import_module(f"drivers.stress.{name}").outcomes() if not x.passed
-    ]
+    trial = importlib.import_module(f"drivers.stress.trials.{name}")
+    failed = [outcome for outcome in trial.outcomes() if not outcome.passed]
     assert not failed
 
 
 def test_the_exit_status_tells_of_failures(monkeypatch, capsys):
-    held = importlib.import_module("drivers.stress.held")
+    held = importlib.import_module("drivers.stress.trials.held")
     wrong = refused("nothing", "is refused", ValueError, "it", lambda: None)
     assert math.isinf(wrong.error)
     monkeypatch.setattr(held, "outcomes", lambda: iter([wrong]))

@@ -1,7 +1,4 @@
-"""Numerical stability under stress: every module tries one kind of it.
-
-Each module has a function ``outcomes()`` that yields one `Outcome` per line of the table.
-"""
+"""Numerical stability under stress: every module of `trials` tries one kind of it."""
 
 from __future__ import annotations
 

@@ -11,11 +11,11 @@ import importlib
 import pkgutil
 import sys
 
-from drivers import stress
+from drivers.stress import Outcome, trials
 from ngcontact import ContactError
 
 
-def line(outcome: stress.Outcome) -> str:
+def line(outcome: Outcome) -> str:
     """One line of the table."""
     return (
         f"{outcome.case:32} {outcome.varied:44} {outcome.steps:5d} {outcome.residual:9.1e} "
@@ -25,7 +25,7 @@ def line(outcome: stress.Outcome) -> str:
 
 def modules() -> list[str]:
     """Names of all modules with cases."""
-    return sorted(m.name for m in pkgutil.iter_modules(stress.__path__) if m.name[0] != "_")
+    return sorted(m.name for m in pkgutil.iter_modules(trials.__path__) if m.name[0] != "_")
 
 
 def main(names: list[str]) -> int:
@@ -34,7 +34,7 @@ def main(names: list[str]) -> int:
     print(f"{'case':32} {'varied':44} {'steps':>5} {'residual':>9} {'error':>9} {'allowed':>9}")
     for name in names or modules():
         try:
-            for outcome in importlib.import_module(f"drivers.stress.{name}").outcomes():
+            for outcome in importlib.import_module(f"drivers.stress.trials.{name}").outcomes():
                 count += 1
                 failed += not outcome.passed
                 print(line(outcome), flush=True)

@@ -15,7 +15,7 @@ from drivers.reference import cases
 from drivers.reference.straight import patch, relative_energy_error
 from drivers.reference.westergaard import effective_modulus, moduli
 from drivers.stress import Outcome, solved
-from drivers.stress.shapes import structured
+from drivers.stress.trials.shapes import structured
 from geometries import blocks
 from ngcontact import Contact, Problem, Solution, adapt, solve
 from ngcontact.transition import nodal_pressure

@@ -9,8 +9,6 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 
-from drivers.compared import differences
-from drivers.motion import Array, Motion, Scene, moved_mesh, posed, swapped
 from drivers.reference.cases import (
     FIRST,
     SECOND,
@@ -20,6 +18,8 @@ from drivers.reference.cases import (
     pressed_disc,
 )
 from drivers.stress import Outcome, solved
+from drivers.stress.differences import differences
+from drivers.stress.motion import Array, Motion, Scene, moved_mesh, posed, swapped
 from geometries import blocks
 from ngcontact import Contact, Elastic, Problem, Solution, solve
 from ngcontact.mesh import first_mesh

@@ -200,7 +200,7 @@ def _interrupt(process: subprocess.Popen[bytes]) -> None:
 
 def in_another_process() -> Iterator[Outcome]:
     """Ctrl-C in a script that writes a series: whole files and the levels that are listed."""
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     for wait in WAITS:
         with tempfile.TemporaryDirectory() as folder:
             series = Path(folder) / "run.pvd"

@@ -11,11 +11,11 @@ from itertools import product
 import ngsolve as ng
 import numpy as np
 
-from drivers.compared import differences
-from drivers.motion import Motion, Scene, moved_mesh, posed
 from drivers.reference.cases import FIRST, one_transition
 from drivers.stress import Outcome, refused, solved
-from drivers.stress.symmetry import cornered, disc_scene, hertz_scene, parting
+from drivers.stress.differences import differences
+from drivers.stress.motion import Motion, Scene, moved_mesh, posed
+from drivers.stress.trials.symmetry import cornered, disc_scene, hertz_scene, parting
 from ngcontact import Contact, Elastic, Hooke, Solution, solve
 
 SAME = 1e-10  # difference of two solutions in different units, the figure asked for

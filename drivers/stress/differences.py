@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from drivers.motion import Motion
+from drivers.stress.motion import Motion
 from ngcontact import Solution
 
 Array = NDArray[np.float64]

@@ -1,7 +1,7 @@
 """Contact problems carried along by similarities of the plane: what must not change, does not.
 
 `Scene` is a contact problem on one straight-sided mesh without CAD geometry, `Motion` what is done
-to it, `posed` the moved problem; `compared.differences` is what its solution misses.
+to it, `posed` the moved problem; `differences.differences` is what its solution misses.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from drivers.reference.curved import Rings, rings
 from drivers.reference.straight import Exact, relative_energy_error
 from drivers.reference.westergaard import hooke, moduli
 from drivers.stress import Outcome, refused, solved
-from drivers.stress.shapes import interpolated, structured, touching
+from drivers.stress.trials.shapes import interpolated, structured, touching
 from geometries import blocks
 from geometries import rings as ring_geometry
 from geometries.region import body, compound, polygon
