@@ -8,20 +8,20 @@ from functools import partial
 import numpy as np
 import pytest
 
-from drivers.benchmark import (
+from drivers.benchmark.engines import (
     NotInstalledError,
     Run,
-    large,
     needed,
     ngsolve_active_set,
     ngsolve_penalty,
 )
-from drivers.benchmark.assembled import solved
-from drivers.benchmark.meshes import KINDS, made
-from drivers.benchmark.problems import Common, block, disc
-from drivers.benchmark.reading import contact_end, peak, weights
-from drivers.benchmark.tables import of_large
-from drivers.benchmark.triangles import forces, sides, which
+from drivers.benchmark.engines.assembled import solved
+from drivers.benchmark.report.tables import of_large
+from drivers.benchmark.scenes.meshes import KINDS, made
+from drivers.benchmark.scenes.problems import Common, block, disc
+from drivers.benchmark.scenes.reading import contact_end, peak, weights
+from drivers.benchmark.scenes.triangles import forces, sides, which
+from drivers.benchmark.studies import large
 from ngcontact import adapt, iterative
 
 COMMON = {"disc": disc(), "block": block()}
@@ -77,7 +77,7 @@ OTHERS = {
 
 
 def runs_if_installed(module: str, common: Common) -> list[Run]:
-    engine = importlib.import_module(f"drivers.benchmark.{module}")
+    engine = importlib.import_module(f"drivers.benchmark.engines.{module}")
     try:
         return list(engine.runs(common, ["graded"], [1000]))
     except NotInstalledError as error:

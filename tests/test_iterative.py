@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from conftest import REFINED
 
-from drivers.benchmark.linear import uniform_mesh
+from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
 from ngcontact import Elastic, Solution, adapt, hierarchy, iterative, solve
 from ngcontact.bordered import Systems

@@ -6,8 +6,8 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from drivers.benchmark.linear import uniform_mesh
-from drivers.benchmark.skip import two_blocks
+from drivers.benchmark.studies.linear import uniform_mesh
+from drivers.benchmark.studies.skip import two_blocks
 from drivers.reference import cases
 from ngcontact import adapt, solve
 

@@ -18,8 +18,9 @@ from pathlib import Path
 
 import ngsolve as ng
 
-from drivers.benchmark import accuracy, growth, large, levels, pictures, skip, stages, tables, tax
-from drivers.benchmark.problems import block, disc
+from drivers.benchmark.report import pictures, tables
+from drivers.benchmark.scenes.problems import block, disc
+from drivers.benchmark.studies import accuracy, growth, large, levels, skip, stages, tax
 
 FOLDER = Path("out")
 PACKAGES = ("ngsolve", "numpy", "scipy", "scikit-fem", "felupe", "KratosMultiphysics", "akantu")

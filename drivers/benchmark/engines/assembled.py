@@ -13,12 +13,12 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
-from drivers.benchmark import Run
-from drivers.benchmark.active_set import Solver, active_set
-from drivers.benchmark.meshes import Mesh, made
-from drivers.benchmark.plane import Numbering, bounded
-from drivers.benchmark.problems import Common
-from drivers.benchmark.reading import read
+from drivers.benchmark.engines import Run
+from drivers.benchmark.engines.active_set import Solver, active_set
+from drivers.benchmark.scenes.meshes import Mesh, made
+from drivers.benchmark.scenes.plane import Numbering, bounded
+from drivers.benchmark.scenes.problems import Common
+from drivers.benchmark.scenes.reading import read
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -15,12 +15,12 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.benchmark import Run
-from drivers.benchmark.meshes import OBSTACLE, Mesh, made
-from drivers.benchmark.ngsolve_plane import load, matrix, nodal, numbering, stiffness
-from drivers.benchmark.plane import Numbering, facing, prescribed
-from drivers.benchmark.problems import Common
-from drivers.benchmark.reading import Reading, read
+from drivers.benchmark.engines import Run
+from drivers.benchmark.scenes.meshes import OBSTACLE, Mesh, made
+from drivers.benchmark.scenes.ngsolve_plane import load, matrix, nodal, numbering, stiffness
+from drivers.benchmark.scenes.plane import Numbering, facing, prescribed
+from drivers.benchmark.scenes.problems import Common
+from drivers.benchmark.scenes.reading import Reading, read
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from drivers.benchmark.linear import uniform_mesh
+from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
 from geometries import blocks
 from geometries.region import body, compound, polygon

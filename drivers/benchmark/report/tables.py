@@ -7,13 +7,20 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from drivers.benchmark.accuracy import OURS, TOGETHER, TOLERANCES, Point, best_seconds, series
-from drivers.benchmark.growth import Growth
-from drivers.benchmark.large import Large
-from drivers.benchmark.levels import Level
-from drivers.benchmark.skip import Scene
-from drivers.benchmark.stages import Stages
-from drivers.benchmark.tax import Tax
+from drivers.benchmark.studies.accuracy import (
+    OURS,
+    TOGETHER,
+    TOLERANCES,
+    Point,
+    best_seconds,
+    series,
+)
+from drivers.benchmark.studies.growth import Growth
+from drivers.benchmark.studies.large import Large
+from drivers.benchmark.studies.levels import Level
+from drivers.benchmark.studies.skip import Scene
+from drivers.benchmark.studies.stages import Stages
+from drivers.benchmark.studies.tax import Tax
 
 
 def table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

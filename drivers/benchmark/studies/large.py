@@ -1,6 +1,6 @@
 """Large problems: whole contact solves by Cholesky factor and by multigrid, each in a process.
 
-python -m drivers.benchmark.large block 2 1000000 iterative
+python -m drivers.benchmark.studies.large block 2 1000000 iterative
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from dataclasses import asdict, dataclass
 
 import ngsolve as ng
 
-from drivers.benchmark.growth import COMMONS, Process, apart, peak_memory
-from drivers.benchmark.linear import uniform_mesh
+from drivers.benchmark.studies.growth import COMMONS, Process, apart, peak_memory
+from drivers.benchmark.studies.linear import uniform_mesh
 from ngcontact import iterative, solve
 
 SIZES = (100_000, 300_000, 1_000_000, 3_000_000)
@@ -61,7 +61,7 @@ def larges() -> Iterator[Large]:
         for order in ORDERS:
             for size in SIZES:
                 for path in PATHS:
-                    yield Large(**apart("drivers.benchmark.large", name, order, size, path))
+                    yield Large(**apart("drivers.benchmark.studies.large", name, order, size, path))
 
 
 if __name__ == "__main__":

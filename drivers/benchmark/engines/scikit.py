@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.benchmark import Run, needed
-from drivers.benchmark.assembled import Assembled, all_solved
-from drivers.benchmark.meshes import Mesh
-from drivers.benchmark.nodes import middles, segments
-from drivers.benchmark.plane import Numbering, moduli, pressures
-from drivers.benchmark.problems import Common
-from drivers.benchmark.triangles import which
+from drivers.benchmark.engines import Run, needed
+from drivers.benchmark.engines.assembled import Assembled, all_solved
+from drivers.benchmark.scenes.meshes import Mesh
+from drivers.benchmark.scenes.nodes import middles, segments
+from drivers.benchmark.scenes.plane import Numbering, moduli, pressures
+from drivers.benchmark.scenes.problems import Common
+from drivers.benchmark.scenes.triangles import which
 
 Array = NDArray[np.float64]
 

@@ -6,8 +6,8 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from drivers.benchmark.plane import Numbering, moduli
-from drivers.benchmark.problems import Common
+from drivers.benchmark.scenes.plane import Numbering, moduli
+from drivers.benchmark.scenes.problems import Common
 
 BUBBLE = -1 / 8  # value of NGSolve's edge function of order 2 at the middle of the edge
 

@@ -9,8 +9,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from drivers.benchmark.linear import uniform_mesh
-from drivers.benchmark.problems import Common
+from drivers.benchmark.scenes.problems import Common
+from drivers.benchmark.studies.linear import uniform_mesh
 from ngcontact import solve
 from ngcontact.mark import doerfler
 from ngcontact.refine import refined

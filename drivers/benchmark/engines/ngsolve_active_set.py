@@ -10,12 +10,12 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from drivers.benchmark import Run
-from drivers.benchmark.active_set import Solver
-from drivers.benchmark.assembled import Assembled, solved
-from drivers.benchmark.meshes import Mesh, made
-from drivers.benchmark.ngsolve_plane import load, matrix, nodal, numbering
-from drivers.benchmark.problems import Common
+from drivers.benchmark.engines import Run
+from drivers.benchmark.engines.active_set import Solver
+from drivers.benchmark.engines.assembled import Assembled, solved
+from drivers.benchmark.scenes.meshes import Mesh, made
+from drivers.benchmark.scenes.ngsolve_plane import load, matrix, nodal, numbering
+from drivers.benchmark.scenes.problems import Common
 from ngcontact.matrix import lower_half
 
 Array = NDArray[np.float64]

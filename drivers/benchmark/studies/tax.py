@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.benchmark.linear import linear_solve, uniform_mesh
-from drivers.benchmark.problems import Common
+from drivers.benchmark.scenes.problems import Common
+from drivers.benchmark.studies.linear import linear_solve, uniform_mesh
 from ngcontact import solve
 
 SIZES = (1_000, 10_000, 100_000, 300_000)

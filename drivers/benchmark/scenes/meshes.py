@@ -13,8 +13,8 @@ from netgen.meshing import MeshingParameters
 from netgen.occ import Compound, OCCGeometry, TopoDS_Shape
 from numpy.typing import NDArray
 
-from drivers.benchmark.problems import Common
-from drivers.benchmark.triangles import sides
+from drivers.benchmark.scenes.problems import Common
+from drivers.benchmark.scenes.triangles import sides
 from geometries.region import body, polygon
 from ngcontact import Problem
 from ngcontact.mesh import first_mesh

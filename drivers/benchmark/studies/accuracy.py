@@ -12,11 +12,11 @@ from itertools import groupby
 
 import numpy as np
 
-from drivers.benchmark import NotInstalledError, Run
-from drivers.benchmark.problems import Common, Reference
+from drivers.benchmark.engines import NotInstalledError, Run
+from drivers.benchmark.scenes.problems import Common, Reference
 from ngcontact import adapt
 
-PACKAGE = "drivers.benchmark"
+PACKAGE = "drivers.benchmark.engines"
 ENGINES = (
     "ngsolve_penalty",
     "ngsolve_active_set",

@@ -1,6 +1,6 @@
 """Growth: seconds and peak memory against unknowns, each run in a process of its own.
 
-python -m drivers.benchmark.growth block 2 100000 contact
+python -m drivers.benchmark.studies.growth block 2 100000 contact
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from typing import Any
 
 import ngsolve as ng
 
-from drivers.benchmark.linear import linear_solve, uniform_mesh
-from drivers.benchmark.problems import block, disc
+from drivers.benchmark.scenes.problems import block, disc
+from drivers.benchmark.studies.linear import linear_solve, uniform_mesh
 from ngcontact import solve
 
 SIZES = (10_000, 30_000, 100_000, 300_000, 1_000_000)
@@ -93,7 +93,7 @@ def growths() -> Iterator[Growth]:
             for size in SIZES:
                 for kind in KINDS:
                     words = name, order, size, kind
-                    yield Growth(**apart("drivers.benchmark.growth", *words))
+                    yield Growth(**apart("drivers.benchmark.studies.growth", *words))
 
 
 if __name__ == "__main__":

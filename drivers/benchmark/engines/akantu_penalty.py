@@ -17,13 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from drivers.benchmark import Run, needed
-from drivers.benchmark.meshes import OBSTACLE, Mesh, made
-from drivers.benchmark.ngsolve_penalty import PENALTIES
-from drivers.benchmark.nodes import interleaved
-from drivers.benchmark.plane import Numbering, facing, prescribed
-from drivers.benchmark.problems import Common
-from drivers.benchmark.reading import read
+from drivers.benchmark.engines import Run, needed
+from drivers.benchmark.engines.ngsolve_penalty import PENALTIES
+from drivers.benchmark.scenes.meshes import OBSTACLE, Mesh, made
+from drivers.benchmark.scenes.nodes import interleaved
+from drivers.benchmark.scenes.plane import Numbering, facing, prescribed
+from drivers.benchmark.scenes.problems import Common
+from drivers.benchmark.scenes.reading import read
 
 ENGINE = "Akantu penalty"
 LOAD_STEPS = 4  # in one, the search may miss nodes that are many elements deep: no force, no word

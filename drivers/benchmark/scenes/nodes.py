@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.benchmark.meshes import Mesh
-from drivers.benchmark.plane import Numbering
-from drivers.benchmark.problems import Common
-from drivers.benchmark.triangles import sides, which
+from drivers.benchmark.scenes.meshes import Mesh
+from drivers.benchmark.scenes.plane import Numbering
+from drivers.benchmark.scenes.problems import Common
+from drivers.benchmark.scenes.triangles import sides, which
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -3,44 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from drivers.benchmark.scenes.plane import Bounded
+
 Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]
 Solver = Callable[[Mask, Array], Array]
 
 STEPS = 100
-
-
-@dataclass(frozen=True, eq=False)
-class Bounded:
-    """min v'Kv/2 - f'v over v with v[fixed] = value[fixed] and v[at] >= lower.
-
-    Attributes
-    ----------
-    K : csr_matrix
-        Stiffness (n, n), symmetric.
-    f, value : Array
-        Load and prescribed values (n,).
-    fixed : Mask
-        Prescribed unknowns (n,).
-    at : Indices
-        Unknowns bounded from below (m,).
-    lower : Array
-        Bounds (m,).
-    """
-
-    K: sp.csr_matrix
-    f: Array
-    value: Array
-    fixed: Mask
-    at: Indices
-    lower: Array
 
 
 def active_set(problem: Bounded, solve: Solver) -> tuple[Array, Array, int]:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.benchmark.problems import Common
+from drivers.benchmark.scenes.problems import Common
 
 Array = NDArray[np.float64]
 

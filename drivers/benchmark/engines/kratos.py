@@ -17,13 +17,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.benchmark import Run, needed
-from drivers.benchmark.kratos_settings import CONTACT, KRATOS, MOST, STRUCTURAL, settings, sides
-from drivers.benchmark.meshes import OBSTACLE, Mesh, made
-from drivers.benchmark.plane import Numbering, facing, moduli, prescribed, pressures
-from drivers.benchmark.problems import Common
-from drivers.benchmark.reading import Reading, read
-from drivers.benchmark.triangles import forces
+from drivers.benchmark.engines import Run, needed
+from drivers.benchmark.engines.kratos_settings import (
+    CONTACT,
+    KRATOS,
+    MOST,
+    STRUCTURAL,
+    settings,
+    sides,
+)
+from drivers.benchmark.scenes.meshes import OBSTACLE, Mesh, made
+from drivers.benchmark.scenes.plane import Numbering, facing, moduli, prescribed, pressures
+from drivers.benchmark.scenes.problems import Common
+from drivers.benchmark.scenes.reading import Reading, read
+from drivers.benchmark.scenes.triangles import forces
 
 Array = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from drivers.benchmark.meshes import OBSTACLE
-from drivers.benchmark.plane import pressures, supports
-from drivers.benchmark.problems import Common
+from drivers.benchmark.scenes.meshes import OBSTACLE
+from drivers.benchmark.scenes.plane import pressures, supports
+from drivers.benchmark.scenes.problems import Common
 
 KRATOS = "KratosMultiphysics"
 STRUCTURAL = f"{KRATOS}.StructuralMechanicsApplication"

@@ -10,8 +10,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
-from drivers.benchmark.accuracy import OURS, QUANTITIES, Point, best_seconds, series
-from drivers.benchmark.growth import Growth
+from drivers.benchmark.studies.accuracy import OURS, QUANTITIES, Point, best_seconds, series
+from drivers.benchmark.studies.growth import Growth
 
 BOUNDS = np.logspace(-1, -7, 61)  # errors below the last are those of the references
 LINES = {"uniform": "--", "graded": ":", "adaptive": "-"}

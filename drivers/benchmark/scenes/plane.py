@@ -9,8 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from drivers.benchmark.active_set import Bounded
-from drivers.benchmark.problems import Common
+from drivers.benchmark.scenes.problems import Common
 from ngcontact import Elastic
 
 Array = NDArray[np.float64]
@@ -127,6 +126,32 @@ def facing(common: Common, numbering: Numbering) -> Facing:
     if len(opposite) != len(nodes) or not np.allclose(place, there):
         raise ValueError("facing nodes differ: expected a mesh with matched contact lines")
     return Facing(place[:, 0], at, numbering.unknown[1, opposite], np.zeros(len(at)))
+
+
+@dataclass(frozen=True, eq=False)
+class Bounded:
+    """min v'Kv/2 - f'v over v with v[fixed] = value[fixed] and v[at] >= lower.
+
+    Attributes
+    ----------
+    K : csr_matrix
+        Stiffness (n, n), symmetric.
+    f, value : Array
+        Load and prescribed values (n,).
+    fixed : Mask
+        Prescribed unknowns (n,).
+    at : Indices
+        Unknowns bounded from below (m,).
+    lower : Array
+        Bounds (m,).
+    """
+
+    K: sp.csr_matrix
+    f: Array
+    value: Array
+    fixed: Mask
+    at: Indices
+    lower: Array
 
 
 def bounded(

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.benchmark.linear import linear_solve
-from drivers.benchmark.problems import Common
+from drivers.benchmark.scenes.problems import Common
+from drivers.benchmark.studies.linear import linear_solve
 from ngcontact import adapt
 
 TARGETS = (1_000, 10_000, 30_000)  # unknowns; the first level of at least as many is shown

@@ -1,0 +1,1 @@
+"""The common problems: statements, meshes, arrays for other codes, and how answers are read."""
