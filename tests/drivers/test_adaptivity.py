@@ -8,8 +8,8 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from drivers import adaptive_study
-from drivers.adaptive_study import STUDIES, error_measure, rate, run, share_near
+from drivers.adaptive_study import runs
+from drivers.adaptive_study.runs import STUDIES, error_measure, rate, run, share_near
 from drivers.reference import cases
 from ngcontact import adapt
 
@@ -132,9 +132,9 @@ def test_elements_follow_the_optimal_density():
 
 
 def test_driver_writes_rows_and_pictures(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(adaptive_study, "UNKNOWNS", dict.fromkeys((1, 2), 2000))
-    monkeypatch.setattr(adaptive_study, "REFERENCE", 6000)
-    rows = adaptive_study.main(["disc on rigid plane"], (1, 2), tmp_path)
+    monkeypatch.setattr(runs, "UNKNOWNS", dict.fromkeys((1, 2), 2000))
+    monkeypatch.setattr(runs, "REFERENCE", 6000)
+    rows = runs.main(["disc on rigid plane"], (1, 2), tmp_path)
     with (tmp_path / "adaptive_study.csv").open() as file:
         table = list(csv.DictReader(file))
     assert len(table) == len(rows) > 8

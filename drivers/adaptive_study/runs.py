@@ -17,7 +17,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 
-import ngsolve as ng
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -287,8 +286,3 @@ def main(
         writer.writerow([field.name for field in fields(Row)])
         writer.writerows(astuple(row) for row in everything)
     return everything
-
-
-if __name__ == "__main__":
-    with ng.TaskManager():
-        main()
