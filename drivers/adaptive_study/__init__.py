@@ -1,1 +1,1 @@
-"""Uniform against adaptive refinement."""
+"""Uniform against adaptive refinement: `studies`, their `runs` and `pictures` of both."""

@@ -8,8 +8,10 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from drivers.adaptive_study import runs
-from drivers.adaptive_study.runs import STUDIES, error_measure, rate, run, share_near
+from drivers.adaptive_study import runs, studies
+from drivers.adaptive_study.__main__ import main
+from drivers.adaptive_study.runs import rate, run, share_near
+from drivers.adaptive_study.studies import STUDIES, error_measure
 from drivers.reference import cases
 from ngcontact import adapt
 
@@ -133,8 +135,9 @@ def test_elements_follow_the_optimal_density():
 
 def test_driver_writes_rows_and_pictures(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(runs, "UNKNOWNS", dict.fromkeys((1, 2), 2000))
-    monkeypatch.setattr(runs, "REFERENCE", 6000)
-    rows = runs.main(["disc on rigid plane"], (1, 2), tmp_path)
+    for module in (runs, studies):
+        monkeypatch.setattr(module, "REFERENCE", 6000)
+    rows = main(["disc on rigid plane"], (1, 2), tmp_path)
     with (tmp_path / "adaptive_study.csv").open() as file:
         table = list(csv.DictReader(file))
     assert len(table) == len(rows) > 8
