@@ -16,8 +16,8 @@ from pathlib import Path
 
 import ngsolve as ng
 
-from geometries import disc_on_block
 from ngcontact import Contact, Elastic, Problem, Solution, adapt
+from ngcontact.geometries import disc_on_block
 
 STEEL = Elastic(E=210e9, nu=0.3)  # Pa
 ALUMINIUM = Elastic(E=70e9, nu=0.33)

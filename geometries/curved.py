@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 from netgen.occ import OCCGeometry
 
-from geometries.check import above, count, finite, positive
-from geometries.graph_edge import follow
-from geometries.region import body, compound, segment
+from ngcontact.geometries.check import above, count, finite, positive
+from ngcontact.geometries.graph_edge import follow
+from ngcontact.geometries.region import body, compound, segment
 
 
 def graphs(

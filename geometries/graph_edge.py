@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 from scipy.special import comb
 
-from geometries.check import finite
-from geometries.region import Point, segment
+from ngcontact.geometries.check import finite
+from ngcontact.geometries.region import Point, segment
 
 Graph = Callable[[float], float]
 

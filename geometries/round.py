@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from netgen.occ import Face, OCCGeometry
 
-from geometries.check import above, finite, flag, positive
-from geometries.region import Loop, Point, body, compound, polygon, quarter_arc, segment
+from ngcontact.geometries.check import above, finite, flag, positive
+from ngcontact.geometries.region import Loop, Point, body, compound, polygon, quarter_arc, segment
 
 RIGHT, UP, LEFT, DOWN = range(4)
 

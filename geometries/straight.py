@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from netgen.occ import OCCGeometry
 
-from geometries.check import above, increasing_line, positive
-from geometries.region import body, compound, polygon
+from ngcontact.geometries.check import above, increasing_line, positive
+from ngcontact.geometries.region import body, compound, polygon
 
 
 def blocks(

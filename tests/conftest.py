@@ -9,10 +9,10 @@ import pytest
 from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
-from geometries import blocks
 from ngcontact.ancestry import parents
 from ngcontact.check import boundary_mask
 from ngcontact.discrete import discretise
+from ngcontact.geometries import blocks
 from ngcontact.hierarchy import coarsenings
 from ngcontact.mesh import first_mesh
 from ngcontact.refine import refined

@@ -14,9 +14,9 @@ from conftest import unmatched_blocks
 
 from drivers.reference import cases
 from drivers.reference.straight import patch, relative_energy_error
-from geometries import blocks, disc_on_block
 from ngcontact import Contact, ContactError, Elastic, NoEquilibriumError, Problem, adapt, solve
 from ngcontact import level as one_level
+from ngcontact.geometries import blocks, disc_on_block
 from ngcontact.mesh import first_mesh
 
 SOFT = Elastic(E=1.0, nu=0.3)

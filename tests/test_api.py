@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
-import geometries
 import ngcontact
+from ngcontact import geometries
 
 ROOT = Path(__file__).parents[1]
 PUBLIC = [

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 
 from drivers.convergence import identities
 from drivers.reference import cases
-from geometries import blocks, rings
-from geometries.region import body, compound, polygon
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.constraint import change_of_basis
+from ngcontact.geometries import blocks, rings
+from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.lagrange import lagrange
 from ngcontact.rows import Conditions, Rows
 

@@ -14,9 +14,9 @@ from drivers.reference import cases
 from drivers.reference.curved import rings as ring_solution
 from drivers.reference.straight import patch as patch_solution
 from drivers.reference.straight import relative_energy_error, transition
-from geometries import blocks, rings
 from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.check import boundary_mask
+from ngcontact.geometries import blocks, rings
 from ngcontact.mesh import first_mesh
 from ngcontact.refine import refined
 

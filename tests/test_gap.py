@@ -10,10 +10,10 @@ import pytest
 from conftest import unmatched_blocks
 from netgen.occ import Compound, OCCGeometry, Vec, WorkPlane
 
-from geometries import blocks, disc, disc_on_block, graphs, rings
-from geometries.region import body, compound, polygon
 from ngcontact import Contact
 from ngcontact.gap import at_quadrature, contact_line, unmatched, without
+from ngcontact.geometries import blocks, disc, disc_on_block, graphs, rings
+from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.lagrange import gauss, lagrange
 from ngcontact.trace import boundary_trace
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from netgen.occ import OCCGeometry
 
-import geometries
-from geometries import blocks, disc, disc_on_block, disc_on_disc, graphs, punch, rings
-from geometries.graph_edge import follow
+from ngcontact import geometries
+from ngcontact.geometries import blocks, disc, disc_on_block, disc_on_disc, graphs, punch, rings
+from ngcontact.geometries.graph_edge import follow
 
 PI = math.pi
 LINE = ((-1.0, 0.0), (-0.2, 0.3), (0.5, -0.1), (1.0, 0.2))  # a convex and a re-entrant corner

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from geometries import punch
 from ngcontact import Contact, ConvergenceError, Elastic, Problem, solve
 from ngcontact.discrete import discretise
+from ngcontact.geometries import punch
 from ngcontact.mesh import first_mesh
 
 PAIR = ("punch_contact", "foundation_contact")

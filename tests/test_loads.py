@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from geometries import blocks
 from ngcontact import Contact, Elastic, Problem, Solution, adapt, solve
+from ngcontact.geometries import blocks
 
 STEEL = Elastic(E=200.0, nu=0.3)
 PAIR = Contact(secondary="upper_contact", primary="lower_contact")

@@ -13,10 +13,10 @@ import pytest
 from conftest import coordinates, vertices
 from netgen.occ import OCCGeometry
 
-from geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
-from geometries.region import body, compound, polygon, quarter_arc
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.check import boundary_mask
+from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
+from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh import check_curves, first_mesh
 from ngcontact.refine import matched_vertices
 from ngcontact.trace import boundary_trace

@@ -15,9 +15,9 @@ from conftest import coordinates, unmatched_blocks, vertices
 from netgen.meshing import Element1D, Element2D, FaceDescriptor, Mesh, MeshPoint, Pnt
 from netgen.occ import OCCGeometry
 
-from geometries import blocks, disc_on_block, disc_on_disc, graphs, rings
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.check import boundary_mask
+from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, rings
 from ngcontact.mesh import first_mesh
 from ngcontact.refine import refined
 from ngcontact.space import curve

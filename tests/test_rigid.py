@@ -13,8 +13,6 @@ from netgen.occ import OCCGeometry
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
 from drivers.stress.trials import held
-from geometries import blocks, rings
-from geometries.region import body, compound, polygon, quarter_arc
 from ngcontact import (
     Contact,
     ConvergenceError,
@@ -26,6 +24,8 @@ from ngcontact import (
 )
 from ngcontact.bordered import SingularError, Systems
 from ngcontact.discrete import discretise, minimise_energy
+from ngcontact.geometries import blocks, rings
+from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.rigid import rigid_motions
 
 STEEL = Elastic(E=1000.0, nu=0.3)

@@ -14,10 +14,10 @@ from netgen.occ import Axis, OCCGeometry, Vec, WorkPlane
 from netgen.occ import Pnt as Point
 
 from drivers.reference import cases
-from geometries import blocks, disc, disc_on_block, disc_on_disc, rings
-from geometries.region import body, compound, polygon
 from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
 from ngcontact.check import boundary_mask
+from ngcontact.geometries import blocks, disc, disc_on_block, disc_on_disc, rings
+from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.mesh import first_mesh
 
 SOFT = Elastic(E=1.0, nu=0.3)

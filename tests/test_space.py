@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
-from geometries import blocks, disc, graphs, rings
 from ngcontact import Elastic, Hooke, Problem, solve
+from ngcontact.geometries import blocks, disc, graphs, rings
 from ngcontact.lagrange import gauss
 from ngcontact.space import assemble, check_element, curve, geometry_order
 from ngcontact.trace import boundary_trace

@@ -12,7 +12,7 @@ from netgen.geom2d import SplineGeometry
 from netgen.occ import Glue, OCCGeometry, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
-from geometries import blocks, disc_on_block, graphs, rings
+from ngcontact.geometries import blocks, disc_on_block, graphs, rings
 from ngcontact.lagrange import gauss, gauss_lobatto
 from ngcontact.nodal import nodal_basis
 from ngcontact.trace import boundary_trace

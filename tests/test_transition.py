@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from geometries import blocks
 from ngcontact import Contact, Problem, adapt, solve
+from ngcontact.geometries import blocks
 from ngcontact.transition import (
     ending_segments,
     in_contact,

@@ -14,10 +14,10 @@ import numpy as np
 
 from drivers.reference.curved import Curved, curved, rings
 from drivers.reference.straight import Exact, hertz, patch, transition, transition_cutoff
-from geometries import blocks, disc, disc_on_block, graphs, punch
-from geometries import rings as ring_geometry
-from geometries.region import body, compound, polygon
 from ngcontact import Contact, Elastic, Problem, Solution
+from ngcontact.geometries import blocks, disc, disc_on_block, graphs, punch
+from ngcontact.geometries import rings as ring_geometry
+from ngcontact.geometries.region import body, compound, polygon
 
 FIRST = Elastic(E=1.0, nu=0.3)
 SECOND = Elastic(E=3.0, nu=0.2)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from drivers.benchmark.scenes.problems import Common
 from drivers.benchmark.scenes.triangles import sides
-from geometries.region import body, polygon
 from ngcontact import Problem
+from ngcontact.geometries.region import body, polygon
 from ngcontact.mesh import first_mesh
 
 Array = NDArray[np.float64]

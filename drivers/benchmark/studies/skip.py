@@ -11,9 +11,9 @@ import numpy as np
 
 from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
-from geometries import blocks
-from geometries.region import body, compound, polygon
 from ngcontact import Contact, Elastic, Problem, Solution, solve
+from ngcontact.geometries import blocks
+from ngcontact.geometries.region import body, compound, polygon
 
 SIZE = 15_000  # unknowns, about
 ORDER = 2

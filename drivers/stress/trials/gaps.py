@@ -16,10 +16,10 @@ from drivers.reference.straight import Exact, relative_energy_error
 from drivers.reference.westergaard import hooke, moduli
 from drivers.stress import Outcome, refused, solved
 from drivers.stress.trials.shapes import interpolated, structured, touching
-from geometries import blocks
-from geometries import rings as ring_geometry
-from geometries.region import body, compound, polygon
 from ngcontact import Contact, Problem, Solution, solve
+from ngcontact.geometries import blocks
+from ngcontact.geometries import rings as ring_geometry
+from ngcontact.geometries.region import body, compound, polygon
 
 TINY = 1e-12  # gaps, in units of the bodies' size 1
 ROUND_OFF = 1e-14  # of displacements of the size 0.1: a hundred last bits

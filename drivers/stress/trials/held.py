@@ -14,9 +14,9 @@ from netgen.occ import OCCGeometry
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
 from drivers.stress import Outcome, refused, solved
-from geometries import blocks
-from geometries.region import Loop, Point, body, compound, polygon, quarter_arc
 from ngcontact import Contact, Elastic, NoEquilibriumError, Problem, solve
+from ngcontact.geometries import blocks
+from ngcontact.geometries.region import Loop, Point, body, compound, polygon, quarter_arc
 
 STEEL = Elastic(E=1000.0, nu=0.3)
 BALANCE = 1e-12  # of forces and moments, relative to the load: round-off

@@ -16,8 +16,8 @@ from drivers.reference.straight import patch, relative_energy_error
 from drivers.reference.westergaard import effective_modulus, moduli
 from drivers.stress import Outcome, solved
 from drivers.stress.trials.shapes import structured
-from geometries import blocks
 from ngcontact import Contact, Problem, Solution, adapt, solve
+from ngcontact.geometries import blocks
 from ngcontact.transition import nodal_pressure
 
 Array = NDArray[np.float64]

@@ -21,8 +21,8 @@ from drivers.reference.curved import Rings
 from drivers.reference.curved import rings as ring_solution
 from drivers.reference.straight import Exact, relative_energy_error, transition
 from drivers.stress import Outcome, refused, solved
-from geometries import punch
 from ngcontact import ContactError, Elastic, Problem, Solution, adapt, solve
+from ngcontact.geometries import punch
 from ngcontact.mesh import first_mesh
 from ngcontact.refine import refined
 

@@ -20,8 +20,8 @@ from drivers.reference.cases import (
 from drivers.stress import Outcome, solved
 from drivers.stress.differences import differences
 from drivers.stress.motion import Array, Motion, Scene, moved_mesh, posed, swapped
-from geometries import blocks
 from ngcontact import Contact, Elastic, Problem, Solution, solve
+from ngcontact.geometries import blocks
 from ngcontact.mesh import first_mesh
 
 SAME = 1e-9  # difference of two solutions of one problem, the figure asked for
