@@ -17,6 +17,7 @@ if _typing.TYPE_CHECKING:
     from .solution import Solution
     from .ssn import solve_qp
 
+__version__ = "0.1.0"
 __all__ = [
     "Contact",
     "ContactError",
