@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from .arrays import Mask
 from .discrete import Discrete
 from .newton import Minimiser
 from .transition import transitions
-
-Mask = NDArray[np.bool_]
 
 SEPARATION = 1e-6  # of the directions at a corner, relative to the zone
 TOUCHING = 1e-12  # gap, relative to the zone, up to which points start active

@@ -12,11 +12,12 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import power_of_two
 from .errors import ContactError, ConvergenceError
 from .level import solve_level, unknowns
 from .mark import doerfler
 from .mesh import first_mesh
-from .moduli import bulk_moduli, power_of_two, shear_moduli, warn_of_locking
+from .moduli import bulk_moduli, shear_moduli, warn_of_locking
 from .problem import Problem
 from .refine import refined
 from .solution import Solution

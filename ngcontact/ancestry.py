@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import ngsolve as ng
 import numpy as np
-from numpy.typing import NDArray
 
-Index = NDArray[np.int32]
+from .arrays import Integers
 
 KEPT = "_ngcontact_parents"  # attribute of a mesh: it lives as long as the mesh
 
 
-def parents(mesh: ng.Mesh) -> Index:
+def parents(mesh: ng.Mesh) -> Integers:
     """Ends of the edges that refinement halved, (nv, 2); -1 for vertices of the first mesh.
 
     Both have lower numbers than the vertex itself.
     """
-    kept: Index = getattr(mesh, KEPT, np.zeros((0, 2), dtype=np.int32))
+    kept: Integers = getattr(mesh, KEPT, np.zeros((0, 2), dtype=np.int32))
     known = len(kept)
     if known > mesh.nv:  # another mesh has been loaded into this one
         known, kept = 0, kept[:0]

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array
 from .check import boundary_mask
 from .matrix import terms
 from .newton import Minimiser
 from .problem import Problem
 from .program import Program
 from .trace import Trace
-
-Array = NDArray[np.float64]
 
 
 def resultants(problem: Problem, trace: Trace, reaction: Array) -> dict[str, Array]:

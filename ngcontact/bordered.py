@@ -5,19 +5,13 @@ NumPy and SciPy only; the factorisation is an argument.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from .arrays import Array, Factor, Mask, Solve
 from .program import Program
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
-Solve = Callable[[Array], Array]
-Factor = Callable[[Mask], Solve]
 
 BORDER = 16  # changed rows up to which a bordered solve is cheaper than a factorisation ...
 PATIENT = 4  # ... times this for every one before: the sets that follow change less and less

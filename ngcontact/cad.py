@@ -12,9 +12,8 @@ from functools import cached_property, lru_cache
 import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry, TopoDS_Shape
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from .arrays import Array
 
 SAMPLES = 65  # points of an edge from which a projection starts
 NEWTON_STEPS = 30

@@ -14,12 +14,11 @@ from typing import TYPE_CHECKING, Any
 import ngsolve as ng
 import numpy as np
 
-from ngcontact.material import refuse_where
+from .material import refuse_where
 
 if TYPE_CHECKING:
-    from ngcontact.problem import Contact, Problem
+    from .problem import Contact, Problem
 
-__all__ = ["body_mask", "body_of_vertex", "boundary_mask", "check_problem"]
 
 Masks = dict[str, np.ndarray]  # by 'argument "pattern"': which region numbers it selects
 

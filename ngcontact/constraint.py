@@ -12,16 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components
 
+from .arrays import Array, Index, Mask
 from .host import INDEPENDENT, assign, check_prescribed, coefficients_at
 from .rows import Conditions, Rows
 from .triplets import from_triplets
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""The discrete problems (P_1h), (P_2h) of HH81 on one mesh, and their solution."""
+"""The discrete problems (P_1h), (P_2h) of HH81: assembled, in equilibrium, started, re-used."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from .ancestry import parents
+from .arrays import Index, Mask
 from .bordered import Systems
 from .check import boundary_mask
 from .constraint import Basis, change_of_basis
@@ -29,10 +29,6 @@ from .space import LOAD_BONUS, Space, assemble, load_vector, node_basis
 from .ssn import minimise
 from .trace import Trace, boundary_trace
 from .triplets import from_triplets
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 SMALLEST, LARGEST = -306, 305  # powers of ten between which sums of products keep their digits
 

@@ -11,10 +11,9 @@ import netgen.occ as occ
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array
 from .cad import CadEdge
 from .problem import Contact, Problem
-
-Array = NDArray[np.float64]
 
 TURN = 0.5  # largest turn (radians) of a curve along one contact segment
 STEEPEST = 0.5  # cosine between a curve's normal and the direction below which nodes go unmatched

@@ -6,7 +6,7 @@ import math
 
 import ngsolve as ng
 
-from .moduli import power_of_two
+from .arrays import power_of_two
 from .problem import Problem
 from .space import Space, strain
 

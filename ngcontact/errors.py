@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-__all__ = ["ContactError", "ConvergenceError", "NoEquilibriumError"]
-
 
 class ContactError(RuntimeError):
     """A well-posed input for which no solution was reached."""

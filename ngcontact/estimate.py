@@ -31,6 +31,7 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array, Index, power_of_two
 from .check import boundary_mask
 from .gap import ContactLine, at_quadrature, prescribed_gap
 from .incompressible import PressureCorrection, Share, Term
@@ -41,7 +42,6 @@ from .moduli import (
     bulk_moduli,
     diameters,
     nearly_incompressible,
-    power_of_two,
     shear_moduli,
 )
 from .partners import partners
@@ -51,8 +51,6 @@ from .trace import Trace
 if TYPE_CHECKING:
     from .solution import Solution
 
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 DATA_BONUS = 4  # quadrature order above that of the discrete terms, for the loads
 ROUND_OFF = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions

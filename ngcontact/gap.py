@@ -13,14 +13,12 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array, Index
 from .check import boundary_mask
 from .lagrange import gauss, lagrange
 from .partners import partners
 from .problem import Contact
 from .trace import Trace
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 GRAZING = 1e-8  # cosine between normal and direction from which a point faces the other body
 

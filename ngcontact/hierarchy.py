@@ -10,12 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from .arrays import Integers
 from .lagrange import gauss_lobatto
 from .triplets import from_triplets
-
-Index = NDArray[np.integer]
 
 COARSEST = 10_000  # unknowns below which a factor costs less than what coarser spaces save
 SHARE = 0.5  # of the vertices that the next coarser space has at most
@@ -40,16 +38,16 @@ class Coarsening:
     """
 
     P: sp.csr_array
-    kept: Index
+    kept: Integers
 
 
-def refined_share(parents: Index) -> float:
+def refined_share(parents: Integers) -> float:
     """Share of the vertices (nv, 2) that refinement made."""
     return float(np.count_nonzero(parents[:, 0] >= 0) / len(parents))
 
 
 def coarsenings(
-    T: sp.csr_array, parents: Index, nodes: Index, coarsest: int | None = None
+    T: sp.csr_array, parents: Integers, nodes: Integers, coarsest: int | None = None
 ) -> list[Coarsening]:
     """Coarser spaces, finest first, until one has `coarsest` unknowns or the first mesh is met.
 
@@ -83,7 +81,7 @@ def coarsenings(
     return found
 
 
-def _depths(parents: Index) -> Index:
+def _depths(parents: Integers) -> Integers:
     """How many generations of parents each vertex has, (nv,)."""
     depth = np.zeros(len(parents), dtype=np.intp)
     new = np.flatnonzero(parents[:, 0] >= 0)
@@ -94,13 +92,13 @@ def _depths(parents: Index) -> Index:
         depth[new] = deeper
 
 
-def _vertex_steps(parents: Index, coarsest: int) -> list[tuple[sp.csr_array, Index]]:
+def _vertex_steps(parents: Integers, coarsest: int) -> list[tuple[sp.csr_array, Integers]]:
     """Interpolation (n, k) of vertex values and the vertices that stay, finest first.
 
     A step takes as many generations away as halve the vertices: work falls geometrically also
     where refinement is local.
     """
-    steps: list[tuple[sp.csr_array, Index]] = []
+    steps: list[tuple[sp.csr_array, Integers]] = []
     depth = _depths(parents)
     counts = np.bincount(depth).cumsum()
     while 2 * depth.size > coarsest:
@@ -124,7 +122,7 @@ def _vertex_steps(parents: Index, coarsest: int) -> list[tuple[sp.csr_array, Ind
     return steps
 
 
-def _linear(n: int, vertices: int, nodes: Index) -> sp.csr_array:
+def _linear(n: int, vertices: int, nodes: Integers) -> sp.csr_array:
     """Functions of degree 1 among those of degree p, (n, nv): edge functions add to them."""
     s = gauss_lobatto(nodes.shape[1] - 1)[1:-1]
     _, first = np.unique(nodes[:, 1], return_index=True)  # segments between bodies occur twice

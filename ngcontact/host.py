@@ -10,13 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from .arrays import Array, Index, Mask
 from .rows import Rows
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 PIVOT = 0.05  # least share of a row at the node whose unknown it becomes, if another is possible
 INDEPENDENT = 1e-6  # sine below which two conditions at one node are the same

@@ -20,16 +20,12 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from .arrays import Array, Index
 from .matrix import cholesky, lower_half, shared
 from .problem import Problem
 from .trace import Trace
 from .triplets import from_triplets
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 HELD = 1e6  # stiffness of supports in the last term, relative to the elements beside them
 FLOATING = 1e-9  # ... and of the bedding that keeps free bodies, relative to their size

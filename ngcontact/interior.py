@@ -6,14 +6,12 @@ from typing import TYPE_CHECKING
 
 import ngsolve as ng
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array
 from .material import varies
 
 if TYPE_CHECKING:
     from .solution import Solution
-
-Array = NDArray[np.float64]
 
 
 def projected_stress(solution: Solution) -> ng.GridFunction:

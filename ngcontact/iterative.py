@@ -9,8 +9,9 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from .bordered import REFINED, ROUGH, Anchor, Array, Factor, Mask, Systems
-from .hierarchy import Index, coarsenings, refined_share
+from .arrays import Array, Factor, Integers, Mask
+from .bordered import REFINED, ROUGH, Anchor, Systems
+from .hierarchy import coarsenings, refined_share
 from .matrix import cholesky, terms
 from .multigrid import Multigrid, StalledError
 from .program import Program
@@ -134,7 +135,7 @@ class IterativeSystems(Systems):
 
 
 def linear_systems(
-    program: Program, matrix: ng.BaseMatrix, T: sp.csr_array, parents: Index, nodes: Index
+    program: Program, matrix: ng.BaseMatrix, T: sp.csr_array, parents: Integers, nodes: Integers
 ) -> Systems:
     """Systems of a discrete problem: by multigrid where it is large and has coarser spaces.
 

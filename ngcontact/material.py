@@ -11,8 +11,6 @@ from typing import Any
 import ngsolve as ng
 import numpy as np
 
-__all__ = ["MODELS", "Elastic", "Hooke", "refuse_where", "require_model", "scalar_data"]
-
 MODELS = ("plane strain", "plane stress")
 
 # Symmetry of C is a statement about input digits, definiteness one about round-off.

@@ -7,12 +7,9 @@ from typing import Any
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from pyngcore import Array_D_S, Array_I_S
 
-from .bordered import Factor, Mask, Solve
-
-Array = NDArray[np.float64]
+from .arrays import Array, Factor, Mask, Solve
 
 ROWS = 1 << 14  # that are copied at a time: the copy stays in the cache
 

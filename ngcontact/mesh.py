@@ -1,4 +1,4 @@
-"""First meshes whose nodes on facing contact lines match, HH81 (2.3), (2.10)."""
+"""Meshes: exact CAD curves, first meshes with matched nodes, curving, parents of vertices."""
 
 from __future__ import annotations
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import logging
-import math
 from collections.abc import Callable
 
 import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array
 from .material import Elastic, Hooke, varies
 from .problem import Problem
-
-Array = NDArray[np.float64]
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
 NEARLY_INCOMPRESSIBLE = 6.0
@@ -21,20 +19,6 @@ NEARLY_INCOMPRESSIBLE = 6.0
 LOCKING = 11.0
 
 log = logging.getLogger("ngcontact")
-
-
-def power_of_two(values: Array) -> float:
-    """The power of 2 below the largest of the values in size; 1 where all vanish."""
-    largest = float(np.abs(values).max(initial=0.0))
-    if not 0 < largest < math.inf:
-        return 1.0
-    return math.ldexp(1.0, max(math.frexp(largest)[1] - 1, -1000))  # its inverse is finite, too
-
-
-def root_of_squares(values: Array) -> float:
-    """Root of the sum of squares; the squares may be too large or too small for a float."""
-    unit = power_of_two(values)
-    return unit * float(np.sqrt(((values / unit) ** 2).sum()))
 
 
 def diameters(mesh: ng.Mesh) -> Array:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Array, Index
 from .check import body_of_vertex
 from .kernel import FREE, null_space
 from .problem import Problem
@@ -16,9 +16,6 @@ from .space import Space
 from .trace import Trace
 
 LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,13 +5,10 @@ from __future__ import annotations
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from .arrays import Array, Mask
 from .hierarchy import Coarsening
 from .matrix import handed_over
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 TRIAL = 25  # V-cycles after which is judged whether the target will be reached
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from .bordered import Anchor, Array, Mask, SingularError, Systems
+from .arrays import Array, Mask
+from .bordered import Anchor, SingularError, Systems
 from .errors import ConvergenceError
 from .kernel import FREE
 

@@ -5,14 +5,11 @@ from __future__ import annotations
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from .arrays import Array, Index
 from .lagrange import gauss_lobatto
 from .trace import Trace
 from .triplets import from_triplets
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 
 def edge_bubbles(space: ng.FESpace) -> Array:

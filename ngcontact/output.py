@@ -1,4 +1,4 @@
-"""Files for ParaView: curved bodies with their fields, contact points, series of levels."""
+"""Files and pictures of a solution."""
 
 from __future__ import annotations
 
@@ -23,6 +23,7 @@ from .triplets import from_triplets
 
 if TYPE_CHECKING:
     import pyvista
+
 
 VTK_CELL = {1: 5, 2: 22}  # VTK_TRIANGLE, VTK_QUADRATIC_TRIANGLE
 VTK_LAGRANGE_TRIANGLE = 69  # every higher order

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from .arrays import Index
 from .gap import ContactLine, without
 from .lagrange import lagrange
 from .projection import snap
 from .rows import Rows
 from .trace import Trace
-
-Index = NDArray[np.intp]
 
 
 def _rows(line: ContactLine, trace: Trace) -> Rows:

@@ -5,11 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array, Index
 from .projection import Partners, cast, coincident
 from .trace import Trace
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 ROUND_OFF = 4 * np.finfo(float).eps  # of a measured gap, relative to the coordinates
 

@@ -1,4 +1,4 @@
-"""The continuous contact problem of HH81 (2.6), (3.1)-(3.12): data only, nothing discrete."""
+"""The continuous contact problem of HH81 section 3: laws, pairs, supports, loads, checks."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry
 
-from ngcontact.material import Elastic, Hooke, require_model, scalar_data
+from .material import Elastic, Hooke, require_model, scalar_data
 
 Scalar: TypeAlias = float | ng.CoefficientFunction
 Vector: TypeAlias = Sequence[Scalar] | ng.CoefficientFunction

@@ -9,13 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from .arrays import Array, Index
 from .lagrange import gauss_lobatto, lagrange, lagrange_derivative
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 MATCHED = 1e-9  # distance, relative to a segment's length, below which two points are one
 GRAZING = 1e-9  # cosine between ray and normal up to which the ray does not meet the curve

@@ -6,15 +6,12 @@ import logging
 
 import ngsolve as ng
 import numpy as np
-from numpy.typing import NDArray
 
 from .ancestry import copied
+from .arrays import Array, Mask
 from .gap import contact_line
 from .problem import Contact, Problem
 from .trace import Trace, boundary_trace
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 ROUNDS = 12  # refinements after which a facing segment that still lags stays unmatched
 

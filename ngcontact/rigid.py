@@ -13,10 +13,10 @@ from functools import cache
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 from scipy.optimize import linprog, nnls
 
+from .arrays import Array, Mask
 from .cad import cad_edges
 from .constraint import Basis
 from .errors import NoEquilibriumError
@@ -35,9 +35,6 @@ from .motions import (
 from .problem import Problem
 from .rows import Conditions
 from .space import LOAD_BONUS, Space, load_vector
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 FINER = 5  # quadrature orders added to see the error of those of the loads
 CURVED = 2  # degrees added to see the error of the mesh's curved sides

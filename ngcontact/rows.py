@@ -6,13 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
+from .arrays import Array, Index, Mask
 from .triplets import from_triplets
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
-Mask = NDArray[np.bool_]
 
 REPEATED = 1e-9  # difference of coefficients, each at most 1, below which two rows are one
 

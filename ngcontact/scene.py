@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
+from .arrays import Array, Integers
 from .output import full_stress, lattice, neighbour_tree, nodes_of, von_mises
 
-Array = NDArray[np.float64]
-Integers = NDArray[np.int64]
 _MOST_TRIANGLES = 200_000
 
 

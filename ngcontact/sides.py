@@ -8,14 +8,12 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array, Index
 from .gap import ContactLine
 from .incompressible import Share, Term
 from .lagrange import gauss_lobatto
 from .partners import partners
 from .trace import Trace
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 
 def traction(trace: Trace, stress: ng.CoefficientFunction, segment: Index, s: Array) -> Array:

@@ -11,20 +11,17 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array, Mask, root_of_squares
 from .balance import optimality, resultants
 from .discrete import Discrete
 from .energy import energy_norm, potential_energy
 from .estimate import Estimate, estimate
-from .moduli import root_of_squares
 from .motions import RigidMotion
 from .newton import Minimiser
 from .output import write_solution
 from .problem import Problem
 from .space import strain
 from .transition import Transitions, transitions_of
-
-Array = NDArray[np.float64]
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

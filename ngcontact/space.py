@@ -8,9 +8,9 @@ from functools import cached_property
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from .ancestry import copied
+from .arrays import Array, Index
 from .cad import cad_edges
 from .check import boundary_mask
 from .material import varies
@@ -19,9 +19,6 @@ from .nodal import edge_bubbles, nodal_basis
 from .problem import Problem
 from .trace import Trace
 from .triplets import from_triplets
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 ORDERS = (1, 2, 3, 4)
 ELEMENTS = ("isoparametric", "superparametric", "physical")

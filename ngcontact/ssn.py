@@ -22,7 +22,8 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 from scipy.sparse.linalg import splu
 
-from .bordered import Anchor, Array, Mask, Solve, Systems
+from .arrays import Array, Mask, Solve
+from .bordered import Anchor, Systems
 from .errors import ConvergenceError
 from .newton import Minimiser, Newton
 from .program import Program

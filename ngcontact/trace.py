@@ -15,11 +15,9 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from .arrays import Array, Index
 from .cad import CadEdge, cad_edges
 from .lagrange import gauss_lobatto, lagrange, lagrange_derivative
-
-Array = NDArray[np.float64]
-Index = NDArray[np.intp]
 
 CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two rows at a smaller
 # one would be dependent to 1 / turn^2

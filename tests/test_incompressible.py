@@ -14,7 +14,7 @@ from drivers.reference import cases
 from drivers.reference.straight import hertz, patch, relative_energy_error, transition
 from ngcontact import Elastic, Hooke, Problem, solve
 from ngcontact import estimate as estimate_module
-from ngcontact.moduli import root_of_squares
+from ngcontact.arrays import root_of_squares
 
 
 def one_transition(upper, lower):

@@ -11,6 +11,7 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import Elastic, Hooke
+from ngcontact.arrays import power_of_two, root_of_squares
 from ngcontact.mesh import first_mesh
 from ngcontact.moduli import (
     NEARLY_INCOMPRESSIBLE,
@@ -18,8 +19,6 @@ from ngcontact.moduli import (
     diameters,
     middles,
     nearly_incompressible,
-    power_of_two,
-    root_of_squares,
     shear_moduli,
     warn_of_locking,
 )

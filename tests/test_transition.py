@@ -12,13 +12,7 @@ import pytest
 from drivers.reference import cases
 from ngcontact import Contact, Problem, adapt, solve
 from ngcontact.geometries import blocks
-from ngcontact.transition import (
-    ending_segments,
-    in_contact,
-    nodal_pressure,
-    transitions,
-    twins,
-)
+from ngcontact.transition import ending_segments, in_contact, nodal_pressure, transitions, twins
 
 
 def line(x, order=1, y=None):
