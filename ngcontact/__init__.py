@@ -8,8 +8,9 @@ import importlib as _importlib
 import typing as _typing
 
 from .errors import ContactError, ConvergenceError, NoEquilibriumError
-from .material import Elastic, Hooke
-from .problem import Contact, Problem
+from .problem.contact import Contact
+from .problem.material import Elastic, Hooke
+from .problem.problem import Problem
 
 if _typing.TYPE_CHECKING:
     from .adaptive import adapt, solve

@@ -18,7 +18,7 @@ from .level import solve_level, unknowns
 from .mark import doerfler
 from .mesh import first_mesh
 from .moduli import bulk_moduli, shear_moduli, warn_of_locking
-from .problem import Problem
+from .problem.problem import Problem
 from .refine import refined
 from .solution import Solution
 from .space import check_element, curve

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array
-from .check import boundary_mask
 from .matrix import terms
 from .newton import Minimiser
-from .problem import Problem
+from .problem.problem import Problem
+from .problem.regions import boundary_mask
 from .program import Program
 from .trace import Trace
 

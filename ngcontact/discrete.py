@@ -11,7 +11,6 @@ import scipy.sparse as sp
 from .ancestry import parents
 from .arrays import Index, Mask
 from .bordered import Systems
-from .check import boundary_mask
 from .constraint import Basis, change_of_basis
 from .errors import ConvergenceError
 from .gap import ContactLine
@@ -20,7 +19,8 @@ from .kernel import no_kernel
 from .matrix import congruent
 from .newton import Minimiser
 from .pairs import joined, kept_lines, merged
-from .problem import Problem
+from .problem.problem import Problem
+from .problem.regions import boundary_mask
 from .program import Program
 from .reuse import contact_lines, same_basis, same_boundary, same_stiffness
 from .rigid import Rigid, rigid_motions

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from .arrays import Array
 from .cad import CadEdge
-from .problem import Contact, Problem
+from .problem.contact import Contact
+from .problem.problem import Problem
 
 TURN = 0.5  # largest turn (radians) of a curve along one contact segment
 STEEPEST = 0.5  # cosine between a curve's normal and the direction below which nodes go unmatched

@@ -7,7 +7,7 @@ import math
 import ngsolve as ng
 
 from .arrays import power_of_two
-from .problem import Problem
+from .problem.problem import Problem
 from .space import Space, strain
 
 CANCELLED = 1e-6  # energy relative to its terms below which fewer than ten digits are left

@@ -32,7 +32,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array, Index, power_of_two
-from .check import boundary_mask
 from .gap import ContactLine, at_quadrature, prescribed_gap
 from .incompressible import PressureCorrection, Share, Term
 from .interior import divergence_and_jump, integral, projected_stress
@@ -45,6 +44,7 @@ from .moduli import (
     shear_moduli,
 )
 from .partners import partners
+from .problem.regions import boundary_mask
 from .sides import Side, met_from_behind, nodal_pressure, traction
 from .trace import Trace
 

@@ -23,7 +23,7 @@ import scipy.sparse as sp
 
 from .arrays import Array, Index
 from .matrix import cholesky, lower_half, shared
-from .problem import Problem
+from .problem.problem import Problem
 from .trace import Trace
 from .triplets import from_triplets
 

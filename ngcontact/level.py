@@ -12,7 +12,7 @@ from .discrete import Discrete, discretise, minimise_energy
 from .gap import unmatched
 from .mesh import check_curves
 from .newton import Minimiser
-from .problem import Problem
+from .problem.problem import Problem
 from .solution import Solution
 from .space import curve
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from .cad import cad_edges
 from .division import Edge, divided
-from .problem import Problem
+from .problem.problem import Problem
 
 COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given ...
 FINER = 2  # ... and that many times more on a bounded zone: contact may end anywhere on it

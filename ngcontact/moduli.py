@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array
-from .material import Elastic, Hooke, varies
-from .problem import Problem
+from .problem.material import Elastic, Hooke, varies
+from .problem.problem import Problem
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
 NEARLY_INCOMPRESSIBLE = 6.0

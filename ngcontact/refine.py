@@ -10,7 +10,8 @@ import numpy as np
 from .ancestry import copied
 from .arrays import Array, Mask
 from .gap import contact_line
-from .problem import Contact, Problem
+from .problem.contact import Contact
+from .problem.problem import Problem
 from .trace import Trace, boundary_trace
 
 ROUNDS = 12  # refinements after which a facing segment that still lags stays unmatched

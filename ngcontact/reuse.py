@@ -8,8 +8,9 @@ import numpy as np
 
 from .constraint import Basis
 from .gap import ContactLine, contact_line
-from .material import Elastic, Hooke, varies
-from .problem import Contact, Problem
+from .problem.contact import Contact
+from .problem.material import Elastic, Hooke, varies
+from .problem.problem import Problem
 from .trace import Trace
 
 

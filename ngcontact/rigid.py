@@ -32,7 +32,7 @@ from .motions import (
     unsupported,
     work_of_load,
 )
-from .problem import Problem
+from .problem.problem import Problem
 from .rows import Conditions
 from .space import LOAD_BONUS, Space, load_vector
 

@@ -19,7 +19,7 @@ from .estimate import Estimate, estimate
 from .motions import RigidMotion
 from .newton import Minimiser
 from .output import write_solution
-from .problem import Problem
+from .problem.problem import Problem
 from .space import strain
 from .transition import Transitions, transitions_of
 

@@ -12,11 +12,11 @@ import scipy.sparse as sp
 from .ancestry import copied
 from .arrays import Array, Index
 from .cad import cad_edges
-from .check import boundary_mask
-from .material import varies
 from .matrix import shared
 from .nodal import edge_bubbles, nodal_basis
-from .problem import Problem
+from .problem.material import varies
+from .problem.problem import Problem
+from .problem.regions import boundary_mask
 from .trace import Trace
 from .triplets import from_triplets
 

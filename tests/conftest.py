@@ -10,11 +10,11 @@ from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
 from ngcontact.ancestry import parents
-from ngcontact.check import boundary_mask
 from ngcontact.discrete import discretise
 from ngcontact.geometries import blocks
 from ngcontact.hierarchy import coarsenings
 from ngcontact.mesh import first_mesh
+from ngcontact.problem.regions import boundary_mask
 from ngcontact.refine import refined
 from ngcontact.space import curve
 from ngcontact.trace import boundary_trace

@@ -15,9 +15,9 @@ from drivers.reference.curved import rings as ring_solution
 from drivers.reference.straight import patch as patch_solution
 from drivers.reference.straight import relative_energy_error, transition
 from ngcontact import Contact, Elastic, Problem, adapt, solve
-from ngcontact.check import boundary_mask
 from ngcontact.geometries import blocks, rings
 from ngcontact.mesh import first_mesh
+from ngcontact.problem.regions import boundary_mask
 from ngcontact.refine import refined
 
 # A(u, u) of the exact solutions over both bodies, from Clapeyron's theorem.

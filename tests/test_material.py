@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
-from ngcontact.material import MODELS, Elastic, Hooke
+from ngcontact.problem.material import MODELS, Elastic, Hooke
 
 # A few products and one inversion of numbers of size one: some units of round-off.
 ROUND_OFF = 1e-13

@@ -14,10 +14,10 @@ from conftest import coordinates, vertices
 from netgen.occ import OCCGeometry
 
 from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.check import boundary_mask
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh import check_curves, first_mesh
+from ngcontact.problem.regions import boundary_mask
 from ngcontact.refine import matched_vertices
 from ngcontact.trace import boundary_trace
 

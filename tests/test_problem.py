@@ -12,10 +12,11 @@ import pytest
 from netgen.occ import Box, Compound, Glue, OCCGeometry, Pnt, WorkPlane, X, Y
 from ngsolve.meshes import MakeStructured2DMesh
 
-from ngcontact.check import body_mask, body_of_vertex, boundary_mask
 from ngcontact.errors import ContactError, ConvergenceError, NoEquilibriumError
-from ngcontact.material import Elastic, Hooke
-from ngcontact.problem import Contact, Problem
+from ngcontact.problem.contact import Contact
+from ngcontact.problem.material import Elastic, Hooke
+from ngcontact.problem.problem import Problem
+from ngcontact.problem.regions import body_mask, body_of_vertex, boundary_mask
 
 STEEL = Elastic(E=210e9, nu=0.3)
 NAN = ng.sqrt(-1 - ng.x * ng.x)  # not a number at every point

@@ -16,9 +16,9 @@ from netgen.meshing import Element1D, Element2D, FaceDescriptor, Mesh, MeshPoint
 from netgen.occ import OCCGeometry
 
 from ngcontact import Contact, Elastic, Problem
-from ngcontact.check import boundary_mask
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, rings
 from ngcontact.mesh import first_mesh
+from ngcontact.problem.regions import boundary_mask
 from ngcontact.refine import refined
 from ngcontact.space import curve
 from ngcontact.trace import boundary_trace

@@ -15,10 +15,10 @@ from netgen.occ import Pnt as Point
 
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
-from ngcontact.check import boundary_mask
 from ngcontact.geometries import blocks, disc, disc_on_block, disc_on_disc, rings
 from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.mesh import first_mesh
+from ngcontact.problem.regions import boundary_mask
 
 SOFT = Elastic(E=1.0, nu=0.3)
 STIFF = Elastic(E=3.0, nu=0.2)

@@ -21,7 +21,7 @@ from drivers.reference.straight import (
     transition_cutoff,
 )
 from drivers.reference.westergaard import effective_modulus, hooke
-from ngcontact.material import Elastic
+from ngcontact.problem.material import Elastic
 
 UPPER, LOWER = Elastic(E=1.0, nu=0.3), Elastic(E=3.0, nu=0.2)
 MATERIALS = {"upper": UPPER, "lower": LOWER, "outer": UPPER, "inner": LOWER}

@@ -14,10 +14,12 @@ from typing import TYPE_CHECKING, Any
 import ngsolve as ng
 import numpy as np
 
-from .material import refuse_where
+from .regions import body_mask, body_of_vertex, boundary_mask, vertex_numbers
+from .values import refuse_where
 
 if TYPE_CHECKING:
-    from .problem import Contact, Problem
+    from .contact import Contact
+    from .problem import Problem
 
 
 Masks = dict[str, np.ndarray]  # by 'argument "pattern"': which region numbers it selects
@@ -31,44 +33,6 @@ _TRIANGLES = (10, 12)  # netgen's element types TRIG and TRIG6
 _FLAT = 16 * np.finfo(float).eps
 
 
-def boundary_mask(mesh: ng.Mesh, pattern: str) -> np.ndarray:
-    """Return which boundary region numbers a name or pattern selects, bool (number of regions,).
-
-    One name may stand on several numbers. Nothing selected is not an error here.
-    """
-    return _mask(mesh.Boundaries, pattern)
-
-
-def body_mask(mesh: ng.Mesh, pattern: str) -> np.ndarray:
-    """Return which material region numbers a name or pattern selects, bool (number of regions,)."""
-    return _mask(mesh.Materials, pattern)
-
-
-def _mask(select: Callable[[str], ng.Region], pattern: str) -> np.ndarray:
-    try:
-        return np.fromiter(select(pattern).Mask(), dtype=bool)
-    except RuntimeError as error:
-        raise ValueError(f'"{pattern}" is no name and no regular expression: {error}') from error
-
-
-def body_of_vertex(mesh: ng.Mesh) -> np.ndarray:
-    """Return the number of the connected piece of the mesh each vertex belongs to, int (nv,)."""
-    from scipy.sparse.csgraph import connected_components  # not needed to state a problem
-
-    from ngcontact.triplets import from_triplets
-
-    nodes = _nodes(mesh.ngmesh.Elements2D(), 3)
-    size = len(mesh.ngmesh.Coordinates())
-    start, end = nodes[:, [0, 1]].ravel(), nodes[:, [1, 2]].ravel()
-    graph = from_triplets(np.ones(len(start), dtype=bool), start, end, (size, size))
-    return connected_components(graph, directed=False)[1]
-
-
-def _nodes(elements: Any, count: int) -> np.ndarray:
-    """Return the vertex numbers of netgen's elements, counted from 0, int (n, count)."""
-    return elements.NumPy()["nodes"][:, :count] - 1
-
-
 def check_problem(problem: Problem, mesh: ng.Mesh) -> None:
     """Refuse a problem whose names or values do not fit the mesh.
 
@@ -80,15 +44,15 @@ def check_problem(problem: Problem, mesh: ng.Mesh) -> None:
         If the mesh is no valid plane triangulation, a name selects nothing, two conditions meet
         on one boundary, a contact pair is impossible, or data are not finite or not elliptic.
     """
-    _check_mesh(mesh)
+    check_mesh(mesh)
     names = mesh.GetBoundaries()
-    materials = _regions(mesh, "materials", problem.materials, body_mask)
-    force = _regions(mesh, "force", problem.force, body_mask)
-    displacement = _regions(mesh, "displacement", problem.displacement, boundary_mask)
-    traction = _regions(mesh, "traction", problem.traction, boundary_mask)
+    materials = regions_of(mesh, "materials", problem.materials, body_mask)
+    force = regions_of(mesh, "force", problem.force, body_mask)
+    displacement = regions_of(mesh, "displacement", problem.displacement, boundary_mask)
+    traction = regions_of(mesh, "traction", problem.traction, boundary_mask)
     slides = [problem.sliding] if isinstance(problem.sliding, str) else []
-    sliding = _regions(mesh, "sliding", slides, boundary_mask)
-    contact = [_sides(mesh, f"contact[{j}]", pair) for j, pair in enumerate(problem.contact)]
+    sliding = regions_of(mesh, "sliding", slides, boundary_mask)
+    contact = [sides_of(mesh, f"contact[{j}]", pair) for j, pair in enumerate(problem.contact)]
 
     _check_bodies(mesh, materials)
     _refuse_common(names, sliding, displacement, "keep one of the two")
@@ -116,7 +80,7 @@ def check_problem(problem: Problem, mesh: ng.Mesh) -> None:
             _check_gap(points, pair.gap, f"contact[{j}].gap")
 
 
-def _check_mesh(mesh: ng.Mesh) -> None:
+def check_mesh(mesh: ng.Mesh) -> None:
     """Refuse anything but a plane mesh of positively oriented, non-degenerate triangles."""
     if not isinstance(mesh, ng.Mesh):
         raise TypeError(f"mesh is a {type(mesh).__name__}: give an ngsolve.Mesh")
@@ -128,7 +92,7 @@ def _check_mesh(mesh: ng.Mesh) -> None:
     others = np.count_nonzero(~np.isin(elements.NumPy()["type"], _TRIANGLES))
     if others:
         raise ValueError(f"mesh has {others} quadrilaterals: it must be a triangulation")
-    vertex = np.asarray(mesh.ngmesh.Coordinates())[:, :2][_nodes(elements, 3)]
+    vertex = np.asarray(mesh.ngmesh.Coordinates())[:, :2][vertex_numbers(elements, 3)]
     edge = np.roll(vertex, -1, axis=1) - vertex
     area = (edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0]) / 2
     longest = np.square(edge).sum(axis=2).max(axis=1)
@@ -142,7 +106,7 @@ def _check_mesh(mesh: ng.Mesh) -> None:
         )
 
 
-def _regions(
+def regions_of(
     mesh: ng.Mesh,
     argument: str,
     patterns: Iterable[str],
@@ -166,11 +130,11 @@ def _regions(
     return masks
 
 
-def _sides(mesh: ng.Mesh, argument: str, pair: Contact) -> Masks:
+def sides_of(mesh: ng.Mesh, argument: str, pair: Contact) -> Masks:
     """Return the masks of the sides of a contact pair, the secondary first."""
-    sides = _regions(mesh, f"{argument}.secondary", [pair.secondary], boundary_mask)
+    sides = regions_of(mesh, f"{argument}.secondary", [pair.secondary], boundary_mask)
     if pair.primary is not None:
-        sides |= _regions(mesh, f"{argument}.primary", [pair.primary], boundary_mask)
+        sides |= regions_of(mesh, f"{argument}.primary", [pair.primary], boundary_mask)
     return sides
 
 
@@ -201,7 +165,7 @@ def _check_pairs(mesh: ng.Mesh, contact: Sequence[Masks]) -> None:
         return
     names = mesh.GetBoundaries()
     region = mesh.ngmesh.Elements1D().NumPy()["index"] - 1
-    ends = _nodes(mesh.ngmesh.Elements1D(), 2)
+    ends = vertex_numbers(mesh.ngmesh.Elements1D(), 2)
     body = body_of_vertex(mesh)
     inner = np.bincount(region[_has_two_sides(mesh, ends)], minlength=len(names)) > 0
     for sides in contact:
@@ -221,7 +185,7 @@ def _has_two_sides(mesh: ng.Mesh, ends: np.ndarray) -> np.ndarray:
     size = len(mesh.ngmesh.Coordinates())
     marked = np.zeros(size, dtype=bool)
     marked[ends] = True
-    edges = _nodes(mesh.ngmesh.Elements2D(), 3)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    edges = vertex_numbers(mesh.ngmesh.Elements2D(), 3)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     edges = np.sort(edges[marked[edges].all(axis=1)], axis=1)
     keys, count = np.unique(edges[:, 0] * np.int64(size) + edges[:, 1], return_counts=True)
     ends = np.sort(ends, axis=1)

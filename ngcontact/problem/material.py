@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-import numbers
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import ngsolve as ng
 import numpy as np
+
+from .values import refuse_where, scalar_data
 
 MODELS = ("plane strain", "plane stress")
 
@@ -29,31 +30,6 @@ def require_model(model: str) -> str:
         state = "is not available yet" if model == "axisymmetric" else "is unknown"
         raise ValueError(f'model "{model}" {state}: choose one of {MODELS}')
     return model
-
-
-def scalar_data(value: Any, what: str) -> float | ng.CoefficientFunction:
-    """Return a finite float or a real scalar CoefficientFunction; `what` leads the message."""
-    if isinstance(value, ng.CoefficientFunction):
-        if value.dim != 1:
-            raise ValueError(f"{what} is a CoefficientFunction of dim {value.dim}: give a scalar")
-        if value.is_complex:
-            raise TypeError(f"{what} is a complex CoefficientFunction: it must be real")
-        return value
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
-        raise TypeError(f"{what} = {value!r}: give a real number or a scalar CoefficientFunction")
-    if not math.isfinite(value):
-        raise ValueError(f"{what} = {value}: give a finite number")
-    return float(value)
-
-
-def refuse_where(
-    points: np.ndarray, bad: np.ndarray, values: np.ndarray, what: str, right: str
-) -> None:
-    """Raise `ValueError` for the first mesh point (n,) with `bad` (n,), naming value and place."""
-    if bad.any():
-        first = int(np.argmax(bad))
-        x, y = ng.CF((ng.x, ng.y))(points[first : first + 1])[0]
-        raise ValueError(f"{what} = {values[first].tolist()} at ({x:.6g}, {y:.6g}): {right}")
 
 
 @dataclass(frozen=True, eq=False)

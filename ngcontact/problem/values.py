@@ -1,0 +1,119 @@
+"""Values of data: what is accepted, and what is refused with the value and what would be right."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeAlias
+
+import ngsolve as ng
+import numpy as np
+
+Scalar: TypeAlias = float | ng.CoefficientFunction
+Vector: TypeAlias = Sequence[Scalar] | ng.CoefficientFunction
+
+
+def scalar_data(value: Any, what: str) -> float | ng.CoefficientFunction:
+    """Return a finite float or a real scalar CoefficientFunction; `what` leads the message."""
+    if isinstance(value, ng.CoefficientFunction):
+        if value.dim != 1:
+            raise ValueError(f"{what} is a CoefficientFunction of dim {value.dim}: give a scalar")
+        if value.is_complex:
+            raise TypeError(f"{what} is a complex CoefficientFunction: it must be real")
+        return value
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise TypeError(f"{what} = {value!r}: give a real number or a scalar CoefficientFunction")
+    if not math.isfinite(value):
+        raise ValueError(f"{what} = {value}: give a finite number")
+    return float(value)
+
+
+def refuse_where(
+    points: np.ndarray, bad: np.ndarray, values: np.ndarray, what: str, right: str
+) -> None:
+    """Raise `ValueError` for the first mesh point (n,) with `bad` (n,), naming value and place."""
+    if bad.any():
+        first = int(np.argmax(bad))
+        x, y = ng.CF((ng.x, ng.y))(points[first : first + 1])[0]
+        raise ValueError(f"{what} = {values[first].tolist()} at ({x:.6g}, {y:.6g}): {right}")
+
+
+def region_name(value: Any, what: str) -> str:
+    """Return a region name or pattern; `what` leads the message of a refusal."""
+    if not isinstance(value, str):
+        raise TypeError(f"{what} = {value!r}: give a region name or pattern, a string")
+    if not value:
+        raise ValueError(f'{what} = "": give a region name or pattern')
+    return value
+
+
+def by_region(value: Any, what: str, normalise: Callable[[Any, str], Any]) -> dict[str, Any]:
+    """Return a plain dict of normalised values; None is empty."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise TypeError(f"{what} = {value!r}: give a dict from region names to values")
+    return {
+        region_name(name, f"a name in {what}"): normalise(entry, f'{what} "{name}"')
+        for name, entry in value.items()
+    }
+
+
+def pair_of(value: Any, what: str) -> tuple[Any, Any]:
+    """Return the two entries of a sequence or of a CoefficientFunction of dim 2."""
+    if isinstance(value, ng.CoefficientFunction):
+        if tuple(value.dims) != (2,):
+            dims = tuple(value.dims)
+            raise ValueError(f"{what} is a CoefficientFunction of dims {dims}: give a 2-vector")
+        return value[0], value[1]
+    if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
+        raise TypeError(f"{what} = {value!r}: give a pair or a CoefficientFunction of dim 2")
+    if len(value) != 2:
+        raise ValueError(f"{what} = {value!r} has length {len(value)}: give a pair")
+    return value[0], value[1]
+
+
+def displacement_components(value: Any, what: str) -> tuple[ng.CoefficientFunction | None, ...]:
+    """Return the two components of a prescribed displacement, None where one is free."""
+    pair = tuple(
+        None if entry is None else ng.CF(scalar_data(entry, what)) for entry in pair_of(value, what)
+    )
+    if pair == (None, None):
+        raise ValueError(f"{what} = (None, None) prescribes nothing: leave the boundary out")
+    return pair
+
+
+def vector_data(value: Any, what: str) -> ng.CoefficientFunction:
+    """Return a vector field (dim 2)."""
+    entries = tuple(scalar_data(entry, what) for entry in pair_of(value, what))
+    return value if isinstance(value, ng.CoefficientFunction) else ng.CF(entries)
+
+
+def traction_data(value: Any, what: str) -> ng.CoefficientFunction:
+    """Return a pressure (dim 1) or a traction (dim 2)."""
+    vector = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
+    if vector or (isinstance(value, ng.CoefficientFunction) and value.dim != 1):
+        return vector_data(value, what)
+    return ng.CF(scalar_data(value, what))
+
+
+def region_pattern(value: Any) -> str | None:
+    """Return one pattern for a name, several or none."""
+    if value is None or isinstance(value, str):
+        return value if value is None else region_name(value, "sliding")
+    if not isinstance(value, Sequence):
+        raise TypeError(f"sliding = {value!r}: give a region name or a sequence of names")
+    return "|".join(region_name(entry, "an entry of sliding") for entry in value) or None
+
+
+def unit_vector(value: Any) -> tuple[float, float]:
+    """Return a direction as a unit vector; the size of its entries never overflows."""
+    x, y = (scalar_data(entry, "direction") for entry in pair_of(value, "direction"))
+    if not (isinstance(x, float) and isinstance(y, float)):
+        raise TypeError(f"direction = {value!r}: give a pair of numbers, one direction for all")
+    size = max(abs(x), abs(y))
+    if size == 0:
+        raise ValueError(f"direction = ({x}, {y}): give a vector from secondary to primary body")
+    length = math.hypot(x / size, y / size)
+    return x / size / length, y / size / length
