@@ -8,7 +8,6 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from .ancestry import parents
 from .arrays import Index, Mask
 from .bordered import Systems
 from .constraint import Basis, change_of_basis
@@ -17,6 +16,7 @@ from .gap import ContactLine
 from .iterative import linear_systems
 from .kernel import no_kernel
 from .matrix import congruent
+from .mesh.parents import parents
 from .newton import Minimiser
 from .pairs import joined, kept_lines, merged
 from .problem.problem import Problem

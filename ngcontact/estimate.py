@@ -36,13 +36,8 @@ from .gap import ContactLine, at_quadrature, prescribed_gap
 from .incompressible import PressureCorrection, Share, Term
 from .interior import divergence_and_jump, integral, projected_stress
 from .lagrange import gauss, lagrange
-from .moduli import (
-    NEARLY_INCOMPRESSIBLE,
-    bulk_moduli,
-    diameters,
-    nearly_incompressible,
-    shear_moduli,
-)
+from .mesh.elements import diameters
+from .moduli import NEARLY_INCOMPRESSIBLE, bulk_moduli, nearly_incompressible, shear_moduli
 from .partners import partners
 from .problem.regions import boundary_mask
 from .sides import Side, met_from_behind, nodal_pressure, traction

@@ -10,11 +10,10 @@ import numpy as np
 from .active import carried_active_set, first_active_set
 from .discrete import Discrete, discretise, minimise_energy
 from .gap import unmatched
-from .mesh import check_curves
+from .mesh.curving import check_curves, curve
 from .newton import Minimiser
 from .problem.problem import Problem
 from .solution import Solution
-from .space import curve
 
 MANY = 0.2  # of the points in contact, that face no node, spoil the pressure
 

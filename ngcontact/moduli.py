@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array
+from .mesh.elements import middles
 from .problem.material import Elastic, Hooke, varies
 from .problem.problem import Problem
 
@@ -19,18 +20,6 @@ NEARLY_INCOMPRESSIBLE = 6.0
 LOCKING = 11.0
 
 log = logging.getLogger("ngcontact")
-
-
-def diameters(mesh: ng.Mesh) -> Array:
-    """Longest side of each triangle, (ne,)."""
-    triangles = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.intp) - 1
-    corners = np.array(mesh.ngmesh.Coordinates())[:, :2][triangles]
-    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-
-
-def middles(mesh: ng.Mesh) -> NDArray:
-    """Mesh points (ne,) in the middle of each element."""
-    return mesh.MapToAllElements(ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1]), ng.VOL)
 
 
 def _of_elements(problem: Problem, mesh: ng.Mesh, modulus: Callable[..., Array]) -> Array:

@@ -7,9 +7,9 @@ import logging
 import ngsolve as ng
 import numpy as np
 
-from .ancestry import copied
 from .arrays import Array, Mask
 from .gap import contact_line
+from .mesh.parents import copied
 from .problem.contact import Contact
 from .problem.problem import Problem
 from .trace import Trace, boundary_trace

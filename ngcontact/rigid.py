@@ -17,10 +17,10 @@ from scipy.linalg import block_diag
 from scipy.optimize import linprog, nnls
 
 from .arrays import Array, Mask
-from .cad import cad_edges
 from .constraint import Basis
 from .errors import NoEquilibriumError
 from .kernel import FREE, Kernel, kernel, null_space
+from .mesh.cad import cad_edges
 from .motions import (
     Bodies,
     RigidMotion,

@@ -9,9 +9,7 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from .ancestry import copied
 from .arrays import Array, Index
-from .cad import cad_edges
 from .matrix import shared
 from .nodal import edge_bubbles, nodal_basis
 from .problem.material import varies
@@ -25,7 +23,6 @@ ELEMENTS = ("isoparametric", "superparametric", "physical")
 # Loads and variable moduli may be as rough as r^(-1/2): quadrature orders above the default.
 LOAD_BONUS = 6
 MODULUS_BONUS = 4
-ROUND_OFF = 1e-12  # of coordinates, relative to the geometry's size
 
 
 def check_element(order: int, element: str) -> None:
@@ -37,39 +34,6 @@ def check_element(order: int, element: str) -> None:
         raise TypeError(f"order={order!r} is not an integer; element={element!r} has {orders}")
     if order not in orders:
         raise ValueError(f"order={order} is not available; element={element!r} has {orders}")
-
-
-def geometry_order(order: int, element: str) -> int:
-    """Degree of the curved elements: Zlamal's (2.8) maps P_order by geometry one degree up."""
-    return order if element == "isoparametric" else order + 1
-
-
-def _straightened(mesh: ng.Mesh) -> bool:
-    """Whether elements miss their own curved boundary, as after NGSolve's `Refine`."""
-    position = ng.CF((ng.x, ng.y))
-    off = ng.BoundaryFromVolumeCF(position) - position
-    missed, size = (ng.Integrate(ng.InnerProduct(x, x), mesh, ng.BND) for x in (off, position))
-    return bool(missed > ROUND_OFF**2 * size)
-
-
-def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
-    """Mesh curved to the element's degree, and the number of elements at curved edges.
-
-    A mesh without an OCC geometry, without curved edges, or curved to that degree already is
-    used as it is; otherwise, also after `Refine` has straightened it, the result is a copy.
-    """
-    degree = geometry_order(order, element)
-    edges = cad_edges(mesh)
-    if edges is None:
-        return mesh, 0
-    region = mesh.ngmesh.Elements1D().NumPy()["index"] - 1
-    curved = np.array([not edge.straight for edge in edges])[region]
-    count = int(np.count_nonzero(curved))
-    if count == 0 or (mesh.GetCurveOrder() == degree and not _straightened(mesh)):
-        return mesh, count
-    copy = copied(mesh)
-    copy.Curve(degree)
-    return copy, count
 
 
 @dataclass(frozen=True, eq=False)

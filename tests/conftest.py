@@ -9,14 +9,14 @@ import pytest
 from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
-from ngcontact.ancestry import parents
 from ngcontact.discrete import discretise
 from ngcontact.geometries import blocks
 from ngcontact.hierarchy import coarsenings
-from ngcontact.mesh import first_mesh
+from ngcontact.mesh.curving import curve
+from ngcontact.mesh.generation import first_mesh
+from ngcontact.mesh.parents import parents
 from ngcontact.problem.regions import boundary_mask
 from ngcontact.refine import refined
-from ngcontact.space import curve
 from ngcontact.trace import boundary_trace
 
 REPRODUCED = {  # by order: cases whose solution lies in the space

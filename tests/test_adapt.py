@@ -17,7 +17,7 @@ from drivers.reference.straight import patch, relative_energy_error
 from ngcontact import Contact, ContactError, Elastic, NoEquilibriumError, Problem, adapt, solve
 from ngcontact import level as one_level
 from ngcontact.geometries import blocks, disc_on_block
-from ngcontact.mesh import first_mesh
+from ngcontact.mesh.generation import first_mesh
 
 SOFT = Elastic(E=1.0, nu=0.3)
 LOOP = import_module("ngcontact.adaptive")

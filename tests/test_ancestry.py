@@ -8,10 +8,10 @@ import pytest
 from conftest import coordinates, near_origin
 
 from drivers.reference import cases
-from ngcontact.ancestry import copied, parents
-from ngcontact.mesh import first_mesh
+from ngcontact.mesh.curving import curve
+from ngcontact.mesh.generation import first_mesh
+from ngcontact.mesh.parents import copied, parents
 from ngcontact.refine import refined
-from ngcontact.space import curve
 
 BLOCK = cases.partly_opening_block()  # straight, nodes matched
 

@@ -21,8 +21,8 @@ from netgen.occ import (
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact import geometries
-from ngcontact.cad import CadEdge, cad_edges
 from ngcontact.geometries import blocks, disc, disc_on_block, disc_on_disc, graphs, punch, rings
+from ngcontact.mesh.cad import CadEdge, cad_edges
 
 RNG = np.random.default_rng(3)
 CENTRES = [(0.0, 0.0, 1.0), (0.3, 0.7, 0.1), (100.0, -50.0, 2.0)]

@@ -16,7 +16,7 @@ from drivers.reference.straight import patch as patch_solution
 from drivers.reference.straight import relative_energy_error, transition
 from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.geometries import blocks, rings
-from ngcontact.mesh import first_mesh
+from ngcontact.mesh.generation import first_mesh
 from ngcontact.problem.regions import boundary_mask
 from ngcontact.refine import refined
 

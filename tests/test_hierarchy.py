@@ -8,11 +8,11 @@ import scipy.sparse as sp
 from conftest import REFINED, coordinates, discrete, near_origin, steps_of
 
 from drivers.reference import cases
-from ngcontact.ancestry import parents
 from ngcontact.discrete import Discrete, discretise
 from ngcontact.hierarchy import RingError, coarsenings, refined_share
 from ngcontact.lagrange import gauss_lobatto
-from ngcontact.mesh import first_mesh
+from ngcontact.mesh.generation import first_mesh
+from ngcontact.mesh.parents import parents
 from ngcontact.refine import refined
 
 

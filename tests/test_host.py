@@ -11,7 +11,7 @@ from drivers.reference import cases
 from ngcontact import Contact, ConvergenceError, Elastic, Problem, solve
 from ngcontact.discrete import discretise
 from ngcontact.geometries import punch
-from ngcontact.mesh import first_mesh
+from ngcontact.mesh.generation import first_mesh
 
 PAIR = ("punch_contact", "foundation_contact")
 

@@ -15,7 +15,7 @@ from drivers.reference import cases
 from ngcontact import Elastic, Solution, adapt, hierarchy, iterative, solve
 from ngcontact.bordered import Systems
 from ngcontact.discrete import minimise_energy
-from ngcontact.mesh import first_mesh
+from ngcontact.mesh.generation import first_mesh
 from ngcontact.refine import refined
 
 ORDERS = (1, 2, 3, 4)

@@ -16,7 +16,8 @@ from netgen.occ import OCCGeometry
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
-from ngcontact.mesh import check_curves, first_mesh
+from ngcontact.mesh.curving import check_curves
+from ngcontact.mesh.generation import first_mesh
 from ngcontact.problem.regions import boundary_mask
 from ngcontact.refine import matched_vertices
 from ngcontact.trace import boundary_trace

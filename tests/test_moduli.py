@@ -12,12 +12,11 @@ import pytest
 from drivers.reference import cases
 from ngcontact import Elastic, Hooke
 from ngcontact.arrays import power_of_two, root_of_squares
-from ngcontact.mesh import first_mesh
+from ngcontact.mesh.elements import diameters, middles
+from ngcontact.mesh.generation import first_mesh
 from ngcontact.moduli import (
     NEARLY_INCOMPRESSIBLE,
     bulk_moduli,
-    diameters,
-    middles,
     nearly_incompressible,
     shear_moduli,
     warn_of_locking,

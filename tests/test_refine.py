@@ -17,10 +17,10 @@ from netgen.occ import OCCGeometry
 
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, rings
-from ngcontact.mesh import first_mesh
+from ngcontact.mesh.curving import curve
+from ngcontact.mesh.generation import first_mesh
 from ngcontact.problem.regions import boundary_mask
 from ngcontact.refine import refined
-from ngcontact.space import curve
 from ngcontact.trace import boundary_trace
 
 SOFT = Elastic(E=1.0, nu=0.3)

@@ -17,7 +17,7 @@ from drivers.reference import cases
 from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
 from ngcontact.geometries import blocks, disc, disc_on_block, disc_on_disc, rings
 from ngcontact.geometries.region import body, compound, polygon
-from ngcontact.mesh import first_mesh
+from ngcontact.mesh.generation import first_mesh
 from ngcontact.problem.regions import boundary_mask
 
 SOFT = Elastic(E=1.0, nu=0.3)

@@ -12,7 +12,8 @@ from ngsolve.meshes import MakeStructured2DMesh
 from ngcontact import Elastic, Hooke, Problem, solve
 from ngcontact.geometries import blocks, disc, graphs, rings
 from ngcontact.lagrange import gauss
-from ngcontact.space import assemble, check_element, curve, geometry_order
+from ngcontact.mesh.curving import curve, geometry_order
+from ngcontact.space import assemble, check_element
 from ngcontact.trace import boundary_trace
 
 ORDERS = [1, 2, 3, 4]

@@ -10,9 +10,10 @@ import numpy as np
 
 from ngcontact import Problem
 from ngcontact.level import unknowns_of
-from ngcontact.mesh import first_mesh
+from ngcontact.mesh.curving import curve
+from ngcontact.mesh.generation import first_mesh
 from ngcontact.refine import refined
-from ngcontact.space import curve, strain
+from ngcontact.space import strain
 
 START = 300  # unknowns of a first mesh, about; refinement is much quicker than meshing at size
 

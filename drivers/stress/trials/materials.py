@@ -23,7 +23,7 @@ from drivers.reference.straight import Exact, relative_energy_error, transition
 from drivers.stress import Outcome, refused, solved
 from ngcontact import ContactError, Elastic, Problem, Solution, adapt, solve
 from ngcontact.geometries import punch
-from ngcontact.mesh import first_mesh
+from ngcontact.mesh.generation import first_mesh
 from ngcontact.refine import refined
 
 TOWARDS_HALF = (0.3, 0.49, 0.499, 0.4999)

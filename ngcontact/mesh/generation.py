@@ -1,4 +1,4 @@
-"""Meshes: exact CAD curves, first meshes with matched nodes, curving, parents of vertices."""
+"""First meshes whose nodes on facing contact lines match, HH81 (2.3), (2.10)."""
 
 from __future__ import annotations
 
@@ -6,19 +6,11 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 
-from .cad import cad_edges
-from .division import Edge, divided
-from .problem.problem import Problem
+from ..problem.problem import Problem
+from .matching import Edge, divided
 
 COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given ...
 FINER = 2  # ... and that many times more on a bounded zone: contact may end anywhere on it
-
-# OCC's projections know absolute lengths: points within 1e-7 of the end of an arc go to that end,
-# on other curves 1e-10 over the speed counts as met. On edges of extent SMALLEST that changes no
-# more than 1e-8 of it as long as elements keep their shape.
-SMALLEST = 1e-2  # extent of an edge; measured: all but arcs of circles are wrong from 2e-3
-SHORTEST = 1e-6  # a segment of a curved edge; measured: elements of order 4 turn over at 5e-7
-SHORTEST_ON_SMALL = 1e-5  # ... of a smaller arc; measured: middles displaced from 5e-6, order 4
 
 
 def _require_complete(mesh: ng.Mesh) -> None:
@@ -86,31 +78,3 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
     mesh = _generated(shape, edges, maxh)
     _require_complete(mesh)
     return mesh
-
-
-def check_curves(mesh: ng.Mesh) -> None:
-    """Raise if curved edges are too small for OCC to curve the elements beside them.
-
-    Raises
-    ------
-    ValueError
-        Names the edge and its length; another unit of length mends it.
-    """
-    edges = cad_edges(mesh) or []
-    xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
-    segments = mesh.ngmesh.Elements1D().NumPy()
-    ends = xy[segments["nodes"][:, :2].astype(np.intp) - 1]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    for number, edge in enumerate(edges):
-        if edge.straight:
-            continue
-        small = edge.size < SMALLEST
-        limit = SHORTEST_ON_SMALL if small else SHORTEST
-        shortest = float(length[segments["index"] == number + 1].min(initial=np.inf))
-        if shortest < limit or (small and not edge.uniform):
-            raise ValueError(
-                f'the curved edge "{edge.name}" has the extent {edge.size:g} and segments of '
-                f"{shortest:g}, on which the geometry kernel loses digits; choose a smaller unit "
-                f"of length: curved edges of {SMALLEST:g} and more may have segments down to "
-                f"{SHORTEST:g}"
-            )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ngsolve as ng
 import numpy as np
 
-from .arrays import Integers
+from ..arrays import Integers
 
 KEPT = "_ngcontact_parents"  # attribute of a mesh: it lives as long as the mesh
 

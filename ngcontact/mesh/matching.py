@@ -11,10 +11,10 @@ import netgen.occ as occ
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array
+from ..arrays import Array
+from ..problem.contact import Contact
+from ..problem.problem import Problem
 from .cad import CadEdge
-from .problem.contact import Contact
-from .problem.problem import Problem
 
 TURN = 0.5  # largest turn (radians) of a curve along one contact segment
 STEEPEST = 0.5  # cosine between a curve's normal and the direction below which nodes go unmatched

@@ -13,7 +13,7 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry, TopoDS_Shape
 
-from .arrays import Array
+from ..arrays import Array
 
 SAMPLES = 65  # points of an edge from which a projection starts
 NEWTON_STEPS = 30
