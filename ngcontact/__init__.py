@@ -14,7 +14,7 @@ from .problem.problem import Problem
 
 if _typing.TYPE_CHECKING:
     from .adaptive import adapt, solve
-    from .output import write_series
+    from .output.vtk import write_series
     from .solution import Solution
     from .ssn import solve_qp
 
@@ -39,7 +39,7 @@ _MODULES = {
     "adapt": "adaptive",
     "solve": "adaptive",
     "solve_qp": "ssn",
-    "write_series": "output",
+    "write_series": "output.vtk",
 }
 
 

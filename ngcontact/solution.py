@@ -18,7 +18,7 @@ from .energy import energy_norm, potential_energy
 from .estimate import Estimate, estimate
 from .motions import RigidMotion
 from .newton import Minimiser
-from .output import write_solution
+from .output.vtk import write_solution
 from .problem.problem import Problem
 from .space import strain
 from .transition import Transitions, transitions_of
@@ -229,7 +229,7 @@ class Solution:
 
         `scale` magnifies the displacement; chosen to be seen when left out.
         """
-        from .plot import plot_solution  # matplotlib loads only for a picture
+        from .output.picture import plot_solution  # matplotlib loads only for a picture
 
         plot_solution(self, path, scale)
 

@@ -20,10 +20,13 @@ from ngsolve.meshes import MakeStructured2DMesh
 from vtkmodules.vtkCommonDataModel import vtkHigherOrderTriangle
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
-from ngcontact import Contact, Elastic, Hooke, Problem, output, solve
-from ngcontact.output import check_path, lattice, write_series, write_solution
-from ngcontact.plot import plot_solution
-from ngcontact.scene import contact_lines
+from ngcontact import Contact, Elastic, Hooke, Problem, solve
+from ngcontact.output import files, vtk
+from ngcontact.output.files import check_path
+from ngcontact.output.nodes import lattice
+from ngcontact.output.picture import plot_solution
+from ngcontact.output.scene import contact_lines
+from ngcontact.output.vtk import write_series, write_solution
 
 MAXH = 0.4
 
@@ -353,7 +356,7 @@ def test_failure_leaves_old_files_and_no_others(tmp_path, monkeypatch, failing):
             arguments[2].write_text("half a file")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(output, failing, fail)
+    monkeypatch.setattr(vtk, failing, fail)
     with pytest.raises(KeyboardInterrupt):
         write_solution(path, stub(2))
     assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == old
@@ -375,9 +378,9 @@ def test_failing_rename_leaves_old_files_and_no_others(tmp_path, monkeypatch):
 
 
 def test_failure_of_vtk_is_an_error(tmp_path, monkeypatch):
-    real = output._write
+    real = vtk._write
     missing = tmp_path / "missing" / "draft.vtu"
-    monkeypatch.setattr(output, "_write", lambda writer, data, _: real(writer, data, missing))
+    monkeypatch.setattr(vtk, "_write", lambda writer, data, _: real(writer, data, missing))
     with pytest.raises(OSError, match="VTK could not write"):
         write_solution(tmp_path / "a.vtu", stub(1))
     assert list(tmp_path.iterdir()) == []
@@ -405,7 +408,7 @@ def test_folder_that_refuses_files_is_refused(tmp_path, monkeypatch):
     def refuse(dir):  # the keyword of tempfile.TemporaryFile
         raise OSError(errno.EACCES, "Permission denied")
 
-    monkeypatch.setattr(output.tempfile, "TemporaryFile", refuse)
+    monkeypatch.setattr(files.tempfile, "TemporaryFile", refuse)
     with pytest.raises(PermissionError, match=r"refuses new files \(Permission denied\)"):
         check_path(tmp_path / "a.vtu", ".vtu")
 
@@ -428,10 +431,10 @@ def test_paths_are_checked_before_any_work(tmp_path, write, suffix):
 
 
 def test_import_loads_neither_vtk_nor_matplotlib():
-    code = "import sys, ngcontact.output, ngcontact.plot; print(*sys.modules)"
+    code = "import sys, ngcontact.output.vtk, ngcontact.output.picture; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True)
     modules = set(loaded.stdout.decode().split())
-    assert "ngcontact.plot" in modules
+    assert "ngcontact.output.picture" in modules
     assert not {"pyvista", "vtk", "vtkmodules", "matplotlib"} & modules
 
 

@@ -13,7 +13,7 @@ from drivers.stress.trials import scaling, symmetry
 from drivers.stress.trials.interruption import while_writing
 from drivers.stress.trials.symmetry import cornered, disc_scene, graph_scene, hertz_scene, parting
 from ngcontact import ConvergenceError, Elastic, Solution, adapt, solve
-from ngcontact.output import von_mises
+from ngcontact.output.nodes import von_mises
 from ngcontact.trace import boundary_trace
 
 TURN = np.array([[0.6, -0.8], [0.8, 0.6]])

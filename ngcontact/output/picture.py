@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .output import check_path, replacing
+from .files import check_path, replacing
 from .scene import Scene, close_up, contact_lines, picture
 
 if TYPE_CHECKING:

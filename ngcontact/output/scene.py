@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
-from .arrays import Array, Integers
-from .output import full_stress, lattice, neighbour_tree, nodes_of, von_mises
+from ..arrays import Array, Integers
+from .nodes import full_stress, lattice, neighbour_tree, nodes_of, von_mises
 
 _MOST_TRIANGLES = 200_000
 

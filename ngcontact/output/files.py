@@ -1,0 +1,50 @@
+"""Files that replace older ones only when they are complete."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+def check_path(path: str | os.PathLike[str], suffix: str) -> Path:
+    """Output path, known to be writable; to be called before any work is done.
+
+    Raises ``ValueError`` if the name does not end in `suffix` and the fitting ``OSError`` if its
+    folder is missing, none or refuses new files, or if it is a folder or a protected file.
+    """
+    target = Path(path)
+    if target.suffix.lower() != suffix:
+        raise ValueError(f"cannot write {str(target)!r}: the name must end in {suffix!r}")
+    folder, say = target.parent, f"cannot write {str(target)!r}: "
+    if not folder.exists():
+        raise FileNotFoundError(f"{say}there is no folder {str(folder)!r}; create it first")
+    if not folder.is_dir():
+        raise NotADirectoryError(f"{say}{str(folder)!r} is not a folder")
+    if target.is_dir():
+        raise IsADirectoryError(f"{say}it is a folder; give the name of a file")
+    if target.exists() and not os.access(target, os.W_OK):
+        raise PermissionError(f"{say}the file is write-protected; choose another name")
+    try:
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError as error:
+        reason = f"{say}the folder refuses new files ({error.strerror}); choose another folder"
+        raise OSError(error.errno, reason) from error
+    return target
+
+
+@contextmanager
+def replacing(*paths: Path) -> Iterator[list[Path]]:
+    """Temporary names beside `paths`, renamed to them on success and removed on failure."""
+    mark = uuid.uuid4().hex[:8]
+    drafts = [path.with_name(f".{path.stem}-{mark}{path.suffix.lower()}") for path in paths]
+    try:
+        yield drafts
+        for draft, path in zip(drafts, paths, strict=True):
+            os.replace(draft, path)
+    finally:
+        for draft in drafts:
+            draft.unlink(missing_ok=True)

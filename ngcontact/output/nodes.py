@@ -1,0 +1,111 @@
+"""Values of a solution at the Lagrange nodes of its elements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import ngsolve as ng
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import minimum_spanning_tree
+from scipy.spatial import KDTree
+
+from ..triplets import from_triplets
+
+VTK_CELL = {1: 5, 2: 22}  # VTK_TRIANGLE, VTK_QUADRATIC_TRIANGLE
+VTK_LAGRANGE_TRIANGLE = 69  # every higher order
+
+
+@dataclass(frozen=True, eq=False)
+class Nodes:
+    """Lagrange nodes of a triangle mesh, shared inside a body and never between bodies.
+
+    ``cells`` (ne, n) numbers the nodes of each triangle in VTK's order, n = (order + 1)
+    (order + 2) / 2; ``body`` (ne,) is the position of the element's region in ``names``;
+    ``at`` (ne n) are the same nodes as NGSolve mesh points, element after element.
+    """
+
+    cells: NDArray[np.int64]
+    body: NDArray[np.int64]
+    names: tuple[str, ...]
+    at: NDArray[Any]
+
+    def values(self, function: ng.CoefficientFunction) -> NDArray[np.float64]:
+        """Nodal values (nodes, components): the mean over the triangles that meet there."""
+        numbers = self.cells.ravel()
+        found = np.asarray(function(self.at), dtype=float).reshape(len(numbers), -1)
+        count = np.bincount(numbers)
+        return np.stack([np.bincount(numbers, column) / count for column in found.T], axis=1)
+
+
+def lattice(order: int) -> NDArray[np.int64]:
+    """Barycentric indices (n, 3) of the nodes of VTK's Lagrange triangle, row sums = `order`.
+
+    Corners, then the insides of the edges 01, 12, 20, then the inside, which is again such a
+    triangle of order - 3.
+    """
+    if order == 0:
+        return np.zeros((1, 3), dtype=np.int64)
+    unit, step = np.eye(3, dtype=np.int64), np.arange(1, order)[:, None]
+    edges = [(order - step) * unit[a] + step * unit[b] for a, b in ((0, 1), (1, 2), (2, 0))]
+    inside = [lattice(order - 3) + 1] if order > 2 else []
+    return np.concatenate([order * unit, *edges, *inside])
+
+
+def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
+    """Nodes of the Lagrange triangles of a mesh; ``ValueError`` if it has other elements."""
+    weights = lattice(order)
+    # NGSolve's reference triangle has its vertices at (1, 0), (0, 1), (0, 0).
+    places = [(a / order, b / order, 0.0) for a, b, _ in weights]
+    rule = ng.IntegrationRule(places, [0.0] * len(places))
+    at = mesh.MapToAllElements({ng.TRIG: rule}, ng.VOL)
+    elements = mesh.ngmesh.Elements2D().NumPy()
+    if len(at) != len(elements) * len(weights):
+        others = len(elements) - len(at) // len(weights)
+        raise ValueError(f"{others} elements of the mesh are no triangles; mesh without quads")
+    names = tuple(dict.fromkeys(mesh.GetMaterials()))
+    regions = np.array([names.index(name) for name in mesh.GetMaterials()], dtype=np.int64)
+    body = regions[elements["index"] - 1]
+    vertices = (elements["nodes"][:, :3].astype(np.int64) - 1) * len(names) + body[:, None]
+    # A node is known by the vertices it leans on and its weights there, from any triangle.
+    key = np.where(weights > 0, vertices[:, None, :] * (order + 1) + weights, 0)
+    key = np.sort(key.reshape(-1, 3), axis=1)
+    rank = np.lexsort(key.T)
+    fresh = np.any(np.diff(key[rank], axis=0, prepend=-1), axis=1)
+    cells = np.empty(len(key), dtype=np.int64)
+    cells[rank] = np.cumsum(fresh) - 1
+    return Nodes(cells.reshape(-1, len(weights)), body, names, at)
+
+
+def full_stress(solution: Any) -> ng.CoefficientFunction:
+    """Stress components xx, yy, xy and zz, the one normal to the plane.
+
+    zz is 0 in plane stress and nu (xx + yy) in plane strain. A material without Poisson's ratio
+    ``nu`` (general Hooke) does not say what zz is in plane strain: 0 is taken there.
+    """
+    stress, zz = solution.stress, ng.CF(0.0)
+    if solution.problem.model == "plane strain":
+        nu = {body: m.nu for body, m in solution.problem.materials.items() if hasattr(m, "nu")}
+        zz = solution.mesh.MaterialCF(nu, default=0) * (stress[0, 0] + stress[1, 1])
+    return ng.CF((stress[0, 0], stress[1, 1], stress[0, 1], zz))
+
+
+def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Von Mises stress (k,) of the components xx, yy, xy, zz (k, 4)."""
+    size = float(np.abs(stress).max(initial=0.0)) or 1.0  # squares must stay in range
+    xx, yy, xy, zz = stress.T / size
+    return size * np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * xy**2)
+
+
+def neighbour_tree(points: NDArray[np.float64]) -> csr_array:
+    """Neighbours along the curves through points (m, 2): minimum spanning tree of distances."""
+    near = list(range(1, min(len(points), 9) + 1))
+    distance, neighbour = KDTree(points).query(points, k=near)
+    start = np.broadcast_to(np.arange(len(points))[:, None], neighbour.shape)
+    other = neighbour != start
+    # The two rows of a corner are at distance 0, which a sparse graph reads as "no edge".
+    weight = np.maximum(distance[other], np.finfo(float).tiny)
+    graph = from_triplets(weight, start[other], neighbour[other], (len(points), len(points)))
+    return minimum_spanning_tree(graph)

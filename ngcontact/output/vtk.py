@@ -1,0 +1,119 @@
+"""Files for ParaView: curved bodies with their fields, contact points, series of levels."""
+
+from __future__ import annotations
+
+import os
+import xml.etree.ElementTree as ET
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import ngsolve as ng
+import numpy as np
+
+from .files import check_path, replacing
+from .nodes import VTK_CELL, VTK_LAGRANGE_TRIANGLE, full_stress, neighbour_tree, nodes_of, von_mises
+
+if TYPE_CHECKING:
+    import pyvista
+
+
+def write_solution(path: str | os.PathLike[str], solution: Any) -> Path:
+    """Bodies of a solution as ``.vtu``, contact points beside it as ``<stem>_contact.vtp``.
+
+    The cells are Lagrange triangles of the order of the geometry or of the displacement,
+    whichever is higher. Point data: ``displacement``, ``stress`` (xx, yy, xy; means inside each
+    body) and ``von_mises`` (see `full_stress`). Cell data: ``body``, whose names
+    are the field data ``body_names``, and ``indicators`` if they have been computed already.
+    Contact points: ``pressure``, ``gap``, ``force``, ``active`` and ``pair``. Any consistent
+    units. Returns the path. A file appears complete or not at all. Raises ``ValueError`` and
+    ``OSError`` as `check_path` does, before any work.
+    """
+    target = check_path(path, ".vtu")
+    beside = check_path(target.with_name(f"{target.stem}_contact.vtp"), ".vtp")
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
+
+    with replacing(target, beside) as drafts:
+        _write(vtkXMLUnstructuredGridWriter(), _bodies(solution), drafts[0])
+        _write(vtkXMLPolyDataWriter(), _contact_points(solution), drafts[1])
+    return target
+
+
+def write_series(path: str | os.PathLike[str], solutions: Iterable[Any]) -> Path:
+    """Solutions, one per level, as a ``.pvd`` for ParaView; the level stands for the time.
+
+    Beside it the files of `write_solution`: ``<stem>_000.vtu``, ``<stem>_000_contact.vtp``, and
+    so on. `solutions` may be a generator: the ``.pvd`` lists the levels written so far.
+
+    Raises ``ValueError`` if there is no solution; otherwise as `check_path`, before any work.
+    """
+    target = check_path(path, ".pvd")
+    root = ET.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
+    collection = ET.SubElement(root, "Collection")
+    for level, solution in enumerate(solutions):
+        stem = f"{target.stem}_{level:03d}"
+        write_solution(target.with_name(f"{stem}.vtu"), solution)
+        for part, name in enumerate((f"{stem}.vtu", f"{stem}_contact.vtp")):
+            entry = {"timestep": str(level), "group": "", "part": str(part), "file": name}
+            ET.SubElement(collection, "DataSet", entry)
+        ET.indent(root)
+        with replacing(target) as (draft,):
+            ET.ElementTree(root).write(draft, encoding="utf-8", xml_declaration=True)
+    if len(collection) == 0:
+        raise ValueError(f"no solution to write to {str(target)!r}: the series is empty")
+    return target
+
+
+def _bodies(solution: Any) -> pyvista.UnstructuredGrid:
+    """Both bodies with their fields as a VTK grid."""
+    import pyvista
+
+    order = max(solution.mesh.GetCurveOrder(), solution.order)
+    nodes = nodes_of(solution.mesh, order)
+    count, size = nodes.cells.shape
+    cells = np.column_stack([np.full(count, size), nodes.cells]).ravel()
+    kinds = np.full(count, VTK_CELL.get(order, VTK_LAGRANGE_TRIANGLE), dtype=np.uint8)
+    grid = pyvista.UnstructuredGrid(cells, kinds, nodes.values(ng.CF((ng.x, ng.y, 0))))
+    u = solution.displacement
+    grid.point_data["displacement"] = nodes.values(ng.CF((u[0], u[1], 0)))
+    stress = nodes.values(full_stress(solution))
+    grid.point_data["stress"] = stress[:, :3]
+    for k, component in enumerate(("xx", "yy", "xy")):
+        grid.GetPointData().GetAbstractArray("stress").SetComponentName(k, component)
+    grid.point_data["von_mises"] = von_mises(stress)
+    grid.cell_data["body"] = nodes.body
+    grid.field_data["body_names"] = list(nodes.names)
+    if solution.estimated:
+        grid.cell_data["indicators"] = np.asarray(solution.indicators, dtype=float)
+    return grid
+
+
+def _contact_points(solution: Any) -> pyvista.PolyData:
+    """Contact points as VTK vertices, neighbours of a pair joined by lines."""
+    import pyvista
+
+    points = np.asarray(solution.points, dtype=float).reshape(-1, 2)
+    if len(points) == 0:
+        return pyvista.PolyData()
+    lines = []
+    for pair in np.unique(solution.pair):
+        rows = np.flatnonzero(solution.pair == pair)
+        tree = neighbour_tree(points[rows]).tocoo()
+        lines.append(np.column_stack([np.full(tree.nnz, 2), rows[tree.row], rows[tree.col]]))
+    data = pyvista.PolyData(
+        np.column_stack([points, np.zeros(len(points))]),
+        verts=np.column_stack([np.ones(len(points), dtype=int), np.arange(len(points))]).ravel(),
+        lines=np.concatenate(lines).ravel(),
+    )
+    for name in ("pressure", "gap", "force", "active", "pair"):
+        kind = np.int32 if name in ("active", "pair") else float
+        data.point_data[name] = np.asarray(getattr(solution, name), dtype=kind)
+    return data
+
+
+def _write(writer: Any, data: pyvista.DataSet, path: Path) -> None:
+    """Write a data set with a VTK XML writer; VTK reports failure by return value only."""
+    writer.SetFileName(str(path))
+    writer.SetInputData(data)
+    if not writer.Write():
+        raise OSError(f"VTK could not write {str(path)!r} (disk full?)")
