@@ -15,8 +15,8 @@ from .problem.problem import Problem
 if _typing.TYPE_CHECKING:
     from .adaptive import adapt, solve
     from .output.vtk import write_series
+    from .qp.solving import solve_qp
     from .solution import Solution
-    from .ssn import solve_qp
 
 __version__ = "0.1.0"
 __all__ = [
@@ -38,7 +38,7 @@ _MODULES = {
     "Solution": "solution",
     "adapt": "adaptive",
     "solve": "adaptive",
-    "solve_qp": "ssn",
+    "solve_qp": "qp.solving",
     "write_series": "output.vtk",
 }
 

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from .arrays import Mask
 from .discrete import Discrete
-from .newton import Minimiser
+from .qp.quadratic_program import Minimiser
 from .transition import transitions
 
 SEPARATION = 1e-6  # of the directions at a corner, relative to the zone

@@ -5,11 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array
-from .matrix import terms
-from .newton import Minimiser
 from .problem.problem import Problem
 from .problem.regions import boundary_mask
-from .program import Program
 from .trace import Trace
 
 
@@ -31,25 +28,3 @@ def resultants(problem: Problem, trace: Trace, reaction: Array) -> dict[str, Arr
             counted[nodes] = True
             result[str(name)] = reaction[nodes].sum(axis=0)
     return result
-
-
-def optimality(program: Program, minimiser: Minimiser) -> dict[str, float]:
-    """Dimensionless residuals of the Karush-Kuhn-Tucker conditions, see `Solution.residuals`."""
-    p, y, force, active = program, minimiser.u, minimiser.force, minimiser.active
-    gap = p.g - y[p.unknown]
-    residual = p.b - p.K @ y - p.R.T @ force
-    sizes = (p.b, terms(p.K, y), force)
-    load = max(np.abs(x).max(initial=0.0) for x in sizes)
-    length = max(np.abs(y).max(initial=0.0), np.abs(p.g[active]).max(initial=0.0))
-    largest = np.abs(force).max(initial=0.0)
-    one_sided = force[~p.equality]
-
-    def over(value: float, scale: float) -> float:
-        return float(value / scale) if value > 0 else 0.0
-
-    return {
-        "equilibrium": over(np.abs(residual[~p.fixed]).max(initial=0.0), load),
-        "penetration": over(-gap.min(initial=0.0), length),
-        "tension": over(-one_sided.min(initial=0.0), largest),
-        "complementarity": float(np.abs(force / (largest or 1.0) * (gap / (length or 1.0))).sum()),
-    }

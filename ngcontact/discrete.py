@@ -9,24 +9,23 @@ import numpy as np
 import scipy.sparse as sp
 
 from .arrays import Index, Mask
-from .bordered import Systems
 from .constraint import Basis, change_of_basis
 from .errors import ConvergenceError
 from .gap import ContactLine
 from .iterative import linear_systems
-from .kernel import no_kernel
 from .matrix import congruent
 from .mesh.parents import parents
-from .newton import Minimiser
 from .pairs import joined, kept_lines, merged
 from .problem.problem import Problem
 from .problem.regions import boundary_mask
-from .program import Program
+from .qp.active_set import minimise
+from .qp.null_space import no_kernel
+from .qp.quadratic_program import Minimiser, Program
+from .qp.schur_complement import Systems
 from .reuse import contact_lines, same_basis, same_boundary, same_stiffness
 from .rigid import Rigid, rigid_motions
 from .rows import Conditions
 from .space import LOAD_BONUS, Space, assemble, load_vector, node_basis
-from .ssn import minimise
 from .trace import Trace, boundary_trace
 from .triplets import from_triplets
 

@@ -10,11 +10,12 @@ import numpy as np
 import scipy.sparse as sp
 
 from .arrays import Array, Factor, Integers, Mask
-from .bordered import REFINED, ROUGH, Anchor, Systems
 from .hierarchy import coarsenings, refined_share
-from .matrix import cholesky, terms
+from .matrix import cholesky
 from .multigrid import Multigrid, StalledError
-from .program import Program
+from .qp.optimality import terms
+from .qp.quadratic_program import Program
+from .qp.schur_complement import REFINED, ROUGH, Anchor, Systems
 
 # Unknowns by order from which multigrid is the faster one, on one thread: at 80 000 of orders 1
 # and 2 both take the same time, of order 3 at a million; it always takes less memory. See

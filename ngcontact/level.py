@@ -11,8 +11,8 @@ from .active import carried_active_set, first_active_set
 from .discrete import Discrete, discretise, minimise_energy
 from .gap import unmatched
 from .mesh.curving import check_curves, curve
-from .newton import Minimiser
 from .problem.problem import Problem
+from .qp.quadratic_program import Minimiser
 from .solution import Solution
 
 MANY = 0.2  # of the points in contact, that face no node, spoil the pressure

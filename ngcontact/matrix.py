@@ -11,8 +11,6 @@ from pyngcore import Array_D_S, Array_I_S
 
 from .arrays import Array, Factor, Mask, Solve
 
-ROWS = 1 << 14  # that are copied at a time: the copy stays in the cache
-
 
 class _View:
     """Buffer of NGSolve's memory; arrays made of it keep the owner alive, NGSolve's do not."""
@@ -65,13 +63,6 @@ def congruent(
     change = AD + AD.T + D.T @ AD
     total = (matrix + handed_over(change)).CreateSparseMatrix()
     return shared(total), total
-
-
-def terms(A: sp.csr_array, x: Array) -> Array:
-    """|A| |x|, the size of the terms of A x, without a second matrix of that size."""
-    x = np.abs(x)
-    parts = [abs(A[start : start + ROWS]) @ x for start in range(0, A.shape[0], ROWS)]
-    return np.concatenate([np.zeros((0, *x.shape[1:])), *parts])
 
 
 def cholesky(matrix: ng.BaseMatrix) -> Factor:

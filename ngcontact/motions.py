@@ -8,9 +8,9 @@ import ngsolve as ng
 import numpy as np
 
 from .arrays import Array, Index
-from .kernel import FREE, null_space
 from .problem.problem import Problem
 from .problem.regions import body_of_vertex
+from .qp.null_space import FREE, null_space
 from .rows import Conditions
 from .space import Space
 from .trace import Trace

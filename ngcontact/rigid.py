@@ -19,7 +19,6 @@ from scipy.optimize import linprog, nnls
 from .arrays import Array, Mask
 from .constraint import Basis
 from .errors import NoEquilibriumError
-from .kernel import FREE, Kernel, kernel, null_space
 from .mesh.cad import cad_edges
 from .motions import (
     Bodies,
@@ -33,6 +32,7 @@ from .motions import (
     work_of_load,
 )
 from .problem.problem import Problem
+from .qp.null_space import FREE, Kernel, kernel, null_space
 from .rows import Conditions
 from .space import LOAD_BONUS, Space, load_vector
 

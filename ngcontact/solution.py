@@ -12,14 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array, Mask, root_of_squares
-from .balance import optimality, resultants
+from .balance import resultants
 from .discrete import Discrete
 from .energy import energy_norm, potential_energy
 from .estimate import Estimate, estimate
 from .motions import RigidMotion
-from .newton import Minimiser
 from .output.vtk import write_solution
 from .problem.problem import Problem
+from .qp.optimality import optimality
+from .qp.quadratic_program import Minimiser
 from .space import strain
 from .transition import Transitions, transitions_of
 

@@ -13,9 +13,9 @@ from conftest import REFINED
 from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
 from ngcontact import Elastic, Solution, adapt, hierarchy, iterative, solve
-from ngcontact.bordered import Systems
 from ngcontact.discrete import minimise_energy
 from ngcontact.mesh.generation import first_mesh
+from ngcontact.qp.schur_complement import Systems
 from ngcontact.refine import refined
 
 ORDERS = (1, 2, 3, 4)

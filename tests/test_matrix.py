@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from ngcontact import matrix
-from ngcontact.matrix import cholesky, congruent, lower_half, shared, terms
+from ngcontact.matrix import cholesky, congruent, lower_half, shared
+from ngcontact.qp import optimality
+from ngcontact.qp.optimality import terms
 
 SIZE = 40
 
@@ -81,7 +82,7 @@ def test_congruent_matrix_of_fewer_unknowns():
 @pytest.mark.parametrize("columns", [(), (3,)])
 @pytest.mark.parametrize("rows", [1, SIZE - 1, SIZE, 7])
 def test_size_of_terms(monkeypatch, columns, rows):
-    monkeypatch.setattr(matrix, "ROWS", rows)
+    monkeypatch.setattr(optimality, "ROWS", rows)
     rng = np.random.default_rng(4)
     A, x = definite(rng) - 2 * sp.identity(SIZE), rng.normal(size=(SIZE, *columns))
     expected = np.abs(A.toarray()) @ np.abs(x)

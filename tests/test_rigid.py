@@ -22,10 +22,10 @@ from ngcontact import (
     adapt,
     solve,
 )
-from ngcontact.bordered import SingularError, Systems
 from ngcontact.discrete import discretise, minimise_energy
 from ngcontact.geometries import blocks, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
+from ngcontact.qp.schur_complement import SingularError, Systems
 from ngcontact.rigid import rigid_motions
 
 STEEL = Elastic(E=1000.0, nu=0.3)

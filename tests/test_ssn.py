@@ -23,11 +23,13 @@ from drivers.stress.trials.algebra import (
     random_program,
     tied_program,
 )
-from ngcontact import bordered, newton
-from ngcontact.bordered import Systems
 from ngcontact.errors import ConvergenceError
-from ngcontact.program import Program
-from ngcontact.ssn import minimise, solve_qp
+from ngcontact.qp import active_set as newton
+from ngcontact.qp import schur_complement as bordered
+from ngcontact.qp.active_set import minimise
+from ngcontact.qp.quadratic_program import Program
+from ngcontact.qp.schur_complement import Systems
+from ngcontact.qp.solving import solve_qp
 
 SIZES_AND_SEEDS = st.integers(1, 40), st.integers(0, 2**32 - 1)
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from .arrays import Array, Factor, Mask, Solve
-from .program import Program
+from ..arrays import Array, Factor, Mask, Solve
+from .quadratic_program import Program
 
 BORDER = 16  # changed rows up to which a bordered solve is cheaper than a factorisation ...
 PATIENT = 4  # ... times this for every one before: the sets that follow change less and less

@@ -22,71 +22,12 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 from scipy.sparse.linalg import splu
 
-from .arrays import Array, Mask, Solve
-from .bordered import Anchor, Systems
-from .errors import ConvergenceError
-from .newton import Minimiser, Newton
-from .program import Program
+from ..arrays import Array, Mask, Solve
+from .active_set import minimise
+from .quadratic_program import Minimiser, Program
+from .schur_complement import Systems
 
 Matrix: TypeAlias = sp.sparray | sp.spmatrix | ArrayLike  # a dense one may be a list of rows
-
-PROXIMAL = 1e-3  # of the stiffness at the pins, where contact leaves rigid motions free
-WEAKEST = 1e-6  # of that, to which it falls, tenfold at each proximal step
-RESTED = 1e-14  # force of the proximal term, relative to stiffness times displacement
-STEADY = 0.9  # ratio of that force to the last from which a motion is steady, not slowing down
-OUTER = 100  # proximal steps; most problems need less than five
-
-
-def minimise(systems: Systems, active: Mask | None = None) -> Minimiser:
-    """Solve a quadratic program by semismooth Newton steps.
-
-    Parameters
-    ----------
-    systems : Systems
-        The program, with its factorisation where there is one already.
-    active : ndarray of bool (m,), optional
-        First active set; the equalities alone when left out.
-
-    Returns
-    -------
-    Minimiser
-        With `u` (n,) all unknowns and `force` (m,) the multipliers of all rows, equalities
-        included.
-
-    Raises
-    ------
-    ConvergenceError
-        A system is singular, or the step limit was reached, to which only a matrix that is not
-        positive definite is known to lead. `iterate` holds the last `Minimiser`.
-    """
-    p = systems.program
-    state = p.equality.copy() if active is None else p.equality | active
-    newton = Newton(systems, state)
-    pins = p.kernel.pins
-    hardness = p.diagonal[pins]  # of bodies that may be very unlike
-    share = PROXIMAL
-    anchor = Anchor(share * hardness, np.zeros(pins.size))
-    last = np.inf
-    for _ in range(OUTER):
-        if newton.resisted():
-            newton.settle(None)
-            if newton.resisted():
-                return newton.result()
-        newton.settle(anchor)
-        moved = newton.y[pins] - anchor.at
-        force = anchor.stiffness * np.abs(moved)
-        if (force <= RESTED * hardness * newton.extent).all():
-            return newton.result()
-        at = newton.y[pins]
-        # A steady motion: go where it leads.
-        if force.max() > STEADY * last and not newton.resisted():
-            at = at + newton.advance(moved) * moved
-        last = force.max()
-        share = max(share / 10, WEAKEST * PROXIMAL)
-        anchor = Anchor(share * hardness, at)
-    raise ConvergenceError(
-        f"the rigid motions did not settle in {OUTER} proximal steps", iterate=newton.result()
-    )
 
 
 def _matrix(name: str, M: Matrix, columns: int | None) -> sp.csr_array:

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from .arrays import Array, Index, Mask
-from .kernel import Kernel, no_kernel
+from ..arrays import Array, Index, Mask
+from .null_space import Kernel, no_kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,3 +58,32 @@ class Program:
     def unit_rows(self) -> bool:
         """Whether every row is a single unknown."""
         return len(self.unknown) == len(self.g)
+
+
+@dataclass(frozen=True, eq=False)
+class Minimiser:
+    """Solution of a quadratic program.
+
+    Attributes
+    ----------
+    u : ndarray (n,)
+        Minimiser.
+    force : ndarray (m,)
+        Multipliers of the rows R u <= g, not negative.
+    multiplier : ndarray
+        Multipliers of the equations E u = e, of either sign.
+    active : ndarray of bool (m,)
+        Rows that hold with equality.
+    steps : list of int
+        Changes of the active set after each linear system; the last one is 0.
+    factorizations, back_solves : int
+        Work done; large problems without factorisation count V-cycles as back-solves.
+    """
+
+    u: Array
+    force: Array
+    active: Mask
+    steps: list[int]
+    multiplier: Array = field(default_factory=lambda: np.zeros(0))
+    factorizations: int = 0
+    back_solves: int = 0

@@ -6,14 +6,14 @@ NumPy and SciPy only.
 from __future__ import annotations
 
 import logging
-from dataclasses import dataclass, field
 
 import numpy as np
 
-from .arrays import Array, Mask
-from .bordered import Anchor, SingularError, Systems
-from .errors import ConvergenceError
-from .kernel import FREE
+from ..arrays import Array, Mask
+from ..errors import ConvergenceError
+from .null_space import FREE
+from .quadratic_program import Minimiser
+from .schur_complement import Anchor, SingularError, Systems
 
 log = logging.getLogger("ngcontact")
 
@@ -22,34 +22,11 @@ CLEAR = 1e-9  # ... below which it is judged by the refined solution only
 WIDEST_TIE = 1e-9  # ... and to which that grows, tenfold, each time an active set comes back
 PATIENCE = 10  # full switches allowed without fewer violated rows (Judice, Pires 1994)
 
-
-@dataclass(frozen=True, eq=False)
-class Minimiser:
-    """Solution of a quadratic program.
-
-    Attributes
-    ----------
-    u : ndarray (n,)
-        Minimiser.
-    force : ndarray (m,)
-        Multipliers of the rows R u <= g, not negative.
-    multiplier : ndarray
-        Multipliers of the equations E u = e, of either sign.
-    active : ndarray of bool (m,)
-        Rows that hold with equality.
-    steps : list of int
-        Changes of the active set after each linear system; the last one is 0.
-    factorizations, back_solves : int
-        Work done; large problems without factorisation count V-cycles as back-solves.
-    """
-
-    u: Array
-    force: Array
-    active: Mask
-    steps: list[int]
-    multiplier: Array = field(default_factory=lambda: np.zeros(0))
-    factorizations: int = 0
-    back_solves: int = 0
+PROXIMAL = 1e-3  # of the stiffness at the pins, where contact leaves rigid motions free
+WEAKEST = 1e-6  # of that, to which it falls, tenfold at each proximal step
+RESTED = 1e-14  # force of the proximal term, relative to stiffness times displacement
+STEADY = 0.9  # ratio of that force to the last from which a motion is steady, not slowing down
+OUTER = 100  # proximal steps; most problems need less than five
 
 
 class Newton:
@@ -157,3 +134,55 @@ class Newton:
             "check that the matrix is symmetric and positive definite",
             iterate=self.result(),
         )
+
+
+def minimise(systems: Systems, active: Mask | None = None) -> Minimiser:
+    """Solve a quadratic program by semismooth Newton steps.
+
+    Parameters
+    ----------
+    systems : Systems
+        The program, with its factorisation where there is one already.
+    active : ndarray of bool (m,), optional
+        First active set; the equalities alone when left out.
+
+    Returns
+    -------
+    Minimiser
+        With `u` (n,) all unknowns and `force` (m,) the multipliers of all rows, equalities
+        included.
+
+    Raises
+    ------
+    ConvergenceError
+        A system is singular, or the step limit was reached, to which only a matrix that is not
+        positive definite is known to lead. `iterate` holds the last `Minimiser`.
+    """
+    p = systems.program
+    state = p.equality.copy() if active is None else p.equality | active
+    newton = Newton(systems, state)
+    pins = p.kernel.pins
+    hardness = p.diagonal[pins]  # of bodies that may be very unlike
+    share = PROXIMAL
+    anchor = Anchor(share * hardness, np.zeros(pins.size))
+    last = np.inf
+    for _ in range(OUTER):
+        if newton.resisted():
+            newton.settle(None)
+            if newton.resisted():
+                return newton.result()
+        newton.settle(anchor)
+        moved = newton.y[pins] - anchor.at
+        force = anchor.stiffness * np.abs(moved)
+        if (force <= RESTED * hardness * newton.extent).all():
+            return newton.result()
+        at = newton.y[pins]
+        # A steady motion: go where it leads.
+        if force.max() > STEADY * last and not newton.resisted():
+            at = at + newton.advance(moved) * moved
+        last = force.max()
+        share = max(share / 10, WEAKEST * PROXIMAL)
+        anchor = Anchor(share * hardness, at)
+    raise ConvergenceError(
+        f"the rigid motions did not settle in {OUTER} proximal steps", iterate=newton.result()
+    )

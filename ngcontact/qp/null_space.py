@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import qr
 
-from .arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask
 
 FREE = 1e-8  # singular value, relative to motions of size 1, below which nothing resists
 
