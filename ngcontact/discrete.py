@@ -9,7 +9,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from .arrays import Index, Mask
-from .constraint import Basis, change_of_basis
+from .constraints.basis_transformation import Basis, change_of_basis
+from .constraints.rows import Conditions
 from .errors import ConvergenceError
 from .gap import ContactLine
 from .iterative import linear_systems
@@ -24,7 +25,6 @@ from .qp.quadratic_program import Minimiser, Program
 from .qp.schur_complement import Systems
 from .reuse import contact_lines, same_basis, same_boundary, same_stiffness
 from .rigid import Rigid, rigid_motions
-from .rows import Conditions
 from .space import LOAD_BONUS, Space, assemble, load_vector, node_basis
 from .trace import Trace, boundary_trace
 from .triplets import from_triplets

@@ -8,10 +8,10 @@ import ngsolve as ng
 import numpy as np
 
 from .arrays import Array, Index
+from .constraints.rows import Conditions
 from .problem.problem import Problem
 from .problem.regions import body_of_vertex
 from .qp.null_space import FREE, null_space
-from .rows import Conditions
 from .space import Space
 from .trace import Trace
 

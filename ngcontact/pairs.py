@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from .arrays import Index
+from .constraints.rows import Rows
 from .gap import ContactLine, without
 from .lagrange import lagrange
 from .projection import snap
-from .rows import Rows
 from .trace import Trace
 
 

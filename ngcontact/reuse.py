@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .constraint import Basis
+from .constraints.basis_transformation import Basis
 from .gap import ContactLine, contact_line
 from .problem.contact import Contact
 from .problem.material import Elastic, Hooke, varies

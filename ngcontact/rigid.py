@@ -17,7 +17,8 @@ from scipy.linalg import block_diag
 from scipy.optimize import linprog, nnls
 
 from .arrays import Array, Mask
-from .constraint import Basis
+from .constraints.basis_transformation import Basis
+from .constraints.rows import Conditions
 from .errors import NoEquilibriumError
 from .mesh.cad import cad_edges
 from .motions import (
@@ -33,7 +34,6 @@ from .motions import (
 )
 from .problem.problem import Problem
 from .qp.null_space import FREE, Kernel, kernel, null_space
-from .rows import Conditions
 from .space import LOAD_BONUS, Space, load_vector
 
 FINER = 5  # quadrature orders added to see the error of those of the loads

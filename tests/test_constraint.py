@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 from drivers.convergence import identities
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.constraint import change_of_basis
+from ngcontact.constraints.basis_transformation import change_of_basis
+from ngcontact.constraints.rows import Conditions, Rows
 from ngcontact.geometries import blocks, rings
 from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.lagrange import lagrange
-from ngcontact.rows import Conditions, Rows
 
 X, Y = (1.0, 0.0), (0.0, 1.0)
 

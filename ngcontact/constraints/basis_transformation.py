@@ -14,10 +14,10 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from .arrays import Array, Index, Mask
-from .host import INDEPENDENT, assign, check_prescribed, coefficients_at
+from ..arrays import Array, Index, Mask
+from ..triplets import from_triplets
+from .pivots import INDEPENDENT, assign, check_prescribed, coefficients_at
 from .rows import Conditions, Rows
-from .triplets import from_triplets
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from .arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask
 from .rows import Rows
 
 PIVOT = 0.05  # least share of a row at the node whose unknown it becomes, if another is possible
