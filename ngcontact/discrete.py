@@ -13,8 +13,8 @@ from .constraints.basis_transformation import Basis, change_of_basis
 from .constraints.rows import Conditions
 from .errors import ConvergenceError
 from .gap import ContactLine
-from .iterative import linear_systems
-from .matrix import congruent
+from .linalg.iterative import linear_systems
+from .linalg.sparse import congruent
 from .mesh.parents import parents
 from .pairs import joined, kept_lines, merged
 from .problem.problem import Problem

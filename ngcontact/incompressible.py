@@ -22,7 +22,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from .arrays import Array, Index
-from .matrix import cholesky, lower_half, shared
+from .linalg.sparse import cholesky, lower_half, shared
 from .problem.problem import Problem
 from .trace import Trace
 from .triplets import from_triplets

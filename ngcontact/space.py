@@ -10,7 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from .arrays import Array, Index
-from .matrix import shared
+from .linalg.sparse import shared
 from .nodal import edge_bubbles, nodal_basis
 from .problem.material import varies
 from .problem.problem import Problem

@@ -11,7 +11,7 @@ from netgen.occ import OCCGeometry
 from drivers.reference import cases
 from ngcontact.discrete import discretise
 from ngcontact.geometries import blocks
-from ngcontact.hierarchy import coarsenings
+from ngcontact.linalg.coarse_spaces import coarsenings
 from ngcontact.mesh.curving import curve
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.mesh.parents import parents

@@ -9,8 +9,8 @@ from conftest import REFINED, coordinates, discrete, near_origin, steps_of
 
 from drivers.reference import cases
 from ngcontact.discrete import Discrete, discretise
-from ngcontact.hierarchy import RingError, coarsenings, refined_share
 from ngcontact.lagrange import gauss_lobatto
+from ngcontact.linalg.coarse_spaces import RingError, coarsenings, refined_share
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.mesh.parents import parents
 from ngcontact.refine import refined

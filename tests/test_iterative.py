@@ -12,8 +12,9 @@ from conftest import REFINED
 
 from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
-from ngcontact import Elastic, Solution, adapt, hierarchy, iterative, solve
+from ngcontact import Elastic, Solution, adapt, solve
 from ngcontact.discrete import minimise_energy
+from ngcontact.linalg import coarse_spaces, iterative
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.qp.schur_complement import Systems
 from ngcontact.refine import refined
@@ -25,7 +26,7 @@ ORDERS = (1, 2, 3, 4)
 def large(monkeypatch):
     """Every size is a large one, down to coarsest spaces of a few hundred unknowns."""
     monkeypatch.setattr(iterative, "LARGE", dict.fromkeys(ORDERS, 0))
-    monkeypatch.setattr(hierarchy, "COARSEST", 300)
+    monkeypatch.setattr(coarse_spaces, "COARSEST", 300)
 
 
 def direct(*args, **options) -> Solution:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from ngcontact.matrix import cholesky, congruent, lower_half, shared
+from ngcontact.linalg.sparse import cholesky, congruent, lower_half, shared
 from ngcontact.qp import optimality
 from ngcontact.qp.optimality import terms
 

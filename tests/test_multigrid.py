@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from conftest import REFINED, discrete, steps_of
 
-from ngcontact.matrix import congruent
-from ngcontact.multigrid import Multigrid, StalledError
+from ngcontact.linalg.multigrid import Multigrid, StalledError
+from ngcontact.linalg.sparse import congruent
 
 
 def prepared(name: str, order: int, rounds: int, maxh: float = 0.5):

@@ -22,7 +22,8 @@ from drivers.benchmark.scenes.problems import Common, block, disc
 from drivers.benchmark.scenes.reading import contact_end, peak, weights
 from drivers.benchmark.scenes.triangles import forces, sides, which
 from drivers.benchmark.studies import large
-from ngcontact import adapt, iterative
+from ngcontact import adapt
+from ngcontact.linalg import iterative
 
 COMMON = {"disc": disc(), "block": block()}
 QUANTITIES = ("force", "peak", "half_width", "energy")

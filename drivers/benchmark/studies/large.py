@@ -15,7 +15,8 @@ import ngsolve as ng
 
 from drivers.benchmark.studies.growth import COMMONS, Process, apart, peak_memory
 from drivers.benchmark.studies.linear import uniform_mesh
-from ngcontact import iterative, solve
+from ngcontact import solve
+from ngcontact.linalg import iterative
 
 SIZES = (100_000, 300_000, 1_000_000, 3_000_000)
 ORDERS = (1, 2)

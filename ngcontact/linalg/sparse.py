@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 from pyngcore import Array_D_S, Array_I_S
 
-from .arrays import Array, Factor, Mask, Solve
+from ..arrays import Array, Factor, Mask, Solve
 
 
 class _View:

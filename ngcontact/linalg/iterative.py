@@ -9,13 +9,13 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from .arrays import Array, Factor, Integers, Mask
-from .hierarchy import coarsenings, refined_share
-from .matrix import cholesky
+from ..arrays import Array, Factor, Integers, Mask
+from ..qp.optimality import terms
+from ..qp.quadratic_program import Program
+from ..qp.schur_complement import REFINED, ROUGH, Anchor, Systems
+from .coarse_spaces import coarsenings, refined_share
 from .multigrid import Multigrid, StalledError
-from .qp.optimality import terms
-from .qp.quadratic_program import Program
-from .qp.schur_complement import REFINED, ROUGH, Anchor, Systems
+from .sparse import cholesky
 
 # Unknowns by order from which multigrid is the faster one, on one thread: at 80 000 of orders 1
 # and 2 both take the same time, of order 3 at a million; it always takes less memory. See

@@ -6,9 +6,9 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from .arrays import Array, Mask
-from .hierarchy import Coarsening
-from .matrix import handed_over
+from ..arrays import Array, Mask
+from .coarse_spaces import Coarsening
+from .sparse import handed_over
 
 TRIAL = 25  # V-cycles after which is judged whether the target will be reached
 

@@ -1,0 +1,1 @@
+"""Sparse matrices and solvers that NGSolve and SciPy share."""
