@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 
 from .arrays import power_of_two
 from .errors import ContactError, ConvergenceError
-from .level import solve_level, unknowns
+from .fem.element import check_element, unknowns
+from .fem.moduli import bulk_moduli, shear_moduli, warn_of_locking
+from .level import solve_level
 from .mark import doerfler
 from .mesh.curving import curve
 from .mesh.generation import first_mesh
-from .moduli import bulk_moduli, shear_moduli, warn_of_locking
 from .problem.problem import Problem
 from .refine import refined
 from .solution import Solution
-from .space import check_element
 from .transition import ending_segments
 
 ROUND_OFF = 1e-12  # relative estimate at which refinement stops: the solution is exact

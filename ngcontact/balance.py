@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from .arrays import Array
+from .fem.boundary import Trace
 from .problem.problem import Problem
 from .problem.regions import boundary_mask
-from .trace import Trace
 
 
 def resultants(problem: Problem, trace: Trace, reaction: Array) -> dict[str, Array]:

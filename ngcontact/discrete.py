@@ -12,6 +12,9 @@ from .arrays import Index, Mask
 from .constraints.basis_transformation import Basis, change_of_basis
 from .constraints.rows import Conditions
 from .errors import ConvergenceError
+from .fem.boundary import Trace, boundary_trace
+from .fem.element import node_basis
+from .fem.space import LOAD_BONUS, Space, assemble, load_vector
 from .gap import ContactLine
 from .linalg.iterative import linear_systems
 from .linalg.sparse import congruent
@@ -25,8 +28,6 @@ from .qp.quadratic_program import Minimiser, Program
 from .qp.schur_complement import Systems
 from .reuse import contact_lines, same_basis, same_boundary, same_stiffness
 from .rigid import Rigid, rigid_motions
-from .space import LOAD_BONUS, Space, assemble, load_vector, node_basis
-from .trace import Trace, boundary_trace
 from .triplets import from_triplets
 
 SMALLEST, LARGEST = -306, 305  # powers of ten between which sums of products keep their digits

@@ -22,9 +22,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from .arrays import Array, Index
+from .fem.boundary import Trace
 from .linalg.sparse import cholesky, lower_half, shared
 from .problem.problem import Problem
-from .trace import Trace
 from .triplets import from_triplets
 
 HELD = 1e6  # stiffness of supports in the last term, relative to the elements beside them

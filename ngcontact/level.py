@@ -20,19 +20,6 @@ MANY = 0.2  # of the points in contact, that face no node, spoil the pressure
 log = logging.getLogger("ngcontact")
 
 
-def unknowns(mesh: ng.Mesh, order: int, element: str) -> int:
-    """Number of unknowns of the displacement on a mesh that is curved to the element's degree."""
-    # Functions linear in physical coordinates are kept in a space with boundary edge functions.
-    edges = mesh.GetNE(ng.BND) if element == "physical" and mesh.GetCurveOrder() > 1 else 0
-    return unknowns_of(order, mesh.nv + edges, mesh.nedge, mesh.ne)
-
-
-def unknowns_of(order: int, vertices: int, edges: int, elements: int) -> int:
-    """Number of unknowns of a displacement of degree `order` on that many of each."""
-    inner = (order - 1) * (order - 2) // 2
-    return 2 * (vertices + (order - 1) * edges + inner * elements)
-
-
 def _unmatched_pairs(discrete: Discrete, minimiser: Minimiser) -> list[int]:
     """Pairs of which many points in contact face no node."""
     stops = np.cumsum([len(line.node) for line in discrete.lines])[:-1]

@@ -9,11 +9,11 @@ import numpy as np
 
 from .arrays import Array, Index
 from .constraints.rows import Conditions
+from .fem.boundary import Trace
+from .fem.space import Space
 from .problem.problem import Problem
 from .problem.regions import body_of_vertex
 from .qp.null_space import FREE, null_space
-from .space import Space
-from .trace import Trace
 
 LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
 

@@ -8,10 +8,10 @@ import numpy as np
 
 from .arrays import Index
 from .constraints.rows import Rows
+from .fem.boundary import Trace
 from .gap import ContactLine, without
 from .lagrange import lagrange
 from .projection import snap
-from .trace import Trace
 
 
 def _rows(line: ContactLine, trace: Trace) -> Rows:

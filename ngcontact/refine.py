@@ -8,11 +8,11 @@ import ngsolve as ng
 import numpy as np
 
 from .arrays import Array, Mask
+from .fem.boundary import Trace, boundary_trace
 from .gap import contact_line
 from .mesh.parents import copied
 from .problem.contact import Contact
 from .problem.problem import Problem
-from .trace import Trace, boundary_trace
 
 ROUNDS = 12  # refinements after which a facing segment that still lags stays unmatched
 

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from .constraints.basis_transformation import Basis
+from .fem.boundary import Trace
 from .gap import ContactLine, contact_line
 from .problem.contact import Contact
 from .problem.material import Elastic, Hooke, varies
 from .problem.problem import Problem
-from .trace import Trace
 
 
 def same_boundary(one: Trace, other: Trace) -> bool:

@@ -20,6 +20,7 @@ from .arrays import Array, Mask
 from .constraints.basis_transformation import Basis
 from .constraints.rows import Conditions
 from .errors import NoEquilibriumError
+from .fem.space import LOAD_BONUS, Space, load_vector
 from .mesh.cad import cad_edges
 from .motions import (
     Bodies,
@@ -34,7 +35,6 @@ from .motions import (
 )
 from .problem.problem import Problem
 from .qp.null_space import FREE, Kernel, kernel, null_space
-from .space import LOAD_BONUS, Space, load_vector
 
 FINER = 5  # quadrature orders added to see the error of those of the loads
 CURVED = 2  # degrees added to see the error of the mesh's curved sides

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from .arrays import Array, Mask, root_of_squares
 from .balance import resultants
 from .discrete import Discrete
-from .energy import energy_norm, potential_energy
 from .estimate import Estimate, estimate
+from .fem.energy import energy_norm, potential_energy
+from .fem.model import strain
 from .motions import RigidMotion
 from .output.vtk import write_solution
 from .problem.problem import Problem
 from .qp.optimality import optimality
 from .qp.quadratic_program import Minimiser
-from .space import strain
 from .transition import Transitions, transitions_of
 
 

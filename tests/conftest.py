@@ -10,6 +10,7 @@ from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
 from ngcontact.discrete import discretise
+from ngcontact.fem.boundary import boundary_trace
 from ngcontact.geometries import blocks
 from ngcontact.linalg.coarse_spaces import coarsenings
 from ngcontact.mesh.curving import curve
@@ -17,7 +18,6 @@ from ngcontact.mesh.generation import first_mesh
 from ngcontact.mesh.parents import parents
 from ngcontact.problem.regions import boundary_mask
 from ngcontact.refine import refined
-from ngcontact.trace import boundary_trace
 
 REPRODUCED = {  # by order: cases whose solution lies in the space
     "constant pressure": (cases.pressure_patch, (1, 3)),

@@ -11,11 +11,11 @@ from conftest import unmatched_blocks
 from netgen.occ import Compound, OCCGeometry, Vec, WorkPlane
 
 from ngcontact import Contact
+from ngcontact.fem.boundary import boundary_trace
 from ngcontact.gap import at_quadrature, contact_line, unmatched, without
 from ngcontact.geometries import blocks, disc, disc_on_block, graphs, rings
 from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.lagrange import gauss, lagrange
-from ngcontact.trace import boundary_trace
 
 ORDERS = [1, 2, 3, 4]
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))

@@ -12,15 +12,15 @@ import pytest
 from drivers.reference import cases
 from ngcontact import Elastic, Hooke
 from ngcontact.arrays import power_of_two, root_of_squares
-from ngcontact.mesh.elements import diameters, middles
-from ngcontact.mesh.generation import first_mesh
-from ngcontact.moduli import (
+from ngcontact.fem.moduli import (
     NEARLY_INCOMPRESSIBLE,
     bulk_moduli,
     nearly_incompressible,
     shear_moduli,
     warn_of_locking,
 )
+from ngcontact.mesh.elements import diameters, middles
+from ngcontact.mesh.generation import first_mesh
 
 BODIES = ("upper", "lower")
 

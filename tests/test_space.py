@@ -10,11 +10,12 @@ import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact import Elastic, Hooke, Problem, solve
+from ngcontact.fem.boundary import boundary_trace
+from ngcontact.fem.element import check_element
+from ngcontact.fem.space import assemble
 from ngcontact.geometries import blocks, disc, graphs, rings
 from ngcontact.lagrange import gauss
 from ngcontact.mesh.curving import curve, geometry_order
-from ngcontact.space import assemble, check_element
-from ngcontact.trace import boundary_trace
 
 ORDERS = [1, 2, 3, 4]
 STEEL = Elastic(E=2.0, nu=0.3)

@@ -12,10 +12,10 @@ from netgen.geom2d import SplineGeometry
 from netgen.occ import Glue, OCCGeometry, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
+from ngcontact.fem.boundary import boundary_trace
+from ngcontact.fem.nodal_basis import nodal_basis
 from ngcontact.geometries import blocks, disc_on_block, graphs, rings
 from ngcontact.lagrange import gauss, gauss_lobatto
-from ngcontact.nodal import nodal_basis
-from ngcontact.trace import boundary_trace
 
 ORDERS = [1, 2, 3, 4]
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))

@@ -6,10 +6,10 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from .arrays import Array, Index
-from .lagrange import gauss_lobatto
-from .trace import Trace
-from .triplets import from_triplets
+from ..arrays import Array, Index
+from ..lagrange import gauss_lobatto
+from ..triplets import from_triplets
+from .boundary import Trace
 
 
 def edge_bubbles(space: ng.FESpace) -> Array:

@@ -6,9 +6,10 @@ import math
 
 import ngsolve as ng
 
-from .arrays import power_of_two
-from .problem.problem import Problem
-from .space import Space, strain
+from ..arrays import power_of_two
+from ..problem.problem import Problem
+from .model import strain
+from .space import Space
 
 CANCELLED = 1e-6  # energy relative to its terms below which fewer than ten digits are left
 

@@ -9,10 +9,10 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array
-from .mesh.elements import middles
-from .problem.material import Elastic, Hooke, varies
-from .problem.problem import Problem
+from ..arrays import Array
+from ..mesh.elements import middles
+from ..problem.material import Elastic, Hooke, varies
+from ..problem.problem import Problem
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
 NEARLY_INCOMPRESSIBLE = 6.0

@@ -1,0 +1,1 @@
+"""The finite element spaces V_h: elements, boundary nodes, forms, energies."""

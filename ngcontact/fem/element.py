@@ -1,0 +1,96 @@
+"""Elements of HH81 (2.2), (2.4), (2.9): which there are, their spaces, their node values."""
+
+from __future__ import annotations
+
+import ngsolve as ng
+import numpy as np
+import scipy.sparse as sp
+
+from ..arrays import Index
+from ..triplets import from_triplets
+from .boundary import Trace
+from .nodal_basis import edge_bubbles, nodal_basis
+
+ORDERS = (1, 2, 3, 4)
+ELEMENTS = ("isoparametric", "superparametric", "physical")
+
+
+def unknowns(mesh: ng.Mesh, order: int, element: str) -> int:
+    """Number of unknowns of the displacement on a mesh that is curved to the element's degree."""
+    # Functions linear in physical coordinates are kept in a space with boundary edge functions.
+    edges = mesh.GetNE(ng.BND) if element == "physical" and mesh.GetCurveOrder() > 1 else 0
+    return unknowns_of(order, mesh.nv + edges, mesh.nedge, mesh.ne)
+
+
+def unknowns_of(order: int, vertices: int, edges: int, elements: int) -> int:
+    """Number of unknowns of a displacement of degree `order` on that many of each."""
+    inner = (order - 1) * (order - 2) // 2
+    return 2 * (vertices + (order - 1) * edges + inner * elements)
+
+
+def check_element(order: int, element: str) -> None:
+    """Raise unless the element is one of `ELEMENTS` with an order it is available in."""
+    if element not in ELEMENTS:
+        raise ValueError(f"element={element!r} is not available; choose one of {ELEMENTS}")
+    orders = (1,) if element == "physical" else ORDERS
+    if isinstance(order, bool) or not isinstance(order, int | np.integer):
+        raise TypeError(f"order={order!r} is not an integer; element={element!r} has {orders}")
+    if order not in orders:
+        raise ValueError(f"order={order} is not available; element={element!r} has {orders}")
+
+
+def _physical_basis(V: ng.FESpace, trace: Trace) -> sp.csr_array:
+    """P1 in physical coordinates (2.4) inside the quadratic isoparametric space, (N, nv).
+
+    On a curved element a linear function of x has the edge function coefficients that its
+    values at the edge's interior nodes ask for; those values come from all three vertices.
+    """
+    mesh = trace.mesh
+    if V.ndof == 2 * mesh.nv:
+        return sp.eye_array(mesh.nv, format="csr")
+    xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
+    corners = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.intp) - 1
+    triangles = corners[trace.element]
+    if trace.geometry_order > 2:
+        raise ValueError(
+            f"the mesh is curved to degree {trace.geometry_order}; element='physical' lives on "
+            "meshes curved to degree 2: call mesh.Curve(2)"
+        )
+    middle = trace.curve[:, 1] if trace.geometry_order == 2 else trace.curve.mean(axis=1)
+    # Barycentric coordinates of the edge's node in the straight triangle, affinely extended.
+    sides = xy[triangles[:, 1:]] - xy[triangles[:, :1]]
+    bary = np.linalg.solve(sides.transpose(0, 2, 1), (middle - xy[triangles[:, 0]])[..., None])
+    bary = np.column_stack([1 - bary.sum(axis=1), bary[..., 0]])
+    value = bary - np.where((triangles[:, :, None] == trace.nodes[:, None, :]).any(axis=2), 0.5, 0)
+    numbers = np.array(
+        [
+            V.GetDofNrs(el.edges[0])[0] if V.GetDofNrs(el.edges[0]) else -1
+            for el in mesh.Elements(ng.BND)
+        ]
+    )
+    on = numbers >= 0
+    bubble = 1 / edge_bubbles(ng.H1(mesh, order=2))[0, 0]
+    rows = np.repeat(numbers[on], 3)
+    edges = from_triplets(
+        (bubble * value[on]).ravel(), rows, triangles[on].ravel(), (V.ndof // 2, mesh.nv)
+    )
+    return (sp.eye_array(V.ndof // 2, mesh.nv) + edges).tocsr()
+
+
+def vector_space(mesh: ng.Mesh, order: int, element: str) -> ng.FESpace:
+    """Displacements on a curved mesh, as unknowns of NGSolve."""
+    if element != "physical" or mesh.GetCurveOrder() == 1:
+        return ng.VectorH1(mesh, order=order)
+    full = ng.VectorH1(mesh, order=2)
+    half = full.ndof // 2
+    active = np.zeros(half, dtype=bool)
+    active[: mesh.nv] = True
+    boundary = [el.edges[0].nr for el in mesh.Elements(ng.BND)]
+    active[mesh.nv + np.array(boundary)] = True
+    return ng.Compress(full, active_dofs=ng.BitArray(np.tile(active, 2)))
+
+
+def node_basis(V: ng.FESpace, trace: Trace, nodal: Index, element: str) -> sp.csr_array:
+    """`Space.basis` for node values on the segments `nodal`."""
+    scalar = _physical_basis(V, trace) if element == "physical" else nodal_basis(trace, nodal)
+    return sp.block_diag([scalar, scalar], format="csr")

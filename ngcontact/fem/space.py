@@ -1,0 +1,121 @@
+"""The finite element spaces V_h of HH81 (2.2), (2.4), (2.9): space, stiffness A, load f."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import ngsolve as ng
+import numpy as np
+import scipy.sparse as sp
+
+from ..arrays import Array, Index
+from ..linalg.sparse import shared
+from ..problem.material import varies
+from ..problem.problem import Problem
+from ..problem.regions import boundary_mask
+from .boundary import Trace
+from .element import node_basis, vector_space
+from .model import strain
+
+# Loads and variable moduli may be as rough as r^(-1/2): quadrature orders above the default.
+LOAD_BONUS = 6
+MODULUS_BONUS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Space:
+    """V_h with the assembled forms (3.1), (3.2).
+
+    Attributes
+    ----------
+    V : ng.FESpace
+        Vector space of N unknowns for each component.
+    trace : Trace
+        Its boundary nodes.
+    nodal : ndarray of int (k,)
+        Segments of the trace on which conditions are posed at nodes.
+    basis : sparse (2N, 2n)
+        From n node values there (and unknowns elsewhere) for each component to the unknowns of V.
+    A : sparse (2N, 2N)
+        Stiffness.
+    matrix : ng.BaseMatrix
+        The same for NGSolve, in the same memory.
+    f : ndarray (2N,)
+        Load.
+    """
+
+    V: ng.FESpace
+    trace: Trace
+    nodal: Index
+    basis: sp.csr_array
+    A: sp.csr_array
+    matrix: ng.BaseMatrix
+    f: Array
+
+    @cached_property
+    def diagonal(self) -> Array:
+        """Diagonal of A, (2N,)."""
+        return np.asarray(self.A.diagonal())
+
+    def stiffness(self) -> Array:
+        """Force per displacement of the nodes, (n,), by its order of magnitude."""
+        diagonal = self.basis.power(2).T @ self.diagonal
+        return diagonal.reshape(2, -1).max(axis=0)
+
+
+def _check_normals(trace: Trace, boundary: str) -> None:
+    """Raise unless NGSolve's normals, the direction of pressures, point outwards."""
+    segments = trace.select(boundary_mask(trace.mesh, boundary))
+    s = np.full(len(segments), 0.5)
+    normal = trace.evaluate(ng.specialcf.normal(2), segments, s)
+    if ((normal * trace.normal(segments, s)).sum(axis=1) < 0).any():
+        raise ValueError(
+            f'the normals of the boundary "{boundary}" point into the body; its segments must run '
+            "with the body on their left"
+        )
+
+
+def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
+    """f(v) of (3.2), (2N,), with quadrature `bonus` orders above the default."""
+    v = V.TestFunction()
+    f = ng.LinearForm(V)
+    for body, F in problem.force.items():
+        f += F * v * ng.dx(definedon=V.mesh.Materials(body), bonus_intorder=bonus)
+    for boundary in problem.traction:
+        P = problem.traction_vector(boundary)
+        region = V.mesh.Boundaries(boundary)
+        f += P * v.Trace() * ng.ds(definedon=region, bonus_intorder=bonus)
+    f.Assemble()
+    return f.vec.FV().NumPy().copy()
+
+
+def assemble(problem: Problem, trace: Trace, element: str, nodal: Index | None = None) -> Space:
+    """Space, stiffness and load of a problem on the mesh of `trace`, curved as `element` asks.
+
+    Node values replace NGSolve's unknowns on the segments `nodal`, all when left out.
+    """
+    mesh = trace.mesh
+    V = vector_space(mesh, trace.order, element)
+    nodal = np.arange(len(trace.region)) if nodal is None else nodal
+    u, v = V.TnT()
+    a = ng.BilinearForm(V, symmetric=True)
+    for body, law in problem.materials.items():
+        C = law.voigt(problem.model)
+        bonus = MODULUS_BONUS if varies(law) else 0
+        region = mesh.Materials(body)
+        a += ng.InnerProduct(C * strain(u), strain(v)) * ng.dx(
+            definedon=region, bonus_intorder=bonus
+        )
+    for boundary in problem.traction:
+        _check_normals(trace, boundary)
+    a.Assemble()
+    return Space(
+        V=V,
+        trace=trace,
+        nodal=nodal,
+        basis=node_basis(V, trace, nodal, element),
+        A=shared(a.mat),
+        matrix=a.mat,
+        f=load_vector(problem, V, LOAD_BONUS),
+    )
