@@ -6,9 +6,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from .arrays import Mask
+from .contact.transitions import transitions
 from .discrete import Discrete
 from .qp.quadratic_program import Minimiser
-from .transition import transitions
 
 SEPARATION = 1e-6  # of the directions at a corner, relative to the zone
 TOUCHING = 1e-12  # gap, relative to the zone, up to which points start active

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import power_of_two
+from .contact.transitions import ending_segments
 from .errors import ContactError, ConvergenceError
 from .fem.element import check_element, unknowns
 from .fem.moduli import bulk_moduli, shear_moduli, warn_of_locking
@@ -23,7 +24,6 @@ from .mesh.generation import first_mesh
 from .problem.problem import Problem
 from .refine import refined
 from .solution import Solution
-from .transition import ending_segments
 
 ROUND_OFF = 1e-12  # relative estimate at which refinement stops: the solution is exact
 SMALL = 1e-4  # ... above which no round-off reaches

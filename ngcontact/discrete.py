@@ -11,15 +11,15 @@ import scipy.sparse as sp
 from .arrays import Index, Mask
 from .constraints.basis_transformation import Basis, change_of_basis
 from .constraints.rows import Conditions
+from .contact.assembly import joined, kept_lines, merged
+from .contact.line import ContactLine
 from .errors import ConvergenceError
 from .fem.boundary import Trace, boundary_trace
 from .fem.element import node_basis
 from .fem.space import LOAD_BONUS, Space, assemble, load_vector
-from .gap import ContactLine
 from .linalg.iterative import linear_systems
 from .linalg.sparse import congruent
 from .mesh.parents import parents
-from .pairs import joined, kept_lines, merged
 from .problem.problem import Problem
 from .problem.regions import boundary_mask
 from .qp.active_set import minimise

@@ -32,14 +32,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array, Index, power_of_two
+from .contact.line import ContactLine, at_quadrature, prescribed_gap
+from .contact.search import partners
 from .fem.boundary import Trace
 from .fem.moduli import NEARLY_INCOMPRESSIBLE, bulk_moduli, nearly_incompressible, shear_moduli
-from .gap import ContactLine, at_quadrature, prescribed_gap
 from .incompressible import PressureCorrection, Share, Term
 from .interior import divergence_and_jump, integral, projected_stress
 from .lagrange import gauss, lagrange
 from .mesh.elements import diameters
-from .partners import partners
 from .problem.regions import boundary_mask
 from .sides import Side, met_from_behind, nodal_pressure, traction
 

@@ -8,8 +8,8 @@ import ngsolve as ng
 import numpy as np
 
 from .arrays import Array, Mask
+from .contact.line import contact_line
 from .fem.boundary import Trace, boundary_trace
-from .gap import contact_line
 from .mesh.parents import copied
 from .problem.contact import Contact
 from .problem.problem import Problem

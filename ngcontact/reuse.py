@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from .constraints.basis_transformation import Basis
+from .contact.line import ContactLine, contact_line
 from .fem.boundary import Trace
-from .gap import ContactLine, contact_line
 from .problem.contact import Contact
 from .problem.material import Elastic, Hooke, varies
 from .problem.problem import Problem

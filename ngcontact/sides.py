@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array, Index
+from .contact.line import ContactLine
+from .contact.search import partners
 from .fem.boundary import Trace
-from .gap import ContactLine
 from .incompressible import Share, Term
 from .lagrange import gauss_lobatto
-from .partners import partners
 
 
 def traction(trace: Trace, stress: ng.CoefficientFunction, segment: Index, s: Array) -> Array:

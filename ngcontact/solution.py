@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from .arrays import Array, Mask, root_of_squares
 from .balance import resultants
+from .contact.transitions import Transitions, transitions_of
 from .discrete import Discrete
 from .estimate import Estimate, estimate
 from .fem.energy import energy_norm, potential_energy
@@ -22,7 +23,6 @@ from .output.vtk import write_solution
 from .problem.problem import Problem
 from .qp.optimality import optimality
 from .qp.quadratic_program import Minimiser
-from .transition import Transitions, transitions_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from ngcontact import projection
+from ngcontact.contact import projection
+from ngcontact.contact.projection import MATCHED, cast, coincident, snap
 from ngcontact.lagrange import gauss_lobatto, lagrange
-from ngcontact.projection import MATCHED, cast, coincident, snap
 
 UP, DOWN = np.array([0.0, 1.0]), np.array([0.0, -1.0])
 RNG = np.random.default_rng(7)

@@ -11,8 +11,9 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import Contact, Problem, adapt, solve
+from ngcontact.contact.corners import in_contact, nodal_pressure, twins
+from ngcontact.contact.transitions import ending_segments, transitions
 from ngcontact.geometries import blocks
-from ngcontact.transition import ending_segments, in_contact, nodal_pressure, transitions, twins
 
 
 def line(x, order=1, y=None):

@@ -14,8 +14,9 @@ from itertools import pairwise
 import numpy as np
 from scipy.optimize import brentq
 
-from .arrays import Array, Index, Mask
-from .gap import ContactLine
+from ..arrays import Array, Index, Mask
+from .corners import in_contact, twins
+from .line import ContactLine
 
 # Stencil of the fit, by measurement on Hertz contact at orders 1 to 4: the two points next to the
 # contact carry the error of the element in which it ends.
@@ -23,53 +24,6 @@ SKIPPED = 2
 FEWEST = 8  # points of the fit, or three per order and two if that is more
 DEGREE = 3  # of the fit, 2 at order 1
 SAMPLES = 65  # places at which the fit is evaluated to bracket its zero
-ALIKE = np.sqrt(0.5)  # cosine of the turn up to which both sides of a corner have one pressure
-
-
-def twins(line: ContactLine) -> Index:
-    """Pairs (t, 2) of contact points that share a node."""
-    order = np.argsort(line.node, kind="stable")
-    same = np.flatnonzero(np.diff(line.node[order]) == 0)
-    return np.column_stack([order[same], order[same + 1]])
-
-
-def in_contact(line: ContactLine, active: Mask) -> Mask:
-    """Active points (m,), and those open ones at corners inside the contact.
-
-    The node touches the other side of the corner, and the next point on this side is active: one
-    of the two rows is released where the node would rather slide off the corner.
-    """
-    state = active.copy()
-    corners = twins(line)
-    for i in corners[active[corners].sum(axis=1) == 1].ravel():
-        if not active[i]:
-            first, last = line.rows[:, :-1], line.rows[:, 1:]
-            next_to = np.concatenate([last[first == i], first[last == i]])
-            state[i] = (next_to >= 0).all() and active[next_to].all()
-    return state
-
-
-def nodal_pressure(line: ContactLine, force: Array, active: Mask) -> Array:
-    """Pressure (m,) of nodal forces: force over weight, one value on both sides of a corner.
-
-    A stress that is continuous at a corner without friction has both normals as eigenvectors, so
-    that both pressures are equal unless the sides are perpendicular. Up to a turn of 45 degrees
-    they are told together, from the part of the node's force along the sum of weight times normal:
-    what a uniform pressure on both sides exerts.
-    """
-    pressure = force / line.weight
-    corners = twins(line)
-    if corners.size == 0 or line.contact.direction is not None:
-        return pressure
-    inside = in_contact(line, active)[corners].all(axis=1)
-    normal = line.direction[corners]  # (t, 2, 2), row i the normal of side i
-    inside &= (normal[:, 0] * normal[:, 1]).sum(axis=1) >= ALIKE
-    corners, normal = corners[inside], normal[inside]
-    uniform = (line.weight[corners][:, :, None] * normal).sum(axis=1)
-    resultant = (force[corners][:, :, None] * normal).sum(axis=1)
-    shared = (resultant * uniform).sum(axis=1) / (uniform**2).sum(axis=1)
-    pressure[corners] = shared[:, None]
-    return pressure
 
 
 def _neighbours(line: ContactLine) -> tuple[dict[int, list[int]], Index]:

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .arrays import Array, Index
-from .lagrange import gauss_lobatto, lagrange, lagrange_derivative
+from ..arrays import Array, Index
+from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative
 
 MATCHED = 1e-9  # distance, relative to a segment's length, below which two points are one
 GRAZING = 1e-9  # cosine between ray and normal up to which the ray does not meet the curve

@@ -6,11 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from .arrays import Index
-from .constraints.rows import Rows
-from .fem.boundary import Trace
-from .gap import ContactLine, without
-from .lagrange import lagrange
+from ..arrays import Index
+from ..constraints.rows import Rows
+from ..fem.boundary import Trace
+from ..lagrange import lagrange
+from .line import ContactLine, without
 from .projection import snap
 
 
