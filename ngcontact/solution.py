@@ -15,7 +15,7 @@ from .arrays import Array, Mask, root_of_squares
 from .balance import resultants
 from .contact.transitions import Transitions, transitions_of
 from .discrete import Discrete
-from .estimate import Estimate, estimate
+from .estimator.residual import Estimate, estimate
 from .fem.energy import energy_norm, potential_energy
 from .fem.model import strain
 from .motions import RigidMotion

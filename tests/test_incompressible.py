@@ -13,8 +13,8 @@ from netgen.occ import OCCGeometry, Rectangle
 from drivers.reference import cases
 from drivers.reference.straight import hertz, patch, relative_energy_error, transition
 from ngcontact import Elastic, Hooke, Problem, solve
-from ngcontact import estimate as estimate_module
 from ngcontact.arrays import root_of_squares
+from ngcontact.estimator import residual as estimate_module
 
 
 def one_transition(upper, lower):

@@ -31,20 +31,21 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array, Index, power_of_two
-from .contact.line import ContactLine, at_quadrature, prescribed_gap
-from .contact.search import partners
-from .fem.boundary import Trace
-from .fem.moduli import NEARLY_INCOMPRESSIBLE, bulk_moduli, nearly_incompressible, shear_moduli
-from .incompressible import PressureCorrection, Share, Term
+from ..arrays import Array, Index, power_of_two
+from ..contact.line import ContactLine, at_quadrature, prescribed_gap
+from ..contact.search import partners
+from ..fem.boundary import Trace
+from ..fem.moduli import NEARLY_INCOMPRESSIBLE, bulk_moduli, nearly_incompressible, shear_moduli
+from ..lagrange import gauss, lagrange
+from ..mesh.elements import diameters
+from ..problem.regions import boundary_mask
+from .contact import Side, met_from_behind, nodal_pressure, traction
 from .interior import divergence_and_jump, integral, projected_stress
-from .lagrange import gauss, lagrange
-from .mesh.elements import diameters
-from .problem.regions import boundary_mask
-from .sides import Side, met_from_behind, nodal_pressure, traction
+from .pressure_correction import PressureCorrection
+from .terms import Share, Term
 
 if TYPE_CHECKING:
-    from .solution import Solution
+    from ..solution import Solution
 
 
 DATA_BONUS = 4  # quadrature order above that of the discrete terms, for the loads

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import ngsolve as ng
 import numpy as np
 
-from .arrays import Array
-from .problem.material import varies
+from ..arrays import Array
+from ..problem.material import varies
 
 if TYPE_CHECKING:
-    from .solution import Solution
+    from ..solution import Solution
 
 
 def projected_stress(solution: Solution) -> ng.GridFunction:

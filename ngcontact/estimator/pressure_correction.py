@@ -15,65 +15,20 @@ the last term measures the deviatoric error, because e is orthogonal to v_h.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from .arrays import Array, Index
-from .fem.boundary import Trace
-from .linalg.sparse import cholesky, lower_half, shared
-from .problem.problem import Problem
-from .triplets import from_triplets
+from ..arrays import Array
+from ..fem.boundary import Trace
+from ..linalg.sparse import cholesky, lower_half, shared
+from ..problem.problem import Problem
+from ..triplets import from_triplets
+from .terms import Share, Term
 
 HELD = 1e6  # stiffness of supports in the last term, relative to the elements beside them
 FLOATING = 1e-9  # ... and of the bedding that keeps free bodies, relative to their size
-
-
-@dataclass(frozen=True, eq=False)
-class Share:
-    """What delta at n points of the boundary adds to residuals: `factor` (n, c) times it.
-
-    Attributes
-    ----------
-    at : ndarray of int (n,)
-        Numbers of the residuals.
-    segment, s : ndarray (n,)
-        Where delta counts.
-    factor : ndarray (n, c)
-        Its factor in each component of the residual.
-    """
-
-    at: Index
-    segment: Index
-    s: Array
-    factor: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Term:
-    """Squared residuals at k points of the boundary, linear in the corrected pressure.
-
-    Attributes
-    ----------
-    name : str
-        Part of the estimate.
-    element : ndarray of int (k,)
-        Element each point counts for.
-    weight : ndarray (k,)
-        Factor of its square.
-    residual : ndarray (k, c)
-        The residual of sigma_h.
-    shares : list of Share
-        How the residual changes with delta.
-    """
-
-    name: str
-    element: Index
-    weight: Array
-    residual: Array
-    shares: list[Share]
 
 
 class PressureCorrection:

@@ -8,12 +8,12 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from .arrays import Array, Index
-from .contact.line import ContactLine
-from .contact.search import partners
-from .fem.boundary import Trace
-from .incompressible import Share, Term
-from .lagrange import gauss_lobatto
+from ..arrays import Array, Index
+from ..contact.line import ContactLine
+from ..contact.search import partners
+from ..fem.boundary import Trace
+from ..lagrange import gauss_lobatto
+from .terms import Share, Term
 
 
 def traction(trace: Trace, stress: ng.CoefficientFunction, segment: Index, s: Array) -> Array:

@@ -1,0 +1,1 @@
+"""Error indicators of a solution."""
