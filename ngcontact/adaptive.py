@@ -12,17 +12,17 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from .adaptivity.marking import doerfler
+from .adaptivity.refinement import refined
 from .arrays import power_of_two
 from .contact.transitions import ending_segments
 from .errors import ContactError, ConvergenceError
 from .fem.element import check_element, unknowns
 from .fem.moduli import bulk_moduli, shear_moduli, warn_of_locking
 from .level import solve_level
-from .mark import doerfler
 from .mesh.curving import curve
 from .mesh.generation import first_mesh
 from .problem.problem import Problem
-from .refine import refined
 from .solution import Solution
 
 ROUND_OFF = 1e-12  # relative estimate at which refinement stops: the solution is exact

@@ -9,6 +9,7 @@ import pytest
 from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
+from ngcontact.adaptivity.refinement import refined
 from ngcontact.discrete import discretise
 from ngcontact.fem.boundary import boundary_trace
 from ngcontact.geometries import blocks
@@ -17,7 +18,6 @@ from ngcontact.mesh.curving import curve
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.mesh.parents import parents
 from ngcontact.problem.regions import boundary_mask
-from ngcontact.refine import refined
 
 REPRODUCED = {  # by order: cases whose solution lies in the space
     "constant pressure": (cases.pressure_patch, (1, 3)),

@@ -8,10 +8,10 @@ import pytest
 from conftest import coordinates, near_origin
 
 from drivers.reference import cases
+from ngcontact.adaptivity.refinement import refined
 from ngcontact.mesh.curving import curve
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.mesh.parents import copied, parents
-from ngcontact.refine import refined
 
 BLOCK = cases.partly_opening_block()  # straight, nodes matched
 

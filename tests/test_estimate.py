@@ -15,10 +15,10 @@ from drivers.reference.curved import rings as ring_solution
 from drivers.reference.straight import patch as patch_solution
 from drivers.reference.straight import relative_energy_error, transition
 from ngcontact import Contact, Elastic, Problem, adapt, solve
+from ngcontact.adaptivity.refinement import refined
 from ngcontact.geometries import blocks, rings
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.problem.regions import boundary_mask
-from ngcontact.refine import refined
 
 # A(u, u) of the exact solutions over both bodies, from Clapeyron's theorem.
 ENERGY = {"S1": 1.293180760825 + 0.520333087196, "S3": 1.30696e-4 + 4.9496e-5}

@@ -13,11 +13,11 @@ from conftest import REFINED
 from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
 from ngcontact import Elastic, Solution, adapt, solve
+from ngcontact.adaptivity.refinement import refined
 from ngcontact.discrete import minimise_energy
 from ngcontact.linalg import coarse_spaces, iterative
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.qp.schur_complement import Systems
-from ngcontact.refine import refined
 
 ORDERS = (1, 2, 3, 4)
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ngcontact.mark import doerfler
+from ngcontact.adaptivity.marking import doerfler
 
 SHARES = st.floats(0.01, 1.0)
 INDICATORS = st.lists(st.floats(0.0, 1.0, width=32), min_size=1, max_size=8).map(np.array)

@@ -14,13 +14,13 @@ from conftest import coordinates, vertices
 from netgen.occ import OCCGeometry
 
 from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact.adaptivity.refinement import matched_vertices
 from ngcontact.fem.boundary import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh.curving import check_curves
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.problem.regions import boundary_mask
-from ngcontact.refine import matched_vertices
 
 SOFT = Elastic(E=1.0, nu=0.3)
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))

@@ -16,12 +16,12 @@ from netgen.meshing import Element1D, Element2D, FaceDescriptor, Mesh, MeshPoint
 from netgen.occ import OCCGeometry
 
 from ngcontact import Contact, Elastic, Problem
+from ngcontact.adaptivity.refinement import refined
 from ngcontact.fem.boundary import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, rings
 from ngcontact.mesh.curving import curve
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.problem.regions import boundary_mask
-from ngcontact.refine import refined
 
 SOFT = Elastic(E=1.0, nu=0.3)
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
