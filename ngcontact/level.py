@@ -7,9 +7,9 @@ import logging
 import ngsolve as ng
 import numpy as np
 
-from .active import carried_active_set, first_active_set
 from .contact.line import unmatched
-from .discrete import Discrete, discretise, minimise_energy
+from .discrete.discrete_problem import Discrete, discretise, minimise_energy
+from .discrete.initial_active_set import carried_active_set, first_active_set
 from .mesh.curving import check_curves, curve
 from .problem.problem import Problem
 from .qp.quadratic_program import Minimiser

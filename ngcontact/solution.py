@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array, Mask, root_of_squares
-from .balance import resultants
 from .contact.transitions import Transitions, transitions_of
-from .discrete import Discrete
+from .discrete.discrete_problem import Discrete
+from .discrete.reactions import resultants
+from .discrete.rigid_motions import RigidMotion
 from .estimator.residual import Estimate, estimate
 from .fem.energy import energy_norm, potential_energy
 from .fem.model import strain
-from .motions import RigidMotion
 from .output.vtk import write_solution
 from .problem.problem import Problem
 from .qp.optimality import optimality

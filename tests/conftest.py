@@ -10,7 +10,7 @@ from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
 from ngcontact.adaptivity.refinement import refined
-from ngcontact.discrete import discretise
+from ngcontact.discrete.discrete_problem import discretise
 from ngcontact.fem.boundary import boundary_trace
 from ngcontact.geometries import blocks
 from ngcontact.linalg.coarse_spaces import coarsenings

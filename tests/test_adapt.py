@@ -21,7 +21,7 @@ from ngcontact.mesh.generation import first_mesh
 
 SOFT = Elastic(E=1.0, nu=0.3)
 LOOP = import_module("ngcontact.adaptive")
-DISCRETE = import_module("ngcontact.discrete")
+DISCRETE = import_module("ngcontact.discrete.discrete_problem")
 
 
 def disc() -> Problem:

@@ -9,7 +9,7 @@ from conftest import REFINED, coordinates, discrete, near_origin, steps_of
 
 from drivers.reference import cases
 from ngcontact.adaptivity.refinement import refined
-from ngcontact.discrete import Discrete, discretise
+from ngcontact.discrete.discrete_problem import Discrete, discretise
 from ngcontact.lagrange import gauss_lobatto
 from ngcontact.linalg.coarse_spaces import RingError, coarsenings, refined_share
 from ngcontact.mesh.generation import first_mesh

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import Contact, ConvergenceError, Elastic, Problem, solve
-from ngcontact.discrete import discretise
+from ngcontact.discrete.discrete_problem import discretise
 from ngcontact.geometries import punch
 from ngcontact.mesh.generation import first_mesh
 

@@ -14,7 +14,8 @@ from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
 from ngcontact import Elastic, Solution, adapt, solve
 from ngcontact.adaptivity.refinement import refined
-from ngcontact.discrete import minimise_energy
+from ngcontact.discrete import linear_systems
+from ngcontact.discrete.discrete_problem import minimise_energy
 from ngcontact.linalg import coarse_spaces, iterative
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.qp.schur_complement import Systems
@@ -25,17 +26,17 @@ ORDERS = (1, 2, 3, 4)
 @pytest.fixture
 def large(monkeypatch):
     """Every size is a large one, down to coarsest spaces of a few hundred unknowns."""
-    monkeypatch.setattr(iterative, "LARGE", dict.fromkeys(ORDERS, 0))
+    monkeypatch.setattr(linear_systems, "LARGE", dict.fromkeys(ORDERS, 0))
     monkeypatch.setattr(coarse_spaces, "COARSEST", 300)
 
 
 def direct(*args, **options) -> Solution:
     """The same by factorisation."""
-    known, iterative.LARGE = iterative.LARGE, {}
+    known, linear_systems.LARGE = linear_systems.LARGE, {}
     try:
         return solve(*args, **options)
     finally:
-        iterative.LARGE = known
+        linear_systems.LARGE = known
 
 
 def same(one: Solution, other: Solution) -> None:
@@ -85,8 +86,8 @@ def test_another_load_assembles_nothing(large):
 def test_new_coarse_matrices_where_old_ones_are_slow(large, monkeypatch):
     problem = REFINED["block"]
     mesh = uniform_mesh(problem, 1, 6000)
-    made, prepared = [], iterative.coarsenings
-    monkeypatch.setattr(iterative, "coarsenings", lambda *a: made.append(1) or prepared(*a))
+    made, prepared = [], linear_systems.coarsenings
+    monkeypatch.setattr(linear_systems, "coarsenings", lambda *a: made.append(1) or prepared(*a))
     counts = []
     for dear in (0, 10**6):
         monkeypatch.setattr(iterative, "DEAR", dear)

@@ -22,11 +22,11 @@ from ngcontact import (
     adapt,
     solve,
 )
-from ngcontact.discrete import discretise, minimise_energy
+from ngcontact.discrete.discrete_problem import discretise, minimise_energy
+from ngcontact.discrete.equilibrium import rigid_motions
 from ngcontact.geometries import blocks, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.qp.schur_complement import SingularError, Systems
-from ngcontact.rigid import rigid_motions
 
 STEEL = Elastic(E=1000.0, nu=0.3)
 WEIGHT = 0.1  # of a disc, per area

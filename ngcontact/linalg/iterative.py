@@ -5,23 +5,14 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable
 
-import ngsolve as ng
 import numpy as np
-import scipy.sparse as sp
 
-from ..arrays import Array, Factor, Integers, Mask
+from ..arrays import Array, Factor, Mask
 from ..qp.optimality import terms
 from ..qp.quadratic_program import Program
 from ..qp.schur_complement import REFINED, ROUGH, Anchor, Systems
-from .coarse_spaces import coarsenings, refined_share
 from .multigrid import Multigrid, StalledError
-from .sparse import cholesky
 
-# Unknowns by order from which multigrid is the faster one, on one thread: at 80 000 of orders 1
-# and 2 both take the same time, of order 3 at a million; it always takes less memory. See
-# docs/performance.md.
-LARGE = {1: 100_000, 2: 100_000}
-FEWEST = 0.7  # share of the unknowns that must be gone in the coarsest space
 LOOSE = 1e-2  # residual, relative to the one a system starts from, that tells its active set
 DEAR = 20  # V-cycles for that, the price of new coarse matrices, with those of another set
 MOST = 100  # V-cycles for a system, two to three times those of nu = 0.3
@@ -133,29 +124,3 @@ class IterativeSystems(Systems):
         if not self._size(self.residual()) <= ROUGH * self.scale:
             raise StalledError(f"{RESTARTS} solutions left a residual above {target:.1e}")
         return self.y.copy(), self.force.copy()
-
-
-def linear_systems(
-    program: Program, matrix: ng.BaseMatrix, T: sp.csr_array, parents: Integers, nodes: Integers
-) -> Systems:
-    """Systems of a discrete problem: by multigrid where it is large and has coarser spaces.
-
-    Parameters
-    ----------
-    program : Program
-    matrix : ng.BaseMatrix
-        Its matrix for NGSolve.
-    T, parents, nodes
-        See `hierarchy.coarsenings`.
-    """
-    factor, order = cholesky(matrix), nodes.shape[1] - 1
-    size = program.b.size
-    coarsest = 2 * len(parents) * (1 - refined_share(parents))
-    half = matrix.nze < program.K.nnz  # all that a factorisation reads
-    if half or size < LARGE.get(order, np.inf) or coarsest > (1 - FEWEST) * size:
-        return Systems(program, factor)
-
-    def prepare(free: Mask) -> Multigrid:
-        return Multigrid(matrix, coarsenings(T, parents, nodes), free)
-
-    return IterativeSystems(program, factor, prepare)

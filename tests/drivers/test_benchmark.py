@@ -23,7 +23,7 @@ from drivers.benchmark.scenes.reading import contact_end, peak, weights
 from drivers.benchmark.scenes.triangles import forces, sides, which
 from drivers.benchmark.studies import large
 from ngcontact import adapt
-from ngcontact.linalg import iterative
+from ngcontact.discrete import linear_systems
 
 COMMON = {"disc": disc(), "block": block()}
 QUANTITIES = ("force", "peak", "half_width", "energy")
@@ -221,7 +221,7 @@ def test_forces_of_a_uniform_strain():
 
 
 def test_large_problems_take_the_path_asked_for(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(iterative, "LARGE", iterative.LARGE)  # measurements set another
+    monkeypatch.setattr(linear_systems, "LARGE", linear_systems.LARGE)  # measurements set another
     rows = [large.measure("block", 1, 20_000, path) for path in large.PATHS]
     assert len({row.unknowns for row in rows}) == 1
     assert all(row.seconds > 0 and row.memory > 0 for row in rows)

@@ -16,7 +16,7 @@ import ngsolve as ng
 from drivers.benchmark.studies.growth import COMMONS, Process, apart, peak_memory
 from drivers.benchmark.studies.linear import uniform_mesh
 from ngcontact import solve
-from ngcontact.linalg import iterative
+from ngcontact.discrete import linear_systems
 
 SIZES = (100_000, 300_000, 1_000_000, 3_000_000)
 ORDERS = (1, 2)
@@ -43,7 +43,7 @@ def measure(name: str, order: int, size: int, path: str) -> Large:
     """Run here; `memory` is that of this process so far."""
     problem = COMMONS[name]().problem
     mesh = uniform_mesh(problem, order, size)
-    iterative.LARGE = {order: PATHS[path]}
+    linear_systems.LARGE = {order: PATHS[path]}
     start = time.perf_counter()
     solution = solve(problem, mesh, order=order)
     seconds = time.perf_counter() - start

@@ -16,13 +16,15 @@ import scipy.sparse as sp
 from scipy.linalg import block_diag
 from scipy.optimize import linprog, nnls
 
-from .arrays import Array, Mask
-from .constraints.basis_transformation import Basis
-from .constraints.rows import Conditions
-from .errors import NoEquilibriumError
-from .fem.space import LOAD_BONUS, Space, load_vector
-from .mesh.cad import cad_edges
-from .motions import (
+from ..arrays import Array, Mask
+from ..constraints.basis_transformation import Basis
+from ..constraints.rows import Conditions
+from ..errors import NoEquilibriumError
+from ..fem.space import LOAD_BONUS, Space, load_vector
+from ..mesh.cad import cad_edges
+from ..problem.problem import Problem
+from ..qp.null_space import FREE, Kernel, kernel, null_space
+from .rigid_motions import (
     Bodies,
     RigidMotion,
     body_of_unknown,
@@ -33,8 +35,6 @@ from .motions import (
     unsupported,
     work_of_load,
 )
-from .problem.problem import Problem
-from .qp.null_space import FREE, Kernel, kernel, null_space
 
 FINER = 5  # quadrature orders added to see the error of those of the loads
 CURVED = 2  # degrees added to see the error of the mesh's curved sides

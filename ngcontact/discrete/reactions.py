@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .arrays import Array
-from .fem.boundary import Trace
-from .problem.problem import Problem
-from .problem.regions import boundary_mask
+from ..arrays import Array
+from ..fem.boundary import Trace
+from ..problem.problem import Problem
+from ..problem.regions import boundary_mask
 
 
 def resultants(problem: Problem, trace: Trace, reaction: Array) -> dict[str, Array]:

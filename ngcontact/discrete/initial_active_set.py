@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from .arrays import Mask
-from .contact.transitions import transitions
-from .discrete import Discrete
-from .qp.quadratic_program import Minimiser
+from ..arrays import Mask
+from ..contact.transitions import transitions
+from ..qp.quadratic_program import Minimiser
+from .discrete_problem import Discrete
 
 SEPARATION = 1e-6  # of the directions at a corner, relative to the zone
 TOUCHING = 1e-12  # gap, relative to the zone, up to which points start active

@@ -1,4 +1,4 @@
-"""The discrete problems (P_1h), (P_2h) of HH81: assembled, in equilibrium, started, re-used."""
+"""The discrete problems (P_1h), (P_2h) of HH81 on one mesh, and their solution."""
 
 from __future__ import annotations
 
@@ -8,27 +8,27 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from .arrays import Index, Mask
-from .constraints.basis_transformation import Basis, change_of_basis
-from .constraints.rows import Conditions
-from .contact.assembly import joined, kept_lines, merged
-from .contact.line import ContactLine
-from .errors import ConvergenceError
-from .fem.boundary import Trace, boundary_trace
-from .fem.element import node_basis
-from .fem.space import LOAD_BONUS, Space, assemble, load_vector
-from .linalg.iterative import linear_systems
-from .linalg.sparse import congruent
-from .mesh.parents import parents
-from .problem.problem import Problem
-from .problem.regions import boundary_mask
-from .qp.active_set import minimise
-from .qp.null_space import no_kernel
-from .qp.quadratic_program import Minimiser, Program
-from .qp.schur_complement import Systems
+from ..arrays import Mask
+from ..constraints.basis_transformation import Basis, change_of_basis
+from ..constraints.rows import Conditions
+from ..contact.assembly import joined, kept_lines, merged
+from ..contact.line import ContactLine
+from ..errors import ConvergenceError
+from ..fem.boundary import Trace, boundary_trace
+from ..fem.element import node_basis
+from ..fem.space import LOAD_BONUS, Space, assemble, load_vector
+from ..linalg.sparse import congruent
+from ..mesh.parents import parents
+from ..problem.problem import Problem
+from ..qp.active_set import minimise
+from ..qp.null_space import no_kernel
+from ..qp.quadratic_program import Minimiser, Program
+from ..qp.schur_complement import Systems
+from ..triplets import from_triplets
+from .equilibrium import Rigid, rigid_motions
+from .linear_systems import linear_systems
 from .reuse import contact_lines, same_basis, same_boundary, same_stiffness
-from .rigid import Rigid, rigid_motions
-from .triplets import from_triplets
+from .supports import conditioned_segments, support_conditions
 
 SMALLEST, LARGEST = -306, 305  # powers of ten between which sums of products keep their digits
 
@@ -74,56 +74,11 @@ class Discrete:
     assembled: bool
 
 
-def _prescribed(problem: Problem, trace: Trace) -> Conditions:
-    """Gamma_u: interpolated displacement components at the nodes."""
-    n = trace.space.ndof
-    given = np.zeros((2, n), dtype=bool)
-    value = np.zeros((2, n))
-    for pattern, components in problem.displacement.items():
-        segment, s = trace.at_nodes(trace.select(boundary_mask(trace.mesh, pattern)))
-        node = trace.nodes[segment[:: trace.order + 1]].ravel()
-        for axis, function in enumerate(components):
-            if function is not None:
-                given[axis, node] = True
-                value[axis, node] = trace.evaluate(function, segment, s)[:, 0]
-    axes, nodes = np.nonzero(given)
-    return Conditions(node=nodes, direction=np.eye(2)[axes], value=value[axes, nodes])
-
-
-def _guided(problem: Problem, trace: Trace) -> Conditions:
-    """Gamma_0: zero normal displacement at the nodes, with the exact normals."""
-    if problem.sliding is None:
-        return Conditions(np.zeros(0, dtype=np.intp), np.zeros((0, 2)), np.zeros(0))
-    segment, s = trace.at_nodes(trace.select(boundary_mask(trace.mesh, str(problem.sliding))))
-    node = trace.nodes[segment[:: trace.order + 1]].ravel()
-    number, normal = trace.number_points(segment, node, trace.exact_normal(segment, s))
-    _, first = np.unique(number, return_index=True)
-    return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))
-
-
-def _conditions(problem: Problem, trace: Trace) -> Conditions:
-    """Gamma_u and Gamma_0."""
-    parts = _prescribed(problem, trace), _guided(problem, trace)
-    return Conditions(
-        *(np.concatenate([getattr(c, name) for c in parts]) for name in Conditions.__annotations__)
-    )
-
-
-def _conditioned(problem: Problem, trace: Trace) -> Index:
-    """Segments on which conditions are posed: Gamma_u, Gamma_0, Gamma_K."""
-    sides = [side for pair in problem.contact for side in (pair.secondary, pair.primary)]
-    regions = np.zeros(len(trace.mesh.GetBoundaries()), dtype=bool)
-    for pattern in (*problem.displacement, problem.sliding, *sides):
-        if pattern is not None:
-            regions |= boundary_mask(trace.mesh, str(pattern))
-    return trace.select(regions)
-
-
 def _space(
     problem: Problem, trace: Trace, element: str, previous: Discrete | None
 ) -> tuple[Space, bool]:
     """Space with its forms, and whether its stiffness had to be assembled."""
-    nodal = _conditioned(problem, trace)
+    nodal = conditioned_segments(problem, trace)
     if previous is not None and same_stiffness(problem, previous.problem):
         V = previous.space.V
         basis = node_basis(V, trace, nodal, element)
@@ -167,7 +122,7 @@ def discretise(
     found = contact_lines(problem, trace, [] if previous is None else previous.found)
     space, assembled = _space(problem, trace, element, previous)
     n = space.basis.shape[1] // 2
-    conditions = _conditions(problem, trace)
+    conditions = support_conditions(problem, trace)
     lines, rows = merged(found, joined(found, trace), n)
     length = float(np.abs(trace.curve).max())
     basis = change_of_basis(n, conditions, rows, length, space.stiffness())

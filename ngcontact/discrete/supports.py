@@ -1,0 +1,56 @@
+"""Gamma_u and Gamma_0 as conditions at nodes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..arrays import Index
+from ..constraints.rows import Conditions
+from ..fem.boundary import Trace
+from ..problem.problem import Problem
+from ..problem.regions import boundary_mask
+
+
+def _prescribed(problem: Problem, trace: Trace) -> Conditions:
+    """Gamma_u: interpolated displacement components at the nodes."""
+    n = trace.space.ndof
+    given = np.zeros((2, n), dtype=bool)
+    value = np.zeros((2, n))
+    for pattern, components in problem.displacement.items():
+        segment, s = trace.at_nodes(trace.select(boundary_mask(trace.mesh, pattern)))
+        node = trace.nodes[segment[:: trace.order + 1]].ravel()
+        for axis, function in enumerate(components):
+            if function is not None:
+                given[axis, node] = True
+                value[axis, node] = trace.evaluate(function, segment, s)[:, 0]
+    axes, nodes = np.nonzero(given)
+    return Conditions(node=nodes, direction=np.eye(2)[axes], value=value[axes, nodes])
+
+
+def _guided(problem: Problem, trace: Trace) -> Conditions:
+    """Gamma_0: zero normal displacement at the nodes, with the exact normals."""
+    if problem.sliding is None:
+        return Conditions(np.zeros(0, dtype=np.intp), np.zeros((0, 2)), np.zeros(0))
+    segment, s = trace.at_nodes(trace.select(boundary_mask(trace.mesh, str(problem.sliding))))
+    node = trace.nodes[segment[:: trace.order + 1]].ravel()
+    number, normal = trace.number_points(segment, node, trace.exact_normal(segment, s))
+    _, first = np.unique(number, return_index=True)
+    return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))
+
+
+def support_conditions(problem: Problem, trace: Trace) -> Conditions:
+    """Gamma_u and Gamma_0."""
+    parts = _prescribed(problem, trace), _guided(problem, trace)
+    return Conditions(
+        *(np.concatenate([getattr(c, name) for c in parts]) for name in Conditions.__annotations__)
+    )
+
+
+def conditioned_segments(problem: Problem, trace: Trace) -> Index:
+    """Segments on which conditions are posed: Gamma_u, Gamma_0, Gamma_K."""
+    sides = [side for pair in problem.contact for side in (pair.secondary, pair.primary)]
+    regions = np.zeros(len(trace.mesh.GetBoundaries()), dtype=bool)
+    for pattern in (*problem.displacement, problem.sliding, *sides):
+        if pattern is not None:
+            regions |= boundary_mask(trace.mesh, str(pattern))
+    return trace.select(regions)
