@@ -13,10 +13,11 @@ from .problem.material import Elastic, Hooke
 from .problem.problem import Problem
 
 if _typing.TYPE_CHECKING:
-    from .adaptive import adapt, solve
+    from .adaptive import adapt
     from .output.vtk import write_series
     from .qp.solving import solve_qp
     from .solution import Solution
+    from .solving import solve
 
 __version__ = "0.1.0"
 __all__ = [
@@ -37,7 +38,7 @@ __all__ = [
 _MODULES = {
     "Solution": "solution",
     "adapt": "adaptive",
-    "solve": "adaptive",
+    "solve": "solving",
     "solve_qp": "qp.solving",
     "write_series": "output.vtk",
 }

@@ -16,12 +16,12 @@ from .adaptivity.marking import doerfler
 from .adaptivity.refinement import refined
 from .arrays import power_of_two
 from .contact.transitions import ending_segments
-from .errors import ContactError, ConvergenceError
+from .errors import ConvergenceError
 from .fem.element import check_element, unknowns
 from .fem.moduli import bulk_moduli, shear_moduli, warn_of_locking
-from .level import solve_level
 from .mesh.curving import curve
 from .mesh.generation import first_mesh
+from .one_mesh import solve_level
 from .problem.problem import Problem
 from .solution import Solution
 
@@ -29,92 +29,8 @@ ROUND_OFF = 1e-12  # relative estimate at which refinement stops: the solution i
 SMALL = 1e-4  # ... above which no round-off reaches
 NOISE = 100 * np.finfo(float).eps  # of a stress, relative to its terms; measured 0.5 to 50 eps
 END = 0.1  # size of elements in which contact ends, of its line, over the relative estimate
-# A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
-LARGE = 20_000
-COARSE = 4  # elements of that run along the largest extent
-COARSE_ORDER = 3
-COARSE_DOFS = 1500
 
 log = logging.getLogger("ngcontact")
-
-
-def solve(
-    problem: Problem,
-    mesh: ng.Mesh | None = None,
-    *,
-    maxh: float | None = None,
-    order: int = 1,
-    element: str = "isoparametric",
-    start: Solution | None = None,
-) -> Solution:
-    """Solve a contact problem on one mesh, HH81 (P_1h) or (P_2h).
-
-    Parameters
-    ----------
-    problem : Problem
-        The continuous problem.
-    mesh : ng.Mesh, optional
-        The mesh; made from the geometry, with matched nodes on facing lines, when left out.
-    maxh : float, optional
-        Largest element size for making the mesh, a length; only without `mesh`.
-    order : int
-        Polynomial degree, 1 to 4.
-    element : str
-        "isoparametric": geometry of degree `order`. "superparametric": Zlamal's (2.8), geometry
-        of degree `order` + 1. "physical": (2.4), linear in physical coordinates on curved
-        elements, order 1 only.
-    start : Solution, optional
-        Of the same pairs on any mesh: its active set warms the start. On its own mesh with the
-        same bodies, supports and pairs, assembly and factorisation are taken over: another load
-        costs back-solves only.
-
-    Returns
-    -------
-    Solution
-
-    Raises
-    ------
-    ValueError, TypeError
-        Bad input, before any assembly.
-    ConvergenceError
-        The active set did not settle, or a body can still move rigidly; carries the last iterate.
-    """
-    check_element(order, element)
-    if mesh is not None and maxh is not None:
-        raise ValueError(f"maxh={maxh} has no effect on a given mesh; give one of mesh and maxh")
-    if start is not None and not isinstance(start, Solution):
-        raise TypeError(f"start={start!r} is not a Solution")
-    if start is not None and len(start.discrete.lines) != len(problem.contact):
-        raise ValueError(
-            f"start has {len(start.discrete.lines)} contact pairs, the problem "
-            f"{len(problem.contact)}; a warm start needs the same pairs"
-        )
-    mesh = first_mesh(problem, maxh) if mesh is None else mesh
-    problem.check(mesh)
-    if start is None:
-        warn_of_locking(problem, mesh, order)
-    coarse = _coarse_run(problem, mesh, order, element) if start is None else []
-    solution = solve_level(problem, mesh, order, element, coarse[-1] if coarse else start)
-    solution = replace(solution, coarse_levels=len(coarse))
-    log.info("%s", solution)
-    return solution
-
-
-def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> list[Solution]:
-    """A short adaptive run, to start a large mesh near its active set.
-
-    Empty where it would not pay: on small meshes, and without a CAD geometry to mesh coarsely.
-    """
-    given = isinstance(problem.geometry, ng.Mesh)
-    searched = any(not contact.bilateral for contact in problem.contact)
-    if given or not searched or unknowns(mesh, order, element) < LARGE:
-        return []
-    size = float(np.ptp(np.array(mesh.ngmesh.Coordinates()), axis=0).max()) / COARSE
-    try:
-        return list(adapt(problem, maxh=size, order=COARSE_ORDER, max_dofs=COARSE_DOFS))
-    except (ContactError, ValueError) as error:  # it decides nothing but the start
-        log.debug("no coarse run: %s", error)
-        return []
 
 
 def adapt(

@@ -15,7 +15,7 @@ from conftest import unmatched_blocks
 from drivers.reference import cases
 from drivers.reference.straight import patch, relative_energy_error
 from ngcontact import Contact, ContactError, Elastic, NoEquilibriumError, Problem, adapt, solve
-from ngcontact import level as one_level
+from ngcontact import one_mesh as one_level
 from ngcontact.geometries import blocks, disc_on_block
 from ngcontact.mesh.generation import first_mesh
 
