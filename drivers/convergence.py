@@ -20,8 +20,8 @@ from drivers.reference.cases import Case
 from drivers.reference.curved import Rings
 from drivers.reference.straight import relative_energy_error
 from ngcontact import Solution, solve
-from ngcontact.adaptivity.refinement import refined
-from ngcontact.mesh.generation import first_mesh
+from ngcontact.adaptivity import refined
+from ngcontact.mesh import first_mesh
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,12 @@ import importlib as _importlib
 import typing as _typing
 
 from .errors import ContactError, ConvergenceError, NoEquilibriumError
-from .problem.contact import Contact
-from .problem.material import Elastic, Hooke
-from .problem.problem import Problem
+from .problem import Contact, Elastic, Hooke, Problem
 
 if _typing.TYPE_CHECKING:
     from .adaptive import adapt
-    from .output.vtk import write_series
-    from .qp.solving import solve_qp
+    from .output import write_series
+    from .qp import solve_qp
     from .solution import Solution
     from .solving import solve
 

@@ -12,17 +12,14 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from .adaptivity.marking import doerfler
-from .adaptivity.refinement import refined
+from .adaptivity import doerfler, refined
 from .arrays import power_of_two
-from .contact.transitions import ending_segments
+from .contact import ending_segments
 from .errors import ConvergenceError
-from .fem.element import check_element, unknowns
-from .fem.moduli import bulk_moduli, shear_moduli, warn_of_locking
-from .mesh.curving import curve
-from .mesh.generation import first_mesh
+from .fem import bulk_moduli, check_element, shear_moduli, unknowns, warn_of_locking
+from .mesh import curve, first_mesh
 from .one_mesh import solve_level
-from .problem.problem import Problem
+from .problem import Problem
 from .solution import Solution
 
 ROUND_OFF = 1e-12  # relative estimate at which refinement stops: the solution is exact

@@ -7,12 +7,11 @@ import logging
 import ngsolve as ng
 import numpy as np
 
-from .contact.line import unmatched
-from .discrete.discrete_problem import Discrete, discretise, minimise_energy
-from .discrete.initial_active_set import carried_active_set, first_active_set
-from .mesh.curving import check_curves, curve
-from .problem.problem import Problem
-from .qp.quadratic_program import Minimiser
+from .contact import unmatched
+from .discrete import Discrete, carried_active_set, discretise, first_active_set, minimise_energy
+from .mesh import check_curves, curve
+from .problem import Problem
+from .qp import Minimiser
 from .solution import Solution
 
 MANY = 0.2  # of the points in contact, that face no node, spoil the pressure

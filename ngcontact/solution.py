@@ -12,17 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array, Mask, root_of_squares
-from .contact.transitions import Transitions, transitions_of
-from .discrete.discrete_problem import Discrete
-from .discrete.reactions import resultants
-from .discrete.rigid_motions import RigidMotion
-from .estimator.residual import Estimate, estimate
-from .fem.energy import energy_norm, potential_energy
-from .fem.model import strain
-from .output.vtk import write_solution
-from .problem.problem import Problem
-from .qp.optimality import optimality
-from .qp.quadratic_program import Minimiser
+from .contact import Transitions, transitions_of
+from .discrete import Discrete, RigidMotion, resultants
+from .estimator import Estimate, estimate
+from .fem import energy_norm, potential_energy, strain
+from .output import write_solution
+from .problem import Problem
+from .qp import Minimiser, optimality
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,7 +226,7 @@ class Solution:
 
         `scale` magnifies the displacement; chosen to be seen when left out.
         """
-        from .output.picture import plot_solution  # matplotlib loads only for a picture
+        from .output import plot_solution
 
         plot_solution(self, path, scale)
 

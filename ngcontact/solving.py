@@ -9,11 +9,10 @@ import numpy as np
 
 from .adaptive import adapt, log
 from .errors import ContactError
-from .fem.element import check_element, unknowns
-from .fem.moduli import warn_of_locking
-from .mesh.generation import first_mesh
+from .fem import check_element, unknowns, warn_of_locking
+from .mesh import first_mesh
 from .one_mesh import solve_level
-from .problem.problem import Problem
+from .problem import Problem
 from .solution import Solution
 
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.

@@ -12,8 +12,8 @@ import numpy as np
 from drivers.adaptive_study.studies import REFERENCE, Study
 from drivers.reference.straight import Hertz
 from ngcontact import Problem, Solution, adapt, solve
-from ngcontact.adaptivity.refinement import refined
-from ngcontact.mesh.generation import first_mesh
+from ngcontact.adaptivity import refined
+from ngcontact.mesh import first_mesh
 
 UNKNOWNS = {1: 40_000, 2: 40_000, 3: 40_000, 4: 50_000}  # order 4 is asymptotic from 10k on
 NEAR = 0.2  # distance from a transition, relative to the zone, that counts as near

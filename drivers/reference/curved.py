@@ -19,7 +19,7 @@ from drivers.reference.straight import NO_FORCE, Exact, Profile, compiled, posit
 from drivers.reference.westergaard import CF, hooke, moduli
 
 if TYPE_CHECKING:
-    from ngcontact.problem.material import Elastic
+    from ngcontact.problem import Elastic
 
 
 @dataclass(frozen=True, eq=False)

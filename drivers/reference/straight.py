@@ -28,7 +28,7 @@ from drivers.reference.westergaard import (
     moduli,
     root_potential,
 )
-from ngcontact.problem.material import Elastic
+from ngcontact.problem import Elastic
 
 if TYPE_CHECKING:
     from ngcontact.solution import Solution

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 import ngsolve as ng
 
 if TYPE_CHECKING:
-    from ngcontact.problem.material import Elastic
+    from ngcontact.problem import Elastic
 
 CF: TypeAlias = ng.CoefficientFunction
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ngcontact import Contact, Elastic, Problem
-from ngcontact.problem.contact import Gap
+from ngcontact.problem import Gap
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]

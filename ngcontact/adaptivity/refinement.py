@@ -8,11 +8,10 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..contact.line import contact_line
-from ..fem.boundary import Trace, boundary_trace
-from ..mesh.parents import copied
-from ..problem.contact import Contact
-from ..problem.problem import Problem
+from ..contact import contact_line
+from ..fem import Trace, boundary_trace
+from ..mesh import copied
+from ..problem import Contact, Problem
 
 ROUNDS = 12  # refinements after which a facing segment that still lags stays unmatched
 

@@ -1,1 +1,5 @@
 """Gamma_K on a mesh: facing points, gaps, weights, rows, ends of contact."""
+
+import lazy_loader as _lazy
+
+__getattr__, __dir__, __all__ = _lazy.attach_stub(__name__, __file__)

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..arrays import Index
-from ..constraints.rows import Rows
-from ..fem.boundary import Trace
+from ..constraints import Rows
+from ..fem import Trace
 from ..lagrange import lagrange
 from .line import ContactLine, without
 from .projection import snap

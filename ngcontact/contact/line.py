@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, Index
-from ..fem.boundary import Trace
+from ..fem import Trace
 from ..lagrange import gauss, lagrange
-from ..problem.contact import Contact
-from ..problem.regions import boundary_mask
+from ..problem import Contact, boundary_mask
 from .search import partners
 
 GRAZING = 1e-8  # cosine between normal and direction from which a point faces the other body

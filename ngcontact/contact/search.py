@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, Index
-from ..fem.boundary import Trace
+from ..fem import Trace
 from .projection import Partners, cast, coincident
 
 ROUND_OFF = 4 * np.finfo(float).eps  # of a measured gap, relative to the coordinates

@@ -9,21 +9,14 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Mask
-from ..constraints.basis_transformation import Basis, change_of_basis
-from ..constraints.rows import Conditions
-from ..contact.assembly import joined, kept_lines, merged
-from ..contact.line import ContactLine
+from ..constraints import Basis, Conditions, change_of_basis
+from ..contact import ContactLine, joined, kept_lines, merged
 from ..errors import ConvergenceError
-from ..fem.boundary import Trace, boundary_trace
-from ..fem.element import node_basis
-from ..fem.space import LOAD_BONUS, Space, assemble, load_vector
-from ..linalg.sparse import congruent
-from ..mesh.parents import parents
-from ..problem.problem import Problem
-from ..qp.active_set import minimise
-from ..qp.null_space import no_kernel
-from ..qp.quadratic_program import Minimiser, Program
-from ..qp.schur_complement import Systems
+from ..fem import LOAD_BONUS, Space, Trace, assemble, boundary_trace, load_vector, node_basis
+from ..linalg import congruent
+from ..mesh import parents
+from ..problem import Problem
+from ..qp import Minimiser, Program, Systems, minimise, no_kernel
 from ..triplets import from_triplets
 from .equilibrium import Rigid, rigid_motions
 from .linear_systems import linear_systems

@@ -17,13 +17,12 @@ from scipy.linalg import block_diag
 from scipy.optimize import linprog, nnls
 
 from ..arrays import Array, Mask
-from ..constraints.basis_transformation import Basis
-from ..constraints.rows import Conditions
+from ..constraints import Basis, Conditions
 from ..errors import NoEquilibriumError
-from ..fem.space import LOAD_BONUS, Space, load_vector
-from ..mesh.cad import cad_edges
-from ..problem.problem import Problem
-from ..qp.null_space import FREE, Kernel, kernel, null_space
+from ..fem import LOAD_BONUS, Space, load_vector
+from ..mesh import cad_edges
+from ..problem import Problem
+from ..qp import FREE, Kernel, kernel, null_space
 from .rigid_motions import (
     Bodies,
     RigidMotion,

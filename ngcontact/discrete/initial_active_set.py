@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import Mask
-from ..contact.transitions import transitions
-from ..qp.quadratic_program import Minimiser
+from ..contact import transitions
+from ..qp import Minimiser
 from .discrete_problem import Discrete
 
 SEPARATION = 1e-6  # of the directions at a corner, relative to the zone

@@ -7,12 +7,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Integers, Mask
-from ..linalg.coarse_spaces import coarsenings, refined_share
-from ..linalg.iterative import IterativeSystems
-from ..linalg.multigrid import Multigrid
-from ..linalg.sparse import cholesky
-from ..qp.quadratic_program import Program
-from ..qp.schur_complement import Systems
+from ..linalg import IterativeSystems, Multigrid, cholesky, coarsenings, refined_share
+from ..qp import Program, Systems
 
 # Unknowns by order from which multigrid is the faster one, on one thread: at 80 000 of orders 1
 # and 2 both take the same time, of order 3 at a million; it always takes less memory. See

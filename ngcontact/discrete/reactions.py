@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Array
-from ..fem.boundary import Trace
-from ..problem.problem import Problem
-from ..problem.regions import boundary_mask
+from ..fem import Trace
+from ..problem import Problem, boundary_mask
 
 
 def resultants(problem: Problem, trace: Trace, reaction: Array) -> dict[str, Array]:

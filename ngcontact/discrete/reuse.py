@@ -6,12 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..constraints.basis_transformation import Basis
-from ..contact.line import ContactLine, contact_line
-from ..fem.boundary import Trace
-from ..problem.contact import Contact
-from ..problem.material import Elastic, Hooke, varies
-from ..problem.problem import Problem
+from ..constraints import Basis
+from ..contact import ContactLine, contact_line
+from ..fem import Trace
+from ..problem import Contact, Elastic, Hooke, Problem, varies
 
 
 def same_boundary(one: Trace, other: Trace) -> bool:

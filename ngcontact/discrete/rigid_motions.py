@@ -8,12 +8,10 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index
-from ..constraints.rows import Conditions
-from ..fem.boundary import Trace
-from ..fem.space import Space
-from ..problem.problem import Problem
-from ..problem.regions import body_of_vertex
-from ..qp.null_space import FREE, null_space
+from ..constraints import Conditions
+from ..fem import Space, Trace
+from ..problem import Problem, body_of_vertex
+from ..qp import FREE, null_space
 
 LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
 

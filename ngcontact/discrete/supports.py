@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Index
-from ..constraints.rows import Conditions
-from ..fem.boundary import Trace
-from ..problem.problem import Problem
-from ..problem.regions import boundary_mask
+from ..constraints import Conditions
+from ..fem import Trace
+from ..problem import Problem, boundary_mask
 
 
 def _prescribed(problem: Problem, trace: Trace) -> Conditions:

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, Index
-from ..contact.line import ContactLine
-from ..contact.search import partners
-from ..fem.boundary import Trace
+from ..contact import ContactLine, partners
+from ..fem import Trace
 from ..lagrange import gauss_lobatto
 from .terms import Share, Term
 

@@ -8,7 +8,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array
-from ..problem.material import varies
+from ..problem import varies
 
 if TYPE_CHECKING:
     from ..solution import Solution

@@ -21,9 +21,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Array
-from ..fem.boundary import Trace
-from ..linalg.sparse import cholesky, lower_half, shared
-from ..problem.problem import Problem
+from ..fem import Trace
+from ..linalg import cholesky, lower_half, shared
+from ..problem import Problem
 from ..triplets import from_triplets
 from .terms import Share, Term
 

@@ -32,13 +32,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, Index, power_of_two
-from ..contact.line import ContactLine, at_quadrature, prescribed_gap
-from ..contact.search import partners
-from ..fem.boundary import Trace
-from ..fem.moduli import NEARLY_INCOMPRESSIBLE, bulk_moduli, nearly_incompressible, shear_moduli
+from ..contact import ContactLine, at_quadrature, partners, prescribed_gap
+from ..fem import NEARLY_INCOMPRESSIBLE, Trace, bulk_moduli, nearly_incompressible, shear_moduli
 from ..lagrange import gauss, lagrange
-from ..mesh.elements import diameters
-from ..problem.regions import boundary_mask
+from ..mesh import diameters
+from ..problem import boundary_mask
 from .contact import Side, met_from_behind, nodal_pressure, traction
 from .interior import divergence_and_jump, integral, projected_stress
 from .pressure_correction import PressureCorrection

@@ -1,1 +1,20 @@
 """The finite element spaces V_h: elements, boundary nodes, forms, energies."""
+
+from .boundary import Trace as Trace
+from .boundary import boundary_trace as boundary_trace
+from .element import check_element as check_element
+from .element import node_basis as node_basis
+from .element import unknowns as unknowns
+from .element import unknowns_of as unknowns_of
+from .energy import energy_norm as energy_norm
+from .energy import potential_energy as potential_energy
+from .model import strain as strain
+from .moduli import NEARLY_INCOMPRESSIBLE as NEARLY_INCOMPRESSIBLE
+from .moduli import bulk_moduli as bulk_moduli
+from .moduli import nearly_incompressible as nearly_incompressible
+from .moduli import shear_moduli as shear_moduli
+from .moduli import warn_of_locking as warn_of_locking
+from .space import LOAD_BONUS as LOAD_BONUS
+from .space import Space as Space
+from .space import assemble as assemble
+from .space import load_vector as load_vector

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, Index
 from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative
-from ..mesh.cad import CadEdge, cad_edges
+from ..mesh import CadEdge, cad_edges
 
 CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two rows at a smaller
 # one would be dependent to 1 / turn^2

@@ -7,7 +7,7 @@ import math
 import ngsolve as ng
 
 from ..arrays import power_of_two
-from ..problem.problem import Problem
+from ..problem import Problem
 from .model import strain
 from .space import Space
 

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
-from ..mesh.elements import middles
-from ..problem.material import Elastic, Hooke, varies
-from ..problem.problem import Problem
+from ..mesh import middles
+from ..problem import Elastic, Hooke, Problem, varies
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
 NEARLY_INCOMPRESSIBLE = 6.0

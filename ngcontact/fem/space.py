@@ -10,10 +10,8 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Array, Index
-from ..linalg.sparse import shared
-from ..problem.material import varies
-from ..problem.problem import Problem
-from ..problem.regions import boundary_mask
+from ..linalg import shared
+from ..problem import Problem, boundary_mask, varies
 from .boundary import Trace
 from .element import node_basis, vector_space
 from .model import strain

@@ -8,9 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..arrays import Array, Factor, Mask
-from ..qp.optimality import terms
-from ..qp.quadratic_program import Program
-from ..qp.schur_complement import REFINED, ROUGH, Anchor, Systems
+from ..qp import REFINED, ROUGH, Anchor, Program, Systems, terms
 from .multigrid import Multigrid, StalledError
 
 LOOSE = 1e-2  # residual, relative to the one a system starts from, that tells its active set

@@ -1,1 +1,11 @@
 """Meshes: exact CAD curves, first meshes with matched nodes, curving, parents of vertices."""
+
+from .cad import CadEdge as CadEdge
+from .cad import cad_edges as cad_edges
+from .curving import check_curves as check_curves
+from .curving import curve as curve
+from .elements import diameters as diameters
+from .elements import middles as middles
+from .generation import first_mesh as first_mesh
+from .parents import copied as copied
+from .parents import parents as parents

@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
-from ..problem.contact import Contact
-from ..problem.problem import Problem
+from ..problem import Contact, Problem
 from .cad import CadEdge
 
 TURN = 0.5  # largest turn (radians) of a curve along one contact segment

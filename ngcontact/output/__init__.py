@@ -1,1 +1,5 @@
 """Files and pictures of a solution."""
+
+from .picture import plot_solution as plot_solution
+from .vtk import write_series as write_series
+from .vtk import write_solution as write_solution

@@ -1,1 +1,10 @@
 """The continuous contact problem of HH81 section 3: laws, pairs, supports, loads, checks."""
+
+from .contact import Contact as Contact
+from .contact import Gap as Gap
+from .material import Elastic as Elastic
+from .material import Hooke as Hooke
+from .material import varies as varies
+from .problem import Problem as Problem
+from .regions import body_of_vertex as body_of_vertex
+from .regions import boundary_mask as boundary_mask

@@ -16,7 +16,7 @@ from drivers.benchmark.engines.assembled import Assembled, solved
 from drivers.benchmark.scenes.meshes import Mesh, made
 from drivers.benchmark.scenes.ngsolve_plane import load, matrix, nodal, numbering
 from drivers.benchmark.scenes.problems import Common
-from ngcontact.linalg.sparse import lower_half
+from ngcontact.linalg import lower_half
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -17,7 +17,7 @@ from drivers.benchmark.scenes.problems import Common
 from drivers.benchmark.scenes.triangles import sides
 from ngcontact import Problem
 from ngcontact.geometries.region import body, polygon
-from ngcontact.mesh.generation import first_mesh
+from ngcontact.mesh import first_mesh
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -9,11 +9,9 @@ import ngsolve as ng
 import numpy as np
 
 from ngcontact import Problem
-from ngcontact.adaptivity.refinement import refined
-from ngcontact.fem.element import unknowns_of
-from ngcontact.fem.model import strain
-from ngcontact.mesh.curving import curve
-from ngcontact.mesh.generation import first_mesh
+from ngcontact.adaptivity import refined
+from ngcontact.fem import strain, unknowns_of
+from ngcontact.mesh import curve, first_mesh
 
 START = 300  # unknowns of a first mesh, about; refinement is much quicker than meshing at size
 

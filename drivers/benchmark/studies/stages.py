@@ -12,8 +12,7 @@ from pathlib import Path
 from drivers.benchmark.scenes.problems import Common
 from drivers.benchmark.studies.linear import uniform_mesh
 from ngcontact import solve
-from ngcontact.adaptivity.marking import doerfler
-from ngcontact.adaptivity.refinement import refined
+from ngcontact.adaptivity import doerfler, refined
 
 SIZES = (1_000, 10_000, 100_000, 1_000_000)
 ORDER = 2

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from drivers.stress import Outcome, refused
 from ngcontact import solve_qp
-from ngcontact.qp.quadratic_program import Minimiser
+from ngcontact.qp import Minimiser
 
 Array = NDArray[np.float64]
 Program = tuple[Array, Array, Array, Array]  # A, f, B, g

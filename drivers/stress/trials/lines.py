@@ -17,7 +17,7 @@ from drivers.reference.westergaard import effective_modulus, moduli
 from drivers.stress import Outcome, solved
 from drivers.stress.trials.shapes import structured
 from ngcontact import Contact, Problem, Solution, adapt, solve
-from ngcontact.contact.corners import nodal_pressure
+from ngcontact.contact import nodal_pressure
 from ngcontact.geometries import blocks
 
 Array = NDArray[np.float64]

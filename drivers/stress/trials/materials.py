@@ -22,9 +22,9 @@ from drivers.reference.curved import rings as ring_solution
 from drivers.reference.straight import Exact, relative_energy_error, transition
 from drivers.stress import Outcome, refused, solved
 from ngcontact import ContactError, Elastic, Problem, Solution, adapt, solve
-from ngcontact.adaptivity.refinement import refined
+from ngcontact.adaptivity import refined
 from ngcontact.geometries import punch
-from ngcontact.mesh.generation import first_mesh
+from ngcontact.mesh import first_mesh
 
 TOWARDS_HALF = (0.3, 0.49, 0.499, 0.4999)
 EXTREME = 0.499999

@@ -22,7 +22,7 @@ from drivers.stress.differences import differences
 from drivers.stress.motion import Array, Motion, Scene, moved_mesh, posed, swapped
 from ngcontact import Contact, Elastic, Problem, Solution, solve
 from ngcontact.geometries import blocks
-from ngcontact.mesh.generation import first_mesh
+from ngcontact.mesh import first_mesh
 
 SAME = 1e-9  # difference of two solutions of one problem, the figure asked for
 ORDERS = (1, 4)

@@ -1,0 +1,2 @@
+from .marking import doerfler as doerfler
+from .refinement import refined as refined

@@ -1,0 +1,14 @@
+from .assembly import joined as joined
+from .assembly import kept_lines as kept_lines
+from .assembly import merged as merged
+from .corners import nodal_pressure as nodal_pressure
+from .line import ContactLine as ContactLine
+from .line import at_quadrature as at_quadrature
+from .line import contact_line as contact_line
+from .line import prescribed_gap as prescribed_gap
+from .line import unmatched as unmatched
+from .search import partners as partners
+from .transitions import Transitions as Transitions
+from .transitions import ending_segments as ending_segments
+from .transitions import transitions as transitions
+from .transitions import transitions_of as transitions_of
