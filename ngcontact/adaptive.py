@@ -18,7 +18,7 @@ from .contact import ending_segments
 from .errors import ConvergenceError
 from .fem import bulk_moduli, check_element, shear_moduli, unknowns, warn_of_locking
 from .mesh import curve, first_mesh
-from .one_mesh import solve_level
+from .one_mesh import solve_on
 from .problem import Problem
 from .solution import Solution
 
@@ -145,7 +145,7 @@ def _levels(
     """Levels of `adapt` on checked input."""
     solution: Solution | None = None
     while unknowns(mesh, order, element) <= max_dofs:
-        solution = replace(solve_level(problem, mesh, order, element, solution), adaptive=True)
+        solution = replace(solve_on(problem, mesh, order, element, solution), adaptive=True)
         solution.discrete.systems.forget()  # a level's factorisation is of no use to the next one
         yield solution
         error = solution.relative_error_estimate

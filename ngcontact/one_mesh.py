@@ -8,10 +8,16 @@ import ngsolve as ng
 import numpy as np
 
 from .contact import unmatched
-from .discrete import Discrete, carried_active_set, discretise, first_active_set, minimise_energy
+from .discrete import (
+    DiscreteProblem,
+    carried_active_set,
+    discretise,
+    first_active_set,
+    minimise_energy,
+)
 from .mesh import check_curves, curve
 from .problem import Problem
-from .qp import Minimiser
+from .qp import Iterate
 from .solution import Solution
 
 MANY = 0.2  # of the points in contact, that face no node, spoil the pressure
@@ -19,7 +25,7 @@ MANY = 0.2  # of the points in contact, that face no node, spoil the pressure
 log = logging.getLogger("ngcontact")
 
 
-def _unmatched_pairs(discrete: Discrete, minimiser: Minimiser) -> list[int]:
+def _unmatched_pairs(discrete: DiscreteProblem, minimiser: Iterate) -> list[int]:
     """Pairs of which many points in contact face no node."""
     stops = np.cumsum([len(line.node) for line in discrete.lines])[:-1]
     active = np.split(minimiser.active, stops) if discrete.lines else []
@@ -30,7 +36,7 @@ def _unmatched_pairs(discrete: Discrete, minimiser: Minimiser) -> list[int]:
     return [pair for pair, share in enumerate(shares) if share > MANY]
 
 
-def _warn_of_unmatched(discrete: Discrete, minimiser: Minimiser, told: list[int]) -> None:
+def _warn_of_unmatched(discrete: DiscreteProblem, minimiser: Iterate, told: list[int]) -> None:
     """Say once a run where pressures are not to be trusted."""
     for pair in _unmatched_pairs(discrete, minimiser):
         if pair not in told:
@@ -45,7 +51,7 @@ def _warn_of_unmatched(discrete: Discrete, minimiser: Minimiser, told: list[int]
             )
 
 
-def solve_level(
+def solve_on(
     problem: Problem, mesh: ng.Mesh, order: int, element: str, start: Solution | None
 ) -> Solution:
     """Solution on one mesh, of which names and values are known to be right."""

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from .arrays import Array, Mask, root_of_squares
 from .contact import Transitions, transitions_of
-from .discrete import Discrete, RigidMotion, resultants
+from .discrete import DiscreteProblem, RigidMotion, resultants
 from .estimator import Estimate, estimate
 from .fem import energy_norm, potential_energy, strain
 from .output import write_solution
 from .problem import Problem
-from .qp import Minimiser, optimality
+from .qp import Iterate, kkt_residuals
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +39,9 @@ class Solution:
         "isoparametric", "superparametric" or "physical".
     displacement : ng.GridFunction
         u_h on a VectorH1 space; "unknowns" means ``displacement.space.ndof``.
-    discrete : Discrete
+    discrete : DiscreteProblem
         The algebraic problem.
-    minimiser : Minimiser
+    minimiser : Iterate
         Its solution.
     work : dict
         Counts of assemblies, factorizations, back_solves, gap_searches, curved_elements and
@@ -58,8 +58,8 @@ class Solution:
     order: int
     element: str
     displacement: ng.GridFunction
-    discrete: Discrete
-    minimiser: Minimiser
+    discrete: DiscreteProblem
+    minimiser: Iterate
     work: dict[str, int] = field(default_factory=dict)
     coarse_levels: int = 0
     adaptive: bool = False
@@ -215,7 +215,7 @@ class Solution:
         contact force;
         `complementarity`: sum of force times gap over force times length.
         """
-        return optimality(self.discrete.program, self.minimiser)
+        return kkt_residuals(self.discrete.program, self.minimiser)
 
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write `path` (.vtu) and, beside it, ``<stem>_contact.vtp``."""

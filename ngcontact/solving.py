@@ -11,7 +11,7 @@ from .adaptive import adapt, log
 from .errors import ContactError
 from .fem import check_element, unknowns, warn_of_locking
 from .mesh import first_mesh
-from .one_mesh import solve_level
+from .one_mesh import solve_on
 from .problem import Problem
 from .solution import Solution
 
@@ -78,7 +78,7 @@ def solve(
     if start is None:
         warn_of_locking(problem, mesh, order)
     coarse = _coarse_run(problem, mesh, order, element) if start is None else []
-    solution = solve_level(problem, mesh, order, element, coarse[-1] if coarse else start)
+    solution = solve_on(problem, mesh, order, element, coarse[-1] if coarse else start)
     solution = replace(solution, coarse_levels=len(coarse))
     log.info("%s", solution)
     return solution

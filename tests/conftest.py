@@ -16,7 +16,7 @@ from ngcontact.geometries import blocks
 from ngcontact.linalg.coarse_spaces import coarsenings
 from ngcontact.mesh.curving import curve
 from ngcontact.mesh.generation import first_mesh
-from ngcontact.mesh.parents import parents
+from ngcontact.mesh.parents import vertex_parents
 from ngcontact.problem.regions import boundary_mask
 
 REPRODUCED = {  # by order: cases whose solution lies in the space
@@ -86,4 +86,4 @@ def steps_of(problem, coarsest=100):
     """Coarser spaces of a discrete problem."""
     trace = problem.space.trace
     nodes = trace.nodes[problem.space.nodal]
-    return coarsenings(problem.basis.T, parents(trace.mesh), nodes, coarsest)
+    return coarsenings(problem.basis.T, vertex_parents(trace.mesh), nodes, coarsest)

@@ -11,14 +11,14 @@ from drivers.reference import cases
 from ngcontact.adaptivity.refinement import refined
 from ngcontact.mesh.curving import curve
 from ngcontact.mesh.generation import first_mesh
-from ngcontact.mesh.parents import copied, parents
+from ngcontact.mesh.parents import copied, vertex_parents
 
 BLOCK = cases.partly_opening_block()  # straight, nodes matched
 
 
 def check_midpoints(mesh, old):
     """Vertices after the first `old` ones lie in the middle of their parents."""
-    family, xy = parents(mesh), coordinates(mesh)
+    family, xy = vertex_parents(mesh), coordinates(mesh)
     assert len(family) == mesh.nv
     assert (family[:old] == -1).all()
     new = np.arange(old, mesh.nv)
@@ -30,7 +30,7 @@ def check_midpoints(mesh, old):
 
 def test_a_first_mesh_has_no_parents():
     mesh = first_mesh(BLOCK, 0.5)
-    np.testing.assert_array_equal(parents(mesh), np.full((mesh.nv, 2), -1))
+    np.testing.assert_array_equal(vertex_parents(mesh), np.full((mesh.nv, 2), -1))
 
 
 @pytest.mark.parametrize("local", [False, True])
@@ -39,7 +39,7 @@ def test_vertices_lie_between_their_parents(local):
     for _ in range(3):
         mesh = refined(BLOCK, mesh, near_origin(mesh) if local else None)
     check_midpoints(mesh, first.nv)
-    np.testing.assert_array_equal(parents(first), np.full((first.nv, 2), -1))
+    np.testing.assert_array_equal(vertex_parents(first), np.full((first.nv, 2), -1))
 
 
 def test_what_refinement_in_place_knows_is_kept():
@@ -59,5 +59,5 @@ def test_curved_copies_keep_them():
     mesh = refined(problem, first_mesh(problem, 0.3))
     bent, _ = curve(mesh, 2, "isoparametric")
     assert bent is not mesh
-    np.testing.assert_array_equal(parents(bent), parents(mesh))
-    assert (parents(bent) >= 0).any()
+    np.testing.assert_array_equal(vertex_parents(bent), vertex_parents(mesh))
+    assert (vertex_parents(bent) >= 0).any()

@@ -9,14 +9,14 @@ from conftest import REFINED, coordinates, discrete, near_origin, steps_of
 
 from drivers.reference import cases
 from ngcontact.adaptivity.refinement import refined
-from ngcontact.discrete.discrete_problem import Discrete, discretise
+from ngcontact.discrete.discrete_problem import DiscreteProblem, discretise
 from ngcontact.lagrange import gauss_lobatto
 from ngcontact.linalg.coarse_spaces import RingError, coarsenings, refined_share
 from ngcontact.mesh.generation import first_mesh
-from ngcontact.mesh.parents import parents
+from ngcontact.mesh.parents import vertex_parents
 
 
-def linear_field(problem: Discrete) -> np.ndarray:
+def linear_field(problem: DiscreteProblem) -> np.ndarray:
     """Node values of a linear displacement, edge functions 0, (2n,)."""
     trace = problem.space.trace
     xy = coordinates(trace.mesh)
@@ -67,7 +67,7 @@ def test_spaces_shrink_geometrically(local: bool):
     assert all(k <= n / 2 for n, k in sizes)
     assert sizes[0][0] == 2 * mesh.nv
     assert sizes[-1][1] <= 4 * first.nv
-    assert refined_share(parents(mesh)) == pytest.approx(1 - first.nv / mesh.nv)
+    assert refined_share(vertex_parents(mesh)) == pytest.approx(1 - first.nv / mesh.nv)
 
 
 def test_the_first_mesh_is_the_coarsest():

@@ -26,7 +26,7 @@ from ngcontact.discrete.discrete_problem import discretise, minimise_energy
 from ngcontact.discrete.equilibrium import rigid_motions
 from ngcontact.geometries import blocks, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
-from ngcontact.qp.schur_complement import SingularError, Systems
+from ngcontact.qp.schur_complement import BorderedSystems, SingularError
 
 STEEL = Elastic(E=1000.0, nu=0.3)
 WEIGHT = 0.1  # of a disc, per area
@@ -177,7 +177,7 @@ def test_bodies_that_supports_hold_cost_nothing():
     solution = solve(problem, maxh=0.3)
     d = solution.discrete
     assert d.rigid is None
-    assert d.program.kernel.held.size == d.program.kernel.pins.size == 0
+    assert d.program.null_space.held.size == d.program.null_space.pins.size == 0
     p = d.program
     assert rigid_motions(problem, d.space, d.conditions, d.basis, d.B, p.g, p.equality) is None
 
@@ -325,7 +325,7 @@ def test_a_failure_carries_the_iterate_where_the_bodies_are(stopped, monkeypatch
     discrete = discretise(problem, solve(problem, maxh=0.3).mesh, 2, "isoparametric")
     p = discrete.program
     assert np.abs(discrete.rigid.rows @ discrete.rigid.placing).max() > 0.09
-    original, met = Systems.solve, []
+    original, met = BorderedSystems.solve, []
 
     def fail(self, active, anchor=None):
         if len(met) == stopped:
@@ -333,12 +333,12 @@ def test_a_failure_carries_the_iterate_where_the_bodies_are(stopped, monkeypatch
         met.append(active)
         return original(self, active, anchor)
 
-    monkeypatch.setattr(Systems, "solve", fail)
+    monkeypatch.setattr(BorderedSystems, "solve", fail)
     with pytest.raises(ConvergenceError, match="stopped") as failure:
         minimise_energy(discrete, np.ones(len(p.g), dtype=bool))
     u, closed = failure.value.iterate.u, met[-1]
     np.testing.assert_allclose(u[p.unknown[closed]], p.g[closed], rtol=ROUND_OFF)
-    assert np.abs(p.kernel.conditions @ u).max() <= ROUND_OFF * np.abs(u).max()
+    assert np.abs(p.null_space.conditions @ u).max() <= ROUND_OFF * np.abs(u).max()
 
 
 def shaft(load):

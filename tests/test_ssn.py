@@ -27,8 +27,8 @@ from ngcontact.errors import ConvergenceError
 from ngcontact.qp import active_set as newton
 from ngcontact.qp import schur_complement as bordered
 from ngcontact.qp.active_set import minimise
-from ngcontact.qp.quadratic_program import Program
-from ngcontact.qp.schur_complement import Systems
+from ngcontact.qp.quadratic_program import QuadraticProgram
+from ngcontact.qp.schur_complement import BorderedSystems
 from ngcontact.qp.solving import solve_qp
 
 SIZES_AND_SEEDS = st.integers(1, 40), st.integers(0, 2**32 - 1)
@@ -140,7 +140,7 @@ def membrane(n=60, load=-1.0, height=-0.02):
 def first_unknowns_bounded(K, b, g):
     """The program of bounds g on the first unknowns, none of them fixed."""
     m, n = g.size, b.size
-    return Program(
+    return QuadraticProgram(
         K=K,
         b=b,
         R=sp.identity(n, format="csr")[:m],
@@ -181,7 +181,7 @@ def test_one_factorisation_at_a_time(monkeypatch):
         alive.add(solve)
         return solve
 
-    minimise(Systems(program, factor), np.ones(6, dtype=bool))
+    minimise(BorderedSystems(program, factor), np.ones(6, dtype=bool))
     assert len(before) > 1
     assert not any(before)
 
@@ -197,7 +197,7 @@ def test_bordering_equals_refactorising(monkeypatch, border):
     calls = []
     start = np.zeros(n, dtype=bool)
     start[::2] = True
-    result = minimise(Systems(program, counting_factor(K, calls)), start)
+    result = minimise(BorderedSystems(program, counting_factor(K, calls)), start)
     reference = solve_qp(K, -b, flip, g)
     np.testing.assert_array_equal(result.active, reference.active)
     np.testing.assert_allclose(result.u, reference.u, rtol=1e-11)
@@ -218,7 +218,7 @@ def test_given_values_and_equalities_with_unit_rows():
     R = sp.identity(n, format="csr")[rows]
     fixed, values = np.zeros(n, dtype=bool), np.zeros(n)
     fixed[0], values[0] = True, 0.01
-    program = Program(
+    program = QuadraticProgram(
         K=K,
         b=b,
         R=R,
@@ -228,7 +228,7 @@ def test_given_values_and_equalities_with_unit_rows():
         values=values,
         unknown=rows,
     )
-    result = minimise(Systems(program, counting_factor(K, [])))
+    result = minimise(BorderedSystems(program, counting_factor(K, [])))
     assert result.u[0] == 0.01
     assert result.u[3] == 0.05
     assert result.active.tolist() == [True, False]
@@ -284,7 +284,9 @@ def test_bordered_systems_do_not_depend_on_the_stiffness(stiffness):
         K, b, g = sp.csr_matrix(X @ X.T), rng.normal(size=n), 0.3 * rng.normal(size=m)
         rows = sp.identity(n, format="csr")[:m]
         program = first_unknowns_bounded(stiffness * K, stiffness * b, g)
-        result = minimise(Systems(program, counting_factor(program.K, [])), rng.random(m) < 0.5)
+        result = minimise(
+            BorderedSystems(program, counting_factor(program.K, [])), rng.random(m) < 0.5
+        )
         reference = solve_qp(K, b, rows, g)
         np.testing.assert_array_equal(result.active, reference.active)
         # Condition of these matrices up to 1e5: round-off 1e-10.

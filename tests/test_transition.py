@@ -12,7 +12,7 @@ import pytest
 from drivers.reference import cases
 from ngcontact import Contact, Problem, adapt, solve
 from ngcontact.contact.corners import in_contact, nodal_pressure, twins
-from ngcontact.contact.transitions import ending_segments, transitions
+from ngcontact.contact.transitions import ending_segments, transitions_on
 from ngcontact.geometries import blocks
 
 
@@ -42,7 +42,7 @@ EXACT = 1e-12
 @pytest.mark.parametrize("end", [0.31, 0.4999, 0.5001, 0.6])
 def test_the_model_end_is_found_exactly(end, order):
     x = np.linspace(0, 1, 13) ** 1.3
-    found = transitions(line(x, order), *opening(x - end))
+    found = transitions_on(line(x, order), *opening(x - end))
     assert found.position == pytest.approx(np.array([[end, 0.0]]), abs=EXACT)
     [inner], [outer] = found.inner, found.outer
     assert x[inner] < end < x[outer]
@@ -55,7 +55,7 @@ def test_a_smooth_factor_of_the_gap_does_no_harm():
     for count in (41, 81, 161):
         x = np.linspace(0, 1, count)
         gap, active = opening(x - 0.437)
-        found = transitions(line(x, 2), gap * (1 + x - 0.437), active)
+        found = transitions_on(line(x, 2), gap * (1 + x - 0.437), active)
         errors.append(abs(found.position[0, 0] - 0.437))
     rates = np.log2(np.array(errors[:-1]) / errors[1:])
     assert errors[-1] < 1e-6
@@ -66,21 +66,21 @@ def test_a_smooth_factor_of_the_gap_does_no_harm():
 def test_the_end_does_not_depend_on_units(unit):
     x = np.linspace(0, 1, 21)
     gap, active = opening(x - 0.437)
-    found = transitions(line(unit * x), unit * gap, active)
+    found = transitions_on(line(unit * x), unit * gap, active)
     assert found.position == pytest.approx(unit * np.array([[0.437, 0.0]]), abs=EXACT * unit)
 
 
 def test_the_direction_of_the_line_does_not_matter():
     x = np.linspace(0, 1, 21)
     gap, active = opening(x - 0.437)
-    there = transitions(line(x), gap, active)
-    back = transitions(line(x[::-1]), gap[::-1], active[::-1])
+    there = transitions_on(line(x), gap, active)
+    back = transitions_on(line(x[::-1]), gap[::-1], active[::-1])
     assert back.position == pytest.approx(there.position, abs=EXACT)
 
 
 def test_both_ends_of_a_zone_on_an_inclined_line():
     x, a, slope = np.linspace(-1, 1, 41), 0.333, 0.2
-    found = transitions(line(x, y=slope * x), *opening(np.abs(x) - a))
+    found = transitions_on(line(x, y=slope * x), *opening(np.abs(x) - a))
     expected = np.array([[-a, -slope * a], [a, slope * a]])
     assert sorted_by_x(found.position) == pytest.approx(expected, abs=EXACT)
 
@@ -88,14 +88,14 @@ def test_both_ends_of_a_zone_on_an_inclined_line():
 def test_two_zones_have_four_ends():
     x = np.linspace(0, 4, 161)
     # Contact in |x - 1| < 0.43 and |x - 3| < 0.43; between them each end has its half.
-    found = transitions(line(x), *opening(np.abs(np.abs(x - 2) - 1) - 0.43))
+    found = transitions_on(line(x), *opening(np.abs(np.abs(x - 2) - 1) - 0.43))
     expected = [0.57, 1.43, 2.57, 3.43]
     assert np.sort(found.position[:, 0]) == pytest.approx(expected, abs=EXACT)
 
 
 @pytest.mark.parametrize("state", [True, False])
 def test_no_end_without_a_change(state):
-    found = transitions(line(np.linspace(0, 1, 9)), np.ones(9), np.full(9, state))
+    found = transitions_on(line(np.linspace(0, 1, 9)), np.ones(9), np.full(9, state))
     assert found.position.shape == (0, 2)
     assert len(found.inner) == len(found.outer) == 0
 
@@ -107,7 +107,7 @@ def test_points_of_separate_lines_are_not_neighbours():
         position=np.column_stack([x, 0 * x]), rows=np.array([[0, 1], [2, 3]]), node=np.arange(4)
     )
     active = np.array([True, True, False, False])
-    assert len(transitions(lines, ~active * 1.0, active).position) == 0
+    assert len(transitions_on(lines, ~active * 1.0, active).position) == 0
 
 
 def test_points_without_a_row_are_no_neighbours():
@@ -119,7 +119,7 @@ def test_points_without_a_row_are_no_neighbours():
         node=np.arange(5),
     )
     active = np.array([True, True, True, False, False])
-    assert len(transitions(short, ~active * 1.0, active).position) == 0
+    assert len(transitions_on(short, ~active * 1.0, active).position) == 0
 
 
 def test_a_closed_line_has_no_first_point():
@@ -131,7 +131,7 @@ def test_a_closed_line_has_no_first_point():
         node=np.arange(count),
     )
     from_zero = np.abs((angle + math.pi) % (2 * math.pi) - math.pi)
-    found = transitions(ring, *opening(from_zero - end)).position
+    found = transitions_on(ring, *opening(from_zero - end)).position
     # Distances are chords, shorter than arcs by h^2 / 24 of them; the end is on a chord of
     # the circle, h^2 / 8 inside.
     h = 2 * math.pi / count
@@ -144,7 +144,7 @@ def test_a_closed_line_has_no_first_point():
 def test_the_middle_where_few_points_are_open(active, gap):
     active, x = np.array(active, dtype=bool), np.arange(4.0)
     changes = np.flatnonzero(active[1:] != active[:-1])
-    found = transitions(line(x), gap * ~active, active)
+    found = transitions_on(line(x), gap * ~active, active)
     assert np.sort(found.position[:, 0]) == pytest.approx(x[changes] + 0.5)
 
 
@@ -165,7 +165,7 @@ def test_contact_that_ends_at_a_corner(order):
     active = np.append(x < x[corner] + 1e-9, False)
     gap = np.where(active, 0.0, 1e-3 + lines.position[:, 0] - x[corner])
     for state, outer in ((active, corner + 1), (np.append(x > x[corner] + 1e-9, True), corner - 1)):
-        found = transitions(lines, np.where(state, 0.0, gap + 1e-3), state)
+        found = transitions_on(lines, np.where(state, 0.0, gap + 1e-3), state)
         assert found.position.tolist() == [[x[corner], 0.0]]
         # The warm start takes the way from `inner` to `outer` for the direction of the contact.
         assert found.outer.tolist() == [outer]
@@ -179,7 +179,7 @@ def test_contact_that_ends_next_to_a_corner(end):
     lines = at_a_corner(x, corner)
     lines.position[:, 1] = 0
     gap, active = opening(lines.position[:, 0] - end)
-    found = transitions(lines, gap, active)
+    found = transitions_on(lines, gap, active)
     assert found.position == pytest.approx(np.array([[end, 0.0]]), abs=EXACT)
 
 
@@ -188,8 +188,8 @@ def test_contact_ends_in_one_segment_for_each_end(order):
     x = np.linspace(0, 1, 8 * order + 1)
     zone = line(x, order)
     gap, active = opening(np.abs(x - 0.5) - 0.2)  # ends at 0.3 and 0.7, segments of 1 / 8
-    assert ending_segments(zone, transitions(zone, gap, active)).tolist() == [2, 5]
-    all_open = transitions(zone, np.ones(len(x)), np.zeros(len(x), dtype=bool))
+    assert ending_segments(zone, transitions_on(zone, gap, active)).tolist() == [2, 5]
+    all_open = transitions_on(zone, np.ones(len(x)), np.zeros(len(x), dtype=bool))
     assert ending_segments(zone, all_open).size == 0
 
 
@@ -200,7 +200,7 @@ def test_no_end_at_a_corner_inside_the_contact():
     for i in (corner, 9):  # the node has slid off one side of the corner
         one_side = active.copy()
         one_side[i] = False
-        assert len(transitions(lines, ~one_side * 1e-6, one_side).position) == 0
+        assert len(transitions_on(lines, ~one_side * 1e-6, one_side).position) == 0
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -229,7 +229,7 @@ def test_an_end_stays_next_to_the_last_active_point():
     x = np.linspace(0, 1, 21)
     active = x < 0.42
     for gap in (np.ones(21), 5 - x, x**3, (1 - x) ** 2, np.zeros(21)):
-        [place] = transitions(line(x), gap * ~active, active).position
+        [place] = transitions_on(line(x), gap * ~active, active).position
         assert 0.35 <= place[0] <= 0.6
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from ..contact import contact_line
-from ..fem import Trace, boundary_trace
+from ..fem import BoundaryTrace, boundary_trace
 from ..mesh import copied
 from ..problem import Contact, Problem
 
@@ -18,7 +18,7 @@ ROUNDS = 12  # refinements after which a facing segment that still lags stays un
 log = logging.getLogger("ngcontact")
 
 
-def matched_vertices(trace: Trace, contact: Contact) -> dict[int, int]:
+def matched_vertices(trace: BoundaryTrace, contact: Contact) -> dict[int, int]:
     """Vertices of the secondary and, at the same C_j, of the primary; `trace` is of degree 1."""
     if contact.primary is None:
         return {}
@@ -28,20 +28,20 @@ def matched_vertices(trace: Trace, contact: Contact) -> dict[int, int]:
     return dict(zip(line.node[end].tolist(), partner.tolist(), strict=True))
 
 
-def _boundary_edges(trace: Trace) -> dict[tuple[int, int], int]:
+def _boundary_edges(trace: BoundaryTrace) -> dict[tuple[int, int], int]:
     """Element at each boundary segment, by its vertices."""
     ends = np.sort(trace.nodes[:, [0, -1]], axis=1)
     return {(a, b): el for (a, b), el in zip(ends.tolist(), trace.element.tolist(), strict=True)}
 
 
-def _children(trace: Trace, first: int) -> dict[tuple[int, int], int]:
+def _children(trace: BoundaryTrace, first: int) -> dict[tuple[int, int], int]:
     """New vertex on each bisected boundary segment, by the segment's vertices."""
     new = np.unique(trace.nodes[trace.nodes >= first])
     parents = ((v, trace.mesh.GetParentVertices(v)) for v in new.tolist())
     return {(min(a, b), max(a, b)): v for v, (a, b) in parents}
 
 
-def _facing_elements(pairs: list[dict[int, int]], trace: Trace, flags: Mask) -> list[int]:
+def _facing_elements(pairs: list[dict[int, int]], trace: BoundaryTrace, flags: Mask) -> list[int]:
     """Elements at segments that face those of flagged elements: marked late, they cost a round."""
     segments = _boundary_edges(trace)
     found = []
@@ -73,7 +73,9 @@ def _match_children(
     return lagging
 
 
-def _move_to_common_eta(trace: Trace, contact: Contact, pairs: dict[int, int], first: int) -> None:
+def _move_to_common_eta(
+    trace: BoundaryTrace, contact: Contact, pairs: dict[int, int], first: int
+) -> None:
     """Move new pairs of vertices along their exact curves to their mean eta."""
     new = [(a, b) for a, b in pairs.items() if a >= first or b >= first]
     if contact.direction is None or trace.edges is None or not new:

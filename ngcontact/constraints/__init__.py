@@ -1,6 +1,6 @@
 """Supports and contact rows as arrays, and the basis in which each is one unknown. Arrays only."""
 
-from .basis_transformation import Basis as Basis
+from .basis_transformation import BasisTransformation as BasisTransformation
 from .basis_transformation import change_of_basis as change_of_basis
 from .rows import Conditions as Conditions
 from .rows import Rows as Rows

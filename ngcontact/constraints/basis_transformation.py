@@ -16,12 +16,12 @@ from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Array, Index, Mask
 from ..triplets import from_triplets
-from .pivots import INDEPENDENT, assign, check_prescribed, coefficients_at
+from .pivots import INDEPENDENT, check_prescribed, coefficients_at, pivots
 from .rows import Conditions, Rows
 
 
 @dataclass(frozen=True, eq=False)
-class Basis:
+class BasisTransformation:
     """Node values u = T y in unknowns of which some are prescribed and one is each row's value.
 
     Attributes
@@ -159,7 +159,7 @@ def change_of_basis(
     rows: Rows,
     length: float = 0.0,
     stiffness: Array | None = None,
-) -> Basis:
+) -> BasisTransformation:
     """Basis in which prescribed conditions and contact rows are single unknowns.
 
     Parameters
@@ -184,7 +184,7 @@ def change_of_basis(
     R = _blocks(frame)
     Bz = (rows.matrix(n) @ R).tocsr()
     flat_fixed, flat_values = fixed.T.ravel(), values.T.ravel()
-    host = assign(rows, Bz, fixed, np.ones(n) if stiffness is None else stiffness)
+    host = pivots(rows, Bz, fixed, np.ones(n) if stiffness is None else stiffness)
     check_prescribed(rows, Bz, flat_fixed, flat_values, np.flatnonzero(host < 0), length)
     kept = np.flatnonzero(host >= 0)
     host = host[kept]
@@ -203,7 +203,7 @@ def change_of_basis(
         H = H + term
         term = N @ term
         term.eliminate_zeros()
-    return Basis(
+    return BasisTransformation(
         T=(R @ H).tocsr(),
         fixed=flat_fixed,
         values=flat_values,

@@ -21,7 +21,7 @@ ROUND_OFF = 1e-13  # of measured gaps, relative to the largest coordinate
 CONTRAST = 1e3  # stiffness of the secondary over that facing it above which the latter hosts
 
 
-class _Hosts:
+class _Pivots:
     """Assignment of rows to the nodes whose unknowns they become."""
 
     def __init__(self, fixed: Mask) -> None:
@@ -61,7 +61,7 @@ def _preferred(rows: Rows, stiffness: Array) -> Index:
     return np.where(softer & rows.share.any(axis=1), facing, rows.node)
 
 
-def assign(rows: Rows, Bz: sp.csr_array, fixed: Mask, stiffness: Array) -> Index:
+def pivots(rows: Rows, Bz: sp.csr_array, fixed: Mask, stiffness: Array) -> Index:
     """Host node of every row, -1 where all of a row's unknowns are prescribed.
 
     Parameters
@@ -81,7 +81,7 @@ def assign(rows: Rows, Bz: sp.csr_array, fixed: Mask, stiffness: Array) -> Index
     free = np.where(fixed[host], 0.0, local)
     lonely = np.bincount(host, minlength=n)[host] == 1
     regular = lonely & (np.linalg.norm(free, axis=1) > PIVOT)
-    hosts = _Hosts(fixed)
+    hosts = _Pivots(fixed)
     for j in np.flatnonzero(regular) if not regular.all() else ():
         hosts.take(host[j], local[j])
     for j in np.flatnonzero(~regular):

@@ -10,5 +10,5 @@ from .line import unmatched as unmatched
 from .search import partners as partners
 from .transitions import Transitions as Transitions
 from .transitions import ending_segments as ending_segments
-from .transitions import transitions as transitions
 from .transitions import transitions_of as transitions_of
+from .transitions import transitions_on as transitions_on

@@ -8,13 +8,13 @@ import numpy as np
 
 from ..arrays import Index
 from ..constraints import Rows
-from ..fem import Trace
+from ..fem import BoundaryTrace
 from ..lagrange import lagrange
 from .line import ContactLine, without
 from .projection import snap
 
 
-def _rows(line: ContactLine, trace: Trace) -> Rows:
+def _rows(line: ContactLine, trace: BoundaryTrace) -> Rows:
     """Rows of one contact line."""
     share = lagrange(trace.order, snap(line.partner_s, trace.order))
     share[line.partner < 0] = 0.0
@@ -28,7 +28,7 @@ def _rows(line: ContactLine, trace: Trace) -> Rows:
     )
 
 
-def joined(lines: list[ContactLine], trace: Trace) -> Rows:
+def joined(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:
     """Rows of all lines, in order."""
     rows = [_rows(line, trace) for line in lines]
     if rows:

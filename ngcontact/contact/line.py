@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, Index
-from ..fem import Trace
+from ..fem import BoundaryTrace
 from ..lagrange import gauss, lagrange
 from ..problem import Contact, boundary_mask
 from .search import partners
@@ -70,7 +70,7 @@ class ContactLine:
 
 
 def prescribed_gap(
-    contact: Contact, trace: Trace, segment: Index, s: Array, position: Array
+    contact: Contact, trace: BoundaryTrace, segment: Index, s: Array, position: Array
 ) -> Array:
     """Values (k,) of `Contact.gap` at points of the secondary."""
     if isinstance(contact.gap, ng.CoefficientFunction):
@@ -80,7 +80,7 @@ def prescribed_gap(
     return np.full(len(s), contact.gap, dtype=float)
 
 
-def jacobian(trace: Trace, contact: Contact, segment: Index, s: Array) -> Array:
+def jacobian(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
     """Change of the integration variable - arc length (P1) or eta (P2) - with s, (k,)."""
     derivative = trace.derivative(segment, s)
     if contact.direction is None:
@@ -89,7 +89,7 @@ def jacobian(trace: Trace, contact: Contact, segment: Index, s: Array) -> Array:
     return np.abs(derivative[:, 0] * -dy + derivative[:, 1] * dx)
 
 
-def _segment_weights(trace: Trace, contact: Contact, segments: Index) -> Array:
+def _segment_weights(trace: BoundaryTrace, contact: Contact, segments: Index) -> Array:
     """Integrals (k, order + 1) of the basis functions over each segment."""
     s, w = gauss(trace.order + 2 * trace.geometry_order)
     k = len(segments)
@@ -97,7 +97,7 @@ def _segment_weights(trace: Trace, contact: Contact, segments: Index) -> Array:
     return (scale * w) @ lagrange(trace.order, s)
 
 
-def contact_line(trace: Trace, contact: Contact) -> ContactLine:
+def contact_line(trace: BoundaryTrace, contact: Contact) -> ContactLine:
     """Contact points of one pair.
 
     Raises
@@ -197,7 +197,9 @@ def without(line: ContactLine, dropped: Index) -> ContactLine:
     return replace(line, rows=renumber[line.rows], **kept)
 
 
-def at_quadrature(line: ContactLine, trace: Trace, order: int) -> tuple[Index, Index, Array, Array]:
+def at_quadrature(
+    line: ContactLine, trace: BoundaryTrace, order: int
+) -> tuple[Index, Index, Array, Array]:
     """Quadrature points on the segments of `line` that face the primary.
 
     Returns

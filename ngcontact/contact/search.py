@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, Index
-from ..fem import Trace
+from ..fem import BoundaryTrace
 from .projection import Partners, cast, coincident
 
 ROUND_OFF = 4 * np.finfo(float).eps  # of a measured gap, relative to the coordinates
 
 
 def _beyond_own_body(
-    trace: Trace, own: Index, points: Array, directions: Array, found: Partners
+    trace: BoundaryTrace, own: Index, points: Array, directions: Array, found: Partners
 ) -> NDArray[np.bool_]:
     """Whether bodies overlap so far that the partner lies on the other side of the own body.
 
@@ -31,7 +31,7 @@ def _beyond_own_body(
 
 
 def partners(
-    trace: Trace, facing: Index, own: Index, points: Array, directions: Array
+    trace: BoundaryTrace, facing: Index, own: Index, points: Array, directions: Array
 ) -> tuple[Index, Array, Array, int]:
     """Points of the segments `facing` opposite to `points`, which lie on the segments `own`.
 

@@ -88,7 +88,7 @@ class Transitions:
     position: Array
 
 
-def transitions(line: ContactLine, gap: Array, active: Mask) -> Transitions:
+def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
     """Transitions between neighbours of which one is active.
 
     Near a frictionless transition the gap grows like the 3/2 power of the distance, so that
@@ -138,7 +138,7 @@ def transitions_of(lines: list[ContactLine], gap: Array, active: Mask) -> list[T
     """Transitions of each line; `gap` and `active` (m,) are those of all its points in order."""
     stops = np.cumsum([0, *(len(line.node) for line in lines)])
     parts = [slice(start, stop) for start, stop in pairwise(stops)]
-    return [transitions(x, gap[at], active[at]) for x, at in zip(lines, parts, strict=True)]
+    return [transitions_on(x, gap[at], active[at]) for x, at in zip(lines, parts, strict=True)]
 
 
 def ending_segments(line: ContactLine, ends: Transitions) -> Index:

@@ -1,6 +1,6 @@
 """The discrete problems (P_1h), (P_2h) of HH81: assembled, in equilibrium, started, re-used."""
 
-from .discrete_problem import Discrete as Discrete
+from .discrete_problem import DiscreteProblem as DiscreteProblem
 from .discrete_problem import discretise as discretise
 from .discrete_problem import minimise_energy as minimise_energy
 from .initial_active_set import carried_active_set as carried_active_set

@@ -9,14 +9,22 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Mask
-from ..constraints import Basis, Conditions, change_of_basis
+from ..constraints import BasisTransformation, Conditions, change_of_basis
 from ..contact import ContactLine, joined, kept_lines, merged
 from ..errors import ConvergenceError
-from ..fem import LOAD_BONUS, Space, Trace, assemble, boundary_trace, load_vector, node_basis
+from ..fem import (
+    LOAD_BONUS,
+    BoundaryTrace,
+    Space,
+    assemble,
+    boundary_trace,
+    load_vector,
+    node_basis,
+)
 from ..linalg import congruent
-from ..mesh import parents
+from ..mesh import vertex_parents
 from ..problem import Problem
-from ..qp import Minimiser, Program, Systems, minimise, no_kernel
+from ..qp import BorderedSystems, Iterate, QuadraticProgram, minimise, no_null_space
 from ..triplets import from_triplets
 from .equilibrium import Rigid, rigid_motions
 from .linear_systems import linear_systems
@@ -27,7 +35,7 @@ SMALLEST, LARGEST = -306, 305  # powers of ten between which sums of products ke
 
 
 @dataclass(frozen=True, eq=False)
-class Discrete:
+class DiscreteProblem:
     """One discrete problem.
 
     Attributes
@@ -42,11 +50,11 @@ class Discrete:
         Gamma_u and Gamma_0 at nodes.
     B : sparse (m, 2n)
         Contact rows on node values, all pairs in order.
-    basis : Basis
+    basis : BasisTransformation
         Unknowns in which rows and prescribed values are single unknowns.
-    program : Program
+    program : QuadraticProgram
         The quadratic program in those unknowns.
-    systems : Systems
+    systems : BorderedSystems
         Its linear systems, with the factorisation once there is one.
     rigid : Rigid or None
         Rigid motions that supports leave free, if there are any.
@@ -60,15 +68,15 @@ class Discrete:
     lines: list[ContactLine]
     conditions: Conditions
     B: sp.csr_array
-    basis: Basis
-    program: Program
-    systems: Systems
+    basis: BasisTransformation
+    program: QuadraticProgram
+    systems: BorderedSystems
     rigid: Rigid | None
     assembled: bool
 
 
 def _space(
-    problem: Problem, trace: Trace, element: str, previous: Discrete | None
+    problem: Problem, trace: BoundaryTrace, element: str, previous: DiscreteProblem | None
 ) -> tuple[Space, bool]:
     """Space with its forms, and whether its stiffness had to be assembled."""
     nodal = conditioned_segments(problem, trace)
@@ -80,7 +88,7 @@ def _space(
     return assemble(problem, trace, element, nodal), True
 
 
-def _check_range(program: Program) -> None:
+def _check_range(program: QuadraticProgram) -> None:
     """Raise where double precision holds the data but neither the forces nor the displacements."""
     p = program
     stiffness, load = p.diagonal.max(initial=0.0), np.abs(p.b).max(initial=0.0)
@@ -96,8 +104,12 @@ def _check_range(program: Program) -> None:
 
 
 def discretise(
-    problem: Problem, mesh: ng.Mesh, order: int, element: str, previous: Discrete | None = None
-) -> Discrete:
+    problem: Problem,
+    mesh: ng.Mesh,
+    order: int,
+    element: str,
+    previous: DiscreteProblem | None = None,
+) -> DiscreteProblem:
     """Assemble the discrete problem on a mesh that is curved to the element's degree.
 
     Of a `previous` problem with the same elements on the same mesh, what is the same is used
@@ -138,7 +150,7 @@ def discretise(
     else:
         K, matrix = congruent(space.matrix, space.A, T)
         systems = None
-    program = Program(
+    program = QuadraticProgram(
         K=K,
         b=T.T @ space.f,
         R=from_triplets(np.ones(m), np.arange(m), basis.unknown, (m, 2 * n)),
@@ -147,10 +159,10 @@ def discretise(
         fixed=basis.fixed,
         values=basis.values,
         unknown=basis.unknown,
-        kernel=no_kernel(2 * n) if rigid is None else rigid.kernel,
+        null_space=no_null_space(2 * n) if rigid is None else rigid.null_space,
     )
     _check_range(program)
-    return Discrete(
+    return DiscreteProblem(
         problem=problem,
         space=space,
         found=found,
@@ -160,13 +172,13 @@ def discretise(
         basis=basis,
         program=program,
         systems=systems
-        or linear_systems(program, matrix, basis.T, parents(mesh), trace.nodes[space.nodal]),
+        or linear_systems(program, matrix, basis.T, vertex_parents(mesh), trace.nodes[space.nodal]),
         rigid=rigid,
         assembled=assembled,
     )
 
 
-def minimise_energy(discrete: Discrete, active: Mask) -> Minimiser:
+def minimise_energy(discrete: DiscreteProblem, active: Mask) -> Iterate:
     """Exact minimiser of L over K_h.
 
     Bodies that contact alone can hold start from where they rest when rigid, so that the way
@@ -179,9 +191,9 @@ def minimise_energy(discrete: Discrete, active: Mask) -> Minimiser:
     """
     p, rigid, systems = discrete.program, discrete.rigid, discrete.systems
     if rigid is None or not rigid.placing.any():
-        systems.take(p)
+        systems.restart(p)
         return minimise(systems, active)
-    systems.take(replace(p, g=p.g - rigid.rows @ rigid.placing))
+    systems.restart(replace(p, g=p.g - rigid.rows @ rigid.placing))
     try:
         result = minimise(systems, active)
     except ConvergenceError as error:
@@ -192,8 +204,8 @@ def minimise_energy(discrete: Discrete, active: Mask) -> Minimiser:
     return result
 
 
-def _placed(p: Program, rigid: Rigid, iterate: Minimiser) -> Minimiser:
+def _placed(p: QuadraticProgram, rigid: Rigid, iterate: Iterate) -> Iterate:
     """An iterate relative to where the bodies rest when rigid, with the way there added."""
     u = iterate.u + rigid.motions @ rigid.placing
-    u -= p.kernel.lineal @ (p.kernel.conditions @ u)
+    u -= p.null_space.lineal @ (p.null_space.conditions @ u)
     return replace(iterate, u=u)

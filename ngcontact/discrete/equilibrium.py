@@ -17,12 +17,12 @@ from scipy.linalg import block_diag
 from scipy.optimize import linprog, nnls
 
 from ..arrays import Array, Mask
-from ..constraints import Basis, Conditions
+from ..constraints import BasisTransformation, Conditions
 from ..errors import NoEquilibriumError
 from ..fem import LOAD_BONUS, Space, load_vector
 from ..mesh import cad_edges
 from ..problem import Problem
-from ..qp import FREE, Kernel, kernel, null_space
+from ..qp import FREE, NullSpace, pinned_null_space, vanishing_combinations
 from .rigid_motions import (
     Bodies,
     RigidMotion,
@@ -59,7 +59,7 @@ class Rigid:
         Integrals (r, r) of the products of the motions over the boundaries, made when asked for.
     motions : ndarray (2n, r)
         In the unknowns of the program.
-    kernel : Kernel
+    null_space : NullSpace
         Their part that no row resists, and the rest.
     placing : ndarray (r,)
         Amounts by which the load moves the bodies until contact stops them, were they rigid.
@@ -73,7 +73,7 @@ class Rigid:
     work: Array
     gram: Callable[[], Array]
     motions: Array
-    kernel: Kernel
+    null_space: NullSpace
     placing: Array
     carries: Mask
 
@@ -84,7 +84,7 @@ class Rigid:
 
     def left_free(self, active: Mask) -> list[RigidMotion]:
         """Motions that the rows `active` do not resist either."""
-        return [self.motion(x) for x in null_space(self.rows[active]).T]
+        return [self.motion(x) for x in vanishing_combinations(self.rows[active]).T]
 
 
 def _placing(rows: Array, work: Array, g: Array, equality: Mask) -> tuple[Array, Mask]:
@@ -96,7 +96,7 @@ def _placing(rows: Array, work: Array, g: Array, equality: Mask) -> tuple[Array,
     scale, force = np.abs(g).max(initial=0.0), np.abs(work).max(initial=0.0)
     if scale == 0.0 or force == 0.0:
         return stay
-    lineal = null_space(rows)
+    lineal = vanishing_combinations(rows)
     free = ~equality
     result = linprog(
         -work / force,
@@ -168,7 +168,7 @@ def rigid_motions(
     problem: Problem,
     space: Space,
     conditions: Conditions,
-    basis: Basis,
+    basis: BasisTransformation,
     B: sp.csr_array,
     g: Array,
     equality: Mask,
@@ -235,7 +235,7 @@ def rigid_motions(
     f = space.f
     if (left := residue + noise).any():
         f = f - boundary() @ np.linalg.solve(in_v.T @ boundary(), left)
-    lineal = null_space(rows)
+    lineal = vanishing_combinations(rows)
     motions = basis.coordinates(Z, rows)
     means = np.zeros((len(motions), 0))
     if lineal.size:
@@ -248,7 +248,7 @@ def rigid_motions(
         work=work,
         gram=lambda: in_v.T @ boundary(),
         motions=motions,
-        kernel=kernel(motions, lineal, means.T, basis.unknown, basis.fixed),
+        null_space=pinned_null_space(motions, lineal, means.T, basis.unknown, basis.fixed),
         placing=placing,
         carries=carries,
     )

@@ -6,15 +6,15 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import Mask
-from ..contact import transitions
-from ..qp import Minimiser
-from .discrete_problem import Discrete
+from ..contact import transitions_on
+from ..qp import Iterate
+from .discrete_problem import DiscreteProblem
 
 SEPARATION = 1e-6  # of the directions at a corner, relative to the zone
 TOUCHING = 1e-12  # gap, relative to the zone, up to which points start active
 
 
-def first_active_set(discrete: Discrete) -> Mask:
+def first_active_set(discrete: DiscreteProblem) -> Mask:
     """Cold start: the points that touch before the load.
 
     Bodies that contact alone can hold are first placed, rigid, where the load presses them.
@@ -32,7 +32,9 @@ def first_active_set(discrete: Discrete) -> Mask:
     return np.concatenate(active) | carries
 
 
-def carried_active_set(discrete: Discrete, previous: Discrete, state: Minimiser) -> Mask:
+def carried_active_set(
+    discrete: DiscreteProblem, previous: DiscreteProblem, state: Iterate
+) -> Mask:
     """Warm start: the state of the nearest contact point of the same pair on another mesh.
 
     At orders above 1 the points around a transition are told by the side of it they lie on: it is
@@ -56,7 +58,7 @@ def carried_active_set(discrete: Discrete, previous: Discrete, state: Minimiser)
         tied = distance[:, 1] <= (1 + 1e-6) * away
         active = state.active[at][nearest] | (tied & state.active[at][near[:, 1]])
         if previous.space.trace.order > 1 and away.max() > size:  # not the same points
-            ends = transitions(old, slack[at], state.active[at])
+            ends = transitions_on(old, slack[at], state.active[at])
             for inner, outer, place in zip(ends.inner, ends.outer, ends.position, strict=True):
                 around = (nearest == inner) | (nearest == outer)
                 inwards = old.position[inner] - old.position[outer]

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from ..arrays import Integers, Mask
 from ..linalg import IterativeSystems, Multigrid, cholesky, coarsenings, refined_share
-from ..qp import Program, Systems
+from ..qp import BorderedSystems, QuadraticProgram
 
 # Unknowns by order from which multigrid is the faster one, on one thread: at 80 000 of orders 1
 # and 2 both take the same time, of order 3 at a million; it always takes less memory. See
@@ -18,13 +18,17 @@ FEWEST = 0.7  # share of the unknowns that must be gone in the coarsest space
 
 
 def linear_systems(
-    program: Program, matrix: ng.BaseMatrix, T: sp.csr_array, parents: Integers, nodes: Integers
-) -> Systems:
+    program: QuadraticProgram,
+    matrix: ng.BaseMatrix,
+    T: sp.csr_array,
+    parents: Integers,
+    nodes: Integers,
+) -> BorderedSystems:
     """Systems of a discrete problem: by multigrid where it is large and has coarser spaces.
 
     Parameters
     ----------
-    program : Program
+    program : QuadraticProgram
     matrix : ng.BaseMatrix
         Its matrix for NGSolve.
     T, parents, nodes
@@ -35,7 +39,7 @@ def linear_systems(
     coarsest = 2 * len(parents) * (1 - refined_share(parents))
     half = matrix.nze < program.K.nnz  # all that a factorisation reads
     if half or size < LARGE.get(order, np.inf) or coarsest > (1 - FEWEST) * size:
-        return Systems(program, factor)
+        return BorderedSystems(program, factor)
 
     def prepare(free: Mask) -> Multigrid:
         return Multigrid(matrix, coarsenings(T, parents, nodes), free)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Array
-from ..fem import Trace
+from ..fem import BoundaryTrace
 from ..problem import Problem, boundary_mask
 
 
-def resultants(problem: Problem, trace: Trace, reaction: Array) -> dict[str, Array]:
+def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[str, Array]:
     """Sums (2,) of the forces `reaction` (n, 2) on nodes, by boundary of Gamma_u and Gamma_0."""
     mesh = trace.mesh
     names = np.array(mesh.GetBoundaries())

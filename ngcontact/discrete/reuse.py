@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..constraints import Basis
+from ..constraints import BasisTransformation
 from ..contact import ContactLine, contact_line
-from ..fem import Trace
+from ..fem import BoundaryTrace
 from ..problem import Contact, Elastic, Hooke, Problem, varies
 
 
-def same_boundary(one: Trace, other: Trace) -> bool:
+def same_boundary(one: BoundaryTrace, other: BoundaryTrace) -> bool:
     """Whether the boundaries of two meshes have the same nodes at the same places."""
     return np.array_equal(one.nodes, other.nodes) and np.array_equal(one.curve, other.curve)
 
@@ -41,7 +41,9 @@ def _same_pair(one: Contact, other: Contact) -> bool:
     return same and one.gap is None and other.gap is None
 
 
-def contact_lines(problem: Problem, trace: Trace, known: list[ContactLine]) -> list[ContactLine]:
+def contact_lines(
+    problem: Problem, trace: BoundaryTrace, known: list[ContactLine]
+) -> list[ContactLine]:
     """The line of each pair, a known one where it is the same."""
     lines = []
     for contact in problem.contact:
@@ -51,7 +53,7 @@ def contact_lines(problem: Problem, trace: Trace, known: list[ContactLine]) -> l
     return lines
 
 
-def same_basis(one: Basis, other: Basis) -> bool:
+def same_basis(one: BasisTransformation, other: BasisTransformation) -> bool:
     """Whether rows and supports make the same unknowns; bounds and values may differ."""
     return (
         np.array_equal(one.fixed, other.fixed)

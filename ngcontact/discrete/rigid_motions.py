@@ -9,9 +9,9 @@ import numpy as np
 
 from ..arrays import Array, Index
 from ..constraints import Conditions
-from ..fem import Space, Trace
+from ..fem import BoundaryTrace, Space
 from ..problem import Problem, body_of_vertex
-from ..qp import FREE, null_space
+from ..qp import FREE, vanishing_combinations
 
 LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
 
@@ -65,7 +65,7 @@ class Bodies:
     of_vertex: Index
 
 
-def connected_bodies(trace: Trace) -> Bodies:
+def connected_bodies(trace: BoundaryTrace) -> Bodies:
     """The connected pieces of the mesh of `trace`."""
     piece = body_of_vertex(trace.mesh)
     pieces, number = np.unique(piece[trace.nodes[:, 0]], return_inverse=True)
@@ -81,7 +81,7 @@ def connected_bodies(trace: Trace) -> Bodies:
     )
 
 
-def unsupported(trace: Trace, bodies: Bodies, c: Conditions) -> list[Array]:
+def unsupported(trace: BoundaryTrace, bodies: Bodies, c: Conditions) -> list[Array]:
     """Motions (3, d) of each body - translations, rotation - that its supports leave free."""
     order = trace.order + 1
     position = np.zeros((trace.space.ndof, 2))
@@ -93,7 +93,7 @@ def unsupported(trace: Trace, bodies: Bodies, c: Conditions) -> list[Array]:
     arm = (position[c.node] - bodies.middle[at]) / bodies.size[at, None]
     turn = arm[:, 0] * c.direction[:, 1] - arm[:, 1] * c.direction[:, 0]
     resisted = np.column_stack([c.direction, turn])
-    return [null_space(resisted[at == b]) for b in range(len(bodies.names))]
+    return [vanishing_combinations(resisted[at == b]) for b in range(len(bodies.names))]
 
 
 def rigid_motion(bodies: Bodies, amounts: Array, multiplier: float) -> RigidMotion:

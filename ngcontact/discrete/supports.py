@@ -6,11 +6,11 @@ import numpy as np
 
 from ..arrays import Index
 from ..constraints import Conditions
-from ..fem import Trace
+from ..fem import BoundaryTrace
 from ..problem import Problem, boundary_mask
 
 
-def _prescribed(problem: Problem, trace: Trace) -> Conditions:
+def _prescribed(problem: Problem, trace: BoundaryTrace) -> Conditions:
     """Gamma_u: interpolated displacement components at the nodes."""
     n = trace.space.ndof
     given = np.zeros((2, n), dtype=bool)
@@ -26,7 +26,7 @@ def _prescribed(problem: Problem, trace: Trace) -> Conditions:
     return Conditions(node=nodes, direction=np.eye(2)[axes], value=value[axes, nodes])
 
 
-def _guided(problem: Problem, trace: Trace) -> Conditions:
+def _guided(problem: Problem, trace: BoundaryTrace) -> Conditions:
     """Gamma_0: zero normal displacement at the nodes, with the exact normals."""
     if problem.sliding is None:
         return Conditions(np.zeros(0, dtype=np.intp), np.zeros((0, 2)), np.zeros(0))
@@ -37,7 +37,7 @@ def _guided(problem: Problem, trace: Trace) -> Conditions:
     return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))
 
 
-def support_conditions(problem: Problem, trace: Trace) -> Conditions:
+def support_conditions(problem: Problem, trace: BoundaryTrace) -> Conditions:
     """Gamma_u and Gamma_0."""
     parts = _prescribed(problem, trace), _guided(problem, trace)
     return Conditions(
@@ -45,7 +45,7 @@ def support_conditions(problem: Problem, trace: Trace) -> Conditions:
     )
 
 
-def conditioned_segments(problem: Problem, trace: Trace) -> Index:
+def conditioned_segments(problem: Problem, trace: BoundaryTrace) -> Index:
     """Segments on which conditions are posed: Gamma_u, Gamma_0, Gamma_K."""
     sides = [side for pair in problem.contact for side in (pair.secondary, pair.primary)]
     regions = np.zeros(len(trace.mesh.GetBoundaries()), dtype=bool)

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, Index
 from ..contact import ContactLine, partners
-from ..fem import Trace
+from ..fem import BoundaryTrace
 from ..lagrange import gauss_lobatto
-from .terms import Share, Term
+from .terms import BoundaryResidual, PressureShare
 
 
-def traction(trace: Trace, stress: ng.CoefficientFunction, segment: Index, s: Array) -> Array:
+def traction(
+    trace: BoundaryTrace, stress: ng.CoefficientFunction, segment: Index, s: Array
+) -> Array:
     """Traction (k, 2) at boundary points; `stress` (2, 2) is that of the body."""
     values = trace.evaluate(ng.BoundaryFromVolumeCF(stress), segment, s).reshape(-1, 2, 2)
     return np.einsum("kij,kj->ki", values, trace.normal(segment, s))
@@ -29,7 +31,7 @@ class Side:
 
     def __init__(
         self,
-        trace: Trace,
+        trace: BoundaryTrace,
         stress: ng.CoefficientFunction,
         direction: Sequence[float] | None,
         at: Index,
@@ -51,12 +53,14 @@ class Side:
         self.across = t - d[:, :, None] * self.along[:, None, :]
         self.along[:, 0] += pi
 
-    def tangential(self) -> Term:
+    def tangential(self) -> BoundaryResidual:
         """The traction across the direction of contact."""
-        share = Share(np.arange(len(self.at)), self.segment, self.s, self.across[..., 1])
-        return Term("tangential", self.element, self.weight, self.across[..., 0], [share])
+        share = PressureShare(np.arange(len(self.at)), self.segment, self.s, self.across[..., 1])
+        return BoundaryResidual(
+            "tangential", self.element, self.weight, self.across[..., 0], [share]
+        )
 
-    def pressure(self, other: Side, full: NDArray[np.bool_], least: Array) -> Term:
+    def pressure(self, other: Side, full: NDArray[np.bool_], least: Array) -> BoundaryResidual:
         """The traction along it plus pi_h; half the difference of both sides where in contact.
 
         `full` and `least`, whether and with which weight that holds, are over all points.
@@ -74,12 +78,12 @@ class Side:
             value[mine] /= 2
             value[mine, 0] += other.along[theirs, 0] / 2
             factor = other.along[theirs, 1:] / 2
-            shares.append(Share(mine, other.segment[theirs], other.s[theirs], factor))
-        shares.append(Share(np.arange(len(self.at)), self.segment, self.s, value[:, 1:]))
-        return Term("pressure", self.element, weight, value[:, :1], shares)
+            shares.append(PressureShare(mine, other.segment[theirs], other.s[theirs], factor))
+        shares.append(PressureShare(np.arange(len(self.at)), self.segment, self.s, value[:, 1:]))
+        return BoundaryResidual("pressure", self.element, weight, value[:, :1], shares)
 
 
-def met_from_behind(trace: Trace, line: ContactLine) -> Index:
+def met_from_behind(trace: BoundaryTrace, line: ContactLine) -> Index:
     """Segments of the primary whose middle faces the secondary, (q,)."""
     middle = np.full(len(line.facing), 0.5)
     x = trace.point(line.facing, middle)
@@ -91,7 +95,7 @@ def met_from_behind(trace: Trace, line: ContactLine) -> Index:
     return line.facing[back >= 0]
 
 
-def nodal_pressure(line: ContactLine, pressure: Array, order: int) -> Array:
+def pressure_at_nodes(line: ContactLine, pressure: Array, order: int) -> Array:
     """Pressure (k, order + 1) at the nodes of each segment.
 
     At a node without a row, an end of Gamma_K on Gamma_u, the polynomial through the others.

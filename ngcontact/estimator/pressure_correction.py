@@ -21,11 +21,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Array
-from ..fem import Trace
+from ..fem import BoundaryTrace
 from ..linalg import cholesky, lower_half, shared
 from ..problem import Problem
 from ..triplets import from_triplets
-from .terms import Share, Term
+from .terms import BoundaryResidual, PressureShare
 
 HELD = 1e6  # stiffness of supports in the last term, relative to the elements beside them
 FLOATING = 1e-9  # ... and of the bedding that keeps free bodies, relative to their size
@@ -51,7 +51,7 @@ class PressureCorrection:
         The v_h of the supremum, for which that term is mu |grad v_h|^2.
     """
 
-    def __init__(self, problem: Problem, trace: Trace, names: list[str]) -> None:
+    def __init__(self, problem: Problem, trace: BoundaryTrace, names: list[str]) -> None:
         self.problem, self.trace, self.mesh = problem, trace, trace.mesh
         self.region = self.mesh.Materials("|".join(map(re.escape, names)))
         self.space = ng.L2(self.mesh, order=trace.order, dgjumps=True)
@@ -65,7 +65,7 @@ class PressureCorrection:
         weights: tuple[Array, Array],
         moduli: tuple[Array, Array],
         residuals: tuple[ng.CoefficientFunction, ng.CoefficientFunction],
-        terms: list[Term],
+        terms: list[BoundaryResidual],
     ) -> None:
         """Find delta.
 
@@ -109,7 +109,7 @@ class PressureCorrection:
         f.Assemble()
         return shared(a.mat), f.vec.FV().NumPy().copy()
 
-    def _on_boundary(self, terms: list[Term]) -> tuple[sp.csr_array, Array]:
+    def _on_boundary(self, terms: list[BoundaryResidual]) -> tuple[sp.csr_array, Array]:
         """The same of the boundary terms."""
         shape = []
         for j in range(self.functions):
@@ -188,7 +188,7 @@ class PressureCorrection:
         self.pressure.vec.FV().NumPy()[:] = solution[:size]
         self.motion.vec.FV().NumPy()[:] = solution[size:]
 
-    def add_to(self, residual: Array, shares: list[Share]) -> None:
+    def add_to(self, residual: Array, shares: list[PressureShare]) -> None:
         """Add what delta contributes to a residual (k, c) at the boundary."""
         on_boundary = ng.BoundaryFromVolumeCF(self.pressure)
         for share in shares:

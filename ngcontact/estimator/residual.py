@@ -33,14 +33,20 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, Index, power_of_two
 from ..contact import ContactLine, at_quadrature, partners, prescribed_gap
-from ..fem import NEARLY_INCOMPRESSIBLE, Trace, bulk_moduli, nearly_incompressible, shear_moduli
+from ..fem import (
+    NEARLY_INCOMPRESSIBLE,
+    BoundaryTrace,
+    bulk_moduli,
+    nearly_incompressible,
+    shear_moduli,
+)
 from ..lagrange import gauss, lagrange
 from ..mesh import diameters
 from ..problem import boundary_mask
-from .contact import Side, met_from_behind, nodal_pressure, traction
+from .contact import Side, met_from_behind, pressure_at_nodes, traction
 from .interior import divergence_and_jump, integral, projected_stress
 from .pressure_correction import PressureCorrection
-from .terms import Share, Term
+from .terms import BoundaryResidual, PressureShare
 
 if TYPE_CHECKING:
     from ..solution import Solution
@@ -76,7 +82,7 @@ class _Residuals:
     def __init__(self, solution: Solution) -> None:
         self.solution = solution
         self.mesh = solution.mesh
-        self.trace: Trace = solution.discrete.space.trace
+        self.trace: BoundaryTrace = solution.discrete.space.trace
         self.order = solution.order
         self.diameter = diameters(self.mesh)
         mu = shear_moduli(solution.problem, self.mesh)
@@ -90,7 +96,7 @@ class _Residuals:
         self.stress = solution.stress * (1 / self.unit)
         self.edge_weight = self.diameter / (2 * self.mu * self.order)
         self.in_contact = self.trace.inner.copy()
-        self.terms: list[Term] = []
+        self.terms: list[BoundaryResidual] = []
         self.parts: dict[str, Array] = {"element": np.zeros(self.mesh.ne)}
 
     def add(self, name: str, element: Index, squares: Array) -> None:
@@ -163,8 +169,10 @@ class _Residuals:
                 vector[guided] -= along[:, None] * normal
         weight = self.edge_weight[element] * ds
         for name, at in (("traction", ~guided), ("sliding", guided)):
-            share = Share(np.arange(at.sum()), segment[at], s[at], factor[at])
-            self.terms.append(Term(name, element[at], weight[at], residual[at], [share]))
+            share = PressureShare(np.arange(at.sum()), segment[at], s[at], factor[at])
+            self.terms.append(
+                BoundaryResidual(name, element[at], weight[at], residual[at], [share])
+            )
 
     def on_contact(self, line: ContactLine, pressure: Array, active: NDArray[np.bool_]) -> None:
         """Gamma_K: tractions of both sides, complementarity, penetration."""
@@ -172,7 +180,7 @@ class _Residuals:
         local, segment, s, dc = at_quadrature(line, trace, 2 * self.order + DATA_BONUS)
         if len(local) == 0:
             return
-        pi = (lagrange(self.order, s) * nodal_pressure(line, pressure, self.order)[local]).sum(1)
+        pi = (lagrange(self.order, s) * pressure_at_nodes(line, pressure, self.order)[local]).sum(1)
         pi /= self.unit
         full = np.asarray(np.append(active, True)[line.rows].all(axis=1))[local]
         self.in_contact[segment] = True

@@ -8,7 +8,7 @@ from ..arrays import Array, Index
 
 
 @dataclass(frozen=True, eq=False)
-class Share:
+class PressureShare:
     """What delta at n points of the boundary adds to residuals: `factor` (n, c) times it.
 
     Attributes
@@ -28,7 +28,7 @@ class Share:
 
 
 @dataclass(frozen=True, eq=False)
-class Term:
+class BoundaryResidual:
     """Squared residuals at k points of the boundary, linear in the corrected pressure.
 
     Attributes
@@ -41,7 +41,7 @@ class Term:
         Factor of its square.
     residual : ndarray (k, c)
         The residual of sigma_h.
-    shares : list of Share
+    shares : list of PressureShare
         How the residual changes with delta.
     """
 
@@ -49,4 +49,4 @@ class Term:
     element: Index
     weight: Array
     residual: Array
-    shares: list[Share]
+    shares: list[PressureShare]

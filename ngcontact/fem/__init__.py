@@ -1,6 +1,6 @@
 """The finite element spaces V_h: elements, boundary nodes, forms, energies."""
 
-from .boundary import Trace as Trace
+from .boundary import BoundaryTrace as BoundaryTrace
 from .boundary import boundary_trace as boundary_trace
 from .element import check_element as check_element
 from .element import node_basis as node_basis

@@ -25,7 +25,7 @@ CORNER_WITHOUT_CAD = np.deg2rad(30)  # ... and two segments of one name on a mes
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class BoundaryTrace:
     """Segments of the whole boundary, k of them, each from s = 0 to s = 1.
 
     Attributes
@@ -181,7 +181,7 @@ def _neighbours(
     return order[first] // 3, last - first > 1
 
 
-def boundary_trace(mesh: ng.Mesh, order: int) -> Trace:
+def boundary_trace(mesh: ng.Mesh, order: int) -> BoundaryTrace:
     """Trace of the displacements of degree `order` on the boundary of `mesh`."""
     ngmesh = mesh.ngmesh
     triangles = ngmesh.Elements2D().NumPy()
@@ -205,7 +205,7 @@ def boundary_trace(mesh: ng.Mesh, order: int) -> Trace:
     xy = np.array(ngmesh.Coordinates())[:, :2]
     opposite = xy[corners[element]].mean(axis=1) - xy[ends[:, 0]]
     right = _right(xy[ends[:, 1]] - xy[ends[:, 0]])
-    return Trace(
+    return BoundaryTrace(
         mesh=mesh,
         space=space,
         order=order,

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from ..arrays import Index
 from ..triplets import from_triplets
-from .boundary import Trace
+from .boundary import BoundaryTrace
 from .nodal_basis import edge_bubbles, nodal_basis
 
 ORDERS = (1, 2, 3, 4)
@@ -39,7 +39,7 @@ def check_element(order: int, element: str) -> None:
         raise ValueError(f"order={order} is not available; element={element!r} has {orders}")
 
 
-def _physical_basis(V: ng.FESpace, trace: Trace) -> sp.csr_array:
+def _physical_basis(V: ng.FESpace, trace: BoundaryTrace) -> sp.csr_array:
     """P1 in physical coordinates (2.4) inside the quadratic isoparametric space, (N, nv).
 
     On a curved element a linear function of x has the edge function coefficients that its
@@ -90,7 +90,7 @@ def vector_space(mesh: ng.Mesh, order: int, element: str) -> ng.FESpace:
     return ng.Compress(full, active_dofs=ng.BitArray(np.tile(active, 2)))
 
 
-def node_basis(V: ng.FESpace, trace: Trace, nodal: Index, element: str) -> sp.csr_array:
+def node_basis(V: ng.FESpace, trace: BoundaryTrace, nodal: Index, element: str) -> sp.csr_array:
     """`Space.basis` for node values on the segments `nodal`."""
     scalar = _physical_basis(V, trace) if element == "physical" else nodal_basis(trace, nodal)
     return sp.block_diag([scalar, scalar], format="csr")

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from ..arrays import Array, Index
 from ..lagrange import gauss_lobatto
 from ..triplets import from_triplets
-from .boundary import Trace
+from .boundary import BoundaryTrace
 
 
 def edge_bubbles(space: ng.FESpace) -> Array:
@@ -33,7 +33,7 @@ def edge_bubbles(space: ng.FESpace) -> Array:
     return values[:, columns]
 
 
-def nodal_basis(trace: Trace, segments: Index) -> sp.csr_array:
+def nodal_basis(trace: BoundaryTrace, segments: Index) -> sp.csr_array:
     """Matrix (n, n) from node values on the segments and other unknowns to NGSolve's unknowns."""
     order, size = trace.order, trace.space.ndof
     if order == 1:

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from ..arrays import Array, Index
 from ..linalg import shared
 from ..problem import Problem, boundary_mask, varies
-from .boundary import Trace
+from .boundary import BoundaryTrace
 from .element import node_basis, vector_space
 from .model import strain
 
@@ -29,7 +29,7 @@ class Space:
     ----------
     V : ng.FESpace
         Vector space of N unknowns for each component.
-    trace : Trace
+    trace : BoundaryTrace
         Its boundary nodes.
     nodal : ndarray of int (k,)
         Segments of the trace on which conditions are posed at nodes.
@@ -44,7 +44,7 @@ class Space:
     """
 
     V: ng.FESpace
-    trace: Trace
+    trace: BoundaryTrace
     nodal: Index
     basis: sp.csr_array
     A: sp.csr_array
@@ -62,7 +62,7 @@ class Space:
         return diagonal.reshape(2, -1).max(axis=0)
 
 
-def _check_normals(trace: Trace, boundary: str) -> None:
+def _check_normals(trace: BoundaryTrace, boundary: str) -> None:
     """Raise unless NGSolve's normals, the direction of pressures, point outwards."""
     segments = trace.select(boundary_mask(trace.mesh, boundary))
     s = np.full(len(segments), 0.5)
@@ -88,7 +88,9 @@ def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
     return f.vec.FV().NumPy().copy()
 
 
-def assemble(problem: Problem, trace: Trace, element: str, nodal: Index | None = None) -> Space:
+def assemble(
+    problem: Problem, trace: BoundaryTrace, element: str, nodal: Index | None = None
+) -> Space:
     """Space, stiffness and load of a problem on the mesh of `trace`, curved as `element` asks.
 
     Node values replace NGSolve's unknowns on the segments `nodal`, all when left out.

@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..arrays import Array, Factor, Mask
-from ..qp import REFINED, ROUGH, Anchor, Program, Systems, terms
+from ..qp import REFINED, ROUGH, Anchor, BorderedSystems, QuadraticProgram, terms
 from .multigrid import Multigrid, StalledError
 
 LOOSE = 1e-2  # residual, relative to the one a system starts from, that tells its active set
@@ -20,17 +20,17 @@ FLOOR = 4 * np.finfo(float).eps  # round-off of the residual, relative to its te
 log = logging.getLogger("ngcontact")
 
 
-class IterativeSystems(Systems):
+class IterativeSystems(BorderedSystems):
     """The linear systems of one program with unit rows, by conjugate gradients and multigrid.
 
     Each system starts from the iterate of the one before, and is solved as closely as telling
     the next active set takes; `refine` takes the last one to round-off. `back_solves` counts
     V-cycles. Where they do not converge, and for proximal terms, the matrix is factorised and
-    everything is as in `Systems`.
+    everything is as in `BorderedSystems`.
 
     Parameters
     ----------
-    program : Program
+    program : QuadraticProgram
     factor : Factor
         For the fallback.
     prepare : callable
@@ -38,7 +38,7 @@ class IterativeSystems(Systems):
     """
 
     def __init__(
-        self, program: Program, factor: Factor, prepare: Callable[[Mask], Multigrid]
+        self, program: QuadraticProgram, factor: Factor, prepare: Callable[[Mask], Multigrid]
     ) -> None:
         self.prepare = prepare
         self.multigrid: Multigrid | None = None
@@ -86,7 +86,7 @@ class IterativeSystems(Systems):
         """Reduce the residual that the last iterate has for the active set."""
         p, active = self.program, self.active
         self.free = ~p.fixed
-        self.free[p.kernel.held] = False
+        self.free[p.null_space.held] = False
         self.free[p.unknown[active]] = False
         if self.multigrid is None:
             self.multigrid = self.prepare(self.free)

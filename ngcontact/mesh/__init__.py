@@ -8,4 +8,4 @@ from .elements import diameters as diameters
 from .elements import middles as middles
 from .generation import first_mesh as first_mesh
 from .parents import copied as copied
-from .parents import parents as parents
+from .parents import vertex_parents as vertex_parents

@@ -10,7 +10,7 @@ from ..arrays import Integers
 KEPT = "_ngcontact_parents"  # attribute of a mesh: it lives as long as the mesh
 
 
-def parents(mesh: ng.Mesh) -> Integers:
+def vertex_parents(mesh: ng.Mesh) -> Integers:
     """Ends of the edges that refinement halved, (nv, 2); -1 for vertices of the first mesh.
 
     Both have lower numbers than the vertex itself.
@@ -30,5 +30,5 @@ def parents(mesh: ng.Mesh) -> Integers:
 def copied(mesh: ng.Mesh) -> ng.Mesh:
     """Copy that keeps the names, the geometry and the parents; not curved."""
     copy = ng.Mesh(mesh.ngmesh.Copy())
-    setattr(copy, KEPT, parents(mesh))
+    setattr(copy, KEPT, vertex_parents(mesh))
     return copy

@@ -12,6 +12,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import KDTree
 
+from ..arrays import Index
 from ..triplets import from_triplets
 
 VTK_CELL = {1: 5, 2: 22}  # VTK_TRIANGLE, VTK_QUADRATIC_TRIANGLE
@@ -27,8 +28,8 @@ class Nodes:
     ``at`` (ne n) are the same nodes as NGSolve mesh points, element after element.
     """
 
-    cells: NDArray[np.int64]
-    body: NDArray[np.int64]
+    cells: Index
+    body: Index
     names: tuple[str, ...]
     at: NDArray[Any]
 
@@ -40,15 +41,15 @@ class Nodes:
         return np.stack([np.bincount(numbers, column) / count for column in found.T], axis=1)
 
 
-def lattice(order: int) -> NDArray[np.int64]:
+def lattice(order: int) -> Index:
     """Barycentric indices (n, 3) of the nodes of VTK's Lagrange triangle, row sums = `order`.
 
     Corners, then the insides of the edges 01, 12, 20, then the inside, which is again such a
     triangle of order - 3.
     """
     if order == 0:
-        return np.zeros((1, 3), dtype=np.int64)
-    unit, step = np.eye(3, dtype=np.int64), np.arange(1, order)[:, None]
+        return np.zeros((1, 3), dtype=np.intp)
+    unit, step = np.eye(3, dtype=np.intp), np.arange(1, order)[:, None]
     edges = [(order - step) * unit[a] + step * unit[b] for a, b in ((0, 1), (1, 2), (2, 0))]
     inside = [lattice(order - 3) + 1] if order > 2 else []
     return np.concatenate([order * unit, *edges, *inside])
@@ -66,15 +67,15 @@ def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
         others = len(elements) - len(at) // len(weights)
         raise ValueError(f"{others} elements of the mesh are no triangles; mesh without quads")
     names = tuple(dict.fromkeys(mesh.GetMaterials()))
-    regions = np.array([names.index(name) for name in mesh.GetMaterials()], dtype=np.int64)
+    regions = np.array([names.index(name) for name in mesh.GetMaterials()], dtype=np.intp)
     body = regions[elements["index"] - 1]
-    vertices = (elements["nodes"][:, :3].astype(np.int64) - 1) * len(names) + body[:, None]
+    vertices = (elements["nodes"][:, :3].astype(np.intp) - 1) * len(names) + body[:, None]
     # A node is known by the vertices it leans on and its weights there, from any triangle.
     key = np.where(weights > 0, vertices[:, None, :] * (order + 1) + weights, 0)
     key = np.sort(key.reshape(-1, 3), axis=1)
     rank = np.lexsort(key.T)
     fresh = np.any(np.diff(key[rank], axis=0, prepend=-1), axis=1)
-    cells = np.empty(len(key), dtype=np.int64)
+    cells = np.empty(len(key), dtype=np.intp)
     cells[rank] = np.cumsum(fresh) - 1
     return Nodes(cells.reshape(-1, len(weights)), body, names, at)
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
-from ..arrays import Array, Integers
+from ..arrays import Array, Index
 from .nodes import full_stress, lattice, neighbour_tree, nodes_of, von_mises
 
 _MOST_TRIANGLES = 200_000
@@ -28,14 +28,14 @@ class Scene:
 
     moved: Array
     stress: Array
-    triangles: Integers
-    edges: Integers
+    triangles: Index
+    edges: Index
     outline: NDArray[np.bool_]
     zone: Array
     scale: float
 
 
-def contact_lines(solution: Any) -> list[tuple[int, Integers, Array]]:
+def contact_lines(solution: Any) -> list[tuple[int, Index, Array]]:
     """Contact points in order along their lines: (pair, rows, coordinate) for every line.
 
     ``rows`` index ``solution.points``. The coordinate is eta, across the fixed direction xi
@@ -57,11 +57,11 @@ def contact_lines(solution: Any) -> list[tuple[int, Integers, Array]]:
     return lines
 
 
-def _arcs(points: Array) -> list[tuple[Integers, Array]]:
+def _arcs(points: Array) -> list[tuple[Index, Array]]:
     """Order and arc position of points on curves: walks along the tree of neighbours."""
     tree = neighbour_tree(points)
     count, piece = connected_components(tree, directed=False)
-    arcs: list[tuple[Integers, Array]] = []
+    arcs: list[tuple[Index, Array]] = []
     start = 0.0
     for k in range(count):
         members = np.flatnonzero(piece == k)
@@ -104,7 +104,7 @@ def picture(solution: Any, scale: float | None) -> Scene:
     active = solution.points[solution.active]
     at = KDTree(place).query(active)[1].astype(int)
     if scale is None:
-        body = np.empty(len(place), dtype=np.int64)
+        body = np.empty(len(place), dtype=np.intp)
         body[nodes.cells] = nodes.body[:, None]
         scale = _chosen_scale(solution, place, move, body)
     return Scene(
@@ -118,7 +118,7 @@ def picture(solution: Any, scale: float | None) -> Scene:
     )
 
 
-def _chosen_scale(solution: Any, place: Array, move: Array, body: Integers) -> float:
+def _chosen_scale(solution: Any, place: Array, move: Array, body: Index) -> float:
     """Factor 1, 2, 5, 10, ... on the displacement: seen, yet no false overlap of the bodies.
 
     Contact turns a gap e into `gap`; a factor s draws it as e - s (e - gap). For e, the distance

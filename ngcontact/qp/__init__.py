@@ -2,16 +2,16 @@
 
 from .active_set import minimise as minimise
 from .null_space import FREE as FREE
-from .null_space import Kernel as Kernel
-from .null_space import kernel as kernel
-from .null_space import no_kernel as no_kernel
-from .null_space import null_space as null_space
-from .optimality import optimality as optimality
+from .null_space import NullSpace as NullSpace
+from .null_space import no_null_space as no_null_space
+from .null_space import pinned_null_space as pinned_null_space
+from .null_space import vanishing_combinations as vanishing_combinations
+from .optimality import kkt_residuals as kkt_residuals
 from .optimality import terms as terms
-from .quadratic_program import Minimiser as Minimiser
-from .quadratic_program import Program as Program
+from .quadratic_program import Iterate as Iterate
+from .quadratic_program import QuadraticProgram as QuadraticProgram
 from .schur_complement import REFINED as REFINED
 from .schur_complement import ROUGH as ROUGH
 from .schur_complement import Anchor as Anchor
-from .schur_complement import Systems as Systems
+from .schur_complement import BorderedSystems as BorderedSystems
 from .solving import solve_qp as solve_qp

@@ -12,8 +12,8 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..errors import ConvergenceError
 from .null_space import FREE
-from .quadratic_program import Minimiser
-from .schur_complement import Anchor, SingularError, Systems
+from .quadratic_program import Iterate
+from .schur_complement import Anchor, BorderedSystems, SingularError
 
 log = logging.getLogger("ngcontact")
 
@@ -29,10 +29,10 @@ STEADY = 0.9  # ratio of that force to the last from which a motion is steady, n
 OUTER = 100  # proximal steps; most problems need less than five
 
 
-class Newton:
+class ActiveSetIteration:
     """Newton iteration for one quadratic program with changing proximal terms."""
 
-    def __init__(self, systems: Systems, state: Mask) -> None:
+    def __init__(self, systems: BorderedSystems, state: Mask) -> None:
         self.program = program = systems.program
         self.systems = systems
         self.state = state
@@ -45,14 +45,14 @@ class Newton:
     def resisted(self) -> bool:
         """Whether the active rows resist all motions they can."""
         p = self.program
-        return p.kernel.pins.size == 0 or p.kernel.resisted(p.unknown[self.state])
+        return p.null_space.pins.size == 0 or p.null_space.resisted(p.unknown[self.state])
 
-    def result(self) -> Minimiser:
+    def result(self) -> Iterate:
         """The current iterate, with the lineal motions that its conditions ask for."""
-        kernel, y = self.program.kernel, self.y
-        if kernel.held.size:
-            y = y - kernel.lineal @ (kernel.conditions @ y)
-        return Minimiser(
+        null_space, y = self.program.null_space, self.y
+        if null_space.held.size:
+            y = y - null_space.lineal @ (null_space.conditions @ y)
+        return Iterate(
             u=y,
             force=self.force,
             active=self.state,
@@ -66,8 +66,8 @@ class Newton:
 
         Returns how often that motion leads there, 0 if it meets none.
         """
-        p, kernel = self.program, self.program.kernel
-        motion = kernel.others @ np.linalg.solve(kernel.others[kernel.pins], moved)
+        p, null_space = self.program, self.program.null_space
+        motion = null_space.others @ np.linalg.solve(null_space.others[null_space.pins], moved)
         approach = np.where(self.state, 0.0, motion[p.unknown])
         meets = approach > FREE * np.abs(moved).max()
         if not meets.any():
@@ -136,19 +136,19 @@ class Newton:
         )
 
 
-def minimise(systems: Systems, active: Mask | None = None) -> Minimiser:
+def minimise(systems: BorderedSystems, active: Mask | None = None) -> Iterate:
     """Solve a quadratic program by semismooth Newton steps.
 
     Parameters
     ----------
-    systems : Systems
+    systems : BorderedSystems
         The program, with its factorisation where there is one already.
     active : ndarray of bool (m,), optional
         First active set; the equalities alone when left out.
 
     Returns
     -------
-    Minimiser
+    Iterate
         With `u` (n,) all unknowns and `force` (m,) the multipliers of all rows, equalities
         included.
 
@@ -156,12 +156,12 @@ def minimise(systems: Systems, active: Mask | None = None) -> Minimiser:
     ------
     ConvergenceError
         A system is singular, or the step limit was reached, to which only a matrix that is not
-        positive definite is known to lead. `iterate` holds the last `Minimiser`.
+        positive definite is known to lead. `iterate` holds the last `Iterate`.
     """
     p = systems.program
     state = p.equality.copy() if active is None else p.equality | active
-    newton = Newton(systems, state)
-    pins = p.kernel.pins
+    newton = ActiveSetIteration(systems, state)
+    pins = p.null_space.pins
     hardness = p.diagonal[pins]  # of bodies that may be very unlike
     share = PROXIMAL
     anchor = Anchor(share * hardness, np.zeros(pins.size))

@@ -18,7 +18,7 @@ from ..arrays import Array, Index, Mask
 FREE = 1e-8  # singular value, relative to motions of size 1, below which nothing resists
 
 
-def null_space(resisted: Array) -> Array:
+def vanishing_combinations(resisted: Array) -> Array:
     """Combinations (r, l) of the r columns of `resisted` (k, r) that vanish, in echelon form."""
     r = resisted.shape[1]
     if len(resisted) < r:
@@ -42,7 +42,7 @@ def echelon(vectors: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Kernel:
+class NullSpace:
     """Rigid motions in the unknowns of a quadratic program.
 
     Attributes
@@ -69,18 +69,18 @@ class Kernel:
         """Whether the rows with these unknowns resist all motions that are not lineal."""
         if self.pins.size == 0:
             return True
-        return null_space(self.others[rows]).shape[1] == 0
+        return vanishing_combinations(self.others[rows]).shape[1] == 0
 
 
-def no_kernel(n: int) -> Kernel:
+def no_null_space(n: int) -> NullSpace:
     """The kernel of a definite matrix of size n."""
     none, index = np.zeros((n, 0)), np.zeros(0, dtype=np.intp)
-    return Kernel(lineal=none, others=none, held=index, pins=index, conditions=none.T)
+    return NullSpace(lineal=none, others=none, held=index, pins=index, conditions=none.T)
 
 
-def kernel(
+def pinned_null_space(
     motions: Array, combinations: Array, functionals: Array, rows: Index, fixed: Mask
-) -> Kernel:
+) -> NullSpace:
     """Kernel with well separated pins.
 
     Parameters
@@ -108,7 +108,7 @@ def kernel(
     rest -= lineal @ np.linalg.solve(lineal[held], rest[held]) if held.size else 0.0
     rest[held] = 0.0
     pins = _separated(rest, places)
-    return Kernel(
+    return NullSpace(
         lineal=lineal,
         others=rest,
         held=held,

@@ -6,7 +6,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Array
-from .quadratic_program import Minimiser, Program
+from .quadratic_program import Iterate, QuadraticProgram
 
 ROWS = 1 << 14  # that are copied at a time: the copy stays in the cache
 
@@ -18,7 +18,7 @@ def terms(A: sp.csr_array, x: Array) -> Array:
     return np.concatenate([np.zeros((0, *x.shape[1:])), *parts])
 
 
-def optimality(program: Program, minimiser: Minimiser) -> dict[str, float]:
+def kkt_residuals(program: QuadraticProgram, minimiser: Iterate) -> dict[str, float]:
     """Dimensionless residuals of the Karush-Kuhn-Tucker conditions, see `Solution.residuals`."""
     p, y, force, active = program, minimiser.u, minimiser.force, minimiser.active
     gap = p.g - y[p.unknown]

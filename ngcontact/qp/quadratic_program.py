@@ -9,11 +9,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Array, Index, Mask
-from .null_space import Kernel, no_kernel
+from .null_space import NullSpace, no_null_space
 
 
 @dataclass(frozen=True, eq=False)
-class Program:
+class QuadraticProgram:
     """Minimise 1/2 y'Ky - b'y subject to R y <= g and given values of some unknowns.
 
     Attributes
@@ -35,7 +35,7 @@ class Program:
     unknown : ndarray of int (m,), optional
         Given when row j is the unit vector of unknown `unknown[j]`: an active row is then an
         unknown that leaves the system, and every factorised matrix is a principal submatrix.
-    kernel : Kernel, optional
+    null_space : NullSpace, optional
         Null space of K, only with unit rows.
     """
 
@@ -47,7 +47,7 @@ class Program:
     fixed: Mask
     values: Array
     unknown: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
-    kernel: Kernel = field(default_factory=lambda: no_kernel(0))
+    null_space: NullSpace = field(default_factory=lambda: no_null_space(0))
 
     @cached_property
     def diagonal(self) -> Array:
@@ -61,7 +61,7 @@ class Program:
 
 
 @dataclass(frozen=True, eq=False)
-class Minimiser:
+class Iterate:
     """Solution of a quadratic program.
 
     Attributes

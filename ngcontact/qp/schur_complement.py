@@ -11,7 +11,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Array, Factor, Mask, Solve
-from .quadratic_program import Program
+from .quadratic_program import QuadraticProgram
 
 BORDER = 16  # changed rows up to which a bordered solve is cheaper than a factorisation ...
 PATIENT = 4  # ... times this for every one before: the sets that follow change less and less
@@ -40,7 +40,7 @@ class Anchor:
     at: Array
 
 
-class Systems:
+class BorderedSystems:
     """The linear systems of one program for changing active sets.
 
     One set, the base, is factorised with all pins of the kernel held. Another set is reached by
@@ -52,13 +52,13 @@ class Systems:
 
     _solve: Solve
 
-    def __init__(self, program: Program, factor: Factor) -> None:
+    def __init__(self, program: QuadraticProgram, factor: Factor) -> None:
         self.factor = factor
         self.factorised = False
         self.base = np.zeros(len(program.g), dtype=bool)
-        self.take(program)
+        self.restart(program)
 
-    def take(self, program: Program) -> None:
+    def restart(self, program: QuadraticProgram) -> None:
         """Begin with another load, other values or bounds; a factorisation stays."""
         self.program = program
         self.factorizations = self.back_solves = 0
@@ -84,7 +84,7 @@ class Systems:
         self.forget()  # two factorisations at a time would double the memory
         self.base = active.copy() if p.unit_rows else np.zeros_like(active)
         self.free = ~p.fixed
-        self.free[np.concatenate([p.kernel.held, p.kernel.pins])] = False
+        self.free[np.concatenate([p.null_space.held, p.null_space.pins])] = False
         if p.unit_rows:
             self.free[p.unknown[active]] = False
         self._solve = self.factor(self.free)
@@ -102,7 +102,7 @@ class Systems:
         """Border of the unknowns `at` released from the base and of the added `rows`."""
         p = self.program
         self.rows = np.flatnonzero(self.active & ~self.base)
-        self.at = p.kernel.pins
+        self.at = p.null_space.pins
         if p.unit_rows:
             self.at = np.concatenate([p.unknown[self.base & ~self.active], self.at])
         C = sp.vstack([p.K[self.at], p.R[self.rows]], format="csr")
@@ -119,7 +119,7 @@ class Systems:
         D[:, : self.at.size] = C[:, self.at].toarray()
         D[: self.at.size] = D[:, : self.at.size].T
         if self.anchor is not None:
-            pins = np.arange(self.at.size - p.kernel.pins.size, self.at.size)
+            pins = np.arange(self.at.size - p.null_space.pins.size, self.at.size)
             D[pins, pins] += self.anchor.stiffness
         schur = self.C @ self.known[np.ix_(self.solution, self.touched)].T - D
         # Forces and displacements side by side: only after scaling can small pivots be told.
@@ -151,7 +151,7 @@ class Systems:
         p = self.program
         residual = p.b - p.K @ self.y
         if self.anchor is not None:
-            pins = p.kernel.pins
+            pins = p.null_space.pins
             residual[pins] -= self.anchor.stiffness * (self.y[pins] - self.anchor.at)
         if p.unit_rows:  # active unknowns take what is left there, others must balance
             self.force[:] = 0.0
@@ -202,7 +202,7 @@ class Systems:
         scale = max(self.scale, *(np.abs(x).max(initial=0.0) for x in terms))
         balanced = ~p.fixed
         if self.anchor is not None:  # its force on the pins may turn what the held unknowns hold
-            balanced[p.kernel.held] = False
+            balanced[p.null_space.held] = False
         if not np.abs(residual[balanced]).max(initial=0.0) <= UNSOLVED * scale:
             raise SingularError(
                 "the system for the current active set is singular to working precision: a body "

@@ -24,8 +24,8 @@ from scipy.sparse.linalg import splu
 
 from ..arrays import Array, Mask, Solve
 from .active_set import minimise
-from .quadratic_program import Minimiser, Program
-from .schur_complement import Systems
+from .quadratic_program import Iterate, QuadraticProgram
+from .schur_complement import BorderedSystems
 
 Matrix: TypeAlias = sp.sparray | sp.spmatrix | ArrayLike  # a dense one may be a list of rows
 
@@ -62,7 +62,7 @@ def solve_qp(
     E: Matrix | None = None,
     e: ArrayLike | None = None,
     active: ArrayLike | None = None,
-) -> Minimiser:
+) -> Iterate:
     """Minimise 1/2 u'Au - f'u subject to B u <= g and E u = e.
 
     Parameters
@@ -80,7 +80,7 @@ def solve_qp(
 
     Returns
     -------
-    Minimiser
+    Iterate
         With `u` (n,), `force` (m,) >= 0, `multiplier` (k,), `active` (m,) and `steps`: the
         KKT conditions A u + B' force + E' multiplier = f, force >= 0, B u <= g,
         force' (B u - g) = 0 hold to round-off.
@@ -128,7 +128,7 @@ def solve_qp(
             raise ValueError("A is not positive definite; all its eigenvalues must be positive")
         return lu.solve
 
-    program = Program(
+    program = QuadraticProgram(
         K=K,
         b=load,
         R=sp.vstack([rows, equations], format="csr"),
@@ -138,8 +138,8 @@ def solve_qp(
         values=np.zeros(n),
     )
     first = np.concatenate([start, np.zeros(k, dtype=bool)])
-    result = minimise(Systems(program, factor), first)
-    return Minimiser(
+    result = minimise(BorderedSystems(program, factor), first)
+    return Iterate(
         u=result.u,
         force=result.force[:m],
         multiplier=result.force[m:],

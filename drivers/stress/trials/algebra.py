@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from drivers.stress import Outcome, refused
 from ngcontact import solve_qp
-from ngcontact.qp import Minimiser
+from ngcontact.qp import Iterate
 
 Array = NDArray[np.float64]
 Program = tuple[Array, Array, Array, Array]  # A, f, B, g
@@ -73,7 +73,7 @@ def tied_program(draw: Generator, m: int) -> tuple[Program, Array, Array]:
     return (A, A @ u + B.T @ force, B, B @ u + slack), u, force
 
 
-def kkt_residual(program: Program, result: Minimiser) -> float:
+def kkt_residual(program: Program, result: Iterate) -> float:
     """Largest violation of the optimality conditions relative to the size of the terms."""
     A, f, B, g = program
     u, force = result.u, result.force

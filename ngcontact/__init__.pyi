@@ -1,0 +1,14 @@
+from .adaptive import adapt as adapt
+from .errors import ContactError as ContactError
+from .errors import ConvergenceError as ConvergenceError
+from .errors import NoEquilibriumError as NoEquilibriumError
+from .output import write_series as write_series
+from .problem import Contact as Contact
+from .problem import Elastic as Elastic
+from .problem import Hooke as Hooke
+from .problem import Problem as Problem
+from .qp import solve_qp as solve_qp
+from .solution import Solution as Solution
+from .solving import solve as solve
+
+__version__: str
