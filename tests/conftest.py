@@ -1,89 +1,22 @@
-"""What several test modules share."""
+"""Fixtures of several rooms. Nothing here loads NGSolve: tests of arrays run without it."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
-import numpy as np
 import pytest
-from netgen.occ import OCCGeometry
 
-from drivers.reference import cases
-from ngcontact.adaptivity.refinement import refined
-from ngcontact.discrete.discrete_problem import discretise
-from ngcontact.fem.boundary import boundary_trace
-from ngcontact.geometries import blocks
-from ngcontact.linalg.coarse_spaces import coarsenings
-from ngcontact.mesh.curving import curve
-from ngcontact.mesh.generation import first_mesh
-from ngcontact.mesh.parents import vertex_parents
-from ngcontact.problem.regions import boundary_mask
-
-REPRODUCED = {  # by order: cases whose solution lies in the space
-    "constant pressure": (cases.pressure_patch, (1, 3)),
-    "linear pressure": (lambda: cases.pressure_patch(p1=0.5), (2, 4)),
-    "polygonal line": (cases.polygonal_patch, (1, 2)),
-}
-
-REFINED = {  # problems whose meshes are refined: a rigid obstacle, matched nodes, two curves
-    "disc": cases.disc_on_rigid_plane(),
-    "block": cases.partly_opening_block(),
-    "disc on block": replace(
-        cases.pressed_disc(), displacement={"block_bottom": (0, 0), "disc_top": (0, -0.05)}
-    ),
-}
-
-
-def unmatched_blocks():
-    """Geometry of two blocks with a division of the upper line that the lower one has not."""
-    shape = blocks().shape
-    for edge in shape.edges:
-        if edge.name == "upper_contact":
-            edge.partition = [0.13, 0.31, 0.77]
-    return OCCGeometry(shape, dim=2)
+ORDERS = {"constant pressure": (1, 3), "linear pressure": (2, 4), "polygonal line": (1, 2)}
 
 
 @pytest.fixture(
     params=[
-        pytest.param((make, order), id=f"{name}, order {order}")
-        for name, (make, orders) in REPRODUCED.items()
+        pytest.param((name, order), id=f"{name}, order {order}")
+        for name, orders in ORDERS.items()
         for order in orders
     ]
 )
 def reproduced(request):
     """A case and an order at which its solution lies in the space."""
-    make, order = request.param
-    return make(), order
+    from tests.scenes import REPRODUCED
 
-
-def coordinates(mesh):
-    """Copy of all vertices; a view outlives no mesh."""
-    return np.array(mesh.ngmesh.Coordinates())[:, :2]
-
-
-def vertices(mesh, pattern):
-    """Vertices (k, 2) of the boundaries of that name."""
-    trace = boundary_trace(mesh, 1)
-    numbers = np.unique(trace.nodes[trace.select(boundary_mask(mesh, pattern))])
-    return coordinates(mesh)[numbers]
-
-
-def near_origin(mesh, radius=0.7):
-    """Elements with centres that near, (ne,)."""
-    triangles = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
-    return np.linalg.norm(coordinates(mesh)[triangles].mean(axis=1), axis=1) < radius
-
-
-def discrete(problem, order, rounds, maxh=0.5):
-    """Discrete problem on a mesh that was refined so often."""
-    mesh = first_mesh(problem, maxh)
-    for _ in range(rounds):
-        mesh = refined(problem, mesh)
-    return discretise(problem, curve(mesh, order, "isoparametric")[0], order, "isoparametric")
-
-
-def steps_of(problem, coarsest=100):
-    """Coarser spaces of a discrete problem."""
-    trace = problem.space.trace
-    nodes = trace.nodes[problem.space.nodal]
-    return coarsenings(problem.basis.T, vertex_parents(trace.mesh), nodes, coarsest)
+    name, order = request.param
+    return REPRODUCED[name](), order

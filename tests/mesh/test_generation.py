@@ -10,7 +10,6 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 import pytest
-from conftest import coordinates, vertices
 from netgen.occ import OCCGeometry
 
 from ngcontact import Contact, Elastic, Problem, solve
@@ -21,6 +20,7 @@ from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh.curving import check_curves
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.problem.regions import boundary_mask
+from tests.scenes import coordinates, vertices
 
 SOFT = Elastic(E=1.0, nu=0.3)
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))

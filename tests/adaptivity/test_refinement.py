@@ -11,7 +11,6 @@ from itertools import pairwise
 import ngsolve as ng
 import numpy as np
 import pytest
-from conftest import coordinates, unmatched_blocks, vertices
 from netgen.meshing import Element1D, Element2D, FaceDescriptor, Mesh, MeshPoint, Pnt
 from netgen.occ import OCCGeometry
 
@@ -22,6 +21,7 @@ from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, ri
 from ngcontact.mesh.curving import curve
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.problem.regions import boundary_mask
+from tests.scenes import coordinates, unmatched_blocks, vertices
 
 SOFT = Elastic(E=1.0, nu=0.3)
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))

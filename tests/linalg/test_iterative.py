@@ -8,7 +8,6 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from conftest import REFINED
 
 from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
@@ -19,6 +18,7 @@ from ngcontact.discrete.discrete_problem import minimise_energy
 from ngcontact.linalg import coarse_spaces, iterative
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.qp.schur_complement import BorderedSystems
+from tests.scenes import REFINED
 
 ORDERS = (1, 2, 3, 4)
 

@@ -7,7 +7,6 @@ import math
 import ngsolve as ng
 import numpy as np
 import pytest
-from conftest import unmatched_blocks
 from netgen.occ import Compound, OCCGeometry, Vec, WorkPlane
 
 from ngcontact import Contact
@@ -16,6 +15,7 @@ from ngcontact.fem.boundary import boundary_trace
 from ngcontact.geometries import blocks, disc, disc_on_block, graphs, rings
 from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.lagrange import gauss, lagrange
+from tests.scenes import unmatched_blocks
 
 ORDERS = [1, 2, 3, 4]
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))

@@ -5,13 +5,13 @@ from __future__ import annotations
 import ngsolve as ng
 import numpy as np
 import pytest
-from conftest import coordinates, near_origin
 
 from drivers.reference import cases
 from ngcontact.adaptivity.refinement import refined
 from ngcontact.mesh.curving import curve
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.mesh.parents import copied, vertex_parents
+from tests.scenes import coordinates, near_origin
 
 BLOCK = cases.partly_opening_block()  # straight, nodes matched
 

@@ -10,7 +10,6 @@ from importlib import import_module
 import ngsolve as ng
 import numpy as np
 import pytest
-from conftest import unmatched_blocks
 
 from drivers.reference import cases
 from drivers.reference.straight import patch, relative_energy_error
@@ -18,6 +17,7 @@ from ngcontact import Contact, ContactError, Elastic, NoEquilibriumError, Proble
 from ngcontact import one_mesh as one_level
 from ngcontact.geometries import blocks, disc_on_block
 from ngcontact.mesh.generation import first_mesh
+from tests.scenes import unmatched_blocks
 
 SOFT = Elastic(E=1.0, nu=0.3)
 LOOP = import_module("ngcontact.adaptive")

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from conftest import REFINED, discrete, steps_of
 
 from ngcontact.linalg.multigrid import Multigrid, StalledError
 from ngcontact.linalg.sparse import congruent
+from tests.scenes import REFINED, discrete, steps_of
 
 
 def prepared(name: str, order: int, rounds: int, maxh: float = 0.5):

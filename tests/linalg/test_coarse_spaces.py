@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from conftest import REFINED, coordinates, discrete, near_origin, steps_of
 
 from drivers.reference import cases
 from ngcontact.adaptivity.refinement import refined
@@ -14,6 +13,7 @@ from ngcontact.lagrange import gauss_lobatto
 from ngcontact.linalg.coarse_spaces import RingError, coarsenings, refined_share
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.mesh.parents import vertex_parents
+from tests.scenes import REFINED, coordinates, discrete, near_origin, steps_of
 
 
 def linear_field(problem: DiscreteProblem) -> np.ndarray:
