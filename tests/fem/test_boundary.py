@@ -109,7 +109,7 @@ def test_nodal_basis_reproduces_node_values(make, order):
 def test_nodal_basis_keeps_the_other_unknowns(order):
     trace = boundary_trace(MESHES["refined"](order), order)
     basis = nodal_basis(trace, np.arange(len(trace.region)))
-    unit = sp.identity(trace.space.ndof, format="csr")
+    unit = sp.eye_array(trace.space.ndof, format="csr")
     inner = np.setdiff1d(np.arange(trace.space.ndof), trace.nodes)
     assert abs(basis - unit)[:, inner].max() == 0
     vertices = np.arange(trace.mesh.nv)

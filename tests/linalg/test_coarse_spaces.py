@@ -54,7 +54,7 @@ def test_unknowns_that_stay_mean_the_same(name: str, order: int):
         chosen = step.P[step.kept]
         # Theory: the identity, to round-off of the frames; pairs that refinement did not match
         # exactly refer to other partners.
-        assert abs(chosen - sp.identity(chosen.shape[0])).max() < 1e-12
+        assert abs(chosen - sp.eye_array(chosen.shape[0])).max() < 1e-12
 
 
 @pytest.mark.parametrize("local", [False, True])
@@ -78,7 +78,7 @@ def test_the_first_mesh_is_the_coarsest():
 
 
 def test_rows_in_a_ring_are_refused():
-    T = sp.identity(8, format="lil")
+    T = sp.eye_array(8, format="lil")
     T[0, 1] = T[1, 0] = 0.5
     with pytest.raises(RingError, match="ring"):
         coarsenings(T.tocsr(), np.array([[-1, -1]] * 2 + [[0, 1]] * 2), np.array([[0, 1]]), 0)

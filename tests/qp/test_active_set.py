@@ -133,7 +133,7 @@ def test_equations_are_met():
 def membrane(n=60, load=-1.0, height=-0.02):
     """An obstacle problem with one unknown per row: K, b, bounds of -u <= height."""
     h = 1 / (n + 1)
-    K = sp.diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(n, n), format="csr") / h
+    K = sp.diags_array([-1.0, 2.0, -1.0], offsets=[-1, 0, 1], shape=(n, n), format="csr") / h
     return K, np.full(n, load * h), np.full(n, -height)
 
 
@@ -143,7 +143,7 @@ def first_unknowns_bounded(K, b, g):
     return QuadraticProgram(
         K=K,
         b=b,
-        R=sp.identity(n, format="csr")[:m],
+        R=sp.eye_array(n, format="csr")[:m],
         g=g,
         equality=np.zeros(m, dtype=bool),
         fixed=np.zeros(n, dtype=bool),
@@ -168,9 +168,7 @@ def test_one_factorisation_at_a_time(monkeypatch):
     monkeypatch.setattr(bordered, "BORDER", 0)
     rng = np.random.default_rng(7)
     X = rng.normal(size=(12, 14))
-    program = first_unknowns_bounded(
-        sp.csr_matrix(X @ X.T), rng.normal(size=12), rng.normal(size=6)
-    )
+    program = first_unknowns_bounded(sp.csr_array(X @ X.T), rng.normal(size=12), rng.normal(size=6))
     dense = counting_factor(program.K, [])
     alive: weakref.WeakSet[Callable] = weakref.WeakSet()
     before = []
@@ -192,7 +190,7 @@ def test_bordering_equals_refactorising(monkeypatch, border):
     monkeypatch.setattr(bordered, "BORDER", border)
     K, b, g = membrane()
     n = g.size
-    flip = sp.identity(n, format="csr")
+    flip = sp.eye_array(n, format="csr")
     program = first_unknowns_bounded(K, -b, g)
     calls = []
     start = np.zeros(n, dtype=bool)
@@ -215,7 +213,7 @@ def test_given_values_and_equalities_with_unit_rows():
     K, b, g = membrane(n=9)
     n = g.size
     rows = np.array([3, 6])
-    R = sp.identity(n, format="csr")[rows]
+    R = sp.eye_array(n, format="csr")[rows]
     fixed, values = np.zeros(n, dtype=bool), np.zeros(n)
     fixed[0], values[0] = True, 0.01
     program = QuadraticProgram(
@@ -248,8 +246,8 @@ def test_zero_load_takes_one_step():
 @pytest.mark.parametrize("scale", [1e-300, 1e-9, 1e9, 1e150])
 def test_active_set_does_not_depend_on_units(scale):
     K, b, g = membrane()
-    plain = solve_qp(K, -b, sp.identity(g.size), g)
-    scaled = solve_qp(K, -b * scale, sp.identity(g.size), g * scale)
+    plain = solve_qp(K, -b, sp.eye_array(g.size), g)
+    scaled = solve_qp(K, -b * scale, sp.eye_array(g.size), g * scale)
     np.testing.assert_array_equal(plain.active, scaled.active)
     assert plain.steps == scaled.steps
 
@@ -274,6 +272,25 @@ def test_bad_input(change, message):
         solve_qp(**data)
 
 
+@pytest.mark.parametrize(
+    "kind",
+    [np.ndarray.tolist, np.asarray, sp.csr_matrix, sp.coo_matrix, sp.csr_array, sp.dok_array],
+)
+def test_matrices_of_any_kind(kind):
+    A, B, E = np.diag([2.0, 4.0, 1.0]), np.eye(3)[:2], np.array([[0.0, 0.0, 1.0]])
+    program = [2.0, 2.0, 0.0], kind(B), [0.25, 1.0], kind(E), [0.5]
+    result = solve_qp(kind(A), *program)
+    # Exact: all numbers are sums of powers of two.
+    assert result.u.tolist() == [0.25, 0.5, 0.5]
+    assert result.force.tolist() == [1.5, 0.0]
+    assert result.multiplier.tolist() == [-0.5]
+
+
+def test_a_vector_is_one_row():
+    result = solve_qp(np.eye(2), [2.0, 2.0], [1.0, 0.0], [0.25])
+    assert result.u.tolist() == [0.25, 2.0]
+
+
 @pytest.mark.parametrize("stiffness", [1e-9, 1.0, 2.1e11])
 def test_bordered_systems_do_not_depend_on_the_stiffness(stiffness):
     """Added rows border with compliances, released rows with stiffnesses: both must count."""
@@ -281,8 +298,8 @@ def test_bordered_systems_do_not_depend_on_the_stiffness(stiffness):
     n, m = 12, 6
     for _ in range(50):
         X = rng.normal(size=(n, n + 2))
-        K, b, g = sp.csr_matrix(X @ X.T), rng.normal(size=n), 0.3 * rng.normal(size=m)
-        rows = sp.identity(n, format="csr")[:m]
+        K, b, g = sp.csr_array(X @ X.T), rng.normal(size=n), 0.3 * rng.normal(size=m)
+        rows = sp.eye_array(n, format="csr")[:m]
         program = first_unknowns_bounded(stiffness * K, stiffness * b, g)
         result = minimise(
             BorderedSystems(program, counting_factor(program.K, [])), rng.random(m) < 0.5

@@ -38,23 +38,23 @@ class Assembled:
 
     Attributes
     ----------
-    K : csr_matrix
+    K : csr_array
         Stiffness (n, n).
     f : Array
         Load (n,).
     numbering : Numbering
         Unknowns of the nodes.
-    basis : csr_matrix, optional
+    basis : csr_array, optional
         As in `plane.bounded`.
     """
 
-    K: sp.csr_matrix
+    K: sp.csr_array
     f: Array
     numbering: Numbering
-    basis: sp.csr_matrix | None = None
+    basis: sp.csr_array | None = None
 
 
-def lu(K: sp.csr_matrix, order: int) -> Solver:
+def lu(K: sp.csr_array, order: int) -> Solver:
     """SciPy's sparse LU factorisation of the free part, for the active set."""
 
     def solve(free: Mask, b: Array) -> Array:
@@ -74,7 +74,7 @@ def solved(
     order: int,
     mesh: Mesh,
     assemble: Callable[[], Assembled],
-    factor: Callable[[sp.csr_matrix, int], Solver] = lu,
+    factor: Callable[[sp.csr_array, int], Solver] = lu,
 ) -> Run:
     """One run: what `assemble` returns, solved with `factor`; both are timed."""
     mesh.read()

@@ -8,6 +8,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from drivers.benchmark.engines import Run, needed
@@ -79,4 +80,4 @@ def assembled(felupe: ModuleType, common: Common, made: Mesh, order: int) -> Ass
     [law] = common.problem.materials.values()
     material = felupe.LinearElastic(E=law.E, nu=law.nu)  # type: ignore[union-attr]
     K = felupe.SolidBody(material, felupe.FieldContainer([field])).assemble.matrix()
-    return Assembled(K, load(common, numbering, order), numbering)
+    return Assembled(sp.csr_array(K), load(common, numbering, order), numbering)

@@ -32,7 +32,7 @@ def runs(common: Common, kinds: Sequence[str], sizes: Sequence[int]) -> Iterator
                 yield run(common, kind, order, made(common, kind, order, size))
 
 
-def cholesky(K: sp.csr_matrix, order: int) -> Solver:
+def cholesky(K: sp.csr_array, order: int) -> Solver:
     """NGSolve's sparse Cholesky factorisation for the active set."""
     matrix = lower_half(K)
     right, solution = matrix.CreateColVector(), matrix.CreateRowVector()

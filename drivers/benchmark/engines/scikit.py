@@ -8,6 +8,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from drivers.benchmark.engines import Run, needed
@@ -61,4 +62,4 @@ def assembled(skfem: ModuleType, common: Common, made: Mesh, order: int) -> Asse
     K = skfem.models.elasticity.linear_elasticity(*moduli(common)).assemble(basis)
     nodes = basis.nodal_dofs if order == 1 else np.hstack([basis.nodal_dofs, basis.facet_dofs])
     numbering = Numbering(made.points, nodes, segments(made, order, basis.mesh.facets.T))
-    return Assembled(K.tocsr(), load(skfem, common, made, basis), numbering)
+    return Assembled(sp.csr_array(K), load(skfem, common, made, basis), numbering)

@@ -8,6 +8,8 @@ import scipy.sparse as sp
 
 from drivers.benchmark.scenes.plane import Numbering, moduli
 from drivers.benchmark.scenes.problems import Common
+from ngcontact.linalg import shared
+from ngcontact.triplets import from_triplets
 
 BUBBLE = -1 / 8  # value of NGSolve's edge function of order 2 at the middle of the edge
 
@@ -21,10 +23,10 @@ def stiffness(common: Common, space: ng.FESpace) -> ng.BilinearForm:
     return ng.BilinearForm(energy * ng.dx, symmetric=True)
 
 
-def matrix(common: Common, space: ng.FESpace) -> sp.csr_matrix:
+def matrix(common: Common, space: ng.FESpace) -> sp.csr_array:
     """Stiffness matrix (n, n); a copy, as NGSolve's is gone with its form."""
     form = stiffness(common, space).Assemble()
-    return sp.csr_matrix(form.mat.CSR(), copy=True)
+    return shared(form.mat).copy()
 
 
 def load(common: Common, space: ng.FESpace) -> ng.LinearForm:
@@ -51,7 +53,7 @@ def numbering(mesh: ng.Mesh, order: int) -> Numbering:
     )
 
 
-def nodal(numbering: Numbering) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+def nodal(numbering: Numbering) -> tuple[sp.csr_array, sp.csr_array]:
     """Unknowns (n, n) from values at the nodes of the boundary, else from themselves; inverse.
 
     They differ at the middles of edges: NGSolve's unknown there counts from the mean of the ends.
@@ -62,7 +64,7 @@ def nodal(numbering: Numbering) -> tuple[sp.csr_matrix, sp.csr_matrix]:
         return sp.eye_array(n, format="csr"), sp.eye_array(n, format="csr")
     first, middle, last = numbering.unknown[:, rows].transpose(2, 0, 1).reshape(3, -1)
     i, j = np.tile(middle, 2), np.concatenate([first, last])
-    means = sp.csr_array((np.full(len(i), 0.5), (i, j)), shape=(n, n))
+    means = from_triplets(np.full(len(i), 0.5), i, j, (n, n))
     scale = np.ones(n)
     scale[middle] = BUBBLE
     forward = (sp.diags_array(1 / scale) @ (sp.eye_array(n) - means)).tocsr()

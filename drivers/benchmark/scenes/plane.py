@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from drivers.benchmark.scenes.problems import Common
 from ngcontact import Elastic
+from ngcontact.triplets import from_triplets
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -155,7 +156,7 @@ class Bounded:
 
 
 def bounded(
-    common: Common, K: sp.csr_matrix, f: Array, numbering: Numbering, basis: sp.csr_matrix | None
+    common: Common, K: sp.csr_array, f: Array, numbering: Numbering, basis: sp.csr_array | None
 ) -> tuple[Bounded, Facing]:
     """The problem with one bound per contact node, and those nodes.
 
@@ -164,7 +165,7 @@ def bounded(
     """
     line = facing(common, numbering)
     if line.opposite is not None:
-        ties = sp.csr_array((np.ones(len(line.at)), (line.at, line.opposite)), shape=K.shape)
+        ties = from_triplets(np.ones(len(line.at)), line.at, line.opposite, K.shape)
         opening = ties + sp.eye_array(len(f), format="csr")
         basis = opening if basis is None else basis @ opening
     if basis is not None:

@@ -1,0 +1,39 @@
+"""Sparse arrays from entries: repeated ones add, indices have as many bits as they need."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from drivers import cases
+from ngcontact import solve
+from ngcontact.triplets import from_triplets
+
+
+@pytest.mark.parametrize("index", [np.int32, np.int64, np.uint64])
+def test_repeated_entries_add(index):
+    rows, columns = np.array([[2, 0, 2, 1], [1, 0, 1, 3]], dtype=index)
+    matrix = from_triplets(np.array([1.0, 2.0, 4.0, 0.0]), rows, columns, (3, 4))
+    assert isinstance(matrix, sp.csr_array)
+    assert matrix.toarray().tolist() == [[2, 0, 0, 0], [0, 0, 0, 0], [0, 5, 0, 0]]
+    assert matrix.indices.dtype == matrix.indptr.dtype == np.int32
+
+
+def test_nothing():
+    none = np.zeros(0, dtype=np.intp)
+    assert from_triplets(np.zeros(0), none, none, (0, 3)).shape == (0, 3)
+
+
+def test_large_places_are_kept():
+    matrix = from_triplets(np.ones(1), [0], [2**40], (1, 2**41))
+    assert matrix.indices.tolist() == [2**40]
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_all_matrices_of_a_problem_have_short_indices(order):
+    """One of 64 bits would make those of every product long, at twice the memory."""
+    d = solve(cases.pressed_disc(), maxh=0.5, order=order).discrete
+    for matrix in (d.space.A, d.space.basis, d.basis.T, d.B, d.program.K, d.program.R):
+        assert isinstance(matrix, sp.csr_array)
+        assert matrix.indices.dtype == matrix.indptr.dtype == np.int32
