@@ -100,7 +100,7 @@ def _disc_size(points: Array, c: float) -> Array:
 def _block_size(points: Array, c: float) -> Array:
     """Finer at the end of contact, the end of the load and the corner of the clamped edge."""
     ends = [(BLOCK.half_width, 0.0), (1.0, 1.0), (2.0, -1.0)]
-    return c * np.min([_towards(points, end, 0.5, c) for end in ends], axis=0)
+    return c * np.array([_towards(points, end, 0.5, c) for end in ends]).min(axis=0)
 
 
 def _on_circle(points: Array) -> Array:

@@ -22,9 +22,9 @@ def sides(triangles: Indices) -> tuple[Indices, Indices]:
 def which(ends: Indices, wanted: Indices) -> Indices:
     """Numbers (m,) of the sides that join `wanted` (m, 2) among those that join `ends` (k, 2)."""
     count = ends.max() + 1
-    keys, wanted = (np.sort(pairs, axis=1) @ [count, 1] for pairs in (ends, wanted))
+    keys, found = (np.sort(pairs, axis=1) @ [count, 1] for pairs in (ends, wanted))
     sorter = np.argsort(keys)
-    return sorter[np.searchsorted(keys, wanted, sorter=sorter)]
+    return sorter[np.searchsorted(keys, found, sorter=sorter)]
 
 
 def forces(
