@@ -22,9 +22,10 @@ BUILD = "import sys; from setuptools.build_meta import build_wheel; build_wheel(
 
 def shipped():
     """Names of the files that a wheel should bring."""
-    room = {path.relative_to(ROOT) for path in (ROOT / "ngcontact").rglob("*.py")}
-    geometries = {LINK / path.name for path in (ROOT / "geometries").glob("*.py")}
-    return {path.as_posix() for path in room | geometries} | {"ngcontact/py.typed"}
+    rooms = {path.relative_to(ROOT) for path in (ROOT / "ngcontact").rglob("*.py*")}
+    geometries = {LINK / path.name for path in (ROOT / "geometries").glob("*.py*")}
+    sources = {path.as_posix() for path in rooms | geometries if path.suffix in (".py", ".pyi")}
+    return sources | {"ngcontact/py.typed"}
 
 
 @pytest.fixture(params=["with the link", "without the link"])
