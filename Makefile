@@ -1,7 +1,7 @@
 # Two commands do everything; each makes the environment it needs.
 #
 #   make demo    a steel disc on an aluminium block, compared with Hertz's formulas
-#   make test    linter, formatter, type checker, doctests, tests
+#   make test    linter, formatter, type checker, import contracts, doctests, tests
 #
 # `make test PYTHON=python3.13` does it with another Python, in an environment of its own.
 PYTHON ?= python3
@@ -31,7 +31,7 @@ smoke: demo
 	$(BIN)/python -m pytest -p tests.smoke tests
 
 # What reads the source without running it.
-check: lint types
+check: lint types imports
 
 lint: $(INSTALLED)
 	$(BIN)/ruff check .
