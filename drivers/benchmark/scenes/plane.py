@@ -135,7 +135,7 @@ class Bounded:
 
     Attributes
     ----------
-    K : csr_matrix
+    K : csr_array
         Stiffness (n, n), symmetric.
     f, value : Array
         Load and prescribed values (n,).
@@ -147,7 +147,7 @@ class Bounded:
         Bounds (m,).
     """
 
-    K: sp.csr_matrix
+    K: sp.csr_array
     f: Array
     value: Array
     fixed: Mask
