@@ -1,27 +1,38 @@
-"""A steel disc pressed on an aluminium block, compared with Hertz's formulas.
+"""A disc pressed on a block, steel on aluminium, compared with Hertz's formulas.
 
 The disc's top moves down by a given distance; how far the contact zone spreads is found by the
 adaptive loop, from a coarse mesh that knows nothing of it. By symmetry half of each body is
 computed. Writes hertz.vtu, hertz_contact.vtp and hertz.png.
 
     python -m drivers.hertz
+    python -m drivers.hertz --radius 2 --tolerance 1e-3 --out out/
 """
 
 from __future__ import annotations
 
 import math
 import time
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated, TypeAlias
 
 import ngsolve as ng
+from cyclopts import Parameter
 
+from drivers.command_line import Count, Order, Positive, run
 from ngcontact import Contact, Elastic, Problem, Solution, adapt
 from ngcontact.geometries import disc_on_block
 
-STEEL = Elastic(E=210e9, nu=0.3)  # Pa
-ALUMINIUM = Elastic(E=70e9, nu=0.33)
-RADIUS = 0.01  # m
+STEEL = (210e9, 0.3)  # E, Pa, and nu
+ALUMINIUM = (70e9, 0.33)
+
+
+def _check(_: object, law: tuple[float, float]) -> None:
+    Elastic(*law)
+
+
+Law: TypeAlias = Annotated[tuple[float, float], Parameter(validator=_check)]
 
 
 @dataclass(frozen=True)
@@ -33,12 +44,12 @@ class Quantities:
     half_width: float
 
 
-def press(distance: float = 2.0e-5) -> Problem:
-    """Disc on a block whose bottom is clamped; its top moves down by `distance` (m)."""
+def pressed(radius: float, press: float, disc: Elastic, block: Elastic) -> Problem:
+    """Disc of `radius` (m) on a clamped block; its top moves down by `press` radii."""
     return Problem(
-        geometry=disc_on_block(radius=RADIUS),
-        materials={"disc": STEEL, "block": ALUMINIUM},
-        displacement={"block_bottom": (0, 0), "disc_top": (0, -distance)},
+        geometry=disc_on_block(radius=radius),
+        materials={"disc": disc, "block": block},
+        displacement={"block_bottom": (0, 0), "disc_top": (0, -press * radius)},
         sliding="axis",
         contact=[Contact(secondary="disc_arc", primary="block_top", direction=(0, -1))],
     )
@@ -54,32 +65,21 @@ def measured(solution: Solution) -> Quantities:
     )
 
 
-def hertz(force: float) -> Quantities:
+def hertz(force: float, radius: float, *laws: tuple[float, float]) -> Quantities:
     """Hertz's line contact of a cylinder and a half-space under the same force (Johnson 1985)."""
-    stiffness = 1 / sum((1 - m.nu**2) / m.E for m in (STEEL, ALUMINIUM))
+    stiffness = 1 / sum((1 - nu**2) / E for E, nu in laws)
     return Quantities(
         force=force,
-        peak=math.sqrt(force * stiffness / (math.pi * RADIUS)),
-        half_width=math.sqrt(4 * force * RADIUS / (math.pi * stiffness)),
+        peak=math.sqrt(force * stiffness / (math.pi * radius)),
+        half_width=math.sqrt(4 * force * radius / (math.pi * stiffness)),
     )
 
 
-def main(
-    order: int = 3, max_dofs: int = 20_000, folder: str | Path | None = "out"
-) -> tuple[Quantities, Quantities]:
-    """Solve adaptively, print levels and the comparison, write results to `folder`.
-
-    Returns
-    -------
-    computed, expected : Quantities
-        The last level, and Hertz's formulas for its force.
-    """
-    print("A steel disc pressed on an aluminium block")
-    print(
-        "unknowns  active  steps  estimate     force/N/m  peak/MPa  half-width/mm  seconds",
-    )
+def last_level(levels: Iterable[Solution]) -> tuple[Solution, Quantities]:
+    """Print all levels as they come; the last one and its quantities."""
+    print("unknowns  active  steps  estimate     force/N/m  peak/MPa  half-width/mm  seconds")
     started = time.perf_counter()
-    for solution in adapt(press(), order=order, max_dofs=max_dofs):
+    for solution in levels:
         estimate = solution.relative_error_estimate
         computed = measured(solution)
         now = time.perf_counter()
@@ -89,22 +89,75 @@ def main(
             f"{computed.peak / 1e6:8.2f}  {computed.half_width * 1e3:13.5f}  {now - started:7.2f}"
         )
         started = now
-    expected = hertz(computed.force)
-    print(f"\nAt a/R = {computed.half_width / RADIUS:.4f}   computed    Hertz  difference")
+    return solution, computed
+
+
+def print_comparison(radius: float, computed: Quantities, expected: Quantities) -> None:
+    """Print peak pressures and half-widths beside each other."""
+    print(f"\nAt a/R = {computed.half_width / radius:.4f}   computed    Hertz  difference")
     for name, a, b, unit in (
         ("peak pressure, MPa", computed.peak, expected.peak, 1e6),
         ("half-width, mm", computed.half_width, expected.half_width, 1e-3),
     ):
         print(f"{name:20s} {a / unit:10.4f} {b / unit:10.4f}  {(a / b - 1) * 100:+.3f} %")
-    if folder is not None:
-        folder = Path(folder)
-        folder.mkdir(parents=True, exist_ok=True)
-        solution.write(folder / "hertz.vtu")
-        solution.plot(folder / "hertz.png")
-        print(f"\nWritten: {folder}/hertz.vtu, hertz_contact.vtp, hertz.png")
+
+
+def main(
+    *,
+    radius: Positive = 0.01,
+    press: Positive = 2e-3,
+    disc: Law = STEEL,
+    block: Law = ALUMINIUM,
+    order: Order = 3,
+    tolerance: Positive | None = None,
+    max_dofs: Count = 20_000,
+    out: Path | None = Path("out"),
+) -> tuple[Quantities, Quantities]:
+    """A disc pressed on a block: solved adaptively, compared with Hertz's formulas.
+
+    Prints every level and the comparison, writes hertz.vtu, hertz_contact.vtp and hertz.png.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the disc, m.
+    press : float
+        Distance by which the top of the disc moves down, in radii of the disc.
+    disc : tuple of float
+        Young's modulus of the disc, Pa, and its Poisson's ratio, without unit.
+    block : tuple of float
+        Young's modulus of the block, Pa, and its Poisson's ratio, without unit.
+    order : int
+        Degree of the displacement on each element, 1 to 4.
+    tolerance : float, optional
+        Estimated error, relative in the energy norm, that ends the refinement.
+    max_dofs : int
+        Number of unknowns that no level exceeds.
+    out : path, optional
+        Folder of the files; without one nothing is written.
+
+    Returns
+    -------
+    computed, expected : Quantities
+        The last level, and Hertz's formulas for its force; N/m, Pa and m.
+    """
+    print(
+        f"A disc of radius {radius * 1e3:g} mm, E = {disc[0] / 1e9:g} GPa, nu = {disc[1]:g}, "
+        f"pressed on a block, E = {block[0] / 1e9:g} GPa, nu = {block[1]:g}"
+    )
+    problem = pressed(radius, press, Elastic(*disc), Elastic(*block))
+    levels = adapt(problem, order=order, tolerance=tolerance, max_dofs=max_dofs)
+    solution, computed = last_level(levels)
+    expected = hertz(computed.force, radius, disc, block)
+    print_comparison(radius, computed, expected)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        solution.write(out / "hertz.vtu")
+        solution.plot(out / "hertz.png")
+        print(f"\nWritten: {out}/hertz.vtu, hertz_contact.vtp, hertz.png")
     return computed, expected
 
 
 if __name__ == "__main__":
     with ng.TaskManager():
-        main()
+        run(main)

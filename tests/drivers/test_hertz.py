@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import pytest
 import pyvista
 
 from drivers import hertz
 
 
 def test_hertz_agrees_with_the_formulas(tmp_path, capsys):
-    computed, expected = hertz.main(max_dofs=6000, folder=tmp_path)
+    computed, expected = hertz.main(max_dofs=6000, out=tmp_path)
     # The formulas hold up to O((a/R)^2) = 1e-3; required 1 %, measured 0.02 % and 0.3 % here.
-    assert computed.half_width / hertz.RADIUS <= 0.03
+    assert computed.half_width / 0.01 <= 0.03  # radii
     assert abs(computed.peak / expected.peak - 1) < 2e-3
     assert abs(computed.half_width / expected.half_width - 1) < 1e-2
     printed = capsys.readouterr().out
@@ -27,3 +28,19 @@ def test_hertz_agrees_with_the_formulas(tmp_path, capsys):
     assert {"displacement", "stress", "von_mises"} <= set(bodies.point_data)
     contact = pyvista.read(tmp_path / "hertz_contact.vtp")
     assert contact["pressure"].max() == computed.peak
+
+
+def test_similar_discs_have_the_same_pressure():
+    options = {"order": 2, "max_dofs": 2000, "out": None}
+    (one, _), (other, formulas) = (hertz.main(radius=r, **options) for r in (0.01, 0.04))
+    assert other.peak == pytest.approx(one.peak, rel=1e-9)  # the same problem in other units
+    assert other.half_width == pytest.approx(4 * one.half_width, rel=1e-9)
+    assert formulas.force == pytest.approx(4 * one.force, rel=1e-9)
+    softer, _ = hertz.main(disc=(21e9, 0.3), block=(7e9, 0.33), **options)
+    assert softer.peak == pytest.approx(one.peak / 10, rel=1e-9)
+
+
+def test_a_tolerance_ends_the_refinement(capsys):
+    hertz.main(order=2, tolerance=0.5, out=None)
+    levels = [line for line in capsys.readouterr().out.splitlines() if line[:8].strip().isdigit()]
+    assert float(levels[-1].split()[3]) <= 0.5 < float(levels[-2].split()[3])
