@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import numpy as np
 import pytest
 
 from drivers import convergence
-from drivers.convergence import PATCHES, mean_rate, study
+from drivers.convergence import PATCHES, TABLES, Part, mean_rate, study
 from drivers.reference import cases
 
 # Residuals of identities that hold exactly: required 1e-10, measured below 4e-13 at 31k unknowns.
@@ -98,17 +100,21 @@ def test_nested_polygonal_meshes_lower_the_energy():
 def test_mean_rate_of_a_power():
     rows = [convergence.Level(0, 3.0 * 2 ** (-1.5 * k), 0.0, 0, 0.0) for k in range(4)]
     assert mean_rate(rows) == pytest.approx(1.5, rel=1e-12)
+    assert np.isnan(mean_rate(rows[:1]))
 
 
-def test_driver_prints_every_table(capsys, monkeypatch):
+def test_driver_prints_every_table(capsys):
     """The tables of the driver, on first meshes only."""
-    small = {
-        name: (make, [(element, order, 0.5, 2) for element, order, _, _ in runs])
-        for name, (make, runs) in convergence.TABLE.items()
-    }
-    monkeypatch.setattr(convergence, "TABLE", small)
-    convergence.main()
+    found = convergence.main(levels=2)
     printed = capsys.readouterr().out
-    for name in (*PATCHES, *small):
-        assert name in printed
+    for title, rows in found.items():
+        assert title in printed
+        assert len(rows) == (2 if "order 1" in title else 1)
+    assert set(PATCHES) <= set(found)
+    assert len(found) == len(PATCHES) + sum(len(runs) for *_, runs in TABLES.values())
     assert "P2" in printed
+
+
+def test_driver_prints_the_parts_asked_for():
+    assert list(convergence.main(["patch"])) == list(PATCHES)
+    assert set(get_args(Part)) == {"patch", *TABLES}
