@@ -9,13 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.adaptive_study.studies import REFERENCE, Study
+from drivers.adaptive_study.studies import Study
 from drivers.reference.straight import Hertz
 from ngcontact import Problem, Solution, adapt, solve
 from ngcontact.adaptivity import refined
 from ngcontact.mesh import first_mesh
 
-UNKNOWNS = {1: 40_000, 2: 40_000, 3: 40_000, 4: 50_000}  # order 4 is asymptotic from 10k on
 NEAR = 0.2  # distance from a transition, relative to the zone, that counts as near
 
 
@@ -74,27 +73,29 @@ def half_width_error(study: Study, solution: Solution) -> float:
 
 
 def uniform(problem: Problem, order: int, max_dofs: int) -> Iterator[Solution]:
-    """Solutions on uniformly refined meshes, warm started."""
-    mesh, solution = first_mesh(problem), None
+    """Solutions on uniformly refined meshes, warm started; the first one of any size."""
+    solution = solve(problem, first_mesh(problem), order=order)
     while True:
+        yield solution
+        mesh = refined(problem, solution.mesh)
         solution = solve(problem, mesh, order=order, start=solution)
         if solution.displacement.space.ndof > max_dofs:
             return
-        yield solution
-        mesh = refined(problem, solution.mesh)
 
 
-def run(
-    name: str, study: Study, strategy: str, order: int, error: Callable[[Solution], float]
+def run_of(
+    name: str,
+    study: Study,
+    strategy: str,
+    order: int,
+    error: Callable[[Solution], float],
+    max_dofs: int,
 ) -> Iterator[tuple[Solution, Row]]:
     """One run, from the geometry on; the seconds are those of the product, not of the study."""
-    most = UNKNOWNS[order]
-    if study.exact is None:  # the reference has to be much finer
-        most = min(most, 2 * REFERENCE // 5)
     if strategy == "uniform":
-        levels = uniform(study.problem, order, most)
+        levels = uniform(study.problem, order, max_dofs)
     else:
-        levels = adapt(study.problem, order=order, max_dofs=most)
+        levels = adapt(study.problem, order=order, max_dofs=max_dofs)
     seconds = 0.0
     level = 0
     started = time.perf_counter()

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import csv
 from functools import lru_cache
+from typing import get_args
 
 import numpy as np
 import pytest
 
-from drivers.adaptive_study import runs, studies
 from drivers.adaptive_study.__main__ import main
-from drivers.adaptive_study.runs import rate, run, share_near
-from drivers.adaptive_study.studies import STUDIES, error_measure
+from drivers.adaptive_study.runs import rate, run_of, share_near
+from drivers.adaptive_study.studies import STUDIES, Name, error_measure
 from drivers.reference import cases
 from ngcontact import adapt
 
@@ -20,11 +20,7 @@ from ngcontact import adapt
 def levels(name, strategy, order, unknowns):
     """Solutions and rows of one run up to a number of unknowns."""
     study = STUDIES[name]()
-    results = []
-    for solution, row in run(name, study, strategy, order, error_measure(study)):
-        if row.unknowns > unknowns:
-            break
-        results.append((solution, row))
+    results = list(run_of(name, study, strategy, order, error_measure(study), unknowns))
     return [s for s, _ in results], [r for _, r in results]
 
 
@@ -106,12 +102,8 @@ def test_punch_regains_the_rate():
     study = STUDIES["flat punch"]()
     rates = {}
     for strategy in ("uniform", "adaptive"):
-        rows = []
-        for _, row in run("flat punch", study, strategy, 1, error):
-            rows.append(row)
-            if row.unknowns > 5000:
-                break
-        rates[strategy] = rate(rows)
+        levels = run_of("flat punch", study, strategy, 1, error, max_dofs=10_000)
+        rates[strategy] = rate([row for _, row in levels])
     assert abs(rates["uniform"] + 0.25) < 0.05
     assert abs(rates["adaptive"] + 0.5) < 0.075
 
@@ -133,11 +125,10 @@ def test_elements_follow_the_optimal_density():
     assert 0.023 < np.mean(shares) < 0.092  # within a factor 2 of the optimum
 
 
-def test_driver_writes_rows_and_pictures(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(runs, "UNKNOWNS", dict.fromkeys((1, 2), 2000))
-    for module in (runs, studies):
-        monkeypatch.setattr(module, "REFERENCE", 6000)
-    rows = main(["disc on rigid plane"], (1, 2), tmp_path)
+def test_driver_writes_rows_and_pictures(tmp_path, capsys):
+    sizes = {"max_dofs": 2000, "reference": 6000}
+    rows = main(["disc on rigid plane"], orders=(1, 2), **sizes, out=tmp_path)
+    assert max(row.unknowns for row in rows) <= 2000
     with (tmp_path / "adaptive_study.csv").open() as file:
         table = list(csv.DictReader(file))
     assert len(table) == len(rows) > 8
@@ -156,3 +147,7 @@ def test_problem_a_references():
     assert abs(solution.pressure.max() / 5.5919 - 1) < 2e-4
     assert abs(half_width / 0.05082 - 1) < 1e-3
     assert abs(solution.energy / 5.221032e-4 - 1) < 2e-6
+
+
+def test_every_study_has_its_name():
+    assert get_args(Name) == tuple(STUDIES)
