@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import importlib
 import math
+from pathlib import Path
+from typing import get_args
 
 import pytest
 
+from drivers.stress import __path__ as folder
 from drivers.stress import refused
-from drivers.stress.__main__ import main, modules
+from drivers.stress.__main__ import RANDOM, Trial, line, main, outcomes
 from drivers.stress.differences import differences
 from drivers.stress.motion import Motion, posed
+from drivers.stress.trials import algebra, held, symmetry
 from drivers.stress.trials.symmetry import parting
 from ngcontact import solve
 
@@ -18,24 +21,39 @@ from ngcontact import solve
 QUICK = ("algebra", "gaps", "held", "shapes")
 
 
-def test_modules_are_found():
-    assert set(QUICK) <= set(modules())
+def test_every_module_has_its_name():
+    [path] = folder
+    modules = {file.stem for file in Path(path).glob("trials/[a-z]*.py")}
+    assert modules == set(get_args(Trial))
+    assert set(QUICK) < modules
+
+
+def test_seeds_draw_other_cases():
+    """Other quadratic programs, and other numbers of vertices and triangles."""
+
+    def programs(seed):
+        return [line(outcome) for outcome in algebra.random_programs(count=2, seed=seed)]
+
+    def numberings(seed):
+        return {motion.seed for motion in symmetry.motions(seed)} - {None}
+
+    assert programs(0) == programs(0)
+    assert programs(0) != programs(1)
+    assert len(numberings(0) | numberings(1) | numberings(2)) == 3 * len(numberings(0)) > 3
+    assert set(RANDOM) == {"algebra", "symmetry"}
 
 
 @pytest.mark.parametrize("name", QUICK)
 def test_outcomes(name):
-    trial = importlib.import_module(f"drivers.stress.trials.{name}")
-    failed = [outcome for outcome in trial.outcomes() if not outcome.passed]
-    assert not failed
+    assert [outcome for outcome in outcomes(name, seed=0) if not outcome.passed] == []
 
 
 def test_the_exit_status_tells_of_failures(monkeypatch, capsys):
-    held = importlib.import_module("drivers.stress.trials.held")
     wrong = refused("nothing", "is refused", ValueError, "it", lambda: None)
     assert math.isinf(wrong.error)
-    monkeypatch.setattr(held, "outcomes", lambda: iter([wrong]))
-    assert main(["held"]) == 1
-    assert "1 cases, 1 failed" in capsys.readouterr().out
+    monkeypatch.setattr(held, "outcomes", lambda: iter([wrong, wrong]))
+    assert main(["held"]) == 2
+    assert "2 cases, 2 failed" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("length", [1e-9, 1.0, 1e9])

@@ -1,4 +1,5 @@
 """Kinds of stress, one a module.
 
-Each module has a function ``outcomes()`` that yields one `Outcome` per line of the table.
+Each module has a function ``outcomes()`` that yields one `Outcome` per line of the table; where
+numbers are drawn it takes a ``seed``.
 """

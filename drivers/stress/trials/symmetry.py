@@ -130,13 +130,18 @@ def compared(scene: Scene, motion: Motion, order: int, first: Solution, allowed:
     return solved(f"{scene.name}, order {order}", motion.name, other, error, allowed)
 
 
-def outcomes() -> Iterator[Outcome]:
+def motions(seed: int = 0) -> list[Motion]:
+    """All motions, with numberings of their own for every seed."""
+    return [m if m.seed is None else replace(m, seed=m.seed + 2 * seed) for m in MOTIONS]
+
+
+def outcomes(seed: int = 0) -> Iterator[Outcome]:
     """Every scene at orders 1 and 4, moved in every way, and with its bodies swapped."""
     for make in SCENES:
         scene = make()
         for order in ORDERS:
             first = solve(posed(scene, Motion("as it is"))[0], order=order)
-            for motion in MOTIONS:
+            for motion in motions(seed):
                 yield compared(scene, motion, order, first, SAME)
             if scene.matched:
                 yield compared(swapped(scene), Motion("bodies swapped"), order, first, SAME)
