@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import importlib
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
 
+from drivers.benchmark.__main__ import PARTS, Part, main
 from drivers.benchmark.engines import (
     NotInstalledError,
     Run,
@@ -16,12 +20,12 @@ from drivers.benchmark.engines import (
     ngsolve_penalty,
 )
 from drivers.benchmark.engines.assembled import solved
-from drivers.benchmark.report.tables import of_large
+from drivers.benchmark.report.tables import of_growth, of_large
 from drivers.benchmark.scenes.meshes import KINDS, made
 from drivers.benchmark.scenes.problems import Common, block, disc
 from drivers.benchmark.scenes.reading import contact_end, peak, weights
 from drivers.benchmark.scenes.triangles import forces, sides, which
-from drivers.benchmark.studies import large
+from drivers.benchmark.studies import growth, large
 from ngcontact import adapt
 from ngcontact.discrete import linear_systems
 
@@ -229,3 +233,25 @@ def test_large_problems_take_the_path_asked_for(monkeypatch: pytest.MonkeyPatch)
     assert one.cycles < other.cycles
     assert of_large(rows).count("\n") == 2
     assert f"| {other.systems} | {other.cycles} |" in of_large(rows)
+
+
+def test_driver_writes_the_parts_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    found = main(["tax"], problems=["block"], rounds=1, max_dofs=10_000, out=tmp_path)
+    assert list(found) == ["tax"]
+    sizes = [row.unknowns for row in found["tax"]]
+    assert len(sizes) == 2 * 2  # orders, sizes
+    assert max(sizes) < 11_000
+    assert all(row.linear > 0 and row.cold > 0 and row.warm > 0 for row in found["tax"])
+    [path] = tmp_path.iterdir()
+    assert path.name == "benchmark_tax.md"
+    assert path.read_text() in capsys.readouterr().out
+
+
+def test_every_part_has_its_name():
+    assert get_args(Part) == tuple(PARTS)
+
+
+def test_one_size_grows_by_no_exponent():
+    rows = [growth.measure("block", 1, 1000, kind) for kind in ("linear", "contact")]
+    assert "exponent" not in of_growth(rows)
+    assert "exponent" in of_growth([*rows, *(replace(row, unknowns=9000) for row in rows)])

@@ -77,6 +77,8 @@ def of_growth(rows: Sequence[Growth]) -> str:
                     *(f"{ratio:.2f}" for ratio in ratios),
                 )
             )
+        if len(linear) < 2:
+            continue
         exponents = [
             np.polyfit(np.log([r.unknowns for r in x]), np.log([r.seconds for r in x]), 1)[0]
             for x in (linear, contact)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,3 +118,7 @@ def disc() -> Common:
 def block() -> Common:
     """Problem B: block that lifts off on one side, contact zone bounded, nodes matched."""
     return Common("block", partly_opening_block(), BLOCK, 1, _block_size, lambda points: points)
+
+
+Name: TypeAlias = Literal["disc", "block"]
+COMMONS: dict[Name, Callable[[], Common]] = {"disc": disc, "block": block}

@@ -37,7 +37,6 @@ LARGEST = {"kratos": 16_000, "ngsolve_penalty": 16_000, "akantu_penalty": 4_000}
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 QUANTITIES = ("force", "peak", "half_width", "energy")
 TOGETHER = ("force", "peak", "half_width")
-ROUNDS = 5
 
 
 @dataclass(frozen=True)
@@ -71,11 +70,11 @@ def errors(found: Run, reference: Reference) -> dict[str, float]:
     return {name: abs(getattr(found, name) / getattr(reference, name) - 1) for name in QUANTITIES}
 
 
-def adaptive_run(common: Common, order: int) -> list[Run]:
+def adaptive_run(common: Common, order: int, max_dofs: int) -> list[Run]:
     """One adaptive run; the seconds of each level include all before it, and the meshing."""
     result = []
     start = time.perf_counter()
-    for solution in adapt(common.problem, order=order, max_dofs=BUDGET[order]):
+    for solution in adapt(common.problem, order=order, max_dofs=min(BUDGET[order], max_dofs)):
         seconds = time.perf_counter() - start
         ends = solution.transitions()
         result.append(
@@ -110,9 +109,10 @@ def median_runs(rounds: Sequence[Sequence[Run]]) -> list[Run]:
     ]
 
 
-def engine_runs(name: str, common: Common) -> list[Run]:
+def engine_runs(name: str, common: Common, max_dofs: int) -> list[Run]:
     """All runs of one other code."""
-    engine, most = import_module(f"{PACKAGE}.{name}"), LARGEST.get(name, math.inf)
+    engine = import_module(f"{PACKAGE}.{name}")
+    most = min(LARGEST.get(name, max_dofs), max_dofs)
     return [
         run
         for kind, sizes in SIZES.items()
@@ -120,20 +120,22 @@ def engine_runs(name: str, common: Common) -> list[Run]:
     ]
 
 
-def points(common: Common, rounds: int = ROUNDS) -> tuple[list[Point], list[str]]:
+def points(common: Common, rounds: int, max_dofs: int) -> tuple[list[Point], list[str]]:
     """All engines on one problem, interleaved, and what could not be run."""
     missing: dict[str, str] = {}
     collected: dict[str, list[list[Run]]] = {}
-    adaptive_run(common, ORDERS[0])  # warm-up
+    adaptive_run(common, ORDERS[0], max_dofs)  # warm-up
     for number in range(rounds):
         print(f"{common.name}: round {number + 1} of {rounds}", file=sys.stderr, flush=True)
         for order in ORDERS:
-            collected.setdefault(f"{OURS} {order}", []).append(adaptive_run(common, order))
+            collected.setdefault(f"{OURS} {order}", []).append(
+                adaptive_run(common, order, max_dofs)
+            )
         for name in ENGINES:
             if name in missing:
                 continue
             try:
-                collected.setdefault(name, []).append(engine_runs(name, common))
+                collected.setdefault(name, []).append(engine_runs(name, common, max_dofs))
             except NotInstalledError as error:
                 missing[name] = str(error)
                 collected.pop(name)

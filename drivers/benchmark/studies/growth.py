@@ -10,21 +10,21 @@ import resource
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, TypeAlias, get_args
 
 import ngsolve as ng
 
-from drivers.benchmark.scenes.problems import block, disc
+from drivers.benchmark.scenes.problems import COMMONS, Name
 from drivers.benchmark.studies.linear import linear_solve, uniform_mesh
+from drivers.command_line import Count, Order, run
 from ngcontact import solve
 
 SIZES = (10_000, 30_000, 100_000, 300_000, 1_000_000)
 ORDERS = (1, 2)
-COMMONS = {"disc": disc, "block": block}
-KINDS = ("linear", "contact")
+Kind: TypeAlias = Literal["linear", "contact"]
 
 
 @dataclass(frozen=True)
@@ -55,8 +55,25 @@ class Growth(Process):
     kind: str
 
 
-def measure(name: str, order: int, size: int, kind: str) -> Growth:
-    """Run here; `memory` is that of this process so far."""
+def measure(name: Name, order: Order, size: Count, kind: Kind) -> Growth:
+    """One solve, in this process, whose memory so far counts.
+
+    Parameters
+    ----------
+    name : str
+        Common problem.
+    order : int
+        Degree of the displacement on each element, 1 to 4.
+    size : int
+        Number of unknowns, about.
+    kind : str
+        What is solved: contact, or the linear problem without it.
+
+    Returns
+    -------
+    Growth
+        Seconds, memory in GB and the exact number of unknowns.
+    """
     problem = COMMONS[name]().problem
     mesh = uniform_mesh(problem, order, size)
     start = time.perf_counter()
@@ -86,17 +103,16 @@ def apart(module: str, *words: object) -> dict[str, Any]:
     return found
 
 
-def growths() -> Iterator[Growth]:
-    """All sizes, the kinds interleaved."""
-    for name in COMMONS:
+def growths(problems: Sequence[Name], max_dofs: int) -> Iterator[Growth]:
+    """All sizes up to about `max_dofs` unknowns, the kinds interleaved."""
+    for name in problems:
         for order in ORDERS:
             for size in SIZES:
-                for kind in KINDS:
+                for kind in get_args(Kind) if size <= max_dofs else ():
                     words = name, order, size, kind
                     yield Growth(**apart("drivers.benchmark.studies.growth", *words))
 
 
 if __name__ == "__main__":
     ng.SetNumThreads(1)
-    name, order, size, kind = sys.argv[1:]
-    print(json.dumps(asdict(measure(name, int(order), int(size), kind))))
+    print(json.dumps(asdict(run(measure))))

@@ -8,19 +8,24 @@ from __future__ import annotations
 import json
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
+from typing import Literal, TypeAlias
 
 import ngsolve as ng
 
-from drivers.benchmark.studies.growth import COMMONS, Process, apart, peak_memory
+from drivers.benchmark.scenes.problems import COMMONS, Name
+from drivers.benchmark.studies.growth import Process, apart, peak_memory
 from drivers.benchmark.studies.linear import uniform_mesh
+from drivers.command_line import Count, Order, run
 from ngcontact import solve
 from ngcontact.discrete import linear_systems
 
 SIZES = (100_000, 300_000, 1_000_000, 3_000_000)
 ORDERS = (1, 2)
-PATHS = {"direct": sys.maxsize, "iterative": 0}  # with the size from which the path is iterative
+Solver: TypeAlias = Literal["direct", "iterative"]
+# With the size from which the path is iterative.
+PATHS: dict[Solver, int] = {"direct": sys.maxsize, "iterative": 0}
 
 
 @dataclass(frozen=True)
@@ -39,8 +44,25 @@ class Large(Process):
     cycles: int
 
 
-def measure(name: str, order: int, size: int, path: str) -> Large:
-    """Run here; `memory` is that of this process so far."""
+def measure(name: Name, order: Order, size: Count, path: Solver) -> Large:
+    """One contact solve, in this process, whose memory so far counts.
+
+    Parameters
+    ----------
+    name : str
+        Common problem.
+    order : int
+        Degree of the displacement on each element, 1 to 4.
+    size : int
+        Number of unknowns, about.
+    path : str
+        How linear systems are solved: by Cholesky factor or by multigrid.
+
+    Returns
+    -------
+    Large
+        Seconds, memory in GB and the exact number of unknowns.
+    """
     problem = COMMONS[name]().problem
     mesh = uniform_mesh(problem, order, size)
     linear_systems.LARGE = {order: PATHS[path]}
@@ -56,16 +78,15 @@ def measure(name: str, order: int, size: int, path: str) -> Large:
     )
 
 
-def larges() -> Iterator[Large]:
-    """All sizes, both paths interleaved."""
-    for name in COMMONS:
+def larges(problems: Sequence[Name], max_dofs: int) -> Iterator[Large]:
+    """All sizes up to about `max_dofs` unknowns, both paths interleaved."""
+    for name in problems:
         for order in ORDERS:
             for size in SIZES:
-                for path in PATHS:
+                for path in PATHS if size <= max_dofs else ():
                     yield Large(**apart("drivers.benchmark.studies.large", name, order, size, path))
 
 
 if __name__ == "__main__":
     ng.SetNumThreads(1)
-    name, order, size, path = sys.argv[1:]
-    print(json.dumps(asdict(measure(name, int(order), int(size), path))))
+    print(json.dumps(asdict(run(measure))))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,6 @@ from ngcontact import adapt
 
 TARGETS = (1_000, 10_000, 30_000)  # unknowns; the first level of at least as many is shown
 ORDERS = (1, 2, 3, 4)
-ROUNDS = 5
 
 
 @dataclass(frozen=True)
@@ -39,9 +38,9 @@ class Level:
     ratio: float
 
 
-def levels(common: Common, order: int, rounds: int = ROUNDS) -> list[Level]:
+def levels(common: Common, order: int, targets: Sequence[int], rounds: int) -> list[Level]:
     """Medians over several equal runs, each after a warm-up, linear solves interleaved."""
-    problem, budget = common.problem, 2 * TARGETS[-1]
+    problem, budget = common.problem, 2 * targets[-1]
     seconds, linear = [], []
     for number in range(rounds + 1):
         clock, meshes = [time.perf_counter()], []
@@ -54,7 +53,7 @@ def levels(common: Common, order: int, rounds: int = ROUNDS) -> list[Level]:
             linear.append([linear_solve(problem, mesh, order).seconds for mesh, _ in meshes])
     level, base = np.median(seconds, axis=0), np.median(linear, axis=0)
     count = np.array([n for _, n in meshes])
-    chosen = sorted({int(np.searchsorted(count, target)) for target in TARGETS})
+    chosen = sorted({int(np.searchsorted(count, target)) for target in targets})
     return [
         Level(common.name, order, int(count[i]), float(level[i]), float(level[i] / base[i]))
         for i in chosen
@@ -62,11 +61,12 @@ def levels(common: Common, order: int, rounds: int = ROUNDS) -> list[Level]:
     ]
 
 
-def all_levels(commons: list[Common]) -> Iterator[Level]:
-    """All problems and orders."""
+def all_levels(commons: list[Common], rounds: int, max_dofs: int) -> Iterator[Level]:
+    """All problems and orders; levels of `TARGETS` up to `max_dofs` unknowns."""
+    targets = [target for target in TARGETS if target <= max_dofs]
     for common in commons:
         for order in ORDERS:
-            yield from levels(common, order)
+            yield from levels(common, order, targets, rounds)
 
 
 def import_seconds(rounds: int = 7) -> tuple[float, float]:

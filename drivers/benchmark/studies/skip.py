@@ -17,7 +17,6 @@ from ngcontact.geometries.region import body, compound, polygon
 
 SIZE = 15_000  # unknowns, about
 ORDER = 2
-ROUNDS = 5
 STEEL = Elastic(E=200.0, nu=0.3)
 COUNTS = ("factorizations", "back_solves", "gap_searches", "curved_elements", "estimates")
 
@@ -63,10 +62,10 @@ def two_blocks(gap: float | None = None, third: bool = False) -> Problem:
     )
 
 
-def timed(problem: Problem, mesh: ng.Mesh, estimated: bool) -> tuple[Solution, float]:
+def timed(problem: Problem, mesh: ng.Mesh, estimated: bool, rounds: int) -> tuple[Solution, float]:
     """Median of several equal solutions."""
     seconds = []
-    for _ in range(ROUNDS):
+    for _ in range(rounds):
         start = time.perf_counter()
         solution = solve(problem, mesh, order=ORDER)
         if estimated:
@@ -75,7 +74,7 @@ def timed(problem: Problem, mesh: ng.Mesh, estimated: bool) -> tuple[Solution, f
     return solution, float(np.median(seconds))
 
 
-def scenes() -> Iterator[Scene]:
+def scenes(rounds: int, max_dofs: int) -> Iterator[Scene]:
     """Pairs of scenes, with the feature first."""
     opening, rings = two_blocks(), cases.ring_in_ring().problem
     variants = [
@@ -91,8 +90,8 @@ def scenes() -> Iterator[Scene]:
         ("gap search", "matched rings", rings, False),
     ]
     for feature, variant, problem, estimated in variants:
-        mesh = uniform_mesh(problem, ORDER, SIZE)
-        solution, seconds = timed(problem, mesh, estimated)
+        mesh = uniform_mesh(problem, ORDER, min(SIZE, max_dofs))
+        solution, seconds = timed(problem, mesh, estimated, rounds)
         yield Scene(
             feature=feature,
             variant=variant,

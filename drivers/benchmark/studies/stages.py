@@ -66,9 +66,10 @@ def stages(common: Common, size: int) -> Stages:
     return Stages(common.name, solution.displacement.space.ndof, spent)
 
 
-def all_stages(commons: list[Common]) -> Iterator[Stages]:
-    """All problems and sizes, after a warm-up."""
+def all_stages(commons: list[Common], max_dofs: int) -> Iterator[Stages]:
+    """All problems and sizes up to about `max_dofs` unknowns, after a warm-up."""
     for common in commons:
         stages(common, SIZES[0])
         for size in SIZES:
-            yield stages(common, size)
+            if size <= max_dofs:
+                yield stages(common, size)

@@ -14,7 +14,6 @@ from ngcontact import solve
 
 SIZES = (1_000, 10_000, 100_000, 300_000)
 ORDERS = (1, 2)
-ROUNDS = 5
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ class Tax:
     factorizations: tuple[int, int]
 
 
-def tax(common: Common, order: int, size: int, rounds: int = ROUNDS) -> Tax:
+def tax(common: Common, order: int, size: int, rounds: int) -> Tax:
     """Measure one size."""
     problem = common.problem
     mesh = uniform_mesh(problem, order, size)
@@ -73,9 +72,10 @@ def tax(common: Common, order: int, size: int, rounds: int = ROUNDS) -> Tax:
     )
 
 
-def taxes(commons: list[Common]) -> Iterator[Tax]:
-    """All problems, orders and sizes."""
+def taxes(commons: list[Common], rounds: int, max_dofs: int) -> Iterator[Tax]:
+    """All problems, orders and sizes up to about `max_dofs` unknowns."""
     for common in commons:
         for order in ORDERS:
             for size in SIZES:
-                yield tax(common, order, size)
+                if size <= max_dofs:
+                    yield tax(common, order, size, rounds)
