@@ -107,11 +107,12 @@ def _marked(solution: Solution, theta: float) -> NDArray[np.bool_]:
     """
     marked = doerfler(solution.indicators, theta)
     trace = solution.discrete.space.trace
-    for line, ends in zip(solution.discrete.lines, solution.ends, strict=True):
-        segments = line.segments[ending_segments(line, ends)]
+    for pair in solution.pairs:
+        line = pair.line
+        segments = line.segments[ending_segments(line, pair.transitions)]
         sides = trace.curve[segments]
         length = np.linalg.norm(sides[:, -1] - sides[:, 0], axis=1)
-        extent = np.linalg.norm(np.ptp(line.position, axis=0)) if len(line.node) else 0.0
+        extent = np.linalg.norm(np.ptp(line.position, axis=0)) if line.node.size else 0.0
         coarse = length > END * solution.relative_error_estimate * extent
         marked[trace.element[segments[coarse]]] = True
     return marked

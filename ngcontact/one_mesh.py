@@ -5,50 +5,39 @@ from __future__ import annotations
 import logging
 
 import ngsolve as ng
-import numpy as np
 
-from .contact import unmatched
-from .discrete import (
-    DiscreteProblem,
-    carried_active_set,
-    discretise,
-    first_active_set,
-    minimise_energy,
-)
+from .contact import ContactState, unmatched
+from .discrete import carried_active_set, discretise, first_active_set, minimise_energy
 from .mesh import check_curves, curve
 from .problem import Problem
-from .qp import Iterate
 from .solution import Solution
 
-MANY = 0.2  # of the points in contact, that face no node, spoil the pressure
+SPOILING = 0.2  # share of the points in contact facing no node from which pressures oscillate
 
 log = logging.getLogger("ngcontact")
 
 
-def _unmatched_pairs(discrete: DiscreteProblem, minimiser: Iterate) -> list[int]:
-    """Pairs of which many points in contact face no node."""
-    stops = np.cumsum([len(line.node) for line in discrete.lines])[:-1]
-    active = np.split(minimiser.active, stops) if discrete.lines else []
+def _unmatched_pairs(pairs: list[ContactState]) -> set[int]:
+    """Numbers of the pairs of which many points in contact face no node."""
     shares = [
-        unmatched(line)[at].mean() if at.any() else 0.0
-        for line, at in zip(discrete.lines, active, strict=True)
+        unmatched(pair.line)[pair.active].mean() if pair.active.any() else 0.0 for pair in pairs
     ]
-    return [pair for pair, share in enumerate(shares) if share > MANY]
+    return {number for number, share in enumerate(shares) if share > SPOILING}
 
 
-def _warn_of_unmatched(discrete: DiscreteProblem, minimiser: Iterate, told: list[int]) -> None:
+def _warn_of_unmatched(solution: Solution, start: Solution | None) -> None:
     """Say once a run where pressures are not to be trusted."""
-    for pair in _unmatched_pairs(discrete, minimiser):
-        if pair not in told:
-            contact = discrete.lines[pair].contact
-            log.warning(
-                'the nodes of "%s" and "%s" do not match where they touch: forces and ends of '
-                "contact hold, pressures oscillate; leave the mesh to ngcontact, give a pair with "
-                "a gap a direction, and parts of an edge that face different boundaries edges of "
-                "their own",
-                contact.secondary,
-                contact.primary,
-            )
+    told = set() if start is None else _unmatched_pairs(start.pairs)
+    for pair in sorted(_unmatched_pairs(solution.pairs) - told):
+        contact = solution.pairs[pair].line.contact
+        log.warning(
+            'the nodes of "%s" and "%s" do not match where they touch: forces and ends of '
+            "contact hold, pressures oscillate; leave the mesh to ngcontact, give a pair with "
+            "a gap a direction, and parts of an edge that face different boundaries edges of "
+            "their own",
+            contact.secondary,
+            contact.primary,
+        )
 
 
 def solve_on(
@@ -64,13 +53,11 @@ def solve_on(
     if start is None:
         active = first_active_set(discrete)
     else:
-        active = carried_active_set(discrete, start.discrete, start.minimiser)
+        active = carried_active_set(discrete.lines, start.pairs)
     minimiser = minimise_energy(discrete, active)
-    told = [] if start is None else _unmatched_pairs(start.discrete, start.minimiser)
-    _warn_of_unmatched(discrete, minimiser, told)
     displacement = ng.GridFunction(discrete.space.V)
     displacement.vec.FV().NumPy()[:] = discrete.space.basis @ (discrete.basis.T @ minimiser.u)
-    return Solution(
+    solution = Solution(
         problem=problem,
         mesh=mesh,
         order=order,
@@ -87,3 +74,5 @@ def solve_on(
             "estimates": 0,
         },
     )
+    _warn_of_unmatched(solution, start)
+    return solution

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .arrays import Array, Mask, root_of_squares
-from .contact import Transitions, transitions_of
+from .contact import ContactState, contact_states
 from .discrete import DiscreteProblem, RigidMotion, resultants
 from .estimator import Estimate, estimate
 from .fem import energy_norm, potential_energy, strain
@@ -72,26 +72,27 @@ class Solution:
         s = [self.mesh.MaterialCF({body: (C * e)[i] for body, C in law.items()}) for i in range(3)]
         return ng.CF((s[0], s[2], s[2], s[1]), dims=(2, 2))
 
-    def _points(self, name: str, shape: tuple[int, ...]) -> Array:
-        """An array of the contact lines, all pairs in order."""
-        return np.concatenate([np.zeros(shape), *(getattr(x, name) for x in self.discrete.lines)])
+    @cached_property
+    def pairs(self) -> list[ContactState]:
+        """Gap, force, pressure and state of the points of each pair, in arrays of their own."""
+        program = self.discrete.program
+        gap = program.g - self.minimiser.u[program.unknown]
+        return contact_states(self.discrete.lines, gap, self.force, self.active)
 
     @cached_property
     def points(self) -> Array:
-        """Contact points C_j on the secondary before deformation, (m, 2)."""
-        return self._points("position", (0, 2))
+        """Contact points C_j on the secondary before deformation, (m, 2), a length."""
+        return np.concatenate([np.zeros((0, 2)), *(pair.line.position for pair in self.pairs)])
 
     @cached_property
     def pair(self) -> NDArray[np.intp]:
         """Number of the pair in ``problem.contact`` of each point, (m,)."""
-        counts = [len(line.node) for line in self.discrete.lines]
-        return np.repeat(np.arange(len(counts)), counts)
+        return np.repeat(np.arange(len(self.pairs)), [pair.gap.size for pair in self.pairs])
 
     @cached_property
     def gap(self) -> Array:
-        """Gap after deformation along the direction of each point, (m,); >= 0 to round-off."""
-        program = self.discrete.program
-        return program.g - self.minimiser.u[program.unknown]
+        """Gap (m,) after deformation along the direction of each point; >= 0 to round-off."""
+        return np.concatenate([np.zeros(0), *(pair.gap for pair in self.pairs)])
 
     @property
     def force(self) -> Array:
@@ -101,7 +102,7 @@ class Solution:
     @cached_property
     def pressure(self) -> Array:
         """-T_n per unit length (P1), -T_xi per unit eta (P2): force over weight, (m,)."""
-        return self.force / self._points("weight", (0,))
+        return np.concatenate([np.zeros(0), *(pair.pressure for pair in self.pairs)])
 
     @property
     def active(self) -> Mask:
@@ -115,9 +116,8 @@ class Solution:
 
     def contact_force(self, pair: int = 0) -> Array:
         """Resultant of the contact forces of a pair on its secondary body, (2,)."""
-        directions = self._points("direction", (0, 2))
-        at = self.pair == self._pair_number(pair)
-        return -(self.force[at, None] * directions[at]).sum(axis=0)
+        state = self.pairs[self._pair_number(pair)]
+        return -(state.force[:, None] * state.line.direction).sum(axis=0)
 
     def _pair_number(self, pair: int) -> int:
         """`pair`, or an error unless it numbers a contact pair."""
@@ -157,12 +157,7 @@ class Solution:
 
     def transitions(self, pair: int = 0) -> Array:
         """Points (k, 2) where contact of a pair turns from binding to non-binding."""
-        return self.ends[self._pair_number(pair)].position
-
-    @cached_property
-    def ends(self) -> list[Transitions]:
-        """The transitions of each pair, with the contact points beside them."""
-        return transitions_of(self.discrete.lines, self.gap, self.active)
+        return self.pairs[self._pair_number(pair)].transitions.position
 
     @cached_property
     def energy(self) -> float:

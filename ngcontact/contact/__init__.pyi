@@ -8,7 +8,9 @@ from .line import contact_line as contact_line
 from .line import prescribed_gap as prescribed_gap
 from .line import unmatched as unmatched
 from .search import partners as partners
+from .state import ContactState as ContactState
+from .state import by_line as by_line
+from .state import contact_states as contact_states
 from .transitions import Transitions as Transitions
 from .transitions import ending_segments as ending_segments
-from .transitions import transitions_of as transitions_of
 from .transitions import transitions_on as transitions_on

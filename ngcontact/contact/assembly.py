@@ -12,6 +12,7 @@ from ..fem import BoundaryTrace
 from ..lagrange import lagrange
 from .line import ContactLine, without
 from .projection import snap
+from .state import by_line
 
 
 def _rows(line: ContactLine, trace: BoundaryTrace) -> Rows:
@@ -51,9 +52,8 @@ def kept_lines(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
     """The lines with the points that carry the rows `kept` of all lines together."""
     dropped = np.ones(sum(len(line.node) for line in lines), dtype=bool)
     dropped[kept] = False
-    stops = np.cumsum([len(line.node) for line in lines])
-    parts = np.split(dropped, stops[:-1]) if lines else []
-    return [without(x, np.flatnonzero(part)) for x, part in zip(lines, parts, strict=True)]
+    parts = zip(lines, by_line(lines, dropped), strict=True)
+    return [without(line, np.flatnonzero(part)) for line, part in parts]
 
 
 def merged(lines: list[ContactLine], rows: Rows, n: int) -> tuple[list[ContactLine], Rows]:
@@ -71,9 +71,6 @@ def merged(lines: list[ContactLine], rows: Rows, n: int) -> tuple[list[ContactLi
     np.minimum.at(g, number, tight)
     repeated = number != np.arange(len(number))
     np.add.at(weight, number[repeated], weight[repeated])
-    stops = np.cumsum([len(line.node) for line in lines])
-    lines = [
-        replace(line, weight=part)
-        for line, part in zip(lines, np.split(weight, stops[:-1]), strict=True)
-    ]
+    parts = zip(lines, by_line(lines, weight), strict=True)
+    lines = [replace(line, weight=part) for line, part in parts]
     return kept_lines(lines, first), replace(rows, g=g, equality=equality).select(first)

@@ -9,7 +9,6 @@ weighs 1 / turn in it, and one of the two rows may even be open.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq
@@ -132,13 +131,6 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
         found.append([np.interp(at, along, x[path, axis]) for axis in (0, 1)])
     inner_outer = np.array(ends, dtype=np.intp).reshape(-1, 2)
     return Transitions(inner_outer[:, 0], inner_outer[:, 1], np.array(found).reshape(-1, 2))
-
-
-def transitions_of(lines: list[ContactLine], gap: Array, active: Mask) -> list[Transitions]:
-    """Transitions of each line; `gap` and `active` (m,) are those of all its points in order."""
-    stops = np.cumsum([0, *(len(line.node) for line in lines)])
-    parts = [slice(start, stop) for start, stop in pairwise(stops)]
-    return [transitions_on(x, gap[at], active[at]) for x, at in zip(lines, parts, strict=True)]
 
 
 def ending_segments(line: ContactLine, ends: Transitions) -> Index:
