@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from .arrays import Array, Mask, root_of_squares
 from .contact import ContactState, contact_states
 from .discrete import DiscreteProblem, RigidMotion, resultants
-from .estimator import Estimate, estimate
+from .estimator import Estimate, Estimator, estimate
 from .fem import energy_norm, potential_energy, strain
 from .output import write_solution
 from .problem import Problem
@@ -51,6 +51,8 @@ class Solution:
         Levels of the coarse adaptive run that told `solve` the first active set of a large mesh.
     adaptive : bool
         Whether it is a level of `adapt`, whose estimate is needed anyway.
+    estimator : Estimator
+        What tells `indicators`.
     """
 
     problem: Problem
@@ -63,6 +65,7 @@ class Solution:
     work: dict[str, int] = field(default_factory=dict)
     coarse_levels: int = 0
     adaptive: bool = False
+    estimator: Estimator = estimate
 
     @cached_property
     def stress(self) -> ng.CoefficientFunction:
@@ -172,7 +175,8 @@ class Solution:
     @cached_property
     def _estimate(self) -> Estimate:
         self.work["estimates"] += 1
-        return estimate(self)
+        boundary = self.discrete.space.trace
+        return self.estimator(self.problem, boundary, self.displacement, self.stress, self.pairs)
 
     @property
     def estimated(self) -> bool:

@@ -1,4 +1,5 @@
-"""Error indicators of a solution."""
+"""Error indicators of a solution: functions of one signature, `Estimator`."""
 
-from .residual import Estimate as Estimate
+from .indicators import Estimate as Estimate
+from .indicators import Estimator as Estimator
 from .residual import estimate as estimate

@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array
-from ..problem import varies
-
-if TYPE_CHECKING:
-    from ..solution import Solution
+from ..fem import BoundaryTrace
+from ..problem import Problem, varies
 
 
-def projected_stress(solution: Solution) -> ng.GridFunction:
+def projected_stress(
+    problem: Problem, boundary: BoundaryTrace, stress: ng.CoefficientFunction
+) -> ng.GridFunction:
     """sigma_h as (xx, yy, xy), polynomials on each element, to be differentiated.
 
     Right for any modulus and curved elements; its jumps cost a fifth of those of the stress.
     """
-    mesh, order = solution.mesh, solution.order
-    laws = solution.problem.materials.values()
+    mesh, order = boundary.mesh, boundary.order
+    laws = problem.materials.values()
     exact = mesh.GetCurveOrder() == 1 and not any(varies(law) for law in laws)
     projected = ng.GridFunction(ng.L2(mesh, order=order - 1 if exact else order, dim=3))
-    xx, xy, _, yy = solution.stress
+    xx, xy, _, yy = stress
     projected.Set(ng.CF((xx, yy, xy)).Compile())
     return projected
 
@@ -31,7 +29,7 @@ def projected_stress(solution: Solution) -> ng.GridFunction:
 def divergence_and_jump(
     stress: ng.GridFunction,
 ) -> tuple[ng.CoefficientFunction, ng.CoefficientFunction]:
-    """Div sigma and [sigma n] of a projected stress."""
+    """Div sigma and [sigma n] of a projected stress, two of two components."""
     slope = ng.Grad(stress)
     xx, yy, xy = stress - stress.Other()
     jump = ng.CF((xx, xy, xy, yy), dims=(2, 2)) * ng.specialcf.normal(2)

@@ -15,88 +15,125 @@ the last term measures the deviatoric error, because e is orthogonal to v_h.
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Array
-from ..fem import BoundaryTrace
+from ..fem import BoundaryTrace, bulk_moduli
 from ..linalg import cholesky, lower_half, shared
 from ..problem import Problem
 from ..triplets import from_triplets
-from .terms import BoundaryResidual, PressureShare
+from .terms import BoundaryResidual, PressureShare, ScaledSolution
 
 HELD = 1e6  # stiffness of supports in the last term, relative to the elements beside them
 FLOATING = 1e-9  # ... and of the bedding that keeps free bodies, relative to their size
 
 
+@dataclass(frozen=True, eq=False)
 class PressureCorrection:
-    """The minimising delta on the bodies `names`, of the displacement's degree on each element.
+    """The minimising delta on some bodies, of the displacement's degree on each element.
 
-    Moduli and residuals are dimensionless: relative to one modulus and one stress.
-
-    Parameters
-    ----------
-    problem, trace
-        The problem and the boundary.
-    names : list of str
-        Those bodies.
+    Moduli and pressures are relative to the units of a `ScaledSolution`.
 
     Attributes
     ----------
+    boundary : BoundaryTrace
+        The boundary of the mesh.
+    region : ng.Region
+        Those bodies.
+    mu, kappa : ng.GridFunction
+        Shear and bulk modulus of each element.
     pressure : ng.GridFunction
         delta.
     motion : ng.GridFunction
         The v_h of the supremum, for which that term is mu |grad v_h|^2.
     """
 
-    def __init__(self, problem: Problem, trace: BoundaryTrace, names: list[str]) -> None:
-        self.problem, self.trace, self.mesh = problem, trace, trace.mesh
-        self.region = self.mesh.Materials("|".join(map(re.escape, names)))
-        self.space = ng.L2(self.mesh, order=trace.order, dgjumps=True)
-        self.functions = self.space.ndof // self.mesh.ne  # on an element; numbered one by one
-        self.V = ng.VectorH1(self.mesh, order=trace.order, definedon=self.region)
-        self.pressure = ng.GridFunction(self.space)
-        self.motion = ng.GridFunction(self.V)
+    boundary: BoundaryTrace
+    region: ng.Region
+    mu: ng.GridFunction
+    kappa: ng.GridFunction
+    pressure: ng.GridFunction
+    motion: ng.GridFunction
 
-    def minimise(
-        self,
-        weights: tuple[Array, Array],
-        moduli: tuple[Array, Array],
-        residuals: tuple[ng.CoefficientFunction, ng.CoefficientFunction],
-        terms: list[BoundaryResidual],
-    ) -> None:
-        """Find delta.
+    def add_to(self, residual: Array, shares: list[PressureShare]) -> None:
+        """Add what delta contributes to a residual (k, c) at the boundary."""
+        on_boundary = ng.BoundaryFromVolumeCF(self.pressure)
+        for share in shares:
+            if len(share.at):
+                delta = self.boundary.evaluate(on_boundary, share.segment, share.s)
+                residual[share.at] += share.factor * delta
 
-        Parameters
-        ----------
-        weights
-            Of the squared residuals in an element and on its edges, (ne,) each.
-        moduli
-            mu and kappa, (ne,) each.
-        residuals
-            (2,) in the elements and [sigma_h n] on their edges.
-        terms
-            Those on the boundary.
-        """
-        self.weights = [self._constant(w) for w in weights]
-        self.mu, self.kappa = (self._constant(m) for m in moduli)
-        (inner, f), (outer, g) = self._inside(*residuals), self._on_boundary(terms)
-        self._solve((inner + outer).tocsr(), f + g)
+    def divergence_and_jump(self) -> tuple[ng.CoefficientFunction, ng.CoefficientFunction]:
+        """Grad delta and [delta n]: what delta adds inside the bodies, two of two components."""
+        delta = self.pressure
+        return ng.Grad(delta), (delta - delta.Other()) * ng.specialcf.normal(2)
 
-    def _constant(self, values: Array) -> ng.GridFunction:
-        function = ng.GridFunction(ng.L2(self.mesh, order=0))
-        function.vec.FV().NumPy()[:] = values
-        return function
+    def squares(self) -> Array:
+        """Squares (ne,) of the two terms that delta itself adds."""
+        grad = ng.Grad(self.motion)
+        density = self.pressure**2 / self.kappa + self.mu * ng.InnerProduct(grad, grad)
+        values = ng.Integrate(density, self.region, element_wise=True)
+        return np.asarray(values)
 
-    def _inside(
+
+def correcting_pressure(
+    solution: ScaledSolution,
+    names: Sequence[str],
+    residuals: tuple[ng.CoefficientFunction, ng.CoefficientFunction],
+    terms: Sequence[BoundaryResidual],
+) -> PressureCorrection:
+    """Find delta on the bodies `names`.
+
+    Parameters
+    ----------
+    solution : ScaledSolution
+        In units of its own.
+    names : sequence of str
+        The nearly incompressible bodies.
+    residuals : pair of ng.CoefficientFunction
+        div sigma_h + F, (2,), in the elements and [sigma_h n], (2,), on their edges.
+    terms : sequence of BoundaryResidual
+        Those on the boundary.
+    """
+    forms = _forms(solution, names)
+    (inner, f), (outer, g) = forms.inside(*residuals), forms.on_boundary(terms)
+    A, b = (inner + outer).tocsr(), f + g
+    return forms.minimiser(A, b, forms.divergence(), forms.stiffness())
+
+
+@dataclass(frozen=True, eq=False)
+class _Forms:
+    """The quadratic forms of the sum that delta minimises: on V, and on `space`, both global.
+
+    `element` and `edge` are the weights of squared residuals, constant on each element.
+    """
+
+    problem: Problem
+    boundary: BoundaryTrace
+    region: ng.Region
+    space: ng.FESpace
+    V: ng.FESpace
+    element: ng.GridFunction
+    edge: ng.GridFunction
+    mu: ng.GridFunction
+    kappa: ng.GridFunction
+
+    @property
+    def functions(self) -> int:
+        """Number of pressures on an element; they are numbered one by one."""
+        return int(self.space.ndof // self.space.mesh.ne)
+
+    def inside(
         self, divergence: ng.CoefficientFunction, jump: ng.CoefficientFunction
     ) -> tuple[sp.csr_array, Array]:
         """Quadratic form and right side of the terms in elements and between them."""
         d, t = self.space.TnT()
-        element, edge = self.weights
-        edge = (edge + edge.Other()) / 2
+        element, edge = self.element, (self.edge + self.edge.Other()) / 2
         n = ng.specialcf.normal(2)
         skeleton = ng.dx(skeleton=True, bonus_intorder=2)
         a = ng.BilinearForm(self.space, symmetric=True)
@@ -109,7 +146,7 @@ class PressureCorrection:
         f.Assemble()
         return shared(a.mat), f.vec.FV().NumPy().copy()
 
-    def _on_boundary(self, terms: list[BoundaryResidual]) -> tuple[sp.csr_array, Array]:
+    def on_boundary(self, terms: Sequence[BoundaryResidual]) -> tuple[sp.csr_array, Array]:
         """The same of the boundary terms."""
         shape = []
         for j in range(self.functions):
@@ -125,8 +162,8 @@ class PressureCorrection:
             for share in term.shares:
                 if len(share.at) == 0:
                     continue
-                value = self.trace.evaluate(shapes, share.segment, share.s)
-                first = self.trace.element[share.segment] * self.functions
+                value = self.boundary.evaluate(shapes, share.segment, share.s)
+                first = self.boundary.element[share.segment] * self.functions
                 column = first[:, None, None] + np.arange(self.functions)
                 row = share.at[:, None, None] * c + np.arange(c)[:, None]
                 row, column = np.broadcast_arrays(row, column)
@@ -137,11 +174,11 @@ class PressureCorrection:
             b -= rows.T @ (weight * term.residual.ravel())
         return A, b
 
-    def _stiffness(self) -> sp.csr_array:
+    def stiffness(self) -> sp.csr_array:
         """Form of mu |grad v|^2, with v held where displacements are prescribed."""
-        problem, mesh = self.problem, self.mesh
+        problem, mesh = self.problem, self.space.mesh
         u, v = self.V.TnT()
-        position = self.trace.curve.reshape(-1, 2)
+        position = self.boundary.curve.reshape(-1, 2)
         bedding = FLOATING / float(np.ptp(position, axis=0).max()) ** 2
         a = ng.BilinearForm(self.V, symmetric=True)
         a += (
@@ -162,9 +199,9 @@ class PressureCorrection:
         a.Assemble()
         return shared(a.mat)
 
-    def _divergence(self) -> sp.csr_array:
+    def divergence(self) -> sp.csr_array:
         """(q, div v) of pressures q and displacements v."""
-        pressures = ng.L2(self.mesh, order=self.trace.order)
+        pressures = ng.L2(self.space.mesh, order=self.boundary.order)
         q, v = pressures.TrialFunction(), self.V.TestFunction()
         b = ng.BilinearForm(trialspace=pressures, testspace=self.V)
         grad = ng.Grad(v)
@@ -172,33 +209,44 @@ class PressureCorrection:
         b.Assemble()
         return shared(b.mat)
 
-    def _solve(self, A: sp.csr_array, b: Array) -> None:
+    def minimiser(
+        self, A: sp.csr_array, b: Array, B: sp.csr_array, K: sp.csr_array
+    ) -> PressureCorrection:
         """Solve the optimality conditions of delta and of the v_h of the supremum.
 
         [[A, B'], [B, -K]] is quasi-definite: it has a factorisation without pivots.
         """
-        B, K = self._divergence(), self._stiffness()
         size = self.space.ndof
-        regions = self.mesh.ngmesh.Elements2D().NumPy()["index"].astype(int) - 1
+        regions = self.space.mesh.ngmesh.Elements2D().NumPy()["index"].astype(int) - 1
         inside = np.array(self.region.Mask())[regions]
         free = np.append(np.repeat(inside, self.functions), K.diagonal() > 0)
         saddle = sp.block_array([[A, B.T], [B, -K]], format="csr")
         right = np.append(b, np.zeros(K.shape[0]))
         solution = np.where(free, cholesky(lower_half(saddle))(free)(right), 0.0)
-        self.pressure.vec.FV().NumPy()[:] = solution[:size]
-        self.motion.vec.FV().NumPy()[:] = solution[size:]
+        pressure, motion = ng.GridFunction(self.space), ng.GridFunction(self.V)
+        pressure.vec.FV().NumPy()[:] = solution[:size]
+        motion.vec.FV().NumPy()[:] = solution[size:]
+        return PressureCorrection(self.boundary, self.region, self.mu, self.kappa, pressure, motion)
 
-    def add_to(self, residual: Array, shares: list[PressureShare]) -> None:
-        """Add what delta contributes to a residual (k, c) at the boundary."""
-        on_boundary = ng.BoundaryFromVolumeCF(self.pressure)
-        for share in shares:
-            if len(share.at):
-                delta = self.trace.evaluate(on_boundary, share.segment, share.s)
-                residual[share.at] += share.factor * delta
 
-    def squares(self) -> Array:
-        """Squares (ne,) of the two terms that delta itself adds."""
-        grad = ng.Grad(self.motion)
-        density = self.pressure**2 / self.kappa + self.mu * ng.InnerProduct(grad, grad)
-        values = ng.Integrate(density, self.region, element_wise=True)
-        return np.asarray(values)
+def _forms(solution: ScaledSolution, names: Sequence[str]) -> _Forms:
+    """Spaces and weights of the sum."""
+    mesh, order = solution.mesh, solution.order
+    region = mesh.Materials("|".join(map(re.escape, names)))
+
+    def constant(values: Array) -> ng.GridFunction:
+        function = ng.GridFunction(ng.L2(mesh, order=0))
+        function.vec.FV().NumPy()[:] = values
+        return function
+
+    return _Forms(
+        problem=solution.problem,
+        boundary=solution.boundary,
+        region=region,
+        space=ng.L2(mesh, order=order, dgjumps=True),
+        V=ng.VectorH1(mesh, order=order, definedon=region),
+        element=constant(solution.element_weight),
+        edge=constant(solution.edge_weight),
+        mu=constant(solution.mu),
+        kappa=constant(bulk_moduli(solution.problem, mesh) / solution.modulus),
+    )

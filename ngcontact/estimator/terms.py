@@ -1,10 +1,115 @@
-"""Residuals on the boundary, before and after the pressure correction."""
+"""What the residual estimate is made of: a solution in units of its own, residuals, squares."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import cached_property
 
-from ..arrays import Array, Index
+import ngsolve as ng
+import numpy as np
+
+from ..arrays import Array, Index, power_of_two
+from ..fem import BoundaryTrace, shear_moduli
+from ..mesh import diameters
+from ..problem import Problem
+from .interior import projected_stress
+
+DATA_BONUS = 4  # quadrature order above that of the discrete terms, for the loads
+
+
+@dataclass(frozen=True, eq=False)
+class ScaledSolution:
+    """A solution with its stress relative to `unit` and its moduli relative to `modulus`.
+
+    So squares neither overflow nor underflow; both units are powers of 2, by which nothing is
+    rounded. The mesh has ne elements.
+
+    Attributes
+    ----------
+    problem : Problem
+        The data, as they are.
+    boundary : BoundaryTrace
+        The boundary of the mesh.
+    displacement : ng.GridFunction
+        u_h, a length.
+    stress : ng.CoefficientFunction
+        sigma_h (2, 2) over `unit`.
+    projected : ng.GridFunction
+        The same as (xx, yy, xy), polynomials on each element.
+    unit, modulus : float
+        A stress and a modulus, forces per area.
+    mu : ndarray (ne,)
+        Shear modulus over `modulus`.
+    diameter : ndarray (ne,)
+        h, a length.
+    """
+
+    problem: Problem
+    boundary: BoundaryTrace
+    displacement: ng.GridFunction
+    stress: ng.CoefficientFunction
+    projected: ng.GridFunction
+    unit: float
+    modulus: float
+    mu: Array
+    diameter: Array
+
+    @property
+    def mesh(self) -> ng.Mesh:
+        """The mesh."""
+        return self.boundary.mesh
+
+    @property
+    def order(self) -> int:
+        """Degree p of the displacement."""
+        return self.boundary.order
+
+    @property
+    def strain(self) -> float:
+        """The strain that belongs to both units; by it displacements are divided."""
+        return self.unit / self.modulus
+
+    @cached_property
+    def edge_weight(self) -> Array:
+        """Weight (h/p) / 2mu of squared tractions, (ne,)."""
+        return self.diameter / (2 * self.mu * self.order)
+
+    @property
+    def element_weight(self) -> Array:
+        """Weight (h/p)^2 / 2mu of squared forces, (ne,)."""
+        return (self.diameter / self.order) ** 2 / (2 * self.mu)
+
+    def traction(self, segment: Index, s: Array) -> Array:
+        """Traction sigma_h n (k, 2) over `unit` at parameters s (k,) of the segments (k,)."""
+        on_boundary = ng.BoundaryFromVolumeCF(self.stress)
+        values = self.boundary.evaluate(on_boundary, segment, s).reshape(-1, 2, 2)
+        return np.einsum("kij,kj->ki", values, self.boundary.normal(segment, s))
+
+
+def scaled(
+    problem: Problem,
+    boundary: BoundaryTrace,
+    displacement: ng.GridFunction,
+    stress: ng.CoefficientFunction,
+) -> ScaledSolution:
+    """A solution in units of its own."""
+    mu = shear_moduli(problem, boundary.mesh)
+    modulus = power_of_two(mu)
+    projected = projected_stress(problem, boundary, stress)
+    coefficients = projected.vec.FV().NumPy()
+    unit = power_of_two(coefficients)
+    coefficients /= unit
+    return ScaledSolution(
+        problem=problem,
+        boundary=boundary,
+        displacement=displacement,
+        stress=stress * (1 / unit),
+        projected=projected,
+        unit=unit,
+        modulus=modulus,
+        mu=mu / modulus,
+        diameter=diameters(boundary.mesh),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,9 +121,9 @@ class PressureShare:
     at : ndarray of int (n,)
         Numbers of the residuals.
     segment, s : ndarray (n,)
-        Where delta counts.
+        Where delta counts: segments of the boundary, and parameters in [0, 1] on them.
     factor : ndarray (n, c)
-        Its factor in each component of the residual.
+        Its factor in each component of the residual, without a unit.
     """
 
     at: Index
@@ -29,7 +134,7 @@ class PressureShare:
 
 @dataclass(frozen=True, eq=False)
 class BoundaryResidual:
-    """Squared residuals at k points of the boundary, linear in the corrected pressure.
+    """Residuals of the stress at k points of the boundary, linear in the corrected pressure.
 
     Attributes
     ----------
@@ -40,7 +145,7 @@ class BoundaryResidual:
     weight : ndarray (k,)
         Factor of its square.
     residual : ndarray (k, c)
-        The residual of sigma_h.
+        The residual of sigma_h, over the unit of stress.
     shares : list of PressureShare
         How the residual changes with delta.
     """
@@ -50,3 +155,41 @@ class BoundaryResidual:
     weight: Array
     residual: Array
     shares: list[PressureShare]
+
+
+@dataclass(frozen=True, eq=False)
+class Squares:
+    """Squared residuals of the displacement at k points, which no pressure changes.
+
+    Attributes
+    ----------
+    name : str
+        Part of the estimate.
+    element : ndarray of int (k,)
+        Element each point counts for.
+    values : ndarray (k,)
+        The squares with their weights.
+    """
+
+    name: str
+    element: Index
+    values: Array
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryTerms:
+    """What a part of the boundary contributes.
+
+    Attributes
+    ----------
+    residuals : list of BoundaryResidual
+        Those of the stress.
+    squares : list of Squares
+        Those of the displacement.
+    covered : ndarray of int (q,)
+        The segments of that part.
+    """
+
+    residuals: list[BoundaryResidual] = field(default_factory=list)
+    squares: list[Squares] = field(default_factory=list)
+    covered: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))

@@ -1,0 +1,86 @@
+"""Residuals on Gamma_tau, Gamma_0 and Gamma_u."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..arrays import Array, Index, Mask
+from ..lagrange import gauss
+from ..problem import boundary_mask
+from .terms import (
+    DATA_BONUS,
+    BoundaryResidual,
+    BoundaryTerms,
+    PressureShare,
+    ScaledSolution,
+    Squares,
+)
+
+
+def on_supports_and_loads(solution: ScaledSolution, covered: Mask) -> BoundaryTerms:
+    """Residuals on all of the boundary that contact has not covered.
+
+    Parameters
+    ----------
+    solution : ScaledSolution
+        In units of its own.
+    covered : ndarray of bool (q,)
+        Segments of the boundary that are none of a support or a load.
+    """
+    boundary, mesh, problem = solution.boundary, solution.mesh, solution.problem
+    segments = np.flatnonzero(~covered)
+    rule, rule_weight = gauss(2 * solution.order + DATA_BONUS)
+    segment, s = np.repeat(segments, len(rule)), np.tile(rule, len(segments))
+    stretch = np.linalg.norm(boundary.derivative(segment, s), axis=1)
+    ds = stretch * np.tile(rule_weight, len(segments))
+
+    residual = _unbalanced(solution, segment, s)  # (3.7)
+    factor = -boundary.normal(segment, s)  # of a pressure in the residual
+    squares = []
+    for axis, at, miss in _misses(solution, segment, s):  # (3.6)
+        residual[at, axis] = factor[at, axis] = 0.0
+        here = boundary.element[segment[at]]
+        scale = 2 * solution.mu[here] / solution.diameter[here]
+        values = scale * ds[at] * (miss / solution.strain) ** 2
+        squares.append(Squares("displacement", here, values))
+    guided = np.zeros(len(segment), dtype=bool)
+    if problem.sliding is not None:  # (3.8): any force along the normal, none across it
+        guided = boundary_mask(mesh, str(problem.sliding))[boundary.region[segment]]
+        normal = boundary.normal(segment[guided], s[guided])
+        for vector in (residual, factor):
+            along = (vector[guided] * normal).sum(axis=1)
+            vector[guided] -= along[:, None] * normal
+
+    element = boundary.element[segment]
+    weight = solution.edge_weight[element] * ds
+    residuals = []
+    for name, at in (("traction", ~guided), ("sliding", guided)):
+        share = PressureShare(np.arange(at.sum()), segment[at], s[at], factor[at])
+        residuals.append(BoundaryResidual(name, element[at], weight[at], residual[at], [share]))
+    return BoundaryTerms(residuals, squares, segments)
+
+
+def _unbalanced(solution: ScaledSolution, segment: Index, s: Array) -> Array:
+    """P - sigma_h n (k, 2) at points of the boundary, with P = 0 where no traction is given."""
+    boundary, problem = solution.boundary, solution.problem
+    residual = -solution.traction(segment, s)
+    for pattern in problem.traction:
+        at = boundary_mask(solution.mesh, pattern)[boundary.region[segment]]
+        load = problem.traction_vector(pattern)
+        residual[at] += boundary.evaluate(load, segment[at], s[at]) / solution.unit
+    return residual
+
+
+def _misses(
+    solution: ScaledSolution, segment: Index, s: Array
+) -> Iterator[tuple[int, Mask, Array]]:
+    """Of each prescribed component: its axis, the points (k,) of its boundary, u_D - u_h there."""
+    boundary = solution.boundary
+    for pattern, components in solution.problem.displacement.items():
+        at = boundary_mask(solution.mesh, pattern)[boundary.region[segment]]
+        u = boundary.evaluate(solution.displacement, segment[at], s[at])
+        for axis, value in enumerate(components):
+            if value is not None:
+                yield axis, at, boundary.evaluate(value, segment[at], s[at])[:, 0] - u[:, axis]
