@@ -1,33 +1,68 @@
-"""Solve on one mesh, or on a sequence of adaptively refined ones."""
+"""Solve, estimate, mark, refine: a sequence of adaptively refined meshes."""
 
 from __future__ import annotations
 
 import logging
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from numbers import Real
 
 import ngsolve as ng
 import numpy as np
-from numpy.typing import NDArray
 
 from .adaptivity import doerfler, refined
-from .arrays import power_of_two
+from .arrays import Mask, power_of_two
 from .contact import ending_segments
 from .errors import ConvergenceError
+from .estimator import Estimator, estimate
 from .fem import bulk_moduli, check_element, shear_moduli, unknowns, warn_of_locking
 from .mesh import curve, first_mesh
 from .one_mesh import solve_on
 from .problem import Problem
 from .solution import Solution
 
-ROUND_OFF = 1e-12  # relative estimate at which refinement stops: the solution is exact
-SMALL = 1e-4  # ... above which no round-off reaches
-NOISE = 100 * np.finfo(float).eps  # of a stress, relative to its terms; measured 0.5 to 50 eps
-END = 0.1  # size of elements in which contact ends, of its line, over the relative estimate
+EXACT = 1e-12  # relative estimate at which refinement stops: the solution is exact
+BEYOND_NOISE = 1e-4  # ... above which no round-off reaches
+STRESS_NOISE = 100 * np.finfo(float).eps  # relative to its terms; measured 0.5 to 50 eps
 
 log = logging.getLogger("ngcontact")
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How a sequence of levels is refined, and when it ends.
+
+    Raises `ValueError` or `TypeError` with the offending value and what would be right.
+
+    Parameters
+    ----------
+    order, element, theta, tolerance, max_dofs
+        As in `adapt`.
+    ending : float
+        Size from which elements in which contact ends are refined: their segment's length over
+        that of its contact line, relative to the relative estimate.
+    estimator : Estimator
+        What tells the indicators.
+    """
+
+    order: int
+    element: str
+    theta: float
+    tolerance: float | None
+    max_dofs: float
+    ending: float = 0.1
+    estimator: Estimator = estimate
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        check_element(self.order, self.element)
+        if not 0 < _number("theta", self.theta) <= 1:
+            raise ValueError(f"theta={self.theta} must lie in (0, 1]; 0.5 is usual")
+        if self.tolerance is not None and not _number("tolerance", self.tolerance) > 0:
+            raise ValueError(f"tolerance={self.tolerance} must be positive, like 1e-3, or None")
+        if not _number("max_dofs", self.max_dofs) > 0:
+            raise ValueError(f"max_dofs={self.max_dofs} must be positive, like 100_000")
 
 
 def adapt(
@@ -73,13 +108,7 @@ def adapt(
     ConvergenceError
         The active set of a level did not settle.
     """
-    check_element(order, element)
-    if not 0 < _number("theta", theta) <= 1:
-        raise ValueError(f"theta={theta} must lie in (0, 1]; 0.5 is usual")
-    if tolerance is not None and not _number("tolerance", tolerance) > 0:
-        raise ValueError(f"tolerance={tolerance} must be positive, like 1e-3, or None")
-    if not _number("max_dofs", max_dofs) > 0:
-        raise ValueError(f"max_dofs={max_dofs} must be positive, like 100_000")
+    refinement = Refinement(order, element, theta, tolerance, max_dofs)
     mesh = first_mesh(problem, maxh)
     problem.check(mesh)
     mesh, _ = curve(mesh, order, element)
@@ -89,7 +118,7 @@ def adapt(
             f"max_dofs={max_dofs}; give a larger maxh or max_dofs"
         )
     warn_of_locking(problem, mesh, order)
-    return _levels(problem, mesh, order, element, theta, tolerance, max_dofs)
+    return levels(problem, mesh, refinement)
 
 
 def _number(name: str, value: object) -> float:
@@ -99,22 +128,20 @@ def _number(name: str, value: object) -> float:
     return float(value)
 
 
-def _marked(solution: Solution, theta: float) -> NDArray[np.bool_]:
+def _marked(solution: Solution, refinement: Refinement) -> Mask:
     """Elements (ne,) to refine: Doerfler's, and those in which contact ends.
 
     The end of contact is known to the square of these elements' size, the energy to the square of
     the relative error: both stay of one size.
     """
-    marked = doerfler(solution.indicators, theta)
+    marked = doerfler(solution.indicators, refinement.theta)
     trace = solution.discrete.space.trace
     for pair in solution.pairs:
         line = pair.line
         segments = line.segments[ending_segments(line, pair.transitions)]
-        sides = trace.curve[segments]
-        length = np.linalg.norm(sides[:, -1] - sides[:, 0], axis=1)
         extent = np.linalg.norm(np.ptp(line.position, axis=0)) if line.node.size else 0.0
-        coarse = length > END * solution.relative_error_estimate * extent
-        marked[trace.element[segments[coarse]]] = True
+        size = refinement.ending * solution.relative_error_estimate * extent
+        marked[trace.element[segments[trace.lengths(segments) > size]]] = True
     return marked
 
 
@@ -127,26 +154,30 @@ def _at_round_off(solution: Solution) -> bool:
     u = solution.displacement.vec.FV().NumPy()
     size = power_of_two(u)  # squares must stay in range
     terms = size * float(np.sqrt(solution.discrete.space.diagonal @ (u / size) ** 2))
-    if solution.error_estimate > SMALL * terms:  # as nearly always
+    if solution.error_estimate > BEYOND_NOISE * terms:  # as nearly always
         return False
     problem, mesh = solution.problem, solution.mesh
     ratio = float((bulk_moduli(problem, mesh) / shear_moduli(problem, mesh)).max())
-    return solution.error_estimate <= max(ROUND_OFF, NOISE * math.sqrt(ratio)) * terms
+    return solution.error_estimate <= max(EXACT, STRESS_NOISE * math.sqrt(ratio)) * terms
 
 
-def _levels(
-    problem: Problem,
-    mesh: ng.Mesh,
-    order: int,
-    element: str,
-    theta: float,
-    tolerance: float | None,
-    max_dofs: int,
-) -> Iterator[Solution]:
-    """Levels of `adapt` on checked input."""
+def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[Solution]:
+    """Levels from a first mesh on, of which names and values are known to be right.
+
+    Parameters
+    ----------
+    problem : Problem
+        The continuous problem.
+    mesh : ng.Mesh
+        The first mesh, curved as the element asks.
+    refinement : Refinement
+        What is refined, and when to stop.
+    """
+    order, element = refinement.order, refinement.element
     solution: Solution | None = None
-    while unknowns(mesh, order, element) <= max_dofs:
-        solution = replace(solve_on(problem, mesh, order, element, solution), adaptive=True)
+    while unknowns(mesh, order, element) <= refinement.max_dofs:
+        solution = solve_on(problem, mesh, order, element, solution)
+        solution = replace(solution, adaptive=True, estimator=refinement.estimator)
         solution.discrete.systems.forget()  # a level's factorisation is of no use to the next one
         yield solution
         error = solution.relative_error_estimate
@@ -157,12 +188,12 @@ def _levels(
                 iterate=solution.minimiser,
             )
         log.info("%s", solution)
-        if error <= max(tolerance or 0.0, ROUND_OFF) or _at_round_off(solution):
+        if error <= max(refinement.tolerance or 0.0, EXACT) or _at_round_off(solution):
             return
-        mesh = refined(problem, solution.mesh, _marked(solution, theta))
+        mesh = refined(problem, solution.mesh, _marked(solution, refinement))
         mesh, _ = curve(mesh, order, element)
-    if tolerance is not None:
+    if refinement.tolerance is not None:
         log.warning(
             "the estimate is %.2e, more than tolerance=%g: the next level would exceed max_dofs=%g",
-            *(error, tolerance, max_dofs),
+            *(error, refinement.tolerance, refinement.max_dofs),
         )

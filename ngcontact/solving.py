@@ -16,8 +16,8 @@ from .problem import Problem
 from .solution import Solution
 
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
-LARGE = 20_000
-COARSE = 4  # elements of that run along the largest extent
+COARSE_RUN_FROM = 20_000
+COARSE_ELEMENTS = 4  # of that run along the largest extent
 COARSE_ORDER = 3
 COARSE_DOFS = 1500
 
@@ -91,9 +91,9 @@ def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> li
     """
     given = isinstance(problem.geometry, ng.Mesh)
     searched = any(not contact.bilateral for contact in problem.contact)
-    if given or not searched or unknowns(mesh, order, element) < LARGE:
+    if given or not searched or unknowns(mesh, order, element) < COARSE_RUN_FROM:
         return []
-    size = float(np.ptp(np.array(mesh.ngmesh.Coordinates()), axis=0).max()) / COARSE
+    size = float(np.ptp(np.array(mesh.ngmesh.Coordinates()), axis=0).max()) / COARSE_ELEMENTS
     try:
         return list(adapt(problem, maxh=size, order=COARSE_ORDER, max_dofs=COARSE_DOFS))
     except (ContactError, ValueError) as error:  # it decides nothing but the start

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import replace
-from importlib import import_module
 
 import ngsolve as ng
 import numpy as np
@@ -13,15 +12,22 @@ import pytest
 
 from drivers.reference import cases
 from drivers.reference.straight import patch, relative_energy_error
-from ngcontact import Contact, ContactError, Elastic, NoEquilibriumError, Problem, adapt, solve
-from ngcontact import one_mesh as one_level
+from ngcontact import (
+    Contact,
+    ContactError,
+    Elastic,
+    NoEquilibriumError,
+    Problem,
+    adapt,
+    adaptive,
+    solve,
+)
+from ngcontact.estimator import Estimate
 from ngcontact.geometries import blocks, disc_on_block
-from ngcontact.mesh.generation import first_mesh
+from ngcontact.mesh import first_mesh
 from tests.scenes import unmatched_blocks
 
 SOFT = Elastic(E=1.0, nu=0.3)
-LOOP = import_module("ngcontact.adaptive")
-DISCRETE = import_module("ngcontact.discrete.discrete_problem")
 
 
 def disc() -> Problem:
@@ -47,6 +53,12 @@ def unloaded() -> Problem:
 
 def unknowns(solution):
     return solution.displacement.space.ndof
+
+
+def refinement(**changes):
+    """What `adapt` asks of its levels by default, but for some changes."""
+    default = {"element": "isoparametric", "theta": 0.5, "tolerance": None}
+    return adaptive.Refinement(**(default | changes))
 
 
 def decay(values, sizes):
@@ -110,7 +122,7 @@ def sides_at_the_end(solution):
     return np.ptp(sides, axis=1)[(sides.min(axis=1) <= end[0]) & (end[0] <= sides.max(axis=1))]
 
 
-def test_elements_in_which_contact_ends_are_always_refined(monkeypatch):
+def test_elements_in_which_contact_ends_are_always_refined():
     """Doerfler alone leaves them as they are on the first five levels: corners are worse."""
     problem = cases.partly_opening_block()
     first, *_, last = adapt(problem, order=3, max_dofs=3000)
@@ -118,9 +130,28 @@ def test_elements_in_which_contact_ends_are_always_refined(monkeypatch):
     assert sides_at_the_end(last).max() <= 1 / 8 / 2**2  # third level
     assert last.transitions()[0, 0] == pytest.approx(1.545313, rel=4e-4)  # measured 1.6e-4
     # ... until they are small for the error there is.
-    monkeypatch.setattr(LOOP, "END", 10.0)
-    *_, last = adapt(problem, order=3, max_dofs=3000)
+    coarse = refinement(order=3, max_dofs=3000, ending=10.0)
+    *_, last = adaptive.levels(problem, first_mesh(problem, None), coarse)
     assert sides_at_the_end(last) == pytest.approx(1 / 8)
+
+
+def test_the_estimator_decides_where_to_refine():
+    """Another one is another function of the same arguments."""
+    problem, seen = cases.one_transition().problem, []
+
+    def left(problem, boundary, displacement, stress, pairs):
+        """Indicators that ask for the elements on the left alone."""
+        mesh = boundary.mesh
+        seen.append((displacement.space.ndof, len(pairs), tuple(stress.dims)))
+        x = np.array(ng.Integrate(ng.x, mesh, element_wise=True))
+        return Estimate(indicators=np.maximum(-x, 0.0), parts={})
+
+    chosen = refinement(order=2, max_dofs=2000, estimator=left)
+    mesh = first_mesh(problem, 0.5)
+    solutions = list(adaptive.levels(problem, mesh, chosen))
+    assert seen == [(unknowns(s), 1, (2, 2)) for s in solutions]
+    centre = np.array(ng.Integrate(ng.x, solutions[-1].mesh, element_wise=True))
+    assert np.count_nonzero(centre < 0) > 3 * np.count_nonzero(centre > 0)
 
 
 @pytest.mark.parametrize("theta", [0.2, 1.0])
@@ -253,18 +284,13 @@ def test_no_level_exceeds_the_number_of_unknowns(order, element):
 
 @pytest.fixture
 def no_work(monkeypatch):
-    """Meshing, assembly and solving are forbidden."""
+    """Nothing can be assembled, so nothing can be solved."""
 
     def forbidden(*args, **kwargs):
-        raise AssertionError("work was done before the arguments were checked")
+        raise AssertionError("a form was made before the arguments were checked")
 
-    for module, name in (
-        (one_level, "discretise"),
-        (one_level, "minimise_energy"),
-        (LOOP, "refined"),
-        (DISCRETE, "assemble"),
-    ):
-        monkeypatch.setattr(module, name, forbidden)
+    monkeypatch.setattr(ng, "BilinearForm", forbidden)
+    monkeypatch.setattr(ng, "LinearForm", forbidden)
 
 
 BAD = [
@@ -372,11 +398,8 @@ def test_a_mesh_must_be_a_mesh(mesh):
         solve(cases.one_transition().problem, mesh)
 
 
-def test_a_pair_that_does_not_face_is_refused_before_assembly(monkeypatch):
-    def forbidden(*args):
-        raise AssertionError("assembled")
-
-    monkeypatch.setattr(DISCRETE, "assemble", forbidden)
+@pytest.mark.usefixtures("no_work")
+def test_a_pair_that_does_not_face_is_refused_before_assembly():
     contact = [Contact("disc_arc", "block_top", direction=(0, 1))]  # away from the block
     with pytest.raises(ValueError, match='"disc_arc" faces the primary "block_top"'):
         solve(replace(disc(), contact=contact))
