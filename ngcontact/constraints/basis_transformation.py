@@ -19,6 +19,8 @@ from ..triplets import from_triplets
 from .pivots import INDEPENDENT, check_prescribed, coefficients_at, pivots
 from .rows import Conditions, Rows
 
+SAME_IN_A_RING = 1e6  # condition of rows that refer to each other from which they repeat each other
+
 
 @dataclass(frozen=True, eq=False)
 class BasisTransformation:
@@ -27,6 +29,7 @@ class BasisTransformation:
     Attributes
     ----------
     T : sparse (2n, 2n)
+        From the unknowns to x of all nodes, then y.
     fixed : ndarray of bool (2n,)
         Prescribed unknowns.
     values : ndarray (2n,)
@@ -139,7 +142,7 @@ def _without_rings(N: sp.csr_array, G: sp.csr_array) -> tuple[sp.csr_array, sp.c
         return N, G
     inside = N[ring][:, ring]
     block = np.eye(ring.size) - inside.toarray()
-    if np.linalg.cond(block) > 1 / INDEPENDENT:
+    if np.linalg.cond(block) > SAME_IN_A_RING:
         raise ValueError(
             "contact rows depend on each other in a ring; leave one of the contact pairs out, or "
             "give each pair of boundaries once"
@@ -154,7 +157,6 @@ def _without_rings(N: sp.csr_array, G: sp.csr_array) -> tuple[sp.csr_array, sp.c
 
 
 def change_of_basis(
-    n: int,
     conditions: Conditions,
     rows: Rows,
     length: float = 0.0,
@@ -164,12 +166,10 @@ def change_of_basis(
 
     Parameters
     ----------
-    n : int
-        Number of nodes (scalar unknowns).
     conditions : Conditions
         Gamma_u and Gamma_0.
     rows : Rows
-        Gamma_K.
+        Gamma_K, on the n nodes of all bodies.
     length : float
         Largest coordinate, to whose round-off the gaps are known.
     stiffness : ndarray (n,), optional
@@ -180,9 +180,10 @@ def change_of_basis(
     ValueError
         Prescribed displacements on both sides violate a row, or rows depend on each other.
     """
+    n = rows.coupling.shape[1]
     frame, fixed, values = _frames(n, conditions)
     R = _blocks(frame)
-    Bz = (rows.matrix(n) @ R).tocsr()
+    Bz = (rows.matrix() @ R).tocsr()
     flat_fixed, flat_values = fixed.T.ravel(), values.T.ravel()
     host = pivots(rows, Bz, fixed, np.ones(n) if stiffness is None else stiffness)
     check_prescribed(rows, Bz, flat_fixed, flat_values, np.flatnonzero(host < 0), length)

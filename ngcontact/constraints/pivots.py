@@ -16,13 +16,21 @@ from .rows import Rows
 
 PIVOT = 0.05  # least share of a row at the node whose unknown it becomes, if another is possible
 INDEPENDENT = 1e-6  # sine below which two conditions at one node are the same
-SATISFIED = 1e-8  # interpolation error of prescribed values, relative to the largest
-ROUND_OFF = 1e-13  # of measured gaps, relative to the largest coordinate
+INTERPOLATED = 1e-8  # error of prescribed values, relative to the largest, that is no interference
+MEASURED = 1e-13  # error of gaps, relative to the largest coordinate, that is none either
 CONTRAST = 1e3  # stiffness of the secondary over that facing it above which the latter hosts
 
 
 class _Pivots:
-    """Assignment of rows to the nodes whose unknowns they become."""
+    """Assignment of rows to the nodes whose unknowns they become.
+
+    Attributes
+    ----------
+    fixed : ndarray of bool (n, 2)
+        Prescribed directions.
+    taken : dict of int to list of ndarray (2,)
+        Coefficients of the rows that nodes have.
+    """
 
     def __init__(self, fixed: Mask) -> None:
         self.fixed = fixed
@@ -46,7 +54,7 @@ class _Pivots:
 
 
 def coefficients_at(Bz: sp.csr_array, row: Index, node: Index) -> Array:
-    """Coefficients (k, 2) of rows (k,) at nodes (k,)."""
+    """Coefficients (k, 2) of rows `row` (k,) of `Bz` (m, 2n) at the nodes `node` (k,)."""
     n = Bz.shape[1] // 2
     if row.size == 0:  # SciPy answers an empty index with a sparse matrix
         return np.zeros((0, 2))
@@ -54,19 +62,22 @@ def coefficients_at(Bz: sp.csr_array, row: Index, node: Index) -> Array:
 
 
 def _preferred(rows: Rows, stiffness: Array) -> Index:
-    """Node of the secondary, or the nearest one that faces it where that is much softer."""
-    nearest = np.abs(rows.share).argmax(axis=1)[:, None]
-    facing = np.take_along_axis(rows.partner, nearest, axis=1)[:, 0]
+    """Node (m,) of the secondary, or the nearest one that faces it where that is much softer."""
+    coupling = rows.coupling.tocoo()
+    falling = np.argsort(-np.abs(coupling.data), kind="stable")
+    facing = rows.node.copy()  # where nothing does
+    facing[coupling.row[falling[::-1]]] = coupling.col[falling[::-1]]  # the largest comes last
     softer = CONTRAST * stiffness[facing] < stiffness[rows.node]
-    return np.where(softer & rows.share.any(axis=1), facing, rows.node)
+    return np.where(softer, facing, rows.node)
 
 
 def pivots(rows: Rows, Bz: sp.csr_array, fixed: Mask, stiffness: Array) -> Index:
-    """Host node of every row, -1 where all of a row's unknowns are prescribed.
+    """Host node (m,) of every row, -1 where all of a row's unknowns are prescribed.
 
     Parameters
     ----------
     rows : Rows
+        m of them.
     Bz : sparse (m, 2n)
         The rows in the frames of the nodes.
     fixed : ndarray of bool (n, 2)
@@ -104,7 +115,28 @@ def pivots(rows: Rows, Bz: sp.csr_array, fixed: Mask, stiffness: Array) -> Index
 def check_prescribed(
     rows: Rows, Bz: sp.csr_array, fixed: Mask, values: Array, drop: Index, length: float
 ) -> None:
-    """Raise unless the rows that find no free unknown hold for the prescribed values."""
+    """Raise unless the rows that find no free unknown hold for the prescribed values.
+
+    Parameters
+    ----------
+    rows : Rows
+        m of them.
+    Bz : sparse (m, 2n)
+        The rows in the frames of the nodes.
+    fixed : ndarray of bool (2n,)
+        Prescribed unknowns there.
+    values : ndarray (2n,)
+        Their values.
+    drop : ndarray of int (k,)
+        The rows in question.
+    length : float
+        Largest coordinate, to whose round-off the gaps are known.
+
+    Raises
+    ------
+    ValueError
+        A row is violated, or all its free unknowns are those of other rows.
+    """
     size = np.abs(values).max(initial=0.0)
     for j in drop:
         columns, entries = Bz[[j]].indices, Bz[[j]].data
@@ -115,7 +147,7 @@ def check_prescribed(
                 "one of the contact boundaries before that point"
             )
         value = float(entries @ values[columns])
-        allowed = SATISFIED * max(size, abs(rows.g[j])) + ROUND_OFF * length
+        allowed = INTERPOLATED * max(size, abs(rows.g[j])) + MEASURED * length
         excess = value - rows.g[j]
         if (abs(excess) if rows.equality[j] else excess) > allowed:
             raise ValueError(

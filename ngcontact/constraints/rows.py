@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,9 +22,11 @@ class Conditions:
     Attributes
     ----------
     node : ndarray of int (k,)
+        Numbers i of the nodes.
     direction : ndarray (k, 2)
-        Unit vectors.
+        Unit vectors a.
     value : ndarray (k,)
+        Prescribed displacements along them, in units of length.
     """
 
     node: Index
@@ -32,48 +36,56 @@ class Conditions:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """Contact rows d.(u(x_i) - trace of the facing body) <= g, m of them.
+    """Contact rows d_j.(u(x_j) - sum_k c_jk u(x_k)) <= g_j, m of them, on n nodes.
+
+    The sum is the displacement that faces node j: the trace of the facing body at one point for
+    rows at nodes, a mean of it for others.
 
     Attributes
     ----------
     node : ndarray of int (m,)
-        Node of the secondary.
+        Node j of the secondary.
     direction : ndarray (m, 2)
-    partner : ndarray of int (m, q)
-        Nodes of the facing segment; any nodes for a rigid obstacle.
-    share : ndarray (m, q)
-        Basis functions of those nodes at the partner point; zero for a rigid obstacle.
+        Unit vectors d.
+    coupling : sparse (m, n)
+        Weights c of the nodes of the facing body; an empty row for a rigid obstacle.
     g : ndarray (m,)
+        Bounds, in units of length.
     equality : ndarray of bool (m,)
         Rows that hold with equality, Remark 3.3.
     """
 
     node: Index
     direction: Array
-    partner: Index
-    share: Array
+    coupling: sp.csr_array
     g: Array
     equality: Mask
 
-    def matrix(self, n: int) -> sp.csr_array:
+    def matrix(self) -> sp.csr_array:
         """B (m, 2n) on node values: x components first, then y."""
-        m, q = self.partner.shape
-        node = np.column_stack([self.node, self.partner])
-        share = np.column_stack([np.ones(m), -self.share])
-        cols = np.concatenate([node, node + n], axis=1)
-        vals = np.concatenate(
-            [share * self.direction[:, :1], share * self.direction[:, 1:]], axis=1
-        )
-        rows = np.repeat(np.arange(m), 2 * (q + 1))
-        B = from_triplets(vals.ravel(), rows, cols.ravel(), (m, 2 * n))
+        m, n = self.coupling.shape
+        c = self.coupling.tocoo()
+        row = np.concatenate([np.arange(m), c.row])
+        column = np.concatenate([self.node, c.col])
+        weight = np.concatenate([np.ones(m), -c.data])
+        # (2.3), (2.5): n.(v' - v''); (2.10): v''_xi - v'_xi
+        values = (weight[:, None] * self.direction[row]).T
+        columns = np.concatenate([column, column + n])
+        B = from_triplets(values.ravel(), np.tile(row, 2), columns, (m, 2 * n))
         B.eliminate_zeros()
         return B
 
     def select(self, rows: Index) -> Rows:
-        """Some of the rows."""
-        return Rows(*(getattr(self, name)[rows] for name in Rows.__annotations__))
+        """Some of the rows, by their numbers (k,)."""
+        return Rows(
+            node=self.node[rows],
+            direction=self.direction[rows],
+            coupling=self.coupling[rows],
+            g=self.g[rows],
+            equality=self.equality[rows],
+        )
 
-    def repeated(self, n: int) -> Index:
+    def repeated(self) -> Index:
         """Number (m,) of an earlier row with the same left side, or the row's own number.
 
         Where two contact lines meet smoothly, both ask for the row of their common node.
@@ -83,8 +95,42 @@ class Rows:
         alike = self.node[order][1:] == self.node[order][:-1]
         if not alike.any():
             return number
-        B = self.matrix(n)
+        B = self.matrix()
         for first, second in zip(order[:-1][alike], order[1:][alike], strict=True):
             if abs(B[[first]] - B[[second]]).max() <= REPEATED:
                 number[second] = number[first]
         return number
+
+
+def no_rows(n: int) -> Rows:
+    """The rows of a problem without contact on n nodes."""
+    return Rows(
+        node=np.zeros(0, dtype=np.intp),
+        direction=np.zeros((0, 2)),
+        coupling=sp.csr_array((0, n)),
+        g=np.zeros(0),
+        equality=np.zeros(0, dtype=bool),
+    )
+
+
+def no_conditions() -> Conditions:
+    """The conditions of a problem without supports."""
+    return Conditions(
+        node=np.zeros(0, dtype=np.intp), direction=np.zeros((0, 2)), value=np.zeros(0)
+    )
+
+
+Part = TypeVar("Part", Conditions, Rows)
+
+
+def concatenated(parts: Sequence[Part]) -> Part:
+    """Conditions, or rows, of all parts in order; there is at least one part."""
+    kind = type(parts[0])
+    return kind(*(_stacked([getattr(part, x.name) for part in parts]) for x in fields(kind)))
+
+
+def _stacked(arrays: list[Any]) -> Any:
+    """Arrays, dense or sparse, one after the other."""
+    if sp.issparse(arrays[0]):
+        return sp.vstack(arrays, format="csr")
+    return np.concatenate(arrays)

@@ -5,47 +5,43 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..arrays import Index
-from ..constraints import Rows
+from ..constraints import Rows, concatenated, no_rows
 from ..fem import BoundaryTrace
 from ..lagrange import lagrange
+from ..triplets import from_triplets
 from .line import ContactLine, without
 from .projection import snap
 from .state import by_line
 
 
-def _rows(line: ContactLine, trace: BoundaryTrace) -> Rows:
-    """Rows of one contact line."""
+def _coupling(line: ContactLine, trace: BoundaryTrace) -> sp.csr_array:
+    """Basis functions (m, n) of the facing nodes at the partner points; none of an obstacle."""
     share = lagrange(trace.order, snap(line.partner_s, trace.order))
     share[line.partner < 0] = 0.0
+    row = np.repeat(np.arange(len(share)), trace.order + 1)
+    facing = trace.nodes[line.partner].ravel()
+    coupling = from_triplets(share.ravel(), row, facing, (len(share), trace.space.ndof))
+    coupling.eliminate_zeros()
+    return coupling
+
+
+def _rows(line: ContactLine, trace: BoundaryTrace) -> Rows:
+    """Rows of one contact line."""
     return Rows(
         node=line.node,
         direction=line.direction,
-        partner=trace.nodes[line.partner],
-        share=share,
-        g=line.gap,
+        coupling=_coupling(line, trace),
+        g=line.gap,  # (2.10): eps(C_j); (2.3), (2.5): 0 where the bodies touch
         equality=np.full(len(line.node), line.contact.bilateral),
     )
 
 
 def joined(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:
     """Rows of all lines, in order."""
-    rows = [_rows(line, trace) for line in lines]
-    if rows:
-        return Rows(
-            *(np.concatenate([getattr(r, name) for r in rows]) for name in Rows.__annotations__)
-        )
-    none = np.zeros(0, dtype=np.intp)
-    shape = (0, trace.order + 1)
-    return Rows(
-        node=none,
-        direction=np.zeros((0, 2)),
-        partner=np.zeros(shape, dtype=np.intp),
-        share=np.zeros(shape),
-        g=np.zeros(0),
-        equality=np.zeros(0, dtype=bool),
-    )
+    return concatenated([no_rows(trace.space.ndof), *(_rows(line, trace) for line in lines)])
 
 
 def kept_lines(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
@@ -56,9 +52,9 @@ def kept_lines(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
     return [without(line, np.flatnonzero(part)) for line, part in parts]
 
 
-def merged(lines: list[ContactLine], rows: Rows, n: int) -> tuple[list[ContactLine], Rows]:
+def merged(lines: list[ContactLine], rows: Rows) -> tuple[list[ContactLine], Rows]:
     """Lines and rows with one row for each left side: the tightest of those that repeat it."""
-    number = rows.repeated(n)
+    number = rows.repeated()
     first = np.unique(number)
     if len(first) == len(number):
         return lines, rows

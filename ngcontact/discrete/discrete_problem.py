@@ -128,11 +128,11 @@ def discretise(
     space, assembled = _space(problem, trace, element, previous)
     n = space.basis.shape[1] // 2
     conditions = support_conditions(problem, trace)
-    lines, rows = merged(found, joined(found, trace), n)
+    lines, rows = merged(found, joined(found, trace))
     length = float(np.abs(trace.curve).max())
-    basis = change_of_basis(n, conditions, rows, length, space.stiffness())
+    basis = change_of_basis(conditions, rows, length, space.stiffness())
     lines, rows = kept_lines(lines, basis.kept), rows.select(basis.kept)
-    B = rows.matrix(n)
+    B = rows.matrix()
     rigid = None
     loaded = rigid_motions(problem, space, conditions, basis, B, rows.g, rows.equality)
     if loaded is not None:

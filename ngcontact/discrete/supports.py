@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..arrays import Index
-from ..constraints import Conditions
+from ..constraints import Conditions, concatenated, no_conditions
 from ..fem import BoundaryTrace
 from ..problem import Problem, boundary_mask
 
@@ -29,7 +29,7 @@ def _prescribed(problem: Problem, trace: BoundaryTrace) -> Conditions:
 def _guided(problem: Problem, trace: BoundaryTrace) -> Conditions:
     """Gamma_0: zero normal displacement at the nodes, with the exact normals."""
     if problem.sliding is None:
-        return Conditions(np.zeros(0, dtype=np.intp), np.zeros((0, 2)), np.zeros(0))
+        return no_conditions()
     segment, s = trace.at_nodes(trace.select(boundary_mask(trace.mesh, str(problem.sliding))))
     node = trace.nodes[segment[:: trace.order + 1]].ravel()
     number, normal = trace.number_points(segment, node, trace.exact_normal(segment, s))
@@ -39,10 +39,7 @@ def _guided(problem: Problem, trace: BoundaryTrace) -> Conditions:
 
 def support_conditions(problem: Problem, trace: BoundaryTrace) -> Conditions:
     """Gamma_u and Gamma_0."""
-    parts = _prescribed(problem, trace), _guided(problem, trace)
-    return Conditions(
-        *(np.concatenate([getattr(c, name) for c in parts]) for name in Conditions.__annotations__)
-    )
+    return concatenated([_prescribed(problem, trace), _guided(problem, trace)])
 
 
 def conditioned_segments(problem: Problem, trace: BoundaryTrace) -> Index:
