@@ -14,6 +14,7 @@ from .mesh import first_mesh
 from .one_mesh import solve_on
 from .problem import Problem
 from .solution import Solution
+from .triangulation import Triangulation
 
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
 COARSE_RUN_FROM = 20_000
@@ -93,7 +94,7 @@ def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> li
     searched = any(not contact.bilateral for contact in problem.contact)
     if given or not searched or unknowns(mesh, order, element) < COARSE_RUN_FROM:
         return []
-    size = float(np.ptp(np.array(mesh.ngmesh.Coordinates()), axis=0).max()) / COARSE_ELEMENTS
+    size = float(np.ptp(Triangulation(mesh).vertices, axis=0).max()) / COARSE_ELEMENTS
     try:
         return list(adapt(problem, maxh=size, order=COARSE_ORDER, max_dofs=COARSE_DOFS))
     except (ContactError, ValueError) as error:  # it decides nothing but the start

@@ -14,6 +14,7 @@ from drivers.reference.straight import Hertz
 from ngcontact import Problem, Solution, adapt, solve
 from ngcontact.adaptivity import refined
 from ngcontact.mesh import first_mesh
+from ngcontact.triangulation import Triangulation
 
 NEAR = 0.2  # distance from a transition, relative to the zone, that counts as near
 
@@ -39,9 +40,7 @@ class Row:
 
 def triangles(solution: Solution) -> np.ndarray:
     """Corners (ne, 3, 2) of the elements."""
-    ngmesh = solution.mesh.ngmesh
-    nodes = ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
-    return np.array(ngmesh.Coordinates())[:, :2][nodes]
+    return Triangulation(solution.mesh).corners
 
 
 def smallest_angle(corners: np.ndarray) -> float:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.problem import Gap
+from ngcontact.triangulation import Triangulation
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -82,15 +83,13 @@ class Motion:
 
 
 def _vertices(mesh: ng.Mesh) -> Array:
-    return np.array(mesh.ngmesh.Coordinates())[:, :2]
+    return Triangulation(mesh).vertices
 
 
 def moved_mesh(mesh: ng.Mesh, motion: Motion) -> tuple[ng.Mesh, Index, Index]:
     """A new mesh without geometry, and the numbers there of the old vertices and triangles."""
-    old = mesh.ngmesh
-    triangles = old.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
-    segments = old.Elements1D().NumPy()["nodes"][:, :2].astype(int) - 1
-    body, side = (x.NumPy()["index"] - 1 for x in (old.Elements2D(), old.Elements1D()))
+    old = Triangulation(mesh)
+    triangles, segments, body, side = old.triangles, old.segments, old.bodies, old.boundaries
     names = list(mesh.GetMaterials()), list(mesh.GetBoundaries())
     sizes = (len(_vertices(mesh)), len(triangles), len(segments), *map(len, names))
     if motion.seed is None:

@@ -12,6 +12,7 @@ from ..contact import contact_line
 from ..fem import BoundaryTrace, boundary_trace
 from ..mesh import copied
 from ..problem import Contact, Problem
+from ..triangulation import Triangulation, bisect, move_vertices
 
 ROUNDS = 12  # refinements after which a facing segment that still lags stays unmatched
 
@@ -80,8 +81,7 @@ def _move_to_common_eta(
     new = [(a, b) for a, b in pairs.items() if a >= first or b >= first]
     if contact.direction is None or trace.edges is None or not new:
         return
-    coordinates = trace.mesh.ngmesh.Coordinates()
-    xy = np.array(coordinates)[:, :2]
+    xy = Triangulation(trace.mesh).vertices
     across = np.array([-contact.direction[1], contact.direction[0]])
     vertices = np.array(new)
     eta = (xy[vertices] @ across).mean(axis=1)
@@ -97,12 +97,12 @@ def _move_to_common_eta(
             t = edge.level(across, eta[at], xy[v])
             reached = ~np.isnan(t)
             moved[v[reached]] = edge.point(t[reached])
-    coordinates[:, :2] = _without_inversion(trace.mesh, xy, moved)
+    move_vertices(trace.mesh, _without_inversion(trace.mesh, xy, moved))
 
 
 def _without_inversion(mesh: ng.Mesh, old: Array, new: Array) -> Array:
     """The new positions, but the old ones at triangles they would turn over."""
-    triangles = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.intp) - 1
+    triangles = Triangulation(mesh).triangles
     while True:
         a, b, c = (new[triangles[:, i]] for i in range(3))
         area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
@@ -138,8 +138,7 @@ def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.M
     flags = np.ones(copy.ne, dtype=bool) if marked is None else np.array(marked)
     flags[_facing_elements(pairs, trace, flags)] = True
     for _ in range(ROUNDS):
-        copy.ngmesh.Elements2D().NumPy()["refine"] = flags
-        copy.Refine()
+        bisect(copy, flags)
         trace = boundary_trace(copy, 1)
         segments = _boundary_edges(trace)
         children = _children(trace, first)

@@ -12,6 +12,7 @@ from ..constraints import Conditions
 from ..fem import BoundaryTrace, Space
 from ..problem import Problem, body_of_vertex
 from ..qp import FREE, vanishing_combinations
+from ..triangulation import Triangulation
 
 LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
 
@@ -142,7 +143,7 @@ def node_values(space: Space, bodies: Bodies, of_node: Index) -> Array:
     one = np.zeros(n)
     one[: trace.mesh.nv] = 1.0
     if trace.geometry_order == 1:  # edge and inner functions have no part in straight elements
-        place[: trace.mesh.nv] = np.array(trace.mesh.ngmesh.Coordinates())[:, :2]
+        place[: trace.mesh.nv] = Triangulation(trace.mesh).vertices
     else:
         field = ng.GridFunction(trace.space)
         for axis, x in enumerate((ng.x, ng.y)):

@@ -26,6 +26,7 @@ from ..arrays import Array
 from ..fem import BoundaryTrace, bulk_moduli
 from ..linalg import cholesky, lower_half, shared
 from ..problem import Problem
+from ..triangulation import Triangulation
 from ..triplets import from_triplets
 from .terms import BoundaryResidual, PressureShare, ScaledSolution
 
@@ -217,8 +218,7 @@ class _Forms:
         [[A, B'], [B, -K]] is quasi-definite: it has a factorisation without pivots.
         """
         size = self.space.ndof
-        regions = self.space.mesh.ngmesh.Elements2D().NumPy()["index"].astype(int) - 1
-        inside = np.array(self.region.Mask())[regions]
+        inside = np.array(self.region.Mask())[Triangulation(self.space.mesh).bodies]
         free = np.append(np.repeat(inside, self.functions), K.diagonal() > 0)
         saddle = sp.block_array([[A, B.T], [B, -K]], format="csr")
         right = np.append(b, np.zeros(K.shape[0]))

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..arrays import Array, Index
 from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative
 from ..mesh import CadEdge, cad_edges
+from ..triangulation import Triangulation, triangle_sides
 
 CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two rows at a smaller
 # one would be dependent to 1 / turn^2
@@ -171,7 +172,7 @@ def _neighbours(
     segments: Index, triangles: Index, vertices: int
 ) -> tuple[Index, NDArray[np.bool_]]:
     """Number of a triangle at each segment, and whether there is another one."""
-    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    sides = np.sort(triangle_sides(triangles), axis=1)
     keys = sides[:, 0] * vertices + sides[:, 1]
     order = np.argsort(keys)
     low, high = np.sort(segments, axis=1).T
@@ -183,16 +184,12 @@ def _neighbours(
 
 def boundary_trace(mesh: ng.Mesh, order: int) -> BoundaryTrace:
     """Trace of the displacements of degree `order` on the boundary of `mesh`."""
-    ngmesh = mesh.ngmesh
-    triangles = ngmesh.Elements2D().NumPy()
-    corners = triangles["nodes"][:, :3].astype(np.intp) - 1
-    elements = list(mesh.Elements(ng.BND))
-    ends = np.array([[v.nr for v in el.vertices] for el in elements]).reshape(-1, 2)
-    nodes = ends
+    view = Triangulation(mesh)
+    nodes = ends = view.segments
     space = ng.H1(mesh, order=order)
     if order > 1:
         # From the end with the lower number, as NGSolve orients its edges.
-        interior = np.array([space.GetDofNrs(el.edges[0]) for el in elements])
+        interior = np.array([space.GetDofNrs(el.edges[0]) for el in mesh.Elements(ng.BND)])
         interior = np.where((ends[:, 0] < ends[:, 1])[:, None], interior, interior[:, ::-1])
         nodes = np.column_stack([ends[:, 0], interior, ends[:, 1]])
 
@@ -201,19 +198,19 @@ def boundary_trace(mesh: ng.Mesh, order: int) -> BoundaryTrace:
     curve = np.asarray(ng.CF((ng.x, ng.y))(mesh.MapToAllElements(rule, ng.BND)))
     curve = curve.reshape(-1, degree + 1, 2)
 
-    element, inner = _neighbours(ends, corners, mesh.nv)
-    xy = np.array(ngmesh.Coordinates())[:, :2]
-    opposite = xy[corners[element]].mean(axis=1) - xy[ends[:, 0]]
+    element, inner = _neighbours(ends, view.triangles, mesh.nv)
+    xy = view.vertices
+    opposite = xy[view.triangles[element]].mean(axis=1) - xy[ends[:, 0]]
     right = _right(xy[ends[:, 1]] - xy[ends[:, 0]])
     return BoundaryTrace(
         mesh=mesh,
         space=space,
         order=order,
         geometry_order=degree,
-        region=np.array([el.index for el in elements], dtype=np.intp),
+        region=view.boundaries,
         nodes=nodes,
         element=element,
-        body=triangles["index"][element].astype(np.intp) - 1,
+        body=view.bodies[element],
         inner=inner,
         curve=curve,
         side=np.where((opposite * right).sum(axis=1) > 0, -1.0, 1.0),

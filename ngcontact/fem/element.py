@@ -7,6 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Index
+from ..triangulation import Triangulation
 from ..triplets import from_triplets
 from .boundary import BoundaryTrace
 from .nodal_basis import edge_bubbles, nodal_basis
@@ -48,9 +49,8 @@ def _physical_basis(V: ng.FESpace, trace: BoundaryTrace) -> sp.csr_array:
     mesh = trace.mesh
     if V.ndof == 2 * mesh.nv:
         return sp.eye_array(mesh.nv, format="csr")
-    xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
-    corners = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.intp) - 1
-    triangles = corners[trace.element]
+    view = Triangulation(mesh)
+    xy, triangles = view.vertices, view.triangles[trace.element]
     if trace.geometry_order > 2:
         raise ValueError(
             f"the mesh is curved to degree {trace.geometry_order}; element='physical' lives on "

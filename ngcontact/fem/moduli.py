@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..arrays import Array
 from ..mesh import middles
 from ..problem import Elastic, Hooke, Problem, varies
+from ..triangulation import Triangulation
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
 NEARLY_INCOMPRESSIBLE = 6.0
@@ -23,7 +24,7 @@ log = logging.getLogger("ngcontact")
 
 def _of_elements(problem: Problem, mesh: ng.Mesh, modulus: Callable[..., Array]) -> Array:
     """modulus(law, points) (ne,) in the middle of each element; of one where a law is constant."""
-    region = mesh.ngmesh.Elements2D().NumPy()["index"] - 1
+    region = Triangulation(mesh).bodies
     points, values = middles(mesh), np.zeros(mesh.ne)
     for pattern, law in problem.materials.items():
         at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
@@ -61,7 +62,7 @@ def bulk_moduli(problem: Problem, mesh: ng.Mesh) -> Array:
 def nearly_incompressible(problem: Problem, mesh: ng.Mesh, limit: float) -> dict[str, float]:
     """Largest kappa / mu of each body where it exceeds `limit`."""
     ratio = bulk_moduli(problem, mesh) / shear_moduli(problem, mesh)
-    region = mesh.ngmesh.Elements2D().NumPy()["index"] - 1
+    region = Triangulation(mesh).bodies
     most = dict.fromkeys(mesh.GetMaterials(), 0.0)
     for number, name in enumerate(mesh.GetMaterials()):
         most[name] = max(most[name], float(ratio[region == number].max(initial=0.0)))

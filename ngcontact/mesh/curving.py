@@ -5,6 +5,7 @@ from __future__ import annotations
 import ngsolve as ng
 import numpy as np
 
+from ..triangulation import Triangulation
 from .cad import cad_edges
 from .parents import copied
 
@@ -26,16 +27,15 @@ def check_curves(mesh: ng.Mesh) -> None:
         Names the edge and its length; another unit of length mends it.
     """
     edges = cad_edges(mesh) or []
-    xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
-    segments = mesh.ngmesh.Elements1D().NumPy()
-    ends = xy[segments["nodes"][:, :2].astype(np.intp) - 1]
+    view = Triangulation(mesh)
+    ends = view.vertices[view.segments]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     for number, edge in enumerate(edges):
         if edge.straight:
             continue
         small = edge.size < SMALLEST
         limit = SHORTEST_ON_SMALL if small else SHORTEST
-        shortest = float(length[segments["index"] == number + 1].min(initial=np.inf))
+        shortest = float(length[view.boundaries == number].min(initial=np.inf))
         if shortest < limit or (small and not edge.uniform):
             raise ValueError(
                 f'the curved edge "{edge.name}" has the extent {edge.size:g} and segments of '
@@ -68,8 +68,7 @@ def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
     edges = cad_edges(mesh)
     if edges is None:
         return mesh, 0
-    region = mesh.ngmesh.Elements1D().NumPy()["index"] - 1
-    curved = np.array([not edge.straight for edge in edges])[region]
+    curved = np.array([not edge.straight for edge in edges])[Triangulation(mesh).boundaries]
     count = int(np.count_nonzero(curved))
     if count == 0 or (mesh.GetCurveOrder() == degree and not _straightened(mesh)):
         return mesh, count

@@ -1,4 +1,4 @@
-"""NGSolve's mesh as arrays."""
+"""Sizes and middles of elements."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
+from ..triangulation import Triangulation
 
 
 def diameters(mesh: ng.Mesh) -> Array:
-    """Longest side of each triangle, (ne,)."""
-    triangles = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.intp) - 1
-    corners = np.array(mesh.ngmesh.Coordinates())[:, :2][triangles]
+    """Longest side of each triangle, (ne,), lengths."""
+    corners = Triangulation(mesh).corners
     return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
 
 

@@ -7,6 +7,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..problem import Problem
+from ..triangulation import Triangulation, triangle_sides
 from .matching import Edge, divided
 
 COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given ...
@@ -15,10 +16,11 @@ FINER = 2  # ... and that many times more on a bounded zone: contact may end any
 
 def _require_complete(mesh: ng.Mesh) -> None:
     """Raise where Netgen, which only prints a message, left a part of a body without elements."""
-    corners = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.int64)
-    sides = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    rim = np.sort(mesh.ngmesh.Elements1D().NumPy()["nodes"][:, :2].astype(np.int64), axis=1)
-    side, rim = (x @ np.array([mesh.nv + 1, 1]) for x in (sides, rim))
+    view = Triangulation(mesh)
+    side, rim = (
+        np.sort(ends, axis=1) @ np.array([mesh.nv, 1])
+        for ends in (triangle_sides(view.triangles), view.segments)
+    )
     known, count = np.unique(side, return_counts=True)
     missing = np.setxor1d(known[count == 1], rim[~np.isin(rim, known[count > 1])])
     if missing.size:

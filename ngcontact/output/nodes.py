@@ -13,6 +13,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import KDTree
 
 from ..arrays import Index
+from ..triangulation import Triangulation
 from ..triplets import from_triplets
 
 VTK_CELL = {1: 5, 2: 22}  # VTK_TRIANGLE, VTK_QUADRATIC_TRIANGLE
@@ -62,14 +63,13 @@ def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
     places = [(a / order, b / order, 0.0) for a, b, _ in weights]
     rule = ng.IntegrationRule(places, [0.0] * len(places))
     at = mesh.MapToAllElements({ng.TRIG: rule}, ng.VOL)
-    elements = mesh.ngmesh.Elements2D().NumPy()
-    if len(at) != len(elements) * len(weights):
-        others = len(elements) - len(at) // len(weights)
+    view = Triangulation(mesh)
+    if others := view.others():
         raise ValueError(f"{others} elements of the mesh are no triangles; mesh without quads")
     names = tuple(dict.fromkeys(mesh.GetMaterials()))
     regions = np.array([names.index(name) for name in mesh.GetMaterials()], dtype=np.intp)
-    body = regions[elements["index"] - 1]
-    vertices = (elements["nodes"][:, :3].astype(np.intp) - 1) * len(names) + body[:, None]
+    body = regions[view.bodies]
+    vertices = view.triangles * len(names) + body[:, None]
     # A node is known by the vertices it leans on and its weights there, from any triangle.
     key = np.where(weights > 0, vertices[:, None, :] * (order + 1) + weights, 0)
     key = np.sort(key.reshape(-1, 3), axis=1)

@@ -9,75 +9,36 @@ from __future__ import annotations
 import difflib
 import itertools
 from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
 
-from .regions import body_mask, body_of_vertex, boundary_mask, vertex_numbers
+from ..triangulation import Triangulation, triangle_sides
+from .contact import Contact
+from .material import Elastic, Hooke
+from .regions import body_mask, body_of_vertex, boundary_mask
 from .values import refuse_where
-
-if TYPE_CHECKING:
-    from .contact import Contact
-    from .problem import Problem
-
 
 Masks = dict[str, np.ndarray]  # by 'argument "pattern"': which region numbers it selects
 
+Places = tuple[
+    ng.comp.VorB, ng.IntegrationRule
+]  # points of every element at which data are looked at
+
+IN_BODIES: Places = (
+    ng.VOL,
+    ng.IntegrationRule([(1 / 6, 1 / 6, 0), (2 / 3, 1 / 6, 0), (1 / 6, 2 / 3, 0)], [1 / 6] * 3),
+)
 # Loads are integrated and may be singular at an end; prescribed values and gaps are interpolated
 # and must exist there.
-_INNER = ng.IntegrationRule(ng.SEGM, 3)
-_ENDS = ng.IntegrationRule([(0, 0, 0), (0.5, 0, 0), (1, 0, 0)], [1 / 6, 2 / 3, 1 / 6])
-_BULK = ng.IntegrationRule([(1 / 6, 1 / 6, 0), (2 / 3, 1 / 6, 0), (1 / 6, 2 / 3, 0)], [1 / 6] * 3)
-_TRIANGLES = (10, 12)  # netgen's element types TRIG and TRIG6
-_FLAT = 16 * np.finfo(float).eps
+IN_SEGMENTS: Places = (ng.BND, ng.IntegrationRule(ng.SEGM, 3))
+AT_ENDS: Places = (
+    ng.BND,
+    ng.IntegrationRule([(0, 0, 0), (0.5, 0, 0), (1, 0, 0)], [1 / 6, 2 / 3, 1 / 6]),
+)
 
-
-def check_problem(problem: Problem, mesh: ng.Mesh) -> None:
-    """Refuse a problem whose names or values do not fit the mesh.
-
-    Raises
-    ------
-    TypeError
-        If `mesh` is not an `ngsolve.Mesh`, or a gap function does not return numbers.
-    ValueError
-        If the mesh is no valid plane triangulation, a name selects nothing, two conditions meet
-        on one boundary, a contact pair is impossible, or data are not finite or not elliptic.
-    """
-    check_mesh(mesh)
-    names = mesh.GetBoundaries()
-    materials = regions_of(mesh, "materials", problem.materials, body_mask)
-    force = regions_of(mesh, "force", problem.force, body_mask)
-    displacement = regions_of(mesh, "displacement", problem.displacement, boundary_mask)
-    traction = regions_of(mesh, "traction", problem.traction, boundary_mask)
-    slides = [problem.sliding] if isinstance(problem.sliding, str) else []
-    sliding = regions_of(mesh, "sliding", slides, boundary_mask)
-    contact = [sides_of(mesh, f"contact[{j}]", pair) for j, pair in enumerate(problem.contact)]
-
-    _check_bodies(mesh, materials)
-    _refuse_common(names, sliding, displacement, "keep one of the two")
-    _refuse_common(names, traction, sliding, "keep one of the two")
-    prescribed = zip(displacement.items(), problem.displacement.values(), strict=True)
-    full = {label: mask for (label, mask), (ux, uy) in prescribed if not (ux is None or uy is None)}
-    _refuse_common(names, traction, full, "keep one, or leave a component free by None")
-    for sides in contact:
-        others = displacement | traction | sliding
-        _refuse_common(names, sides, others, "a contact boundary takes no other condition")
-    _check_pairs(mesh, contact)
-
-    for (label, mask), law in zip(materials.items(), problem.materials.values(), strict=True):
-        law.check_at(_points(mesh, ng.VOL, mask, _BULK), label)
-    for masks, given, vb, rule in [
-        (force, problem.force, ng.VOL, _BULK),
-        (traction, problem.traction, ng.BND, _INNER),
-        (displacement, problem.displacement, ng.BND, _ENDS),
-    ]:
-        for (label, mask), data in zip(masks.items(), given.values(), strict=True):
-            _check_finite(_points(mesh, vb, mask, rule), data, label)
-    for j, (sides, pair) in enumerate(zip(contact, problem.contact, strict=True)):
-        if pair.gap is not None:
-            points = _points(mesh, ng.BND, next(iter(sides.values())), _ENDS)
-            _check_gap(points, pair.gap, f"contact[{j}].gap")
+FLAT = 16 * np.finfo(float).eps  # area of a triangle over its longest side squared, without height
 
 
 def check_mesh(mesh: ng.Mesh) -> None:
@@ -88,15 +49,14 @@ def check_mesh(mesh: ng.Mesh) -> None:
         raise ValueError(f"mesh has dimension {mesh.dim}: make it with OCCGeometry(shape, dim=2)")
     if mesh.ne == 0:
         raise ValueError("mesh has 0 elements: generate it first")
-    elements = mesh.ngmesh.Elements2D()
-    others = np.count_nonzero(~np.isin(elements.NumPy()["type"], _TRIANGLES))
-    if others:
+    view = Triangulation(mesh)
+    if others := view.others():
         raise ValueError(f"mesh has {others} quadrilaterals: it must be a triangulation")
-    vertex = np.asarray(mesh.ngmesh.Coordinates())[:, :2][vertex_numbers(elements, 3)]
+    vertex = view.corners
     edge = np.roll(vertex, -1, axis=1) - vertex
     area = (edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0]) / 2
     longest = np.square(edge).sum(axis=2).max(axis=1)
-    bad = ~(area > _FLAT * longest)  # so a NaN is bad
+    bad = ~(area > FLAT * longest)  # so a NaN is bad
     if bad.any():
         first = int(np.argmax(bad))
         raise ValueError(
@@ -125,7 +85,7 @@ def regions_of(
                 raise ValueError(f'{argument} "{part}" selects no region; {hint}there are {known}')
         label = f'{argument} "{pattern}"'
         mask = {label: mask_of(mesh, pattern)}
-        _refuse_common(names, masks, mask, "give every region once")
+        refuse_common(names, masks, mask, "give every region once")
         masks |= mask
     return masks
 
@@ -138,7 +98,7 @@ def sides_of(mesh: ng.Mesh, argument: str, pair: Contact) -> Masks:
     return sides
 
 
-def _refuse_common(names: Sequence[str], one: Masks, other: Masks, right: str) -> None:
+def refuse_common(names: Sequence[str], one: Masks, other: Masks, right: str) -> None:
     """Refuse a region that two arguments have in common."""
     for (a, first), (b, second) in itertools.product(one.items(), other.items()):
         common = sorted({n for n, both in zip(names, first & second, strict=True) if both})
@@ -146,7 +106,7 @@ def _refuse_common(names: Sequence[str], one: Masks, other: Masks, right: str) -
             raise ValueError(f'"{"|".join(common)}" is both in {a} and in {b}: {right}')
 
 
-def _check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
+def check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
     """Refuse bodies without a name or without a material."""
     covered = np.logical_or.reduce(list(materials.values()))
     for number, name in enumerate(mesh.GetMaterials()):
@@ -156,7 +116,7 @@ def _check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
             raise ValueError(f'body "{name}" has no material: add materials["{name}"]')
 
 
-def _check_pairs(mesh: ng.Mesh, contact: Sequence[Masks]) -> None:
+def check_pairs(mesh: ng.Mesh, contact: Sequence[Masks]) -> None:
     """Refuse contact inside a body: on an interface, of a curve with itself, of a body with itself.
 
     A body is a connected piece of the mesh, whatever the names of its parts.
@@ -164,15 +124,15 @@ def _check_pairs(mesh: ng.Mesh, contact: Sequence[Masks]) -> None:
     if not contact:
         return
     names = mesh.GetBoundaries()
-    region = mesh.ngmesh.Elements1D().NumPy()["index"] - 1
-    ends = vertex_numbers(mesh.ngmesh.Elements1D(), 2)
+    view = Triangulation(mesh)
+    region, ends = view.boundaries, view.segments
     body = body_of_vertex(mesh)
-    inner = np.bincount(region[_has_two_sides(mesh, ends)], minlength=len(names)) > 0
+    inner = np.bincount(region[_has_two_sides(view)], minlength=len(names)) > 0
     for sides in contact:
         right = "it lies inside one body; join bodies by Compound, not Glue"
-        _refuse_common(names, sides, {"the interfaces of the mesh": inner}, right)
+        refuse_common(names, sides, {"the interfaces of the mesh": inner}, right)
         for (a, first), (b, second) in itertools.combinations(sides.items(), 2):
-            _refuse_common(names, {a: first}, {b: second}, "name two different boundaries")
+            refuse_common(names, {a: first}, {b: second}, "name two different boundaries")
             if np.intersect1d(body[ends[first[region]]], body[ends[second[region]]]).size:
                 raise ValueError(
                     f"{a} and {b} lie on the same body: contact is between two bodies without a "
@@ -180,23 +140,44 @@ def _check_pairs(mesh: ng.Mesh, contact: Sequence[Masks]) -> None:
                 )
 
 
-def _has_two_sides(mesh: ng.Mesh, ends: np.ndarray) -> np.ndarray:
-    """Return which segments, given by vertices (n, 2), lie between two triangles, bool (n,)."""
-    size = len(mesh.ngmesh.Coordinates())
+def _has_two_sides(view: Triangulation) -> np.ndarray:
+    """Return which boundary segments (k,) lie between two triangles, bool (k,)."""
+    size, ends = len(view.vertices), view.segments
     marked = np.zeros(size, dtype=bool)
     marked[ends] = True
-    edges = vertex_numbers(mesh.ngmesh.Elements2D(), 3)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-    edges = np.sort(edges[marked[edges].all(axis=1)], axis=1)
-    keys, count = np.unique(edges[:, 0] * np.int64(size) + edges[:, 1], return_counts=True)
+    sides = triangle_sides(view.triangles)
+    sides = np.sort(sides[marked[sides].all(axis=1)], axis=1)
+    keys, count = np.unique(sides[:, 0] * size + sides[:, 1], return_counts=True)
     ends = np.sort(ends, axis=1)
-    return np.isin(ends[:, 0] * np.int64(size) + ends[:, 1], keys[count > 1])
+    return np.isin(ends[:, 0] * size + ends[:, 1], keys[count > 1])
 
 
-def _points(mesh: ng.Mesh, vb: ng.VorB, mask: np.ndarray, rule: ng.IntegrationRule) -> np.ndarray:
-    """Return NGSolve's mesh points of a rule on every element of the selected regions."""
-    elements = mesh.ngmesh.Elements2D() if vb == ng.VOL else mesh.ngmesh.Elements1D()
+def check_laws(mesh: ng.Mesh, materials: Masks, laws: Iterable[Elastic | Hooke]) -> None:
+    """Refuse laws that are not elliptic in the bodies `materials`, HH81 (2.7)."""
+    for (label, mask), law in zip(materials.items(), laws, strict=True):
+        law.check_at(_points(mesh, mask, IN_BODIES), label)  # (2.7)
+
+
+def check_data(mesh: ng.Mesh, masks: Masks, data: Iterable[Any], places: Places) -> None:
+    """Refuse loads or displacements that are not finite somewhere, one for each of `masks`."""
+    for (label, mask), value in zip(masks.items(), data, strict=True):
+        _check_finite(_points(mesh, mask, places), value, label)
+
+
+def check_gaps(mesh: ng.Mesh, contact: Sequence[Masks], pairs: Sequence[Contact]) -> None:
+    """Refuse gaps that are not finite on the secondary, the first of the sides of each pair."""
+    for j, (sides, pair) in enumerate(zip(contact, pairs, strict=True)):
+        if pair.gap is not None:
+            points = _points(mesh, next(iter(sides.values())), AT_ENDS)
+            _check_gap(points, pair.gap, f"contact[{j}].gap")
+
+
+def _points(mesh: ng.Mesh, mask: np.ndarray, places: Places) -> np.ndarray:
+    """Return NGSolve's mesh points of the places on every element of the selected regions."""
+    (vb, rule), view = places, Triangulation(mesh)
+    regions = view.bodies if vb == ng.VOL else view.boundaries
     points = mesh.MapToAllElements(rule, vb)
-    return points[mask[elements.NumPy()["index"] - 1][points["nr"]]]
+    return points[mask[regions][points["nr"]]]
 
 
 def _check_finite(points: np.ndarray, data: Any, label: str) -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import ngsolve as ng
 import numpy as np
+
+from ..triangulation import Triangulation
 
 
 def boundary_mask(mesh: ng.Mesh, pattern: str) -> np.ndarray:
@@ -33,15 +34,10 @@ def body_of_vertex(mesh: ng.Mesh) -> np.ndarray:
     """Return the number of the connected piece of the mesh each vertex belongs to, int (nv,)."""
     from scipy.sparse.csgraph import connected_components  # not needed to state a problem
 
-    from ngcontact.triplets import from_triplets
+    from ..triplets import from_triplets
 
-    nodes = vertex_numbers(mesh.ngmesh.Elements2D(), 3)
-    size = len(mesh.ngmesh.Coordinates())
+    view = Triangulation(mesh)
+    nodes, size = view.triangles, len(view.vertices)
     start, end = nodes[:, [0, 1]].ravel(), nodes[:, [1, 2]].ravel()
     graph = from_triplets(np.ones(len(start), dtype=bool), start, end, (size, size))
     return connected_components(graph, directed=False)[1]
-
-
-def vertex_numbers(elements: Any, count: int) -> np.ndarray:
-    """Return the vertex numbers of netgen's elements, counted from 0, int (n, count)."""
-    return elements.NumPy()["nodes"][:, :count] - 1

@@ -18,6 +18,7 @@ from drivers.benchmark.scenes.triangles import sides
 from ngcontact import Problem
 from ngcontact.geometries.region import body, polygon
 from ngcontact.mesh import first_mesh
+from ngcontact.triangulation import Triangulation
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -55,32 +56,30 @@ class Mesh:
         return ng.Mesh(self.ngmesh.Copy())  # type: ignore[attr-defined]
 
     @cached_property
-    def _mesh(self) -> ng.Mesh:
-        return self.copy()
+    def _view(self) -> Triangulation:
+        return Triangulation(self.copy())
 
     @cached_property
     def points(self) -> Array:
         """Vertices (nv, 2)."""
-        return np.array(self._mesh.ngmesh.Coordinates())[:, :2]
+        return self._view.vertices
 
     @cached_property
     def triangles(self) -> Indices:
         """Vertices (ne, 3) of the triangles, anticlockwise."""
-        return _corners(self._mesh.ngmesh.Elements2D(), 3)
+        return self._view.triangles
 
     @cached_property
     def bodies(self) -> dict[str, Indices]:
         """Triangles of each body."""
-        number = self._mesh.ngmesh.Elements2D().NumPy()["index"]
-        names = np.array(self._mesh.GetMaterials())[number - 1]
+        names = np.array(self._view.mesh.GetMaterials())[self._view.bodies]
         return {str(name): np.flatnonzero(names == name) for name in np.unique(names)}
 
     @cached_property
     def edges(self) -> dict[str, Indices]:
         """Vertices (k, 2) of the segments of each boundary."""
-        number = self._mesh.ngmesh.Elements1D().NumPy()["index"]
-        names = np.array(self._mesh.GetBoundaries())[number - 1]
-        ends = _corners(self._mesh.ngmesh.Elements1D(), 2)
+        names, ends = np.array(self._view.mesh.GetBoundaries()), self._view.segments
+        names = names[self._view.boundaries]
         return {str(name): ends[names == name] for name in np.unique(names)}
 
     def read(self) -> None:
@@ -96,10 +95,6 @@ class Mesh:
         if order == 2:
             nodes += len(sides(corners)[0])
         return 2 * nodes
-
-
-def _corners(elements: object, count: int) -> Indices:
-    return elements.NumPy()["nodes"][:, :count].astype(np.intp) - 1  # type: ignore[attr-defined]
 
 
 @lru_cache

@@ -9,6 +9,7 @@ import scipy.sparse as sp
 from drivers.benchmark.scenes.plane import Numbering, moduli
 from drivers.benchmark.scenes.problems import Common
 from ngcontact.linalg import shared
+from ngcontact.triangulation import Triangulation
 from ngcontact.triplets import from_triplets
 
 BUBBLE = -1 / 8  # value of NGSolve's edge function of order 2 at the middle of the edge
@@ -47,7 +48,7 @@ def numbering(mesh: ng.Mesh, order: int) -> Numbering:
         middle = [mesh.nv + element.edges[0].nr] if order == 2 else []
         segments.setdefault(element.mat, []).append([first, *middle, last])
     return Numbering(
-        points=np.array(mesh.ngmesh.Coordinates())[:, :2],
+        points=Triangulation(mesh).vertices,
         unknown=np.arange(2 * nodes).reshape(2, nodes),
         segments={name: np.array(rows) for name, rows in segments.items()},
     )

@@ -12,6 +12,7 @@ from ngcontact import Problem
 from ngcontact.adaptivity import refined
 from ngcontact.fem import strain, unknowns_of
 from ngcontact.mesh import curve, first_mesh
+from ngcontact.triangulation import Triangulation
 
 START = 300  # unknowns of a first mesh, about; refinement is much quicker than meshing at size
 
@@ -69,8 +70,7 @@ def linear_solve(problem: Problem, mesh: ng.Mesh, order: int) -> Linear:
 def uniform_mesh(problem: Problem, order: int, size: int) -> ng.Mesh:
     """Uniformly refined mesh of about `size` unknowns, curved to the order."""
     rounds = max(0, round(np.log(size / START) / np.log(4)))
-    first = first_mesh(problem)  # a view of its vertices does not keep it alive
-    extent = np.ptp(np.array(first.ngmesh.Coordinates()), axis=0).max()
+    extent = np.ptp(Triangulation(first_mesh(problem)).vertices, axis=0).max()
     trials = [first_mesh(problem, float(extent) / count) for count in np.linspace(2, 16, 29)]
 
     def miss(mesh: ng.Mesh) -> float:

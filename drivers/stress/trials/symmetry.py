@@ -23,6 +23,7 @@ from drivers.stress.motion import Array, Motion, Scene, moved_mesh, posed, swapp
 from ngcontact import Contact, Elastic, Problem, Solution, solve
 from ngcontact.geometries import blocks
 from ngcontact.mesh import first_mesh
+from ngcontact.triangulation import Triangulation
 
 SAME = 1e-9  # difference of two solutions of one problem, the figure asked for
 ORDERS = (1, 4)
@@ -37,8 +38,8 @@ def _scene(name: str, problem: Problem, maxh: float, matched: bool = True) -> Sc
     mesh, *_ = moved_mesh(mesh, Motion("none"))
     value = np.zeros((mesh.nv, 2))
     ends = ng.IntegrationRule([(1, 0, 0), (0, 0, 0)], [1, 1])
-    nodes = mesh.ngmesh.Elements1D().NumPy()["nodes"][:, :2].astype(int) - 1
-    names = np.array(mesh.GetBoundaries())[mesh.ngmesh.Elements1D().NumPy()["index"] - 1]
+    view = Triangulation(mesh)
+    nodes, names = view.segments, np.array(mesh.GetBoundaries())[view.boundaries]
     points = mesh.MapToAllElements(ends, ng.BND).reshape(-1, 2)
     for pattern, components in problem.displacement.items():
         at = np.isin(names, pattern.split("|"))

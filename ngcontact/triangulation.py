@@ -1,0 +1,78 @@
+"""NGSolve's mesh as arrays: the one place that reads and writes Netgen's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import ngsolve as ng
+import numpy as np
+
+from .arrays import Array, Index, Mask
+
+TRIANGLES = (10, 12)  # Netgen's element types TRIG and TRIG6
+
+
+@dataclass(frozen=True)
+class Triangulation:
+    """A plane mesh as arrays, each copied when it is first asked for; numbers count from 0.
+
+    Attributes
+    ----------
+    mesh : ng.Mesh
+        With nv vertices, ne triangles and k boundary segments. A mesh that is refined or moved
+        in place needs another view.
+    """
+
+    mesh: ng.Mesh
+
+    @cached_property
+    def vertices(self) -> Array:
+        """Coordinates (nv, 2), lengths."""
+        return np.array(self.mesh.ngmesh.Coordinates())[:, :2]
+
+    @cached_property
+    def triangles(self) -> Index:
+        """Vertices (ne, 3) of each triangle, anticlockwise."""
+        return self.mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(np.intp) - 1
+
+    @cached_property
+    def bodies(self) -> Index:
+        """Material region number (ne,) of each triangle."""
+        return self.mesh.ngmesh.Elements2D().NumPy()["index"].astype(np.intp) - 1
+
+    @cached_property
+    def segments(self) -> Index:
+        """Vertices (k, 2) of each boundary segment, lines inside bodies included."""
+        return self.mesh.ngmesh.Elements1D().NumPy()["nodes"][:, :2].astype(np.intp) - 1
+
+    @cached_property
+    def boundaries(self) -> Index:
+        """Boundary region number (k,) of each segment."""
+        return self.mesh.ngmesh.Elements1D().NumPy()["index"].astype(np.intp) - 1
+
+    @property
+    def corners(self) -> Array:
+        """Coordinates (ne, 3, 2) of the vertices of each triangle, lengths."""
+        return self.vertices[self.triangles]
+
+    def others(self) -> int:
+        """Number of elements that are no triangles."""
+        types = self.mesh.ngmesh.Elements2D().NumPy()["type"]
+        return int(np.count_nonzero(~np.isin(types, TRIANGLES)))
+
+
+def triangle_sides(triangles: Index) -> Index:
+    """Vertices (3 ne, 2) of the sides of triangles (ne, 3), three for each in turn."""
+    return triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+
+
+def move_vertices(mesh: ng.Mesh, positions: Array) -> None:
+    """Move the vertices of a mesh to `positions` (nv, 2), in place; curves stay as they were."""
+    mesh.ngmesh.Coordinates()[:, :2] = positions
+
+
+def bisect(mesh: ng.Mesh, marked: Mask) -> None:
+    """Refine the elements `marked` (ne,) of a mesh in place, which straightens it."""
+    mesh.ngmesh.Elements2D().NumPy()["refine"] = marked  # all of them: they are True by default
+    mesh.Refine()
