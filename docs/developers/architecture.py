@@ -18,7 +18,7 @@ from importlinter.api import read_configuration
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 PICTURE, PAGE = HERE / "architecture.png", HERE / "architecture.md"
-START, END = "<!-- rooms: from architecture.py -->\n", "\n<!-- end -->"
+START, END = "<!-- rooms: from architecture.py -->\n\n", "\n\n<!-- end -->"
 MESHES = ("ngsolve", "netgen", "pyngcore")
 
 Imports = dict[str, set[str]]

@@ -133,9 +133,9 @@ def page() -> str:
         [
             "# Equation index",
             "",
-            "What J. Haslinger and I. Hlaváček (1981) state, and the lines that implement it; made",
-            "by `python docs/developers/equations.py` from the comments at these lines. The symbols",
-            "are those of [notation](../notation.md).",
+            "What J. Haslinger and I. Hlaváček (1981) state, and the lines that implement it.",
+            "Made by `python docs/developers/equations.py` from the comments at these lines; the",
+            "symbols are those of [notation](../notation.md).",
             "",
             "| HH81 | states | where |",
             "|---|---|---|",
