@@ -16,7 +16,6 @@ from ngcontact.linalg.coarse_spaces import coarsenings
 from ngcontact.mesh.curving import curve
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.mesh.parents import vertex_parents
-from ngcontact.problem.regions import boundary_mask
 
 REPRODUCED = {  # cases whose solution lies in the space, at the orders of conftest.ORDERS
     "constant pressure": cases.pressure_patch,
@@ -50,7 +49,7 @@ def coordinates(mesh):
 def vertices(mesh, pattern):
     """Vertices (k, 2) of the boundaries of that name."""
     trace = boundary_trace(mesh, 1)
-    numbers = np.unique(trace.nodes[trace.select(boundary_mask(mesh, pattern))])
+    numbers = np.unique(trace.nodes[trace.segments(pattern)])
     return coordinates(mesh)[numbers]
 
 

@@ -120,7 +120,7 @@ def values(solution):
 def nodes_on(solution, pattern):
     """Positions and displacements at the nodes of a boundary, segment by segment."""
     trace = solution.discrete.space.trace
-    segment, s = trace.at_nodes(trace.select(boundary_mask(solution.mesh, pattern)))
+    segment, s = trace.at_nodes(trace.segments(pattern))
     return trace.point(segment, s), trace.evaluate(solution.displacement, segment, s)
 
 

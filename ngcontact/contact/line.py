@@ -11,15 +11,14 @@ from dataclasses import dataclass, replace
 
 import ngsolve as ng
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Array, Index
+from ..arrays import Array, Index, Mask
 from ..fem import BoundaryTrace
 from ..lagrange import gauss, lagrange
-from ..problem import Contact, boundary_mask
+from ..problem import Contact
 from .search import partners
 
-GRAZING = 1e-8  # cosine between normal and direction from which a point faces the other body
+FACING = 1e-8  # cosine between normal and direction from which a point faces the other body
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +57,7 @@ class ContactLine:
     segments: Index
     facing: Index
     rows: Index
-    faces: NDArray[np.bool_]
+    faces: Mask
     node: Index
     position: Array
     direction: Array
@@ -97,6 +96,51 @@ def _segment_weights(trace: BoundaryTrace, contact: Contact, segments: Index) ->
     return (scale * w) @ lagrange(trace.order, s)
 
 
+def _numbered(
+    trace: BoundaryTrace, contact: Contact, segment: Index, node: Index, normal: Array
+) -> tuple[Index, Array]:
+    """Number (n,) of the contact point at each node of each segment, and directions (m, 2).
+
+    -1 where the `normal` (n, 2) there does not face the other body.
+    """
+    number = np.full(len(node), -1)
+    if contact.direction is None:
+        number[:], direction = trace.number_points(segment, node, normal)  # n^i in (2.3), (2.5)
+        return number, direction
+    xi = np.tile(contact.direction, (len(node), 1))  # (2.10): one point at a node
+    faces = normal @ np.array(contact.direction) > FACING
+    number[faces], direction = trace.number_points(segment[faces], node[faces], xi[faces])
+    return number, direction
+
+
+def _kept(contact: Contact, partner: Index) -> Mask:
+    """Points (m,) that meet the primary or a rigid obstacle; raise if none does."""
+    kept = (partner >= 0) | (contact.primary is None)
+    if not kept.any():
+        raise ValueError(
+            f'no point of the secondary "{contact.secondary}" faces the primary '
+            f'"{contact.primary}" along direction={contact.direction}: the direction points from '
+            "the secondary body to the primary one"
+        )
+    return kept
+
+
+def _weights(shares: Array, rows: Index, kept: Mask) -> tuple[Array, Mask]:
+    """Weights (m,) of the points, and the segments (k,) that face the primary with all nodes.
+
+    `shares` (k, order + 1) are the integrals of the nodes' functions over each segment, `rows` the
+    points there; `kept` (m,) are the points that meet the primary.
+    """
+    weight = np.zeros(len(kept))
+    met = np.append(kept, False)[rows]
+    faces = met.all(axis=1)
+    np.add.at(weight, rows[faces], shares[faces])
+    # A point whose segments face the primary in part only has nothing better than those parts.
+    partly = met & (np.append(weight, 1.0)[rows] == 0)
+    np.add.at(weight, rows[partly], shares[partly])
+    return weight, np.asarray(faces)
+
+
 def contact_line(trace: BoundaryTrace, contact: Contact) -> ContactLine:
     """Contact points of one pair.
 
@@ -105,59 +149,23 @@ def contact_line(trace: BoundaryTrace, contact: Contact) -> ContactLine:
     ValueError
         No point of the secondary faces the primary.
     """
-    mesh = trace.mesh
-    segments = trace.select(boundary_mask(mesh, contact.secondary))
-    facing = segments[:0]
-    if contact.primary is not None:
-        facing = trace.select(boundary_mask(mesh, contact.primary))
+    segments, facing = trace.segments(contact.secondary), trace.segments(contact.primary)
     segment, s = trace.at_nodes(segments)
     node = trace.nodes[segments].ravel()
     normal = trace.exact_normal(segment, s)
-    if contact.direction is None:
-        candidate = np.ones(len(node), dtype=bool)
-    else:
-        candidate = normal @ np.array(contact.direction) > GRAZING
-
-    number = np.full(len(node), -1)
-    # A fixed direction asks for one point at a node, whatever the normals there.
-    alike = None if contact.direction is None else np.tile(contact.direction, (len(node), 1))
-    number[candidate], direction = trace.number_points(
-        segment[candidate], node[candidate], (normal if alike is None else alike)[candidate]
-    )
-    points, first = np.unique(number[candidate], return_index=True)
-    m = len(points)
-    first = np.flatnonzero(candidate)[first]
-    position = trace.point(segment[first], s[first])
-
-    if contact.primary is None:
-        partner, partner_s, distance, searches = np.full(m, -1), np.zeros(m), np.zeros(m), 0
-        keep = np.ones(m, dtype=bool)
-    else:
-        partner, partner_s, distance, searches = partners(
-            trace, facing, segment[first], position, direction
-        )
-        keep = partner >= 0
-    if not keep.any():
-        raise ValueError(
-            f'no point of the secondary "{contact.secondary}" faces the primary '
-            f'"{contact.primary}" along direction={contact.direction}: the direction points from '
-            "the secondary body to the primary one"
-        )
-    if contact.gap is not None:
-        distance = prescribed_gap(contact, trace, segment[first], s[first], position)
-
+    number, direction = _numbered(trace, contact, segment, node, normal)
     rows = number.reshape(len(segments), -1)
-    weight = np.zeros(m)
-    met = np.append(keep, False)[rows]
-    faces = met.all(axis=1)
+    _, first = np.unique(number, return_index=True)
+    first = first[len(first) - len(direction) :]  # without -1
+    position = trace.point(segment[first], s[first])
+    partner, partner_s, gap, searches = partners(trace, facing, segment[first], position, direction)
+    kept = _kept(contact, partner)
+    if contact.gap is not None:
+        gap = prescribed_gap(contact, trace, segment[first], s[first], position)
     shares = _segment_weights(trace, contact, segments)
     if contact.direction is None:  # what counts where two sides share a point at a small turn
-        cosine = (normal[candidate] * direction[number[candidate]]).sum(axis=1)
-        shares *= cosine.reshape(rows.shape)
-    np.add.at(weight, rows[faces], shares[faces])
-    # A point whose segments face the primary in part only has nothing better than those parts.
-    partly = met & (np.append(weight, 1.0)[rows] == 0)
-    np.add.at(weight, rows[partly], shares[partly])
+        shares *= (normal * direction[number]).sum(axis=1).reshape(rows.shape)
+    weight, faces = _weights(shares, rows, kept)
     line = ContactLine(
         contact=contact,
         segments=segments,
@@ -167,16 +175,16 @@ def contact_line(trace: BoundaryTrace, contact: Contact) -> ContactLine:
         node=node[first],
         position=position,
         direction=direction,
-        gap=distance,
+        gap=gap,  # eps(C_j) in (2.10)
         weight=weight,
         partner=partner,
         partner_s=partner_s,
         searches=searches,
     )
-    return without(line, np.flatnonzero(~keep))
+    return without(line, np.flatnonzero(~kept))
 
 
-def unmatched(line: ContactLine) -> NDArray[np.bool_]:
+def unmatched(line: ContactLine) -> Mask:
     """Points (m,) on no segment whose ends both face nodes of the primary."""
     result = np.full(len(line.node), line.contact.primary is not None)
     at_node = np.append(np.isin(line.partner_s, (0.0, 1.0)), True)  # without a point: no matter

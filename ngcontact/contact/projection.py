@@ -1,7 +1,7 @@
 """Where the ray from a contact point meets the facing curve. NumPy only.
 
 Curves are segments (q, degree + 1, 2) given by their points at the Gauss-Lobatto parameters, as
-in `trace.Trace.curve`; `side` (q,) is +1 where the outward normal lies to the right.
+in `BoundaryTrace.curve`; `side` (q,) is +1 where the outward normal lies to the right.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative
 MATCHED = 1e-9  # distance, relative to a segment's length, below which two points are one
 GRAZING = 1e-9  # cosine between ray and normal up to which the ray does not meet the curve
 NEWTON_STEPS = 20
-PAIRS_AT_ONCE = 4_000_000  # bound on the memory of the candidate search
+SETTLED = 1e-15  # change of a parameter in [0, 1] at which Newton's method has arrived
+PAIRS_AT_ONCE = 4_000_000  # of points and segments: bounds the memory of a search
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,11 +92,13 @@ def coincident(points: Array, directions: Array, curve: Array, side: Array, orde
     return found
 
 
-def _candidates(points: Array, across: Array, curve: Array) -> tuple[Index, Index, Array]:
+def _candidates(
+    points: Array, across: Array, curve: Array, pairs_at_once: int
+) -> tuple[Index, Index, Array]:
     """Pairs (point, segment) whose ray passes between the ends, and the crossing of the chord."""
     ends = curve[:, [0, -1]]
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    block = max(1, PAIRS_AT_ONCE // max(1, len(curve)))
+    block = max(1, pairs_at_once // max(1, len(curve)))
     pairs = []
     for first in range(0, len(points), block):
         t = across[first : first + block]
@@ -113,7 +116,13 @@ def _candidates(points: Array, across: Array, curve: Array) -> tuple[Index, Inde
 
 
 def cast(
-    points: Array, directions: Array, curve: Array, side: Array, ahead: bool = False
+    points: Array,
+    directions: Array,
+    curve: Array,
+    side: Array,
+    *,
+    ahead: bool = False,
+    pairs_at_once: int = PAIRS_AT_ONCE,
 ) -> Partners:
     """Nearest points, along given directions, of a curve whose outward normal opposes them.
 
@@ -130,6 +139,8 @@ def cast(
         The facing segments.
     ahead : bool
         Only points in the sense of the direction.
+    pairs_at_once : int
+        Of points and segments that are looked at together; bounds the memory, changes no result.
 
     Returns
     -------
@@ -140,17 +151,17 @@ def cast(
     if len(curve) == 0 or len(points) == 0:
         return found
     across = np.column_stack([-directions[:, 1], directions[:, 0]])
-    point, segment, s = _candidates(points, across, curve)
+    point, segment, s = _candidates(points, across, curve, pairs_at_once)
     degree = curve.shape[1] - 1
     for _ in range(NEWTON_STEPS):
         offset = np.einsum("ki,kid->kd", lagrange(degree, s), curve[segment]) - points[point]
         slope = np.einsum("ki,kid->kd", lagrange_derivative(degree, s), curve[segment])
-        miss = (offset * across[point]).sum(axis=1)
+        miss = (offset * across[point]).sum(axis=1)  # (2.10): both points on one perpendicular
         rate = (slope * across[point]).sum(axis=1)
         new = np.clip(s - np.divide(miss, rate, out=np.zeros_like(miss), where=rate != 0), 0, 1)
         moved = np.abs(new - s).max(initial=0.0)
         s = new
-        if moved <= 1e-15:
+        if moved <= SETTLED:
             break
     s = np.where(s < MATCHED, 0.0, np.where(s > 1 - MATCHED, 1.0, s))
     offset = np.einsum("ki,kid->kd", lagrange(degree, s), curve[segment]) - points[point]

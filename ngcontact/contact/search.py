@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Array, Index
+from ..arrays import Array, Index, Mask
 from ..fem import BoundaryTrace
 from .projection import Partners, cast, coincident
 
-ROUND_OFF = 4 * np.finfo(float).eps  # of a measured gap, relative to the coordinates
+TOUCHING = 4 * np.finfo(float).eps  # round-off of a measured gap, relative to the coordinates
 
 
 def _beyond_own_body(
     trace: BoundaryTrace, own: Index, points: Array, directions: Array, found: Partners
-) -> NDArray[np.bool_]:
+) -> Mask:
     """Whether bodies overlap so far that the partner lies on the other side of the own body.
 
     Overlap puts a partner behind the point, inside the own body; one that the backward ray meets
@@ -33,19 +32,30 @@ def _beyond_own_body(
 def partners(
     trace: BoundaryTrace, facing: Index, own: Index, points: Array, directions: Array
 ) -> tuple[Index, Array, Array, int]:
-    """Points of the segments `facing` opposite to `points`, which lie on the segments `own`.
+    """Points of the segments `facing` opposite to `points`: A_j and B_j of HH81 (2.10).
+
+    Parameters
+    ----------
+    trace : BoundaryTrace
+    facing : ndarray of int (q,)
+        Segments of the facing body; none for a rigid obstacle.
+    own : ndarray of int (k,)
+        Segments on which the points lie.
+    points, directions : ndarray (k, 2)
+        The points, and unit vectors towards the facing body.
 
     Returns
     -------
     segment : ndarray of int (k,)
-        -1 where there is none.
+        Of the facing body, -1 where none is met.
     s, distance : ndarray (k,)
+        Parameter on it, and its distance along the direction, a length, inf where none is met.
     searches : int
-        0 if all of them are nodes at the same place.
+        0 if there is nothing to search, as where all of them are nodes at the same place.
     """
     curve, side = trace.curve[facing], trace.side[facing]
     found = coincident(points, directions, curve, side, trace.order)
-    rest = np.flatnonzero(found.segment < 0)
+    rest = np.flatnonzero(found.segment < 0) if facing.size else facing
     if rest.size:
         other: Partners = cast(points[rest], directions[rest], curve, side)
         other.segment[
@@ -54,6 +64,6 @@ def partners(
         found.segment[rest] = other.segment
         found.s[rest], found.distance[rest] = other.s, other.distance
     # Points that only round-off keeps apart touch: no load is too small to be felt.
-    found.distance[np.abs(found.distance) <= ROUND_OFF * np.abs(points).max(initial=0.0)] = 0.0
+    found.distance[np.abs(found.distance) <= TOUCHING * np.abs(points).max(initial=0.0)] = 0.0
     segment = np.where(found.segment < 0, -1, facing[found.segment] if facing.size else -1)
     return segment, found.s, found.distance, int(rest.size > 0)

@@ -20,9 +20,10 @@ def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[
     counted = np.zeros(len(reaction), dtype=bool)
     result: dict[str, Array] = {}
     for pattern in patterns:
-        mask = boundary_mask(mesh, pattern)
-        for name in dict.fromkeys(names[mask]):
-            nodes = np.unique(trace.nodes[trace.select(mask & (names == name))])
+        segments = trace.segments(pattern)
+        named = names[trace.region[segments]]
+        for name in dict.fromkeys(names[boundary_mask(mesh, pattern)]):
+            nodes = np.unique(trace.nodes[segments[named == name]])
             nodes = nodes[~counted[nodes]]
             counted[nodes] = True
             result[str(name)] = reaction[nodes].sum(axis=0)

@@ -7,7 +7,7 @@ import numpy as np
 from ..arrays import Index
 from ..constraints import Conditions, concatenated, no_conditions
 from ..fem import BoundaryTrace
-from ..problem import Problem, boundary_mask
+from ..problem import Problem
 
 
 def _prescribed(problem: Problem, trace: BoundaryTrace) -> Conditions:
@@ -16,7 +16,7 @@ def _prescribed(problem: Problem, trace: BoundaryTrace) -> Conditions:
     given = np.zeros((2, n), dtype=bool)
     value = np.zeros((2, n))
     for pattern, components in problem.displacement.items():
-        segment, s = trace.at_nodes(trace.select(boundary_mask(trace.mesh, pattern)))
+        segment, s = trace.at_nodes(trace.segments(pattern))
         node = trace.nodes[segment[:: trace.order + 1]].ravel()
         for axis, function in enumerate(components):
             if function is not None:
@@ -30,7 +30,7 @@ def _guided(problem: Problem, trace: BoundaryTrace) -> Conditions:
     """Gamma_0: zero normal displacement at the nodes, with the exact normals."""
     if problem.sliding is None:
         return no_conditions()
-    segment, s = trace.at_nodes(trace.select(boundary_mask(trace.mesh, str(problem.sliding))))
+    segment, s = trace.at_nodes(trace.segments(str(problem.sliding)))
     node = trace.nodes[segment[:: trace.order + 1]].ravel()
     number, normal = trace.number_points(segment, node, trace.exact_normal(segment, s))
     _, first = np.unique(number, return_index=True)
@@ -45,8 +45,5 @@ def support_conditions(problem: Problem, trace: BoundaryTrace) -> Conditions:
 def conditioned_segments(problem: Problem, trace: BoundaryTrace) -> Index:
     """Segments on which conditions are posed: Gamma_u, Gamma_0, Gamma_K."""
     sides = [side for pair in problem.contact for side in (pair.secondary, pair.primary)]
-    regions = np.zeros(len(trace.mesh.GetBoundaries()), dtype=bool)
-    for pattern in (*problem.displacement, problem.sliding, *sides):
-        if pattern is not None:
-            regions |= boundary_mask(trace.mesh, str(pattern))
-    return trace.select(regions)
+    guides = [] if problem.sliding is None else [str(problem.sliding)]
+    return trace.segments(*problem.displacement, *guides, *sides)

@@ -8,7 +8,6 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask
 from ..lagrange import gauss
-from ..problem import boundary_mask
 from .terms import (
     DATA_BONUS,
     BoundaryResidual,
@@ -47,7 +46,7 @@ def on_supports_and_loads(solution: ScaledSolution, covered: Mask) -> BoundaryTe
         squares.append(Squares("displacement", here, values))
     guided = np.zeros(len(segment), dtype=bool)
     if problem.sliding is not None:  # (3.8): any force along the normal, none across it
-        guided = boundary_mask(mesh, str(problem.sliding))[boundary.region[segment]]
+        guided = boundary.lies_on(segment, str(problem.sliding))
         normal = boundary.normal(segment[guided], s[guided])
         for vector in (residual, factor):
             along = (vector[guided] * normal).sum(axis=1)
@@ -67,7 +66,7 @@ def _unbalanced(solution: ScaledSolution, segment: Index, s: Array) -> Array:
     boundary, problem = solution.boundary, solution.problem
     residual = -solution.traction(segment, s)
     for pattern in problem.traction:
-        at = boundary_mask(solution.mesh, pattern)[boundary.region[segment]]
+        at = boundary.lies_on(segment, pattern)
         load = problem.traction_vector(pattern)
         residual[at] += boundary.evaluate(load, segment[at], s[at]) / solution.unit
     return residual
@@ -79,7 +78,7 @@ def _misses(
     """Of each prescribed component: its axis, the points (k,) of its boundary, u_D - u_h there."""
     boundary = solution.boundary
     for pattern, components in solution.problem.displacement.items():
-        at = boundary_mask(solution.mesh, pattern)[boundary.region[segment]]
+        at = boundary.lies_on(segment, pattern)
         u = boundary.evaluate(solution.displacement, segment[at], s[at])
         for axis, value in enumerate(components):
             if value is not None:

@@ -15,9 +15,10 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array, Index
+from ..arrays import Array, Index, Mask
 from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative
 from ..mesh import CadEdge, cad_edges
+from ..problem import boundary_mask
 from ..triangulation import Triangulation, triangle_sides
 
 CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two rows at a smaller
@@ -65,7 +66,7 @@ class BoundaryTrace:
     nodes: Index
     element: Index
     body: Index
-    inner: NDArray[np.bool_]
+    inner: Mask
     curve: Array
     side: Array
     edges: list[CadEdge] | None
@@ -104,9 +105,20 @@ class BoundaryTrace:
         """Chord lengths (k,)."""
         return np.linalg.norm(self.curve[segments, -1] - self.curve[segments, 0], axis=1)
 
-    def select(self, regions: NDArray[np.bool_]) -> Index:
-        """Segments whose region number is set in the mask `regions`."""
-        return np.flatnonzero(regions[self.region])
+    def lies_on(self, segment: Index, *patterns: str | None) -> Mask:
+        """Whether segments (k,) belong to a boundary that one of the patterns selects, (k,).
+
+        Patterns are names or NGSolve patterns, as in `Problem`; None selects nothing.
+        """
+        regions = np.zeros(len(self.mesh.GetBoundaries()), dtype=bool)
+        for pattern in patterns:
+            if pattern is not None:
+                regions |= boundary_mask(self.mesh, pattern)
+        return regions[self.region[segment]]
+
+    def segments(self, *patterns: str | None) -> Index:
+        """Segments (j,) of the boundaries that the patterns select, as in `lies_on`."""
+        return np.flatnonzero(self.lies_on(np.arange(len(self.region)), *patterns))
 
     @cached_property
     def _mesh_points(self) -> NDArray:
@@ -153,7 +165,7 @@ class BoundaryTrace:
         np.add.at(mean, number, vector * self.lengths(segment)[:, None])
         return number, mean / np.linalg.norm(mean, axis=1)[:, None]
 
-    def _corner(self, first: Index, second: Index, turn: Array) -> NDArray[np.bool_]:
+    def _corner(self, first: Index, second: Index, turn: Array) -> Mask:
         """Whether pairs of adjacent segments, whose normals differ by `turn`, form corners."""
         if self.edges is not None:
             return turn > CORNER
@@ -168,9 +180,7 @@ def _right(vectors: Array) -> Array:
     return right / np.linalg.norm(right, axis=1)[:, None]
 
 
-def _neighbours(
-    segments: Index, triangles: Index, vertices: int
-) -> tuple[Index, NDArray[np.bool_]]:
+def _neighbours(segments: Index, triangles: Index, vertices: int) -> tuple[Index, Mask]:
     """Number of a triangle at each segment, and whether there is another one."""
     sides = np.sort(triangle_sides(triangles), axis=1)
     keys = sides[:, 0] * vertices + sides[:, 1]

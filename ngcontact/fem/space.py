@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Index
 from ..linalg import shared
-from ..problem import Problem, boundary_mask, varies
+from ..problem import Problem, varies
 from .boundary import BoundaryTrace
 from .element import node_basis, vector_space
 from .model import strain
@@ -64,7 +64,7 @@ class Space:
 
 def _check_normals(trace: BoundaryTrace, boundary: str) -> None:
     """Raise unless NGSolve's normals, the direction of pressures, point outwards."""
-    segments = trace.select(boundary_mask(trace.mesh, boundary))
+    segments = trace.segments(boundary)
     s = np.full(len(segments), 0.5)
     normal = trace.evaluate(ng.specialcf.normal(2), segments, s)
     if ((normal * trace.normal(segments, s)).sum(axis=1) < 0).any():

@@ -20,7 +20,6 @@ from ngcontact.fem.boundary import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, rings
 from ngcontact.mesh.curving import curve
 from ngcontact.mesh.generation import first_mesh
-from ngcontact.problem.regions import boundary_mask
 from tests.scenes import coordinates, unmatched_blocks, vertices
 
 SOFT = Elastic(E=1.0, nu=0.3)
@@ -115,7 +114,7 @@ def shapes(mesh):
 def near_tip(mesh, pattern, distance):
     """Elements at segments of a boundary whose middle is near its vertex nearest to (0.05, 0)."""
     trace = boundary_trace(mesh, 1)
-    segments = trace.select(boundary_mask(mesh, pattern))
+    segments = trace.segments(pattern)
     points = vertices(mesh, pattern)
     tip = points[np.linalg.norm(points - [0.05, 0], axis=1).argmin()]
     middle = trace.curve[segments].mean(axis=1)
@@ -225,7 +224,7 @@ def test_an_unmarked_facing_segment_is_divided_once_and_no_further():
     problem = BOUNDED["blocks"].problem()
     mesh = first_mesh(problem, 0.25)
     trace = boundary_trace(mesh, 1)
-    upper = trace.select(boundary_mask(mesh, "upper_contact"))
+    upper = trace.segments("upper_contact")
     marked = np.zeros(mesh.ne, dtype=bool)
     marked[trace.element[upper[len(upper) // 2]]] = True
     result = refined(problem, mesh, marked)

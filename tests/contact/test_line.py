@@ -126,7 +126,7 @@ def test_a_uniform_pressure_is_that_of_the_weights_where_sides_share_a_point(ord
     trace = boundary_trace(mesh, order)
     line = contact_line(trace, Contact("upper_contact", "lower_contact"))
     assert (np.bincount(line.node) <= 1).all()
-    here = trace.select(np.array(mesh.GetBoundaries()) == "upper_contact")
+    here = trace.segments("upper_contact")
     lengths = trace.lengths(here)
     assert lengths.max() > 1.05 * lengths.min()
     along = vertices[-1] - vertices[0]

@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pytest
 
-from ngcontact.contact import projection
 from ngcontact.contact.projection import MATCHED, cast, coincident, snap
 from ngcontact.lagrange import gauss_lobatto, lagrange
 
@@ -195,12 +194,11 @@ def test_vertex_at_the_end_of_the_facing_side():
     assert (found.segment.tolist(), found.s.tolist()) == ([1], [0.0])
 
 
-def test_blocks_of_points_give_the_same(monkeypatch):
+def test_blocks_of_points_give_the_same():
     curve = graph(lambda x: x**2 / 2, np.linspace(-1, 1, 9), 2)
     points, directions = rays(RNG.uniform(-1, 1, (57, 2)), DOWN)
     whole = cast(points, directions, curve, upward(curve))
-    monkeypatch.setattr(projection, "PAIRS_AT_ONCE", 40)
-    parts = cast(points, directions, curve, upward(curve))
+    parts = cast(points, directions, curve, upward(curve), pairs_at_once=40)
     assert (whole.segment == parts.segment).all()
     assert (whole.s == parts.s).all()
     assert (whole.distance == parts.distance).all()

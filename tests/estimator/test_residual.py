@@ -18,7 +18,6 @@ from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.adaptivity.refinement import refined
 from ngcontact.geometries import blocks, rings
 from ngcontact.mesh.generation import first_mesh
-from ngcontact.problem.regions import boundary_mask
 
 # A(u, u) of the exact solutions over both bodies, from Clapeyron's theorem.
 ENERGY = {"S1": 1.293180760825 + 0.520333087196, "S3": 1.30696e-4 + 4.9496e-5}
@@ -231,7 +230,7 @@ def altered(solution, u=None, contact=None, **data):
 def along(solution, pattern):
     """Of every segment of a boundary: diameter of its element, shear modulus, length."""
     trace = solution.discrete.space.trace
-    segments = trace.select(boundary_mask(solution.mesh, pattern))
+    segments = trace.segments(pattern)
     mu = np.array([MU[solution.mesh.GetMaterials()[body]] for body in trace.body[segments]])
     return diameters(solution.mesh)[trace.element[segments]], mu, trace.lengths(segments)
 
@@ -240,9 +239,7 @@ def facing_pairs(solution):
     """Of both bodies, (2, k), along the straight line of contact: diameter, shear modulus."""
     trace, found = solution.discrete.space.trace, []
     for pattern in ("upper_contact", "lower_contact"):
-        order = np.argsort(
-            trace.curve[trace.select(boundary_mask(solution.mesh, pattern))][..., 0].mean(axis=1)
-        )
+        order = np.argsort(trace.curve[trace.segments(pattern)][..., 0].mean(axis=1))
         h, mu, length = along(solution, pattern)
         found.append((h[order], mu[order]))
     h, mu = np.array(found).transpose(1, 0, 2)
@@ -285,7 +282,7 @@ def test_traction_part_of_a_pressure_that_varies(patch):
     solution = altered(patch, traction={"lower_left": ng.y})
     [value] = only(solution, "traction")
     trace = patch.discrete.space.trace
-    segments = trace.select(boundary_mask(patch.mesh, "lower_left"))
+    segments = trace.segments("lower_left")
     (a, b) = trace.curve[segments][:, [0, -1], 1].T
     h, mu, length = along(patch, "lower_left")
     squares = (a * a + a * b + b * b) / 3 * length  # integral of y^2 on each segment
@@ -445,7 +442,7 @@ def test_pressure_part_out_of_full_contact_is_the_distance_to_the_nodal_pressure
     assert np.count_nonzero(changed) == 4  # two segments, two bodies
     normal = {"upper": 2 * MU["upper"] * 0.7 / 0.4, "lower": 2 * MU["lower"] * 0.8 / 0.6}
     trace = patch.discrete.space.trace
-    segments = trace.select(boundary_mask(patch.mesh, LINE))
+    segments = trace.segments(LINE)
     at = changed[trace.element[segments]]
     h, mu, length = (values[at] for values in along(patch, LINE))
     residual = np.where(mu == MU["upper"], 1 - s * normal["upper"], 1 - s * normal["lower"])
@@ -520,7 +517,7 @@ def test_forces_of_an_enlarging_zone_are_per_unit_eta():
     solution = solve(problem, maxh=0.4)
     squeezed = altered(solution, case.exact.displacement)
     trace = solution.discrete.space.trace
-    segments = trace.select(boundary_mask(solution.mesh, LINE))
+    segments = trace.segments(LINE)
     h = diameters(solution.mesh)[trace.element[segments]]
     eta = np.ptp(trace.curve[segments][..., 0], axis=1)
     mu, cosine = 1 / 2.6, 1 / math.hypot(1, slope)
@@ -656,6 +653,6 @@ def test_a_finer_primary_is_covered_by_contact():
     solution = solve(case.problem, mesh, order=1)
     sides = solution.estimate_parts["traction"]
     trace = solution.discrete.space.trace
-    below = trace.element[trace.select(boundary_mask(mesh, "lower_contact"))]
-    corners = trace.element[trace.select(boundary_mask(mesh, "lower_left|lower_right"))]
+    below = trace.element[trace.segments("lower_contact")]
+    corners = trace.element[trace.segments("lower_left|lower_right")]
     assert sides[np.setdiff1d(below, corners)].max() == 0

@@ -72,7 +72,7 @@ def everywhere(trace, count=5):
 
 
 def named(trace, name):
-    return trace.select(np.array(trace.mesh.GetBoundaries()) == name)
+    return trace.segments(name)
 
 
 MESHES = {

@@ -19,7 +19,6 @@ from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, pu
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh.curving import check_curves
 from ngcontact.mesh.generation import first_mesh
-from ngcontact.problem.regions import boundary_mask
 from tests.scenes import coordinates, vertices
 
 SOFT = Elastic(E=1.0, nu=0.3)
@@ -124,7 +123,7 @@ def pressed(geometry, bodies, *contact):
 def lengths(mesh, pattern):
     """Chords of the segments of the boundaries of that name."""
     trace = boundary_trace(mesh, 1)
-    return trace.lengths(trace.select(boundary_mask(mesh, pattern)))
+    return trace.lengths(trace.segments(pattern))
 
 
 def unmatched(a, b):
