@@ -8,9 +8,9 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Mask
-from ..constraints import BasisTransformation, Conditions, change_of_basis
-from ..contact import ContactLine, joined, kept_lines, merged
+from ..arrays import Index, Mask
+from ..constraints import BasisTransformation, Conditions
+from ..contact import ContactLine
 from ..errors import ConvergenceError
 from ..fem import (
     LOAD_BONUS,
@@ -26,12 +26,16 @@ from ..mesh import vertex_parents
 from ..problem import Problem
 from ..qp import BorderedSystems, Iterate, QuadraticProgram, minimise, no_null_space
 from ..triplets import from_triplets
-from .equilibrium import Rigid, rigid_motions
+from .admissible_set import AdmissibleSet, admissible_set
+from .equilibrium import Rigid, equilibrium
 from .linear_systems import linear_systems
-from .reuse import contact_lines, same_basis, same_boundary, same_stiffness
-from .supports import conditioned_segments, support_conditions
+from .reuse import Reduced, Reusable, contact_lines, same_basis, same_boundary, same_stiffness
+from .supports import conditioned_segments
 
-SMALLEST, LARGEST = -306, 305  # powers of ten between which sums of products keep their digits
+LOWEST, HIGHEST = (
+    -306,
+    305,
+)  # powers of ten between which sums of products keep their digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,34 +79,6 @@ class DiscreteProblem:
     assembled: bool
 
 
-def _space(
-    problem: Problem, trace: BoundaryTrace, element: str, previous: DiscreteProblem | None
-) -> tuple[Space, bool]:
-    """Space with its forms, and whether its stiffness had to be assembled."""
-    nodal = conditioned_segments(problem, trace)
-    if previous is not None and same_stiffness(problem, previous.problem):
-        V = previous.space.V
-        basis = node_basis(V, trace, nodal, element)
-        f = load_vector(problem, V, LOAD_BONUS)
-        return replace(previous.space, trace=trace, nodal=nodal, basis=basis, f=f), False
-    return assemble(problem, trace, element, nodal), True
-
-
-def _check_range(program: QuadraticProgram) -> None:
-    """Raise where double precision holds the data but neither the forces nor the displacements."""
-    p = program
-    stiffness, load = p.diagonal.max(initial=0.0), np.abs(p.b).max(initial=0.0)
-    given = max(np.abs(p.values).max(initial=0.0), -p.g.min(initial=0.0))
-    with np.errstate(divide="ignore"):
-        k, f, v = np.log10([stiffness, load, given])
-    for name, size in (("displacements", max(v, f - k)), ("forces", max(f, k + v))):
-        if not (size == -np.inf or SMALLEST < size < LARGEST):
-            raise ValueError(
-                f"moduli, loads and prescribed displacements make {name} of 1e{size:+.0f}, beyond "
-                f"the range of numbers (1e{SMALLEST} to 1e+{LARGEST}); choose other units"
-            )
-
-
 def discretise(
     problem: Problem,
     mesh: ng.Mesh,
@@ -120,62 +96,108 @@ def discretise(
     ValueError
         A pair of which no point faces; prescribed displacements that violate a contact row;
         forces or displacements beyond the range of numbers.
+    NoEquilibriumError
+        The load does work on a rigid motion that supports and contact admit.
     """
     trace = boundary_trace(mesh, order)
-    if previous is not None and not same_boundary(trace, previous.space.trace):
-        previous = None  # the mesh has been changed in place
-    found = contact_lines(problem, trace, [] if previous is None else previous.found)
-    space, assembled = _space(problem, trace, element, previous)
-    n = space.basis.shape[1] // 2
-    conditions = support_conditions(problem, trace)
-    lines, rows = merged(found, joined(found, trace))
-    length = float(np.abs(trace.curve).max())
-    basis = change_of_basis(conditions, rows, length, space.stiffness())
-    lines, rows = kept_lines(lines, basis.kept), rows.select(basis.kept)
-    B = rows.matrix()
-    rigid = None
-    loaded = rigid_motions(problem, space, conditions, basis, B, rows.g, rows.equality)
-    if loaded is not None:
-        rigid, f = loaded
-        space = replace(space, f=f)
-    T = space.basis @ basis.T
-    m = len(basis.unknown)
-    if (
-        previous is not None
-        and not assembled
-        and np.array_equal(space.nodal, previous.space.nodal)
-        and same_basis(basis, previous.basis)
-    ):
-        K, systems = previous.program.K, previous.systems
-    else:
-        K, matrix = congruent(space.matrix, space.A, T)
-        systems = None
-    program = QuadraticProgram(
-        K=K,
-        b=T.T @ space.f,
-        R=from_triplets(np.ones(m), np.arange(m), basis.unknown, (m, 2 * n)),
-        g=rows.g,
-        equality=rows.equality,
-        fixed=basis.fixed,
-        values=basis.values,
-        unknown=basis.unknown,
-        null_space=no_null_space(2 * n) if rigid is None else rigid.null_space,
-    )
-    _check_range(program)
+    nodal = conditioned_segments(problem, trace)
+    known = _reusable(problem, trace, nodal, previous)
+    found = contact_lines(problem, trace, known.lines)  # Gamma_K, first: it may be refused
+    space = _space(problem, trace, element, nodal, known.space)  # V_h
+    admissible = admissible_set(problem, space, found)  # K_h
+    rigid, f = equilibrium(problem, space, admissible)  # Remark 3.7
+    space = replace(space, f=f)
+    program, systems = _program(space, admissible, rigid, known.reduced)
     return DiscreteProblem(
         problem=problem,
         space=space,
         found=found,
-        lines=lines,
-        conditions=conditions,
-        B=B,
-        basis=basis,
+        lines=admissible.lines,
+        conditions=admissible.conditions,
+        B=admissible.B,
+        basis=admissible.basis,
         program=program,
-        systems=systems
-        or linear_systems(program, matrix, basis.T, vertex_parents(mesh), trace.nodes[space.nodal]),
+        systems=systems,
         rigid=rigid,
-        assembled=assembled,
+        assembled=known.space is None,
     )
+
+
+def _reusable(
+    problem: Problem, trace: BoundaryTrace, nodal: Index, previous: DiscreteProblem | None
+) -> Reusable:
+    """What `previous` leaves to a problem with conditions at the nodes of the segments `nodal`."""
+    if previous is None or not same_boundary(trace, previous.space.trace):
+        return Reusable()  # there is none, or its mesh has been changed in place
+    if not same_stiffness(problem, previous.problem):
+        return Reusable(previous.found)
+    if not np.array_equal(nodal, previous.space.nodal):
+        return Reusable(previous.found, previous.space)
+    reduced = Reduced(previous.basis, previous.program.K, previous.systems)
+    return Reusable(previous.found, previous.space, reduced)
+
+
+def _space(
+    problem: Problem, trace: BoundaryTrace, element: str, nodal: Index, known: Space | None
+) -> Space:
+    """V_h with its forms; the stiffness is that of `known` if given."""
+    if known is None:
+        return assemble(problem, trace, element, nodal)
+    basis = node_basis(known.V, trace, nodal, element)
+    f = load_vector(problem, known.V, LOAD_BONUS)
+    return replace(known, trace=trace, nodal=nodal, basis=basis, f=f)
+
+
+def _program(
+    space: Space, admissible: AdmissibleSet, rigid: Rigid | None, known: Reduced | None
+) -> tuple[QuadraticProgram, BorderedSystems]:
+    """L over K_h in the unknowns of rows and supports, and its linear systems.
+
+    Raises
+    ------
+    ValueError
+        Forces or displacements beyond the range of numbers.
+    """
+    basis = admissible.basis
+    T, m = space.basis @ basis.T, len(basis.unknown)
+
+    def program(K: sp.csr_array) -> QuadraticProgram:
+        result = QuadraticProgram(  # (2.6)
+            K=K,
+            b=T.T @ space.f,
+            R=from_triplets(np.ones(m), np.arange(m), basis.unknown, (m, K.shape[0])),
+            g=admissible.g,
+            equality=admissible.equality,
+            fixed=basis.fixed,
+            values=basis.values,
+            unknown=basis.unknown,
+            null_space=no_null_space(K.shape[0]) if rigid is None else rigid.null_space,
+        )
+        _check_range(result)
+        return result
+
+    if known is not None and same_basis(basis, known.basis):
+        return program(known.K), known.systems
+    K, matrix = congruent(space.matrix, space.A, T)
+    reduced, trace = program(K), space.trace
+    nodes = trace.nodes[space.nodal]
+    systems = linear_systems(reduced, matrix, basis.T, vertex_parents(trace.mesh), nodes)
+    return reduced, systems
+
+
+def _check_range(program: QuadraticProgram) -> None:
+    """Raise where double precision holds the data but neither the forces nor the displacements."""
+    p = program
+    stiffness, load = p.diagonal.max(initial=0.0), np.abs(p.b).max(initial=0.0)
+    given = max(np.abs(p.values).max(initial=0.0), -p.g.min(initial=0.0))
+    with np.errstate(divide="ignore"):
+        k, f, v = np.log10([stiffness, load, given])
+    for name, size in (("displacements", max(v, f - k)), ("forces", max(f, k + v))):
+        if not (size == -np.inf or LOWEST < size < HIGHEST):
+            raise ValueError(
+                f"moduli, loads and prescribed displacements make {name} of 1e{size:+.0f}, beyond "
+                f"the range of numbers (1e{LOWEST} to 1e+{HIGHEST}); choose other units"
+            )
 
 
 def minimise_energy(discrete: DiscreteProblem, active: Mask) -> Iterate:
@@ -187,7 +209,7 @@ def minimise_energy(discrete: DiscreteProblem, active: Mask) -> Iterate:
     Raises
     ------
     ConvergenceError
-        See `ssn.minimise`; carries the last iterate.
+        See `qp.minimise`; carries the last iterate.
     """
     p, rigid, systems = discrete.program, discrete.rigid, discrete.systems
     if rigid is None or not rigid.placing.any():

@@ -8,55 +8,40 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
 
 import ngsolve as ng
 import numpy as np
-import scipy.sparse as sp
-from scipy.linalg import block_diag
 from scipy.optimize import linprog, nnls
 
 from ..arrays import Array, Mask
-from ..constraints import BasisTransformation, Conditions
 from ..errors import NoEquilibriumError
 from ..fem import LOAD_BONUS, Space, load_vector
 from ..mesh import cad_edges
 from ..problem import Problem
 from ..qp import FREE, NullSpace, pinned_null_space, vanishing_combinations
-from .rigid_motions import (
-    Bodies,
-    RigidMotion,
-    body_of_unknown,
-    connected_bodies,
-    functionals,
-    node_values,
-    rigid_motion,
-    unsupported,
-    work_of_load,
-)
+from .admissible_set import AdmissibleSet
+from .rigid_motions import FreeMotions, RigidMotion, free_motions
 
+LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
 FINER = 5  # quadrature orders added to see the error of those of the loads
 CURVED = 2  # degrees added to see the error of the mesh's curved sides
 QUADRATURE = 10.0  # times that error is work that may be quadrature
-ROUND_OFF = 1e-10  # ... and this, relative to the sum of its terms, round-off
-NOISE = 1e-14  # work, relative to the sum of its terms or of all contact forces, that is none
-INEXACT = 1e-9  # force of a rigid motion, relative to its terms, that shows it is not in V_h
+WORK_NOISE = 1e-10  # ... and this, relative to the sum of its terms, round-off
+NO_WORK = 1e-14  # work, relative to the sum of its terms or of all contact forces, that is none
 
 
 @dataclass(frozen=True, eq=False)
 class Rigid:
-    """The r rigid motions that supports leave free, and the load on them.
+    """The r rigid motions that supports leave free, the load and the contact rows on them.
 
     Attributes
     ----------
-    combinations : ndarray (3 b, r)
-        Of the translations and the rotation of each of b bodies.
+    free : FreeMotions
+        The motions.
     rows : ndarray (m, r)
-        Left sides of the contact rows.
+        Left sides of the contact rows, lengths.
     work : ndarray (r,)
         Of the load, before what quadrature left of it was taken out.
-    gram : callable
-        Integrals (r, r) of the products of the motions over the boundaries, made when asked for.
     motions : ndarray (2n, r)
         In the unknowns of the program.
     null_space : NullSpace
@@ -67,24 +52,99 @@ class Rigid:
         Rows that would carry the load there.
     """
 
-    bodies: Bodies
-    combinations: Array
+    free: FreeMotions
     rows: Array
     work: Array
-    gram: Callable[[], Array]
     motions: Array
     null_space: NullSpace
     placing: Array
     carries: Mask
 
-    def motion(self, amounts: Array) -> RigidMotion:
-        """One of the motions, by its amounts (r,)."""
-        multiplier = float(amounts @ self.work / (amounts @ self.gram() @ amounts))
-        return rigid_motion(self.bodies, self.combinations @ amounts, multiplier)
-
     def left_free(self, active: Mask) -> list[RigidMotion]:
-        """Motions that the rows `active` do not resist either."""
-        return [self.motion(x) for x in vanishing_combinations(self.rows[active]).T]
+        """Motions that the rows `active` (m,) do not resist either, Remark 3.7."""
+        return [self._motion(x) for x in vanishing_combinations(self.rows[active]).T]
+
+    def _motion(self, amounts: Array) -> RigidMotion:
+        """One of the motions, by its amounts (r,), with the multiplier of its condition."""
+        multiplier = float(amounts @ self.work / (amounts @ self.free.gram @ amounts))
+        return self.free.motion(amounts, multiplier)
+
+
+def equilibrium(
+    problem: Problem, space: Space, admissible: AdmissibleSet
+) -> tuple[Rigid | None, Array]:
+    """The rigid motions that supports leave free, and the load (2N,) in equilibrium on them.
+
+    None, and the load as it is, if supports alone hold all bodies.
+
+    Raises
+    ------
+    NoEquilibriumError
+        The load does work on a rigid motion that supports and contact admit.
+    ValueError
+        The elements do not contain the rotation of a free body.
+    """
+    free = free_motions(space, admissible.conditions)
+    if free is None:
+        return None, space.f
+    rows = np.asarray(admissible.B @ free.nodal)
+    work = free.values.T @ space.f
+    residue, noise = _left_over(problem, free, rows, admissible.equality, work)
+    f, left = space.f, residue + noise
+    if left.any():  # Remark 3.7: without it the energy has no minimiser
+        f = f - free.means @ np.linalg.solve(free.gram, left)
+    rest = work - noise - residue
+    placing, carries = _placing(rows, rest, admissible.g, admissible.equality)
+    motions = admissible.basis.coordinates(free.nodal, rows)
+    rigid = Rigid(
+        free=free,
+        rows=rows,
+        work=work,
+        motions=motions,
+        null_space=_null_space(free, rows, motions, admissible),
+        placing=placing,
+        carries=carries,
+    )
+    return rigid, f
+
+
+def _null_space(
+    free: FreeMotions, rows: Array, motions: Array, admissible: AdmissibleSet
+) -> NullSpace:
+    """The motions that no row resists, with the condition of Remark 3.7, and the others' pins.
+
+    That condition: the mean of the motion over the boundary of the bodies vanishes.
+    """
+    basis = admissible.basis
+    lineal = vanishing_combinations(rows)
+    means = np.zeros((len(motions), 0))
+    if lineal.size:
+        means = basis.T.T @ (free.space.basis.T @ (free.means @ lineal))
+    return pinned_null_space(motions, lineal, means.T, basis.unknown, basis.fixed)
+
+
+def _left_over(
+    problem: Problem, free: FreeMotions, rows: Array, equality: Mask, work: Array
+) -> tuple[Array, Array]:
+    """Work (r,) that contact cannot balance, left by quadrature, and work (r,) that is round-off.
+
+    Raises
+    ------
+    NoEquilibriumError
+        It is more than these leave.
+    """
+    space = free.space
+    terms = np.abs(free.values).T @ np.abs(space.f)
+    noise = np.where(np.abs(work) <= NO_WORK * terms, work, 0.0)
+    residue, carried = _residue(rows, equality, work - noise)
+    if residue.any():
+        finer = free.values.T @ load_vector(problem, space.V, LOAD_BONUS + FINER)
+        motion = free.motion(residue / np.abs(residue).max())
+        _check_work(
+            *(residue, work, finer, terms, carried, motion),
+            lambda: _work_by_shape(problem, space.trace.mesh, motion),
+        )
+    return residue, noise
 
 
 def _placing(rows: Array, work: Array, g: Array, equality: Mask) -> tuple[Array, Mask]:
@@ -130,13 +190,30 @@ def _residue(rows: Array, equality: Mask, work: Array) -> tuple[Array, float]:
     return work - scale * (G @ force), scale * float(force.sum())
 
 
+def _work_of_load(problem: Problem, mesh: ng.Mesh, motion: RigidMotion) -> float:
+    """Work of the load on a rigid motion of bodies with names of their own, by the mesh's shape."""
+    z = {}
+    parts = zip(motion.bodies, motion.translation, motion.rotation, motion.middle, strict=True)
+    for name, (tx, ty), turn, (cx, cy) in parts:
+        z[name] = ng.CF((tx - turn * (ng.y - cy), ty + turn * (ng.x - cx)))
+    moved = mesh.MaterialCF(z, default=ng.CF((0, 0)))
+    work = 0.0
+    for name, force in problem.force.items():
+        power = ng.InnerProduct(force, moved)
+        work += ng.Integrate(power, mesh, definedon=mesh.Materials(name), order=LOAD_ORDER)
+    for name in problem.traction:
+        power = ng.InnerProduct(problem.traction_vector(name), ng.BoundaryFromVolumeCF(moved))
+        work += ng.Integrate(power, mesh, definedon=mesh.Boundaries(name), order=LOAD_ORDER)
+    return float(work)
+
+
 def _work_by_shape(problem: Problem, mesh: ng.Mesh, motion: RigidMotion) -> float:
     """What curved sides change of the load's work: the centre of a disc is not that of its mesh."""
     if cad_edges(mesh) is None or len(set(motion.bodies)) < len(motion.bodies):
         return 0.0
     copy = ng.Mesh(mesh.ngmesh.Copy())
     copy.Curve(mesh.GetCurveOrder() + CURVED)
-    return work_of_load(problem, copy, motion) - work_of_load(problem, mesh, motion)
+    return _work_of_load(problem, copy, motion) - _work_of_load(problem, mesh, motion)
 
 
 def _check_work(
@@ -152,7 +229,7 @@ def _check_work(
     amounts = residue / np.abs(residue).max()
     done = float(amounts @ residue)  # what forces balance does no work on it
     allowed = QUADRATURE * abs(float(amounts @ (work - finer)))
-    allowed += ROUND_OFF * float(np.abs(amounts) @ terms) + NOISE * carried
+    allowed += WORK_NOISE * float(np.abs(amounts) @ terms) + NO_WORK * carried
     if done > allowed and done > allowed + QUADRATURE * abs(by_shape()):
         raise NoEquilibriumError(
             f"no equilibrium: the load does the work {done:.6g} on a rigid {motion}, which "
@@ -162,94 +239,3 @@ def _check_work(
             motion=motion,
             work=done,
         )
-
-
-def rigid_motions(
-    problem: Problem,
-    space: Space,
-    conditions: Conditions,
-    basis: BasisTransformation,
-    B: sp.csr_array,
-    g: Array,
-    equality: Mask,
-) -> tuple[Rigid, Array] | None:
-    """The rigid motions that supports leave free, and the load (2N,) in equilibrium on them.
-
-    Parameters
-    ----------
-    problem, space, conditions, basis
-        The discrete problem.
-    B : sparse (m, 2n)
-        Contact rows on node values.
-    g : ndarray (m,)
-        Their bounds.
-    equality : ndarray of bool (m,)
-        Rows that hold with equality.
-
-    Returns
-    -------
-    None
-        If supports alone hold all bodies.
-
-    Raises
-    ------
-    NoEquilibriumError
-        The load does work on a rigid motion that supports and contact admit.
-    ValueError
-        The elements do not contain the rotation of a free body.
-    """
-    trace = space.trace
-    bodies = connected_bodies(trace)
-    free = unsupported(trace, bodies, conditions)
-    if not any(x.shape[1] for x in free):
-        return None
-    combinations = block_diag(*free)
-    of_unknown = body_of_unknown(space, bodies)
-    n = space.basis.shape[1] // 2
-    Z = node_values(space, bodies, of_unknown[:n]) @ combinations
-    in_v = space.basis @ Z
-    terms = (space.diagonal[:, None] * np.abs(in_v)).max(axis=0)
-    if (np.abs(space.A @ in_v).max(axis=0) > INEXACT * terms).any():
-        raise ValueError(
-            "curved superparametric elements do not contain the rotation of a body that its "
-            'supports leave free; use element="isoparametric"'
-        )
-    rows = np.asarray(B @ Z)
-    work = in_v.T @ space.f
-    sizes = np.abs(in_v).T @ np.abs(space.f)
-    noise = np.where(np.abs(work) <= NOISE * sizes, work, 0.0)
-    residue, carried = _residue(rows, equality, work - noise)
-
-    @cache
-    def boundary() -> Array:
-        """Integrals (2N, r) of v.z over the boundaries for the motions z."""
-        return functionals(space, bodies, of_unknown) @ combinations
-
-    if residue.any():
-        finer = in_v.T @ load_vector(problem, space.V, LOAD_BONUS + FINER)
-        motion = rigid_motion(bodies, combinations @ residue / np.abs(residue).max(), 0.0)
-        _check_work(
-            *(residue, work, finer, sizes, carried, motion),
-            lambda: _work_by_shape(problem, trace.mesh, motion),
-        )
-    f = space.f
-    if (left := residue + noise).any():
-        f = f - boundary() @ np.linalg.solve(in_v.T @ boundary(), left)
-    lineal = vanishing_combinations(rows)
-    motions = basis.coordinates(Z, rows)
-    means = np.zeros((len(motions), 0))
-    if lineal.size:
-        means = basis.T.T @ (space.basis.T @ (boundary() @ lineal))
-    placing, carries = _placing(rows, work - noise - residue, g, equality)
-    rigid = Rigid(
-        bodies=bodies,
-        combinations=combinations,
-        rows=rows,
-        work=work,
-        gram=lambda: in_v.T @ boundary(),
-        motions=motions,
-        null_space=pinned_null_space(motions, lineal, means.T, basis.unknown, basis.fixed),
-        placing=placing,
-        carries=carries,
-    )
-    return rigid, f

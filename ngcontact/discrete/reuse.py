@@ -2,14 +2,56 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy.sparse as sp
 
 from ..constraints import BasisTransformation
 from ..contact import ContactLine, contact_line
-from ..fem import BoundaryTrace
+from ..fem import BoundaryTrace, Space
 from ..problem import Contact, Elastic, Hooke, Problem, varies
+from ..qp import BorderedSystems
+
+
+@dataclass(frozen=True, eq=False)
+class Reduced:
+    """The stiffness in the unknowns of a basis, and what solves with it.
+
+    Attributes
+    ----------
+    basis : BasisTransformation
+        The unknowns, n of them.
+    K : sparse (n, n)
+        The stiffness, force per length.
+    systems : BorderedSystems
+        Its linear systems, with the factorisation once there is one.
+    """
+
+    basis: BasisTransformation
+    K: sp.csr_array
+    systems: BorderedSystems
+
+
+@dataclass(frozen=True, eq=False)
+class Reusable:
+    """What an earlier problem leaves to a new one on the same mesh; nothing by default.
+
+    Attributes
+    ----------
+    lines : sequence of ContactLine
+        The contact points it has found.
+    space : Space or None
+        Its V_h, if the stiffness is the same.
+    reduced : Reduced or None
+        That stiffness in unknowns which are, if rows and supports make the same ones again, those
+        of the new problem.
+    """
+
+    lines: Sequence[ContactLine] = ()
+    space: Space | None = None
+    reduced: Reduced | None = None
 
 
 def same_boundary(one: BoundaryTrace, other: BoundaryTrace) -> bool:
@@ -42,7 +84,7 @@ def _same_pair(one: Contact, other: Contact) -> bool:
 
 
 def contact_lines(
-    problem: Problem, trace: BoundaryTrace, known: list[ContactLine]
+    problem: Problem, trace: BoundaryTrace, known: Sequence[ContactLine]
 ) -> list[ContactLine]:
     """The line of each pair, a known one where it is the same."""
     lines = []

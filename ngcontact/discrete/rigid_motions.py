@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import ngsolve as ng
 import numpy as np
+from scipy.linalg import block_diag
 
 from ..arrays import Array, Index
 from ..constraints import Conditions
 from ..fem import BoundaryTrace, Space
-from ..problem import Problem, body_of_vertex
+from ..problem import body_of_vertex
 from ..qp import FREE, vanishing_combinations
 from ..triangulation import Triangulation
 
-LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
+NOT_RIGID = 1e-9  # force of a rigid motion, relative to its terms, that shows it is not in V_h
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,10 +28,11 @@ class RigidMotion:
     bodies : tuple of str
         What moves, the body that moves most first.
     translation : ndarray (k, 2)
-        Of the middle of each of them.
+        Of the middle of each of them, a length.
     rotation : ndarray (k,)
         Angle, anticlockwise, about the middle.
     middle : ndarray (k, 2)
+        Places, lengths.
     multiplier : float
         Of the condition that the integral of v.z ds over the boundary of the bodies vanishes, for
         the motion z: what the quadrature of the load leaves, a force per length.
@@ -57,7 +60,19 @@ class RigidMotion:
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """The connected bodies: names (b,), middles (b, 2), half sizes (b,), and whose what is."""
+    """The connected bodies, b of them.
+
+    Attributes
+    ----------
+    names : list of str
+        The material region of each.
+    middle : ndarray (b, 2)
+        Of its boundary.
+    size : ndarray (b,)
+        Half its extent, a length.
+    of_segment, of_vertex : ndarray of int (q,), (nv,)
+        The body of each segment of the boundary and of each vertex of the mesh.
+    """
 
     names: list[str]
     middle: Array
@@ -112,23 +127,6 @@ def rigid_motion(bodies: Bodies, amounts: Array, multiplier: float) -> RigidMoti
     )
 
 
-def work_of_load(problem: Problem, mesh: ng.Mesh, motion: RigidMotion) -> float:
-    """Work of the load on a rigid motion of bodies with names of their own, by the mesh's shape."""
-    z = {}
-    parts = zip(motion.bodies, motion.translation, motion.rotation, motion.middle, strict=True)
-    for name, (tx, ty), turn, (cx, cy) in parts:
-        z[name] = ng.CF((tx - turn * (ng.y - cy), ty + turn * (ng.x - cx)))
-    moved = mesh.MaterialCF(z, default=ng.CF((0, 0)))
-    work = 0.0
-    for name, force in problem.force.items():
-        power = ng.InnerProduct(force, moved)
-        work += ng.Integrate(power, mesh, definedon=mesh.Materials(name), order=LOAD_ORDER)
-    for name in problem.traction:
-        power = ng.InnerProduct(problem.traction_vector(name), ng.BoundaryFromVolumeCF(moved))
-        work += ng.Integrate(power, mesh, definedon=mesh.Boundaries(name), order=LOAD_ORDER)
-    return float(work)
-
-
 def body_of_unknown(space: Space, bodies: Bodies) -> Index:
     """Number of the body that each unknown (2N,) of V_h belongs to."""
     # Vertices come first, so that the first entry of a row is one of an element of its body.
@@ -176,3 +174,71 @@ def functionals(space: Space, bodies: Bodies, of_unknown: Index) -> Array:
         parts = np.column_stack([x, y, (turn + cy * x - cx * y) / size])
         result[:, 3 * b : 3 * b + 3] = np.where((of_unknown == b)[:, None], parts, 0.0)
     return result
+
+
+@dataclass(frozen=True, eq=False)
+class FreeMotions:
+    """The r rigid motions that supports leave free, as functions of V_h.
+
+    Attributes
+    ----------
+    space : Space
+        V_h.
+    bodies : Bodies
+        What moves.
+    combinations : ndarray (3b, r)
+        Of the translations and the rotation of each of b bodies.
+    of_unknown : ndarray of int (2N,)
+        The body of each unknown of V_h.
+    nodal : ndarray (2n, r)
+        Node values, lengths.
+    values : ndarray (2N, r)
+        Unknowns of V_h.
+    """
+
+    space: Space
+    bodies: Bodies
+    combinations: Array
+    of_unknown: Index
+    nodal: Array
+    values: Array
+
+    @cached_property
+    def means(self) -> Array:
+        """Integrals (2N, r) of v.z over the boundaries for the motions z, made when asked for."""
+        return functionals(self.space, self.bodies, self.of_unknown) @ self.combinations
+
+    @cached_property
+    def gram(self) -> Array:
+        """Integrals (r, r) of the products of the motions over the boundaries."""
+        return self.values.T @ self.means
+
+    def motion(self, amounts: Array, multiplier: float = 0.0) -> RigidMotion:
+        """One of the motions, by its amounts (r,)."""
+        return rigid_motion(self.bodies, self.combinations @ amounts, multiplier)
+
+
+def free_motions(space: Space, conditions: Conditions) -> FreeMotions | None:
+    """The rigid motions that the supports `conditions` leave free, None if there are none.
+
+    Raises
+    ------
+    ValueError
+        The elements do not contain the rotation of a free body.
+    """
+    bodies = connected_bodies(space.trace)
+    free = unsupported(space.trace, bodies, conditions)
+    if not any(x.shape[1] for x in free):
+        return None
+    combinations = block_diag(*free)
+    of_unknown = body_of_unknown(space, bodies)
+    n = space.basis.shape[1] // 2
+    nodal = node_values(space, bodies, of_unknown[:n]) @ combinations
+    values = space.basis @ nodal
+    terms = (space.diagonal[:, None] * np.abs(values)).max(axis=0)
+    if (np.abs(space.A @ values).max(axis=0) > NOT_RIGID * terms).any():
+        raise ValueError(
+            "curved superparametric elements do not contain the rotation of a body that its "
+            'supports leave free; use element="isoparametric"'
+        )
+    return FreeMotions(space, bodies, combinations, of_unknown, nodal, values)

@@ -1,17 +1,17 @@
-"""Gamma_u and Gamma_0 as conditions at nodes."""
+"""Gamma_u and Gamma_0: conditions at nodes, and the forces that enforce them."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..arrays import Index
+from ..arrays import Array, Index
 from ..constraints import Conditions, concatenated, no_conditions
 from ..fem import BoundaryTrace
-from ..problem import Problem
+from ..problem import Problem, boundary_mask
 
 
 def _prescribed(problem: Problem, trace: BoundaryTrace) -> Conditions:
-    """Gamma_u: interpolated displacement components at the nodes."""
+    """Gamma_u, (3.6): interpolated displacement components at the nodes."""
     n = trace.space.ndof
     given = np.zeros((2, n), dtype=bool)
     value = np.zeros((2, n))
@@ -21,20 +21,20 @@ def _prescribed(problem: Problem, trace: BoundaryTrace) -> Conditions:
         for axis, function in enumerate(components):
             if function is not None:
                 given[axis, node] = True
-                value[axis, node] = trace.evaluate(function, segment, s)[:, 0]
+                value[axis, node] = trace.evaluate(function, segment, s)[:, 0]  # (3.6)
     axes, nodes = np.nonzero(given)
     return Conditions(node=nodes, direction=np.eye(2)[axes], value=value[axes, nodes])
 
 
 def _guided(problem: Problem, trace: BoundaryTrace) -> Conditions:
-    """Gamma_0: zero normal displacement at the nodes, with the exact normals."""
+    """Gamma_0, (3.8): zero normal displacement at the nodes, with the exact normals."""
     if problem.sliding is None:
         return no_conditions()
     segment, s = trace.at_nodes(trace.segments(str(problem.sliding)))
     node = trace.nodes[segment[:: trace.order + 1]].ravel()
     number, normal = trace.number_points(segment, node, trace.exact_normal(segment, s))
     _, first = np.unique(number, return_index=True)
-    return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))
+    return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))  # (3.8)
 
 
 def support_conditions(problem: Problem, trace: BoundaryTrace) -> Conditions:
@@ -47,3 +47,34 @@ def conditioned_segments(problem: Problem, trace: BoundaryTrace) -> Index:
     sides = [side for pair in problem.contact for side in (pair.secondary, pair.primary)]
     guides = [] if problem.sliding is None else [str(problem.sliding)]
     return trace.segments(*problem.displacement, *guides, *sides)
+
+
+def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[str, Array]:
+    """Sums (2,) of forces on nodes, by boundary of Gamma_u and Gamma_0.
+
+    Parameters
+    ----------
+    problem : Problem
+        What names these boundaries.
+    trace : BoundaryTrace
+        The boundary.
+    reaction : ndarray (n, 2)
+        Forces of the supports on its nodes and all others, per unit thickness.
+    """
+    mesh = trace.mesh
+    names = np.array(mesh.GetBoundaries())
+    patterns = [
+        *reversed(list(problem.displacement)),  # at a common node the last one is in force
+        *([] if problem.sliding is None else [str(problem.sliding)]),
+    ]
+    counted = np.zeros(len(reaction), dtype=bool)
+    result: dict[str, Array] = {}
+    for pattern in patterns:
+        segments = trace.segments(pattern)
+        named = names[trace.region[segments]]
+        for name in dict.fromkeys(names[boundary_mask(mesh, pattern)]):
+            nodes = np.unique(trace.nodes[segments[named == name]])
+            nodes = nodes[~counted[nodes]]
+            counted[nodes] = True
+            result[str(name)] = reaction[nodes].sum(axis=0)
+    return result
