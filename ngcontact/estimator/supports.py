@@ -28,7 +28,7 @@ def on_supports_and_loads(solution: ScaledSolution, covered: Mask) -> BoundaryTe
     covered : ndarray of bool (q,)
         Segments of the boundary that are none of a support or a load.
     """
-    boundary, mesh, problem = solution.boundary, solution.mesh, solution.problem
+    boundary, problem = solution.boundary, solution.problem
     segments = np.flatnonzero(~covered)
     rule, rule_weight = gauss(2 * solution.order + DATA_BONUS)
     segment, s = np.repeat(segments, len(rule)), np.tile(rule, len(segments))

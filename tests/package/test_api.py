@@ -187,8 +187,9 @@ def imports(path):
 def test_every_driver_and_every_geometry_is_tested():
     used = set().union(*(imports(p) for p in ROOT.glob("tests/*/test_*.py")))
     named = {module for module, _ in used} | {f"{module}.{name}" for module, name in used}
-    paths = [*ROOT.glob("drivers/*.py"), *ROOT.glob("drivers/reference/*.py")]
+    folders = ("drivers/*.py", "drivers/*/__main__.py", "drivers/reference/*.py")
+    paths = [path for pattern in folders for path in ROOT.glob(pattern)]
     modules = {".".join(path.relative_to(ROOT).with_suffix("").parts) for path in paths}
-    assert {name for name in modules if not name.endswith("__")} <= named
+    assert {name for name in modules if not name.endswith("__init__")} <= named
     functions = {name for module, name in used if module.startswith("ngcontact.geometries")}
     assert set(geometries.__all__) <= functions
