@@ -12,7 +12,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Annotated, Any, TypeAlias, TypeVar
 
-from cyclopts import App, Group, Parameter, Token
+from cyclopts import App, CycloptsError, Group, Parameter, Token
 from cyclopts.validators import Number
 
 Result = TypeVar("Result")
@@ -82,7 +82,10 @@ def run(main: Callable[..., Result], tokens: Sequence[str] | None = None) -> Res
         group_commands=Group("Commands", show=False),  # there are none but --help
         default_parameter=Parameter(show_default=_default, **every),
     )
-    command, arguments, _ = app.parse_args(tokens)
+    try:
+        command, arguments, _ = app.parse_args(tokens, exit_on_error=False)
+    except CycloptsError as error:  # its message is on the screen
+        raise SystemExit(2) from error
     if command is not main:  # but the help asked for
         command(*arguments.args, **arguments.kwargs)
         raise SystemExit(0)
@@ -91,5 +94,5 @@ def run(main: Callable[..., Result], tokens: Sequence[str] | None = None) -> Res
     except ValueError as error:
         if sys.flags.dev_mode:
             raise
-        print(f"{app.name[0]}: {error}", file=sys.stderr)
+        print(f"{error}\n(python -X dev -m {module_of(main)} ... shows where)", file=sys.stderr)
         raise SystemExit(2) from error
