@@ -120,7 +120,9 @@ def pressure_on_segments(line: ContactLine, pressure: Array, order: int) -> Arra
     for k in np.flatnonzero((line.rows < 0).any(axis=1) & line.faces):
         known = line.rows[k] >= 0
         if known.any():
-            fit = np.polynomial.Polynomial.fit(nodes[known], values[k, known], known.sum() - 1)
+            degree = known.sum() - 1
+            scaled = None if degree else (0, 1)  # one node spans no interval, which old NumPy asks
+            fit = np.polynomial.Polynomial.fit(nodes[known], values[k, known], degree, scaled)
             values[k, ~known] = fit(nodes[~known])
     return values
 

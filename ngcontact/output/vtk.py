@@ -112,8 +112,9 @@ def _contact_points(solution: Any) -> pyvista.PolyData:
 
 
 def _write(writer: Any, data: pyvista.DataSet, path: Path) -> None:
-    """Write a data set with a VTK XML writer; VTK reports failure by return value only."""
+    """Write a data set with a VTK XML writer; VTK raises nothing."""
     writer.SetFileName(str(path))
     writer.SetInputData(data)
-    if not writer.Write():
+    # Before VTK 9.7 a full disk shows in the code alone, a file that cannot be opened in neither.
+    if not writer.Write() or writer.GetErrorCode() or not path.exists():
         raise OSError(f"VTK could not write {str(path)!r} (disk full?)")
