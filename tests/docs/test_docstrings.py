@@ -87,7 +87,7 @@ SOLUTION = {
 PLAIN = {
     *("problem", "mesh", "order", "element", "discrete", "minimiser", "work", "coarse_levels"),
     *("adaptive", "pair", "active", "steps", "free_motions", "ends", "estimated"),
-    *("write", "plot", "draw"),
+    *("pairs", "estimator", "write", "plot", "draw"),
 }
 
 
