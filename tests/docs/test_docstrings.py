@@ -86,7 +86,7 @@ SOLUTION = {
 # ... and those that are no quantities: objects, names, numbers of things, truth values, files.
 PLAIN = {
     *("problem", "mesh", "order", "element", "discrete", "minimiser", "work", "coarse_levels"),
-    *("adaptive", "pair", "active", "steps", "free_motions", "ends", "estimated"),
+    *("adaptive", "pair", "active", "steps", "free_motions", "estimated"),
     *("pairs", "estimator", "write", "plot", "draw"),
 }
 
