@@ -25,7 +25,7 @@ from drivers.benchmark.scenes.meshes import KINDS, made
 from drivers.benchmark.scenes.problems import Common, block, disc
 from drivers.benchmark.scenes.reading import contact_end, peak, weights
 from drivers.benchmark.scenes.triangles import forces, sides, which
-from drivers.benchmark.studies import growth, large
+from drivers.benchmark.studies import growth, large, stages
 from ngcontact import adapt
 from ngcontact.discrete import linear_systems
 
@@ -255,3 +255,9 @@ def test_one_size_grows_by_no_exponent():
     rows = [growth.measure("block", 1, 1000, kind) for kind in ("linear", "contact")]
     assert "exponent" not in of_growth(rows)
     assert "exponent" in of_growth([*rows, *(replace(row, unknowns=9000) for row in rows)])
+
+
+def test_every_stage_of_a_level_is_found():
+    """Stages name functions of the package, which may move."""
+    found = stages.stages(COMMON["block"], 1000).seconds
+    assert [stage for stage, seconds in found.items() if not seconds > 0] == ["multigrid"]
