@@ -16,7 +16,7 @@ from .contact import ContactState, contact_states
 from .discrete import DiscreteProblem, RigidMotion, resultants
 from .estimator import Estimate, Estimator, estimate
 from .fem import energy_norm, potential_energy, strain
-from .output import write_solution
+from .output import plot_solution, write_solution
 from .problem import Problem
 from .qp import Iterate, kkt_residuals
 
@@ -225,8 +225,6 @@ class Solution:
 
         `scale` magnifies the displacement; chosen to be seen when left out.
         """
-        from .output import plot_solution
-
         plot_solution(self, path, scale)
 
     def draw(self) -> object:

@@ -12,9 +12,10 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import KDTree
 
-from ..arrays import Index
+from ..arrays import Array, Index
 from ..triangulation import Triangulation
 from ..triplets import from_triplets
+from .solution_data import SolutionData
 
 VTK_CELL = {1: 5, 2: 22}  # VTK_TRIANGLE, VTK_QUADRATIC_TRIANGLE
 VTK_LAGRANGE_TRIANGLE = 69  # every higher order
@@ -34,7 +35,7 @@ class Nodes:
     names: tuple[str, ...]
     at: NDArray[Any]
 
-    def values(self, function: ng.CoefficientFunction) -> NDArray[np.float64]:
+    def values(self, function: ng.CoefficientFunction) -> Array:
         """Nodal values (nodes, components): the mean over the triangles that meet there."""
         numbers = self.cells.ravel()
         found = np.asarray(function(self.at), dtype=float).reshape(len(numbers), -1)
@@ -80,7 +81,7 @@ def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
     return Nodes(cells.reshape(-1, len(weights)), body, names, at)
 
 
-def full_stress(solution: Any) -> ng.CoefficientFunction:
+def full_stress(solution: SolutionData) -> ng.CoefficientFunction:
     """Stress components xx, yy, xy and zz, the one normal to the plane.
 
     zz is 0 in plane stress and nu (xx + yy) in plane strain. A material without Poisson's ratio
@@ -93,14 +94,14 @@ def full_stress(solution: Any) -> ng.CoefficientFunction:
     return ng.CF((stress[0, 0], stress[1, 1], stress[0, 1], zz))
 
 
-def von_mises(stress: NDArray[np.float64]) -> NDArray[np.float64]:
+def von_mises(stress: Array) -> Array:
     """Von Mises stress (k,) of the components xx, yy, xy, zz (k, 4)."""
     size = float(np.abs(stress).max(initial=0.0)) or 1.0  # squares must stay in range
     xx, yy, xy, zz = stress.T / size
     return size * np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * xy**2)
 
 
-def neighbour_tree(points: NDArray[np.float64]) -> csr_array:
+def neighbour_tree(points: Array) -> csr_array:
     """Neighbours along the curves through points (m, 2): minimum spanning tree of distances."""
     near = list(range(1, min(len(points), 9) + 1))
     distance, neighbour = KDTree(points).query(points, k=near)

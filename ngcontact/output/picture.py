@@ -9,6 +9,7 @@ import numpy as np
 
 from .files import check_path, replacing
 from .scene import Scene, close_up, contact_lines, picture
+from .solution_data import SolutionData
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def plot_solution(
-    solution: Any, path: str | os.PathLike[str] | None = None, scale: float | None = None
+    solution: SolutionData, path: str | os.PathLike[str] | None = None, scale: float | None = None
 ) -> Figure:
     """Picture of the deformed bodies with von Mises stress, and of the contact pressure.
 
@@ -49,7 +50,7 @@ def plot_solution(
     return figure
 
 
-def _draw(figure: Figure, solution: Any, scale: float | None) -> None:
+def _draw(figure: Figure, solution: SolutionData, scale: float | None) -> None:
     """Bodies on the left, a close-up of the contact if needed, the pressure on the right."""
     from matplotlib.patches import Rectangle
 
@@ -92,7 +93,7 @@ def _draw_bodies(axes: Axes, scene: Scene, top: float) -> Any:
     return shading
 
 
-def _draw_pressure(axes: Axes, solution: Any) -> None:
+def _draw_pressure(axes: Axes, solution: SolutionData) -> None:
     """Pressure along the contact lines, points in contact full and the others hollow."""
     lines, contact = contact_lines(solution), solution.problem.contact
     touching = []

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import ngsolve as ng
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
-from ..arrays import Array, Index
+from ..arrays import Array, Index, Mask
 from .nodes import full_stress, lattice, neighbour_tree, nodes_of, von_mises
+from .solution_data import SolutionData
 
-_MOST_TRIANGLES = 200_000
+MOST_TRIANGLES = 200_000  # of a picture: more cannot be seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +29,12 @@ class Scene:
     stress: Array
     triangles: Index
     edges: Index
-    outline: NDArray[np.bool_]
+    outline: Mask
     zone: Array
     scale: float
 
 
-def contact_lines(solution: Any) -> list[tuple[int, Index, Array]]:
+def contact_lines(solution: SolutionData) -> list[tuple[int, Index, Array]]:
     """Contact points in order along their lines: (pair, rows, coordinate) for every line.
 
     ``rows`` index ``solution.points``. The coordinate is eta, across the fixed direction xi
@@ -88,12 +87,12 @@ def _subdivision(order: int) -> tuple[list[list[int]], list[list[int]]]:
     return triangles, [bottom, [number[order - k, k] for k in steps], left]
 
 
-def picture(solution: Any, scale: float | None) -> Scene:
+def picture(solution: SolutionData, scale: float | None) -> Scene:
     """Evaluate a solution for the picture."""
     mesh, u = solution.mesh, solution.displacement
     order = max(mesh.GetCurveOrder(), solution.order)
     if order > 1:  # enough to look smooth on coarse meshes, no more than can be seen on fine ones
-        order = int(np.clip(np.sqrt(_MOST_TRIANGLES / mesh.ne), 1, 2 * order))
+        order = int(np.clip(np.sqrt(MOST_TRIANGLES / mesh.ne), 1, 2 * order))
     nodes = nodes_of(mesh, order)
     triangles, sides = _subdivision(order)
     edges = nodes.cells[:, sides].reshape(-1, order + 1)
@@ -118,7 +117,7 @@ def picture(solution: Any, scale: float | None) -> Scene:
     )
 
 
-def _chosen_scale(solution: Any, place: Array, move: Array, body: Index) -> float:
+def _chosen_scale(solution: SolutionData, place: Array, move: Array, body: Index) -> float:
     """Factor 1, 2, 5, 10, ... on the displacement: seen, yet no false overlap of the bodies.
 
     Contact turns a gap e into `gap`; a factor s draws it as e - s (e - gap). For e, the distance

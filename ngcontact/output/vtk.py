@@ -13,12 +13,13 @@ import numpy as np
 
 from .files import check_path, replacing
 from .nodes import VTK_CELL, VTK_LAGRANGE_TRIANGLE, full_stress, neighbour_tree, nodes_of, von_mises
+from .solution_data import SolutionData
 
 if TYPE_CHECKING:
     import pyvista
 
 
-def write_solution(path: str | os.PathLike[str], solution: Any) -> Path:
+def write_solution(path: str | os.PathLike[str], solution: SolutionData) -> Path:
     """Bodies of a solution as ``.vtu``, contact points beside it as ``<stem>_contact.vtp``.
 
     The cells are Lagrange triangles of the order of the geometry or of the displacement,
@@ -34,12 +35,12 @@ def write_solution(path: str | os.PathLike[str], solution: Any) -> Path:
     from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
     with replacing(target, beside) as drafts:
-        _write(vtkXMLUnstructuredGridWriter(), _bodies(solution), drafts[0])
-        _write(vtkXMLPolyDataWriter(), _contact_points(solution), drafts[1])
+        write_data(vtkXMLUnstructuredGridWriter(), _bodies(solution), drafts[0])
+        write_data(vtkXMLPolyDataWriter(), _contact_points(solution), drafts[1])
     return target
 
 
-def write_series(path: str | os.PathLike[str], solutions: Iterable[Any]) -> Path:
+def write_series(path: str | os.PathLike[str], solutions: Iterable[SolutionData]) -> Path:
     """Solutions, one per level, as a ``.pvd`` for ParaView; the level stands for the time.
 
     Beside it the files of `write_solution`: ``<stem>_000.vtu``, ``<stem>_000_contact.vtp``, and
@@ -64,7 +65,7 @@ def write_series(path: str | os.PathLike[str], solutions: Iterable[Any]) -> Path
     return target
 
 
-def _bodies(solution: Any) -> pyvista.UnstructuredGrid:
+def _bodies(solution: SolutionData) -> pyvista.UnstructuredGrid:
     """Both bodies with their fields as a VTK grid."""
     import pyvista
 
@@ -88,7 +89,7 @@ def _bodies(solution: Any) -> pyvista.UnstructuredGrid:
     return grid
 
 
-def _contact_points(solution: Any) -> pyvista.PolyData:
+def _contact_points(solution: SolutionData) -> pyvista.PolyData:
     """Contact points as VTK vertices, neighbours of a pair joined by lines."""
     import pyvista
 
@@ -111,7 +112,7 @@ def _contact_points(solution: Any) -> pyvista.PolyData:
     return data
 
 
-def _write(writer: Any, data: pyvista.DataSet, path: Path) -> None:
+def write_data(writer: Any, data: pyvista.DataSet, path: Path) -> None:
     """Write a data set with a VTK XML writer; VTK raises nothing."""
     writer.SetFileName(str(path))
     writer.SetInputData(data)
