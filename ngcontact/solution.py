@@ -38,7 +38,7 @@ class Solution:
     element : str
         "isoparametric", "superparametric" or "physical".
     displacement : ng.GridFunction
-        u_h on a VectorH1 space; "unknowns" means ``displacement.space.ndof``.
+        u_h, a length, on a VectorH1 space; "unknowns" means ``displacement.space.ndof``.
     discrete : DiscreteProblem
         The algebraic problem.
     minimiser : Iterate
@@ -69,7 +69,7 @@ class Solution:
 
     @cached_property
     def stress(self) -> ng.CoefficientFunction:
-        """In-plane stress, a (2, 2) CoefficientFunction, any consistent units."""
+        """In-plane stress, a (2, 2) CoefficientFunction, in any consistent units."""
         e = strain(self.displacement)
         law = {body: law.voigt(self.problem.model) for body, law in self.problem.materials.items()}
         s = [self.mesh.MaterialCF({body: (C * e)[i] for body, C in law.items()}) for i in range(3)]
@@ -79,7 +79,7 @@ class Solution:
     def pairs(self) -> list[ContactState]:
         """Gap, force, pressure and state of the points of each pair, in arrays of their own."""
         program = self.discrete.program
-        gap = program.g - self.minimiser.u[program.unknown]
+        gap = program.g - self.minimiser.u[program.unknown]  # (3.9), (3.9')
         return contact_states(self.discrete.lines, gap, self.force, self.active)
 
     @cached_property
@@ -94,17 +94,17 @@ class Solution:
 
     @cached_property
     def gap(self) -> Array:
-        """Gap (m,) after deformation along the direction of each point; >= 0 to round-off."""
+        """Gap (m,) after deformation along each point's direction, a length; >= 0 to round-off."""
         return np.concatenate([np.zeros(0), *(pair.gap for pair in self.pairs)])
 
     @property
     def force(self) -> Array:
-        """Nodal contact forces lambda_j (force per unit thickness), (m,)."""
+        """Nodal contact forces lambda_j, (m,), a force per unit thickness."""
         return self.minimiser.force
 
     @cached_property
     def pressure(self) -> Array:
-        """-T_n per unit length (P1), -T_xi per unit eta (P2): force over weight, (m,)."""
+        """-T_n per unit length (P1), -T_xi per unit eta (P2), (m,), in units of stress."""
         return np.concatenate([np.zeros(0), *(pair.pressure for pair in self.pairs)])
 
     @property
@@ -118,7 +118,7 @@ class Solution:
         return self.minimiser.steps
 
     def contact_force(self, pair: int = 0) -> Array:
-        """Resultant of the contact forces of a pair on its secondary body, (2,)."""
+        """Resultant (2,) of a pair's contact forces on its secondary, force per thickness."""
         state = self.pairs[self._pair_number(pair)]
         return -(state.force[:, None] * state.line.direction).sum(axis=0)
 
@@ -134,14 +134,14 @@ class Solution:
 
     @cached_property
     def nodal_reaction(self) -> Array:
-        """Forces (n, 2) of the supports on the nodes: A u - f + B' force, zero at free nodes."""
+        """Forces (n, 2) of the supports on the nodes, force per thickness: A u - f + B' force."""
         d = self.discrete
         residual = d.space.A @ self.displacement.vec.FV().NumPy() - d.space.f
         return (d.space.basis.T @ residual + d.B.T @ self.force).reshape(2, -1).T
 
     @cached_property
     def reactions(self) -> dict[str, Array]:
-        """Resultant (2,) of every boundary of Gamma_u and Gamma_0 on its body.
+        """Resultant (2,) of every boundary of Gamma_u, Gamma_0 on its body, force per thickness.
 
         A node shared by several of them counts for the last entry of `displacement`, then for
         `sliding`; a name that several bodies share gives the sum over them.
@@ -159,7 +159,7 @@ class Solution:
         return [] if rigid is None else rigid.left_free(self.active)
 
     def transitions(self, pair: int = 0) -> Array:
-        """Points (k, 2) where contact of a pair turns from binding to non-binding."""
+        """Points (k, 2) where a pair's contact turns from binding to non-binding, each a length."""
         return self.pairs[self._pair_number(pair)].transitions.position
 
     @cached_property
@@ -169,7 +169,7 @@ class Solution:
 
     @cached_property
     def energy_norm(self) -> float:
-        """A(u_h, u_h)^(1/2)."""
+        """A(u_h, u_h)^(1/2), root of an energy per unit thickness."""
         return energy_norm(self.problem, self.discrete.space, self.displacement)
 
     @cached_property
@@ -185,29 +185,29 @@ class Solution:
 
     @property
     def indicators(self) -> Array:
-        """Local error indicators eta_T in the energy norm, (ne,)."""
+        """Local error indicators eta_T, (ne,), root of an energy per unit thickness."""
         return self._estimate.indicators
 
     @property
     def estimate_parts(self) -> dict[str, Array]:
-        """Squared contributions (ne,) to the indicators by origin."""
+        """Squared contributions (ne,) to the indicators by origin, energy per thickness."""
         return self._estimate.parts
 
     @property
     def error_estimate(self) -> float:
-        """Estimated error in the energy norm, A(u - u_h, u - u_h)^(1/2)."""
+        """Estimated A(u - u_h, u - u_h)^(1/2), root of an energy per unit thickness."""
         return root_of_squares(self.indicators)
 
     @property
     def relative_error_estimate(self) -> float:
-        """Estimated error over the energy norm of u_h; 0 where both vanish."""
+        """Estimated error over the energy norm of u_h, dimensionless; 0 where both vanish."""
         if self.error_estimate == 0:
             return 0.0
         return self.error_estimate / self.energy_norm if self.energy_norm > 0 else float("inf")
 
     @cached_property
     def residuals(self) -> dict[str, float]:
-        """Dimensionless residuals of the Karush-Kuhn-Tucker conditions.
+        """Residuals of the Karush-Kuhn-Tucker conditions, dimensionless.
 
         `equilibrium`: unbalanced force over the largest force or term of a force; `penetration`:
         negative gap over the largest displacement or closed gap; `tension`: negative over largest

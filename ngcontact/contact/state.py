@@ -39,8 +39,8 @@ class ContactState:
 
     @property
     def pressure(self) -> Array:
-        """-T_n per unit length (P1), -T_xi per unit eta (P2), (m,): force over weight."""
-        return self.force / self.line.weight
+        """-T_n per unit length (P1), -T_xi per unit eta (P2), (m,): units of stress."""
+        return self.force / self.line.weight  # (3.10), (3.10')
 
     @cached_property
     def transitions(self) -> Transitions:

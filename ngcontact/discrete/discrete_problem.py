@@ -201,7 +201,7 @@ def _check_range(program: QuadraticProgram) -> None:
 
 
 def minimise_energy(discrete: DiscreteProblem, active: Mask) -> Iterate:
-    """Exact minimiser of L over K_h.
+    """Exact minimiser of L over K_h, from the first active set `active` (m,): (P_1h), (P_2h).
 
     Bodies that contact alone can hold start from where they rest when rigid, so that the way
     there costs no digits of the deformation.

@@ -17,7 +17,7 @@ TIED = 1e-6  # difference of two distances, relative to them, that round-off may
 
 
 def first_active_set(discrete: DiscreteProblem) -> Mask:
-    """Cold start: the points that touch before the load.
+    """Cold start (m,): the points that touch before the load.
 
     Bodies that contact alone can hold are first placed, rigid, where the load presses them.
     """

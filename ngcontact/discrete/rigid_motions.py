@@ -113,7 +113,7 @@ def unsupported(trace: BoundaryTrace, bodies: Bodies, c: Conditions) -> list[Arr
 
 
 def rigid_motion(bodies: Bodies, amounts: Array, multiplier: float) -> RigidMotion:
-    """Motion by its amounts (3 b,) of the translations and rotations of all bodies."""
+    """Motion by the `amounts` (3b,) of the translations and rotations of all bodies."""
     parts = amounts.reshape(-1, 3).copy()
     parts[np.abs(parts) <= FREE * np.abs(parts).max()] = 0.0
     size = np.abs(parts).max(axis=1)
@@ -134,7 +134,10 @@ def body_of_unknown(space: Space, bodies: Bodies) -> Index:
 
 
 def node_values(space: Space, bodies: Bodies, of_node: Index) -> Array:
-    """Translations and rotation of each body, (2n, 3b), as values of nodes and unknowns."""
+    """Translations and rotation of each body, (2n, 3b), as values of nodes and unknowns.
+
+    `of_node` (n,) is the body of each of them; translations are 1, rotations 1 at half its size.
+    """
     trace = space.trace
     n = space.basis.shape[1] // 2
     place = np.zeros((n, 2))
@@ -160,7 +163,10 @@ def node_values(space: Space, bodies: Bodies, of_node: Index) -> Array:
 
 
 def functionals(space: Space, bodies: Bodies, of_unknown: Index) -> Array:
-    """Integrals (2N, 3b) of v.z over the boundary of each body, for its three motions z."""
+    """Integrals (2N, 3b) of v.z over the boundary of each body, for its three motions z.
+
+    `of_unknown` (2N,) is the body of each unknown.
+    """
     v = space.V.TestFunction()
     columns = []
     for z in (ng.CF((1, 0)), ng.CF((0, 1)), ng.CF((-ng.y, ng.x))):
@@ -214,7 +220,7 @@ class FreeMotions:
         return self.values.T @ self.means
 
     def motion(self, amounts: Array, multiplier: float = 0.0) -> RigidMotion:
-        """One of the motions, by its amounts (r,)."""
+        """One of the motions, by its `amounts` (r,)."""
         return rigid_motion(self.bodies, self.combinations @ amounts, multiplier)
 
 

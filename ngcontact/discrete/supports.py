@@ -43,7 +43,7 @@ def support_conditions(problem: Problem, trace: BoundaryTrace) -> Conditions:
 
 
 def conditioned_segments(problem: Problem, trace: BoundaryTrace) -> Index:
-    """Segments on which conditions are posed: Gamma_u, Gamma_0, Gamma_K."""
+    """Segments (k,) on which conditions are posed: Gamma_u, Gamma_0, Gamma_K."""
     sides = [side for pair in problem.contact for side in (pair.secondary, pair.primary)]
     guides = [] if problem.sliding is None else [str(problem.sliding)]
     return trace.segments(*problem.displacement, *guides, *sides)

@@ -62,7 +62,7 @@ class PressureCorrection:
     motion: ng.GridFunction
 
     def add_to(self, residual: Array, shares: list[PressureShare]) -> None:
-        """Add what delta contributes to a residual (k, c) at the boundary."""
+        """Add what delta contributes to a `residual` (k, c) at the boundary."""
         on_boundary = ng.BoundaryFromVolumeCF(self.pressure)
         for share in shares:
             if len(share.at):

@@ -80,7 +80,7 @@ class ScaledSolution:
         return (self.diameter / self.order) ** 2 / (2 * self.mu)
 
     def traction(self, segment: Index, s: Array) -> Array:
-        """Traction sigma_h n (k, 2) over `unit` at parameters s (k,) of the segments (k,)."""
+        """Traction sigma_h n (k, 2) over `unit`, at points `s` (k,) of each `segment` (k,)."""
         on_boundary = ng.BoundaryFromVolumeCF(self.stress)
         values = self.boundary.evaluate(on_boundary, segment, s).reshape(-1, 2, 2)
         return np.einsum("kij,kj->ki", values, self.boundary.normal(segment, s))

@@ -25,9 +25,16 @@ VTK_LAGRANGE_TRIANGLE = 69  # every higher order
 class Nodes:
     """Lagrange nodes of a triangle mesh, shared inside a body and never between bodies.
 
-    ``cells`` (ne, n) numbers the nodes of each triangle in VTK's order, n = (order + 1)
-    (order + 2) / 2; ``body`` (ne,) is the position of the element's region in ``names``;
-    ``at`` (ne n) are the same nodes as NGSolve mesh points, element after element.
+    Attributes
+    ----------
+    cells : ndarray of int (ne, n)
+        Nodes of each triangle in VTK's order, n = (order + 1) (order + 2) / 2 of them.
+    body : ndarray of int (ne,)
+        Position of the element's region in `names`.
+    names : tuple of str
+        The material regions.
+    at : ndarray (k,)
+        The same nodes as NGSolve mesh points, element after element: k = ne n.
     """
 
     cells: Index
@@ -36,7 +43,7 @@ class Nodes:
     at: NDArray[Any]
 
     def values(self, function: ng.CoefficientFunction) -> Array:
-        """Nodal values (nodes, components): the mean over the triangles that meet there."""
+        """Nodal values (k, dim) at all k nodes: the mean over the triangles that meet there."""
         numbers = self.cells.ravel()
         found = np.asarray(function(self.at), dtype=float).reshape(len(numbers), -1)
         count = np.bincount(numbers)
@@ -95,14 +102,14 @@ def full_stress(solution: SolutionData) -> ng.CoefficientFunction:
 
 
 def von_mises(stress: Array) -> Array:
-    """Von Mises stress (k,) of the components xx, yy, xy, zz (k, 4)."""
+    """Von Mises stress (k,) of the components xx, yy, xy, zz in `stress` (k, 4), same units."""
     size = float(np.abs(stress).max(initial=0.0)) or 1.0  # squares must stay in range
     xx, yy, xy, zz = stress.T / size
     return size * np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * xy**2)
 
 
 def neighbour_tree(points: Array) -> csr_array:
-    """Neighbours along the curves through points (m, 2): minimum spanning tree of distances."""
+    """Neighbours (m, m) along the curves through `points` (m, 2): tree of least total distance."""
     near = list(range(1, min(len(points), 9) + 1))
     distance, neighbour = KDTree(points).query(points, k=near)
     start = np.broadcast_to(np.arange(len(points))[:, None], neighbour.shape)

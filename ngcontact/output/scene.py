@@ -20,9 +20,22 @@ MOST_TRIANGLES = 200_000  # of a picture: more cannot be seen
 class Scene:
     """What is drawn of the bodies: triangles and lines that follow the curved elements.
 
-    ``moved`` (k, 2) are the nodes after `scale` times the displacement and ``stress`` (k,) is
-    von Mises; ``triangles`` (t, 3) and the element edges ``edges`` (e, n + 1), of which
-    ``outline`` (e,) bound a body, number the nodes. ``zone`` (c, 2) are the points in contact.
+    Attributes
+    ----------
+    moved : ndarray (k, 2)
+        Nodes after `scale` times the displacement, lengths.
+    stress : ndarray (k,)
+        Von Mises stress there, a force per area.
+    triangles : ndarray of int (t, 3)
+        Nodes of each triangle.
+    edges : ndarray of int (e, order + 1)
+        Nodes of each element edge.
+    outline : ndarray of bool (e,)
+        Edges that bound a body.
+    zone : ndarray (c, 2)
+        The points in contact, moved as the nodes are.
+    scale : float
+        Factor of the displacement.
     """
 
     moved: Array
@@ -37,7 +50,8 @@ class Scene:
 def contact_lines(solution: SolutionData) -> list[tuple[int, Index, Array]]:
     """Contact points in order along their lines: (pair, rows, coordinate) for every line.
 
-    ``rows`` index ``solution.points``. The coordinate is eta, across the fixed direction xi
+    Of the k points of each line `rows` (k,) index ``solution.points``, and the coordinate (k,) is a
+    length: eta, across the fixed direction xi
     (P2), or without one (P1) the arc position, a sum of chords. A pair whose points lie on
     separate pieces of boundary gives several lines, one behind the other.
     """
@@ -139,7 +153,7 @@ def _chosen_scale(solution: SolutionData, place: Array, move: Array, body: Index
 
 
 def close_up(scene: Scene) -> tuple[Array, Array] | None:
-    """Corners of a close-up of the zone in contact, None if the whole picture shows it."""
+    """Corners (2,) each of a close-up of the zone in contact; None if the picture shows it."""
     if len(scene.zone) == 0:
         return None
     size = np.ptp(scene.moved, axis=0).max()
