@@ -19,17 +19,17 @@ ORDER = 2
 STAGES = {  # cumulative seconds of these functions; none calls another
     "assembly": [("space", "assemble")],
     "rows": [
-        ("gap", "contact_line"),
-        ("constraint", "change_of_basis"),
-        ("trace", "boundary_trace"),
+        ("line", "contact_line"),
+        ("basis_transformation", "change_of_basis"),
+        ("boundary", "boundary_trace"),
     ],
-    "rigid motions": [("rigid", "rigid_motions")],
-    "matrix": [("matrix", "congruent")],
-    "factorisation": [("matrix", "factor")],
-    "back-solves": [("matrix", "solve")],
-    "multigrid": [("iterative", "prepare"), ("multigrid", "solve")],
-    "estimate": [("estimate", "estimate")],
-    "refinement": [("refine", "refined")],
+    "rigid motions": [("equilibrium", "equilibrium")],
+    "matrix": [("sparse", "congruent")],
+    "factorisation": [("sparse", "factor")],
+    "back-solves": [("sparse", "solve")],
+    "multigrid": [("linear_systems", "prepare"), ("multigrid", "solve")],
+    "estimate": [("residual", "estimate")],
+    "refinement": [("refinement", "refined")],
 }
 
 
@@ -59,7 +59,7 @@ def stages(common: Common, size: int) -> Stages:
     for (path, _, name), (*_, cumulative, callers) in stats.stats.items():  # type: ignore[attr-defined]
         for stage, functions in STAGES.items():
             if (Path(path).stem, name) in functions:
-                outside = [c for c in callers if Path(c[0]).stem != "refine"]
+                outside = [c for c in callers if Path(c[0]).stem != "refinement"]
                 share = sum(callers[c][3] for c in outside) if stage == "rows" else cumulative
                 spent[stage] += share
     spent["rest"] = clock - sum(spent.values())
