@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from ngcontact import Solution
+if TYPE_CHECKING:  # trials of algebra run without NGSolve
+    from ngcontact import Solution
 
 RESIDUAL = 1e-10  # of the optimality conditions, dimensionless; round-off leaves 1e-16 to 1e-12
 

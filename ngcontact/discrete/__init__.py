@@ -5,5 +5,6 @@ from .discrete_problem import discretise as discretise
 from .discrete_problem import minimise_energy as minimise_energy
 from .initial_active_set import carried_active_set as carried_active_set
 from .initial_active_set import first_active_set as first_active_set
+from .linear_systems import MULTIGRID as MULTIGRID
 from .rigid_motions import RigidMotion as RigidMotion
 from .supports import resultants as resultants

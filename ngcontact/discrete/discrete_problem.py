@@ -24,7 +24,7 @@ from ..fem import (
 from ..linalg import congruent
 from ..mesh import vertex_parents
 from ..problem import Problem
-from ..qp import BorderedSystems, Iterate, QuadraticProgram, minimise, no_null_space
+from ..qp import Iterate, LinearSystems, QuadraticProgram, minimise, no_null_space
 from ..triplets import from_triplets
 from .admissible_set import AdmissibleSet, admissible_set
 from .equilibrium import Rigid, equilibrium
@@ -58,7 +58,7 @@ class DiscreteProblem:
         Unknowns in which rows and prescribed values are single unknowns.
     program : QuadraticProgram
         The quadratic program in those unknowns.
-    systems : BorderedSystems
+    systems : LinearSystems
         Its linear systems, with the factorisation once there is one.
     rigid : Rigid or None
         Rigid motions that supports leave free, if there are any.
@@ -74,7 +74,7 @@ class DiscreteProblem:
     B: sp.csr_array
     basis: BasisTransformation
     program: QuadraticProgram
-    systems: BorderedSystems
+    systems: LinearSystems
     rigid: Rigid | None
     assembled: bool
 
@@ -150,7 +150,7 @@ def _space(
 
 def _program(
     space: Space, admissible: AdmissibleSet, rigid: Rigid | None, known: Reduced | None
-) -> tuple[QuadraticProgram, BorderedSystems]:
+) -> tuple[QuadraticProgram, LinearSystems]:
     """L over K_h in the unknowns of rows and supports, and its linear systems.
 
     Raises

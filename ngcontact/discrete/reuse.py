@@ -12,7 +12,7 @@ from ..constraints import BasisTransformation
 from ..contact import ContactLine, contact_line
 from ..fem import BoundaryTrace, Space
 from ..problem import Contact, Elastic, Hooke, Problem, varies
-from ..qp import BorderedSystems
+from ..qp import LinearSystems
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,13 +25,13 @@ class Reduced:
         The unknowns, n of them.
     K : sparse (n, n)
         The stiffness, force per length.
-    systems : BorderedSystems
+    systems : LinearSystems
         Its linear systems, with the factorisation once there is one.
     """
 
     basis: BasisTransformation
     K: sp.csr_array
-    systems: BorderedSystems
+    systems: LinearSystems
 
 
 @dataclass(frozen=True, eq=False)

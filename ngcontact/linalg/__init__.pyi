@@ -1,7 +1,11 @@
+from .coarse_spaces import COARSEST as COARSEST
 from .coarse_spaces import coarsenings as coarsenings
 from .coarse_spaces import refined_share as refined_share
 from .iterative import IterativeSystems as IterativeSystems
+from .iterative import Limits as Limits
+from .iterative import iterative_systems as iterative_systems
 from .multigrid import Multigrid as Multigrid
+from .multigrid import truncated_multigrid as truncated_multigrid
 from .sparse import cholesky as cholesky
 from .sparse import congruent as congruent
 from .sparse import lower_half as lower_half

@@ -17,7 +17,7 @@ from ..triplets import from_triplets
 
 COARSEST = 10_000  # unknowns below which a factor costs less than what coarser spaces save
 SHARE = 0.5  # of the vertices that the next coarser space has at most
-ROUND_OFF = 1e-14  # of the entries of changes of basis, which are of size 1
+CANCELLED = 1e-14  # entries of products of changes of basis, of size 1, that are zero in truth
 IN_A_ROW = 10  # bodies whose contact lines share nodes; more only where they refer to each other
 
 
@@ -42,12 +42,12 @@ class Coarsening:
 
 
 def refined_share(parents: Integers) -> float:
-    """Share of the vertices (nv, 2) that refinement made."""
+    """Share of the vertices that refinement made, by their parents (nv, 2): -1 for others."""
     return float(np.count_nonzero(parents[:, 0] >= 0) / len(parents))
 
 
 def coarsenings(
-    T: sp.csr_array, parents: Integers, nodes: Integers, coarsest: int | None = None
+    T: sp.csr_array, parents: Integers, nodes: Integers, coarsest: int = COARSEST
 ) -> list[Coarsening]:
     """Coarser spaces, finest first, until one has `coarsest` unknowns or the first mesh is met.
 
@@ -60,15 +60,14 @@ def coarsenings(
         Ends of the edges halved by refinement, of lower number; -1 for vertices of the first mesh.
     nodes : ndarray of int (k, p + 1)
         Nodes of the segments where unknowns are node values.
-    coarsest : int, optional
-        `COARSEST` when left out.
+    coarsest : int
+        A space of fewer unknowns has no coarser one.
 
     Raises
     ------
     RingError
         Contact rows refer to each other in a ring.
     """
-    coarsest = COARSEST if coarsest is None else coarsest
     n, vertices = T.shape[0] // 2, len(parents)
     steps = [(_linear(n, vertices, nodes), np.arange(vertices))] if nodes.shape[1] > 2 else []
     found = []
@@ -145,7 +144,7 @@ def _inverse(T: sp.csr_array) -> sp.csr_array:
         [diagonal, -b / determinant, -c / determinant], offsets=[0, n, -n], format="csr"
     )
     rest = sp.eye_array(2 * n, format="csr") - blocks @ T
-    rest.data[np.abs(rest.data) < ROUND_OFF] = 0.0
+    rest.data[np.abs(rest.data) < CANCELLED] = 0.0
     rest.eliminate_zeros()
     inverse, term = blocks, rest @ blocks
     for _ in range(IN_A_ROW):

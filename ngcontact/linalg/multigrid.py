@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
@@ -17,19 +19,49 @@ class StalledError(ArithmeticError):
     """Conjugate gradients did not reach their target."""
 
 
+@dataclass(frozen=True, eq=False)
 class _Level:
-    """One space that has a coarser one: its smoother, and vectors of both."""
+    """One space of n unknowns that has a coarser one of k, and vectors of both to work with.
 
-    def __init__(self, matrix: ng.BaseMatrix, free: Mask, step: Coarsening) -> None:
-        self.matrix = matrix
-        self.P, self.transposed = step.P, step.P.T
-        self.residual = matrix.CreateColVector()
-        self.right, self.solution = ng.BaseVector(step.kept.size), ng.BaseVector(step.kept.size)
-        self.hold(free)
+    Attributes
+    ----------
+    matrix : ng.BaseMatrix (n, n)
+    P, transposed : sparse (n, k) and (k, n)
+        Prolongation.
+    free : ndarray of bool (n,)
+        Unknowns that are corrected.
+    smoother : ng.BaseSmoother
+        Gauss-Seidel sweeps over them.
+    residual : ng.BaseVector (n,)
+    right, solution : ng.BaseVector (k,)
+    """
 
-    def hold(self, free: Mask) -> None:
-        self.free = free
-        self.smoother = self.matrix.CreateSmoother(ng.BitArray(free))
+    matrix: ng.BaseMatrix
+    P: sp.csr_array
+    transposed: sp.csc_array
+    free: Mask
+    smoother: ng.BaseSmoother
+    residual: ng.BaseVector
+    right: ng.BaseVector
+    solution: ng.BaseVector
+
+    def holding(self, free: Mask) -> _Level:
+        """The same with other free unknowns (n,); work vectors are shared."""
+        return replace(self, free=free, smoother=self.matrix.CreateSmoother(ng.BitArray(free)))
+
+
+def _level(matrix: ng.BaseMatrix, free: Mask, step: Coarsening) -> _Level:
+    """The space of `matrix` above that of a step."""
+    return _Level(
+        matrix=matrix,
+        P=step.P,
+        transposed=step.P.T,
+        free=free,
+        smoother=matrix.CreateSmoother(ng.BitArray(free)),
+        residual=matrix.CreateColVector(),
+        right=ng.BaseVector(step.kept.size),
+        solution=ng.BaseVector(step.kept.size),
+    )
 
 
 def _galerkin(matrix: ng.BaseMatrix, P: sp.csr_array, free: Mask, coarse: Mask) -> ng.BaseMatrix:
@@ -40,36 +72,28 @@ def _galerkin(matrix: ng.BaseMatrix, P: sp.csr_array, free: Mask, coarse: Mask) 
     return there.CreateTranspose() @ (matrix @ there)
 
 
+@dataclass(frozen=True, eq=False)
 class Multigrid:
     """Solver of the systems of the free unknowns of a symmetric positive definite matrix.
 
     One Gauss-Seidel sweep over all unknowns before a coarser space corrects, the reverse one
     after it, and a Cholesky factor of the coarsest space: a symmetric positive definite
-    preconditioner. Functions of coarser spaces vanish at the unknowns that are not free, as in
-    truncated monotone multigrid (Kornhuber 1994, Numer. Math. 69:167).
+    preconditioner. `truncated_multigrid` makes it.
 
-    Parameters
+    Attributes
     ----------
-    matrix : ng.BaseMatrix (n, n)
-        Both halves of it.
-    steps : list of Coarsening
-        At least one, finest first.
-    free : ndarray of bool (n,)
-        Unknowns of the systems.
+    levels : list of _Level
+        Spaces that have a coarser one, finest first; the first one has n unknowns.
+    inverse : ng.BaseMatrix
+        Inverse of the matrix of the coarsest space.
     """
 
-    def __init__(self, matrix: ng.BaseMatrix, steps: list[Coarsening], free: Mask) -> None:
-        self.levels: list[_Level] = []
-        for step in steps:
-            self.levels.append(_Level(matrix, free, step))
-            coarse = free[step.kept]
-            matrix = _galerkin(matrix, step.P, free, coarse)
-            free = coarse
-        self.inverse = matrix.Inverse(ng.BitArray(free), inverse="sparsecholesky")
+    levels: list[_Level]
+    inverse: ng.BaseMatrix
 
     def hold(self, free: Mask) -> None:
-        """Free other unknowns; coarser spaces stay as they are but for what they correct."""
-        self.levels[0].hold(free)
+        """Free other unknowns (n,); coarser spaces stay as they are but for what they correct."""
+        self.levels[0] = self.levels[0].holding(free)
 
     def cycle(self, right: ng.BaseVector, solution: ng.BaseVector, level: int = 0) -> None:
         """Set `solution` to the preconditioner times `right`; both vanish where not free."""
@@ -90,6 +114,15 @@ class Multigrid:
 
     def solve(self, right: Array, target: float, most: int) -> tuple[Array, int]:
         """Solution (n,), its largest residual at most `target`, and the number of V-cycles.
+
+        Parameters
+        ----------
+        right : ndarray (n,)
+            Read where unknowns are free.
+        target : float
+            In the units of `right`.
+        most : int
+            V-cycles allowed.
 
         Raises
         ------
@@ -120,3 +153,27 @@ class Multigrid:
             x.data += step * d
             r.data -= step * q
         raise StalledError(f"{count} V-cycles left {size / first:.1e} of a residual")
+
+
+def truncated_multigrid(matrix: ng.BaseMatrix, steps: list[Coarsening], free: Mask) -> Multigrid:
+    """Multigrid whose coarser functions vanish at the unknowns that are not free.
+
+    As in truncated monotone multigrid (Kornhuber 1994, Numer. Math. 69:167).
+
+    Parameters
+    ----------
+    matrix : ng.BaseMatrix (n, n)
+        Both halves of it.
+    steps : list of Coarsening
+        At least one, finest first.
+    free : ndarray of bool (n,)
+        Unknowns of the systems.
+    """
+    levels: list[_Level] = []
+    for step in steps:
+        levels.append(_level(matrix, free, step))
+        coarse = free[step.kept]
+        matrix = _galerkin(matrix, step.P, free, coarse)
+        free = coarse
+    inverse = matrix.Inverse(ng.BitArray(free), inverse="sparsecholesky")
+    return Multigrid(levels=levels, inverse=inverse)

@@ -66,7 +66,7 @@ def congruent(
 
 
 def cholesky(matrix: ng.BaseMatrix) -> Factor:
-    """NGSolve's sparse Cholesky factorisation as the `factor` argument of `ssn.minimise`."""
+    """NGSolve's sparse Cholesky factorisation as what `bordered_systems` asks for."""
     right, solution = matrix.CreateColVector(), matrix.CreateRowVector()
 
     def factor(free: Mask) -> Solve:

@@ -10,8 +10,12 @@ from .optimality import kkt_residuals as kkt_residuals
 from .optimality import terms as terms
 from .quadratic_program import Iterate as Iterate
 from .quadratic_program import QuadraticProgram as QuadraticProgram
-from .schur_complement import REFINED as REFINED
-from .schur_complement import ROUGH as ROUGH
-from .schur_complement import Anchor as Anchor
 from .schur_complement import BorderedSystems as BorderedSystems
+from .schur_complement import bordered_systems as bordered_systems
 from .solving import solve_qp as solve_qp
+from .systems import REFINED as REFINED
+from .systems import ROUGH as ROUGH
+from .systems import Anchor as Anchor
+from .systems import Approximation as Approximation
+from .systems import LinearSystems as LinearSystems
+from .systems import first_approximation as first_approximation

@@ -1,11 +1,18 @@
-"""Newton iteration for one active-set problem, with the safeguards that make it finite.
+"""Primal-dual active set method: semismooth Newton steps, with the safeguards that end them.
 
-NumPy and SciPy only.
+The steps of Hintermueller, Ito, Kunisch (2002, SIAM J. Optim. 13:865): (i) choose y and force;
+(ii) rows with force + c (R y - g) > 0 are active, the others not; (iii) solve the linear system of
+that set; (iv) stop when the set repeats, the iterate is the exact minimiser, else go to (ii). The
+method alone can cycle on positive definite problems that are not M-matrices; block principal
+pivoting (Judice, Pires 1994, Comput. Oper. Res. 21:587) makes it finite for all of them. A
+semidefinite matrix, of bodies that supports do not hold, is met by exact proximal steps
+(Rockafellar 1976, SIAM J. Control Optim. 14:877). NumPy and SciPy only.
 """
 
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -13,14 +20,14 @@ from ..arrays import Array, Mask
 from ..errors import ConvergenceError
 from .null_space import FREE
 from .quadratic_program import Iterate
-from .schur_complement import Anchor, BorderedSystems, SingularError
+from .systems import Anchor, LinearSystems, SingularError
 
 log = logging.getLogger("ngcontact")
 
 TIE = 1e-13  # relative size below which a force or a slack keeps its state
 CLEAR = 1e-9  # ... below which it is judged by the refined solution only
 WIDEST_TIE = 1e-9  # ... and to which that grows, tenfold, each time an active set comes back
-PATIENCE = 10  # full switches allowed without fewer violated rows (Judice, Pires 1994)
+PATIENCE = 10  # full switches allowed without fewer violated rows: p of Judice and Pires
 
 PROXIMAL = 1e-3  # of the stiffness at the pins, where contact leaves rigid motions free
 WEAKEST = 1e-6  # of that, to which it falls, tenfold at each proximal step
@@ -29,58 +36,144 @@ STEADY = 0.9  # ratio of that force to the last from which a motion is steady, n
 OUTER = 100  # proximal steps; most problems need less than five
 
 
-class ActiveSetIteration:
-    """Newton iteration for one quadratic program with changing proximal terms."""
+@dataclass
+class _Pivoting:
+    """Block principal pivoting: which of the rows on the wrong side change theirs.
 
-    def __init__(self, systems: BorderedSystems, state: Mask) -> None:
-        self.program = program = systems.program
-        self.systems = systems
-        self.state = state
-        self.y = np.where(program.fixed, program.values, 0.0)
-        self.force = np.zeros(program.g.size)
-        self.steps: list[int] = []
-        self.extent = 0.0  # largest displacement met so far
-        self.size = np.asarray(abs(program.R).sum(axis=1)).ravel()
+    As in Judice and Pires, ninf is the fewest violated rows so far, and p the full switches left.
+    """
+
+    patience: int
+    ninf: int
+    p: int
+
+    def switched(self, wrong: Mask) -> Mask:
+        """Of the violated rows `wrong` (m,) those that switch, (m,)."""
+        count = int(np.count_nonzero(wrong))
+        if count < self.ninf:
+            self.ninf, self.p = count, self.patience
+        else:
+            self.p -= 1
+        if count == 0 or self.p >= 0:
+            return wrong
+        single = np.zeros_like(wrong)  # Murty's rule, until fewer rows are violated
+        single[np.flatnonzero(wrong)[-1]] = True
+        return single
+
+
+@dataclass(eq=False)
+class ActiveSetIteration:
+    """The iterate of one quadratic program; `first_iterate` makes it.
+
+    Attributes
+    ----------
+    systems : LinearSystems
+        Of the program with n unknowns and m rows.
+    active : ndarray of bool (m,)
+        Current active set.
+    y : ndarray (n,)
+        Solution of the last linear system.
+    force : ndarray (m,)
+        Its multipliers.
+    size : ndarray (m,)
+        Sums of the sizes of the rows' coefficients.
+    patience : int
+        See `minimise`.
+    steps : list of int
+        Changes of the active set after each linear system.
+    extent : float
+        Largest displacement met so far.
+    """
+
+    systems: LinearSystems
+    active: Mask
+    y: Array
+    force: Array
+    size: Array
+    patience: int
+    steps: list[int] = field(default_factory=list)
+    extent: float = 0.0
 
     def resisted(self) -> bool:
         """Whether the active rows resist all motions they can."""
-        p = self.program
-        return p.null_space.pins.size == 0 or p.null_space.resisted(p.unknown[self.state])
+        p = self.systems.program
+        return p.null_space.pins.size == 0 or p.null_space.resisted(p.unknown[self.active])
 
     def result(self) -> Iterate:
         """The current iterate, with the lineal motions that its conditions ask for."""
-        null_space, y = self.program.null_space, self.y
+        null_space, y = self.systems.program.null_space, self.y
         if null_space.held.size:
             y = y - null_space.lineal @ (null_space.conditions @ y)
         return Iterate(
             u=y,
             force=self.force,
-            active=self.state,
+            active=self.active,
             steps=self.steps,
             factorizations=self.systems.factorizations,
             back_solves=self.systems.back_solves,
         )
 
     def advance(self, moved: Array) -> float:
-        """Activate the row that a steady rigid motion, given at the pins, meets first.
+        """Activate the row that a steady rigid motion, given at the pins (q,), meets first.
 
         Returns how often that motion leads there, 0 if it meets none.
         """
-        p, null_space = self.program, self.program.null_space
+        p = self.systems.program
+        null_space = p.null_space
         motion = null_space.others @ np.linalg.solve(null_space.others[null_space.pins], moved)
-        approach = np.where(self.state, 0.0, motion[p.unknown])
+        approach = np.where(self.active, 0.0, motion[p.unknown])
         meets = approach > FREE * np.abs(moved).max()
         if not meets.any():
             return 0.0
         slack = p.g - self.y[p.unknown]
         steps = np.divide(slack, approach, out=np.full(slack.shape, np.inf), where=meets)
-        self.state = self.state.copy()
-        self.state[steps.argmin()] = True
+        self.active = self.active.copy()
+        self.active[steps.argmin()] = True
         return float(steps.min())
+
+    def settle(self, anchor: Anchor | None) -> None:
+        """Newton steps until the active set repeats or, without anchor, leaves a motion free."""
+        m = self.systems.program.g.size
+        pivoting = _Pivoting(patience=self.patience, ninf=m + 1, p=self.patience)
+        seen: set[bytes] = set()
+        tie, limit = TIE, 100 + 20 * m
+        for _ in range(limit):
+            wrong = self._solved(anchor, tie)
+            switched = pivoting.switched(wrong)
+            self.steps.append(int(np.count_nonzero(switched)))
+            step = len(self.steps), self.active.sum(), self.steps[-1]
+            log.debug("Newton step %d: %d active, %d change", *step)
+            if not wrong.any():
+                return  # (iv)
+            if (key := self.active.tobytes()) in seen:
+                tie = min(10 * tie, WIDEST_TIE)
+            seen.add(key)
+            self.active = self.active ^ switched  # (ii)
+            if anchor is None and not self.resisted():
+                return
+        raise ConvergenceError(
+            f"the active set did not settle in {limit} Newton steps ({np.count_nonzero(wrong)} "
+            "rows still change); check that the matrix is symmetric and positive definite",
+            iterate=self.result(),
+        )
+
+    def _solved(self, anchor: Anchor | None, tie: float) -> Mask:
+        """Solve the system of the active set; answer the rows (m,) that are on the wrong side."""
+        try:
+            self.y, self.force = self.systems.solve(self.active, anchor)  # (iii)
+            wrong = self._violated(CLEAR)
+            if not wrong.any():
+                self.y, self.force = self.systems.refine(self.active, anchor)
+                wrong = self._violated(tie)
+        except SingularError as singular:
+            raise ConvergenceError(
+                f"Newton step {len(self.steps) + 1}: {singular}", iterate=self.result()
+            ) from None
+        return wrong
 
     def _violated(self, tie: float) -> Mask:
         """Active rows that pull and others that penetrate, by more than ties."""
-        p, stiffness = self.program, self.systems.stiffness()
+        p, stiffness = self.systems.program, self.systems.stiffness()
         # Displacements met so far: all of them may vanish while forces tie.
         with np.errstate(divide="ignore", invalid="ignore"):
             reached = np.nanmax(np.abs(self.force) / stiffness, initial=0.0)
@@ -89,62 +182,39 @@ class ActiveSetIteration:
         slack = p.g - p.R @ self.y
         # Ties keep their state: hysteresis against cycling on round-off.
         with np.errstate(invalid="ignore"):
-            pulling = self.force < -length * np.where(self.state, stiffness, 0.0)
+            pulling = self.force < -length * np.where(self.active, stiffness, 0.0)
             penetrating = slack < -length - tie * np.abs(p.g)
-        return np.where(self.state, pulling, penetrating) & ~p.equality
-
-    def settle(self, anchor: Anchor | None) -> None:
-        """Newton steps until the active set repeats or, without anchor, leaves a motion free."""
-        seen: set[bytes] = set()
-        fewest, patience, tie = self.program.g.size + 1, PATIENCE, TIE
-        limit = 100 + 20 * self.program.g.size
-        for _ in range(limit):
-            try:
-                self.y, self.force = self.systems.solve(self.state, anchor)
-                wrong = self._violated(CLEAR)
-                if not wrong.any():
-                    self.y, self.force = self.systems.refine()
-                    wrong = self._violated(tie)
-            except SingularError as singular:
-                raise ConvergenceError(
-                    f"Newton step {len(self.steps) + 1}: {singular}", iterate=self.result()
-                ) from None
-            count = int(np.count_nonzero(wrong))
-            if count < fewest:
-                fewest, patience = count, PATIENCE
-            else:
-                patience -= 1
-            if count and patience < 0:  # Murty's least-index rule until fewer rows are violated
-                wrong[: np.flatnonzero(wrong)[-1]] = False
-            self.steps.append(int(np.count_nonzero(wrong)))
-            log.debug(
-                "Newton step %d: %d active, %d change",
-                *(len(self.steps), self.state.sum(), self.steps[-1]),
-            )
-            if count == 0:
-                return
-            if (key := self.state.tobytes()) in seen:
-                tie = min(10 * tie, WIDEST_TIE)
-            seen.add(key)
-            self.state = self.state ^ wrong
-            if anchor is None and not self.resisted():
-                return
-        raise ConvergenceError(
-            f"the active set did not settle in {limit} Newton steps ({count} rows still change); "
-            "check that the matrix is symmetric and positive definite",
-            iterate=self.result(),
-        )
+        return np.where(self.active, pulling, penetrating) & ~p.equality
 
 
-def minimise(systems: BorderedSystems, active: Mask | None = None) -> Iterate:
+def first_iterate(
+    systems: LinearSystems, active: Mask | None = None, patience: int = PATIENCE
+) -> ActiveSetIteration:
+    """Prescribed values, no force, and the first active set (m,)."""
+    p = systems.program
+    return ActiveSetIteration(
+        systems=systems,
+        active=p.equality.copy() if active is None else p.equality | active,
+        y=np.where(p.fixed, p.values, 0.0),
+        force=np.zeros(p.g.size),
+        size=np.asarray(abs(p.R).sum(axis=1)).ravel(),
+        patience=patience,
+    )
+
+
+def minimise(
+    systems: LinearSystems, active: Mask | None = None, patience: int = PATIENCE
+) -> Iterate:
     """Solve a quadratic program by semismooth Newton steps.
 
     Parameters
     ----------
-    systems : BorderedSystems
+    systems : LinearSystems
         The program, with its factorisation where there is one already.
     active : ndarray of bool (m,), optional
         First active set; the equalities alone when left out.
+    patience : int
+        Full switches of the active set allowed without fewer violated rows.
 
     Returns
     -------
@@ -156,33 +226,31 @@ def minimise(systems: BorderedSystems, active: Mask | None = None) -> Iterate:
     ------
     ConvergenceError
         A system is singular, or the step limit was reached, to which only a matrix that is not
-        positive definite is known to lead. `iterate` holds the last `Iterate`.
+        positive definite is known to lead; with the last `Iterate`.
     """
-    p = systems.program
-    state = p.equality.copy() if active is None else p.equality | active
-    newton = ActiveSetIteration(systems, state)
-    pins = p.null_space.pins
-    hardness = p.diagonal[pins]  # of bodies that may be very unlike
-    share = PROXIMAL
-    anchor = Anchor(share * hardness, np.zeros(pins.size))
-    last = np.inf
+    current = first_iterate(systems, active, patience)  # (i)
+    pins = systems.program.null_space.pins
+    hardness = systems.program.diagonal[pins]  # of bodies that may be very unlike
+    anchor = Anchor(PROXIMAL * hardness, np.zeros(pins.size))
+    share, last = PROXIMAL, np.inf
     for _ in range(OUTER):
-        if newton.resisted():
-            newton.settle(None)
-            if newton.resisted():
-                return newton.result()
-        newton.settle(anchor)
-        moved = newton.y[pins] - anchor.at
+        if current.resisted():
+            current.settle(None)
+            if current.resisted():
+                return current.result()
+        # Rockafellar: the next y minimises L(y) + 1/2 stiffness (y - at)^2, until that force rests.
+        current.settle(anchor)
+        at = current.y[pins]
+        moved = at - anchor.at
         force = anchor.stiffness * np.abs(moved)
-        if (force <= RESTED * hardness * newton.extent).all():
-            return newton.result()
-        at = newton.y[pins]
+        if (force <= RESTED * hardness * current.extent).all():
+            return current.result()
         # A steady motion: go where it leads.
-        if force.max() > STEADY * last and not newton.resisted():
-            at = at + newton.advance(moved) * moved
+        if force.max() > STEADY * last and not current.resisted():
+            at = at + current.advance(moved) * moved
         last = force.max()
         share = max(share / 10, WEAKEST * PROXIMAL)
         anchor = Anchor(share * hardness, at)
     raise ConvergenceError(
-        f"the rigid motions did not settle in {OUTER} proximal steps", iterate=newton.result()
+        f"the rigid motions did not settle in {OUTER} proximal steps", iterate=current.result()
     )

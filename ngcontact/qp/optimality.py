@@ -8,13 +8,22 @@ import scipy.sparse as sp
 from ..arrays import Array
 from .quadratic_program import Iterate, QuadraticProgram
 
-ROWS = 1 << 14  # that are copied at a time: the copy stays in the cache
+IN_CACHE = 1 << 14  # rows that are copied at a time: the copy stays in the cache
 
 
-def terms(A: sp.csr_array, x: Array) -> Array:
-    """|A| |x|, the size of the terms of A x, without a second matrix of that size."""
+def terms(A: sp.csr_array, x: Array, rows: int = IN_CACHE) -> Array:
+    """|A| |x| (m,), the size of the terms of A x, without a second matrix of that size.
+
+    Parameters
+    ----------
+    A : sparse (m, n)
+    x : ndarray (n,) or (n, k)
+        With k columns the result is (m, k).
+    rows : int
+        Rows that are copied at a time.
+    """
     x = np.abs(x)
-    parts = [abs(A[start : start + ROWS]) @ x for start in range(0, A.shape[0], ROWS)]
+    parts = [abs(A[start : start + rows]) @ x for start in range(0, A.shape[0], rows)]
     return np.concatenate([np.zeros((0, *x.shape[1:])), *parts])
 
 

@@ -1,20 +1,11 @@
-"""Semismooth Newton = primal-dual active set for convex quadratic programs.
+"""Quadratic programs for users with matrices of their own: checked, factorised by SciPy, solved.
 
-The discrete problems HH81 (P_1h), (P_2h) in algebraic form: minimise 1/2 y'Ky - b'y subject to
-R y <= g. The Newton derivative of force - max(0, force + c (R y - g)) turns every step into one
-linear system for the current active set; when the set repeats, the iterate is the exact
-minimiser (Hintermueller, Ito, Kunisch 2002, SIAM J. Optim. 13:865). The method alone can cycle
-on positive definite problems that are not M-matrices; the block pivoting safeguard of Judice
-and Pires (1994, Comput. Oper. Res. 21:587) makes it finite for all of them.
-
-A positive semidefinite matrix, of bodies that supports do not hold, is met by exact proximal
-steps (Rockafellar 1976, SIAM J. Control Optim. 14:877): they end where the proximal force vanishes.
-
-This module knows matrices only.
+The discrete problems HH81 (P_1h), (P_2h) in algebraic form; `active_set` holds the method.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TypeAlias
 
 import numpy as np
@@ -22,10 +13,12 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 from scipy.sparse.linalg import splu
 
-from ..arrays import Array, Mask, Solve
+from ..arrays import Array, Factor, Mask, Solve
 from .active_set import minimise
 from .quadratic_program import Iterate, QuadraticProgram
-from .schur_complement import BorderedSystems
+from .schur_complement import bordered_systems
+
+SYMMETRIC = 1e-10  # difference of A and its transpose, relative to the largest entry
 
 Matrix: TypeAlias = sp.sparray | sp.spmatrix | ArrayLike  # a dense one may be a list of rows
 
@@ -52,6 +45,48 @@ def _vector(name: str, v: object, size: int) -> Array:
     if not np.isfinite(v).all():
         raise ValueError(f"{name} has entries that are NaN or infinite; all must be finite numbers")
     return v
+
+
+def _factor(K: sp.csr_array) -> Factor:
+    """Factorisation of the whole of K, all of whose unknowns are free."""
+
+    def factor(free: Mask) -> Solve:
+        lu = splu(
+            K.tocsc(),
+            permc_spec="MMD_AT_PLUS_A",
+            diag_pivot_thresh=0.0,
+            options={"SymmetricMode": True},
+        )
+        if (lu.U.diagonal() <= 0).any() or (lu.perm_r != lu.perm_c).any():
+            raise ValueError("A is not positive definite; all its eigenvalues must be positive")
+        return lu.solve
+
+    return factor
+
+
+def _program(
+    A: Matrix, f: ArrayLike, B: Matrix, g: ArrayLike, E: Matrix | None, e: ArrayLike | None
+) -> QuadraticProgram:
+    """The program, inequalities before equations, of data that are checked here."""
+    K = _matrix("A", A, None)
+    n = K.shape[1]
+    if K.shape[0] != n:
+        raise ValueError(f"A has shape {K.shape}; it must be square")
+    if abs(K - K.T).max() > SYMMETRIC * abs(K).max():
+        raise ValueError("A is not symmetric; it must equal its transpose")
+    rows, equations = _matrix("B", B, n), sp.csr_array((0, n)) if E is None else _matrix("E", E, n)
+    (m, _), (k, _) = rows.shape, equations.shape
+    load, bounds = _vector("f", f, n), _vector("g", g, m)
+    values = _vector("e", np.zeros(0) if e is None else e, k)
+    return QuadraticProgram(
+        K=K,
+        b=load,
+        R=sp.vstack([rows, equations], format="csr"),
+        g=np.concatenate([bounds, values]),
+        equality=np.arange(m + k) >= m,
+        fixed=np.zeros(n, dtype=bool),
+        values=np.zeros(n),
+    )
 
 
 def solve_qp(
@@ -103,48 +138,12 @@ def solve_qp(
     >>> result.u.round(12).tolist(), result.force.round(12).tolist(), result.steps
     ([0.25, 1.0], [1.5], [1, 0])
     """
-    K = _matrix("A", A, None)
-    n = K.shape[1]
-    if K.shape[0] != n:
-        raise ValueError(f"A has shape {K.shape}; it must be square")
-    if abs(K - K.T).max() > 1e-10 * abs(K).max():
-        raise ValueError("A is not symmetric; it must equal its transpose")
-    rows, equations = _matrix("B", B, n), sp.csr_array((0, n)) if E is None else _matrix("E", E, n)
-    (m, _), (k, _) = rows.shape, equations.shape
-    load, bounds = _vector("f", f, n), _vector("g", g, m)
-    values = _vector("e", np.zeros(0) if e is None else e, k)
+    program = _program(A, f, B, g, E, e)
+    m = np.count_nonzero(~program.equality)
     start = np.zeros(m, dtype=bool) if active is None else np.asarray(active)
     if start.shape != (m,) or start.dtype != bool:
         raise ValueError(f"active is {active!r}; it must be {m} booleans, one per row of B")
-
-    def factor(free: Mask) -> Solve:
-        lu = splu(
-            K.tocsc(),
-            permc_spec="MMD_AT_PLUS_A",
-            diag_pivot_thresh=0.0,
-            options={"SymmetricMode": True},
-        )
-        if (lu.U.diagonal() <= 0).any() or (lu.perm_r != lu.perm_c).any():
-            raise ValueError("A is not positive definite; all its eigenvalues must be positive")
-        return lu.solve
-
-    program = QuadraticProgram(
-        K=K,
-        b=load,
-        R=sp.vstack([rows, equations], format="csr"),
-        g=np.concatenate([bounds, values]),
-        equality=np.arange(m + k) >= m,
-        fixed=np.zeros(n, dtype=bool),
-        values=np.zeros(n),
-    )
-    first = np.concatenate([start, np.zeros(k, dtype=bool)])
-    result = minimise(BorderedSystems(program, factor), first)
-    return Iterate(
-        u=result.u,
-        force=result.force[:m],
-        multiplier=result.force[m:],
-        active=result.active[:m],
-        steps=result.steps,
-        factorizations=result.factorizations,
-        back_solves=result.back_solves,
-    )
+    first = np.concatenate([start, program.equality[m:]])
+    result = minimise(bordered_systems(program, _factor(program.K)), first)
+    force, multiplier = np.split(result.force, [m])
+    return replace(result, force=force, multiplier=multiplier, active=result.active[:m])

@@ -27,7 +27,7 @@ from drivers.benchmark.scenes.reading import contact_end, peak, weights
 from drivers.benchmark.scenes.triangles import forces, sides, which
 from drivers.benchmark.studies import growth, large, stages
 from ngcontact import adapt
-from ngcontact.discrete import linear_systems
+from ngcontact.discrete import MULTIGRID
 
 COMMON = {"disc": disc(), "block": block()}
 QUANTITIES = ("force", "peak", "half_width", "energy")
@@ -225,7 +225,7 @@ def test_forces_of_a_uniform_strain():
 
 
 def test_large_problems_take_the_path_asked_for(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(linear_systems, "LARGE", linear_systems.LARGE)  # measurements set another
+    monkeypatch.setattr(MULTIGRID, "large", MULTIGRID.large)  # measurements set another
     rows = [large.measure("block", 1, 20_000, path) for path in large.PATHS]
     assert len({row.unknowns for row in rows}) == 1
     assert all(row.seconds > 0 and row.memory > 0 for row in rows)

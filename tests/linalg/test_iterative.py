@@ -1,174 +1,120 @@
-"""Large systems by multigrid: the minimisers that factorisations give, and when they step in."""
+"""Iterative systems of one program: minimisers, work, and what sends them to a factorisation."""
 
 from __future__ import annotations
 
 import logging
-from dataclasses import replace
 
-import ngsolve as ng
 import numpy as np
 import pytest
 
-from drivers.benchmark.studies.linear import uniform_mesh
-from drivers.reference import cases
-from ngcontact import Elastic, Solution, adapt, solve
-from ngcontact.adaptivity.refinement import refined
-from ngcontact.discrete import linear_systems
-from ngcontact.discrete.discrete_problem import minimise_energy
-from ngcontact.linalg import coarse_spaces, iterative
-from ngcontact.mesh.generation import first_mesh
-from ngcontact.qp.schur_complement import BorderedSystems
-from tests.scenes import REFINED
-
-ORDERS = (1, 2, 3, 4)
+from ngcontact.linalg.iterative import Limits, iterative_systems
+from ngcontact.linalg.multigrid import truncated_multigrid
+from ngcontact.linalg.sparse import cholesky, congruent
+from ngcontact.qp import Anchor, Iterate, bordered_systems, minimise
+from tests.scenes import REFINED, discrete, steps_of
 
 
-@pytest.fixture
-def large(monkeypatch):
-    """Every size is a large one, down to coarsest spaces of a few hundred unknowns."""
-    monkeypatch.setattr(linear_systems, "LARGE", dict.fromkeys(ORDERS, 0))
-    monkeypatch.setattr(coarse_spaces, "COARSEST", 300)
+class Scene:
+    """One program, its factorisation, its multigrid, and how often that was made."""
+
+    def __init__(self, name: str, order: int, rounds: int, maxh: float = 0.5) -> None:
+        self.problem = discrete(REFINED[name], order, rounds, maxh)
+        self.program = self.problem.program
+        space = self.problem.space
+        _, self.matrix = congruent(space.matrix, space.A, space.basis @ self.problem.basis.T)
+        self.factor = cholesky(self.matrix)
+        self.made = 0
+
+    def prepare(self, free):
+        self.made += 1
+        return truncated_multigrid(self.matrix, steps_of(self.problem, 300), free)
+
+    def systems(self, limits: Limits | None = None):
+        return iterative_systems(self.program, self.factor, self.prepare, limits)
+
+    def direct(self) -> Iterate:
+        return minimise(bordered_systems(self.program, self.factor))
 
 
-def direct(*args, **options) -> Solution:
-    """The same by factorisation."""
-    known, linear_systems.LARGE = linear_systems.LARGE, {}
-    try:
-        return solve(*args, **options)
-    finally:
-        linear_systems.LARGE = known
-
-
-def same(one: Solution, other: Solution) -> None:
-    """Both solve the same discrete problem, to the digits that its condition leaves."""
+def same(one: Iterate, other: Iterate) -> None:
+    """Both solve the same program, to the digits that its condition leaves."""
     np.testing.assert_array_equal(one.active, other.active)
     # Measured 1e-13 to 5e-12 at 1e5 unknowns.
-    u, v = (s.displacement.vec.FV().NumPy() for s in (one, other))
-    np.testing.assert_allclose(u, v, rtol=0, atol=1e-10 * np.abs(v).max())
+    np.testing.assert_allclose(one.u, other.u, rtol=0, atol=1e-10 * np.abs(other.u).max())
     np.testing.assert_allclose(one.force, other.force, rtol=0, atol=1e-10 * other.force.max())
-    # Round-off: as small as the direct ones.
-    assert all(one.residuals[name] < 1e-12 for name in one.residuals)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("name", REFINED)
-def test_solutions_are_those_of_a_factor(large, name: str, order: int):
-    problem = REFINED[name]
-    mesh = uniform_mesh(problem, order, 6000)
-    solution = solve(problem, mesh, order=order)
-    assert len(solution.steps) > 2
-    assert solution.work["factorizations"] == 0
-    assert solution.work["back_solves"] > 10
-    same(solution, direct(problem, mesh, order=order))
 
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", REFINED)
-def test_adaptive_meshes(large, name: str, order: int):
-    *_, solution = adapt(REFINED[name], order=order, max_dofs=6000)
-    assert solution.work["factorizations"] == 0
-    same(solution, direct(REFINED[name], solution.mesh, order=order))
+def test_minimisers_are_those_of_a_factor(name: str, order: int):
+    scene = Scene(name, order, 4 - order)
+    start = np.arange(len(scene.program.g)) % 2 == 0  # no motion is free from there
+    result = minimise(scene.systems(), start)
+    assert result.factorizations == 0
+    assert result.back_solves > 10
+    same(result, scene.direct())
 
 
-def test_another_load_assembles_nothing(large):
-    problem = cases.disc_on_rigid_plane()
-    first = solve(problem, uniform_mesh(problem, 2, 6000), order=2)
-    deeper = replace(problem, displacement={"top": (None, -0.006)})
-    second = solve(deeper, first.mesh, order=2, start=first)
-    assert (second.work["assemblies"], second.work["factorizations"]) == (0, 0)
-    assert second.discrete.systems is first.discrete.systems
-    same(second, direct(deeper, first.mesh, order=2))
-    first.discrete.systems.forget()
-    assert first.discrete.systems.multigrid is None
-    same(solve(problem, first.mesh, order=2, start=second), first)
-
-
-def test_new_coarse_matrices_where_old_ones_are_slow(large, monkeypatch):
-    problem = REFINED["block"]
-    mesh = uniform_mesh(problem, 1, 6000)
-    made, prepared = [], linear_systems.coarsenings
-    monkeypatch.setattr(linear_systems, "coarsenings", lambda *a: made.append(1) or prepared(*a))
+def test_new_coarse_matrices_where_old_ones_are_slow():
+    scene = Scene("disc", 1, 4)
     counts = []
     for dear in (0, 10**6):
-        monkeypatch.setattr(iterative, "DEAR", dear)
-        made.clear()
-        solution = solve(problem, mesh)
-        same(solution, direct(problem, mesh))
-        counts.append((len(made), solution.work["back_solves"]))
+        scene.made = 0
+        result = minimise(scene.systems(Limits(dear=dear)))
+        same(result, scene.direct())
+        counts.append((scene.made, result.back_solves))
     (often, few), (once, many) = counts
     assert once == 1
     assert often > 1
     assert few < many
 
 
-@pytest.mark.parametrize(("name", "value"), [("MOST", 1), ("RESTARTS", 0)])
-def test_systems_that_stall_are_factorised(large, monkeypatch, caplog, name: str, value: int):
+@pytest.mark.parametrize("limits", [Limits(most=1), Limits(restarts=0)])
+def test_systems_that_stall_are_factorised(caplog, limits: Limits):
     """In a Newton step, and in the last refinement."""
-    problem = REFINED["disc"]
-    mesh = uniform_mesh(problem, 1, 3000)
-    monkeypatch.setattr(iterative, name, value)
+    scene = Scene("disc", 1, 3)
     with caplog.at_level(logging.INFO, logger="ngcontact"):
-        solution = solve(problem, mesh)
-    assert "the matrix is factorised: " in caplog.text
-    assert solution.work["factorizations"] > 0
-    same(solution, direct(problem, mesh))
-
-
-def test_nearly_incompressible_bodies(large):
-    """Gauss-Seidel sweeps are slow there: that is seen soon."""
-    stiff = Elastic(E=1.0, nu=0.4999)
-    problem = replace(REFINED["disc on block"], materials={"disc": stiff, "block": stiff})
-    mesh = uniform_mesh(problem, 2, 3000)
-    solution = solve(problem, mesh, order=2)
-    assert solution.work["factorizations"] > 0
-    known = direct(problem, mesh, order=2)
-    np.testing.assert_array_equal(solution.active, known.active)
-    assert solution.work["back_solves"] <= known.work["back_solves"] + 30
-
-
-def test_motions_that_no_contact_resists_ask_for_a_factor(large):
-    """The block's upper body is held by contact alone; with no point active it falls."""
-    problem = REFINED["block"]
-    solution = solve(problem, uniform_mesh(problem, 2, 3000), order=2)
-    assert solution.discrete.program.null_space.pins.size > 0
-    assert solution.work["factorizations"] == 0
-    result = minimise_energy(solution.discrete, np.zeros_like(solution.active))
+        result = minimise(scene.systems(limits))
+    assert caplog.text.count("the matrix is factorised: ") == 1
     assert result.factorizations > 0
-    np.testing.assert_array_equal(result.active, solution.active)
-    u = solution.minimiser.u
-    np.testing.assert_allclose(result.u, u, rtol=0, atol=1e-10 * np.abs(u).max())
+    same(result, scene.direct())
 
 
-def test_without_coarser_spaces_there_is_a_factor(large):
-    problem = REFINED["block"]
-    mesh = first_mesh(problem, 0.1)
-    assert type(solve(problem, mesh).discrete.systems) is BorderedSystems
-    # Degree 1 on the same mesh has a quarter of the unknowns.
-    solution = solve(problem, mesh, order=2)
-    assert solution.work["factorizations"] == 0
-    same(solution, direct(problem, mesh, order=2))
+def test_proximal_terms_are_factorised_for_good(caplog):
+    scene = Scene("block", 1, 3)
+    pins = scene.program.null_space.pins
+    assert pins.size
+    anchor = Anchor(scene.program.diagonal[pins], np.zeros(pins.size))
+    systems, active = scene.systems(), np.ones(len(scene.program.g), dtype=bool)
+    with caplog.at_level(logging.INFO, logger="ngcontact"):
+        found = systems.refine(active, anchor)
+        systems.refine(active, anchor)
+        systems.solve(active)
+    assert caplog.text.count("the matrix is factorised: motions") == 1
+    assert (scene.made, systems.factorizations) == (0, 1)
+    for one, other in zip(
+        found, bordered_systems(scene.program, scene.factor).refine(active, anchor), strict=True
+    ):
+        np.testing.assert_array_equal(one, other)
 
 
-def test_small_problems_are_factorised():
-    problem = REFINED["block"]
-    assert (
-        type(solve(problem, uniform_mesh(problem, 2, 3000), order=2).discrete.systems)
-        is BorderedSystems
-    )
-
-
-def test_physical_elements_on_curves_are_factorised(large):
-    problem = REFINED["disc"]
-    mesh = refined(problem, refined(problem, first_mesh(problem, 0.3)))
-    solution = solve(problem, mesh, element="physical")
-    assert solution.work["factorizations"] > 0
-
-
-def test_a_mesh_refined_in_place(large):
-    problem = REFINED["block"]
-    mesh = ng.Mesh(first_mesh(problem, 0.3).ngmesh.Copy())
-    for _ in range(3):
-        mesh.Refine()
-    solution = solve(problem, mesh)
-    assert solution.work["factorizations"] == 0
-    same(solution, direct(problem, mesh))
+def test_systems_may_be_refined_in_any_order():
+    """Without `solve` before, or after that of another set: the same solution."""
+    scene = Scene("disc on block", 1, 2)
+    m = len(scene.program.g)
+    one, other = np.arange(m) < m // 2, np.arange(m) > m // 3
+    known, systems = bordered_systems(scene.program, scene.factor), scene.systems()
+    for active in (one, other, one):
+        u, force = systems.refine(active)
+        right, forces = known.refine(active)
+        np.testing.assert_allclose(u, right, rtol=0, atol=1e-10 * np.abs(right).max())
+        np.testing.assert_allclose(force, forces, rtol=0, atol=1e-10 * np.abs(forces).max())
+        systems.solve(one)
+    assert scene.made == 1
+    systems.forget()
+    systems.restart(scene.program)
+    assert systems.back_solves == 0
+    u, _ = systems.refine(one)
+    right, _ = known.refine(one)
+    np.testing.assert_allclose(u, right, rtol=0, atol=1e-10 * np.abs(right).max())
+    assert scene.made == 2

@@ -10,22 +10,15 @@ import pytest
 import scipy.sparse as sp
 
 from ngcontact.linalg.sparse import cholesky, congruent, lower_half, shared
-from ngcontact.qp import optimality
-from ngcontact.qp.optimality import terms
 
 SIZE = 40
 
 
-def sparse(rng, shape, density):
-    """Random entries at random places."""
-    return sp.csr_array(np.where(rng.random(shape) < density, rng.random(shape), 0.0))
-
-
 def definite(rng, size=SIZE):
     """Sparse, symmetric, diagonally dominant."""
-    X = sparse(rng, (size, size), 4 / size)
+    X = sp.random(size, size, density=4 / size, random_state=rng)
     K = X + X.T
-    return (K + sp.diags_array(1 + abs(K).sum(axis=1))).tocsr()
+    return (K + sp.diags(1 + np.asarray(abs(K).sum(axis=1)).ravel())).tocsr()
 
 
 def for_ngsolve(K):
@@ -35,7 +28,7 @@ def for_ngsolve(K):
 
 @pytest.mark.parametrize("shape", [(SIZE, SIZE), (SIZE, 7)])
 def test_same_values_in_the_same_memory(shape):
-    K = sparse(np.random.default_rng(0), shape, 0.2)
+    K = sp.random(*shape, density=0.2, random_state=np.random.default_rng(0)).tocsr()
     owner = for_ngsolve(K)
     view = shared(owner)
     np.testing.assert_array_equal(view.toarray(), K.toarray())
@@ -61,7 +54,7 @@ def test_congruent_matrices(changed):
     A = for_ngsolve(definite(rng))
     T = np.eye(SIZE)
     T[rng.permutation(SIZE)[:changed]] += rng.normal(size=(changed, SIZE))
-    K, total = congruent(A, shared(A), sp.csr_array(T))
+    K, total = congruent(A, shared(A), sp.csr_matrix(T))
     expected = T.T @ shared(A).toarray() @ T
     # Sums of at most SIZE^2 terms: 1e-13 is round-off.
     np.testing.assert_allclose(K.toarray(), expected, atol=1e-13 * np.abs(expected).max())
@@ -77,21 +70,11 @@ def test_congruent_matrices(changed):
 def test_congruent_matrix_of_fewer_unknowns():
     rng = np.random.default_rng(3)
     A = for_ngsolve(definite(rng))
-    T = sp.csr_array(rng.normal(size=(SIZE, 5)))
+    T = sp.csr_matrix(rng.normal(size=(SIZE, 5)))
     K, lower = congruent(A, shared(A), T)
     expected = T.T @ shared(A).toarray() @ T
     np.testing.assert_allclose(K.toarray(), expected, atol=1e-13 * np.abs(expected).max())
     np.testing.assert_array_equal(shared(lower).toarray(), np.tril(K.toarray()))
-
-
-@pytest.mark.parametrize("columns", [(), (3,)])
-@pytest.mark.parametrize("rows", [1, SIZE - 1, SIZE, 7])
-def test_size_of_terms(monkeypatch, columns, rows):
-    monkeypatch.setattr(optimality, "ROWS", rows)
-    rng = np.random.default_rng(4)
-    A, x = definite(rng) - 2 * sp.eye_array(SIZE), rng.normal(size=(SIZE, *columns))
-    expected = np.abs(A.toarray()) @ np.abs(x)
-    np.testing.assert_allclose(terms(A.tocsr(), x), expected, rtol=1e-14)
 
 
 def test_factorisation_of_principal_parts():

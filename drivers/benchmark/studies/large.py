@@ -19,7 +19,7 @@ from drivers.benchmark.studies.growth import Process, apart, peak_memory
 from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.command_line import Count, Order, run
 from ngcontact import solve
-from ngcontact.discrete import linear_systems
+from ngcontact.discrete import MULTIGRID
 
 SIZES = (100_000, 300_000, 1_000_000, 3_000_000)
 ORDERS = (1, 2)
@@ -65,7 +65,7 @@ def measure(name: Name, order: Order, size: Count, path: Solver) -> Large:
     """
     problem = COMMONS[name]().problem
     mesh = uniform_mesh(problem, order, size)
-    linear_systems.LARGE = {order: PATHS[path]}
+    MULTIGRID.large = {order: PATHS[path]}
     start = time.perf_counter()
     solution = solve(problem, mesh, order=order)
     seconds = time.perf_counter() - start

@@ -1,0 +1,87 @@
+"""Rigid motions in a program: what resists them, pins, contact as the only hold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from ngcontact.qp.active_set import minimise
+from ngcontact.qp.null_space import (
+    echelon,
+    no_null_space,
+    pinned_null_space,
+    vanishing_combinations,
+)
+from ngcontact.qp.schur_complement import bordered_systems
+from tests.qp.programs import counting_factor, first_unknowns_bounded
+
+SPRINGS = 6
+
+
+def test_combinations_that_vanish():
+    """Columns x, y, x + y and 2 x of a few points: two combinations are zero."""
+    rng = np.random.default_rng(0)
+    x, y = rng.normal(size=(2, 9))
+    resisted = np.column_stack([x, y, x + y, 2 * x])
+    found = vanishing_combinations(resisted)
+    assert found.shape == (4, 2)
+    assert np.linalg.matrix_rank(found) == 2
+    np.testing.assert_allclose(resisted @ found, 0, atol=1e-14)  # sums of four numbers of size 1
+    assert vanishing_combinations(np.eye(3)).shape == (3, 0)
+    assert vanishing_combinations(np.zeros((0, 2))).tolist() == [[1, 0], [0, 1]]
+    assert vanishing_combinations(np.zeros((5, 0))).shape == (0, 0)
+
+
+def test_echelon_form_spans_the_same():
+    rng = np.random.default_rng(1)
+    vectors = rng.normal(size=(7, 3))
+    form = echelon(vectors)
+    unit_rows = (np.count_nonzero(form, axis=1) == 1) & (form.max(axis=1) == 1)
+    assert np.count_nonzero(unit_rows) >= 3
+    assert np.linalg.matrix_rank(np.column_stack([vectors, form]), tol=1e-12) == 3
+
+
+def chain(load, g):
+    """Springs in a row that nothing holds but bounds at their first two joints."""
+    n = SPRINGS + 1
+    D = np.diff(np.eye(n), axis=0)
+    fixed = np.zeros(n, dtype=bool)
+    rows = np.arange(len(g))
+    null_space = pinned_null_space(np.ones((n, 1)), np.zeros((1, 0)), np.zeros((0, n)), rows, fixed)
+    return first_unknowns_bounded(sp.csr_array(D.T @ D), load, np.array(g), null_space)
+
+
+@pytest.mark.parametrize("start", [False, True])
+def test_contact_alone_holds_a_chain(start):
+    """Pushed at its far end it moves until the first joint meets its bound: no spring is left."""
+    load = np.zeros(SPRINGS + 1)
+    load[-1] = 1.0
+    program = chain(load, [0.3, 5.0])
+    assert program.null_space.pins.size == 1
+    systems = bordered_systems(program, counting_factor(program.K, []))
+    result = minimise(systems, np.full(2, start))
+    np.testing.assert_allclose(result.u, 0.3 + np.arange(SPRINGS + 1), rtol=1e-12)
+    np.testing.assert_allclose(result.force, [1, 0], atol=1e-12)  # condition of the chain: 50
+    assert result.active.tolist() == [True, False]
+    assert systems.factorizations == 1
+
+
+def test_motions_that_nothing_resists_obey_their_conditions():
+    """No bounds at all, a load in equilibrium: the mean of the displacement is zero."""
+    n = SPRINGS + 1
+    D = np.diff(np.eye(n), axis=0)
+    ones, none = np.ones((n, 1)), np.zeros(0, dtype=np.intp)
+    null_space = pinned_null_space(ones, np.eye(1), ones.T / n, none, np.zeros(n, dtype=bool))
+    assert (null_space.held.size, null_space.pins.size) == (1, 0)
+    load = np.zeros(n)
+    load[[0, -1]] = -1.0, 1.0
+    program = first_unknowns_bounded(sp.csr_array(D.T @ D), load, np.zeros(0), null_space)
+    result = minimise(bordered_systems(program, counting_factor(program.K, [])))
+    np.testing.assert_allclose(result.u, np.arange(n) - SPRINGS / 2, atol=1e-13)
+
+
+def test_a_definite_matrix_has_no_null_space():
+    null_space = no_null_space(4)
+    assert null_space.others.shape == null_space.lineal.shape == (4, 0)
+    assert null_space.resisted(np.zeros(0, dtype=np.intp))

@@ -1,0 +1,142 @@
+"""Systems by few factorisations: bordering is exact, remembers, forgets, keeps one factor."""
+
+from __future__ import annotations
+
+import weakref
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from ngcontact.qp.active_set import minimise
+from ngcontact.qp.schur_complement import bordered_systems
+from ngcontact.qp.solving import solve_qp
+from tests.qp.programs import counting_factor, first_unknowns_bounded, inequalities, membrane
+
+
+def test_one_factorisation_at_a_time():
+    rng = np.random.default_rng(7)
+    X = rng.normal(size=(12, 14))
+    program = first_unknowns_bounded(sp.csr_array(X @ X.T), rng.normal(size=12), rng.normal(size=6))
+    dense = counting_factor(program.K, [])
+    alive: weakref.WeakSet[Callable] = weakref.WeakSet()
+    before = []
+
+    def factor(free):
+        before.append(len(alive))
+        solve = dense(free)
+        alive.add(solve)
+        return solve
+
+    minimise(bordered_systems(program, factor, border=0), np.ones(6, dtype=bool))
+    assert len(before) > 1
+    assert not any(before)
+
+
+@pytest.mark.parametrize("border", [0, 5, 1000])
+def test_bordering_equals_refactorising(border):
+    """Unit rows: bordered systems give the solution that a new factor for each set gives."""
+    K, b, g = membrane()
+    n = g.size
+    flip = sp.eye_array(n, format="csr")
+    program = first_unknowns_bounded(K, -b, g)
+    calls = []
+    start = np.zeros(n, dtype=bool)
+    start[::2] = True
+    result = minimise(bordered_systems(program, counting_factor(K, calls), border), start)
+    reference = solve_qp(K, -b, flip, g)
+    np.testing.assert_array_equal(result.active, reference.active)
+    np.testing.assert_allclose(result.u, reference.u, rtol=1e-11)
+    np.testing.assert_allclose(result.force, reference.force, atol=1e-11 * reference.force.max())
+    assert len(calls) == result.factorizations
+    if border == 1000:
+        assert result.factorizations == 1
+    # Free boundary of -u'' = -1 over the obstacle -0.02: contact where x is in [0.2, 0.8].
+    contact = np.flatnonzero(result.active) + 1
+    assert abs(contact[0] / (n + 1) - 0.2) <= 1 / (n + 1)
+    assert abs(contact[-1] / (n + 1) - 0.8) <= 1 / (n + 1)
+
+
+@pytest.mark.parametrize("stiffness", [1e-9, 1.0, 2.1e11])
+def test_bordered_systems_do_not_depend_on_the_stiffness(stiffness):
+    """Added rows border with compliances, released rows with stiffnesses: both must count."""
+    rng = np.random.default_rng(5)
+    n, m = 12, 6
+    for _ in range(50):
+        X = rng.normal(size=(n, n + 2))
+        K, b, g = sp.csr_array(X @ X.T), rng.normal(size=n), 0.3 * rng.normal(size=m)
+        rows = sp.eye_array(n, format="csr")[:m]
+        program = first_unknowns_bounded(stiffness * K, stiffness * b, g)
+        result = minimise(
+            bordered_systems(program, counting_factor(program.K, [])), rng.random(m) < 0.5
+        )
+        reference = solve_qp(K, b, rows, g)
+        np.testing.assert_array_equal(result.active, reference.active)
+        # Condition of these matrices up to 1e5: round-off 1e-10.
+        np.testing.assert_allclose(result.u, reference.u, atol=1e-9)
+
+
+def random_bounds(seed):
+    rng = np.random.default_rng(seed)
+    X = rng.normal(size=(12, 14))
+    return first_unknowns_bounded(sp.csr_array(X @ X.T), rng.normal(size=12), rng.normal(size=6))
+
+
+def test_systems_may_be_refined_in_any_order():
+    """Without `solve` before, after that of another set, twice: the same solution."""
+    program = random_bounds(8)
+    one, other = np.arange(6) < 2, np.arange(6) > 3
+    expected = {}
+    for active in (one, other):
+        systems = bordered_systems(program, counting_factor(program.K, []))
+        systems.solve(active)
+        expected[active.tobytes()] = systems.refine(active)
+    systems = bordered_systems(program, counting_factor(program.K, []))
+    for active in (one, other, other, one):
+        for found, right in zip(systems.refine(active), expected[active.tobytes()], strict=True):
+            # Condition of the matrix up to 1e4, entries of size 1.
+            np.testing.assert_allclose(found, right, rtol=0, atol=1e-11)
+        systems.solve(one)
+
+
+def test_another_load_costs_no_factorisation():
+    program, calls = random_bounds(9), []
+    systems = bordered_systems(program, counting_factor(program.K, calls))
+    minimise(systems)
+    assert systems.factorizations == len(calls) == 1
+    other = replace(program, b=-program.b, g=0.5 * program.g)
+    systems.restart(other)
+    result = minimise(systems)
+    assert (result.factorizations, len(calls)) == (0, 1)
+    assert 0 < result.back_solves < 12
+    reference = minimise(bordered_systems(other, counting_factor(program.K, [])))
+    np.testing.assert_array_equal(result.active, reference.active)
+    np.testing.assert_allclose(result.u, reference.u, rtol=0, atol=1e-11)  # condition up to 1e4
+
+
+def test_what_is_forgotten_is_factorised_again():
+    program, calls = random_bounds(10), []
+    systems = bordered_systems(program, counting_factor(program.K, calls))
+    first = minimise(systems)
+    systems.forget()
+    systems.restart(program)
+    again = minimise(systems)
+    assert len(calls) == 2
+    np.testing.assert_array_equal(again.u, first.u)
+    np.testing.assert_array_equal(again.force, first.force)
+
+
+def test_stiffness_of_rows_bounds_their_forces():
+    """Unit rows: the diagonal. Others: the inverse of the compliance, once a row was met."""
+    program = random_bounds(11)
+    systems = bordered_systems(program, counting_factor(program.K, []))
+    np.testing.assert_array_equal(systems.stiffness(), program.K.diagonal()[:6])
+    general = inequalities(program.K, program.b, program.R, program.g)
+    systems = bordered_systems(general, counting_factor(program.K, []))
+    assert np.isinf(systems.stiffness()).all()
+    systems.solve(np.arange(6) == 2)
+    compliance = np.linalg.inv(program.K.toarray())[2, 2]
+    assert systems.stiffness()[2] == pytest.approx(1 / compliance, rel=1e-10)
+    assert np.isinf(np.delete(systems.stiffness(), 2)).all()
