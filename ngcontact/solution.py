@@ -15,7 +15,7 @@ from .arrays import Array, Mask, root_of_squares
 from .contact import ContactState, contact_states
 from .discrete import DiscreteProblem, RigidMotion, resultants
 from .estimator import Estimate, Estimator, estimate
-from .fem import energy_norm, potential_energy, strain
+from .fem import energy_norm, model_of, potential_energy, stress_of
 from .output import plot_solution, write_solution
 from .problem import Problem
 from .qp import Iterate, kkt_residuals
@@ -69,11 +69,18 @@ class Solution:
 
     @cached_property
     def stress(self) -> ng.CoefficientFunction:
-        """In-plane stress, a (2, 2) CoefficientFunction, in any consistent units."""
-        e = strain(self.displacement)
-        law = {body: law.voigt(self.problem.model) for body, law in self.problem.materials.items()}
-        s = [self.mesh.MaterialCF({body: (C * e)[i] for body, C in law.items()}) for i in range(3)]
-        return ng.CF((s[0], s[2], s[2], s[1]), dims=(2, 2))
+        """In-plane stress, a (2, 2) CoefficientFunction, any consistent units."""
+        return stress_of(self.problem, self.displacement)
+
+    @cached_property
+    def out_of_plane_stress(self) -> ng.CoefficientFunction:
+        """Stress normal to the plane, a scalar CoefficientFunction, any consistent units.
+
+        nu (xx + yy) in plane strain, where for a general `Hooke` law, which does not tell it, 0 is
+        taken; 0 in plane stress.
+        """
+        model = model_of(self.problem)
+        return model.out_of_plane(self.problem.materials, self.mesh, self.stress)
 
     @cached_property
     def pairs(self) -> list[ContactState]:

@@ -15,7 +15,7 @@ from scipy.optimize import linprog, nnls
 
 from ..arrays import Array, Mask
 from ..errors import NoEquilibriumError
-from ..fem import LOAD_BONUS, Space, load_vector
+from ..fem import LOAD_BONUS, Space, load_vector, model_of
 from ..mesh import cad_edges
 from ..problem import Problem
 from ..qp import FREE, NullSpace, pinned_null_space, vanishing_combinations
@@ -84,7 +84,7 @@ def equilibrium(
     ValueError
         The elements do not contain the rotation of a free body.
     """
-    free = free_motions(space, admissible.conditions)
+    free = free_motions(space, admissible.conditions, model_of(problem).motions)
     if free is None:
         return None, space.f
     rows = np.asarray(admissible.B @ free.nodal)
@@ -197,12 +197,13 @@ def _work_of_load(problem: Problem, mesh: ng.Mesh, motion: RigidMotion) -> float
     for name, (tx, ty), turn, (cx, cy) in parts:
         z[name] = ng.CF((tx - turn * (ng.y - cy), ty + turn * (ng.x - cx)))
     moved = mesh.MaterialCF(z, default=ng.CF((0, 0)))
-    work = 0.0
+    work, model = 0.0, model_of(problem)
     for name, force in problem.force.items():
-        power = ng.InnerProduct(force, moved)
+        power = model.weighted(ng.InnerProduct(force, moved))
         work += ng.Integrate(power, mesh, definedon=mesh.Materials(name), order=LOAD_ORDER)
     for name in problem.traction:
-        power = ng.InnerProduct(problem.traction_vector(name), ng.BoundaryFromVolumeCF(moved))
+        there = ng.BoundaryFromVolumeCF(moved)
+        power = model.weighted(ng.InnerProduct(problem.traction_vector(name), there))
         work += ng.Integrate(power, mesh, definedon=mesh.Boundaries(name), order=LOAD_ORDER)
     return float(work)
 

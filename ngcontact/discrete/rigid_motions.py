@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -97,8 +98,13 @@ def connected_bodies(trace: BoundaryTrace) -> Bodies:
     )
 
 
-def unsupported(trace: BoundaryTrace, bodies: Bodies, c: Conditions) -> list[Array]:
-    """Motions (3, d) of each body - translations, rotation - that its supports leave free."""
+def unsupported(
+    trace: BoundaryTrace, bodies: Bodies, c: Conditions, motions: Sequence[bool]
+) -> list[Array]:
+    """Motions (3, d) of each body - translations, rotation - that its supports leave free.
+
+    Of those that are rigid in the model: `motions` (3,), see `Model`.
+    """
     order = trace.order + 1
     position = np.zeros((trace.space.ndof, 2))
     body = np.zeros(trace.space.ndof, dtype=np.intp)
@@ -109,7 +115,13 @@ def unsupported(trace: BoundaryTrace, bodies: Bodies, c: Conditions) -> list[Arr
     arm = (position[c.node] - bodies.middle[at]) / bodies.size[at, None]
     turn = arm[:, 0] * c.direction[:, 1] - arm[:, 1] * c.direction[:, 0]
     resisted = np.column_stack([c.direction, turn])
-    return [vanishing_combinations(resisted[at == b]) for b in range(len(bodies.names))]
+    rigid = np.flatnonzero(motions)
+    result = []
+    for b in range(len(bodies.names)):
+        free = vanishing_combinations(np.take(resisted[at == b], rigid, axis=1))
+        result.append(np.zeros((3, free.shape[1])))
+        result[-1][rigid] = free
+    return result
 
 
 def rigid_motion(bodies: Bodies, amounts: Array, multiplier: float) -> RigidMotion:
@@ -224,8 +236,12 @@ class FreeMotions:
         return rigid_motion(self.bodies, self.combinations @ amounts, multiplier)
 
 
-def free_motions(space: Space, conditions: Conditions) -> FreeMotions | None:
+def free_motions(
+    space: Space, conditions: Conditions, motions: Sequence[bool]
+) -> FreeMotions | None:
     """The rigid motions that the supports `conditions` leave free, None if there are none.
+
+    Of those that are rigid in the model: `motions` (3,), see `Model`.
 
     Raises
     ------
@@ -233,7 +249,7 @@ def free_motions(space: Space, conditions: Conditions) -> FreeMotions | None:
         The elements do not contain the rotation of a free body.
     """
     bodies = connected_bodies(space.trace)
-    free = unsupported(space.trace, bodies, conditions)
+    free = unsupported(space.trace, bodies, conditions, motions)
     if not any(x.shape[1] for x in free):
         return None
     combinations = block_diag(*free)

@@ -8,7 +8,7 @@ import ngsolve as ng
 
 from ..arrays import power_of_two
 from ..problem import Problem
-from .model import strain
+from .model import model_of
 from .space import Space
 
 CANCELLED = 1e-6  # energy relative to its terms below which fewer than ten digits are left
@@ -19,7 +19,7 @@ def potential_energy(space: Space, displacement: ng.GridFunction) -> float:
     u = displacement.vec.FV().NumPy()
     size = power_of_two(u)  # squares of displacements may leave the range where these do not
     u, f = u / size, space.f / size
-    return float(u @ (space.A @ u) / 2 - f @ u) * size * size
+    return float(u @ (space.A @ u) / 2 - f @ u) * size * size  # (2.6)
 
 
 def energy_norm(problem: Problem, space: Space, displacement: ng.GridFunction) -> float:
@@ -29,8 +29,10 @@ def energy_norm(problem: Problem, space: Space, displacement: ng.GridFunction) -
     u = u / size
     energy = float(u @ (space.A @ u))
     if energy <= CANCELLED * float(space.diagonal @ u**2):
-        e, energy = strain(displacement) / size, 0.0
+        model = model_of(problem)
+        e, energy = model.strain(displacement) / size, 0.0
         for body, law in problem.materials.items():
-            density = ng.InnerProduct(law.voigt(problem.model) * e, e).Compile()
+            stress = model.stress(law.voigt(problem.model), e)
+            density = model.weighted(ng.InnerProduct(stress, e)).Compile()
             energy += ng.Integrate(density, mesh.Materials(body), order=2 * order + 2)
     return math.sqrt(energy) * size

@@ -14,7 +14,7 @@ from ..linalg import shared
 from ..problem import Problem, varies
 from .boundary import BoundaryTrace
 from .element import node_basis, vector_space
-from .model import strain
+from .model import model_of
 
 # Loads and variable moduli may be as rough as r^(-1/2): quadrature orders above the default.
 LOAD_BONUS = 6
@@ -76,14 +76,14 @@ def _check_normals(trace: BoundaryTrace, boundary: str) -> None:
 
 def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
     """f(v) of (3.2), (2N,), with quadrature `bonus` orders above the default."""
-    v = V.TestFunction()
+    v, model = V.TestFunction(), model_of(problem)
     f = ng.LinearForm(V)
     for body, F in problem.force.items():
-        f += F * v * ng.dx(definedon=V.mesh.Materials(body), bonus_intorder=bonus)
+        work = model.weighted(F * v)  # (3.2)
+        f += work * ng.dx(definedon=V.mesh.Materials(body), bonus_intorder=bonus)
     for boundary in problem.traction:
-        P = problem.traction_vector(boundary)
-        region = V.mesh.Boundaries(boundary)
-        f += P * v.Trace() * ng.ds(definedon=region, bonus_intorder=bonus)
+        work = model.weighted(problem.traction_vector(boundary) * v.Trace())  # (3.2)
+        f += work * ng.ds(definedon=V.mesh.Boundaries(boundary), bonus_intorder=bonus)
     f.Assemble()
     return f.vec.FV().NumPy().copy()
 
@@ -99,14 +99,13 @@ def assemble(
     V = vector_space(mesh, trace.order, element)
     nodal = np.arange(len(trace.region)) if nodal is None else nodal
     u, v = V.TnT()
+    model = model_of(problem)
     a = ng.BilinearForm(V, symmetric=True)
     for body, law in problem.materials.items():
-        C = law.voigt(problem.model)
+        stress = model.stress(law.voigt(problem.model), model.strain(u))
+        work = model.weighted(ng.InnerProduct(stress, model.strain(v)))  # (3.1)
         bonus = MODULUS_BONUS if varies(law) else 0
-        region = mesh.Materials(body)
-        a += ng.InnerProduct(C * strain(u), strain(v)) * ng.dx(
-            definedon=region, bonus_intorder=bonus
-        )
+        a += work * ng.dx(definedon=mesh.Materials(body), bonus_intorder=bonus)
     for boundary in problem.traction:
         _check_normals(trace, boundary)
     a.Assemble()

@@ -89,16 +89,9 @@ def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
 
 
 def full_stress(solution: SolutionData) -> ng.CoefficientFunction:
-    """Stress components xx, yy, xy and zz, the one normal to the plane.
-
-    zz is 0 in plane stress and nu (xx + yy) in plane strain. A material without Poisson's ratio
-    ``nu`` (general Hooke) does not say what zz is in plane strain: 0 is taken there.
-    """
-    stress, zz = solution.stress, ng.CF(0.0)
-    if solution.problem.model == "plane strain":
-        nu = {body: m.nu for body, m in solution.problem.materials.items() if hasattr(m, "nu")}
-        zz = solution.mesh.MaterialCF(nu, default=0) * (stress[0, 0] + stress[1, 1])
-    return ng.CF((stress[0, 0], stress[1, 1], stress[0, 1], zz))
+    """Stress components xx, yy, xy and zz, the one normal to the plane, (4,)."""
+    stress = solution.stress
+    return ng.CF((stress[0, 0], stress[1, 1], stress[0, 1], solution.out_of_plane_stress))
 
 
 def von_mises(stress: Array) -> Array:

@@ -34,6 +34,10 @@ class SolutionData(Protocol):
         """In-plane stress (2, 2), a force per area."""
 
     @property
+    def out_of_plane_stress(self) -> ng.CoefficientFunction:
+        """Stress normal to the plane, a force per area."""
+
+    @property
     def points(self) -> Array:
         """Contact points (m, 2) before deformation, lengths."""
 

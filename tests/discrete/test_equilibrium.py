@@ -178,7 +178,7 @@ def test_bodies_that_supports_hold_cost_nothing():
     d = solution.discrete
     assert d.rigid is None
     assert d.program.null_space.held.size == d.program.null_space.pins.size == 0
-    assert free_motions(d.space, d.conditions) is None
+    assert free_motions(d.space, d.conditions, (True, True, True)) is None
 
 
 def mesh_area(solution, body):

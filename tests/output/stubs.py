@@ -12,6 +12,7 @@ import pytest
 from netgen.occ import Compound, OCCGeometry, WorkPlane, Y
 
 from ngcontact import Contact, Elastic
+from ngcontact.fem import MODELS
 
 MAXH = 0.4
 
@@ -26,6 +27,7 @@ class Stub:
     stress: Any
     points: Any
     problem: Any
+    out_of_plane_stress: Any
     estimated: bool = False
 
     def __post_init__(self):
@@ -70,4 +72,5 @@ def stub(order=3, stress=None, model="plane strain", materials=None, mesh=None, 
     points = np.column_stack([np.cos(angle), 1 + np.sin(angle)])
     if stress is None:
         stress = ng.CF((ng.x, ng.y, ng.y, ng.x * ng.y), dims=(2, 2))
-    return Stub(mesh, order, u, stress, points, problem)
+    zz = MODELS[model].out_of_plane(problem.materials, mesh, stress)
+    return Stub(mesh, order, u, stress, points, problem, zz)

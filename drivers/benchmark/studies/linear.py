@@ -10,7 +10,7 @@ import numpy as np
 
 from ngcontact import Problem
 from ngcontact.adaptivity import refined
-from ngcontact.fem import strain, unknowns_of
+from ngcontact.fem import model_of, unknowns_of
 from ngcontact.mesh import curve, first_mesh
 from ngcontact.triangulation import Triangulation
 
@@ -48,10 +48,12 @@ def linear_solve(problem: Problem, mesh: ng.Mesh, order: int) -> Linear:
     y += [contact.secondary for contact in problem.contact]
     V = ng.VectorH1(mesh, order=order, dirichletx="|".join(x), dirichlety="|".join(y))
     u, v = V.TnT()
+    model = model_of(problem)
     a, f = ng.BilinearForm(V, symmetric=True), ng.LinearForm(V)
     for body, law in problem.materials.items():
-        C = law.voigt(problem.model)
-        a += ng.InnerProduct(C * strain(u), strain(v)) * ng.dx(definedon=mesh.Materials(body))
+        stress = model.stress(law.voigt(problem.model), model.strain(u))
+        work = model.weighted(ng.InnerProduct(stress, model.strain(v)))
+        a += work * ng.dx(definedon=mesh.Materials(body))
     for name in problem.traction:
         load = problem.traction_vector(name)
         f += load * v.Trace() * ng.ds(definedon=mesh.Boundaries(name))
