@@ -18,7 +18,7 @@ Factor = Callable[[Mask], Solve]
 
 
 def power_of_two(values: Array) -> float:
-    """The power of 2 below the largest of the values in size; 1 where all vanish."""
+    """The power of 2 below the largest in size of `values`, of any shape; 1 where all vanish."""
     largest = float(np.abs(values).max(initial=0.0))
     if not 0 < largest < math.inf:
         return 1.0
@@ -26,6 +26,9 @@ def power_of_two(values: Array) -> float:
 
 
 def root_of_squares(values: Array) -> float:
-    """Root of the sum of squares; the squares may be too large or too small for a float."""
+    """Root of the sum of squares of `values`, of any shape and unit.
+
+    The squares may be too large or too small for a float.
+    """
     unit = power_of_two(values)
     return unit * float(np.sqrt(((values / unit) ** 2).sum()))

@@ -31,7 +31,7 @@ def gauss_lobatto(order: int) -> Array:
 
 @lru_cache
 def gauss(order: int) -> tuple[Array, Array]:
-    """Gauss points and weights on [0, 1], exact for polynomials of degree `order`."""
+    """Gauss points (k,) and weights (k,) on [0, 1], exact for polynomials of degree `order`."""
     points, weights = legendre.leggauss(order // 2 + 1)
     return (1 + points) / 2, weights / 2
 
@@ -68,7 +68,7 @@ def lagrange(order: int, s: Array) -> Array:
 
 
 def lagrange_derivative(order: int, s: Array) -> Array:
-    """Derivatives with respect to s of the polynomials of `lagrange`, (k, order + 1)."""
+    """Derivatives (k, order + 1) of the polynomials of `lagrange` at parameters `s` (k,)."""
     powers = np.vander(2 * np.atleast_1d(s) - 1, order, increasing=True)
     factors = 2.0 * np.arange(1, order + 1)
     return (powers * factors) @ _coefficients(order)[1:]

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+SPARE = 1e-14  # share of a sum that round-off may keep from being carried
+
 
 def doerfler(indicators: NDArray[np.float64], theta: float) -> NDArray[np.bool_]:
     """Smallest set of elements that carries the share `theta` of the squared indicators.
@@ -31,6 +33,6 @@ def doerfler(indicators: NDArray[np.float64], theta: float) -> NDArray[np.bool_]
     carried = np.cumsum(squares[order])
     marked = np.zeros(len(indicators), dtype=bool)
     if carried.size and carried[-1] > 0:
-        count = np.searchsorted(carried, theta * carried[-1] * (1 - 1e-14)) + 1
+        count = np.searchsorted(carried, theta * carried[-1] * (1 - SPARE)) + 1
         marked[order[:count]] = True
     return marked

@@ -84,7 +84,7 @@ def _move_to_common_eta(
     xy = Triangulation(trace.mesh).vertices
     across = np.array([-contact.direction[1], contact.direction[0]])
     vertices = np.array(new)
-    eta = (xy[vertices] @ across).mean(axis=1)
+    eta = (xy[vertices] @ across).mean(axis=1)  # C_j of (2.10)
     region = {}
     for ends, number in zip(trace.nodes[:, [0, -1]].tolist(), trace.region.tolist(), strict=True):
         region.update(dict.fromkeys(ends, number))

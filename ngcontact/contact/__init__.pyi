@@ -1,7 +1,7 @@
 from .assembly import joined as joined
 from .assembly import kept_lines as kept_lines
 from .assembly import merged as merged
-from .corners import nodal_pressure as nodal_pressure
+from .corners import pressure_across_corners as pressure_across_corners
 from .line import ContactLine as ContactLine
 from .line import at_quadrature as at_quadrature
 from .line import contact_line as contact_line

@@ -1,4 +1,4 @@
-"""Where contact turns from binding to non-binding, inside elements and at corners.
+"""Corners of Gamma_K: two contact points at one node, one state and one pressure.
 
 A corner of Gamma_K carries two contact points, one for each side: HH81 (2.3). Both rows hold at one
 node. When it touches the corner, its force splits between the two normals, and where these are
@@ -24,7 +24,7 @@ def twins(line: ContactLine) -> Index:
 
 
 def in_contact(line: ContactLine, active: Mask) -> Mask:
-    """Active points (m,), and those open ones at corners inside the contact.
+    """Points in contact (m,): the `active` (m,) and open ones at corners inside the contact.
 
     The node touches the other side of the corner, and the next point on this side is active: one
     of the two rows is released where the node would rather slide off the corner.
@@ -39,13 +39,28 @@ def in_contact(line: ContactLine, active: Mask) -> Mask:
     return state
 
 
-def nodal_pressure(line: ContactLine, force: Array, active: Mask) -> Array:
-    """Pressure (m,) of nodal forces: force over weight, one value on both sides of a corner.
+def pressure_across_corners(line: ContactLine, force: Array, active: Mask) -> Array:
+    """Pressure (m,): force over weight, but at corners one value for both sides.
 
-    A stress that is continuous at a corner without friction has both normals as eigenvectors, so
-    that both pressures are equal unless the sides are perpendicular. Up to a turn of 45 degrees
-    they are told together, from the part of the node's force along the sum of weight times normal:
-    what a uniform pressure on both sides exerts.
+    `Solution.pressure` is force over weight everywhere, which at corners of small turns splits the
+    node's force without a meaning. A stress that is continuous at a corner without friction has
+    both normals as eigenvectors, so that both pressures are equal unless the sides are
+    perpendicular. Up to a turn of 45 degrees they are told together, from the part of the node's
+    force along the sum of weight times normal: what a uniform pressure on both sides exerts.
+
+    Parameters
+    ----------
+    line : ContactLine
+        The pair.
+    force : ndarray (m,)
+        At its points, per unit thickness.
+    active : ndarray of bool (m,)
+        Points in contact.
+
+    Returns
+    -------
+    ndarray (m,)
+        Force per unit length (P1) or per unit eta (P2).
     """
     pressure = force / line.weight
     corners = twins(line)

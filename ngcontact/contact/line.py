@@ -71,7 +71,7 @@ class ContactLine:
 def prescribed_gap(
     contact: Contact, trace: BoundaryTrace, segment: Index, s: Array, position: Array
 ) -> Array:
-    """Values (k,) of `Contact.gap` at points of the secondary."""
+    """Values (k,) of `Contact.gap`, lengths, at s (k,) of segments (k,): `position` (k, 2)."""
     if isinstance(contact.gap, ng.CoefficientFunction):
         return trace.evaluate(contact.gap, segment, s)[:, 0]
     if callable(contact.gap):
@@ -80,7 +80,7 @@ def prescribed_gap(
 
 
 def jacobian(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
-    """Change of the integration variable - arc length (P1) or eta (P2) - with s, (k,)."""
+    """Arc length (P1) or eta (P2) per s, (k,), at s (k,) of segments (k,): for integrals."""
     derivative = trace.derivative(segment, s)
     if contact.direction is None:
         return np.linalg.norm(derivative, axis=1)
@@ -194,7 +194,7 @@ def unmatched(line: ContactLine) -> Mask:
 
 
 def without(line: ContactLine, dropped: Index) -> ContactLine:
-    """The line without some of its points; the segments still face the primary."""
+    """The line without its points `dropped` (j,); the segments still face the primary."""
     m = len(line.node)
     keep = np.ones(m, dtype=bool)
     keep[dropped] = False
@@ -215,7 +215,7 @@ def at_quadrature(
     local, segment : ndarray of int (k,)
         Row of `line.rows` and segment number of each point.
     s, weight : ndarray (k,)
-        Parameter and quadrature weight in s (P1) or eta (P2).
+        Parameter, and quadrature weight in arc length (P1) or eta (P2).
     """
     s, w = gauss(order)
     inside = np.flatnonzero(line.faces)

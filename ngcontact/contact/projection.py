@@ -32,7 +32,7 @@ class Partners:
     s : ndarray (k,)
         Parameter on it.
     distance : ndarray (k,)
-        Distance along the direction, negative where the curves overlap.
+        Distance along the direction, a length; negative where the curves overlap, inf without one.
     """
 
     segment: Index
@@ -58,7 +58,7 @@ def coincident(points: Array, directions: Array, curve: Array, side: Array, orde
     ----------
     points, directions : ndarray (k, 2)
         Contact points and unit vectors towards the facing body.
-    curve, side : ndarray
+    curve, side : ndarray (q, degree + 1, 2), (q,)
         The facing segments.
     order : int
         Degree of the displacement on them.
@@ -135,7 +135,7 @@ def cast(
         Where the rays pass; both senses count, so overlapping bodies give negative distances.
     directions : ndarray (k, 2)
         Unit vectors towards the facing body.
-    curve, side : ndarray
+    curve, side : ndarray (q, degree + 1, 2), (q,)
         The facing segments.
     ahead : bool
         Only points in the sense of the direction.
@@ -185,7 +185,7 @@ def cast(
 
 
 def snap(s: Array, order: int) -> Array:
-    """Parameters moved to the Gauss-Lobatto points of degree `order` that they match."""
+    """Parameters `s` (k,) moved to Gauss-Lobatto points of degree `order` that they match, (k,)."""
     nodes = gauss_lobatto(order)
     nearest = nodes[np.abs(s[:, None] - nodes).argmin(axis=1)]
     return np.where(np.abs(s - nearest) <= MATCHED, nearest, s)

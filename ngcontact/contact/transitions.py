@@ -1,10 +1,4 @@
-"""Where contact turns from binding to non-binding, inside elements and at corners.
-
-A corner of Gamma_K carries two contact points, one for each side: HH81 (2.3). Both rows hold at one
-node. When it touches the corner, its force splits between the two normals, and where these are
-nearly parallel the split is no measure of the pressure: a part of the force across the corner
-weighs 1 / turn in it, and one of the two rows may even be open.
-"""
+"""Where contact turns from binding to non-binding, inside elements and at corners."""
 
 from __future__ import annotations
 
@@ -101,7 +95,7 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
     line : ContactLine
         The pair.
     gap : ndarray (m,)
-        At its points, after deformation.
+        At its points after deformation, lengths.
     active : ndarray of bool (m,)
         Points in contact.
     """
@@ -134,7 +128,7 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
 
 
 def ending_segments(line: ContactLine, ends: Transitions) -> Index:
-    """Numbers in `line.segments` of those in which contact ends; at corners, of those beside."""
+    """Numbers (j,) in `line.segments` where contact ends; at corners, of those beside."""
     inner = (line.rows[:, :, None] == ends.inner).any(axis=1)
     outer = (line.rows[:, :, None] == ends.outer).any(axis=1)
     both = inner & outer

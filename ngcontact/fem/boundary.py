@@ -76,16 +76,19 @@ class BoundaryTrace:
         return np.einsum("ki,kid->kd", lagrange(self.geometry_order, s), self.curve[segment])
 
     def derivative(self, segment: Index, s: Array) -> Array:
-        """Derivatives (k, 2) of `point` with respect to s."""
+        """Derivatives (k, 2) of `point` with respect to s, at s (k,) of the segments (k,)."""
         weights = lagrange_derivative(self.geometry_order, s)
         return np.einsum("ki,kid->kd", weights, self.curve[segment])
 
     def normal(self, segment: Index, s: Array) -> Array:
-        """Outward unit normals (k, 2) of the mesh's curves."""
+        """Outward unit normals (k, 2) of the mesh's curves at s (k,) of the segments (k,)."""
         return _right(self.derivative(segment, s)) * self.side[segment, None]
 
     def exact_normal(self, segment: Index, s: Array) -> Array:
-        """Outward unit normals (k, 2) of the CAD edges; of the mesh where there are none."""
+        """Outward unit normals (k, 2) of the CAD edges at s (k,) of the segments (k,).
+
+        Those of the mesh where there are no CAD edges.
+        """
         normals = self.normal(segment, s)
         if self.edges is not None:
             points = self.point(segment, s)
@@ -97,12 +100,12 @@ class BoundaryTrace:
         return normals
 
     def at_nodes(self, segments: Index) -> tuple[Index, Array]:
-        """Every node of the segments, segment by segment: (segment, s), both (k (order + 1),)."""
+        """Segment and s, both (k (order + 1),), of the nodes of segments (k,), one by one."""
         s = np.tile(gauss_lobatto(self.order), len(segments))
         return np.repeat(segments, self.order + 1), s
 
     def lengths(self, segments: Index) -> Array:
-        """Chord lengths (k,)."""
+        """Lengths (k,) of the chords of segments (k,)."""
         return np.linalg.norm(self.curve[segments, -1] - self.curve[segments, 0], axis=1)
 
     def lies_on(self, segment: Index, *patterns: str | None) -> Mask:
@@ -131,7 +134,7 @@ class BoundaryTrace:
         return points
 
     def evaluate(self, function: ng.CoefficientFunction, segment: Index, s: Array) -> Array:
-        """Values (k, dim) of a CoefficientFunction at parameters s of the segments."""
+        """Values (k, dim) of a CoefficientFunction at parameters s (k,) of the segments (k,)."""
         values = np.asarray(function(self.mesh_points(segment, s)))
         return values.reshape(len(segment), -1)
 

@@ -61,6 +61,7 @@ def _physical_basis(V: ng.FESpace, trace: BoundaryTrace) -> sp.csr_array:
     sides = xy[triangles[:, 1:]] - xy[triangles[:, :1]]
     bary = np.linalg.solve(sides.transpose(0, 2, 1), (middle - xy[triangles[:, 0]])[..., None])
     bary = np.column_stack([1 - bary.sum(axis=1), bary[..., 0]])
+    # (2.4): the linear function of x at the edge's node, less the mean of its two ends.
     value = bary - np.where((triangles[:, :, None] == trace.nodes[:, None, :]).any(axis=2), 0.5, 0)
     numbers = np.array(
         [
@@ -80,17 +81,17 @@ def _physical_basis(V: ng.FESpace, trace: BoundaryTrace) -> sp.csr_array:
 def vector_space(mesh: ng.Mesh, order: int, element: str) -> ng.FESpace:
     """Displacements on a curved mesh, as unknowns of NGSolve."""
     if element != "physical" or mesh.GetCurveOrder() == 1:
-        return ng.VectorH1(mesh, order=order)
+        return ng.VectorH1(mesh, order=order)  # (2.2); on curved elements (2.9)
     full = ng.VectorH1(mesh, order=2)
     half = full.ndof // 2
     active = np.zeros(half, dtype=bool)
     active[: mesh.nv] = True
     boundary = [el.edges[0].nr for el in mesh.Elements(ng.BND)]
-    active[mesh.nv + np.array(boundary)] = True
+    active[mesh.nv + np.array(boundary)] = True  # (2.4): what linear functions of x need
     return ng.Compress(full, active_dofs=ng.BitArray(np.tile(active, 2)))
 
 
 def node_basis(V: ng.FESpace, trace: BoundaryTrace, nodal: Index, element: str) -> sp.csr_array:
-    """`Space.basis` for node values on the segments `nodal`."""
+    """`Space.basis` (2N, 2n) for node values on the segments `nodal` (k,)."""
     scalar = _physical_basis(V, trace) if element == "physical" else nodal_basis(trace, nodal)
     return sp.block_diag([scalar, scalar], format="csr")

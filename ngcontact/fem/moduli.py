@@ -33,7 +33,7 @@ def _of_elements(problem: Problem, mesh: ng.Mesh, modulus: Callable[..., Array])
 
 
 def shear_moduli(problem: Problem, mesh: ng.Mesh) -> Array:
-    """Shear modulus (ne,) in the middle of each element."""
+    """Shear modulus (ne,) in the middle of each element, a stress."""
 
     def modulus(law: Elastic | Hooke, points: NDArray) -> Array:
         return np.asarray(law.shear_modulus(problem.model)(points)).ravel()
@@ -44,7 +44,7 @@ def shear_moduli(problem: Problem, mesh: ng.Mesh) -> Array:
 def bulk_moduli(problem: Problem, mesh: ng.Mesh) -> Array:
     """Bulk modulus (ne,) in the middle of each element: the largest kappa <= e : C e / (tr e)^2.
 
-    lambda + mu of an isotropic law in plane strain. A Schur complement in C on volumetric,
+    A stress, lambda + mu of isotropic laws in plane strain. A Schur complement in C on volumetric,
     deviatoric and shear strain, which does not cancel where C_11, C_12 and C_22 are nearly equal.
     """
 

@@ -34,7 +34,7 @@ def edge_bubbles(space: ng.FESpace) -> Array:
 
 
 def nodal_basis(trace: BoundaryTrace, segments: Index) -> sp.csr_array:
-    """Matrix (n, n) from node values on the segments and other unknowns to NGSolve's unknowns."""
+    """Matrix (n, n) from node values on `segments` (k,) and other unknowns to those of NGSolve."""
     order, size = trace.order, trace.space.ndof
     if order == 1:
         return sp.eye_array(size, format="csr")

@@ -53,7 +53,7 @@ class Space:
 
     @cached_property
     def diagonal(self) -> Array:
-        """Diagonal of A, (2N,)."""
+        """Diagonal of A, (2N,), force per displacement and unit thickness."""
         return np.asarray(self.A.diagonal())
 
     def stiffness(self) -> Array:
@@ -93,7 +93,7 @@ def assemble(
 ) -> Space:
     """Space, stiffness and load of a problem on the mesh of `trace`, curved as `element` asks.
 
-    Node values replace NGSolve's unknowns on the segments `nodal`, all when left out.
+    Node values replace NGSolve's unknowns on the segments `nodal` (k,), all when left out.
     """
     mesh = trace.mesh
     V = vector_space(mesh, trace.order, element)

@@ -19,7 +19,8 @@ SAMPLES = 65  # points of an edge from which a projection starts
 NEWTON_STEPS = 30
 MISSED = 1e-9  # distance, relative to the edge, beyond which a level counts as not reached
 UNIFORM = 1e-9  # relative change of speed along an arc of a circle
-ROUND_OFF = 1e-12  # relative to the edge's size: OCC keeps coordinates to about 1e-15
+STRAIGHT = 1e-12  # distance from the chord, relative to the edge; OCC keeps about 1e-15
+SETTLED = 1e-15  # relative change of a parameter at which Newton's method has arrived
 
 
 class CadEdge:
@@ -43,7 +44,7 @@ class CadEdge:
         self._x = self.point(self._t)
         self.size = float(np.abs(np.ptp(self._x, axis=0)).max())
         chord = self._x[0] + np.linspace(0, 1, SAMPLES)[:, None] * (self._x[-1] - self._x[0])
-        self.straight = bool(np.abs(self._x - chord).max() <= ROUND_OFF * self.size)
+        self.straight = bool(np.abs(self._x - chord).max() <= STRAIGHT * self.size)
         self.closed = bool(np.abs(self._x[-1] - self._x[0]).max() <= MISSED * self.size)
 
     @property
@@ -66,7 +67,7 @@ class CadEdge:
         return np.array([(p.x, p.y) for p in values]).reshape(-1, 2)
 
     def derivative(self, t: Array) -> Array:
-        """Derivatives (k, 2) with respect to the parameter."""
+        """Derivatives (k, 2) with respect to the parameter, at `t` (k,)."""
         if self.straight:
             return np.tile((self._x[-1] - self._x[0]) / (self.stop - self.start), (len(t), 1))
         values = (self._edge.Tangent(float(ti)) for ti in t)
@@ -79,7 +80,7 @@ class CadEdge:
             new = np.clip(t - step(t), self.start, self.stop)
             moved = np.abs(new - t).max(initial=0.0)
             t = new
-            if moved <= 1e-15 * length:
+            if moved <= SETTLED * length:
                 break
         return t
 
@@ -104,7 +105,7 @@ class CadEdge:
         return t
 
     def normal(self, points: Array) -> Array:
-        """Unit normals (k, 2) at the projections of `points`, to the right of the tangent."""
+        """Unit normals (k, 2) at the projections of `points` (k, 2), right of the tangent."""
         t = np.full(len(points), self.start) if self.straight else self.project(points)
         tangent = self.derivative(t)
         tangent /= np.linalg.norm(tangent, axis=1)[:, None]

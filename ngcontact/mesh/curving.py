@@ -15,7 +15,7 @@ from .parents import copied
 SMALLEST = 1e-2  # extent of an edge; measured: all but arcs of circles are wrong from 2e-3
 SHORTEST = 1e-6  # a segment of a curved edge; measured: elements of order 4 turn over at 5e-7
 SHORTEST_ON_SMALL = 1e-5  # ... of a smaller arc; measured: middles displaced from 5e-6, order 4
-ROUND_OFF = 1e-12  # of coordinates, relative to the geometry's size
+ON_CURVE = 1e-12  # distance, relative to the geometry's size, at which an element misses its curve
 
 
 def check_curves(mesh: ng.Mesh) -> None:
@@ -47,7 +47,7 @@ def check_curves(mesh: ng.Mesh) -> None:
 
 def geometry_order(order: int, element: str) -> int:
     """Degree of the curved elements: Zlamal's (2.8) maps P_order by geometry one degree up."""
-    return order if element == "isoparametric" else order + 1
+    return order if element == "isoparametric" else order + 1  # (2.8)
 
 
 def _straightened(mesh: ng.Mesh) -> bool:
@@ -55,7 +55,7 @@ def _straightened(mesh: ng.Mesh) -> bool:
     position = ng.CF((ng.x, ng.y))
     off = ng.BoundaryFromVolumeCF(position) - position
     missed, size = (ng.Integrate(ng.InnerProduct(x, x), mesh, ng.BND) for x in (off, position))
-    return bool(missed > ROUND_OFF**2 * size)
+    return bool(missed > ON_CURVE**2 * size)
 
 
 def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:

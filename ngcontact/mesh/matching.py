@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise, product
 
 import netgen.occ as occ
@@ -21,27 +21,38 @@ NEARER = 0.01  # of an edge: what a polygon of its samples tells apart
 COINCIDENT = 1e-6  # distance, relative to an edge, up to which two edges are one contact line
 CLOSE = 0.1  # share of the spacing within which a later pair's node yields to one already there
 FINE = 513  # samples on which a division is laid out
+APART = 1e-9  # share of an edge up to which two nodes are one
+SPARE = 1e-9  # share by which a run of elements may exceed their size, not to gain one by round-off
 
 
 @dataclass(eq=False)
 class Edge:
-    """A CAD edge with the nodes that contact asks for."""
+    """A CAD edge with the nodes that contact asks for.
+
+    Attributes
+    ----------
+    shape : occ.TopoDS_Shape
+        The edge of the geometry.
+    curve : CadEdge
+        The same as a curve.
+    maxh : float
+        Largest element size along it, a length.
+    runs : list of ndarray (j,)
+        Parameters of the nodes on each part that faces another line.
+    """
 
     shape: occ.TopoDS_Shape
     curve: CadEdge
     maxh: float
-
-    def __post_init__(self) -> None:
-        self.runs: list[Array] = []
+    runs: list[Array] = field(default_factory=list)
 
     def partition(self) -> list[float]:
         """Interior nodes as fractions of the parameter interval, between runs filled up evenly."""
         start, stop = self.curve.start, self.curve.stop
         runs = [(nodes - start) / (stop - start) for nodes in self.runs]
         nodes = np.sort(_apart(runs))
-        apart = 1e-9
-        inside = nodes[(nodes > apart) & (nodes < 1 - apart)]
-        inside = inside[np.diff(inside, prepend=-1.0) > apart]
+        inside = nodes[(nodes > APART) & (nodes < 1 - APART)]
+        inside = inside[np.diff(inside, prepend=-1.0) > APART]
         result = inside.tolist()
         t, x, _ = self.curve.samples(FINE)
         arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
@@ -49,7 +60,7 @@ class Edge:
         for low, high in pairwise([0.0, *inside.tolist(), 1.0]):
             if not any(run.min() < (low + high) / 2 < run.max() for run in runs):
                 s0, s1 = np.interp([low, high], grid, arc)
-                count = int(np.ceil((s1 - s0) / self.maxh * (1 - 1e-9)))
+                count = int(np.ceil((s1 - s0) / self.maxh * (1 - SPARE)))
                 fill = np.interp(np.linspace(s0, s1, count + 1)[1:-1], arc, grid)
                 result.extend(fill.tolist())
         return sorted(result)
@@ -105,13 +116,13 @@ def _opposite(contact: Contact, x: Array, other: CadEdge) -> tuple[Array, Array]
     if contact.direction is None:
         t = other.project(x)
         distance = np.linalg.norm(other.point(t) - x, axis=1)
-        t = np.where(distance <= COINCIDENT * other.size, t, np.nan)
+        t = np.where(distance <= COINCIDENT * other.size, t, np.nan)  # (2.3): common nodes
     else:
         dx, dy = contact.direction
         across = np.array([-dy, dx])
         _, samples, _ = other.samples()
         near = _nearest_crossing(samples, x, across, np.array([dx, dy]))
-        t = other.level(across, x @ across, near)
+        t = other.level(across, x @ across, near)  # (2.10): A_j and B_j at the same C_j
     return t, other.point(np.where(np.isnan(t), other.start, t))
 
 
@@ -165,7 +176,7 @@ def _divide(contact: Contact, secondary: Edge, primary: Edge, beside: list[Edge]
             density = np.maximum(density, np.linalg.norm(steps, axis=1) / maxh)
             density = np.maximum(density, turn / TURN)
         total = np.concatenate([[0.0], np.cumsum(density)])
-        count = max(1, int(np.ceil(total[-1] * (1 - 1e-9))))
+        count = max(1, int(np.ceil(total[-1] * (1 - SPARE))))
         nodes = np.interp(np.linspace(0, total[-1], count + 1), total, t[run])
         there, _ = _opposite(contact, secondary.curve.point(nodes), primary.curve)
         met = ~np.isnan(there)

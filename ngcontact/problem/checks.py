@@ -20,7 +20,8 @@ from .material import Elastic, Hooke
 from .regions import body_mask, body_of_vertex, boundary_mask
 from .values import refuse_where
 
-Masks = dict[str, np.ndarray]  # by 'argument "pattern"': which region numbers it selects
+# By 'argument "pattern"': which of the r boundaries or bodies of a mesh it selects, bool (r,).
+Masks = dict[str, np.ndarray]
 
 Places = tuple[
     ng.comp.VorB, ng.IntegrationRule
@@ -72,7 +73,7 @@ def regions_of(
     patterns: Iterable[str],
     mask_of: Callable[[ng.Mesh, str], np.ndarray],
 ) -> Masks:
-    """Return the mask of every pattern; each selects something, and no region is given twice."""
+    """Return the mask (r,) of every pattern: each selects something, and no region twice."""
     names = mesh.GetMaterials() if mask_of is body_mask else mesh.GetBoundaries()
     masks: Masks = {}
     for pattern in patterns:
@@ -91,7 +92,7 @@ def regions_of(
 
 
 def sides_of(mesh: ng.Mesh, argument: str, pair: Contact) -> Masks:
-    """Return the masks of the sides of a contact pair, the secondary first."""
+    """Return the masks (r,) of the sides of a contact pair, the secondary first."""
     sides = regions_of(mesh, f"{argument}.secondary", [pair.secondary], boundary_mask)
     if pair.primary is not None:
         sides |= regions_of(mesh, f"{argument}.primary", [pair.primary], boundary_mask)
@@ -99,7 +100,7 @@ def sides_of(mesh: ng.Mesh, argument: str, pair: Contact) -> Masks:
 
 
 def refuse_common(names: Sequence[str], one: Masks, other: Masks, right: str) -> None:
-    """Refuse a region that two arguments have in common."""
+    """Refuse a region, of the names (r,), that the masks (r,) of two arguments have in common."""
     for (a, first), (b, second) in itertools.product(one.items(), other.items()):
         common = sorted({n for n, both in zip(names, first & second, strict=True) if both})
         if common:
@@ -107,7 +108,7 @@ def refuse_common(names: Sequence[str], one: Masks, other: Masks, right: str) ->
 
 
 def check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
-    """Refuse bodies without a name or without a material."""
+    """Refuse bodies without a name, and those in none of the masks (r,) of materials."""
     covered = np.logical_or.reduce(list(materials.values()))
     for number, name in enumerate(mesh.GetMaterials()):
         if not name:
@@ -119,7 +120,8 @@ def check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
 def check_pairs(mesh: ng.Mesh, contact: Sequence[Masks]) -> None:
     """Refuse contact inside a body: on an interface, of a curve with itself, of a body with itself.
 
-    A body is a connected piece of the mesh, whatever the names of its parts.
+    A body is a connected piece of the mesh, whatever the names of its parts. `contact` are the
+    masks (r,) of the sides of each pair.
     """
     if not contact:
         return
@@ -153,19 +155,19 @@ def _has_two_sides(view: Triangulation) -> np.ndarray:
 
 
 def check_laws(mesh: ng.Mesh, materials: Masks, laws: Iterable[Elastic | Hooke]) -> None:
-    """Refuse laws that are not elliptic in the bodies `materials`, HH81 (2.7)."""
+    """Refuse laws that are not elliptic in the bodies of their masks (r,), HH81 (2.7)."""
     for (label, mask), law in zip(materials.items(), laws, strict=True):
         law.check_at(_points(mesh, mask, IN_BODIES), label)  # (2.7)
 
 
 def check_data(mesh: ng.Mesh, masks: Masks, data: Iterable[Any], places: Places) -> None:
-    """Refuse loads or displacements that are not finite somewhere, one for each of `masks`."""
+    """Refuse loads or displacements that are not finite somewhere, one for each mask (r,)."""
     for (label, mask), value in zip(masks.items(), data, strict=True):
         _check_finite(_points(mesh, mask, places), value, label)
 
 
 def check_gaps(mesh: ng.Mesh, contact: Sequence[Masks], pairs: Sequence[Contact]) -> None:
-    """Refuse gaps that are not finite on the secondary, the first of the sides of each pair."""
+    """Refuse gaps that are not finite on the secondary, the first mask (r,) of each pair."""
     for j, (sides, pair) in enumerate(zip(contact, pairs, strict=True)):
         if pair.gap is not None:
             points = _points(mesh, next(iter(sides.values())), AT_ENDS)

@@ -14,9 +14,8 @@ from .values import refuse_where, scalar_data
 
 MODELS = ("plane strain", "plane stress")
 
-# Symmetry of C is a statement about input digits, definiteness one about round-off.
-_SYMMETRY = 1e-12
-_ROUND_OFF = 16 * np.finfo(float).eps
+SYMMETRIC = 1e-12  # difference of entries, relative to the largest: input has that many digits
+DEFINITE = 16 * np.finfo(float).eps  # a pivot, relative to where it starts: round-off of zero
 
 _RIGHT_E = "Young's modulus must be positive and finite"
 _RIGHT_NU = "Poisson's ratio must lie in -1 < nu < 1/2"
@@ -60,7 +59,7 @@ class Elastic:
         object.__setattr__(self, "nu", scalar_data(self.nu, "nu"))
         if isinstance(self.E, float) and not self.E > 0:
             raise ValueError(f"E = {self.E}: {_RIGHT_E}")
-        if isinstance(self.nu, float) and not -1 < self.nu < 0.5:
+        if isinstance(self.nu, float) and not -1 < self.nu < 0.5:  # (2.7)
             raise ValueError(f"nu = {self.nu}: {_RIGHT_NU}")
 
     def voigt(self, model: str = "plane strain") -> ng.CoefficientFunction:
@@ -82,7 +81,7 @@ class Elastic:
         return ng.CF(self.E / (2 * (1 + self.nu)))
 
     def check_at(self, points: np.ndarray, name: str) -> None:
-        """Refuse values outside HH81 (2.7) at mesh points of the body; `name` leads the message."""
+        """Refuse values outside HH81 (2.7) at mesh points (n,); `name` leads the message."""
         if not isinstance(self.E, float):
             E = self.E(points).ravel()
             refuse_where(points, ~((E > 0) & np.isfinite(E)), E, f"{name}.E", _RIGHT_E)
@@ -148,7 +147,7 @@ class Hooke:
         return ng.CF(self.C)[2, 2]
 
     def check_at(self, points: np.ndarray, name: str) -> None:
-        """Refuse values outside HH81 (2.7) at mesh points of the body; `name` leads the message."""
+        """Refuse values outside HH81 (2.7) at mesh points (n,); `name` leads the message."""
         if not isinstance(self.C, np.ndarray):
             matrices = ng.CF(self.C)(points).reshape(-1, 3, 3)
             for bad, right in _faults(matrices):
@@ -191,11 +190,11 @@ def _faults(matrices: np.ndarray) -> list[tuple[np.ndarray, str]]:
         third = c - ac * (ac / a) - rest * (rest / second)
         # A small second pivot enlarges the round-off in the third: bound their product.
         share = second / b
-        definite = (
-            (a > 0) & (b > 0) & (c > 0) & (share > _ROUND_OFF) & (share * (third / c) > _ROUND_OFF)
+        definite = (  # (2.7)
+            (a > 0) & (b > 0) & (c > 0) & (share > DEFINITE) & (share * (third / c) > DEFINITE)
         )
     return [
         (~finite, "the entries of a Voigt matrix must be finite"),
-        (skew > _SYMMETRY, "a Voigt matrix must be symmetric"),
+        (skew > SYMMETRIC, "a Voigt matrix must be symmetric"),
         (~definite, "a Voigt matrix must be positive definite (elliptic)"),
     ]

@@ -105,7 +105,7 @@ class Problem:
     def traction_vector(self, pattern: str) -> ng.CoefficientFunction:
         """Return P of HH81 (3.7) on a key of `traction`, dim 2; a pressure p becomes -p n."""
         load: ng.CoefficientFunction = self.traction[pattern]
-        return -load * ng.specialcf.normal(2) if load.dim == 1 else load
+        return -load * ng.specialcf.normal(2) if load.dim == 1 else load  # P in (3.7)
 
     def check(self, mesh: ng.Mesh) -> None:
         """Refuse names and data that do not fit a mesh.

@@ -11,7 +11,7 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import Contact, Problem, adapt, solve
-from ngcontact.contact.corners import in_contact, nodal_pressure, twins
+from ngcontact.contact.corners import in_contact, pressure_across_corners, twins
 from ngcontact.contact.transitions import ending_segments, transitions_on
 from ngcontact.geometries import blocks
 
@@ -304,14 +304,16 @@ def test_a_point_that_touches_one_side_inside_the_contact(active, expected):
 def test_a_uniform_pressure_is_told_whatever_the_split(turn):
     line = bent(turn)
     force = 2.0 * line.weight
-    assert nodal_pressure(line, force, mask("xxxx")) == pytest.approx([2, 2, 2, 2], rel=1e-14)
+    assert pressure_across_corners(line, force, mask("xxxx")) == pytest.approx(
+        [2, 2, 2, 2], rel=1e-14
+    )
     # The same force across the corner on one side more, on the other less: only its part along
     # the sum of both weighted normals counts.
     n, w = line.direction[[1, 2]], line.weight[[1, 2]]
     along = w @ n
     across = np.array([-along[1], along[0]])
     force[[1, 2]] += np.linalg.solve(n.T, 0.01 * across * math.sin(abs(turn)))
-    told = nodal_pressure(line, force, mask("xxxx"))
+    told = pressure_across_corners(line, force, mask("xxxx"))
     assert told == pytest.approx([2, 2, 2, 2], rel=1e-12)
     assert np.abs(force / line.weight - 2).max() > 1e-3
 
@@ -320,16 +322,24 @@ def test_one_side_carries_all_inside_the_contact():
     line = bent(1e-3)
     force = np.array([0.5, 0.75, 0.0, 0.25])  # of a pressure of 1: 0.5 and 0.25 at the corner
     # To the square of the turn: the whole force has the direction of one side.
-    assert nodal_pressure(line, force, mask("xx.x")) == pytest.approx([1, 1, 1, 1], rel=1e-6)
+    assert pressure_across_corners(line, force, mask("xx.x")) == pytest.approx(
+        [1, 1, 1, 1], rel=1e-6
+    )
 
 
 def test_sides_keep_their_own_pressure():
     sharp = bent(math.radians(60))
     force = np.array([1.0, 2.0, 3.0, 4.0])
-    assert nodal_pressure(sharp, force, mask("xxxx")).tolist() == (force / sharp.weight).tolist()
+    assert (
+        pressure_across_corners(sharp, force, mask("xxxx")).tolist()
+        == (force / sharp.weight).tolist()
+    )
     force[2:] = 0  # contact that ends at the corner
     line = bent()
-    assert nodal_pressure(line, force, mask("xx..")).tolist() == (force / line.weight).tolist()
+    assert (
+        pressure_across_corners(line, force, mask("xx..")).tolist()
+        == (force / line.weight).tolist()
+    )
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -347,7 +357,7 @@ def test_blocks_pressed_together_at_an_almost_flat_corner(turn, order):
     solution = solve(problem, maxh=0.2, order=order)
     x = solution.points[:, 0]
     [contact] = solution.discrete.lines
-    pressure = nodal_pressure(contact, solution.force, solution.active)
+    pressure = pressure_across_corners(contact, solution.force, solution.active)
     assert np.count_nonzero(np.abs(x) < 1e-12) == 2
     near = (np.abs(x) > 1e-12) & (np.abs(x) < 0.25)
     # Measured: 1 % from the mean of the neighbours.

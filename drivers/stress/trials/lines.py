@@ -17,7 +17,7 @@ from drivers.reference.westergaard import effective_modulus, moduli
 from drivers.stress import Outcome, solved
 from drivers.stress.trials.shapes import structured
 from ngcontact import Contact, Problem, Solution, adapt, solve
-from ngcontact.contact import nodal_pressure
+from ngcontact.contact import pressure_across_corners
 from ngcontact.geometries import blocks
 
 Array = NDArray[np.float64]
@@ -70,7 +70,7 @@ def _pressed_corner() -> Iterator[Outcome]:
             contact=[Contact(secondary="upper_contact", primary="lower_contact")],
         )
         s = solve(problem, maxh=0.2, order=order)
-        pressure = nodal_pressure(s.discrete.lines[0], s.force, s.active)
+        pressure = pressure_across_corners(s.discrete.lines[0], s.force, s.active)
         return s, pressure[np.linalg.norm(s.points, axis=1) < 1e-9]
 
     for order in (1, 2):
