@@ -8,14 +8,12 @@ import numpy as np
 from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
-from ngcontact.adaptivity.refinement import refined
-from ngcontact.discrete.discrete_problem import discretise
-from ngcontact.fem.boundary import boundary_trace
+from ngcontact.adaptivity import refined
+from ngcontact.discrete import discretise
+from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks
-from ngcontact.linalg.coarse_spaces import coarsenings
-from ngcontact.mesh.curving import curve
-from ngcontact.mesh.generation import first_mesh
-from ngcontact.mesh.parents import vertex_parents
+from ngcontact.linalg import coarsenings
+from ngcontact.mesh import curve, first_mesh, vertex_parents
 
 REPRODUCED = {  # cases whose solution lies in the space, at the orders of conftest.ORDERS
     "constant pressure": cases.pressure_patch,

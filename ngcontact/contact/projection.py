@@ -40,11 +40,20 @@ class Partners:
     distance: Array
 
 
+def _slope(curve: Array, segment: Index, s: Array) -> Array:
+    """Derivatives (k, 2) of the segments with respect to s."""
+    return np.einsum("ki,kid->kd", lagrange_derivative(curve.shape[1] - 1, s), curve[segment])
+
+
 def _normals(curve: Array, side: Array, segment: Index, s: Array) -> Array:
     """Outward normals (k, 2), not normalised."""
-    degree = curve.shape[1] - 1
-    tangent = np.einsum("ki,kid->kd", lagrange_derivative(degree, s), curve[segment])
+    tangent = _slope(curve, segment, s)
     return np.column_stack([tangent[:, 1], -tangent[:, 0]]) * side[segment, None]
+
+
+def _at(curve: Array, segment: Index, s: Array) -> Array:
+    """Points (k, 2) of the segments."""
+    return np.einsum("ki,kid->kd", lagrange(curve.shape[1] - 1, s), curve[segment])
 
 
 def _none(size: int) -> Partners:
@@ -115,6 +124,20 @@ def _candidates(
     return point, segment, s
 
 
+def _crossings(points: Array, across: Array, curve: Array, segment: Index, s: Array) -> Array:
+    """Parameters (k,) of the segments on the lines through `points` normal to `across` (k, 2)."""
+    for _ in range(NEWTON_STEPS):
+        # (2.10): A_j and B_j on one perpendicular
+        miss = ((_at(curve, segment, s) - points) * across).sum(axis=1)
+        rate = (_slope(curve, segment, s) * across).sum(axis=1)
+        new = np.clip(s - np.divide(miss, rate, out=np.zeros_like(miss), where=rate != 0), 0, 1)
+        moved = np.abs(new - s).max(initial=0.0)
+        s = new
+        if moved <= SETTLED:
+            break
+    return s
+
+
 def cast(
     points: Array,
     directions: Array,
@@ -152,19 +175,9 @@ def cast(
         return found
     across = np.column_stack([-directions[:, 1], directions[:, 0]])
     point, segment, s = _candidates(points, across, curve, pairs_at_once)
-    degree = curve.shape[1] - 1
-    for _ in range(NEWTON_STEPS):
-        offset = np.einsum("ki,kid->kd", lagrange(degree, s), curve[segment]) - points[point]
-        slope = np.einsum("ki,kid->kd", lagrange_derivative(degree, s), curve[segment])
-        miss = (offset * across[point]).sum(axis=1)  # (2.10): both points on one perpendicular
-        rate = (slope * across[point]).sum(axis=1)
-        new = np.clip(s - np.divide(miss, rate, out=np.zeros_like(miss), where=rate != 0), 0, 1)
-        moved = np.abs(new - s).max(initial=0.0)
-        s = new
-        if moved <= SETTLED:
-            break
+    s = _crossings(points[point], across[point], curve, segment, s)
     s = np.where(s < MATCHED, 0.0, np.where(s > 1 - MATCHED, 1.0, s))
-    offset = np.einsum("ki,kid->kd", lagrange(degree, s), curve[segment]) - points[point]
+    offset = _at(curve, segment, s) - points[point]
     miss = np.abs((offset * across[point]).sum(axis=1))
     lengths = np.linalg.norm(curve[segment, -1] - curve[segment, 0], axis=1)
     normal = _normals(curve, side, segment, s)

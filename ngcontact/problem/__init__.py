@@ -2,6 +2,7 @@
 
 from .contact import Contact as Contact
 from .contact import Gap as Gap
+from .material import MODEL_NAMES as MODEL_NAMES
 from .material import Elastic as Elastic
 from .material import Hooke as Hooke
 from .material import varies as varies

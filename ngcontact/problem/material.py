@@ -12,7 +12,7 @@ import numpy as np
 
 from .values import refuse_where, scalar_data
 
-MODELS = ("plane strain", "plane stress")
+MODEL_NAMES = ("plane strain", "plane stress")
 
 SYMMETRIC = 1e-12  # difference of entries, relative to the largest: input has that many digits
 DEFINITE = 16 * np.finfo(float).eps  # a pivot, relative to where it starts: round-off of zero
@@ -22,12 +22,12 @@ _RIGHT_NU = "Poisson's ratio must lie in -1 < nu < 1/2"
 
 
 def require_model(model: str) -> str:
-    """Return a name of `MODELS`; anything else is a `TypeError` or a `ValueError`."""
+    """Return a name of `MODEL_NAMES`; anything else is a `TypeError` or a `ValueError`."""
     if not isinstance(model, str):
-        raise TypeError(f"model = {model!r}: give one of the strings {MODELS}")
-    if model not in MODELS:
+        raise TypeError(f"model = {model!r}: give one of the strings {MODEL_NAMES}")
+    if model not in MODEL_NAMES:
         state = "is not available yet" if model == "axisymmetric" else "is unknown"
-        raise ValueError(f'model "{model}" {state}: choose one of {MODELS}')
+        raise ValueError(f'model "{model}" {state}: choose one of {MODEL_NAMES}')
     return model
 
 

@@ -16,10 +16,9 @@ from netgen.occ import OCCGeometry
 
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.adaptivity.refinement import refined
-from ngcontact.fem.boundary import boundary_trace
+from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, rings
-from ngcontact.mesh.curving import curve
-from ngcontact.mesh.generation import first_mesh
+from ngcontact.mesh import curve, first_mesh
 from tests.scenes import coordinates, unmatched_blocks, vertices
 
 SOFT = Elastic(E=1.0, nu=0.3)

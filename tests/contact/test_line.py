@@ -11,7 +11,7 @@ from netgen.occ import Compound, OCCGeometry, Vec, WorkPlane
 
 from ngcontact import Contact
 from ngcontact.contact.line import at_quadrature, contact_line, unmatched, without
-from ngcontact.fem.boundary import boundary_trace
+from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc, disc_on_block, graphs, rings
 from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.lagrange import gauss, lagrange

@@ -344,3 +344,18 @@ def test_mesh_stripped_of_its_geometry():
     _, vector, at = numbered(trace, named(trace, "upper_contact"))
     assert len(at) == len(np.unique(at)) + 2  # turns of 55 and 56 degrees
     assert len(vector) == len(at)
+
+
+def test_segments_are_selected_by_names_and_patterns():
+    mesh = ng.Mesh(blocks().GenerateMesh(maxh=0.5))
+    trace = boundary_trace(mesh, 2)
+    names = np.array(mesh.GetBoundaries())[trace.region]
+    upper, lower = (np.flatnonzero(names == f"{body}_contact") for body in ("upper", "lower"))
+    both = np.sort(np.concatenate([upper, lower]))
+    assert trace.segments("upper_contact").tolist() == upper.tolist()
+    assert trace.segments("(upper|lower)_contact").tolist() == both.tolist()
+    assert trace.segments("lower_contact", None, "upper_contact").tolist() == both.tolist()
+    assert trace.segments(None).size == trace.segments().size == 0
+    assert (
+        trace.lies_on(both[::-1], "upper_contact").tolist() == np.isin(both[::-1], upper).tolist()
+    )

@@ -19,8 +19,7 @@ from ngcontact.fem.moduli import (
     shear_moduli,
     warn_of_locking,
 )
-from ngcontact.mesh.elements import diameters, middles
-from ngcontact.mesh.generation import first_mesh
+from ngcontact.mesh import diameters, first_mesh, middles
 
 BODIES = ("upper", "lower")
 

@@ -15,7 +15,7 @@ from ngcontact.fem.element import check_element
 from ngcontact.fem.space import assemble
 from ngcontact.geometries import blocks, disc, graphs, rings
 from ngcontact.lagrange import gauss
-from ngcontact.mesh.curving import curve, geometry_order
+from ngcontact.mesh import curve
 
 ORDERS = [1, 2, 3, 4]
 STEEL = Elastic(E=2.0, nu=0.3)
@@ -329,12 +329,6 @@ def test_stiffness_is_symmetric():
 
 
 # ---------------------------------------------------------------------------------- curving
-
-
-def test_geometry_order():
-    assert [geometry_order(p, "isoparametric") for p in ORDERS] == ORDERS
-    assert [geometry_order(p, "superparametric") for p in ORDERS] == [2, 3, 4, 5]
-    assert geometry_order(1, "physical") == 2
 
 
 def test_curve_copies_only_where_it_must():

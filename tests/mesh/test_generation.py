@@ -14,7 +14,7 @@ from netgen.occ import OCCGeometry
 
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.adaptivity.refinement import matched_vertices
-from ngcontact.fem.boundary import boundary_trace
+from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh.curving import check_curves

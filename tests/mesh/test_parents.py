@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact.adaptivity.refinement import refined
+from ngcontact.adaptivity import refined
 from ngcontact.mesh.curving import curve
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.mesh.parents import copied, vertex_parents

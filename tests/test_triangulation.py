@@ -1,0 +1,71 @@
+"""NGSolve's mesh as arrays: against NGSolve's own elements."""
+
+from __future__ import annotations
+
+import ngsolve as ng
+import numpy as np
+import pytest
+from ngsolve.meshes import MakeStructured2DMesh
+
+from ngcontact.geometries import disc_on_block
+from ngcontact.triangulation import Triangulation, bisect, move_vertices, triangle_sides
+
+ROUND_OFF = 1e-14  # of coordinates and areas of size 1
+
+
+@pytest.fixture(params=[1, 3], ids=["straight", "curved"])
+def mesh(request):
+    mesh = ng.Mesh(disc_on_block(radius=1.0).GenerateMesh(maxh=0.5))
+    mesh.Curve(request.param)
+    return mesh
+
+
+def test_numbers_are_those_of_ngsolve(mesh):
+    view = Triangulation(mesh)
+    for vb, vertices, regions in (
+        (ng.VOL, view.triangles, view.bodies),
+        (ng.BND, view.segments, view.boundaries),
+    ):
+        elements = list(mesh.Elements(vb))
+        assert vertices.tolist() == [[v.nr for v in el.vertices] for el in elements]
+        assert regions.tolist() == [el.index for el in elements]
+    assert view.vertices.tolist() == [list(v.point) for v in mesh.vertices]
+    assert view.others() == 0
+
+
+def test_triangles_run_anticlockwise(mesh):
+    a, b, c = np.moveaxis(Triangulation(mesh).corners, 1, 0)
+    area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+    assert (area > 0).all()
+
+
+def test_every_inner_side_belongs_to_two_triangles(mesh):
+    sides = np.sort(triangle_sides(Triangulation(mesh).triangles), axis=1)
+    _, count = np.unique(sides, axis=0, return_counts=True)
+    assert (len(count), (count == 1).sum()) == (mesh.nedge, len(Triangulation(mesh).segments))
+
+
+def test_a_view_is_a_copy(mesh):
+    """It outlives its mesh and does not follow it."""
+    before = Triangulation(mesh).vertices
+    view = Triangulation(ng.Mesh(mesh.ngmesh.Copy()))
+    assert np.array_equal(view.vertices, before)
+    move_vertices(mesh, before + 1.0)
+    assert np.array_equal(Triangulation(mesh).vertices, before + 1.0)
+    assert np.array_equal(view.vertices, before)
+
+
+def test_only_marked_elements_are_bisected(mesh):
+    """Apart from the closure: far from them nothing changes, nor do earlier marks count."""
+    marked = np.zeros(mesh.ne, dtype=bool)
+    marked[0] = True
+    old = mesh.ne
+    bisect(mesh, marked)
+    once = mesh.ne - old
+    assert 0 < once < old / 2
+    bisect(mesh, np.zeros(mesh.ne, dtype=bool))
+    assert mesh.ne == old + once
+
+
+def test_quadrilaterals_are_counted():
+    assert Triangulation(MakeStructured2DMesh(quads=True, nx=2, ny=3)).others() == 6
