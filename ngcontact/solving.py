@@ -12,9 +12,8 @@ from .errors import ContactError
 from .fem import check_element, unknowns, warn_of_locking
 from .mesh import first_mesh
 from .one_mesh import solve_on
-from .problem import Problem
+from .problem import Problem, Triangulation
 from .solution import Solution
-from .triangulation import Triangulation
 
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
 COARSE_RUN_FROM = 20_000

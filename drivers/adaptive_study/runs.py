@@ -14,7 +14,7 @@ from drivers.reference.straight import Hertz
 from ngcontact import Problem, Solution, adapt, solve
 from ngcontact.adaptivity import refined
 from ngcontact.mesh import first_mesh
-from ngcontact.triangulation import Triangulation
+from ngcontact.problem import Triangulation
 
 NEAR = 0.2  # distance from a transition, relative to the zone, that counts as near
 

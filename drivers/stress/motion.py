@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ngcontact import Contact, Elastic, Problem
-from ngcontact.problem import Gap
-from ngcontact.triangulation import Triangulation
+from ngcontact.problem import Gap, Triangulation
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]

@@ -11,8 +11,7 @@ from ..arrays import Array, Mask
 from ..contact import contact_line
 from ..fem import BoundaryTrace, boundary_trace
 from ..mesh import copied
-from ..problem import Contact, Problem
-from ..triangulation import Triangulation, bisect, move_vertices
+from ..problem import Contact, Problem, Triangulation, bisect, move_vertices
 
 ROUNDS = 12  # refinements after which a facing segment that still lags stays unmatched
 

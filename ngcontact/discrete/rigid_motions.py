@@ -13,9 +13,8 @@ from scipy.linalg import block_diag
 from ..arrays import Array, Index
 from ..constraints import Conditions
 from ..fem import BoundaryTrace, Space
-from ..problem import body_of_vertex
+from ..problem import Triangulation, body_of_vertex
 from ..qp import FREE, vanishing_combinations
-from ..triangulation import Triangulation
 
 NOT_RIGID = 1e-9  # force of a rigid motion, relative to its terms, that shows it is not in V_h
 

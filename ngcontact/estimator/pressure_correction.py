@@ -25,8 +25,7 @@ import scipy.sparse as sp
 from ..arrays import Array
 from ..fem import BoundaryTrace, bulk_moduli
 from ..linalg import cholesky, lower_half, shared
-from ..problem import Problem
-from ..triangulation import Triangulation
+from ..problem import Problem, Triangulation
 from ..triplets import from_triplets
 from .terms import BoundaryResidual, PressureShare, ScaledSolution
 

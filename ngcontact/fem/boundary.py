@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 from ..arrays import Array, Index, Mask
 from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative
 from ..mesh import CadEdge, cad_edges
-from ..problem import boundary_mask
-from ..triangulation import Triangulation, triangle_sides
+from ..problem import Triangulation, boundary_mask, triangle_sides
 
 CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two rows at a smaller
 # one would be dependent to 1 / turn^2

@@ -7,7 +7,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Index
-from ..triangulation import Triangulation
+from ..problem import Triangulation
 from ..triplets import from_triplets
 from .boundary import BoundaryTrace
 from .nodal_basis import edge_bubbles, nodal_basis

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..mesh import middles
-from ..problem import Elastic, Hooke, Problem, varies
-from ..triangulation import Triangulation
+from ..problem import Elastic, Hooke, Problem, Triangulation, varies
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
 NEARLY_INCOMPRESSIBLE = 6.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ngsolve as ng
 import numpy as np
 
-from ..triangulation import Triangulation
+from ..problem import Triangulation
 from .cad import cad_edges
 from .parents import copied
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array
-from ..triangulation import Triangulation
+from ..problem import Triangulation
 
 
 def diameters(mesh: ng.Mesh) -> Array:

@@ -6,8 +6,7 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 
-from ..problem import Problem
-from ..triangulation import Triangulation, triangle_sides
+from ..problem import Problem, Triangulation, triangle_sides
 from .matching import Edge, divided
 
 COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given ...

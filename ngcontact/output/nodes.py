@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import KDTree
 
 from ..arrays import Array, Index
-from ..triangulation import Triangulation
+from ..problem import Triangulation
 from ..triplets import from_triplets
 from .solution_data import SolutionData
 

@@ -14,10 +14,10 @@ from typing import Any
 import ngsolve as ng
 import numpy as np
 
-from ..triangulation import Triangulation, triangle_sides
 from .contact import Contact
 from .material import Elastic, Hooke
 from .regions import body_mask, body_of_vertex, boundary_mask
+from .triangulation import Triangulation, triangle_sides
 from .values import refuse_where
 
 # By 'argument "pattern"': which of the r boundaries or bodies of a mesh it selects, bool (r,).

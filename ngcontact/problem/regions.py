@@ -7,7 +7,7 @@ from collections.abc import Callable
 import ngsolve as ng
 import numpy as np
 
-from ..triangulation import Triangulation
+from .triangulation import Triangulation
 
 
 def boundary_mask(mesh: ng.Mesh, pattern: str) -> np.ndarray:

@@ -18,7 +18,7 @@ from drivers.benchmark.scenes.triangles import sides
 from ngcontact import Problem
 from ngcontact.geometries.region import body, polygon
 from ngcontact.mesh import first_mesh
-from ngcontact.triangulation import Triangulation
+from ngcontact.problem import Triangulation
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

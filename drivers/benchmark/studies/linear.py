@@ -12,7 +12,7 @@ from ngcontact import Problem
 from ngcontact.adaptivity import refined
 from ngcontact.fem import model_of, unknowns_of
 from ngcontact.mesh import curve, first_mesh
-from ngcontact.triangulation import Triangulation
+from ngcontact.problem import Triangulation
 
 START = 300  # unknowns of a first mesh, about; refinement is much quicker than meshing at size
 

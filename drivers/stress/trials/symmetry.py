@@ -23,7 +23,7 @@ from drivers.stress.motion import Array, Motion, Scene, moved_mesh, posed, swapp
 from ngcontact import Contact, Elastic, Problem, Solution, solve
 from ngcontact.geometries import blocks
 from ngcontact.mesh import first_mesh
-from ngcontact.triangulation import Triangulation
+from ngcontact.problem import Triangulation
 
 SAME = 1e-9  # difference of two solutions of one problem, the figure asked for
 ORDERS = (1, 4)

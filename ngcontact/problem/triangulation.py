@@ -8,7 +8,7 @@ from functools import cached_property
 import ngsolve as ng
 import numpy as np
 
-from .arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask
 
 TRIANGLES = (10, 12)  # Netgen's element types TRIG and TRIG6
 

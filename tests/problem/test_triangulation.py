@@ -8,7 +8,7 @@ import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.geometries import disc_on_block
-from ngcontact.triangulation import Triangulation, bisect, move_vertices, triangle_sides
+from ngcontact.problem import Triangulation, bisect, move_vertices, triangle_sides
 
 ROUND_OFF = 1e-14  # of coordinates and areas of size 1
 
