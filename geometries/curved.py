@@ -24,12 +24,14 @@ def graphs(
     The upper curve is f' of HH81, the lower one f'', with x for eta and y for xi (HH81 section 2,
     the enlarging zone). The gap f' - f'' may vanish, and be negative where the bodies overlap.
 
+    Lengths are in any consistent unit.
+
     Parameters
     ----------
     upper, lower : callable
         y as a function of x, called with one number at a time.
     a, b : float
-        The bodies cover `a` <= x <= `b`, any consistent unit of length.
+        The bodies cover `a` <= x <= `b`.
     height : float
         The bodies reach to y = `height` and y = -`height`.
     samples : int

@@ -19,11 +19,12 @@ def rings(
 ) -> OCCGeometry:
     """Two concentric rings about the origin, one in the other: a press fit or a clearance.
 
+    Lengths are in any consistent unit.
+
     Parameters
     ----------
     inner, interface, outer : float
-        Radius of the hole, outer radius of the inner ring, radius of the rim; increasing, any
-        consistent unit of length.
+        Radius of the hole, outer radius of the inner ring, radius of the rim; increasing.
     interference : float
         Outer radius of the inner ring minus inner radius of the outer ring; negative: clearance.
     quarter : bool
@@ -128,10 +129,12 @@ def disc_on_block(
 ) -> OCCGeometry:
     """Lower half of a disc that rests at the origin on the top of a block.
 
+    Lengths are in any consistent unit.
+
     Parameters
     ----------
     radius : float
-        Radius of the disc about (0, `radius`), any consistent unit of length.
+        Radius of the disc about (0, `radius`).
     width : float, optional
         The block covers |x| <= `width`. Default: 2 `radius`.
     height : float, optional
@@ -193,10 +196,12 @@ def disc_on_disc(
 ) -> OCCGeometry:
     """Lower half of a disc that touches the upper half of another at the origin.
 
+    Lengths are in any consistent unit.
+
     Parameters
     ----------
     radius : float
-        Radius of the upper disc about (0, `radius`), any consistent unit of length.
+        Radius of the upper disc about (0, `radius`).
     lower_radius : float, optional
         Radius of the lower disc about (0, -`lower_radius`). Default: `radius`.
     symmetric : bool

@@ -18,10 +18,12 @@ def blocks(
 ) -> OCCGeometry:
     """Two blocks that meet along a common straight or polygonal line.
 
+    Lengths are in any consistent unit.
+
     Parameters
     ----------
     width : float
-        Width of both blocks, any consistent unit of length. Sets the default `line` only.
+        Width of both blocks. Sets the default `line` only.
     height : float
         The upper block reaches to y = `height`.
     line : sequence of (x, y), optional
@@ -95,10 +97,12 @@ def punch(
 ) -> OCCGeometry:
     """Rectangular punch on a large foundation.
 
+    Lengths are in any consistent unit.
+
     Parameters
     ----------
     half_width : float
-        Half the width of the punch, any consistent unit of length.
+        Half the width of the punch.
     punch_height : float
         Height of the punch above the surface y = 0.
     width : float, optional

@@ -18,7 +18,7 @@ Factor = Callable[[Mask], Solve]
 
 
 def power_of_two(values: Array) -> float:
-    """The power of 2 below the largest in size of `values`, of any shape; 1 where all vanish."""
+    """The power of 2 below the largest in size of `values` (...,); 1 where all vanish."""
     largest = float(np.abs(values).max(initial=0.0))
     if not 0 < largest < math.inf:
         return 1.0
@@ -26,7 +26,7 @@ def power_of_two(values: Array) -> float:
 
 
 def root_of_squares(values: Array) -> float:
-    """Root of the sum of squares of `values`, of any shape and unit.
+    """Root of the sum of squares of `values` (...,), in their unit.
 
     The squares may be too large or too small for a float.
     """

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 def from_triplets(
     values: NDArray[Any], rows: ArrayLike, columns: ArrayLike, shape: tuple[int, int]
 ) -> sp.csr_array:
-    """Sparse array of `shape` with `values` (k,) at (`rows`, `columns`), (k,) each; sums repeated.
+    """Sparse array (m, n), its `shape`, of the `values` (k,) at `rows` and `columns` (k,), summed.
 
     Indices have 32 bits where they fit: sparse arrays keep the type they are given, products with
     64 bits copy the other factor's indices to 64, and SciPy's graphs before 1.16 refuse them.

@@ -71,7 +71,10 @@ class ContactLine:
 def prescribed_gap(
     contact: Contact, trace: BoundaryTrace, segment: Index, s: Array, position: Array
 ) -> Array:
-    """Values (k,) of `Contact.gap`, lengths, at s (k,) of segments (k,): `position` (k, 2)."""
+    """Values (k,) of `Contact.gap`, lengths, at points of the secondary.
+
+    They lie at `s` (k,) of segments `segment` (k,), which is `position` (k, 2).
+    """
     if isinstance(contact.gap, ng.CoefficientFunction):
         return trace.evaluate(contact.gap, segment, s)[:, 0]
     if callable(contact.gap):
@@ -80,7 +83,7 @@ def prescribed_gap(
 
 
 def jacobian(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
-    """Arc length (P1) or eta (P2) per s, (k,), at s (k,) of segments (k,): for integrals."""
+    """Arc length (P1) or eta (P2) per s, (k,), at `s` (k,) of segments `segment` (k,)."""
     derivative = trace.derivative(segment, s)
     if contact.direction is None:
         return np.linalg.norm(derivative, axis=1)

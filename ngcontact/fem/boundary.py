@@ -29,6 +29,8 @@ CORNER_WITHOUT_CAD = np.deg2rad(30)  # ... and two segments of one name on a mes
 class BoundaryTrace:
     """Segments of the whole boundary, k of them, each from s = 0 to s = 1.
 
+    Methods take places as numbers of segments and parameters s on them.
+
     Attributes
     ----------
     mesh : ng.Mesh
@@ -71,20 +73,20 @@ class BoundaryTrace:
     edges: list[CadEdge] | None
 
     def point(self, segment: Index, s: Array) -> Array:
-        """Points (k, 2) of the mesh's curves at parameters s (k,) of the segments (k,)."""
+        """Points (k, 2) of the mesh's curves at parameters `s` (k,) of segments `segment` (k,)."""
         return np.einsum("ki,kid->kd", lagrange(self.geometry_order, s), self.curve[segment])
 
     def derivative(self, segment: Index, s: Array) -> Array:
-        """Derivatives (k, 2) of `point` with respect to s, at s (k,) of the segments (k,)."""
+        """Derivatives (k, 2) with respect to s, at `s` (k,) of segments `segment` (k,)."""
         weights = lagrange_derivative(self.geometry_order, s)
         return np.einsum("ki,kid->kd", weights, self.curve[segment])
 
     def normal(self, segment: Index, s: Array) -> Array:
-        """Outward unit normals (k, 2) of the mesh's curves at s (k,) of the segments (k,)."""
+        """Outward unit normals (k, 2) of the mesh at `s` (k,) of segments `segment` (k,)."""
         return _right(self.derivative(segment, s)) * self.side[segment, None]
 
     def exact_normal(self, segment: Index, s: Array) -> Array:
-        """Outward unit normals (k, 2) of the CAD edges at s (k,) of the segments (k,).
+        """Outward unit normals (k, 2) of the CAD edges at `s` (k,) of segments `segment` (k,).
 
         Those of the mesh where there are no CAD edges.
         """
@@ -99,16 +101,16 @@ class BoundaryTrace:
         return normals
 
     def at_nodes(self, segments: Index) -> tuple[Index, Array]:
-        """Segment and s, both (k (order + 1),), of the nodes of segments (k,), one by one."""
+        """Segment (n,) and s (n,) of all nodes of `segments` (k,), one segment after the other."""
         s = np.tile(gauss_lobatto(self.order), len(segments))
         return np.repeat(segments, self.order + 1), s
 
     def lengths(self, segments: Index) -> Array:
-        """Lengths (k,) of the chords of segments (k,)."""
+        """Lengths (k,) of the chords of `segments` (k,)."""
         return np.linalg.norm(self.curve[segments, -1] - self.curve[segments, 0], axis=1)
 
     def lies_on(self, segment: Index, *patterns: str | None) -> Mask:
-        """Whether segments (k,) belong to a boundary that one of the patterns selects, (k,).
+        """Whether each `segment` (k,) is of a boundary that one of the patterns selects, (k,).
 
         Patterns are names or NGSolve patterns, as in `Problem`; None selects nothing.
         """
@@ -127,13 +129,13 @@ class BoundaryTrace:
         return self.mesh.MapToAllElements(ng.IntegrationRule([(0.5, 0, 0)], [1]), ng.BND)
 
     def mesh_points(self, segment: Index, s: Array) -> NDArray:
-        """NGSolve boundary points at parameters s (k,) of the segments (k,)."""
+        """NGSolve boundary points (k,) at parameters `s` (k,) of segments `segment` (k,)."""
         points = self._mesh_points[segment].copy()
         points["x"] = 1 - s  # NGSolve's segment runs from the second vertex to the first
         return points
 
     def evaluate(self, function: ng.CoefficientFunction, segment: Index, s: Array) -> Array:
-        """Values (k, dim) of a CoefficientFunction at parameters s (k,) of the segments (k,)."""
+        """Values (k, dim) of a CoefficientFunction at `s` (k,) of segments `segment` (k,)."""
         values = np.asarray(function(self.mesh_points(segment, s)))
         return values.reshape(len(segment), -1)
 

@@ -127,7 +127,7 @@ class CadEdge:
         return np.where(missed, np.nan, t)
 
     def samples(self, count: int = SAMPLES) -> tuple[Array, Array, Array]:
-        """Parameters (count,), points (count, 2) and derivatives (count, 2) along the edge."""
+        """Parameters (n,), points (n, 2) and derivatives (n, 2) along the edge, n = `count`."""
         t = np.linspace(self.start, self.stop, count)
         return t, self.point(t), self.derivative(t)
 

@@ -40,7 +40,7 @@ class Elastic:
     E
         Young's modulus, any consistent unit of stress; a number or a scalar CoefficientFunction.
     nu
-        Poisson's ratio; a number or a scalar CoefficientFunction.
+        Poisson's ratio, dimensionless; a number or a scalar CoefficientFunction.
 
     Raises
     ------
@@ -81,7 +81,7 @@ class Elastic:
         return ng.CF(self.E / (2 * (1 + self.nu)))
 
     def check_at(self, points: np.ndarray, name: str) -> None:
-        """Refuse values outside HH81 (2.7) at mesh points (n,); `name` leads the message."""
+        """Refuse values outside HH81 (2.7) at mesh `points` (n,); `name` leads the message."""
         if not isinstance(self.E, float):
             E = self.E(points).ravel()
             refuse_where(points, ~((E > 0) & np.isfinite(E)), E, f"{name}.E", _RIGHT_E)
@@ -147,7 +147,7 @@ class Hooke:
         return ng.CF(self.C)[2, 2]
 
     def check_at(self, points: np.ndarray, name: str) -> None:
-        """Refuse values outside HH81 (2.7) at mesh points (n,); `name` leads the message."""
+        """Refuse values outside HH81 (2.7) at mesh `points` (n,); `name` leads the message."""
         if not isinstance(self.C, np.ndarray):
             matrices = ng.CF(self.C)(points).reshape(-1, 3, 3)
             for bad, right in _faults(matrices):

@@ -51,15 +51,17 @@ class Problem:
         `Elastic` or `Hooke` per body, a body being a named material region.
     displacement
         Gamma_u: per boundary a pair of numbers, scalar CoefficientFunctions or None (component
-        left free), or a CoefficientFunction of dim 2. Kept as pairs of CoefficientFunction or None.
+        left free), or a CoefficientFunction of dim 2, in units of length. Kept as pairs of
+        CoefficientFunction or None.
     sliding
         Gamma_0, u.n = 0 without shear: a name or several. Kept as one pattern, or None.
     traction
         Gamma_tau: per boundary a number or a scalar CoefficientFunction, the pressure p of the
-        traction -p n, or a pair, or a CoefficientFunction of dim 2. Kept as CoefficientFunction
-        of dim 1 or 2; `traction_vector` is the traction itself.
+        traction -p n, or a pair, or a CoefficientFunction of dim 2, in units of stress. Kept as
+        CoefficientFunction of dim 1 or 2; `traction_vector` is the traction itself.
     force
-        F per body and area: a pair or a CoefficientFunction of dim 2. Kept as the latter.
+        F per body and area: a pair or a CoefficientFunction of dim 2, any consistent units.
+        Kept as the latter.
     contact
         Gamma_K: the pairs, kept as a tuple.
     model

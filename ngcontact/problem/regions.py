@@ -11,7 +11,7 @@ from .triangulation import Triangulation
 
 
 def boundary_mask(mesh: ng.Mesh, pattern: str) -> np.ndarray:
-    """Return which boundary region numbers a name or pattern selects, bool (number of regions,).
+    """Return which of r boundary region numbers a name or pattern selects, bool (r,).
 
     One name may stand on several numbers. Nothing selected is not an error here.
     """
@@ -19,7 +19,7 @@ def boundary_mask(mesh: ng.Mesh, pattern: str) -> np.ndarray:
 
 
 def body_mask(mesh: ng.Mesh, pattern: str) -> np.ndarray:
-    """Return which material region numbers a name or pattern selects, bool (number of regions,)."""
+    """Return which of r material region numbers a name or pattern selects, bool (r,)."""
     return _mask(mesh.Materials, pattern)
 
 

@@ -63,7 +63,7 @@ class Triangulation:
 
 
 def triangle_sides(triangles: Index) -> Index:
-    """Vertices (3 ne, 2) of the sides of triangles (ne, 3), three for each in turn."""
+    """Vertices (3 ne, 2) of the three sides of each triangle in turn, `triangles` (ne, 3)."""
     return triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
 
 

@@ -32,7 +32,10 @@ def scalar_data(value: Any, what: str) -> float | ng.CoefficientFunction:
 def refuse_where(
     points: np.ndarray, bad: np.ndarray, values: np.ndarray, what: str, right: str
 ) -> None:
-    """Raise `ValueError` for the first mesh point (n,) with `bad` (n,), naming value and place."""
+    """Raise `ValueError` for the first of mesh `points` (n,) that is `bad` (n,), naming the place.
+
+    And its value: `values` (n, ...).
+    """
     if bad.any():
         first = int(np.argmax(bad))
         x, y = ng.CF((ng.x, ng.y))(points[first : first + 1])[0]

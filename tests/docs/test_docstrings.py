@@ -67,6 +67,7 @@ UNITS = {
 SOLUTION = {
     "displacement": "length",
     "stress": "stress",
+    "out_of_plane_stress": "stress",
     "points": "length",
     "gap": "length",
     "force": "force",

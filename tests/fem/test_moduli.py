@@ -11,7 +11,6 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import Elastic, Hooke
-from ngcontact.arrays import power_of_two, root_of_squares
 from ngcontact.fem.moduli import (
     NEARLY_INCOMPRESSIBLE,
     bulk_moduli,
@@ -19,7 +18,7 @@ from ngcontact.fem.moduli import (
     shear_moduli,
     warn_of_locking,
 )
-from ngcontact.mesh import diameters, first_mesh, middles
+from ngcontact.mesh import first_mesh, middles
 
 BODIES = ("upper", "lower")
 
@@ -94,25 +93,3 @@ def test_locking_is_not_silent(mesh, caplog, nu, order, model, warned):
     for record, body in zip(caplog.records, BODIES, strict=False):
         assert f'"{body}"' in record.getMessage()
         assert "order=2" in record.getMessage()
-
-
-def test_diameters_are_longest_sides():
-    mesh = ng.Mesh(cases.one_transition().problem.geometry.GenerateMesh(maxh=10))
-    x = np.array(mesh.ngmesh.Coordinates())[:, :2]
-    for element, h in zip(mesh.Elements(ng.VOL), diameters(mesh), strict=True):
-        a, b, c = (x[v.nr] for v in element.vertices)
-        sides = [np.linalg.norm(p - q) for p, q in ((a, b), (b, c), (c, a))]
-        assert h == pytest.approx(max(sides), rel=1e-14)
-
-
-@pytest.mark.parametrize("size", [1e-300, 1e-170, 1.0, 1e170, 1e300])
-def test_root_of_squares_that_are_out_of_range(size):
-    assert root_of_squares(np.array([3.0, -4.0]) * size) == pytest.approx(5 * size, rel=1e-14)
-    unit = power_of_two(np.array([0.0, -size]))
-    assert unit <= size < 2 * unit
-    assert np.frexp(unit)[0] == 0.5
-
-
-def test_root_of_squares_of_nothing():
-    assert root_of_squares(np.zeros(3)) == 0.0
-    assert root_of_squares(np.zeros(0)) == 0.0
