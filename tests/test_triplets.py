@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from drivers import cases
-from ngcontact import solve
 from ngcontact.triplets import from_triplets
 
 
@@ -33,6 +31,9 @@ def test_large_places_are_kept():
 @pytest.mark.parametrize("order", [1, 2])
 def test_all_matrices_of_a_problem_have_short_indices(order):
     """One of 64 bits would make those of every product long, at twice the memory."""
+    from drivers.reference import cases  # needs NGSolve, the others do not
+    from ngcontact import solve
+
     d = solve(cases.pressed_disc(), maxh=0.5, order=order).discrete
     for matrix in (d.space.A, d.space.basis, d.basis.T, d.B, d.program.K, d.program.R):
         assert isinstance(matrix, sp.csr_array)
