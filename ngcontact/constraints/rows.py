@@ -125,6 +125,8 @@ Part = TypeVar("Part", Conditions, Rows)
 
 def concatenated(parts: Sequence[Part]) -> Part:
     """Conditions, or rows, of all parts in order; there is at least one part."""
+    if len(parts) == 1:
+        return parts[0]
     kind = type(parts[0])
     return kind(*(_stacked([getattr(part, x.name) for part in parts]) for x in fields(kind)))
 

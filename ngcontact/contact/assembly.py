@@ -21,11 +21,9 @@ def _coupling(line: ContactLine, trace: BoundaryTrace) -> sp.csr_array:
     """Basis functions (m, n) of the facing nodes at the partner points; none of an obstacle."""
     share = lagrange(trace.order, snap(line.partner_s, trace.order))
     share[line.partner < 0] = 0.0
-    row = np.repeat(np.arange(len(share)), trace.order + 1)
-    facing = trace.nodes[line.partner].ravel()
-    coupling = from_triplets(share.ravel(), row, facing, (len(share), trace.space.ndof))
-    coupling.eliminate_zeros()
-    return coupling
+    row, place = np.nonzero(share)
+    facing = trace.nodes[line.partner[row], place]
+    return from_triplets(share[row, place], row, facing, (len(share), trace.space.ndof))
 
 
 def _rows(line: ContactLine, trace: BoundaryTrace) -> Rows:
@@ -40,8 +38,10 @@ def _rows(line: ContactLine, trace: BoundaryTrace) -> Rows:
 
 
 def joined(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:
-    """Rows of all lines, in order."""
-    return concatenated([no_rows(trace.space.ndof), *(_rows(line, trace) for line in lines)])
+    """Rows of all lines, in order, on the nodes of the trace's space."""
+    if not lines:
+        return no_rows(trace.space.ndof)
+    return concatenated([_rows(line, trace) for line in lines])
 
 
 def kept_lines(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
