@@ -98,11 +98,7 @@ class BorderedSystems:
 
     def refine(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
         """The same, its residual at round-off."""
-        system = self.system
-        if system is None or not system.serves(active, anchor):
-            system = self._solved(active, anchor)
-            self._settled(system, ROUGH)
-        return self._settled(system, REFINED)
+        return self._settled(self._roughly_solved(active, anchor), REFINED)
 
     def stiffness(self) -> Array:
         """Force per displacement at each row, (m,): an upper bound, infinite where unknown."""
@@ -155,6 +151,14 @@ class BorderedSystems:
         residual = now.unbalanced(active, anchor)
         now.scale = max(now.scale, system.largest(residual))
         self._correct(system, residual, ROUGH)
+        return system
+
+    def _roughly_solved(self, active: Mask, anchor: Anchor | None) -> Border:
+        """The same, that of the last solution where it serves."""
+        if self.system is not None and self.system.serves(active, anchor):
+            return self.system
+        system = self._solved(active, anchor)
+        self._settled(system, ROUGH)
         return system
 
     def _correct(self, system: Border, residual: Array, tolerance: float) -> None:

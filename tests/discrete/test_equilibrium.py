@@ -26,7 +26,8 @@ from ngcontact.discrete.discrete_problem import discretise, minimise_energy
 from ngcontact.discrete.rigid_motions import free_motions
 from ngcontact.geometries import blocks, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
-from ngcontact.qp.schur_complement import BorderedSystems, SingularError
+from ngcontact.qp import BorderedSystems
+from ngcontact.qp.systems import SingularError
 
 STEEL = Elastic(E=1000.0, nu=0.3)
 WEIGHT = 0.1  # of a disc, per area

@@ -30,8 +30,12 @@ def test_one_factorisation_at_a_time():
         alive.add(solve)
         return solve
 
-    minimise(bordered_systems(program, factor, border=0), np.ones(6, dtype=bool))
+    systems = bordered_systems(program, factor, border=0)
+    minimise(systems, np.ones(6, dtype=bool))
     assert len(before) > 1
+    for last in range(3):
+        systems.refine(np.arange(6) == last)
+    assert len(before) > 4
     assert not any(before)
 
 
