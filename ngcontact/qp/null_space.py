@@ -73,7 +73,7 @@ class NullSpace:
 
 
 def no_null_space(n: int) -> NullSpace:
-    """The kernel of a definite matrix of size n."""
+    """The null space of a definite matrix of size n."""
     none, index = np.zeros((n, 0)), np.zeros(0, dtype=np.intp)
     return NullSpace(lineal=none, others=none, held=index, pins=index, conditions=none.T)
 
@@ -81,7 +81,7 @@ def no_null_space(n: int) -> NullSpace:
 def pinned_null_space(
     motions: Array, combinations: Array, functionals: Array, rows: Index, fixed: Mask
 ) -> NullSpace:
-    """Kernel with well separated pins.
+    """Null space with well separated pins.
 
     Parameters
     ----------

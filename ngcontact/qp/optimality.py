@@ -28,7 +28,15 @@ def terms(A: sp.csr_array, x: Array, rows: int = IN_CACHE) -> Array:
 
 
 def kkt_residuals(program: QuadraticProgram, minimiser: Iterate) -> dict[str, float]:
-    """Dimensionless residuals of the Karush-Kuhn-Tucker conditions, see `Solution.residuals`."""
+    """Dimensionless residuals of the Karush-Kuhn-Tucker conditions, see `Solution.residuals`.
+
+    Parameters
+    ----------
+    program : QuadraticProgram
+        With unit rows.
+    minimiser : Iterate
+        As computed.
+    """
     p, y, force, active = program, minimiser.u, minimiser.force, minimiser.active
     gap = p.g - y[p.unknown]
     residual = p.b - p.K @ y - p.R.T @ force

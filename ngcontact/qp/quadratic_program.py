@@ -19,7 +19,7 @@ class QuadraticProgram:
     Attributes
     ----------
     K : sparse (n, n)
-        Symmetric; on the unknowns that are not `fixed` positive definite but for the `kernel`.
+        Symmetric; on the unknowns that are not `fixed` positive definite but for `null_space`.
     b : ndarray (n,)
         Load.
     R : sparse (m, n)
