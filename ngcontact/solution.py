@@ -69,12 +69,12 @@ class Solution:
 
     @cached_property
     def stress(self) -> ng.CoefficientFunction:
-        """In-plane stress, a (2, 2) CoefficientFunction, any consistent units."""
+        """In-plane stress, a (2, 2) CoefficientFunction, in units of stress."""
         return stress_of(self.problem, self.displacement)
 
     @cached_property
     def out_of_plane_stress(self) -> ng.CoefficientFunction:
-        """Stress normal to the plane, a scalar CoefficientFunction, any consistent units.
+        """Stress normal to the plane, a scalar CoefficientFunction, in units of stress.
 
         nu (xx + yy) in plane strain, where for a general `Hooke` law, which does not tell it, 0 is
         taken; 0 in plane stress.

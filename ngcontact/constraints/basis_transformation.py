@@ -50,7 +50,7 @@ class BasisTransformation:
     local: Array
 
     def coordinates(self, values: Array, rows: Array) -> Array:
-        """Unknowns (2n, r) of node values (2n, r) with the values (k, r) of the kept rows."""
+        """Unknowns (2n, r) of node `values` (2n, r) with the values `rows` (k, r) of kept rows."""
         n = len(self.local)
         y = np.einsum("nij,jnr->inr", self.local, values.reshape(2, n, -1)).reshape(2 * n, -1)
         y[self.unknown] = rows

@@ -76,7 +76,7 @@ class Rows:
         return B
 
     def select(self, rows: Index) -> Rows:
-        """Some of the rows, by their numbers (k,)."""
+        """Some of the rows, by their numbers `rows` (k,)."""
         return Rows(
             node=self.node[rows],
             direction=self.direction[rows],

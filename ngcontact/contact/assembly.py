@@ -45,7 +45,7 @@ def joined(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:
 
 
 def kept_lines(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
-    """The lines with the points that carry the rows `kept` of all lines together."""
+    """The lines with the points that carry the rows `kept` (k,) of all lines together."""
     dropped = np.ones(sum(len(line.node) for line in lines), dtype=bool)
     dropped[kept] = False
     parts = zip(lines, by_line(lines, dropped), strict=True)

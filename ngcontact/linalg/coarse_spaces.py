@@ -42,7 +42,7 @@ class Coarsening:
 
 
 def refined_share(parents: Integers) -> float:
-    """Share of the vertices that refinement made, by their parents (nv, 2): -1 for others."""
+    """Share of the vertices that refinement made, by their `parents` (nv, 2): -1 for others."""
     return float(np.count_nonzero(parents[:, 0] >= 0) / len(parents))
 
 

@@ -147,7 +147,7 @@ class IterativeSystems:
         return self.direct.solve(active, anchor)
 
     def refine(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
-        """The same, its residual at round-off."""
+        """Minimiser (n,) and multipliers (m,) for `active` (m,), the residual at round-off."""
         if anchor is not None:
             self._turn_direct(PROXIMAL_TERMS)
         if not self.stalled:

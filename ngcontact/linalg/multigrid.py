@@ -92,7 +92,7 @@ class Multigrid:
     inverse: ng.BaseMatrix
 
     def hold(self, free: Mask) -> None:
-        """Free other unknowns (n,); coarser spaces stay as they are but for what they correct."""
+        """Let `free` (n,) be the unknowns; coarser spaces change only in what they correct."""
         self.levels[0] = self.levels[0].holding(free)
 
     def cycle(self, right: ng.BaseVector, solution: ng.BaseVector, level: int = 0) -> None:

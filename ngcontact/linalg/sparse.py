@@ -21,7 +21,7 @@ class _View:
 
 
 def shared(matrix: ng.BaseMatrix) -> sp.csr_array:
-    """The same matrix for SciPy, in the same memory: values and columns are not copied."""
+    """The same matrix (m, n) for SciPy, in the same memory: no values and columns are copied."""
     values, columns, starts = (np.asarray(_View(x, matrix)) for x in matrix.CSR())
     if len(values) <= np.iinfo(columns.dtype).max:  # SciPy has both of one type, or copies
         starts = starts.astype(columns.dtype)
@@ -29,7 +29,7 @@ def shared(matrix: ng.BaseMatrix) -> sp.csr_array:
 
 
 def handed_over(K: sp.sparray) -> ng.BaseMatrix:
-    """A copy of a SciPy matrix for NGSolve."""
+    """A copy for NGSolve of the SciPy matrix `K` (m, n)."""
     K = K.tocoo()
     entries = []
     # NumPy arrays as arguments would be converted entry by entry, at ten times the price.
@@ -40,17 +40,17 @@ def handed_over(K: sp.sparray) -> ng.BaseMatrix:
 
 
 def lower_half(K: sp.csr_array) -> ng.BaseMatrix:
-    """Lower half of a symmetric matrix for NGSolve, all that its Cholesky factorisation reads."""
+    """Lower half of the symmetric `K` (n, n) for NGSolve: what its Cholesky factorisation reads."""
     return handed_over(sp.tril(K))
 
 
 def congruent(
     matrix: ng.BaseMatrix, A: sp.csr_array, T: sp.csr_array
 ) -> tuple[sp.csr_array, ng.BaseMatrix]:
-    """Matrix T'AT of the unknowns y of u = T y, for SciPy and at least its lower half for NGSolve.
+    """Matrix T'AT (k, k) of the unknowns y of u = T y, for SciPy; its lower half for NGSolve.
 
-    `A` is `matrix` for SciPy. T is the identity but for nodes on the boundary: only the change is
-    multiplied and handed over entry by entry, a small part of the price of the whole.
+    `A` (n, n) is `matrix` for SciPy. `T` (n, k) is the identity but for nodes on the boundary: only
+    the change is multiplied and handed over entry by entry, a small part of the price of the whole.
     """
     if T.shape[0] != T.shape[1]:  # fewer node values than edge unknowns: element="physical"
         K = (T.T @ A @ T).tocsr()

@@ -114,7 +114,7 @@ class ActiveSetIteration:
         )
 
     def advance(self, moved: Array) -> float:
-        """Activate the row that a steady rigid motion, given at the pins (q,), meets first.
+        """Activate the row that a steady rigid motion, `moved` (q,) at the pins, meets first.
 
         Returns how often that motion leads there, 0 if it meets none.
         """
@@ -190,7 +190,7 @@ class ActiveSetIteration:
 def first_iterate(
     systems: LinearSystems, active: Mask | None = None, patience: int = PATIENCE
 ) -> ActiveSetIteration:
-    """Prescribed values, no force, and the first active set (m,)."""
+    """Prescribed values, no force, and the first active set `active` (m,)."""
     p = systems.program
     return ActiveSetIteration(
         systems=systems,

@@ -93,7 +93,7 @@ class Border:
     S: Array
 
     def serves(self, active: Mask, anchor: Anchor | None) -> bool:
-        """Whether it is the system of these rows (m,) and this anchor."""
+        """Whether it is the system of the rows `active` (m,) and this anchor."""
         return self.anchor is anchor and np.array_equal(self.active, active)
 
     def largest(self, residual: Array) -> float:

@@ -30,7 +30,7 @@ def vanishing_combinations(resisted: Array) -> Array:
 
 
 def echelon(vectors: Array) -> Array:
-    """The same span as the columns of `vectors` (n, l), of which l rows form the identity."""
+    """Columns (n, l) of the same span as `vectors` (n, l), of which l rows form the identity."""
     if vectors.shape[1] == 0:
         return vectors
     pivots = qr(vectors.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
@@ -66,7 +66,7 @@ class NullSpace:
     conditions: Array
 
     def resisted(self, rows: Index) -> bool:
-        """Whether the rows with these unknowns resist all motions that are not lineal."""
+        """Whether rows with the unknowns `rows` (k,) resist all motions that are not lineal."""
         if self.pins.size == 0:
             return True
         return vanishing_combinations(self.others[rows]).shape[1] == 0

@@ -51,7 +51,7 @@ class QuadraticProgram:
 
     @cached_property
     def diagonal(self) -> Array:
-        """Diagonal of K."""
+        """Diagonal (n,) of K."""
         return np.asarray(self.K.diagonal())
 
     @property
@@ -62,7 +62,7 @@ class QuadraticProgram:
 
 @dataclass(frozen=True, eq=False)
 class Iterate:
-    """Solution of a quadratic program.
+    """Solution of a quadratic program, in any consistent units.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Iterate:
         Minimiser.
     force : ndarray (m,)
         Multipliers of the rows R u <= g, not negative.
-    multiplier : ndarray
+    multiplier : ndarray (k,)
         Multipliers of the equations E u = e, of either sign.
     active : ndarray of bool (m,)
         Rows that hold with equality.

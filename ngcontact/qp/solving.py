@@ -98,7 +98,7 @@ def solve_qp(
     e: ArrayLike | None = None,
     active: ArrayLike | None = None,
 ) -> Iterate:
-    """Minimise 1/2 u'Au - f'u subject to B u <= g and E u = e.
+    """Minimise 1/2 u'Au - f'u subject to B u <= g and E u = e, in any consistent units.
 
     Parameters
     ----------

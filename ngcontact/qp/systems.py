@@ -68,7 +68,7 @@ class LinearSystems(Protocol):
         """
 
     def refine(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
-        """The same with a residual of round-off; costs little after `solve`."""
+        """Solution (n,), multipliers (m,) for `active` (m,) to round-off: little after `solve`."""
 
     def stiffness(self) -> Array:
         """Force per displacement at each row, (m,): an upper bound, infinite where unknown."""
@@ -101,7 +101,7 @@ class Approximation:
     def unbalanced(self, active: Mask, anchor: Anchor | None) -> Array:
         """Unbalanced force b - K y - R' force, (n,), less that of the proximal terms.
 
-        Active unit rows first take as their force what is left at their unknowns.
+        The unit rows `active` (m,) first take as their force what is left at their unknowns.
         """
         p = self.program
         residual = p.b - p.K @ self.y
@@ -121,7 +121,7 @@ class Approximation:
 
 
 def first_approximation(program: QuadraticProgram, closed: Mask | None = None) -> Approximation:
-    """Prescribed values, and the bounds of unit rows that are `closed`, (m,)."""
+    """Prescribed values, and the bounds of the unit rows that are `closed` (m,)."""
     y = np.where(program.fixed, program.values, 0.0)
     if closed is not None and program.unit_rows:
         y[program.unknown[closed]] = program.g[closed]
