@@ -5,8 +5,9 @@ separate faces, so that the mesh keeps distinct, coincident nodes where they tou
 bodies and boundaries stand in the docstring of each function. Lengths are in any consistent unit.
 """
 
+from ngcontact.geometries.concentric import rings
 from ngcontact.geometries.curved import graphs
-from ngcontact.geometries.round import disc, disc_on_block, disc_on_disc, rings
+from ngcontact.geometries.discs import disc, disc_on_block, disc_on_disc
 from ngcontact.geometries.straight import blocks, punch
 
 __all__ = ["blocks", "disc", "disc_on_block", "disc_on_disc", "graphs", "punch", "rings"]

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from netgen.occ import OCCGeometry
+from netgen.occ import Face, OCCGeometry
 
 from ngcontact.geometries.check import above, count, finite, positive
-from ngcontact.geometries.graph_edge import follow
+from ngcontact.geometries.graph_edge import GraphCurve, follow
 from ngcontact.geometries.region import body, compound, segment
 
 
@@ -23,20 +23,16 @@ def graphs(
 
     The upper curve is f' of HH81, the lower one f'', with x for eta and y for xi (HH81 section 2,
     the enlarging zone). The gap f' - f'' may vanish, and be negative where the bodies overlap.
-
     Lengths are in any consistent unit.
 
     Parameters
     ----------
     upper, lower : callable
         y as a function of x, called with one number at a time.
-    a, b : float
-        The bodies cover `a` <= x <= `b`.
-    height : float
-        The bodies reach to y = `height` and y = -`height`.
+    a, b, height : float
+        The bodies cover `a` <= x <= `b`, and reach to y = `height` and y = -`height`.
     samples : int
-        Number of points of each graph that the quintic spline interpolates, at least 16.
-        A polynomial of degree 8 or less is exact at any number.
+        Points of each graph for a quintic spline, at least 16; degrees up to 8 are exact anyway.
 
     Returns
     -------
@@ -48,22 +44,17 @@ def graphs(
     TypeError
         If `upper` or `lower` is not a function from number to number, `samples` no whole number.
     ValueError
-        If `b` does not exceed `a`, a graph does not stay strictly between y = -`height` and
-        y = `height`, or `samples` points do not resolve it to 1e-4 of its departure
-        from a straight line.
+        If `b` does not exceed `a`, a graph leaves -`height` < y < `height`, or `samples` points do
+        not resolve it to 1e-4 of its departure from a straight line.
 
     Notes
     -----
     ====================  ==================================================
-    body                  where
+    body, boundary        where
     ====================  ==================================================
     ``upper``             upper(x) <= y <= `height`
     ``lower``             -`height` <= y <= lower(x)
-    ====================  ==================================================
 
-    ====================  ==================================================
-    boundary              where
-    ====================  ==================================================
     ``upper_contact``     y = upper(x)
     ``lower_contact``     y = lower(x)
     ``top``               y = `height`
@@ -74,36 +65,49 @@ def graphs(
     ``lower_right``       x = `b`, ``lower``
     ====================  ==================================================
     """
-    for name, f in (("upper", upper), ("lower", lower)):
-        if not callable(f):
-            raise TypeError(f"{name} = {f!r}: expected a function of one number x")
     a = finite("a", a)
-    b = above("b", b, "a", a)
-    height = positive("height", height)
-    samples = count("samples", samples, 16)
-    over, under = follow("upper", upper, a, b, samples), follow("lower", lower, a, b, samples)
-    for name, curve in (("upper", over), ("lower", under)):
-        if not -height < curve.lowest <= curve.highest < height:
-            raise ValueError(
-                f"{name}: values from {curve.lowest!r} to {curve.highest!r}: expected values "
-                f"strictly between -height = {-height!r} and height = {height!r}"
-            )
-    top = body(
+    b, height = above("b", b, "a", a), positive("height", height)
+    over = _curve("upper", upper, a, b, height, samples)
+    under = _curve("lower", lower, a, b, height, samples)
+    return compound(_above(over, a, b, height), _below(under, a, b, -height))
+
+
+def _curve(
+    name: str, f: Callable[[float], float], a: float, b: float, height: float, samples: int
+) -> GraphCurve:
+    """Curve along a graph, refused where it leaves -`height` < y < `height`."""
+    if not callable(f):
+        raise TypeError(f"{name} = {f!r}: expected a function of one number x")
+    curve = follow(name, f, a, b, count("samples", samples, 16))
+    if not -height < curve.lowest <= curve.highest < height:
+        raise ValueError(
+            f"{name}: values from {curve.lowest!r} to {curve.highest!r}: expected values "
+            f"strictly between -height = {-height!r} and height = {height!r}"
+        )
+    return curve
+
+
+def _above(curve: GraphCurve, a: float, b: float, top: float) -> Face:
+    """Body between the curve and y = `top`."""
+    return body(
         "upper",
         [
-            ("upper_contact", over.edge()),
-            ("upper_right", segment(over.right, (b, height))),
-            ("top", segment((b, height), (a, height))),
-            ("upper_left", segment((a, height), over.left)),
+            ("upper_contact", curve.edge()),
+            ("upper_right", segment(curve.right, (b, top))),
+            ("top", segment((b, top), (a, top))),
+            ("upper_left", segment((a, top), curve.left)),
         ],
     )
-    bottom = body(
+
+
+def _below(curve: GraphCurve, a: float, b: float, bottom: float) -> Face:
+    """Body between y = `bottom` and the curve."""
+    return body(
         "lower",
         [
-            ("lower_contact", under.edge(leftward=True)),
-            ("lower_left", segment(under.left, (a, -height))),
-            ("bottom", segment((a, -height), (b, -height))),
-            ("lower_right", segment((b, -height), under.right)),
+            ("lower_contact", curve.edge(leftward=True)),
+            ("lower_left", segment(curve.left, (a, bottom))),
+            ("bottom", segment((a, bottom), (b, bottom))),
+            ("lower_right", segment((b, bottom), curve.right)),
         ],
     )
-    return compound(top, bottom)

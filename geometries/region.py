@@ -30,6 +30,7 @@ SHORTEST_EDGE = 1e-6
 
 # Unit vectors at 0, 90, 180 and 270 degrees, exact where cos and sin would leave 6e-17.
 COMPASS: tuple[Point, ...] = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
+RIGHT, UP, LEFT, DOWN = range(4)  # their numbers
 
 
 def segment(start: Point, end: Point) -> Edge:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from netgen.occ import OCCGeometry
+from netgen.occ import Face, OCCGeometry
 
 from ngcontact.geometries.check import above, increasing_line, positive
-from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.geometries.region import Point, body, compound, polygon
 
 
 def blocks(
@@ -46,15 +46,11 @@ def blocks(
     Notes
     -----
     ====================  ==================================================
-    body                  where
+    body, boundary        where
     ====================  ==================================================
     ``upper``             between the line and y = `height`
     ``lower``             between y = -`lower_height` and the line
-    ====================  ==================================================
 
-    ====================  ==================================================
-    boundary              where
-    ====================  ==================================================
     ``upper_contact``     the line, side of ``upper``
     ``lower_contact``     the line, side of ``lower``
     ``top``               y = `height`
@@ -69,24 +65,8 @@ def blocks(
     depth = height if lower_height is None else positive("lower_height", lower_height)
     if line is None:
         line = ((-width / 2, 0.0), (width / 2, 0.0))
-    vertices = increasing_line("line", line)
-    for k, (_, y) in enumerate(vertices):
-        if not -depth < y < height:
-            raise ValueError(
-                f"line[{k}] = {vertices[k]!r}: expected y strictly between "
-                f"-lower_height = {-depth!r} and height = {height!r}"
-            )
-    left, right = vertices[0][0], vertices[-1][0]
-    sides = len(vertices) - 1
-    upper = polygon(
-        [*vertices, (right, height), (left, height)],
-        ["upper_contact"] * sides + ["upper_right", "top", "upper_left"],
-    )
-    lower = polygon(
-        [*vertices[::-1], (left, -depth), (right, -depth)],
-        ["lower_contact"] * sides + ["lower_left", "bottom", "lower_right"],
-    )
-    return compound(body("upper", upper), body("lower", lower))
+    vertices = _line_between(-depth, height, line)
+    return compound(_upper_block(vertices, height), _lower_block(vertices, -depth))
 
 
 def punch(
@@ -125,15 +105,11 @@ def punch(
     Notes
     -----
     ======================  ==================================================
-    body                    where
+    body, boundary          where
     ======================  ==================================================
     ``punch``               |x| <= `half_width`, 0 <= y <= `punch_height`
     ``foundation``          |x| <= `width`, -`depth` <= y <= 0
-    ======================  ==================================================
 
-    ======================  ==================================================
-    boundary                where
-    ======================  ==================================================
     ``punch_top``           y = `punch_height`
     ``punch_sides``         |x| = `half_width`
     ``punch_contact``       y = 0, side of ``punch``
@@ -151,12 +127,43 @@ def punch(
         [(-half, 0.0), (half, 0.0), (half, top), (-half, top)],
         ["punch_contact", "punch_sides", "punch_top", "punch_sides"],
     )
+    return compound(body("punch", upper), _foundation(half, far, bottom))
+
+
+def _line_between(bottom: float, top: float, line: object) -> list[Point]:
+    """Vertices of a line that runs to the right, refused where one leaves `bottom` < y < `top`."""
+    vertices = increasing_line("line", line)
+    for k, (_, y) in enumerate(vertices):
+        if not bottom < y < top:
+            raise ValueError(
+                f"line[{k}] = {vertices[k]!r}: expected y strictly between "
+                f"-lower_height = {bottom!r} and height = {top!r}"
+            )
+    return vertices
+
+
+def _upper_block(line: list[Point], top: float) -> Face:
+    """Block between a line and y = `top`."""
+    (left, _), (right, _) = line[0], line[-1]
+    names = ["upper_contact"] * (len(line) - 1) + ["upper_right", "top", "upper_left"]
+    return body("upper", polygon([*line, (right, top), (left, top)], names))
+
+
+def _lower_block(line: list[Point], bottom: float) -> Face:
+    """Block between y = `bottom` and a line."""
+    (left, _), (right, _) = line[0], line[-1]
+    names = ["lower_contact"] * (len(line) - 1) + ["lower_left", "bottom", "lower_right"]
+    return body("lower", polygon([*line[::-1], (left, bottom), (right, bottom)], names))
+
+
+def _foundation(half: float, far: float, bottom: float) -> Face:
+    """Foundation |x| <= `far` down to y = `bottom`, in contact for |x| <= `half`."""
     surface = [(far, 0.0), (half, 0.0), (-half, 0.0), (-far, 0.0)]
-    lower = polygon(
+    outline = polygon(
         [*surface, (-far, bottom), (far, bottom)],
         [
             *("foundation_free", "foundation_contact", "foundation_free"),
             *("foundation_sides", "foundation_bottom", "foundation_sides"),
         ],
     )
-    return compound(body("punch", upper), body("foundation", lower))
+    return body("foundation", outline)

@@ -1,5 +1,8 @@
 """The finite element spaces V_h: elements, boundary nodes, forms, energies."""
 
+from .bodies import Bodies as Bodies
+from .bodies import body_of_unknown as body_of_unknown
+from .bodies import connected_bodies as connected_bodies
 from .boundary import BoundaryTrace as BoundaryTrace
 from .boundary import boundary_trace as boundary_trace
 from .element import check_element as check_element
