@@ -97,7 +97,7 @@ class BorderedSystems:
         return self._settled(self._solved(active, anchor), ROUGH)
 
     def refine(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
-        """The same, its residual at round-off."""
+        """Minimiser (n,) and multipliers (m,) for `active` (m,), the residual at round-off."""
         return self._settled(self._roughly_solved(active, anchor), REFINED)
 
     def stiffness(self) -> Array:
