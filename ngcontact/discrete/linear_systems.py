@@ -34,7 +34,7 @@ class MultigridUse:
         and 2 both take the same time, of order 3 at a million; it always takes less memory. See
         docs/performance.md.
     coarsest : int
-        Unknowns below which there is no coarser space.
+        Unknowns up to which there is no coarser space, and a problem is factorised anyway.
     """
 
     large: dict[int, int] = field(default_factory=lambda: {1: 100_000, 2: 100_000})
@@ -65,9 +65,10 @@ def linear_systems(
     """
     factor, order = cholesky(matrix), nodes.shape[1] - 1
     size = program.b.size
+    small = size < MULTIGRID.large.get(order, np.inf) or size <= MULTIGRID.coarsest
     coarsest = 2 * len(parents) * (1 - refined_share(parents))
     half = matrix.nze < program.K.nnz  # all that a factorisation reads
-    if half or size < MULTIGRID.large.get(order, np.inf) or coarsest > (1 - FEWEST) * size:
+    if small or half or coarsest > (1 - FEWEST) * size:
         return bordered_systems(program, factor)
 
     def prepare(free: Mask) -> Multigrid:

@@ -116,6 +116,18 @@ def test_without_coarser_spaces_there_is_a_factor(large):
     same(solution, direct(problem, mesh, order=2))
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_no_larger_than_the_coarsest_space_there_is_a_factor(large, monkeypatch, order):
+    problem = REFINED["block"]
+    mesh = uniform_mesh(problem, order, 1000)
+    known = solve(problem, mesh, order=order)
+    assert known.work["factorizations"] == 0
+    monkeypatch.setattr(MULTIGRID, "coarsest", known.displacement.space.ndof)
+    solution = solve(problem, mesh, order=order)
+    assert type(solution.discrete.systems) is BorderedSystems
+    same(solution, known)
+
+
 def test_small_problems_are_factorised():
     problem = REFINED["block"]
     assert (

@@ -224,15 +224,21 @@ def test_forces_of_a_uniform_strain():
     assert np.abs(force[inside]).max() < 1e-12 * np.abs(force).max()
 
 
-def test_large_problems_take_the_path_asked_for(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(MULTIGRID, "large", MULTIGRID.large)  # measurements set another
+def test_large_problems_take_the_path_asked_for():
+    usual = MULTIGRID.large
     rows = [large.measure("block", 1, 20_000, path) for path in large.PATHS]
     assert len({row.unknowns for row in rows}) == 1
     assert all(row.seconds > 0 and row.memory > 0 for row in rows)
+    assert MULTIGRID.large is usual
     one, other = rows
     assert one.cycles < other.cycles
     assert of_large(rows).count("\n") == 2
     assert f"| {other.systems} | {other.cycles} |" in of_large(rows)
+
+
+def test_small_problems_do_not_stay_iterative():
+    with pytest.raises(RuntimeError, match="1000 unknowns did not stay iterative"):
+        large.measure("block", 1, 1000, "iterative")
 
 
 def test_driver_writes_the_parts_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
