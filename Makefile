@@ -18,7 +18,7 @@ INSTALLED := $(VENV)/installed-$(VERSION)
 DEVELOPING := $(VENV)/developing-$(VERSION)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test smoke check lint types imports spelling dev dist clean
+.PHONY: demo test smoke check lint types imports spelling pages dev dist clean
 
 demo: $(INSTALLED)
 	$(BIN)/python -m drivers.hertz
@@ -50,6 +50,11 @@ imports: $(INSTALLED)
 
 spelling: $(DEVELOPING)
 	$(BIN)/codespell
+
+# The pages that are made from the source: the picture of the rooms, the index of equations.
+pages: $(INSTALLED)
+	$(BIN)/python docs/developers/architecture.py
+	$(BIN)/python docs/developers/equations.py
 
 # To work on the package: everything, and checks before each commit.
 dev: $(DEVELOPING)

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import ngsolve as ng
 import numpy as np
-from numpy.typing import NDArray
 
-from .arrays import Array, Mask, root_of_squares
+from .arrays import Array, Index, Mask, root_of_squares
 from .contact import ContactState, contact_states
 from .discrete import DiscreteProblem, RigidMotion, resultants
 from .estimator import Estimate, Estimator, estimate
@@ -95,7 +94,7 @@ class Solution:
         return np.concatenate([np.zeros((0, 2)), *(pair.line.position for pair in self.pairs)])
 
     @cached_property
-    def pair(self) -> NDArray[np.intp]:
+    def pair(self) -> Index:
         """Number of the pair in ``problem.contact`` of each point, (m,)."""
         return np.repeat(np.arange(len(self.pairs)), [pair.gap.size for pair in self.pairs])
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from ..arrays import Array, Mask
 
 SPARE = 1e-14  # share of a sum that round-off may keep from being carried
 
 
-def doerfler(indicators: NDArray[np.float64], theta: float) -> NDArray[np.bool_]:
+def doerfler(indicators: Array, theta: float) -> Mask:
     """Smallest set of elements that carries the share `theta` of the squared indicators.
 
     Parameters

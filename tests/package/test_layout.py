@@ -1,0 +1,137 @@
+"""The house stays one to live in: few modules in a folder, short ones, each thing in one place."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+
+MODULES_IN_A_FOLDER = 9  # with its __init__
+LINES_OF_A_MODULE = 260
+LINES_OF_A_FUNCTION = 60  # with its docstring
+
+FILES = [*(ROOT / "ngcontact").rglob("*.py"), *(ROOT / "geometries").glob("*.py")]
+SOURCES = {path.resolve().relative_to(ROOT).as_posix(): path.read_text() for path in FILES}
+TREES = {path: ast.parse(source) for path, source in SOURCES.items()}
+
+every_module = pytest.mark.parametrize("path", sorted(SOURCES))
+
+
+def with_lines(pattern: str) -> set[str]:
+    """Modules with a line that has the pattern."""
+    return {path for path, source in SOURCES.items() if re.search(pattern, source)}
+
+
+def test_modules_are_found():
+    """About the number of today: who finds nothing finds no fault."""
+    assert len(SOURCES) > 80
+
+
+def test_folders_are_small():
+    count = Counter(str(Path(path).parent) for path in SOURCES)
+    assert {"ngcontact", "ngcontact/qp", "geometries"} < count.keys()
+    assert {folder: n for folder, n in count.items() if n > MODULES_IN_A_FOLDER} == {}
+
+
+def test_modules_are_short():
+    lines = {path: source.count("\n") for path, source in SOURCES.items()}
+    assert {path: n for path, n in lines.items() if n > LINES_OF_A_MODULE} == {}
+
+
+@every_module
+def test_functions_are_short(path: str):
+    functions = [node for node in ast.walk(TREES[path]) if isinstance(node, ast.FunctionDef)]
+    lines = {f"{f.name}, line {f.lineno}": f.end_lineno - f.lineno + 1 for f in functions}
+    assert {name: n for name, n in lines.items() if n > LINES_OF_A_FUNCTION} == {}
+
+
+def bound(function: ast.AST) -> set[str]:
+    """Attributes that a method sets on its ``self``."""
+    return {
+        node.attr
+        for node in ast.walk(function)
+        if isinstance(node, ast.Attribute)
+        and isinstance(node.ctx, ast.Store)
+        and isinstance(node.value, ast.Name)
+        and node.value.id == "self"
+    }
+
+
+def bound_late(tree: ast.AST) -> Iterator[str]:
+    """Attributes that are no fields of a class and that another method than __init__ binds."""
+    for cls in (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)):
+        methods = [node for node in cls.body if isinstance(node, ast.FunctionDef)]
+        known = {ast.unparse(x.target) for x in cls.body if isinstance(x, ast.AnnAssign)}
+        for method in methods:
+            known |= bound(method) if method.name == "__init__" else set()
+        for method in methods:
+            yield from (f"{cls.name}.{name} in {method.name}" for name in bound(method) - known)
+
+
+@every_module
+def test_attributes_are_bound_where_objects_are_made(path: str):
+    assert list(bound_late(TREES[path])) == []
+
+
+def test_late_attributes_are_found():
+    source = """
+class State:
+    known: int
+    def __init__(self):
+        self.first = 0
+    def step(self):
+        self.known = self.first = self.late = 1
+        self.later, other = 2, 3
+"""
+    assert set(bound_late(ast.parse(source))) == {"State.late in step", "State.later in step"}
+
+
+def test_types_of_arrays_stand_in_one_module():
+    assert with_lines(r"(?m)^\w+(: TypeAlias)? = (np\.ndarray|NDArray)\b") == {
+        "ngcontact/arrays.py"
+    }
+
+
+def test_meshes_are_read_as_arrays_in_one_module():
+    assert with_lines(r"\b(Elements[12]D|Coordinates)\(") == {"ngcontact/problem/triangulation.py"}
+
+
+def test_boundaries_are_selected_by_name_in_one_module():
+    """Where a problem is checked, reactions are named, and a boundary selects its segments."""
+    outside = {path for path in with_lines(r"boundary_mask\(") if "/problem/" not in path}
+    assert outside == {"ngcontact/fem/boundary.py", "ngcontact/discrete/supports.py"}
+
+
+def test_arrays_are_cut_into_pairs_in_one_module():
+    """Rooms that know of no pairs split other things."""
+    without_pairs = ("ngcontact/qp/", "ngcontact/linalg/", "ngcontact/constraints/")
+    cut = with_lines(r"np\.split\(|cumsum\(\[?len|cumsum\(\[0, \*\(len")
+    assert {path for path in cut if not path.startswith(without_pairs)} == {
+        "ngcontact/contact/state.py"
+    }
+
+
+def test_fields_are_named_not_reflected():
+    assert with_lines("__annotations__") == set()
+
+
+def exported(face: Path) -> set[str]:
+    """Names that a face makes public."""
+    imports = [n for n in ast.walk(ast.parse(face.read_text())) if isinstance(n, ast.ImportFrom)]
+    return {name.asname or name.name for node in imports for name in node.names}
+
+
+@pytest.mark.parametrize(
+    "face",
+    [*(ROOT / "ngcontact").rglob("__init__.py*")],
+    ids=lambda face: f"{face.parent.name}/{face.name}",
+)
+def test_no_module_bears_the_name_of_what_its_package_exports(face: Path):
+    modules = {path.stem for path in face.parent.glob("*.py")}
+    assert exported(face) & modules == set()
