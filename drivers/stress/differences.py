@@ -34,7 +34,7 @@ def _directions(solution: Solution) -> Array:
 def _same_points(first: Solution, other: Solution, motion: Motion) -> tuple[Index, Index]:
     """Numbers in both solutions of the contact points that are the same.
 
-    Of swapped bodies they are so if they face each other.
+    Of swapped bodies they are so if they face each other; means are taken on the secondary.
     """
     origin, size = first.points[:1], np.ptp(first.points, axis=0).max()
     x = (motion.place(first.points) - motion.place(origin)) / (motion.length * size)
@@ -46,7 +46,14 @@ def _same_points(first: Solution, other: Solution, motion: Motion) -> tuple[Inde
             x, y = (z - (z * there[0]).sum(axis=1)[:, None] * there[0] for z in (x, y))
     distance, number = cKDTree(np.column_stack([y, there])).query(np.column_stack([x, here]))
     same = np.flatnonzero(distance < 1e-6)
+    if _sides_swapped(first, other):
+        same = same[~(_means(first)[same] | _means(other)[number[same]])]
     return same, number[same]
+
+
+def _means(solution: Solution) -> NDArray[np.bool_]:
+    """Contact points (m,) whose row is a mean over segments."""
+    return np.concatenate([pair.line.means for pair in solution.pairs])
 
 
 def _all_compared(first: Solution, other: Solution, same: Index, number: Index) -> bool:

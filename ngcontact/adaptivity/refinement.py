@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Iterator
 
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Mask
-from ..contact import contact_line
+from ..arrays import Array, Index, Mask
+from ..contact import nodal_line
 from ..fem import BoundaryTrace, boundary_trace
-from ..mesh import copied
+from ..mesh import CadEdge, copied
 from ..problem import Contact, Problem, Triangulation, bisect, move_vertices
 
+TOUCHING = 1e-12  # distance, relative to the geometry, up to which two vertices are at one place
 ROUNDS = 12  # refinements after which a facing segment that still lags stays unmatched
 
 log = logging.getLogger("ngcontact")
@@ -22,8 +24,8 @@ def matched_vertices(trace: BoundaryTrace, contact: Contact) -> dict[int, int]:
     """Vertices of the secondary and, at the same C_j, of the primary; `trace` is of degree 1."""
     if contact.primary is None:
         return {}
-    line = contact_line(trace, contact)
-    end = np.isin(line.partner_s, (0.0, 1.0))
+    line, facing = nodal_line(trace, contact)
+    end = facing & np.isin(line.partner_s, (0.0, 1.0))
     partner = trace.nodes[line.partner[end], line.partner_s[end].astype(int)]
     return dict(zip(line.node[end].tolist(), partner.tolist(), strict=True))
 
@@ -73,27 +75,66 @@ def _match_children(
     return lagging
 
 
-def _move_to_common_eta(
-    trace: BoundaryTrace, contact: Contact, pairs: dict[int, int], first: int
+def _edge_of_vertex(trace: BoundaryTrace, vertices: Index) -> Index:
+    """Number (k,) of a CAD edge on which each of the vertices (k,) lies."""
+    region = np.full(trace.space.ndof, -1)
+    region[trace.nodes[:, [0, -1]]] = trace.region[:, None]
+    return region[vertices]
+
+
+def _on_normals(trace: BoundaryTrace, pairs: Index, xy: Array) -> tuple[Index, Array, Array]:
+    """Pairs (k, 2) of vertices that are apart, and the normals of their first ones.
+
+    Returns
+    -------
+    pairs : ndarray of int (k, 2)
+    axis : ndarray (k, 2)
+        Unit vectors across the normals.
+    level : ndarray (k,)
+        Coordinates of the first vertices along them.
+    """
+    size = np.ptp(xy, axis=0).max()
+    apart = np.linalg.norm(xy[pairs[:, 0]] - xy[pairs[:, 1]], axis=1) > TOUCHING * size
+    pairs = pairs[apart]
+    normal = np.zeros((len(pairs), 2))
+    for edge, at in _by_edge(trace, pairs[:, 0]):
+        normal[at] = edge.normal(xy[pairs[at, 0]])
+    axis = np.column_stack([-normal[:, 1], normal[:, 0]])
+    return pairs, axis, (xy[pairs[:, 0]] * axis).sum(axis=1)
+
+
+def _by_edge(trace: BoundaryTrace, vertices: Index) -> Iterator[tuple[CadEdge, Index]]:
+    """CAD edges on which the vertices (k,) lie, each with the numbers of those."""
+    region = np.full(trace.space.ndof, -1)
+    region[trace.nodes[:, [0, -1]]] = trace.region[:, None]
+    for number in np.unique(region[vertices]):
+        yield (trace.edges or [])[number], np.flatnonzero(region[vertices] == number)
+
+
+def _move_to_partners(
+    trace: BoundaryTrace, contact: Contact, matched: dict[int, int], first: int
 ) -> None:
-    """Move new pairs of vertices along their exact curves to their mean eta."""
-    new = [(a, b) for a, b in pairs.items() if a >= first or b >= first]
-    if contact.direction is None or trace.edges is None or not new:
+    """Move new pairs of vertices along their exact curves until they face each other.
+
+    Along a fixed direction both go to their mean eta; along normals, across a clearance or an
+    overlap, the one of the primary goes to the normal of the other.
+    """
+    new = [(a, b) for a, b in matched.items() if a >= first or b >= first]
+    if trace.edges is None or not new:
         return
-    xy = Triangulation(trace.mesh).vertices
-    across = np.array([-contact.direction[1], contact.direction[0]])
-    vertices = np.array(new)
-    eta = (xy[vertices] @ across).mean(axis=1)  # C_j of (2.10)
-    region = {}
-    for ends, number in zip(trace.nodes[:, [0, -1]].tolist(), trace.region.tolist(), strict=True):
-        region.update(dict.fromkeys(ends, number))
+    pairs, xy = np.array(new), Triangulation(trace.mesh).vertices
+    if contact.direction is None:
+        pairs, axis, level = _on_normals(trace, pairs, xy)
+        moving: tuple[int, ...] = (1,)
+    else:
+        axis = np.array([-contact.direction[1], contact.direction[0]])
+        level = (xy[pairs] @ axis).mean(axis=1)  # C_j of (2.10)
+        moving = (0, 1)
     moved = xy.copy()
-    for side in (0, 1):
-        numbers = np.array([region[v] for v in vertices[:, side]])
-        for number in np.unique(numbers):
-            at = np.flatnonzero(numbers == number)
-            edge, v = trace.edges[number], vertices[at, side]
-            t = edge.level(across, eta[at], xy[v])
+    for side in moving:
+        for edge, at in _by_edge(trace, pairs[:, side]):
+            v = pairs[at, side]
+            t = edge.level(axis if axis.ndim == 1 else axis[at], level[at], xy[v])
             reached = ~np.isnan(t)
             moved[v[reached]] = edge.point(t[reached])
     move_vertices(trace.mesh, _without_inversion(trace.mesh, xy, moved))
@@ -149,5 +190,5 @@ def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.M
     else:
         log.warning("%d facing contact segments stay unmatched", len(lagging))
     for contact, pair in zip(problem.contact, pairs, strict=True):
-        _move_to_common_eta(trace, contact, pair, first)
+        _move_to_partners(trace, contact, pair, first)
     return copied(copy)  # numbers only the edges that are left

@@ -1,12 +1,12 @@
+from .assembly import contact_line as contact_line
 from .assembly import joined as joined
 from .assembly import kept_lines as kept_lines
 from .assembly import merged as merged
 from .corners import pressure_across_corners as pressure_across_corners
 from .line import ContactLine as ContactLine
 from .line import at_quadrature as at_quadrature
-from .line import contact_line as contact_line
+from .line import nodal_line as nodal_line
 from .line import prescribed_gap as prescribed_gap
-from .line import unmatched as unmatched
 from .search import partners as partners
 from .state import ContactState as ContactState
 from .state import by_line as by_line

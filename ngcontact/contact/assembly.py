@@ -3,35 +3,83 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
-import scipy.sparse as sp
 
-from ..arrays import Index
+from ..arrays import Array, Index, Mask
 from ..constraints import Rows, concatenated, no_rows
 from ..fem import BoundaryTrace
-from ..lagrange import lagrange
+from ..problem import Contact
 from ..triplets import from_triplets
-from .line import ContactLine, without
-from .projection import snap
+from .dual import with_dual_rows
+from .line import ContactLine, nodal_line, without
 from .state import by_line
 
-
-def _coupling(line: ContactLine, trace: BoundaryTrace) -> sp.csr_array:
-    """Basis functions (m, n) of the facing nodes at the partner points; none of an obstacle."""
-    share = lagrange(trace.order, snap(line.partner_s, trace.order))
-    share[line.partner < 0] = 0.0
-    row, place = np.nonzero(share)
-    facing = trace.nodes[line.partner[row], place]
-    return from_triplets(share[row, place], row, facing, (len(share), trace.space.ndof))
+ALIKE = 1e-9  # difference of unit directions up to which two points at a node are one
+UNLIKE = 0.05  # relative difference of two sides from which their roles are not alike
 
 
-def _rows(line: ContactLine, trace: BoundaryTrace) -> Rows:
+def _covered(trace: BoundaryTrace, contact: Contact) -> float:
+    """Share of the secondary's length that faces the primary, by segments that wholly do."""
+    line, _ = nodal_line(trace, contact)
+    length = trace.lengths(line.segments)
+    return float(length[line.faces].sum() / length.sum())
+
+
+def _bulge(trace: BoundaryTrace, pattern: str) -> float:
+    """How far the middles of segments lie outside their chords, relative; > 0 of a convex side."""
+    segments = trace.segments(pattern)
+    normal = trace.exact_normal(*trace.at_nodes(segments)).reshape(len(segments), -1, 2)
+    along = trace.curve[segments, -1] - trace.curve[segments, 0]
+    turn = ((normal[:, -1] - normal[:, 0]) * along).sum(axis=1)
+    return float(turn.sum() / trace.lengths(segments).sum())
+
+
+def with_roles(trace: BoundaryTrace, contact: Contact) -> Contact:
+    """The pair with `roles` decided: the covered side is secondary, else the finer, else convex."""
+    if contact.roles == "given" or contact.primary is None:
+        return contact
+    one, other = replace(contact, roles="given"), replace(contact, roles="given").swapped()
+    covered = [_covered(trace, pair) for pair in (one, other)]
+    if abs(covered[0] - covered[1]) > UNLIKE:
+        return one if covered[0] > covered[1] else other
+    length = [trace.lengths(trace.segments(pair.secondary)).mean() for pair in (one, other)]
+    if abs(length[0] - length[1]) > UNLIKE * max(length):
+        return one if length[0] < length[1] else other
+    bulge = [_bulge(trace, pair.secondary) for pair in (one, other)]
+    return other if bulge[1] > bulge[0] + UNLIKE else one
+
+
+def contact_line(trace: BoundaryTrace, contact: Contact, taken: Index | None = None) -> ContactLine:
+    """Contact points of one pair: at nodes where nodes face nodes, with dual rows elsewhere.
+
+    Segments `taken` (j,) of its secondary belong to other pairs.
+
+    Raises
+    ------
+    ValueError
+        No point of the secondary faces the primary.
+    """
+    contact = with_roles(trace, contact)
+    line, facing = nodal_line(trace, contact, taken)
+    if contact.primary is not None and contact.rows != "nodal":
+        line, facing = with_dual_rows(trace, line, facing)
+    if len(line.segments) and not facing.any():
+        raise ValueError(
+            f'no point of the secondary "{contact.secondary}" faces the primary '
+            f'"{contact.primary}" along direction={contact.direction}: the direction points from '
+            "the secondary body to the primary one"
+        )
+    return without(line, np.flatnonzero(~facing))
+
+
+def _rows(line: ContactLine) -> Rows:
     """Rows of one contact line."""
     return Rows(
         node=line.node,
         direction=line.direction,
-        coupling=_coupling(line, trace),
+        coupling=line.coupling,
         g=line.gap,  # (2.10): eps(C_j); (2.3), (2.5): 0 where the bodies touch
         equality=np.full(len(line.node), line.contact.bilateral),
     )
@@ -41,7 +89,7 @@ def joined(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:
     """Rows of all lines, in order, on the nodes of the trace's space."""
     if not lines:
         return no_rows(trace.space.ndof)
-    return concatenated([_rows(line, trace) for line in lines])
+    return concatenated([_rows(line) for line in lines])
 
 
 def kept_lines(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
@@ -52,20 +100,50 @@ def kept_lines(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
     return [without(line, np.flatnonzero(part)) for line, part in parts]
 
 
-def merged(lines: list[ContactLine], rows: Rows) -> tuple[list[ContactLine], Rows]:
-    """Lines and rows with one row for each left side: the tightest of those that repeat it."""
+def _same_point(lines: list[ContactLine], rows: Rows) -> tuple[Index, Mask]:
+    """Number (m,) of an earlier row of the same point, or the row's own; and rows to be averaged.
+
+    Rows are of one point if their left sides are the same, or if one of two at a node and along a
+    direction is a mean over segments: then both are, over the segments of different pairs.
+    """
     number = rows.repeated()
+    means = np.concatenate([np.zeros(0, dtype=bool), *(line.means for line in lines)])
+    averaged = np.zeros(len(number), dtype=bool)
+    order = np.argsort(rows.node, kind="stable")
+    for a, b in pairwise(order) if means.any() else ():
+        alike = np.abs(rows.direction[a] - rows.direction[b]).max() <= ALIKE
+        if rows.node[a] == rows.node[b] and alike and (means[a] or means[b]):
+            number[b] = number[a]
+            averaged[[a, b]] = True
+    return number, averaged
+
+
+def _averaged(rows: Rows, number: Index, averaged: Mask, weight: Array) -> Rows:
+    """Rows whose first one of a point is the mean by `weight` (m,) of those `averaged` (m,)."""
+    every = np.arange(len(number))
+    total = np.bincount(number, weight * averaged)
+    share = np.where(averaged, weight / np.where(averaged, total[number], 1.0), 1.0)
+    mean = from_triplets(share, np.where(averaged, number, every), every, (len(every),) * 2)
+    return replace(rows, coupling=(mean @ rows.coupling).tocsr(), g=mean @ rows.g)
+
+
+def merged(lines: list[ContactLine], rows: Rows) -> tuple[list[ContactLine], Rows]:
+    """Lines and rows with one row for each point: of those that repeat a left side the tightest."""
+    number, averaged = _same_point(lines, rows)
     first = np.unique(number)
     if len(first) == len(number):
         return lines, rows
-    g, weight = rows.g.copy(), np.concatenate([line.weight for line in lines])
-    equality = np.zeros(len(g), dtype=bool)
+    weight = np.concatenate([line.weight for line in lines])
+    repeated = number != np.arange(len(number))
+    if averaged.any():
+        rows = _averaged(rows, number, averaged, weight)
+    g, equality = rows.g.copy(), np.zeros(len(number), dtype=bool)
     np.logical_or.at(equality, number, rows.equality)
     # An equality is the tightest; what another pair at that node asks for follows or is refused.
     tight = np.where(rows.equality | ~equality[number], rows.g, np.inf)
+    tight[averaged & repeated] = np.inf  # in the mean already
     g[first] = np.inf
     np.minimum.at(g, number, tight)
-    repeated = number != np.arange(len(number))
     np.add.at(weight, number[repeated], weight[repeated])
     parts = zip(lines, by_line(lines, weight), strict=True)
     lines = [replace(line, weight=part) for line, part in parts]

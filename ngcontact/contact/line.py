@@ -11,11 +11,14 @@ from dataclasses import dataclass, replace
 
 import ngsolve as ng
 import numpy as np
+import scipy.sparse as sp
 
 from ..arrays import Array, Index, Mask
 from ..fem import BoundaryTrace
 from ..lagrange import gauss, lagrange
 from ..problem import Contact
+from ..triplets import from_triplets
+from .projection import snap
 from .search import partners
 
 FACING = 1e-8  # cosine between normal and direction from which a point faces the other body
@@ -49,6 +52,12 @@ class ContactLine:
         Segment of the primary, -1 for a rigid obstacle.
     partner_s : ndarray (m,)
         Parameter on it.
+    coupling : sparse (m, n)
+        Weights of the n nodes in the displacement that faces each point; empty rows of an obstacle.
+    means : ndarray of bool (m,)
+        Points whose row is a mean over facing segments, not one at the node.
+    shares : ndarray (k, order + 1)
+        What each segment contributes to the weights of its points.
     searches : int
         1 if partner points had to be searched, 0 if all of them are nodes at the same place.
     """
@@ -65,6 +74,9 @@ class ContactLine:
     weight: Array
     partner: Index
     partner_s: Array
+    coupling: sp.csr_array
+    means: Mask
+    shares: Array
     searches: int
 
 
@@ -91,11 +103,11 @@ def jacobian(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -
     return np.abs(derivative[:, 0] * -dy + derivative[:, 1] * dx)
 
 
-def _segment_weights(trace: BoundaryTrace, contact: Contact, segments: Index) -> Array:
-    """Integrals (k, order + 1) of the basis functions over each segment."""
+def segment_weights(trace: BoundaryTrace, contact: Contact, segments: Index) -> Array:
+    """Integrals (k, order + 1) of the basis functions over each of the `segments` (k,)."""
     s, w = gauss(trace.order + 2 * trace.geometry_order)
     k = len(segments)
-    scale = jacobian(trace, contact, np.repeat(segments, len(s)), np.tile(s, k)).reshape(k, -1)
+    scale = jacobian(trace, contact, np.repeat(segments, len(s)), np.tile(s, k)).reshape(k, len(s))
     return (scale * w) @ lagrange(trace.order, s)
 
 
@@ -116,16 +128,13 @@ def _numbered(
     return number, direction
 
 
-def _kept(contact: Contact, partner: Index) -> Mask:
-    """Points (m,) that meet the primary or a rigid obstacle; raise if none does."""
-    kept = (partner >= 0) | (contact.primary is None)
-    if not kept.any():
-        raise ValueError(
-            f'no point of the secondary "{contact.secondary}" faces the primary '
-            f'"{contact.primary}" along direction={contact.direction}: the direction points from '
-            "the secondary body to the primary one"
-        )
-    return kept
+def _coupling(trace: BoundaryTrace, partner: Index, partner_s: Array) -> sp.csr_array:
+    """Basis functions (m, n) of the facing nodes at the partner points; none of an obstacle."""
+    share = lagrange(trace.order, snap(partner_s, trace.order))
+    share[partner < 0] = 0.0
+    row, place = np.nonzero(share)
+    facing = trace.nodes[partner[row], place]
+    return from_triplets(share[row, place], row, facing, (len(share), trace.space.ndof))
 
 
 def _weights(shares: Array, rows: Index, kept: Mask) -> tuple[Array, Mask]:
@@ -144,31 +153,32 @@ def _weights(shares: Array, rows: Index, kept: Mask) -> tuple[Array, Mask]:
     return weight, np.asarray(faces)
 
 
-def contact_line(trace: BoundaryTrace, contact: Contact) -> ContactLine:
-    """Contact points of one pair.
+def nodal_line(
+    trace: BoundaryTrace, contact: Contact, taken: Index | None = None
+) -> tuple[ContactLine, Mask]:
+    """Contact points of one pair at all nodes of its secondary, and which (m,) face the primary.
 
-    Raises
-    ------
-    ValueError
-        No point of the secondary faces the primary.
+    All of them face a rigid obstacle. Segments `taken` (j,) are left to other pairs.
     """
     segments, facing = trace.segments(contact.secondary), trace.segments(contact.primary)
+    if taken is not None:
+        segments = np.setdiff1d(segments, taken)
     segment, s = trace.at_nodes(segments)
     node = trace.nodes[segments].ravel()
     normal = trace.exact_normal(segment, s)
     number, direction = _numbered(trace, contact, segment, node, normal)
-    rows = number.reshape(len(segments), -1)
+    rows = number.reshape(len(segments), trace.order + 1)
     _, first = np.unique(number, return_index=True)
     first = first[len(first) - len(direction) :]  # without -1
     position = trace.point(segment[first], s[first])
     partner, partner_s, gap, searches = partners(trace, facing, segment[first], position, direction)
-    kept = _kept(contact, partner)
+    facing_points = (partner >= 0) | (contact.primary is None)
     if contact.gap is not None:
         gap = prescribed_gap(contact, trace, segment[first], s[first], position)
-    shares = _segment_weights(trace, contact, segments)
+    shares = segment_weights(trace, contact, segments)
     if contact.direction is None:  # what counts where two sides share a point at a small turn
         shares *= (normal * direction[number]).sum(axis=1).reshape(rows.shape)
-    weight, faces = _weights(shares, rows, kept)
+    weight, faces = _weights(shares, rows, facing_points)
     line = ContactLine(
         contact=contact,
         segments=segments,
@@ -182,18 +192,12 @@ def contact_line(trace: BoundaryTrace, contact: Contact) -> ContactLine:
         weight=weight,
         partner=partner,
         partner_s=partner_s,
+        coupling=_coupling(trace, partner, partner_s),
+        means=np.zeros(len(partner), dtype=bool),
+        shares=shares,
         searches=searches,
     )
-    return without(line, np.flatnonzero(~kept))
-
-
-def unmatched(line: ContactLine) -> Mask:
-    """Points (m,) on no segment whose ends both face nodes of the primary."""
-    result = np.full(len(line.node), line.contact.primary is not None)
-    at_node = np.append(np.isin(line.partner_s, (0.0, 1.0)), True)  # without a point: no matter
-    points = line.rows[at_node[line.rows[:, [0, -1]]].all(axis=1)]
-    result[points[points >= 0]] = False
-    return result
+    return line, facing_points
 
 
 def without(line: ContactLine, dropped: Index) -> ContactLine:
@@ -204,7 +208,7 @@ def without(line: ContactLine, dropped: Index) -> ContactLine:
     renumber = np.full(m + 1, -1)
     renumber[:-1][keep] = np.arange(np.count_nonzero(keep))
     arrays = ("node", "position", "direction", "gap", "weight", "partner", "partner_s")
-    kept = {name: getattr(line, name)[keep] for name in arrays}
+    kept = {name: getattr(line, name)[keep] for name in (*arrays, "coupling", "means")}
     return replace(line, rows=renumber[line.rows], **kept)
 
 

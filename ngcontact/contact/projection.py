@@ -6,6 +6,7 @@ in `BoundaryTrace.curve`; `side` (q,) is +1 where the outward normal lies to the
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +41,11 @@ class Partners:
     distance: Array
 
 
+def at(curve: Array, segment: Index, s: Array) -> Array:
+    """Points (k, 2) of segments `curve` (q, p + 1, 2) at `segment` (k,) and `s` (k,)."""
+    return np.einsum("ki,kid->kd", lagrange(curve.shape[1] - 1, s), curve[segment])
+
+
 def _slope(curve: Array, segment: Index, s: Array) -> Array:
     """Derivatives (k, 2) of the segments with respect to s."""
     return np.einsum("ki,kid->kd", lagrange_derivative(curve.shape[1] - 1, s), curve[segment])
@@ -49,11 +55,6 @@ def _normals(curve: Array, side: Array, segment: Index, s: Array) -> Array:
     """Outward normals (k, 2), not normalised."""
     tangent = _slope(curve, segment, s)
     return np.column_stack([tangent[:, 1], -tangent[:, 0]]) * side[segment, None]
-
-
-def _at(curve: Array, segment: Index, s: Array) -> Array:
-    """Points (k, 2) of the segments."""
-    return np.einsum("ki,kid->kd", lagrange(curve.shape[1] - 1, s), curve[segment])
 
 
 def _none(size: int) -> Partners:
@@ -91,7 +92,8 @@ def coincident(points: Array, directions: Array, curve: Array, side: Array, orde
         near = np.flatnonzero(np.isfinite(distances[:, column]))
         segment, local = np.divmod(numbers[near, column], order + 1)
         normal = _normals(curve, side, segment, nodes[local])
-        faces = (normal * directions[near]).sum(axis=1) < 0
+        grazing = GRAZING * np.linalg.norm(normal, axis=1)  # round-off must not decide
+        faces = (normal * directions[near]).sum(axis=1) < -grazing
         faces &= distances[near, column] <= MATCHED * lengths[segment]
         near, segment, local = near[faces], segment[faces], local[faces]
         found.segment[near] = segment
@@ -124,18 +126,30 @@ def _candidates(
     return point, segment, s
 
 
-def _crossings(points: Array, across: Array, curve: Array, segment: Index, s: Array) -> Array:
-    """Parameters (k,) of the segments on the lines through `points` normal to `across` (k, 2)."""
+def _settled(s: Array, step: Callable[[Array], Array]) -> Array:
+    """Parameters (k,) in [0, 1] after s - step(s) has been repeated until it stands still."""
     for _ in range(NEWTON_STEPS):
-        # (2.10): A_j and B_j on one perpendicular
-        miss = ((_at(curve, segment, s) - points) * across).sum(axis=1)
-        rate = (_slope(curve, segment, s) * across).sum(axis=1)
-        new = np.clip(s - np.divide(miss, rate, out=np.zeros_like(miss), where=rate != 0), 0, 1)
+        new = np.clip(s - step(s), 0, 1)
         moved = np.abs(new - s).max(initial=0.0)
         s = new
         if moved <= SETTLED:
             break
     return s
+
+
+def crossings(points: Array, across: Array, curve: Array, segment: Index, s: Array) -> Array:
+    """Parameters (k,) of segments on lines through `points` (k, 2) normal to `across` (k, 2).
+
+    By Newton's method from `s` (k,) on `segment` (k,) of `curve` (q, p + 1, 2).
+    """
+
+    def step(s: Array) -> Array:
+        # (2.10): A_j and B_j on one perpendicular
+        miss = ((at(curve, segment, s) - points) * across).sum(axis=1)
+        rate = (_slope(curve, segment, s) * across).sum(axis=1)
+        return np.divide(miss, rate, out=np.zeros_like(miss), where=rate != 0)
+
+    return _settled(s, step)
 
 
 def cast(
@@ -175,9 +189,9 @@ def cast(
         return found
     across = np.column_stack([-directions[:, 1], directions[:, 0]])
     point, segment, s = _candidates(points, across, curve, pairs_at_once)
-    s = _crossings(points[point], across[point], curve, segment, s)
+    s = crossings(points[point], across[point], curve, segment, s)
     s = np.where(s < MATCHED, 0.0, np.where(s > 1 - MATCHED, 1.0, s))
-    offset = _at(curve, segment, s) - points[point]
+    offset = at(curve, segment, s) - points[point]
     miss = np.abs((offset * across[point]).sum(axis=1))
     lengths = np.linalg.norm(curve[segment, -1] - curve[segment, 0], axis=1)
     normal = _normals(curve, side, segment, s)
@@ -202,3 +216,45 @@ def snap(s: Array, order: int) -> Array:
     nodes = gauss_lobatto(order)
     nearest = nodes[np.abs(s[:, None] - nodes).argmin(axis=1)]
     return np.where(np.abs(s - nearest) <= MATCHED, nearest, s)
+
+
+def feet(
+    points: Array, curve: Array, direction: Array | None, pairs_at_once: int = PAIRS_AT_ONCE
+) -> tuple[Index, Array]:
+    """Where segments pass points: on the lines along `direction`, or on their own normals.
+
+    Parameters
+    ----------
+    points, curve : ndarray (k, 2), (q, p + 1, 2)
+        Any points, and the segments; `pairs_at_once` as in `cast`.
+    direction : ndarray (2,) or None for the normal of the segment at the foot.
+
+    Returns
+    -------
+    segment, s : ndarray (r,), (r,)
+        Segments that pass a point between their ends, once for each, and parameters.
+    """
+    if direction is not None:
+        across = np.tile([-direction[1], direction[0]], (len(points), 1))
+        point, segment, s = _candidates(points, across, curve, pairs_at_once)
+        return segment, crossings(points[point], across[point], curve, segment, s)
+
+    def ahead(point: Index, segment: Index, s: Array) -> Array:
+        return ((points[point] - at(curve, segment, s)) * _slope(curve, segment, s)).sum(axis=1)
+
+    block = max(1, pairs_at_once // max(1, len(curve)))
+    found = []
+    for first in range(0, len(points), block):
+        point, segment = np.divmod(
+            np.arange(first * len(curve), min(first + block, len(points)) * len(curve)), len(curve)
+        )
+        none, one = np.zeros(len(point)), np.ones(len(point))
+        # The nearest point of the segment, not the farthest.
+        passed = (ahead(point, segment, none) > 0) & (ahead(point, segment, one) < 0)
+        found.append((point[passed], segment[passed]))
+    point, segment = (np.concatenate(part) for part in zip(*found, strict=True))
+
+    def step(s: Array) -> Array:  # of Gauss and Newton: at once where the point is on the segment
+        return -ahead(point, segment, s) / (_slope(curve, segment, s) ** 2).sum(axis=1)
+
+    return segment, _settled(np.full(len(point), 0.5), step)

@@ -29,7 +29,7 @@ from ..triplets import from_triplets
 from .admissible_set import AdmissibleSet, admissible_set
 from .equilibrium import Rigid, equilibrium
 from .linear_systems import linear_systems
-from .reuse import Reduced, Reusable, contact_lines, same_basis, same_boundary, same_stiffness
+from .reuse import Reduced, Reusable, contact_lines, same_basis, same_mesh, same_stiffness
 from .supports import conditioned_segments
 
 LOWEST, HIGHEST = (
@@ -127,7 +127,7 @@ def _reusable(
     problem: Problem, trace: BoundaryTrace, nodal: Index, previous: DiscreteProblem | None
 ) -> Reusable:
     """What `previous` leaves to a problem with conditions at the nodes of the segments `nodal`."""
-    if previous is None or not same_boundary(trace, previous.space.trace):
+    if previous is None or not same_mesh(trace, previous.space):
         return Reusable()  # there is none, or its mesh has been changed in place
     if not same_stiffness(problem, previous.problem):
         return Reusable(previous.found)

@@ -27,7 +27,7 @@ def first_active_set(discrete: DiscreteProblem) -> Mask:
         gap, carries = gap - rigid.rows @ rigid.placing, rigid.carries
     active = [np.zeros(0, dtype=bool)]
     for line, distance in zip(discrete.lines, by_line(discrete.lines, gap), strict=True):
-        size = np.ptp(line.position, axis=0).max(initial=0.0)
+        size = np.ptp(line.position, axis=0).max() if len(line.node) else 0.0
         active.append(distance <= TOUCHING * size)
     return np.concatenate(active) | carries
 

@@ -11,7 +11,7 @@ import scipy.sparse as sp
 from ..constraints import BasisTransformation
 from ..contact import ContactLine, contact_line
 from ..fem import BoundaryTrace, Space
-from ..problem import Contact, Elastic, Hooke, Problem, varies
+from ..problem import Contact, Elastic, Hooke, Problem, Triangulation, varies
 from ..qp import LinearSystems
 
 
@@ -54,9 +54,14 @@ class Reusable:
     reduced: Reduced | None = None
 
 
-def same_boundary(one: BoundaryTrace, other: BoundaryTrace) -> bool:
-    """Whether the boundaries of two meshes have the same nodes at the same places."""
-    return np.array_equal(one.nodes, other.nodes) and np.array_equal(one.curve, other.curve)
+def same_mesh(trace: BoundaryTrace, space: Space) -> bool:
+    """Whether the mesh of `trace` is still as it was when `space` was made on it."""
+    old = space.trace
+    return (
+        np.array_equal(trace.nodes, old.nodes)
+        and np.array_equal(trace.curve, old.curve)
+        and np.array_equal(Triangulation(trace.mesh).vertices, space.vertices)
+    )
 
 
 def _same_law(one: Elastic | Hooke, other: Elastic | Hooke) -> bool:
@@ -78,7 +83,7 @@ def same_stiffness(problem: Problem, other: Problem) -> bool:
 
 def _same_pair(one: Contact, other: Contact) -> bool:
     """Whether two pairs have the same points and gaps; functions may have changed unseen."""
-    names = ("secondary", "primary", "direction", "bilateral")
+    names = ("secondary", "primary", "direction", "bilateral", "rows", "roles")
     same = all(getattr(one, name) == getattr(other, name) for name in names)
     return same and one.gap is None and other.gap is None
 
@@ -86,13 +91,28 @@ def _same_pair(one: Contact, other: Contact) -> bool:
 def contact_lines(
     problem: Problem, trace: BoundaryTrace, known: Sequence[ContactLine]
 ) -> list[ContactLine]:
-    """The line of each pair, a known one where it is the same."""
-    lines = []
-    for contact in problem.contact:
+    """The line of each pair, a known one where it is the same.
+
+    What an earlier pair with the same other side, direction and gap covers is left to that one.
+    """
+    lines: list[ContactLine] = []
+    for number, contact in enumerate(problem.contact):
         same = (line for line in known if _same_pair(line.contact, contact))
-        line = next(same, None)
-        lines.append(contact_line(trace, contact) if line is None else replace(line, searches=0))
+        earlier = [pair for pair in problem.contact[:number] if _same_row(pair, contact)]
+        line = None if earlier else next(same, None)
+        if line is None:
+            taken = trace.segments(*(pair.secondary for pair in earlier))
+            line = contact_line(trace, contact, taken)
+        else:
+            line = replace(line, searches=0)
+        lines.append(line)
     return lines
+
+
+def _same_row(one: Contact, other: Contact) -> bool:
+    """Whether two pairs ask for the same rows on what their secondaries have in common."""
+    names = ("primary", "direction", "gap", "bilateral", "rows", "roles")
+    return all(getattr(one, name) == getattr(other, name) for name in names)
 
 
 def same_basis(one: BasisTransformation, other: BasisTransformation) -> bool:

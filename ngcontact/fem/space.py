@@ -11,7 +11,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Index
 from ..linalg import shared
-from ..problem import Problem, varies
+from ..problem import Problem, Triangulation, varies
 from .boundary import BoundaryTrace
 from .element import node_basis, vector_space
 from .model import model_of
@@ -41,6 +41,8 @@ class Space:
         The same for NGSolve, in the same memory.
     f : ndarray (2N,)
         Load.
+    vertices : ndarray (nv, 2)
+        Where the vertices of the mesh were.
     """
 
     V: ng.FESpace
@@ -50,6 +52,7 @@ class Space:
     A: sp.csr_array
     matrix: ng.BaseMatrix
     f: Array
+    vertices: Array
 
     @cached_property
     def diagonal(self) -> Array:
@@ -117,4 +120,5 @@ def assemble(
         A=shared(a.mat),
         matrix=a.mat,
         f=load_vector(problem, V, LOAD_BONUS),
+        vertices=Triangulation(mesh).vertices,
     )

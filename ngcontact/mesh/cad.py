@@ -112,19 +112,30 @@ class CadEdge:
         return np.column_stack([tangent[:, 1], -tangent[:, 0]])
 
     def level(self, axis: Array, values: Array, near: Array) -> Array:
-        """Parameters (k,) where the coordinate along `axis` (2,) takes `values` (k,).
+        """Parameters (k,) where coordinates along `axis` (2,), or (k, 2), take `values` (k,).
 
         Of several such points the one Newton's method reaches from the projections of the points
         `near` (k, 2); NaN where it reaches none.
         """
 
+        def along(vectors: Array) -> Array:
+            return vectors @ axis if axis.ndim == 1 else (vectors * axis).sum(axis=1)
+
         def step(t: Array) -> Array:
-            slope = self.derivative(t) @ axis
-            return (self.point(t) @ axis - values) / np.where(slope == 0, np.inf, slope)
+            slope = along(self.derivative(t))
+            return (along(self.point(t)) - values) / np.where(slope == 0, np.inf, slope)
 
         t = self._newton(self.project(near), step)
-        missed = np.abs(self.point(t) @ axis - values) > MISSED * self.size
+        missed = np.abs(along(self.point(t)) - values) > MISSED * self.size
         return np.where(missed, np.nan, t)
+
+    def opposite(self, points: Array, normals: Array) -> Array:
+        """Parameters (k,) where the lines through `points` (k, 2) along `normals` (k, 2) meet it.
+
+        The one near the closest point of the edge; NaN where there is none.
+        """
+        across = np.column_stack([-normals[:, 1], normals[:, 0]])
+        return self.level(across, (points * across).sum(axis=1), points)
 
     def samples(self, count: int = SAMPLES) -> tuple[Array, Array, Array]:
         """Parameters (n,), points (n, 2) and derivatives (n, 2) along the edge, n = `count`."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
@@ -11,6 +13,8 @@ from .matching import Edge, divided
 
 COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given ...
 FINER = 2  # ... and that many times more on a bounded zone: contact may end anywhere on it
+
+SHARED = threading.Lock()
 
 
 def _require_complete(mesh: ng.Mesh) -> None:
@@ -75,7 +79,8 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
         raise TypeError(f"maxh={maxh!r} is not a number; give a length like {extent / COARSE:g}")
     if not (np.isfinite(maxh) and maxh > 0):
         raise ValueError(f"maxh={maxh} must be positive and finite, like {extent / COARSE:g}")
-    edges = divided(problem, shape, maxh, maxh / finer)
-    mesh = _generated(shape, edges, maxh)
+    with SHARED:  # sizes and divisions are told to Netgen on the shape, which others may mesh, too
+        edges = divided(problem, shape, maxh, maxh / finer)
+        mesh = _generated(shape, edges, maxh)
     _require_complete(mesh)
     return mesh

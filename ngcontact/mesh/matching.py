@@ -111,12 +111,38 @@ def _nearest_crossing(samples: Array, x: Array, across: Array, along: Array) -> 
     return points[np.arange(len(x)), best]
 
 
-def _opposite(contact: Contact, x: Array, other: CadEdge) -> tuple[Array, Array]:
-    """Parameters on `other` opposite to points `x` (NaN where there are none), and the points."""
+def _right(slope: Array) -> Array:
+    """Unit normals (k, 2) to the right of tangents (k, 2)."""
+    return np.column_stack([slope[:, 1], -slope[:, 0]]) / np.linalg.norm(slope, axis=1)[:, None]
+
+
+def _nearest_of(x: Array, edge: CadEdge, others: list[Edge]) -> NDArray[np.bool_]:
+    """Whether no other edge is nearer to the points `x` (k, 2) than `edge`."""
+
+    def distance(to: CadEdge) -> Array:
+        return np.linalg.norm(to.point(to.project(x)) - x, axis=1)
+
+    own = distance(edge)
+    slack = COINCIDENT * edge.size
+    nearest = np.ones(len(x), dtype=bool)
+    for other in others:
+        if other.curve is not edge:
+            nearest &= own <= distance(other.curve) + slack
+    return nearest
+
+
+def _opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple[Array, Array]:
+    """Parameters on `other` opposite to points `x` (NaN where there are none), and the points.
+
+    Without a direction on the normals of the curve through `x`, whose tangents are `slope` (k, 2).
+    """
     if contact.direction is None:
         t = other.project(x)
-        distance = np.linalg.norm(other.point(t) - x, axis=1)
-        t = np.where(distance <= COINCIDENT * other.size, t, np.nan)  # (2.3): common nodes
+        apart = np.linalg.norm(other.point(t) - x, axis=1) > COINCIDENT * other.size
+        if contact.gap is None and apart.any():  # clearance or interference: along the normals
+            t[apart] = other.opposite(x[apart], _right(slope[apart]))
+        else:
+            t[apart] = np.nan  # (2.3): common nodes
     else:
         dx, dy = contact.direction
         across = np.array([-dy, dx])
@@ -146,20 +172,33 @@ def _behind(contact: Contact, x: Array, y: Array, edges: list[Edge]) -> NDArray[
     return behind
 
 
-def _divide(contact: Contact, secondary: Edge, primary: Edge, beside: list[Edge]) -> None:
+def _ends_between(contact: Contact, secondary: CadEdge, primary: CadEdge) -> Array:
+    """Parameters on the secondary at which parts end that face the primary."""
+    at = np.array([primary.start, primary.stop])
+    x = primary.point(at)
+    ends, _ = _opposite(contact, x, primary.derivative(at), secondary)
+    met = ~np.isnan(ends)
+    if contact.direction is None and met.any():
+        ends[met] = secondary.project(x[met])  # its normal there passes the end of the primary
+    return np.unique(ends[met])  # both are one point of a closed curve
+
+
+def _divide(
+    contact: Contact, secondary: Edge, primary: Edge, beside: list[Edge], facing: list[Edge]
+) -> None:
     """Lay a common division {C_j} on the parts of two edges that face each other.
 
-    `beside` are all edges of the secondary, this one included.
+    `beside` and `facing` are all edges of the secondary and of the primary, these two included.
     """
     t, _, _ = secondary.curve.samples(FINE)
-    ends = primary.curve.point(np.array([primary.curve.start, primary.curve.stop]))
-    ends, _ = _opposite(contact, ends, secondary.curve)
-    ends = ends[~np.isnan(ends)]  # where the facing parts end inside the secondary
+    ends = _ends_between(contact, secondary.curve, primary.curve)
     apart = np.abs(t[:, None] - ends).min(axis=1, initial=np.inf)
     t = np.sort(np.concatenate([t[apart > (t[1] - t[0]) / 2], ends]))
     x, slope = secondary.curve.point(t), secondary.curve.derivative(t)
-    other, y = _opposite(contact, x, primary.curve)
+    other, y = _opposite(contact, x, slope, primary.curve)
     faces = ~np.isnan(other)
+    if contact.direction is None and len(facing) > 1:
+        faces &= _nearest_of(x, primary.curve, facing)
     faces &= ~_behind(contact, x, y, beside)
     if contact.direction is not None:
         slope_there = primary.curve.derivative(np.where(faces, other, primary.curve.start))
@@ -178,7 +217,8 @@ def _divide(contact: Contact, secondary: Edge, primary: Edge, beside: list[Edge]
         total = np.concatenate([[0.0], np.cumsum(density)])
         count = max(1, int(np.ceil(total[-1] * (1 - SPARE))))
         nodes = np.interp(np.linspace(0, total[-1], count + 1), total, t[run])
-        there, _ = _opposite(contact, secondary.curve.point(nodes), primary.curve)
+        at_nodes = secondary.curve.point(nodes), secondary.curve.derivative(nodes)
+        there, _ = _opposite(contact, *at_nodes, primary.curve)
         met = ~np.isnan(there)
         if met.any():
             secondary.runs.append(nodes[met])
@@ -197,6 +237,7 @@ def divided(problem: Problem, shape: occ.TopoDS_Shape, maxh: float, finer: float
     for contact in problem.contact:
         if contact.primary is not None:
             sides = _named(edges, contact.secondary)
-            for secondary, primary in product(sides, _named(edges, contact.primary)):
-                _divide(contact, secondary, primary, sides)
+            facing = _named(edges, contact.primary)
+            for secondary, primary in product(sides, facing):
+                _divide(contact, secondary, primary, sides, facing)
     return edges

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import ngsolve as ng
@@ -12,6 +12,9 @@ import numpy as np
 from .values import region_name, scalar_data, unit_vector
 
 Gap: TypeAlias = float | ng.CoefficientFunction | Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+ROWS = ("auto", "nodal", "dual")
+ROLES = ("given", "auto")
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +36,13 @@ class Contact:
         function of the coordinate arrays x, y (n,) that returns (n,) overrides it; a length.
     bilateral
         Equality in place of the inequality, HH81 Remark 3.3.
+    rows
+        "nodal": at nodes, HH81 (2.3), (2.10), right where nodes face nodes. "dual": weighted means
+        over the facing segments, right on any pair of meshes. "auto": nodal wherever nodes face
+        nodes, dual elsewhere.
+    roles
+        "given": the first boundary is the secondary. "auto": the side that is wholly covered by the
+        other becomes the secondary, of two the finer, of equal ones the convex one.
 
     Raises
     ------
@@ -45,6 +55,8 @@ class Contact:
     direction: Sequence[float] | None = None
     gap: Gap | None = None
     bilateral: bool = False
+    rows: str = "auto"
+    roles: str = "given"
 
     def __post_init__(self) -> None:
         """Validate and normalise."""
@@ -63,3 +75,15 @@ class Contact:
             object.__setattr__(self, "gap", gap)
         if not isinstance(self.bilateral, bool):
             raise TypeError(f"bilateral = {self.bilateral!r}: give True or False")
+        for what, value, known in (("rows", self.rows, ROWS), ("roles", self.roles, ROLES)):
+            if value not in known:
+                raise ValueError(f"{what} = {value!r}: choose one of {known}")
+        if self.roles == "auto" and self.primary is None:
+            raise ValueError('roles = "auto" with primary=None: a rigid obstacle has no other side')
+
+    def swapped(self) -> Contact:
+        """The pair with its roles exchanged; a gap stays where it is measured or given."""
+        if self.primary is None:
+            raise ValueError("a rigid obstacle (primary=None) cannot be the secondary")
+        back = None if self.direction is None else (-self.direction[0], -self.direction[1])
+        return replace(self, secondary=self.primary, primary=self.secondary, direction=back)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import ngsolve as ng
 import numpy as np
@@ -10,7 +11,8 @@ import pytest
 from netgen.occ import Compound, OCCGeometry, Vec, WorkPlane
 
 from ngcontact import Contact
-from ngcontact.contact.line import at_quadrature, contact_line, unmatched, without
+from ngcontact.contact.assembly import contact_line
+from ngcontact.contact.line import at_quadrature, without
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc, disc_on_block, graphs, rings
 from ngcontact.geometries.region import body, compound, polygon
@@ -203,7 +205,7 @@ def test_weights_of_a_circle_are_its_length(order):
 @pytest.mark.parametrize("order", ORDERS)
 def test_disc_on_block_measures_the_curves_of_the_mesh(order):
     trace = trace_of(disc_on_block(), order, maxh=0.3)
-    line = contact_line(trace, Contact("disc_arc", "block_top", direction=(0, -1)))
+    line = contact_line(trace, Contact("disc_arc", "block_top", direction=(0, -1), rows="nodal"))
     points_are_consistent(line, trace)
     assert line.searches == 1
     np.testing.assert_allclose(line.gap, line.position[:, 1], atol=1e-15)
@@ -230,7 +232,8 @@ def test_two_curves_are_compared_at_equal_eta(order):
     """Gap and partner between the mesh's curves, not between equal reference points."""
     geometry = graphs(lambda x: 0.1 + 0.5 * x**2, lambda x: -0.1 * x**3, a=-0.8, b=0.7)
     trace = trace_of(geometry, order, maxh=0.4)
-    line = contact_line(trace, Contact("upper_contact", "lower_contact", direction=(0, -1)))
+    contact = Contact("upper_contact", "lower_contact", direction=(0, -1), rows="nodal")
+    line = contact_line(trace, contact)
     points_are_consistent(line, trace)
     partner = trace.point(line.partner, line.partner_s)
     np.testing.assert_allclose(partner[:, 0], line.position[:, 0], atol=1e-14)
@@ -285,7 +288,7 @@ def test_meshes_that_do_not_match(order, gap):
     np.testing.assert_allclose(met, 3 * line.position[:, 0] - 1, atol=1e-14)
 
 
-def test_points_without_an_opposite_carry_no_row():
+def test_points_without_an_opposite_carry_no_nodal_row():
     """The upper line is longer than the lower one on both ends."""
     upper = polygon([(-1, 0), (1, 0), (1, 1), (-1, 1)], ["zone", "side", "top", "side"])
     lower = polygon(
@@ -298,7 +301,7 @@ def test_points_without_an_opposite_carry_no_row():
     for order in (1, 2):
         trace = trace_of(OCCGeometry(geometry.shape, dim=2), order, maxh=2)
         for direction in (None, (0, -1)):
-            line = contact_line(trace, Contact("zone", "below", direction))
+            line = contact_line(trace, Contact("zone", "below", direction, rows="nodal"))
             points_are_consistent(line, trace)
             x = np.sort(line.position[:, 0])
             expected = [-0.5, 0.0, 0.4] if order == 1 else [-0.5, -0.25, 0.0, 0.2, 0.4]
@@ -450,7 +453,8 @@ def test_the_far_side_of_the_own_body_has_no_partner():
 @pytest.mark.parametrize("order", ORDERS)
 def test_points_between_matched_vertices_are_matched(order):
     contact = Contact("upper_contact", "lower_contact")
-    assert not unmatched(contact_line(trace_of(blocks(), order), contact)).any()
+    assert not contact_line(trace_of(blocks(), order), contact).means.any()
     trace = trace_of(unmatched_blocks(), order)
-    assert unmatched(contact_line(trace, contact)).all()  # though the ends face nodes
-    assert not unmatched(contact_line(trace, Contact("upper_contact", gap=0.0))).any()
+    assert contact_line(trace, contact).means.all()  # though the ends face nodes
+    assert not contact_line(trace, Contact("upper_contact", gap=0.0)).means.any()
+    assert not contact_line(trace, replace(contact, rows="nodal")).means.any()

@@ -11,6 +11,8 @@ import pytest
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, Solution, adapt, solve
 from ngcontact.geometries import blocks
+from ngcontact.mesh import first_mesh
+from ngcontact.problem import Triangulation, move_vertices
 
 STEEL = Elastic(E=200.0, nu=0.3)
 PAIR = Contact(secondary="upper_contact", primary="lower_contact")
@@ -123,3 +125,18 @@ def test_a_level_of_an_adaptive_run_starts_a_sequence() -> None:
     third = solve(pressed(3.0), level.mesh, order=2, start=second)
     assert (third.work["assemblies"], third.work["factorizations"]) == (0, 0)
     same(third, solve(pressed(3.0), level.mesh, order=2))
+
+
+def test_a_mesh_whose_interior_moved_is_assembled_again():
+    problem = cases.one_transition().problem
+    mesh = first_mesh(problem, 0.3)
+    first = solve(problem, mesh, order=2)
+    view = Triangulation(mesh)
+    places, inner = view.vertices.copy(), np.setdiff1d(np.arange(mesh.nv), view.segments)
+    places[inner] += 0.02  # a tenth of an element
+    move_vertices(mesh, places)
+    again, fresh = solve(problem, mesh, order=2, start=first), solve(problem, mesh, order=2)
+    assert again.work["assemblies"] == 1
+    u, v = (s.displacement.vec.FV().NumPy() for s in (again, fresh))
+    # Factors for other first active sets: round-off times the condition, about 1e4.
+    np.testing.assert_allclose(u, v, rtol=0, atol=1e-11 * np.abs(v).max())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from netgen.occ import OCCGeometry
 
+from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.adaptivity.refinement import matched_vertices
 from ngcontact.fem import boundary_trace
@@ -515,3 +517,21 @@ def test_refinement_beyond_the_kernel_s_lengths_is_refused():
     with pytest.raises(ValueError, match=r'"disc_arc".* segments of [0-9.]+e-07'):
         check_curves(mesh)
     check_curves(ng.Mesh(blocks().GenerateMesh(maxh=0.3)))
+
+
+def test_meshes_made_in_several_threads_do_not_see_each_other():
+    """Sizes are told to Netgen on the shape, which both threads share."""
+    problem = cases.pressed_disc()
+    sizes = (0.1, 0.4)
+    alone = {size: first_mesh(problem, size).ne for size in sizes}
+    found = {size: [] for size in sizes}
+
+    def work(size):
+        found[size].extend(first_mesh(problem, size).ne for _ in range(4))
+
+    threads = [threading.Thread(target=work, args=(size,)) for size in sizes]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert found == {size: [alone[size]] * 4 for size in sizes}

@@ -38,6 +38,8 @@ SIGNATURES = {
         "direction": None,
         "gap": None,
         "bilateral": False,
+        "rows": "auto",
+        "roles": "given",
     },
     "solve": {
         "problem": REQUIRED,

@@ -1,0 +1,244 @@
+"""Contact rows where nodes do not face nodes: means over the parts of segments that face.
+
+On a segment e of the secondary, restricted to its part that faces the primary, let D_e be the
+diagonal of the integrals of the basis functions phi, M_e their mass matrix, and psi = D_e M_e^-1
+phi the dual basis: int psi_i phi_j = 0 for i other than j. The row of node j weighs the jump,
+
+    d_j.(u_j - sum_k (int psi_j phi'_k / D_j) u'_k)  <=  int psi_j eps / D_j,
+
+with D_j the integral of phi_j over all facing parts, so that it has one unknown of the secondary as
+(2.10) has. Dual bases: Wohlmuth 2000, SIAM J. Numer. Anal. 38:989; of higher order Popp, Wohlmuth,
+Gee, Wall 2012, SIAM J. Sci. Comput. 34:B421. On Gauss-Lobatto nodes the psi of straight segments
+that face wholly contain the continuous functions of degree p - 1, since the quadrature of these
+nodes is exact to degree 2 p - 1; on others the constants.
+
+Where a segment faces in part, D_e need not be positive at order 2 and above. There the hats of its
+two ends take the place of phi, and the row holds more than one unknown of the secondary.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from ..arrays import Array, Index, Mask
+from ..fem import BoundaryTrace
+from ..lagrange import gauss, gauss_lobatto, lagrange
+from ..problem import Contact
+from ..triplets import from_triplets
+from .line import ContactLine, jacobian, prescribed_gap, segment_weights
+from .projection import at, crossings, feet
+from .search import partners
+
+SLIVER = 1e-9  # share of a segment below which a piece of it is none
+LEAST = 0.1  # of the integral of phi over the whole segment, below which hats take its place
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """Parts of secondary segments that face one primary segment each.
+
+    Attributes
+    ----------
+    local : ndarray of int (r,)
+        Number of the segment among those divided.
+    start, stop : ndarray (r,)
+        Its interval of the parameter.
+    facing : ndarray of int (r,)
+        Segment of the primary that it faces.
+    """
+
+    local: Index
+    start: Array
+    stop: Array
+    facing: Index
+
+
+@dataclass(frozen=True, eq=False)
+class DualIntegrals:
+    """Integrals over the facing parts of k segments, in arc length (P1) or eta (P2).
+
+    Attributes
+    ----------
+    weight : ndarray (k, order + 1)
+        Of the basis functions: D_e.
+    gap : ndarray (k, order + 1)
+        Of psi times eps, areas.
+    coupling : sparse (k * order + k, n)
+        Of psi times the basis functions of n nodes: those of the primary, less those of the
+        secondary itself but for D_e.
+    """
+
+    weight: Array
+    gap: Array
+    coupling: sp.csr_array
+
+
+def _rays(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
+    """Unit vectors (k, 2) from points of the secondary to the primary."""
+    if contact.direction is None:
+        return trace.exact_normal(segment, s)
+    return np.tile(contact.direction, (len(s), 1))
+
+
+def _divided(trace: BoundaryTrace, contact: Contact, segments: Index, facing: Index) -> Pieces:
+    """Divide `segments` (k,) where they pass vertices of the primary segments `facing` (q,)."""
+    k, ends = len(segments), trace.nodes[facing][:, [0, -1]]
+    _, first = np.unique(ends, return_index=True)
+    x = trace.curve[facing][:, [0, -1]].reshape(-1, 2)[first]
+    xi = None if contact.direction is None else np.array(contact.direction)
+    passing, s = feet(x, trace.curve[segments], xi)
+    local = np.concatenate([passing, np.arange(k), np.arange(k)])
+    cut = np.concatenate([s, np.zeros(k), np.ones(k)])
+    order = np.lexsort((cut, local))
+    local, cut = local[order], cut[order]
+    one = (local[1:] == local[:-1]) & (np.diff(cut) > SLIVER)
+    local, start, stop = local[:-1][one], cut[:-1][one], cut[1:][one]
+    segment, middle = segments[local], (start + stop) / 2
+    d = _rays(trace, contact, segment, middle)
+    met, *_ = partners(trace, facing, segment, trace.point(segment, middle), d)
+    on = met >= 0
+    return Pieces(local[on], start[on], stop[on], met[on])
+
+
+def _dual_basis(whole: Array, weight: Array, mass: Array, order: int) -> tuple[Array, Array, Mask]:
+    """Dual bases of k segments over their facing parts.
+
+    Parameters
+    ----------
+    whole, weight : ndarray (k, p + 1)
+        Integrals of phi over the segments and over their facing parts.
+    mass : ndarray (k, p + 1, p + 1)
+        Integrals of phi_i phi_j over the facing parts.
+
+    Returns
+    -------
+    weight : ndarray (k, p + 1)
+        D_e; 0 for what carries no row.
+    change : ndarray (k, p + 1, p + 1)
+        psi = change phi.
+    hats : ndarray of bool (k,)
+        Segments on which psi are those of the hats of the ends.
+    """
+    faces = (mass != 0).any(axis=(1, 2))
+    hats = faces & (weight < LEAST * whole).any(axis=1) & (order > 1)
+    change = np.zeros_like(mass)
+    whole_basis = faces & ~hats
+    change[whole_basis] = weight[whole_basis][:, :, None] * np.linalg.inv(mass[whole_basis])
+    hat = lagrange(1, gauss_lobatto(order)).T  # in terms of phi: their values at its nodes
+    D = weight[hats] @ hat.T
+    ends = np.flatnonzero(hats)[:, None], np.array([[0, order]])
+    change[ends] = D[:, :, None] * (np.linalg.inv(hat @ mass[hats] @ hat.T) @ hat)
+    weight = np.where(hats[:, None], 0.0, weight)
+    weight[ends] = D
+    return weight, change, hats
+
+
+def _integrals(
+    trace: BoundaryTrace, contact: Contact, segments: Index, pieces: Pieces
+) -> DualIntegrals:
+    """Integrate over the pieces of `segments` (k,)."""
+    p, k, r = trace.order, len(segments), len(pieces.local)
+    points, weights = gauss(2 * p + 2 * trace.geometry_order - 1)
+    q, length = len(points), pieces.stop - pieces.start
+    s = (pieces.start[:, None] + length[:, None] * points).ravel()
+    local, facing = (np.repeat(x, q) for x in (pieces.local, pieces.facing))
+    segment, x = segments[local], trace.point(segments[local], s)
+    w = (length[:, None] * weights).ravel() * jacobian(trace, contact, segment, s)
+    d = _rays(trace, contact, segment, s)
+    across = np.column_stack([-d[:, 1], d[:, 0]])
+    s_there = crossings(x, across, trace.curve, facing, np.full(len(s), 0.5))
+    if contact.gap is None:
+        eps = ((at(trace.curve, facing, s_there) - x) * d).sum(axis=1)
+    else:
+        eps = prescribed_gap(contact, trace, segment, s, x)
+    phi, phi_there = (lagrange(p, t).reshape(r, q, p + 1) for t in (s, s_there))
+    w, eps = w.reshape(r, q), eps.reshape(r, q)
+    weight, gap, mass = np.zeros((k, p + 1)), np.zeros((k, p + 1)), np.zeros((k, p + 1, p + 1))
+    np.add.at(weight, pieces.local, np.einsum("rg,rgi->ri", w, phi))
+    np.add.at(gap, pieces.local, np.einsum("rg,rgi->ri", w * eps, phi))
+    np.add.at(mass, pieces.local, np.einsum("rg,rgi,rgj->rij", w, phi, phi))
+    weight, change, hats = _dual_basis(segment_weights(trace, contact, segments), weight, mass, p)
+    facing_part = change[pieces.local] @ np.einsum("rg,rgi,rgj->rij", w, phi, phi_there)
+    own_part = change @ mass - weight[:, :, None] * np.eye(p + 1)
+    own_part[~hats] = 0.0  # int psi_i phi_j = 0 but for i = j
+    blocks = np.concatenate([facing_part, -own_part])
+    row = np.concatenate([pieces.local, np.arange(k)])[:, None] * (p + 1) + np.arange(p + 1)
+    column = trace.nodes[np.concatenate([pieces.facing, segments])]
+    row, column = np.broadcast_arrays(row[:, :, None], column[:, None, :])
+    size = (k * (p + 1), trace.space.ndof)
+    coupling = from_triplets(blocks.ravel(), row.ravel(), column.ravel(), size)
+    return DualIntegrals(weight, np.einsum("kij,kj->ki", change, gap), coupling)
+
+
+def _matched(trace: BoundaryTrace, line: ContactLine, facing: Mask) -> Mask:
+    """Segments (k,) of the secondary whose two ends face the two ends of one primary segment."""
+    vertex = np.full(len(facing) + 1, -1)  # of the primary at each point
+    at_end = facing & np.isin(line.partner_s, (0.0, 1.0))
+    end = np.where(line.partner_s[at_end] == 0.0, 0, -1)
+    vertex[:-1][at_end] = trace.nodes[line.partner[at_end], end]
+    ends = line.rows[:, [0, -1]]
+    met = np.sort(np.where(ends < 0, -1, vertex[ends]), axis=1)
+    sides = np.sort(trace.nodes[line.facing][:, [0, -1]], axis=1)
+    size = trace.space.ndof
+    keys = sides[:, 0] * size + sides[:, 1]
+    return np.asarray((met[:, 0] >= 0) & np.isin(met[:, 0] * size + met[:, 1], keys))
+
+
+def with_dual_rows(
+    trace: BoundaryTrace, line: ContactLine, facing: Mask
+) -> tuple[ContactLine, Mask]:
+    """The line with dual rows where nodes do not face nodes, and which points (m,) carry rows.
+
+    Parameters
+    ----------
+    trace : BoundaryTrace
+    line : ContactLine
+        With points at all nodes of the secondary.
+    facing : ndarray of bool (m,)
+        Points that face the primary.
+
+    A point on segments of both kinds takes the mean of both rows, by their weights; one whose
+    segments all match keeps the row at its node to the last bit.
+    """
+    matched = _matched(trace, line, facing)
+    if line.contact.rows == "dual":
+        matched[:] = False
+    chosen = np.flatnonzero(~matched)
+    if len(chosen) == 0 or len(line.facing) == 0:
+        return line, facing
+    segments, rows, m = line.segments[chosen], line.rows[chosen], len(facing)
+    pieces = _divided(trace, line.contact, segments, line.facing)
+    parts = _integrals(trace, line.contact, segments, pieces)
+    here = (rows >= 0) & (parts.weight > 0)
+    point = rows[here]
+    # What counts where two sides share a point at a small turn, as in the nodal weights.
+    normal = trace.exact_normal(*trace.at_nodes(segments)).reshape(*rows.shape, 2)
+    cosine = np.ones(len(point))
+    if line.contact.direction is None:
+        cosine = (normal[here] * line.direction[point]).sum(axis=1)
+    nodal, dual, gap = np.zeros(m), np.zeros(m), np.zeros(m)
+    np.add.at(nodal, line.rows[matched], line.shares[matched])
+    np.add.at(dual, point, parts.weight[here] * cosine)
+    np.add.at(gap, point, parts.gap[here] * cosine)
+    at_nodes, carries = dual == 0, (dual > 0) | (facing & (nodal > 0))
+    weight = np.where(at_nodes, 1.0, nodal + dual)
+    share = np.where(at_nodes, 1.0, nodal / weight)  # of the row at the node
+    scale = cosine / weight[point]
+    shape = m, parts.coupling.shape[0]
+    means = from_triplets(scale, point, np.flatnonzero(here), shape) @ parts.coupling
+    covered = np.bincount(pieces.local, pieces.stop - pieces.start, minlength=len(chosen))
+    faces = line.faces.copy()
+    faces[chosen] = (covered > 1 - SLIVER) & here.all(axis=1)
+    line = replace(
+        line,
+        gap=share * np.where(share > 0, line.gap, 0.0) + gap / weight,
+        weight=np.where(at_nodes, line.weight, weight),
+        coupling=(sp.diags_array(share) @ line.coupling + means).tocsr(),
+        means=~at_nodes,
+        faces=faces,
+        searches=1,
+    )
+    return line, carries

@@ -1,0 +1,208 @@
+"""Rows where nodes do not face nodes, against exact solutions that the elements contain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import ngsolve as ng
+import numpy as np
+import pytest
+from netgen.occ import Compound, OCCGeometry, WorkPlane, Y
+
+from drivers.reference import cases
+from drivers.reference.straight import relative_energy_error
+from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact.contact import contact_line
+from ngcontact.discrete import discretise, first_active_set, minimise_energy
+from ngcontact.fem import boundary_trace
+from ngcontact.geometries import blocks
+from ngcontact.lagrange import gauss, lagrange
+
+EXACT = 1e-10  # round-off times the condition of small meshes; measured below 2e-12
+RATIOS = [(4, 6), (5, 37), (10, 73), (4, 8)]
+ORDERS = [1, 2, 3, 4]
+
+
+def divided(geometry, counts):
+    """A geometry whose edges of these names have so many equal segments."""
+    for edge in geometry.shape.edges:
+        if edge.name in counts:
+            n = counts[edge.name]
+            edge.partition = [k / n for k in range(1, n)]
+    return OCCGeometry(geometry.shape, dim=2)
+
+
+def pressed(case, ratio, swap, **options):
+    """A case on a geometry whose two contact lines have so many segments."""
+    [pair] = case.problem.contact
+    counts = dict(zip((pair.secondary, pair.primary), ratio, strict=True))
+    pair = replace(pair.swapped() if swap else pair, **options)
+    geometry = divided(case.problem.geometry, counts)
+    return replace(case.problem, geometry=geometry, contact=[pair])
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("ratio", RATIOS)
+@pytest.mark.parametrize(("slope", "order"), [(0.0, 1), *((0.5, p) for p in (2, 3, 4))])
+def test_pressures_of_degree_p_minus_1_are_exact(slope, order, ratio, swap):
+    case = cases.pressure_patch(p1=min(slope, 0.5))
+    solution = solve(pressed(case, ratio, swap), maxh=0.5, order=order)
+    assert relative_energy_error(solution, case.exact) < EXACT
+    pressure = case.exact.pressure(solution.points[:, 0])
+    np.testing.assert_allclose(solution.pressure, pressure, rtol=EXACT)
+    assert abs(np.linalg.norm(solution.contact_force()) - 2.0) < 2 * EXACT  # p = 1 + slope x
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("swap", [False, True])
+def test_polygonal_zones_are_exact(order, swap):
+    case = cases.polygonal_patch()
+    solution = solve(pressed(case, (3, 5), swap), maxh=0.5, order=order)
+    assert relative_energy_error(solution, case.exact) < EXACT
+
+
+@pytest.mark.parametrize("rows", ["auto", "dual"])
+def test_matched_meshes_take_the_rows_of_the_paper_unless_asked(rows):
+    case = cases.pressure_patch(p1=0.5)
+    problem = replace(
+        case.problem, contact=[replace(pair, rows=rows) for pair in case.problem.contact]
+    )
+    solution = solve(problem, maxh=0.5, order=3)
+    [pair] = solution.pairs
+    assert pair.line.means.all() == (rows == "dual")
+    assert relative_energy_error(solution, case.exact) < EXACT
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_matched_part_keeps_its_rows_to_the_last_bit(order):
+    """The left half of the line has equal segments on both sides, the right half has not."""
+    shape, contact = blocks().shape, Contact("upper_contact", "lower_contact")
+    for edge in shape.edges:
+        if edge.name in ("upper_contact", "lower_contact"):
+            left = [0.1, 0.2, 0.3, 0.4, 0.5]
+            right = [0.6, 0.8] if edge.name == "upper_contact" else [0.7, 0.85, 0.95]
+            start = edge.start.x > 0  # the lower edge runs to the left
+            nodes = sorted(1 - s for s in left + right) if start else left + right
+            edge.partition = nodes
+    mesh = ng.Mesh(OCCGeometry(shape, dim=2).GenerateMesh(maxh=0.5))
+    trace = boundary_trace(mesh, order)
+    line = contact_line(trace, contact)
+    nodal = contact_line(trace, replace(contact, rows="nodal"))
+    inside = nodal.position[:, 0] < -1e-9  # the half with x < 0, its end excluded
+    assert inside.sum() == 5 * order
+    np.testing.assert_array_equal(line.position, nodal.position)
+    np.testing.assert_array_equal(line.means, ~inside)
+    assert (line.gap[inside] == nodal.gap[inside]).all()
+    assert (line.weight[inside] == nodal.weight[inside]).all()
+    assert (line.coupling[inside] != nodal.coupling[inside]).nnz == 0
+
+
+def overhanging(upper, lower, start, stop):
+    """Blocks on 0 < x < 1 and `start` < x < `stop`, given as a mesh."""
+    top = WorkPlane().MoveTo(0, 0).Rectangle(1, 1).Face()
+    base = WorkPlane().MoveTo(start, -1).Rectangle(stop - start, 1).Face()
+    top.faces.name, base.faces.name = "upper", "lower"
+    top.edges.name, base.edges.name = "side", "side"
+    top.edges.Max(Y).name, base.edges.Min(Y).name = "top", "bottom"
+    top.edges.Min(Y).name, base.edges.Max(Y).name = "upper_contact", "lower_contact"
+    shape = Compound([top, base])
+    counts = {"upper_contact": upper, "lower_contact": lower}
+    return ng.Mesh(divided(OCCGeometry(shape, dim=2), counts).GenerateMesh(maxh=0.4))
+
+
+def uncovered_load(trace, start, stop):
+    """Nodal forces (n,) of a unit traction on the parts of the upper line that face nothing."""
+    force = np.zeros(trace.space.ndof)
+    points, weights = gauss(2 * trace.order)
+    for k in trace.segments("upper_contact"):
+        a, b = trace.curve[k][[0, -1], 0]
+        ends = np.clip((np.array([start, stop]) - a) / (b - a), 0, 1)
+        cuts = np.unique([0.0, 1.0, *ends])
+        for low, high in pairwise(cuts):
+            if not start < a + (low + high) / 2 * (b - a) < stop:
+                s = low + (high - low) * points
+                scale = weights * (high - low) * abs(b - a)
+                force[trace.nodes[k]] += scale @ lagrange(trace.order, s)
+    return force
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize(
+    ("upper", "lower", "start", "stop"),
+    [(4, 3, 0.0, 0.75), (9, 8, 0.12, 0.83), (4, 7, 0.0, 0.6123), (5, 4, 0.0, 0.9999)],
+)
+def test_an_overhanging_secondary_is_exact(order, upper, lower, start, stop):
+    """Uniform pressure 1; the same traction on what faces nothing, integrated in parts."""
+    mesh, law = overhanging(upper, lower, start, stop), Elastic(E=1.0, nu=0.3)
+    u = (0.3 * 1.3 * ng.x, -(1 - 0.3**2) * ng.y)  # plane strain under -1 along y
+    problem = Problem(
+        geometry=mesh,
+        materials={"upper|lower": law},
+        displacement={"top": u, "bottom": u},
+        contact=[Contact("upper_contact", "lower_contact")],
+    )
+    d = discretise(problem, mesh, order, "isoparametric")
+    load = uncovered_load(d.space.trace, start, stop)
+    nodal = np.concatenate([np.zeros_like(load), load])
+    program = replace(d.program, b=d.program.b + d.basis.T.T @ nodal)
+    d = replace(d, program=program)
+    d.systems.restart(program)
+    result = minimise_energy(d, first_active_set(d))
+    [line] = d.lines
+    np.testing.assert_allclose(result.force / line.weight, 1.0, rtol=EXACT)
+    displacement = ng.GridFunction(d.space.V)
+    displacement.vec.FV().NumPy()[:] = d.space.basis @ (d.basis.T @ result.u)
+    miss = displacement - ng.CF(u)
+    assert np.sqrt(ng.Integrate(ng.InnerProduct(miss, miss), mesh)) < EXACT
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_rings_converge_at_the_best_rates(order):
+    """Curved lines, segments 2:3. Theory: rates 1, 2, 3 in h; measured .91, 2.07, 3.2."""
+    errors = []
+    for n in (8, 16):
+        case = cases.ring_in_ring()
+        solution = solve(pressed(case, (n, 3 * n // 2), False), maxh=1.6 / n, order=order)
+        errors.append(relative_energy_error(solution, case.exact))
+    assert (
+        np.log2(errors[0] / errors[1]) > {1: 0.88, 2: 1.85, 3: 2.6}[order]
+    )  # measured .91, 2.07, 3.2
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_no_worse_than_matched_meshes_of_the_coarser_spacing(order):
+    errors = []
+    for ratio in ((16, 24), (16, 16)):
+        case = cases.one_transition()
+        solution = solve(pressed(case, ratio, False), maxh=0.125, order=order)
+        errors.append(relative_energy_error(solution, case.exact))
+    assert errors[0] <= 1.05 * errors[1]
+
+
+def parts(counts):
+    """Two blocks whose upper contact line is made of the edges a, b, c."""
+    line = ((-1.0, 0.0), (-0.4, 0.0), (0.3, 0.0), (1.0, 0.0))
+    shape = blocks(line=line).shape
+    upper = sorted((e for e in shape.edges if e.name == "upper_contact"), key=lambda e: e.center.x)
+    for edge, name in zip(upper, "abc", strict=True):
+        edge.name = name
+    return divided(OCCGeometry(shape, dim=2), counts)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+@pytest.mark.parametrize("lower", [3, 4])
+def test_overlapping_and_repeated_pairs_are_one(order, lower):
+    """Pairs on a|b and b|c, the first of them twice, on matched (3) and other meshes."""
+    case = cases.pressure_patch()
+    geometry = parts({"a": 3, "b": 3, "c": 3, "lower_contact": lower})
+    names = ("a|b", "b|c", "a|b")
+    problem = replace(
+        case.problem, geometry=geometry, contact=[Contact(x, "lower_contact") for x in names]
+    )
+    solution = solve(problem, maxh=0.5, order=order)
+    assert relative_energy_error(solution, case.exact) < EXACT
+    np.testing.assert_allclose(solution.pressure, 1.0, rtol=EXACT)
+    forces = [solution.contact_force(pair) for pair in range(3)]
+    np.testing.assert_allclose(sum(forces), [0.0, 2.0], atol=2 * EXACT)
+    assert np.linalg.norm(forces[2]) == 0.0
