@@ -56,9 +56,9 @@ class _Pivots:
 def coefficients_at(Bz: sp.csr_array, row: Index, node: Index) -> Array:
     """Coefficients (k, 2) of rows `row` (k,) of `Bz` (m, 2n) at the nodes `node` (k,)."""
     n = Bz.shape[1] // 2
-    if row.size == 0:  # SciPy answers an empty index with a sparse matrix
+    if row.size == 0:  # SciPy answers an empty index with a sparse array
         return np.zeros((0, 2))
-    return np.column_stack([np.ravel(Bz[row, node]), np.ravel(Bz[row, node + n])])
+    return np.column_stack([Bz[row, node], Bz[row, node + n]])
 
 
 def _preferred(rows: Rows, stiffness: Array) -> Index:
@@ -96,7 +96,7 @@ def pivots(rows: Rows, Bz: sp.csr_array, fixed: Mask, stiffness: Array) -> Index
     for j in np.flatnonzero(regular) if not regular.all() else ():
         hosts.take(host[j], local[j])
     for j in np.flatnonzero(~regular):
-        row = Bz[[j]]
+        row = Bz[j : j + 1]
         columns = np.unique(row.indices % n)
         entries = row.toarray().ravel()
         choices = [(np.hypot(entries[i], entries[i + n]), i) for i in columns if i != preferred[j]]
@@ -139,7 +139,7 @@ def check_prescribed(
     """
     size = np.abs(values).max(initial=0.0)
     for j in drop:
-        columns, entries = Bz[[j]].indices, Bz[[j]].data
+        columns, entries = Bz[j : j + 1].indices, Bz[j : j + 1].data
         where = f"the contact row at node {rows.node[j]} with direction {rows.direction[j]}"
         if (np.abs(entries[~fixed[columns]]) > INDEPENDENT).any():
             raise ValueError(

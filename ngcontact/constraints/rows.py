@@ -97,7 +97,7 @@ class Rows:
             return number
         B = self.matrix()
         for first, second in zip(order[:-1][alike], order[1:][alike], strict=True):
-            if abs(B[[first]] - B[[second]]).max() <= REPEATED:
+            if abs(B[first : first + 1] - B[second : second + 1]).max() <= REPEATED:
                 number[second] = number[first]
         return number
 

@@ -108,7 +108,7 @@ class BorderedSystems:
         stiffness = np.full(p.g.size, np.inf)
         for j in range(p.g.size):
             if base is not None and ~j in base.place:
-                stiffness[j] = 1 / float((p.R[[j]] @ base.known[base.place[~j]])[0])
+                stiffness[j] = 1 / float((p.R[j : j + 1] @ base.known[base.place[~j]])[0])
         return stiffness
 
     def _base_near(self, active: Mask) -> Base:
