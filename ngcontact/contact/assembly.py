@@ -109,7 +109,8 @@ def _same_point(lines: list[ContactLine], rows: Rows) -> tuple[Index, Mask]:
     number = rows.repeated()
     means = np.concatenate([np.zeros(0, dtype=bool), *(line.means for line in lines)])
     averaged = np.zeros(len(number), dtype=bool)
-    order = np.argsort(rows.node, kind="stable")
+    x, y = np.round(rows.direction.T, 6)  # neighbours in this order, the first pair's row first
+    order = np.lexsort((y, x, rows.node))
     for a, b in pairwise(order) if means.any() else ():
         alike = np.abs(rows.direction[a] - rows.direction[b]).max() <= ALIKE
         if rows.node[a] == rows.node[b] and alike and (means[a] or means[b]):

@@ -192,16 +192,17 @@ def with_dual_rows(
 ) -> tuple[ContactLine, Mask]:
     """The line with dual rows where nodes do not face nodes, and which points (m,) carry rows.
 
+    A point on segments of both kinds takes the mean of both rows, by their weights; one whose
+    segments all match keeps the row at its node to the last bit.
+
     Parameters
     ----------
     trace : BoundaryTrace
+        The boundary.
     line : ContactLine
         With points at all nodes of the secondary.
     facing : ndarray of bool (m,)
         Points that face the primary.
-
-    A point on segments of both kinds takes the mean of both rows, by their weights; one whose
-    segments all match keeps the row at its node to the last bit.
     """
     matched = _matched(trace, line, facing)
     if line.contact.rows == "dual":
@@ -214,11 +215,10 @@ def with_dual_rows(
     parts = _integrals(trace, line.contact, segments, pieces)
     here = (rows >= 0) & (parts.weight > 0)
     point = rows[here]
-    # What counts where two sides share a point at a small turn, as in the nodal weights.
-    normal = trace.exact_normal(*trace.at_nodes(segments)).reshape(*rows.shape, 2)
     cosine = np.ones(len(point))
-    if line.contact.direction is None:
-        cosine = (normal[here] * line.direction[point]).sum(axis=1)
+    if line.contact.direction is None:  # what counts where two sides share a point at a small turn
+        normal = trace.exact_normal(*trace.at_nodes(segments))[here.ravel()]
+        cosine = (normal * line.direction[point]).sum(axis=1)
     nodal, dual, gap = np.zeros(m), np.zeros(m), np.zeros(m)
     np.add.at(nodal, line.rows[matched], line.shares[matched])
     np.add.at(dual, point, parts.weight[here] * cosine)
