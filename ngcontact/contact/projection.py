@@ -242,7 +242,7 @@ def feet(
     def ahead(point: Index, segment: Index, s: Array) -> Array:
         return ((points[point] - at(curve, segment, s)) * _slope(curve, segment, s)).sum(axis=1)
 
-    block = max(1, pairs_at_once // max(1, len(curve)))
+    block = max(1, pairs_at_once // max(1, curve.size))  # each pair holds its curve
     found = []
     for first in range(0, len(points), block):
         point, segment = np.divmod(
