@@ -1,5 +1,6 @@
 from .adaptive import adapt as adapt
 from .errors import ContactError as ContactError
+from .errors import ContactWarning as ContactWarning
 from .errors import ConvergenceError as ConvergenceError
 from .errors import NoEquilibriumError as NoEquilibriumError
 from .output import write_series as write_series

@@ -1,8 +1,31 @@
-"""Named failures; bad input is a `ValueError` or a `TypeError` instead."""
+"""Named failures and warnings; bad input is a `ValueError` or a `TypeError` instead."""
 
 from __future__ import annotations
 
+import sys
+import warnings
+from pathlib import Path
 from typing import Any
+
+PACKAGE = str(Path(__file__).parent)
+
+
+class ContactWarning(UserWarning):
+    """A result that may be wrong, and what to do about it."""
+
+
+def warn(message: str) -> None:
+    """Warn, at the line outside of the package that led here.
+
+    Parameters
+    ----------
+    message : str
+        What may be wrong, where, and what to do.
+    """
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(message, ContactWarning, stacklevel=level + 1)
 
 
 class ContactError(RuntimeError):
