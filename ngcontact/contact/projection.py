@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index
 from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative
@@ -51,56 +50,15 @@ def _slope(curve: Array, segment: Index, s: Array) -> Array:
     return np.einsum("ki,kid->kd", lagrange_derivative(curve.shape[1] - 1, s), curve[segment])
 
 
-def _normals(curve: Array, side: Array, segment: Index, s: Array) -> Array:
+def normals(curve: Array, side: Array, segment: Index, s: Array) -> Array:
     """Outward normals (k, 2), not normalised."""
     tangent = _slope(curve, segment, s)
     return np.column_stack([tangent[:, 1], -tangent[:, 0]]) * side[segment, None]
 
 
-def _none(size: int) -> Partners:
+def none_met(size: int) -> Partners:
+    """Partners of points (size,) that meet nothing."""
     return Partners(np.full(size, -1), np.zeros(size), np.full(size, np.inf))
-
-
-def coincident(points: Array, directions: Array, curve: Array, side: Array, order: int) -> Partners:
-    """Partners among the Gauss-Lobatto nodes of degree `order` that lie at the points themselves.
-
-    Parameters
-    ----------
-    points, directions : ndarray (k, 2)
-        Contact points and unit vectors towards the facing body.
-    curve, side : ndarray (q, degree + 1, 2), (q,)
-        The facing segments.
-    order : int
-        Degree of the displacement on them.
-
-    Returns
-    -------
-    Partners
-        Segment -1 where no node is within `MATCHED` of the point, or the curve does not face it.
-    """
-    found = _none(len(points))
-    if len(curve) == 0 or len(points) == 0:
-        return found
-    nodes = gauss_lobatto(order)
-    degree = curve.shape[1] - 1
-    at = np.einsum("ji,qid->qjd", lagrange(degree, nodes), curve)
-    lengths = np.linalg.norm(curve[:, -1] - curve[:, 0], axis=1)
-    tree = cKDTree(at.reshape(-1, 2))
-    # A vertex belongs to two segments; the ray may face only one of them.
-    distances, numbers = tree.query(points, k=2, distance_upper_bound=MATCHED * lengths.max())
-    for column in (1, 0):
-        near = np.flatnonzero(np.isfinite(distances[:, column]))
-        segment, local = np.divmod(numbers[near, column], order + 1)
-        normal = _normals(curve, side, segment, nodes[local])
-        grazing = GRAZING * np.linalg.norm(normal, axis=1)  # round-off must not decide
-        faces = (normal * directions[near]).sum(axis=1) < -grazing
-        faces &= distances[near, column] <= MATCHED * lengths[segment]
-        near, segment, local = near[faces], segment[faces], local[faces]
-        found.segment[near] = segment
-        found.s[near] = nodes[local]
-        offset = at[segment, local] - points[near]
-        found.distance[near] = (offset * directions[near]).sum(axis=1)
-    return found
 
 
 def _candidates(
@@ -184,7 +142,7 @@ def cast(
     Partners
         Of least absolute distance; parameters within `MATCHED` of an end are that end.
     """
-    found = _none(len(points))
+    found = none_met(len(points))
     if len(curve) == 0 or len(points) == 0:
         return found
     across = np.column_stack([-directions[:, 1], directions[:, 0]])
@@ -194,7 +152,7 @@ def cast(
     offset = at(curve, segment, s) - points[point]
     miss = np.abs((offset * across[point]).sum(axis=1))
     lengths = np.linalg.norm(curve[segment, -1] - curve[segment, 0], axis=1)
-    normal = _normals(curve, side, segment, s)
+    normal = normals(curve, side, segment, s)
     # A ray along a straight boundary, such as a symmetry plane, does not meet it.
     grazing = GRAZING * np.linalg.norm(normal, axis=1)
     faces = (normal * directions[point]).sum(axis=1) < -grazing

@@ -3,12 +3,56 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask
 from ..fem import BoundaryTrace
-from .projection import Partners, cast, coincident
+from ..lagrange import gauss_lobatto, lagrange
+from .projection import GRAZING, MATCHED, Partners, cast, none_met, normals
 
 TOUCHING = 4 * np.finfo(float).eps  # round-off of a measured gap, relative to the coordinates
+
+
+def coincident(points: Array, directions: Array, curve: Array, side: Array, order: int) -> Partners:
+    """Partners among the Gauss-Lobatto nodes of degree `order` that lie at the points themselves.
+
+    Parameters
+    ----------
+    points, directions : ndarray (k, 2)
+        Contact points and unit vectors towards the facing body.
+    curve, side : ndarray (q, degree + 1, 2), (q,)
+        The facing segments.
+    order : int
+        Degree of the displacement on them.
+
+    Returns
+    -------
+    Partners
+        Segment -1 where no node is within `MATCHED` of the point, or the curve does not face it.
+    """
+    found = none_met(len(points))
+    if len(curve) == 0 or len(points) == 0:
+        return found
+    nodes = gauss_lobatto(order)
+    degree = curve.shape[1] - 1
+    at = np.einsum("ji,qid->qjd", lagrange(degree, nodes), curve)
+    lengths = np.linalg.norm(curve[:, -1] - curve[:, 0], axis=1)
+    tree = cKDTree(at.reshape(-1, 2))
+    # A vertex belongs to two segments; the ray may face only one of them.
+    distances, numbers = tree.query(points, k=2, distance_upper_bound=MATCHED * lengths.max())
+    for column in (1, 0):
+        near = np.flatnonzero(np.isfinite(distances[:, column]))
+        segment, local = np.divmod(numbers[near, column], order + 1)
+        normal = normals(curve, side, segment, nodes[local])
+        grazing = GRAZING * np.linalg.norm(normal, axis=1)  # round-off must not decide
+        faces = (normal * directions[near]).sum(axis=1) < -grazing
+        faces &= distances[near, column] <= MATCHED * lengths[segment]
+        near, segment, local = near[faces], segment[faces], local[faces]
+        found.segment[near] = segment
+        found.s[near] = nodes[local]
+        offset = at[segment, local] - points[near]
+        found.distance[near] = (offset * directions[near]).sum(axis=1)
+    return found
 
 
 def _beyond_own_body(

@@ -1,0 +1,61 @@
+"""Nodes that lie at the same place on both curves."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from ngcontact.contact.search import coincident
+from ngcontact.lagrange import gauss_lobatto, lagrange
+from tests.contact.curves import DOWN, UP, at, graph, rays, upward
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_coincident_nodes(order):
+    curve = graph(lambda x: 0.3 * x, [0, 0.4, 1])
+    normal = np.array([-0.3, 1.0]) / math.hypot(0.3, 1)
+    nodes = np.einsum("ji,qid->qjd", lagrange(1, gauss_lobatto(order)), curve)
+    nodes = np.unique(nodes.reshape(-1, 2), axis=0)
+    lift = np.zeros(len(nodes))
+    lift[::2] = 1e-11
+    points = nodes + lift[:, None] * normal
+    found = coincident(points, np.tile(-normal, (len(nodes), 1)), curve, upward(curve), order)
+    np.testing.assert_allclose(at(curve, found), nodes, atol=1e-15)
+    assert np.isin(found.s, gauss_lobatto(order)).all()
+    # The gap is a subtraction of coordinates, not zero by decree.
+    np.testing.assert_allclose(found.distance, lift, atol=1e-16)
+
+
+def test_points_off_the_nodes_do_not_coincide():
+    curve = graph(lambda x: 0 * x, [0, 1])
+    points, directions = rays([[0.5, 0.0], [0.0, 1e-8], [1.0, 0.0]], DOWN)
+    found = coincident(points, directions, curve, upward(curve), 1)
+    assert found.segment.tolist() == [-1, -1, 0]
+    assert found.s[2] == 1.0
+    assert coincident(points, directions, curve, upward(curve), 2).segment.tolist() == [0, -1, 0]
+
+
+def test_coincident_nodes_must_face():
+    curve = graph(lambda x: 0 * x, [0, 1])
+    points, directions = rays([[0.0, 0.0]], UP)
+    assert coincident(points, directions, curve, upward(curve), 1).segment.tolist() == [-1]
+
+
+def test_coincident_vertex_of_two_segments():
+    """At a corner the row of each side has its partner on the segment that opposes it."""
+    corner = np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [1.0, -1.0]]])
+    points = np.ones((2, 2)) * [1.0, 0.0]
+    found = coincident(points, np.array([[0.0, -1.0], [-1.0, 0.0]]), corner, -np.ones(2), 1)
+    assert found.segment.tolist() == [0, 1]
+    assert found.s.tolist() == [1.0, 0.0]
+    assert found.distance.tolist() == [0.0, 0.0]
+
+
+def test_matched_is_relative_to_the_segment():
+    """Beside a short segment a long one does not widen the tolerance."""
+    curve = graph(lambda x: 0 * x, [0, 1e-4, 1])
+    points, directions = rays([[0.0, 5e-10], [0.0, 5e-14], [1.0, 5e-10]], DOWN)
+    found = coincident(points, directions, curve, upward(curve), 1)
+    assert found.segment.tolist() == [-1, 0, 1]
