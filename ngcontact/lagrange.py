@@ -5,9 +5,11 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.polynomial import legendre
+from numpy.polynomial import legendre, polynomial
 
-from .arrays import Array
+from .arrays import Array, Index
+
+HALVINGS = 54  # of [-1, 1], to the last bit
 
 
 @lru_cache
@@ -72,3 +74,39 @@ def lagrange_derivative(order: int, s: Array) -> Array:
     powers = np.vander(2 * np.atleast_1d(s) - 1, order, increasing=True)
     factors = 2.0 * np.arange(1, order + 1)
     return (powers * factors) @ _coefficients(order)[1:]
+
+
+def zeros(order: int, values: Array) -> tuple[Index, Array]:
+    """All places in [0, 1] where polynomials change their sign.
+
+    Between the zeros of its derivative a polynomial is monotone, so that halving finds them all,
+    from the linear derivative upwards.
+
+    Parameters
+    ----------
+    order : int
+        Polynomial degree, at least 1.
+    values : ndarray (k, order + 1)
+        The polynomials at the Gauss-Lobatto points of that degree.
+
+    Returns
+    -------
+    number, s : ndarray (r,), (r,)
+        Polynomial and parameter of each.
+    """
+    coefficients = values @ _coefficients(order).T
+    ends = np.tile([-1.0, 1.0], (len(values), 1))
+    edges = ends
+    for degree in range(1, order + 1):
+        derivative = polynomial.polyder(coefficients, order - degree, axis=1).T[..., None]
+        low, high = edges[:, :-1], edges[:, 1:]
+        below = polynomial.polyval(low, derivative, tensor=False) < 0
+        changes = below != (polynomial.polyval(high, derivative, tensor=False) < 0)
+        for _ in range(HALVINGS):
+            middle = (low + high) / 2
+            left = changes & (below == (polynomial.polyval(middle, derivative, tensor=False) < 0))
+            low, high = np.where(left, middle, low), np.where(left, high, middle)
+        edges = np.column_stack([ends[:, :1], np.where(changes, low, high), ends[:, 1:]])
+        edges = np.sort(edges, axis=1)
+    number, place = np.nonzero(changes)
+    return number, (1 + low[number, place]) / 2

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
+import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
 from ngcontact.adaptivity import refined
-from ngcontact.discrete import discretise
+from ngcontact.discrete import discretise, first_active_set, minimise_energy
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks
+from ngcontact.lagrange import gauss, lagrange
 from ngcontact.linalg import coarsenings
 from ngcontact.mesh import curve, first_mesh, vertex_parents
 
@@ -70,3 +73,60 @@ def steps_of(problem, coarsest=100):
     trace = problem.space.trace
     nodes = trace.nodes[problem.space.nodal]
     return coarsenings(problem.basis.T, vertex_parents(trace.mesh), nodes, coarsest)
+
+
+def divided(geometry, counts):
+    """A geometry whose edges of these names have so many equal segments."""
+    for edge in geometry.shape.edges:
+        if edge.name in counts:
+            n = counts[edge.name]
+            edge.partition = [k / n for k in range(1, n)]
+    return OCCGeometry(geometry.shape, dim=2)
+
+
+def pressed(case, ratio, swap, **options):
+    """A case on a geometry whose two contact lines have so many segments."""
+    [pair] = case.problem.contact
+    counts = dict(zip((pair.secondary, pair.primary), ratio, strict=True))
+    pair = replace(pair.swapped() if swap else pair, **options)
+    geometry = divided(case.problem.geometry, counts)
+    return replace(case.problem, geometry=geometry, contact=[pair])
+
+
+def unit_load(trace, pattern, parts):
+    """Nodal forces (n,) of a unit traction on the `parts`, intervals of x, of a straight line."""
+    force = np.zeros(trace.space.ndof)
+    points, weights = gauss(2 * trace.order)
+    for k in trace.segments(pattern):
+        a, b = trace.curve[k][[0, -1], 0]
+        cuts = np.unique([0.0, 1.0, *np.clip((np.ravel(parts) - a) / (b - a), 0, 1)])
+        for low, high in pairwise(cuts):
+            middle = a + (low + high) / 2 * (b - a)
+            if any(start < middle < stop for start, stop in parts):
+                s = low + (high - low) * points
+                scale = weights * (high - low) * abs(b - a)
+                force[trace.nodes[k]] += scale @ lagrange(trace.order, s)
+    return force
+
+
+def solved_with_load(problem, mesh, order, pattern, parts):
+    """Discrete problem with a unit traction along y on parts of a contact line, and its solution.
+
+    Parts that end inside segments are integrated exactly, so that trials of uniform pressure have
+    an exact solution.
+    """
+    d = discretise(problem, mesh, order, "isoparametric")
+    load = unit_load(d.space.trace, pattern, parts)
+    nodal = np.concatenate([np.zeros_like(load), load])
+    program = replace(d.program, b=d.program.b + d.basis.T.T @ nodal)
+    d = replace(d, program=program)
+    d.systems.restart(program)
+    return d, minimise_energy(d, first_active_set(d))
+
+
+def distance(d, result, u):
+    """From the displacement `u` in L2."""
+    displacement = ng.GridFunction(d.space.V)
+    displacement.vec.FV().NumPy()[:] = d.space.basis @ (d.basis.T @ result.u)
+    miss = displacement - ng.CF(u)
+    return np.sqrt(ng.Integrate(ng.InnerProduct(miss, miss), d.space.trace.mesh))

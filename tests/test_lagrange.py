@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ngcontact.lagrange import gauss, gauss_lobatto, lagrange, lagrange_derivative
+from ngcontact.lagrange import gauss, gauss_lobatto, lagrange, lagrange_derivative, zeros
 
 ORDERS = [1, 2, 3, 4, 5]
 ROOT5, ROOT21 = np.sqrt(1 / 5), np.sqrt(3 / 7)
@@ -92,3 +92,17 @@ def test_one_parameter_gives_one_row():
     assert lagrange(3, np.array(0.3)).shape == (1, 4)
     assert lagrange(2, np.zeros(0)).shape == (0, 3)
     np.testing.assert_allclose(lagrange_derivative(2, 0.0), [[-3, 4, -1]], atol=1e-14)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_zeros_are_all_the_roots_in_the_interval(order):
+    values = np.random.default_rng(order).normal(size=(100, order + 1))
+    number, s = zeros(order, values)
+    assert (np.diff(number) >= 0).all()
+    for k in range(100):
+        x = gauss_lobatto(order)
+        roots = np.roots(np.polyfit(x, values[k], order))
+        real = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
+        np.testing.assert_allclose(s[number == k], real[(real >= 0) & (real <= 1)], atol=1e-9)
+    # To the last bits of numbers of order 1, by the sums of at most six of them.
+    assert np.abs((lagrange(order, s) * values[number]).sum(axis=1)).max() < 1e-13

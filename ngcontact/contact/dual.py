@@ -48,12 +48,15 @@ class Pieces:
         Its interval of the parameter.
     facing : ndarray of int (r,)
         Segment of the primary that it faces.
+    opposite : ndarray (r,)
+        Parameter on it that its middle faces.
     """
 
     local: Index
     start: Array
     stop: Array
     facing: Index
+    opposite: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +101,9 @@ def _divided(trace: BoundaryTrace, contact: Contact, segments: Index, facing: In
     local, start, stop = local[:-1][one], cut[:-1][one], cut[1:][one]
     segment, middle = segments[local], (start + stop) / 2
     d = _rays(trace, contact, segment, middle)
-    met, *_ = partners(trace, facing, segment, trace.point(segment, middle), d)
+    met, there, *_ = partners(trace, facing, segment, trace.point(segment, middle), d)
     on = met >= 0
-    return Pieces(local[on], start[on], stop[on], met[on])
+    return Pieces(local[on], start[on], stop[on], met[on], there[on])
 
 
 def _dual_basis(whole: Array, weight: Array, mass: Array, order: int) -> tuple[Array, Array, Mask]:
@@ -149,7 +152,7 @@ def _integrals(
     w = (length[:, None] * weights).ravel() * jacobian(trace, contact, segment, s)
     d = _rays(trace, contact, segment, s)
     across = np.column_stack([-d[:, 1], d[:, 0]])
-    s_there = crossings(x, across, trace.curve, facing, np.full(len(s), 0.5))
+    s_there = crossings(x, across, trace.curve, facing, np.repeat(pieces.opposite, q))
     if contact.gap is None:
         eps = ((at(trace.curve, facing, s_there) - x) * d).sum(axis=1)
     else:
@@ -235,7 +238,8 @@ def with_dual_rows(
     line = replace(
         line,
         gap=share * np.where(share > 0, line.gap, 0.0) + gap / weight,
-        weight=np.where(at_nodes, line.weight, weight),
+        # Not of segments whose ends alone face, as of one over a slot at order 1.
+        weight=np.where(at_nodes, np.where(nodal > 0, nodal, line.weight), nodal + dual),
         coupling=(sp.diags_array(share) @ line.coupling + means).tocsr(),
         means=~at_nodes,
         faces=faces,

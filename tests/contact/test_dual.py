@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from itertools import pairwise
 
 import ngsolve as ng
 import numpy as np
@@ -14,32 +13,13 @@ from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.contact import contact_line
-from ngcontact.discrete import discretise, first_active_set, minimise_energy
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks
-from ngcontact.lagrange import gauss, lagrange
+from tests.scenes import distance, divided, pressed, solved_with_load
 
 EXACT = 1e-10  # round-off times the condition of small meshes; measured below 2e-12
 RATIOS = [(4, 6), (5, 37), (10, 73), (4, 8)]
 ORDERS = [1, 2, 3, 4]
-
-
-def divided(geometry, counts):
-    """A geometry whose edges of these names have so many equal segments."""
-    for edge in geometry.shape.edges:
-        if edge.name in counts:
-            n = counts[edge.name]
-            edge.partition = [k / n for k in range(1, n)]
-    return OCCGeometry(geometry.shape, dim=2)
-
-
-def pressed(case, ratio, swap, **options):
-    """A case on a geometry whose two contact lines have so many segments."""
-    [pair] = case.problem.contact
-    counts = dict(zip((pair.secondary, pair.primary), ratio, strict=True))
-    pair = replace(pair.swapped() if swap else pair, **options)
-    geometry = divided(case.problem.geometry, counts)
-    return replace(case.problem, geometry=geometry, contact=[pair])
 
 
 @pytest.mark.parametrize("swap", [False, True])
@@ -111,22 +91,6 @@ def overhanging(upper, lower, start, stop):
     return ng.Mesh(divided(OCCGeometry(shape, dim=2), counts).GenerateMesh(maxh=0.4))
 
 
-def uncovered_load(trace, start, stop):
-    """Nodal forces (n,) of a unit traction on the parts of the upper line that face nothing."""
-    force = np.zeros(trace.space.ndof)
-    points, weights = gauss(2 * trace.order)
-    for k in trace.segments("upper_contact"):
-        a, b = trace.curve[k][[0, -1], 0]
-        ends = np.clip((np.array([start, stop]) - a) / (b - a), 0, 1)
-        cuts = np.unique([0.0, 1.0, *ends])
-        for low, high in pairwise(cuts):
-            if not start < a + (low + high) / 2 * (b - a) < stop:
-                s = low + (high - low) * points
-                scale = weights * (high - low) * abs(b - a)
-                force[trace.nodes[k]] += scale @ lagrange(trace.order, s)
-    return force
-
-
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize(
     ("upper", "lower", "start", "stop"),
@@ -142,19 +106,11 @@ def test_an_overhanging_secondary_is_exact(order, upper, lower, start, stop):
         displacement={"top": u, "bottom": u},
         contact=[Contact("upper_contact", "lower_contact")],
     )
-    d = discretise(problem, mesh, order, "isoparametric")
-    load = uncovered_load(d.space.trace, start, stop)
-    nodal = np.concatenate([np.zeros_like(load), load])
-    program = replace(d.program, b=d.program.b + d.basis.T.T @ nodal)
-    d = replace(d, program=program)
-    d.systems.restart(program)
-    result = minimise_energy(d, first_active_set(d))
+    bare = [(-np.inf, start), (stop, np.inf)]
+    d, result = solved_with_load(problem, mesh, order, "upper_contact", bare)
     [line] = d.lines
     np.testing.assert_allclose(result.force / line.weight, 1.0, rtol=EXACT)
-    displacement = ng.GridFunction(d.space.V)
-    displacement.vec.FV().NumPy()[:] = d.space.basis @ (d.basis.T @ result.u)
-    miss = displacement - ng.CF(u)
-    assert np.sqrt(ng.Integrate(ng.InnerProduct(miss, miss), mesh)) < EXACT
+    assert distance(d, result, u) < EXACT
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

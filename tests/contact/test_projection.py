@@ -97,6 +97,40 @@ def test_oblique_rays_on_a_parabola_solve_the_quadratic():
     np.testing.assert_allclose(at(curve, found), points + expected[:, None] * d, atol=1e-14)
 
 
+@pytest.mark.parametrize("count", [1, 2, 5])
+@pytest.mark.parametrize("degree", [2, 3, 4])
+def test_rays_that_cross_a_segment_twice(count, degree):
+    """Both crossings may lie in one segment, whose ends are then on one side of the ray."""
+    curve = graph(lambda x: x**2, np.linspace(-1, 1, count + 1), degree)
+    angle = RNG.uniform(-math.pi, 0, 400)
+    d = np.column_stack([np.cos(angle), np.sin(angle)])
+    points = np.column_stack([RNG.uniform(-2, 2, 400), RNG.uniform(-1, 2, 400)])
+    found = cast(points, d, curve, upward(curve))
+    # y0 + t dy = (x0 + t dx)^2; the normal (-2x, 1) opposes d.
+    (x0, y0), (dx, dy) = points.T, d.T
+    a, b, c = dx**2, 2 * x0 * dx - dy, x0**2 - y0
+    root = np.sqrt(np.maximum(b**2 - 4 * a * c, 0))
+    t = np.stack([-b - root, -b + root]) / (2 * a)
+    x = x0 + t * dx
+    meets = (b**2 > 4 * a * c) & (np.abs(x) < 1) & (-2 * x * dx + dy < 0)
+    t = np.where(meets, t, np.inf)
+    expected = t[np.abs(t).argmin(axis=0), np.arange(400)]
+    assert (np.isfinite(expected) == (found.segment >= 0)).all()
+    met = np.isfinite(expected)
+    assert met.sum() > 100
+    np.testing.assert_allclose(found.distance[met], expected[met], atol=1e-11)
+
+
+def test_three_crossings_of_a_wave():
+    """Y = x (x^2 - 1) as one segment, looked at along x: three crossings, two of them facing."""
+    curve = graph(lambda x: x * (x**2 - 1), [-1.5, 1.5], 3)
+    points, directions = rays([[-2.0, 0.1], [0.2, 0.1], [2.0, 0.1]], [1.0, 0.0])
+    found = cast(points, directions, curve, upward(curve))  # faces where the curve rises
+    roots = np.sort(np.roots([1, 0, -1, -0.1]).real)[[0, 2]]
+    nearest = roots[np.abs(roots - points[:, :1]).argmin(axis=1)]
+    np.testing.assert_allclose(points[:, 0] + found.distance, nearest, atol=1e-14)
+
+
 def test_parametrisation_need_not_be_linear():
     """A quadratic segment whose middle node is off the middle: eta(s) = 0.4 s + 0.6 s^2."""
     s = gauss_lobatto(2)
