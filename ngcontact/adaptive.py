@@ -16,7 +16,7 @@ from .arrays import Mask, power_of_two
 from .contact import ending_segments
 from .errors import ConvergenceError
 from .estimator import Estimator, estimate
-from .fem import bulk_moduli, check_element, shear_moduli, unknowns, warn_of_locking
+from .fem import check_element, incompressibilities, unknowns, warn_of_locking
 from .mesh import curve, first_mesh
 from .one_mesh import solve_on
 from .problem import Problem
@@ -157,7 +157,7 @@ def _at_round_off(solution: Solution) -> bool:
     if solution.error_estimate > BEYOND_NOISE * terms:  # as nearly always
         return False
     problem, mesh = solution.problem, solution.mesh
-    ratio = float((bulk_moduli(problem, mesh) / shear_moduli(problem, mesh)).max())
+    ratio = float(incompressibilities(problem, mesh).max())
     return solution.error_estimate <= max(EXACT, STRESS_NOISE * math.sqrt(ratio)) * terms
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from ..arrays import Array
 from ..fem import BoundaryTrace
-from ..problem import Problem, varies
+from ..problem import Problem, Triangulation, varies
 
 
 def projected_stress(
@@ -21,9 +21,14 @@ def projected_stress(
     laws = problem.materials.values()
     exact = mesh.GetCurveOrder() == 1 and not any(varies(law) for law in laws)
     projected = ng.GridFunction(ng.L2(mesh, order=order - 1 if exact else order, dim=3))
-    xx, xy, _, yy = stress
-    projected.Set(ng.CF((xx, yy, xy)).Compile())
+    projected.Set(components(stress).Compile())
     return projected
+
+
+def components(stress: ng.CoefficientFunction) -> ng.CoefficientFunction:
+    """(xx, yy, xy) of a stress (2, 2)."""
+    xx, xy, _, yy = stress
+    return ng.CF((xx, yy, xy))
 
 
 def divergence_and_jump(
@@ -36,13 +41,41 @@ def divergence_and_jump(
     return ng.CF((slope[0, 0] + slope[2, 1], slope[2, 0] + slope[1, 1])), jump
 
 
-def integral(
-    mesh: ng.Mesh, residual: ng.CoefficientFunction, order: int, *, edges: bool = False
-) -> Array:
-    """Squares of a residual integrated over each element, or over its inner edges, (ne,)."""
+def element_integral(mesh: ng.Mesh, residual: ng.CoefficientFunction, order: int) -> Array:
+    """Squares of a residual integrated over each element, (ne,)."""
     v = ng.L2(mesh, order=0).TestFunction()
-    test = v + v.Other() if edges else v
-    form = ng.LinearForm(v.space)
-    form += ng.InnerProduct(residual, residual) * test * ng.dx(skeleton=edges, bonus_intorder=order)
-    form.Assemble()
-    return np.array(form.vec.FV().NumPy())
+    return _assembled(v, ng.InnerProduct(residual, residual) * v * ng.dx(bonus_intorder=order))
+
+
+def edge_integral(mesh: ng.Mesh, jump: ng.CoefficientFunction, order: int, mu: Array) -> Array:
+    """Squares of a jump integrated over the inner edges of each element, (ne,).
+
+    Where the other side is stiffer, times the ratio of both moduli `mu` (ne,): stiff bodies take
+    up what soft ones cannot.
+    """
+    v = ng.L2(mesh, order=0).TestFunction()
+    squares = ng.InnerProduct(jump, jump) * (v + v.Other())
+    dx = ng.dx(skeleton=True, bonus_intorder=order)
+    if not _differs_at_a_vertex(mesh, mu):
+        return _assembled(v, squares * dx)
+    soft = ng.GridFunction(v.space)
+    soft.vec.FV().NumPy()[:] = 1 / mu
+    least = ng.IfPos(soft - soft.Other(), soft.Other(), soft)
+    return mu * _assembled(v, least * squares * dx)
+
+
+def _differs_at_a_vertex(mesh: ng.Mesh, mu: Array) -> bool:
+    """Whether elements with a common vertex have different moduli."""
+    low, high = np.full(mesh.nv, np.inf), np.zeros(mesh.nv)
+    for corner in Triangulation(mesh).triangles.T:
+        np.minimum.at(low, corner, mu)
+        np.maximum.at(high, corner, mu)
+    return bool((high > low).any())
+
+
+def _assembled(v: ng.comp.ProxyFunction, form: ng.comp.SumOfIntegrals) -> Array:
+    """Values (ne,) of a form linear in the function v, constant on each element."""
+    f = ng.LinearForm(v.space)
+    f += form
+    f.Assemble()
+    return np.array(f.vec.FV().NumPy())

@@ -6,6 +6,8 @@ shear modulus mu, degree p:
 
 * element: (h/p)^2 / 2mu |F + div sigma_h|^2 over T
 * jump: half of (h/p) / 2mu |[sigma_h n]|^2 over the edges inside a body
+* oscillation: |sigma_h - Pi sigma_h|^2 in the norm of C^-1 over T, where moduli vary; there
+  Pi sigma_h, polynomials, stands for sigma_h in the parts before
 * traction: (h/p) / 2mu |P - sigma_h n|^2 over Gamma_tau and all free boundary
 * sliding: (h/p) / 2mu |sigma_t|^2 over Gamma_0
 * tangential, pressure: (h/p) / 2mu times the squares of the parts of the traction across and
@@ -32,10 +34,11 @@ import numpy as np
 from ..arrays import Array
 from ..contact import ContactState
 from ..fem import NEARLY_INCOMPRESSIBLE, BoundaryTrace, nearly_incompressible
-from ..problem import Problem
+from ..problem import Problem, varies
 from .contact import on_contact
 from .indicators import Estimate
-from .interior import divergence_and_jump, integral
+from .interior import divergence_and_jump, edge_integral, element_integral
+from .oscillation import oscillation
 from .pressure_correction import PressureCorrection, correcting_pressure
 from .supports import on_supports_and_loads
 from .terms import DATA_BONUS, BoundaryTerms, ScaledSolution, scaled
@@ -82,6 +85,11 @@ def _squares(
     def of(name: str) -> Array:
         return parts.setdefault(name, np.zeros(solution.mesh.ne))
 
+    if any(map(varies, solution.problem.materials.values())):
+        of("oscillation")[:] = oscillation(
+            *(solution.problem, solution.projected, solution.stress),
+            *(solution.modulus, solution.rough),
+        )
     for squares in (x for term in terms for x in term.squares):
         np.add.at(of(squares.name), squares.element, squares.values)
     residuals = [x for term in terms for x in term.residuals]
@@ -117,7 +125,7 @@ def _inside(
     degree = solution.order if correction else solution.projected.space.globalorder
     element = np.zeros(solution.mesh.ne)
     if degree or data:  # else there is no divergence
-        squares = integral(solution.mesh, divergence, 2 * degree + data)
+        squares = element_integral(solution.mesh, divergence, 2 * degree + data)
         element = solution.element_weight * squares
-    edges = integral(solution.mesh, jump, 2 * degree, edges=True)
+    edges = edge_integral(solution.mesh, jump, 2 * degree, solution.mu)
     return {"element": element, "jump": solution.edge_weight / 2 * edges}

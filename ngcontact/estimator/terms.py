@@ -8,11 +8,12 @@ from functools import cached_property
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, power_of_two
-from ..fem import BoundaryTrace, shear_moduli
+from ..arrays import Array, Index, Mask, power_of_two
+from ..fem import BoundaryTrace, rigidities, rough_moduli, shear_moduli
 from ..mesh import diameters
 from ..problem import Problem
 from .interior import projected_stress
+from .oscillation import project_by_compliance
 
 DATA_BONUS = 4  # quadrature order above that of the discrete terms, for the loads
 
@@ -38,8 +39,11 @@ class ScaledSolution:
         The same as (xx, yy, xy), polynomials on each element.
     unit, modulus : float
         A stress and a modulus, forces per area.
-    mu : ndarray (ne,)
-        Shear modulus over `modulus`.
+    mu, rigidity : ndarray (ne,)
+        The smallest and the largest stiffness of each element over `modulus`: see
+        `fem.shear_moduli` and `fem.rigidities`.
+    rough : ndarray of bool (ne,)
+        Elements in which the law varies by more than a part of itself.
     diameter : ndarray (ne,)
         h, a length.
     """
@@ -52,6 +56,8 @@ class ScaledSolution:
     unit: float
     modulus: float
     mu: Array
+    rigidity: Array
+    rough: Mask
     diameter: Array
 
     @property
@@ -96,6 +102,9 @@ def scaled(
     mu = shear_moduli(problem, boundary.mesh)
     modulus = power_of_two(mu)
     projected = projected_stress(problem, boundary, stress)
+    rough = rough_moduli(problem, boundary.mesh)
+    if rough.any():
+        project_by_compliance(problem, projected, stress, modulus, rough)
     coefficients = projected.vec.FV().NumPy()
     unit = power_of_two(coefficients)
     coefficients /= unit
@@ -108,6 +117,8 @@ def scaled(
         unit=unit,
         modulus=modulus,
         mu=mu / modulus,
+        rigidity=rigidities(problem, boundary.mesh) / modulus,
+        rough=rough,
         diameter=diameters(boundary.mesh),
     )
 

@@ -17,7 +17,11 @@ from .model import model_of as model_of
 from .model import stress_of as stress_of
 from .moduli import NEARLY_INCOMPRESSIBLE as NEARLY_INCOMPRESSIBLE
 from .moduli import bulk_moduli as bulk_moduli
+from .moduli import incompressibilities as incompressibilities
+from .moduli import law_measures as law_measures
 from .moduli import nearly_incompressible as nearly_incompressible
+from .moduli import rigidities as rigidities
+from .moduli import rough_moduli as rough_moduli
 from .moduli import shear_moduli as shear_moduli
 from .moduli import warn_of_locking as warn_of_locking
 from .space import LOAD_BONUS as LOAD_BONUS

@@ -3,64 +3,163 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
 
 import ngsolve as ng
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Array
-from ..mesh import middles
-from ..problem import Elastic, Hooke, Problem, Triangulation, varies
+from ..arrays import Array, Mask
+from ..mesh import diameters
+from ..problem import Problem, Triangulation, varies
+from ..quadrature import composite, on_lattice
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
 NEARLY_INCOMPRESSIBLE = 6.0
 # ... and from which order 1 locks: nu = 0.4545, where errors are 1.3 times those of nu = 0.3.
 LOCKING = 11.0
 
+ROUGH = 0.5  # change of a law inside an element over its least value from which it is rough
+ROUGH_PARTS = 8  # of the sides of such an element, each with a rule of its own
+MODULUS_BONUS = 4  # quadrature orders above the default: moduli may be as rough as r^(-1/2)
+CURVED = 2  # ... and for the map of a curved element
+
 log = logging.getLogger("ngcontact")
 
 
-def _of_elements(problem: Problem, mesh: ng.Mesh, modulus: Callable[..., Array]) -> Array:
-    """modulus(law, points) (ne,) in the middle of each element; of one where a law is constant."""
-    region = Triangulation(mesh).bodies
-    points, values = middles(mesh), np.zeros(mesh.ne)
+# Where a law that varies is looked at in each element: its middle and towards its corners.
+SAMPLES = ng.IntegrationRule(
+    [(1 / 3, 1 / 3, 0), (0.1, 0.1, 0), (0.8, 0.1, 0), (0.1, 0.8, 0)], [1 / 8] * 4
+)
+
+
+def _of_elements(problem: Problem, mesh: ng.Mesh, modulus: Callable[[Array], Array]) -> Array:
+    """modulus(C) (ne, 4) at `SAMPLES` of each element, of laws C (k, q, q); one if it is constant.
+
+    Voigt components q, the shear last.
+    """
+    region, samples = Triangulation(mesh).bodies, len(SAMPLES)
+    points = mesh.MapToAllElements(SAMPLES, ng.VOL).reshape(-1, samples)
+    values = np.zeros((mesh.ne, samples))
     for pattern, law in problem.materials.items():
         at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
-        values[at] = modulus(law, points[at if varies(law) else at[:1]])
+        places = points[at] if varies(law) else points[at[:1], :1]
+        C = np.asarray(law.voigt(problem.model)(places.ravel()))
+        size = round(math.sqrt(C.shape[1]))
+        values[at] = modulus(C.reshape(-1, size, size)).reshape(places.shape)
     return values
 
 
+def mandel(C: Array) -> Array:
+    """Laws (k, q, q) on the strain e itself, energy e : C : e / 2, of Voigt's `C` (k, q, q).
+
+    Shear strain is counted twice in e : e, so it is scaled by the root of 2.
+    """
+    scale = np.ones(C.shape[-1])
+    scale[-1] = math.sqrt(2.0)
+    return C * scale * scale[:, None]
+
+
+def _smallest(C: Array) -> Array:
+    """The best c_0 (k,) in HH81 (2.7): the smallest eigenvalue of the laws (k, q, q)."""
+    return np.asarray(np.linalg.eigvalsh(mandel(C))[:, 0])
+
+
+def _bulk(C: Array) -> Array:
+    """The largest kappa (k,) <= e : C e / (tr e)^2 of laws (k, 3, 3).
+
+    A Schur complement in C on volumetric, deviatoric and shear strain, which does not cancel where
+    C_11, C_12 and C_22 are nearly equal.
+    """
+    size = np.abs(C).max(axis=(1, 2))
+    T = np.array([[0.5, 0.5, 0.0], [0.5, -0.5, 0.0], [0.0, 0.0, 1.0]])
+    D = T @ (C / size[:, None, None]) @ T.T
+    bend = np.linalg.solve(D[:, 1:, 1:], D[:, 1:, :1])
+    return np.asarray(size * (D[:, 0, 0] - (D[:, :1, 1:] @ bend)[:, 0, 0]))
+
+
+def _rigidity(C: Array) -> Array:
+    """Largest eigenvalue (k,) of laws (k, 3, 3) less kappa (tr e)^2, that of a strain without it.
+
+    The energy |w|^2 of boundary values in a half-plane is at most this times their square in
+    H^(1/2), as that of the field without divergence among those with these values.
+    """
+    dilatation = np.array([1.0, 1.0, 0.0])
+    rest = mandel(C) - _bulk(C)[:, None, None] * np.outer(dilatation, dilatation)
+    return np.asarray(np.linalg.eigvalsh(rest)[:, -1])
+
+
 def shear_moduli(problem: Problem, mesh: ng.Mesh) -> Array:
-    """Shear modulus (ne,) in the middle of each element, a stress."""
+    """Half the smallest eigenvalue (ne,) of the law, the least in each element, a stress.
 
-    def modulus(law: Elastic | Hooke, points: NDArray) -> Array:
-        return np.asarray(law.shear_modulus(problem.model)(points)).ravel()
+    That of C on strains, in Mandel's scaling: mu of isotropic laws with nu >= 0, and kappa below.
+    """
+    return _of_elements(problem, mesh, _smallest).min(axis=1) / 2
 
-    return _of_elements(problem, mesh, modulus)
+
+def rigidities(problem: Problem, mesh: ng.Mesh) -> Array:
+    """Half the largest eigenvalue (ne,) of C less its bulk modulus, the largest in each element.
+
+    A stress, mu of isotropic laws: boundary values w store at most 2 mu |w|^2 in H^(1/2).
+    """
+    return _of_elements(problem, mesh, _rigidity).max(axis=1) / 2
 
 
 def bulk_moduli(problem: Problem, mesh: ng.Mesh) -> Array:
     """Bulk modulus (ne,) in the middle of each element: the largest kappa <= e : C e / (tr e)^2.
 
-    A stress, lambda + mu of isotropic laws in plane strain. A Schur complement in C on volumetric,
-    deviatoric and shear strain, which does not cancel where C_11, C_12 and C_22 are nearly equal.
+    A stress, lambda + mu of isotropic laws in plane strain.
     """
+    return _of_elements(problem, mesh, _bulk)[:, 0]
 
-    def modulus(law: Elastic | Hooke, points: NDArray) -> Array:
-        C = np.asarray(law.voigt(problem.model)(points)).reshape(-1, 3, 3)
-        size = np.abs(C).max(axis=(1, 2))
-        T = np.array([[0.5, 0.5, 0.0], [0.5, -0.5, 0.0], [0.0, 0.0, 1.0]])
-        D = T @ (C / size[:, None, None]) @ T.T
-        bend = np.linalg.solve(D[:, 1:, 1:], D[:, 1:, :1])
-        return np.asarray(size * (D[:, 0, 0] - (D[:, :1, 1:] @ bend)[:, 0, 0]))
 
-    return _of_elements(problem, mesh, modulus)
+def incompressibilities(problem: Problem, mesh: ng.Mesh) -> Array:
+    """Bulk modulus over half the smallest eigenvalue in the middle of each element, (ne,)."""
+
+    def ratio(C: Array) -> Array:
+        return 2 * _bulk(C) / _smallest(C)
+
+    return _of_elements(problem, mesh, ratio)[:, 0]
+
+
+def rough_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
+    """Elements (ne,) in which the law varies by more than a part of itself, or jumps."""
+    region, diameter = Triangulation(mesh).bodies, diameters(mesh)
+    rough = np.zeros(mesh.ne, dtype=bool)
+    for pattern, law in problem.materials.items():
+        if varies(law):
+            at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
+            C = law.voigt(problem.model)
+            for here, points in on_lattice(mesh, at, diameter):
+                values = np.asarray(C(points.ravel())).reshape(*points.shape, -1)
+                size = round(math.sqrt(values.shape[-1]))
+                diagonal = values[..., :: size + 1].mean(axis=2)
+                change = np.ptp(values, axis=1).max(axis=1)
+                rough[here] = change > ROUGH * diagonal.min(axis=1)
+    return rough
+
+
+def law_measures(
+    mesh: ng.Mesh, body: str, order: int, rough: Mask
+) -> list[ng.comp.DifferentialSymbol]:
+    """Integrals over a body whose law varies, the last one over its elements `rough` (ne,).
+
+    Of a polynomial of degree `order`, which is that of the form without the law, times the law.
+    """
+    where = mesh.Materials(body)
+    if not rough.any():
+        return [ng.dx(definedon=where, bonus_intorder=MODULUS_BONUS)]
+    smooth, rest = ng.BitArray(~rough), ng.BitArray(rough)
+    rule = {ng.TRIG: composite(ROUGH_PARTS, order + CURVED)}
+    return [
+        ng.dx(definedon=where, definedonelements=smooth, bonus_intorder=MODULUS_BONUS),
+        ng.dx(definedon=where, definedonelements=rest, intrules=rule),
+    ]
 
 
 def nearly_incompressible(problem: Problem, mesh: ng.Mesh, limit: float) -> dict[str, float]:
     """Largest kappa / mu of each body where it exceeds `limit`."""
-    ratio = bulk_moduli(problem, mesh) / shear_moduli(problem, mesh)
+    ratio = incompressibilities(problem, mesh)
     region = Triangulation(mesh).bodies
     most = dict.fromkeys(mesh.GetMaterials(), 0.0)
     for number, name in enumerate(mesh.GetMaterials()):

@@ -15,10 +15,9 @@ from ..problem import Problem, Triangulation, varies
 from .boundary import BoundaryTrace
 from .element import node_basis, vector_space
 from .model import model_of
+from .moduli import law_measures, rough_moduli
 
-# Loads and variable moduli may be as rough as r^(-1/2): quadrature orders above the default.
-LOAD_BONUS = 6
-MODULUS_BONUS = 4
+LOAD_BONUS = 6  # quadrature orders above the default: loads may be as rough as r^(-1/2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +103,15 @@ def assemble(
     u, v = V.TnT()
     model = model_of(problem)
     a = ng.BilinearForm(V, symmetric=True)
+    rough = rough_moduli(problem, mesh)
     for body, law in problem.materials.items():
         stress = model.stress(law.voigt(problem.model), model.strain(u))
         work = model.weighted(ng.InnerProduct(stress, model.strain(v)))  # (3.1)
-        bonus = MODULUS_BONUS if varies(law) else 0
-        a += work * ng.dx(definedon=mesh.Materials(body), bonus_intorder=bonus)
+        measures = [ng.dx(definedon=mesh.Materials(body))]
+        if varies(law):
+            measures = law_measures(mesh, body, 2 * trace.order, rough)
+        for dx in measures:
+            a += work * dx
     for boundary in problem.traction:
         _check_normals(trace, boundary)
     a.Assemble()
