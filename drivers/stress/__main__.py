@@ -2,6 +2,7 @@
 
     python -m drivers.stress
     python -m drivers.stress held scaling
+    python -m drivers.stress scenes --scenes 600
 
 The exit status is 1 if a case fails.
 """
@@ -13,8 +14,9 @@ import sys
 from collections.abc import Iterator, Sequence
 from typing import Literal, TypeAlias, get_args
 
-from drivers.command_line import Seed, run
+from drivers.command_line import Count, Seed, run
 from drivers.stress import Outcome
+from drivers.stress.scenes.checks.report import summary
 from ngcontact import ContactError
 
 Trial: TypeAlias = Literal[
@@ -25,10 +27,12 @@ Trial: TypeAlias = Literal[
     "lines",
     "materials",
     "scaling",
+    "scenes",
     "shapes",
     "symmetry",
 ]
-RANDOM = ("algebra", "symmetry")  # whose cases are drawn
+RANDOM = ("algebra", "scenes", "symmetry")  # whose cases are drawn
+SCENES = 66  # every kind six times, in two minutes
 
 
 def line(outcome: Outcome) -> str:
@@ -39,14 +43,19 @@ def line(outcome: Outcome) -> str:
     )
 
 
-def outcomes(name: Trial, seed: int) -> Iterator[Outcome]:
-    """Outcomes of one module, which is loaded only now."""
+def outcomes(name: Trial, seed: int, scenes: int = SCENES) -> Iterator[Outcome]:
+    """Outcomes of one module, which is loaded only now; `scenes` of them where scenes are drawn."""
     trial = importlib.import_module(f"drivers.stress.trials.{name}")
-    found: Iterator[Outcome] = trial.outcomes(seed) if name in RANDOM else trial.outcomes()
+    given = {"seed": seed} if name in RANDOM else {}
+    if name == "scenes":
+        given["count"] = scenes
+    found: Iterator[Outcome] = trial.outcomes(**given)
     return found
 
 
-def main(trials: Sequence[Trial] = get_args(Trial), *, seed: Seed = 0) -> int:
+def main(
+    trials: Sequence[Trial] = get_args(Trial), *, seed: Seed = 0, scenes: Count = SCENES
+) -> int:
     """Numerical stability: a table of cases under stress, with what passes and what fails.
 
     Prints of each case the Newton steps, the worst residual of the optimality conditions, the error
@@ -58,7 +67,10 @@ def main(trials: Sequence[Trial] = get_args(Trial), *, seed: Seed = 0) -> int:
     trials : sequence of str
         Kinds of stress.
     seed : int
-        Number from which quadratic programs of `algebra` and numberings of `symmetry` are drawn.
+        Number from which quadratic programs of `algebra` and numberings of `symmetry` are drawn;
+        of the first of the `scenes`.
+    scenes : int
+        How many random scenes are drawn, of seeds one after the other.
 
     Returns
     -------
@@ -69,10 +81,14 @@ def main(trials: Sequence[Trial] = get_args(Trial), *, seed: Seed = 0) -> int:
     print(f"{'case':32} {'varied':44} {'steps':>5} {'residual':>9} {'error':>9} {'allowed':>9}")
     for name in trials:
         try:
-            for outcome in outcomes(name, seed):
+            found = []
+            for outcome in outcomes(name, seed, scenes):
                 count += 1
+                found.append(outcome)
                 failed += not outcome.passed
                 print(line(outcome), flush=True)
+            if name == "scenes":
+                print(*summary(found), sep="\n")
         except ContactError as error:  # the rest of a module falls with a case that raises
             count, failed = count + 1, failed + 1
             print(f"{name:32} {type(error).__name__}: {error} FAIL", flush=True)

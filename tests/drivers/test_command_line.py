@@ -47,6 +47,7 @@ HELP = {
     "stress": {
         "trials": ("Kinds of stress", "algebra gaps held"),
         "seed": ("Number", "0"),
+        "scenes": ("How many", "66"),
     },
     "benchmark": {
         "parts": ("Tables", "tax levels growth large accuracy skip stages"),

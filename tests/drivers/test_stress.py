@@ -40,7 +40,7 @@ def test_seeds_draw_other_cases():
     assert programs(0) == programs(0)
     assert programs(0) != programs(1)
     assert len(numberings(0) | numberings(1) | numberings(2)) == 3 * len(numberings(0)) > 3
-    assert set(RANDOM) == {"algebra", "symmetry"}
+    assert set(RANDOM) == {"algebra", "scenes", "symmetry"}
 
 
 @pytest.mark.parametrize("name", QUICK)

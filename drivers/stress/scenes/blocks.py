@@ -1,0 +1,184 @@
+"""Random scenes of bodies with straight sides, about 1 in size and 1 in stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from drivers.stress.scenes.scene import Body, Pair, Scene
+from drivers.stress.scenes.sides import Affine, Point, Side, scalar, vector
+
+Draw = np.random.Generator
+
+LOAD = 0.01  # displacements and loads over size and stiffness
+
+
+def polygon(name: str, vertices: Sequence[Point], sides: Sequence[str], draw: Draw) -> Body:
+    """A body with random moduli; ``sides[i]`` leaves vertex i, each name begins with the body's."""
+    ends = [*vertices[1:], vertices[0]]
+    found = tuple(
+        Side(f"{name}_{side}", a, b) for side, a, b in zip(sides, vertices, ends, strict=True)
+    )
+    E = float(10 ** draw.uniform(-1, 1.5))
+    return Body(name, found, E, float(draw.uniform(0, 0.4)))
+
+
+def block(name: str, x: Point, y: Point, draw: Draw) -> Body:
+    """A rectangle: left and right end `x`, lower and upper end `y`."""
+    (a, b), (c, d) = x, y
+    return polygon(name, ((a, c), (b, c), (b, d), (a, d)), ("bottom", "right", "top", "left"), draw)
+
+
+def fixed(name: str) -> dict[str, Affine]:
+    """A clamped side."""
+    return {name: vector((0.0, 0.0))}
+
+
+def pressed(scene: Scene, body: Body, middle: float, half: float, draw: Draw) -> Scene:
+    """The scene with the top of a body moved down and tilted, or under a pressure.
+
+    Of a line from `middle` - `half` to `middle` + `half` in x.
+    """
+    top, softest = f"{body.name}_top", min(b.E for b in scene.bodies)
+    if draw.random() < 0.5:
+        tilt = LOAD * draw.uniform(-2, 2) / half
+        down = -LOAD * draw.uniform(0.5, 1)
+        u = vector((LOAD * draw.uniform(-0.3, 0.3), down - tilt * middle), tilt)
+        return replace(scene, clamped={**scene.clamped, top: u})
+    mean = LOAD * softest * draw.uniform(0.5, 1)
+    slope = mean * draw.uniform(-2.5, 2.5) / half  # opens beyond 1, tips over beyond 3
+    p = scalar(mean - slope * middle, (slope, 0.0))
+    return replace(scene, pressure={**scene.pressure, top: p})
+
+
+def swapped_sides(pair: Pair, draw: Draw) -> Pair:
+    """The pair, or with its roles exchanged."""
+    if draw.random() < 0.5:
+        return pair
+    d = None if pair.direction is None else (-pair.direction[0], -pair.direction[1])
+    return replace(pair, secondary=pair.primary, primary=pair.secondary, direction=d)
+
+
+def line(draw: Draw) -> Scene:
+    """Two blocks on a common line."""
+    u = block("u", (-1, 1), (0, float(draw.uniform(0.6, 1.2))), draw)
+    wide = float(draw.choice([1.0, draw.uniform(1.1, 1.6)]))
+    low = block("l", (-wide, wide), (-float(draw.uniform(0.6, 1.2)), 0), draw)
+    pair = swapped_sides(Pair(("u_bottom",), ("l_top",)), draw)
+    if draw.random() < 0.3:
+        y = -1.0 if pair.secondary[0] == "u_bottom" else 1.0
+        pair = replace(pair, direction=(0.0, y))
+    scene = Scene("line", (u, low), (pair,), clamped=fixed("l_bottom"))
+    return pressed(scene, u, 0.0, 1.0, draw)
+
+
+def unmatched(draw: Draw) -> Scene:
+    """The same, one side finer, at any ratio up to 8."""
+    finer = float(draw.uniform(1 / 8, 1.0))
+    names = draw.permutation(["u", "l"])
+    sizes = {str(names[0]): finer, str(names[1]): 1.0}
+    return replace(line(draw), kind="unmatched", finer=sizes)
+
+
+def corner(draw: Draw) -> Scene:
+    """A block in a step, or on it with its side free: bottom and side are the secondary."""
+    w, h = draw.uniform(0.8, 1.3, 2)
+    u = block("u", (0, float(w)), (0, float(h)), draw)
+    wide, high = float(w * draw.uniform(1, 1.5)), float(h * draw.uniform(0.5, 1.4))
+    vertices = ((-0.6, -0.7), (wide, -0.7), (wide, 0.0), (0.0, 0.0), (0.0, high), (-0.6, high))
+    low = polygon("l", vertices, ("bottom", "right", "top", "wall", "head", "left"), draw)
+    wall = draw.random() < 0.6
+    pair = Pair(("u_bottom", "u_left"), ("l_top", "l_wall") if wall else ("l_top",))
+    if not wall:  # the step ends below the block's side
+        low = block("l", (-0.6, wide), (-0.7, 0), draw)
+        if draw.random() < 0.5:
+            low = block("l", (0, wide), (-0.7, 0), draw)
+    scene = Scene("corner", (u, low), (pair,), clamped=fixed("l_bottom"))
+    scene = pressed(scene, u, w / 2, w / 2, draw)
+    if wall:
+        p = LOAD * min(u.E, low.E) * float(draw.uniform(0, 1))
+        scene = replace(scene, pressure={**scene.pressure, "u_right": scalar(p)})
+    if wall and draw.random() < 0.4:
+        pair = Pair(("l_top", "l_wall"), ("u_bottom", "u_left"))
+        scene = replace(scene, pairs=(pair,))
+    return scene
+
+
+def stack(draw: Draw) -> Scene:
+    """Three blocks; contact alone holds those that are not clamped."""
+    half = draw.uniform(0.6, 1.2, 3)
+    low = block("a", (-float(half[0]), float(half[0])), (-0.8, 0), draw)
+    shift = float(draw.uniform(-0.2, 0.2))
+    mid = block("b", (shift - float(half[1]), shift + float(half[1])), (0, 0.6), draw)
+    top = block("c", (-float(half[2]), float(half[2])), (0.6, 1.2), draw)
+    pairs = (
+        swapped_sides(Pair(("b_bottom",), ("a_top",)), draw),
+        swapped_sides(Pair(("c_bottom",), ("b_top",)), draw),
+    )
+    scene = Scene("stack", (low, mid, top), pairs, clamped=fixed("a_bottom"))
+    if draw.random() < 0.5:
+        scene = replace(scene, weight={"b": (0.0, -0.2 * LOAD * mid.E)})
+    return pressed(scene, top, 0.0, float(half[2]), draw)
+
+
+def polygonal(draw: Draw) -> Scene:
+    """Two blocks on a line with corners both ways."""
+    inner = np.sort(draw.uniform(-0.8, 0.8, draw.integers(1, 4)))
+    x = [-1.0, *inner[np.diff(inner, prepend=-1.0) > 0.2].tolist(), 1.0]
+    vertices = [(a, float(draw.uniform(-0.25, 0.25))) for a in x]
+    n = len(x) - 1
+    up = [*vertices, (1.0, 1.0), (-1.0, 1.0)]
+    u = polygon("u", up, [*["bottom"] * n, "right", "top", "left"], draw)
+    down = [(-1.0, -1.0), (1.0, -1.0), *vertices[::-1]]
+    low = polygon("l", down, ["bottom", "right", *["top"] * n, "left"], draw)
+    pair = swapped_sides(Pair(("u_bottom",), ("l_top",)), draw)
+    scene = Scene("polygon", (u, low), (pair,), clamped=fixed("l_bottom"))
+    return pressed(scene, u, 0.0, 1.0, draw)
+
+
+def branch(draw: Draw) -> Scene:
+    """One secondary against two primaries beside a slot, in two pairs or in one."""
+    u = block("u", (-1, 1), (0, float(draw.uniform(0.4, 1.0))), draw)
+    slot = float(draw.choice([0.4, 0.1, 1e-2, 1e-3]))
+    at = float(draw.uniform(-0.4, 0.4))
+    end = float(draw.choice([1.0, 1.3]))
+    a = block("a", (-end, at - slot / 2), (-0.8, 0), draw)
+    b = block("b", (at + slot / 2, end), (-0.8, 0), draw)
+    pairs: tuple[Pair, ...] = (Pair(("u_bottom",), ("a_top",)), Pair(("u_bottom",), ("b_top",)))
+    if draw.random() < 0.4:
+        pairs = (Pair(("u_bottom",), ("a_top", "b_top")),)
+    elif draw.random() < 0.3:
+        pairs = (Pair(("a_top",), ("u_bottom",)), Pair(("b_top",), ("u_bottom",)))
+    clamped = {**fixed("a_bottom"), **fixed("b_bottom")}
+    return pressed(Scene("branch", (u, a, b), pairs, clamped=clamped), u, 0.0, 1.0, draw)
+
+
+def overlap(draw: Draw) -> Scene:
+    """Pairs that share a part of the secondary, or that are the same."""
+    cut = np.sort(draw.uniform(-0.7, 0.7, 2))
+    cut[1] = max(cut[1], cut[0] + 0.2)
+    x = (-1.0, float(cut[0]), float(cut[1]), 1.0)
+    bottom = [(a, 0.0) for a in x]
+    u = polygon(
+        "u", [*bottom, (1.0, 0.9), (-1.0, 0.9)], ["1", "2", "3", "right", "top", "left"], draw
+    )
+    low = block("l", (-1.2, 1.2), (-0.8, 0), draw)
+    pairs = (Pair(("u_1", "u_2"), ("l_top",)), Pair(("u_2", "u_3"), ("l_top",)))
+    if draw.random() < 0.3:
+        pairs = (Pair(("u_1", "u_2", "u_3"), ("l_top",)),) * 2
+    scene = Scene("overlap", (u, low), pairs, clamped=fixed("l_bottom"))
+    if draw.random() < 0.3:
+        scene = replace(scene, finer={"u": 1.0, "l": float(draw.uniform(0.3, 0.9))})
+    return pressed(scene, u, 0.0, 1.0, draw)
+
+
+def obstacle(draw: Draw) -> Scene:
+    """A block on a rigid plane, level or slightly tilted, at a distance."""
+    u = block("u", (-1, 1), (0, float(draw.uniform(0.5, 1.2))), draw)
+    tilt = LOAD * float(draw.choice([0.0, draw.uniform(-1, 1)]))
+    gap = scalar(abs(tilt) + LOAD * 0.3 * float(draw.uniform(0, 1)), (tilt, 0.0))
+    d = (0.0, -1.0) if draw.random() < 0.5 else None
+    scene = Scene("obstacle", (u,), (Pair(("u_bottom",), (), d, gap),))
+    return pressed(scene, u, 0.0, 1.0, draw)

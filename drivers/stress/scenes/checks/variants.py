@@ -1,0 +1,226 @@
+"""Variants of a scene that must agree with it, and how far they may be apart."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import ngsolve as ng
+import numpy as np
+
+from drivers.stress.motion import Motion, moved_mesh
+from drivers.stress.scenes.checks.measures import Measures, differences, measured
+from drivers.stress.scenes.checks.reference import reference
+from drivers.stress.scenes.drawing import rotation
+from drivers.stress.scenes.posing import Answer, adapted, answer
+from drivers.stress.scenes.scene import Pair, Scene
+from ngcontact import ContactError, Solution
+
+FACTOR = 3.0  # of the sum of both estimates, above which two solutions disagree
+SAME = 1e-6  # relative difference of one discrete problem posed in two ways; ties need not be alike
+NODES = 2000  # of the finer mesh of the reference, about
+UNITS = 1e9  # by which lengths and moduli are multiplied
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One check of one scene.
+
+    Attributes
+    ----------
+    check : str
+        What was compared.
+    difference, allowed : float
+        Dimensionless.
+    warned : bool
+        Whether a solution compared came with a ContactWarning.
+    """
+
+    check: str
+    difference: float
+    allowed: float
+    warned: bool = False
+
+    @property
+    def ratio(self) -> float:
+        """Difference over what is allowed; infinite if it is not a number."""
+        ratio = self.difference / self.allowed if self.allowed > 0 else np.inf
+        return float(ratio) if ratio == ratio else np.inf
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene that was solved, for its checks."""
+
+    scene: Scene
+    answer: Answer
+    measures: Measures
+    draw: np.random.Generator
+
+    @property
+    def solution(self) -> Solution:
+        """The solution."""
+        assert self.answer.solution is not None
+        return self.answer.solution
+
+    @cached_property
+    def without_geometry(self) -> Case | None:
+        """The same straight mesh without geometry, which knows corners by their angle or names."""
+        mesh, *_ = moved_mesh(self.solution.mesh, Motion("as it is"))
+        other = answer(self.scene, mesh)
+        m = _there(self.scene, other)
+        return None if m is None else replace(self, answer=other, measures=m)
+
+
+def named(scene: Scene, error: Exception) -> bool:
+    """Whether a refusal says what it is about: a class of the package's own kind, and a name."""
+    names = {*scene.body_of, *scene.body_of.values(), *(str(j) for j in range(len(scene.pairs)))}
+    told = any(f'"{name}' in str(error) or f"contact[{name}]" in str(error) for name in names)
+    return isinstance(error, ValueError | ContactError) and told
+
+
+def close(scene: Scene, what: str, case: Case, other: Answer, m: Measures | None) -> list[Finding]:
+    """Findings against another solution with an estimate; `m` are its measures in this frame."""
+    warned = bool(case.answer.warned or other.warned)
+    if m is None:
+        error = other.refusal
+        wrong = 0.0 if error is not None and named(scene, error) else np.inf
+        return [Finding(f"{what}: {type(error).__name__}", wrong, 1.0, warned)]
+    allowed = FACTOR * (case.measures.relative_error + m.relative_error) + SAME
+    found = differences(case.scene, case.measures, m)
+    return [Finding(f"{what}: {k}", d, allowed, warned) for k, d in found.items()]
+
+
+def equal(what: str, case: Case | None, other: Answer, m: Measures | None) -> list[Finding]:
+    """Findings against the same discrete problem: both are solved, or both refused."""
+    if case is None and m is None:
+        return []
+    if case is None or m is None:
+        return [Finding(f"{what}: {type(other.refusal).__name__}", np.inf, SAME)]
+    found = differences(case.scene, case.measures, m)
+    found["energy"] = found.get("energy", 0.0) ** 2
+    return [Finding(f"{what}: {k}", d, SAME) for k, d in found.items()]
+
+
+def _there(scene: Scene, other: Answer) -> Measures | None:
+    return None if other.solution is None else measured(scene, other.solution)
+
+
+def _carried(case: Case, what: str, motion: Motion) -> list[Finding]:
+    """The scene moved: straight ones with their mesh, others with a mesh of their own."""
+    scene = case.scene.moved(motion)
+    if case.scene.straight:
+        mesh, *_ = moved_mesh(case.solution.mesh, motion)
+        other = answer(scene, mesh)
+    else:
+        other = answer(scene)
+    m = _there(scene, other)
+    m = None if m is None else m.back(motion)
+    if case.scene.straight:
+        return equal(what, case.without_geometry, other, m)
+    return close(scene, what, case, other, m)
+
+
+def rotated(case: Case) -> list[Finding]:
+    """Any other angle."""
+    angle = float(case.draw.uniform(0, 2 * np.pi))
+    return _carried(case, "rotated", Motion("rotated", turn=rotation(angle)))
+
+
+def scaled(case: Case) -> list[Finding]:
+    """Lengths and moduli times 1e9 or 1e-9; curved sides need lengths that the CAD kernel takes."""
+    power = case.draw.choice([-1, 1], 2)
+    length = UNITS ** float(power[0]) if case.scene.straight else 1.0
+    motion = Motion("scaled", length=length, modulus=UNITS ** float(power[1]))
+    return _carried(case, "scaled", motion)
+
+
+def renamed(case: Case) -> list[Finding]:
+    """Bodies and sides with names in another order."""
+    scene = case.scene
+    names = sorted({*scene.body_of, *scene.body_of.values()})
+    order = case.draw.permutation(len(names))
+    new = {name: f"n{order[i]:02d}" for i, name in enumerate(names)}
+    other_scene = scene.renamed(new)
+    back = {b: a for a, b in new.items()}
+    if scene.straight:
+        mesh, *_ = moved_mesh(case.solution.mesh, Motion("as it is"))
+        for i, name in enumerate(mesh.GetBoundaries()):
+            mesh.ngmesh.SetBCName(i, new.get(name, name))
+        for i, name in enumerate(mesh.GetMaterials()):
+            mesh.ngmesh.SetMaterial(i + 1, new[name])
+        other = answer(other_scene, ng.Mesh(mesh.ngmesh))
+    else:
+        other = answer(other_scene)
+    m = _there(other_scene, other)
+    m = None if m is None else m.back(Motion("as it is"), back)
+    if scene.straight:
+        return equal("renamed", case.without_geometry, other, m)
+    return close(other_scene, "renamed", case, other, m)
+
+
+def permuted(case: Case) -> list[Finding]:
+    """Pairs, and the sides that they name, in the other order."""
+
+    def turned(pair: Pair) -> Pair:
+        return replace(pair, secondary=pair.secondary[::-1], primary=pair.primary[::-1])
+
+    scene = replace(case.scene, pairs=tuple(turned(p) for p in case.scene.pairs[::-1]))
+    other = answer(scene, case.solution.mesh)
+    m = _there(scene, other)
+    return equal("permuted", case, other, m)
+
+
+def swapped(case: Case) -> list[Finding]:
+    """The primary carries the points."""
+    if any(pair.gap is not None or not pair.primary for pair in case.scene.pairs):
+        return []
+
+    def back(pair: Pair) -> Pair:
+        d = None if pair.direction is None else (-pair.direction[0], -pair.direction[1])
+        return replace(pair, secondary=pair.primary, primary=pair.secondary, direction=d)
+
+    scene = replace(case.scene, pairs=tuple(back(pair) for pair in case.scene.pairs))
+    other = answer(scene)
+    return close(scene, "swapped", case, other, _there(scene, other))
+
+
+def other_order(case: Case) -> list[Finding]:
+    """The next order."""
+    order = case.scene.order + 1 if case.scene.order < 4 else 3
+    other = answer(case.scene, order=order)
+    return close(case.scene, f"order {order}", case, other, _there(case.scene, other))
+
+
+def refined(case: Case) -> list[Finding]:
+    """An adaptive run to twice the unknowns."""
+    other = adapted(case.scene, 2 * case.solution.displacement.space.ndof)
+    return close(case.scene, "adaptive", case, other, _there(case.scene, other))
+
+
+def referred(case: Case) -> list[Finding]:
+    """The order-1 solver that shares no code, on two meshes whose energies tell its error."""
+    triangles, order = case.solution.mesh.ne, case.scene.order
+    factor = min(1.0 / order, (triangles / NODES) ** 0.5)
+    for finer in (1.0, 0.5):  # a coarse mesh may not hold what corners hold
+        try:
+            coarse, fine = (reference(case.scene, k * factor * finer) for k in (2.0, 1.0))
+        except ArithmeticError:
+            continue
+        error = abs(2 * (coarse.energy - fine.energy)) ** 0.5
+        m = replace(fine, error=error)
+        return close(case.scene, "reference", case, Answer(None), m)
+    return [Finding("reference: no minimum", np.inf, 1.0, bool(case.answer.warned))]
+
+
+CHECKS: tuple[tuple[Callable[[Case], list[Finding]], float], ...] = (
+    (rotated, 0.4),
+    (scaled, 0.3),
+    (renamed, 0.3),
+    (permuted, 0.3),
+    (swapped, 0.4),
+    (other_order, 0.4),
+    (refined, 0.3),
+    (referred, 0.3),
+)
