@@ -20,6 +20,7 @@ from drivers.stress.scenes.posing import answer
 from drivers.stress.scenes.scene import Body, Pair, Scene
 from drivers.stress.scenes.sides import Side, scalar, vector
 
+SEEDS = (11, 34, 13, 25, 59, 38, 50, 29, 63, 31, 43, 1)  # every kind and check, soon done
 WHOLE = 8  # a seed whose scene is solved, has a pair on each flank and opens in part
 P, E, NU = 0.01, (1.0, 3.0), (0.3, 0.2)
 
@@ -45,7 +46,7 @@ def column(finer: float) -> Scene:
 
 
 def test_every_kind_passes():
-    verdicts = [judged(seed) for seed in range(len(KINDS))]
+    verdicts = [judged(seed) for seed in SEEDS]
     assert [(v.seed, v.silent) for v in verdicts if v.silent] == []
     assert len({v.scene.kind for v in verdicts}) == len(KINDS)
     assert all(math.isfinite(f.difference) and f.allowed > 0 for v in verdicts for f in v.findings)
@@ -53,7 +54,7 @@ def test_every_kind_passes():
     every = {"balance", "equations", "penetration", "rotated", "scaled", "renamed", "permuted"}
     assert every | {"swapped", "adaptive", "reference"} <= checks
     table = list(summary([outcome_of(v) for v in verdicts]))
-    assert any(line.startswith(f"| all | {len(KINDS)} |") for line in table)
+    assert any(line.startswith(f"| all | {len(SEEDS)} |") for line in table)
 
 
 def test_seeds_draw_scenes():
