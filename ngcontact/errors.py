@@ -7,7 +7,7 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-PACKAGE = str(Path(__file__).parent)
+PACKAGE = str(Path(__file__).parent / "x")[:-1]  # with the separator
 
 
 class ContactWarning(UserWarning):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator
 
 import ngsolve as ng
@@ -15,9 +14,7 @@ from ..mesh import CadEdge, copied
 from ..problem import Contact, Problem, Triangulation, bisect, move_vertices
 
 TOUCHING = 1e-12  # distance, relative to the geometry, up to which two vertices are at one place
-ROUNDS = 12  # refinements after which a facing segment that still lags stays unmatched
-
-log = logging.getLogger("ngcontact")
+ROUNDS = 12  # refinements after which a facing segment that still lags takes dual rows
 
 
 def matched_vertices(trace: BoundaryTrace, contact: Contact) -> dict[int, int]:
@@ -187,8 +184,6 @@ def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.M
             break
         flags = np.zeros(copy.ne, dtype=bool)
         flags[lagging] = True
-    else:
-        log.warning("%d facing contact segments stay unmatched", len(lagging))
     for contact, pair in zip(problem.contact, pairs, strict=True):
         _move_to_partners(trace, contact, pair, first)
     return copied(copy)  # numbers only the edges that are left

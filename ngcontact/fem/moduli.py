@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import math
 from collections.abc import Callable
 
@@ -10,6 +9,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Mask
+from ..errors import warn
 from ..mesh import diameters
 from ..problem import Problem, Triangulation, varies
 from ..quadrature import composite, on_lattice
@@ -23,9 +23,6 @@ ROUGH = 0.5  # change of a law inside an element over its least value from which
 ROUGH_PARTS = 8  # of the sides of such an element, each with a rule of its own
 MODULUS_BONUS = 4  # quadrature orders above the default: moduli may be as rough as r^(-1/2)
 CURVED = 2  # ... and for the map of a curved element
-
-log = logging.getLogger("ngcontact")
-
 
 # Where a law that varies is looked at in each element: its middle and towards its corners.
 SAMPLES = ng.IntegrationRule(
@@ -168,13 +165,11 @@ def nearly_incompressible(problem: Problem, mesh: ng.Mesh, limit: float) -> dict
 
 
 def warn_of_locking(problem: Problem, mesh: ng.Mesh, order: int) -> None:
-    """Log a warning for every body that elements of order 1 are too stiff for."""
+    """Warn of every body that elements of order 1 are too stiff for."""
     if order > 1:
         return
     for name, ratio in nearly_incompressible(problem, mesh, LOCKING).items():
-        log.warning(
-            'body "%s" is nearly incompressible, lambda / mu = %.3g: elements of order 1 lock; '
-            "use order=2 or higher",
-            name,
-            ratio - 1,
+        warn(
+            f'body "{name}" is nearly incompressible, lambda / mu = {ratio - 1:.3g}: elements of '
+            "order 1 lock; use order=2 or higher"
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import logging
+import warnings
 from dataclasses import replace
 
 import ngsolve as ng
@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact import Elastic, Hooke
+from ngcontact import ContactWarning, Elastic, Hooke
 from ngcontact.fem.moduli import (
     NEARLY_INCOMPRESSIBLE,
     bulk_moduli,
@@ -87,10 +87,12 @@ def test_only_the_bodies_beyond_the_limit_count(mesh):
         (0.499, 1, "plane stress", False),
     ],
 )
-def test_locking_is_not_silent(mesh, caplog, nu, order, model, warned):
-    with caplog.at_level(logging.WARNING, logger="ngcontact"):
+def test_locking_is_not_silent(mesh, nu, order, model, warned):
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
         warn_of_locking(made_of(Elastic(E=1.0, nu=nu), model), mesh, order)
-    assert len(caplog.records) == (2 if warned else 0)
-    for record, body in zip(caplog.records, BODIES, strict=False):
-        assert f'"{body}"' in record.getMessage()
-        assert "order=2" in record.getMessage()
+    assert len(caught) == (2 if warned else 0)
+    for warning, body in zip(caught, BODIES, strict=False):
+        assert warning.category is ContactWarning
+        assert f'"{body}"' in str(warning.message)
+        assert "order=2" in str(warning.message)
