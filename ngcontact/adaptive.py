@@ -14,11 +14,12 @@ import numpy as np
 from .adaptivity import doerfler, refined
 from .arrays import Mask, power_of_two
 from .contact import ending_segments
-from .errors import ConvergenceError
+from .errors import ConvergenceError, warn
 from .estimator import Estimator, estimate
 from .fem import check_element, incompressibilities, unknowns, warn_of_locking
 from .mesh import curve, first_mesh
-from .one_mesh import solve_on
+from .one_mesh import solve_on, warn_of_doubts
+from .plausibility import doubt_of_refinement, estimates_rise
 from .problem import Problem
 from .solution import Solution
 
@@ -109,6 +110,14 @@ def adapt(
         The active set of a level did not settle.
     """
     refinement = Refinement(order, element, theta, tolerance, max_dofs)
+    mesh = first_level(problem, maxh, refinement)
+    warn_of_locking(problem, mesh, order)
+    return _with_warnings(levels(problem, mesh, refinement))
+
+
+def first_level(problem: Problem, maxh: float | None, refinement: Refinement) -> ng.Mesh:
+    """The first mesh of `levels`, checked and curved; arguments and errors of `adapt`."""
+    order, element, max_dofs = refinement.order, refinement.element, refinement.max_dofs
     mesh = first_mesh(problem, maxh)
     problem.check(mesh)
     mesh, _ = curve(mesh, order, element)
@@ -117,8 +126,26 @@ def adapt(
             f"the first mesh has {unknowns(mesh, order, element)} unknowns, more than "
             f"max_dofs={max_dofs}; give a larger maxh or max_dofs"
         )
-    warn_of_locking(problem, mesh, order)
-    return levels(problem, mesh, refinement)
+    return mesh
+
+
+def _with_warnings(solutions: Iterator[Solution]) -> Iterator[Solution]:
+    """The levels of a run, with a warning of whatever may be wrong, once.
+
+    What no mesh mends is said at the first level that shows it, what refinement mends at the last.
+    """
+    told: set[object] = set()
+    estimates: list[float] = []
+    solution = None
+    for solution in solutions:
+        warn_of_doubts(solution, told, last=False)
+        yield solution
+        estimates.append(solution.relative_error_estimate)
+        if "estimates" not in told and estimates_rise(estimates):
+            told.add("estimates")
+            warn(doubt_of_refinement(solution.mesh, solution.indicators, estimates))
+    if solution is not None:
+        warn_of_doubts(solution, told, last=True)
 
 
 def _number(name: str, value: object) -> float:
@@ -193,7 +220,8 @@ def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[
         mesh = refined(problem, solution.mesh, _marked(solution, refinement))
         mesh, _ = curve(mesh, order, element)
     if refinement.tolerance is not None:
-        log.warning(
-            "the estimate is %.2e, more than tolerance=%g: the next level would exceed max_dofs=%g",
-            *(error, refinement.tolerance, refinement.max_dofs),
+        warn(
+            f"the estimate is {error:.2e}, more than tolerance={refinement.tolerance:g}: the next "
+            f"level would exceed max_dofs={refinement.max_dofs:g}; give a larger max_dofs or "
+            "tolerance"
         )

@@ -5,7 +5,9 @@ from __future__ import annotations
 import ngsolve as ng
 
 from .discrete import carried_active_set, discretise, first_active_set, minimise_energy
+from .errors import warn
 from .mesh import check_curves, curve
+from .plausibility import doubts
 from .problem import Problem
 from .solution import Solution
 
@@ -44,3 +46,16 @@ def solve_on(
             "estimates": 0,
         },
     )
+
+
+def warn_of_doubts(solution: Solution, told: set[object], *, last: bool) -> None:
+    """Warn of what may be wrong but was not `told` before, and add it there.
+
+    What a finer mesh mends is left out unless none follows: the mesh is the `last`.
+    """
+    space, u = solution.discrete.space, solution.displacement.vec.FV().NumPy()
+    found = doubts(solution.problem, space, u, solution.pairs, last=last)
+    for doubt, message in found.items():
+        if doubt not in told:
+            warn(message)
+    told.update(found)

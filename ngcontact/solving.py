@@ -7,11 +7,11 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 
-from .adaptive import adapt, log
+from .adaptive import Refinement, first_level, levels, log
 from .errors import ContactError
 from .fem import check_element, unknowns, warn_of_locking
 from .mesh import first_mesh
-from .one_mesh import solve_on
+from .one_mesh import solve_on, warn_of_doubts
 from .problem import Problem, Triangulation
 from .solution import Solution
 
@@ -66,13 +66,7 @@ def solve(
     check_element(order, element)
     if mesh is not None and maxh is not None:
         raise ValueError(f"maxh={maxh} has no effect on a given mesh; give one of mesh and maxh")
-    if start is not None and not isinstance(start, Solution):
-        raise TypeError(f"start={start!r} is not a Solution")
-    if start is not None and len(start.discrete.lines) != len(problem.contact):
-        raise ValueError(
-            f"start has {len(start.discrete.lines)} contact pairs, the problem "
-            f"{len(problem.contact)}; a warm start needs the same pairs"
-        )
+    _check_start(problem, start)
     mesh = first_mesh(problem, maxh) if mesh is None else mesh
     problem.check(mesh)
     if start is None:
@@ -81,7 +75,19 @@ def solve(
     solution = solve_on(problem, mesh, order, element, coarse[-1] if coarse else start)
     solution = replace(solution, coarse_levels=len(coarse))
     log.info("%s", solution)
+    warn_of_doubts(solution, set(), last=True)
     return solution
+
+
+def _check_start(problem: Problem, start: Solution | None) -> None:
+    """Raise unless `start` is a solution of as many pairs as the problem has."""
+    if start is not None and not isinstance(start, Solution):
+        raise TypeError(f"start={start!r} is not a Solution")
+    if start is not None and len(start.discrete.lines) != len(problem.contact):
+        raise ValueError(
+            f"start has {len(start.discrete.lines)} contact pairs, the problem "
+            f"{len(problem.contact)}; a warm start needs the same pairs"
+        )
 
 
 def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> list[Solution]:
@@ -94,8 +100,9 @@ def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> li
     if given or not searched or unknowns(mesh, order, element) < COARSE_RUN_FROM:
         return []
     size = float(np.ptp(Triangulation(mesh).vertices, axis=0).max()) / COARSE_ELEMENTS
+    refinement = Refinement(COARSE_ORDER, "isoparametric", 0.5, None, COARSE_DOFS)
     try:
-        return list(adapt(problem, maxh=size, order=COARSE_ORDER, max_dofs=COARSE_DOFS))
+        return list(levels(problem, first_level(problem, size, refinement), refinement))
     except (ContactError, ValueError) as error:  # it decides nothing but the start
         log.debug("no coarse run: %s", error)
         return []

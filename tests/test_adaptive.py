@@ -15,6 +15,7 @@ from drivers.reference.straight import patch, relative_energy_error
 from ngcontact import (
     Contact,
     ContactError,
+    ContactWarning,
     Elastic,
     NoEquilibriumError,
     Problem,
@@ -28,6 +29,7 @@ from ngcontact.mesh import first_mesh
 from tests.scenes import unmatched_blocks
 
 SOFT = Elastic(E=1.0, nu=0.3)
+FAIL = "error::ngcontact.ContactWarning"
 
 
 def disc() -> Problem:
@@ -353,25 +355,27 @@ def test_a_first_mesh_beyond_the_budget_is_refused_with_both_numbers():
         adapt(problem, maxh=0.28, order=3, max_dofs=1000)
 
 
-def test_a_tolerance_out_of_reach_is_told(caplog):
-    with caplog.at_level(logging.WARNING, logger="ngcontact"):
+def test_a_tolerance_out_of_reach_is_told():
+    with pytest.warns(ContactWarning) as caught:
         *_, last = adapt(cases.one_transition().problem, order=2, tolerance=1e-6, max_dofs=2000)
-    [record] = caplog.records
-    assert "tolerance=1e-06" in record.message
-    assert f"{last.relative_error_estimate:.2e}" in record.message
-    caplog.clear()
-    with caplog.at_level(logging.WARNING, logger="ngcontact"):
-        list(adapt(cases.one_transition().problem, order=2, tolerance=0.1, max_dofs=2000))
-    assert not caplog.records
+    [warning] = caught
+    assert "tolerance=1e-06" in str(warning.message)
+    assert f"{last.relative_error_estimate:.2e}" in str(warning.message)
+    assert warning.filename == __file__
 
 
-def test_nodes_that_do_not_match_cost_no_rate(caplog):
+@pytest.mark.filterwarnings(FAIL)
+def test_a_tolerance_within_reach_is_silent():
+    *_, last = adapt(cases.one_transition().problem, order=2, tolerance=0.1, max_dofs=2000)
+    assert last.relative_error_estimate <= 0.1
+
+
+@pytest.mark.filterwarnings(FAIL)
+def test_nodes_that_do_not_match_cost_no_rate():
     """The clamped ends of the blocks are corners; the rate of order 2 on their singularity is 1."""
     supports = {"top": (0, -1), "bottom": (0, 0)}
     problem = replace(unloaded(), geometry=unmatched_blocks(), displacement=supports)
-    with caplog.at_level(logging.WARNING, logger="ngcontact"):
-        levels = list(adapt(problem, order=2, max_dofs=3000))
-    assert not caplog.records
+    levels = list(adapt(problem, order=2, max_dofs=3000))
     unknowns = [level.displacement.space.ndof for level in levels]
     estimates = [level.relative_error_estimate for level in levels]
     assert np.polyfit(np.log(unknowns), np.log(estimates), 1)[0] < -0.9  # measured -1.0

@@ -2,7 +2,9 @@ from .assembly import contact_line as contact_line
 from .assembly import joined as joined
 from .assembly import kept_lines as kept_lines
 from .assembly import merged as merged
+from .corners import in_contact as in_contact
 from .corners import pressure_across_corners as pressure_across_corners
+from .corners import twins as twins
 from .line import ContactLine as ContactLine
 from .line import at_quadrature as at_quadrature
 from .line import nodal_line as nodal_line

@@ -1,0 +1,145 @@
+"""What may be wrong with a solution: fixed directions, unresolved zones, large strains."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ..arrays import Array
+from ..contact import ContactState
+from ..fem import BoundaryTrace, Space, bulk_moduli, shear_moduli
+from ..problem import Contact, Problem
+from .inclinations import INCLINED, inclinations
+from .zones import Zones, at_its_end, zones_of
+
+# Share of a pair's force below which a part of its zone does not matter.
+SHARE = 0.01
+# Contact forces of this size, relative to the largest term of a force, are round-off.
+NOISE = 100 * np.finfo(float).eps
+# Mean pressure of a zone over the modulus of confined compression from which a result means
+# nothing: a layer would be pressed to no thickness, Hertz's zone be over two radii wide. Wrong
+# signs and units lie beyond by orders of magnitude, examples with loads in units of E do not. The
+# mean of a zone stays finite at the corners of a punch, where the peak does not; confined bodies
+# that are nearly incompressible bear pressures far above E at small strains.
+LARGE = 1.0
+
+Doubts = dict[tuple[str, int], str]  # messages by what is doubted and the number of the pair
+
+
+def _name(number: int, contact: Contact) -> str:
+    """A pair, as a user knows it."""
+    other = "a rigid obstacle" if contact.primary is None else f'"{contact.primary}"'
+    return f'contact {number} of "{contact.secondary}" with {other}'
+
+
+def _loaded(
+    space: Space, u: Array, pairs: Sequence[ContactState]
+) -> Iterator[tuple[int, ContactState]]:
+    """Pairs whose forces are more than round-off, with their numbers."""
+    force = max((np.abs(state.force).max(initial=0.0) for state in pairs), default=0.0)
+    noise = NOISE * max(np.abs(space.diagonal * u).max(initial=0.0), force)
+    for number, state in enumerate(pairs):
+        if np.abs(state.force).max(initial=0.0) > noise:
+            yield number, state
+
+
+def doubts(
+    problem: Problem, space: Space, u: Array, pairs: Sequence[ContactState], *, last: bool
+) -> Doubts:
+    """What may be wrong with a solution, pair by pair.
+
+    Fixed directions far from the normals and strains that are not small, which no mesh mends; of
+    the `last` mesh also zones in contact that are too short for it.
+
+    Parameters
+    ----------
+    problem : Problem
+        The data.
+    space : Space
+        V_h of n unknowns.
+    u : ndarray (n,)
+        The displacement.
+    pairs : sequence of ContactState
+        Gaps and contact forces of each pair.
+    last : bool
+        Whether no finer mesh follows.
+    """
+    found: Doubts = {}
+    for number, state in _loaded(space, u, pairs):
+        zones = zones_of(state)
+        messages = {"strain": _large(problem, space.trace, state, zones)}
+        if not messages["strain"]:  # which leaves nothing else to believe
+            messages["direction"] = _inclined(space.trace, state)
+            messages["zone"] = _unresolved(problem, space.trace, state, zones) if last else ""
+        name = _name(number, state.line.contact)
+        found |= {(what, number): f"{name}: {text}" for what, text in messages.items() if text}
+    return found
+
+
+def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
+    """Message where surfaces that carry force are inclined to the fixed direction, or nothing."""
+    angle, force = inclinations(trace, state), np.abs(state.force)
+    inclined = angle > INCLINED
+    if force[inclined].sum() <= SHARE * force.sum():
+        return ""
+    xi = ", ".join(f"{component:.3g}" for component in state.line.contact.direction or ())
+    return (
+        f"surfaces in contact are inclined to direction=({xi}) by up to "
+        f"{np.rad2deg(angle.max()):.0f} degrees, so that forces do not act along their normals; "
+        "leave the direction out (direction=None), or give each flank a pair of its own direction"
+    )
+
+
+def _large(problem: Problem, trace: BoundaryTrace, state: ContactState, zones: Zones) -> str:
+    """Message where strains are far from small, or nothing."""
+    pressure = float((np.abs(zones.force) / zones.weight).max(initial=0.0))
+    modulus = _confined_modulus(problem, trace, state)
+    if pressure <= LARGE * modulus:
+        return ""
+    return (
+        f"the mean pressure in contact, {pressure:.3g}, is {pressure / modulus:.2g} times the "
+        f"modulus {modulus:.3g} of the softer body in confined compression: strains are not small; "
+        "check the sign of gap (positive where bodies are apart) and the units of E, loads, lengths"
+    )
+
+
+def _confined_modulus(problem: Problem, trace: BoundaryTrace, state: ContactState) -> float:
+    """Kappa + mu = lambda + 2 mu: mean along each side, of the two the smaller one; a stress."""
+    modulus = shear_moduli(problem, trace.mesh) + bulk_moduli(problem, trace.mesh)
+    sides = [trace.element[state.line.segments], trace.element[state.line.facing]]
+    return float(min(modulus[side].mean() for side in sides if len(side)))
+
+
+def _unresolved(problem: Problem, trace: BoundaryTrace, state: ContactState, zones: Zones) -> str:
+    """Message where zones in contact are too short for the mesh, or nothing.
+
+    A zone is resolved from order + 2 intervals between nodes on, 3 segments at order 1 and 1.5 at
+    order 4: the peak of Hertz's pressure is then within 3.1, 1.4, 3.7, 1.1 % at orders 1 to 4,
+    measured on meshes of one size; with fewer it is wrong by up to 70 %. Contact of a whole line is
+    resolved whatever its segments.
+    """
+    order = trace.order
+    cut = (zones.ends > 0) & (np.abs(zones.force) > SHARE * np.abs(state.force).sum())
+    enough = (order + 1.5) / order  # in between: sums of parts of segments carry round-off
+    if state.line.contact.bilateral or not (cut & (zones.segments < enough)).any():
+        return ""
+    images = _images(problem, trace, state, zones)
+    short = cut & (zones.segments * images < enough)
+    if not short.any():
+        return ""
+    shortest = np.flatnonzero(short)[np.argmin(zones.segments[short])]
+    return (
+        f"a zone in contact is {zones.segments[shortest]:.2g} segments long, where order {order} "
+        f"needs {(1 + 2 / order) / images[shortest]:.2g}: the force is better than the pressure, "
+        "whose peak may be wrong by half; use adapt, or a smaller maxh"
+    )
+
+
+def _images(problem: Problem, trace: BoundaryTrace, state: ContactState, zones: Zones) -> Array:
+    """1 for each zone (k,), but 2 for those that end at a support, as at a plane of symmetry."""
+    guides = [] if problem.sliding is None else [str(problem.sliding)]
+    nodes = np.unique(trace.nodes[trace.segments(*problem.displacement, *guides)])
+    images = np.ones(len(zones.segments))
+    images[zones.number[at_its_end(state.line, nodes) & (zones.number >= 0)]] = 2.0
+    return images

@@ -1,0 +1,79 @@
+"""Zones in contact: connected parts of a contact line, their forces and lengths."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from ..arrays import Array, Index, Mask
+from ..contact import ContactLine, ContactState, in_contact, twins
+from ..triplets import from_triplets
+
+
+@dataclass(frozen=True, eq=False)
+class Zones:
+    """The k connected zones of one pair in which its bodies touch.
+
+    Attributes
+    ----------
+    number : ndarray of int (m,)
+        Zone of each contact point, -1 where the gap is open.
+    force, weight : ndarray (k,)
+        Sums over the points of each zone: a force per unit thickness, a length.
+    segments : ndarray (k,)
+        Length in segments, parts of segments included.
+    ends : ndarray of int (k,)
+        Transitions to open points.
+    """
+
+    number: Index
+    force: Array
+    weight: Array
+    segments: Array
+    ends: Index
+
+
+def links(line: ContactLine) -> tuple[Index, Index]:
+    """Pairs of neighbouring points: (l, 2) on one segment, (t, 2) on both sides of a corner."""
+    pairs = np.stack([line.rows[:, :-1].ravel(), line.rows[:, 1:].ravel()], axis=1)
+    return pairs[(pairs >= 0).all(axis=1)], twins(line)
+
+
+def zones_of(state: ContactState) -> Zones:
+    """The zones of one pair."""
+    line, closed = state.line, in_contact(state.line, state.active)
+    along, across = links(line)
+    both = np.concatenate([along, across])
+    joined = both[closed[both].all(axis=1)]
+    m = len(closed)
+    graph = from_triplets(np.ones(len(joined)), joined[:, 0], joined[:, 1], (m, m))
+    _, number = connected_components(graph, directed=False)
+    kept, number[closed] = np.unique(number[closed], return_inverse=True)
+    number[~closed] = -1
+    k = len(kept)
+
+    def summed(points: Index, values: Array) -> Array:
+        return np.asarray(np.bincount(number[points], values, minlength=k), dtype=float)
+
+    def counted(points: Index) -> Index:
+        return np.bincount(number[points], minlength=k)
+
+    at = np.flatnonzero(closed)
+    inside = along[closed[along].all(axis=1)]
+    ending = both[closed[both].sum(axis=1) == 1]
+    return Zones(
+        number=number,
+        force=summed(at, state.force[at]),
+        weight=summed(at, line.weight[at]),
+        segments=counted(inside[:, 0]) / (line.rows.shape[1] - 1),
+        ends=counted(ending[closed[ending]]),
+    )
+
+
+def at_its_end(line: ContactLine, nodes: Index) -> Mask:
+    """Points (m,) at ends of the line that lie at one of the `nodes` (k,) of supports."""
+    along, across = links(line)
+    neighbours = np.bincount(np.concatenate([along, across]).ravel(), minlength=len(line.node))
+    return np.asarray((neighbours <= 1) & np.isin(line.node, nodes))
