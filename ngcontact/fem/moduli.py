@@ -30,16 +30,24 @@ SAMPLES = ng.IntegrationRule(
 )
 
 
-def _of_elements(problem: Problem, mesh: ng.Mesh, modulus: Callable[[Array], Array]) -> Array:
+def _of_elements(
+    problem: Problem,
+    mesh: ng.Mesh,
+    modulus: Callable[[Array], Array],
+    asked: Mask | None = None,
+) -> Array:
     """modulus(C) (ne, 4) at `SAMPLES` of each element, of laws C (k, q, q); one if it is constant.
 
-    Voigt components q, the shear last.
+    Voigt components q, the shear last. Only elements `asked` (ne,) for are met, others are 0.
     """
     region, samples = Triangulation(mesh).bodies, len(SAMPLES)
     points = mesh.MapToAllElements(SAMPLES, ng.VOL).reshape(-1, samples)
     values = np.zeros((mesh.ne, samples))
     for pattern, law in problem.materials.items():
-        at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
+        inside = np.array(mesh.Materials(pattern).Mask())[region]
+        at = np.flatnonzero(inside if asked is None else inside & asked)
+        if len(at) == 0:
+            continue
         places = points[at] if varies(law) else points[at[:1], :1]
         C = np.asarray(law.voigt(problem.model)(places.ravel()))
         size = round(math.sqrt(C.shape[1]))
@@ -86,12 +94,13 @@ def _rigidity(C: Array) -> Array:
     return np.asarray(np.linalg.eigvalsh(rest)[:, -1])
 
 
-def shear_moduli(problem: Problem, mesh: ng.Mesh) -> Array:
+def shear_moduli(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Array:
     """Half the smallest eigenvalue (ne,) of the law, the least in each element, a stress.
 
     That of C on strains, in Mandel's scaling: mu of isotropic laws with nu >= 0, and kappa below.
+    Of elements `asked` (ne,) for, 0 elsewhere; of all when left out.
     """
-    return _of_elements(problem, mesh, _smallest).min(axis=1) / 2
+    return _of_elements(problem, mesh, _smallest, asked).min(axis=1) / 2
 
 
 def rigidities(problem: Problem, mesh: ng.Mesh) -> Array:
@@ -102,12 +111,13 @@ def rigidities(problem: Problem, mesh: ng.Mesh) -> Array:
     return _of_elements(problem, mesh, _rigidity).max(axis=1) / 2
 
 
-def bulk_moduli(problem: Problem, mesh: ng.Mesh) -> Array:
+def bulk_moduli(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Array:
     """Bulk modulus (ne,) in the middle of each element: the largest kappa <= e : C e / (tr e)^2.
 
-    A stress, lambda + mu of isotropic laws in plane strain.
+    A stress, lambda + mu of isotropic laws in plane strain. Of elements `asked` (ne,) for, 0
+    elsewhere; of all when left out.
     """
-    return _of_elements(problem, mesh, _bulk)[:, 0]
+    return _of_elements(problem, mesh, _bulk, asked)[:, 0]
 
 
 def incompressibilities(problem: Problem, mesh: ng.Mesh) -> Array:

@@ -106,9 +106,11 @@ def _large(problem: Problem, trace: BoundaryTrace, state: ContactState, zones: Z
 
 def _confined_modulus(problem: Problem, trace: BoundaryTrace, state: ContactState) -> float:
     """Kappa + mu = lambda + 2 mu: mean along each side, of the two the smaller one; a stress."""
-    modulus = shear_moduli(problem, trace.mesh) + bulk_moduli(problem, trace.mesh)
     sides = [trace.element[state.line.segments], trace.element[state.line.facing]]
-    return float(min(modulus[side].mean() for side in sides if len(side)))
+    asked = np.zeros(trace.mesh.ne, dtype=bool)
+    asked[np.concatenate(sides)] = True
+    mu, kappa = (of(problem, trace.mesh, asked) for of in (shear_moduli, bulk_moduli))
+    return float(min((mu + kappa)[side].mean() for side in sides if len(side)))
 
 
 def _unresolved(problem: Problem, trace: BoundaryTrace, state: ContactState, zones: Zones) -> str:
