@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..arrays import Array, Index
+from ..arrays import Array, Index, Mask
 from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative, zeros
 
 MATCHED = 1e-9  # distance, relative to a segment's length, below which two points are one
@@ -72,6 +72,14 @@ def _bend(curve: Array) -> Array:
     return LEBESGUE * np.linalg.norm(curve - along, axis=2).max(axis=1)
 
 
+def _turning(curve: Array, across: Array) -> Mask:
+    """Whether segments (k, p + 1, 2) go back and forth along `across` (k, 2)."""
+    degree = curve.shape[1] - 1
+    rates = lagrange_derivative(degree, gauss_lobatto(max(1, degree - 1)))
+    which, _ = zeros(max(1, degree - 1), np.einsum("ji,kid,kd->kj", rates, curve, across))
+    return np.isin(np.arange(len(curve)), which)
+
+
 def _candidates(
     points: Array, across: Array, curve: Array, pairs_at_once: int
 ) -> tuple[Index, Index, Array]:
@@ -96,6 +104,7 @@ def _candidates(
         passes &= np.maximum(a, b) >= -slack[segment]
         # Markov: what is no larger than the bend on [0, 1] has a slope up to 2 p^2 times that.
         turns = np.flatnonzero(np.abs(a - b) <= 2 * degree**2 * bend[segment])
+        turns = turns[_turning(curve[segment[turns]], t[point[turns]])]
         height = np.einsum("kid,kd->ki", curve[segment[turns]], t[point[turns]])
         which, zero = zeros(degree, height - here[point[turns], None])
         passes[turns[which]] = False  # all their crossings are known

@@ -19,7 +19,7 @@ TURN = 0.5  # largest turn (radians) of a curve along one contact segment
 STEEPEST = 0.5  # cosine between a curve's normal and the direction below which nodes go unmatched
 NEARER = 0.01  # of an edge: what a polygon of its samples tells apart
 COINCIDENT = 1e-6  # distance, relative to an edge, up to which two edges are one contact line
-CLOSE = 0.1  # share of the spacing within which a later pair's node yields to one already there
+CLOSE = 0.1  # share of the spacing within which a node yields to one already there, or to a vertex
 FINE = 513  # samples on which a division is laid out
 APART = 1e-9  # share of an edge up to which two nodes are one
 SPARE = 1e-9  # share by which a run of elements may exceed their size, not to gain one by round-off
@@ -50,7 +50,7 @@ class Edge:
         """Interior nodes as fractions of the parameter interval, between runs filled up evenly."""
         start, stop = self.curve.start, self.curve.stop
         runs = [(nodes - start) / (stop - start) for nodes in self.runs]
-        nodes = np.sort(_apart(runs))
+        nodes = np.sort(_apart([np.array([0.0, 1.0]), *runs]))
         inside = nodes[(nodes > APART) & (nodes < 1 - APART)]
         inside = inside[np.diff(inside, prepend=-1.0) > APART]
         result = inside.tolist()
@@ -206,7 +206,10 @@ def _divide(
             across = tangent @ np.array([-contact.direction[1], contact.direction[0]])
             faces &= np.abs(across) >= STEEPEST * np.linalg.norm(tangent, axis=1)
     maxh = min(secondary.maxh, primary.maxh)
+    sliver = CLOSE * min(maxh, secondary.curve.size, primary.curve.size)
     for run in _facing_runs(faces, np.searchsorted(t, np.sort(ends))):
+        if np.linalg.norm(np.diff(x[run], axis=0), axis=1).sum() < sliver:
+            continue  # beside the vertex of one edge, which faces near that of another
         density = np.zeros(np.count_nonzero(faces[run]) - 1)
         for points in (x[run], y[run]):
             steps = np.diff(points, axis=0)
