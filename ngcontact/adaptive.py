@@ -15,7 +15,7 @@ from .adaptivity import doerfler, refined
 from .arrays import Mask, power_of_two
 from .contact import ending_segments
 from .errors import ConvergenceError, warn
-from .estimator import Estimator, estimate
+from .estimator import Estimator, estimate, refuse_bound
 from .fem import check_element, incompressibilities, unknowns, warn_of_locking
 from .mesh import curve, first_mesh
 from .one_mesh import solve_on, warn_of_doubts
@@ -26,6 +26,7 @@ from .solution import Solution
 EXACT = 1e-12  # relative estimate at which refinement stops: the solution is exact
 BEYOND_NOISE = 1e-4  # ... above which no round-off reaches
 STRESS_NOISE = 100 * np.finfo(float).eps  # relative to its terms; measured 0.5 to 50 eps
+SHARPER = 0.2  # bound over estimate that is hoped for at first; measured: 0.17 to 1
 
 log = logging.getLogger("ngcontact")
 
@@ -38,7 +39,7 @@ class Refinement:
 
     Parameters
     ----------
-    order, element, theta, tolerance, max_dofs
+    order, element, theta, tolerance, max_dofs, guaranteed
         As in `adapt`.
     ending : float
         Size from which elements in which contact ends are refined: their segment's length over
@@ -52,6 +53,7 @@ class Refinement:
     theta: float
     tolerance: float | None
     max_dofs: float
+    guaranteed: bool = False
     ending: float = 0.1
     estimator: Estimator = estimate
 
@@ -64,6 +66,10 @@ class Refinement:
             raise ValueError(f"tolerance={self.tolerance} must be positive, like 1e-3, or None")
         if not _number("max_dofs", self.max_dofs) > 0:
             raise ValueError(f"max_dofs={self.max_dofs} must be positive, like 100_000")
+        if not isinstance(self.guaranteed, bool):
+            raise TypeError(f"guaranteed={self.guaranteed!r}: give True or False")
+        if self.guaranteed and self.tolerance is None:
+            raise ValueError("guaranteed=True with tolerance=None: give a tolerance, like 1e-3")
 
 
 def adapt(
@@ -75,6 +81,7 @@ def adapt(
     theta: float = 0.5,
     tolerance: float | None = None,
     max_dofs: int = 100_000,
+    guaranteed: bool = False,
 ) -> Iterator[Solution]:
     """Solve, estimate, mark, refine: one `Solution` per level.
 
@@ -94,6 +101,9 @@ def adapt(
         Relative estimated error in the energy norm at which to stop.
     max_dofs : int
         Number of unknowns that no level exceeds.
+    guaranteed : bool
+        Stop at `Solution.relative_error_bound` instead of the estimate. The estimate still marks;
+        the bound is made where the estimate suggests that it meets the tolerance.
 
     Yields
     ------
@@ -105,11 +115,12 @@ def adapt(
     ------
     ValueError, TypeError
         Bad input, before any assembly; also a first mesh of more than `max_dofs` unknowns, or a
-        mesh with segments of curved edges below 1e-6 units.
+        mesh with segments of curved edges below 1e-6 units; with `guaranteed`, at the first level,
+        a problem for which no bound is known.
     ConvergenceError
         The active set of a level did not settle.
     """
-    refinement = Refinement(order, element, theta, tolerance, max_dofs)
+    refinement = Refinement(order, element, theta, tolerance, max_dofs, guaranteed)
     mesh = first_level(problem, maxh, refinement)
     warn_of_locking(problem, mesh, order)
     return _with_warnings(levels(problem, mesh, refinement))
@@ -188,6 +199,18 @@ def _at_round_off(solution: Solution) -> bool:
     return solution.error_estimate <= max(EXACT, STRESS_NOISE * math.sqrt(ratio)) * terms
 
 
+def _bounded(solution: Solution, refinement: Refinement, ratio: float) -> tuple[float, float]:
+    """The relative bound where it may meet the tolerance, else inf; and the bound per estimate.
+
+    `ratio` is that of the last bound that was made.
+    """
+    estimate = solution.relative_error_estimate
+    if not solution.bounded and ratio * estimate > (refinement.tolerance or 0.0):
+        return math.inf, ratio
+    bound = solution.relative_error_bound
+    return bound, bound / estimate if estimate > 0 else ratio
+
+
 def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[Solution]:
     """Levels from a first mesh on, of which names and values are known to be right.
 
@@ -202,12 +225,17 @@ def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[
     """
     order, element = refinement.order, refinement.element
     solution: Solution | None = None
+    ratio = SHARPER
     while unknowns(mesh, order, element) <= refinement.max_dofs:
         solution = solve_on(problem, mesh, order, element, solution)
         solution = replace(solution, adaptive=True, estimator=refinement.estimator)
         solution.discrete.systems.forget()  # a level's factorisation is of no use to the next one
+        if refinement.guaranteed:
+            refuse_bound(problem, solution.discrete.space.trace, solution.pairs)
         yield solution
         error = solution.relative_error_estimate
+        if refinement.guaranteed:
+            error, ratio = _bounded(solution, refinement, ratio)
         if not np.isfinite(solution.error_estimate):  # it would mark nothing, for ever
             raise ConvergenceError(
                 f"the error estimate is {solution.error_estimate}, so nothing can be refined; "
@@ -220,8 +248,9 @@ def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[
         mesh = refined(problem, solution.mesh, _marked(solution, refinement))
         mesh, _ = curve(mesh, order, element)
     if refinement.tolerance is not None:
+        what = "bound" if refinement.guaranteed else "estimate"
         warn(
-            f"the estimate is {error:.2e}, more than tolerance={refinement.tolerance:g}: the next "
+            f"the {what} is {error:.2e}, more than tolerance={refinement.tolerance:g}: the next "
             f"level would exceed max_dofs={refinement.max_dofs:g}; give a larger max_dofs or "
             "tolerance"
         )

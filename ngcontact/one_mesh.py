@@ -44,6 +44,7 @@ def solve_on(
             "gap_searches": sum(line.searches for line in discrete.lines),
             "curved_elements": curved,
             "estimates": 0,
+            "equilibrations": 0,
         },
     )
 

@@ -13,7 +13,7 @@ import numpy as np
 from .arrays import Array, Index, Mask, root_of_squares
 from .contact import ContactState, contact_states
 from .discrete import DiscreteProblem, RigidMotion, resultants
-from .estimator import Estimate, Estimator, estimate
+from .estimator import Estimate, Estimator, Guaranteed, estimate
 from .fem import energy_norm, model_of, potential_energy, stress_of
 from .output import plot_solution, write_solution
 from .problem import Problem
@@ -21,7 +21,7 @@ from .qp import Iterate, kkt_residuals
 
 
 @dataclass(frozen=True, eq=False)
-class Solution:
+class Solution(Guaranteed):
     """Exact minimiser u_h of L over K_h on one mesh: HH81 (P_1h), (P_2h).
 
     Contact quantities are arrays over the m contact points, all pairs in order.
@@ -43,8 +43,8 @@ class Solution:
     minimiser : Iterate
         Its solution.
     work : dict
-        Counts of assemblies, factorizations, back_solves, gap_searches, curved_elements and
-        estimates spent on this solution, on its mesh. Without factorisation V-cycles of
+        Counts of assemblies, factorizations, back_solves, gap_searches, curved_elements, estimates
+        and equilibrations spent on this solution, on its mesh. Without factorisation V-cycles of
         multigrid count as back_solves.
     coarse_levels : int
         Levels of the coarse adaptive run that told `solve` the first active set of a large mesh.

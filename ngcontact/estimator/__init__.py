@@ -1,5 +1,7 @@
-"""Error indicators of a solution: functions of one signature, `Estimator`."""
+"""Error indicators of a solution, functions of one signature, `Estimator`; bounds of its error."""
 
+from .equilibrated import Guaranteed as Guaranteed
+from .equilibrated import refuse_bound as refuse_bound
 from .indicators import Estimate as Estimate
 from .indicators import Estimator as Estimator
 from .residual import estimate as estimate

@@ -82,12 +82,17 @@ SOLUTION = {
     "error_estimate": "energy norm",
     "estimate_parts": "energy",
     "relative_error_estimate": "none",
+    "error_bound": "energy norm",
+    "relative_error_bound": "none",
+    "bound_parts": "energy",
+    "energy_bounds": "energy",
+    "equilibrated": "stress",
     "residuals": "none",
 }
 # ... and those that are no quantities: objects, names, numbers of things, truth values, files.
 PLAIN = {
     *("problem", "mesh", "order", "element", "discrete", "minimiser", "work", "coarse_levels"),
-    *("adaptive", "pair", "active", "steps", "free_motions", "estimated"),
+    *("adaptive", "pair", "active", "steps", "free_motions", "estimated", "bounded"),
     *("pairs", "estimator", "write", "plot", "draw"),
 }
 

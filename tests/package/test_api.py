@@ -58,6 +58,7 @@ SIGNATURES = {
         "theta": 0.5,
         "tolerance": None,
         "max_dofs": 100_000,
+        "guaranteed": False,
     },
     "solve_qp": {
         "A": REQUIRED,
@@ -75,6 +76,7 @@ MEMBERS = {
     *("points", "pair", "gap", "pressure", "force", "active", "steps"),
     *("contact_force", "reactions", "transitions", "energy", "residuals"),
     *("indicators", "error_estimate", "relative_error_estimate"),
+    *("error_bound", "relative_error_bound", "bound_parts", "energy_bounds", "equilibrated"),
     *("write", "plot", "draw"),
 }
 

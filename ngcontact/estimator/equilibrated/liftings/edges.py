@@ -1,0 +1,126 @@
+"""Liftings w of what the discrete displacement misses on Gamma_u and on Gamma_K.
+
+On the triangle at an edge, between the edge (t = 0) and the opposite vertex (t = 1), r(s) on the
+edge is continued by r(s) (1 - t)^m, with the best m. It vanishes on both other edges.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....arrays import Array, Index
+from ....lagrange import gauss, gauss_lobatto
+from ..stresses import Partition, legendre_derivative, legendre_values
+
+DEGREE = 16  # of the polynomials that stand for prescribed displacements and gaps on a segment
+LEAST_POWER = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeField:
+    """A displacement on k edges, at q points each, without its values at their ends.
+
+    Attributes
+    ----------
+    edge : ndarray of int (k,)
+        Edges, in whose direction the parameter runs.
+    t, weight : ndarray (k, q)
+        Parameters in [0, 1] and weights of quadrature.
+    value, slope : ndarray (k, q, 2)
+        The displacement, over strain times length, and its derivative with respect to t.
+    """
+
+    edge: Index
+    t: Array
+    weight: Array
+    value: Array
+    slope: Array
+
+
+def samples() -> Array:
+    """Parameters (d + 1,) at which functions on a segment are looked at, ends included."""
+    return gauss_lobatto(DEGREE)
+
+
+def coefficients(values: Array) -> Array:
+    """Legendre coefficients (k, d + 1) of functions with `values` (k, d + 1) there; or vectors."""
+    inverse = np.linalg.inv(legendre_values(DEGREE, samples()))
+    return np.einsum("ij,kj...->ki...", inverse, values)
+
+
+def derivative(c: Array) -> Array:
+    """Coefficients (k, d + 1) of derivatives of functions from their own, `c` (k, d + 1)."""
+    return np.einsum("ij,kj...->ki...", legendre_derivative(DEGREE), c)
+
+
+def at_points(c: Array, t: Array) -> Array:
+    """Values (k, q) of functions with coefficients `c` (k, d + 1) at `t` (k, q); or vectors."""
+    values = legendre_values(DEGREE, t.ravel()).reshape(*t.shape, DEGREE + 1)
+    return np.einsum("kqi,ki...->kq...", values, c)
+
+
+def panels(gap: Array) -> tuple[Array, Array]:
+    """Points (k, q) and weights (k, q) on segments cut where functions change their sign.
+
+    `gap` (k, d + 1) are their coefficients. Cuts that a segment lacks are at its end.
+    """
+    rule, w = gauss(2 * DEGREE)
+    grid = np.linspace(0, 1, 8 * DEGREE + 1)
+    values = gap @ legendre_values(DEGREE, grid).T
+    row, column = np.nonzero(values[:, 1:] * values[:, :-1] < 0)
+    slope = gap @ legendre_derivative(DEGREE).T
+    low, high = grid[column], grid[column + 1]
+    a, b = values[row, column], values[row, column + 1]
+    t = low + (high - low) * a / (a - b)
+    for _ in range(4):  # Newton, from within 1 / 128
+        f = (legendre_values(DEGREE, t) * gap[row]).sum(axis=1)
+        df = (legendre_values(DEGREE, t) * slope[row]).sum(axis=1)
+        t = np.clip(t - f / np.where(df == 0, 1.0, df), low, high)
+    count = np.bincount(row, minlength=len(gap))
+    cuts = np.ones((len(gap), int(count.max(initial=0)) + 2))
+    cuts[:, 0] = 0.0
+    place = np.arange(len(row)) - np.concatenate([[0], np.cumsum(count)[:-1]])[row]
+    cuts[row, 1 + place] = t
+    length = np.diff(cuts, axis=1)
+    points = cuts[:, :-1, None] + length[:, :, None] * rule
+    return points.reshape(len(gap), -1), (length[:, :, None] * w).reshape(len(gap), -1)
+
+
+def norms(partition: Partition, law: Array, field: EdgeField) -> Array:
+    """Energy norms (k,) of the liftings into the triangles beside the edges, with the best m.
+
+    `law` (n, 3, 3) are the moduli of all triangles.
+    """
+    triangle, opposite = (x[field.edge] for x in partition.owner)
+    gradients = partition.hat_gradients[triangle]
+    k = np.arange(len(triangle))
+    last = np.where(partition.flips[triangle, opposite], 1, 2)
+    to_end, inwards = gradients[k, (opposite + last) % 3], gradients[k, opposite]
+    along = to_end[:, None, :] + field.t[:, :, None] * inwards[:, None, :]
+    first = _strain(field.slope, along)
+    second = _strain(field.value, np.broadcast_to(inwards[:, None, :], along.shape))
+    C, weight = law[triangle], field.weight
+
+    def product(a: Array, b: Array) -> Array:
+        return np.einsum("kq,kqi,kij,kqj->k", weight, a, C, b, optimize=True)
+
+    # 1 / m |first - m second|^2 is least at m = |first| / |second|.
+    one, mixed, two = product(first, first), product(first, second), product(second, second)
+    ratio = np.sqrt(np.divide(one, two, out=np.ones_like(one), where=two > 0))
+    m = np.maximum(ratio, LEAST_POWER)
+    square = partition.areas[triangle] * (one / m - 2 * mixed + m * two)
+    return np.sqrt(np.maximum(square, 0.0))
+
+
+def _strain(r: Array, gradient: Array) -> Array:
+    """Voigt strain (k, q, 3) of the products of vectors `r` and gradients, (k, q, 2)."""
+    return np.stack(
+        [
+            r[..., 0] * gradient[..., 0],
+            r[..., 1] * gradient[..., 1],
+            r[..., 0] * gradient[..., 1] + r[..., 1] * gradient[..., 0],
+        ],
+        axis=-1,
+    )

@@ -1,0 +1,8 @@
+"""The pressure p* on Gamma_K of an equilibrated stress."""
+
+from .balance import balanced as balanced
+from .selection import selected as selected
+from .zone import Zone as Zone
+from .zone import ZonePoints as ZonePoints
+from .zone import zone_of as zone_of
+from .zone import zone_points as zone_points

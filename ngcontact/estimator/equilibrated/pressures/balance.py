@@ -1,0 +1,203 @@
+"""Forces and moments that p* shall share with the discrete contact forces, or with the loads."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from ....arrays import Array, Index, Mask
+from ....errors import ContactError
+from ....fem import BoundaryTrace
+from ....lagrange import gauss_lobatto
+from ....triplets import from_triplets
+from ..stresses import CORNERS, Discrete, EdgeConditions, basis, dimension
+from .choice import Sums
+from .zone import Zone, ZonePoints
+
+RESISTED = 1e-10  # square of a body's motion on its supports, relative, from which they resist it
+MET = 1e-10  # work of the pressures on a motion, relative, from which they can balance it
+BALANCED = 1e-3  # work of loads that nothing balances, relative, that is no quadrature error
+
+
+def _in_order(nodes: Index) -> Index:
+    """Vertices (v,) of segments with the ends `nodes` (k, 2), from end to end of each chain."""
+    next_to: dict[int, list[int]] = {}
+    for a, b in nodes.tolist():
+        next_to.setdefault(a, []).append(b)
+        next_to.setdefault(b, []).append(a)
+    order: dict[int, None] = {}
+    for start in sorted(next_to, key=lambda v: len(next_to[v])):
+        at: int | None = start
+        while at is not None and at not in order:
+            order[at] = None
+            at = next((v for v in next_to[at] if v not in order), None)
+    return np.array(list(order), dtype=np.intp)
+
+
+def line_sums(
+    zone: Zone,
+    boundary: BoundaryTrace,
+    points: ZonePoints,
+    supported: Index,
+    unit: float,
+    compliance: float,
+) -> Sums:
+    """Hat moments of p* and of the discrete forces, over `unit`, along the secondary.
+
+    Vertices `supported` (j,) take no part: there a support takes what is missing.
+    """
+    line = zone.state.line
+    faces = np.flatnonzero(line.faces)
+    nodes = boundary.nodes[line.segments[faces]][:, [0, -1]]
+    order = _in_order(nodes)
+    number = np.full(int(order.max(initial=-1)) + 1, -1)
+    number[order] = np.arange(len(order))
+    rows = line.rows[faces]
+    known, first = np.unique(rows, return_index=True)
+    first = first[known >= 0]
+    segment, node = np.divmod(first, rows.shape[1])
+    s = gauss_lobatto(boundary.order)[node]
+    force = zone.state.force[rows.ravel()[first]] / unit
+    forces = np.zeros(len(order))
+    np.add.at(forces, number[nodes[segment, 0]], force * (1 - s))
+    np.add.at(forces, number[nodes[segment, 1]], force * s)
+    ends = number[boundary.nodes[points.segment][:, [0, -1]]]
+    hats = np.stack([1 - points.s, points.s], axis=1) * points.weight[:, None]
+    column = np.repeat(np.arange(len(points.s)), 2)
+    shape = len(order), len(points.s)
+    moments = from_triplets(hats.ravel(), ends.ravel(), column, shape)
+    kept = ~np.isin(order, supported)
+    moments = (moments @ zone.values(points.local, points.s)).tocsr()[np.flatnonzero(kept)]
+    return Sums(moments, forces[kept], compliance, not kept.all())
+
+
+def _bodies(discrete: Discrete) -> Index:
+    """Number (v,) of the connected body of each vertex."""
+    triangles = discrete.partition.triangles
+    size = len(discrete.partition.vertices)
+    start, end = triangles[:, [0, 1]].ravel(), triangles[:, [1, 2]].ravel()
+    graph = from_triplets(np.ones(len(start)), start, end, (size, size))
+    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.intp)
+
+
+def balanced(
+    discrete: Discrete, conditions: EdgeConditions, pressures: sp.csr_array
+) -> tuple[Discrete, Array, Array]:
+    """What p* must balance: A b = a for the motions that no support resists.
+
+    Loads that neither supports nor pressures balance, as quadrature leaves them, are balanced by
+    rigid body loads.
+
+    Parameters
+    ----------
+    discrete : Discrete
+        The data.
+    conditions : EdgeConditions
+        Of e edges.
+    pressures : sparse (e * 2 * r, m)
+        Tractions by coefficients of p*.
+
+    Returns
+    -------
+    discrete : Discrete
+        With such loads.
+    A, a : ndarray (c, m), (c,)
+        The equations.
+
+    Raises
+    ------
+    ContactError
+        Loads that nothing balances.
+    """
+    body = _bodies(discrete)
+    rows, sides = [], []
+    for number in range(int(body.max()) + 1):
+        of_body = _functionals(discrete, conditions, body == number)
+        if of_body is None:
+            continue
+        functional, work, inside, fields = of_body
+        A = functional @ pressures
+        terms = functional * conditions.given.ravel()
+        a = -terms.sum(axis=1) - work.sum(axis=1)
+        met = np.abs(A).max(axis=1, initial=0.0) > MET * np.abs(functional).max()
+        if not met.all():
+            largest = np.abs(terms).sum() + np.abs(work).sum()
+            if np.abs(a[~met]).max() > BALANCED * largest:
+                raise ContactError("the loads on a body that can move are not in equilibrium")
+            discrete = _with_rigid_load(discrete, inside, fields[~met], a[~met])
+        rows.append(A[met])
+        sides.append(a[met])
+    m = pressures.shape[1]
+    return discrete, np.concatenate([np.zeros((0, m)), *rows]), np.concatenate([[], *sides])
+
+
+def _functionals(
+    discrete: Discrete, conditions: EdgeConditions, mine: Mask
+) -> tuple[Array, Array, Index, Array] | None:
+    """Work of tractions on the motions of a body, the `mine` (v,), that no support resists.
+
+    The functionals (m, e * 2 * r), the work (m, j) of body forces on its triangles (j,), and the
+    motions (m, j, 2, 3) there; None where supports resist all.
+    """
+    partition = discrete.partition
+    e, r = conditions.constrained.shape
+    edges = np.flatnonzero(mine[partition.ends[:, 0]] & (partition.segment >= 0))
+    inside = np.flatnonzero(mine[partition.triangles[:, 0]])
+    x = partition.vertices[mine]
+    centre, size = x.mean(axis=0), np.ptp(x, axis=0).max()
+    low = _low(conditions, partition.vertices[partition.ends[edges]], edges, centre, size)
+    free = ~conditions.constrained[edges].reshape(len(edges), 2, r // 2)[:, :, 0]
+    square = np.einsum("eifq,ejfq,ef->ij", low, low, free, optimize=True) / max(1, len(edges))
+    values, vectors = np.linalg.eigh(square)
+    motions = vectors[:, values <= RESISTED].T
+    if len(motions) == 0:
+        return None
+    low = np.einsum("mi,eifq->mefq", motions, low)
+    functional = np.zeros((len(motions), e, 2, 2, r // 2))
+    lengths = partition.edge_lengths[edges][:, None, None]
+    functional[:, edges, :, :, :2] = (low * lengths)[:, :, None]
+    work, fields = _work(discrete, inside, motions, centre, size)
+    return functional.reshape(len(motions), -1), work, inside, fields
+
+
+def _low(
+    conditions: EdgeConditions, ends: Array, edges: Index, centre: Array, size: float
+) -> Array:
+    """Rigid motions on edges, (j, 3, 2, 2): motion, component, Legendre polynomial."""
+    apart = (ends - centre) / size
+    values = np.zeros((len(ends), 3, 2, 2))
+    values[:, 0, 0], values[:, 1, 1] = 1.0, 1.0
+    values[:, 2, 0], values[:, 2, 1] = -apart[..., 1], apart[..., 0]
+    values = np.einsum("efc,eicp->eifp", conditions.frames[edges], values)
+    first, last = values[..., 0], values[..., 1]
+    return np.stack([(first + last) / 2, (last - first) / np.sqrt(12)], axis=-1)
+
+
+def _work(
+    discrete: Discrete, inside: Index, motions: Array, centre: Array, size: float
+) -> tuple[Array, Array]:
+    """Work (m, j) of the body force on motions, triangle by triangle, and these (m, j, 2, 3)."""
+    partition = discrete.partition
+    corners = (partition.vertices[partition.triangles[inside]] - centre) / size
+    values = np.zeros((3, len(inside), 2, 3))
+    values[0, :, 0], values[1, :, 1] = 1.0, 1.0
+    values[2, :, 0], values[2, :, 1] = -corners[..., 1], corners[..., 0]
+    at_corners = basis(1).values(CORNERS)
+    fields = np.einsum("mi,ijcp->mjcp", motions, values @ np.linalg.inv(at_corners).T)
+    force = discrete.force[inside].sum(axis=1)[..., :3]
+    work = np.einsum("j,mjcp,jcp->mj", partition.areas[inside], fields, force)
+    return work, fields
+
+
+def _with_rigid_load(discrete: Discrete, inside: Index, fields: Array, missing: Array) -> Discrete:
+    """With the rigid load in the `inside` (j,) that does the work `missing` (m,) on `fields`."""
+    area = discrete.partition.areas[inside]
+    gram = np.einsum("j,mjcp,njcp->mn", area, fields, fields)
+    load = np.einsum("m,mjcp->jcp", np.linalg.solve(gram, missing), fields)
+    hatted = np.einsum("aip,jcp->jaci", basis(2).hats, load)
+    force = discrete.force.copy()
+    force[inside, :, :, : dimension(2)] += hatted
+    return replace(discrete, force=force)

@@ -1,0 +1,140 @@
+"""The pressure p* on Gamma_K: near the discrete stress, not negative, in balance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ....arrays import Array, Index, Mask
+from ....errors import ContactError
+from ....qp import solve_qp
+
+NEARNESS = 0.3  # weight of |p* + sigma_n|^2 h / E; measured best for the bound, and flat about it
+TOTALS = 1.0  # ... of the squared sums of what forces and p* differ by, over E
+STEPS = 30
+NEGATIVE = 1e-13  # relative, what a pressure or a multiplier must exceed to change sides
+
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """Stress of one body at q points of Gamma_K.
+
+    Attributes
+    ----------
+    p : sparse (q, m)
+        Values of p* from its coefficients.
+    target : ndarray (q,)
+        -sigma_n of the discrete stress there.
+    weight : ndarray (q,)
+        Of quadrature, times size over modulus of the element.
+    """
+
+    p: sp.csr_array
+    target: Array
+    weight: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Moments of hats along a line, v of them, with the forces that p* stands for.
+
+    Attributes
+    ----------
+    moments : sparse (v, m)
+        Of p*, vertex after vertex along the line.
+    forces : ndarray (v,)
+        The same of the discrete forces.
+    weight : float
+        One over a modulus.
+    """
+
+    moments: sp.csr_array
+    forces: Array
+    weight: float
+    open_: bool
+
+
+def best_pressure(
+    sides: Sequence[Side],
+    sums: Sequence[Sums],
+    closing: Array,
+    nonnegative: Mask,
+    balance: tuple[Array, Array],
+) -> Array:
+    """Coefficients (m,) of p*.
+
+    Parameters
+    ----------
+    sides, sums
+        What p* shall be near to.
+    closing : ndarray (m,)
+        Integrals of the basis functions times the open gap.
+    nonnegative : ndarray of bool (m,)
+        Coefficients of unilateral pairs.
+    balance : tuple of ndarray (c, m), (c,)
+        Resultants that bodies without supports need.
+
+    Raises
+    ------
+    ContactError
+        No such pressure balances the loads.
+    """
+    m = len(closing)
+    H, f = np.zeros((m, m)), -closing.copy()
+    for side in sides:
+        weighted = sp.diags_array(NEARNESS * side.weight) @ side.p
+        H += (side.p.T @ weighted).toarray()
+        f += weighted.T @ side.target
+    for line in sums:
+        C, c = np.cumsum(line.moments.toarray(), axis=0), np.cumsum(line.forces)
+        if line.open_:
+            C, c = C - C.mean(axis=0), c - c.mean()
+        H += TOTALS * line.weight * C.T @ C
+        f += TOTALS * line.weight * C.T @ c
+    return _minimiser(H, f, nonnegative, *balance)
+
+
+def _minimiser(H: Array, f: Array, nonnegative: Mask, A: Array, a: Array) -> Array:
+    """The least b.Hb / 2 - f.b with A b = a, by primal-dual active sets."""
+    m, c = len(f), len(a)
+    if m == 0:
+        if np.abs(a).max(initial=0.0) > 0:
+            raise ContactError("no pressure balances the loads of a body that contact alone holds")
+        return np.zeros(0)
+    zero = np.zeros(m, dtype=bool)
+    b = np.zeros(m)
+    for _ in range(STEPS):
+        free = np.flatnonzero(~zero)
+        K = np.zeros((len(free) + c, len(free) + c))
+        K[: len(free), : len(free)] = H[np.ix_(free, free)]
+        K[len(free) :, : len(free)] = A[:, free]
+        K[: len(free), len(free) :] = A[:, free].T
+        try:
+            x = np.linalg.solve(K, np.concatenate([f[free], a]))
+        except np.linalg.LinAlgError:
+            break
+        b[:] = 0.0
+        b[free] = x[: len(free)]
+        slope = H @ b - f + A.T @ x[len(free) :]
+        smallest = NEGATIVE * np.abs(b).max(), NEGATIVE * np.abs(f).max()
+        leaving = nonnegative & ~zero & (b < -smallest[0])
+        entering = zero & (slope < -smallest[1])
+        if not leaving.any() and not entering.any():
+            return np.where(nonnegative, np.maximum(b, 0.0), b)
+        zero = (zero | leaving) & ~entering
+    return _surely(H, f, nonnegative, A, a)
+
+
+def _surely(H: Array, f: Array, nonnegative: Mask, A: Array, a: Array) -> Array:
+    """The same by a method that always ends, if there is a solution at all."""
+    rows: Index = np.flatnonzero(nonnegative)
+    B = -sp.eye_array(len(f)).tocsr()[rows]
+    equations = (sp.csr_array(A), a) if len(a) else (None, None)
+    try:
+        b = solve_qp(sp.csr_array(H), f, B, np.zeros(len(rows)), *equations).u
+    except (ContactError, ValueError) as error:
+        raise ContactError(f"no pressure balances the loads: {error}") from error
+    return np.where(nonnegative, np.maximum(b, 0.0), b)

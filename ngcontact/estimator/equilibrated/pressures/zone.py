@@ -1,0 +1,218 @@
+"""Gamma_K for an equilibrated stress: pressures p* on it, the tractions they exert, the gap."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ....arrays import Array, Index, Mask
+from ....contact import ContactState, partners, prescribed_gap
+from ....contact.line import jacobian
+from ....fem import BoundaryTrace
+from ....lagrange import gauss
+from ....triplets import from_triplets
+from ..stresses import Partition, edge_parameters, legendre_values, with_hats
+
+GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
+STRAIGHT_ON = 0.1  # turn up to which a boundary runs straight on, so that tractions must not jump
+
+
+def bernstein(degree: int, s: Array) -> Array:
+    """Values (q, d + 1) of the Bernstein polynomials at `s` (q,)."""
+    i = np.arange(degree + 1)
+    binomial = np.array([math.comb(degree, j) for j in i])
+    return np.asarray(binomial * s[:, None] ** i * (1 - s[:, None]) ** (degree - i))
+
+
+@dataclass(frozen=True, eq=False)
+class ZonePoints:
+    """Points of Gamma_K, q of them, on the segments of the secondary.
+
+    Attributes
+    ----------
+    local : ndarray of int (q,)
+        Segment, counted in the pair's line.
+    s : ndarray (q,)
+        Parameter on it.
+    segment, facing : ndarray of int (q,)
+        Segments of the boundary: its own, and the one that it faces, -1 for none.
+    facing_s : ndarray (q,)
+        Parameter there.
+    weight : ndarray (q,)
+        Of quadrature in arc length (P1) or eta (P2), in units of length.
+    direction : ndarray (q, 2)
+        d.
+    gap : ndarray (q,)
+        After deformation, over strain times length.
+    """
+
+    local: Index
+    s: Array
+    segment: Index
+    facing: Index
+    facing_s: Array
+    weight: Array
+    direction: Array
+    gap: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Zone:
+    """One pair: m pressures, coefficients of continuous piecewise polynomials.
+
+    Attributes
+    ----------
+    state : ContactState
+        The pair.
+    number : ndarray of int (j, d + 1)
+        Coefficients of Bernstein polynomials on each segment of the line, -1 where p* is 0.
+    size : int
+        m.
+    """
+
+    state: ContactState
+    number: Index
+    size: int
+
+    def values(self, local: Index, s: Array) -> sp.csr_array:
+        """Matrix (q, m) to the values at `s` (q,) of the segments `local` (q,) of the line."""
+        degree = self.number.shape[1] - 1
+        share, column = bernstein(degree, s), self.number[local]
+        row = np.broadcast_to(np.arange(len(s))[:, None], column.shape)
+        kept = column >= 0
+        return from_triplets(share[kept], row[kept], column[kept], (len(s), self.size))
+
+    @property
+    def full(self) -> Mask:
+        """Segments (j,) of the line that are in contact with all nodes."""
+        return np.asarray(np.append(self.state.active, True)[self.state.line.rows].all(axis=1))
+
+
+def zone_of(state: ContactState, boundary: BoundaryTrace, degree: int) -> Zone:
+    """Where p* may differ from 0, as polynomials of a degree: where forces are, and beside."""
+    line = state.line
+    faces = np.flatnonzero(line.faces)
+    segment, nodes = line.segments[faces], boundary.nodes[line.segments[faces]]
+    ends = np.tile([0.0, 1.0], len(faces))
+    normal = boundary.exact_normal(np.repeat(segment, 2), ends)
+    point, _ = boundary.number_points(np.repeat(segment, 2), nodes[:, [0, -1]].ravel(), normal)
+    point = point.reshape(-1, 2)
+    force = np.append(state.force, 0.0)[line.rows[faces]]
+    carries = (force != 0).any(axis=1) | line.contact.bilateral
+    touched = np.zeros(point.max(initial=-1) + 1, dtype=bool)
+    touched[point[carries]] = True
+    near = touched[point].any(axis=1)
+    fixed = np.zeros(len(touched), dtype=bool)  # the ends of what is near, within the line
+    fixed[point[~near]] = True
+    fixed[_continued(boundary, line.segments[faces], point, nodes[:, [0, -1]])] = True
+    number = np.full((len(line.segments), degree + 1), -1)
+    coefficient = np.full(len(touched), -1)
+    used = np.zeros(len(touched), dtype=bool)
+    used[point[near]] = True
+    used &= ~fixed
+    coefficient[used] = np.arange(np.count_nonzero(used))
+    size = np.count_nonzero(used)
+    inner = size + np.arange(np.count_nonzero(near) * (degree - 1)).reshape(-1, degree - 1)
+    number[faces[near], 1:-1] = inner
+    number[np.ix_(faces[near], np.array([0, degree]))] = coefficient[point[near]]
+    return Zone(state, number, int(size + inner.size))
+
+
+def _continued(boundary: BoundaryTrace, segments: Index, point: Index, nodes: Index) -> Index:
+    """Points at which the line ends but the boundary runs straight on, without a support."""
+    count = np.bincount(point.ravel())
+    single = count[point] == 1
+    others = np.setdiff1d(np.flatnonzero(~boundary.inner), segments)
+    ends = boundary.nodes[others][:, [0, -1]]
+    found = []
+    for row, side in zip(*np.nonzero(single), strict=True):
+        at, which = np.nonzero(ends == nodes[row, side])
+        for other, end in zip(others[at], which, strict=True):
+            pair = segments[[row, row]]
+            pair[1] = other
+            a, b = boundary.normal(pair, np.array([float(side), float(end)]))
+            if a @ b > 1 - STRAIGHT_ON**2 / 2:
+                found.append(point[row, side])
+    return np.array(found, dtype=np.intp)
+
+
+def zone_points(
+    state: ContactState,
+    boundary: BoundaryTrace,
+    displacement: object,
+    units: tuple[float, float],
+    local: Index,
+    s: Array,
+    weight: Array,
+) -> ZonePoints:
+    """Points at `s` (q,) of the segments `local` (q,) of a line, `weight` (q,) per parameter.
+
+    `units` are the strain by which displacements and the length by which places are divided.
+    """
+    line, contact = state.line, state.line.contact
+    strain, length = units
+    segment = line.segments[local]
+    x = boundary.point(segment, s)
+    if contact.direction is None:
+        d = boundary.normal(segment, s)
+    else:
+        d = np.tile(contact.direction, (len(s), 1))
+    if contact.primary is None:
+        facing, facing_s, distance = np.full(len(s), -1), np.zeros(len(s)), np.zeros(len(s))
+    else:
+        facing, facing_s, distance, _ = partners(boundary, line.facing, segment, x, d)
+    if contact.gap is not None:
+        distance = prescribed_gap(contact, boundary, segment, s, x)
+    u = boundary.evaluate(displacement, segment, s)
+    noise = np.full(len(s), GAP_NOISE * np.abs(u).max(initial=0.0))
+    if contact.gap is None:
+        noise[distance != 0] += GAP_NOISE * np.abs(x).max(initial=0.0)
+    met = facing >= 0
+    u[met] -= boundary.evaluate(displacement, facing[met], facing_s[met])
+    gap = distance - (u * d).sum(axis=1)
+    gap[np.abs(gap) <= noise] = 0.0
+    return ZonePoints(
+        local=local,
+        s=s,
+        segment=segment,
+        facing=facing,
+        facing_s=facing_s,
+        weight=weight * jacobian(boundary, contact, segment, s) / length,
+        direction=d,
+        gap=gap / strain / length,
+    )
+
+
+def gauss_points(segments: Index, order: int) -> tuple[Index, Array, Array]:
+    """Points on each of `segments` (k,): the segment, the parameter, the weight, each (q,)."""
+    s, w = gauss(order)
+    return np.repeat(segments, len(s)), np.tile(s, len(segments)), np.tile(w, len(segments))
+
+
+def tractions(
+    partition: Partition, zone: Zone, points: ZonePoints, edges: int, degree: int
+) -> sp.csr_array:
+    """Matrix (e * 2 * r, m) from p* to what `EdgeConditions.given` needs of it, on both bodies."""
+    p = zone.values(points.local, points.s)
+    r = 2 * (degree + 1)
+    total = sp.csr_array((edges * 2 * r, zone.size))
+    for sign, segment, s in (
+        (-1.0, points.segment, points.s),
+        (1.0, points.facing, points.facing_s),
+    ):
+        at = np.flatnonzero(segment >= 0)
+        if at.size == 0:
+            continue
+        edge, t = edge_parameters(partition, segment[at], s[at])
+        moments = legendre_values(degree - 1, t) @ with_hats(degree).transpose(0, 2, 1)
+        factor = sign * points.weight[at] / partition.edge_lengths[edge]
+        values = np.einsum("k,kf,hkq->khfq", factor, points.direction[at], moments)
+        values = values.reshape(len(at), -1)
+        row = (edge[:, None] * 2 * r + np.arange(2 * r)).ravel()
+        column = np.repeat(np.arange(len(at)), 2 * r)
+        shape = (edges * 2 * r, len(at))
+        total = total + from_triplets(values.ravel(), row, column, shape) @ p[at]
+    return total.tocsr()

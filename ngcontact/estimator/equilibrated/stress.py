@@ -1,0 +1,100 @@
+"""An equilibrated stress: its coefficients, its certificate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Array, Index
+from .stresses import Discrete, EdgeConditions, Equilibrated, dimension, raw_operators
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPressure:
+    """p* of one pair.
+
+    Attributes
+    ----------
+    segments : ndarray of int (k,)
+        Segments of the boundary of the mesh, the secondary's.
+    coefficients : ndarray (k, d + 1)
+        Of Bernstein polynomials from one end of each segment to the other, units of stress; per
+        unit length (P1), per unit eta (P2).
+    """
+
+    segments: Index
+    coefficients: Array
+
+
+@dataclass(frozen=True, eq=False)
+class EquilibratedStress:
+    """A stress in equilibrium with the loads on n triangles.
+
+    Attributes
+    ----------
+    degree : int
+        Of its polynomials.
+    triangles : ndarray (n, 3, 2)
+        Corners of the triangles, lengths.
+    element : ndarray of int (n,)
+        Elements of the mesh that they are, or parts of.
+    coefficients : ndarray (n, 3, m)
+        (xx, yy, xy) in the m orthonormal polynomials on each triangle, units of stress.
+    pressure : list of ContactPressure
+        p* of each pair.
+    certificate : dict of float
+        Largest residuals of divergence (times diameter), jumps and given tractions, relative to the
+        largest stress; the least p*, in units of stress.
+    """
+
+    degree: int
+    triangles: Array
+    element: Index
+    coefficients: Array
+    pressure: list[ContactPressure]
+    certificate: dict[str, float]
+
+
+def raw_coefficients(discrete: Discrete, result: Equilibrated, at: Index) -> Array:
+    """Coefficients (b, 3, m) of the equilibrated stress on triangles `at` (b,)."""
+    m = dimension(discrete.degree)
+    size = np.sqrt(discrete.partition.areas[at])[:, None, None]
+    c = (discrete.root[at] / size) @ result.change[at].reshape(len(at), 3, m)
+    c[..., : discrete.stress.shape[-1]] += discrete.stress[at]
+    return c
+
+
+def certified(
+    discrete: Discrete, conditions: EdgeConditions, given: Array, result: Equilibrated
+) -> tuple[Array, Array, dict[str, float]]:
+    """Coefficients (n, 3, m), tractions (n, 3, r) on the edges, and residuals.
+
+    `given` (e, 2, r) are the tractions asked for, those of contact included.
+    """
+    partition, k = discrete.partition, discrete.degree
+    n, m, low = len(partition.triangles), dimension(k), dimension(k - 1)
+    coefficients, traction = np.empty((n, 3, m)), np.empty((n, 3, 2 * (k + 1)))
+    divergence = np.empty((n, 2, low))
+    step = max(1, 4_000_000 // (9 * m * m))
+    for start in range(0, n, step):
+        at = np.arange(start, min(start + step, n))
+        c = coefficients[at] = raw_coefficients(discrete, result, at)
+        D, N = raw_operators(partition, at, k, conditions.frames)
+        flat = c.reshape(len(at), -1, 1)
+        divergence[at] = (D @ flat).reshape(len(at), 2, low)
+        traction[at] = (N @ flat).reshape(len(at), 3, -1)
+    largest = max(np.abs(coefficients).max(initial=0.0), np.finfo(float).tiny)
+    force = discrete.force.sum(axis=1)
+    unbalanced = np.abs(divergence + force).max(axis=(1, 2)) * partition.diameters
+    total = np.zeros_like(given[:, 0])
+    np.add.at(total, partition.edges, traction)
+    missing = np.where(conditions.constrained, total - given.sum(axis=1), 0.0)
+    missing = np.abs(missing).max(axis=1)
+    inner = partition.segment < 0
+    residuals = {
+        "divergence": float(unbalanced.max() / largest),
+        "jumps": float(missing[inner].max(initial=0.0) / largest),
+        "tractions": float(missing[~inner].max(initial=0.0) / largest),
+    }
+    return coefficients, traction, residuals

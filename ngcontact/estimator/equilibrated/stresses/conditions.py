@@ -1,0 +1,117 @@
+"""What tractions an equilibrated stress has on the edges: continuous, given, or free."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from ....arrays import Array, Index, Mask
+from ....fem import BoundaryTrace
+from ....lagrange import gauss
+from ....problem import Problem
+from .partition import Partition
+from .polynomials import legendre_values
+
+DATA_BONUS = 10  # quadrature order above that of the polynomials, for loads
+
+
+@dataclass(frozen=True, eq=False)
+class EdgeConditions:
+    """Tractions on e edges: two components of k + 1 Legendre polynomials, r numbers on each.
+
+    Attributes
+    ----------
+    frames : ndarray (e, 2, 2)
+        Directions of the components, as rows.
+    constrained : ndarray of bool (e, r)
+        Components that are continuous or given; the others are the supports'.
+    given : ndarray (e, 2, r)
+        Loads, weighted by the hats of both ends of the edge.
+    missed : ndarray (e,)
+        Norm of the part of the load that polynomials of degree k - 1 do not have.
+    """
+
+    frames: Array
+    constrained: Mask
+    given: Array
+    missed: Array
+
+
+def edge_parameters(partition: Partition, segment: Index, s: Array) -> tuple[Index, Array]:
+    """Edge (k,) and parameter (k,) on it of points `s` (k,) of segments `segment` (k,)."""
+    edge = partition.edge_of_segment[segment]
+    return edge, np.where(partition.along[edge], s, 1 - s)
+
+
+@lru_cache
+def with_hats(degree: int) -> Array:
+    """Coefficients (2, k + 1, k) of Legendre polynomials times the hats of both ends."""
+    t, w = gauss(2 * degree)
+    high, low = legendre_values(degree, t), legendre_values(degree - 1, t)
+    return np.stack([(high * (w * hat)[:, None]).T @ low for hat in (1 - t, t)])
+
+
+def projected_loads(
+    problem: Problem, boundary: BoundaryTrace, degree: int
+) -> Iterator[tuple[Index, Array, Array]]:
+    """Loads on the segments of each pattern of Gamma_tau, as polynomials of degree k - 1.
+
+    Yields
+    ------
+    segments : ndarray of int (j,)
+        Of the boundary.
+    coefficients : ndarray (j, 2, k)
+        Along x and y, Legendre coefficients in the segment's parameter, units of stress.
+    squares : ndarray (j,)
+        Means of the squares of what these miss.
+    """
+    rule, w = gauss(2 * degree + DATA_BONUS)
+    values = legendre_values(degree - 1, rule)
+    for pattern in problem.traction:  # (3.7)
+        segments = boundary.segments(pattern)
+        at, s = np.repeat(segments, len(rule)), np.tile(rule, len(segments))
+        P = boundary.evaluate(problem.traction_vector(pattern), at, s)
+        P = P.reshape(len(segments), -1, 2)
+        c = np.einsum("q,qi,jqc->jci", w, values, P)
+        rest = P - np.einsum("qi,jci->jqc", values, c)
+        yield segments, c, np.einsum("q,jqc->j", w, rest**2)
+
+
+def edge_conditions(
+    problem: Problem, boundary: BoundaryTrace, partition: Partition, degree: int, unit: float
+) -> EdgeConditions:
+    """The conditions of Gamma_u, Gamma_0, Gamma_tau; stresses over `unit`.
+
+    The tractions of contact are left to be added to `given`.
+    """
+    e, q = len(partition.ends), degree + 1
+    frames = np.tile(np.eye(2), (e, 1, 1))
+    constrained = np.ones((e, 2, q), dtype=bool)
+    for pattern, components in problem.displacement.items():  # (3.6)
+        edges = partition.edge_of_segment[boundary.segments(pattern)]
+        for axis, value in enumerate(components):
+            if value is not None:
+                constrained[edges, axis] = False
+    if problem.sliding is not None:  # (3.8)
+        segments = boundary.segments(str(problem.sliding))
+        edges = partition.edge_of_segment[segments]
+        normal = boundary.normal(segments, np.full(len(segments), 0.5))
+        frames[edges] = np.stack([normal, np.column_stack([-normal[:, 1], normal[:, 0]])], axis=1)
+        constrained[edges, 0] = False
+    given, missed = np.zeros((e, 2, 2, q)), np.zeros(e)
+    signs = (-1.0) ** np.arange(degree)
+    for segments, c, squares in projected_loads(problem, boundary, degree):
+        edge = partition.edge_of_segment[segments]
+        c = np.where(partition.along[edge][:, None, None], c, c * signs) / unit
+        c = np.einsum("kfc,kcj->kfj", frames[edge], c) * constrained[edge, :, :1]
+        given[edge] += np.einsum("hij,kfj->khfi", with_hats(degree), c)
+        missed[edge] += np.sqrt(partition.edge_lengths[edge] * squares) / unit
+    return EdgeConditions(
+        frames=frames,
+        constrained=constrained.reshape(e, -1),
+        given=given.reshape(e, 2, -1),
+        missed=missed,
+    )

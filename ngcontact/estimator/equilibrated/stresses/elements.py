@@ -1,0 +1,127 @@
+"""Stresses of one triangle: condensed to tractions on its edges, once for its three patches.
+
+On a triangle stresses are polynomials of degree k with coefficients c, orthonormal in the energy.
+A patch asks for the nearest ones to a given stress with a given divergence, without traction on
+the edge opposite to its vertex: divergence and that edge are eliminated, and what is left are
+multipliers on the two other edges.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....arrays import Array, Index
+from .partition import Partition
+from .polynomials import basis, dimension
+
+
+def raw_operators(
+    partition: Partition, at: Index, degree: int, frames: Array
+) -> tuple[Array, Array]:
+    """Divergence (b, 2 m, 3 n) and tractions (b, 6 (k + 1), 3 n) of straight triangles `at` (b,).
+
+    Of the coefficients of (xx, yy, xy) in the n polynomials of degree k; the divergence in the m
+    of degree k - 1, the tractions, by edge, component along `frames` (e, 2, 2) and Legendre
+    polynomial, in the direction in which each edge runs.
+    """
+    table, b = basis(degree), len(at)
+    n, m = dimension(degree), dimension(degree - 1)
+    of_axis = np.zeros((2, 2, 3))  # which derivative of which stress in which component
+    of_axis[0, 0, 0] = of_axis[0, 1, 2] = of_axis[1, 0, 2] = of_axis[1, 1, 1] = 1.0
+    by_reference = np.einsum("cds,brd->bcrs", of_axis, partition.inverses[at])
+    D = np.einsum("bcrs,rij->bcisj", by_reference, table.derivatives).reshape(b, 2 * m, 3 * n)
+    along = np.einsum("cds,bed->becs", of_axis, partition.normals[at])
+    along = np.einsum("befc,becs->befs", frames[partition.edges[at]], along)
+    signs = np.where(partition.flips[at][:, :, None], (-1.0) ** np.arange(degree + 1), 1.0)
+    N = np.einsum("befs,beq,eqj->befqsj", along, signs, table.traces, optimize=True)
+    return D, N.reshape(b, -1, 3 * n)
+
+
+@dataclass(frozen=True, eq=False)
+class Condensed:
+    """Operators of b triangles on coefficients that are orthonormal in the energy, n of them.
+
+    Attributes
+    ----------
+    Q, R : ndarray (b, n, m), (b, m, m)
+        Q R is the transpose of the divergence.
+    N : ndarray (b, E, n)
+        Tractions on the three edges.
+    K : ndarray (b, n, E)
+        Stresses without divergence that multipliers of the tractions cause.
+    G : ndarray (b, E, E)
+        Their tractions.
+    """
+
+    Q: Array
+    R: Array
+    N: Array
+    K: Array
+    G: Array
+
+    def with_divergence(self, rho: Array) -> Array:
+        """Least stresses (b, j, n) of divergences `rho` (b, j, m)."""
+        x = np.linalg.solve(self.R.transpose(0, 2, 1), rho.transpose(0, 2, 1))
+        return np.asarray((self.Q @ x).transpose(0, 2, 1))
+
+
+def condensed(D: Array, N: Array) -> Condensed:
+    """Condense operators `D` (b, m, n), `N` (b, E, n) on orthonormal coefficients."""
+    across, R = np.linalg.qr(D.transpose(0, 2, 1))
+    K = N.transpose(0, 2, 1)
+    for _ in range(2):  # once more for round-off
+        K = K - across @ (across.transpose(0, 2, 1) @ K)
+    return Condensed(Q=across, R=R, N=N, K=K, G=K.transpose(0, 2, 1) @ K)
+
+
+def without_opposite(G: Array, t: Array) -> tuple[Array, Array, Array, Array]:
+    """Eliminate the edge opposite to each of the three vertices.
+
+    Parameters
+    ----------
+    G : ndarray (b, 3 r, 3 r)
+        Tractions by multipliers.
+    t : ndarray (b, 3, 3 r)
+        Tractions without them, for each vertex.
+
+    Returns
+    -------
+    S, g : ndarray (b, 3, 2 r, 2 r), (b, 3, 2 r)
+        The same on the edges i + 1 and i + 2 of vertex i.
+    X, x : ndarray (b, 3, r, 2 r), (b, 3, r)
+        The opposite edge's multipliers are x - X times those.
+    """
+    b, r = len(G), G.shape[1] // 3
+    S, g = np.empty((b, 3, 2 * r, 2 * r)), np.empty((b, 3, 2 * r))
+    X, x = np.empty((b, 3, r, 2 * r)), np.empty((b, 3, r))
+    for i in range(3):
+        away = i * r + np.arange(r)
+        here = np.concatenate([(i + j) % 3 * r + np.arange(r) for j in (1, 2)])
+        right = np.concatenate([G[:, away[:, None], here], t[:, i, away][:, :, None]], axis=2)
+        solved = np.linalg.solve(G[:, away[:, None], away], right)
+        X[:, i], x[:, i] = solved[:, :, :-1], solved[:, :, -1]
+        across = G[:, here[:, None], away]
+        S[:, i] = G[:, here[:, None], here] - across @ X[:, i]
+        g[:, i] = t[:, i, here] - (across @ x[:, i, :, None])[:, :, 0]
+    return S, g, X, x
+
+
+def gathered(multipliers: Array, X: Array, x: Array) -> Array:
+    """Multipliers (b, 3 r) of the three edges together, summed over the three vertices.
+
+    Parameters
+    ----------
+    multipliers : ndarray (b, 3, 2 r)
+        Of the two edges at each vertex.
+    X, x : ndarray (b, 3, r, 2 r), (b, 3, r)
+        Of `without_opposite`.
+    """
+    b, _, r, _ = X.shape
+    y = np.zeros((b, 3, r))
+    for i in range(3):
+        y[:, i] += x[:, i] - (X[:, i] @ multipliers[:, i, :, None])[:, :, 0]
+        y[:, (i + 1) % 3] += multipliers[:, i, :r]
+        y[:, (i + 2) % 3] += multipliers[:, i, r:]
+    return y.reshape(b, -1)

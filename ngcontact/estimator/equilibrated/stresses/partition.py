@@ -1,0 +1,175 @@
+"""The triangles on which stresses are equilibrated: those of the mesh, some of them in three parts.
+
+A vertex of the boundary in one triangle, with tractions given on both sides, leaves a symmetric
+stress no freedom there: t1.n2 = t2.n1. Such triangles are divided from their middle.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import ngsolve as ng
+import numpy as np
+from numpy.typing import NDArray
+
+from ....arrays import Array, Index, Mask
+from ....fem import BoundaryTrace
+from ....problem import Triangulation
+from .polynomials import CORNERS, barycentric
+
+
+@dataclass(frozen=True, eq=False)
+class Partition:
+    """Triangles, n of them, with e edges; edge i of a triangle lies opposite to its vertex i.
+
+    Attributes
+    ----------
+    mesh : ng.Mesh
+        Whose elements they divide.
+    vertices : ndarray (v, 2)
+        In units of `length`.
+    length : float
+        Unit of length.
+    triangles : ndarray of int (n, 3)
+        Vertices, anticlockwise.
+    parent : ndarray of int (n,)
+        Element of the mesh.
+    within : ndarray (n, 3, 2)
+        Where the vertices lie in the reference triangle of the element.
+    edges : ndarray of int (n, 3)
+        Number of each edge.
+    ends : ndarray of int (e, 2)
+        Vertices of each edge, the lower number first: from there it runs.
+    segment : ndarray of int (e,)
+        Segment of the boundary, -1 of edges between two triangles.
+    along : ndarray of bool (e,)
+        Whether the segment runs as the edge does.
+    """
+
+    mesh: ng.Mesh
+    vertices: Array
+    length: float
+    triangles: Index
+    parent: Index
+    within: Array
+    edges: Index
+    ends: Index
+    segment: Index
+    along: Mask
+
+    @cached_property
+    def sides(self) -> Array:
+        """Columns (n, 2, 2) of the affine maps from the reference triangle."""
+        x = self.vertices[self.triangles]
+        return np.stack([x[:, 0] - x[:, 2], x[:, 1] - x[:, 2]], axis=2)
+
+    @cached_property
+    def areas(self) -> Array:
+        """Areas (n,)."""
+        return np.asarray(np.linalg.det(self.sides) / 2)
+
+    @cached_property
+    def inverses(self) -> Array:
+        """Gradients (n, 2, 2) of the two reference coordinates, as rows."""
+        return np.asarray(np.linalg.inv(self.sides))
+
+    @cached_property
+    def hat_gradients(self) -> Array:
+        """Gradients (n, 3, 2) of the hats of the vertices."""
+        return np.concatenate([self.inverses, -self.inverses.sum(axis=1, keepdims=True)], axis=1)
+
+    @cached_property
+    def diameters(self) -> Array:
+        """Longest sides (n,)."""
+        return np.asarray(self.edge_lengths[self.edges].max(axis=1))
+
+    @cached_property
+    def edge_lengths(self) -> Array:
+        """Lengths (e,)."""
+        x = self.vertices[self.ends]
+        return np.asarray(np.linalg.norm(x[:, 1] - x[:, 0], axis=1))
+
+    @cached_property
+    def normals(self) -> Array:
+        """Outward unit normals (n, 3, 2) of the edges: hats fall towards them."""
+        return -self.hat_gradients / np.linalg.norm(self.hat_gradients, axis=2)[:, :, None]
+
+    @cached_property
+    def flips(self) -> Mask:
+        """Whether a triangle's edge, from vertex i + 1 to i + 2, runs against the edge, (n, 3)."""
+        first, last = self.triangles[:, [1, 2, 0]], self.triangles[:, [2, 0, 1]]
+        return first > last
+
+    @cached_property
+    def owner(self) -> tuple[Index, Index]:
+        """A triangle of each edge (e,), and which of its edges it is."""
+        number = np.zeros(len(self.ends), dtype=np.intp)
+        number[self.edges.ravel()] = np.arange(self.edges.size)
+        return np.divmod(number, 3)
+
+    @cached_property
+    def edge_of_segment(self) -> Index:
+        """Number of the edge of each segment of the boundary, (q,); -1 of lines inside a body."""
+        numbers = np.full(int(self.segment.max(initial=-1)) + 1, -1)
+        at = np.flatnonzero(self.segment >= 0)
+        numbers[self.segment[at]] = at
+        return numbers
+
+    @cached_property
+    def _mesh_points(self) -> NDArray:
+        return self.mesh.MapToAllElements(ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1]), ng.VOL)
+
+    def evaluate(self, function: ng.CoefficientFunction, at: Index, points: Array) -> Array:
+        """Values (k, q, d) at the reference `points` (q, 2) of the triangles `at` (k,)."""
+        where = barycentric(points) @ self.within[at]
+        places = self._mesh_points[np.repeat(self.parent[at], len(points))].copy()
+        places["x"], places["y"] = where.reshape(-1, 2).T
+        return np.asarray(function(places)).reshape(len(at), len(points), -1)
+
+
+def _with_middles(triangles: Index, divided: Mask, vertices: Array) -> tuple[Index, Array, Index]:
+    """Triangles with those `divided` (n,) in three parts, all vertices, and the parents."""
+    whole, cut = np.flatnonzero(~divided), np.flatnonzero(divided)
+    middle = len(vertices) + np.arange(len(cut))
+    old = triangles[cut]
+    parts = [np.column_stack([old[:, i], old[:, (i + 1) % 3], middle]) for i in range(3)]
+    vertices = np.concatenate([vertices, vertices[old].mean(axis=1)])
+    return np.concatenate([triangles[whole], *parts]), vertices, np.concatenate([whole, *[cut] * 3])
+
+
+def partition_of(boundary: BoundaryTrace, length: float, divided: Mask) -> Partition:
+    """The elements of a mesh, those `divided` (ne,) in three parts; coordinates over `length`."""
+    view = Triangulation(boundary.mesh)
+    triangles, vertices, parent = _with_middles(view.triangles, divided, view.vertices / length)
+    third = np.concatenate([CORNERS, [[1 / 3, 1 / 3]]])
+    within = np.tile(CORNERS, (len(triangles), 1, 1))
+    count = np.count_nonzero(divided)
+    for i in range(3):
+        at = slice(len(triangles) - (3 - i) * count, len(triangles) - (2 - i) * count)
+        within[at] = third[[i, (i + 1) % 3, 3]]
+    pairs = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+    size = len(vertices)
+    keys, first, edges = np.unique(
+        pairs[:, 0] * size + pairs[:, 1], return_index=True, return_inverse=True
+    )
+    segment = np.full(len(keys), -1)
+    outer = np.flatnonzero(~boundary.inner)
+    ends = boundary.nodes[outer][:, [0, -1]]
+    low, high = np.sort(ends, axis=1).T
+    at = np.searchsorted(keys, low * size + high)
+    segment[at] = outer
+    along = np.ones(len(keys), dtype=bool)
+    along[at] = ends[:, 0] < ends[:, 1]
+    return Partition(
+        mesh=boundary.mesh,
+        vertices=vertices,
+        length=length,
+        triangles=triangles,
+        parent=parent,
+        within=within,
+        edges=edges.reshape(-1, 3),
+        ends=pairs[first],
+        segment=segment,
+        along=along,
+    )

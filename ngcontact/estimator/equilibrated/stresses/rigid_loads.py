@@ -1,0 +1,159 @@
+"""Rigid body loads that patches exchange, so that each is in equilibrium.
+
+The load of a patch, by the hat of its vertex, is balanced where the discrete solution has been
+tested with hat times rigid motion. It is not for rotations at order 1, on curved elements, and
+where contact pressure replaces nodal forces. What is missing are loads theta on the triangles that
+vanish in the sum over the three patches of each: the least ones that settle all patches.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import splu
+
+from ....arrays import Array, Mask
+from ....triplets import from_triplets
+from .partition import Partition
+from .polynomials import CORNERS, basis
+
+RESISTED = 1e-6  # square of a motion on free edges, relative, from which their tractions resist it
+SHIFT = 1e-11  # relative, of a matrix that is singular where a body is free to move
+REFINEMENTS = 3
+
+
+def _motions(partition: Partition) -> tuple[Array, Array]:
+    """Rigid motions of the vertices of each triangle, and sizes (v,) of the patches.
+
+    Two translations and the rotation over the patch's size, (n, 3, 3, 2, 3): vertex, motion,
+    component, coefficient in the polynomials of degree 1.
+    """
+    x, triangles = partition.vertices, partition.triangles
+    size = np.zeros(len(x))
+    np.maximum.at(size, triangles, partition.diameters[:, None])
+    size[size == 0] = 1.0
+    corners = x[triangles]
+    apart = (corners[:, None] - corners[:, :, None]) / size[triangles][:, :, None, None]
+    values = np.zeros((len(triangles), 3, 3, 2, 3))  # last: at the corners
+    values[:, :, 0, 0], values[:, :, 1, 1] = 1.0, 1.0
+    values[:, :, 2, 0], values[:, :, 2, 1] = -apart[..., 1], apart[..., 0]
+    return values @ np.linalg.inv(basis(1).values(CORNERS)).T, size
+
+
+def _on_edges(partition: Partition, size: Array, frames: Array) -> Array:
+    """The motions of both ends of the e edges, (e, 2, 3, 2, 2): along frames, Legendre."""
+    ends = partition.vertices[partition.ends]
+    apart = (ends[:, None] - ends[:, :, None]) / size[partition.ends][:, :, None, None]
+    values = np.zeros((len(ends), 2, 3, 2, 2))
+    values[:, :, 0, 0], values[:, :, 1, 1] = 1.0, 1.0
+    values[:, :, 2, 0], values[:, :, 2, 1] = -apart[..., 1], apart[..., 0]
+    values = np.einsum("efc,eaicp->eaifp", frames, values)
+    first, last = values[..., 0], values[..., 1]
+    return np.stack([(first + last) / 2, (last - first) / np.sqrt(12)], axis=-1)
+
+
+def _admitted(partition: Partition, on_edges: Array, constrained: Mask) -> Array:
+    """Projectors (v, 3, 3) to the motions of each patch that no free traction resists."""
+    e, r = constrained.shape
+    free = ~constrained.reshape(e, 2, r // 2)[:, :, :2]
+    squares = np.einsum("eaifq,eajfq,efq->eaij", on_edges, on_edges, free)
+    total = np.zeros((len(partition.vertices), 3, 3))
+    np.add.at(total, partition.ends, squares)
+    values, vectors = np.linalg.eigh(total)
+    kept = values <= RESISTED
+    return np.einsum("vij,vj,vkj->vik", vectors, kept, vectors)
+
+
+def exchanged_loads(
+    partition: Partition,
+    load: Array,
+    given: Array,
+    frames: Array,
+    constrained: Mask,
+    stiffness: Array,
+) -> tuple[Array, float]:
+    """Loads theta (n, 3, 2, 3) by triangle, vertex, component and polynomial of degree 1.
+
+    Parameters
+    ----------
+    partition : Partition
+        Of n triangles, v vertices, e edges.
+    load : ndarray (n, 3, 2, 3)
+        What the divergence shall be in the patch of each vertex, up to degree 1.
+    given, frames, constrained : ndarray (e, 2, r), (e, 2, 2), (e, r)
+        Of the boundary's tractions, see `multipliers`.
+    stiffness : ndarray (n,)
+        A modulus of each triangle.
+
+    Returns
+    -------
+    theta : ndarray (n, 3, 2, 3)
+        To be added to `load`.
+    rest : float
+        Forces that stay unbalanced, relative to the largest term.
+    """
+    motions, size = _motions(partition)
+    on_edges = _on_edges(partition, size, frames)
+    P = _admitted(partition, on_edges, constrained)
+    area, triangles, v = partition.areas, partition.triangles, len(partition.vertices)
+    inside = area[:, None, None] * np.einsum("tacq,taicq->tai", load, motions)
+    e, r = constrained.shape
+    low = given.reshape(e, 2, 2, r // 2)[..., :2]
+    outside = partition.edge_lengths[:, None, None] * np.einsum("eafq,eaifq->eai", low, on_edges)
+    defect, terms = np.zeros((v, 3)), np.zeros((v, 3))
+    np.add.at(defect, triangles, inside)
+    np.add.at(defect, partition.ends, -outside)
+    np.add.at(terms, triangles, np.abs(inside))
+    np.add.at(terms, partition.ends, np.abs(outside))
+    defect = np.einsum("vij,vj->vi", P, defect)
+    largest = terms.max(initial=0.0)
+    if np.abs(defect).max(initial=0.0) <= 1e-15 * largest:
+        return np.zeros_like(load), 0.0
+    weight = stiffness / partition.diameters**2
+    A = _exchange(partition, motions, weight * area)
+    mu = _least(A, P, -defect)
+    rho = np.einsum("tai,taicq->tacq", mu[triangles], motions)
+    theta = weight[:, None, None, None] * (rho - rho.mean(axis=1, keepdims=True))
+    left = defect.copy()
+    np.add.at(left, triangles, area[:, None, None] * np.einsum("tacq,taicq->tai", theta, motions))
+    left = np.einsum("vij,vj->vi", P, left)
+    return theta, float(np.abs(left).max() / largest)
+
+
+def _exchange(partition: Partition, motions: Array, weight: Array) -> sp.csr_array:
+    """Loads on patches by the motions (v, 3) of their vertices: each less the mean of the three."""
+    triangles, v = partition.triangles, len(partition.vertices)
+    blocks = -np.einsum("t,tajcq,tbicq->tabji", weight, motions / 3, motions, optimize=True)
+    for i in range(3):
+        mine = motions[:, i]
+        blocks[:, i, i] += np.einsum("t,tjcq,ticq->tji", weight, mine, mine)
+    rows = (3 * triangles[:, :, None] + np.arange(3)).reshape(-1, 9)
+    full = blocks.transpose(0, 1, 3, 2, 4).reshape(-1, 81)
+    row, column = np.repeat(rows, 9, axis=1), np.tile(rows, (1, 9))
+    return from_triplets(full.ravel(), row.ravel(), column.ravel(), (3 * v, 3 * v))
+
+
+def _least(A: sp.csr_array, P: Array, right: Array) -> Array:
+    """Solution (v, 3) of the consistent system on the admitted motions, `P` (v, 3, 3)."""
+    v = len(P)
+    project = sp.bsr_array((P, np.arange(v), np.arange(v + 1)), shape=(3 * v, 3 * v)).tocsr()
+    A = (project @ A @ project).tocsr()
+    scale = A.diagonal().copy()
+    block = scale.reshape(v, 3).max(axis=1)
+    block[block == 0] = 1.0
+    rest = sp.bsr_array((np.eye(3) - P, np.arange(v), np.arange(v + 1)), shape=(3 * v, 3 * v))
+    unit = sp.diags_array(np.repeat(block, 3))
+    A = A + unit @ rest.tocsr()
+    half = sp.diags_array(1 / np.sqrt(np.repeat(block, 3)))
+    scaled = (half @ A @ half).tocsc()
+    lu = splu(
+        (scaled + SHIFT * sp.eye_array(3 * v)).tocsc(),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
+    b = half @ right.ravel()
+    x = lu.solve(b)
+    for _ in range(REFINEMENTS):
+        x += lu.solve(b - scaled @ x)
+    return np.asarray((half @ x).reshape(v, 3))

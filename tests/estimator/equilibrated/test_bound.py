@@ -1,0 +1,179 @@
+"""Guaranteed bounds against exact errors: never below, and hardly above."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from netgen.occ import Axis, OCCGeometry, Z
+
+from drivers.reference import cases
+from drivers.reference.straight import relative_energy_error
+from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
+from ngcontact.geometries import blocks
+
+RESIDUAL = 1e-10  # of equilibrium, jumps and tractions, relative to the largest stress
+ENERGY_ONE_TRANSITION = (1.293180760825 + 0.520333087196) / 2  # L(u) by Clapeyron, no loads
+
+
+def effectivity(solution, exact):
+    """Bound over exact error, both relative; the certificate holds."""
+    certificate = dict(solution.equilibrated.certificate)
+    assert certificate.pop("least pressure") >= 0
+    assert max(certificate.values()) <= RESIDUAL
+    return solution.relative_error_bound / relative_energy_error(solution, exact)
+
+
+def test_a_solution_in_the_space_has_no_error(reproduced):
+    case, order = reproduced
+    solution = solve(case.problem, maxh=0.5, order=order)
+    assert solution.work["equilibrations"] == 0
+    assert solution.relative_error_bound <= 1e-12  # round-off; measured 1e-13
+    assert solution.work["equilibrations"] == 1
+    low, high = solution.energy_bounds
+    assert low <= solution.energy <= high
+    assert high - low <= 1e-12 * solution.energy_norm**2
+    assert solution.work["equilibrations"] == 1
+
+
+@pytest.mark.parametrize(("order", "largest"), [(1, 1.25), (2, 1.15), (3, 2.0)])
+def test_one_transition(order, largest):
+    """Measured: at most 1.18, 1.09, 1.54 on these levels."""
+    case = cases.one_transition()
+    for solution in adapt(case.problem, order=order, max_dofs=2500):
+        assert 1 <= effectivity(solution, case.exact) <= largest
+        low, high = solution.energy_bounds
+        assert low <= ENERGY_ONE_TRANSITION <= high
+        assert high - low <= 1.5 * solution.error_bound**2
+
+
+@pytest.mark.parametrize("half_width", [0.3, 0.05])
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_hertz(order, half_width):
+    """The zone ends inside an element: up to 4 there, 1.5 from where it is resolved."""
+    case = cases.hertz_contact(half_width=half_width)
+    *_, finest = levels = list(adapt(case.problem, order=order, max_dofs=3500))
+    for solution in levels:
+        assert 1 <= effectivity(solution, case.exact) <= 4
+        low, high = solution.energy_bounds
+        assert high - low <= 1.5 * solution.error_bound**2
+        assert low <= finest.energy_bounds[1]
+        assert finest.energy_bounds[0] <= high
+    if order < 4:
+        assert effectivity(finest, case.exact) <= 1.5
+
+
+@pytest.mark.parametrize("case", [cases.clamped_transition, cases.guided_transition])
+def test_body_forces_and_tractions(case):
+    """What no polynomial meets of them enters with constants of the triangles."""
+    case = case()
+    for solution in adapt(case.problem, order=2, max_dofs=1300):
+        assert effectivity(solution, case.exact) >= 1
+        assert solution.bound_parts["loads"] > 0
+
+
+def test_parts_are_the_square_of_the_bound():
+    solution = solve(cases.hertz_contact().problem, maxh=0.3, order=2)
+    parts = solution.bound_parts
+    assert set(parts) == {"constitutive", "complementarity", "lifting", "loads", "curves"}
+    assert sum(parts.values()) == pytest.approx(solution.error_bound**2, rel=1e-12)
+    assert parts["loads"] == parts["curves"] == 0
+    assert solution.relative_error_bound == solution.error_bound / solution.energy_norm
+
+
+@pytest.mark.parametrize("scale", [1e-9, 1e9])
+def test_moduli_and_stresses_scale(scale):
+    """B is the root of a modulus times a length squared, per thickness."""
+    problem = cases.hertz_contact().problem
+    scaled = {name: Elastic(E=law.E * scale, nu=law.nu) for name, law in problem.materials.items()}
+    one = solve(problem, maxh=0.3, order=2).error_bound
+    other = solve(replace(problem, materials=scaled), maxh=0.3, order=2).error_bound
+    assert other == pytest.approx(one * np.sqrt(scale), rel=1e-6)
+
+
+def partly_loaded(angle=0.0, size=1.0, **contact):
+    """A block on a clamped one, pressed on half of its top, turned and magnified."""
+    problem = cases.partly_opening_block()
+    shape = problem.geometry.shape.Scale((0, 0, 0), size).Rotate(Axis((0, 0, 0), Z), angle)
+    return replace(problem, geometry=OCCGeometry(shape, dim=2), **contact)
+
+
+def test_a_turned_and_magnified_scene_has_the_same_bound():
+    one = solve(partly_loaded(), maxh=0.4, order=2)
+    other = solve(partly_loaded(angle=33, size=1e3), maxh=0.4e3, order=2)
+    assert one.relative_error_bound == pytest.approx(other.relative_error_bound, rel=0.05)
+    *_, fine = adapt(partly_loaded(), order=4, max_dofs=8000)
+    assert one.energy_bounds[0] <= fine.energy <= one.energy_bounds[1]
+    error = np.sqrt(max(0.0, 2 * (one.energy - fine.energy)))
+    assert error / 2 <= one.error_bound  # the gap of u_h has a share in the energy
+
+
+@pytest.mark.parametrize("law", ["plane stress", "anisotropic", "contrast"])
+def test_other_laws(law):
+    """Bounds of the energy on a coarse mesh contain those on a fine one."""
+    problem = partly_loaded()
+    if law == "plane stress":
+        problem = replace(problem, model="plane stress")
+    elif law == "anisotropic":
+        C = Hooke([[100.0, 20.0, 5.0], [20.0, 10.0, 1.0], [5.0, 1.0, 3.0]])
+        problem = replace(problem, materials={"upper|lower": C})
+    else:
+        problem = replace(
+            problem, materials={"upper": Elastic(1e9, 0.3), "lower": Elastic(1e3, 0.2)}
+        )
+    coarse, fine = (solve(problem, maxh=h, order=2) for h in (0.6, 0.15))
+    (low, high), (lower, upper) = coarse.energy_bounds, fine.energy_bounds
+    assert low <= upper
+    assert lower <= high
+    assert upper - lower < high - low
+    assert high - low <= 1.5 * coarse.error_bound**2
+
+
+def test_a_body_that_contact_alone_holds():
+    """A block pressed on a clamped one without a support: p* balances the load exactly."""
+    problem = replace(partly_loaded(), sliding="lower_axis", traction={"pressed|top": 1.0})
+    solution = solve(problem, maxh=0.4, order=2)
+    pressure = solution.equilibrated.pressure[0]
+    length = np.linalg.norm(
+        np.ptp(solution.discrete.space.trace.curve[pressure.segments], axis=1), axis=1
+    )
+    assert length @ pressure.coefficients.mean(axis=1) == pytest.approx(2.0, rel=1e-10)
+    certificate = dict(solution.equilibrated.certificate)
+    assert certificate.pop("least pressure") >= 0
+    assert max(certificate.values()) <= RESIDUAL
+    *_, fine = adapt(problem, order=4, max_dofs=6000)
+    assert solution.energy_bounds[0] <= fine.energy <= solution.energy_bounds[1]
+
+
+def test_no_loads_no_error():
+    problem = Problem(
+        geometry=blocks(),
+        materials=cases.BLOCKS,
+        displacement={"top": (0, 0), "bottom": (0, 0)},
+        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
+    )
+    solution = solve(problem, maxh=0.5, order=2)
+    assert solution.error_bound == solution.relative_error_bound == 0
+
+
+def test_adapt_stops_at_the_bound():
+    case = cases.hertz_contact()
+    tolerance = 1e-2
+    levels = list(adapt(case.problem, order=3, tolerance=tolerance, guaranteed=True))
+    assert levels[-1].relative_error_bound <= tolerance
+    assert levels[-1].bounded
+    assert not levels[0].bounded  # its estimate said that it is too coarse
+    assert relative_energy_error(levels[-1], case.exact) <= tolerance
+    assert sum(level.work["equilibrations"] for level in levels[:-1]) <= 2
+    marked = [
+        level.displacement.space.ndof for level in adapt(case.problem, order=3, max_dofs=4000)
+    ]
+    assert [level.displacement.space.ndof for level in levels] == marked[: len(levels)]
+
+
+def test_guaranteed_needs_a_tolerance():
+    with pytest.raises(ValueError, match="tolerance=None"):
+        adapt(cases.one_transition().problem, guaranteed=True)
+    with pytest.raises(TypeError, match="guaranteed=1"):
+        adapt(cases.one_transition().problem, guaranteed=1, tolerance=1e-2)
