@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index
 from ..contact import ContactLine, ContactState, in_contact, twins
 from ..triplets import from_triplets
 
@@ -23,7 +23,7 @@ class Zones:
     force, weight : ndarray (k,)
         Sums over the points of each zone: a force per unit thickness, a length.
     segments : ndarray (k,)
-        Length in segments, parts of segments included.
+        Length in segments: half of the interval between two nodes in which it ends counts.
     ends : ndarray of int (k,)
         Transitions to open points.
     """
@@ -63,17 +63,11 @@ def zones_of(state: ContactState) -> Zones:
     at = np.flatnonzero(closed)
     inside = along[closed[along].all(axis=1)]
     ending = both[closed[both].sum(axis=1) == 1]
+    ends = counted(ending[closed[ending]])
     return Zones(
         number=number,
         force=summed(at, state.force[at]),
         weight=summed(at, line.weight[at]),
-        segments=counted(inside[:, 0]) / (line.rows.shape[1] - 1),
-        ends=counted(ending[closed[ending]]),
+        segments=(counted(inside[:, 0]) + ends / 2) / (line.rows.shape[1] - 1),
+        ends=ends,
     )
-
-
-def at_its_end(line: ContactLine, nodes: Index) -> Mask:
-    """Points (m,) at ends of the line that lie at one of the `nodes` (k,) of supports."""
-    along, across = links(line)
-    neighbours = np.bincount(np.concatenate([along, across]).ravel(), minlength=len(line.node))
-    return np.asarray((neighbours <= 1) & np.isin(line.node, nodes))

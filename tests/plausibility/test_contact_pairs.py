@@ -116,8 +116,8 @@ def test_inclined_rigid_obstacles_are_told():
         disc,
         contact=[Contact("arc", direction=DOWN, gap=lambda x, y: y - x - 1 + math.sqrt(2))],
     )
-    assert only(lambda: solve(grooved, maxh=0.03, order=2), DIRECTION, "a rigid obstacle")
-    assert quiet(lambda: solve(disc, maxh=0.03, order=2))
+    assert only(lambda: solve(grooved, maxh=0.015, order=2), DIRECTION, "a rigid obstacle")
+    assert quiet(lambda: solve(disc, maxh=0.015, order=2))
 
 
 def edge_of(name: str, left: float):
@@ -164,7 +164,7 @@ def test_the_tip_of_a_wedge_takes_the_direction_of_the_plane(slope, half):
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_contact_far_below_the_size_of_elements_is_told(order):
     problem = cases.pressed_disc()
-    parts = (ZONE, '"disc_arc" with "block_top"', "adapt", "maxh", f"order {order}")
+    parts = (ZONE, '"disc_arc" with "block_top"', "adapt", "maxh")
     assert only(lambda: solve(problem, maxh=0.2, order=order), *parts)
 
 
@@ -176,12 +176,9 @@ def test_the_last_level_resolves_the_zone_of_a_load_however_small(press):
     assert only(finest(problem, unknowns=1500), ZONE)  # the first levels do not
 
 
-@pytest.mark.parametrize(("order", "maxh"), [(1, 0.058), (2, 0.084), (3, 0.084), (4, 0.084)])
+@pytest.mark.parametrize(("order", "maxh"), [(1, 0.058), (2, 0.06), (3, 0.06), (4, 0.06)])
 def test_zones_without_a_warning_have_their_peak(order, maxh):
-    """Hertz, half-width 0.1 in blocks of width 2; `contact_pairs` quotes 1 to 4 % where it starts.
-
-    On these meshes, some way above, 3.1, 0.1, 0.5 and 0.1 % were measured.
-    """
+    """Hertz, half-width 0.1 in blocks of width 2: measured 3.1 % at order 1, the worst."""
     case = cases.hertz_contact(half_width=0.1)
     solution = solve(case.problem, maxh=maxh, order=order)
     assert quiet(lambda: solve(case.problem, maxh=maxh, order=order))
@@ -222,7 +219,7 @@ def test_the_coarse_run_that_starts_a_large_mesh_tells_nothing():
     problem = replace(cases.pressed_disc(), displacement=supports)
     messages = told(lambda: solutions.append(solve(problem, maxh=0.045, order=2)))
     assert solutions[0].coarse_levels > 0
-    assert not any("order 3" in message for message in messages)
+    assert len(messages) == 1  # of the mesh itself
 
 
 # --- strains ---
