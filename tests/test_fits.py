@@ -69,18 +69,18 @@ def fit(interference, swap=False, **options):
 
 
 @pytest.mark.parametrize("swap", [False, True])
-@pytest.mark.parametrize("interference", [1e-5, 1e-2])
-@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("interference", [1e-5, 1e-1])
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_press_fits_converge_to_lame(order, interference, swap):
     stress, pressure = exact(interference)
     right = pressure["inner" if swap else "outer"]
-    levels = list(adapt(fit(interference, swap), order=order, max_dofs=6000))
+    levels = list(adapt(fit(interference, swap), order=order, max_dofs=5000))
     estimates = [level.relative_error_estimate for level in levels]
     errors = [relative_error(level, stress) for level in levels]
     assert all(error <= known for error, known in zip(errors, estimates, strict=True))
     unknowns = [level.displacement.space.ndof for level in levels]
     rate = np.polyfit(np.log(unknowns[-4:]), np.log(estimates[-4:]), 1)[0]
-    assert rate < {1: -0.45, 2: -0.8, 3: -1.1}[order]  # theory: half the order
+    assert rate < -0.45 * order  # theory: half the order
     last = levels[-1]
     assert last.active.all()
     # Asked for on the last level: force within 2e-2 (order 1), 1e-3; peak within 5e-2, 1e-2.

@@ -5,10 +5,17 @@ from .assembly import merged as merged
 from .corners import in_contact as in_contact
 from .corners import pressure_across_corners as pressure_across_corners
 from .corners import twins as twins
+from .dual import Pieces as Pieces
+from .dual import divided as divided
+from .dual import end_to_end as end_to_end
 from .line import ContactLine as ContactLine
 from .line import at_quadrature as at_quadrature
+from .line import jacobian as jacobian
 from .line import nodal_line as nodal_line
 from .line import prescribed_gap as prescribed_gap
+from .projection import at as at
+from .projection import crossings as crossings
+from .search import TOUCHING as TOUCHING
 from .search import partners as partners
 from .state import ContactState as ContactState
 from .state import by_line as by_line

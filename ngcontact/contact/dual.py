@@ -86,7 +86,7 @@ def _rays(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> A
     return np.tile(contact.direction, (len(s), 1))
 
 
-def _divided(trace: BoundaryTrace, contact: Contact, segments: Index, facing: Index) -> Pieces:
+def divided(trace: BoundaryTrace, contact: Contact, segments: Index, facing: Index) -> Pieces:
     """Divide `segments` (k,) where they pass vertices of the primary segments `facing` (q,)."""
     k, ends = len(segments), trace.nodes[facing][:, [0, -1]]
     _, first = np.unique(ends, return_index=True)
@@ -176,8 +176,11 @@ def _integrals(
     return DualIntegrals(weight, np.einsum("kij,kj->ki", change, gap), coupling)
 
 
-def _matched(trace: BoundaryTrace, line: ContactLine, facing: Mask) -> Mask:
-    """Segments (k,) of the secondary whose two ends face the two ends of one primary segment."""
+def end_to_end(trace: BoundaryTrace, line: ContactLine, facing: Mask) -> Index:
+    """Segment of the primary whose two ends the two ends of a segment face, (k,), -1 where none.
+
+    `facing` (m,) are the points that face the primary.
+    """
     vertex = np.full(len(facing) + 1, -1)  # of the primary at each point
     at_end = facing & np.isin(line.partner_s, (0.0, 1.0))
     end = np.where(line.partner_s[at_end] == 0.0, 0, -1)
@@ -186,8 +189,12 @@ def _matched(trace: BoundaryTrace, line: ContactLine, facing: Mask) -> Mask:
     met = np.sort(np.where(ends < 0, -1, vertex[ends]), axis=1)
     sides = np.sort(trace.nodes[line.facing][:, [0, -1]], axis=1)
     size = trace.space.ndof
-    keys = sides[:, 0] * size + sides[:, 1]
-    return np.asarray((met[:, 0] >= 0) & np.isin(met[:, 0] * size + met[:, 1], keys))
+    keys, wanted = (x[:, 0] * size + x[:, 1] for x in (sides, met))
+    order = np.argsort(keys)
+    place = np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)
+    found = line.facing[order[place]]
+    same = (met[:, 0] >= 0) & (keys[order[place]] == wanted)
+    return np.where(same, found, -1)
 
 
 def with_dual_rows(
@@ -207,14 +214,14 @@ def with_dual_rows(
     facing : ndarray of bool (m,)
         Points that face the primary.
     """
-    matched = _matched(trace, line, facing)
-    if line.contact.rows == "dual":
-        matched[:] = False
+    if len(line.facing) == 0:
+        return line, facing
+    matched = (end_to_end(trace, line, facing) >= 0) & (line.contact.rows != "dual")
     chosen = np.flatnonzero(~matched)
-    if len(chosen) == 0 or len(line.facing) == 0:
+    if len(chosen) == 0:
         return line, facing
     segments, rows, m = line.segments[chosen], line.rows[chosen], len(facing)
-    pieces = _divided(trace, line.contact, segments, line.facing)
+    pieces = divided(trace, line.contact, segments, line.facing)
     parts = _integrals(trace, line.contact, segments, pieces)
     here = (rows >= 0) & (parts.weight > 0)
     point = rows[here]

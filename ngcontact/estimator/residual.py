@@ -35,7 +35,7 @@ from ..arrays import Array
 from ..contact import ContactState
 from ..fem import NEARLY_INCOMPRESSIBLE, BoundaryTrace, nearly_incompressible
 from ..problem import Problem, varies
-from .contact import on_contact
+from .contact import on_contact, remaining
 from .indicators import Estimate
 from .interior import divergence_and_jump, edge_integral, element_integral
 from .oscillation import oscillation
@@ -63,11 +63,9 @@ def estimate(
         kappa / mu from which the pressure of a body is corrected.
     """
     solution = scaled(problem, boundary, displacement, stress)
-    terms, covered = [], boundary.inner.copy()
-    for pair in pairs:
-        terms.append(on_contact(solution, pair))
-        covered[terms[-1].covered] = True
-    terms.append(on_supports_and_loads(solution, covered))
+    terms = [on_contact(solution, pair, pairs) for pair in pairs]
+    rest = remaining(boundary.inner, [term.covered for term in terms])
+    terms.append(on_supports_and_loads(solution, rest))
     parts = _squares(solution, terms, corrected_from)
     total = np.sum(list(parts.values()), axis=0)
     unit = solution.unit / math.sqrt(solution.modulus)  # of the energy norm

@@ -7,33 +7,30 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..arrays import Array, Index, Mask
-from ..lagrange import gauss
 from .terms import (
     DATA_BONUS,
     BoundaryResidual,
     BoundaryTerms,
+    Parts,
     PressureShare,
     ScaledSolution,
     Squares,
 )
 
 
-def on_supports_and_loads(solution: ScaledSolution, covered: Mask) -> BoundaryTerms:
+def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTerms:
     """Residuals on all of the boundary that contact has not covered.
 
     Parameters
     ----------
     solution : ScaledSolution
         In units of its own.
-    covered : ndarray of bool (q,)
-        Segments of the boundary that are none of a support or a load.
+    parts : Parts
+        What no body faces.
     """
     boundary, problem = solution.boundary, solution.problem
-    segments = np.flatnonzero(~covered)
-    rule, rule_weight = gauss(2 * solution.order + DATA_BONUS)
-    segment, s = np.repeat(segments, len(rule)), np.tile(rule, len(segments))
-    stretch = np.linalg.norm(boundary.derivative(segment, s), axis=1)
-    ds = stretch * np.tile(rule_weight, len(segments))
+    _, segment, s, weight = parts.points(2 * solution.order + DATA_BONUS)
+    ds = np.linalg.norm(boundary.derivative(segment, s), axis=1) * weight
 
     residual = _unbalanced(solution, segment, s)  # (3.7)
     factor = -boundary.normal(segment, s)  # of a pressure in the residual
@@ -58,7 +55,7 @@ def on_supports_and_loads(solution: ScaledSolution, covered: Mask) -> BoundaryTe
     for name, at in (("traction", ~guided), ("sliding", guided)):
         share = PressureShare(np.arange(at.sum()), segment[at], s[at], factor[at])
         residuals.append(BoundaryResidual(name, element[at], weight[at], residual[at], [share]))
-    return BoundaryTerms(residuals, squares, segments)
+    return BoundaryTerms(residuals, squares, parts)
 
 
 def _unbalanced(solution: ScaledSolution, segment: Index, s: Array) -> Array:

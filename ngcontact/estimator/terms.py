@@ -10,6 +10,7 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two
 from ..fem import BoundaryTrace, rigidities, rough_moduli, shear_moduli
+from ..lagrange import gauss
 from ..mesh import diameters
 from ..problem import Problem
 from .interior import projected_stress
@@ -188,6 +189,36 @@ class Squares:
 
 
 @dataclass(frozen=True, eq=False)
+class Parts:
+    """Parts of segments of the boundary, r of them.
+
+    Attributes
+    ----------
+    segment : ndarray of int (r,)
+        The segment.
+    start, stop : ndarray (r,)
+        Interval of its parameter.
+    """
+
+    segment: Index
+    start: Array
+    stop: Array
+
+    @classmethod
+    def none(cls) -> Parts:
+        """No parts."""
+        return cls(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))
+
+    def points(self, order: int) -> tuple[Index, Index, Array, Array]:
+        """Gauss points exact to a degree: part (k,), segment (k,), s (k,), weight in s (k,)."""
+        rule, weight = gauss(order)
+        part = np.repeat(np.arange(len(self.segment)), len(rule))
+        length = (self.stop - self.start)[part]
+        s = self.start[part] + length * np.tile(rule, len(self.segment))
+        return part, self.segment[part], s, length * np.tile(weight, len(self.segment))
+
+
+@dataclass(frozen=True, eq=False)
 class BoundaryTerms:
     """What a part of the boundary contributes.
 
@@ -197,10 +228,10 @@ class BoundaryTerms:
         Those of the stress.
     squares : list of Squares
         Those of the displacement.
-    covered : ndarray of int (q,)
-        The segments of that part.
+    covered : Parts
+        Where that is.
     """
 
     residuals: list[BoundaryResidual] = field(default_factory=list)
     squares: list[Squares] = field(default_factory=list)
-    covered: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    covered: Parts = field(default_factory=Parts.none)

@@ -1,0 +1,260 @@
+"""Residuals on Gamma_K: tractions of both sides, complementarity, penetration."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...arrays import Array, Index, Mask
+from ...contact import ContactLine, ContactState
+from ...fem import BoundaryTrace
+from ...lagrange import gauss_lobatto, lagrange
+from ..terms import (
+    DATA_BONUS,
+    BoundaryResidual,
+    BoundaryTerms,
+    PressureShare,
+    ScaledSolution,
+    Squares,
+)
+from .facing import FacingPoints, covered_parts, facing_points, pieces_of
+
+ALIKE = 1 - 1e-6  # cosine of directions from which points of two pairs at a node are one
+GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """One body's tractions at the k points of a line, per unit of s (P1) or eta (P2).
+
+    The last axis of `along` (k, 2) and `across` (k, 2, 2) is the traction sigma_h n, the former
+    with pi_h, and that of a unit pressure. `weight` (k,) is that of squared tractions, `stiffness`
+    (k,) that of squared depths.
+    """
+
+    segment: Index
+    s: Array
+    element: Index
+    weight: Array
+    stiffness: Array
+    along: Array
+    across: Array
+
+
+def on_contact(
+    solution: ScaledSolution, pair: ContactState, pairs: Sequence[ContactState]
+) -> BoundaryTerms:
+    """Residuals on both sides of one pair.
+
+    Parameters
+    ----------
+    solution : ScaledSolution
+        In units of its own.
+    pair : ContactState
+        Contact forces and state of its points, in the units of the data.
+    pairs : sequence of ContactState
+        All of the problem.
+    """
+    boundary, line = solution.boundary, pair.line
+    nodal, active = at_nodes(boundary, pair, pairs)
+    pieces = pieces_of(boundary, line, np.asarray(np.isfinite(nodal).any(axis=1)))
+    if len(pieces.local) == 0:
+        return BoundaryTerms()
+    points = facing_points(boundary, line, pieces, 2 * solution.order + DATA_BONUS)
+    nodal = pressure_on_segments(nodal, solution.order)
+    pressure = (lagrange(solution.order, points.s) * nodal[points.local]).sum(axis=1)
+    pressure /= solution.unit
+    full = np.asarray(active.all(axis=1))[points.local]
+    sides = [_side(solution, points, pressure, own=True)]
+    if line.contact.primary is not None:
+        sides.append(_side(solution, points, -pressure, own=False))
+    residuals = [_tangential(side) for side in sides]  # (3.11), (3.11')
+    residuals += _normal(sides, pressure, full, line.contact.bilateral)  # (3.10), (3.10')
+    # Where both bodies meet the softer gives way to a depth.
+    stiffness = np.min([side.stiffness for side in sides], axis=0)
+    closed, depth = _gap_squares(solution, line, points, (pressure, full, stiffness))
+    squares = []
+    for side in sides:
+        share = points.weight / len(sides)
+        for name, values in (("complementarity", closed), ("penetration", depth)):
+            squares.append(Squares(name, side.element, share * values))
+    return BoundaryTerms(residuals, squares, covered_parts(boundary, line, pieces))
+
+
+def at_nodes(
+    boundary: BoundaryTrace, pair: ContactState, pairs: Sequence[ContactState]
+) -> tuple[Array, Mask]:
+    """Pressure and state of the points at the nodes of each segment of the secondary.
+
+    Where the point is another pair's, as between two primaries, that one's.
+
+    Parameters
+    ----------
+    boundary : BoundaryTrace
+        The boundary.
+    pair : ContactState
+        Of m points on k segments.
+    pairs : sequence of ContactState
+        All of the problem.
+
+    Returns
+    -------
+    pressure : ndarray (k, order + 1)
+        Force over weight, a force per area; NaN without a point, at an end of Gamma_K on Gamma_u.
+    active : ndarray of bool (k, order + 1)
+        Whether it is in contact; without a point true.
+    """
+    line = pair.line
+    pressure = np.append(pair.pressure, np.nan)[line.rows]
+    active = np.append(pair.active, True)[line.rows]
+    nodes, (segment, s) = boundary.nodes[line.segments].ravel(), boundary.at_nodes(line.segments)
+    for other in pairs if (line.rows < 0).any() else ():
+        at = np.flatnonzero(np.isnan(pressure).ravel() & np.isin(nodes, other.line.node))
+        if other is pair or at.size == 0:
+            continue
+        d = boundary.exact_normal(segment[at], s[at])
+        if line.contact.direction is not None:
+            d[:] = line.contact.direction
+        # At a corner the point whose direction is the nearer one.
+        alike = np.where(nodes[at, None] == other.line.node, d @ other.line.direction.T, -1.0)
+        best, same = alike.argmax(axis=1), alike.max(axis=1) > ALIKE
+        pressure.ravel()[at[same]] = other.pressure[best[same]]
+        active.ravel()[at[same]] = other.active[best[same]]
+    return pressure, active
+
+
+def pressure_on_segments(values: Array, order: int) -> Array:
+    """Nodal values (k, order + 1) of pi_h on each segment of the secondary.
+
+    At a node without a value, NaN, what the polynomial through the segment's other nodes has there;
+    0 where there are none.
+
+    Parameters
+    ----------
+    values : ndarray (k, order + 1)
+        Pressures at the nodes.
+    order : int
+        Degree of pi_h.
+    """
+    nodes, missing = gauss_lobatto(order), np.isnan(values)
+    values = np.where(missing, 0.0, values)
+    for k in np.flatnonzero(missing.any(axis=1) & ~missing.all(axis=1)):
+        known = ~missing[k]
+        degree = known.sum() - 1
+        scaled = None if degree else (0, 1)  # one node spans no interval, which old NumPy asks
+        fit = np.polynomial.Polynomial.fit(nodes[known], values[k, known], degree, scaled)
+        values[k, missing[k]] = fit(nodes[missing[k]])
+    return values
+
+
+def _side(solution: ScaledSolution, points: FacingPoints, pressure: Array, *, own: bool) -> _Side:
+    """The tractions of the secondary, or those of the primary; `pressure` (k,) is pi_h or -pi_h."""
+    boundary, d = solution.boundary, points.direction
+    segment, s = (points.segment, points.s) if own else (points.facing, points.facing_s)
+    stretch, element = points.stretch[0 if own else 1], boundary.element[segment]
+    t = np.stack([solution.traction(segment, s), boundary.normal(segment, s)], axis=2)
+    t *= stretch[:, None, None]
+    along = np.einsum("kij,ki->kj", t, d)
+    across = t - d[:, :, None] * along[:, None, :]
+    along[:, 0] += pressure
+    return _Side(
+        segment=segment,
+        s=s,
+        element=element,
+        weight=solution.edge_weight[element] * points.weight / stretch,
+        stiffness=solution.mu[element] / solution.diameter[element],
+        along=along,
+        across=across,
+    )
+
+
+def _tangential(side: _Side) -> BoundaryResidual:
+    """The traction across the direction of contact: no friction."""
+    share = PressureShare(np.arange(len(side.s)), side.segment, side.s, side.across[..., 1])
+    return BoundaryResidual("tangential", side.element, side.weight, side.across[..., 0], [share])
+
+
+def _normal(
+    sides: list[_Side], pressure: Array, full: Mask, bilateral: bool
+) -> list[BoundaryResidual]:
+    """The traction along it plus the positive part of pi_h; in contact half the jump.
+
+    Any pressure that is not negative may stand for pi_h, by which the estimate compares both sides:
+    where a segment is in contact with all its nodes that is the mean of both tractions, and the
+    stiffer body takes up the difference. `pressure` and `full` (k,) are at all points.
+    """
+    own, other = sides[0], sides[-1]
+    tension = np.zeros_like(pressure) if bilateral else np.maximum(-pressure, 0)
+    signs = (1, -1)[: len(sides)]
+    if len(sides) == 1:
+        full = np.zeros_like(full)
+    elif not bilateral:
+        full = full & (pressure + (other.along[:, 0] - own.along[:, 0]) / 2 >= 0)
+    at, least = np.flatnonzero(full), np.min([side.weight for side in sides], axis=0)
+    residuals = []
+    for side, opposite, sign in zip(sides, sides[::-1], signs, strict=True):
+        value = side.along.copy()
+        value[:, 0] += sign * tension
+        value[at] = side.along[at] / 2
+        value[at, 0] += opposite.along[at, 0] / 2
+        factor = opposite.along[at, 1:] / 2
+        shares = [
+            PressureShare(at, opposite.segment[at], opposite.s[at], factor),
+            PressureShare(np.arange(len(side.s)), side.segment, side.s, value[:, 1:]),
+        ]
+        weight = np.where(full, least, side.weight)
+        residuals.append(BoundaryResidual("pressure", side.element, weight, value[:, :1], shares))
+    return residuals
+
+
+def _gap_squares(
+    solution: ScaledSolution,
+    line: ContactLine,
+    points: FacingPoints,
+    state: tuple[Array, Mask, Array],
+) -> tuple[Array, Array]:
+    """Squares (k,) of complementarity and of penetration, per unit of s or eta.
+
+    `state` are the pressure, whether all nodes of the segment are in contact, and the stiffness of
+    the softer body, (k,) each.
+    """
+    boundary, contact = solution.boundary, line.contact
+    pressure, full, stiffness = state
+    u = boundary.evaluate(solution.displacement, points.segment, points.s)
+    noise = np.full(len(points.s), GAP_NOISE * np.abs(u).max())
+    if contact.gap is None:
+        noise[points.distance != 0] += GAP_NOISE * np.abs(points.position).max()
+    if contact.primary is not None:
+        u -= boundary.evaluate(solution.displacement, points.facing, points.facing_s)
+    gap = points.distance - (u * points.direction).sum(axis=1)
+    gap[np.abs(gap) <= noise] = 0.0  # its root counts: 1e-16 would be an estimate of 1e-8
+    gap /= solution.strain
+    opening, depth = np.maximum(gap, 0), np.minimum(gap, 0)
+    if contact.bilateral:  # Remark 3.3: apart is as wrong as overlapping, and any force is right
+        return np.zeros_like(gap), _cost(solution, points, gap, stiffness)
+    closed = np.maximum(pressure, 0) * opening  # (3.12), (3.12')
+    closing = np.minimum(closed, _cost(solution, points, opening, stiffness))
+    # (3.9), (3.9')
+    return np.where(full, closing, closed), _cost(solution, points, depth, stiffness)
+
+
+def _cost(solution: ScaledSolution, points: FacingPoints, gap: Array, stiffness: Array) -> Array:
+    """Energy (k,) that closes a `gap` (k,), per unit of s or eta: mu / l |gap|^2.
+
+    l is the element's diameter h, or the length |gap| / |d_s gap| in which it changes on the
+    segment where that is shorter.
+    """
+    size = len(solution.boundary.region)
+    energy = np.bincount(points.segment, points.weight * gap**2, size)
+    same = points.segment[1:] == points.segment[:-1]
+    slope = np.diff(gap) ** 2
+    if not slope.any():
+        return stiffness * gap**2
+    apart = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
+    square = np.divide(slope, apart, out=np.zeros_like(slope), where=same & (apart > 0))
+    steep = np.bincount(points.segment[1:], square, size)
+    h = solution.diameter[solution.boundary.element]
+    short = h * np.sqrt(np.divide(steep, energy, out=np.zeros(size), where=energy > 0))
+    return stiffness * gap**2 * np.maximum(short, 1)[points.segment]
