@@ -1,7 +1,9 @@
 """Errors against exact solutions under uniform refinement, every discrete problem of the paper.
 
-Prints, for each case, element and order: unknowns, relative energy-norm error, rate in h, Newton
-steps and the worst residual of the discrete identities.
+Prints, for each case, element and order: unknowns, relative error, rate in h, Newton steps and the
+worst residual of the discrete identities; then the rate beside the one to expect. Errors are those
+of stresses, in the energy norm, or of displacements in the norm of H^1 where the paper has that.
+docs/convergence.md says why which rate.
 
     python -m drivers.convergence
     python -m drivers.convergence S1 S9 --levels 4
@@ -18,13 +20,16 @@ import ngsolve as ng
 import numpy as np
 
 from drivers.command_line import Count, run
-from drivers.reference import cases
+from drivers.reference import cases, paper
 from drivers.reference.cases import Case
 from drivers.reference.curved import Rings
-from drivers.reference.straight import relative_energy_error
+from drivers.reference.norms import relative_h1_error
+from drivers.reference.straight import Exact, relative_energy_error
 from ngcontact import Solution, solve
 from ngcontact.adaptivity import refined
 from ngcontact.mesh import first_mesh
+
+Norm: TypeAlias = Callable[[Solution, Exact], float]
 
 
 @dataclass(frozen=True)
@@ -35,7 +40,7 @@ class Level:
     ----------
     unknowns : int
     error : float
-        Relative error in the energy norm.
+        Relative error, in the energy norm unless the table says another.
     rate : float
         Exponent of the mesh size since the level before.
     steps : int
@@ -82,14 +87,20 @@ def identities(solution: Solution) -> float:
 
 
 def study(
-    case: Case, *, order: int, element: str = "isoparametric", maxh: float, levels: int
+    case: Case,
+    *,
+    order: int,
+    element: str = "isoparametric",
+    maxh: float,
+    levels: int,
+    norm: Norm = relative_energy_error,
 ) -> Iterator[tuple[Solution, Level]]:
     """Solve on uniformly refined meshes; yield each solution with its row of the table."""
     mesh = first_mesh(case.problem, maxh)
     previous = math.nan
     for _ in range(levels):
         solution = solve(case.problem, mesh, order=order, element=element)
-        error = relative_energy_error(solution, case.exact)
+        error = norm(solution, case.exact)
         unknowns = solution.displacement.space.ndof
         rate = math.log2(previous / error)  # every refinement halves the mesh size
         previous = error
@@ -105,30 +116,119 @@ def mean_rate(rows: Sequence[Level], levels: int = 3) -> float:
     return float(-np.polyfit(np.arange(len(errors)), errors, 1)[0])
 
 
-Part: TypeAlias = Literal["patch", "S1", "S3", "S7", "S8", "S9"]
+@dataclass(frozen=True)
+class Run:
+    """Element, order and size of the first mesh of one study, and the rate to expect of it."""
+
+    element: str
+    order: int
+    maxh: float
+    expected: float
+
+
+@dataclass(frozen=True)
+class Table:
+    """A case with its studies.
+
+    Attributes
+    ----------
+    title : str
+    case : callable
+        Makes the `Case`.
+    runs : tuple of Run
+    norm : callable
+        Relative error of a solution against the exact one.
+    """
+
+    title: str
+    case: Callable[[], Case]
+    runs: tuple[Run, ...]
+    norm: Norm = relative_energy_error
+
+
+Part: TypeAlias = Literal[
+    "patch",
+    "S1",
+    "S3",
+    "S7",
+    "S8",
+    "S9",
+    "polygon",
+    "circle",
+    "remark 3.3",
+    "remark 3.7",
+    "theorem 3.2",
+    "theorem 3.3",
+    "theorem 3.5",
+]
 LEVELS = 5  # of order 1, one less at order 2: about 30k unknowns at the end
 
-# Title and case; element, order, size of the first mesh.
-STRAIGHT = [("isoparametric", 1, 0.28), ("isoparametric", 2, 0.28)]
-TABLES: dict[Part, tuple[str, Callable[[], Case], list[tuple[str, int, float]]]] = {
-    "S1": ("S1 one transition", cases.one_transition, STRAIGHT),
-    "S3": ("S3 Hertz, a = 0.3", cases.hertz_contact, STRAIGHT),
-    "S7": ("S7 clamped transition", cases.clamped_transition, STRAIGHT),
-    "S8": (
+ISO, SUPER, PHYSICAL = "isoparametric", "superparametric", "physical"
+TABLES: dict[Part, Table] = {
+    "S1": Table(
+        "S1 one transition",
+        cases.one_transition,
+        (Run(ISO, 1, 0.28, 1.0), Run(ISO, 2, 0.28, 1.5)),
+    ),
+    "S3": Table(
+        "S3 Hertz, a = 0.3",
+        cases.hertz_contact,
+        (Run(ISO, 1, 0.28, 1.0), Run(ISO, 2, 0.28, 1.5)),
+    ),
+    "S7": Table(
+        "S7 data of the paper: Gamma_u above, Gamma_0 below",
+        cases.guided_transition,
+        (Run(ISO, 1, 0.28, 1.0), Run(ISO, 2, 0.28, 1.5)),
+    ),
+    "S8": Table(
         "S8 curved lines",
         cases.curved_lines,
-        [("superparametric", 1, 0.16), ("isoparametric", 1, 0.16)],
+        (Run(SUPER, 1, 0.16, 1.0), Run(ISO, 1, 0.16, 1.0)),
     ),
-    "S9": (
+    "S9": Table(
         "S9 rings, q_n = 0.3",
         cases.ring_in_ring,
-        [("physical", 1, 0.24), ("isoparametric", 1, 0.24), ("isoparametric", 2, 0.24)],
+        (Run(PHYSICAL, 1, 0.24, 1.0), Run(ISO, 1, 0.24, 1.0), Run(ISO, 2, 0.3, 2.0)),
+    ),
+    "polygon": Table("three sides of a polygon", paper.polygonal_zone, (Run(ISO, 1, 0.24, 1.0),)),
+    "circle": Table(
+        "uniform stress across a circle",
+        paper.circular_patch,
+        (Run(SUPER, 1, 0.24, 1.5), Run(PHYSICAL, 1, 0.24, 1.5)),
+    ),
+    "remark 3.3": Table(
+        "bilateral part, H1 norm",
+        paper.bilateral_part,
+        (Run(ISO, 1, 0.24, 1.0),),
+        relative_h1_error,
+    ),
+    "remark 3.7": Table(
+        "S7 held by Gamma_0 alone, H1 norm",
+        cases.guided_transition,
+        (Run(ISO, 1, 0.28, 1.0),),
+        relative_h1_error,
+    ),
+    "theorem 3.2": Table(
+        "zone between slits, u ~ r^(1/2)",
+        paper.slit_blocks,
+        (Run(ISO, 1, 0.28, 0.5), Run(ISO, 2, 0.28, 0.5)),
+    ),
+    "theorem 3.3": Table(
+        "rings that part",
+        paper.opening_ring,
+        (Run(PHYSICAL, 1, 0.24, 1.0), Run(ISO, 1, 0.24, 1.0)),
+    ),
+    "theorem 3.5": Table(
+        "end of a guide, u ~ r^(1/2)",
+        paper.end_of_guide,
+        (Run(ISO, 1, 0.2, 0.5), Run(ISO, 2, 0.28, 0.5)),
     ),
 }
 PATCHES: dict[str, tuple[Callable[[], Case], int]] = {
     "S6 constant pressure": (cases.pressure_patch, 1),
     "S6 linear pressure": (lambda: cases.pressure_patch(p1=0.5), 2),
     "polygonal line, -p I": (cases.polygonal_patch, 1),
+    "circle, -p I": (paper.circular_patch, 1),
 }
 
 
@@ -146,21 +246,28 @@ def print_patches() -> dict[str, list[Level]]:
     return found
 
 
-def print_table(
-    title: str, case: Case, order: int, element: str, maxh: float, levels: int
-) -> list[Level]:
+def print_table(title: str, table: Table, one: Run, levels: int) -> list[Level]:
     """Print the rows of one study as they come, then its mean rate and, of rings, P0 and Pn."""
     print(f"\n{title}")
     print("unknowns  error      rate  steps  identities")
     rows = []
-    for solved, row in study(case, order=order, element=element, maxh=maxh, levels=levels):
+    case = table.case()
+    levels_of = study(
+        case,
+        order=one.order,
+        element=one.element,
+        maxh=one.maxh,
+        levels=levels,
+        norm=table.norm,
+    )
+    for solved, row in levels_of:
         solution = solved
         rows.append(row)
         print(
             f"{row.unknowns:8d}  {row.error:.3e}  {row.rate:4.2f}  {row.steps:5d}  "
             f"{row.identities:.1e}"
         )
-    print(f"rate of the last three levels: {mean_rate(rows):.2f}")
+    print(f"rate of the last three levels: {mean_rate(rows):.2f}, to expect: {one.expected:g}")
     if isinstance(case.exact, Rings):
         mean, amplitude = cases.harmonics(solution, radius=1.0, n=2)
         print(
@@ -175,8 +282,8 @@ def main(
 ) -> dict[str, list[Level]]:
     """Errors against exact solutions under uniform refinement, one table a problem and element.
 
-    Prints unknowns, relative error in the energy norm, its rate in the mesh size, Newton steps and
-    the worst residual of identities that hold on every mesh.
+    Prints unknowns, relative error (energy norm of the stress, or H1), its rate in the mesh size,
+    Newton steps and the worst residual of identities that hold on every mesh.
 
     Parameters
     ----------
@@ -195,11 +302,10 @@ def main(
         if part == "patch":
             found |= print_patches()
             continue
-        name, make, runs = TABLES[part]
-        for element, order, maxh in runs:
-            title = f"{name}, {element}, order {order}"
-            count = max(1, levels + 1 - order)
-            found[title] = print_table(title, make(), order, element, maxh, count)
+        table = TABLES[part]
+        for one in table.runs:
+            title = f"{table.title}, {one.element}, order {one.order}"
+            found[title] = print_table(title, table, one, max(1, levels + 1 - one.order))
     return found
 
 

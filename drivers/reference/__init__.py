@@ -1,5 +1,7 @@
 """Exact solutions, and the contact problems whose solutions they are.
 
 `westergaard` holds the fields of half-planes, `straight` and `curved` the solutions of two bodies
-that meet on straight and on curved lines, `cases` the problems, ready to solve.
+that meet on straight and on curved lines, `manufactured` those on a polygon and a circle,
+`singular` those outside of H^2; `norms` measures in H^1. `cases` are the problems, ready to solve,
+`paper` those that stand for one theorem or remark each.
 """

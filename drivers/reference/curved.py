@@ -15,8 +15,9 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.reference.manufactured import equilibrated
 from drivers.reference.straight import NO_FORCE, Exact, Profile, compiled, positive
-from drivers.reference.westergaard import CF, hooke, moduli
+from drivers.reference.westergaard import CF, moduli
 
 if TYPE_CHECKING:
     from ngcontact.problem import Elastic
@@ -38,12 +39,6 @@ class Rings(Exact):
 
     P0: float
     Pn: float
-
-
-def _gradient(u: CF) -> CF:
-    """Gradient (2, 2) of a displacement given in x and y, row i the gradient of component i."""
-    columns = (u.Diff(ng.x), u.Diff(ng.y))
-    return ng.CF((columns[0][0], columns[1][0], columns[0][1], columns[1][1]), dims=(2, 2))
 
 
 def _parabola(radius: float) -> tuple[Profile, Profile]:
@@ -83,20 +78,16 @@ def curved(
     heights = {"lower": bow * x * x}
     # The gap is eps + u'_y - u''_y: zero in contact, HH81 (3.12'), and as prescribed outside of it.
     heights["upper"] = heights["lower"] - eps + opening * outside * outside * outside
-    displacement, stress, force = {}, {}, {}
+    displacement = {}
     for body, material in (("upper", upper), ("lower", lower)):
         f, height = x * x / (2 * signed[body]), heights[body]
         slope = ng.CF(
             _slope_off_curve(material, x / signed[body], height.Diff(x), pressure * inside * inside)
         )
         displacement[body] = ng.CF((0.0, height)) + (y - f) * slope
-        stress[body] = hooke(material, _gradient(displacement[body]))
-        force[body] = -(stress[body].Diff(x)[0, :] + stress[body].Diff(y)[1, :])
     graphs = {body: _parabola(radius) for body, radius in signed.items()}
     return Curved(
-        compiled(displacement),
-        compiled(stress),
-        compiled(force),
+        *equilibrated(displacement, {"upper": upper, "lower": lower}),
         pressure=lambda s: pressure * np.maximum(a**2 - np.asarray(s, float) ** 2, 0) ** 2,
         gap=lambda s: opening * np.maximum(np.asarray(s, float) ** 2 - a**2, 0) ** 3,
         initial_gap=eps,

@@ -17,6 +17,7 @@ always that of the body asked for. Any consistent units.
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
 import ngsolve as ng
@@ -47,11 +48,15 @@ class Field(NamedTuple):
 
 
 class Potential(NamedTuple):
-    """Real and imaginary parts of Z, of Y Z' and of the integral W of Z, at z = x + i Y."""
+    """Real and imaginary parts of Z, of Y Z' and of the integral W of Z, at z = x + i Y.
+
+    And of Y Z, where Z is unbounded and Y times Z would be no number.
+    """
 
     Z: tuple[CF, CF]
     YdZ: tuple[CF, CF]
     W: tuple[CF, CF]
+    YZ: tuple[CF, CF] | None = None
 
 
 def moduli(material: Elastic) -> Moduli:
@@ -81,9 +86,10 @@ def depth(body: str) -> CF:
 def half_plane(potential: Potential, material: Elastic, body: str) -> Field:
     """Field of Z in one body; the lower one is the mirror image of the upper one."""
     side, Y, m = SIDES[body], depth(body), moduli(material)
-    (zr, zi), (dr, di), (wr, wi) = potential
+    (zr, zi), (dr, di), (wr, wi) = potential.Z, potential.YdZ, potential.W
+    yr, yi = potential.YZ or (Y * zr, Y * zi)
     plus, minus, scale = (m.kappa + 1) / 2, (m.kappa - 1) / 2, 1 / (2 * m.mu)
-    u = (minus * wr - Y * zi, side * (plus * wi - Y * zr))
+    u = (minus * wr - yi, side * (plus * wi - yr))
     # From W' = Z and the Cauchy-Riemann equations: d/dY of Re and Im is -Im' and +Re'.
     grad = (minus * zr - di, side * (-plus * zi - dr), side * (plus * zi - dr), minus * zr + di)
     return Field(scale * ng.CF(u), scale * ng.CF(grad, dims=(2, 2)))
@@ -103,10 +109,11 @@ def root_potential(c: float, body: str) -> Potential:
 
 
 def hertz_potential(k: float, a: float, body: str) -> Potential:
-    """Z = i k (w - z), w = sqrt(z^2 - a^2), W = i k (z w - a^2 log((z + w)/a) - z^2) / 2.
+    """Z = i k (w - z), w = sqrt(z^2 - a^2), W = i k (z w - a^2 log((z + w)/(i a)) - z^2) / 2.
 
     With polar coordinates (r1, t1) about a and (r2, t2) about -a, w is sqrt(r1 r2) times
     exp(i (t1 + t2)/2), and Y / |w| = sqrt(sin(t1) sin(t2)) is regular at both ends.
+    The i in the logarithm makes u_x odd in x.
     """
     x, Y = ng.x, depth(body)
     r1, r2 = (ng.sqrt((x - s) * (x - s) + Y * Y) for s in (a, -a))
@@ -115,7 +122,7 @@ def hertz_potential(k: float, a: float, body: str) -> Potential:
     wr, wi = rho * cos, rho * sin
     slope = ng.sqrt(ng.sin(t1) * ng.sin(t2))
     modulus = 0.5 * ng.log(((x + wr) * (x + wr) + (Y + wi) * (Y + wi)) / a**2)
-    argument = ng.atan2(Y + wi, x + wr)
+    argument = ng.atan2(Y + wi, x + wr) - math.pi / 2
     return Potential(
         Z=(k * (Y - wi), k * (wr - x)),
         YdZ=(k * slope * (x * sin - Y * cos), k * (slope * (x * cos + Y * sin) - Y)),

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import get_args
 
+import ngsolve as ng
 import numpy as np
 import pytest
 
 from drivers import convergence
 from drivers.convergence import PATCHES, TABLES, Part, mean_rate, study
-from drivers.reference import cases
+from drivers.reference import cases, paper
 
 # Residuals of identities that hold exactly: required 1e-10, measured below 4e-13 at 31k unknowns.
 IDENTITIES = 1e-10
@@ -49,10 +50,91 @@ def test_straight_lines(make, order, levels, unknowns, reference, rate, band):
     assert max(row.identities for row in rows) < IDENTITIES
 
 
-def test_data_exactly_as_in_the_paper():
-    _, rows = rows_of(cases.clamped_transition(), order=1, maxh=0.28, levels=4)
-    assert abs(rows[-1].rate - 1) <= 0.05
+# The table, sizes of first mesh and levels for a test, and how far rates may lie from what the
+# theorem or the regularity gives (docs/convergence.md): required 0.05 in the driver, where they do.
+@pytest.mark.parametrize(
+    ("part", "run", "maxh", "levels"),
+    [
+        ("S7", 0, 0.28, 4),  # a body on Gamma_0 only: 1.00
+        ("remark 3.3", 0, 0.12, 3),  # 0.96
+        ("remark 3.7", 0, 0.28, 4),  # 1.00
+        ("polygon", 0, 0.08, 3),  # 0.95
+        ("circle", 0, 0.24, 4),  # 1.54
+        ("circle", 1, 0.24, 4),  # 1.50
+        ("theorem 3.2", 0, 0.28, 4),  # 0.51
+        ("theorem 3.2", 1, 0.28, 3),  # 0.51
+        ("theorem 3.3", 0, 0.24, 4),  # 1.00
+        ("theorem 3.3", 1, 0.24, 4),  # 1.00
+        ("theorem 3.5", 1, 0.28, 3),  # 0.53
+    ],
+)
+def test_theorems_and_remarks(part, run, maxh, levels):
+    table = TABLES[part]
+    one = table.runs[run]
+    _, rows = rows_of(
+        table.case(),
+        order=one.order,
+        element=one.element,
+        maxh=maxh,
+        levels=levels,
+        norm=table.norm,
+    )
+    assert abs(rows[-1].rate - one.expected) <= 0.05
     assert max(row.identities for row in rows) < IDENTITIES
+
+
+def test_body_on_gamma_0_only():
+    """Data exactly as in the paper: homogeneous, semicoercive; the lower body slides freely."""
+    case = cases.guided_transition()
+    assert list(case.problem.displacement) == ["top"]
+    solutions, _ = rows_of(case, order=1, maxh=0.28, levels=2)
+    [motion] = solutions[-1].free_motions
+    assert motion.bodies == ("lower",)
+    mesh = solutions[-1].mesh
+    boundary = mesh.Materials("lower").Boundaries()
+    along, length = ng.Integrate(ng.CF((solutions[-1].displacement[0], 1)), boundary)
+    size = np.abs(solutions[-1].displacement.vec.FV().NumPy()).max()
+    assert abs(along) < 1e-13 * size * length  # p(u_h) = 0, Remark 3.7
+
+
+def test_tension_on_the_bilateral_part_only():
+    solutions, _ = rows_of(paper.bilateral_part(), order=1, maxh=0.14, levels=2)
+    solution = solutions[-1]
+    exact = paper.bilateral_part().exact
+    held, free = solution.pair == 0, solution.pair == 1
+    assert solution.pressure[held].min() < -0.7  # exactly -1
+    assert solution.pressure[free].min() >= 0
+    assert not solution.free_motions
+    # At corners the split between both rows of a node is a difference of forces.
+    middle = np.abs(np.abs(solution.points[:, 0]) - 0.65) < 0.2
+    error = solution.pressure - exact.pressure(solution.points[:, 0])
+    assert np.abs(error[middle]).max() < 0.2  # of pressures from -1 to 1; measured 0.154
+
+
+def test_zone_that_parts_on_a_circle():
+    """Two ends of contact and the pressure of a unilateral zone that K_h does not lie in."""
+    case = paper.opening_ring()
+    solutions, _ = rows_of(case, order=1, element="physical", maxh=0.24, levels=4)
+    solution = solutions[-1]
+    assert len(solution.transitions()) == 2
+    assert solution.pressure.min() >= 0
+    angle = np.arctan2(solution.points[:, 1], solution.points[:, 0])
+    error = np.abs(solution.pressure - case.exact.pressure(angle)).max()
+    assert error < 0.05 * case.exact.pressure(0.0)
+
+
+def test_zlamals_and_the_isoparametric_element_differ():
+    """Uniform stress across a circle: straight triangles have it exactly, (2.8) only nearly.
+
+    Linear functions of x are not in (2.8) on curved elements: |grad| h there, on a strip as wide
+    as h, which is h^(3/2) in all.
+    """
+    errors = {}
+    for element in ("isoparametric", "superparametric", "physical"):
+        _, rows = rows_of(paper.circular_patch(), order=1, element=element, maxh=0.24, levels=2)
+        errors[element] = rows[-1].error
+    assert errors["isoparametric"] < 1e-11  # round-off
+    assert 1e-3 < errors["physical"] < errors["superparametric"] < 1e-2
 
 
 def test_both_lines_curved():
@@ -111,7 +193,7 @@ def test_driver_prints_every_table(capsys):
         assert title in printed
         assert len(rows) == (2 if "order 1" in title else 1)
     assert set(PATCHES) <= set(found)
-    assert len(found) == len(PATCHES) + sum(len(runs) for *_, runs in TABLES.values())
+    assert len(found) == len(PATCHES) + sum(len(table.runs) for table in TABLES.values())
     assert "P2" in printed
 
 

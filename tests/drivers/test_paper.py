@@ -1,0 +1,197 @@
+"""Exact solutions of single theorems and remarks: elasticity, contact conditions, boundary data."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from ngsolve.meshes import MakeStructured2DMesh
+
+from drivers.reference import cases, paper
+from drivers.reference.manufactured import Bump, circular, equilibrated, polygonal
+from drivers.reference.norms import relative_h1_error
+from drivers.reference.singular import slits
+from drivers.reference.straight import hertz
+from ngcontact import Elastic, solve
+
+FIRST, SECOND = cases.FIRST, cases.SECOND
+
+# Solution, materials, and per body a box (x0, x1, y0, y1) in which it holds.
+HALVES = {"upper": (-1, 1, 0.01, 1), "lower": (-1, 1, -1, -0.01)}
+CASES = {
+    "polygonal": (paper.polygonal_zone().exact, {"upper": FIRST, "lower": paper.ALIKE}, HALVES),
+    "bilateral": (paper.bilateral_part().exact, {"upper": FIRST, "lower": paper.ALIKE}, HALVES),
+    "circular": (
+        paper.opening_ring().exact,
+        {"outer": FIRST, "inner": SECOND},
+        {"outer": (0.75, 1.4, 0.75, 1.4), "inner": (0.36, 0.7, 0.36, 0.7)},
+    ),
+    "slits": (paper.slit_blocks().exact, cases.BLOCKS, HALVES),
+    "hertz": (
+        hertz(FIRST, SECOND, radius=5.0, half_width=0.3, plateau=0.5),
+        cases.BLOCKS,
+        HALVES,
+    ),
+}
+BODIES = [(name, body) for name, (_, _, boxes) in CASES.items() for body in boxes]
+
+
+def mesh_of(box):
+    """One quadrilateral."""
+    x0, x1, y0, y1 = box
+    place = lambda s, t: (x0 + (x1 - x0) * s, y0 + (y1 - y0) * t)  # noqa: E731
+    return MakeStructured2DMesh(quads=True, nx=1, ny=1, mapping=place)
+
+
+def at(field, box, x, y):
+    """Values at points of a box: (points,) + the shape of the field."""
+    mesh = mesh_of(box)
+    values = np.asarray(field(mesh(np.asarray(x, float), np.asarray(y, float))))
+    return values.reshape(np.size(x), *field.dims)
+
+
+@pytest.mark.parametrize(("name", "body"), BODIES)
+def test_stress_and_force_follow_from_the_displacement(name, body):
+    """Against NGSolve's derivatives of the displacement; the formulas were derived by hand."""
+    exact, materials, boxes = CASES[name]
+    x0, x1, y0, y1 = box = boxes[body]
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform(x0, x1, 400), rng.uniform(y0, y1, 400)
+    _, stress, force = (
+        at(f[body], box, x, y) for f in equilibrated({body: exact.displacement[body]}, materials)
+    )
+    found, size = at(exact.stress[body], box, x, y), np.abs(stress).max()
+    np.testing.assert_allclose(found, stress, rtol=0, atol=1e-12 * size)  # round-off
+    found = at(exact.force[body], box, x, y)
+    # round-off; next to a slit's end, 0.01 away, that of a second derivative of r^(1/2)
+    scale = max(np.abs(force).max(), 1e3 * size)
+    np.testing.assert_allclose(found, force, rtol=0, atol=1e-11 * scale)
+
+
+def on_side(start, end, n=41):
+    """Points (n, 2) of a side, without its ends, and its unit tangent."""
+    t = np.linspace(0, 1, n + 2)[1:-1, None]
+    start, end = np.asarray(start), np.asarray(end)
+    return start + t * (end - start), (end - start) / math.dist(start, end)
+
+
+@pytest.mark.parametrize("make", [paper.polygonal_zone, paper.bilateral_part])
+def test_conditions_on_a_polygonal_line(make):
+    exact = make().exact
+    box, opened = (-1.1, 1.1, -1.1, 1.1), 0
+    for start, end in zip(paper.LINE[:-1], paper.LINE[1:], strict=True):
+        points, tangent = on_side(start, end)
+        x, y = points.T
+        normal = np.array([tangent[1], -tangent[0]])  # n' points down
+        p, gap = exact.pressure(x), exact.gap(x)
+        assert (gap >= 0).all()
+        assert np.abs(p * gap).max() < 1e-15
+        opened += (gap > 0).sum()
+        jump = 0.0
+        for body, sign in (("upper", 1), ("lower", -1)):
+            traction = at(exact.stress[body], box, x, y) @ normal
+            # (3.10), (3.11): round-off
+            np.testing.assert_allclose(traction, -p[:, None] * normal, rtol=0, atol=1e-13)
+            jump = jump + sign * at(exact.displacement[body], box, x, y) @ normal
+        np.testing.assert_allclose(jump, -gap, rtol=0, atol=1e-15)  # (3.9)
+    assert opened > 10
+    # Tension: on the bilateral part alone.
+    pressures = exact.pressure(np.linspace(-1, 1, 401))
+    assert (pressures.min() < -0.9) == (make is paper.bilateral_part)
+    assert pressures.min() >= (-1.001 if make is paper.bilateral_part else 0)
+
+
+def test_conditions_on_a_circle():
+    exact = paper.opening_ring().exact
+    theta = np.linspace(0, math.pi / 2, 61)
+    e = np.transpose([np.cos(theta), np.sin(theta)])
+    box = (-0.1, 2.1, -0.1, 2.1)
+    p, gap = exact.pressure(theta), exact.gap(theta)
+    assert (p >= 0).all()
+    assert (gap >= 0).all()
+    assert (p * gap == 0).all()
+    assert p.max() > 0
+    assert gap.max() > 0.005
+    inside = (theta > exact.ends[0]) & (theta < exact.ends[1])
+    np.testing.assert_array_equal(gap > 0, inside)
+    jump = 0.0
+    for body, sign in (("outer", 1), ("inner", -1)):
+        traction = np.einsum("kij,kj->ki", at(exact.stress[body], box, *e.T), e)
+        np.testing.assert_allclose(traction, -p[:, None] * e, rtol=0, atol=1e-13)
+        jump = jump + sign * np.sum(at(exact.displacement[body], box, *e.T) * e, axis=1)
+        # Guides on both axes: no displacement across, no shear.
+        r = np.linspace(0.5, 2, 16)
+        for x, y, across in ((r, 0 * r, 1), (0 * r, r, 0)):
+            u, s = (at(f[body], box, x, y) for f in (exact.displacement, exact.stress))
+            assert np.abs(u[:, across]).max() < 1e-15
+            assert np.abs(s[:, 0, 1]).max() < 1e-13
+    np.testing.assert_allclose(jump, gap, rtol=0, atol=1e-15)
+    rim = at(exact.displacement["outer"], box, *(2 * e.T))
+    assert np.abs(rim).max() < 1e-15  # clamped
+
+
+def test_slits_are_a_flat_punch_on_each_body():
+    exact, a = slits(FIRST, SECOND, half_width=0.5, force=2.0), 0.5
+    s, w = np.polynomial.chebyshev.chebgauss(20)
+    total = a * np.sum(w * np.sqrt(1 - s**2) * exact.pressure(a * s))
+    assert total == pytest.approx(2.0, rel=1e-14)
+    x = np.linspace(-0.9, 0.9, 12)  # none at the ends of the slits
+    for body, box in (("upper", (-1, 1, 0, 1)), ("lower", (-1, 1, -1, 0))):
+        u, stress = (at(f[body], box, x, 0 * x) for f in (exact.displacement, exact.stress))
+        touching = np.abs(x) < a
+        assert np.abs(u[touching, 1]).max() < 1e-15
+        p = np.zeros(12)
+        p[touching] = exact.pressure(x[touching])
+        np.testing.assert_allclose(stress[:, 1, 1], -p, rtol=0, atol=1e-14)
+        np.testing.assert_allclose(stress[:, 0, 1], 0, atol=1e-14)
+        ends = at(exact.displacement[body], box, [-a, a], [0, 0])
+        assert np.isfinite(ends).all()
+
+
+def test_end_of_a_guide():
+    case = paper.end_of_guide()
+    exact, box = case.exact, (0, 2, -1, 0)
+    u, stress, force = (f["lower"] for f in (exact.displacement, exact.stress, exact.force))
+    size = np.abs(at(stress, box, [1.2], [-1])).max()
+    x = np.linspace(1.05, 2, 20)  # guided
+    assert np.abs(at(u, box, x, 0 * x - 1)[:, 1]).max() < 1e-14
+    assert np.abs(at(stress, box, x, 0 * x - 1)[:, 0, 1]).max() < 1e-13 * size
+    y = np.linspace(-1, 0, 20)  # the axis
+    assert np.abs(at(u, box, 0 * y, y)[:, 0]).max() < 1e-14
+    assert np.abs(at(stress, box, 0 * y, y)[:, 0, 1]).max() < 1e-13 * size
+    # Towards the end: displacements as r^(1/2), stresses as r^(-1/2) but for the free part's
+    # tractions, which vanish as the force stays.
+    for r, power in ((1e-4, 0.5), (1e-6, 0.5)):
+        ahead, behind = (at(stress, box, [1 + sign * r], [-1])[0] for sign in (1, -1))
+        assert ahead[1, 1] * r**power == pytest.approx(0.2, rel=1e-3)
+        assert np.abs(behind[:, 1]).max() * r**power < 1e-3
+        assert np.abs(at(force, box, [1 + r], [-1 + r])).max() < 10
+    top = at(exact.displacement["upper"], (0, 2, 0, 1), [0, 1, 2], [1, 1, 1])
+    assert np.abs(top).max() < 1e-15
+
+
+def test_h1_error_takes_free_translations_off():
+    case = cases.guided_transition()
+    solution = solve(case.problem, maxh=0.28)
+    error = relative_h1_error(solution, case.exact)
+    held = solve(cases.clamped_transition().problem, maxh=0.28)
+    assert len(solution.free_motions) == 1
+    assert len(held.free_motions) == 0
+    # The same field but for the translation and the unknowns on the bottom.
+    assert error == pytest.approx(relative_h1_error(held, case.exact), rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("materials", "half_length", "message"),
+    [((FIRST, SECOND), 0.2, "shrink alike"), ((FIRST, FIRST), 0.6, "half_length = 0.6")],
+)
+def test_polygonal_refuses(materials, half_length, message):
+    with pytest.raises(ValueError, match=message):
+        polygonal(*materials, line=((-0.5, 0), (0.5, 0)), bumps=(Bump(half_length),))
+
+
+def test_circular_keeps_its_ends():
+    exact = circular(FIRST, Elastic(E=2.0, nu=0.1), turn=0.0)
+    assert exact.ends == pytest.approx((math.pi / 8, 3 * math.pi / 8))
+    assert exact.pressure(exact.ends[0]) == pytest.approx(0, abs=1e-30)
