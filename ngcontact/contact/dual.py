@@ -12,8 +12,8 @@ Gee, Wall 2012, SIAM J. Sci. Comput. 34:B421. On Gauss-Lobatto nodes the psi of 
 that face wholly contain the continuous functions of degree p - 1, since the quadrature of these
 nodes is exact to degree 2 p - 1; on others the constants.
 
-Where a segment faces in part, D_e need not be positive at order 2 and above. There the hats of its
-two ends take the place of phi, and the row holds more than one unknown of the secondary.
+Where a segment faces in part, D_e need not be positive from order 2 on: hats of its ends replace
+phi, with more unknowns in a row, but the node's alone on curves: rotations along them close no gap.
 """
 
 from __future__ import annotations
@@ -123,20 +123,24 @@ def _dual_basis(whole: Array, weight: Array, mass: Array, order: int) -> tuple[A
     change : ndarray (k, p + 1, p + 1)
         psi = change phi.
     hats : ndarray of bool (k,)
-        Segments on which psi are those of the hats of the ends.
+        Segments on which psi are those of the hats of the ends, or one constant.
     """
     faces = (mass != 0).any(axis=(1, 2))
-    hats = faces & (weight < LEAST * whole).any(axis=1) & (order > 1)
+    sliver = faces & (weight.sum(axis=1) < LEAST * whole.sum(axis=1))  # one row, at the nearer end
+    hats = faces & ~sliver & (weight < LEAST * whole).any(axis=1) & (order > 1)
     change = np.zeros_like(mass)
-    whole_basis = faces & ~hats
-    change[whole_basis] = weight[whole_basis][:, :, None] * np.linalg.inv(mass[whole_basis])
+    full = faces & ~hats & ~sliver
+    change[full] = weight[full][:, :, None] * np.linalg.inv(mass[full])
     hat = lagrange(1, gauss_lobatto(order)).T  # in terms of phi: their values at its nodes
     D = weight[hats] @ hat.T
     ends = np.flatnonzero(hats)[:, None], np.array([[0, order]])
     change[ends] = D[:, :, None] * (np.linalg.inv(hat @ mass[hats] @ hat.T) @ hat)
-    weight = np.where(hats[:, None], 0.0, weight)
-    weight[ends] = D
-    return weight, change, hats
+    share = weight[sliver].sum(axis=1)
+    end = np.flatnonzero(sliver), order * (weight[sliver] @ hat.T @ [-1, 1] > SLIVER * share)
+    change[end] = 1.0
+    weight = np.where((hats | sliver)[:, None], 0.0, weight)
+    weight[ends], weight[end] = D, share
+    return weight, change, hats | sliver
 
 
 def _integrals(
@@ -153,9 +157,8 @@ def _integrals(
     d = _rays(trace, contact, segment, s)
     across = np.column_stack([-d[:, 1], d[:, 0]])
     s_there = crossings(x, across, trace.curve, facing, np.repeat(pieces.opposite, q))
-    if contact.gap is None:
-        eps = ((at(trace.curve, facing, s_there) - x) * d).sum(axis=1)
-    else:
+    eps = ((at(trace.curve, facing, s_there) - x) * d).sum(axis=1)
+    if contact.gap is not None:
         eps = prescribed_gap(contact, trace, segment, s, x)
     phi, phi_there = (lagrange(p, t).reshape(r, q, p + 1) for t in (s, s_there))
     w, eps = w.reshape(r, q), eps.reshape(r, q)
@@ -166,6 +169,8 @@ def _integrals(
     weight, change, hats = _dual_basis(segment_weights(trace, contact, segments), weight, mass, p)
     facing_part = change[pieces.local] @ np.einsum("rg,rgi,rgj->rij", w, phi, phi_there)
     own_part = change @ mass - weight[:, :, None] * np.eye(p + 1)
+    first, last = (_rays(trace, contact, segments, np.full(k, s)) for s in (0.0, 1.0))
+    hats &= np.abs(last - first).max(axis=1) <= SLIVER  # no turn
     own_part[~hats] = 0.0  # int psi_i phi_j = 0 but for i = j
     blocks = np.concatenate([facing_part, -own_part])
     row = np.concatenate([pieces.local, np.arange(k)])[:, None] * (p + 1) + np.arange(p + 1)

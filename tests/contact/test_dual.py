@@ -12,9 +12,10 @@ from netgen.occ import Compound, OCCGeometry, WorkPlane, Y
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
 from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.contact import contact_line
+from ngcontact.contact import contact_line, joined
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import blocks
+from ngcontact.geometries import blocks, disc_on_block
+from ngcontact.mesh import curve
 from tests.scenes import distance, divided, pressed, solved_with_load
 
 EXACT = 1e-10  # round-off times the condition of small meshes; measured below 2e-12
@@ -94,7 +95,13 @@ def overhanging(upper, lower, start, stop):
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize(
     ("upper", "lower", "start", "stop"),
-    [(4, 3, 0.0, 0.75), (9, 8, 0.12, 0.83), (4, 7, 0.0, 0.6123), (5, 4, 0.0, 0.9999)],
+    [
+        (4, 3, 0.0, 0.75),
+        (9, 8, 0.12, 0.83),
+        (4, 7, 0.0, 0.6123),
+        (5, 4, 0.0, 0.9999),
+        (4, 7, 0.25 - 1e-5, 0.75 + 1e-6),  # of two segments next to nothing faces the block
+    ],
 )
 def test_an_overhanging_secondary_is_exact(order, upper, lower, start, stop):
     """Uniform pressure 1; the same traction on what faces nothing, integrated in parts."""
@@ -111,6 +118,22 @@ def test_an_overhanging_secondary_is_exact(order, upper, lower, start, stop):
     [line] = d.lines
     np.testing.assert_allclose(result.force / line.weight, 1.0, rtol=EXACT)
     assert distance(d, result, u) < EXACT
+
+
+@pytest.mark.parametrize("share", [1e-3, 0.05, 0.3, 0.6])
+def test_a_rotation_of_a_disc_about_its_centre_closes_no_gap(share):
+    """Also where the block ends under a segment of the disc; nodes of order 2 lie on the circle."""
+    count = 9  # segments of a quarter of the circle
+    width = np.tan((3 + share) * np.pi / 2 / count)  # where the normal of a segment ends
+    shape = disc_on_block(radius=1.0, width=width, symmetric=False)
+    mesh = divided(shape, {"disc_arc": count, "block_top": 5}).GenerateMesh(maxh=0.3)
+    trace = boundary_trace(curve(ng.Mesh(mesh), 2, "isoparametric")[0], 2)
+    line = contact_line(trace, Contact("disc_arc", "block_top"))
+    assert line.means.any()
+    motion = np.zeros((2, trace.space.ndof))
+    x = trace.point(*trace.at_nodes(line.segments))
+    motion[:, trace.nodes[line.segments].ravel()] = np.array([1 - x[:, 1], x[:, 0]])
+    assert np.abs(joined([line], trace).matrix() @ motion.ravel()).max() < EXACT
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

@@ -20,7 +20,9 @@ from drivers.stress.scenes.checks.lines import LEAST, Plane, plane, side_rows
 from drivers.stress.scenes.checks.measures import Measures, law
 from drivers.stress.scenes.posing import netgen_mesh
 from drivers.stress.scenes.scene import Pair, Scene
-from drivers.stress.scenes.sides import Array
+from drivers.stress.scenes.sides import Array, Index
+
+BALANCED = 1e-6  # of the largest force; the tolerance of the quadratic program is 1e-10
 
 
 def stiffness(m: Plane) -> tuple[sp.csr_array, Array]:
@@ -120,12 +122,14 @@ def contact_rows(m: Plane) -> tuple[sp.csr_array, Array, list[tuple[tuple[str, i
     return sp.vstack(blocks).tocsr(), np.concatenate(gaps), places
 
 
-def minimised(A: sp.csc_array, f: Array, B: sp.csc_array, g: Array) -> tuple[Array, Array]:
+def minimised(
+    A: sp.csc_array, f: Array, B: sp.csc_array, g: Array, at: Index
+) -> tuple[Array, Array]:
     """Minimiser (n,) of y.A y / 2 - f.y where B y <= g, and multipliers (k,).
 
-    Raises `ArithmeticError` where the solver finds none.
+    The unknowns `at` (r,) hold all bodies, and all that B knows are among them. Raises
+    `ArithmeticError` where the solver finds none.
     """
-    at = np.unique(B.nonzero()[1])
     rest = np.setdiff1d(np.arange(len(f)), at)
     factor = splu(A[rest][:, rest].tocsc())
     across = A[rest][:, at].toarray()
@@ -138,12 +142,14 @@ def minimised(A: sp.csc_array, f: Array, B: sp.csc_array, g: Array) -> tuple[Arr
     y, _, flag, info = daqp.solve(
         H, -h, rows, g / size, primal_tol=1e-10, eps_prox=-1e-6, iter_limit=100_000
     )
-    if flag != 1:
+    force = np.asarray(info["lam"])
+    left = H @ y - h + rows.T @ force  # all terms of size 1, forces balance but for them
+    if flag != 1 or not np.abs(left).max() <= BALANCED * max(1.0, np.abs(force).max(initial=0.0)):
         raise ArithmeticError(f"the quadratic program ended with {flag}")
     result = np.zeros(len(f))
     result[at] = y * size
     result[rest] = inner[:, -1] - inner[:, :-1] @ result[at]
-    return result, np.asarray(info["lam"]) * stiff * size
+    return result, force * stiff * size
 
 
 def reference(scene: Scene, factor: float) -> Measures:
@@ -153,7 +159,10 @@ def reference(scene: Scene, factor: float) -> Measures:
     f = f + tractions(m)
     T, u0 = supported(m)
     B, g, places = contact_rows(m)
-    y, force = minimised((T.T @ A @ T).tocsc(), T.T @ (f - A @ u0), (B @ T).tocsc(), g - B @ u0)
+    node = np.unique(B.nonzero()[1]) // 2  # with both components: no body moves while they rest
+    at = np.unique(T.tocsr()[[*2 * node, *2 * node + 1]].nonzero()[1])
+    K, load = (T.T @ A @ T).tocsc(), T.T @ (f - A @ u0)
+    y, force = minimised(K, load, (B @ T).tocsc(), g - B @ u0, at)
     u = T @ y + u0
     own = [
         np.repeat(np.isin(np.arange(len(m.x)), m.triangles[m.body == k]), 2)
