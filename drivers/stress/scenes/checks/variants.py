@@ -182,14 +182,14 @@ def swapped(case: Case) -> list[Finding]:
         return replace(pair, secondary=pair.primary, primary=pair.secondary, direction=d)
 
     scene = replace(case.scene, pairs=tuple(back(pair) for pair in case.scene.pairs))
-    other = answer(scene)
+    other = answer(scene, case.solution.mesh)
     return close(scene, "swapped", case, other, _there(scene, other))
 
 
 def other_order(case: Case) -> list[Finding]:
-    """The next order."""
+    """The next order on the same mesh."""
     order = case.scene.order + 1 if case.scene.order < 4 else 3
-    other = answer(case.scene, order=order)
+    other = answer(case.scene, case.solution.mesh, order)
     return close(case.scene, f"order {order}", case, other, _there(case.scene, other))
 
 
@@ -215,12 +215,12 @@ def referred(case: Case) -> list[Finding]:
 
 
 CHECKS: tuple[tuple[Callable[[Case], list[Finding]], float], ...] = (
-    (rotated, 0.4),
-    (scaled, 0.3),
-    (renamed, 0.3),
-    (permuted, 0.3),
+    (rotated, 0.3),
+    (scaled, 0.25),
+    (renamed, 0.2),
+    (permuted, 0.25),
     (swapped, 0.4),
     (other_order, 0.4),
-    (refined, 0.3),
-    (referred, 0.3),
+    (refined, 0.25),
+    (referred, 0.25),
 )
