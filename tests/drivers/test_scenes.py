@@ -20,7 +20,7 @@ from drivers.stress.scenes.posing import answer
 from drivers.stress.scenes.scene import Body, Pair, Scene
 from drivers.stress.scenes.sides import Side, scalar, vector
 
-SEEDS = (11, 12, 13, 25, 59, 38, 50, 29, 63, 31, 43)  # every kind and check, soon done
+SEEDS = (11, 12, 13, 25, 59, 38, 6, 29, 63, 31, 43)  # every kind and check, soon done
 WHOLE = 8  # a seed whose scene is solved, has a pair on each flank and opens in part
 P, E, NU = 0.01, (1.0, 3.0), (0.3, 0.2)
 
