@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..arrays import Array, Index, Mask
+from .contact import between_nodes, closing_energy
 from .terms import (
     DATA_BONUS,
     BoundaryResidual,
@@ -16,6 +17,8 @@ from .terms import (
     ScaledSolution,
     Squares,
 )
+
+NOISE = 4e-15  # of displacements along the normal of a guide, relative to the largest
 
 
 def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTerms:
@@ -44,7 +47,8 @@ def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTer
     guided = np.zeros(len(segment), dtype=bool)
     if problem.sliding is not None:  # (3.8): any force along the normal, none across it
         guided = boundary.lies_on(segment, str(problem.sliding))
-        normal = boundary.normal(segment[guided], s[guided])
+        normal = _guiding(solution, segment[guided], s[guided])
+        squares.append(_off_guide(solution, segment[guided], s[guided], ds[guided], normal))
         for vector in (residual, factor):
             along = (vector[guided] * normal).sum(axis=1)
             vector[guided] -= along[:, None] * normal
@@ -80,3 +84,28 @@ def _misses(
         for axis, value in enumerate(components):
             if value is not None:
                 yield axis, at, boundary.evaluate(value, segment[at], s[at])[:, 0] - u[:, axis]
+
+
+def _guiding(solution: ScaledSolution, segment: Index, s: Array) -> Array:
+    """Unit vectors (k, 2) by which Gamma_0 is held at `s` (k,) of segments (k,)."""
+    boundary = solution.boundary
+    segments = boundary.segments(str(solution.problem.sliding))
+    at, at_node = boundary.at_nodes(segments)
+    node = boundary.nodes[segments].ravel()
+    number, normal = boundary.number_points(at, node, boundary.exact_normal(at, at_node))
+    nodal = normal[number].reshape(len(segments), -1, 2)
+    return between_nodes(nodal[np.searchsorted(segments, segment)], s)[0]
+
+
+def _off_guide(
+    solution: ScaledSolution, segment: Index, s: Array, ds: Array, normal: Array
+) -> Squares:
+    """What u_h.n between the nodes of Gamma_0 costs, at points (k,) with weights `ds` (k,)."""
+    boundary, element = solution.boundary, solution.boundary.element[segment]
+    u = boundary.evaluate(solution.displacement, segment, s)
+    miss = (u * normal).sum(axis=1)
+    miss[np.abs(miss) <= NOISE * np.abs(u).max(initial=0.0)] = 0.0
+    stiffness = 2 * solution.rigidity[element] / solution.diameter[element]
+    where = segment, ds, boundary.point(segment, s)
+    cost = closing_energy(solution, where, stiffness, miss / solution.strain)
+    return Squares("displacement", element, ds * cost)

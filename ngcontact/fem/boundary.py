@@ -22,6 +22,7 @@ from ..problem import Triangulation, boundary_mask, triangle_sides
 
 CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two rows at a smaller
 # one would be dependent to 1 / turn^2
+BENT = 1e-12  # distance of a segment from its chord, relative to it, from which it is curved
 CORNER_WITHOUT_CAD = np.deg2rad(30)  # ... and two segments of one name on a mesh without CAD
 
 
@@ -123,6 +124,22 @@ class BoundaryTrace:
     def segments(self, *patterns: str | None) -> Index:
         """Segments (j,) of the boundaries that the patterns select, as in `lies_on`."""
         return np.flatnonzero(self.lies_on(np.arange(len(self.region)), *patterns))
+
+    @cached_property
+    def curved_elements(self) -> Mask:
+        """Elements (ne,) with a curved side."""
+        view = Triangulation(self.mesh)
+        if self.geometry_order == 1:
+            return np.zeros(self.mesh.ne, dtype=bool)
+        ends = self.curve[:, :1], self.curve[:, -1:]
+        nodes = gauss_lobatto(self.geometry_order)[:, None]
+        off = np.abs(self.curve - ends[0] - nodes * (ends[1] - ends[0])).max(axis=(1, 2))
+        bent = off > BENT * self.lengths(np.arange(len(self.curve)))
+        sides = np.sort(triangle_sides(view.triangles), axis=1)
+        low, high = np.sort(view.segments[bent], axis=1).T
+        keys = sides[:, 0] * self.mesh.nv + sides[:, 1]
+        found = np.isin(keys, low * self.mesh.nv + high).reshape(-1, 3)
+        return np.asarray(found.any(axis=1))
 
     @cached_property
     def _mesh_points(self) -> NDArray:

@@ -15,7 +15,7 @@ from ..problem import Problem, Triangulation, varies
 from .boundary import BoundaryTrace
 from .element import node_basis, vector_space
 from .model import model_of
-from .moduli import law_measures, rough_moduli
+from .moduli import constant_measures, law_measures, rough_moduli
 
 LOAD_BONUS = 6  # quadrature orders above the default: loads may be as rough as r^(-1/2)
 
@@ -107,7 +107,7 @@ def assemble(
     for body, law in problem.materials.items():
         stress = model.stress(law.voigt(problem.model), model.strain(u))
         work = model.weighted(ng.InnerProduct(stress, model.strain(v)))  # (3.1)
-        measures = [ng.dx(definedon=mesh.Materials(body))]
+        measures = constant_measures(mesh, body, trace.curved_elements)
         if varies(law):
             measures = law_measures(mesh, body, 2 * trace.order, rough)
         for dx in measures:

@@ -13,7 +13,7 @@ from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.estimator.contact import remaining
 from ngcontact.estimator.contact.facing import between_nodes
 from ngcontact.estimator.terms import Parts
-from ngcontact.geometries import rings
+from ngcontact.geometries import blocks, rings
 from ngcontact.lagrange import gauss_lobatto
 
 LAW = Elastic(E=1.0, nu=0.3)
@@ -150,3 +150,68 @@ def test_a_slip_along_a_curved_zone_is_no_gap(order):
         found.append(solve(problem, maxh=0.4, order=order).relative_error_estimate)
     # Middles of the mesh's curves lie off the circle: measured 7e-4 at order 2, 4e-7 at order 3.
     assert found[1] == pytest.approx(found[0], rel=2e-3)
+
+
+def reference_error(solution, reference):
+    """Stress of a solution less that of another on other elements, relative, by energy."""
+    points = reference.mesh.MapToAllElements(ng.IntegrationRule(ng.TRIG, 8), ng.VOL)
+    x, y = np.ascontiguousarray(ng.CF((ng.x, ng.y))(points).T)
+    fine, coarse = (
+        s.stress(at).reshape(-1, 4)
+        for s, at in ((reference, points), (solution, solution.mesh(x, y)))
+    )
+    jacobian = ng.specialcf.JacobianMatrix(2)(points)
+    weights = np.tile(ng.IntegrationRule(ng.TRIG, 8).weights, reference.mesh.ne)
+    weights = weights * np.abs(jacobian[:, 0] * jacobian[:, 3] - jacobian[:, 1] * jacobian[:, 2])
+    mu, nu = np.where(y > 0, 1 / 2.6, 3 / 2.4), np.where(y > 0, 0.3, 0.2)
+    squares = [
+        (weights / mu * ((s**2).sum(axis=1) - nu * (s[:, 0] + s[:, 3]) ** 2)).sum()
+        for s in (fine - coarse, fine)
+    ]
+    return np.sqrt(squares[0] / squares[1])
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["unilateral", "bilateral"])
+def wavy(request):
+    """Blocks pressed together over a wave of length 0.16, and their solution on a fine mesh."""
+    wave = 2e-3 * (ng.cos(40 * ng.x) if request.param else 1 - ng.cos(40 * ng.x))
+    problem = Problem(
+        geometry=blocks(),
+        materials=cases.BLOCKS,
+        displacement={"bottom": (0, 0), "top": (0, -0.05)},
+        contact=[
+            Contact(
+                *("lower_contact", "upper_contact"),
+                direction=(0, 1),
+                gap=wave,
+                bilateral=request.param,
+            )
+        ],
+    )
+    # Its error is 1e-3, a hundredth of those measured below.
+    return problem, solve(problem, maxh=0.05, order=4)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_gaps_that_nodes_do_not_resolve_are_estimated(wavy, order):
+    """Three waves on each segment: measured 2.3 to 3.0."""
+    problem, reference = wavy
+    solution = solve(problem, maxh=0.5, order=order)
+    ratio = solution.relative_error_estimate / reference_error(solution, reference)
+    assert 1.5 < ratio < 6
+
+
+def test_narrow_gaps_are_found_between_quadrature_points():
+    """The penetration of a ridge of width 0.02 on segments of length 0.4, off the nodes."""
+    ridge = 1e-3 * ng.exp(-(((ng.x - 0.137) / 0.01) ** 2))
+    problem = Problem(
+        geometry=blocks(),
+        materials=cases.BLOCKS,
+        displacement={"bottom": (0, 0), "top": (0, -0.05)},
+        contact=[Contact("lower_contact", "upper_contact", direction=(0, 1), gap=-ridge)],
+    )
+    parts = solve(problem, maxh=0.4).estimate_parts
+    # |r| |r'| of e exp(-(x / w)^2) is e^2 (pi / 2)^(1/2), times mu of the softer block; differences
+    # between points make it an approximation.
+    expected = 1e-6 * np.sqrt(np.pi / 2) / 2.6
+    assert parts["penetration"].sum() == pytest.approx(expected, rel=0.15)

@@ -416,7 +416,13 @@ def test_sliding_and_tangential_parts(patch):
         h, mu, length = along(patch, where)
         expected = (h / (2 * mu) * (0.1 * mu) ** 2 * length).sum()
         assert parts[name] == pytest.approx(expected, rel=1e-11), name
-    assert parts["displacement"] < 1e-24
+    # And u.n = -0.1 y is no admissible displacement of the guides: 2 mu |w| max(|w| / h, |w'|).
+    h, mu, length = along(patch, "upper_left|lower_left")
+    trace = patch.discrete.space.trace
+    a, b = trace.curve[trace.segments("upper_left|lower_left")][:, [0, -1], 1].T
+    size = 0.1 * np.sqrt((a * a + a * b + b * b) / 3 * length)
+    expected = (2 * mu * size * np.maximum(size / h, 0.1 * np.sqrt(length))).sum()
+    assert parts["displacement"] == pytest.approx(expected, rel=1e-11)
 
 
 def test_pressure_part_in_contact_is_the_jump_between_the_bodies(patch):

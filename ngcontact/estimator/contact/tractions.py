@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -19,7 +20,9 @@ from ..terms import (
     ScaledSolution,
     Squares,
 )
+from .closing import closing_energy
 from .facing import FacingPoints, covered_parts, facing_points, pieces_of
+from .following import following_gap
 
 ALIKE = 1 - 1e-6  # cosine of directions from which points of two pairs at a node are one
 GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
@@ -62,7 +65,8 @@ def on_contact(
     pieces = pieces_of(boundary, line, np.asarray(np.isfinite(nodal).any(axis=1)))
     if len(pieces.local) == 0:
         return BoundaryTerms()
-    points = facing_points(boundary, line, pieces, 2 * solution.order + DATA_BONUS)
+    order = 2 * solution.order + DATA_BONUS
+    points = facing_points(boundary, line, following_gap(boundary, line, pieces, order), order)
     nodal = pressure_on_segments(nodal, solution.order)
     pressure = (lagrange(solution.order, points.s) * nodal[points.local]).sum(axis=1)
     pressure /= solution.unit
@@ -164,7 +168,7 @@ def _side(solution: ScaledSolution, points: FacingPoints, pressure: Array, *, ow
         s=s,
         element=element,
         weight=solution.edge_weight[element] * points.weight / stretch,
-        stiffness=solution.mu[element] / solution.diameter[element],
+        stiffness=solution.rigidity[element] / solution.diameter[element],
         along=along,
         across=across,
     )
@@ -232,29 +236,11 @@ def _gap_squares(
     gap[np.abs(gap) <= noise] = 0.0  # its root counts: 1e-16 would be an estimate of 1e-8
     gap /= solution.strain
     opening, depth = np.maximum(gap, 0), np.minimum(gap, 0)
+    where = points.segment, points.weight, points.position
+    cost = partial(closing_energy, solution, where, stiffness)
     if contact.bilateral:  # Remark 3.3: apart is as wrong as overlapping, and any force is right
-        return np.zeros_like(gap), _cost(solution, points, gap, stiffness)
+        return np.zeros_like(gap), cost(gap)
     closed = np.maximum(pressure, 0) * opening  # (3.12), (3.12')
-    closing = np.minimum(closed, _cost(solution, points, opening, stiffness))
+    closing = np.minimum(closed, cost(opening))
     # (3.9), (3.9')
-    return np.where(full, closing, closed), _cost(solution, points, depth, stiffness)
-
-
-def _cost(solution: ScaledSolution, points: FacingPoints, gap: Array, stiffness: Array) -> Array:
-    """Energy (k,) that closes a `gap` (k,), per unit of s or eta: mu / l |gap|^2.
-
-    l is the element's diameter h, or the length |gap| / |d_s gap| in which it changes on the
-    segment where that is shorter.
-    """
-    size = len(solution.boundary.region)
-    energy = np.bincount(points.segment, points.weight * gap**2, size)
-    same = points.segment[1:] == points.segment[:-1]
-    slope = np.diff(gap) ** 2
-    if not slope.any():
-        return stiffness * gap**2
-    apart = np.linalg.norm(np.diff(points.position, axis=0), axis=1)
-    square = np.divide(slope, apart, out=np.zeros_like(slope), where=same & (apart > 0))
-    steep = np.bincount(points.segment[1:], square, size)
-    h = solution.diameter[solution.boundary.element]
-    short = h * np.sqrt(np.divide(steep, energy, out=np.zeros(size), where=energy > 0))
-    return stiffness * gap**2 * np.maximum(short, 1)[points.segment]
+    return np.where(full, closing, closed), cost(depth)
