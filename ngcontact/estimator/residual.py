@@ -11,17 +11,17 @@ shear modulus mu, degree p:
 * traction: (h/p) / 2mu |P - sigma_h n|^2 over Gamma_tau and all free boundary
 * sliding: (h/p) / 2mu |sigma_t|^2 over Gamma_0
 * tangential, pressure: (h/p) / 2mu times the squares of the parts of the traction across and
-  along the direction of contact, the latter plus (pi_h)_+, on the parts of segments that face; where
-  a segment is in contact with all its nodes and the mean of both bodies' tractions presses, half
-  their difference, with the weight of the stiffer. Tractions are per arc length of the secondary,
-  those of the primary times ds_p / ds_s
+  along the direction of contact, the latter plus (pi_h)_+, on the parts of segments that face;
+  where a segment is in contact with all its nodes and the mean of both bodies' tractions presses,
+  half their difference, with the weight of the stiffer. Tractions are per arc length of the
+  secondary, those of the primary times ds_p / ds_s
 * complementarity: half of pi_h (gap)_+ over Gamma_K; where all nodes of a segment are in contact
   no more than closing the gap would cost, as a penetration
 * penetration: mu / l |(-gap)_+|^2 over Gamma_K, of the softer body; l is h, or the length
   |gap| / |d_s gap| in which the gap changes where that is shorter. Gaps are measured along the
   normals of the contact rows, and gap data followed by the quadrature
-* displacement: 2 mu / h |u_D - u_h|^2 over Gamma_u, the interpolation error of its data; the same of u_h.n over
-  Gamma_0, with the normals by which its nodes are held
+* displacement: 2 mu / h |u_D - u_h|^2 over Gamma_u, the interpolation error of its data; over
+  Gamma_0 2 mu / l |u_h.n|^2 with the normals by which its nodes are held
 * incompressibility: what correcting the pressure costs, see `pressure_correction`; on nearly
   incompressible bodies sigma_h stands for the corrected stress in all other parts
 
