@@ -110,3 +110,17 @@ def zeros(order: int, values: Array) -> tuple[Index, Array]:
         edges = np.sort(edges, axis=1)
     number, place = np.nonzero(changes)
     return number, (1 + low[number, place]) / 2
+
+
+@lru_cache
+def gauss_derivative(order: int) -> Array:
+    """Matrix (k, k) from values at the k points of `gauss` to the derivatives there.
+
+    Of the polynomial through them, on [0, 1].
+    """
+    points = 2 * gauss(order)[0] - 1
+    degree = len(points) - 1
+    values, slopes = legendre.legvander(points, degree), np.zeros((degree + 1, degree + 1))
+    for j in range(1, degree + 1):
+        slopes[:, j] = 2 * legendre.legval(points, legendre.legder(np.eye(degree + 1)[j]))
+    return np.asarray(np.linalg.solve(values.T, slopes.T).T)

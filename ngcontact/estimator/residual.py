@@ -20,8 +20,11 @@ shear modulus mu, degree p:
 * penetration: mu / l |(-gap)_+|^2 over Gamma_K, of the softer body; l is h, or the length
   |gap| / |d_s gap| in which the gap changes where that is shorter. Gaps are measured along the
   normals of the contact rows, and gap data followed by the quadrature
-* displacement: 2 mu / h |u_D - u_h|^2 over Gamma_u, the interpolation error of its data; over
-  Gamma_0 2 mu / l |u_h.n|^2 with the normals by which its nodes are held
+* displacement: 2 mu |w| max(|w| / h, |dw/ds|) over each segment of Gamma_u, w = u_D - u_h; mu is
+  here the stiffness of a strain without change of volume, the largest. What w costs is at most
+  2 mu times its square in H^(1/2), which |w| |dw/ds| bounds. Over Gamma_0 2 mu / l |u_h.n|^2 with
+  the normals by which its nodes are held
+* loads: what no quadrature found of rough loads, as forces f at points: f^2 / 2mu
 * incompressibility: what correcting the pressure costs, see `pressure_correction`; on nearly
   incompressible bodies sigma_h stands for the corrected stress in all other parts
 
@@ -38,15 +41,21 @@ import numpy as np
 
 from ..arrays import Array
 from ..contact import ContactState
-from ..fem import NEARLY_INCOMPRESSIBLE, BoundaryTrace, nearly_incompressible
+from ..fem import (
+    NEARLY_INCOMPRESSIBLE,
+    BoundaryTrace,
+    moment_degree,
+    nearly_incompressible,
+)
 from ..problem import Problem, varies
+from ..quadrature import known_rough_load
 from .contact import on_contact, remaining
 from .indicators import Estimate
 from .interior import divergence_and_jump, edge_integral, element_integral
 from .oscillation import oscillation
 from .pressure_correction import PressureCorrection, correcting_pressure
 from .supports import on_supports_and_loads
-from .terms import DATA_BONUS, BoundaryTerms, ScaledSolution, scaled
+from .terms import DATA_BONUS, BoundaryTerms, ScaledSolution, Squares, scaled
 
 
 def estimate(
@@ -97,9 +106,11 @@ def _squares(
         np.add.at(of(squares.name), squares.element, squares.values)
     residuals = [x for term in terms for x in term.residuals]
     divergence, jump = divergence_and_jump(solution.projected)
-    if solution.problem.force:
-        force = solution.mesh.MaterialCF(solution.problem.force, default=ng.CF((0, 0)))
-        divergence += force * (1 / solution.unit)  # (3.5)
+    force, rest = _body_forces(solution)
+    for squares in rest:
+        np.add.at(of(squares.name), squares.element, squares.values)
+    if force is not None:
+        divergence += force  # (3.5)
     names = nearly_incompressible(solution.problem, solution.mesh, corrected_from)
     correction = None
     if names:
@@ -115,6 +126,28 @@ def _squares(
             correction.add_to(residual, term.shares)
         np.add.at(of(term.name), term.element, term.weight * (residual**2).sum(axis=1))
     return parts
+
+
+def _body_forces(
+    solution: ScaledSolution,
+) -> tuple[ng.CoefficientFunction | None, list[Squares]]:
+    """F over the unit of stress, polynomials where it is rough, and squares of what they miss."""
+    problem, mesh = solution.problem, solution.mesh
+    if not problem.force:
+        return None, []
+    forces, squares, every = {}, [], np.arange(mesh.ne)
+    for body, F in problem.force.items():
+        region = mesh.Materials(body)
+        found = known_rough_load(F, F, region, moment_degree(solution.order))
+        forces[body] = ng.CF(F) * (1 / solution.unit)
+        if found is not None:
+            rough = ng.GridFunction(ng.L2(mesh, order=0))
+            rough.vec.FV().NumPy()[:] = found.rough
+            projection = found.projection * (1 / solution.unit)
+            forces[body] = ng.IfPos(rough, projection, forces[body])
+            rest = solution.element_weight * (found.rest / solution.unit) ** 2
+            squares += [Squares("element", every, rest), solution.missed(every, found.missed)]
+    return mesh.MaterialCF(forces, default=ng.CF((0, 0))), squares
 
 
 def _inside(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
+import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index
+from ..fem import moment_degree
+from ..lagrange import gauss, gauss_derivative
+from ..quadrature import known_rough_load, pieces, rough_segments
 from .contact import between_nodes, closing_energy
 from .terms import (
     DATA_BONUS,
@@ -37,13 +39,14 @@ def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTer
 
     residual = _unbalanced(solution, segment, s)  # (3.7)
     factor = -boundary.normal(segment, s)  # of a pressure in the residual
-    squares = []
-    for axis, at, miss in _misses(solution, segment, s):  # (3.6)
-        residual[at, axis] = factor[at, axis] = 0.0
-        here = boundary.element[segment[at]]
-        scale = 2 * solution.mu[here] / solution.diameter[here]
-        values = scale * ds[at] * (miss / solution.strain) ** 2
-        squares.append(Squares("displacement", here, values))
+    squares = _rough_loads(solution, segment, s, residual)
+    for pattern, components in problem.displacement.items():  # (3.6)
+        at = boundary.lies_on(segment, pattern)
+        given = [axis for axis, value in enumerate(components) if value is not None]
+        for axis in given:
+            residual[at, axis] = factor[at, axis] = 0.0
+        data = ng.CF(tuple(components[axis] for axis in given))
+        squares.append(_displacement(solution, boundary.segments(pattern), given, data))
     guided = np.zeros(len(segment), dtype=bool)
     if problem.sliding is not None:  # (3.8): any force along the normal, none across it
         guided = boundary.lies_on(segment, str(problem.sliding))
@@ -73,17 +76,73 @@ def _unbalanced(solution: ScaledSolution, segment: Index, s: Array) -> Array:
     return residual
 
 
-def _misses(
-    solution: ScaledSolution, segment: Index, s: Array
-) -> Iterator[tuple[int, Mask, Array]]:
-    """Of each prescribed component: its axis, the points (k,) of its boundary, u_D - u_h there."""
-    boundary = solution.boundary
-    for pattern, components in solution.problem.displacement.items():
-        at = boundary.lies_on(segment, pattern)
-        u = boundary.evaluate(solution.displacement, segment[at], s[at])
-        for axis, value in enumerate(components):
-            if value is not None:
-                yield axis, at, boundary.evaluate(value, segment[at], s[at])[:, 0] - u[:, axis]
+def _rough_loads(
+    solution: ScaledSolution, segment: Index, s: Array, residual: Array
+) -> list[Squares]:
+    """Squares of what polynomials miss of tractions where these are rough.
+
+    There `residual` (k, 2) at `s` (k,) of segments (k,) is made that of the polynomials.
+    """
+    boundary, problem, squares = solution.boundary, solution.problem, []
+    for pattern in problem.traction:
+        load = problem.traction_vector(pattern)
+        found = known_rough_load(
+            *(problem.traction[pattern], load, boundary.mesh.Boundaries(pattern)),
+            moment_degree(solution.order),
+        )
+        if found is None:
+            continue
+        at = found.rough[segment]
+        change = found.projection - load
+        residual[at] += boundary.evaluate(change, segment[at], s[at]) / solution.unit
+        element = boundary.element
+        rest = solution.edge_weight[element] * (found.rest / solution.unit) ** 2
+        squares.append(Squares("traction", element, rest))
+        squares.append(solution.missed(element, found.missed))
+    return squares
+
+
+def _displacement(
+    solution: ScaledSolution, segments: Index, axes: list[int], data: ng.CoefficientFunction
+) -> Squares:
+    """2 mu |w| max(|w| / h, |w'|) on `segments` (k,), with w = u_D - u_h of components given.
+
+    |w| |w'| bounds the square of w in H^(1/2), and 2 mu times that the energy that w costs.
+    """
+    boundary, order = solution.boundary, 2 * solution.order + DATA_BONUS
+    points, weights = gauss(order)
+    size = boundary.lengths(segments)
+
+    def miss(segment: Index, s: Array) -> Array:
+        """Values (k, m, c) at `s` (k, m) of segments (k,), without a unit."""
+        every, where = np.repeat(segment, s.shape[1]), s.ravel()
+        u = boundary.evaluate(solution.displacement, every, where)[:, axes]
+        w = boundary.evaluate(data, every, where) - u
+        return np.asarray(w.reshape(*s.shape, len(axes)) / solution.strain)
+
+    count, mesh = len(segments), boundary.mesh
+    number, start, length = np.arange(count), np.zeros(count), np.ones(count)
+    w = miss(segments, np.tile(points, (count, 1)))
+    rough = rough_segments(data, mesh, segments, solution.strain * np.abs(w).max())
+    if rough.any():
+        found = pieces(
+            lambda k, s: miss(segments[k], s), boundary.mesh, size, np.flatnonzero(rough)
+        )
+        number, start, length = (
+            np.concatenate([x[~rough], y])
+            for x, y in zip((number, start, length), found, strict=True)
+        )
+        w = miss(segments[number], start[:, None] + length[:, None] * points)
+    s = start[:, None] + length[:, None] * points
+    every = np.repeat(segments[number], len(points))
+    stretch = np.linalg.norm(boundary.derivative(every, s.ravel()), axis=1).reshape(s.shape)
+    slope = (gauss_derivative(order) @ w) / (length[:, None] * stretch)[..., None]
+    ds = (length[:, None] * weights * stretch)[..., None]
+    square, sloping = (np.bincount(number, (ds * x**2).sum(axis=(1, 2)), count) for x in (w, slope))
+    element = boundary.element[segments]
+    root = np.sqrt(square)
+    worst = root * np.maximum(root / solution.diameter[element], np.sqrt(sloping))
+    return Squares("displacement", element, 2 * solution.rigidity[element] * worst)
 
 
 def _guiding(solution: ScaledSolution, segment: Index, s: Array) -> Array:

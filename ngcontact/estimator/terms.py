@@ -86,6 +86,13 @@ class ScaledSolution:
         """Weight (h/p)^2 / 2mu of squared forces, (ne,)."""
         return (self.diameter / self.order) ** 2 / (2 * self.mu)
 
+    def missed(self, element: Index, force: Array) -> Squares:
+        """Squares of errors `force` (k,) of the loads' quadrature, each in an `element` (k,).
+
+        A force f at one point costs f^2 / 2mu, times the logarithm of sizes.
+        """
+        return Squares("loads", element, (force / self.unit) ** 2 / (2 * self.mu[element]))
+
     def traction(self, segment: Index, s: Array) -> Array:
         """Traction sigma_h n (k, 2) over `unit`, at points `s` (k,) of each `segment` (k,)."""
         on_boundary = ng.BoundaryFromVolumeCF(self.stress)

@@ -28,3 +28,4 @@ from .space import LOAD_BONUS as LOAD_BONUS
 from .space import Space as Space
 from .space import assemble as assemble
 from .space import load_vector as load_vector
+from .space import moment_degree as moment_degree

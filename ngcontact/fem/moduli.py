@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from weakref import WeakKeyDictionary
 
 import ngsolve as ng
 import numpy as np
@@ -11,7 +12,7 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..errors import warn
 from ..mesh import diameters
-from ..problem import Problem, Triangulation, varies
+from ..problem import Elastic, Hooke, Problem, Triangulation, varies
 from ..quadrature import composite, on_lattice
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
@@ -23,6 +24,8 @@ ROUGH = 0.5  # change of a law inside an element over its least value from which
 ROUGH_PARTS = 8  # of the sides of such an element, each with a rule of its own
 MODULUS_BONUS = 4  # quadrature orders above the default: moduli may be as rough as r^(-1/2)
 CURVED = 2  # ... and for the map of a curved element
+
+CONSTANT: WeakKeyDictionary[Elastic | Hooke, dict[str, Array]] = WeakKeyDictionary()
 
 # Where a law that varies is looked at in each element: its middle and towards its corners.
 SAMPLES = ng.IntegrationRule(
@@ -41,18 +44,31 @@ def _of_elements(
     Voigt components q, the shear last. Only elements `asked` (ne,) for are met, others are 0.
     """
     region, samples = Triangulation(mesh).bodies, len(SAMPLES)
-    points = mesh.MapToAllElements(SAMPLES, ng.VOL).reshape(-1, samples)
     values = np.zeros((mesh.ne, samples))
     for pattern, law in problem.materials.items():
         inside = np.array(mesh.Materials(pattern).Mask())[region]
-        at = np.flatnonzero(inside if asked is None else inside & asked)
-        if len(at) == 0:
+        at = inside if asked is None else inside & asked
+        if not at.any():
             continue
-        places = points[at] if varies(law) else points[at[:1], :1]
-        C = np.asarray(law.voigt(problem.model)(places.ravel()))
-        size = round(math.sqrt(C.shape[1]))
-        values[at] = modulus(C.reshape(-1, size, size)).reshape(places.shape)
+        if varies(law):
+            points = mesh.MapToAllElements(SAMPLES, ng.VOL).reshape(-1, samples)[at]
+            C = np.asarray(law.voigt(problem.model)(points.ravel()))
+            size = round(math.sqrt(C.shape[1]))
+            values[at] = modulus(C.reshape(-1, size, size)).reshape(points.shape)
+        else:
+            values[at] = modulus(_constant(law, problem.model, mesh)[None])
     return values
+
+
+def _constant(law: Elastic | Hooke, model: str, mesh: ng.Mesh) -> Array:
+    """A law of numbers as a matrix (q, q), made once."""
+    kept = CONSTANT.setdefault(law, {})
+    if model not in kept:
+        rule = ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1])
+        C = np.asarray(law.voigt(model)(mesh.MapToAllElements(rule, ng.VOL)[:1]))
+        size = round(math.sqrt(C.size))
+        kept[model] = C.reshape(size, size)
+    return kept[model]
 
 
 def mandel(C: Array) -> Array:

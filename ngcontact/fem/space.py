@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,12 +13,18 @@ import scipy.sparse as sp
 from ..arrays import Array, Index
 from ..linalg import shared
 from ..problem import Problem, Triangulation, varies
+from ..quadrature import keep_rough_load
 from .boundary import BoundaryTrace
 from .element import node_basis, vector_space
 from .model import model_of
 from .moduli import constant_measures, law_measures, rough_moduli
 
 LOAD_BONUS = 6  # quadrature orders above the default: loads may be as rough as r^(-1/2)
+
+
+def moment_degree(order: int) -> int:
+    """Degree to which moments of a rough load are kept: displacements' times a radius."""
+    return max(order, 2) + 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,17 +84,39 @@ def _check_normals(trace: BoundaryTrace, boundary: str) -> None:
 
 
 def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
-    """f(v) of (3.2), (2N,), with quadrature `bonus` orders above the default."""
-    v, model = V.TestFunction(), model_of(problem)
+    """f(v) of (3.2), (2N,), with quadrature `bonus` orders above the default.
+
+    Where that misses a part of a load, with the load's moments.
+    """
+    v, model, mesh = V.TestFunction(), model_of(problem), V.mesh
     f = ng.LinearForm(V)
     for body, F in problem.force.items():
-        work = model.weighted(F * v)  # (3.2)
-        f += work * ng.dx(definedon=V.mesh.Materials(body), bonus_intorder=bonus)
+        for load, dx in _smooth_and_rough(F, F, mesh.Materials(body), V, bonus):
+            f += model.weighted(load * v) * dx  # (3.2)
     for boundary in problem.traction:
-        work = model.weighted(problem.traction_vector(boundary) * v.Trace())  # (3.2)
-        f += work * ng.ds(definedon=V.mesh.Boundaries(boundary), bonus_intorder=bonus)
+        p, P = problem.traction[boundary], problem.traction_vector(boundary)
+        for load, ds in _smooth_and_rough(p, P, mesh.Boundaries(boundary), V, bonus):
+            f += model.weighted(load * v.Trace()) * ds  # (3.2)
     f.Assemble()
     return f.vec.FV().NumPy().copy()
+
+
+def _smooth_and_rough(
+    data: ng.CoefficientFunction,
+    load: ng.CoefficientFunction,
+    region: ng.Region,
+    V: ng.FESpace,
+    bonus: int,
+) -> Iterator[tuple[ng.CoefficientFunction, ng.comp.DifferentialSymbol]]:
+    """A load where it is smooth, what stands for it where it is rough, and the measures of both."""
+    measure = ng.dx if region.VB() == ng.VOL else ng.ds
+    found = keep_rough_load(data, load, region, moment_degree(V.globalorder))
+    if found is None:
+        yield load, measure(definedon=region, bonus_intorder=bonus)
+        return
+    smooth, rough = ng.BitArray(~found.rough), ng.BitArray(found.rough)
+    yield load, measure(definedon=region, definedonelements=smooth, bonus_intorder=bonus)
+    yield found.projection, measure(definedon=region, definedonelements=rough, bonus_intorder=bonus)
 
 
 def assemble(

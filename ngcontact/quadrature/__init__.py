@@ -3,3 +3,9 @@
 from .lattice import composite as composite
 from .lattice import extent as extent
 from .lattice import on_lattice as on_lattice
+from .loads import RoughLoad as RoughLoad
+from .loads import keep_rough_load as keep_rough_load
+from .loads import known_rough_load as known_rough_load
+from .loads import rough_load as rough_load
+from .values import pieces as pieces
+from .values import rough_segments as rough_segments

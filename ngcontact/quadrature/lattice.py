@@ -1,4 +1,4 @@
-"""Elements looked at closely: lattices of points in them, and rules on parts of them."""
+"""Elements looked at closely: equal parts of them, points in these, and rules on them."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 from ..arrays import Array, Index
 from ..problem import Triangulation
 
-# A disc of a hundredth of the bodies contains a point: none is further from one than .58 / FINEST.
-FINEST = 116
-LARGEST = 32  # divisions of the side of an element
+# Parts of the bodies' extent: a disc, or a length, of a hundredth of it contains a point.
+FINEST = {1: 256, 2: 116}
+PARTS = {1: (8, 32, 128), 2: (2, 4, 8, 12, 16, 24, 32)}  # of the side of an element
+GOLDEN = (1 + 5**0.5) / 2  # takes points on a line out of step with waves
 
 
 def extent(mesh: ng.Mesh) -> float:
@@ -23,8 +24,13 @@ def extent(mesh: ng.Mesh) -> float:
 
 
 @lru_cache
-def parts(n: int) -> tuple[Array, Array]:
-    """The k = n^2 equal parts of the unit triangle: origins (k, 2), sides (k, 2, 2) as rows."""
+def parts(dim: int, n: int) -> tuple[Array, Array]:
+    """The k = n^dim equal parts of the unit segment or triangle.
+
+    Origins (k, dim), and sides (k, dim, dim) as rows.
+    """
+    if dim == 1:
+        return np.arange(n)[:, None] / n, np.full((n, 1, 1), 1 / n)
     i, j = (k.ravel() for k in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
     upright, turned = i + j < n, i + j < n - 1
     origin = np.concatenate(
@@ -35,19 +41,34 @@ def parts(n: int) -> tuple[Array, Array]:
 
 
 @lru_cache
+def lattice(dim: int, n: int) -> Array:
+    """A point in each of the k = n^dim parts, (k, dim): their middles, on a line out of step."""
+    origin, side = parts(dim, n)
+    if dim == 1:
+        return origin + (0.25 + 0.5 * (GOLDEN * np.arange(n)[:, None] % 1)) / n
+    return np.asarray(origin + side.sum(axis=1) / 3)
+
+
+@lru_cache
 def composite(n: int, order: int) -> ng.IntegrationRule:
     """Rule of an order on each of n^2 equal parts of a triangle."""
     rule = ng.IntegrationRule(ng.TRIG, order)
     points, weights = np.array([p[:2] for p in rule.points]), np.array(rule.weights)
-    origin, side = parts(n)
+    origin, side = parts(2, n)
     x = (origin[:, None] + points @ side).reshape(-1, 2)
     return ng.IntegrationRule(
         [(a, b, 0.0) for a, b in x.tolist()], np.tile(weights / n**2, n**2).tolist()
     )
 
 
-def on_lattice(mesh: ng.Mesh, elements: Index, diameter: Array) -> Iterator[tuple[Index, NDArray]]:
-    """Elements (j,) of about one size, and mesh points (j, n) in them, until all have come.
+def divisions(dim: int, sizes: Array, whole: float) -> Index:
+    """How many of `PARTS` the side of elements of `sizes` (k,) is divided into, (k,)."""
+    at = np.searchsorted(PARTS[dim], sizes * (FINEST[dim] / whole))
+    return np.array(PARTS[dim])[np.minimum(at, len(PARTS[dim]) - 1)]
+
+
+def on_lattice(mesh: ng.Mesh, elements: Index, sizes: Array) -> Iterator[tuple[Index, NDArray]]:
+    """Triangles (j,) of about one size, and mesh points (j, n) in them, until all have come.
 
     No disc of a hundredth of the mesh's extent falls between the points.
 
@@ -56,21 +77,23 @@ def on_lattice(mesh: ng.Mesh, elements: Index, diameter: Array) -> Iterator[tupl
     mesh : ng.Mesh
         The mesh.
     elements : ndarray of int (k,)
-        Numbers of elements.
-    diameter : ndarray (ne,)
-        Of all elements, lengths.
+        Numbers of triangles.
+    sizes : ndarray (ne,)
+        Diameters of all triangles, lengths.
     """
-    wanted = np.ceil(diameter[elements] * FINEST / extent(mesh))
-    divisions = np.clip(2 ** np.ceil(np.log2(np.maximum(wanted, 2))), 2, LARGEST).astype(int)
-    for n in np.unique(divisions).tolist():
-        here = elements[divisions == n]
-        origin, side = parts(n)
-        yield here, mesh_points(mesh, here, origin + side.sum(axis=1) / 3)
+    count = divisions(2, sizes[elements], extent(mesh))
+    for n in np.unique(count).tolist():
+        here, reference = elements[count == n], lattice(2, n)
+        points = np.broadcast_to(reference, (len(here), *reference.shape))
+        yield here, mesh_points(mesh, here, points)
 
 
 def mesh_points(mesh: ng.Mesh, elements: Index, reference: Array) -> NDArray:
-    """NGSolve's points (j, n) of `elements` (j,) at `reference` (n, 2)."""
-    template = mesh.MapToAllElements(ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1]), ng.VOL)
-    points = np.repeat(template[elements][:, None], len(reference), axis=1)
-    points["x"], points["y"] = reference.T
+    """NGSolve's points (j, n) of `elements` (j,) at `reference` (j, n, dim)."""
+    dim = reference.shape[-1]
+    middle = ng.IntegrationRule([(1 / 3, 1 / 3 if dim == 2 else 0.0, 0.0)], [1])
+    template = mesh.MapToAllElements(middle, ng.VOL if dim == 2 else ng.BND)
+    points = np.repeat(template[elements][:, None], reference.shape[1], axis=1)
+    for axis, name in zip(range(dim), "xy", strict=False):
+        points[name] = reference[..., axis]
     return points

@@ -1,0 +1,149 @@
+"""Parts of elements, halved where a function asks for it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import ngsolve as ng
+import numpy as np
+
+from ..arrays import Array, Index, Mask
+from .lattice import parts
+
+ORDER = {1: 7, 2: 4}  # of the rule on a part
+DEEPEST = {1: 40, 2: 10}  # halvings of the sides of a part
+MOST_CELLS = 20_000  # parts that are halved at a time: rougher functions are noise
+
+CORNER = 1e-4  # distance of the points at corners from these, relative to a part
+BEYOND = 0.05  # share of a part beyond the last point of the rule
+
+Integrand = Callable[[Index, Array], Array]
+
+
+@lru_cache
+def rule(dim: int) -> tuple[Array, Array, Array]:
+    """Points and weights on the unit segment or triangle, those of its corners at the end.
+
+    Points (m, dim); weights (m,), 0 at the corners; a matrix (dim + 1, m) to what a polynomial
+    through the others misses at the corners. Steps beyond the last point of a rule are seen there.
+    """
+    made = ng.IntegrationRule(ng.SEGM if dim == 1 else ng.TRIG, ORDER[dim])
+    inner = np.array([p[:dim] for p in made.points]).reshape(-1, dim)
+    middle = np.full(dim, 1 / (dim + 1))
+    corners = np.vstack([np.zeros(dim), np.eye(dim)])
+    corners = corners + CORNER * (middle - corners)
+    degree = {1: 3, 2: 2}[dim]
+    powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i) if dim == 2 or j < 1]
+
+    def monomials(x: Array) -> Array:
+        return np.column_stack([x[:, 0] ** i * x[:, -1] ** j for i, j in powers])
+
+    through = monomials(corners) @ np.linalg.pinv(monomials(inner))
+    return (
+        np.vstack([inner, corners]),
+        np.append(made.weights, np.zeros(dim + 1)),
+        np.hstack([-through, np.eye(dim + 1)]),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """Parts of elements, k of them.
+
+    Attributes
+    ----------
+    element : ndarray of int (k,)
+        The element of each.
+    origin : ndarray (k, dim)
+        Reference coordinates of a corner.
+    side : ndarray (k, dim, dim)
+        Sides from there, as rows.
+    """
+
+    element: Index
+    origin: Array
+    side: Array
+
+    @property
+    def points(self) -> Array:
+        """Points of the rule, (k, m, dim), in reference coordinates of the elements."""
+        return self.origin[:, None] + rule(self.origin.shape[1])[0] @ self.side
+
+    @property
+    def weights(self) -> Array:
+        """Weights of the rule, (k, m)."""
+        return np.abs(np.linalg.det(self.side))[:, None] * rule(self.origin.shape[1])[1]
+
+    def __getitem__(self, at: Mask | Index) -> Cells:
+        """Those selected by `at` (k,), a mask or numbers."""
+        return Cells(self.element[at], self.origin[at], self.side[at])
+
+    def divided(self, n: int) -> Cells:
+        """Each in n^dim equal parts, one after the other."""
+        origin, side = parts(self.origin.shape[1], n)
+        return Cells(
+            np.repeat(self.element, len(origin)),
+            (self.origin[:, None] + origin @ self.side).reshape(-1, *origin.shape[1:]),
+            (side @ self.side[:, None]).reshape(-1, *side.shape[1:]),
+        )
+
+
+def whole(dim: int, elements: Index) -> Cells:
+    """The `elements` (k,) themselves."""
+    size = len(elements)
+    return Cells(elements, np.zeros((size, dim)), np.tile(np.eye(dim), (size, 1, 1)))
+
+
+def joined(several: list[Cells]) -> Cells:
+    """All of several."""
+    return Cells(*(np.concatenate(x) for x in zip(*map(_arrays, several), strict=True)))
+
+
+def _arrays(cells: Cells) -> tuple[Index, Array, Array]:
+    return cells.element, cells.origin, cells.side
+
+
+def following(integrand: Integrand, cells: Cells, allowed: float) -> tuple[Cells, Array]:
+    """Parts of `cells` on which the rule integrates a function.
+
+    Parameters
+    ----------
+    integrand : function
+        Values (k, m, c) at points (k, m, dim) of elements (k,).
+    cells : Cells
+        To start from.
+    allowed : float
+        Difference of the integrals over a part and over its halves at which it is not halved again.
+
+    Returns
+    -------
+    Cells
+        The parts.
+    missed : ndarray (k,)
+        That difference where a part is halved no more although it is larger, else 0.
+    """
+    dim, found, missed = cells.origin.shape[1], [], []
+
+    def integrals(cells: Cells) -> tuple[Array, Array]:
+        values = integrand(cells.element, cells.points)
+        beyond = np.abs(rule(dim)[2] @ values).max(axis=(1, 2))
+        integral = (cells.weights[:, None] @ values)[:, 0]
+        return integral, BEYOND * beyond * cells.weights.sum(axis=1)
+
+    coarse, beyond = integrals(cells)
+    for depth in range(DEEPEST[dim]):
+        halves = cells.divided(2)
+        fine, next_beyond = integrals(halves)
+        error = np.abs(fine.reshape(len(coarse), 2**dim, -1).sum(axis=1) - coarse).max(axis=1)
+        error = np.maximum(error, beyond)
+        last = depth == DEEPEST[dim] - 1 or np.count_nonzero(error > allowed) > MOST_CELLS
+        again = np.repeat((error > allowed) & (not last), 2**dim)
+        found.append(halves[~again])
+        over = np.where(error > allowed, error, 0.0) * last / 2**dim
+        missed.append(np.repeat(over, 2**dim)[~again])
+        cells, coarse, beyond = halves[again], fine[again], next_beyond[again]
+        if not len(coarse):
+            break
+    return joined(found), np.concatenate(missed)

@@ -1,0 +1,159 @@
+"""Loads that quadrature misses, as polynomials with the same moments."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+
+from ..arrays import Array, Index, Mask, power_of_two
+from .cells import Cells, following, whole
+from .lattice import divisions, extent
+from .view import View, looked_at
+
+SHAPE = 0.05  # what they miss of a load at a point, relative to its largest value ...
+SHARE = 1e-4  # ... or over an element, relative to its integral, at which it is rough there
+LONG = 4000  # of what is printed; numbers are short
+KEPT = "_ngcontact_loads"  # attribute of a mesh
+CURVED = 4  # quadrature orders for the maps of curved elements
+FINE = {1: 1e-6, 2: 1e-5}  # error of a part relative to that integral at which it is not halved
+# What NGSolve prints of numbers, also times others and times the normal.
+NUMBER = r"[-+.\de]+"
+NUMBERS = re.compile(
+    rf"\s*({NUMBER}\*\()?(coef (unary operation ' '|VectorialCoefficientFunction|{NUMBER}|"
+    rf"scale {NUMBER}|scalar-vector multiply|normal vector), real(, dim=\d+)?)?\s*\)?\s*"
+)
+
+
+@dataclass(frozen=True, eq=False)
+class RoughLoad:
+    """A load on elements in which quadrature of the usual order misses a part of it.
+
+    Attributes
+    ----------
+    rough : ndarray of bool (n,)
+        Those of all n elements, or segments of the boundary.
+    projection : ng.GridFunction
+        There the polynomial, discontinuous, with the load's moments.
+    rest : ndarray (n,)
+        Root of the integral of the square of what it misses of the load.
+    missed : ndarray (n,)
+        Error of the integral of the load, a force.
+    total : float
+        Integral of the load's size, a force.
+    """
+
+    rough: Mask
+    projection: ng.GridFunction
+    rest: Array
+    missed: Array
+    total: float
+
+
+def numbers(load: ng.CoefficientFunction) -> bool:
+    """Whether a load is made of numbers alone: these are nowhere rough."""
+    text = str(load)
+    return len(text) < LONG and all(NUMBERS.fullmatch(line) for line in text.splitlines())
+
+
+def rough_load(load: ng.CoefficientFunction, region: ng.Region, degree: int) -> RoughLoad | None:
+    """A load on a region, bodies or boundaries, where it is rough; None where it is nowhere.
+
+    Parameters
+    ----------
+    load : ng.CoefficientFunction
+        A force per volume or area, of any dimension.
+    region : ng.Region
+        Where it acts.
+    degree : int
+        Of the polynomials with the same moments.
+    """
+    if numbers(load):
+        return None
+    view = View(region.mesh, 2 if region.VB() == ng.VOL else 1)
+    inside = view.inside(region)
+    rough, total = _rough(load, view, inside)
+    if not rough.any():
+        return None
+    rough = view.with_neighbours(rough, inside)  # a part of a feature may have none of the points
+    elements = np.flatnonzero(rough)
+    count = int(divisions(view.dim, view.sizes[elements], extent(region.mesh)).max())
+
+    def density(elements: Index, reference: Array) -> Array:
+        values = view.evaluate(load, elements, reference)
+        return np.asarray(values * view.evaluate(view.measure, elements, reference))
+
+    cells, over = following(
+        density, whole(view.dim, elements).divided(count), FINE[view.dim] * total
+    )
+    missed = np.bincount(cells.element, over, len(rough)).astype(float)
+    order = np.argsort(cells.element, kind="stable")
+    projection, rest = _projected(load, view, cells[order], degree)
+    return RoughLoad(rough, projection, rest, missed, total)
+
+
+def known_rough_load(
+    data: ng.CoefficientFunction, load: ng.CoefficientFunction, region: ng.Region, degree: int
+) -> RoughLoad | None:
+    """What `rough_load` found last of the `data` a load is made of, on the same mesh.
+
+    A mesh keeps it as long as it lives: loads are assembled, then the estimate asks again.
+    """
+    key = (id(data), str(region.VB()), bytes(np.array(region.Mask())), degree)
+    kept = getattr(region.mesh, KEPT, {})
+    count = region.mesh.GetNE(region.VB())
+    if key not in kept or kept[key][:2] != (data, count):
+        return keep_rough_load(data, load, region, degree)
+    found: RoughLoad | None = kept[key][2]
+    return found
+
+
+def keep_rough_load(
+    data: ng.CoefficientFunction, load: ng.CoefficientFunction, region: ng.Region, degree: int
+) -> RoughLoad | None:
+    """`rough_load`, kept for `known_rough_load`."""
+    found = rough_load(load, region, degree)
+    key = (id(data), str(region.VB()), bytes(np.array(region.Mask())), degree)
+    kept = getattr(region.mesh, KEPT, {})
+    kept[key] = (data, region.mesh.GetNE(region.VB()), found)
+    setattr(region.mesh, KEPT, kept)
+    return found
+
+
+def _rough(load: ng.CoefficientFunction, view: View, elements: Index) -> tuple[Mask, float]:
+    """Those (n,) of `elements` (k,) where a load is rough, and the integral of its size."""
+    sizes = view.sizes
+    miss, largest, total = np.zeros(len(sizes)), 0.0, 0.0
+    for here, values, left in looked_at(load, view, elements):
+        miss[here] = left
+        size = np.abs(values).max(axis=2)  # no squares: they may leave the range of numbers
+        largest = max(largest, float(size.max(initial=0.0)))
+        total += float(size.mean(axis=1) @ sizes[here] ** view.dim) / view.dim
+    share = miss * sizes**view.dim / view.dim
+    return (miss > SHAPE * largest) | (share > SHARE * total), total
+
+
+def _projected(
+    load: ng.CoefficientFunction, view: View, cells: Cells, degree: int
+) -> tuple[ng.GridFunction, Array]:
+    """Polynomials with the moments of a load on `cells`, sorted by element; squares (n,) left."""
+    space, shapes = view.shapes(degree)
+    elements, first = np.unique(cells.element, return_index=True)
+    values = view.evaluate(load, cells.element, cells.points)
+    density = cells.weights * view.evaluate(view.measure, cells.element, cells.points)[..., 0]
+    shape = view.evaluate(shapes, cells.element, cells.points)
+    moments = np.swapaxes(density[..., None] * shape, 1, 2) @ values
+    moments = np.add.reduceat(moments, first, axis=0)
+    unit = power_of_two(values)
+    squares = np.add.reduceat((density * ((values / unit) ** 2).sum(axis=2)).sum(axis=1), first)
+    coefficients = np.linalg.solve(view.mass(shapes, elements, 2 * degree + CURVED), moments)
+    projection = ng.GridFunction(type(space)(view.mesh, order=degree, dim=load.dim))
+    number = moments.shape[1]
+    at = (elements[:, None] * number + np.arange(number)).ravel()
+    projection.vec.FV().NumPy().reshape(-1, load.dim)[at] = coefficients.reshape(-1, load.dim)
+    rest = np.zeros(len(view.sizes))
+    squares -= (coefficients / unit * (moments / unit)).sum(axis=(1, 2))
+    rest[elements] = unit * np.sqrt(np.maximum(squares, 0.0))
+    return projection, rest

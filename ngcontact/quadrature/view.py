@@ -1,0 +1,122 @@
+"""Triangles of bodies, or segments of boundaries: their sizes, functions there, polynomials."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import ngsolve as ng
+import numpy as np
+
+from ..arrays import Array, Index, Mask
+from ..mesh import diameters
+from ..problem import Triangulation
+from .lattice import divisions, extent, lattice, mesh_points
+
+DEGREE = 6  # of polynomials that the usual rules integrate against displacements
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """All triangles of a mesh, `dim` 2, or all segments of its boundary, 1."""
+
+    mesh: ng.Mesh
+    dim: int
+
+    def inside(self, region: ng.Region) -> Index:
+        """Numbers (k,) of those in a region of the same dimension."""
+        view = Triangulation(self.mesh)
+        number = view.bodies if self.dim == 2 else view.boundaries
+        return np.flatnonzero(np.array(region.Mask())[number])
+
+    def with_neighbours(self, some: Mask, inside: Index) -> Mask:
+        """Mask (n,) of `some` (n,) and of those `inside` (k,) that share a vertex with one."""
+        view = Triangulation(self.mesh)
+        ends = view.triangles if self.dim == 2 else view.segments
+        touched = np.zeros(self.mesh.nv, dtype=bool)
+        touched[ends[some]] = True
+        result = some.copy()
+        result[inside] |= touched[ends[inside]].any(axis=1)
+        return result
+
+    @cached_property
+    def sizes(self) -> Array:
+        """Diameters or lengths (n,) of all elements."""
+        view = Triangulation(self.mesh)
+        if self.dim == 2:
+            return diameters(self.mesh)
+        return np.asarray(
+            np.linalg.norm(np.diff(view.vertices[view.segments], axis=1)[:, 0], axis=1)
+        )
+
+    @property
+    def measure(self) -> ng.CoefficientFunction:
+        """Area or length of an element per unit of its reference element."""
+        jacobian = ng.specialcf.JacobianMatrix(2, self.dim)
+        return ng.Det(jacobian) if self.dim == 2 else ng.Norm(jacobian)
+
+    def evaluate(
+        self, function: ng.CoefficientFunction, elements: Index, reference: Array
+    ) -> Array:
+        """Values (j, n, c) at `reference` (j, n, dim), or (n, dim), of `elements` (j,)."""
+        reference = np.broadcast_to(reference, (len(elements), *reference.shape[-2:]))
+        points = mesh_points(self.mesh, elements, reference)
+        return np.asarray(function(points.ravel())).reshape(*points.shape, -1)
+
+    def shapes(self, degree: int) -> tuple[ng.FESpace, ng.CoefficientFunction]:
+        """Discontinuous polynomials, and the functions of an element, numbered one by one."""
+        space = (ng.L2 if self.dim == 2 else ng.SurfaceL2)(self.mesh, order=degree)
+        number = math.comb(degree + self.dim, self.dim)
+        functions = []
+        for j in range(number):
+            functions.append(ng.GridFunction(space))
+            functions[-1].vec.FV().NumPy()[j::number] = 1.0
+        return space, ng.CF(tuple(functions))
+
+    def mass(self, shapes: ng.CoefficientFunction, elements: Index, order: int) -> Array:
+        """Integrals (j, q, q) of the products of an element's q functions over `elements` (j,)."""
+        rule = ng.IntegrationRule(ng.SEGM if self.dim == 1 else ng.TRIG, order)
+        points = np.array([p[: self.dim] for p in rule.points]).reshape(-1, self.dim)
+        shape = self.evaluate(shapes, elements, points)
+        weights = np.array(rule.weights)[:, None] * self.evaluate(self.measure, elements, points)
+        return np.asarray(np.swapaxes(shape * weights, 1, 2) @ shape)
+
+
+@lru_cache
+def polynomials(dim: int, n: int) -> Array:
+    """Values (k, q) of orthonormal polynomials at the points of a lattice, fewer than half of them.
+
+    Of degree up to `DEGREE`: what is left of values without them is rough.
+    """
+    x = 2 * lattice(dim, n) - 1
+    degree = min({1: n - 2, 2: n - 1}[dim], DEGREE)
+    powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i) if dim == 2 or j < 1]
+    basis, _ = np.linalg.qr(np.column_stack([x[:, 0] ** i * x[:, -1] ** j for i, j in powers]))
+    return np.asarray(basis)
+
+
+def looked_at(
+    function: ng.CoefficientFunction, view: View, elements: Index, fewest: int = 0
+) -> Iterator[tuple[Index, Array, Array]]:
+    """Elements (j,), values (j, n, c) there, and (j,) what polynomials miss of these at most.
+
+    Parameters
+    ----------
+    function : ng.CoefficientFunction
+        Of c components.
+    view : View
+        Of the elements.
+    elements : ndarray of int (k,)
+        Which.
+    fewest : int
+        Parts of their sides at least.
+    """
+    count = divisions(view.dim, view.sizes[elements], extent(view.mesh))
+    count = np.maximum(count, fewest)
+    for n in np.unique(count).tolist():
+        here = elements[count == n]
+        values = view.evaluate(function, here, lattice(view.dim, n))
+        basis = polynomials(view.dim, n)
+        yield here, values, np.abs(values - basis @ (basis.T @ values)).max(axis=(1, 2))

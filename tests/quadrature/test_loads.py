@@ -1,0 +1,115 @@
+"""Loads that quadrature misses: found, integrated, and numbers pay nothing."""
+
+from __future__ import annotations
+
+import math
+
+import ngsolve as ng
+import numpy as np
+import pytest
+from netgen.occ import OCCGeometry, Rectangle, X, Y
+
+from ngcontact import Elastic, Problem, solve
+from ngcontact.mesh import first_mesh
+from ngcontact.quadrature import rough_load
+
+
+def square():
+    face = Rectangle(1, 1).Face()
+    face.faces.name = "body"
+    face.edges.Max(Y).name, face.edges.Min(Y).name = "top", "bottom"
+    face.edges.Min(X).name, face.edges.Max(X).name = "left", "right"
+    return OCCGeometry(face, dim=2)
+
+
+def loaded(**data):
+    return Problem(
+        geometry=square(),
+        materials={"body": Elastic(1.0, 0.3)},
+        displacement={"bottom": (0, 0)},
+        **data,
+    )
+
+
+def box(x, start, width):
+    return ng.IfPos(x - start, ng.IfPos(start + width - x, 1.0, 0.0), 0.0)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+@pytest.mark.parametrize("start", [0.1, 0.333, 0.5, 0.6180339, 0.987])
+def test_a_narrow_strip_of_pressure_is_not_lost(start, order):
+    # Width .01, total 1, on the first mesh: the force was 0. Parts are halved to 1e-6 of the load.
+    problem = loaded(traction={"top": 100 * box(ng.x, start, 0.01)})
+    force = solve(problem, maxh=1 / 8, order=order).reactions["bottom"]
+    assert force == pytest.approx([0, 1], abs=2e-5)
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.533, 0.621), (0.05, 0.97), (0.25, 0.25)])
+def test_a_small_patch_of_body_force_is_not_lost(x, y):
+    inside = ng.IfPos(0.005**2 - (ng.x - x) ** 2 - (ng.y - y) ** 2, 1.0, 0.0)
+    problem = loaded(force={"body": (0, -1e4 * inside)})
+    force = solve(problem, order=2).reactions["bottom"]
+    assert force[1] == pytest.approx(1e4 * math.pi * 0.005**2, rel=1e-3)
+
+
+def test_a_load_that_is_infinite_at_an_end():
+    problem = loaded(traction={"top": ng.sqrt(1 / ng.x)})
+    force = solve(problem, maxh=1 / 8, order=1).reactions["bottom"]
+    assert force[1] == pytest.approx(2, rel=1e-4)
+
+
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+def test_rough_loads_in_any_unit(unit):
+    def found(unit, load):
+        shape = square().shape.Scale((0, 0, 0), unit)
+        mesh = first_mesh(Problem(OCCGeometry(shape, dim=2), {"body": Elastic(1.0, 0.3)}))
+        return mesh, rough_load(ng.CF((0, load)), mesh.Boundaries("top"), 3)
+
+    if unit == 1e-9:  # the geometry kernel knows no such lengths; loads do
+        mesh, rough = found(1.0, 1e-200 * box(ng.x, 0.4, 0.01))
+        expected = 1e-202
+    else:
+        mesh, rough = found(unit, box(ng.x / unit, 0.4, 0.01))
+        expected = 0.01 * unit
+    projection = rough.projection
+    total = ng.Integrate(projection[1], mesh, ng.BND, definedon=mesh.Boundaries("top"))
+    assert total == pytest.approx(expected, rel=1e-4)
+    # It vanishes but on the strip: |P|^2 = |Pi P|^2 + |P - Pi P|^2.
+    size = 1e-200 if unit == 1e-9 else 1.0
+    inside = ng.Integrate((projection[1] / size) ** 2, mesh, ng.BND, order=8)
+    rest = ((rough.rest / size) ** 2).sum()
+    assert inside + rest == pytest.approx(expected / size, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    "load",
+    [
+        ng.CF((0.0, -1.0)),
+        -ng.CF(ng.CF(2e-5)) * ng.specialcf.normal(2),
+        ng.CF((1 + ng.x, ng.y**2)),
+        ng.CF((ng.sin(3 * ng.x), 0)),
+    ],
+)
+def test_smooth_loads_are_left_to_the_usual_rule(load):
+    mesh = first_mesh(loaded())
+    assert rough_load(load, mesh.Boundaries("top"), 3) is None
+
+
+def test_noise_is_said_to_be_missed():
+    mesh = first_mesh(loaded())
+    load = ng.CF((0, ng.IfPos(ng.sin(1e7 * ng.x), 1.0, 0.0)))
+    found = rough_load(load, mesh.Boundaries("top"), 3)
+    assert found.missed.sum() > 1e-3 * found.total
+    assert found.total == pytest.approx(0.5, rel=0.2)  # from 500 points
+
+
+def test_functions_of_place_are_looked_at_once_a_mesh(monkeypatch):
+    from ngcontact.quadrature import loads
+
+    calls = []
+    monkeypatch.setattr(loads, "rough_load", lambda *a: calls.append(a))
+    problem = loaded(traction={"top": ng.x})
+    solution = solve(problem, maxh=0.5)
+    assert solution.error_estimate > 0
+    assert len(calls) == 1
+    assert np.isfinite(solution.indicators).all()
