@@ -123,7 +123,7 @@ def pieces_of(boundary: BoundaryTrace, line: ContactLine, carrying: Mask) -> Pie
     rest = np.flatnonzero((facing < 0) & (line.faces | carrying))
     if line.contact.primary is None or len(rest) == 0:
         return pieces
-    parts = divided(boundary, line.contact, line.segments[rest], line.facing)
+    parts = _parts(boundary, line, rest)
     return Pieces(
         np.concatenate([pieces.local, rest[parts.local]]),
         np.concatenate([pieces.start, parts.start]),
@@ -131,6 +131,23 @@ def pieces_of(boundary: BoundaryTrace, line: ContactLine, carrying: Mask) -> Pie
         np.concatenate([pieces.facing, parts.facing]),
         np.concatenate([pieces.opposite, parts.opposite]),
     )
+
+
+def _parts(boundary: BoundaryTrace, line: ContactLine, rest: Index) -> Pieces:
+    """Pieces of the segments `rest` (j,), by their numbers there.
+
+    Looked for beside the partners of their points; elsewhere where those do not cover them.
+    """
+    points, segments = line.rows[rest], line.segments[rest]
+    ends = boundary.nodes[line.facing][:, [0, -1]]
+    met = boundary.nodes[line.partner[points[points >= 0]]][:, [0, -1]]
+    near = line.facing[np.isin(ends, met).any(axis=1)]
+    if len(near):
+        parts = divided(boundary, line.contact, segments, near)
+        covered = np.bincount(parts.local, parts.stop - parts.start, len(rest))
+        if (covered > 1 - SLIVER).all():
+            return parts
+    return divided(boundary, line.contact, segments, line.facing)
 
 
 def facing_points(

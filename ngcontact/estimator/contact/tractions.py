@@ -115,8 +115,10 @@ def at_nodes(
     active = np.append(pair.active, True)[line.rows]
     nodes, (segment, s) = boundary.nodes[line.segments].ravel(), boundary.at_nodes(line.segments)
     for other in pairs if (line.rows < 0).any() else ():
+        if other is pair:
+            continue
         at = np.flatnonzero(np.isnan(pressure).ravel() & np.isin(nodes, other.line.node))
-        if other is pair or at.size == 0:
+        if at.size == 0:
             continue
         d = boundary.exact_normal(segment[at], s[at])
         if line.contact.direction is not None:
