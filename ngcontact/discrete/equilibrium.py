@@ -15,7 +15,7 @@ from scipy.optimize import linprog, nnls
 
 from ..arrays import Array, Mask
 from ..errors import NoEquilibriumError
-from ..fem import LOAD_BONUS, Space, load_vector, model_of
+from ..fem import LOAD_BONUS, Space, has_rough_loads, load_vector, model_of
 from ..mesh import cad_edges
 from ..problem import Problem
 from ..qp import FREE, NullSpace, pinned_null_space, vanishing_combinations
@@ -27,6 +27,7 @@ FINER = 5  # quadrature orders added to see the error of those of the loads
 CURVED = 2  # degrees added to see the error of the mesh's curved sides
 QUADRATURE = 10.0  # times that error is work that may be quadrature
 WORK_NOISE = 1e-10  # ... and this, relative to the sum of its terms, round-off
+ROUGH_WORK = 1e-6  # ... where loads are rough: their parts are integrated to 1e-6 or 1e-5 of them
 BALANCED = 1e-13  # of all contact forces: what their least squares leave, measured 2e-14
 NO_WORK = 1e-14  # work, relative to the sum of its terms, that is none
 
@@ -141,8 +142,9 @@ def _left_over(
     if residue.any():
         finer = free.values.T @ load_vector(problem, space.V, LOAD_BONUS + FINER)
         motion = free.motion(residue / np.abs(residue).max())
+        noisy = ROUGH_WORK if has_rough_loads(problem, space.V) else WORK_NOISE
         _check_work(
-            *(residue, work, finer, terms, carried, motion),
+            *(residue, work, finer, noisy * terms, carried, motion),
             lambda: _work_by_shape(problem, space.trace.mesh, motion),
         )
     return residue, noise
@@ -222,7 +224,7 @@ def _check_work(
     residue: Array,
     work: Array,
     finer: Array,
-    terms: Array,
+    noise: Array,
     carried: float,
     motion: RigidMotion,
     by_shape: Callable[[], float],
@@ -231,7 +233,7 @@ def _check_work(
     amounts = residue / np.abs(residue).max()
     done = float(amounts @ residue)  # what forces balance does no work on it
     allowed = QUADRATURE * abs(float(amounts @ (work - finer)))
-    allowed += WORK_NOISE * float(np.abs(amounts) @ terms) + BALANCED * carried
+    allowed += float(np.abs(amounts) @ noise) + BALANCED * carried
     if done > allowed and done > allowed + QUADRATURE * abs(by_shape()):
         raise NoEquilibriumError(
             f"no equilibrium: the load does the work {done:.6g} on a rigid {motion}, which "

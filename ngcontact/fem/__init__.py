@@ -27,5 +27,6 @@ from .moduli import warn_of_locking as warn_of_locking
 from .space import LOAD_BONUS as LOAD_BONUS
 from .space import Space as Space
 from .space import assemble as assemble
+from .space import has_rough_loads as has_rough_loads
 from .space import load_vector as load_vector
 from .space import moment_degree as moment_degree

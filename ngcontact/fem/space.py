@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from ..arrays import Array, Index
 from ..linalg import shared
 from ..problem import Problem, Triangulation, varies
-from ..quadrature import keep_rough_load
+from ..quadrature import keep_rough_load, known_rough_load
 from .boundary import BoundaryTrace
 from .element import node_basis, vector_space
 from .model import model_of
@@ -101,6 +101,17 @@ def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
     return f.vec.FV().NumPy().copy()
 
 
+def has_rough_loads(problem: Problem, V: ng.FESpace) -> bool:
+    """Whether quadrature of the usual order would miss a part of a load on the mesh of `V`."""
+    degree, mesh = moment_degree(V.globalorder), V.mesh
+    forces = [(F, F, mesh.Materials(body)) for body, F in problem.force.items()]
+    tractions = [
+        (p, problem.traction_vector(boundary), mesh.Boundaries(boundary))
+        for boundary, p in problem.traction.items()
+    ]
+    return any(known_rough_load(*load, degree) is not None for load in [*forces, *tractions])
+
+
 def _smooth_and_rough(
     data: ng.CoefficientFunction,
     load: ng.CoefficientFunction,
@@ -110,7 +121,8 @@ def _smooth_and_rough(
 ) -> Iterator[tuple[ng.CoefficientFunction, ng.comp.DifferentialSymbol]]:
     """A load where it is smooth, what stands for it where it is rough, and the measures of both."""
     measure = ng.dx if region.VB() == ng.VOL else ng.ds
-    found = keep_rough_load(data, load, region, moment_degree(V.globalorder))
+    look = keep_rough_load if bonus == LOAD_BONUS else known_rough_load  # a finer rule asks again
+    found = look(data, load, region, moment_degree(V.globalorder))
     if found is None:
         yield load, measure(definedon=region, bonus_intorder=bonus)
         return

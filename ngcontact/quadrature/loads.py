@@ -9,12 +9,16 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two
-from .cells import Cells, following, whole
+from .cells import Cells, following, joined, whole
 from .lattice import divisions, extent
 from .view import View, looked_at
 
 SHAPE = 0.05  # what they miss of a load at a point, relative to its largest value ...
-SHARE = 1e-4  # ... or over an element, relative to its integral, at which it is rough there
+SHARE = {
+    1: 1e-4,
+    2: 2e-3,
+}  # ... or over an element, relative to its integral, at which it is rough there
+POINTS = {1: 3, 2: 1}  # parts of a lattice that one of the rule is as good as
 LONG = 4000  # of what is printed; numbers are short
 KEPT = "_ngcontact_loads"  # attribute of a mesh
 CURVED = 4  # quadrature orders for the maps of curved elements
@@ -79,15 +83,15 @@ def rough_load(load: ng.CoefficientFunction, region: ng.Region, degree: int) -> 
         return None
     rough = view.with_neighbours(rough, inside)  # a part of a feature may have none of the points
     elements = np.flatnonzero(rough)
-    count = int(divisions(view.dim, view.sizes[elements], extent(region.mesh)).max())
+    count = divisions(view.dim, view.sizes[elements], extent(region.mesh))
+    count = np.maximum(count // POINTS[view.dim], 2)
+    start = [whole(view.dim, elements[count == n]).divided(n) for n in np.unique(count).tolist()]
 
     def density(elements: Index, reference: Array) -> Array:
         values = view.evaluate(load, elements, reference)
         return np.asarray(values * view.evaluate(view.measure, elements, reference))
 
-    cells, over = following(
-        density, whole(view.dim, elements).divided(count), FINE[view.dim] * total
-    )
+    cells, over = following(density, joined(start), FINE[view.dim] * total)
     missed = np.bincount(cells.element, over, len(rough)).astype(float)
     order = np.argsort(cells.element, kind="stable")
     projection, rest = _projected(load, view, cells[order], degree)
@@ -132,7 +136,7 @@ def _rough(load: ng.CoefficientFunction, view: View, elements: Index) -> tuple[M
         largest = max(largest, float(size.max(initial=0.0)))
         total += float(size.mean(axis=1) @ sizes[here] ** view.dim) / view.dim
     share = miss * sizes**view.dim / view.dim
-    return (miss > SHAPE * largest) | (share > SHARE * total), total
+    return (miss > SHAPE * largest) | (share > SHARE[view.dim] * total), total
 
 
 def _projected(
