@@ -21,6 +21,7 @@ from .mesh import curve, first_mesh
 from .one_mesh import solve_on, warn_of_doubts
 from .plausibility import doubt_of_refinement, estimates_rise
 from .problem import Problem
+from .quadrature import warn_of_data
 from .solution import Solution
 
 EXACT = 1e-12  # relative estimate at which refinement stops: the solution is exact
@@ -123,6 +124,7 @@ def adapt(
     refinement = Refinement(order, element, theta, tolerance, max_dofs, guaranteed)
     mesh = first_level(problem, maxh, refinement)
     warn_of_locking(problem, mesh, order)
+    warn_of_data(problem, mesh, order)
     return _with_warnings(levels(problem, mesh, refinement))
 
 

@@ -44,11 +44,10 @@ from ..contact import ContactState
 from ..fem import (
     NEARLY_INCOMPRESSIBLE,
     BoundaryTrace,
-    moment_degree,
     nearly_incompressible,
 )
 from ..problem import Problem, varies
-from ..quadrature import known_rough_load
+from ..quadrature import known_rough_load, moment_degree
 from .contact import on_contact, remaining
 from .indicators import Estimate
 from .interior import divergence_and_jump, edge_integral, element_integral

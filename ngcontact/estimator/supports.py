@@ -6,9 +6,8 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index
-from ..fem import moment_degree
 from ..lagrange import gauss, gauss_derivative
-from ..quadrature import known_rough_load, pieces, rough_segments
+from ..quadrature import known_rough_load, moment_degree, pieces, rough_segments
 from .contact import between_nodes, closing_energy
 from .terms import (
     DATA_BONUS,

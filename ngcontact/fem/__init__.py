@@ -29,4 +29,3 @@ from .space import Space as Space
 from .space import assemble as assemble
 from .space import has_rough_loads as has_rough_loads
 from .space import load_vector as load_vector
-from .space import moment_degree as moment_degree

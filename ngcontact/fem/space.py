@@ -13,18 +13,13 @@ import scipy.sparse as sp
 from ..arrays import Array, Index
 from ..linalg import shared
 from ..problem import Problem, Triangulation, varies
-from ..quadrature import keep_rough_load, known_rough_load
+from ..quadrature import keep_rough_load, known_rough_load, moment_degree
 from .boundary import BoundaryTrace
 from .element import node_basis, vector_space
 from .model import model_of
 from .moduli import constant_measures, law_measures, rough_moduli
 
 LOAD_BONUS = 6  # quadrature orders above the default: loads may be as rough as r^(-1/2)
-
-
-def moment_degree(order: int) -> int:
-    """Degree to which moments of a rough load are kept: displacements' times a radius."""
-    return max(order, 2) + 1
 
 
 @dataclass(frozen=True, eq=False)

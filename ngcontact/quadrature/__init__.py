@@ -1,11 +1,13 @@
 """Quadrature that follows the data: where functions are rough, and rules that resolve them."""
 
+from .doubts import warn_of_data as warn_of_data
 from .lattice import composite as composite
 from .lattice import extent as extent
 from .lattice import on_lattice as on_lattice
 from .loads import RoughLoad as RoughLoad
 from .loads import keep_rough_load as keep_rough_load
 from .loads import known_rough_load as known_rough_load
+from .loads import moment_degree as moment_degree
 from .loads import rough_load as rough_load
 from .values import pieces as pieces
 from .values import rough_segments as rough_segments

@@ -56,6 +56,11 @@ class RoughLoad:
     total: float
 
 
+def moment_degree(order: int) -> int:
+    """Degree to which moments of a rough load are kept: displacements' times a radius."""
+    return max(order, 2) + 1
+
+
 def numbers(load: ng.CoefficientFunction) -> bool:
     """Whether a load is made of numbers alone: these are nowhere rough."""
     text = str(load)
