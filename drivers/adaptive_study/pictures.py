@@ -36,7 +36,7 @@ def draw_errors(path: Path, name: str, runs: dict[tuple[str, int], list[Row]]) -
             )
     left.set(title=name, xlabel="unknowns N", ylabel="relative error, energy norm")
     left.legend(fontsize=8, title="grey: N^(-p/2)", title_fontsize=8)
-    right.set(title="time from geometry to solution", xlabel="seconds")
+    right.set(title="processor time from geometry to solution", xlabel="seconds, one thread")
     for axes in (left, right):
         axes.grid(which="major", alpha=0.3)
     FigureCanvasAgg(figure).print_png(path)

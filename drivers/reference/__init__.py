@@ -2,6 +2,7 @@
 
 `westergaard` holds the fields of half-planes, `straight` and `curved` the solutions of two bodies
 that meet on straight and on curved lines, `manufactured` those on a polygon and a circle,
-`singular` those outside of H^2; `norms` measures in H^1. `cases` are the problems, ready to solve,
-`paper` those that stand for one theorem or remark each.
+`singular` those outside of H^2; `norms` measures in H^1, `overkill` against a finer solution where
+none is known. `cases` are the problems, ready to solve, `paper` those that stand for one theorem or
+remark each.
 """

@@ -1,0 +1,67 @@
+"""Errors against a finer solution: as against the exact one, on curved meshes as well."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivers.adaptive_study.runs import uniform
+from drivers.reference import cases, paper
+from drivers.reference.overkill import Overkill
+from drivers.reference.straight import relative_energy_error
+from ngcontact import Hooke, adapt, solve
+
+
+@pytest.mark.parametrize(
+    ("make", "order", "element"),
+    [
+        (cases.hertz_contact, 1, "isoparametric"),
+        (cases.hertz_contact, 2, "isoparametric"),
+        (cases.ring_in_ring, 1, "isoparametric"),  # partly outside of the triangles
+        (cases.ring_in_ring, 1, "physical"),
+        (cases.ring_in_ring, 2, "isoparametric"),
+        (paper.opening_ring, 2, "isoparametric"),
+    ],
+)
+def test_as_the_error_against_the_exact_stress(make, order, element):
+    case = make()
+    *_, finest = adapt(case.problem, order=4, max_dofs=12_000)
+    known = relative_energy_error(finest, case.exact)
+    solution = solve(case.problem, maxh=0.12, order=order, element=element)
+    exact = relative_energy_error(solution, case.exact)
+    found = Overkill(finest).relative_error(solution)
+    assert known < 0.05 * exact
+    # Measured at most 1.1 % off, Hertz at order 1: quadrature, and what the finer one errs.
+    assert found == pytest.approx(exact, rel=0.02)
+
+
+def test_of_itself_there_is_none():
+    solution = solve(cases.pressed_disc(), maxh=0.3, order=2)
+    assert Overkill(solution).relative_error(solution) < 1e-9  # points found again to round-off
+
+
+def test_differences_of_energies_are_no_errors_on_curves():
+    """Order 1: what the polygons miss of the disc is in the energy, with the sign of its own."""
+    problem = cases.disc_on_rigid_plane()
+    *_, finest = adapt(problem, order=4, max_dofs=12_000)
+    overkill = Overkill(finest)
+    levels = [solution for solution, _ in zip(uniform(problem, 1, 8000), range(4), strict=False)]
+    errors = np.array([overkill.relative_error(s) for s in levels])
+    energies = np.array([s.energy - finest.energy for s in levels])
+    by_energy = np.sqrt(2 * np.abs(energies)) / finest.energy_norm
+    assert (np.diff(np.log2(errors)) < -0.5).all()  # measured -0.57, -0.74, -0.89
+    assert (np.diff(by_energy) > 0).any()  # "errors" that rise: 0.122, 0.146
+    assert (by_energy < errors / 2).any()  # or a third of the true one
+
+
+def test_what_there_is_no_formula_for_is_refused():
+    problem = cases.one_transition().problem
+    solution = solve(replace(problem, model="plane stress"), maxh=1.0)
+    with pytest.raises(ValueError, match="plane stress"):
+        Overkill(solution)
+    law = Hooke([[3.0, 1.0, 0.0], [1.0, 3.0, 0.0], [0.0, 0.0, 1.0]])
+    solution = solve(replace(problem, materials={"upper|lower": law}), maxh=1.0)
+    with pytest.raises(TypeError, match="constant moduli"):
+        Overkill(solution)
