@@ -102,7 +102,7 @@ def zeros(order: int, values: Array) -> tuple[Index, Array]:
         low, high = edges[:, :-1], edges[:, 1:]
         below = polynomial.polyval(low, derivative, tensor=False) < 0
         changes = below != (polynomial.polyval(high, derivative, tensor=False) < 0)
-        for _ in range(HALVINGS):
+        for _ in range(HALVINGS if changes.any() else 0):
             middle = (low + high) / 2
             left = changes & (below == (polynomial.polyval(middle, derivative, tensor=False) < 0))
             low, high = np.where(left, middle, low), np.where(left, high, middle)
