@@ -14,15 +14,14 @@ from numpy.typing import NDArray
 from ..arrays import Array
 from ..problem import Contact, Problem
 from .cad import CadEdge
+from .spacing import SPARE, spaced
 
-TURN = 0.5  # largest turn (radians) of a curve along one contact segment
 STEEPEST = 0.5  # cosine between a curve's normal and the direction below which nodes go unmatched
 NEARER = 0.01  # of an edge: what a polygon of its samples tells apart
 COINCIDENT = 1e-6  # distance, relative to an edge, up to which two edges are one contact line
 CLOSE = 0.1  # share of the spacing within which a node yields to one already there, or to a vertex
 FINE = 513  # samples on which a division is laid out
 APART = 1e-9  # share of an edge up to which two nodes are one
-SPARE = 1e-9  # share by which a run of elements may exceed their size, not to gain one by round-off
 
 
 @dataclass(eq=False)
@@ -210,16 +209,7 @@ def _divide(
     for run in _facing_runs(faces, np.searchsorted(t, np.sort(ends))):
         if np.linalg.norm(np.diff(x[run], axis=0), axis=1).sum() < sliver:
             continue  # beside the vertex of one edge, which faces near that of another
-        density = np.zeros(np.count_nonzero(faces[run]) - 1)
-        for points in (x[run], y[run]):
-            steps = np.diff(points, axis=0)
-            angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
-            turn = np.abs(np.gradient(angle)) if len(angle) > 1 else np.zeros(1)
-            density = np.maximum(density, np.linalg.norm(steps, axis=1) / maxh)
-            density = np.maximum(density, turn / TURN)
-        total = np.concatenate([[0.0], np.cumsum(density)])
-        count = max(1, int(np.ceil(total[-1] * (1 - SPARE))))
-        nodes = np.interp(np.linspace(0, total[-1], count + 1), total, t[run])
+        nodes = spaced(t[run], x[run], y[run], maxh)
         at_nodes = secondary.curve.point(nodes), secondary.curve.derivative(nodes)
         there, _ = _opposite(contact, *at_nodes, primary.curve)
         met = ~np.isnan(there)
