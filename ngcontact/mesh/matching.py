@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..arrays import Array
 from ..problem import Contact, Problem
 from .cad import CadEdge
-from .spacing import SPARE, spaced
+from .spacing import SPARE, narrowest, spaced
 
 STEEPEST = 0.5  # cosine between a curve's normal and the direction below which nodes go unmatched
 NEARER = 0.01  # of an edge: what a polygon of its samples tells apart
@@ -37,7 +37,8 @@ class Edge:
     maxh : float
         Largest element size along it, a length.
     runs : list of ndarray (j,)
-        Parameters of the nodes on each part that faces another line.
+        Parameters of the nodes on each part that faces another line; first those of parts with a
+        narrowest place, whose nodes stay.
     """
 
     shape: occ.TopoDS_Shape
@@ -151,6 +152,17 @@ def _opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple
     return t, other.point(np.where(np.isnan(t), other.start, t))
 
 
+def _signed_gap(contact: Contact, curve: CadEdge, t: Array, other: CadEdge) -> Array:
+    """Distances (k,) from `t` (k,) on `curve` to the points opposite, NaN where there are none.
+
+    Along the direction; without one along the normals, and of either sign.
+    """
+    x, slope = curve.point(t), curve.derivative(t)
+    there, y = _opposite(contact, x, slope, other)
+    along = _right(slope) if contact.direction is None else np.array(contact.direction)
+    return np.where(np.isnan(there), np.nan, ((y - x) * along).sum(axis=1))
+
+
 def _behind(contact: Contact, x: Array, y: Array, edges: list[Edge]) -> NDArray[np.bool_]:
     """Whether another point of `edges` lies between `x` (k, 2) and the points `y` they see.
 
@@ -204,18 +216,23 @@ def _divide(
         for tangent in (slope, slope_there):
             across = tangent @ np.array([-contact.direction[1], contact.direction[0]])
             faces &= np.abs(across) >= STEEPEST * np.linalg.norm(tangent, axis=1)
+
+    def gap(t: Array) -> Array:
+        return _signed_gap(contact, secondary.curve, t, primary.curve)
+
     maxh = min(secondary.maxh, primary.maxh)
     sliver = CLOSE * min(maxh, secondary.curve.size, primary.curve.size)
     for run in _facing_runs(faces, np.searchsorted(t, np.sort(ends))):
         if np.linalg.norm(np.diff(x[run], axis=0), axis=1).sum() < sliver:
             continue  # beside the vertex of one edge, which faces near that of another
-        nodes = spaced(t[run], x[run], y[run], maxh)
+        places = narrowest(t[run], x[run], y[run], maxh, gap)
+        nodes = spaced(t[run], x[run], y[run], maxh, places)
         at_nodes = secondary.curve.point(nodes), secondary.curve.derivative(nodes)
         there, _ = _opposite(contact, *at_nodes, primary.curve)
         met = ~np.isnan(there)
         if met.any():
-            secondary.runs.append(nodes[met])
-            primary.runs.append(there[met])
+            for edge, found in ((secondary, nodes[met]), (primary, there[met])):
+                edge.runs.insert(0 if places.size else len(edge.runs), found)
 
 
 def divided(problem: Problem, shape: occ.TopoDS_Shape, maxh: float, finer: float) -> list[Edge]:
