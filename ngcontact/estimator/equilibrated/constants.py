@@ -13,66 +13,95 @@ of radius rho about the middle of the inscribed circle, inside, and R, outside o
 
 (Costabel, Dauge 2015, Arch. Rational Mech. Anal. 217:873, theorem 2.3). On an edge E opposite to P,
 
-    |w|_E^2 = |E| / 2|T| int_T div((x - P) w^2) <= |E| / |T| (|w|^2 + d |w| |grad w|)
+    min_E (x - P).n |w|_E^2 <= int_T div((x - P) w^2) <= 2 |w|^2 + 2 d |w| |grad w|
 
-with the largest distance d from P.
+with the largest distance d from P. On a curved T the first inequality is that of the straight
+triangle, of which T is the image under D: |w| <= h / pi max |D| (max det D / min det D)^(1/2)
+|grad w|. Extrema on curves are taken over points.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Array
-from .stresses import Partition
+from ...arrays import Array, Index
+from .data import Discrete, edge_places
 
+PLACES = 17  # on each edge, at which curves are looked at
 MANDEL = np.array([1.0, 1.0, math.sqrt(2.0)])
 
 
-def korn(corners: Array) -> Array:
-    """Constants (n,) of |grad(v - r)| <= c |e(v)| on triangles `corners` (n, 3, 2)."""
-    sides = np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1), axis=2)
-    a, b = corners[:, 0] - corners[:, 2], corners[:, 1] - corners[:, 2]
-    area = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
-    round_ = sides.sum(axis=1)
-    middle = (sides[:, :, None] * corners).sum(axis=1) / round_[:, None]
-    rho = 2 * area / round_
-    R = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
-    ratio = rho / R
+@dataclass(frozen=True, eq=False)
+class _Shapes:
+    """Triangles, b of them: constants of Poincare and Korn, and of traces on edges.
+
+    `poincare` and `korn` (b,), `trace` (b, 3): of squares, for |grad w| = 1.
+    """
+
+    poincare: Array
+    korn: Array
+    trace: Array
+
+
+def _shapes(discrete: Discrete, at: Index) -> _Shapes:
+    partition = discrete.partition
+    corners = partition.vertices[partition.triangles[at]]
+    edges = partition.edges[at]
+    t = np.broadcast_to(np.linspace(0, 1, PLACES), (3 * len(at), PLACES))
+    x, dx = edge_places(partition, edges.ravel(), discrete.curves, t)
+    x, dx = x.reshape(len(at), 3, PLACES, 2), dx.reshape(len(at), 3, PLACES, 2)
+    normal = np.stack([dx[..., 1], -dx[..., 0]], axis=-1)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    outward = (normal * partition.normals[at][:, :, None]).sum(axis=-1).mean(axis=-1)
+    normal *= np.sign(outward)[:, :, None, None]
+    opposite = np.linalg.norm(np.roll(corners, -1, 1) - np.roll(corners, -2, 1), axis=2)
+    middle = (opposite[:, :, None] * corners).sum(axis=1) / opposite.sum(axis=1)[:, None]
+    away = x - middle[:, None, None]
+    rho = (away * normal).sum(axis=-1).min(axis=(1, 2))
+    radius = np.linalg.norm(away, axis=-1).max(axis=(1, 2))
+    ratio = np.maximum(rho / radius, np.finfo(float).tiny)
     beta = ratio / math.sqrt(2) / np.sqrt(1 + np.sqrt(1 - ratio**2))
-    return np.asarray(np.sqrt(1 + 2 / beta**2))
+    poincare = partition.diameters[at] / math.pi
+    several = np.zeros(len(at), dtype=bool)
+    if discrete.rough is not None:
+        number = discrete.rough.number[at]
+        poincare = poincare * np.where(number >= 0, discrete.rough.distortion[number], 1.0)
+        several = (discrete.curves.number[edges] >= 0).sum(axis=1) > 1
+    # P is the opposite vertex, through which the other edges run; the middle if these are curved.
+    centre = np.where(several[:, None, None], middle[:, None], corners)
+    away = x - centre[:, :, None]
+    least = (away * normal).sum(axis=-1).min(axis=-1)
+    far = np.linalg.norm(away, axis=-1).max(axis=-1)
+    p = poincare[:, None]
+    return _Shapes(poincare, np.sqrt(1 + 2 / beta**2), 2 * (p**2 + far * p) / least)
 
 
-def data_terms(partition: Partition, law: Array, inside: Array, on_edges: Array) -> Array:
+def data_terms(discrete: Discrete, inside: Array, on_edges: Array) -> Array:
     """What loads that are not met contribute to the norm on each triangle, (n,).
 
     Parameters
     ----------
-    partition : Partition
-        Of n triangles and e edges.
-    law : ndarray (n, 3, 3)
-        Moduli.
+    discrete : Discrete
+        On n triangles with e edges.
     inside : ndarray (n,)
         Norms of forces that are orthogonal to rigid motions.
     on_edges : ndarray (e,)
         Norms of such tractions on edges of the boundary.
     """
-    loaded = np.flatnonzero((inside > 0) | (on_edges[partition.edges] > 0).any(axis=1))
+    edges = discrete.partition.edges
+    loaded = np.flatnonzero((inside > 0) | (on_edges[edges] > 0).any(axis=1))
     D = np.zeros(len(inside))
     if loaded.size == 0:
         return D
-    corners = partition.vertices[partition.triangles[loaded]]
-    least = np.linalg.eigvalsh(law[loaded] * MANDEL[:, None] * MANDEL)[:, 0]
-    c = korn(corners) / np.sqrt(least)
-    h, area = partition.diameters[loaded], partition.areas[loaded]
-    in_body = h / math.pi
-    total = in_body * inside[loaded]
-    for i in range(3):
-        edge = partition.edges[loaded, i]
-        ends = [np.linalg.norm(corners[:, j] - corners[:, i], axis=1) for j in range(3)]
-        far = np.maximum.reduce(ends)
-        factor = partition.edge_lengths[edge] / area * (in_body**2 + far * in_body)
-        total += np.sqrt(factor) * on_edges[edge]
-    D[loaded] = c * total
+    least = np.linalg.eigvalsh(discrete.law[loaded] * MANDEL[:, None] * MANDEL)[:, 0]
+    if discrete.rough is not None:
+        number = discrete.rough.number[loaded]
+        least = np.where(number >= 0, discrete.rough.least[number], least)
+    shapes = _shapes(discrete, loaded)
+    total = shapes.poincare * inside[loaded]
+    total = total + (np.sqrt(shapes.trace) * on_edges[edges[loaded]]).sum(axis=1)
+    D[loaded] = shapes.korn * total / np.sqrt(least)
     return D

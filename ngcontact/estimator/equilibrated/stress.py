@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array, Index
-from .stresses import Discrete, EdgeConditions, Equilibrated, dimension, raw_operators
+from .data import Discrete, EdgeConditions, dimension
+from .stresses import Equilibrated, into_raw, raw_operators
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,10 +59,14 @@ class EquilibratedStress:
 
 def raw_coefficients(discrete: Discrete, result: Equilibrated, at: Index) -> Array:
     """Coefficients (b, 3, m) of the equilibrated stress on triangles `at` (b,)."""
-    m = dimension(discrete.degree)
-    size = np.sqrt(discrete.partition.areas[at])[:, None, None]
-    c = (discrete.root[at] / size) @ result.change[at].reshape(len(at), 3, m)
-    c[..., : discrete.stress.shape[-1]] += discrete.stress[at]
+    c = (into_raw(discrete, at) @ result.change[at][:, :, None]).reshape(len(at), 3, -1)
+    smooth, rough = np.arange(len(at)), discrete.rough
+    if rough is not None:
+        number = rough.number[at]
+        smooth, here, number = (number < 0).nonzero()[0], number >= 0, number[number >= 0]
+        hatted = rough.hatted[number].sum(axis=1)[:, :, None]
+        c[here] += (rough.into[number] @ hatted).reshape(len(number), 3, -1)
+    c[smooth, :, : discrete.stress.shape[-1]] += discrete.stress[at[smooth]]
     return c
 
 
@@ -80,16 +85,19 @@ def certified(
     for start in range(0, n, step):
         at = np.arange(start, min(start + step, n))
         c = coefficients[at] = raw_coefficients(discrete, result, at)
-        D, N = raw_operators(partition, at, k, conditions.frames)
+        D, N = raw_operators(discrete, at, conditions.frames)
         flat = c.reshape(len(at), -1, 1)
         divergence[at] = (D @ flat).reshape(len(at), 2, low)
         traction[at] = (N @ flat).reshape(len(at), 3, -1)
     largest = max(np.abs(coefficients).max(initial=0.0), np.finfo(float).tiny)
     force = discrete.force.sum(axis=1)
+    if discrete.rough is not None:
+        force[discrete.rough.at] = discrete.rough.force
     unbalanced = np.abs(divergence + force).max(axis=(1, 2)) * partition.diameters
     total = np.zeros_like(given[:, 0])
     np.add.at(total, partition.edges, traction)
-    missing = np.where(conditions.constrained, total - given.sum(axis=1), 0.0)
+    asked = conditions.constrained & ~conditions.soft
+    missing = np.where(asked, total - given.sum(axis=1), 0.0)
     missing = np.abs(missing).max(axis=1)
     inner = partition.segment < 0
     residuals = {

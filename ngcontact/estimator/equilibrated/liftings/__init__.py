@@ -2,10 +2,11 @@
 
 from .edges import EdgeField as EdgeField
 from .edges import at_points as at_points
-from .edges import norms as norms
-from .edges import panels as panels
-from .misses import Gap as Gap
-from .misses import gap_of as gap_of
+from .edges import coefficients as coefficients
+from .edges import derivative as derivative
+from .edges import samples as samples
+from .gaps import Gap as Gap
+from .gaps import gap_of as gap_of
+from .gaps import on_contact as on_contact
 from .misses import lifted as lifted
-from .misses import on_contact as on_contact
 from .misses import on_supports as on_supports

@@ -12,7 +12,7 @@ import numpy as np
 
 from ....arrays import Array, Index
 from ....lagrange import gauss, gauss_lobatto
-from ..stresses import Partition, legendre_derivative, legendre_values
+from ..data import Discrete, edge_places, legendre_derivative, legendre_values
 
 DEGREE = 16  # of the polynomials that stand for prescribed displacements and gaps on a segment
 LEAST_POWER = 1.0
@@ -88,20 +88,15 @@ def panels(gap: Array) -> tuple[Array, Array]:
     return points.reshape(len(gap), -1), (length[:, :, None] * w).reshape(len(gap), -1)
 
 
-def norms(partition: Partition, law: Array, field: EdgeField) -> Array:
+def norms(discrete: Discrete, field: EdgeField) -> Array:
     """Energy norms (k,) of the liftings into the triangles beside the edges, with the best m.
 
-    `law` (n, 3, 3) are the moduli of all triangles.
+    On curved edges the continuation is from the curve to the opposite vertex.
     """
-    triangle, opposite = (x[field.edge] for x in partition.owner)
-    gradients = partition.hat_gradients[triangle]
-    k = np.arange(len(triangle))
-    last = np.where(partition.flips[triangle, opposite], 1, 2)
-    to_end, inwards = gradients[k, (opposite + last) % 3], gradients[k, opposite]
-    along = to_end[:, None, :] + field.t[:, :, None] * inwards[:, None, :]
-    first = _strain(field.slope, along)
-    second = _strain(field.value, np.broadcast_to(inwards[:, None, :], along.shape))
-    C, weight = law[triangle], field.weight
+    triangle, opposite = (x[field.edge] for x in discrete.partition.owner)
+    along, inwards, weight = _towards(discrete, triangle, opposite, field.edge, field.t)
+    first, second = _strain(field.slope, along), _strain(field.value, inwards)
+    C, weight = discrete.law[triangle], field.weight * weight
 
     def product(a: Array, b: Array) -> Array:
         return np.einsum("kq,kqi,kij,kqj->k", weight, a, C, b, optimize=True)
@@ -110,8 +105,49 @@ def norms(partition: Partition, law: Array, field: EdgeField) -> Array:
     one, mixed, two = product(first, first), product(first, second), product(second, second)
     ratio = np.sqrt(np.divide(one, two, out=np.ones_like(one), where=two > 0))
     m = np.maximum(ratio, LEAST_POWER)
-    square = partition.areas[triangle] * (one / m - 2 * mixed + m * two)
-    return np.sqrt(np.maximum(square, 0.0))
+    square = (one / m - 2 * mixed + m * two) / 2
+    return np.sqrt(np.maximum(square, 0.0) * _most(discrete, triangle))
+
+
+def hat_norms(discrete: Discrete, triangle: Index, corner: Index, moves: Array) -> Array:
+    """Energy norms (k,) of the hats of a `corner` (k,) of triangles (k,) times `moves` (k, 2).
+
+    On curved `triangle` (k,) hats are linear on lines from the curve to the opposite vertex.
+    """
+    partition = discrete.partition
+    opposite = (discrete.curves.number[partition.edges[triangle]] >= 0).argmax(axis=1)
+    edge = partition.edges[triangle, opposite]
+    rule, w = gauss(2 * discrete.geometry + 4)
+    t = np.tile(rule, (len(triangle), 1))
+    along, inwards, weight = _towards(discrete, triangle, opposite, edge, t)
+    first = np.where(partition.flips[triangle, opposite], 2, 1)
+    starts = (opposite + first) % 3 == corner
+    share = np.where(starts[:, None], t - 1, -t)[:, :, None] * inwards
+    slope = np.where(starts[:, None, None], -along, along) + share
+    slope = np.where((opposite == corner)[:, None, None], inwards, slope)
+    e = _strain(np.broadcast_to(moves[:, None], slope.shape), slope)
+    C = discrete.law[triangle]
+    square = np.einsum("kq,kqi,kij,kqj->k", weight * w, e, C, e, optimize=True) / 2
+    return np.sqrt(square * _most(discrete, triangle))
+
+
+def _most(discrete: Discrete, triangle: Index) -> Array:
+    """Factors (k,) by which the law exceeds that in the middle of each triangle."""
+    if discrete.rough is None:
+        return np.ones(len(triangle))
+    number = discrete.rough.number[triangle]
+    return np.where(number >= 0, discrete.rough.most[number], 1.0)
+
+
+def _towards(
+    discrete: Discrete, triangle: Index, opposite: Index, edge: Index, t: Array
+) -> tuple[Array, Array, Array]:
+    """Gradients (k, q, 2) along an edge, times 1 - t, and from it; twice the area per parameter."""
+    partition = discrete.partition
+    apex = partition.vertices[partition.triangles[triangle, opposite]]
+    x, dx = edge_places(partition, edge, discrete.curves, t)
+    inverse = np.linalg.inv(np.stack([dx, apex[:, None] - x], axis=3))
+    return inverse[:, :, 0], inverse[:, :, 1], 1 / np.abs(np.linalg.det(inverse))
 
 
 def _strain(r: Array, gradient: Array) -> Array:

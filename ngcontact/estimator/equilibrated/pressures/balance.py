@@ -13,7 +13,14 @@ from ....errors import ContactError
 from ....fem import BoundaryTrace
 from ....lagrange import gauss_lobatto
 from ....triplets import from_triplets
-from ..stresses import CORNERS, Discrete, EdgeConditions, basis, dimension
+from ..data import (
+    CORNERS,
+    Discrete,
+    EdgeConditions,
+    basis,
+    dimension,
+    rigid_motions_on,
+)
 from .choice import Sums
 from .zone import Zone, ZonePoints
 
@@ -148,7 +155,9 @@ def _functionals(
     inside = np.flatnonzero(mine[partition.triangles[:, 0]])
     x = partition.vertices[mine]
     centre, size = x.mean(axis=0), np.ptp(x, axis=0).max()
-    low = _low(conditions, partition.vertices[partition.ends[edges]], edges, centre, size)
+    about = np.tile(centre, (len(edges), 1, 1)), np.full((len(edges), 1), size)
+    frames, degree = conditions.frames[edges], discrete.geometry
+    low = rigid_motions_on(partition, discrete.curves, edges, frames, about, degree)[:, 0]
     free = ~conditions.constrained[edges].reshape(len(edges), 2, r // 2)[:, :, 0]
     square = np.einsum("eifq,ejfq,ef->ij", low, low, free, optimize=True) / max(1, len(edges))
     values, vectors = np.linalg.eigh(square)
@@ -158,22 +167,9 @@ def _functionals(
     low = np.einsum("mi,eifq->mefq", motions, low)
     functional = np.zeros((len(motions), e, 2, 2, r // 2))
     lengths = partition.edge_lengths[edges][:, None, None]
-    functional[:, edges, :, :, :2] = (low * lengths)[:, :, None]
+    functional[:, edges, :, :, : degree + 1] = (low * lengths)[:, :, None]
     work, fields = _work(discrete, inside, motions, centre, size)
     return functional.reshape(len(motions), -1), work, inside, fields
-
-
-def _low(
-    conditions: EdgeConditions, ends: Array, edges: Index, centre: Array, size: float
-) -> Array:
-    """Rigid motions on edges, (j, 3, 2, 2): motion, component, Legendre polynomial."""
-    apart = (ends - centre) / size
-    values = np.zeros((len(ends), 3, 2, 2))
-    values[:, 0, 0], values[:, 1, 1] = 1.0, 1.0
-    values[:, 2, 0], values[:, 2, 1] = -apart[..., 1], apart[..., 0]
-    values = np.einsum("efc,eicp->eifp", conditions.frames[edges], values)
-    first, last = values[..., 0], values[..., 1]
-    return np.stack([(first + last) / 2, (last - first) / np.sqrt(12)], axis=-1)
 
 
 def _work(
@@ -194,6 +190,9 @@ def _work(
 
 def _with_rigid_load(discrete: Discrete, inside: Index, fields: Array, missing: Array) -> Discrete:
     """With the rigid load in the `inside` (j,) that does the work `missing` (m,) on `fields`."""
+    if discrete.rough is not None:
+        smooth = discrete.rough.number[inside] < 0
+        inside, fields = inside[smooth], fields[:, smooth]
     area = discrete.partition.areas[inside]
     gram = np.einsum("j,mjcp,njcp->mn", area, fields, fields)
     load = np.einsum("m,mjcp->jcp", np.linalg.solve(gram, missing), fields)

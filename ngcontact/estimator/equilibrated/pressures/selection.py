@@ -12,14 +12,17 @@ import scipy.sparse as sp
 
 from ....arrays import Array, Index
 from ....fem import BoundaryTrace
-from ..stresses import Discrete, EdgeConditions, Units
+from ....lagrange import gauss
+from ..data import Discrete, EdgeConditions, Units
 from .balance import balanced, line_sums
 from .choice import Side, Sums, best_pressure
-from .zone import Zone, ZonePoints, gauss_points, tractions, zone_points
+from .pieces import Pieces
+from .zone import Zone, ZonePoints, tractions, zone_points
 
 
 def selected(
     zones: Sequence[Zone],
+    every_pieces: Sequence[Pieces],
     boundary: BoundaryTrace,
     displacement: ng.GridFunction,
     stress: ng.CoefficientFunction,
@@ -31,7 +34,7 @@ def selected(
 
     Parameters
     ----------
-    zones : sequence of Zone
+    zones, every_pieces : sequence of Zone, of Pieces
         The pairs.
     boundary, displacement, stress
         The discrete solution.
@@ -56,10 +59,10 @@ def selected(
     every = sp.eye_array(int(starts[-1])).tocsr()
     wishes = Wishes([], [], np.zeros(len(every.indptr) - 1))
     exerted = [sp.csr_array((2 * e * r, 0))]
-    for zone, (start, stop) in zip(zones, pairwise(starts), strict=True):
-        local, s, w = gauss_points(np.flatnonzero(zone.state.line.faces), 2 * discrete.degree + 2)
+    for zone, pieces, (start, stop) in zip(zones, every_pieces, pairwise(starts), strict=True):
+        t, w = gauss(2 * discrete.degree + 2)
         scales = units.strain, units.length
-        points = zone_points(zone.state, boundary, displacement, scales, local, s, w)
+        points = zone_points(zone.state, pieces, boundary, displacement, scales, t, w)
         exerted.append(tractions(discrete.partition, zone, points, e, discrete.degree))
         _add(wishes, zone, points, every[start:stop], boundary, stress, discrete, conditions, units)
     pressures = sp.hstack(exerted).tocsr()

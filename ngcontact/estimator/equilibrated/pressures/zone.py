@@ -5,16 +5,17 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
 from ....arrays import Array, Index, Mask
-from ....contact import ContactState, partners, prescribed_gap
-from ....contact.line import jacobian
+from ....contact import ContactState, prescribed_gap
+from ....contact.line import jacobian as contact_jacobian
 from ....fem import BoundaryTrace
-from ....lagrange import gauss
 from ....triplets import from_triplets
-from ..stresses import Partition, edge_parameters, legendre_values, with_hats
+from ..data import Partition, edge_parameters, legendre_values, with_hats
+from .pieces import Pieces, contact_directions
 
 GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
 STRAIGHT_ON = 0.1  # turn up to which a boundary runs straight on, so that tractions must not jump
@@ -141,29 +142,26 @@ def _continued(boundary: BoundaryTrace, segments: Index, point: Index, nodes: In
 
 def zone_points(
     state: ContactState,
+    pieces: Pieces,
     boundary: BoundaryTrace,
-    displacement: object,
+    displacement: ng.GridFunction,
     units: tuple[float, float],
-    local: Index,
-    s: Array,
+    t: Array,
     weight: Array,
 ) -> ZonePoints:
-    """Points at `s` (q,) of the segments `local` (q,) of a line, `weight` (q,) per parameter.
+    """Points at `t` (q,) on each piece, with weights `weight` (q,) there.
 
     `units` are the strain by which displacements and the length by which places are divided.
     """
     line, contact = state.line, state.line.contact
     strain, length = units
+    places = pieces.places(t)
+    there, distance = (x.ravel() for x in pieces.opposite(boundary, places))
+    q, s = len(t), places.ravel()
+    local, facing = np.repeat(pieces.local, q), np.repeat(pieces.facing, q)
     segment = line.segments[local]
     x = boundary.point(segment, s)
-    if contact.direction is None:
-        d = boundary.normal(segment, s)
-    else:
-        d = np.tile(contact.direction, (len(s), 1))
-    if contact.primary is None:
-        facing, facing_s, distance = np.full(len(s), -1), np.zeros(len(s)), np.zeros(len(s))
-    else:
-        facing, facing_s, distance, _ = partners(boundary, line.facing, segment, x, d)
+    d = contact_directions(contact, boundary, segment, s)
     if contact.gap is not None:
         distance = prescribed_gap(contact, boundary, segment, s, x)
     u = boundary.evaluate(displacement, segment, s)
@@ -171,25 +169,21 @@ def zone_points(
     if contact.gap is None:
         noise[distance != 0] += GAP_NOISE * np.abs(x).max(initial=0.0)
     met = facing >= 0
-    u[met] -= boundary.evaluate(displacement, facing[met], facing_s[met])
+    if met.any():
+        u[met] -= boundary.evaluate(displacement, facing[met], there[met])
     gap = distance - (u * d).sum(axis=1)
     gap[np.abs(gap) <= noise] = 0.0
+    scale = np.outer(pieces.stop - pieces.start, weight).ravel()
     return ZonePoints(
         local=local,
         s=s,
         segment=segment,
         facing=facing,
-        facing_s=facing_s,
-        weight=weight * jacobian(boundary, contact, segment, s) / length,
+        facing_s=there,
+        weight=scale * contact_jacobian(boundary, contact, segment, s) / length,
         direction=d,
         gap=gap / strain / length,
     )
-
-
-def gauss_points(segments: Index, order: int) -> tuple[Index, Array, Array]:
-    """Points on each of `segments` (k,): the segment, the parameter, the weight, each (q,)."""
-    s, w = gauss(order)
-    return np.repeat(segments, len(s)), np.tile(s, len(segments)), np.tile(w, len(segments))
 
 
 def tractions(

@@ -13,19 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....arrays import Array, Index
-from .partition import Partition
-from .polynomials import basis, dimension
+from ..data import Discrete, basis, dimension
 
 
-def raw_operators(
-    partition: Partition, at: Index, degree: int, frames: Array
-) -> tuple[Array, Array]:
-    """Divergence (b, 2 m, 3 n) and tractions (b, 6 (k + 1), 3 n) of straight triangles `at` (b,).
+def raw_operators(discrete: Discrete, at: Index, frames: Array) -> tuple[Array, Array]:
+    """Divergence (b, 2 m, 3 n) and tractions (b, 6 (k + 1), 3 n) of the triangles `at` (b,).
 
     Of the coefficients of (xx, yy, xy) in the n polynomials of degree k; the divergence in the m
     of degree k - 1, the tractions, by edge, component along `frames` (e, 2, 2) and Legendre
-    polynomial, in the direction in which each edge runs.
+    polynomial, in the direction in which each edge runs. On curved edges, where these are moments,
+    tractions count per chord.
     """
+    partition, degree = discrete.partition, discrete.degree
     table, b = basis(degree), len(at)
     n, m = dimension(degree), dimension(degree - 1)
     of_axis = np.zeros((2, 2, 3))  # which derivative of which stress in which component
@@ -36,6 +35,10 @@ def raw_operators(
     along = np.einsum("befc,becs->befs", frames[partition.edges[at]], along)
     signs = np.where(partition.flips[at][:, :, None], (-1.0) ** np.arange(degree + 1), 1.0)
     N = np.einsum("befs,beq,eqj->befqsj", along, signs, table.traces, optimize=True)
+    N = N.reshape(b, 3, -1, 3 * n)
+    curved, side = np.nonzero(discrete.curves.number[partition.edges[at]] >= 0)
+    edge = partition.edges[at[curved], side]
+    N[curved, side] = discrete.moments[discrete.curves.number[edge]]
     return D, N.reshape(b, -1, 3 * n)
 
 

@@ -5,134 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import ngsolve as ng
 import numpy as np
 
-from ....arrays import Array, Index, power_of_two
-from ....fem import BoundaryTrace, shear_moduli
-from ....problem import Problem, Triangulation
-from .conditions import DATA_BONUS, EdgeConditions
-from .elements import condensed, gathered, raw_operators, without_opposite
-from .partition import Partition
+from ....arrays import Array, Index
+from ..data import Discrete, EdgeConditions, basis, dimension
+from .elements import Condensed, condensed, gathered, raw_operators, without_opposite
 from .patches import multipliers
-from .polynomials import basis, dimension, lattice, triangle_rule
 from .rigid_loads import exchanged_loads
 
 AT_ONCE = 4_000_000  # numbers in the operators of elements that are made together
-
-
-@dataclass(frozen=True)
-class Units:
-    """Powers of 2 by which all numbers are divided: a stress, a modulus and a length."""
-
-    stress: float
-    modulus: float
-    length: float
-
-    @property
-    def strain(self) -> float:
-        """The strain that belongs to stress and modulus."""
-        return self.stress / self.modulus
-
-
-@dataclass(frozen=True, eq=False)
-class Discrete:
-    """A discrete solution on n triangles, in units of its own.
-
-    Attributes
-    ----------
-    partition : Partition
-        The triangles.
-    order : int
-        Degree p of the displacement.
-    law : ndarray (n, 3, 3)
-        Moduli.
-    root : ndarray (n, 3, 3)
-        Their Cholesky factors.
-    stress : ndarray (n, 3, m)
-        (xx, yy, xy) of sigma_h, coefficients of polynomials of degree p - 1.
-    force : ndarray (n, 3, 2, j)
-        Hats times body forces, coefficients of polynomials of degree k - 1.
-    missed : ndarray (n,)
-        Norms of what polynomials of degree k - 1 miss of the body forces.
-    """
-
-    partition: Partition
-    order: int
-    law: Array
-    root: Array
-    stress: Array
-    force: Array
-    missed: Array
-
-    @property
-    def degree(self) -> int:
-        """Degree k of the equilibrated stress."""
-        return degree_for(self.order)
-
-
-def degree_for(order: int) -> int:
-    """Degree k of the equilibrated stress of displacements of degree `order`."""
-    return max(3, order + 1)
-
-
-def units_of(problem: Problem, boundary: BoundaryTrace, stress: ng.CoefficientFunction) -> Units:
-    """Units of a solution."""
-    mesh = boundary.mesh
-    points = mesh.MapToAllElements(ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1]), ng.VOL)
-    return Units(
-        stress=power_of_two(np.asarray(stress(points))),
-        modulus=power_of_two(shear_moduli(problem, mesh)),
-        length=power_of_two(np.ptp(Triangulation(mesh).vertices, axis=0)),
-    )
-
-
-def discrete_on(
-    problem: Problem,
-    partition: Partition,
-    order: int,
-    stress: ng.CoefficientFunction,
-    units: Units,
-) -> Discrete:
-    """A discrete stress and its data on the triangles of a partition."""
-    every, middle = np.arange(len(partition.triangles)), np.array([[1 / 3, 1 / 3]])
-    law = np.zeros((len(every), 3, 3))
-    region = Triangulation(partition.mesh).bodies[partition.parent]
-    for pattern, material in problem.materials.items():
-        at = _of_body(partition.mesh, pattern, region)
-        C = material.voigt(problem.model)
-        law[at] = partition.evaluate(C, at[:1], middle).reshape(-1, 3, 3) / units.modulus
-    points = lattice(order - 1)
-    xx, xy, _, yy = stress
-    values = partition.evaluate(ng.CF((xx, yy, xy)).Compile(), every, points) / units.stress
-    fit = basis(max(order - 1, 1)).values(points)[:, : dimension(order - 1)]
-    coefficients = np.einsum("iq,nqc->nci", np.linalg.inv(fit), values)
-    degree = degree_for(order)
-    force = np.zeros((len(every), 3, 2, dimension(degree - 1)))
-    missed = np.zeros(len(every))
-    rule, weights = triangle_rule(2 * degree + DATA_BONUS)
-    values = basis(degree - 1).values(rule)
-    hats = np.column_stack([rule, 1 - rule.sum(axis=1)])
-    for pattern, F in problem.force.items():  # (3.5)
-        at = _of_body(partition.mesh, pattern, region)
-        f = partition.evaluate(F, at, rule) * (units.length / units.stress)
-        force[at] = np.einsum("q,qa,qi,nqc->naci", weights, hats, values, f, optimize=True)
-        rest = f - np.einsum("qi,nci->nqc", values, force[at].sum(axis=1))
-        missed[at] = np.sqrt(partition.areas[at] * np.einsum("q,nqc->n", weights, rest**2))
-    return Discrete(
-        partition=partition,
-        order=order,
-        law=law,
-        root=np.asarray(np.linalg.cholesky(law)),
-        stress=coefficients,
-        force=force,
-        missed=missed,
-    )
-
-
-def _of_body(mesh: ng.Mesh, pattern: str, region: Index) -> Index:
-    """Triangles, of the `region` (n,), of the bodies that a pattern selects, (j,)."""
-    return np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,26 +38,60 @@ def _blocks(count: int, size: int) -> Iterator[Index]:
         yield np.arange(low, min(low + step, count))
 
 
-def _basis(discrete: Discrete, at: Index) -> tuple[Array, Array]:
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Triangles `at` (b,): operators, hats times sigma_h (b, 3, 3 n), what to add (b, 3, 2 m).
+
+    All on orthonormal coefficients, the latter the divergence that hats times sigma_h lack.
+    """
+
+    parts: Condensed
+    hatted: Array
+    rho: Array
+
+
+def into_raw(discrete: Discrete, at: Index) -> Array:
     """Matrices (b, 3 n, 3 n) from orthonormal to raw coefficients of triangles `at` (b,)."""
     n = dimension(discrete.degree)
-    size = np.sqrt(discrete.partition.areas[at])[:, None, None]
-    root = discrete.root[at] / size
-    eye = np.eye(n)
-    into = np.einsum("bij,kl->bikjl", root, eye).reshape(len(at), 3 * n, 3 * n)
-    return into, np.asarray(np.linalg.inv(root))
+    root = discrete.root[at] / np.sqrt(discrete.partition.areas[at])[:, None, None]
+    into = np.einsum("bij,kl->bikjl", root, np.eye(n)).reshape(len(at), 3 * n, 3 * n)
+    if discrete.rough is not None:
+        number = discrete.rough.number[at]
+        into[number >= 0] = discrete.rough.into[number[number >= 0]]
+    return into
 
 
-def _loads(discrete: Discrete, at: Index, theta: Array) -> tuple[Array, Array]:
-    """Hats times sigma_h (b, 3, 3, m), and divergences (b, 3, 2, l) that are to be added to them.
+def _block(discrete: Discrete, at: Index, frames: Array, theta: Array) -> _Block:
+    """What the patches need of the triangles `at` (b,)."""
+    n, b = dimension(discrete.degree), len(at)
+    into = into_raw(discrete, at)
+    D, N = (M @ into for M in raw_operators(discrete, at, frames))
+    sigma, rho = _loads(discrete, at)
+    wide = np.zeros((b, 3, 3, n))
+    inverse = (
+        np.linalg.inv(discrete.root[at]) * np.sqrt(discrete.partition.areas[at])[:, None, None]
+    )
+    wide[..., : sigma.shape[-1]] = np.einsum("bij,bajl->bail", inverse, sigma)
+    c = wide.reshape(b, 3, 3 * n)
+    if discrete.rough is not None:
+        number = discrete.rough.number[at]
+        mine, number = np.flatnonzero(number >= 0), number[number >= 0]
+        c[mine] = discrete.rough.hatted[number]
+        lacks = discrete.rough.divergence[number].reshape(len(mine), 3, -1)
+        rho[mine] = (lacks - c[mine] @ D[mine].transpose(0, 2, 1)).reshape(len(mine), 3, 2, -1)
+    rho[..., :3] += theta[at]
+    return _Block(condensed(D, N), c, rho.reshape(b, 3, -1))
 
-    To coefficients in polynomials of degree p and k - 1, for each vertex.
+
+def _loads(discrete: Discrete, at: Index) -> tuple[Array, Array]:
+    """Hats times sigma_h (b, 3, 3, m), and divergences (b, 3, 2, l) that they lack.
+
+    Coefficients in polynomials of degree p and k - 1, for each vertex.
     """
     partition, p = discrete.partition, discrete.order
     sigma = discrete.stress[at]
     hatted = np.einsum("aij,bcj->baci", basis(p).hats, sigma)
-    rho = -discrete.force[at].copy()
-    rho[..., :3] += theta[at]
+    rho = -discrete.force[at]
     if p > 1:
         D = basis(p - 1).derivatives
         low = np.einsum("brd,rij,bcj->bdci", partition.inverses[at], D, sigma)
@@ -187,7 +102,10 @@ def _loads(discrete: Discrete, at: Index, theta: Array) -> tuple[Array, Array]:
 
 
 def patch_loads(discrete: Discrete) -> Array:
-    """What the divergence of each patch's stress shall be, up to degree 1: (n, 3, 2, 3)."""
+    """What the divergence of each patch's stress shall be: means (n, 3, 2, 3) of its products.
+
+    With polynomials of degree 1, over the straight area.
+    """
     sigma, gradients = discrete.stress, discrete.partition.hat_gradients
     xx, yy, xy = sigma[:, 0], sigma[:, 1], sigma[:, 2]
     gx, gy = gradients[:, :, 0, None], gradients[:, :, 1, None]
@@ -197,6 +115,8 @@ def patch_loads(discrete: Discrete) -> Array:
     result = -discrete.force[..., :3].copy()
     low = min(3, load.shape[-1])
     result[..., :low] += load[..., :low]
+    if discrete.rough is not None:
+        result[discrete.rough.at] = discrete.rough.moments
     return result
 
 
@@ -207,36 +127,20 @@ def equilibrated(discrete: Discrete, conditions: EdgeConditions, given: Array) -
     """
     partition, k = discrete.partition, discrete.degree
     n, r = len(partition.triangles), 2 * (k + 1)
-    stiffness = 1 / np.linalg.inv(discrete.law)[:, [0, 1], [0, 1]].max(axis=1)
-    theta, rest = exchanged_loads(
-        partition,
-        patch_loads(discrete),
-        given,
-        conditions.frames,
-        conditions.constrained,
-        stiffness,
-    )
+    theta, rest = exchanged_loads(discrete, patch_loads(discrete), given, conditions)
     S, g = np.empty((n, 3, 2 * r, 2 * r)), np.empty((n, 3, 2 * r))
     X, x = np.empty((n, 3, r, 2 * r)), np.empty((n, 3, r))
     size = 9 * dimension(k) ** 2
     for at in _blocks(n, size):
-        into, inverse = _basis(discrete, at)
-        D, N = raw_operators(partition, at, k, conditions.frames)
-        parts = condensed(D @ into, N @ into)
-        hatted, rho = _loads(discrete, at, theta)
-        c = np.zeros((len(at), 3, 3, dimension(k)))
-        c[..., : hatted.shape[-1]] = np.einsum("bij,bajl->bail", inverse, hatted)
-        c = c.reshape(len(at), 3, -1) + parts.with_divergence(rho.reshape(len(at), 3, -1))
-        t = c @ parts.N.transpose(0, 2, 1)
-        S[at], g[at], X[at], x[at] = without_opposite(parts.G, t)
-    lam = multipliers(partition, S, g, conditions.constrained, given)
+        block = _block(discrete, at, conditions.frames, theta)
+        c = block.hatted + block.parts.with_divergence(block.rho)
+        t = c @ block.parts.N.transpose(0, 2, 1)
+        S[at], g[at], X[at], x[at] = without_opposite(block.parts.G, t)
+    lam = multipliers(partition, S, g, conditions, given)
     change = np.empty((n, 3 * dimension(k)))
     for at in _blocks(n, size):
-        into, _ = _basis(discrete, at)
-        D, N = raw_operators(partition, at, k, conditions.frames)
-        parts = condensed(D @ into, N @ into)
-        _, rho = _loads(discrete, at, 0 * theta)
+        block = _block(discrete, at, conditions.frames, 0 * theta)  # their sum is 0
         y = gathered(lam[at], X[at], x[at])
-        change[at] = parts.with_divergence(rho.sum(axis=1).reshape(len(at), 1, -1))[:, 0]
-        change[at] -= (parts.K @ y[:, :, None])[:, :, 0]
+        change[at] = block.parts.with_divergence(block.rho.sum(axis=1, keepdims=True))[:, 0]
+        change[at] -= (block.parts.K @ y[:, :, None])[:, :, 0]
     return Equilibrated(change, rest)

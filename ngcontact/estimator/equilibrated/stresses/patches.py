@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....arrays import Array, Index, Mask
-from .partition import Partition
+from ....arrays import Array, Index
+from ..data import EdgeConditions, Partition
 
 AT_ONCE = 4_000_000  # numbers in the matrices of patches that are solved together
 SHIFT = 1e-10  # relative, by which singular matrices are solved; refined away where it matters
 REFINEMENTS = 3
 SOLVED = 1e-12  # residual, relative, above which a patch is solved by its eigenvectors
+SOFT = 1e-5  # relative compliance of tractions that need be met but nearly
 TRUNCATED = 1e-13  # eigenvalues, relative, that are zero: of rigid motions, of crossing lines
 
 
@@ -96,7 +97,9 @@ def _solved(A: Array, b: Array, size: Array) -> Array:
     return np.asarray(x / scale)
 
 
-def multipliers(partition: Partition, S: Array, g: Array, constrained: Mask, given: Array) -> Array:
+def multipliers(
+    partition: Partition, S: Array, g: Array, conditions: EdgeConditions, given: Array
+) -> Array:
     """Multipliers (n, 3, 2 r) of the two edges at each vertex of each triangle.
 
     Parameters
@@ -107,11 +110,12 @@ def multipliers(partition: Partition, S: Array, g: Array, constrained: Mask, giv
         Tractions on the two edges by their multipliers, condensed, for each vertex.
     g : ndarray (n, 3, 2 r)
         Tractions on them without multipliers.
-    constrained : ndarray of bool (e, r)
+    conditions : EdgeConditions
         Which components of the tractions are prescribed, or continuous.
     given : ndarray (e, 2, r)
         Their values on the boundary, weighted by the hats of both ends of the edge.
     """
+    constrained = conditions.constrained
     r = constrained.shape[1]
     sizes = np.abs(g).max(axis=2)
     result = np.zeros_like(g)
@@ -134,6 +138,8 @@ def multipliers(partition: Partition, S: Array, g: Array, constrained: Mask, giv
         A[patch, :, row] = 0.0
         A[patch, row, row] = 1.0
         rhs[free] = 0.0
+        patch, row = np.nonzero(conditions.soft[group.spokes].reshape(b, -1))
+        A[patch, row, row] *= 1 + SOFT
         x = _solved(A, rhs, size)
         result[group.triangle, group.corner] = x[group.patch[:, None], columns]
     return result

@@ -14,8 +14,7 @@ from scipy.sparse.linalg import splu
 
 from ....arrays import Array, Mask
 from ....triplets import from_triplets
-from .partition import Partition
-from .polynomials import CORNERS, basis
+from ..data import CORNERS, Discrete, EdgeConditions, Partition, basis, rigid_motions_on
 
 RESISTED = 1e-6  # square of a motion on free edges, relative, from which their tractions resist it
 SHIFT = 1e-11  # relative, of a matrix that is singular where a body is free to move
@@ -40,22 +39,10 @@ def _motions(partition: Partition) -> tuple[Array, Array]:
     return values @ np.linalg.inv(basis(1).values(CORNERS)).T, size
 
 
-def _on_edges(partition: Partition, size: Array, frames: Array) -> Array:
-    """The motions of both ends of the e edges, (e, 2, 3, 2, 2): along frames, Legendre."""
-    ends = partition.vertices[partition.ends]
-    apart = (ends[:, None] - ends[:, :, None]) / size[partition.ends][:, :, None, None]
-    values = np.zeros((len(ends), 2, 3, 2, 2))
-    values[:, :, 0, 0], values[:, :, 1, 1] = 1.0, 1.0
-    values[:, :, 2, 0], values[:, :, 2, 1] = -apart[..., 1], apart[..., 0]
-    values = np.einsum("efc,eaicp->eaifp", frames, values)
-    first, last = values[..., 0], values[..., 1]
-    return np.stack([(first + last) / 2, (last - first) / np.sqrt(12)], axis=-1)
-
-
 def _admitted(partition: Partition, on_edges: Array, constrained: Mask) -> Array:
     """Projectors (v, 3, 3) to the motions of each patch that no free traction resists."""
     e, r = constrained.shape
-    free = ~constrained.reshape(e, 2, r // 2)[:, :, :2]
+    free = ~constrained.reshape(e, 2, r // 2)[:, :, : on_edges.shape[-1]]
     squares = np.einsum("eaifq,eajfq,efq->eaij", on_edges, on_edges, free)
     total = np.zeros((len(partition.vertices), 3, 3))
     np.add.at(total, partition.ends, squares)
@@ -65,25 +52,21 @@ def _admitted(partition: Partition, on_edges: Array, constrained: Mask) -> Array
 
 
 def exchanged_loads(
-    partition: Partition,
-    load: Array,
-    given: Array,
-    frames: Array,
-    constrained: Mask,
-    stiffness: Array,
+    discrete: Discrete, load: Array, given: Array, conditions: EdgeConditions
 ) -> tuple[Array, float]:
     """Loads theta (n, 3, 2, 3) by triangle, vertex, component and polynomial of degree 1.
 
     Parameters
     ----------
-    partition : Partition
-        Of n triangles, v vertices, e edges.
+    discrete : Discrete
+        On n triangles.
     load : ndarray (n, 3, 2, 3)
-        What the divergence shall be in the patch of each vertex, up to degree 1.
-    given, frames, constrained : ndarray (e, 2, r), (e, 2, 2), (e, r)
-        Of the boundary's tractions, see `multipliers`.
-    stiffness : ndarray (n,)
-        A modulus of each triangle.
+        What the divergence shall be in the patch of each vertex: means of its products with
+        polynomials of degree 1.
+    given : ndarray (e, 2, r)
+        Tractions on the e edges, see `multipliers`.
+    conditions : EdgeConditions
+        Of the edges.
 
     Returns
     -------
@@ -92,13 +75,17 @@ def exchanged_loads(
     rest : float
         Forces that stay unbalanced, relative to the largest term.
     """
+    partition, constrained = discrete.partition, conditions.constrained
     motions, size = _motions(partition)
-    on_edges = _on_edges(partition, size, frames)
+    about = partition.vertices[partition.ends], size[partition.ends]
+    every = np.arange(len(partition.ends))
+    frames, degree = conditions.frames, discrete.geometry
+    on_edges = rigid_motions_on(partition, discrete.curves, every, frames, about, degree)
     P = _admitted(partition, on_edges, constrained)
     area, triangles, v = partition.areas, partition.triangles, len(partition.vertices)
     inside = area[:, None, None] * np.einsum("tacq,taicq->tai", load, motions)
     e, r = constrained.shape
-    low = given.reshape(e, 2, 2, r // 2)[..., :2]
+    low = given.reshape(e, 2, 2, r // 2)[..., : degree + 1]
     outside = partition.edge_lengths[:, None, None] * np.einsum("eafq,eaifq->eai", low, on_edges)
     defect, terms = np.zeros((v, 3)), np.zeros((v, 3))
     np.add.at(defect, triangles, inside)
@@ -109,24 +96,26 @@ def exchanged_loads(
     largest = terms.max(initial=0.0)
     if np.abs(defect).max(initial=0.0) <= 1e-15 * largest:
         return np.zeros_like(load), 0.0
+    stiffness = 1 / np.linalg.inv(discrete.law)[:, [0, 1], [0, 1]].max(axis=1)
     weight = stiffness / partition.diameters**2
-    A = _exchange(partition, motions, weight * area)
+    weighed = motions @ discrete.motions_gram()[:, None, None]
+    A = _exchange(partition, motions, weighed, weight * area)
     mu = _least(A, P, -defect)
     rho = np.einsum("tai,taicq->tacq", mu[triangles], motions)
     theta = weight[:, None, None, None] * (rho - rho.mean(axis=1, keepdims=True))
     left = defect.copy()
-    np.add.at(left, triangles, area[:, None, None] * np.einsum("tacq,taicq->tai", theta, motions))
+    np.add.at(left, triangles, area[:, None, None] * np.einsum("tacq,taicq->tai", theta, weighed))
     left = np.einsum("vij,vj->vi", P, left)
     return theta, float(np.abs(left).max() / largest)
 
 
-def _exchange(partition: Partition, motions: Array, weight: Array) -> sp.csr_array:
+def _exchange(partition: Partition, motions: Array, weighed: Array, weight: Array) -> sp.csr_array:
     """Loads on patches by the motions (v, 3) of their vertices: each less the mean of the three."""
     triangles, v = partition.triangles, len(partition.vertices)
-    blocks = -np.einsum("t,tajcq,tbicq->tabji", weight, motions / 3, motions, optimize=True)
+    blocks = -np.einsum("t,tajcq,tbicq->tabji", weight, motions / 3, weighed, optimize=True)
     for i in range(3):
-        mine = motions[:, i]
-        blocks[:, i, i] += np.einsum("t,tjcq,ticq->tji", weight, mine, mine)
+        mine = motions[:, i], weighed[:, i]
+        blocks[:, i, i] += np.einsum("t,tjcq,ticq->tji", weight, *mine)
     rows = (3 * triangles[:, :, None] + np.arange(3)).reshape(-1, 9)
     full = blocks.transpose(0, 1, 3, 2, 4).reshape(-1, 81)
     row, column = np.repeat(rows, 9, axis=1), np.tile(rows, (1, 9))

@@ -8,19 +8,21 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....arrays import Mask
+from ....arrays import Index, Mask
 from ....fem import BoundaryTrace
 from ....problem import Problem, Triangulation
 from .conditions import projected_loads
+from .curves import bent_segments
 from .polynomials import legendre_values
 
 SAME = 1e-12  # difference of tractions, relative to the largest
 
 
-def divided_elements(problem: Problem, boundary: BoundaryTrace, degree: int) -> Mask:
+def divided_elements(problem: Problem, boundary: BoundaryTrace, degree: int, uneven: Index) -> Mask:
     """Elements (ne,) in whose corners given tractions meet that leave a stress no freedom.
 
-    `degree` is that of the stress.
+    `degree` is that of the stress; on segments `uneven` (j,) the polynomials that stand for p*
+    jump at vertices.
     """
     view = Triangulation(boundary.mesh)
     outer = np.flatnonzero(~boundary.inner)
@@ -47,7 +49,11 @@ def divided_elements(problem: Problem, boundary: BoundaryTrace, degree: int) -> 
     contact = touching[outer[i]] | touching[outer[j]]
     skew = np.abs((one * n).sum(axis=1) - (other * m).sum(axis=1)) > small
     jump = np.abs(one - other).max(axis=1) > small
+    jump |= np.isin(outer[i], uneven) | np.isin(outer[j], uneven)
     count = np.bincount(view.triangles.ravel(), minlength=len(view.vertices))[vertex[first]]
     bad = ((count == 1) & (contact | skew)) | ((count == 2) & jump)
     bad &= ~free[outer[i]] & ~free[outer[j]]
-    return np.asarray(np.isin(view.triangles, vertex[first[bad]]).any(axis=1))
+    divided: Mask = np.any(np.isin(view.triangles, vertex[first[bad]]), axis=1, keepdims=True)[:, 0]
+    # On curves tractions are met in the mean, and curved triangles have no straight parts.
+    divided[boundary.element[bent_segments(boundary)]] = False
+    return np.asarray(divided)

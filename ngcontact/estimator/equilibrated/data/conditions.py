@@ -12,6 +12,7 @@ from ....arrays import Array, Index, Mask
 from ....fem import BoundaryTrace
 from ....lagrange import gauss
 from ....problem import Problem
+from .curves import bent_segments
 from .partition import Partition
 from .polynomials import legendre_values
 
@@ -28,6 +29,9 @@ class EdgeConditions:
         Directions of the components, as rows.
     constrained : ndarray of bool (e, r)
         Components that are continuous or given; the others are the supports'.
+    soft : ndarray of bool (e, r)
+        Those of them that need be met but nearly: the last ones on curves, where all of them are
+        nearly dependent, as they are on straight edges.
     given : ndarray (e, 2, r)
         Loads, weighted by the hats of both ends of the edge.
     missed : ndarray (e,)
@@ -36,6 +40,7 @@ class EdgeConditions:
 
     frames: Array
     constrained: Mask
+    soft: Mask
     given: Array
     missed: Array
 
@@ -64,7 +69,8 @@ def projected_loads(
     segments : ndarray of int (j,)
         Of the boundary.
     coefficients : ndarray (j, 2, k)
-        Along x and y, Legendre coefficients in the segment's parameter, units of stress.
+        Along x and y, Legendre coefficients in the segment's parameter, units of stress; on curves
+        of the load per chord.
     squares : ndarray (j,)
         Means of the squares of what these miss.
     """
@@ -74,6 +80,8 @@ def projected_loads(
         segments = boundary.segments(pattern)
         at, s = np.repeat(segments, len(rule)), np.tile(rule, len(segments))
         P = boundary.evaluate(problem.traction_vector(pattern), at, s)
+        ds = np.linalg.norm(boundary.derivative(at, s), axis=1) / boundary.lengths(at)
+        P = P * ds[:, None]
         P = P.reshape(len(segments), -1, 2)
         c = np.einsum("q,qi,jqc->jci", w, values, P)
         rest = P - np.einsum("qi,jci->jqc", values, c)
@@ -109,9 +117,12 @@ def edge_conditions(
         c = np.einsum("kfc,kcj->kfj", frames[edge], c) * constrained[edge, :, :1]
         given[edge] += np.einsum("hij,kfj->khfi", with_hats(degree), c)
         missed[edge] += np.sqrt(partition.edge_lengths[edge] * squares) / unit
+    soft = np.zeros_like(constrained)
+    soft[partition.edge_of_segment[bent_segments(boundary)], :, -1] = True
     return EdgeConditions(
         frames=frames,
         constrained=constrained.reshape(e, -1),
+        soft=soft.reshape(e, -1),
         given=given.reshape(e, 2, -1),
         missed=missed,
     )

@@ -1,0 +1,214 @@
+"""Triangles without closed forms: curved ones, and those of laws that vary.
+
+There stresses are polynomials in x, too, of which norms and moments are integrated in points.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+
+from ....arrays import Array, Index
+from ....problem import Problem
+from .partition import Partition
+from .polynomials import basis, dimension, triangle_rule
+
+LAW_BONUS = 8  # quadrature order above that of polynomials, for laws that vary
+AT_ONCE = 2_000_000  # values of polynomials at quadrature points that are looked at together
+
+
+@dataclass(frozen=True, eq=False)
+class Rough:
+    """Rough triangles, r of n; 3 j stresses, m polynomials of degree k - 1.
+
+    Attributes
+    ----------
+    at : ndarray of int (r,)
+        Their numbers.
+    number : ndarray of int (n,)
+        Which of them a triangle is, or -1.
+    into : ndarray (r, 3 j, 3 j)
+        From coefficients orthonormal in the energy to those of polynomials in x.
+    hatted : ndarray (r, 3, 3 j)
+        Orthonormal coefficients of the hats times sigma_h.
+    divergence : ndarray (r, 3, 2, m)
+        What the divergence of the stress of each patch shall be, less rigid loads.
+    force, force_means : ndarray (r, 2, m)
+        Projected body forces, and their means over the straight area times polynomials.
+    moments : ndarray (r, 3, 2, 3)
+        Means over the triangle's straight area of `divergence` times polynomials of degree 1.
+    gram : ndarray (r, 3, 3)
+        The same of products of these polynomials.
+    rest : ndarray (r,)
+        Norms of what polynomials miss of sigma_h.
+    missed : ndarray (r,)
+        Norms of what they miss of the forces.
+    distortion : ndarray (r,)
+        Factor of Poincare's constant of the straight triangle.
+    least, most : ndarray (r,)
+        Smallest eigenvalue of the law in Mandel's scaling, and its largest ratio to the law of the
+        middle.
+    """
+
+    at: Index
+    number: Index
+    into: Array
+    hatted: Array
+    divergence: Array
+    force: Array
+    force_means: Array
+    moments: Array
+    gram: Array
+    rest: Array
+    missed: Array
+    distortion: Array
+    least: Array
+    most: Array
+
+
+@dataclass(frozen=True, eq=False)
+class _Points:
+    """Quadrature in b triangles: weights over the straight area, values, gradients of hats."""
+
+    weight: Array
+    values: Array
+    hats: Array
+    gradients: Array
+    distortion: Array
+
+
+def _points(partition: Partition, at: Index, order: int, degree: int) -> _Points:
+    rule, w = triangle_rule(order)
+    jacobian = partition.evaluate(ng.specialcf.JacobianMatrix(2), at, rule) / partition.length
+    jacobian = jacobian.reshape(len(at), -1, 2, 2) @ _inner_sides(partition, at)
+    x = partition.evaluate(ng.CF((ng.x, ng.y)), at, rule) / partition.length
+    origin = partition.vertices[partition.triangles[at, 2]]
+    flat = np.einsum("bij,bqj->bqi", partition.inverses[at], x - origin[:, None])
+    weight = w * np.linalg.det(jacobian) / (2 * partition.areas[at][:, None])
+    inverse = np.linalg.inv(jacobian)
+    gradients = np.concatenate([inverse, -inverse.sum(axis=2, keepdims=True)], axis=2)
+    values = basis(degree).values(flat.reshape(-1, 2)).reshape(*x.shape[:2], -1)
+    hats = np.column_stack([rule, 1 - rule.sum(axis=1)])
+    # |w|^2 <= max det (h / pi)^2 |grad of w in the straight triangle|^2, which is at most
+    # max |D|^2 / min det |grad w|^2.
+    D = jacobian @ partition.inverses[at][:, None]
+    det, largest = np.linalg.det(D), np.linalg.norm(D, ord=2, axis=(2, 3)).max(axis=1)
+    distortion = largest * np.sqrt(det.max(axis=1) / det.min(axis=1))
+    return _Points(weight, values, hats, gradients, distortion)
+
+
+def _inner_sides(partition: Partition, at: Index) -> Array:
+    """Jacobians (b, 1, 2, 2) from a triangle's reference coordinates to its element's."""
+    corners = partition.within[at]
+    return np.stack([corners[:, 0] - corners[:, 2], corners[:, 1] - corners[:, 2]], axis=2)[:, None]
+
+
+def rough_triangles(
+    problem: Problem,
+    partition: Partition,
+    at: Index,
+    geometry: int,
+    degree: int,
+    stress: ng.CoefficientFunction,
+    law: Array,
+    units: tuple[float, float],
+) -> Rough:
+    """Look at the triangles `at` (r,) in points.
+
+    Parameters
+    ----------
+    problem, partition, stress
+        The problem, all triangles, and (xx, yy, xy) of sigma_h.
+    at : ndarray of int (r,)
+        The rough triangles.
+    geometry, degree : int
+        Degree of curves and of stresses.
+    law : ndarray (n, 3, 3)
+        Moduli in the middle of all triangles.
+    units : tuple of float
+        Of stress and modulus.
+    """
+    n, m, r = dimension(degree), dimension(degree - 1), len(at)
+    order = 2 * degree * geometry + 2 * (geometry - 1) + LAW_BONUS
+    number = np.full(len(partition.triangles), -1)
+    number[at] = np.arange(r)
+    result = Rough(
+        at=at,
+        number=number,
+        into=np.empty((r, 3 * n, 3 * n)),
+        hatted=np.empty((r, 3, 3 * n)),
+        divergence=np.empty((r, 3, 2, m)),
+        force=np.empty((r, 2, m)),
+        force_means=np.empty((r, 2, m)),
+        moments=np.empty((r, 3, 2, 3)),
+        gram=np.empty((r, 3, 3)),
+        rest=np.empty(r),
+        missed=np.empty(r),
+        distortion=np.empty(r),
+        least=np.empty(r),
+        most=np.empty(r),
+    )
+    moduli = partition.mesh.MaterialCF(
+        {name: body.voigt(problem.model) for name, body in problem.materials.items()}
+    )
+    force = partition.mesh.MaterialCF(problem.force, default=ng.CF((0, 0)))
+    step = max(1, AT_ONCE // (len(triangle_rule(order)[1]) * 3 * n))
+    for low in range(0, r, step):
+        part = slice(low, min(low + step, r))
+        _look(result, part, partition, order, degree, (moduli, stress, force), law, units)
+    return result
+
+
+def _look(
+    result: Rough,
+    part: slice,
+    partition: Partition,
+    order: int,
+    degree: int,
+    functions: tuple[ng.CoefficientFunction, ng.CoefficientFunction, ng.CoefficientFunction],
+    law: Array,
+    units: tuple[float, float],
+) -> None:
+    """Fill in a part of the triangles."""
+    at, m = result.at[part], dimension(degree - 1)
+    rule, _ = triangle_rule(order)
+    points = _points(partition, at, order, degree)
+    C, sigma, F = (partition.evaluate(f, at, rule) for f in functions)
+    C, sigma = C.reshape(*C.shape[:2], 3, 3) / units[1], sigma / units[0]
+    F = F * (partition.length / units[0])
+    w, phi, area = points.weight, points.values, partition.areas[at]
+    S = np.linalg.inv(C)
+    b, n = len(at), phi.shape[2]
+    weighted = (w * area[:, None])[:, :, None, None] * S
+    gram = np.einsum("bqxy,bqi,bqj->bxiyj", weighted, phi, phi, optimize=True)
+    lower = np.linalg.cholesky(gram.reshape(b, 3 * n, 3 * n))
+    into = np.linalg.inv(lower).transpose(0, 2, 1)
+    target = np.einsum("bqxy,bqy,qa,bqi->baxi", weighted, sigma, points.hats, phi, optimize=True)
+    hatted = target.reshape(b, 3, -1) @ into
+    result.into[part], result.hatted[part] = into, hatted
+    raw = (into @ hatted.sum(axis=1)[:, :, None]).reshape(b, 3, n)
+    off = sigma - np.einsum("bxi,bqi->bqx", raw, phi)
+    result.rest[part] = np.sqrt(np.einsum("bqx,bqxy,bqy->b", off, weighted, off, optimize=True))
+    low = phi[:, :, :m]
+    gx, gy = points.gradients[..., 0], points.gradients[..., 1]  # (b, q, 3)
+    xx, yy, xy = sigma[..., 0, None], sigma[..., 1, None], sigma[..., 2, None]
+    gradient = np.stack([gx * xx + gy * xy, gx * xy + gy * yy], axis=-1)  # (b, q, 3, 2)
+    d = gradient - points.hats[:, :, None] * F[:, :, None, :]
+    moments = np.einsum("bq,bqac,bqi->baci", w, d, low, optimize=True)
+    of_force = np.einsum("bq,bqc,bqi->bci", w, F, low, optimize=True)
+    mass = np.einsum("bq,bqi,bqj->bij", w, low, low, optimize=True)
+    inverse = np.linalg.inv(mass)
+    result.divergence[part] = moments @ inverse[:, None]
+    result.force[part], result.force_means[part] = of_force @ inverse, of_force
+    result.moments[part] = moments[..., :3]
+    result.gram[part] = mass[:, :3, :3]
+    off_force = F - np.einsum("bci,bqi->bqc", result.force[part], low)
+    result.missed[part] = np.sqrt(area * np.einsum("bq,bqc->b", w, off_force**2))
+    result.distortion[part] = points.distortion
+    mandel = np.array([1.0, 1.0, np.sqrt(2.0)])
+    result.least[part] = np.linalg.eigvalsh(C * mandel[:, None] * mandel)[..., 0].min(axis=1)
+    half = np.linalg.inv(np.linalg.cholesky(law[at]))[:, None]
+    ratio = np.linalg.eigvalsh(half @ C @ half.transpose(0, 1, 3, 2))[..., -1]
+    result.most[part] = ratio.max(axis=1)
