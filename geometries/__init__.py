@@ -5,9 +5,23 @@ separate faces, so that the mesh keeps distinct, coincident nodes where they tou
 bodies and boundaries stand in the docstring of each function. Lengths are in any consistent unit.
 """
 
-from ngcontact.geometries.concentric import rings
+from ngcontact.geometries.concentric import ball_in_socket, rings
 from ngcontact.geometries.curved import graphs
 from ngcontact.geometries.discs import disc, disc_on_block, disc_on_disc
-from ngcontact.geometries.straight import blocks, punch
+from ngcontact.geometries.revolved import cone_on_block, ring_in_groove, rounded_punch
+from ngcontact.geometries.straight import blocks, punch, sleeve_on_shaft
 
-__all__ = ["blocks", "disc", "disc_on_block", "disc_on_disc", "graphs", "punch", "rings"]
+__all__ = [
+    "ball_in_socket",
+    "blocks",
+    "cone_on_block",
+    "disc",
+    "disc_on_block",
+    "disc_on_disc",
+    "graphs",
+    "punch",
+    "ring_in_groove",
+    "rings",
+    "rounded_punch",
+    "sleeve_on_shaft",
+]

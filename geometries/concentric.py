@@ -1,4 +1,4 @@
-"""Concentric rings, bounded by circles."""
+"""Bodies inside of others, bounded by circles: rings, a ball in its socket."""
 
 from __future__ import annotations
 
@@ -76,6 +76,68 @@ def rings(
         part("inner", hole, shaft, "hole", "inner_contact"),
         part("outer", bore, rim, "outer_contact", "rim"),
     )
+
+
+def ball_in_socket(
+    radius: float = 1.0,
+    clearance: float = 0.05,
+    width: float | None = None,
+    depth: float | None = None,
+) -> OCCGeometry:
+    """Lower half of a ball that rests at (0, -`radius`) in a hemispherical socket.
+
+    Lengths are in any consistent unit.
+
+    Parameters
+    ----------
+    radius, clearance : float
+        Radius of the ball about the origin; that of the socket is larger by the clearance.
+    width, depth : float, optional
+        The socket's block covers x <= `width` and y >= -`depth`. Default: 2 `radius` each, and more
+        than the radius of the socket.
+
+    Returns
+    -------
+    OCCGeometry
+        Compound of the two bodies. Both have a vertex at the lowest point.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a length is not positive, or the block does not hold the socket.
+
+    Notes
+    -----
+    ====================  ==================================================
+    body, boundary        where
+    ====================  ==================================================
+    ``ball``              y <= 0, inside the ball
+    ``socket``            the block, outside the socket
+
+    ``ball_top``          y = 0, ``ball``
+    ``ball_arc``          the ball
+    ``socket_arc``        the socket, a circle about (0, `clearance`)
+    ``socket_rim``        y = `clearance`
+    ``side``              x = `width`
+    ``socket_bottom``     y = -`depth`
+    ``axis``              x = 0, both bodies
+    ====================  ==================================================
+    """
+    radius, clearance = positive("radius", radius), positive("clearance", clearance)
+    bore = radius + clearance
+    right = 2 * bore if width is None else above("width", width, "radius + clearance", bore)
+    bottom = -2 * radius if depth is None else -above("depth", depth, "radius", radius)
+    ball = [
+        ("ball_arc", quarter_arc((0.0, 0.0), radius, DOWN, RIGHT)),
+        ("ball_top", segment((radius, 0.0), (0.0, 0.0))),
+        ("axis", segment((0.0, 0.0), (0.0, -radius))),
+    ]
+    corners = [(0.0, -radius), (0.0, bottom), (right, bottom), (right, clearance)]
+    names = ["axis", "socket_bottom", "side", "socket_rim"]
+    ends = [*corners[1:], (bore, clearance)]
+    socket = [(name, segment(a, b)) for name, a, b in zip(names, corners, ends, strict=True)]
+    socket.append(("socket_arc", quarter_arc((0.0, clearance), bore, RIGHT, DOWN)))
+    return compound(body("ball", ball), body("socket", socket))
 
 
 def _bore(hole: float, shaft: float, rim: float, interference: float) -> float:

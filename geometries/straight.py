@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from netgen.occ import Face, OCCGeometry
 
-from ngcontact.geometries.check import above, increasing_line, positive
+from ngcontact.geometries.check import above, finite, increasing_line, positive
 from ngcontact.geometries.region import Point, body, compound, polygon
 
 
@@ -128,6 +128,67 @@ def punch(
         ["punch_contact", "punch_sides", "punch_top", "punch_sides"],
     )
     return compound(body("punch", upper), _foundation(half, far, bottom))
+
+
+def sleeve_on_shaft(
+    radius: float = 1.0,
+    outer: float = 1.6,
+    length: float = 1.0,
+    overhang: float = 0.5,
+    interference: float = 0.0,
+) -> OCCGeometry:
+    """Solid shaft, longer than the sleeve on it: a press fit or a clearance.
+
+    Lengths are in any consistent unit.
+
+    Parameters
+    ----------
+    radius, outer : float
+        Of the shaft and of the sleeve's rim.
+    length, overhang : float
+        The sleeve covers |y| <= `length` / 2, the shaft the overhang more on both sides.
+    interference : float
+        Radius of the shaft minus that of the sleeve's bore; negative: clearance.
+
+    Returns
+    -------
+    OCCGeometry
+        Compound of the two bodies.
+
+    Raises
+    ------
+    TypeError, ValueError
+        If a length is not positive, `outer` does not exceed `radius`, or the bore leaves (0,
+        `outer`).
+
+    Notes
+    -----
+    ====================  ==================================================
+    body, boundary        where
+    ====================  ==================================================
+    ``shaft``             x <= `radius`
+    ``sleeve``            `radius` - `interference` <= x <= `outer`
+
+    ``shaft_contact``     x = `radius`, |y| <= `length` / 2
+    ``shaft_free``        x = `radius`, beside the sleeve
+    ``sleeve_contact``    the bore of the sleeve
+    ``rim``               x = `outer`
+    ``shaft_ends``        both ends of the shaft
+    ``sleeve_ends``       both ends of the sleeve
+    ``axis``              x = 0
+    ====================  ==================================================
+    """
+    radius = positive("radius", radius)
+    rim, half = above("outer", outer, "radius", radius), positive("length", length) / 2
+    end, bore = half + positive("overhang", overhang), radius - finite("interference", interference)
+    above("radius - interference", bore, "zero", 0.0)
+    above("outer", outer, "radius - interference", bore)
+    corners = [(radius, -end), (radius, -half), (radius, half), (radius, end), (0.0, end)]
+    names = ["shaft_free", "shaft_contact", "shaft_free", "shaft_ends", "axis", "shaft_ends"]
+    shaft = polygon([*corners, (0.0, -end)], names)
+    corners = [(bore, -half), (rim, -half), (rim, half), (bore, half)]
+    sleeve = polygon(corners, ["sleeve_ends", "rim", "sleeve_ends", "sleeve_contact"])
+    return compound(body("shaft", shaft), body("sleeve", sleeve))
 
 
 def _line_between(bottom: float, top: float, line: object) -> list[Point]:

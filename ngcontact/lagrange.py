@@ -1,4 +1,8 @@
-"""Lagrange interpolation at Gauss-Lobatto points of the unit segment."""
+"""Lagrange interpolation at Gauss-Lobatto points of the unit segment.
+
+Those of the weight 1, and of a weight that vanishes at one end, where a segment of a body of
+revolution meets its axis: `axis` is 0, or -1 for the weight s and 1 for the weight 1 - s.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import legendre, polynomial
+from scipy.special import roots_jacobi
 
 from .arrays import Array, Index
 
@@ -13,20 +18,27 @@ HALVINGS = 54  # of [-1, 1], to the last bit
 
 
 @lru_cache
-def gauss_lobatto(order: int) -> Array:
+def gauss_lobatto(order: int, axis: int = 0) -> Array:
     """Gauss-Lobatto points of degree `order` on [0, 1], ends included.
 
     Parameters
     ----------
     order : int
         Polynomial degree, at least 1.
+    axis : int
+        End at which the weight vanishes, see above.
 
     Returns
     -------
     ndarray (order + 1,)
-        0, the zeros of the derivative of the Legendre polynomial of that degree, 1. Their
-        interpolatory weights are positive at every degree.
+        0, the zeros of the derivative of the Legendre polynomial of that degree, 1; of the weight s
+        the zeros of the Jacobi polynomial (1, 2) of one degree less. The integrals of the weight
+        times the Lagrange polynomials are positive at every degree, and by them polynomials of
+        degree 2 order - 1 are integrated exactly.
     """
+    if axis and order > 1:
+        inner = (1 + np.sort(roots_jacobi(order - 1, 1, 2)[0])) / 2
+        return np.concatenate([[0.0], inner if axis < 0 else 1 - inner[::-1], [1.0]])
     interior = legendre.Legendre.basis(order).deriv().roots()
     return np.concatenate([[0.0], (1 + np.sort(interior.real)) / 2, [1.0]])
 
@@ -39,13 +51,13 @@ def gauss(order: int) -> tuple[Array, Array]:
 
 
 @lru_cache
-def _coefficients(order: int) -> Array:
+def _coefficients(order: int, axis: int = 0) -> Array:
     """Monomial coefficients (lowest first) in 2s - 1 of the Lagrange polynomials, as columns."""
-    vandermonde = np.vander(2 * gauss_lobatto(order) - 1, increasing=True)
+    vandermonde = np.vander(2 * gauss_lobatto(order, axis) - 1, increasing=True)
     return np.asarray(np.linalg.inv(vandermonde), dtype=np.float64)
 
 
-def lagrange(order: int, s: Array) -> Array:
+def lagrange(order: int, s: Array, axis: int = 0) -> Array:
     """Values of the Lagrange polynomials at the Gauss-Lobatto points of degree `order`.
 
     Parameters
@@ -54,6 +66,8 @@ def lagrange(order: int, s: Array) -> Array:
         Polynomial degree.
     s : ndarray (k,)
         Parameters in [0, 1].
+    axis : int
+        Which points, see `gauss_lobatto`.
 
     Returns
     -------
@@ -62,8 +76,8 @@ def lagrange(order: int, s: Array) -> Array:
         the rows are unit vectors exactly.
     """
     s = np.atleast_1d(s)
-    values: Array = np.vander(2 * s - 1, order + 1, increasing=True) @ _coefficients(order)
-    at, node = np.nonzero(s[:, None] == gauss_lobatto(order))
+    values: Array = np.vander(2 * s - 1, order + 1, increasing=True) @ _coefficients(order, axis)
+    at, node = np.nonzero(s[:, None] == gauss_lobatto(order, axis))
     values[at] = 0.0
     values[at, node] = 1.0
     return values

@@ -11,11 +11,11 @@ import ngsolve as ng
 import numpy as np
 
 from .arrays import Array, Index, Mask, root_of_squares
-from .contact import ContactState, contact_states
+from .contact import ContactState, contact_states, state_of
 from .discrete import DiscreteProblem, RigidMotion, resultants
 from .estimator import Estimate, Estimator, Guaranteed, estimate
-from .fem import energy_norm, model_of, potential_energy, stress_of
-from .output import plot_solution, write_solution
+from .fem import energy_norm, model_of, normal_stress_of, potential_energy, stress_of
+from .output import plot_solution, write_revolved, write_solution
 from .problem import Problem
 from .qp import Iterate, kkt_residuals
 
@@ -75,11 +75,15 @@ class Solution(Guaranteed):
     def out_of_plane_stress(self) -> ng.CoefficientFunction:
         """Stress normal to the plane, a scalar CoefficientFunction, in units of stress.
 
-        nu (xx + yy) in plane strain, where for a general `Hooke` law, which does not tell it, 0 is
-        taken; 0 in plane stress.
+        nu (xx + yy) in plane strain, 0 where a general `Hooke` law does not tell it and in plane
+        stress, the hoop stress about an axis.
         """
-        model = model_of(self.problem)
-        return model.out_of_plane(self.problem.materials, self.mesh, self.stress)
+        return normal_stress_of(self.problem, self.displacement)
+
+    @property
+    def hoop_stress(self) -> ng.CoefficientFunction:
+        """Hoop stress of a body of revolution, a scalar, in units of stress; refused in planes."""
+        return model_of(self.problem).hoop(self.out_of_plane_stress)
 
     @cached_property
     def pairs(self) -> list[ContactState]:
@@ -125,18 +129,9 @@ class Solution(Guaranteed):
 
     def contact_force(self, pair: int = 0) -> Array:
         """Resultant (2,) of a pair's contact forces on its secondary, force per thickness."""
-        state = self.pairs[self._pair_number(pair)]
-        return -(state.force[:, None] * state.line.direction).sum(axis=0)
-
-    def _pair_number(self, pair: int) -> int:
-        """`pair`, or an error unless it numbers a contact pair."""
-        count = len(self.discrete.lines)
-        right = f"the pairs are numbered from 0 to {count - 1}" if count else "there is no contact"
-        if isinstance(pair, bool) or not isinstance(pair, int | np.integer):
-            raise TypeError(f"pair={pair!r} is not an integer; {right}")
-        if not 0 <= pair < count:
-            raise ValueError(f"pair={pair} is not a contact pair; {right}")
-        return int(pair)
+        state = state_of(self.pairs, pair)
+        forces = -(state.force[:, None] * state.line.direction).sum(axis=0)
+        return model_of(self.problem).resultant(forces)
 
     @cached_property
     def nodal_reaction(self) -> Array:
@@ -166,7 +161,7 @@ class Solution(Guaranteed):
 
     def transitions(self, pair: int = 0) -> Array:
         """Points (k, 2) where a pair's contact turns from binding to non-binding, each a length."""
-        return self.pairs[self._pair_number(pair)].transitions.position
+        return state_of(self.pairs, pair).transitions.position
 
     @cached_property
     def energy(self) -> float:
@@ -225,6 +220,10 @@ class Solution(Guaranteed):
     def write(self, path: str | os.PathLike[str]) -> Path:
         """Write `path` (.vtu) and, beside it, ``<stem>_contact.vtp``."""
         return write_solution(path, self)
+
+    def revolved(self, path: str | os.PathLike[str], angle: float = 270.0) -> Path:
+        """Write the body of revolution, turned by `angle` degrees, to `path` (.vtu)."""
+        return write_revolved(path, self, angle)
 
     def plot(self, path: str | os.PathLike[str] | None = None, scale: float | None = None) -> None:
         """Picture of the deformed bodies and the pressure; a file when `path` (.png) is given.

@@ -106,3 +106,19 @@ def test_zeros_are_all_the_roots_in_the_interval(order):
         np.testing.assert_allclose(s[number == k], real[(real >= 0) & (real <= 1)], atol=1e-9)
     # To the last bits of numbers of order 1, by the sums of at most six of them.
     assert np.abs((lagrange(order, s) * values[number]).sum(axis=1)).max() < 1e-13
+
+
+@pytest.mark.parametrize("axis", [-1, 1])
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_points_of_a_weight_that_vanishes_at_one_end(order, axis):
+    """Positive weights at every order, exact for degree 2 order - 1, mirrored at the other end."""
+    nodes = gauss_lobatto(order, axis)
+    assert nodes == pytest.approx(1 - gauss_lobatto(order, -axis)[::-1], abs=1e-15)
+    assert (lagrange(order, nodes, axis) == np.eye(order + 1)).all()
+    s, w = gauss(3 * order + 1)
+    weight = s if axis < 0 else 1 - s
+    weights = (w * weight) @ lagrange(order, s, axis)
+    assert (weights > 0).all()
+    for degree in range(2 * order):
+        expected = w @ (weight * s**degree)
+        assert weights @ nodes**degree == pytest.approx(expected, abs=1e-15)

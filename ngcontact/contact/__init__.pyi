@@ -20,6 +20,7 @@ from .search import partners as partners
 from .state import ContactState as ContactState
 from .state import by_line as by_line
 from .state import contact_states as contact_states
+from .state import state_of as state_of
 from .transitions import Transitions as Transitions
 from .transitions import ending_segments as ending_segments
 from .transitions import transitions_on as transitions_on

@@ -25,7 +25,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Index, Mask
 from ..fem import BoundaryTrace
-from ..lagrange import gauss, gauss_lobatto, lagrange
+from ..lagrange import gauss, lagrange
 from ..problem import Contact
 from ..triplets import from_triplets
 from .line import ContactLine, jacobian, prescribed_gap, segment_weights
@@ -106,13 +106,13 @@ def divided(trace: BoundaryTrace, contact: Contact, segments: Index, facing: Ind
     return Pieces(local[on], start[on], stop[on], met[on], there[on])
 
 
-def _dual_basis(whole: Array, weight: Array, mass: Array, order: int) -> tuple[Array, Array, Mask]:
+def _dual_basis(whole: Array, weight: Array, mass: Array, s: Array) -> tuple[Array, Array, Mask]:
     """Dual bases of k segments over their facing parts.
 
     Parameters
     ----------
-    whole, weight : ndarray (k, p + 1)
-        Integrals of phi over the segments and over their facing parts.
+    whole, weight, s : ndarray (k, p + 1)
+        Integrals of phi over the segments and over their facing parts; parameters of the nodes.
     mass : ndarray (k, p + 1, p + 1)
         Integrals of phi_i phi_j over the facing parts.
 
@@ -125,21 +125,22 @@ def _dual_basis(whole: Array, weight: Array, mass: Array, order: int) -> tuple[A
     hats : ndarray of bool (k,)
         Segments on which psi are those of the hats of the ends, or one constant.
     """
-    faces = (mass != 0).any(axis=(1, 2))
+    faces, order = (mass != 0).any(axis=(1, 2)), s.shape[1] - 1
     sliver = faces & (weight.sum(axis=1) < LEAST * whole.sum(axis=1))  # one row, at the nearer end
     hats = faces & ~sliver & (weight < LEAST * whole).any(axis=1) & (order > 1)
     change = np.zeros_like(mass)
     full = faces & ~hats & ~sliver
     change[full] = weight[full][:, :, None] * np.linalg.inv(mass[full])
-    hat = lagrange(1, gauss_lobatto(order)).T  # in terms of phi: their values at its nodes
-    D = weight[hats] @ hat.T
-    ends = np.flatnonzero(hats)[:, None], np.array([[0, order]])
-    change[ends] = D[:, :, None] * (np.linalg.inv(hat @ mass[hats] @ hat.T) @ hat)
+    hat = lagrange(1, s.ravel()).reshape(-1, order + 1, 2)  # values at the nodes of phi
+    D = np.einsum("ki,kij->kj", weight, hat)
+    ends, hat = (np.flatnonzero(hats)[:, None], np.array([[0, order]])), hat[hats]
+    across = hat.transpose(0, 2, 1)
+    change[ends] = D[hats][:, :, None] * (np.linalg.inv(across @ mass[hats] @ hat) @ across)
     share = weight[sliver].sum(axis=1)
-    end = np.flatnonzero(sliver), order * (weight[sliver] @ hat.T @ [-1, 1] > SLIVER * share)
+    end = np.flatnonzero(sliver), order * (D[sliver] @ [-1, 1] > SLIVER * share)
     change[end] = 1.0
     weight = np.where((hats | sliver)[:, None], 0.0, weight)
-    weight[ends], weight[end] = D, share
+    weight[ends], weight[end] = D[hats], share
     return weight, change, hats | sliver
 
 
@@ -160,13 +161,15 @@ def _integrals(
     eps = ((at(trace.curve, facing, s_there) - x) * d).sum(axis=1)
     if contact.gap is not None:
         eps = prescribed_gap(contact, trace, segment, s, x)
-    phi, phi_there = (lagrange(p, t).reshape(r, q, p + 1) for t in (s, s_there))
+    shapes = (trace.shapes(*place) for place in ((segment, s), (facing, s_there)))
+    phi, phi_there = (values.reshape(r, q, p + 1) for values in shapes)
     w, eps = w.reshape(r, q), eps.reshape(r, q)
     weight, gap, mass = np.zeros((k, p + 1)), np.zeros((k, p + 1)), np.zeros((k, p + 1, p + 1))
     np.add.at(weight, pieces.local, np.einsum("rg,rgi->ri", w, phi))
     np.add.at(gap, pieces.local, np.einsum("rg,rgi->ri", w * eps, phi))
     np.add.at(mass, pieces.local, np.einsum("rg,rgi,rgj->rij", w, phi, phi))
-    weight, change, hats = _dual_basis(segment_weights(trace, contact, segments), weight, mass, p)
+    whole = segment_weights(trace, contact, segments)
+    weight, change, hats = _dual_basis(whole, weight, mass, trace.places(segments))
     facing_part = change[pieces.local] @ np.einsum("rg,rgi,rgj->rij", w, phi, phi_there)
     own_part = change @ mass - weight[:, :, None] * np.eye(p + 1)
     first, last = (_rays(trace, contact, segments, np.full(k, s)) for s in (0.0, 1.0))
@@ -196,10 +199,8 @@ def end_to_end(trace: BoundaryTrace, line: ContactLine, facing: Mask) -> Index:
     size = trace.space.ndof
     keys, wanted = (x[:, 0] * size + x[:, 1] for x in (sides, met))
     order = np.argsort(keys)
-    place = np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)
-    found = line.facing[order[place]]
-    same = (met[:, 0] >= 0) & (keys[order[place]] == wanted)
-    return np.where(same, found, -1)
+    found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
+    return np.where((met[:, 0] >= 0) & (keys[found] == wanted), line.facing[found], -1)
 
 
 def with_dual_rows(
@@ -241,8 +242,7 @@ def with_dual_rows(
     at_nodes, carries = dual == 0, (dual > 0) | (facing & (nodal > 0))
     weight = np.where(at_nodes, 1.0, nodal + dual)
     share = np.where(at_nodes, 1.0, nodal / weight)  # of the row at the node
-    scale = cosine / weight[point]
-    shape = m, parts.coupling.shape[0]
+    scale, shape = cosine / weight[point], (m, parts.coupling.shape[0])
     means = from_triplets(scale, point, np.flatnonzero(here), shape) @ parts.coupling
     covered = np.bincount(pieces.local, pieces.stop - pieces.start, minlength=len(chosen))
     faces = line.faces.copy()

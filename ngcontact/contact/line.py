@@ -54,6 +54,8 @@ class ContactLine:
         Parameter on it.
     coupling : sparse (m, n)
         Weights of the n nodes in the displacement that faces each point; empty rows of an obstacle.
+    on_axis : ndarray of bool (m,)
+        Points on the axis of a body of revolution.
     means : ndarray of bool (m,)
         Points whose row is a mean over facing segments, not one at the node.
     shares : ndarray (k, order + 1)
@@ -75,6 +77,7 @@ class ContactLine:
     partner: Index
     partner_s: Array
     coupling: sp.csr_array
+    on_axis: Mask
     means: Mask
     shares: Array
     searches: int
@@ -95,12 +98,15 @@ def prescribed_gap(
 
 
 def jacobian(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
-    """Arc length (P1) or eta (P2) per s, (k,), at `s` (k,) of segments `segment` (k,)."""
-    derivative = trace.derivative(segment, s)
+    """Arc length (P1) or eta (P2) per s, (k,), at `s` (k,) of segments `segment` (k,).
+
+    Times what a length stands for in the model.
+    """
+    derivative, measure = trace.derivative(segment, s), trace.measure(segment, s)
     if contact.direction is None:
-        return np.linalg.norm(derivative, axis=1)
+        return np.linalg.norm(derivative, axis=1) * measure
     dx, dy = contact.direction
-    return np.abs(derivative[:, 0] * -dy + derivative[:, 1] * dx)
+    return np.abs(derivative[:, 0] * -dy + derivative[:, 1] * dx) * measure
 
 
 def segment_weights(trace: BoundaryTrace, contact: Contact, segments: Index) -> Array:
@@ -108,7 +114,11 @@ def segment_weights(trace: BoundaryTrace, contact: Contact, segments: Index) -> 
     s, w = gauss(trace.order + 2 * trace.geometry_order)
     k = len(segments)
     scale = jacobian(trace, contact, np.repeat(segments, len(s)), np.tile(s, k)).reshape(k, len(s))
-    return (scale * w) @ lagrange(trace.order, s)
+    weights = (scale * w) @ lagrange(trace.order, s)
+    for end in (-1, 1):  # nodes of their own
+        at = trace.axis[segments] == end
+        weights[at] = (scale[at] * w) @ lagrange(trace.order, s, end)
+    return weights
 
 
 def _numbered(
@@ -130,7 +140,7 @@ def _numbered(
 
 def _coupling(trace: BoundaryTrace, partner: Index, partner_s: Array) -> sp.csr_array:
     """Basis functions (m, n) of the facing nodes at the partner points; none of an obstacle."""
-    share = lagrange(trace.order, snap(partner_s, trace.order))
+    share = trace.shapes(partner, snap(partner_s, trace.places(partner)))
     share[partner < 0] = 0.0
     row, place = np.nonzero(share)
     facing = trace.nodes[partner[row], place]
@@ -170,7 +180,7 @@ def nodal_line(
     rows = number.reshape(len(segments), trace.order + 1)
     _, first = np.unique(number, return_index=True)
     first = first[len(first) - len(direction) :]  # without -1
-    position = trace.point(segment[first], s[first])
+    position, at_end = trace.point(segment[first], s[first]), np.isin(s[first], (0.0, 1.0))
     partner, partner_s, gap, searches = partners(trace, facing, segment[first], position, direction)
     facing_points = (partner >= 0) | (contact.primary is None)
     if contact.gap is not None:
@@ -193,6 +203,7 @@ def nodal_line(
         partner=partner,
         partner_s=partner_s,
         coupling=_coupling(trace, partner, partner_s),
+        on_axis=np.where(s[first] < 0.5, -1, 1) * trace.axis[segment[first]] * at_end == 1,
         means=np.zeros(len(partner), dtype=bool),
         shares=shares,
         searches=searches,
@@ -208,7 +219,7 @@ def without(line: ContactLine, dropped: Index) -> ContactLine:
     renumber = np.full(m + 1, -1)
     renumber[:-1][keep] = np.arange(np.count_nonzero(keep))
     arrays = ("node", "position", "direction", "gap", "weight", "partner", "partner_s")
-    kept = {name: getattr(line, name)[keep] for name in (*arrays, "coupling", "means")}
+    kept = {name: getattr(line, name)[keep] for name in (*arrays, "coupling", "on_axis", "means")}
     return replace(line, rows=renumber[line.rows], **kept)
 
 

@@ -199,10 +199,9 @@ def cast(
     return found
 
 
-def snap(s: Array, order: int) -> Array:
-    """Parameters `s` (k,) moved to Gauss-Lobatto points of degree `order` that they match, (k,)."""
-    nodes = gauss_lobatto(order)
-    nearest = nodes[np.abs(s[:, None] - nodes).argmin(axis=1)]
+def snap(s: Array, nodes: Array) -> Array:
+    """Parameters `s` (k,) moved to those of the `nodes` (k, p + 1) that they match, (k,)."""
+    nearest = nodes[np.arange(len(s)), np.abs(s[:, None] - nodes).argmin(axis=1)]
     return np.where(np.abs(s - nearest) <= MATCHED, nearest, s)
 
 

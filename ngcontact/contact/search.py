@@ -7,14 +7,16 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask
 from ..fem import BoundaryTrace
-from ..lagrange import gauss_lobatto, lagrange
+from ..lagrange import lagrange
 from .projection import GRAZING, MATCHED, Partners, cast, none_met, normals
 
 TOUCHING = 4 * np.finfo(float).eps  # round-off of a measured gap, relative to the coordinates
 
 
-def coincident(points: Array, directions: Array, curve: Array, side: Array, order: int) -> Partners:
-    """Partners among the Gauss-Lobatto nodes of degree `order` that lie at the points themselves.
+def coincident(
+    points: Array, directions: Array, curve: Array, side: Array, nodes: Array
+) -> Partners:
+    """Partners among the nodes of the facing segments that lie at the points themselves.
 
     Parameters
     ----------
@@ -22,8 +24,8 @@ def coincident(points: Array, directions: Array, curve: Array, side: Array, orde
         Contact points and unit vectors towards the facing body.
     curve, side : ndarray (q, degree + 1, 2), (q,)
         The facing segments.
-    order : int
-        Degree of the displacement on them.
+    nodes : ndarray (q, order + 1)
+        Parameters of the nodes on them.
 
     Returns
     -------
@@ -33,23 +35,22 @@ def coincident(points: Array, directions: Array, curve: Array, side: Array, orde
     found = none_met(len(points))
     if len(curve) == 0 or len(points) == 0:
         return found
-    nodes = gauss_lobatto(order)
-    degree = curve.shape[1] - 1
-    at = np.einsum("ji,qid->qjd", lagrange(degree, nodes), curve)
+    shapes = lagrange(curve.shape[1] - 1, nodes.ravel()).reshape(*nodes.shape, -1)
+    at = np.einsum("qji,qid->qjd", shapes, curve)
     lengths = np.linalg.norm(curve[:, -1] - curve[:, 0], axis=1)
     tree = cKDTree(at.reshape(-1, 2))
     # A vertex belongs to two segments; the ray may face only one of them.
     distances, numbers = tree.query(points, k=2, distance_upper_bound=MATCHED * lengths.max())
     for column in (1, 0):
         near = np.flatnonzero(np.isfinite(distances[:, column]))
-        segment, local = np.divmod(numbers[near, column], order + 1)
-        normal = normals(curve, side, segment, nodes[local])
+        segment, local = np.divmod(numbers[near, column], nodes.shape[1])
+        normal = normals(curve, side, segment, nodes[segment, local])
         grazing = GRAZING * np.linalg.norm(normal, axis=1)  # round-off must not decide
         faces = (normal * directions[near]).sum(axis=1) < -grazing
         faces &= distances[near, column] <= MATCHED * lengths[segment]
         near, segment, local = near[faces], segment[faces], local[faces]
         found.segment[near] = segment
-        found.s[near] = nodes[local]
+        found.s[near] = nodes[segment, local]
         offset = at[segment, local] - points[near]
         found.distance[near] = (offset * directions[near]).sum(axis=1)
     return found
@@ -98,7 +99,7 @@ def partners(
         0 if there is nothing to search, as where all of them are nodes at the same place.
     """
     curve, side = trace.curve[facing], trace.side[facing]
-    found = coincident(points, directions, curve, side, trace.order)
+    found = coincident(points, directions, curve, side, trace.places(facing))
     rest = np.flatnonzero(found.segment < 0) if facing.size else facing
     if rest.size:
         other: Partners = cast(points[rest], directions[rest], curve, side)

@@ -19,6 +19,7 @@ from ..fem import (
     assemble,
     boundary_trace,
     load_vector,
+    model_of,
     node_basis,
 )
 from ..linalg import congruent
@@ -99,7 +100,7 @@ def discretise(
     NoEquilibriumError
         The load does work on a rigid motion that supports and contact admit.
     """
-    trace = boundary_trace(mesh, order)
+    trace = boundary_trace(mesh, order, model_of(problem))
     nodal = conditioned_segments(problem, trace)
     known = _reusable(problem, trace, nodal, previous)
     found = contact_lines(problem, trace, known.lines)  # Gamma_K, first: it may be refused

@@ -55,10 +55,11 @@ class Reusable:
 
 
 def same_mesh(trace: BoundaryTrace, space: Space) -> bool:
-    """Whether the mesh of `trace` is still as it was when `space` was made on it."""
+    """Whether the mesh of `trace` is still as it was when `space` was made on it, in its model."""
     old = space.trace
     return (
-        np.array_equal(trace.nodes, old.nodes)
+        trace.model is old.model
+        and np.array_equal(trace.nodes, old.nodes)
         and np.array_equal(trace.curve, old.curve)
         and np.array_equal(Triangulation(trace.mesh).vertices, space.vertices)
     )

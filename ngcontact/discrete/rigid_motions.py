@@ -137,7 +137,7 @@ def functionals(space: Space, bodies: Bodies, of_unknown: Index) -> Array:
     columns = []
     for z in (ng.CF((1, 0)), ng.CF((0, 1)), ng.CF((-ng.y, ng.x))):
         form = ng.LinearForm(space.V)
-        form += z * v.Trace() * ng.ds
+        form += space.trace.model.weighted(z * v.Trace()) * ng.ds
         form.Assemble()
         columns.append(form.vec.FV().NumPy().copy())
     x, y, turn = columns

@@ -37,16 +37,24 @@ def _guided(problem: Problem, trace: BoundaryTrace) -> Conditions:
     return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))  # (3.8)
 
 
+def _on_axis(trace: BoundaryTrace) -> Conditions:
+    """No radial displacement on the axis of a body of revolution."""
+    ends = [trace.nodes[trace.axis == end, place] for end, place in ((-1, 0), (1, -1))]
+    node = np.unique(np.concatenate([trace.nodes[trace.on_axis].ravel(), *ends]))
+    return Conditions(node, np.tile([1.0, 0.0], (len(node), 1)), np.zeros(len(node)))
+
+
 def support_conditions(problem: Problem, trace: BoundaryTrace) -> Conditions:
-    """Gamma_u and Gamma_0."""
-    return concatenated([_prescribed(problem, trace), _guided(problem, trace)])
+    """Gamma_u and Gamma_0, to which the axis of a body of revolution belongs."""
+    return concatenated([_prescribed(problem, trace), _guided(problem, trace), _on_axis(trace)])
 
 
 def conditioned_segments(problem: Problem, trace: BoundaryTrace) -> Index:
-    """Segments (k,) on which conditions are posed: Gamma_u, Gamma_0, Gamma_K."""
+    """Segments (k,) on which conditions are posed: Gamma_u, Gamma_0, Gamma_K, the axis."""
     sides = [side for pair in problem.contact for side in (pair.secondary, pair.primary)]
     guides = [] if problem.sliding is None else [str(problem.sliding)]
-    return trace.segments(*problem.displacement, *guides, *sides)
+    chosen = trace.lies_on(np.arange(len(trace.region)), *problem.displacement, *guides, *sides)
+    return np.flatnonzero(chosen | trace.on_axis)
 
 
 def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[str, Array]:
@@ -76,5 +84,5 @@ def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[
             nodes = np.unique(trace.nodes[segments[named == name]])
             nodes = nodes[~counted[nodes]]
             counted[nodes] = True
-            result[str(name)] = reaction[nodes].sum(axis=0)
+            result[str(name)] = trace.model.resultant(reaction[nodes].sum(axis=0))
     return result

@@ -6,7 +6,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array
-from ..fem import BoundaryTrace
+from ..fem import BoundaryTrace, Model
 from ..problem import Problem, Triangulation, varies
 
 
@@ -20,6 +20,7 @@ def projected_stress(
     mesh, order = boundary.mesh, boundary.order
     laws = problem.materials.values()
     exact = mesh.GetCurveOrder() == 1 and not any(varies(law) for law in laws)
+    exact = exact and boundary.model.polynomial
     projected = ng.GridFunction(ng.L2(mesh, order=order - 1 if exact else order, dim=3))
     projected.Set(components(stress).Compile())
     return projected
@@ -41,20 +42,25 @@ def divergence_and_jump(
     return ng.CF((slope[0, 0] + slope[2, 1], slope[2, 0] + slope[1, 1])), jump
 
 
-def element_integral(mesh: ng.Mesh, residual: ng.CoefficientFunction, order: int) -> Array:
+def element_integral(
+    mesh: ng.Mesh, residual: ng.CoefficientFunction, order: int, model: Model
+) -> Array:
     """Squares of a residual integrated over each element, (ne,)."""
     v = ng.L2(mesh, order=0).TestFunction()
-    return _assembled(v, ng.InnerProduct(residual, residual) * v * ng.dx(bonus_intorder=order))
+    dx = ng.dx(bonus_intorder=order + 2 * model.bonus)
+    return _assembled(v, model.weighted(ng.InnerProduct(residual, residual)) * v * dx)
 
 
-def edge_integral(mesh: ng.Mesh, jump: ng.CoefficientFunction, order: int, mu: Array) -> Array:
+def edge_integral(
+    mesh: ng.Mesh, jump: ng.CoefficientFunction, order: int, mu: Array, model: Model
+) -> Array:
     """Squares of a jump integrated over the inner edges of each element, (ne,).
 
     Where the other side is stiffer, times the ratio of both moduli `mu` (ne,): stiff bodies take
     up what soft ones cannot.
     """
     v = ng.L2(mesh, order=0).TestFunction()
-    squares = ng.InnerProduct(jump, jump) * (v + v.Other())
+    squares = model.weighted(ng.InnerProduct(jump, jump)) * (v + v.Other())
     dx = ng.dx(skeleton=True, bonus_intorder=order)
     if not _differs_at_a_vertex(mesh, mu):
         return _assembled(v, squares * dx)

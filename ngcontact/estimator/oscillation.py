@@ -6,7 +6,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..fem import law_measures
+from ..fem import Model, law_measures
 from ..linalg import cholesky, lower_half, shared
 from ..problem import Problem, varies
 from .interior import components
@@ -18,6 +18,7 @@ def project_by_compliance(
     stress: ng.CoefficientFunction,
     modulus: float,
     rough: Mask,
+    model: Model,
 ) -> None:
     """Replace a projection by that in the norm of C^-1 on the elements `rough` (ne,).
 
@@ -29,10 +30,10 @@ def project_by_compliance(
     a, f = ng.BilinearForm(space, symmetric=True), ng.LinearForm(space)
     for body, law in problem.materials.items():
         if varies(law):
-            compliance = ng.Inv(law.voigt(problem.model) / modulus)
+            compliance = model.compliance(law.voigt(problem.model) / modulus)
             *_, dx = law_measures(mesh, body, 2 * order, rough)
-            a += ng.InnerProduct(compliance * s, t) * dx
-            f += ng.InnerProduct(compliance * components(stress), t) * dx
+            a += model.weighted(ng.InnerProduct(compliance * s, t)) * dx
+            f += model.weighted(ng.InnerProduct(compliance * components(stress), t)) * dx
     a.Assemble()
     f.Assemble()
     free = np.repeat(rough, space.ndof // (3 * mesh.ne))
@@ -46,6 +47,7 @@ def oscillation(
     stress: ng.CoefficientFunction,
     modulus: float,
     rough: Mask,
+    model: Model,
 ) -> Array:
     """Squares (ne,) of |sigma_h - Pi sigma_h| in the norm of C^-1, where moduli vary.
 
@@ -57,7 +59,8 @@ def oscillation(
     for body, law in problem.materials.items():
         if varies(law):
             miss = components(stress) - projected
-            density = ng.InnerProduct(ng.Inv(law.voigt(problem.model) / modulus) * miss, miss)
+            compliance = model.compliance(law.voigt(problem.model) / modulus)
+            density = model.weighted(ng.InnerProduct(compliance * miss, miss))
             for dx in law_measures(mesh, body, 2 * order, rough):
                 f += density * v * dx
     f.Assemble()

@@ -75,9 +75,10 @@ class PressureCorrection:
 
     def squares(self) -> Array:
         """Squares (ne,) of the two terms that delta itself adds."""
-        grad = ng.Grad(self.motion)
-        density = self.pressure**2 / self.kappa + self.mu * ng.InnerProduct(grad, grad)
-        values = ng.Integrate(density, self.region, element_wise=True)
+        model = self.boundary.model
+        gradients = model.gradients(self.motion, self.motion)
+        density = self.pressure**2 / self.kappa + self.mu * gradients
+        values = ng.Integrate(model.weighted(density), self.region, element_wise=True)
         return np.asarray(values)
 
 
@@ -133,15 +134,16 @@ class _Forms:
     ) -> tuple[sp.csr_array, Array]:
         """Quadratic form and right side of the terms in elements and between them."""
         d, t = self.space.TnT()
+        model = self.boundary.model
         element, edge = self.element, (self.edge + self.edge.Other()) / 2
         n = ng.specialcf.normal(2)
         skeleton = ng.dx(skeleton=True, bonus_intorder=2)
         a = ng.BilinearForm(self.space, symmetric=True)
-        a += (element * ng.Grad(d) * ng.Grad(t) + d * t / self.kappa) * ng.dx
-        a += edge * (d - d.Other()) * (t - t.Other()) * skeleton
+        a += model.weighted(element * ng.Grad(d) * ng.Grad(t) + d * t / self.kappa) * ng.dx
+        a += model.weighted(edge * (d - d.Other()) * (t - t.Other())) * skeleton
         f = ng.LinearForm(self.space)
-        f += -element * divergence * ng.Grad(t) * ng.dx(bonus_intorder=2)
-        f += -edge * (jump * n) * (t - t.Other()) * skeleton
+        f += model.weighted(-element * divergence * ng.Grad(t)) * ng.dx(bonus_intorder=2)
+        f += model.weighted(-edge * (jump * n) * (t - t.Other())) * skeleton
         a.Assemble()
         f.Assemble()
         return shared(a.mat), f.vec.FV().NumPy().copy()
@@ -176,26 +178,23 @@ class _Forms:
 
     def stiffness(self) -> sp.csr_array:
         """Form of mu |grad v|^2, with v held where displacements are prescribed."""
-        problem, mesh = self.problem, self.space.mesh
+        problem, mesh, model = self.problem, self.space.mesh, self.boundary.model
         u, v = self.V.TnT()
         position = self.boundary.curve.reshape(-1, 2)
         bedding = FLOATING / float(np.ptp(position, axis=0).max()) ** 2
         a = ng.BilinearForm(self.V, symmetric=True)
-        a += (
-            self.mu
-            * (ng.InnerProduct(ng.Grad(u), ng.Grad(v)) + bedding * u * v)
-            * ng.dx(definedon=self.region)
-        )
+        work = self.mu * (model.gradients(u, v) + bedding * u * v)
+        a += model.weighted(work) * ng.dx(definedon=self.region, bonus_intorder=model.bonus)
         held = ng.BoundaryFromVolumeCF(HELD * self.mu) / ng.specialcf.mesh_size
         for pattern, components in problem.displacement.items():
             for axis, value in enumerate(components):
                 if value is not None:
                     ds = ng.ds(definedon=mesh.Boundaries(pattern))
-                    a += held * u.Trace()[axis] * v.Trace()[axis] * ds
+                    a += model.weighted(held * u.Trace()[axis] * v.Trace()[axis]) * ds
         if problem.sliding is not None:
             n = ng.specialcf.normal(2)
             ds = ng.ds(definedon=mesh.Boundaries(str(problem.sliding)))
-            a += held * (u.Trace() * n) * (v.Trace() * n) * ds
+            a += model.weighted(held * (u.Trace() * n) * (v.Trace() * n)) * ds
         a.Assemble()
         return shared(a.mat)
 
@@ -204,8 +203,9 @@ class _Forms:
         pressures = ng.L2(self.space.mesh, order=self.boundary.order)
         q, v = pressures.TrialFunction(), self.V.TestFunction()
         b = ng.BilinearForm(trialspace=pressures, testspace=self.V)
-        grad = ng.Grad(v)
-        b += q * (grad[0, 0] + grad[1, 1]) * ng.dx(definedon=self.region)
+        model = self.boundary.model
+        work = model.weighted(q * model.volume(v))
+        b += work * ng.dx(definedon=self.region, bonus_intorder=model.bonus)
         b.Assemble()
         return shared(b.mat)
 

@@ -77,7 +77,7 @@ def estimate(
     """
     solution = scaled(problem, boundary, displacement, stress)
     terms = [on_contact(solution, pair, pairs) for pair in pairs]
-    rest = remaining(boundary.inner, [term.covered for term in terms])
+    rest = remaining(boundary.inner | boundary.on_axis, [term.covered for term in terms])
     terms.append(on_supports_and_loads(solution, rest))
     parts = _squares(solution, terms, corrected_from)
     total = np.sum(list(parts.values()), axis=0)
@@ -100,11 +100,14 @@ def _squares(
         of("oscillation")[:] = oscillation(
             *(solution.problem, solution.projected, solution.stress),
             *(solution.modulus, solution.rough),
+            model=solution.boundary.model,
         )
     for squares in (x for term in terms for x in term.squares):
         np.add.at(of(squares.name), squares.element, squares.values)
     residuals = [x for term in terms for x in term.residuals]
     divergence, jump = divergence_and_jump(solution.projected)
+    model = solution.boundary.model
+    divergence = model.divergence(divergence, solution.stress, solution.normal_stress)
     force, rest = _body_forces(solution)
     for squares in rest:
         np.add.at(of(squares.name), squares.element, squares.values)
@@ -144,7 +147,7 @@ def _body_forces(
             rough.vec.FV().NumPy()[:] = found.rough
             projection = found.projection * (1 / solution.unit)
             forces[body] = ng.IfPos(rough, projection, forces[body])
-            rest = solution.element_weight * (found.rest / solution.unit) ** 2
+            rest = solution.element_weight * (found.rest / solution.unit) ** 2 * solution.measure
             squares += [Squares("element", every, rest), solution.missed(every, found.missed)]
     return mesh.MaterialCF(forces, default=ng.CF((0, 0))), squares
 
@@ -158,9 +161,9 @@ def _inside(
     """Squared residuals (ne,) in the elements and on the edges between them."""
     data = DATA_BONUS if solution.problem.force else 0
     degree = solution.order if correction else solution.projected.space.globalorder
-    element = np.zeros(solution.mesh.ne)
+    element, model = np.zeros(solution.mesh.ne), solution.boundary.model
     if degree or data:  # else there is no divergence
-        squares = element_integral(solution.mesh, divergence, 2 * degree + data)
+        squares = element_integral(solution.mesh, divergence, 2 * degree + data, model)
         element = solution.element_weight * squares
-    edges = edge_integral(solution.mesh, jump, 2 * degree, solution.mu)
+    edges = edge_integral(solution.mesh, jump, 2 * degree, solution.mu, model)
     return {"element": element, "jump": solution.edge_weight / 2 * edges}

@@ -35,6 +35,7 @@ def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTer
     boundary, problem = solution.boundary, solution.problem
     _, segment, s, weight = parts.points(2 * solution.order + DATA_BONUS)
     ds = np.linalg.norm(boundary.derivative(segment, s), axis=1) * weight
+    ds *= boundary.measure(segment, s)
 
     residual = _unbalanced(solution, segment, s)  # (3.7)
     factor = -boundary.normal(segment, s)  # of a pressure in the residual
@@ -96,6 +97,7 @@ def _rough_loads(
         residual[at] += boundary.evaluate(change, segment[at], s[at]) / solution.unit
         element = boundary.element
         rest = solution.edge_weight[element] * (found.rest / solution.unit) ** 2
+        rest *= solution.measure[element]
         squares.append(Squares("traction", element, rest))
         squares.append(solution.missed(element, found.missed))
     return squares
@@ -136,7 +138,8 @@ def _displacement(
     every = np.repeat(segments[number], len(points))
     stretch = np.linalg.norm(boundary.derivative(every, s.ravel()), axis=1).reshape(s.shape)
     slope = (gauss_derivative(order) @ w) / (length[:, None] * stretch)[..., None]
-    ds = (length[:, None] * weights * stretch)[..., None]
+    measure = boundary.measure(every, s.ravel()).reshape(s.shape)
+    ds = (length[:, None] * weights * stretch * measure)[..., None]
     square, sloping = (np.bincount(number, (ds * x**2).sum(axis=(1, 2)), count) for x in (w, slope))
     element = boundary.element[segments]
     root = np.sqrt(square)

@@ -9,10 +9,10 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two
-from ..fem import BoundaryTrace, rigidities, rough_moduli, shear_moduli
+from ..fem import BoundaryTrace, normal_stress_of, rigidities, rough_moduli, shear_moduli
 from ..lagrange import gauss
 from ..mesh import diameters
-from ..problem import Problem
+from ..problem import Problem, Triangulation
 from .interior import projected_stress
 from .oscillation import project_by_compliance
 
@@ -36,8 +36,10 @@ class ScaledSolution:
         u_h, a length.
     stress : ng.CoefficientFunction
         sigma_h (2, 2) over `unit`.
+    normal_stress : ng.CoefficientFunction
+        The stress normal to the plane over `unit`.
     projected : ng.GridFunction
-        The same as (xx, yy, xy), polynomials on each element.
+        `stress` as (xx, yy, xy), polynomials on each element.
     unit, modulus : float
         A stress and a modulus, forces per area.
     mu, rigidity : ndarray (ne,)
@@ -53,6 +55,7 @@ class ScaledSolution:
     boundary: BoundaryTrace
     displacement: ng.GridFunction
     stress: ng.CoefficientFunction
+    normal_stress: ng.CoefficientFunction
     projected: ng.GridFunction
     unit: float
     modulus: float
@@ -86,12 +89,18 @@ class ScaledSolution:
         """Weight (h/p)^2 / 2mu of squared forces, (ne,)."""
         return (self.diameter / self.order) ** 2 / (2 * self.mu)
 
+    @cached_property
+    def measure(self) -> Array:
+        """What an area of the mesh stands for in the body, in the middle of elements, (ne,)."""
+        return self.boundary.model.measure(Triangulation(self.mesh).corners.mean(axis=1))
+
     def missed(self, element: Index, force: Array) -> Squares:
         """Squares of errors `force` (k,) of the loads' quadrature, each in an `element` (k,).
 
         A force f at one point costs f^2 / 2mu, times the logarithm of sizes.
         """
-        return Squares("loads", element, (force / self.unit) ** 2 / (2 * self.mu[element]))
+        energy = (force / self.unit) ** 2 / (2 * self.mu[element])
+        return Squares("loads", element, energy * self.measure[element])
 
     def traction(self, segment: Index, s: Array) -> Array:
         """Traction sigma_h n (k, 2) over `unit`, at points `s` (k,) of each `segment` (k,)."""
@@ -112,7 +121,7 @@ def scaled(
     projected = projected_stress(problem, boundary, stress)
     rough = rough_moduli(problem, boundary.mesh)
     if rough.any():
-        project_by_compliance(problem, projected, stress, modulus, rough)
+        project_by_compliance(problem, projected, stress, modulus, rough, boundary.model)
     coefficients = projected.vec.FV().NumPy()
     unit = power_of_two(coefficients)
     coefficients /= unit
@@ -121,6 +130,7 @@ def scaled(
         boundary=boundary,
         displacement=displacement,
         stress=stress * (1 / unit),
+        normal_stress=normal_stress_of(problem, displacement) * (1 / unit),
         projected=projected,
         unit=unit,
         modulus=modulus,

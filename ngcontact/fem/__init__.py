@@ -10,11 +10,12 @@ from .element import node_basis as node_basis
 from .element import unknowns as unknowns
 from .element import unknowns_of as unknowns_of
 from .energy import energy_norm as energy_norm
+from .energy import normal_stress_of as normal_stress_of
 from .energy import potential_energy as potential_energy
+from .energy import stress_of as stress_of
 from .model import MODELS as MODELS
 from .model import Model as Model
 from .model import model_of as model_of
-from .model import stress_of as stress_of
 from .moduli import NEARLY_INCOMPRESSIBLE as NEARLY_INCOMPRESSIBLE
 from .moduli import bulk_moduli as bulk_moduli
 from .moduli import incompressibilities as incompressibilities

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask
 from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative
-from ..mesh import CadEdge, cad_edges
+from ..mesh import CadEdge, cad_edges, neighbours, rightward
 from ..problem import Triangulation, boundary_mask, triangle_sides
+from .model import PLANE, Model
 
 CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two rows at a smaller
 # one would be dependent to 1 / turn^2
@@ -58,6 +59,12 @@ class BoundaryTrace:
         +1 where the outward normal lies to the right of the direction of s, else -1.
     edges : list of CadEdge or None
         CAD edges by region number.
+    model : Model
+        What lengths of segments stand for.
+    axis : ndarray of int (k,)
+        -1 or 1 where s = 0 or s = 1 alone lies on the axis of a body of revolution, else 0.
+    on_axis : ndarray of bool (k,)
+        Segments that lie on it.
     """
 
     mesh: ng.Mesh
@@ -72,6 +79,9 @@ class BoundaryTrace:
     curve: Array
     side: Array
     edges: list[CadEdge] | None
+    model: Model
+    axis: Index
+    on_axis: Mask
 
     def point(self, segment: Index, s: Array) -> Array:
         """Points (k, 2) of the mesh's curves at parameters `s` (k,) of segments `segment` (k,)."""
@@ -84,7 +94,7 @@ class BoundaryTrace:
 
     def normal(self, segment: Index, s: Array) -> Array:
         """Outward unit normals (k, 2) of the mesh at `s` (k,) of segments `segment` (k,)."""
-        return _right(self.derivative(segment, s)) * self.side[segment, None]
+        return rightward(self.derivative(segment, s)) * self.side[segment, None]
 
     def exact_normal(self, segment: Index, s: Array) -> Array:
         """Outward unit normals (k, 2) of the CAD edges at `s` (k,) of segments `segment` (k,).
@@ -103,8 +113,22 @@ class BoundaryTrace:
 
     def at_nodes(self, segments: Index) -> tuple[Index, Array]:
         """Segment (n,) and s (n,) of all nodes of `segments` (k,), one segment after the other."""
-        s = np.tile(gauss_lobatto(self.order), len(segments))
-        return np.repeat(segments, self.order + 1), s
+        return np.repeat(segments, self.order + 1), self.places(segments).ravel()
+
+    def places(self, segments: Index) -> Array:
+        """Parameters (k, order + 1) of the nodes of `segments` (k,)."""
+        return np.array([gauss_lobatto(self.order, end) for end in (0, 1, -1)])[self.axis[segments]]
+
+    def shapes(self, segment: Index, s: Array) -> Array:
+        """Basis functions (k, order + 1) of the nodes, at `s` (k,) of segments `segment` (k,)."""
+        values, axis = lagrange(self.order, s), self.axis[segment]
+        for end in (-1, 1):
+            values[axis == end] = lagrange(self.order, s[axis == end], end)
+        return values
+
+    def measure(self, segment: Index, s: Array) -> Array:
+        """What a length stands for in the body, (k,), at `s` (k,) of segments `segment` (k,)."""
+        return self.model.measure(self.point(segment, s))
 
     def lengths(self, segments: Index) -> Array:
         """Lengths (k,) of the chords of `segments` (k,)."""
@@ -195,26 +219,8 @@ class BoundaryTrace:
         return (turn > CORNER_WITHOUT_CAD) | (named & (turn > CORNER))
 
 
-def _right(vectors: Array) -> Array:
-    """Unit vectors to the right of `vectors` (k, 2)."""
-    right = np.column_stack([vectors[:, 1], -vectors[:, 0]])
-    return right / np.linalg.norm(right, axis=1)[:, None]
-
-
-def _neighbours(segments: Index, triangles: Index, vertices: int) -> tuple[Index, Mask]:
-    """Number of a triangle at each segment, and whether there is another one."""
-    sides = np.sort(triangle_sides(triangles), axis=1)
-    keys = sides[:, 0] * vertices + sides[:, 1]
-    order = np.argsort(keys)
-    low, high = np.sort(segments, axis=1).T
-    wanted = low * vertices + high
-    first = np.searchsorted(keys[order], wanted)
-    last = np.searchsorted(keys[order], wanted, side="right")
-    return order[first] // 3, last - first > 1
-
-
-def boundary_trace(mesh: ng.Mesh, order: int) -> BoundaryTrace:
-    """Trace of the displacements of degree `order` on the boundary of `mesh`."""
+def boundary_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTrace:
+    """Trace of the displacements of degree `order` on the boundary of `mesh`, in a model."""
     view = Triangulation(mesh)
     nodes = ends = view.segments
     space = ng.H1(mesh, order=order)
@@ -229,10 +235,11 @@ def boundary_trace(mesh: ng.Mesh, order: int) -> BoundaryTrace:
     curve = np.asarray(ng.CF((ng.x, ng.y))(mesh.MapToAllElements(rule, ng.BND)))
     curve = curve.reshape(-1, degree + 1, 2)
 
-    element, inner = _neighbours(ends, view.triangles, mesh.nv)
+    element, inner = neighbours(ends, view.triangles, mesh.nv)
     xy = view.vertices
     opposite = xy[view.triangles[element]].mean(axis=1) - xy[ends[:, 0]]
-    right = _right(xy[ends[:, 1]] - xy[ends[:, 0]])
+    right = rightward(xy[ends[:, 1]] - xy[ends[:, 0]])
+    axis = model.on_axis(curve.reshape(-1, 2)).reshape(-1, degree + 1)
     return BoundaryTrace(
         mesh=mesh,
         space=space,
@@ -246,4 +253,7 @@ def boundary_trace(mesh: ng.Mesh, order: int) -> BoundaryTrace:
         curve=curve,
         side=np.where((opposite * right).sum(axis=1) > 0, -1.0, 1.0),
         edges=cad_edges(mesh),
+        model=model,
+        axis=axis[:, -1].astype(np.intp) - axis[:, 0],
+        on_axis=np.asarray(axis.all(axis=1)),
     )

@@ -1,4 +1,4 @@
-"""Energies of a displacement."""
+"""Stresses and energies of a displacement."""
 
 from __future__ import annotations
 
@@ -36,3 +36,24 @@ def energy_norm(problem: Problem, space: Space, displacement: ng.GridFunction) -
             density = model.weighted(ng.InnerProduct(stress, e)).Compile()
             energy += ng.Integrate(density, mesh.Materials(body), order=2 * order + 2)
     return math.sqrt(energy) * size
+
+
+def voigt_stress(problem: Problem, displacement: ng.GridFunction) -> list[ng.CoefficientFunction]:
+    """The q Voigt components of the stress of a displacement, in the units of the moduli."""
+    model, mesh = model_of(problem), displacement.space.mesh
+    e = model.strain(displacement)
+    by_body = {
+        body: model.stress(law.voigt(problem.model), e) for body, law in problem.materials.items()
+    }
+    return [mesh.MaterialCF({body: s[i] for body, s in by_body.items()}) for i in range(e.dim)]
+
+
+def stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.CoefficientFunction:
+    """Stress (2, 2) in the plane of a displacement, sigma_h, in the units of the moduli."""
+    return model_of(problem).in_plane(voigt_stress(problem, displacement))
+
+
+def normal_stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.CoefficientFunction:
+    """Stress normal to the plane of a displacement, a scalar, in the units of the moduli."""
+    voigt, mesh = voigt_stress(problem, displacement), displacement.space.mesh
+    return model_of(problem).out_of_plane(problem.materials, mesh, voigt)

@@ -12,11 +12,11 @@ from ..triplets import from_triplets
 from .boundary import BoundaryTrace
 
 
-def edge_bubbles(space: ng.FESpace) -> Array:
+def edge_bubbles(space: ng.FESpace, axis: int = 0) -> Array:
     """Values (order - 1, order - 1) of the edge functions of an H1 space at the interior nodes.
 
     Row i is the i-th interior Gauss-Lobatto point from the end with the lower vertex number,
-    column j the j-th edge function.
+    column j the j-th edge function. Which points, says `axis`: see `gauss_lobatto`.
     """
     mesh, order = space.mesh, space.globalorder
     element = ng.ElementId(ng.VOL, 0)
@@ -28,7 +28,7 @@ def edge_bubbles(space: ng.FESpace) -> Array:
     numbers = list(space.GetDofNrs(element))
     columns = [numbers.index(d) for d in space.GetDofNrs(edge)]
     shape = space.GetFE(element)
-    points = [start + s * (stop - start) for s in gauss_lobatto(order)[1:-1]]
+    points = [start + s * (stop - start) for s in gauss_lobatto(order, axis)[1:-1]]
     values = np.array([shape.CalcShape(float(px), float(py), 0.0).NumPy() for px, py in points])
     return values[:, columns]
 
@@ -38,17 +38,20 @@ def nodal_basis(trace: BoundaryTrace, segments: Index) -> sp.csr_array:
     order, size = trace.order, trace.space.ndof
     if order == 1:
         return sp.eye_array(size, format="csr")
-    bubbles = np.linalg.inv(edge_bubbles(trace.space))
-    nodes = trace.nodes[segments]
-    nodes = np.where((nodes[:, 0] < nodes[:, -1])[:, None], nodes, nodes[:, ::-1])
+    nodes, axis = trace.nodes[segments], trace.axis[segments]
+    falling = nodes[:, 0] > nodes[:, -1]
+    nodes = np.where(falling[:, None], nodes[:, ::-1], nodes)
+    axis = np.where(falling, -axis, axis)
     _, first = np.unique(nodes[:, 1], return_index=True)
-    nodes = nodes[first]
+    nodes, axis = nodes[first], axis[first]
     # Edge function coefficients: bubbles (values - linear part).
-    s = gauss_lobatto(order)[1:-1]
-    local = bubbles @ np.column_stack([s - 1, np.eye(order - 1), -s])
+    values = np.zeros((len(nodes), order - 1, order + 1))
+    for end in np.unique(axis):
+        s = gauss_lobatto(order, int(end))[1:-1]
+        bubbles = np.linalg.inv(edge_bubbles(trace.space, int(end)))
+        values[axis == end] = bubbles @ np.column_stack([s - 1, np.eye(order - 1), -s])
     rows = np.repeat(nodes[:, 1:-1, None], order + 1, axis=2)
     cols = np.repeat(nodes[:, None, :], order - 1, axis=1)
-    values = np.broadcast_to(local, rows.shape)
     diagonal = np.ones(size)
     diagonal[nodes[:, 1:-1].ravel()] = 0.0
     edges = from_triplets(values.ravel(), rows.ravel(), cols.ravel(), (size, size))

@@ -143,7 +143,7 @@ def assemble(
     for body, law in problem.materials.items():
         stress = model.stress(law.voigt(problem.model), model.strain(u))
         work = model.weighted(ng.InnerProduct(stress, model.strain(v)))  # (3.1)
-        measures = constant_measures(mesh, body, trace.curved_elements)
+        measures = constant_measures(mesh, body, trace.curved_elements, model.bonus)
         if varies(law):
             measures = law_measures(mesh, body, 2 * trace.order, rough)
         for dx in measures:

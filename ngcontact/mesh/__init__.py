@@ -6,6 +6,8 @@ from .curving import check_curves as check_curves
 from .curving import curve as curve
 from .elements import diameters as diameters
 from .elements import middles as middles
+from .elements import neighbours as neighbours
+from .elements import rightward as rightward
 from .generation import first_mesh as first_mesh
 from .parents import copied as copied
 from .parents import vertex_parents as vertex_parents

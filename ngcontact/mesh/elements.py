@@ -1,4 +1,4 @@
-"""Sizes and middles of elements."""
+"""Sizes, middles and sides of elements."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arrays import Array
-from ..problem import Triangulation
+from ..arrays import Array, Index, Mask
+from ..problem import Triangulation, triangle_sides
 
 
 def diameters(mesh: ng.Mesh) -> Array:
@@ -19,3 +19,24 @@ def diameters(mesh: ng.Mesh) -> Array:
 def middles(mesh: ng.Mesh) -> NDArray:
     """Mesh points (ne,) in the middle of each element."""
     return mesh.MapToAllElements(ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1]), ng.VOL)
+
+
+def neighbours(segments: Index, triangles: Index, vertices: int) -> tuple[Index, Mask]:
+    """Number (k,) of a triangle at each segment, and whether there is another one, (k,).
+
+    `segments` (k, 2) and `triangles` (ne, 3) are those of a mesh of so many `vertices`.
+    """
+    sides = np.sort(triangle_sides(triangles), axis=1)
+    keys = sides[:, 0] * vertices + sides[:, 1]
+    order = np.argsort(keys)
+    low, high = np.sort(segments, axis=1).T
+    wanted = low * vertices + high
+    first = np.searchsorted(keys[order], wanted)
+    last = np.searchsorted(keys[order], wanted, side="right")
+    return order[first] // 3, last - first > 1
+
+
+def rightward(vectors: Array) -> Array:
+    """Unit vectors (k, 2) to the right of `vectors` (k, 2)."""
+    right = np.column_stack([vectors[:, 1], -vectors[:, 0]])
+    return right / np.linalg.norm(right, axis=1)[:, None]

@@ -1,6 +1,7 @@
 """Files and pictures of a solution."""
 
 from .picture import plot_solution as plot_solution
+from .revolution import write_revolved as write_revolved
 from .solution_data import SolutionData as SolutionData
 from .vtk import write_series as write_series
 from .vtk import write_solution as write_solution

@@ -64,6 +64,20 @@ def lattice(order: int) -> Index:
     return np.concatenate([order * unit, *edges, *inside])
 
 
+def subdivision(order: int) -> tuple[list[list[int]], list[list[int]]]:
+    """Small triangles (order^2, 3) and sides (3, order + 1) of a `lattice` triangle."""
+    number = {(b, c): k for k, (_, b, c) in enumerate(lattice(order).tolist())}
+    triangles = [
+        [number[b + db, c + dc] for db, dc in corners]
+        for b, c in number
+        for corners in (((0, 0), (1, 0), (0, 1)), ((1, 0), (1, 1), (0, 1)))
+        if all((b + db, c + dc) in number for db, dc in corners)
+    ]
+    steps = range(order + 1)
+    bottom, left = [number[k, 0] for k in steps], [number[0, k] for k in steps]
+    return triangles, [bottom, [number[order - k, k] for k in steps], left]
+
+
 def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
     """Nodes of the Lagrange triangles of a mesh; ``ValueError`` if it has other elements."""
     weights = lattice(order)

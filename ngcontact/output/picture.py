@@ -87,7 +87,7 @@ def _draw_bodies(axes: Axes, scene: Scene, top: float) -> Any:
     inner, outer = (list(scene.moved[scene.edges[at]]) for at in (~scene.outline, scene.outline))
     axes.add_collection(LineCollection(inner, colors="w", lw=0.25, alpha=0.5))
     axes.add_collection(LineCollection(outer, colors="k", lw=0.8))
-    axes.set(aspect="equal", xlabel="x", ylabel="y")
+    axes.set(aspect="equal", xlabel=scene.axes[0], ylabel=scene.axes[1])
     axes.locator_params(nbins=5)
     axes.ticklabel_format(scilimits=(-2, 4))
     return shading

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import ngsolve as ng
 import numpy as np
@@ -10,7 +10,8 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
 from ..arrays import Array, Index, Mask
-from .nodes import full_stress, lattice, neighbour_tree, nodes_of, von_mises
+from ..problem import ABOUT_AN_AXIS, on_axis
+from .nodes import full_stress, neighbour_tree, nodes_of, subdivision, von_mises
 from .solution_data import SolutionData
 
 MOST_TRIANGLES = 200_000  # of a picture: more cannot be seen
@@ -36,6 +37,8 @@ class Scene:
         The points in contact, moved as the nodes are.
     scale : float
         Factor of the displacement.
+    axes : tuple of str
+        Names of the coordinates.
     """
 
     moved: Array
@@ -45,6 +48,7 @@ class Scene:
     outline: Mask
     zone: Array
     scale: float
+    axes: tuple[str, str] = ("x", "y")
 
 
 def contact_lines(solution: SolutionData) -> list[tuple[int, Index, Array]]:
@@ -87,20 +91,6 @@ def _arcs(points: Array) -> list[tuple[Index, Array]]:
     return arcs
 
 
-def _subdivision(order: int) -> tuple[list[list[int]], list[list[int]]]:
-    """Small triangles (order^2, 3) and sides (3, order + 1) of a lattice triangle."""
-    number = {(b, c): k for k, (_, b, c) in enumerate(lattice(order).tolist())}
-    triangles = [
-        [number[b + db, c + dc] for db, dc in corners]
-        for b, c in number
-        for corners in (((0, 0), (1, 0), (0, 1)), ((1, 0), (1, 1), (0, 1)))
-        if all((b + db, c + dc) in number for db, dc in corners)
-    ]
-    steps = range(order + 1)
-    bottom, left = [number[k, 0] for k in steps], [number[0, k] for k in steps]
-    return triangles, [bottom, [number[order - k, k] for k in steps], left]
-
-
 def picture(solution: SolutionData, scale: float | None) -> Scene:
     """Evaluate a solution for the picture."""
     mesh, u = solution.mesh, solution.displacement
@@ -108,7 +98,7 @@ def picture(solution: SolutionData, scale: float | None) -> Scene:
     if order > 1:  # enough to look smooth on coarse meshes, no more than can be seen on fine ones
         order = int(np.clip(np.sqrt(MOST_TRIANGLES / mesh.ne), 1, 2 * order))
     nodes = nodes_of(mesh, order)
-    triangles, sides = _subdivision(order)
+    triangles, sides = subdivision(order)
     edges = nodes.cells[:, sides].reshape(-1, order + 1)
     ends = np.sort(edges[:, [0, -1]], axis=1)
     _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
@@ -120,7 +110,7 @@ def picture(solution: SolutionData, scale: float | None) -> Scene:
         body = np.empty(len(place), dtype=np.intp)
         body[nodes.cells] = nodes.body[:, None]
         scale = _chosen_scale(solution, place, move, body)
-    return Scene(
+    scene = Scene(
         moved=place + scale * move,
         stress=von_mises(nodes.values(full_stress(solution))),
         triangles=nodes.cells[:, triangles].reshape(-1, 3),
@@ -128,6 +118,23 @@ def picture(solution: SolutionData, scale: float | None) -> Scene:
         outline=count == 1,
         zone=place[at] + scale * move[at],
         scale=scale,
+    )
+    return mirrored(scene, place) if solution.problem.model in ABOUT_AN_AXIS else scene
+
+
+def mirrored(scene: Scene, place: Array) -> Scene:
+    """A meridian section on both sides of its axis; `place` (k, 2) are its nodes before."""
+    inside = on_axis(place)[scene.edges].all(axis=1)
+    count, other = len(scene.moved), np.array([-1.0, 1.0])
+    return replace(
+        scene,
+        moved=np.concatenate([scene.moved, scene.moved * other]),
+        stress=np.tile(scene.stress, 2),
+        triangles=np.concatenate([scene.triangles, scene.triangles[:, ::-1] + count]),
+        edges=np.concatenate([scene.edges, scene.edges + count]),
+        outline=np.tile(scene.outline & ~inside, 2),
+        zone=np.concatenate([scene.zone, scene.zone * other]),
+        axes=("r", "z"),
     )
 
 

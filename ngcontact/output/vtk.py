@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import ngsolve as ng
 import numpy as np
 
+from ..problem import ABOUT_AN_AXIS
 from .files import check_path, replacing
 from .nodes import VTK_CELL, VTK_LAGRANGE_TRIANGLE, full_stress, neighbour_tree, nodes_of, von_mises
 from .solution_data import SolutionData
@@ -24,8 +25,9 @@ def write_solution(path: str | os.PathLike[str], solution: SolutionData) -> Path
 
     The cells are Lagrange triangles of the order of the geometry or of the displacement,
     whichever is higher. Point data: ``displacement``, ``stress`` (xx, yy, xy; means inside each
-    body) and ``von_mises`` (see `full_stress`). Cell data: ``body``, whose names
-    are the field data ``body_names``, and ``indicators`` if they have been computed already.
+    body), ``hoop_stress`` of bodies of revolution, and ``von_mises`` (see `full_stress`). Cell
+    data: ``body``, whose names are the field data ``body_names``, and ``indicators`` if they have
+    been computed already.
     Contact points: ``pressure``, ``gap``, ``force``, ``active`` and ``pair``. Any consistent
     units. Returns the path. A file appears complete or not at all. Raises ``ValueError`` and
     ``OSError`` as `check_path` does, before any work.
@@ -81,6 +83,8 @@ def _bodies(solution: SolutionData) -> pyvista.UnstructuredGrid:
     grid.point_data["stress"] = stress[:, :3]
     for k, component in enumerate(("xx", "yy", "xy")):
         grid.GetPointData().GetAbstractArray("stress").SetComponentName(k, component)
+    if solution.problem.model in ABOUT_AN_AXIS:
+        grid.point_data["hoop_stress"] = stress[:, 3]
     grid.point_data["von_mises"] = von_mises(stress)
     grid.cell_data["body"] = nodes.body
     grid.field_data["body_names"] = list(nodes.names)

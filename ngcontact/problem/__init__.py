@@ -1,7 +1,10 @@
 """The continuous contact problem of HH81 section 3: laws, pairs, supports, loads, checks."""
 
+from .axis import ON_AXIS as ON_AXIS
+from .axis import on_axis as on_axis
 from .contact import Contact as Contact
 from .contact import Gap as Gap
+from .material import ABOUT_AN_AXIS as ABOUT_AN_AXIS
 from .material import MODEL_NAMES as MODEL_NAMES
 from .material import Elastic as Elastic
 from .material import Hooke as Hooke

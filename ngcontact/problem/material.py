@@ -1,4 +1,4 @@
-"""Hooke's laws of the bodies: the coefficients c_ijkl of HH81 (2.7) in the plane."""
+"""Hooke's laws of the bodies: the coefficients c_ijkl of HH81 (2.7) in each model."""
 
 from __future__ import annotations
 
@@ -12,13 +12,21 @@ import numpy as np
 
 from .values import refuse_where, scalar_data
 
-MODEL_NAMES = ("plane strain", "plane stress")
+VOIGT = {  # components of stress and strain in each model, the shear strain an engineering one
+    "plane strain": ("xx", "yy", "xy"),
+    "plane stress": ("xx", "yy", "xy"),
+    "axisymmetric": ("rr", "zz", "hoop", "rz"),
+}
+MODEL_NAMES = tuple(VOIGT)
+ABOUT_AN_AXIS = ("axisymmetric",)
 
 SYMMETRIC = 1e-12  # difference of entries, relative to the largest: input has that many digits
 DEFINITE = 16 * np.finfo(float).eps  # a pivot, relative to where it starts: round-off of zero
 
 _RIGHT_E = "Young's modulus must be positive and finite"
 _RIGHT_NU = "Poisson's ratio must lie in -1 < nu < 1/2"
+_RIGHT_SHAPE = "a Voigt matrix has (3, 3), of a body of revolution (4, 4)"
+SHAPES = {(len(names), len(names)) for names in VOIGT.values()}
 
 
 def require_model(model: str) -> str:
@@ -26,8 +34,7 @@ def require_model(model: str) -> str:
     if not isinstance(model, str):
         raise TypeError(f"model = {model!r}: give one of the strings {MODEL_NAMES}")
     if model not in MODEL_NAMES:
-        state = "is not available yet" if model == "axisymmetric" else "is unknown"
-        raise ValueError(f'model "{model}" {state}: choose one of {MODEL_NAMES}')
+        raise ValueError(f'model "{model}" is unknown: choose one of {MODEL_NAMES}')
     return model
 
 
@@ -63,8 +70,11 @@ class Elastic:
             raise ValueError(f"nu = {self.nu}: {_RIGHT_NU}")
 
     def voigt(self, model: str = "plane strain") -> ng.CoefficientFunction:
-        """Return the in-plane law, dims (3, 3): (xx, yy, xy) stress from (xx, yy, gamma_xy)."""
-        if require_model(model) == "plane strain":
+        """Return the law of a model, dims (q, q): stress from strain by the components `VOIGT`.
+
+        In the plane (xx, yy, xy) from (xx, yy, gamma_xy); about an axis (rr, zz, hoop, rz).
+        """
+        if require_model(model) != "plane stress":
             scale = self.E / ((1 + self.nu) * (1 - 2 * self.nu))
             normal, cross = scale * (1 - self.nu), scale * self.nu
         else:
@@ -73,10 +83,13 @@ class Elastic:
         shear = self.E / (2 * (1 + self.nu))
         # NGSolve takes numbers in a tuple slowly, and loses an interruption that comes meanwhile.
         n, c, s, zero = (ng.CF(value) for value in (normal, cross, shear, 0.0))
+        if len(VOIGT[model]) == 4:
+            rows = (n, c, c, zero, c, n, c, zero, c, c, n, zero, zero, zero, zero, s)
+            return ng.CF(rows, dims=(4, 4))
         return ng.CF((n, c, zero, c, n, zero, zero, zero, s), dims=(3, 3))
 
     def shear_modulus(self, model: str = "plane strain") -> ng.CoefficientFunction:
-        """Return mu = E / 2 (1 + nu), the same in both models."""
+        """Return mu = E / 2 (1 + nu), the same in all models."""
         require_model(model)
         return ng.CF(self.E / (2 * (1 + self.nu)))
 
@@ -92,7 +105,7 @@ class Elastic:
 
 @dataclass(frozen=True, eq=False)
 class Hooke:
-    """General linear elasticity in the plane.
+    """General linear elasticity in the plane, or of a body of revolution.
 
     Parameters
     ----------
@@ -100,7 +113,8 @@ class Hooke:
         c_ijkl as a symmetric 3x3 Voigt matrix in the order xx, yy, xy with the engineering shear
         gamma_xy = 2 eps_xy, any consistent unit of stress: nested numbers (kept as a read-only
         copy) or a CoefficientFunction of dims (3, 3). It is the in-plane law of the chosen model
-        already and is used as it is.
+        already and is used as it is. For the model "axisymmetric" a 4x4 matrix, or dims (4, 4), in
+        the order rr, zz, hoop, rz.
 
     Raises
     ------
@@ -115,8 +129,8 @@ class Hooke:
     def __post_init__(self) -> None:
         """Validate a matrix of numbers; a CoefficientFunction waits for `check_at`."""
         if isinstance(self.C, ng.CoefficientFunction):
-            if tuple(self.C.dims) != (3, 3):
-                raise ValueError(f"C has dims {tuple(self.C.dims)}: a Voigt matrix has (3, 3)")
+            if tuple(self.C.dims) not in SHAPES:
+                raise ValueError(f"C has dims {tuple(self.C.dims)}: {_RIGHT_SHAPE}")
             if self.C.is_complex:
                 raise TypeError("C is a complex CoefficientFunction: it must be real")
             return
@@ -128,28 +142,40 @@ class Hooke:
         object.__setattr__(self, "C", matrix)
 
     def voigt(self, model: str = "plane strain") -> ng.CoefficientFunction:
-        """Return C as a CoefficientFunction of dims (3, 3), whatever the model."""
-        require_model(model)
+        """Return C as a CoefficientFunction of dims (q, q), as it is."""
+        self.check_model(model, "the law")
         if isinstance(self.C, np.ndarray):
-            return ng.CF(tuple(self.C.ravel().tolist()), dims=(3, 3))
+            return ng.CF(tuple(self.C.ravel().tolist()), dims=self.C.shape)
         return ng.CF(self.C)
+
+    def check_model(self, model: str, name: str) -> None:
+        """Refuse a matrix of another model; `name` leads the message."""
+        q = len(VOIGT[require_model(model)])
+        shape = tuple(self.C.shape if isinstance(self.C, np.ndarray) else ng.CF(self.C).dims)
+        if shape != (q, q):
+            raise ValueError(
+                f'{name}.C has shape {shape}: the model "{model}" needs a {q}x{q} Voigt matrix in '
+                f"the order {', '.join(VOIGT[model])}"
+            )
 
     def shear_modulus(self, model: str = "plane strain") -> ng.CoefficientFunction:
         """Return a scalar modulus that bounds C from below, or is typical of it.
 
         For numbers it is half of the best c_0 in HH81 (2.7), mu for an isotropic law with
-        nu >= 0. For a CoefficientFunction it is the shear entry C_33.
+        nu >= 0. For a CoefficientFunction it is the shear entry, the last one.
         """
-        require_model(model)
+        self.check_model(model, "the law")
+        last = len(VOIGT[model]) - 1
         if isinstance(self.C, np.ndarray):
-            mandel = np.array([1.0, 1.0, math.sqrt(2.0)])
+            mandel = np.array([*[1.0] * last, math.sqrt(2.0)])
             return ng.CF(float(np.linalg.eigvalsh(mandel[:, None] * self.C * mandel)[0]) / 2)
-        return ng.CF(self.C)[2, 2]
+        return ng.CF(self.C)[last, last]
 
     def check_at(self, points: np.ndarray, name: str) -> None:
         """Refuse values outside HH81 (2.7) at mesh `points` (n,); `name` leads the message."""
         if not isinstance(self.C, np.ndarray):
-            matrices = ng.CF(self.C)(points).reshape(-1, 3, 3)
+            C = ng.CF(self.C)
+            matrices = C(points).reshape(-1, *C.dims)
             for bad, right in _faults(matrices):
                 refuse_where(points, bad, matrices, f"{name}.C", right)
 
@@ -160,39 +186,40 @@ def varies(law: Elastic | Hooke) -> bool:
 
 
 def _real_matrix(data: Any) -> np.ndarray:
-    """Return a float copy of shape (3, 3)."""
-    right = "give a 3x3 matrix of real numbers or a CoefficientFunction"
+    """Return a float copy of a shape in `SHAPES`."""
+    right = (
+        "give a 3x3 matrix (4x4 of a body of revolution) of real numbers or a CoefficientFunction"
+    )
     try:
         matrix = np.array(data)
     except (TypeError, ValueError) as error:
         raise TypeError(f"C = {data!r}: {right}") from error
     if matrix.dtype.kind not in "iuf":
         raise TypeError(f"C = {data!r}: {right}")
-    if matrix.shape != (3, 3):
-        raise ValueError(f"C has shape {matrix.shape}: a Voigt matrix has (3, 3)")
+    if matrix.shape not in SHAPES:
+        raise ValueError(f"C has shape {matrix.shape}: {_RIGHT_SHAPE}")
     return matrix.astype(float)
 
 
 def _faults(matrices: np.ndarray) -> list[tuple[np.ndarray, str]]:
-    """Return (bad, what would be right) per condition for Voigt matrices (n, 3, 3), bad (n,).
+    """Return (bad, what would be right) per condition for Voigt matrices (n, q, q), bad (n,).
 
     Definite by the pivots of L D L^T, each against the diagonal entry it starts from: so the
     verdict is the same in all units.
     """
     finite = np.isfinite(matrices).all(axis=(1, 2))
     size = np.abs(matrices).max(axis=(1, 2))
+    left = np.array(matrices, dtype=float)
+    share, definite = np.ones(len(left)), np.ones(len(left), dtype=bool)
     with np.errstate(all="ignore"):  # a pivot that is zero or not a number is the finding itself
         skew = np.abs(matrices - matrices.transpose(0, 2, 1)).max(axis=(1, 2)) / size
-        a, b, c = (matrices[:, i, i] for i in range(3))
-        ab, ac, bc = matrices[:, 0, 1], matrices[:, 0, 2], matrices[:, 1, 2]
-        second = b - ab * (ab / a)
-        rest = bc - ab * (ac / a)
-        third = c - ac * (ac / a) - rest * (rest / second)
-        # A small second pivot enlarges the round-off in the third: bound their product.
-        share = second / b
-        definite = (  # (2.7)
-            (a > 0) & (b > 0) & (c > 0) & (share > DEFINITE) & (share * (third / c) > DEFINITE)
-        )
+        for k in range(matrices.shape[1]):
+            start = matrices[:, k, k]
+            # A small pivot enlarges the round-off in those after it: bound their product.
+            share = share * (left[:, k, k] / start)
+            definite &= (start > 0) & (share > DEFINITE)  # (2.7)
+            row = left[:, k, :].copy()
+            left -= row[:, :, None] * (row / row[:, k, None])[:, None, :]
     return [
         (~finite, "the entries of a Voigt matrix must be finite"),
         (skew > SYMMETRIC, "a Voigt matrix must be symmetric"),

@@ -9,6 +9,7 @@ from typing import Any
 import ngsolve as ng
 from netgen.occ import OCCGeometry
 
+from .axis import check_about_axis
 from .checks import (
     AT_ENDS,
     IN_BODIES,
@@ -24,7 +25,7 @@ from .checks import (
     sides_of,
 )
 from .contact import Contact
-from .material import Elastic, Hooke, require_model
+from .material import ABOUT_AN_AXIS, Elastic, Hooke, require_model
 from .regions import body_mask, boundary_mask
 from .values import (
     Scalar,
@@ -65,7 +66,9 @@ class Problem:
     contact
         Gamma_K: the pairs, kept as a tuple.
     model
-        "plane strain" or "plane stress".
+        "plane strain", "plane stress" or "axisymmetric": a body of revolution about x = 0 by its
+        meridian section, x = r >= 0 and y = z; loads are per area and volume of the body, forces
+        those of the whole body.
 
     Raises
     ------
@@ -92,6 +95,9 @@ class Problem:
             )
         require_model(self.model)
         materials = by_region(self.materials, "materials", _law)
+        for name, law in materials.items():
+            if isinstance(law, Hooke):
+                law.check_model(self.model, f'materials "{name}"')
         if not materials:
             raise ValueError("materials = {}: give every body an Elastic or a Hooke")
         for name, value in {
@@ -147,6 +153,9 @@ class Problem:
         check_data(mesh, traction, self.traction.values(), IN_SEGMENTS)
         check_data(mesh, displacement, self.displacement.values(), AT_ENDS)
         check_gaps(mesh, contact, self.contact)
+        if self.model in ABOUT_AN_AXIS:
+            loads = (self.displacement, self.traction, self.force)
+            check_about_axis(mesh, *loads, self.contact)
 
 
 def _law(value: Any, what: str) -> Elastic | Hooke:

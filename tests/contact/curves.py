@@ -18,6 +18,11 @@ def graph(f, knots, degree=1):
     return np.stack([x, f(x)], axis=2)
 
 
+def nodes_on(curve, order):
+    """Parameters of the nodes of that degree on each segment."""
+    return np.tile(gauss_lobatto(order), (len(curve), 1))
+
+
 def upward(curve):
     """Sides for a body below a curve that runs to the right: the outward normal points up."""
     return -np.ones(len(curve))

@@ -10,7 +10,7 @@ import pytest
 from ngcontact.contact.projection import MATCHED, cast, snap
 from ngcontact.contact.search import coincident
 from ngcontact.lagrange import gauss_lobatto
-from tests.contact.curves import DOWN, at, circle, graph, rays, upward
+from tests.contact.curves import DOWN, at, circle, graph, nodes_on, rays, upward
 
 RNG = np.random.default_rng(7)
 
@@ -62,7 +62,7 @@ def test_nothing_given():
     none = np.zeros((0, 2))
     for search in (
         lambda x, d, c, n: cast(x, d, c, n),
-        lambda x, d, c, n: coincident(x, d, c, n, 1),
+        lambda x, d, c, n: coincident(x, d, c, n, nodes_on(c, 1)),
     ):
         assert search(none, none, curve, upward(curve)).segment.shape == (0,)
         found = search(*rays([0.0, 0.0], DOWN), curve[:0], np.zeros(0))
@@ -225,8 +225,12 @@ def test_scale_does_not_matter():
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_snap(order):
     nodes = gauss_lobatto(order)
-    assert (snap(nodes, order) == nodes).all()
-    assert (snap(nodes + 0.9 * MATCHED, order) == nodes).all()
+
+    def on(s):
+        return np.tile(nodes, (len(s), 1))
+
+    assert (snap(nodes, on(nodes)) == nodes).all()
+    assert (snap(nodes + 0.9 * MATCHED, on(nodes + 0.9 * MATCHED)) == nodes).all()
     away = nodes + 1.1 * MATCHED
-    assert (snap(away, order) == away).all()
-    assert snap(np.zeros(0), order).shape == (0,)
+    assert (snap(away, on(away)) == away).all()
+    assert snap(np.zeros(0), on(np.zeros(0))).shape == (0,)

@@ -9,7 +9,7 @@ import pytest
 
 from ngcontact.contact.search import coincident
 from ngcontact.lagrange import gauss_lobatto, lagrange
-from tests.contact.curves import DOWN, UP, at, graph, rays, upward
+from tests.contact.curves import DOWN, UP, at, graph, nodes_on, rays, upward
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
@@ -21,7 +21,9 @@ def test_coincident_nodes(order):
     lift = np.zeros(len(nodes))
     lift[::2] = 1e-11
     points = nodes + lift[:, None] * normal
-    found = coincident(points, np.tile(-normal, (len(nodes), 1)), curve, upward(curve), order)
+    found = coincident(
+        points, np.tile(-normal, (len(nodes), 1)), curve, upward(curve), nodes_on(curve, order)
+    )
     np.testing.assert_allclose(at(curve, found), nodes, atol=1e-15)
     assert np.isin(found.s, gauss_lobatto(order)).all()
     # The gap is a subtraction of coordinates, not zero by decree.
@@ -31,23 +33,29 @@ def test_coincident_nodes(order):
 def test_points_off_the_nodes_do_not_coincide():
     curve = graph(lambda x: 0 * x, [0, 1])
     points, directions = rays([[0.5, 0.0], [0.0, 1e-8], [1.0, 0.0]], DOWN)
-    found = coincident(points, directions, curve, upward(curve), 1)
+    found = coincident(points, directions, curve, upward(curve), nodes_on(curve, 1))
     assert found.segment.tolist() == [-1, -1, 0]
     assert found.s[2] == 1.0
-    assert coincident(points, directions, curve, upward(curve), 2).segment.tolist() == [0, -1, 0]
+    assert coincident(
+        points, directions, curve, upward(curve), nodes_on(curve, 2)
+    ).segment.tolist() == [0, -1, 0]
 
 
 def test_coincident_nodes_must_face():
     curve = graph(lambda x: 0 * x, [0, 1])
     points, directions = rays([[0.0, 0.0]], UP)
-    assert coincident(points, directions, curve, upward(curve), 1).segment.tolist() == [-1]
+    assert coincident(
+        points, directions, curve, upward(curve), nodes_on(curve, 1)
+    ).segment.tolist() == [-1]
 
 
 def test_coincident_vertex_of_two_segments():
     """At a corner the row of each side has its partner on the segment that opposes it."""
     corner = np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [1.0, -1.0]]])
     points = np.ones((2, 2)) * [1.0, 0.0]
-    found = coincident(points, np.array([[0.0, -1.0], [-1.0, 0.0]]), corner, -np.ones(2), 1)
+    found = coincident(
+        points, np.array([[0.0, -1.0], [-1.0, 0.0]]), corner, -np.ones(2), nodes_on(corner, 1)
+    )
     assert found.segment.tolist() == [0, 1]
     assert found.s.tolist() == [1.0, 0.0]
     assert found.distance.tolist() == [0.0, 0.0]
@@ -57,5 +65,5 @@ def test_matched_is_relative_to_the_segment():
     """Beside a short segment a long one does not widen the tolerance."""
     curve = graph(lambda x: 0 * x, [0, 1e-4, 1])
     points, directions = rays([[0.0, 5e-10], [0.0, 5e-14], [1.0, 5e-10]], DOWN)
-    found = coincident(points, directions, curve, upward(curve), 1)
+    found = coincident(points, directions, curve, upward(curve), nodes_on(curve, 1))
     assert found.segment.tolist() == [-1, 0, 1]

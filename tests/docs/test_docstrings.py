@@ -68,6 +68,7 @@ SOLUTION = {
     "displacement": "length",
     "stress": "stress",
     "out_of_plane_stress": "stress",
+    "hoop_stress": "stress",
     "points": "length",
     "gap": "length",
     "force": "force",
@@ -93,7 +94,7 @@ SOLUTION = {
 PLAIN = {
     *("problem", "mesh", "order", "element", "discrete", "minimiser", "work", "coarse_levels"),
     *("adaptive", "pair", "active", "steps", "free_motions", "estimated", "bounded"),
-    *("pairs", "estimator", "write", "plot", "draw"),
+    *("pairs", "estimator", "write", "revolved", "plot", "draw"),
 }
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import ngsolve as ng
 import numpy as np
 import pytest
+from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact import Elastic, Hooke
 from ngcontact.fem import MODELS
@@ -28,6 +31,9 @@ def test_every_model_has_an_object():
     assert tuple(MODELS) == MODEL_NAMES
 
 
+PLANE = {name: MODELS[name] for name in ("plane strain", "plane stress")}
+
+
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 def test_rigid_motions_are_those_without_strain(mesh, model):
     u = ng.GridFunction(ng.VectorH1(mesh, order=1))
@@ -38,7 +44,7 @@ def test_rigid_motions_are_those_without_strain(mesh, model):
     assert tuple(without) == model.motions
 
 
-@pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+@pytest.mark.parametrize("model", PLANE.values(), ids=PLANE)
 def test_stress_in_the_plane_is_symmetric(mesh, model):
     found = model.in_plane([ng.CF(float(k)) for k in (1, 2, 3)])(mesh(0.5, 0.5))
     assert np.array_equal(np.reshape(found, (2, 2)), [[1, 3], [3, 2]])
@@ -53,6 +59,56 @@ def test_stress_in_the_plane_is_symmetric(mesh, model):
     ],
 )
 def test_stress_out_of_the_plane(mesh, model, law, expected):
-    stress = ng.CF((3, 1, 1, 4), dims=(2, 2))
+    stress = [ng.CF(3.0), ng.CF(4.0), ng.CF(1.0)]
     found = MODELS[model].out_of_plane({"upper|lower": law}, mesh, stress)
     assert found(mesh(0.5, 0.5)) == pytest.approx(expected, abs=ROUND_OFF)
+
+
+@pytest.fixture(scope="module")
+def section():
+    """Meridian section 0 < r < 1, 0 < z < 1."""
+    return MakeStructured2DMesh(quads=False, nx=4, ny=4)
+
+
+def test_stress_about_an_axis(section):
+    model = MODELS["axisymmetric"]
+    voigt = [ng.CF(float(k)) for k in (1, 2, 3, 4)]
+    found = model.in_plane(voigt)(section(0.5, 0.5))
+    assert np.array_equal(np.reshape(found, (2, 2)), [[1, 4], [4, 2]])
+    assert model.out_of_plane({}, section, voigt)(section(0.5, 0.5)) == 3
+
+
+def test_strains_about_an_axis(section):
+    """U = (r^2 + r z, z^2 - r): also on the axis, where the hoop strain is the radial one."""
+    u = ng.GridFunction(ng.VectorH1(section, order=2))
+    u.Set(ng.CF((ng.x**2 + ng.x * ng.y, ng.y**2 - ng.x)))
+    model = MODELS["axisymmetric"]
+    for r, z in ((0.0, 0.3), (0.0, 1.0), (0.3, 0.6), (1.0, 0.1)):
+        expected = [2 * r + z, 2 * z, r + z, r - 1]
+        assert model.strain(u)(section(r, z)) == pytest.approx(expected, abs=1e-13)
+    assert ng.Integrate(model.volume(u), section) == pytest.approx(1.5 + 1 + 1)
+    gradient = ng.InnerProduct(ng.Grad(u), ng.Grad(u)) + (ng.x + ng.y) ** 2
+    assert size(model.gradients(u, u) - gradient, section) < 1e-12
+
+
+def test_divergence_about_an_axis(section):
+    """Sigma = ((r^2, r z), (r z, z)), hoop r z: the divergence in cylindrical coordinates."""
+    stress = ng.CF((ng.x**2, ng.x * ng.y, ng.x * ng.y, ng.y), dims=(2, 2))
+    plane = ng.CF((2 * ng.x + ng.x, ng.y + 1))
+    found = MODELS["axisymmetric"].divergence(plane, stress, ng.x * ng.y)
+    expected = (3 * 0.4 + (0.16 - 0.4 * 0.7) / 0.4, 0.7 + 1 + 0.7)
+    assert found(section(0.4, 0.7)) == pytest.approx(expected)
+
+
+def test_measures_are_those_of_the_body_of_revolution(section):
+    """The volume and the lateral surface of a cylinder; resultants are axial."""
+    model = MODELS["axisymmetric"]
+    assert ng.Integrate(model.weighted(ng.CF(1.0)), section) == pytest.approx(math.pi)
+    right = section.Boundaries("right")
+    lateral = ng.Integrate(model.weighted(ng.CF(1.0)), section, definedon=right)
+    assert lateral == pytest.approx(2 * math.pi)
+    points = np.array([[0.0, 0.3], [1e-12, 0.0], [0.5, 0.2], [1.0, 1.0]])
+    assert model.measure(points) == pytest.approx(2 * math.pi * points[:, 0])
+    assert model.on_axis(points).tolist() == [True, True, False, False]
+    assert model.on_axis(1e9 * points).tolist() == [True, True, False, False]
+    assert model.resultant(np.array([3.0, 4.0])).tolist() == [0.0, 4.0]

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
-from ngcontact.problem.material import MODEL_NAMES, Elastic, Hooke
+from ngcontact.problem.material import MODEL_NAMES, VOIGT, Elastic, Hooke
 
 # A few products and one inversion of numbers of size one: some units of round-off.
 ROUND_OFF = 1e-13
@@ -26,7 +26,11 @@ def points(mesh):
 
 
 def matrix_of(law, model, mesh, at=(0.3, 0.2)):
-    return np.array(law.voigt(model)(mesh(*at))).reshape(3, 3)
+    size = len(VOIGT[model])
+    return np.array(law.voigt(model)(mesh(*at))).reshape(size, size)
+
+
+PLANE = ("plane strain", "plane stress")
 
 
 def orthotropic():
@@ -37,7 +41,7 @@ def orthotropic():
 
 
 @pytest.mark.parametrize("nu", [-0.5, 0.0, 0.3, 0.4999])
-@pytest.mark.parametrize("model", MODEL_NAMES)
+@pytest.mark.parametrize("model", PLANE)
 def test_isotropic_law_inverts_the_compliance(mesh, model, nu):
     E = 7.0
     modulus, ratio = (E, nu) if model == "plane stress" else (E / (1 - nu**2), nu / (1 - nu))
@@ -61,12 +65,58 @@ def test_coefficient_functions_give_the_numbers_at_each_point(mesh, model):
 def test_hooke_is_used_as_it_is(mesh):
     given = orthotropic()
     law = Hooke(given.tolist())
-    for model in MODEL_NAMES:
+    for model in PLANE:
         assert tuple(law.voigt(model).dims) == (3, 3)
         assert np.array_equal(matrix_of(law, model, mesh), given)
     varying = Hooke((1 + ng.x) * law.voigt("plane strain"))
     found = matrix_of(varying, "plane strain", mesh, at=(0.5, 0.5))
     assert np.abs(found - 1.5 * given).max() < ROUND_OFF * given.max()
+
+
+def transversely_isotropic():
+    """A law about an axis, (rr, zz, hoop, rz), with another stiffness along it."""
+    compliance = np.array(
+        [[1, -0.1, -0.3, 0], [-0.1, 0.25, -0.1, 0], [-0.3, -0.1, 1, 0], [0, 0, 0, 3.0]]
+    )
+    stiffness = np.linalg.inv(compliance)
+    return (stiffness + stiffness.T) / 2
+
+
+@pytest.mark.parametrize("nu", [-0.5, 0.0, 0.3, 0.4999])
+def test_isotropic_law_about_an_axis_inverts_the_compliance(mesh, nu):
+    E = 7.0
+    compliance = np.diag([1 + nu] * 3 + [2 * (1 + nu)])
+    compliance[:3, :3] -= nu
+    product = matrix_of(Elastic(E, nu), "axisymmetric", mesh) @ (compliance / E)
+    assert np.abs(product - np.eye(4)).max() < ROUND_OFF / (1 - 2 * nu)
+
+
+def test_hooke_about_an_axis_is_used_as_it_is(mesh):
+    given = transversely_isotropic()
+    assert np.array_equal(matrix_of(Hooke(given), "axisymmetric", mesh), given)
+    varying = Hooke((1 + ng.x) * ng.CF(tuple(given.ravel()), dims=(4, 4)))
+    found = matrix_of(varying, "axisymmetric", mesh, at=(0.5, 0.5))
+    assert np.abs(found - 1.5 * given).max() < ROUND_OFF * given.max()
+
+
+def test_a_law_of_another_model_is_refused(mesh):
+    plane, axial = Hooke(orthotropic()), Hooke(transversely_isotropic())
+    with pytest.raises(
+        ValueError, match=r'shape \(3, 3\): .*"axisymmetric" needs a 4x4.*rr, zz, h'
+    ):
+        plane.voigt("axisymmetric")
+    with pytest.raises(
+        ValueError, match=r'shape \(4, 4\): .*"plane stress" needs a 3x3.*xx, yy, xy'
+    ):
+        axial.shear_modulus("plane stress")
+
+
+@pytest.mark.parametrize("entry", [(0, 1), (2, 2), (3, 3), (0, 2)])
+def test_a_law_about_an_axis_must_be_definite(entry):
+    matrix = transversely_isotropic()
+    matrix[entry] = matrix[entry[::-1]] = 20.0 if entry[0] != entry[1] else -1e-3
+    with pytest.raises(ValueError, match="must be positive definite"):
+        Hooke(matrix)
 
 
 def test_hooke_keeps_a_copy():
@@ -133,9 +183,9 @@ def test_elastic_refuses(E, nu, error, message):
     [
         (np.eye(2), ValueError, r"shape \(2, 2\): a Voigt matrix has \(3, 3\)"),
         ([1, 2, 3], ValueError, r"shape \(3,\): a Voigt matrix has \(3, 3\)"),
-        ([[1, 0], [0]], TypeError, r"C = .*: give a 3x3 matrix of real numbers"),
-        (None, TypeError, r"C = None: give a 3x3 matrix of real numbers"),
-        (1j * np.eye(3), TypeError, r"give a 3x3 matrix of real numbers"),
+        ([[1, 0], [0]], TypeError, r"C = .*: give a 3x3 matrix .* of real numbers"),
+        (None, TypeError, r"C = None: give a 3x3 matrix .* of real numbers"),
+        (1j * np.eye(3), TypeError, r"give a 3x3 matrix .* of real numbers"),
         (np.diag([1, math.nan, 1]), ValueError, r"nan.*must be finite"),
         ([[2, 0, 0], [1e-9, 2, 0], [0, 0, 1]], ValueError, r"1e-09.*must be symmetric"),
         ([[1, 2, 0], [2, 1, 0], [0, 0, 1]], ValueError, r"2\.0.*must be positive definite"),
@@ -172,7 +222,7 @@ def test_hooke_judges_alike_in_all_units(mesh, unit):
 @pytest.mark.parametrize(
     ("model", "error", "message"),
     [
-        ("axisymmetric", ValueError, r'"axisymmetric" is not available yet: .*"?plane strain'),
+        ("axial", ValueError, r'"axial" is unknown: .*"?plane strain'),
         ("plane", ValueError, r'"plane" is unknown: choose one of .*plane strain.*plane stress'),
         (2, TypeError, r"model = 2: give one of the strings .*plane strain"),
     ],

@@ -224,7 +224,7 @@ def test_contact_refuses(arguments, error, message):
         ({"contact": TOUCH}, TypeError, r"contact = Contact.*: give a list of Contact"),
         ({"contact": [TOUCH, ("a", "b")]}, TypeError, r"contact\[1\] = \('a', 'b'\): give a Con"),
         ({"model": "3d"}, ValueError, 'model "3d" is unknown: choose one of .*plane stress'),
-        ({"model": "axisymmetric"}, ValueError, "is not available yet: choose one of .*plane st"),
+        ({"model": "axial"}, ValueError, '"axial" is unknown: choose one of .*axisymmetric'),
     ],
 )
 def test_problem_refuses(make, changes, error, message):

@@ -34,6 +34,7 @@ def closing_energy(
     size = len(solution.boundary.region)
     apart = np.linalg.norm(np.diff(position, axis=0), axis=1)
     steep = np.divide(change, apart, out=np.zeros_like(change), where=change > 0)
+    steep *= solution.boundary.model.measure(position[1:])
     square, rise = (
         np.bincount(at, x, size) for at, x in ((segment, weight * w**2), (segment[1:], steep))
     )

@@ -19,7 +19,7 @@ from ...contact import (
     prescribed_gap,
 )
 from ...fem import BoundaryTrace
-from ...lagrange import lagrange, lagrange_derivative
+from ...lagrange import gauss_lobatto, lagrange, lagrange_derivative
 from ..terms import Parts
 
 SLIVER = 1e-9  # share of a segment below which a part of it is none
@@ -47,7 +47,7 @@ class FacingPoints:
         eps along d before deformation, a length.
     stretch : ndarray (2, k)
         Arc length on the secondary and on the primary, per arc length of the secondary (P1) or
-        per eta (P2).
+        per eta (P2); about an axis areas per area.
     """
 
     local: Index
@@ -95,6 +95,9 @@ def directions(
         segment, at_node = boundary.at_nodes(line.segments)
         here = without.ravel()
         nodal[without] = boundary.exact_normal(segment[here], at_node[here])
+    for k in np.flatnonzero(boundary.axis[line.segments]):  # whose nodes are others
+        s_here = gauss_lobatto(boundary.order)
+        nodal[k] = boundary.exact_normal(np.full(len(s_here), line.segments[k]), s_here)
     return between_nodes(nodal[local], s)
 
 
@@ -161,7 +164,7 @@ def facing_points(
     x, slope = boundary.point(segment, s), boundary.derivative(segment, s)
     speed = jacobian(boundary, line.contact, segment, s)
     stretch = np.ones((2, len(s)))
-    stretch[0] = np.linalg.norm(slope, axis=1) / speed
+    stretch[0] = np.linalg.norm(slope, axis=1) * boundary.measure(segment, s) / speed
     if line.contact.primary is None:
         s_there, distance = np.zeros(len(s)), np.zeros(len(s))
     else:
@@ -172,7 +175,8 @@ def facing_points(
         # Of (y(t) - x(s)) x d(s) = 0: dt / ds = (x' x d - (y - x) x d') / (y' x d).
         there = boundary.derivative(facing, s_there)
         rate = (_cross(slope, d) - _cross(offset, turn)) / _cross(there, d)
-        stretch[1] = np.abs(rate) * np.linalg.norm(there, axis=1) / speed
+        length = np.linalg.norm(there, axis=1) * boundary.measure(facing, s_there)
+        stretch[1] = np.abs(rate) * length / speed
     if line.contact.gap is not None:
         distance = prescribed_gap(line.contact, boundary, segment, s, x)
     return FacingPoints(

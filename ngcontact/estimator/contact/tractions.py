@@ -11,7 +11,7 @@ import numpy as np
 from ...arrays import Array, Index, Mask
 from ...contact import ContactLine, ContactState
 from ...fem import BoundaryTrace
-from ...lagrange import gauss_lobatto, lagrange
+from ...lagrange import gauss_lobatto
 from ..terms import (
     DATA_BONUS,
     BoundaryResidual,
@@ -68,7 +68,7 @@ def on_contact(
     order = 2 * solution.order + DATA_BONUS
     points = facing_points(boundary, line, following_gap(boundary, line, pieces, order), order)
     nodal = pressure_on_segments(nodal, solution.order)
-    pressure = (lagrange(solution.order, points.s) * nodal[points.local]).sum(axis=1)
+    pressure = (boundary.shapes(points.segment, points.s) * nodal[points.local]).sum(axis=1)
     pressure /= solution.unit
     full = np.asarray(active.all(axis=1))[points.local]
     sides = [_side(solution, points, pressure, own=True)]

@@ -1,0 +1,158 @@
+"""Two balls pressed on each other, steel on aluminium, compared with Hertz's formulas.
+
+Half of the upper ball and half of the lower one by their meridian sections, each held or moved on
+its plane of symmetry; how far the circle of contact spreads is found by the adaptive loop. Writes
+spheres.vtu, spheres_contact.vtp, spheres_revolved.vtu and spheres.png.
+
+    python -m drivers.spheres
+    python -m drivers.spheres --lower-radius 0.02 --tolerance 1e-3 --out out/
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import ngsolve as ng
+
+from drivers.command_line import Count, Order, Positive, run
+from drivers.hertz import ALUMINIUM, STEEL, Law
+from ngcontact import Contact, Elastic, Problem, Solution, adapt
+from ngcontact.geometries import disc_on_disc
+
+
+@dataclass(frozen=True)
+class Quantities:
+    """Contact `force`, `peak` pressure and `radius` of the circle of contact."""
+
+    force: float
+    peak: float
+    radius: float
+
+
+def pressed(radii: tuple[float, float], approach: float, upper: Elastic, lower: Elastic) -> Problem:
+    """Balls of two `radii` (m), whose middles approach each other by a distance (m)."""
+    return Problem(
+        geometry=disc_on_disc(*radii),
+        materials={"upper": upper, "lower": lower},
+        displacement={"bottom": (None, 0), "top": (None, -approach)},
+        contact=[Contact(secondary="upper_arc", primary="lower_arc", direction=(0, -1))],
+        model="axisymmetric",
+    )
+
+
+def measured(solution: Solution) -> Quantities:
+    """What a solution says of the contact."""
+    transitions = solution.transitions()
+    return Quantities(
+        force=float(solution.contact_force()[1]),
+        peak=float(solution.pressure.max()),
+        radius=float(transitions[:, 0].max()) if len(transitions) else math.nan,
+    )
+
+
+def hertz(force: float, radii: tuple[float, float], *laws: tuple[float, float]) -> Quantities:
+    """Hertz's contact of two balls under the same force (Johnson 1985, chapter 4)."""
+    stiffness = 1 / sum((1 - nu**2) / E for E, nu in laws)
+    radius = 1 / sum(1 / r for r in radii)
+    a = (3 * force * radius / (4 * stiffness)) ** (1 / 3)
+    return Quantities(force=force, peak=3 * force / (2 * math.pi * a**2), radius=a)
+
+
+def last_level(levels: Iterable[Solution]) -> tuple[Solution, Quantities]:
+    """Print all levels as they come; the last one and its quantities."""
+    print("unknowns  active  steps  estimate       force/N  peak/MPa    radius/mm  seconds")
+    started = time.perf_counter()
+    for solution in levels:
+        estimate = solution.relative_error_estimate
+        computed = measured(solution)
+        now = time.perf_counter()
+        print(
+            f"{solution.displacement.space.ndof:8d}  {solution.active.sum():6d}  "
+            f"{len(solution.steps):5d}  {estimate:.2e}  {computed.force:12.4f}  "
+            f"{computed.peak / 1e6:8.2f}  {computed.radius * 1e3:11.6f}  {now - started:7.2f}"
+        )
+        started = now
+    return solution, computed
+
+
+def print_comparison(
+    radii: tuple[float, float], computed: Quantities, expected: Quantities
+) -> None:
+    """Print peak pressures and radii of contact beside each other."""
+    print(f"\nAt a/R = {computed.radius / min(radii):.4f}   computed    Hertz  difference")
+    for name, a, b, unit in (
+        ("peak pressure, MPa", computed.peak, expected.peak, 1e6),
+        ("radius of contact, mm", computed.radius, expected.radius, 1e-3),
+    ):
+        print(f"{name:21s} {a / unit:9.4f} {b / unit:10.4f}  {(a / b - 1) * 100:+.3f} %")
+
+
+def main(
+    *,
+    radius: Positive = 0.01,
+    lower_radius: Positive = 0.02,
+    press: Positive = 5e-4,
+    upper: Law = STEEL,
+    lower: Law = ALUMINIUM,
+    order: Order = 3,
+    tolerance: Positive | None = None,
+    max_dofs: Count = 6000,
+    out: Path | None = Path("out"),
+) -> tuple[Quantities, Quantities]:
+    """Two balls pressed on each other: solved adaptively, compared with Hertz's formulas.
+
+    Prints every level and the comparison, writes spheres.vtu, spheres_contact.vtp,
+    spheres_revolved.vtu, the body of revolution, and spheres.png.
+
+    Parameters
+    ----------
+    radius : float
+        Radius of the upper ball, m.
+    lower_radius : float
+        Radius of the lower ball, m.
+    press : float
+        Distance by which the middles of the balls approach each other, in radii of the upper ball.
+    upper : tuple of float
+        Young's modulus of the upper ball, Pa, and its Poisson's ratio, without unit.
+    lower : tuple of float
+        Young's modulus of the lower ball, Pa, and its Poisson's ratio, without unit.
+    order : int
+        Degree of the displacement on each element, 1 to 4.
+    tolerance : float, optional
+        Estimated error, relative in the energy norm, that ends the refinement.
+    max_dofs : int
+        Number of unknowns that no level exceeds.
+    out : path, optional
+        Folder of the files; without one nothing is written.
+
+    Returns
+    -------
+    computed, expected : Quantities
+        The last level, and Hertz's formulas for its force; N, Pa and m.
+    """
+    radii = (radius, lower_radius)
+    print(
+        f"A ball of radius {radius * 1e3:g} mm, E = {upper[0] / 1e9:g} GPa, nu = {upper[1]:g}, on "
+        f"one of radius {lower_radius * 1e3:g} mm, E = {lower[0] / 1e9:g} GPa, nu = {lower[1]:g}"
+    )
+    problem = pressed(radii, press * radius, Elastic(*upper), Elastic(*lower))
+    levels = adapt(problem, order=order, tolerance=tolerance, max_dofs=max_dofs)
+    solution, computed = last_level(levels)
+    expected = hertz(computed.force, radii, upper, lower)
+    print_comparison(radii, computed, expected)
+    if out is not None:
+        out.mkdir(parents=True, exist_ok=True)
+        solution.write(out / "spheres.vtu")
+        solution.revolved(out / "spheres_revolved.vtu")
+        solution.plot(out / "spheres.png")
+        print(f"\nWritten: {out}/spheres.vtu, _contact.vtp, _revolved.vtu, spheres.png")
+    return computed, expected
+
+
+if __name__ == "__main__":
+    with ng.TaskManager():
+        run(main)

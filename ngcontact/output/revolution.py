@@ -1,0 +1,86 @@
+"""The body of revolution of an axisymmetric solution, for ParaView."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import ngsolve as ng
+import numpy as np
+
+from ..arrays import Array, Index
+from ..problem import ABOUT_AN_AXIS
+from .files import check_path, replacing
+from .nodes import full_stress, nodes_of, subdivision, von_mises
+from .solution_data import SolutionData
+from .vtk import write_data
+
+if TYPE_CHECKING:
+    import pyvista
+
+STEP = 6.0  # degrees between two sections, at most
+VTK_WEDGE = 13
+
+
+def write_revolved(
+    path: str | os.PathLike[str], solution: SolutionData, angle: float = 270.0
+) -> Path:
+    """Bodies of revolution as ``.vtu``: the meridian section turned by `angle` degrees about z.
+
+    Wedges between sections of linear triangles, order^2 of them for each element. Point data:
+    ``displacement`` (three components), ``stress`` (rr, zz, hoop, rz), ``von_mises``. Cell data:
+    ``body``, whose names are the field data ``body_names``. Any consistent units. Returns the path.
+
+    Raises ``ValueError`` for a plane model and for an angle outside (0, 360], and ``ValueError`` or
+    ``OSError`` as `check_path` does, before any work.
+    """
+    if solution.problem.model not in ABOUT_AN_AXIS:
+        raise ValueError(
+            f'model "{solution.problem.model}": a body of revolution has model="axisymmetric"'
+        )
+    if not 0 < angle <= 360:
+        raise ValueError(f"angle = {angle}: give degrees above 0, at most 360")
+    target = check_path(path, ".vtu")
+    from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
+
+    with replacing(target) as (draft,):
+        write_data(vtkXMLUnstructuredGridWriter(), _grid(solution, float(angle)), draft)
+    return target
+
+
+def _grid(solution: SolutionData, angle: float) -> pyvista.UnstructuredGrid:
+    """The wedges with their fields."""
+    import pyvista
+
+    order = max(solution.mesh.GetCurveOrder(), solution.order)
+    nodes = nodes_of(solution.mesh, order)
+    triangles = nodes.cells[:, subdivision(order)[0]].reshape(-1, 3)
+    steps = max(3, math.ceil(angle / STEP))
+    closed = angle == 360
+    turns = np.deg2rad(angle) / steps * np.arange(steps if closed else steps + 1)
+    place, u = nodes.values(ng.CF((ng.x, ng.y))), solution.displacement
+    count, sections = len(place), len(turns)
+    first = count * np.arange(steps)[:, None, None] + triangles
+    second = count * ((np.arange(steps) + 1) % sections)[:, None, None] + triangles
+    wedges: Index = np.concatenate([second, first], axis=2).reshape(-1, 6)
+    cells = np.column_stack([np.full(len(wedges), 6), wedges]).ravel()
+    kinds = np.full(len(wedges), VTK_WEDGE, dtype=np.uint8)
+    grid = pyvista.UnstructuredGrid(cells, kinds, _turned(place, turns))
+    grid.point_data["displacement"] = _turned(nodes.values(ng.CF((u[0], u[1]))), turns)
+    rr, zz, rz, hoop = nodes.values(full_stress(solution)).T
+    grid.point_data["stress"] = np.tile(np.column_stack([rr, zz, hoop, rz]), (sections, 1))
+    for k, component in enumerate(("rr", "zz", "hoop", "rz")):
+        grid.GetPointData().GetAbstractArray("stress").SetComponentName(k, component)
+    grid.point_data["von_mises"] = np.tile(von_mises(np.column_stack([rr, zz, rz, hoop])), sections)
+    grid.cell_data["body"] = np.tile(np.repeat(nodes.body, order**2), steps)
+    grid.field_data["body_names"] = list(nodes.names)
+    return grid
+
+
+def _turned(vectors: Array, turns: Array) -> Array:
+    """Vectors (r, z) (k, 2) about z by the angles `turns` (t,) in radians: (t k, 3)."""
+    r, z = vectors.T
+    x, y = np.outer(np.cos(turns), r), np.outer(np.sin(turns), r)
+    return np.stack([x, y, np.tile(z, (len(turns), 1))], axis=2).reshape(-1, 3)

@@ -1,0 +1,82 @@
+"""Bodies of revolution: files of the whole body, pictures on both sides of the axis."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import pyvista
+
+from drivers.reference import axisymmetric_cases as cases
+from ngcontact import solve
+from ngcontact.output.scene import picture
+
+
+@pytest.fixture(scope="module")
+def pressed():
+    return solve(cases.pressed_cylinders(0.5), maxh=0.5, order=2)
+
+
+@pytest.mark.parametrize(("angle", "sections"), [(360.0, 60), (270.0, 46), (90.0, 16), (4.0, 4)])
+def test_the_body_is_turned(tmp_path, pressed, angle, sections):
+    """The volume of rings between chords of at most 6 degrees; fields turn with the body."""
+    path = pressed.revolved(tmp_path / "body.vtu", angle=angle)
+    grid = pyvista.read(path)
+    steps = sections if angle == 360 else sections - 1
+    turn = math.radians(angle)
+    chords = math.sin(turn / steps) / (turn / steps)
+    assert grid.volume == pytest.approx(turn / 2 * (1 - 0.25) * 2 * chords, rel=1e-9)
+    assert grid.n_cells == steps * 4 * pressed.mesh.ne
+    x, y, _ = grid.points.T
+    u = grid["displacement"]
+    assert np.abs(u[:, 0] * y - u[:, 1] * x).max() < 1e-9 * np.abs(u).max()
+    assert grid["stress"].shape == (grid.n_points, 4)
+    assert grid["stress"][:, 1] == pytest.approx(-1, abs=1e-9)
+    assert np.abs(grid["stress"][:, [0, 2, 3]]).max() < 1e-9
+    assert grid["von_mises"] == pytest.approx(1, abs=1e-9)
+
+
+def test_what_is_refused(tmp_path, pressed):
+    for angle in (0, -1, 361, math.nan):
+        with pytest.raises(ValueError, match="give degrees above 0, at most 360"):
+            pressed.revolved(tmp_path / "body.vtu", angle=angle)
+    with pytest.raises(ValueError, match=r"must end in '.vtu'"):
+        pressed.revolved(tmp_path / "body.vtk")
+    plane = solve(replace(cases.pressed_cylinders(), model="plane strain"), maxh=1.0)
+    with pytest.raises(ValueError, match='model "plane strain": a body of revolution has'):
+        plane.revolved(tmp_path / "body.vtu")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_hoop_stress_is_in_the_file(tmp_path):
+    problem, exact = cases.fitted_rings()
+    solution = solve(problem, maxh=0.2, order=3)
+    grid = pyvista.read(solution.write(tmp_path / "fit.vtu"))
+    r = grid.points[:, 0]
+    hub = grid.points[:, 0] > 1.1 + 1e-6
+    at = [exact.hoop["hub"](solution.mesh(x, 0.1)) for x in r[hub]]
+    # Nodal means of a stress of degree 2 on elements of size 0.2.
+    assert grid["hoop_stress"][hub] == pytest.approx(at, abs=0.02 * np.abs(at).max())
+
+
+def test_values_on_the_axis_are_numbers(tmp_path):
+    solution = solve(cases.hertz_contact()[0], maxh=0.4, order=3)
+    grid = pyvista.read(solution.write(tmp_path / "hertz.vtu"))
+    assert (grid.points[:, 0] == 0).any()
+    for name in grid.point_data:
+        assert np.isfinite(grid[name]).all()
+
+
+def test_the_picture_shows_both_sides(pressed):
+    solid = solve(cases.pressed_cylinders(), maxh=0.5, order=2)
+    for solution in (pressed, solid):
+        scene = picture(solution, 1.0)
+        half = len(scene.moved) // 2
+        assert scene.axes == ("r", "z")
+        assert np.array_equal(scene.moved[half:], scene.moved[:half] * (-1, 1))
+        ends = scene.moved[scene.edges[scene.outline]][:, :, 0]
+        # The axis of a solid body is no outline.
+        assert not (np.abs(ends).max(axis=1) < 1e-9).any()
+        assert scene.triangles.max() == 2 * half - 1

@@ -1,0 +1,89 @@
+"""Bodies of revolution: what is refused about their axis, before any work."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import ngsolve as ng
+import numpy as np
+import pytest
+
+from ngcontact import Contact, Elastic, Hooke, Problem, solve
+from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.problem import on_axis
+
+SOFT = Elastic(E=1.0, nu=0.3)
+
+
+def cylinder(left=0.0, size=1.0):
+    """Cylinder left < x < 1, 0 < y < 1, times `size`."""
+    corners = [(size * x, size * y) for x, y in [(left, 0), (1, 0), (1, 1), (left, 1)]]
+    return compound(body("body", polygon(corners, ["bottom", "side", "top", "axis"])))
+
+
+def problem(**changes):
+    left, size = changes.pop("left", 0.0), changes.pop("size", 1.0)
+    data = {"displacement": {"bottom": (None, 0)}, "traction": {"top": 1.0}}
+    return Problem(
+        geometry=cylinder(left, size),
+        materials={"body": SOFT},
+        model="axisymmetric",
+        **data | changes,
+    )
+
+
+def test_points_on_the_axis_in_all_units():
+    points = np.array([[0.0, 5.0], [1e-17, 0.0], [1e-3, 0.0], [1.0, 0.0]])
+    for size in (1e-9, 1.0, 1e9):
+        assert on_axis(size * points).tolist() == [True, True, False, False]
+    assert on_axis(np.zeros((0, 2))).shape == (0,)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e6])
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"left": -0.2}, r"reaches to x = -.* across the axis x = 0: .* half with x >= 0"),
+        ({"left": -2.0, "traction": {}}, r"across the axis"),
+        ({"traction": {"axis": 1.0}}, 'traction "axis" is on the axis x = 0, which has no area'),
+        ({"traction": {"top": (1.0, 0)}}, 'traction "top" has the radial component 1 .* sideways'),
+        ({"force": {"body": (2.0, 0)}}, 'force "body" has the radial component 2 .* sideways'),
+        (
+            {"displacement": {"bottom": (0.5, 0)}},
+            'displacement "bottom" has the radial component 0.5 .* sideways',
+        ),
+        ({"displacement": {"axis": (0, 0)}}, 'displacement "axis" is on the axis .* by None'),
+        (
+            {"contact": [Contact("axis", direction=(-1, 0), gap=0.1)]},
+            'contact "axis" is on the axis x = 0, which has no area: name a boundary with x > 0',
+        ),
+    ],
+)
+def test_what_is_refused(changes, message, size):
+    with pytest.raises(ValueError, match=message):
+        solve(problem(size=size, **changes), maxh=size / 2)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"traction": {"side": (-1.0, 0)}},
+        {"traction": {"side": 1.0, "top": ng.CF((ng.x, -1))}},
+        {"force": {"body": ng.CF((ng.x, -1.0))}},
+        {"displacement": {"bottom": (0, 0), "axis": (0, None)}},
+        {"displacement": {"bottom": ng.CF((0.1 * ng.x, 0))}},
+        {"sliding": "axis|bottom", "displacement": {}},
+        {"left": 0.3, "traction": {"top": (1.0, 0)}, "force": {"body": (2.0, 0)}},
+        {"left": 0.3, "traction": {"axis": 1.0}},
+    ],
+)
+def test_what_is_solved(changes):
+    assert solve(problem(**changes), maxh=0.5, order=2).residuals["equilibrium"] < 1e-12
+
+
+def test_laws_have_four_components():
+    with pytest.raises(ValueError, match=r'materials "body".C has shape \(3, 3\): .*4x4'):
+        replace(problem(), materials={"body": Hooke(np.eye(3))})
+    with pytest.raises(ValueError, match=r'materials "body".C has shape \(4, 4\): .*3x3'):
+        replace(problem(), materials={"body": Hooke(np.eye(4))}, model="plane strain")
+    assert solve(replace(problem(), materials={"body": Hooke(np.eye(4))}), maxh=0.5)
