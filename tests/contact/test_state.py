@@ -64,7 +64,7 @@ def test_states_together_are_the_solution(two_pairs):
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_pressure_on_an_axis(order):
     """The even continuation at orders 1 and 2, exact for c0 + c1 r^2; force over weight above."""
-    solution = solve(cases_about_an_axis.pressed_cylinders(), maxh=0.2, order=order)
+    solution = solve(cases_about_an_axis.pressed_cylinders(), maxh=0.1, order=order)
     line, m = solution.pairs[0].line, len(solution.points)
     r = line.position[:, 0]
     axis = int(np.argmin(r))
