@@ -146,7 +146,7 @@ def ring_in_groove(
     depth: float | None = None,
     wall: float | None = None,
 ) -> OCCGeometry:
-    """O-ring in a rectangular groove, under a plate that touches it.
+    """O-ring in a rectangular groove, under a plate.
 
     Lengths are in any consistent unit.
 
@@ -155,21 +155,19 @@ def ring_in_groove(
     radius, section : float
         Radius of the ring's middle line, and of its circular section.
     width, depth : float, optional
-        Of the groove about the middle line; more than twice and less than twice `section`. Default:
-        2.8 and 1.5 times `section`.
+        Of the groove: more and less than 2 `section`. Default: 2.8 and 1.5 `section`.
     wall : float, optional
-        Thickness of the housing around the groove and of the plate. Default: 2 `section`.
+        Thickness of housing and plate. Default: 2 `section`.
 
     Returns
     -------
     OCCGeometry
-        Compound of the three bodies. The ring touches the bottom of the groove, y = 0, and the
-        plate, y = 2 `section`; the housing's face lies `depth` above the bottom.
+        Compound of the three bodies. The ring touches the groove, y = 0, and the plate.
 
     Raises
     ------
     TypeError, ValueError
-        If a length is not positive or out of its range, or the housing reaches the axis.
+        If a length is out of its range, or the housing reaches the axis.
 
     Notes
     -----
@@ -188,20 +186,18 @@ def ring_in_groove(
     ``plate_face``        y = 2 `section`
     ``housing_bottom``    lower end of the housing
     ``plate_top``         upper end of the plate
-    ``rims``              inner and outer sides of housing and plate
+    ``rims``              sides of both
     ====================  ==================================================
     """
     radius, t = positive("radius", radius), positive("section", section)
     half = 1.4 * t if width is None else above("width", width, "2 section", 2 * t) / 2
-    face = 1.5 * t if depth is None else positive("depth", depth)
-    if face >= 2 * t:
-        raise ValueError(f"depth = {depth!r}: expected less than 2 section = {2 * t!r}")
+    face = _groove_depth(t, depth)
     thick = 2 * t if wall is None else positive("wall", wall)
     above("radius", radius, "half the groove and the wall", half + thick)
     a, b, c, d = (radius + x for x in (-half - thick, -half, half, half + thick))
     corners = [(a, 2 * t), (d, 2 * t), (d, 2 * t + thick), (a, 2 * t + thick)]
-    plate = polygon(corners, ["plate_face", "rims", "plate_top", "rims"])
-    return compound(_ring(radius, t), _housing(a, b, c, d, face, -thick), body("plate", plate))
+    plate = body("plate", polygon(corners, ["plate_face", "rims", "plate_top", "rims"]))
+    return compound(_ring(radius, t), _housing(a, b, c, d, face, -thick), plate)
 
 
 def _ring(radius: float, section: float) -> Face:
@@ -210,6 +206,14 @@ def _ring(radius: float, section: float) -> Face:
     names = ["ring_upper", "ring_upper", "ring_lower", "ring_lower"]
     arcs = [quarter_arc((radius, section), section, *around[k : k + 2]) for k in range(4)]
     return body("ring", list(zip(names, arcs, strict=True)))
+
+
+def _groove_depth(section: float, depth: float | None) -> float:
+    """Depth of the groove, refused where the ring would not reach the plate."""
+    face = 1.5 * section if depth is None else positive("depth", depth)
+    if face >= 2 * section:
+        raise ValueError(f"depth = {depth!r}: expected less than 2 section = {2 * section!r}")
+    return face
 
 
 def _housing(a: float, b: float, c: float, d: float, face: float, bottom: float) -> Face:

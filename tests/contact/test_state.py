@@ -77,8 +77,8 @@ def test_pressure_on_an_axis(order):
     assert found[axis] == pytest.approx(2.0 if order < 3 else 2.1, abs=1e-9)
     assert np.array_equal(np.delete(found, axis), np.delete(given, axis))
     # Open points do not count, nor does a continuation from fewer than two.
-    beyond = np.where(r > 0.45, 0.0, given)
-    assert continued_to_axis(heavy, beyond, r < 0.45)[axis] == pytest.approx(found[axis])
+    beyond = np.where(r > 0.75, 0.0, given)
+    assert continued_to_axis(heavy, beyond, r < 0.75)[axis] == pytest.approx(found[axis])
     few = np.argsort(r)[:3]
     assert continued_to_axis(heavy, given, np.isin(np.arange(m), few))[axis] == given[axis]
     assert continued_to_axis(heavy, given, ~line.on_axis)[axis] == given[axis]

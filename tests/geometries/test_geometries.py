@@ -14,7 +14,20 @@ import pytest
 from netgen.occ import OCCGeometry
 
 from ngcontact import geometries
-from ngcontact.geometries import blocks, disc, disc_on_block, disc_on_disc, graphs, punch, rings
+from ngcontact.geometries import (
+    ball_in_socket,
+    blocks,
+    cone_on_block,
+    disc,
+    disc_on_block,
+    disc_on_disc,
+    graphs,
+    punch,
+    ring_in_groove,
+    rings,
+    rounded_punch,
+    sleeve_on_shaft,
+)
 from ngcontact.geometries.graph_edge import follow
 
 PI = math.pi
@@ -62,7 +75,48 @@ class Case:
     edges: int
 
 
+BLOCK_ABOUT_AN_AXIS = {"block_top", "block_bottom", "side", "axis"}
+INDENTER = BLOCK_ABOUT_AN_AXIS | {"indenter_side", "indenter_top"}
+SLOPE = math.tan(math.radians(10))
+
 CASES = [
+    Case(
+        "ball_in_socket",
+        ball_in_socket,
+        {"ball": PI / 4, "socket": 2.1 * 2.05 - 1.05**2 * PI / 4},
+        {"ball_top", "ball_arc", "socket_arc", "socket_rim", "socket_bottom", "side", "axis"},
+        8,
+    ),
+    Case(
+        "cone_on_block",
+        cone_on_block,
+        {"indenter": 1 + SLOPE / 2, "block": 4.0},
+        INDENTER | {"flank"},
+        8,
+    ),
+    Case(
+        "rounded_punch",
+        rounded_punch,
+        {"indenter": 1.2**2 - 0.2**2 * (1 - PI / 4), "block": 2.4**2},
+        INDENTER | {"end"},
+        9,
+    ),
+    Case(
+        "sleeve_on_shaft",
+        sleeve_on_shaft,
+        {"shaft": 2.0, "sleeve": 0.6},
+        {"shaft_contact", "shaft_free", "shaft_ends", "axis"}
+        | {"sleeve_contact", "sleeve_ends", "rim"},
+        10,
+    ),
+    Case(
+        "ring_in_groove",
+        ring_in_groove,
+        {"ring": PI / 4, "housing": 3.4 * 1.75 - 1.4 * 0.75, "plate": 3.4},
+        {"ring_lower", "ring_upper", "groove", "walls", "face", "plate_face"}
+        | {"housing_bottom", "plate_top", "rims"},
+        16,
+    ),
     Case("blocks", blocks, {"upper": 2.0, "lower": 2.0}, BLOCK_SIDES, 8),
     Case(
         "blocks",
