@@ -1,7 +1,7 @@
 """Bounds of the error that are proved, by stresses in equilibrium."""
 
-from .bound import ErrorBound as ErrorBound
 from .bound import error_bound as error_bound
+from .parts import ErrorBound as ErrorBound
 from .readings import Guaranteed as Guaranteed
 from .refusals import refuse_bound as refuse_bound
 from .stress import EquilibratedStress as EquilibratedStress

@@ -14,7 +14,8 @@ import numpy as np
 from ...contact import ContactState
 from ...fem import LOAD_BONUS, Space, load_vector, potential_energy
 from ...problem import Problem
-from .bound import ErrorBound, error_bound
+from .bound import error_bound
+from .parts import ErrorBound
 from .stress import EquilibratedStress
 
 ROUND_OFF = 64 * np.finfo(float).eps  # of an energy, relative to its terms

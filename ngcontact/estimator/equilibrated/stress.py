@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ...arrays import Array, Index
 from .data import Discrete, EdgeConditions, dimension
+from .record import Proof
 from .stresses import Equilibrated, into_raw, raw_operators
 
 
@@ -47,6 +51,8 @@ class EquilibratedStress:
     certificate : dict of float
         Largest residuals of divergence (times diameter), jumps and given tractions, relative to the
         largest stress; the least p*, in units of stress.
+    proof : Proof
+        What it was made of.
     """
 
     degree: int
@@ -55,6 +61,22 @@ class EquilibratedStress:
     coefficients: Array
     pressure: list[ContactPressure]
     certificate: dict[str, float]
+    proof: Proof
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write `path` (.npz): arrays that drivers/check_certificate.py checks with NumPy alone.
+
+        Raises
+        ------
+        ValueError
+            Curved triangles or laws that vary.
+        """
+        path = Path(path)
+        if path.suffix != ".npz":
+            raise ValueError(f'path="{path}" must end in .npz')
+        arrays: dict[str, Any] = dict(self.proof.arrays())
+        np.savez_compressed(path, **arrays)
+        return path
 
 
 def raw_coefficients(discrete: Discrete, result: Equilibrated, at: Index) -> Array:

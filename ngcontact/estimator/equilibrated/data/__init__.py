@@ -15,6 +15,7 @@ from .partition import partition_of as partition_of
 from .polynomials import CORNERS as CORNERS
 from .polynomials import basis as basis
 from .polynomials import dimension as dimension
+from .polynomials import lattice as lattice
 from .polynomials import legendre_derivative as legendre_derivative
 from .polynomials import legendre_values as legendre_values
 from .rough import Rough as Rough

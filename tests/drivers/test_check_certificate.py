@@ -1,0 +1,133 @@
+"""Certificates pass a check that shares no code with the package; tampered ones fail."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from drivers import check_certificate
+from drivers.reference import cases
+from ngcontact import solve
+from tests.scenes import unmatched_blocks
+
+DRIVER = Path(check_certificate.__file__)
+
+
+def dual_transition():
+    case = cases.one_transition()
+    return replace(case.problem, geometry=unmatched_blocks())
+
+
+SCENES = {
+    "transition": lambda: cases.one_transition().problem,
+    "hertz": lambda: cases.hertz_contact().problem,
+    "body forces": lambda: cases.clamped_transition().problem,
+    "corners": lambda: cases.polygonal_patch().problem,
+    "lifting off": cases.partly_opening_block,
+    "punch": cases.flat_punch,
+    "dual rows": dual_transition,
+}
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory):
+    """Arrays of a certificate, and where they are."""
+    path = tmp_path_factory.mktemp("certificate") / "certificate.npz"
+    solution = solve(cases.hertz_contact(half_width=0.5).problem, maxh=0.25, order=2)
+    solution.equilibrated.save(path)
+    with np.load(path) as file:
+        return path, dict(file), solution
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("scene", SCENES)
+def test_certificates_pass(scene, order, tmp_path, capsys):
+    solution = solve(SCENES[scene](), maxh=0.5, order=order)
+    path = solution.equilibrated.save(tmp_path / "certificate.npz")
+    passed = check_certificate.check(path)
+    said = capsys.readouterr().out
+    assert passed, said
+    assert f"|u - u_h| <= {solution.error_bound:.9g}" in said
+
+
+def changed(array, factor=1 + 1e-6):
+    """One entry, the largest, changed by a millionth."""
+    array = array.astype(float)
+    array.flat[np.abs(array).argmax()] *= factor
+    return array
+
+
+TAMPERED = {
+    "a smaller bound": lambda a: {"bound": a["bound"] * (1 - 1e-6)},
+    "a stress": lambda a: {"stress": changed(a["stress"])},
+    "all stresses": lambda a: {"stress": a["stress"] * (1 + 1e-6)},
+    "a discrete stress": lambda a: {"discrete_stress": changed(a["discrete_stress"], 1.01)},
+    "a force": lambda a: {"force": a["force"] + np.abs(a["stress"]).max() * 1e-3},
+    "a vertex": lambda a: {"vertices": changed(a["vertices"])},
+    "an inverted triangle": lambda a: {"triangles": a["triangles"][:, ::-1]},
+    "a missing triangle": lambda a: {
+        name: a[name][:-1]
+        for name in ("triangles", "stress", "discrete_stress", "force", "law", "loads", "lifting")
+    },
+    "a law": lambda a: {"law": changed(a["law"], 1.01)},
+    "an indefinite law": lambda a: {"law": -a["law"]},
+    "a traction": lambda a: {"edge_traction": changed(a["edge_traction"])},
+    "a missing edge": lambda a: {
+        name: a[name][:-1]
+        for name in (
+            "edge_triangle",
+            "edge_side",
+            "edge_frame",
+            "edge_constrained",
+            "edge_traction",
+        )
+    },
+    "a pulling pressure": lambda a: {"contact_pressure": -a["contact_pressure"]},
+    "a pressure": lambda a: {"contact_pressure": changed(a["contact_pressure"])},
+    "a turned direction": lambda a: {"contact_direction": a["contact_direction"][:, ::-1]},
+    "a long direction": lambda a: {"contact_direction": a["contact_direction"] * 1.001},
+    "an overlap": lambda a: {"gap_open": a["gap_open"] - a["gap_open"].max() * 1e-6},
+    "a wider gap": lambda a: {"gap_open": a["gap_open"] + a["gap_open"].max() * 1e-3},
+    "a smaller weight": lambda a: {"gap_weight": a["gap_weight"] * (1 - 1e-6)},
+    "no lifting": lambda a: {"lifting": a["lifting"] * 0},
+    "a negative norm": lambda a: {"lifting": -a["lifting"]},
+    "not a number": lambda a: {"stress": changed(a["stress"], np.nan)},
+}
+
+
+@pytest.mark.parametrize("name", TAMPERED)
+def test_tampered_certificates_fail(name, saved, tmp_path, capsys):
+    path, arrays, _ = saved
+    assert check_certificate.check(path)
+    np.savez(tmp_path / "tampered.npz", **(arrays | TAMPERED[name](arrays)))
+    assert not check_certificate.check(tmp_path / "tampered.npz")
+    assert "FAIL" in capsys.readouterr().out
+
+
+def test_the_driver_needs_nothing_but_numpy(saved):
+    path, arrays, solution = saved
+    tree = ast.parse(DRIVER.read_text())
+    names = {a.name for x in ast.walk(tree) if isinstance(x, ast.Import) for a in x.names}
+    names |= {x.module for x in ast.walk(tree) if isinstance(x, ast.ImportFrom)}
+    assert {name.split(".")[0] for name in names} - set(sys.stdlib_module_names) == {"numpy"}
+    done = subprocess.run([sys.executable, DRIVER, path], capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert float(arrays["bound"]) == solution.error_bound
+
+
+def test_curved_certificates_are_refused(tmp_path):
+    solution = solve(cases.ring_in_ring().problem, maxh=0.5, order=2)
+    with pytest.raises(ValueError, match="triangles are curved"):
+        solution.equilibrated.save(tmp_path / "certificate.npz")
+    assert not list(tmp_path.iterdir())
+
+
+def test_the_name_of_the_file(saved, tmp_path):
+    with pytest.raises(ValueError, match="must end in .npz"):
+        saved[2].equilibrated.save(tmp_path / "certificate.txt")
