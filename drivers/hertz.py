@@ -150,6 +150,8 @@ def main(
     solution, computed = last_level(levels)
     expected = hertz(computed.force, radius, disc, block)
     print_comparison(radius, computed, expected)
+    print("\nThe computed half, with errors (N/m, Pa, m):")
+    print(solution.quantities())
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         solution.write(out / "hertz.vtu")

@@ -13,7 +13,7 @@ import numpy as np
 from .arrays import Array, Index, Mask, root_of_squares
 from .contact import ContactState, contact_states, state_of
 from .discrete import DiscreteProblem, RigidMotion, resultants
-from .estimator import Estimate, Estimator, Guaranteed, estimate
+from .estimator import Estimate, Estimator, Measured, estimate
 from .fem import energy_norm, model_of, normal_stress_of, potential_energy, stress_of
 from .output import plot_solution, write_revolved, write_solution
 from .problem import Problem
@@ -21,7 +21,7 @@ from .qp import Iterate, kkt_residuals
 
 
 @dataclass(frozen=True, eq=False)
-class Solution(Guaranteed):
+class Solution(Measured):
     """Exact minimiser u_h of L over K_h on one mesh: HH81 (P_1h), (P_2h).
 
     Contact quantities are arrays over the m contact points, all pairs in order.

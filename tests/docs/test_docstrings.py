@@ -87,6 +87,7 @@ SOLUTION = {
     "relative_error_bound": "none",
     "bound_parts": "energy",
     "energy_bounds": "energy",
+    "quantities": "any",
     "equilibrated": "stress",
     "residuals": "none",
 }

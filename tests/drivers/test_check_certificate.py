@@ -129,5 +129,5 @@ def test_curved_certificates_are_refused(tmp_path):
 
 
 def test_the_name_of_the_file(saved, tmp_path):
-    with pytest.raises(ValueError, match="must end in .npz"):
+    with pytest.raises(ValueError, match=r"must end in \.npz"):
         saved[2].equilibrated.save(tmp_path / "certificate.txt")

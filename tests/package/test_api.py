@@ -76,7 +76,14 @@ MEMBERS = {
     *("points", "pair", "gap", "pressure", "force", "active", "steps"),
     *("contact_force", "reactions", "transitions", "energy", "residuals"),
     *("indicators", "error_estimate", "relative_error_estimate"),
-    *("error_bound", "relative_error_bound", "bound_parts", "energy_bounds", "equilibrated"),
+    *(
+        "error_bound",
+        "relative_error_bound",
+        "bound_parts",
+        "energy_bounds",
+        "equilibrated",
+        "quantities",
+    ),
     *("write", "plot", "draw"),
 }
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays import Array, Index
-from .data import Discrete, EdgeConditions, dimension
+from .data import Discrete, EdgeConditions, basis, dimension
 from .record import Proof
 from .stresses import Equilibrated, into_raw, raw_operators
 
@@ -62,6 +62,11 @@ class EquilibratedStress:
     pressure: list[ContactPressure]
     certificate: dict[str, float]
     proof: Proof
+
+    def at_middles(self) -> Array:
+        """(xx, yy, xy) in the middles of the triangles, (n, 3), units of stress."""
+        values = basis(self.degree).values(np.array([[1 / 3, 1 / 3]]))[0]
+        return np.asarray(self.coefficients @ values)
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write `path` (.npz): arrays that drivers/check_certificate.py checks with NumPy alone.

@@ -7,6 +7,7 @@ from .pieces import pieces_of as pieces_of
 from .selection import selected as selected
 from .zone import Zone as Zone
 from .zone import ZonePoints as ZonePoints
+from .zone import bernstein as bernstein
 from .zone import contact_jacobian as contact_jacobian
 from .zone import zone_of as zone_of
 from .zone import zone_points as zone_points

@@ -1,0 +1,58 @@
+"""Figures with bars: the energy's is proved, the others are held against Hertz contact."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from drivers.reference import cases
+from ngcontact import adapt, solve
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_bars_contain_the_exact_values(order):
+    """Of the force on every level, of the ends where these are resolved; and are not idle."""
+    case = cases.hertz_contact(half_width=0.3)
+    force, ends = [], []
+    for level in adapt(case.problem, order=order, max_dofs=4500):
+        q = level.quantities()
+        assert level.work["equilibrations"] == 1
+        assert abs(q["force"].value - case.exact.P) <= q["force"].error
+        assert not q["force"].guaranteed
+        force.append(q["force"].error / abs(q["force"].value - case.exact.P))
+        assert q["energy"].guaranteed
+        low, high = level.energy_bounds
+        assert q["energy"].error == max(high - level.energy, level.energy - low)
+        found = [row for row in q if row.name == "end of contact, x"]
+        assert sorted(np.sign(row.value) for row in found) == [-1, 1]
+        ends += [row.error / abs(abs(row.value) - 0.3) for row in found]
+    assert np.median(force) <= 50
+    assert np.mean(np.array(ends) >= 1) >= 0.9
+    assert np.median(ends) <= 100
+
+
+def test_largest_stress_lies_under_the_surface():
+    """Johnson 1985: the largest shear is 0.3 p0 at 0.78 a; von Mises 0.56 p0 at nu = 0.3, 0.7 a."""
+    case = cases.hertz_contact(half_width=0.3)
+    *_, finest = adapt(case.problem, order=4, max_dofs=4500)
+    row = finest.quantities()["largest von Mises"]
+    assert 0.5 * case.exact.p0 < row.value < 0.65 * case.exact.p0
+    assert abs(row.place[0]) < 0.1
+    assert 0.15 < abs(row.place[1]) < 0.3
+    assert 0 < row.error < 0.05 * row.value
+
+
+def test_the_table_reads():
+    solution = solve(cases.hertz_contact().problem, maxh=0.25, order=2)
+    q = solution.quantities()
+    names = [row.name for row in q]
+    assert names[:2] == ["force", "peak pressure"]
+    assert names[-2:] == ["energy", "largest von Mises"]
+    lines = str(q).splitlines()
+    assert len(lines) == len(names)
+    assert all(("guaranteed" in line) == line.startswith("energy") for line in lines)
+    assert all("+-" in line for line in lines)
+    with pytest.raises(KeyError, match="'torque' is none of"):
+        q["torque"]
+    with pytest.raises(ValueError, match="pair=1 is not a contact pair"):
+        solution.quantities(1)
