@@ -8,7 +8,7 @@ from typing import Protocol
 import ngsolve as ng
 import numpy as np
 
-from ...contact import ContactState
+from ...contact import ContactState, state_of
 from ...fem import BoundaryTrace, Space
 from ..equilibrated import EquilibratedStress, Guaranteed
 from .quantities import Quantities, quantities_of
@@ -40,7 +40,6 @@ class _Solved(Protocol):
     def relative_error_bound(self) -> float: ...
     @property
     def equilibrated(self) -> EquilibratedStress: ...
-    def _pair_number(self, pair: int) -> int: ...
 
 
 class Measured(Guaranteed):
@@ -57,11 +56,11 @@ class Measured(Guaranteed):
         ValueError
             A problem for which no bound is known.
         """
-        number = self._pair_number(pair)
-        star = self.equilibrated.pressure[number]
+        state = state_of(self.pairs, pair)
+        star = self.equilibrated.pressure[pair]
         boundary: BoundaryTrace = self.discrete.space.trace
         return quantities_of(
-            self.pairs[number],
+            state,
             (star.segments, np.asarray(star.coefficients)),
             boundary,
             (self.stress, self.out_of_plane_stress),
