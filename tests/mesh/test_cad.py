@@ -197,6 +197,11 @@ GALLERY = {
     "graphs": [lambda: graphs(lambda x: 0.1 * math.sin(4 * x), lambda x: x**2 / 2 - 0.7)],
     "punch": [punch],
     "rings": [rings, lambda: rings(interference=0.1, quarter=True)],
+    "ball_in_socket": [geometries.ball_in_socket],
+    "cone_on_block": [geometries.cone_on_block],
+    "ring_in_groove": [geometries.ring_in_groove],
+    "rounded_punch": [geometries.rounded_punch],
+    "sleeve_on_shaft": [geometries.sleeve_on_shaft],
 }
 
 
