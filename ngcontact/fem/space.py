@@ -141,13 +141,12 @@ def assemble(
     a = ng.BilinearForm(V, symmetric=True)
     rough = rough_moduli(problem, mesh)
     for body, law in problem.materials.items():
-        stress = model.stress(law.voigt(problem.model), model.strain(u))
-        work = model.weighted(ng.InnerProduct(stress, model.strain(v)))  # (3.1)
         measures = constant_measures(mesh, body, trace.curved_elements, model.bonus)
         if varies(law):
             measures = law_measures(mesh, body, 2 * trace.order, rough)
-        for dx in measures:
-            a += work * dx
+        for work in model.work(law.voigt(problem.model), u, v):  # (3.1)
+            for dx in measures:
+                a += work * dx
     for boundary in problem.traction:
         _check_normals(trace, boundary)
     a.Assemble()

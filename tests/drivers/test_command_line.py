@@ -33,6 +33,17 @@ HELP = {
         "max-dofs": ("Number of unknowns", "20000"),
         "out": ("Folder", "out"),
     },
+    "spheres": {
+        "radius": ("upper ball, m.", "0.01"),
+        "lower-radius": ("lower ball, m.", "0.02"),
+        "press": ("radii", "0.0005"),
+        "upper": ("Pa", "2.1e+11 0.3"),
+        "lower": ("Pa", "7e+10 0.33"),
+        "order": ("1 to 4", "3"),
+        "tolerance": ("relative in the energy norm", "none"),
+        "max-dofs": ("Number of unknowns", "6000"),
+        "out": ("Folder", "out"),
+    },
     "convergence": {
         "parts": ("problems", "patch S1 S3 S7 S8 S9"),
         "levels": ("Number of meshes", "5"),
