@@ -52,7 +52,7 @@ HELP = {
         "studies": ("Problems", "'one transition' 'hertz a=0.3' 'hertz a=0.05'"),
         "orders": ("1 to 4", "1 2 3 4"),
         "max-dofs": ("Number of unknowns", "40000"),
-        "reference": ("Number of unknowns", "60000"),
+        "reference": ("Number of unknowns", "100000"),
         "out": ("Folder", "out"),
     },
     "stress": {
