@@ -11,17 +11,16 @@ from numbers import Real
 import ngsolve as ng
 import numpy as np
 
-from .adaptivity import doerfler, refined
-from .arrays import Mask, power_of_two
-from .contact import ending_segments
+from .adaptivity import at_ends, doerfler, refined, settled, together
+from .arrays import Mask, power_of_two, root_of_squares
 from .errors import ConvergenceError, warn
 from .estimator import Estimator, estimate, refuse_bound
-from .fem import check_element, incompressibilities, unknowns, warn_of_locking
-from .mesh import curve, first_mesh
+from .fem import check_element, incompressibilities, unknowns
+from .mesh import curve, diameters, first_mesh
 from .one_mesh import solve_on, warn_of_doubts
-from .plausibility import doubt_of_refinement, estimates_rise
+from .plausibility import contradictions, doubt_of_refinement, estimates_rise, warn_of_implausible
 from .problem import Problem
-from .quadrature import warn_of_data
+from .quadrature import jumping_moduli
 from .solution import Solution
 
 EXACT = 1e-12  # relative estimate at which refinement stops: the solution is exact
@@ -99,7 +98,8 @@ def adapt(
     theta : float
         Doerfler's share of the squared indicators that is marked, in (0, 1].
     tolerance : float, optional
-        Relative estimated error in the energy norm at which to stop.
+        Relative estimated error in the energy norm at which to stop. Elements within a thousandth
+        of the extent of corners where supports contradict each other do not count.
     max_dofs : int
         Number of unknowns that no level exceeds.
     guaranteed : bool
@@ -123,8 +123,7 @@ def adapt(
     """
     refinement = Refinement(order, element, theta, tolerance, max_dofs, guaranteed)
     mesh = first_level(problem, maxh, refinement)
-    warn_of_locking(problem, mesh, order)
-    warn_of_data(problem, mesh, order)
+    warn_of_implausible(problem, mesh, order)
     return _with_warnings(levels(problem, mesh, refinement))
 
 
@@ -168,21 +167,19 @@ def _number(name: str, value: object) -> float:
     return float(value)
 
 
-def _marked(solution: Solution, refinement: Refinement) -> Mask:
+def _marked(solution: Solution, refinement: Refinement, small: Mask) -> Mask:
     """Elements (ne,) to refine: Doerfler's, and those in which contact ends.
 
     The end of contact is known to the square of these elements' size, the energy to the square of
-    the relative error: both stay of one size.
+    the relative error: both stay of one size. Elements in which moduli jump are refined together,
+    those at corners where supports contradict each other no more once they are `small` (ne,).
     """
-    marked = doerfler(solution.indicators, refinement.theta)
-    trace = solution.discrete.space.trace
-    for pair in solution.pairs:
-        line = pair.line
-        segments = line.segments[ending_segments(line, pair.transitions)]
-        extent = np.linalg.norm(np.ptp(line.position, axis=0)) if line.node.size else 0.0
-        size = refinement.ending * solution.relative_error_estimate * extent
-        marked[trace.element[segments[trace.lengths(segments) > size]]] = True
-    return marked
+    mesh = solution.mesh
+    rest = np.where(small, 0.0, solution.indicators)
+    marked = doerfler(rest if rest.any() else solution.indicators, refinement.theta)
+    marked = together(marked, jumping_moduli(solution.problem, mesh), diameters(mesh))
+    share = refinement.ending * solution.relative_error_estimate
+    return marked | at_ends(solution.discrete.space.trace, solution.pairs, share)
 
 
 def _at_round_off(solution: Solution) -> bool:
@@ -228,6 +225,7 @@ def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[
     order, element = refinement.order, refinement.element
     solution: Solution | None = None
     ratio = SHARPER
+    places = np.array([one.place for one in contradictions(problem, mesh)]).reshape(-1, 2)
     while unknowns(mesh, order, element) <= refinement.max_dofs:
         solution = solve_on(problem, mesh, order, element, solution)
         solution = replace(solution, adaptive=True, estimator=refinement.estimator)
@@ -245,12 +243,16 @@ def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[
                 iterate=solution.minimiser,
             )
         log.info("%s", solution)
+        small = settled(solution.mesh, places)
+        if small.any() and not refinement.guaranteed:  # no mesh makes the estimate less there
+            error *= root_of_squares(solution.indicators[~small]) / solution.error_estimate
         if error <= max(refinement.tolerance or 0.0, EXACT) or _at_round_off(solution):
             return
-        mesh = refined(problem, solution.mesh, _marked(solution, refinement))
+        mesh = refined(problem, solution.mesh, _marked(solution, refinement, small))
         mesh, _ = curve(mesh, order, element)
     if refinement.tolerance is not None:
         what = "bound" if refinement.guaranteed else "estimate"
+        what += " outside of the corners of contradictory supports" if small.any() else ""
         warn(
             f"the {what} is {error:.2e}, more than tolerance={refinement.tolerance:g}: the next "
             f"level would exceed max_dofs={refinement.max_dofs:g}; give a larger max_dofs or "

@@ -9,11 +9,11 @@ import numpy as np
 
 from .adaptive import Refinement, first_level, levels, log
 from .errors import ContactError
-from .fem import check_element, unknowns, warn_of_locking
+from .fem import check_element, unknowns
 from .mesh import first_mesh
 from .one_mesh import solve_on, warn_of_doubts
+from .plausibility import warn_of_implausible
 from .problem import Problem, Triangulation
-from .quadrature import warn_of_data
 from .solution import Solution
 
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
@@ -71,8 +71,7 @@ def solve(
     mesh = first_mesh(problem, maxh) if mesh is None else mesh
     problem.check(mesh)
     if start is None:
-        warn_of_locking(problem, mesh, order)
-        warn_of_data(problem, mesh, order)
+        warn_of_implausible(problem, mesh, order)
     coarse = _coarse_run(problem, mesh, order, element) if start is None else []
     solution = solve_on(problem, mesh, order, element, coarse[-1] if coarse else start)
     solution = replace(solution, coarse_levels=len(coarse))

@@ -37,3 +37,34 @@ def doerfler(indicators: Array, theta: float) -> Mask:
         count = np.searchsorted(carried, theta * carried[-1] * (1 - SPARE)) + 1
         marked[order[:count]] = True
     return marked
+
+
+def together(marked: Mask, alike: Mask, sizes: Array) -> Mask:
+    """The marked elements, and all `alike` ones that are as large as the smallest marked of these.
+
+    Where one of many elements stands out by chance, as by how a line cuts it, Doerfler's marking
+    takes one after the other, a level each.
+
+    Parameters
+    ----------
+    marked : ndarray of bool (ne,)
+        Elements.
+    alike : ndarray of bool (ne,)
+        Elements.
+    sizes : ndarray (ne,)
+        Diameters, lengths.
+
+    Returns
+    -------
+    ndarray of bool (ne,)
+        The elements to refine.
+
+    Examples
+    --------
+    >>> together(np.array([True, False, False]), np.array([True, True, True]), np.array([2, 1, 3]))
+    array([ True, False,  True])
+    """
+    both = marked & alike
+    if not both.any():
+        return marked
+    return np.asarray(marked | (alike & (sizes >= sizes[both].min() * (1 - SPARE))))

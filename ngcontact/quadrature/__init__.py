@@ -1,6 +1,8 @@
 """Quadrature that follows the data: where functions are rough, and rules that resolve them."""
 
 from .doubts import warn_of_data as warn_of_data
+from .jumps import jumping_moduli as jumping_moduli
+from .jumps import warn_of_jumps as warn_of_jumps
 from .lattice import composite as composite
 from .lattice import extent as extent
 from .lattice import on_lattice as on_lattice

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ngcontact.adaptivity.marking import doerfler
+from ngcontact.adaptivity.marking import doerfler, together
 
 SHARES = st.floats(0.01, 1.0)
 INDICATORS = st.lists(st.floats(0.0, 1.0, width=32), min_size=1, max_size=8).map(np.array)
@@ -82,3 +82,12 @@ def test_the_indicators_are_not_changed():
     indicators = np.array([1.0, 3.0, 2.0])
     doerfler(indicators, 0.5)
     assert indicators.tolist() == [1.0, 3.0, 2.0]
+
+
+def test_alike_elements_are_marked_together_down_to_the_smallest_marked():
+    alike = np.array([True, True, True, False, True])
+    sizes = np.array([1.0, 2.0, 0.5, 4.0, 1.0])
+    marked = np.array([True, False, False, False, False])
+    assert together(marked, alike, sizes).tolist() == [True, True, False, False, True]
+    others = np.array([False, False, False, True, False])
+    assert (together(others, alike, sizes) == others).all()

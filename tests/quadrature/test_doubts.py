@@ -1,4 +1,4 @@
-"""Warnings of data: loads that are nowhere, supports that contradict each other."""
+"""Warnings of data: loads that are nowhere, or too fine."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import replace
 import ngsolve as ng
 import pytest
 
-from ngcontact import ContactWarning, adapt, solve
+from ngcontact import ContactWarning, solve
 from tests.quadrature.test_loads import box, loaded
 
 
@@ -22,12 +22,6 @@ def test_a_load_finer_than_any_quadrature():
     problem = loaded(traction={"top": ng.IfPos(ng.sin(1e7 * ng.x), 1.0, 0.0)})
     with pytest.warns(ContactWarning, match='traction "top" is finer than any quadrature'):
         solve(problem, maxh=0.3)
-
-
-def test_supports_that_contradict_each_other():
-    data = {"bottom": (0, 0), "left": (0.1, None)}
-    with pytest.warns(ContactWarning, match=r"0 and 0.1 along x at their corner \(0, 0\)"):
-        next(adapt(replace(loaded(), displacement=data), order=1))
 
 
 def test_sound_data_are_no_doubt():

@@ -1,0 +1,95 @@
+"""Corners at which supports contradict each other: no displacement of finite energy has both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+
+from ..arrays import Array
+from ..errors import warn
+from ..fem import BoundaryTrace, boundary_trace
+from ..problem import Problem
+
+APART = 1e-6  # values of two supports at one corner, relative to the largest, that are two values
+
+
+@dataclass(frozen=True)
+class Contradiction:
+    """Two supports and a corner of theirs.
+
+    Attributes
+    ----------
+    supports : tuple of str
+        Names.
+    place : ndarray (2,)
+        The corner, a length.
+    message : str
+        What they say there.
+    """
+
+    supports: tuple[str, str]
+    place: Array
+    message: str
+
+
+def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
+    """All of Gamma_u with itself, and of Gamma_u with guides, by corner and component."""
+    trace = boundary_trace(mesh, 1)
+    known: dict[tuple[int, int], tuple[str, float]] = {}
+    found = []
+    for pattern, components in problem.displacement.items():
+        segment, s = trace.at_nodes(trace.segments(pattern))
+        node = trace.nodes[segment, np.round(s).astype(int)].tolist()
+        for axis, value in enumerate(components):
+            if value is None or not len(segment):
+                continue
+            values = trace.evaluate(value, segment, s)[:, 0].tolist()
+            for k, (vertex, u) in enumerate(zip(node, values, strict=True)):
+                name, other = known.setdefault((vertex, axis), (pattern, u))
+                if name != pattern and abs(u - other) > APART * max(abs(other), abs(u)):
+                    found.append(
+                        Contradiction(
+                            (name, pattern),
+                            trace.point(segment[k : k + 1], s[k : k + 1])[0],
+                            f'displacement "{name}" and "{pattern}" prescribe {other:.6g} and '
+                            f"{u:.6g} along {'xy'[axis]}",
+                        )
+                    )
+    return found + _across_guides(problem, trace, known)
+
+
+def _across_guides(
+    problem: Problem, trace: BoundaryTrace, known: dict[tuple[int, int], tuple[str, float]]
+) -> list[Contradiction]:
+    """Ends of guides at which `known` values, by vertex and axis, lead across them."""
+    if problem.sliding is None:
+        return []
+    found = []
+    segment, s = trace.at_nodes(trace.segments(str(problem.sliding)))
+    node = trace.nodes[segment, np.round(s).astype(int)].tolist()
+    place, normals = trace.point(segment, s), trace.exact_normal(segment, s)
+    for vertex, x, normal in zip(node, place, normals, strict=True):
+        needed = [axis for axis in (0, 1) if abs(normal[axis]) > APART]
+        if all((vertex, axis) in known for axis in needed):
+            name = known[vertex, needed[0]][0]
+            u = [known.get((vertex, axis), ("", 0.0))[1] for axis in (0, 1)]
+            across = float(normal @ u)
+            if abs(across) > APART * max(map(abs, u)):
+                message = f'displacement "{name}" leads {across:.6g} across the guide'
+                found.append(Contradiction((name, "guide"), x, f'{message} "{problem.sliding}"'))
+    return found
+
+
+def warn_of_contradictions(found: list[Contradiction]) -> None:
+    """Warn of the first corner of each two supports."""
+    told: set[tuple[str, str]] = set()
+    for one in found:
+        if one.supports not in told:
+            told.add(one.supports)
+            x, y = one.place
+            warn(
+                f"{one.message} at their corner ({x:.6g}, {y:.6g}): the energy is infinite and no "
+                "mesh resolves it; make them equal there"
+            )

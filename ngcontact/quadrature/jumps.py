@@ -1,0 +1,122 @@
+"""Jumps of moduli inside elements, told from smooth variation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+
+from ..arrays import Array, Index, Mask
+from ..errors import warn
+from ..mesh import diameters
+from ..problem import Problem, Triangulation, varies
+from .lattice import mesh_points, on_lattice
+
+JUMP = 0.5  # change of a law over its least value from which it is told
+HALVINGS = 24  # of the distance between two points: what still changes across 1e-7 of it jumps
+
+
+@dataclass(frozen=True)
+class Jumps:
+    """Where a function jumps: at most one place in each element.
+
+    Attributes
+    ----------
+    element : ndarray of int (k,)
+        Numbers of elements.
+    place : ndarray (k, 2)
+        A place of each jump, a length.
+    least, most : ndarray (k,)
+        Values on both sides of the component that jumps.
+    """
+
+    element: Index
+    place: Array
+    least: Array
+    most: Array
+
+
+def _found(
+    function: ng.CoefficientFunction, mesh: ng.Mesh, elements: Index, sizes: Array, share: float
+) -> Jumps:
+    """Jumps inside elements by more than a `share` of the matrices' least diagonal.
+
+    From the points of a lattice at which a component is least and largest, the half of their
+    distance across which it changes more is kept, again and again: a smooth change shrinks by that.
+
+    Parameters
+    ----------
+    function : ng.CoefficientFunction
+        Of square matrices.
+    mesh : ng.Mesh
+        The mesh.
+    elements : ndarray of int (k,)
+        Which.
+    sizes : ndarray (ne,)
+        Diameters of all triangles, lengths.
+    share : float
+        Positive.
+    """
+    found = [Jumps(np.empty(0, np.intp), np.empty((0, 2)), np.empty(0), np.empty(0))]
+    for here, points in on_lattice(mesh, elements, sizes):
+        values = np.asarray(function(points.ravel())).reshape(*points.shape, -1)
+        step = round(values.shape[-1] ** 0.5) + 1
+        limit = share * values[..., ::step].mean(axis=2).min(axis=1)
+        change = np.ptp(values, axis=1)
+        k = np.flatnonzero(change.max(axis=1) > limit)
+        if not len(k):
+            continue
+        which, row = change[k].argmax(axis=1), np.arange(len(k))
+        of = values[k, :, which]  # the component (k, n) that changes most
+        ends = np.column_stack([of.argmin(axis=1), of.argmax(axis=1)])
+        x = np.stack([points[axis][k[:, None], ends] for axis in "xy"], axis=2)
+        u = np.take_along_axis(of, ends, axis=1)
+        for _ in range(HALVINGS):
+            middle = x.mean(axis=1)
+            at = mesh_points(mesh, here[k], middle[:, None])
+            v = np.asarray(function(at.ravel())).reshape(len(k), -1)[row, which]
+            side = (np.abs(v - u[:, 0]) > np.abs(v - u[:, 1])).astype(int)  # which end to move
+            x[row, side], u[row, side] = middle, v
+        kept = np.abs(u[:, 1] - u[:, 0]) > limit[k]
+        at = mesh_points(mesh, here[k][kept], x[kept, :1])
+        place = np.asarray(ng.CF((ng.x, ng.y))(at.ravel())).reshape(-1, 2)
+        found.append(Jumps(here[k][kept], place, u[kept].min(axis=1), u[kept].max(axis=1)))
+    parts = ("element", "place", "least", "most")
+    return Jumps(*(np.concatenate([getattr(jump, part) for jump in found]) for part in parts))
+
+
+def _jumps(problem: Problem, mesh: ng.Mesh) -> Iterator[tuple[str, Jumps]]:
+    """Where the laws that vary jump inside elements, by pattern of bodies."""
+    region, diameter = Triangulation(mesh).bodies, diameters(mesh)
+    for pattern, law in problem.materials.items():
+        if varies(law):
+            at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
+            yield pattern, _found(law.voigt(problem.model), mesh, at, diameter, JUMP)
+
+
+def jumping_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
+    """Elements (ne,) in which the law jumps, by more than half of itself, and their neighbours.
+
+    A line may cut off a corner that no point of a small element shows.
+    """
+    triangles = Triangulation(mesh).triangles
+    touched = np.zeros(mesh.nv, dtype=bool)
+    for _, found in _jumps(problem, mesh):
+        touched[triangles[found.element]] = True
+    return np.asarray(touched[triangles].any(axis=1))
+
+
+def warn_of_jumps(problem: Problem, mesh: ng.Mesh) -> None:
+    """Warn of every law that jumps inside elements, where it jumps most."""
+    for pattern, found in _jumps(problem, mesh):
+        if len(found.element):
+            k = int(np.argmax(found.most - found.least))
+            x, y = found.place[k]
+            warn(
+                f'materials "{pattern}" jump inside {len(found.element)} elements, most near '
+                f"({x:.4g}, {y:.4g}): a stiffness from {found.least[k]:.3g} to "
+                f"{found.most[k]:.3g}. No order converges fast there; make the line an edge of the "
+                "geometry, with a body of its own on either side"
+            )
