@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
 from .data import Discrete, EdgeConditions, basis, dimension
 from .record import Proof
-from .stresses import Equilibrated, into_raw, raw_operators
+from .stresses import Equilibrated, into_raw, raw_operators, stress_field
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +64,12 @@ class EquilibratedStress:
     pressure: list[ContactPressure]
     certificate: dict[str, float]
     proof: Proof
+
+    @cached_property
+    def stress(self) -> ng.CoefficientFunction:
+        """The stress in the plane, (2, 2), in units of stress."""
+        mesh = self.proof.discrete.partition.mesh
+        return stress_field(mesh, self.triangles, self.element, self.coefficients, self.degree)
 
     def at_middles(self) -> Array:
         """(xx, yy, xy) in the middles of the triangles, (n, 3), units of stress."""

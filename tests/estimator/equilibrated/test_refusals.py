@@ -26,6 +26,13 @@ def test_curved_guides_are_refused():
         next(levels)
 
 
+def test_bodies_of_revolution_are_refused():
+    problem = replace(cases.disc_on_rigid_plane(), model="axisymmetric")
+    solution = solve(problem, maxh=0.5, order=2)
+    with pytest.raises(ValueError, match='the model "axisymmetric"'):
+        _ = solution.error_bound
+
+
 def test_jumping_displacements_have_no_energy():
     case = cases.one_transition()
     problem = replace(

@@ -84,7 +84,7 @@ class Polynomials:
     degree: int
 
     @cached_property
-    def _change(self) -> Array:
+    def change(self) -> Array:
         """Monomials times this matrix (n, n) are the basis; two rounds for its round-off."""
         points, weights = triangle_rule(2 * self.degree)
         values, total = _powers(self.degree, points)[0], np.eye(dimension(self.degree))
@@ -95,11 +95,11 @@ class Polynomials:
 
     def values(self, points: Array) -> Array:
         """Values (q, n) at `points` (q, 2)."""
-        return np.asarray(_powers(self.degree, points)[0] @ self._change)
+        return np.asarray(_powers(self.degree, points)[0] @ self.change)
 
     def gradients(self, points: Array) -> Array:
         """Derivatives (2, q, n) along the two coordinates at `points` (q, 2)."""
-        return np.asarray(np.stack(_powers(self.degree, points)[1:]) @ self._change)
+        return np.asarray(np.stack(_powers(self.degree, points)[1:]) @ self.change)
 
     @cached_property
     def rule(self) -> tuple[Array, Array]:

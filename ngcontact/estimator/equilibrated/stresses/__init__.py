@@ -4,3 +4,4 @@ from .elements import raw_operators as raw_operators
 from .equilibration import Equilibrated as Equilibrated
 from .equilibration import equilibrated as equilibrated
 from .equilibration import into_raw as into_raw
+from .field import stress_field as stress_field
