@@ -41,7 +41,7 @@ def refuse_bound(problem: Problem, boundary: BoundaryTrace, pairs: Sequence[Cont
         name = line.contact.secondary
         loaded = (np.append(pair.force, 0.0)[line.rows] != 0).any(axis=1)
         ends = np.isin(line.rows, line.rows[line.faces]).all(axis=1)
-        if (loaded & ~line.faces & ~ends).any():
+        if not line.faces.any() or (loaded & ~line.faces & ~ends).any():
             raise ValueError(
                 f'{no_bound} segments that face the other body in part, as on "{name}"'
             )

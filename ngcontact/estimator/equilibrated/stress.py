@@ -100,7 +100,7 @@ def raw_coefficients(discrete: Discrete, result: Equilibrated, at: Index) -> Arr
         number = rough.number[at]
         smooth, here, number = (number < 0).nonzero()[0], number >= 0, number[number >= 0]
         hatted = rough.hatted[number].sum(axis=1)[:, :, None]
-        c[here] += (rough.into[number] @ hatted).reshape(len(number), 3, -1)
+        c[here] += (rough.into[number] @ hatted).reshape(len(number), 3, c.shape[2])
     c[smooth, :, : discrete.stress.shape[-1]] += discrete.stress[at[smooth]]
     return c
 
@@ -116,7 +116,7 @@ def certified(
     n, m, low = len(partition.triangles), dimension(k), dimension(k - 1)
     coefficients, traction = np.empty((n, 3, m)), np.empty((n, 3, 2 * (k + 1)))
     divergence = np.empty((n, 2, low))
-    step = max(1, 4_000_000 // (9 * m * m))
+    step = max(1, 1_000_000 // (9 * m * m))
     for start in range(0, n, step):
         at = np.arange(start, min(start + step, n))
         c = coefficients[at] = raw_coefficients(discrete, result, at)

@@ -13,7 +13,7 @@ from .elements import Condensed, condensed, gathered, raw_operators, without_opp
 from .patches import multipliers
 from .rigid_loads import exchanged_loads
 
-AT_ONCE = 4_000_000  # numbers in the operators of elements that are made together
+AT_ONCE = 1_000_000  # numbers in the operators of elements that are made together
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +77,9 @@ def _block(discrete: Discrete, at: Index, frames: Array, theta: Array) -> _Block
         number = discrete.rough.number[at]
         mine, number = np.flatnonzero(number >= 0), number[number >= 0]
         c[mine] = discrete.rough.hatted[number]
-        lacks = discrete.rough.divergence[number].reshape(len(mine), 3, -1)
-        rho[mine] = (lacks - c[mine] @ D[mine].transpose(0, 2, 1)).reshape(len(mine), 3, 2, -1)
+        lacks = discrete.rough.divergence[number].reshape(len(mine), 3, D.shape[1])
+        lacks = lacks - c[mine] @ D[mine].transpose(0, 2, 1)
+        rho[mine] = lacks.reshape(len(mine), *rho.shape[1:])
     rho[..., :3] += theta[at]
     return _Block(condensed(D, N), c, rho.reshape(b, 3, -1))
 
