@@ -20,6 +20,7 @@ from ngcontact import ContactError
 
 Trial: TypeAlias = Literal[
     "algebra",
+    "data",
     "gaps",
     "held",
     "interruption",
@@ -30,7 +31,7 @@ Trial: TypeAlias = Literal[
     "shapes",
     "symmetry",
 ]
-RANDOM = ("algebra", "scenes", "symmetry")  # whose cases are drawn
+RANDOM = ("algebra", "data", "scenes", "symmetry")  # whose cases are drawn
 SCENES = 66  # every kind six times, in two minutes
 SUMMARY = "drivers.stress.scenes.checks.report"  # loaded, with its solver, only where it is needed
 
@@ -47,7 +48,7 @@ def outcomes(name: Trial, seed: int, scenes: int = SCENES) -> Iterator[Outcome]:
     """Outcomes of one module, which is loaded only now; `scenes` of them where scenes are drawn."""
     trial = importlib.import_module(f"drivers.stress.trials.{name}")
     given = {"seed": seed} if name in RANDOM else {}
-    if name == "scenes":
+    if name in ("data", "scenes"):
         given["count"] = scenes
     found: Iterator[Outcome] = trial.outcomes(**given)
     return found
@@ -68,9 +69,9 @@ def main(
         Kinds of stress.
     seed : int
         Number from which quadratic programs of `algebra` and numberings of `symmetry` are drawn;
-        of the first of the `scenes`.
+        of the first of `data` and `scenes`.
     scenes : int
-        How many random scenes are drawn, of seeds one after the other.
+        How many random scenes `data` and `scenes` draw each, of seeds one after the other.
 
     Returns
     -------

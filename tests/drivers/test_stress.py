@@ -13,9 +13,9 @@ from drivers.stress import refused
 from drivers.stress.__main__ import RANDOM, Trial, line, main, outcomes
 from drivers.stress.differences import differences
 from drivers.stress.motion import Motion, posed
-from drivers.stress.trials import algebra, held, symmetry
+from drivers.stress.trials import algebra, data, held, symmetry
 from drivers.stress.trials.symmetry import parting
-from ngcontact import solve
+from ngcontact import Solution, solve
 
 # The slow ones run with the driver; what they found has tests with the modules concerned.
 QUICK = ("algebra", "gaps", "held", "shapes")
@@ -40,7 +40,7 @@ def test_seeds_draw_other_cases():
     assert programs(0) == programs(0)
     assert programs(0) != programs(1)
     assert len(numberings(0) | numberings(1) | numberings(2)) == 3 * len(numberings(0)) > 3
-    assert set(RANDOM) == {"algebra", "scenes", "symmetry"}
+    assert set(RANDOM) == {"algebra", "data", "scenes", "symmetry"}
 
 
 @pytest.mark.parametrize("name", QUICK)
@@ -69,3 +69,13 @@ def test_units_change_nothing(length, modulus):
     assert max(differences(first, other, motion, vertex, triangle).values()) <= 1e-10
     wrong = Motion("another load", length=length, modulus=modulus, load=1.001)
     assert max(differences(first, other, wrong, vertex, triangle).values()) > 1e-4
+
+
+@pytest.mark.parametrize("seed", range(len(data.KINDS)))
+def test_estimates_of_data_that_hurt(seed):
+    assert data.outcome(seed).passed
+
+
+def test_an_estimate_below_the_error_fails(monkeypatch):
+    monkeypatch.setattr(Solution, "error_estimate", property(lambda solution: 1e-6))
+    assert not data.outcome(2).passed

@@ -1,0 +1,178 @@
+"""Stress: random data that the mesh does not resolve; the estimate against the true error.
+
+Narrow and waving loads, displacements with kinks and waves, moduli that vary inside elements and
+jump between bodies, anisotropy along turned axes, interference. The error is that of the stress
+against an adaptive solution of order 4.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import ngsolve as ng
+import numpy as np
+from netgen.occ import OCCGeometry, Rectangle, X, Y
+
+from drivers.reference.overkill import Overkill
+from drivers.stress import Outcome, solved
+from ngcontact import Contact, ContactWarning, Elastic, Hooke, Problem, Solution, adapt, solve
+from ngcontact.geometries import blocks
+
+Draw = np.random.Generator
+
+LEAST = 0.9  # estimate over error; the error is known up to that of the overkill solution
+LOST = 1e-2  # of a load that the supports may not feel
+SHARP = 0.05  # estimate of the overkill solution over that of the one it judges
+DOFS = 8_000  # of the overkill solution
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A scene, and the force (2,) of its loads where that is known."""
+
+    problem: Problem
+    load: tuple[float, float] | None = None
+
+
+def square(draw: Draw) -> Problem:
+    """A clamped square under a uniform load."""
+    face = Rectangle(1, 1).Face()
+    face.faces.name = "body"
+    face.edges.Max(Y).name, face.edges.Min(Y).name = "top", "bottom"
+    face.edges.Min(X).name, face.edges.Max(X).name = "left", "right"
+    return Problem(
+        geometry=OCCGeometry(face, dim=2),
+        materials={"body": Elastic(1.0, float(draw.uniform(0, 0.4)))},
+        displacement={"bottom": (0, 0)},
+        traction={"top": (float(draw.uniform(-1, 1)), -1.0)},
+    )
+
+
+def _inside(x: ng.CoefficientFunction, middle: float, half: float) -> ng.CoefficientFunction:
+    """1 where |x - middle| < half, else 0."""
+    return ng.IfPos(half * half - (x - middle) ** 2, 1.0, 0.0)
+
+
+def narrow_traction(draw: Draw) -> Drawn:
+    """A pressure of force 1 on a strip from a thousandth of a side on."""
+    half = float(10 ** draw.uniform(-3, -1))
+    p = _inside(ng.x, float(draw.uniform(half, 1 - half)), half) / (2 * half)
+    return Drawn(replace(square(draw), traction={"top": p}), (0.0, -1.0))
+
+
+def small_force(draw: Draw) -> Drawn:
+    """A body force of 1 on a disc."""
+    r = float(10 ** draw.uniform(-2, -0.7))
+    x, y = draw.uniform(r, 1 - r, 2).tolist()
+    F = _inside(ng.sqrt((ng.x - x) ** 2 + (ng.y - y) ** 2), 0.0, r) / (math.pi * r * r)
+    return Drawn(replace(square(draw), traction={}, force={"body": (0, -F)}), (0.0, -1.0))
+
+
+def waving_traction(draw: Draw) -> Drawn:
+    """A pressure with up to twenty waves."""
+    n = int(draw.integers(1, 21))
+    p = 1 + float(draw.uniform(0, 3)) * ng.cos(2 * math.pi * n * ng.x)
+    return Drawn(replace(square(draw), traction={"top": p}), (0.0, -1.0))
+
+
+def rough_displacement(draw: Draw) -> Drawn:
+    """The top moved down, with up to twenty waves or a kink."""
+    a, k = float(draw.uniform(0.002, 0.02)), float(draw.uniform(3, 120))
+    kink = ng.sqrt((ng.x - float(draw.uniform(0, 1))) ** 2)
+    u = -0.01 + a * (ng.cos(k * ng.x) if draw.random() < 0.6 else kink)
+    data = {"bottom": (0, 0), "top": (None, u)}
+    return Drawn(replace(square(draw), traction={}, displacement=data))
+
+
+def varying_modulus(draw: Draw) -> Drawn:
+    """E = exp(a cos(k x')), of contrasts up to 100, in any direction x'."""
+    turn, k = draw.uniform(0, math.pi), float(draw.uniform(1, 8))
+    along = math.cos(turn) * ng.x + math.sin(turn) * ng.y
+    E = ng.exp(float(draw.uniform(0, math.log(10))) * ng.cos(k * along))
+    return Drawn(replace(square(draw), materials={"body": Elastic(E, 0.3)}))
+
+
+def anisotropy(draw: Draw) -> Drawn:
+    """Fibres up to 1e4 times stiffer, at any angle; as numbers or as functions."""
+    a = draw.uniform(0, math.pi)
+    c, s = math.cos(a), math.sin(a)
+    T = np.array(
+        [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
+    )
+    C = T.T @ np.diag([float(10 ** draw.uniform(0, 4)), 1.0, draw.uniform(0.3, 1)]) @ T
+    law = Hooke((C + C.T) / 2)
+    law = Hooke(law.voigt()) if draw.random() < 0.5 else law
+    return Drawn(replace(square(draw), materials={"body": law}))
+
+
+def interference(draw: Draw) -> Drawn:
+    """Blocks of other stiffness with a gap that waves and overlaps, unilateral or bilateral."""
+    n, size = int(draw.integers(1, 6)), float(draw.uniform(0.002, 0.02))
+    gap = size * (float(draw.uniform(-1, 0.3)) + ng.cos(n * math.pi * ng.x))
+    bilateral = bool(draw.random() < 0.4)
+    return Drawn(
+        Problem(
+            geometry=blocks(),
+            materials={
+                "upper": Elastic(float(10 ** draw.uniform(-3, 3)), 0.3),
+                "lower": Elastic(1.0, float(draw.uniform(0, 0.4))),
+            },
+            displacement={"top": (0, -0.005), "bottom": (0, 0)},
+            contact=[Contact("upper_contact", "lower_contact", gap=gap, bilateral=bilateral)],
+        )
+    )
+
+
+KINDS: tuple[Callable[[Draw], Drawn], ...] = (
+    narrow_traction,
+    small_force,
+    waving_traction,
+    rough_displacement,
+    varying_modulus,
+    anisotropy,
+    interference,
+)
+
+
+def finest(problem: Problem, estimate: float) -> Solution:
+    """An adaptive solution of order 4 whose estimate, absolute, is far below another's."""
+    for solution in adapt(problem, order=4, max_dofs=DOFS):
+        if solution.error_estimate <= SHARP * estimate:
+            break
+    return solution
+
+
+def outcome(seed: int) -> Outcome:
+    """The scene of a seed: what the estimate, and the supports, lack."""
+    draw = np.random.default_rng(seed)
+    kind = KINDS[seed % len(KINDS)]
+    drawn, order = kind(draw), int(draw.integers(1, 4))
+    maxh = float(draw.uniform(0.12, 0.3)) * (1 if order > 1 else 0.5)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", ContactWarning)
+        solution = solve(drawn.problem, maxh=maxh, order=order)
+    warned = any(issubclass(w.category, ContactWarning) for w in caught)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ContactWarning)
+        reference = finest(drawn.problem, solution.error_estimate)
+    error = Overkill(reference).relative_error(solution) * reference.energy_norm
+    ratio = solution.error_estimate / error
+    lack = LEAST / ratio
+    if drawn.load is not None:
+        force = solution.reactions["bottom"]
+        lack = max(lack, math.hypot(*(force + np.array(drawn.load))) / LOST)
+    return solved(
+        f"{kind.__name__}, order {order}, seed {seed}",
+        f"estimate / error {ratio:.2f}{', warned' if warned else ''}",
+        solution,
+        lack,
+        math.inf if warned else 1.0,
+    )
+
+
+def outcomes(seed: int = 0, count: int = 66) -> Iterator[Outcome]:
+    """The scenes of `count` seeds from `seed` on."""
+    return map(outcome, range(seed, seed + count))
