@@ -3,6 +3,7 @@
     python -m drivers.stress
     python -m drivers.stress held scaling
     python -m drivers.stress scenes --scenes 600
+    python -m drivers.stress data --scenes 200
 
 The exit status is 1 if a case fails.
 """

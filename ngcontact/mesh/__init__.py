@@ -5,7 +5,6 @@ from .cad import cad_edges as cad_edges
 from .curving import check_curves as check_curves
 from .curving import curve as curve
 from .elements import diameters as diameters
-from .elements import middles as middles
 from .elements import neighbours as neighbours
 from .elements import rightward as rightward
 from .generation import first_mesh as first_mesh

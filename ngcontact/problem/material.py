@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -88,11 +87,6 @@ class Elastic:
             return ng.CF(rows, dims=(4, 4))
         return ng.CF((n, c, zero, c, n, zero, zero, zero, s), dims=(3, 3))
 
-    def shear_modulus(self, model: str = "plane strain") -> ng.CoefficientFunction:
-        """Return mu = E / 2 (1 + nu), the same in all models."""
-        require_model(model)
-        return ng.CF(self.E / (2 * (1 + self.nu)))
-
     def check_at(self, points: np.ndarray, name: str) -> None:
         """Refuse values outside HH81 (2.7) at mesh `points` (n,); `name` leads the message."""
         if not isinstance(self.E, float):
@@ -157,19 +151,6 @@ class Hooke:
                 f'{name}.C has shape {shape}: the model "{model}" needs a {q}x{q} Voigt matrix in '
                 f"the order {', '.join(VOIGT[model])}"
             )
-
-    def shear_modulus(self, model: str = "plane strain") -> ng.CoefficientFunction:
-        """Return a scalar modulus that bounds C from below, or is typical of it.
-
-        For numbers it is half of the best c_0 in HH81 (2.7), mu for an isotropic law with
-        nu >= 0. For a CoefficientFunction it is the shear entry, the last one.
-        """
-        self.check_model(model, "the law")
-        last = len(VOIGT[model]) - 1
-        if isinstance(self.C, np.ndarray):
-            mandel = np.array([*[1.0] * last, math.sqrt(2.0)])
-            return ng.CF(float(np.linalg.eigvalsh(mandel[:, None] * self.C * mandel)[0]) / 2)
-        return ng.CF(self.C)[last, last]
 
     def check_at(self, points: np.ndarray, name: str) -> None:
         """Refuse values outside HH81 (2.7) at mesh `points` (n,); `name` leads the message."""

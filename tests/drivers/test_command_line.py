@@ -56,7 +56,7 @@ HELP = {
         "out": ("Folder", "out"),
     },
     "stress": {
-        "trials": ("Kinds of stress", "algebra gaps held"),
+        "trials": ("Kinds of stress", "algebra data gaps held"),
         "seed": ("Number", "0"),
         "scenes": ("How many", "66"),
     },

@@ -58,8 +58,6 @@ def test_coefficient_functions_give_the_numbers_at_each_point(mesh, model):
         expected = matrix_of(Elastic(1 + x, y / 2), model, mesh)
         found = matrix_of(varying, model, mesh, at=(x, y))
         assert np.abs(found - expected).max() < ROUND_OFF * np.abs(expected).max()
-        shear = (1 + x) / (2 + y)
-        assert varying.shear_modulus(model)(mesh(x, y)) == pytest.approx(shear, rel=ROUND_OFF)
 
 
 def test_hooke_is_used_as_it_is(mesh):
@@ -108,7 +106,7 @@ def test_a_law_of_another_model_is_refused(mesh):
     with pytest.raises(
         ValueError, match=r'shape \(4, 4\): .*"plane stress" needs a 3x3.*xx, yy, xy'
     ):
-        axial.shear_modulus("plane stress")
+        axial.voigt("plane stress")
 
 
 @pytest.mark.parametrize("entry", [(0, 1), (2, 2), (3, 3), (0, 2)])
@@ -126,33 +124,6 @@ def test_hooke_keeps_a_copy():
     assert law.C[0, 0] > 0
     with pytest.raises(ValueError, match="read-only"):
         law.C[0, 0] = -1
-
-
-@pytest.mark.parametrize("model", MODEL_NAMES)
-def test_shear_modulus(mesh, model):
-    at = mesh(0.3, 0.2)
-    isotropic = Elastic(2.6, 0.3)
-    assert isotropic.shear_modulus(model)(at) == pytest.approx(1.0, rel=ROUND_OFF)
-    # For nu >= 0 the softest strain of an isotropic law is a shear of stiffness 2 mu.
-    same = Hooke(matrix_of(isotropic, model, mesh))
-    assert same.shear_modulus(model)(at) == pytest.approx(1.0, rel=1e-12)
-    assert Hooke(isotropic.voigt(model)).shear_modulus(model)(at) == pytest.approx(1.0)
-
-
-def test_shear_modulus_of_hooke_bounds_the_energy(mesh):
-    stiffness = orthotropic()
-    bound = 2 * Hooke(stiffness).shear_modulus()(mesh(0.3, 0.2))
-    angle = np.linspace(0, math.pi, 61)
-    a, b = np.meshgrid(angle, angle)
-    # Unit strains e_ij e_ij = 1 as (xx, yy, gamma_xy), HH81 (2.7).
-    strain = np.stack(
-        [np.cos(a), np.sin(a) * np.cos(b), math.sqrt(2) * np.sin(a) * np.sin(b)], axis=-1
-    )
-    energy = np.einsum("...i,ij,...j", strain, stiffness, strain)
-    assert energy.min() >= bound * (1 - ROUND_OFF)
-    # The bound is attained; steps of 3 degrees miss the minimum by their square, 3e-3, times the
-    # ratio of the stiffnesses, 13.
-    assert energy.min() < bound * 1.04
 
 
 @pytest.mark.parametrize(
@@ -229,9 +200,8 @@ def test_hooke_judges_alike_in_all_units(mesh, unit):
 )
 @pytest.mark.parametrize("law", [Elastic(1, 0.3), Hooke(np.eye(3))])
 def test_laws_refuse_models(law, model, error, message):
-    for method in (law.voigt, law.shear_modulus):
-        with pytest.raises(error, match=message):
-            method(model)
+    with pytest.raises(error, match=message):
+        law.voigt(model)
 
 
 # The centroids of the structured mesh have x and y between 1/6 and 5/6.

@@ -89,7 +89,7 @@ def rough_displacement(draw: Draw) -> Drawn:
 
 def varying_modulus(draw: Draw) -> Drawn:
     """E = exp(a cos(k x')), of contrasts up to 100, in any direction x'."""
-    turn, k = draw.uniform(0, math.pi), float(draw.uniform(1, 8))
+    turn, k = draw.uniform(0, math.pi), float(draw.uniform(1, 5))
     along = math.cos(turn) * ng.x + math.sin(turn) * ng.y
     E = ng.exp(float(draw.uniform(0, math.log(10))) * ng.cos(k * along))
     return Drawn(replace(square(draw), materials={"body": Elastic(E, 0.3)}))
