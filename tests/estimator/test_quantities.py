@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from netgen.occ import Circle, Compound, OCCGeometry
 
 from drivers.reference import cases
-from ngcontact import adapt, solve
+from ngcontact import Contact, Elastic, Problem, adapt, solve
 
 
 @pytest.mark.parametrize("order", [2, 4])
@@ -40,6 +41,31 @@ def test_largest_stress_lies_under_the_surface():
     assert abs(row.place[0]) < 0.1
     assert 0.15 < abs(row.place[1]) < 0.3
     assert 0 < row.error < 0.05 * row.value
+
+
+@pytest.mark.parametrize("order", [2, 3, 4])
+def test_largest_stress_lies_on_the_bore_of_a_press_fit(order):
+    """Lame: radial -p, hoop 5/3 p in a hub of twice the radius; full circles, resultant zero."""
+    R, d, E, nu = 20.0, 0.02, 210e3, 0.3
+    hub, bore = (Circle((0, 0), r).Face() for r in (2 * R, R))
+    hub.edges.name, bore.edges.name = "rim", "bore"
+    hub, shaft = hub - bore, Circle((0, 0), R + d).Face()
+    hub.faces.name, shaft.faces.name, shaft.edges.name = "hub", "shaft", "side"
+    problem = Problem(
+        geometry=OCCGeometry(Compound([hub, shaft]), dim=2),
+        materials={"hub|shaft": Elastic(E=E, nu=nu)},
+        contact=[Contact("side", "bore")],
+    )
+    p = d / R * E / (1 - nu**2) / (5 / 3 + 1)  # plane strain
+    q = solve(problem, maxh=6.0, order=order).quantities()
+    stress = np.array([-p, 5 / 3 * p, nu * 2 / 3 * p])
+    mises = np.sqrt(((stress - np.roll(stress, 1)) ** 2).sum() / 2)
+    row = q["largest von Mises"]
+    assert np.linalg.norm(row.place) == pytest.approx(R, rel=1e-3)
+    # The gap of the drawing is closed to first order: d / R of the pressure besides.
+    assert abs(row.value - mises) <= row.error + 2 * d / R * mises
+    assert row.error <= 0.15 * mises  # measured 0.104 at order 2, less above
+    assert q["force"].value <= 1e-6 * p * R  # by symmetry
 
 
 def test_the_table_reads():
