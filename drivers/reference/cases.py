@@ -13,7 +13,14 @@ import ngsolve as ng
 import numpy as np
 
 from drivers.reference.curved import Curved, curved, rings
-from drivers.reference.straight import Exact, hertz, patch, transition, transition_cutoff
+from drivers.reference.straight import (
+    Exact,
+    hertz,
+    patch,
+    transition,
+    transition_cutoff,
+    uniform_pressure,
+)
 from ngcontact import Contact, Elastic, Problem, Solution
 from ngcontact.geometries import blocks, disc, disc_on_block, graphs, punch
 from ngcontact.geometries import rings as ring_geometry
@@ -21,6 +28,7 @@ from ngcontact.geometries.region import body, compound, polygon
 
 FIRST = Elastic(E=1.0, nu=0.3)
 SECOND = Elastic(E=3.0, nu=0.2)
+LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))  # of a polygonal zone
 BLOCKS = {"upper": FIRST, "lower": SECOND}
 OUTSIDE = {"upper": "top|upper_left|upper_right", "lower": "bottom|lower_left|lower_right"}
 
@@ -88,22 +96,11 @@ def pressure_patch(p1: float = 0.0) -> Case:
 
 def polygonal_patch(p: float = 1.0) -> Case:
     """Uniform stress -p I across a zone with a convex and a re-entrant corner, one material."""
-    line = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
-    strain = p * (1 - FIRST.nu - 2 * FIRST.nu**2) / FIRST.E
-    u = ng.CF((-strain * ng.x, -strain * ng.y))
-    stress = ng.CF((-p, 0, 0, -p), dims=(2, 2))
-    bodies = ("upper", "lower")
-    exact = Exact(
-        displacement=dict.fromkeys(bodies, u),
-        stress=dict.fromkeys(bodies, stress),
-        force=dict.fromkeys(bodies, ng.CF((0, 0))),
-        pressure=lambda x: np.full(np.shape(x), p),
-        gap=lambda x: np.zeros(np.shape(x)),
-        initial_gap=ng.CF(0),
-    )
+    exact = uniform_pressure(FIRST, tuple(BLOCKS), p=p)
+    u = exact.displacement["upper"]
     problem = Problem(
-        geometry=blocks(line=line),
-        materials=dict.fromkeys(bodies, FIRST),
+        geometry=blocks(line=LINE),
+        materials=dict.fromkeys(BLOCKS, FIRST),
         displacement={"top": u, "bottom": u},
         traction={"upper_left|upper_right|lower_left|lower_right": p},
         contact=[Contact(secondary="upper_contact", primary="lower_contact")],

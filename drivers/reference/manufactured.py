@@ -17,7 +17,7 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drivers.reference.straight import Exact, compiled
+from drivers.reference.straight import Exact, compiled, shrinkage
 from drivers.reference.westergaard import CF, hooke, moduli
 
 if TYPE_CHECKING:
@@ -185,7 +185,7 @@ def polygonal(
     sides.
     """
     materials = {"upper": upper, "lower": lower}
-    shrink = [p * (1 + m.nu) * (1 - 2 * m.nu) / m.E for m in materials.values()]
+    shrink = [shrinkage(m, p) for m in materials.values()]
     if not math.isclose(*shrink, rel_tol=1e-12):
         raise ValueError(f"shrinkage {shrink}: both bodies must shrink alike under pressure")
     ends = np.asarray(line, float).tolist()

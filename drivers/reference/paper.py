@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import ngsolve as ng
-import numpy as np
 from netgen.occ import OCCGeometry
 
-from drivers.reference.cases import BLOCKS, FIRST, OUTSIDE, SECOND, Case
+from drivers.reference.cases import BLOCKS, FIRST, LINE, OUTSIDE, SECOND, Case
 from drivers.reference.manufactured import Bump, circular, polygonal
 from drivers.reference.singular import slits, with_end_of_guide
-from drivers.reference.straight import Exact, hertz
+from drivers.reference.straight import Exact, hertz, uniform_pressure
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.geometries import rings as ring_geometry
 from ngcontact.geometries.region import Point, body, compound, polygon
 
 ALIKE = Elastic(E=18 / 13, nu=0.2)  # shrinks as FIRST does under equal stresses in the plane
-LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
 CUTS = "inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y"
 
 
@@ -109,21 +107,11 @@ def opening_ring() -> Case:
 def circular_patch(p: float = 1.0) -> Case:
     """Uniform stress -p I across a circular zone, one material: linear displacement."""
     bodies = ("outer", "inner")
-    shrink = p * (1 + FIRST.nu) * (1 - 2 * FIRST.nu) / FIRST.E
-    u = ng.CF((-shrink * ng.x, -shrink * ng.y))
-    stress = ng.CF((-p, 0, 0, -p), dims=(2, 2))
-    exact = Exact(
-        displacement=dict.fromkeys(bodies, u),
-        stress=dict.fromkeys(bodies, stress),
-        force=dict.fromkeys(bodies, ng.CF((0, 0))),
-        pressure=lambda theta: np.full(np.shape(theta), p),
-        gap=lambda theta: np.zeros(np.shape(theta)),
-        initial_gap=ng.CF(0),
-    )
+    exact = uniform_pressure(FIRST, bodies, p=p)
     problem = Problem(
         geometry=ring_geometry(quarter=True),
         materials=dict.fromkeys(bodies, FIRST),
-        displacement={"rim": u},
+        displacement={"rim": exact.displacement["outer"]},
         sliding=CUTS,
         traction={"hole": p},
         contact=[Contact(secondary="outer_contact", primary="inner_contact")],

@@ -8,7 +8,7 @@ the cut boundaries carry its displacement or its traction as data.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -233,6 +233,27 @@ def patch(upper: Elastic, lower: Elastic, *, p0: float = 1.0, p1: float = 0.0) -
         *equilibrium_fields(fields, materials),
         pressure=lambda x: p0 + p1 * np.asarray(x, float),
         gap=lambda x: np.zeros_like(np.asarray(x, float)),
+        initial_gap=ng.CF(0.0),
+    )
+
+
+def shrinkage(material: Elastic, p: float) -> float:
+    """Relative shortening (1 + nu)(1 - 2 nu) p / E of lengths in the plane under -p I."""
+    return p * (1 + material.nu) * (1 - 2 * material.nu) / material.E
+
+
+def uniform_pressure(material: Elastic, bodies: Sequence[str], *, p: float = 1.0) -> Exact:
+    """Uniform stress -p I in bodies of one material, whatever the line in which they meet.
+
+    u = -k (x, y), see `shrinkage`.
+    """
+    u = -shrinkage(material, p) * ng.CF((ng.x, ng.y))
+    return Exact(
+        displacement=dict.fromkeys(bodies, u),
+        stress=dict.fromkeys(bodies, ng.CF((-p, 0, 0, -p), dims=(2, 2))),
+        force=dict.fromkeys(bodies, NO_FORCE),
+        pressure=lambda s: np.full(np.shape(s), p),
+        gap=lambda s: np.zeros(np.shape(s)),
         initial_gap=ng.CF(0.0),
     )
 

@@ -80,7 +80,7 @@ def on_side(start, end, n=41):
 def test_conditions_on_a_polygonal_line(make):
     exact = make().exact
     box, opened = (-1.1, 1.1, -1.1, 1.1), 0
-    for start, end in zip(paper.LINE[:-1], paper.LINE[1:], strict=True):
+    for start, end in zip(cases.LINE[:-1], cases.LINE[1:], strict=True):
         points, tangent = on_side(start, end)
         x, y = points.T
         normal = np.array([tangent[1], -tangent[0]])  # n' points down
