@@ -193,8 +193,7 @@ def _at_round_off(solution: Solution) -> bool:
     terms = size * float(np.sqrt(solution.discrete.space.diagonal @ (u / size) ** 2))
     if solution.error_estimate > BEYOND_NOISE * terms:  # as nearly always
         return False
-    problem, mesh = solution.problem, solution.mesh
-    ratio = float(incompressibilities(problem, mesh).max())
+    ratio = float(incompressibilities(solution.problem, solution.mesh).max())
     return solution.error_estimate <= max(EXACT, STRESS_NOISE * math.sqrt(ratio)) * terms
 
 
@@ -204,7 +203,7 @@ def _bounded(solution: Solution, refinement: Refinement, ratio: float) -> tuple[
     `ratio` is that of the last bound that was made.
     """
     estimate = solution.relative_error_estimate
-    if not solution.bounded and ratio * estimate > (refinement.tolerance or 0.0):
+    if not solution.bounded and not ratio * estimate <= (refinement.tolerance or 0.0):
         return math.inf, ratio
     bound = solution.relative_error_bound
     return bound, bound / estimate if estimate > 0 else ratio
@@ -215,10 +214,8 @@ def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[
 
     Parameters
     ----------
-    problem : Problem
-        The continuous problem.
-    mesh : ng.Mesh
-        The first mesh, curved as the element asks.
+    problem, mesh
+        The continuous problem; the first mesh, curved as the element asks.
     refinement : Refinement
         What is refined, and when to stop.
     """
@@ -232,10 +229,10 @@ def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[
         solution.discrete.systems.forget()  # a level's factorisation is of no use to the next one
         if refinement.guaranteed:
             refuse_bound(problem, solution.discrete.space.trace, solution.pairs)
-        yield solution
-        error = solution.relative_error_estimate
-        if refinement.guaranteed:
             error, ratio = _bounded(solution, refinement, ratio)
+        yield solution
+        if not refinement.guaranteed:
+            error = solution.relative_error_estimate
         if not np.isfinite(solution.error_estimate):  # it would mark nothing, for ever
             raise ConvergenceError(
                 f"the error estimate is {solution.error_estimate}, so nothing can be refined; "
@@ -250,7 +247,9 @@ def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[
             return
         mesh = refined(problem, solution.mesh, _marked(solution, refinement, small))
         mesh, _ = curve(mesh, order, element)
-    if refinement.tolerance is not None:
+    if refinement.guaranteed and solution is not None:
+        error = solution.relative_error_bound
+    if refinement.tolerance is not None and error > refinement.tolerance:
         what = "bound" if refinement.guaranteed else "estimate"
         what += " outside of the corners of contradictory supports" if small.any() else ""
         warn(

@@ -239,7 +239,7 @@ class Solution(Measured):
         return Draw(self.displacement, self.mesh, deformation=True)
 
     def __str__(self) -> str:
-        """One line: unknowns, active points, steps, force; the estimate if adaptive or known."""
+        """One line: unknowns, active points, steps, force; estimate and bound where known."""
         parts = [
             f"order {self.order}",
             f"{self.displacement.space.ndof:7d} unknowns",
@@ -250,6 +250,8 @@ class Solution(Measured):
             parts.append(f"free: {'; '.join(map(str, self.free_motions))}")
         if self.estimated or self.adaptive:
             parts.append(f"estimate {self.relative_error_estimate:.2e}")
+        if self.bounded:
+            parts.append(f"bound {self.relative_error_bound:.2e}")
         if self.discrete.lines:
             parts.append(f"force {np.hypot(*self.contact_force()):.6g}")
         return ", ".join(parts)

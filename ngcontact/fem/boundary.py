@@ -178,7 +178,7 @@ class BoundaryTrace:
     def evaluate(self, function: ng.CoefficientFunction, segment: Index, s: Array) -> Array:
         """Values (k, dim) of a CoefficientFunction at `s` (k,) of segments `segment` (k,)."""
         values = np.asarray(function(self.mesh_points(segment, s)))
-        return values.reshape(len(segment), -1)
+        return values.reshape(len(segment), function.dim)
 
     def number_points(self, segment: Index, node: Index, vector: Array) -> tuple[Index, Array]:
         """Number the nodes of several segments: once each, twice at a corner.

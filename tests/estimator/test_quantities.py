@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from netgen.occ import Circle, Compound, OCCGeometry
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Problem, adapt, solve
+from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
+from ngcontact.estimator import Quantity
+from ngcontact.estimator.equilibrated import bound
 
 
 @pytest.mark.parametrize("order", [2, 4])
@@ -82,3 +87,51 @@ def test_the_table_reads():
         q["torque"]
     with pytest.raises(ValueError, match="pair=1 is not a contact pair"):
         solution.quantities(1)
+
+
+def said_once(solution):
+    """The table of a solution of which nothing is guaranteed; its warning, of two asked for."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        q, again = solution.quantities(), solution.quantities()
+    (message,) = [str(w.message) for w in caught]
+    assert str(q) == str(again)
+    assert all(row.kind == "estimated" and row.error > 0 for row in q)
+    assert str(q).splitlines()[-1] == q.note
+    assert message.startswith(q.note)
+    return q
+
+
+def test_without_a_stress_in_equilibrium_all_rows_are_estimates(monkeypatch):
+    """Residuals are called too large: the same values as ever, bars that contain the truth."""
+    case = cases.hertz_contact(half_width=0.5)
+    solution = solve(case.problem, maxh=0.1, order=2)
+    values = [row.value for row in solution.quantities()]
+    monkeypatch.setattr(bound, "SETTLED", -1.0)
+    other = solve(case.problem, maxh=0.1, order=2)
+    q = said_once(other)
+    assert "no equilibrated stress was found" in q.note
+    assert [row.value for row in q] == pytest.approx(values, rel=1e-12)
+    assert abs(q["force"].value - case.exact.P) <= q["force"].error
+    assert abs(q["peak pressure"].value - case.exact.p0) <= q["peak pressure"].error
+    low, high = solution.energy_bounds
+    assert q["energy"].value - q["energy"].error <= high
+    assert q["energy"].value + q["energy"].error >= low
+
+
+def test_refused_scenes_have_quantities():
+    """Bodies of revolution, held by their axis alone; the force is that of the whole body."""
+    problem = replace(cases.disc_on_rigid_plane(), model="axisymmetric")
+    with pytest.warns(ContactWarning, match="0.25 segments long"):
+        solution = solve(problem, maxh=0.5, order=2)
+    q = said_once(solution)
+    assert 'the model "axisymmetric"' in q.note
+    assert q["force"].value == pytest.approx(np.linalg.norm(solution.contact_force()), rel=1e-12)
+
+
+def test_one_element_has_no_neighbour_to_compare_with():
+    """The bar of a stress that nothing is known of reads as none."""
+    row = Quantity("largest von Mises", 2.0, np.nan, "none")
+    assert "none" in str(row)
+    assert "+-" not in str(row)
+    assert not row.guaranteed

@@ -11,7 +11,7 @@ from netgen.occ import Axis, OCCGeometry, Z
 
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
-from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
+from ngcontact import Contact, ContactWarning, Elastic, Hooke, Problem, adapt, solve
 from ngcontact.geometries import blocks
 from tests.scenes import unmatched_blocks
 
@@ -247,12 +247,31 @@ def test_adapt_stops_at_the_bound():
     assert levels[-1].relative_error_bound <= tolerance
     assert levels[-1].bounded
     assert not levels[0].bounded  # its estimate said that it is too coarse
+    assert "bound" not in str(levels[0])
+    assert f"bound {levels[-1].relative_error_bound:.2e}" in str(levels[-1])
     assert relative_energy_error(levels[-1], case.exact) <= tolerance
     assert sum(level.work["equilibrations"] for level in levels[:-1]) <= 2
     marked = [
         level.displacement.space.ndof for level in adapt(case.problem, order=3, max_dofs=4000)
     ]
     assert [level.displacement.space.ndof for level in levels] == marked[: len(levels)]
+
+
+def test_the_bound_is_there_when_a_level_is():
+    """Who prints levels as they come sees the bound at which the last one stops."""
+    problem = cases.one_transition().problem
+    said = [str(level) for level in adapt(problem, order=2, tolerance=1e-2, guaranteed=True)]
+    assert "bound" in said[-1]
+
+
+def test_a_tolerance_out_of_reach_is_told_by_the_bound():
+    """The bound of the last level is made, whatever the estimate suggests."""
+    problem = cases.hertz_contact().problem
+    with pytest.warns(
+        ContactWarning, match=r"the bound is \d\.\d\de-0\d, more than tolerance=1e-06"
+    ):
+        *_, last = adapt(problem, order=2, max_dofs=800, tolerance=1e-6, guaranteed=True)
+    assert last.bounded
 
 
 def test_guaranteed_needs_a_tolerance():
