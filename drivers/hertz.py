@@ -11,8 +11,7 @@ computed. Writes hertz.vtu, hertz_contact.vtp and hertz.png.
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, TypeAlias
@@ -21,6 +20,7 @@ import ngsolve as ng
 from cyclopts import Parameter
 
 from drivers.command_line import Count, Order, Positive, run
+from drivers.tables import last_level, print_comparison
 from ngcontact import Contact, Elastic, Problem, Solution, adapt
 from ngcontact.geometries import disc_on_block
 
@@ -75,31 +75,11 @@ def hertz(force: float, radius: float, *laws: tuple[float, float]) -> Quantities
     )
 
 
-def last_level(levels: Iterable[Solution]) -> tuple[Solution, Quantities]:
-    """Print all levels as they come; the last one and its quantities."""
-    print("unknowns  active  steps  estimate     force/N/m  peak/MPa  half-width/mm  seconds")
-    started = time.perf_counter()
-    for solution in levels:
-        estimate = solution.relative_error_estimate
-        computed = measured(solution)
-        now = time.perf_counter()
-        print(
-            f"{solution.displacement.space.ndof:8d}  {solution.active.sum():6d}  "
-            f"{len(solution.steps):5d}  {estimate:.2e}  {computed.force:12.1f}  "
-            f"{computed.peak / 1e6:8.2f}  {computed.half_width * 1e3:13.5f}  {now - started:7.2f}"
-        )
-        started = now
-    return solution, computed
-
-
-def print_comparison(radius: float, computed: Quantities, expected: Quantities) -> None:
-    """Print peak pressures and half-widths beside each other."""
-    print(f"\nAt a/R = {computed.half_width / radius:.4f}   computed    Hertz  difference")
-    for name, a, b, unit in (
-        ("peak pressure, MPa", computed.peak, expected.peak, 1e6),
-        ("half-width, mm", computed.half_width, expected.half_width, 1e-3),
-    ):
-        print(f"{name:20s} {a / unit:10.4f} {b / unit:10.4f}  {(a / b - 1) * 100:+.3f} %")
+COLUMNS: dict[str, Callable[[Quantities], str]] = {
+    "   force/N/m": lambda q: f"{q.force:.1f}",
+    "peak/MPa": lambda q: f"{q.peak / 1e6:.2f}",
+    "half-width/mm": lambda q: f"{q.half_width * 1e3:.5f}",
+}
 
 
 def main(
@@ -147,9 +127,13 @@ def main(
     )
     problem = pressed(radius, press, Elastic(*disc), Elastic(*block))
     levels = adapt(problem, order=order, tolerance=tolerance, max_dofs=max_dofs)
-    solution, computed = last_level(levels)
+    solution, computed = last_level(levels, measured, COLUMNS)
     expected = hertz(computed.force, radius, disc, block)
-    print_comparison(radius, computed, expected)
+    rows = {
+        "peak pressure, MPa": (computed.peak / 1e6, expected.peak / 1e6),
+        "half-width, mm": (computed.half_width * 1e3, expected.half_width * 1e3),
+    }
+    print_comparison(computed.half_width / radius, rows)
     print("\nThe computed half, with errors (N/m, Pa, m):")
     print(solution.quantities())
     if out is not None:

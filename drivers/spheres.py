@@ -11,8 +11,7 @@ spheres.vtu, spheres_contact.vtp, spheres_revolved.vtu and spheres.png.
 from __future__ import annotations
 
 import math
-import time
-from collections.abc import Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +19,7 @@ import ngsolve as ng
 
 from drivers.command_line import Count, Order, Positive, run
 from drivers.hertz import ALUMINIUM, STEEL, Law
+from drivers.tables import last_level, print_comparison
 from ngcontact import Contact, Elastic, Problem, Solution, adapt
 from ngcontact.geometries import disc_on_disc
 
@@ -62,33 +62,11 @@ def hertz(force: float, radii: tuple[float, float], *laws: tuple[float, float]) 
     return Quantities(force=force, peak=3 * force / (2 * math.pi * a**2), radius=a)
 
 
-def last_level(levels: Iterable[Solution]) -> tuple[Solution, Quantities]:
-    """Print all levels as they come; the last one and its quantities."""
-    print("unknowns  active  steps  estimate       force/N  peak/MPa    radius/mm  seconds")
-    started = time.perf_counter()
-    for solution in levels:
-        estimate = solution.relative_error_estimate
-        computed = measured(solution)
-        now = time.perf_counter()
-        print(
-            f"{solution.displacement.space.ndof:8d}  {solution.active.sum():6d}  "
-            f"{len(solution.steps):5d}  {estimate:.2e}  {computed.force:12.4f}  "
-            f"{computed.peak / 1e6:8.2f}  {computed.radius * 1e3:11.6f}  {now - started:7.2f}"
-        )
-        started = now
-    return solution, computed
-
-
-def print_comparison(
-    radii: tuple[float, float], computed: Quantities, expected: Quantities
-) -> None:
-    """Print peak pressures and radii of contact beside each other."""
-    print(f"\nAt a/R = {computed.radius / min(radii):.4f}   computed    Hertz  difference")
-    for name, a, b, unit in (
-        ("peak pressure, MPa", computed.peak, expected.peak, 1e6),
-        ("radius of contact, mm", computed.radius, expected.radius, 1e-3),
-    ):
-        print(f"{name:21s} {a / unit:9.4f} {b / unit:10.4f}  {(a / b - 1) * 100:+.3f} %")
+COLUMNS: dict[str, Callable[[Quantities], str]] = {
+    "     force/N": lambda q: f"{q.force:.4f}",
+    "peak/MPa": lambda q: f"{q.peak / 1e6:.2f}",
+    "  radius/mm": lambda q: f"{q.radius * 1e3:.6f}",
+}
 
 
 def main(
@@ -141,9 +119,13 @@ def main(
     )
     problem = pressed(radii, press * radius, Elastic(*upper), Elastic(*lower))
     levels = adapt(problem, order=order, tolerance=tolerance, max_dofs=max_dofs)
-    solution, computed = last_level(levels)
+    solution, computed = last_level(levels, measured, COLUMNS)
     expected = hertz(computed.force, radii, upper, lower)
-    print_comparison(radii, computed, expected)
+    rows = {
+        "peak pressure, MPa": (computed.peak / 1e6, expected.peak / 1e6),
+        "radius of contact, mm": (computed.radius * 1e3, expected.radius * 1e3),
+    }
+    print_comparison(computed.radius / min(radii), rows)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         solution.write(out / "spheres.vtu")

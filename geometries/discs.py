@@ -14,6 +14,7 @@ from ngcontact.geometries.region import (
     Point,
     body,
     compound,
+    half_block,
     polygon,
     quarter_arc,
     segment,
@@ -168,10 +169,7 @@ def disc_on_disc(
 def _block(right: float, bottom: float, symmetric: bool) -> Loop:
     """Counterclockwise loop of a block below y = 0 with a vertex at the origin."""
     if symmetric:
-        return polygon(
-            [(0.0, 0.0), (0.0, bottom), (right, bottom), (right, 0.0)],
-            ["axis", "block_bottom", "side", "block_top"],
-        )
+        return half_block(right, bottom)
     return polygon(
         [(0.0, 0.0), (-right, 0.0), (-right, bottom), (right, bottom), (right, 0.0)],
         ["block_top", "side", "block_bottom", "side", "block_top"],

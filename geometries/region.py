@@ -57,6 +57,12 @@ def polygon(vertices: Sequence[Point], names: Sequence[str]) -> Loop:
     ]
 
 
+def half_block(right: float, bottom: float) -> Loop:
+    """Counterclockwise loop of 0 <= x <= `right`, `bottom` <= y <= 0, in the gallery's names."""
+    corners = [(0.0, 0.0), (0.0, bottom), (right, bottom), (right, 0.0)]
+    return polygon(corners, ["axis", "block_bottom", "side", "block_top"])
+
+
 def body(name: str, outline: Loop, hole: Loop | None = None) -> Face:
     """Plane face with normal +z whose name and edge names are set.
 

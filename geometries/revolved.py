@@ -14,6 +14,7 @@ from ngcontact.geometries.region import (
     UP,
     body,
     compound,
+    half_block,
     polygon,
     quarter_arc,
     segment,
@@ -227,5 +228,4 @@ def _block(radius: float, width: float | None, depth: float | None) -> Face:
     """Block below y = 0 about the axis, by default twice as wide and deep as `radius`."""
     right = 2 * radius if width is None else above("width", width, "the indenter's", radius)
     bottom = -2 * radius if depth is None else -positive("depth", depth)
-    corners = [(0.0, 0.0), (0.0, bottom), (right, bottom), (right, 0.0)]
-    return body("block", polygon(corners, ["axis", "block_bottom", "side", "block_top"]))
+    return body("block", half_block(right, bottom))

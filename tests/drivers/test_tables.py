@@ -1,0 +1,36 @@
+"""What the demonstrations print."""
+
+from __future__ import annotations
+
+from drivers.tables import last_level, print_comparison
+from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact.geometries import blocks
+
+
+def test_levels_are_printed_as_they_are_and_the_last_one_is_returned(capsys):
+    problem = Problem(
+        geometry=blocks(),
+        materials={"upper|lower": Elastic(E=1.0, nu=0.3)},
+        displacement={"bottom": (0, 0), "top": (0, -0.01)},
+        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
+    )
+    levels = [solve(problem, maxh=h) for h in (1.0, 0.5)]
+    columns = {" force": lambda force: f"{force:.3f}", "in mN": lambda force: f"{1e3 * force:.0f}"}
+    last, force = last_level(levels, lambda level: level.contact_force()[1], columns)
+    assert last is levels[1]
+    assert force == last.contact_force()[1]
+    head, *rows = capsys.readouterr().out.splitlines()
+    assert head.split()[-4:] == ["force", "in", "mN", "seconds"]
+    for level, row in zip(levels, rows, strict=True):
+        pushed = level.contact_force()[1]
+        assert len(row) == len(head)
+        assert row.split()[0] == str(level.displacement.space.ndof)
+        assert row.split()[4:6] == [f"{pushed:.3f}", f"{1e3 * pushed:.0f}"]
+
+
+def test_a_comparison_gives_the_difference_in_percent(capsys):
+    print_comparison(0.03, {"peak": (1.02, 1.0), "radius": (3.0, 4.0)})
+    _, head, first, second = capsys.readouterr().out.splitlines()
+    assert "0.0300" in head
+    assert first.split()[-2:] == ["+2.000", "%"]
+    assert second.split() == ["radius", "3.0000", "4.0000", "-25.000", "%"]
