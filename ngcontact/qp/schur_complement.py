@@ -25,6 +25,7 @@ BORDER = 16  # changed rows up to which a bordered solve is cheaper than a facto
 PATIENT = 4  # ... times this for every one before: the sets that follow change less and less
 DEPENDENT = 1e-14  # singular values of the border, relative to the largest, that are round-off
 UNSOLVED = 1e-6  # residual, relative to the first, above which the matrix is singular
+NOISE = 64 * np.finfo(float).eps  # ... unless it is round-off of values that balance each other
 
 
 @dataclass(eq=False)
@@ -195,13 +196,20 @@ class BorderedSystems:
         balanced = ~p.fixed
         if system.anchor is not None:  # its force may turn what the held unknowns hold
             balanced[p.null_space.held] = False
-        if not np.abs(residual[balanced]).max(initial=0.0) <= UNSOLVED * scale:
+        left = np.abs(residual[balanced]).max(initial=0.0)
+        if not left <= UNSOLVED * scale and not left <= self._noise(balanced):
             raise SingularError(
                 "the system for the current active set is singular to working precision: a body "
                 "can move without resistance from supports or active contact, or the moduli of "
                 "the bodies are too many powers of ten apart"
             )
         return now.copies()
+
+    def _noise(self, balanced: Mask) -> float:
+        """Round-off of the forces of prescribed values on the unknowns `balanced` (n,)."""
+        p = self.program
+        given = abs(p.K) @ np.where(p.fixed, np.abs(p.values), 0.0)
+        return NOISE * float(given[balanced].max(initial=0.0))
 
 
 def bordered_systems(
