@@ -13,6 +13,7 @@ from ..fem import BoundaryTrace, boundary_trace
 from ..problem import Problem
 
 APART = 1e-6  # values of two supports at one corner, relative to the largest, that are two values
+NOISE = 64 * np.finfo(float).eps  # ... and to the largest of all values: below it is round-off
 
 
 @dataclass(frozen=True)
@@ -27,11 +28,14 @@ class Contradiction:
         The corner, a length.
     message : str
         What they say there.
+    amount : float
+        By how much they differ, a length.
     """
 
     supports: tuple[str, str]
     place: Array
     message: str
+    amount: float
 
 
 def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
@@ -55,9 +59,12 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
                             trace.point(segment[k : k + 1], s[k : k + 1])[0],
                             f'displacement "{name}" and "{pattern}" prescribe {other:.6g} and '
                             f"{u:.6g} along {'xy'[axis]}",
+                            abs(u - other),
                         )
                     )
-    return found + _across_guides(problem, trace, known)
+    found += _across_guides(problem, trace, known)
+    largest = max((abs(u) for _, u in known.values()), default=0.0)
+    return [one for one in found if one.amount > NOISE * largest]
 
 
 def _across_guides(
@@ -78,7 +85,8 @@ def _across_guides(
             across = float(normal @ u)
             if abs(across) > APART * max(map(abs, u)):
                 message = f'displacement "{name}" leads {across:.6g} across the guide'
-                found.append(Contradiction((name, "guide"), x, f'{message} "{problem.sliding}"'))
+                message += f' "{problem.sliding}"'
+                found.append(Contradiction((name, "guide"), x, message, abs(across)))
     return found
 
 

@@ -6,13 +6,16 @@ import math
 import warnings
 from dataclasses import replace
 
+import ngsolve as ng
 import numpy as np
 import pytest
 from netgen.occ import Axis, OCCGeometry, Z
 
-from ngcontact import ContactWarning, adapt, solve
+from ngcontact import ContactWarning, Elastic, Problem, adapt, solve
 from ngcontact.adaptivity import settled
+from ngcontact.geometries import disc
 from ngcontact.mesh import diameters, first_mesh
+from ngcontact.plausibility import contradictions
 from tests.quadrature.test_loads import loaded, square
 
 CONTRADICTIONS = {
@@ -71,3 +74,15 @@ def test_sound_supports_are_no_doubt():
     with warnings.catch_warnings():
         warnings.simplefilter("error", ContactWarning)
         solve(replace(loaded(), displacement=data), maxh=0.3)
+
+
+def test_round_off_is_no_contradiction():
+    """On the axis the radial displacement e r is 1e-35 where Netgen's corner lies at r = 1e-32."""
+    widened = (1e-3 * ng.x, 0.0)
+    problem = Problem(
+        geometry=disc(),
+        materials={"disc": Elastic(E=200.0, nu=0.3)},
+        displacement={"arc": widened, "top": widened},
+        sliding="axis",
+    )
+    assert contradictions(problem, first_mesh(problem, 0.4)) == []
