@@ -18,10 +18,11 @@ from .fem import energy_norm, model_of, normal_stress_of, potential_energy, stre
 from .output import plot_solution, write_revolved, write_solution
 from .problem import Problem
 from .qp import Iterate, kkt_residuals
+from .results import Readable
 
 
 @dataclass(frozen=True, eq=False)
-class Solution(Measured):
+class Solution(Measured, Readable):
     """Exact minimiser u_h of L over K_h on one mesh: HH81 (P_1h), (P_2h).
 
     Contact quantities are arrays over the m contact points, all pairs in order.

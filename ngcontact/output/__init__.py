@@ -1,5 +1,6 @@
 """Files and pictures of a solution."""
 
+from .nodes import full_stress as full_stress
 from .nodes import von_mises as von_mises
 from .picture import plot_solution as plot_solution
 from .revolution import write_revolved as write_revolved

@@ -2,6 +2,7 @@
 
 from .axis import ON_AXIS as ON_AXIS
 from .axis import on_axis as on_axis
+from .checks import regions_of as regions_of
 from .contact import Contact as Contact
 from .contact import Gap as Gap
 from .material import ABOUT_AN_AXIS as ABOUT_AN_AXIS
@@ -10,6 +11,7 @@ from .material import Elastic as Elastic
 from .material import Hooke as Hooke
 from .material import varies as varies
 from .problem import Problem as Problem
+from .regions import body_mask as body_mask
 from .regions import body_of_vertex as body_of_vertex
 from .regions import boundary_mask as boundary_mask
 from .triangulation import Triangulation as Triangulation

@@ -5,6 +5,7 @@ from .jumps import jumping_moduli as jumping_moduli
 from .jumps import warn_of_jumps as warn_of_jumps
 from .lattice import composite as composite
 from .lattice import extent as extent
+from .lattice import mesh_points as mesh_points
 from .lattice import on_lattice as on_lattice
 from .loads import RoughLoad as RoughLoad
 from .loads import keep_rough_load as keep_rough_load

@@ -90,6 +90,8 @@ SOLUTION = {
     "quantities": "any",
     "equilibrated": "stress",
     "residuals": "none",
+    "at": "any",
+    "along": "any",
 }
 # ... and those that are no quantities: objects, names, numbers of things, truth values, files.
 PLAIN = {

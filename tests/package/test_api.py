@@ -85,6 +85,7 @@ MEMBERS = {
         "quantities",
     ),
     *("write", "plot", "draw"),
+    *("at", "along"),
 }
 
 

@@ -1,0 +1,7 @@
+"""What a solution is asked for: values where one wants them."""
+
+from .location import Location as Location
+from .location import locate as locate
+from .members import Readable as Readable
+from .values import Values as Values
+from .values import values_at as values_at

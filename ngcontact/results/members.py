@@ -1,0 +1,59 @@
+"""What a solution tells of itself at points of its bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from .values import Solved, Values, values_at
+
+
+class Readable:
+    """Members of `Solution` that read it."""
+
+    def at(self: Solved, points: Any, *, body: str | None = None, outside: str = "error") -> Values:
+        """Displacement, stress, von Mises and principal stresses at points, any consistent units.
+
+        Parameters
+        ----------
+        points : array_like (..., 2)
+            Where, before deformation: one point, a list of points, a grid.
+        body : str, optional
+            Name or pattern of the body: of two bodies that share the point, as on a contact line.
+        outside : str
+            "error", or "nan" for NaN at points that lie in no body, or not in `body`.
+
+        Returns
+        -------
+        Values
+            Arrays of the shape of `points`: `.displacement`, `.stress`, `.out_of_plane_stress`,
+            `.von_mises`, `.principal_stresses`, and the name of the `.body`.
+
+        Raises
+        ------
+        ValueError, TypeError
+            Points in no body or in several, with the first of them; a name that is none.
+        """
+        return values_at(self, points, body, outside)
+
+    def along(
+        self: Solved,
+        start: Sequence[float],
+        end: Sequence[float],
+        count: int = 101,
+        *,
+        body: str | None = None,
+        outside: str = "error",
+    ) -> Values:
+        """Values at `count` points of the line from `start` to `end`, any consistent units.
+
+        `.distance` is the length of the way from `start`. `body`, `outside` and what is refused as
+        in `at`.
+        """
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 2:
+            raise ValueError(f"count={count!r}: give a number of points, at least 2")
+        share = np.linspace(0, 1, int(count))[:, None]
+        a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+        return values_at(self, (1 - share) * a + share * b, body, outside)
