@@ -16,9 +16,10 @@ VENV := .venv$(addprefix -,$(filter-out $(DEFAULT),$(VERSION)))
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed-$(VERSION)
 DEVELOPING := $(VENV)/developing-$(VERSION)
+DOCUMENTING := $(VENV)/documenting-$(VERSION)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test smoke check lint types imports spelling pages dev dist clean
+.PHONY: demo test smoke check lint types imports spelling pages docs dev dist clean
 
 demo: $(INSTALLED)
 	$(BIN)/python -m drivers.hertz
@@ -56,6 +57,10 @@ pages: $(INSTALLED)
 	$(BIN)/python docs/developers/architecture.py
 	$(BIN)/python docs/developers/equations.py
 
+# The pages as a site, in build/docs: notebooks executed, a warning is an error.
+docs: $(DOCUMENTING)
+	$(BIN)/python -m sphinx -W --keep-going -n -d build/doctrees docs build/docs
+
 # To work on the package: everything, and checks before each commit.
 dev: $(DEVELOPING)
 	$(BIN)/pre-commit install
@@ -77,6 +82,10 @@ $(INSTALLED): pyproject.toml setup.py
 
 $(DEVELOPING): $(INSTALLED)
 	$(BIN)/python -m pip install --quiet --editable '.[dev]'
+	touch $@
+
+$(DOCUMENTING): $(INSTALLED)
+	$(BIN)/python -m pip install --quiet --editable '.[docs]'
 	touch $@
 
 clean:

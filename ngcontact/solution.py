@@ -136,7 +136,7 @@ class Solution(Measured, Readable):
 
     @cached_property
     def nodal_reaction(self) -> Array:
-        """Forces (n, 2) of the supports on the nodes, force per thickness: A u - f + B' force."""
+        """Forces (n, 2) of the supports on the nodes, force per thickness, A u - f + B' force."""
         d = self.discrete
         residual = d.space.A @ self.displacement.vec.FV().NumPy() - d.space.f
         return (d.space.basis.T @ residual + d.B.T @ self.force).reshape(2, -1).T

@@ -1,0 +1,63 @@
+"""The pages as they lie: their tables of contents, and the Python in them."""
+
+from __future__ import annotations
+
+import re
+import textwrap
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+_FENCE = re.compile(
+    r"^(?P<indent> *)```(?P<info>[^\n`]*)\n(?P<body>.*?)^(?P=indent)```$", re.MULTILINE | re.DOTALL
+)
+_TOCTREE = re.compile(r"^```\{toctree\}\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+_OPTION = re.compile(r"^:[\w-]+:.*\n", re.MULTILINE)
+
+
+@dataclass(frozen=True)
+class Block:
+    """Python in a page: `code` from `line` on; a `cell` is one that the site executes, too."""
+
+    page: str
+    line: int
+    code: str
+    cell: bool
+
+    def __str__(self) -> str:
+        """As an editor opens it."""
+        return f"{self.page}:{self.line}"
+
+
+def blocks(page: str, text: str) -> Iterator[Block]:
+    """All Python of a page, in order."""
+    for fence in _FENCE.finditer(text):
+        info = fence["info"].strip()
+        cell = info.startswith("{code-cell}")
+        if cell or re.match(r"(python|py|pycon|ipython)\b", info):
+            body = textwrap.dedent(fence["body"])
+            options = re.match(r"(?::[\w-]+:.*\n)*", body).group()
+            line = text.count("\n", 0, fence.start("body")) + options.count("\n") + 1
+            yield Block(page, line, body[len(options) :], cell)
+
+
+def listed(page: Path) -> set[Path]:
+    """Pages that the tables of contents of a page list."""
+    found = set[Path]()
+    for match in _TOCTREE.finditer(page.read_text()):
+        for entry in _OPTION.sub("", match.group(1)).split("\n"):
+            name = re.sub(r"^.*<(.*)>$", r"\1", entry.strip())
+            if name:
+                found |= {path.resolve() for path in page.parent.glob(f"{name}.md")}
+    return found - {page}
+
+
+def reached(page: Path) -> set[Path]:
+    """Pages that a reader comes to from a page, itself included."""
+    found, fresh = set[Path](), {page}
+    while fresh:
+        found |= fresh
+        fresh = set().union(*map(listed, fresh)) - found
+    return found

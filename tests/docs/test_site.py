@@ -1,0 +1,103 @@
+"""Every page of docs is in the tree of the site, and all Python in the pages runs.
+
+Blocks of one page are one program, as a reader would type them. `make docs` executes the tutorials,
+which take seconds each; everything else is executed here, the cells of other notebooks included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import matplotlib.pyplot as plt
+import pytest
+
+from tests.docs.pages import DOCS, ROOT, Block, blocks, listed, reached
+
+TEXTS = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
+BLOCKS = [
+    block for path in TEXTS for block in blocks(path.relative_to(ROOT).as_posix(), path.read_text())
+]
+BY_THE_SITE = "docs/tutorials/"
+BY_TEST_DOCS = "README.md"  # with its figures
+
+# What a page that is no program of its own takes for granted.
+PRESS = """
+from ngcontact import Contact, Elastic, Problem, adapt
+from ngcontact.geometries import blocks
+
+steel = Elastic(E=210e9, nu=0.3)
+problem = Problem(
+    geometry=blocks(width=1.0),
+    materials={"upper": steel, "lower": steel},
+    displacement={"bottom": (0, 0)},
+    sliding=["upper_left", "lower_left"],
+    traction={"top": 1e6},
+    contact=[Contact(secondary="upper_contact", primary="lower_contact")],
+)
+"""
+GIVEN = {"docs/bounds.md": PRESS}
+
+
+def test_every_page_is_in_the_tree():
+    lost = set(DOCS.rglob("*.md")) - reached(DOCS / "index.md")
+    assert not lost, "no table of contents lists them"
+
+
+def test_tables_of_contents_are_read():
+    assert DOCS / "theory.md" in listed(DOCS / "topics" / "index.md")
+    assert len(reached(DOCS / "index.md")) > 20
+
+
+def test_blocks_are_read():
+    cell = "* b\n  ```{code-cell} python\n  :tags: [hide]\n\n  y = 2\n  ```\n"
+    text = f"a\n```python\nx = 1\n```\n{cell}"
+    assert [(b.line, b.code.strip(), b.cell) for b in blocks("p", text)] == [
+        (3, "x = 1", False),
+        (8, "y = 2", True),
+    ]
+    fences = sum(text.count("```python") + text.count("{code-cell}") for text in map(_text, TEXTS))
+    assert len(BLOCKS) == fences
+
+
+def _text(path):
+    return path.read_text()
+
+
+@pytest.mark.parametrize("block", [b for b in BLOCKS if b.page.startswith(BY_THE_SITE)], ids=str)
+def test_the_site_executes_tutorials(block):
+    compile(block.code, str(block), "exec")
+    assert block.cell, "only cells are executed: write {code-cell}"
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> Callable[[Block], None]:
+    """Execute a block after those before it in its page, each once, in a folder of the page."""
+    spaces: dict[str, dict[str, object]] = {}
+    done: set[Block] = set()
+
+    def upto(block: Block) -> None:
+        if block.page not in spaces:
+            spaces[block.page] = {"__name__": "__main__"}
+            exec(GIVEN.get(block.page, ""), spaces[block.page])
+        for other in BLOCKS:
+            if other.page == block.page and other.line <= block.line and other not in done:
+                code = "\n" * (other.line - 1) + other.code
+                exec(compile(code, other.page, "exec"), spaces[block.page])
+                done.add(other)
+
+    folders = {block.page: tmp_path_factory.mktemp("page") for block in BLOCKS}
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plt, "show", plt.close)
+
+        def there(block: Block) -> None:
+            patch.chdir(folders[block.page])
+            upto(block)
+
+        yield there
+
+
+@pytest.mark.parametrize(
+    "block", [b for b in BLOCKS if not b.page.startswith((BY_THE_SITE, BY_TEST_DOCS))], ids=str
+)
+def test_block_runs(block, run):
+    run(block)
