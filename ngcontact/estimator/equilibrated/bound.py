@@ -44,7 +44,7 @@ from .record import Norms, Proof
 from .refusals import refuse_bound
 from .remainders import missed_tractions
 from .stress import ContactPressure, EquilibratedStress, certified
-from .stresses import Equilibrated, equilibrated
+from .stresses import Equilibrated, bubble_norms, equilibrated
 
 SETTLED = 1e-9  # residual of equilibrium, relative to the largest stress: measured 1e-15 to 1e-12
 
@@ -94,8 +94,9 @@ def error_bound(
     )
     norms = Norms(
         constitutive=_constitutive(discrete, result),
-        loads=data_terms(discrete, discrete.missed, conditions.missed),
-        curves=data_terms(discrete, np.zeros_like(discrete.missed), curves),
+        loads=bubble_norms(discrete, conditions)
+        + data_terms(discrete, discrete.forces.missed, conditions.missed),
+        curves=data_terms(discrete, np.zeros(len(partition.triangles)), curves),
         lifting=lifted(discrete, fields, others),
     )
     works = [complementarity(gap, b) for gap, b in zip(gaps, coefficients, strict=True)]

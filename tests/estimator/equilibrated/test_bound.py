@@ -68,12 +68,20 @@ def test_hertz(order, half_width):
         assert effectivity(finest, case.exact) <= 1.5
 
 
-def test_body_forces_and_tractions():
-    """What no polynomial meets of them enters with constants of the triangles."""
+@pytest.mark.parametrize(("order", "size"), [(1, 400), (2, 1300), (4, 4000)])
+def test_body_forces_and_tractions(order, size):
+    """Balanced triangle by triangle beyond the degree of the stress; measured at most 1.29."""
     case = cases.clamped_transition()
-    for solution in adapt(case.problem, order=2, max_dofs=1300):
-        assert effectivity(solution, case.exact) >= 1
+    for solution in adapt(case.problem, order=order, max_dofs=size):
+        assert 1 <= effectivity(solution, case.exact) <= 1.5
         assert solution.bound_parts["loads"] > 0
+
+
+def test_body_forces_with_kinks_inside_triangles():
+    """Looked at in parts; measured at most 2.4, 9 where triangles are looked at as a whole."""
+    case = cases.curved_lines()
+    for solution in adapt(case.problem, order=2, max_dofs=1300):
+        assert 1 <= effectivity(solution, case.exact) <= 3
 
 
 @pytest.mark.parametrize(("order", "largest"), [(1, 1.5), (2, 1.5), (4, 2.0)])

@@ -1,5 +1,6 @@
 """The triangles, the polynomials on them, the discrete solution and its data there."""
 
+from .conditions import HIGHER as HIGHER
 from .conditions import EdgeConditions as EdgeConditions
 from .conditions import edge_conditions as edge_conditions
 from .conditions import edge_parameters as edge_parameters
@@ -10,6 +11,10 @@ from .curves import bent_segments as bent_segments
 from .curves import edge_places as edge_places
 from .curves import rigid_motions_on as rigid_motions_on
 from .curves import tractions_on_curves as tractions_on_curves
+from .forces import PART_DEGREE as PART_DEGREE
+from .forces import PARTS as PARTS
+from .forces import Forces as Forces
+from .forces import part_corners as part_corners
 from .partition import Partition as Partition
 from .partition import partition_of as partition_of
 from .polynomials import CORNERS as CORNERS
@@ -18,6 +23,7 @@ from .polynomials import dimension as dimension
 from .polynomials import lattice as lattice
 from .polynomials import legendre_derivative as legendre_derivative
 from .polynomials import legendre_values as legendre_values
+from .polynomials import triangle_rule as triangle_rule
 from .rough import Rough as Rough
 from .solution import Discrete as Discrete
 from .solution import Units as Units

@@ -16,6 +16,7 @@ from .curves import bent_segments
 from .partition import Partition
 from .polynomials import legendre_values
 
+HIGHER = 4  # degrees above that of the stress up to which loads are met triangle by triangle
 DATA_BONUS = 10  # quadrature order above that of the polynomials, for loads
 
 
@@ -34,14 +35,17 @@ class EdgeConditions:
         nearly dependent, as they are on straight edges.
     given : ndarray (e, 2, r)
         Loads, weighted by the hats of both ends of the edge.
+    higher : ndarray (e, 2, l)
+        Loads along x and y on straight edges, Legendre coefficients k to k - 1 + `HIGHER`.
     missed : ndarray (e,)
-        Norm of the part of the load that polynomials of degree k - 1 do not have.
+        Norm of the part of the load on straight edges that all these polynomials do not have.
     """
 
     frames: Array
     constrained: Mask
     soft: Mask
     given: Array
+    higher: Array
     missed: Array
 
 
@@ -62,20 +66,20 @@ def with_hats(degree: int) -> Array:
 def projected_loads(
     problem: Problem, boundary: BoundaryTrace, degree: int
 ) -> Iterator[tuple[Index, Array, Array]]:
-    """Loads on the segments of each pattern of Gamma_tau, as polynomials of degree k - 1.
+    """Loads on the segments of each pattern of Gamma_tau, as polynomials.
 
     Yields
     ------
     segments : ndarray of int (j,)
         Of the boundary.
-    coefficients : ndarray (j, 2, k)
-        Along x and y, Legendre coefficients in the segment's parameter, units of stress; on curves
+    coefficients : ndarray (j, 2, l)
+        Along x and y, l = k + `HIGHER` Legendre coefficients in the segment's parameter, units of stress; on curves
         of the load per chord.
     squares : ndarray (j,)
         Means of the squares of what these miss.
     """
     rule, w = gauss(2 * degree + DATA_BONUS)
-    values = legendre_values(degree - 1, rule)
+    values = legendre_values(degree - 1 + HIGHER, rule)
     for pattern in problem.traction:  # (3.7)
         segments = boundary.segments(pattern)
         at, s = np.repeat(segments, len(rule)), np.tile(rule, len(segments))
@@ -109,20 +113,24 @@ def edge_conditions(
         normal = boundary.normal(segments, np.full(len(segments), 0.5))
         frames[edges] = np.stack([normal, np.column_stack([-normal[:, 1], normal[:, 0]])], axis=1)
         constrained[edges, 0] = False
-    given, missed = np.zeros((e, 2, 2, q)), np.zeros(e)
-    signs = (-1.0) ** np.arange(degree)
+    given, higher, missed = np.zeros((e, 2, 2, q)), np.zeros((e, 2, HIGHER)), np.zeros(e)
+    signs = (-1.0) ** np.arange(degree + HIGHER)
     for segments, c, squares in projected_loads(problem, boundary, degree):
         edge = partition.edge_of_segment[segments]
         c = np.where(partition.along[edge][:, None, None], c, c * signs) / unit
         c = np.einsum("kfc,kcj->kfj", frames[edge], c) * constrained[edge, :, :1]
-        given[edge] += np.einsum("hij,kfj->khfi", with_hats(degree), c)
+        given[edge] += np.einsum("hij,kfj->khfi", with_hats(degree), c[..., :degree])
+        higher[edge] += np.einsum("kfc,kfj->kcj", frames[edge], c[..., degree:])
         missed[edge] += np.sqrt(partition.edge_lengths[edge] * squares) / unit
     soft = np.zeros_like(constrained)
-    soft[partition.edge_of_segment[bent_segments(boundary)], :, -1] = True
+    curved = partition.edge_of_segment[bent_segments(boundary)]
+    soft[curved, :, -1] = True
+    higher[curved], missed[curved] = 0.0, 0.0
     return EdgeConditions(
         frames=frames,
         constrained=constrained.reshape(e, -1),
         soft=soft.reshape(e, -1),
         given=given.reshape(e, 2, -1),
+        higher=higher,
         missed=missed,
     )

@@ -36,7 +36,7 @@ def divided_elements(problem: Problem, boundary: BoundaryTrace, degree: int, une
     ends = np.array([0.0, 1.0])
     load = np.zeros((len(free), 2, 2))
     for at, c, _ in projected_loads(problem, boundary, degree):
-        load[at] = np.einsum("ei,jci->jec", legendre_values(degree - 1, ends), c)
+        load[at] = np.einsum("ei,jci->jec", legendre_values(degree - 1, ends), c[..., :degree])
     normal = boundary.normal(np.repeat(outer, 2), np.tile(ends, len(outer))).reshape(-1, 2, 2)
     vertex = boundary.nodes[outer][:, [0, -1]].ravel()
     order = np.argsort(vertex, kind="stable")

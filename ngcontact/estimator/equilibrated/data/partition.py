@@ -173,3 +173,8 @@ def partition_of(boundary: BoundaryTrace, length: float, divided: Mask) -> Parti
         segment=segment,
         along=along,
     )
+
+
+def of_body(mesh: ng.Mesh, pattern: str, region: Index) -> Index:
+    """Triangles, of the `region` (n,), of the bodies that a pattern selects, (j,)."""
+    return np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])

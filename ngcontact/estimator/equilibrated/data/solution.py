@@ -10,10 +10,10 @@ import numpy as np
 from ....arrays import Array, Index, Mask, power_of_two
 from ....fem import BoundaryTrace, shear_moduli
 from ....problem import Problem, Triangulation, varies
-from .conditions import DATA_BONUS
 from .curves import CurvedEdges, bent_segments, curved_edges, curved_moments
-from .partition import Partition
-from .polynomials import basis, dimension, lattice, triangle_rule
+from .forces import Forces, forces_on
+from .partition import Partition, of_body
+from .polynomials import basis, dimension, lattice
 from .rough import Rough, rough_triangles
 
 
@@ -49,8 +49,8 @@ class Discrete:
         (xx, yy, xy) of sigma_h, coefficients of polynomials of degree p - 1.
     force : ndarray (n, 3, 2, j)
         Hats times body forces, coefficients of polynomials of degree k - 1.
-    missed : ndarray (n,)
-        Norms of what polynomials of degree k - 1 miss of the body forces.
+    forces : Forces
+        What of the body forces is balanced inside each triangle, or missed.
     degree : int
         Degree k of the equilibrated stress.
     geometry : int
@@ -70,7 +70,7 @@ class Discrete:
     root: Array
     stress: Array
     force: Array
-    missed: Array
+    forces: Forces
     degree: int
     geometry: int
     rough: Rough | None
@@ -119,7 +119,7 @@ def discrete_on(
     law = np.zeros((len(every), 3, 3))
     region = Triangulation(partition.mesh).bodies[partition.parent]
     for pattern, material in problem.materials.items():
-        at = _of_body(partition.mesh, pattern, region)
+        at = of_body(partition.mesh, pattern, region)
         C = material.voigt(problem.model)
         law[at] = partition.evaluate(C, at[:1], middle).reshape(-1, 3, 3) / units.modulus
     order, degree, geometry = boundary.order, degree_for(boundary), boundary.geometry_order
@@ -129,17 +129,8 @@ def discrete_on(
     values = partition.evaluate(components, every, points) / units.stress
     fit = basis(max(order - 1, 1)).values(points)[:, : dimension(order - 1)]
     coefficients = np.einsum("iq,nqc->nci", np.linalg.inv(fit), values)
-    force = np.zeros((len(every), 3, 2, dimension(degree - 1)))
-    missed = np.zeros(len(every))
-    rule, weights = triangle_rule(2 * degree + DATA_BONUS)
-    values = basis(degree - 1).values(rule)
-    hats = np.column_stack([rule, 1 - rule.sum(axis=1)])
-    for pattern, F in problem.force.items():  # (3.5)
-        at = _of_body(partition.mesh, pattern, region)
-        f = partition.evaluate(F, at, rule) * (units.length / units.stress)
-        force[at] = np.einsum("q,qa,qi,nqc->naci", weights, hats, values, f, optimize=True)
-        rest = f - np.einsum("qi,nci->nqc", values, force[at].sum(axis=1))
-        missed[at] = np.sqrt(partition.areas[at] * np.einsum("q,nqc->n", weights, rest**2))
+    forces = forces_on(problem, partition, region, degree, units.stress / units.length)
+    force = forces.hatted.copy()
     bent = bent_segments(boundary)
     curves = curved_edges(partition, boundary, bent)
     at = _rough(problem, partition, curves, region)
@@ -147,7 +138,9 @@ def discrete_on(
     if at.size:
         scales = units.stress, units.modulus
         rough = rough_triangles(problem, partition, at, geometry, degree, components, law, scales)
-        force[at], missed[at] = rough.force_means[:, None] / 3, rough.missed
+        force[at] = rough.force_means[:, None] / 3
+        curved = (curves.number[partition.edges[at]] >= 0).any(axis=1)
+        forces = forces.but_on(at[curved], rough.missed[curved])
     return Discrete(
         partition=partition,
         order=order,
@@ -155,7 +148,7 @@ def discrete_on(
         root=np.asarray(np.linalg.cholesky(law)),
         stress=coefficients,
         force=force,
-        missed=missed,
+        forces=forces,
         degree=degree,
         geometry=geometry,
         rough=rough,
@@ -169,10 +162,5 @@ def _rough(problem: Problem, partition: Partition, curves: CurvedEdges, region: 
     rough: Mask = np.any(curves.number[partition.edges] >= 0, axis=1, keepdims=True)[:, 0]
     for pattern, law in problem.materials.items():
         if varies(law):
-            rough[_of_body(partition.mesh, pattern, region)] = True
+            rough[of_body(partition.mesh, pattern, region)] = True
     return np.flatnonzero(rough)
-
-
-def _of_body(mesh: ng.Mesh, pattern: str, region: Index) -> Index:
-    """Triangles, of the `region` (n,), of the bodies that a pattern selects, (j,)."""
-    return np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])

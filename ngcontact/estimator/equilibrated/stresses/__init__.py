@@ -1,5 +1,9 @@
 """Stresses in equilibrium, vertex patch by vertex patch."""
 
+from .bubbles import beside as beside
+from .bubbles import bubble_norms as bubble_norms
+from .bubbles import inside as inside
+from .bubbles import on_parts as on_parts
 from .elements import raw_operators as raw_operators
 from .equilibration import Equilibrated as Equilibrated
 from .equilibration import equilibrated as equilibrated
