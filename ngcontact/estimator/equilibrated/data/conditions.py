@@ -73,8 +73,8 @@ def projected_loads(
     segments : ndarray of int (j,)
         Of the boundary.
     coefficients : ndarray (j, 2, l)
-        Along x and y, l = k + `HIGHER` Legendre coefficients in the segment's parameter, units of stress; on curves
-        of the load per chord.
+        Along x and y, Legendre coefficients in the segment's parameter up to degree k - 1 +
+        `HIGHER`, units of stress; on curves of the load per chord.
     squares : ndarray (j,)
         Means of the squares of what these miss.
     """
