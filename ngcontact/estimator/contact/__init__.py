@@ -2,5 +2,5 @@
 
 from .closing import closing_energy as closing_energy
 from .facing import between_nodes as between_nodes
-from .facing import remaining as remaining
+from .pieces import remaining as remaining
 from .tractions import on_contact as on_contact

@@ -21,8 +21,9 @@ from ..terms import (
     Squares,
 )
 from .closing import closing_energy
-from .facing import FacingPoints, covered_parts, facing_points, pieces_of
+from .facing import FacingPoints, facing_points
 from .following import following_gap
+from .pieces import covered_parts, pieces_of
 
 ALIKE = 1 - 1e-6  # cosine of directions from which points of two pairs at a node are one
 GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
