@@ -13,6 +13,7 @@ from .line import at_quadrature as at_quadrature
 from .line import jacobian as jacobian
 from .line import nodal_line as nodal_line
 from .line import prescribed_gap as prescribed_gap
+from .projection import MATCHED as MATCHED
 from .projection import at as at
 from .projection import crossings as crossings
 from .search import TOUCHING as TOUCHING

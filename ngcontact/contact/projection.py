@@ -114,21 +114,29 @@ def _candidates(
     return point, segment, s
 
 
-def _settled(s: Array, step: Callable[[Array], Array]) -> Array:
+def _settled(s: Array, step: Callable[[Array], Array], settled: float = SETTLED) -> Array:
     """Parameters (k,) in [0, 1] after s - step(s) has been repeated until it stands still."""
     for _ in range(NEWTON_STEPS):
         new = np.clip(s - step(s), 0, 1)
         moved = np.abs(new - s).max(initial=0.0)
         s = new
-        if moved <= SETTLED:
+        if moved <= settled:
             break
     return s
 
 
-def crossings(points: Array, across: Array, curve: Array, segment: Index, s: Array) -> Array:
+def crossings(
+    points: Array,
+    across: Array,
+    curve: Array,
+    segment: Index,
+    s: Array,
+    settled: float = SETTLED,
+) -> Array:
     """Parameters (k,) of segments on lines through `points` (k, 2) normal to `across` (k, 2).
 
-    By Newton's method from `s` (k,) on `segment` (k,) of `curve` (q, p + 1, 2).
+    By Newton's method from `s` (k,) on `segment` (k,) of `curve` (q, p + 1, 2), until no step is
+    larger than `settled`.
     """
 
     def step(s: Array) -> Array:
@@ -137,7 +145,7 @@ def crossings(points: Array, across: Array, curve: Array, segment: Index, s: Arr
         rate = (_slope(curve, segment, s) * across).sum(axis=1)
         return np.divide(miss, rate, out=np.zeros_like(miss), where=rate != 0)
 
-    return _settled(s, step)
+    return _settled(s, step, settled)
 
 
 def cast(

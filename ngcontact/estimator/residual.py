@@ -113,7 +113,9 @@ def _squares(
         np.add.at(of(squares.name), squares.element, squares.values)
     if force is not None:
         divergence += force  # (3.5)
-    names = nearly_incompressible(solution.problem, solution.mesh, corrected_from)
+    names = nearly_incompressible(
+        solution.problem, solution.mesh, corrected_from, solution.incompressibility
+    )
     correction = None
     if names:
         correction = correcting_pressure(solution, list(names), (divergence, jump), residuals)

@@ -9,7 +9,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two
-from ..fem import BoundaryTrace, normal_stress_of, rigidities, rough_moduli, shear_moduli
+from ..fem import BoundaryTrace, normal_stress_of, rough_moduli, stiffnesses
 from ..lagrange import gauss
 from ..mesh import diameters
 from ..problem import Problem, Triangulation
@@ -36,15 +36,15 @@ class ScaledSolution:
         u_h, a length.
     stress : ng.CoefficientFunction
         sigma_h (2, 2) over `unit`.
-    normal_stress : ng.CoefficientFunction
-        The stress normal to the plane over `unit`.
     projected : ng.GridFunction
         `stress` as (xx, yy, xy), polynomials on each element.
     unit, modulus : float
         A stress and a modulus, forces per area.
     mu, rigidity : ndarray (ne,)
         The smallest and the largest stiffness of each element over `modulus`: see
-        `fem.shear_moduli` and `fem.rigidities`.
+        `fem.stiffnesses`.
+    incompressibility : ndarray (ne,)
+        Bulk modulus over mu.
     rough : ndarray of bool (ne,)
         Elements in which the law varies by more than a part of itself.
     diameter : ndarray (ne,)
@@ -55,12 +55,12 @@ class ScaledSolution:
     boundary: BoundaryTrace
     displacement: ng.GridFunction
     stress: ng.CoefficientFunction
-    normal_stress: ng.CoefficientFunction
     projected: ng.GridFunction
     unit: float
     modulus: float
     mu: Array
     rigidity: Array
+    incompressibility: Array
     rough: Mask
     diameter: Array
 
@@ -78,6 +78,10 @@ class ScaledSolution:
     def strain(self) -> float:
         """The strain that belongs to both units; by it displacements are divided."""
         return self.unit / self.modulus
+
+    def normal_stress(self) -> ng.CoefficientFunction:
+        """The stress normal to the plane over `unit`."""
+        return normal_stress_of(self.problem, self.displacement) * (1 / self.unit)
 
     @cached_property
     def edge_weight(self) -> Array:
@@ -116,7 +120,7 @@ def scaled(
     stress: ng.CoefficientFunction,
 ) -> ScaledSolution:
     """A solution in units of its own."""
-    mu = shear_moduli(problem, boundary.mesh)
+    mu, rigidity, ratio = stiffnesses(problem, boundary.mesh)
     modulus = power_of_two(mu)
     projected = projected_stress(problem, boundary, stress)
     rough = rough_moduli(problem, boundary.mesh)
@@ -130,12 +134,12 @@ def scaled(
         boundary=boundary,
         displacement=displacement,
         stress=stress * (1 / unit),
-        normal_stress=normal_stress_of(problem, displacement) * (1 / unit),
         projected=projected,
         unit=unit,
         modulus=modulus,
         mu=mu / modulus,
-        rigidity=rigidities(problem, boundary.mesh) / modulus,
+        rigidity=rigidity / modulus,
+        incompressibility=ratio,
         rough=rough,
         diameter=diameters(boundary.mesh),
     )

@@ -21,9 +21,9 @@ from .moduli import bulk_moduli as bulk_moduli
 from .moduli import incompressibilities as incompressibilities
 from .moduli import law_measures as law_measures
 from .moduli import nearly_incompressible as nearly_incompressible
-from .moduli import rigidities as rigidities
 from .moduli import rough_moduli as rough_moduli
 from .moduli import shear_moduli as shear_moduli
+from .moduli import stiffnesses as stiffnesses
 from .moduli import warn_of_locking as warn_of_locking
 from .space import LOAD_BONUS as LOAD_BONUS
 from .space import Space as Space

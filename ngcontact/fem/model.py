@@ -6,7 +6,7 @@ One object for each model; `Elastic.voigt` has the law of each. Nothing else dep
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Protocol, TypeAlias
 
 import ngsolve as ng
@@ -77,10 +77,10 @@ class Model(Protocol):
     def hoop(self, normal: CF) -> CF:
         """The hoop stress, `normal` to the plane; a `ValueError` without an axis."""
 
-    def divergence(self, plane: CF, stress: CF, normal: CF) -> CF:
+    def divergence(self, plane: CF, stress: CF, normal: Callable[[], CF]) -> CF:
         """Divergence (2,) of a stress by that of its part in the plane, `plane` (2,).
 
-        `stress` (2, 2) is that part, `normal` the stress normal to the plane.
+        `stress` (2, 2) is that part, `normal` makes the stress normal to the plane.
         """
 
 
@@ -137,7 +137,7 @@ class _Plane:
         """There is none."""
         raise ValueError("a plane model has no hoop stress: out_of_plane_stress is what it has")
 
-    def divergence(self, plane: CF, stress: CF, normal: CF) -> CF:
+    def divergence(self, plane: CF, stress: CF, normal: Callable[[], CF]) -> CF:
         """That in the plane."""
         return plane
 
@@ -243,9 +243,9 @@ class Axisymmetric:
         """The stress normal to the plane."""
         return normal
 
-    def divergence(self, plane: CF, stress: CF, normal: CF) -> CF:
+    def divergence(self, plane: CF, stress: CF, normal: Callable[[], CF]) -> CF:
         """With (rr - hoop) / r and rz / r, inside of elements: there r > 0."""
-        return plane + ng.CF((stress[0, 0] - normal, stress[0, 1])) / ng.x
+        return plane + ng.CF((stress[0, 0] - normal(), stress[0, 1])) / ng.x
 
 
 MODELS: dict[str, Model] = {

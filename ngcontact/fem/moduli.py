@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from weakref import WeakKeyDictionary
 
 import ngsolve as ng
@@ -39,18 +39,14 @@ SAMPLES = ng.IntegrationRule(
 )
 
 
-def _of_elements(
-    problem: Problem,
-    mesh: ng.Mesh,
-    modulus: Callable[[Array], Array],
-    asked: Mask | None = None,
-) -> Array:
-    """modulus(C) (ne, 4) at `SAMPLES` of each element, of laws C (k, q, q); one if it is constant.
+def _laws(
+    problem: Problem, mesh: ng.Mesh, asked: Mask | None = None
+) -> Iterator[tuple[Mask, Array]]:
+    """Elements (ne,) of a law C, and C (k, 4, q, q) at their `SAMPLES`; (1, 1, q, q) of numbers.
 
-    Voigt components q, the shear last. Only elements `asked` (ne,) for are met, others are 0.
+    Voigt components q, the shear last. Only elements `asked` (ne,) for are met.
     """
     region, samples = Triangulation(mesh).bodies, len(SAMPLES)
-    values = np.zeros((mesh.ne, samples))
     for pattern, law in problem.materials.items():
         inside = np.array(mesh.Materials(pattern).Mask())[region]
         at = inside if asked is None else inside & asked
@@ -60,9 +56,24 @@ def _of_elements(
             points = mesh.MapToAllElements(SAMPLES, ng.VOL).reshape(-1, samples)[at]
             C = np.asarray(law.voigt(problem.model)(points.ravel()))
             size = round(math.sqrt(C.shape[1]))
-            values[at] = modulus(C.reshape(-1, size, size)).reshape(points.shape)
+            yield at, C.reshape(-1, samples, size, size)
         else:
-            values[at] = modulus(_constant(law, problem.model, mesh)[None])
+            yield at, _constant(law, problem.model, mesh)[None, None]
+
+
+def _of_elements(
+    problem: Problem,
+    mesh: ng.Mesh,
+    modulus: Callable[[Array], Array],
+    asked: Mask | None = None,
+) -> Array:
+    """modulus(C) (ne, 4) at `SAMPLES` of each element, of laws C (..., q, q).
+
+    0 in elements that are not `asked` (ne,) for.
+    """
+    values = np.zeros((mesh.ne, len(SAMPLES)))
+    for at, C in _laws(problem, mesh, asked):
+        values[at] = modulus(C)
     return values
 
 
@@ -78,7 +89,7 @@ def _constant(law: Elastic | Hooke, model: str, mesh: ng.Mesh) -> Array:
 
 
 def mandel(C: Array) -> Array:
-    """Laws (k, q, q) on the strain e itself, energy e : C : e / 2, of Voigt's `C` (k, q, q).
+    """Laws (..., q, q) on the strain e itself, energy e : C : e / 2, of Voigt's `C` (..., q, q).
 
     Shear strain is counted twice in e : e, so it is scaled by the root of 2.
     """
@@ -88,32 +99,32 @@ def mandel(C: Array) -> Array:
 
 
 def _smallest(C: Array) -> Array:
-    """The best c_0 (k,) in HH81 (2.7): the smallest eigenvalue of the laws (k, q, q)."""
-    return np.asarray(np.linalg.eigvalsh(mandel(C))[:, 0])
+    """The best c_0 (...) in HH81 (2.7): the smallest eigenvalue of the laws (..., q, q)."""
+    return np.asarray(np.linalg.eigvalsh(mandel(C))[..., 0])
 
 
 def _bulk(C: Array) -> Array:
-    """The largest kappa (k,) <= e : C e / (tr e)^2 of laws (k, q, q).
+    """The largest kappa (...) <= e : C e / (tr e)^2 of laws (..., q, q).
 
     A Schur complement in C on volumetric, deviatoric and shear strain, which does not cancel where
     C_11, C_12 and C_22 are nearly equal.
     """
-    size = np.abs(C).max(axis=(1, 2))
-    T = VOLUMETRIC[C.shape[1]]
-    D = T @ (C / size[:, None, None]) @ T.T
-    bend = np.linalg.solve(D[:, 1:, 1:], D[:, 1:, :1])
-    return np.asarray(size * (D[:, 0, 0] - (D[:, :1, 1:] @ bend)[:, 0, 0]))
+    size = np.abs(C).max(axis=(-2, -1))
+    T = VOLUMETRIC[C.shape[-1]]
+    D = T @ (C / size[..., None, None]) @ T.T
+    bend = np.linalg.solve(D[..., 1:, 1:], D[..., 1:, :1])
+    return np.asarray(size * (D[..., 0, 0] - (D[..., :1, 1:] @ bend)[..., 0, 0]))
 
 
 def _rigidity(C: Array) -> Array:
-    """Largest eigenvalue (k,) of laws (k, q, q) less kappa (tr e)^2, that of a strain without it.
+    """Largest eigenvalue (...) of laws (..., q, q) less kappa (tr e)^2, of a strain without it.
 
     The energy |w|^2 of boundary values in a half-plane is at most this times their square in
     H^(1/2), as that of the field without divergence among those with these values.
     """
-    dilatation = np.append(np.ones(C.shape[1] - 1), 0.0)
-    rest = mandel(C) - _bulk(C)[:, None, None] * np.outer(dilatation, dilatation)
-    return np.asarray(np.linalg.eigvalsh(rest)[:, -1])
+    dilatation = np.append(np.ones(C.shape[-1] - 1), 0.0)
+    rest = mandel(C) - _bulk(C)[..., None, None] * np.outer(dilatation, dilatation)
+    return np.asarray(np.linalg.eigvalsh(rest)[..., -1])
 
 
 def shear_moduli(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Array:
@@ -125,14 +136,6 @@ def shear_moduli(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> 
     return _of_elements(problem, mesh, _smallest, asked).min(axis=1) / 2
 
 
-def rigidities(problem: Problem, mesh: ng.Mesh) -> Array:
-    """Half the largest eigenvalue (ne,) of C less its bulk modulus, the largest in each element.
-
-    A stress, mu of isotropic laws: boundary values w store at most 2 mu |w|^2 in H^(1/2).
-    """
-    return _of_elements(problem, mesh, _rigidity).max(axis=1) / 2
-
-
 def bulk_moduli(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Array:
     """Bulk modulus (ne,) in the middle of each element: the largest kappa <= e : C e / (tr e)^2.
 
@@ -142,13 +145,34 @@ def bulk_moduli(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> A
     return _of_elements(problem, mesh, _bulk, asked)[:, 0]
 
 
+def stiffnesses(problem: Problem, mesh: ng.Mesh) -> tuple[Array, Array, Array]:
+    """What the estimate asks of the law in each element.
+
+    Returns
+    -------
+    mu : ndarray (ne,)
+        As in `shear_moduli`.
+    rigidity : ndarray (ne,)
+        Half the largest eigenvalue of C less its bulk modulus, the largest in the element, a
+        stress, mu of isotropic laws: boundary values w store at most 2 mu |w|^2 in H^(1/2).
+    ratio : ndarray (ne,)
+        Bulk modulus over half the smallest eigenvalue, in the middle.
+    """
+    mu, rigidity, ratio = np.zeros((3, mesh.ne))
+    for at, C in _laws(problem, mesh):
+        least = _smallest(C)
+        mu[at] = least.min(axis=-1) / 2
+        rigidity[at] = _rigidity(C).max(axis=-1) / 2
+        ratio[at] = 2 * _bulk(C[:, 0]) / least[:, 0]
+    return mu, rigidity, ratio
+
+
 def incompressibilities(problem: Problem, mesh: ng.Mesh) -> Array:
     """Bulk modulus over half the smallest eigenvalue in the middle of each element, (ne,)."""
-
-    def ratio(C: Array) -> Array:
-        return 2 * _bulk(C) / _smallest(C)
-
-    return _of_elements(problem, mesh, ratio)[:, 0]
+    ratio = np.zeros(mesh.ne)
+    for at, C in _laws(problem, mesh):
+        ratio[at] = 2 * _bulk(C[:, 0]) / _smallest(C[:, 0])
+    return ratio
 
 
 def rough_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
@@ -206,9 +230,17 @@ def constant_measures(
     ]
 
 
-def nearly_incompressible(problem: Problem, mesh: ng.Mesh, limit: float) -> dict[str, float]:
-    """Largest kappa / mu of each body where it exceeds `limit`."""
-    ratio = incompressibilities(problem, mesh)
+def nearly_incompressible(
+    problem: Problem, mesh: ng.Mesh, limit: float, ratio: Array | None = None
+) -> dict[str, float]:
+    """Largest kappa / mu of each body where it exceeds `limit`.
+
+    `ratio` (ne,) is that of each element, where it is known.
+    """
+    if ratio is None:
+        ratio = incompressibilities(problem, mesh)
+    if not (ratio > limit).any():
+        return {}
     region = Triangulation(mesh).bodies
     most = dict.fromkeys(mesh.GetMaterials(), 0.0)
     for number, name in enumerate(mesh.GetMaterials()):

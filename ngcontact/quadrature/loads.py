@@ -26,7 +26,8 @@ FINE = {1: 1e-6, 2: 1e-5}  # error of a part relative to that integral at which 
 # What NGSolve prints of numbers, also times others and times the normal.
 NUMBER = r"[-+.\de]+"
 NUMBERS = re.compile(
-    rf"\s*({NUMBER}\*\()?(coef (unary operation ' '|VectorialCoefficientFunction|{NUMBER}|"
+    rf"ZeroCoefficientFunction|\s*({NUMBER}\*\()?"
+    rf"(coef (unary operation ' '|VectorialCoefficientFunction|ZeroCF|{NUMBER}|"
     rf"scale {NUMBER}|scalar-vector multiply|normal vector), real(, dim=\d+)?)?\s*\)?\s*"
 )
 

@@ -10,6 +10,7 @@ import numpy as np
 from ..arrays import Array, Index, Mask
 from .cells import following, whole
 from .lattice import divisions, extent
+from .loads import numbers
 from .view import View, looked_at
 
 ENOUGH = 8  # points on a segment at least, which show any interpolation error
@@ -23,8 +24,10 @@ def rough_segments(
 ) -> Mask:
     """Which `segments` (k,) have values that are not seen at a few points, (k,).
 
-    `missed` is how far a displacement is from them there.
+    `missed` is how far a displacement is from them there. Numbers are nowhere rough.
     """
+    if numbers(values):
+        return np.zeros(len(segments), dtype=bool)
     left, largest = np.zeros(mesh.GetNE(ng.BND)), 0.0
     for here, found, beyond in looked_at(values, View(mesh, 1), segments, ENOUGH):
         left[here] = beyond

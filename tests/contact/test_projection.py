@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from ngcontact.contact.projection import MATCHED, cast, snap
+from ngcontact.contact.projection import MATCHED, cast, crossings, snap
 from ngcontact.contact.search import coincident
 from ngcontact.lagrange import gauss_lobatto
 from tests.contact.curves import DOWN, at, circle, graph, nodes_on, rays, upward
@@ -95,6 +95,28 @@ def test_oblique_rays_on_a_parabola_solve_the_quadratic():
     expected = (-b + root) / (2 * a)
     np.testing.assert_allclose(found.distance, expected, atol=1e-14)
     np.testing.assert_allclose(at(curve, found), points + expected[:, None] * d, atol=1e-14)
+
+
+@pytest.mark.parametrize("slope", [0.0, 1.0])
+def test_newton_s_method_stops_where_it_has_arrived(slope):
+    """Through (x, 1) along (slope, -1) onto y = x^2: slope^2 r^2 + (2 x slope + 1) r + x^2 = 1."""
+    curve = graph(lambda x: x**2, [0, 1], 2)
+    x, calls = np.linspace(0.0, 0.4, 9), []
+
+    class Counting(np.ndarray):
+        def __getitem__(self, at):
+            calls.append(at)
+            return super().__getitem__(at)
+
+    points = np.column_stack([x, np.ones_like(x)])
+    across = np.tile([1.0, slope], (len(x), 1))
+    segment, start = np.zeros(len(x), dtype=int), np.full(len(x), 0.5)
+    s = crossings(points, across, curve.view(Counting), segment, start, 1e-8)
+    # x + slope (1 - y) = s, y = s^2.
+    root = (-1 + np.sqrt(1 + 4 * slope * (x + slope))) / (2 * slope) if slope else x
+    assert np.asarray(s) == pytest.approx(root, rel=4e-16, abs=4e-16)
+    # Two looks at the curve a step; the last step is about the square root of the last bit.
+    assert len(calls) <= (2 if not slope else 5) * 2
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])

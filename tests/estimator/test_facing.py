@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import ngsolve as ng
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from ngcontact.estimator.contact.facing import between_nodes
 from ngcontact.estimator.terms import Parts
 from ngcontact.geometries import blocks, rings
 from ngcontact.lagrange import gauss_lobatto
+from tests.scenes import unmatched_blocks
 
 LAW = Elastic(E=1.0, nu=0.3)
 # Plane strain under -1 along y.
@@ -215,3 +218,19 @@ def test_narrow_gaps_are_found_between_quadrature_points():
     # between points make it an approximation.
     expected = 1e-6 * np.sqrt(np.pi / 2) / 2.6
     assert parts["penetration"].sum() == pytest.approx(expected, rel=0.15)
+
+
+@pytest.mark.parametrize("case", [cases.one_transition, cases.hertz_contact])
+def test_matched_lines_that_end_on_supports_are_not_divided(case, monkeypatch):
+    """The ends of Gamma_K on Gamma_u carry no point, and face what lies at the same place."""
+    solution = solve(case().problem, maxh=0.3, order=2)
+    assert (solution.pairs[0].line.rows < 0).any()
+    expected = solution.error_estimate
+
+    def refuse(*_):
+        raise AssertionError("a search where nodes face nodes")
+
+    monkeypatch.setattr("ngcontact.estimator.contact.pieces.divided", refuse)
+    assert replace(solution).error_estimate == expected
+    with pytest.raises(AssertionError, match="a search"):
+        _ = solve(replace(case().problem, geometry=unmatched_blocks())).error_estimate

@@ -11,7 +11,8 @@ from netgen.occ import OCCGeometry, Rectangle, X, Y
 
 from ngcontact import Elastic, Problem, solve
 from ngcontact.mesh import first_mesh
-from ngcontact.quadrature import rough_load
+from ngcontact.quadrature import rough_load, rough_segments
+from ngcontact.quadrature.loads import numbers
 
 
 def square():
@@ -93,6 +94,26 @@ def test_rough_loads_in_any_unit(unit):
 def test_smooth_loads_are_left_to_the_usual_rule(load):
     mesh = first_mesh(loaded())
     assert rough_load(load, mesh.Boundaries("top"), 3) is None
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        (0, 0),
+        (0, -1.5),
+        (1e-9, 0),
+        -ng.CF(0.2),
+        3 * ng.CF((0, 1)),
+        ng.CF(2) * ng.specialcf.normal(2),
+    ],
+)
+def test_numbers_are_not_looked_at(data, monkeypatch):
+    """Zeros neither, which NGSolve prints in its own ways."""
+    mesh, data = first_mesh(loaded()), ng.CF(data)
+    assert numbers(data)
+    assert not numbers(ng.CF((ng.x, 0)))
+    monkeypatch.delattr("ngcontact.quadrature.values.looked_at")
+    assert not rough_segments(data, mesh, np.arange(mesh.GetNE(ng.BND)), 1.0).any()
 
 
 def test_noise_is_said_to_be_missed():

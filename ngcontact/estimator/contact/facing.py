@@ -20,6 +20,8 @@ from ...fem import BoundaryTrace
 from ...lagrange import gauss_lobatto, lagrange, lagrange_derivative
 from ..terms import Parts
 
+ARRIVED = 1e-8  # last step of Newton's method for a parameter: the next one would be its square
+
 
 @dataclass(frozen=True, eq=False)
 class FacingPoints:
@@ -150,4 +152,4 @@ def opposite(boundary: BoundaryTrace, x: Array, d: Array, facing: Index, near: A
     Those that Newton's method reaches from `near` (k,).
     """
     across = np.column_stack([-d[:, 1], d[:, 0]])
-    return crossings(x, across, boundary.curve, facing, near)
+    return crossings(x, across, boundary.curve, facing, near, ARRIVED)

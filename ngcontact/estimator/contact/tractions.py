@@ -63,7 +63,7 @@ def on_contact(
     """
     boundary, line = solution.boundary, pair.line
     nodal, active = at_nodes(boundary, pair, pairs)
-    pieces = pieces_of(boundary, line, np.asarray(np.isfinite(nodal).any(axis=1)))
+    pieces, whole = pieces_of(boundary, line, np.asarray(np.isfinite(nodal).any(axis=1)))
     if len(pieces.local) == 0:
         return BoundaryTerms()
     order = 2 * solution.order + DATA_BONUS
@@ -85,7 +85,7 @@ def on_contact(
         share = points.weight / len(sides)
         for name, values in (("complementarity", closed), ("penetration", depth)):
             squares.append(Squares(name, side.element, share * values))
-    return BoundaryTerms(residuals, squares, covered_parts(boundary, line, pieces))
+    return BoundaryTerms(residuals, squares, covered_parts(boundary, line, pieces, whole))
 
 
 def at_nodes(
