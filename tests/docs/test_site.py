@@ -1,23 +1,26 @@
 """Every page of docs is in the tree of the site, and all Python in the pages runs.
 
 Blocks of one page are one program, as a reader would type them. `make docs` executes the tutorials,
-which take seconds each; everything else is executed here, the cells of other notebooks included.
+which take seconds each, and what needs more than the package; everything else is executed here,
+the cells of other notebooks included.
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 
 import matplotlib.pyplot as plt
 import pytest
 
+from ngcontact import ContactWarning
 from tests.docs.pages import DOCS, ROOT, Block, blocks, listed, reached
 
 TEXTS = sorted([*ROOT.glob("*.md"), *DOCS.rglob("*.md")])
 BLOCKS = [
     block for path in TEXTS for block in blocks(path.relative_to(ROOT).as_posix(), path.read_text())
 ]
-BY_THE_SITE = "docs/tutorials/"
+BY_THE_SITE = ("docs/tutorials/", "docs/howto/pandas.md")  # the last needs pandas
 BY_TEST_DOCS = "README.md"  # with its figures
 
 # What a page that is no program of its own takes for granted.
@@ -64,14 +67,17 @@ def _text(path):
 
 
 @pytest.mark.parametrize("block", [b for b in BLOCKS if b.page.startswith(BY_THE_SITE)], ids=str)
-def test_the_site_executes_tutorials(block):
+def test_the_site_executes(block):
     compile(block.code, str(block), "exec")
     assert block.cell, "only cells are executed: write {code-cell}"
 
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> Callable[[Block], None]:
-    """Execute a block after those before it in its page, each once, in a folder of the page."""
+    """Execute a block after those before it in its page, each once, in a folder of the page.
+
+    What a page shows to do is not warned of.
+    """
     spaces: dict[str, dict[str, object]] = {}
     done: set[Block] = set()
 
@@ -82,7 +88,9 @@ def run(tmp_path_factory) -> Callable[[Block], None]:
         for other in BLOCKS:
             if other.page == block.page and other.line <= block.line and other not in done:
                 code = "\n" * (other.line - 1) + other.code
-                exec(compile(code, other.page, "exec"), spaces[block.page])
+                with warnings.catch_warnings():
+                    warnings.simplefilter("error", ContactWarning)
+                    exec(compile(code, other.page, "exec"), spaces[block.page])
                 done.add(other)
 
     folders = {block.page: tmp_path_factory.mktemp("page") for block in BLOCKS}
@@ -97,7 +105,7 @@ def run(tmp_path_factory) -> Callable[[Block], None]:
 
 
 @pytest.mark.parametrize(
-    "block", [b for b in BLOCKS if not b.page.startswith((BY_THE_SITE, BY_TEST_DOCS))], ids=str
+    "block", [b for b in BLOCKS if not b.page.startswith((*BY_THE_SITE, BY_TEST_DOCS))], ids=str
 )
 def test_block_runs(block, run):
     run(block)
