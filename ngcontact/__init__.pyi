@@ -10,6 +10,7 @@ from .problem import Hooke as Hooke
 from .problem import Problem as Problem
 from .qp import solve_qp as solve_qp
 from .solution import Solution as Solution
+from .solution import load as load
 from .solving import solve as solve
 
 __version__: str

@@ -10,6 +10,7 @@ from pathlib import Path
 import ngsolve as ng
 import numpy as np
 
+from . import __version__
 from .arrays import Array, Index, Mask, root_of_squares
 from .contact import ContactState, contact_states, state_of
 from .discrete import DiscreteProblem, RigidMotion, resultants
@@ -18,7 +19,7 @@ from .fem import energy_norm, model_of, normal_stress_of, potential_energy, stre
 from .output import plot_solution, write_revolved, write_solution
 from .problem import Problem
 from .qp import Iterate, kkt_residuals
-from .results import Readable
+from .results import Readable, read
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,22 +240,20 @@ class Solution(Measured, Readable):
 
         return Draw(self.displacement, self.mesh, deformation=True)
 
-    def __str__(self) -> str:
-        """One line: unknowns, active points, steps, force; estimate and bound where known."""
-        parts = [
-            f"order {self.order}",
-            f"{self.displacement.space.ndof:7d} unknowns",
-            f"{np.count_nonzero(self.active):4d}/{self.active.size} active",
-            f"{len(self.steps)} steps",
-        ]
-        if self.free_motions:
-            parts.append(f"free: {'; '.join(map(str, self.free_motions))}")
-        if self.estimated or self.adaptive:
-            parts.append(f"estimate {self.relative_error_estimate:.2e}")
-        if self.bounded:
-            parts.append(f"bound {self.relative_error_bound:.2e}")
-        if self.discrete.lines:
-            parts.append(f"force {np.hypot(*self.contact_force()):.6g}")
-        return ", ".join(parts)
+    __repr__ = Readable.__str__  # instead of all arrays
 
-    __repr__ = __str__  # instead of all arrays
+
+def load(path: str | os.PathLike[str]) -> Solution:
+    """The solution that `Solution.save` wrote to `path`.
+
+    Displacement and contact are equal to the last bit. The stiffness is assembled again, and
+    factorised when it is next needed. The file is a pickle: load only what you or people you trust
+    have written.
+
+    Raises
+    ------
+    ValueError
+        A file that is no result, is not complete, or is of a version that cannot be read here.
+    """
+    solution: Solution = read(path, __version__)
+    return solution

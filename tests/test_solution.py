@@ -636,6 +636,8 @@ def test_three_bodies_in_a_stack():
     assert solution.contact_force(0) == pytest.approx([0, 0.25], abs=1e-12)
     assert solution.reactions["a_below"] == pytest.approx([0, 0.25], abs=1e-12)
     assert set(solution.pair) == {0, 1}
+    names = [contact.secondary for contact in solution.problem.contact]
+    assert str(solution).endswith(f"force {names[0]} 0.25, {names[1]} 0.2")
     for pair, height in ((0, 1.0), (1, 1.5)):
         assert solution.points[solution.pair == pair][:, 1] == pytest.approx(height)
 

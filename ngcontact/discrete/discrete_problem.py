@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -184,6 +185,28 @@ def _program(
     nodes = trace.nodes[space.nodal]
     systems = linear_systems(reduced, matrix, basis.T, vertex_parents(trace.mesh), nodes)
     return reduced, systems
+
+
+def reassembled(
+    problem: Problem, space: Space, program: dict[str, Any], arrays: dict[str, Any]
+) -> DiscreteProblem:
+    """A discrete problem of a space that is assembled again and of arrays that were kept.
+
+    Parameters
+    ----------
+    problem : Problem
+    space : Space
+    program : dict
+        Fields of its quadratic program but the matrix.
+    arrays : dict
+        All other fields but the linear systems, `rigid` without its space.
+    """
+    basis, trace, rigid = arrays["basis"], space.trace, arrays["rigid"]
+    K, matrix = congruent(space.matrix, space.A, space.basis @ basis.T)
+    again, nodes = QuadraticProgram(K=K, **program), trace.nodes[space.nodal]
+    systems = linear_systems(again, matrix, basis.T, vertex_parents(trace.mesh), nodes)
+    kept = arrays | {"rigid": rigid and rigid.on(space)}
+    return DiscreteProblem(problem=problem, space=space, program=again, systems=systems, **kept)
 
 
 def _check_range(program: QuadraticProgram) -> None:

@@ -7,7 +7,7 @@ supports and contact admit.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import ngsolve as ng
 import numpy as np
@@ -65,6 +65,10 @@ class Rigid:
     def left_free(self, active: Mask) -> list[RigidMotion]:
         """Motions that the rows `active` (m,) do not resist either, Remark 3.7."""
         return [self._motion(x) for x in vanishing_combinations(self.rows[active]).T]
+
+    def on(self, space: Space | None) -> Rigid:
+        """The same as functions of an equal space; of None, to be kept without one."""
+        return replace(self, free=replace(self.free, space=space))  # type: ignore[arg-type]
 
     def _motion(self, amounts: Array) -> RigidMotion:
         """One of the motions, by its amounts (r,), with the multiplier of its condition."""

@@ -9,4 +9,5 @@ from .elements import neighbours as neighbours
 from .elements import rightward as rightward
 from .generation import first_mesh as first_mesh
 from .parents import copied as copied
+from .parents import keep_parents as keep_parents
 from .parents import vertex_parents as vertex_parents

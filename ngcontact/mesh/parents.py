@@ -30,5 +30,10 @@ def vertex_parents(mesh: ng.Mesh) -> Integers:
 def copied(mesh: ng.Mesh) -> ng.Mesh:
     """Copy that keeps the names, the geometry and the parents; not curved."""
     copy = ng.Mesh(mesh.ngmesh.Copy())
-    setattr(copy, KEPT, vertex_parents(mesh))
+    keep_parents(copy, vertex_parents(mesh))
     return copy
+
+
+def keep_parents(mesh: ng.Mesh, parents: Integers) -> None:
+    """Let `vertex_parents` of a mesh that forgot them be `parents` (nv, 2)."""
+    setattr(mesh, KEPT, parents)

@@ -1,5 +1,7 @@
 """Files and pictures of a solution."""
 
+from .files import check_path as check_path
+from .files import replacing as replacing
 from .nodes import full_stress as full_stress
 from .nodes import von_mises as von_mises
 from .picture import plot_solution as plot_solution

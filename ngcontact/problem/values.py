@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 import ngsolve as ng
 import numpy as np
@@ -51,16 +51,47 @@ def region_name(value: Any, what: str) -> str:
     return value
 
 
-def by_region(value: Any, what: str, normalise: Callable[[Any, str], Any]) -> dict[str, Any]:
-    """Return a plain dict of normalised values; None is empty."""
+class Regions(dict[str, Any]):
+    """Data of a problem by region name; a dict that refuses to be changed, and says what to do."""
+
+    def __init__(self, what: str, data: Mapping[str, Any]) -> None:
+        super().__init__(data)
+        self.what = what
+
+    def _refuse(self, change: str, right: str) -> NoReturn:
+        raise TypeError(
+            f"problem.{self.what}{change}: the data of a Problem cannot be changed; make another "
+            f"by dataclasses.replace(problem, {self.what}={right})"
+        )
+
+    def __setitem__(self, name: str, value: Any) -> NoReturn:
+        new = f'{{"{name}": {value!r:.60}}}'
+        self._refuse(f'["{name}"] = {value!r:.60}', f"problem.{self.what} | {new}")
+
+    def __delitem__(self, name: str) -> NoReturn:
+        self._refuse(f' without "{name}"', "{...}")
+
+    def _changed(self, *_: Any, **__: Any) -> NoReturn:
+        self._refuse(" in place", f"problem.{self.what} | {{...}}")
+
+    update = pop = popitem = clear = setdefault = __ior__ = _changed
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Made again from a plain dict where it is copied or pickled."""
+        return Regions, (self.what, dict(self))
+
+
+def by_region(value: Any, what: str, normalise: Callable[[Any, str], Any]) -> Regions:
+    """Return normalised values by name; None is empty."""
     if value is None:
-        return {}
+        return Regions(what, {})
     if not isinstance(value, Mapping):
         raise TypeError(f"{what} = {value!r}: give a dict from region names to values")
-    return {
+    entries = {
         region_name(name, f"a name in {what}"): normalise(entry, f'{what} "{name}"')
         for name, entry in value.items()
     }
+    return Regions(what, entries)
 
 
 def pair_of(value: Any, what: str) -> tuple[Any, Any]:

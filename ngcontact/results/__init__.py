@@ -1,5 +1,6 @@
-"""What a solution is asked for: values where one wants them."""
+"""What a solution is asked for: values where one wants them, tables, files that outlive it."""
 
+from .archive import read as read
 from .location import Location as Location
 from .location import locate as locate
 from .members import Readable as Readable

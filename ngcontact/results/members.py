@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from .. import __version__
+from .archive import Kept, restored, save, state_of
+from .record import Number, _Recorded, record_of
+from .text import _Told, line_of
 from .values import Solved, Values, values_at
 
 
@@ -57,3 +63,36 @@ class Readable:
         share = np.linspace(0, 1, int(count))[:, None]
         a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
         return values_at(self, (1 - share) * a + share * b, body, outside)
+
+    def record(self: _Recorded) -> dict[str, Number]:
+        """One row of a table: a flat dict of plain numbers, in any consistent units.
+
+        Sizes and counts, energy, forces and peak pressure by number of the pair, reactions by name
+        of the boundary, residuals, work. The columns of a problem are always the same: estimate
+        and bound are NaN unless they have been made, or the solution is a level of `adapt`.
+        """
+        return record_of(self)
+
+    def save(self: Kept, path: str | os.PathLike[str]) -> Path:
+        """Write everything to `path` (.ngcontact), for `ngcontact.load` in another process.
+
+        Raises
+        ------
+        TypeError
+            Data that cannot be pickled, like a gap given by a lambda, with the name.
+        ValueError, OSError
+            A name that does not end in .ngcontact, a folder that cannot be written to.
+        """
+        return save(self, path, __version__)
+
+    def __getstate__(self: Kept) -> dict[str, Any]:
+        """What is pickled and copied: factorisations stay behind."""
+        return state_of(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Make the rest again."""
+        vars(self).update(restored(state))
+
+    def __str__(self: _Told) -> str:
+        """One line: unknowns, active points, steps, pairs' forces; estimate, bound if known."""
+        return line_of(self)

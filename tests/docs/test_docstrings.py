@@ -92,12 +92,13 @@ SOLUTION = {
     "residuals": "none",
     "at": "any",
     "along": "any",
+    "record": "any",
 }
 # ... and those that are no quantities: objects, names, numbers of things, truth values, files.
 PLAIN = {
     *("problem", "mesh", "order", "element", "discrete", "minimiser", "work", "coarse_levels"),
     *("adaptive", "pair", "active", "steps", "free_motions", "estimated", "bounded"),
-    *("pairs", "estimator", "write", "revolved", "plot", "draw"),
+    *("pairs", "estimator", "write", "revolved", "plot", "draw", "save"),
 }
 
 

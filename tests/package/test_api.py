@@ -27,6 +27,7 @@ PUBLIC = [
     "Problem",
     "Solution",
     "adapt",
+    "load",
     "solve",
     "solve_qp",
     "write_series",
@@ -69,6 +70,7 @@ SIGNATURES = {
         "e": None,
         "active": None,
     },
+    "load": {"path": REQUIRED},
     "write_series": {"path": REQUIRED, "solutions": REQUIRED},
 }
 MEMBERS = {
@@ -85,7 +87,7 @@ MEMBERS = {
         "quantities",
     ),
     *("write", "plot", "draw"),
-    *("at", "along"),
+    *("at", "along", "record", "save"),
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import pickle
 
@@ -13,6 +14,7 @@ from netgen.occ import Box, Compound, Glue, OCCGeometry, Pnt, WorkPlane, X, Y
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.errors import ContactError, ConvergenceError, NoEquilibriumError
+from ngcontact.geometries import blocks
 from ngcontact.problem.contact import Contact
 from ngcontact.problem.material import Elastic, Hooke
 from ngcontact.problem.problem import Problem
@@ -421,3 +423,38 @@ def test_triangles_are_judged_alike_in_all_units(unit):
         points[lonely] = middle + height * (corner - middle)
         with pytest.raises(ValueError, match=f"1 inverted .* area {area}.* must be positive"):
             problem.check(mesh)
+
+
+@pytest.mark.parametrize("argument", ["materials", "displacement", "traction", "force"])
+def test_data_cannot_be_changed_in_place(argument):
+    problem = two_blocks_loaded()
+    data = getattr(problem, argument)
+    name = next(iter(data))
+    before = dict(data)
+    changes = [
+        lambda: data.__setitem__(name, 10.0),
+        lambda: data.__delitem__(name),
+        lambda: data.update({name: 10.0}),
+        lambda: data.pop(name),
+        lambda: data.popitem(),
+        lambda: data.clear(),
+        lambda: data.setdefault("other", 1.0),
+        lambda: data.__ior__({name: 1.0}),
+    ]
+    for change in changes:
+        with pytest.raises(TypeError, match=rf"problem\.{argument}.*dataclasses\.replace\("):
+            change()
+    assert dict(data) == before
+    assert type(data | {}) is dict  # and what is made of it is the caller's
+    assert copy.deepcopy(data).keys() == before.keys()
+
+
+def two_blocks_loaded():
+    law = Elastic(1.0, 0.3)
+    return Problem(
+        geometry=blocks(),
+        materials={"upper": law, "lower": law},
+        displacement={"bottom": (0, 0)},
+        traction={"top": 1.0},
+        force={"upper": (0, -1)},
+    )

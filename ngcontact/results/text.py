@@ -1,0 +1,50 @@
+"""A solution in one line."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+
+from ..discrete import RigidMotion
+from .record import _Recorded
+
+
+class _Told(_Recorded, Protocol):
+    """What of a solution is told."""
+
+    @property
+    def free_motions(self) -> list[RigidMotion]: ...
+
+
+def line_of(solution: _Told) -> str:
+    """Unknowns, active points, steps, forces of all pairs; estimate and bound where known."""
+    return ", ".join(f"{name} {value}".strip() for name, value in facts(solution))
+
+
+def forces(solution: _Told) -> str:
+    """Sizes of the forces of all pairs, with the names of the secondaries if there are several."""
+    contact = solution.problem.contact
+    sizes = [f"{np.hypot(*solution.contact_force(k)):.6g}" for k in range(len(contact))]
+    if len(contact) < 2:
+        return "".join(sizes)
+    return ", ".join(f"{pair.secondary} {size}" for pair, size in zip(contact, sizes, strict=True))
+
+
+def facts(solution: _Told) -> list[tuple[str, str]]:
+    """What is worth a word, by name."""
+    told = [
+        ("order", f"{solution.order}"),
+        ("", f"{solution.displacement.space.ndof:7d} unknowns"),
+        ("", f"{np.count_nonzero(solution.active):4d}/{solution.active.size} active"),
+        ("", f"{len(solution.steps)} steps"),
+    ]
+    if solution.free_motions:
+        told.append(("free:", "; ".join(map(str, solution.free_motions))))
+    if solution.estimated or solution.adaptive:
+        told.append(("estimate", f"{solution.relative_error_estimate:.2e}"))
+    if solution.bounded:
+        told.append(("bound", f"{solution.relative_error_bound:.2e}"))
+    if solution.problem.contact:
+        told.append(("force", forces(solution)))
+    return told
