@@ -47,6 +47,7 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented_params"
 autodoc_class_signature = "mixed"
+autodoc_type_aliases = dict.fromkeys(["Array", "Index", "Mask"], "ndarray")
 napoleon_google_docstring = False
 napoleon_use_ivar = True
 python_use_unqualified_type_names = True

@@ -7,12 +7,14 @@ the cells of other notebooks included.
 
 from __future__ import annotations
 
+import re
 import warnings
 from collections.abc import Callable
 
 import matplotlib.pyplot as plt
 import pytest
 
+import ngcontact
 from ngcontact import ContactWarning
 from tests.docs.pages import DOCS, ROOT, Block, blocks, listed, reached
 
@@ -21,7 +23,7 @@ BLOCKS = [
     block for path in TEXTS for block in blocks(path.relative_to(ROOT).as_posix(), path.read_text())
 ]
 BY_THE_SITE = ("docs/tutorials/", "docs/howto/pandas.md")  # the last needs pandas
-BY_TEST_DOCS = "README.md"  # with its figures
+BY_OTHER_TESTS = ("README.md", "docs/results.md")  # with their figures
 
 # What a page that is no program of its own takes for granted.
 PRESS = """
@@ -49,6 +51,12 @@ def test_every_page_is_in_the_tree():
 def test_tables_of_contents_are_read():
     assert DOCS / "theory.md" in listed(DOCS / "topics" / "index.md")
     assert len(reached(DOCS / "index.md")) > 20
+
+
+def test_reference_has_every_public_name():
+    pages = "".join(path.read_text() for path in (DOCS / "reference").glob("*.md"))
+    documented = set(re.findall(r"^\.\. auto\w+:: (?:ngcontact\.)?(\w+)$", pages, re.MULTILINE))
+    assert set(ngcontact.__all__) <= documented
 
 
 def test_blocks_are_read():
@@ -105,7 +113,7 @@ def run(tmp_path_factory) -> Callable[[Block], None]:
 
 
 @pytest.mark.parametrize(
-    "block", [b for b in BLOCKS if not b.page.startswith((*BY_THE_SITE, BY_TEST_DOCS))], ids=str
+    "block", [b for b in BLOCKS if not b.page.startswith((*BY_THE_SITE, *BY_OTHER_TESTS))], ids=str
 )
 def test_block_runs(block, run):
     run(block)
