@@ -1,7 +1,8 @@
-"""The README's example and its commands; test_pages has its links."""
+"""The README's example, its table and its commands; test_pages has its links."""
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -21,6 +22,38 @@ def test_example_runs(tmp_path, monkeypatch, capsys):
     )
     assert abs(peak / 851e6 - 1) < 0.01
     assert abs(half_width / 0.029 - 1) < 0.01
+
+
+def test_comparison_is_that_of_the_benchmarks():
+    """Rows of the table are those of "the first three" in docs/benchmarks.md, to two digits."""
+    full = {}
+    for line in (ROOT / "docs" / "benchmarks.md").read_text().splitlines():
+        cells = [cell.strip(" *") for cell in line.split("|")[1:-1]]
+        if len(cells) == 8 and cells[1] == "the first three":
+            full[cells[0], cells[2], cells[3]] = cells[4:]
+    names = {
+        "ngcontact, which finds the zone itself": ("ngcontact", "adaptive"),
+        "active set in NGSolve, uniform meshes": ("NGSolve active set", "uniform"),
+        "active set in NGSolve, graded meshes": ("NGSolve active set", "graded"),
+        "active set in scikit-fem, graded meshes": ("scikit-fem active set", "graded"),
+        "penalty in NGSolve, graded meshes": ("NGSolve penalty", "graded"),
+        "mortar in Kratos, graded meshes": ("Kratos mortar", "graded"),
+    }
+    [table] = re.findall(r"^\| disc / block .*\n\|[-|]+\n((?:\|.*\n)+)", README, re.MULTILINE)
+    rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in table.splitlines()]
+    assert [row[0] for row in rows] == list(names)
+    for name, *cells in rows:
+        for k, problem in enumerate(("disc", "block")):
+            for cell, seconds in zip(cells, full[(problem, *names[name])], strict=True):
+                assert rounded(cell.split(" / ")[k], seconds), (name, problem, cell)
+
+
+def rounded(stated, seconds):
+    """Whether a figure is another one of two significant digits; "-" is only itself."""
+    if "-" in (stated, seconds):
+        return stated == seconds
+    unit = 10 ** (math.floor(math.log10(float(seconds))) - 1)
+    return abs(float(stated) - float(seconds)) < 0.501 * unit
 
 
 def test_commands_are_targets():
