@@ -25,6 +25,7 @@ from .moduli import rough_moduli as rough_moduli
 from .moduli import shear_moduli as shear_moduli
 from .moduli import stiffnesses as stiffnesses
 from .moduli import warn_of_locking as warn_of_locking
+from .nodal_basis import edge_bubbles as edge_bubbles
 from .space import LOAD_BONUS as LOAD_BONUS
 from .space import Space as Space
 from .space import assemble as assemble

@@ -28,10 +28,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array, Index
-from .data import Discrete, edge_places
+from .data import MANDEL, Discrete, edge_places
 
 PLACES = 17  # on each edge, at which curves are looked at
-MANDEL = np.array([1.0, 1.0, math.sqrt(2.0)])
 
 
 @dataclass(frozen=True, eq=False)

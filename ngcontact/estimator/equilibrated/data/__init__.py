@@ -25,6 +25,7 @@ from .polynomials import legendre_derivative as legendre_derivative
 from .polynomials import legendre_values as legendre_values
 from .polynomials import triangle_rule as triangle_rule
 from .rough import Rough as Rough
+from .solution import MANDEL as MANDEL
 from .solution import Discrete as Discrete
 from .solution import Units as Units
 from .solution import degree_for as degree_for

@@ -127,6 +127,13 @@ class Partition:
         places["x"], places["y"] = where.reshape(-1, 2).T
         return np.asarray(function(places)).reshape(len(at), len(points), -1)
 
+    def jacobians(self, at: Index, points: Array) -> Array:
+        """Jacobians (k, q, 2, 2) of the triangles `at` (k,), curved ones, at `points` (q, 2)."""
+        to_element = self.evaluate(ng.specialcf.JacobianMatrix(2), at, points) / self.length
+        corners = self.within[at]
+        inner = np.stack([corners[:, 0] - corners[:, 2], corners[:, 1] - corners[:, 2]], axis=2)
+        return np.asarray(to_element.reshape(len(at), -1, 2, 2) @ inner[:, None])
+
 
 def _with_middles(triangles: Index, divided: Mask, vertices: Array) -> tuple[Index, Array, Index]:
     """Triangles with those `divided` (n,) in three parts, all vertices, and the parents."""

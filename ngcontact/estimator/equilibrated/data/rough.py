@@ -81,8 +81,7 @@ class _Points:
 
 def _points(partition: Partition, at: Index, order: int, degree: int) -> _Points:
     rule, w = triangle_rule(order)
-    jacobian = partition.evaluate(ng.specialcf.JacobianMatrix(2), at, rule) / partition.length
-    jacobian = jacobian.reshape(len(at), -1, 2, 2) @ _inner_sides(partition, at)
+    jacobian = partition.jacobians(at, rule)
     x = partition.evaluate(ng.CF((ng.x, ng.y)), at, rule) / partition.length
     origin = partition.vertices[partition.triangles[at, 2]]
     flat = np.einsum("bij,bqj->bqi", partition.inverses[at], x - origin[:, None])
@@ -97,12 +96,6 @@ def _points(partition: Partition, at: Index, order: int, degree: int) -> _Points
     det, largest = np.linalg.det(D), np.linalg.norm(D, ord=2, axis=(2, 3)).max(axis=1)
     distortion = largest * np.sqrt(det.max(axis=1) / det.min(axis=1))
     return _Points(weight, values, hats, gradients, distortion)
-
-
-def _inner_sides(partition: Partition, at: Index) -> Array:
-    """Jacobians (b, 1, 2, 2) from a triangle's reference coordinates to its element's."""
-    corners = partition.within[at]
-    return np.stack([corners[:, 0] - corners[:, 2], corners[:, 1] - corners[:, 2]], axis=2)[:, None]
 
 
 def rough_triangles(

@@ -16,6 +16,8 @@ from .partition import Partition, of_body
 from .polynomials import basis, dimension, lattice
 from .rough import Rough, rough_triangles
 
+MANDEL = np.sqrt([1.0, 1.0, 2.0])  # by which (xx, yy, xy) have the products of tensors
+
 
 @dataclass(frozen=True)
 class Units:

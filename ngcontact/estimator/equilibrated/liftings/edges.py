@@ -6,7 +6,7 @@ edge is continued by r(s) (1 - t)^m, with the best m. It vanishes on both other 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,6 +37,11 @@ class EdgeField:
     weight: Array
     value: Array
     slope: Array
+
+    def scaled(self, share: Array) -> EdgeField:
+        """The field times `share` (k,)."""
+        share = share[:, None, None]
+        return replace(self, value=share * self.value, slope=share * self.slope)
 
 
 def samples() -> Array:

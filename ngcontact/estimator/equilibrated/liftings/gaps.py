@@ -94,8 +94,8 @@ def gap_of(
 
 def on_contact(
     gap: Gap, boundary: BoundaryTrace, supported: Index, discrete: Discrete
-) -> list[tuple[Index, Array]]:
-    """Triangles (k,) and energy norms (k,) of liftings after which K is met.
+) -> tuple[list[EdgeField], list[tuple[Index, Array]]]:
+    """What to lift so that K is met: fields on edges, or triangles (k,) and energy norms (k,).
 
     On both bodies, shared by compliance, where rows are at nodes; on the secondary where they are
     means, since then vertices move, too, but for the `supported` (j,) ones.
@@ -111,7 +111,7 @@ def on_contact(
     _, r, _ = gap.lifted(every, np.tile(samples(), (len(every), 1)))
     at = np.flatnonzero(np.abs(r).max(axis=1, initial=0.0) > 0)
     if at.size == 0:
-        return []
+        return [], []
     t, weight = gap.panels(at)
     _, r, dr = gap.lifted(at, t)
     d = coefficients(gap.points.direction.reshape(*shape, 2)[at])
@@ -120,22 +120,17 @@ def on_contact(
     length = (pieces.stop - pieces.start)[at, None]
     sides = [(pieces.segment[at], pieces.start[at, None] + length * t, length * np.ones_like(t))]
     if not pieces.whole:
-        return _on_secondary(
-            gap, at, sides[0], (value, slope, weight), boundary, supported, discrete
-        )
+        parts = value, slope, weight
+        return [], _on_secondary(gap, at, sides[0], parts, boundary, supported, discrete)
     if pieces.line.contact.primary is not None:
         c = coefficients(gap.points.facing_s.reshape(shape)[at])
         sides.append((pieces.facing[at], at_points(c, t), at_points(derivative(c), t)))
-    found = []
-    for segment, s, ds in sides:
-        field = _field(discrete, segment, s, ds, (value, slope, weight))
-        found.append((partition.owner[0][field.edge], norms(discrete, field)))
-    if len(found) == 1:
-        return found
-    (one, a), (other, b) = found
-    whole = a**2 + b**2
-    whole[whole == 0] = 1.0
-    return [(one, a * b**2 / whole), (other, b * a**2 / whole)]
+    fields = [_field(discrete, *one, (value, slope, weight)) for one in sides]
+    if len(fields) == 1:
+        return fields, []
+    one, other = (norms(discrete, field) ** 2 for field in fields)
+    share = np.divide(other, one + other, out=np.zeros_like(one), where=one + other > 0)
+    return [fields[0].scaled(share), fields[1].scaled(1 - share)], []
 
 
 def _field(

@@ -9,3 +9,4 @@ from .equilibration import Equilibrated as Equilibrated
 from .equilibration import equilibrated as equilibrated
 from .equilibration import into_raw as into_raw
 from .field import stress_field as stress_field
+from .sweeps import improved as improved

@@ -32,7 +32,8 @@ class Equilibrated:
     rest: float
 
 
-def _blocks(count: int, size: int) -> Iterator[Index]:
+def blocks(count: int, size: int) -> Iterator[Index]:
+    """Numbers of triangles, in parts that bound the memory; `size` numbers for each of `count`."""
     step = max(1, AT_ONCE // size)
     for low in range(0, count, step):
         yield np.arange(low, min(low + step, count))
@@ -59,6 +60,12 @@ def into_raw(discrete: Discrete, at: Index) -> Array:
         number = discrete.rough.number[at]
         into[number >= 0] = discrete.rough.into[number[number >= 0]]
     return into
+
+
+def operators(discrete: Discrete, at: Index, frames: Array) -> Condensed:
+    """Those of the triangles `at` (b,) on orthonormal coefficients; `frames` (e, 2, 2)."""
+    into = into_raw(discrete, at)
+    return condensed(*(M @ into for M in raw_operators(discrete, at, frames)))
 
 
 def _block(discrete: Discrete, at: Index, frames: Array, theta: Array) -> _Block:
@@ -132,14 +139,14 @@ def equilibrated(discrete: Discrete, conditions: EdgeConditions, given: Array) -
     S, g = np.empty((n, 3, 2 * r, 2 * r)), np.empty((n, 3, 2 * r))
     X, x = np.empty((n, 3, r, 2 * r)), np.empty((n, 3, r))
     size = 9 * dimension(k) ** 2
-    for at in _blocks(n, size):
+    for at in blocks(n, size):
         block = _block(discrete, at, conditions.frames, theta)
         c = block.hatted + block.parts.with_divergence(block.rho)
         t = c @ block.parts.N.transpose(0, 2, 1)
         S[at], g[at], X[at], x[at] = without_opposite(block.parts.G, t)
     lam = multipliers(partition, S, g, conditions, given)
     change = np.empty((n, 3 * dimension(k)))
-    for at in _blocks(n, size):
+    for at in blocks(n, size):
         block = _block(discrete, at, conditions.frames, 0 * theta)  # their sum is 0
         y = gathered(lam[at], X[at], x[at])
         change[at] = block.parts.with_divergence(block.rho.sum(axis=1, keepdims=True))[:, 0]
