@@ -105,7 +105,7 @@ def on_contact(
     ValueError
         Corners with such rows, and supports that overlap the other body.
     """
-    partition, pieces = discrete.partition, gap.pieces
+    pieces = gap.pieces
     every = np.arange(len(pieces.local))
     shape = len(every), -1
     _, r, _ = gap.lifted(every, np.tile(samples(), (len(every), 1)))
