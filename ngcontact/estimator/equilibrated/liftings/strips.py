@@ -54,7 +54,7 @@ def strip_norms(
         np.add.at(total, partition.owner[0][field.edge], norms(discrete, rest))
         moved = np.abs(c).max(axis=(1, 2), initial=0.0) > 0
         touched[partition.ends[field.edge[moved]]] = True
-    strip = touched[Triangulation(mesh).triangles].any(axis=1)
+    strip: Mask = np.any(touched[Triangulation(mesh).triangles], axis=1, keepdims=True)[:, 0]
     given = _given(problem, boundary, conditions, discrete)
     fixed = np.zeros(values.shape, dtype=bool)
     for number, el in enumerate(mesh.Elements(ng.BND)):

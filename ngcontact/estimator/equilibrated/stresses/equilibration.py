@@ -33,7 +33,7 @@ class Equilibrated:
 
 
 def blocks(count: int, size: int) -> Iterator[Index]:
-    """Numbers of triangles, in parts that bound the memory; `size` numbers for each of `count`."""
+    """Numbers (j,) of `count` triangles, part by part; a triangle needs `size` numbers."""
     step = max(1, AT_ONCE // size)
     for low in range(0, count, step):
         yield np.arange(low, min(low + step, count))
