@@ -4,7 +4,7 @@ from .files import check_path as check_path
 from .files import replacing as replacing
 from .nodes import full_stress as full_stress
 from .nodes import von_mises as von_mises
-from .picture import plot_solution as plot_solution
+from .pictures import plot_solution as plot_solution
 from .revolution import write_revolved as write_revolved
 from .solution_data import SolutionData as SolutionData
 from .vtk import write_series as write_series

@@ -11,7 +11,7 @@ import pyvista
 
 from drivers.reference import axisymmetric_cases as cases
 from ngcontact import solve
-from ngcontact.output.scene import picture
+from ngcontact.output.pictures.scene import picture
 
 
 @pytest.fixture(scope="module")

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .files import check_path, replacing
+from ..files import check_path, replacing
+from ..solution_data import SolutionData
 from .scene import Scene, close_up, contact_lines, picture
-from .solution_data import SolutionData
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,10 +9,10 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
-from ..arrays import Array, Index, Mask
-from ..problem import ABOUT_AN_AXIS, on_axis
-from .nodes import full_stress, neighbour_tree, nodes_of, subdivision, von_mises
-from .solution_data import SolutionData
+from ...arrays import Array, Index, Mask
+from ...problem import ABOUT_AN_AXIS, on_axis
+from ..nodes import full_stress, neighbour_tree, nodes_of, subdivision, von_mises
+from ..solution_data import SolutionData
 
 MOST_TRIANGLES = 200_000  # of a picture: more cannot be seen
 

@@ -31,7 +31,7 @@ print(*sys.modules)
 def test_importing_and_solving_load_neither_vtk_nor_matplotlib():
     run = subprocess.run([sys.executable, "-c", LIGHT], capture_output=True, check=True, text=True)
     modules = set(run.stdout.split())
-    assert {"ngcontact.output.picture", "ngcontact.output.vtk"} <= modules
+    assert {"ngcontact.output.pictures.picture", "ngcontact.output.vtk"} <= modules
     assert not {"pyvista", "vtk", "vtkmodules", "matplotlib"} & modules
 
 
