@@ -17,10 +17,11 @@ from .errors import ConvergenceError, warn
 from .estimator import Estimator, estimate, refuse_bound
 from .fem import check_element, incompressibilities, unknowns
 from .mesh import curve, diameters, first_mesh
-from .one_mesh import solve_on, warn_of_doubts
-from .plausibility import contradictions, doubt_of_refinement, estimates_rise, warn_of_implausible
+from .one_mesh import solve_on, with_warnings
+from .plausibility import contradictions, warn_of_implausible
 from .problem import Problem
 from .quadrature import jumping_moduli
+from .results import with_progress
 from .solution import Solution
 
 EXACT = 1e-12  # relative estimate at which refinement stops: the solution is exact
@@ -82,6 +83,7 @@ def adapt(
     tolerance: float | None = None,
     max_dofs: int = 100_000,
     guaranteed: bool = False,
+    progress: bool = False,
 ) -> Iterator[Solution]:
     """Solve, estimate, mark, refine: one `Solution` per level.
 
@@ -105,6 +107,8 @@ def adapt(
     guaranteed : bool
         Stop at `Solution.relative_error_bound` instead of the estimate. The estimate still marks;
         the bound is made where the estimate suggests that it meets the tolerance.
+    progress : bool
+        Tell each level when it is done: a line in a terminal, a growing table in a notebook.
 
     Yields
     ------
@@ -122,9 +126,12 @@ def adapt(
         The active set of a level did not settle.
     """
     refinement = Refinement(order, element, theta, tolerance, max_dofs, guaranteed)
+    if not isinstance(progress, bool):
+        raise TypeError(f"progress={progress!r}: give True or False")
     mesh = first_level(problem, maxh, refinement)
     warn_of_implausible(problem, mesh, order)
-    return _with_warnings(levels(problem, mesh, refinement))
+    solutions = with_warnings(levels(problem, mesh, refinement))
+    return with_progress(solutions, tolerance, max_dofs) if progress else solutions
 
 
 def first_level(problem: Problem, maxh: float | None, refinement: Refinement) -> ng.Mesh:
@@ -139,25 +146,6 @@ def first_level(problem: Problem, maxh: float | None, refinement: Refinement) ->
             f"max_dofs={max_dofs}; give a larger maxh or max_dofs"
         )
     return mesh
-
-
-def _with_warnings(solutions: Iterator[Solution]) -> Iterator[Solution]:
-    """The levels of a run, with a warning of whatever may be wrong, once.
-
-    What no mesh mends is said at the first level that shows it, what refinement mends at the last.
-    """
-    told: set[object] = set()
-    estimates: list[float] = []
-    solution = None
-    for solution in solutions:
-        warn_of_doubts(solution, told, last=False)
-        yield solution
-        estimates.append(solution.relative_error_estimate)
-        if "estimates" not in told and estimates_rise(estimates):
-            told.add("estimates")
-            warn(doubt_of_refinement(solution.mesh, solution.indicators, estimates))
-    if solution is not None:
-        warn_of_doubts(solution, told, last=True)
 
 
 def _number(name: str, value: object) -> float:

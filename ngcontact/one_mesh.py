@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import ngsolve as ng
 
 from .discrete import carried_active_set, discretise, first_active_set, minimise_energy
 from .errors import warn
 from .mesh import check_curves, curve
-from .plausibility import doubts
+from .plausibility import doubt_of_refinement, doubts, estimates_rise
 from .problem import Problem
 from .solution import Solution
 
@@ -60,3 +62,22 @@ def warn_of_doubts(solution: Solution, told: set[object], *, last: bool) -> None
         if doubt not in told:
             warn(message)
     told.update(found)
+
+
+def with_warnings(solutions: Iterator[Solution]) -> Iterator[Solution]:
+    """The levels of a run, with a warning of whatever may be wrong, once.
+
+    What no mesh mends is said at the first level that shows it, what refinement mends at the last.
+    """
+    told: set[object] = set()
+    estimates: list[float] = []
+    solution = None
+    for solution in solutions:
+        warn_of_doubts(solution, told, last=False)
+        yield solution
+        estimates.append(solution.relative_error_estimate)
+        if "estimates" not in told and estimates_rise(estimates):
+            told.add("estimates")
+            warn(doubt_of_refinement(solution.mesh, solution.indicators, estimates))
+    if solution is not None:
+        warn_of_doubts(solution, told, last=True)

@@ -234,12 +234,6 @@ class Solution(Measured, Readable):
         """
         plot_solution(self, path, scale)
 
-    def draw(self) -> object:
-        """Draw the displacement in a notebook with NGSolve's webgui."""
-        from ngsolve.webgui import Draw  # needs the optional webgui packages
-
-        return Draw(self.displacement, self.mesh, deformation=True)
-
     __repr__ = Readable.__str__  # instead of all arrays
 
 

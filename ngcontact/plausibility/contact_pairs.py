@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..contact import ContactState
 from ..fem import BoundaryTrace, Space, bulk_moduli, shear_moduli
-from ..problem import Contact, Problem
+from ..problem import Problem
 from .inclinations import INCLINED, inclinations
 from .penetration import penetration
 from .zones import Zones, zones_of
@@ -33,12 +33,6 @@ MISSING = 0.25
 LARGE = 1.0
 
 Doubts = dict[tuple[str, int], str]  # messages by what is doubted and the number of the pair
-
-
-def _name(number: int, contact: Contact) -> str:
-    """A pair, as a user knows it."""
-    other = "a rigid obstacle" if contact.primary is None else f'"{contact.primary}"'
-    return f'contact {number} of "{contact.secondary}" with {other}'
 
 
 def _loaded(
@@ -87,13 +81,15 @@ def doubts(
         if not messages["strain"]:  # which leaves nothing else to believe
             messages["direction"] = _inclined(space.trace, state)
             messages["zone"] = _unresolved(state, zones) if last else ""
-        name = _name(number, state.line.contact)
+        name = f"contact {number} of {state.line.contact.named()}"
         found |= {(what, number): f"{name}: {text}" for what, text in messages.items() if text}
     peak = max((state.pressure.max(initial=0.0) for state in pairs), default=0.0)
     for number, state in enumerate(pairs) if last else ():  # with forces or without
         known = ("strain", number) in found
         if not known and (text := _passed(problem, space, displacement, state, peak)):
-            found["penetration", number] = f"{_name(number, state.line.contact)}: {text}"
+            found["penetration", number] = (
+                f"{f'contact {number} of {state.line.contact.named()}'}: {text}"
+            )
     return found
 
 

@@ -18,3 +18,4 @@ from .triangulation import Triangulation as Triangulation
 from .triangulation import bisect as bisect
 from .triangulation import move_vertices as move_vertices
 from .triangulation import triangle_sides as triangle_sides
+from .values import table as table

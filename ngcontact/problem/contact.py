@@ -9,7 +9,7 @@ from typing import TypeAlias
 import ngsolve as ng
 import numpy as np
 
-from .values import region_name, scalar_data, unit_vector
+from .values import region_name, scalar_data, told, unit_vector
 
 Gap: TypeAlias = float | ng.CoefficientFunction | Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -80,6 +80,18 @@ class Contact:
                 raise ValueError(f"{what} = {value!r}: choose one of {known}")
         if self.roles == "auto" and self.primary is None:
             raise ValueError('roles = "auto" with primary=None: a rigid obstacle has no other side')
+
+    def named(self) -> str:
+        """Both sides, as a user knows them."""
+        other = "a rigid obstacle" if self.primary is None else f'"{self.primary}"'
+        return f'"{self.secondary}" with {other}'
+
+    def told(self) -> str:
+        """How it is measured, in a few words."""
+        parts = ["along the normal" if self.direction is None else f"along {told(self.direction)}"]
+        if self.gap is not None:
+            parts.append(f"gap {told(self.gap)}")
+        return ", ".join([*parts, *(["bilateral"] if self.bilateral else [])])
 
     def swapped(self) -> Contact:
         """The pair with its roles exchanged; a gap stays where it is measured or given."""

@@ -9,7 +9,7 @@ from typing import Any
 import ngsolve as ng
 import numpy as np
 
-from .values import refuse_where, scalar_data
+from .values import refuse_where, scalar_data, told
 
 VOIGT = {  # components of stress and strain in each model, the shear strain an engineering one
     "plane strain": ("xx", "yy", "xy"),
@@ -87,6 +87,10 @@ class Elastic:
             return ng.CF(rows, dims=(4, 4))
         return ng.CF((n, c, zero, c, n, zero, zero, zero, s), dims=(3, 3))
 
+    def told(self) -> str:
+        """Its constants, in a few words."""
+        return f"E = {told(self.E)}, nu = {told(self.nu)}"
+
     def check_at(self, points: np.ndarray, name: str) -> None:
         """Refuse values outside HH81 (2.7) at mesh `points` (n,); `name` leads the message."""
         if not isinstance(self.E, float):
@@ -141,6 +145,12 @@ class Hooke:
         if isinstance(self.C, np.ndarray):
             return ng.CF(tuple(self.C.ravel().tolist()), dims=self.C.shape)
         return ng.CF(self.C)
+
+    def told(self) -> str:
+        """Its matrix, in a few words."""
+        if isinstance(self.C, np.ndarray):
+            return "C = " + ", ".join(f"({', '.join(map(told, row))})" for row in self.C.tolist())
+        return "C = function"
 
     def check_model(self, model: str, name: str) -> None:
         """Refuse a matrix of another model; `name` leads the message."""

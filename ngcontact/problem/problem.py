@@ -33,6 +33,8 @@ from .values import (
     by_region,
     displacement_components,
     region_pattern,
+    table,
+    told,
     traction_data,
     vector_data,
 )
@@ -109,6 +111,23 @@ class Problem:
             "contact": _contacts(self.contact),
         }.items():
             object.__setattr__(self, name, value)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: a table of the data, a line each."""
+        rows = [("model", "", self.model)]
+        for name, law in self.materials.items():
+            rows.append(("material", name, law.told()))
+        for name, components in self.displacement.items():
+            rows.append(("displacement", name, told(components)))
+        if self.sliding is not None:
+            rows.append(("sliding", str(self.sliding), "no normal displacement, no shear"))
+        for name, load in self.traction.items():
+            kind = "pressure " if ng.CF(load).dim == 1 else ""
+            rows.append(("traction", name, kind + told(load)))
+        rows += [("force", name, told(load)) for name, load in self.force.items()]
+        for number, pair in enumerate(self.contact):
+            rows.append((f"contact {number}", pair.named(), pair.told()))
+        return table(("", "where", "what"), rows)
 
     def traction_vector(self, pattern: str) -> ng.CoefficientFunction:
         """Return P of HH81 (3.7) on a key of `traction`, dim 2; a pressure p becomes -p n."""

@@ -1,10 +1,12 @@
-"""Values of data: what is accepted, and what is refused with the value and what would be right."""
+"""Values of data: what is accepted, what is refused and what would be right, how all is shown."""
 
 from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from html import escape
 from typing import Any, NoReturn, TypeAlias
 
 import ngsolve as ng
@@ -151,3 +153,37 @@ def unit_vector(value: Any) -> tuple[float, float]:
         raise ValueError(f"direction = ({x}, {y}): give a vector from secondary to primary body")
     length = math.hypot(x / size, y / size)
     return x / size / length, y / size / length
+
+
+# Lines of what NGSolve prints of numbers, alone or in vectors.
+_LEAF = re.compile(r"\s*coef (-?[0-9.e+-]+|-?inf|nan), real")
+_AROUND = re.compile(
+    r"\s*coef (unary operation ' '|VectorialCoefficientFunction), real(, dim=\d+)?"
+)
+
+
+def told(value: Any) -> str:
+    """A value in a few characters: numbers, "free" for None, "function" for all that varies."""
+    if value is None:
+        return "free"
+    if isinstance(value, tuple):
+        return f"({', '.join(map(told, value))})"
+    if not isinstance(value, ng.CoefficientFunction):
+        return f"{value:.6g}" if isinstance(value, numbers.Real) else "function"
+    lines = str(value).replace("ZeroCF", "0").splitlines()
+    if lines == ["ZeroCoefficientFunction"]:
+        lines = ["coef 0, real"] * int(value.dim)
+    leaves = [leaf.group(1) for line in lines if (leaf := _LEAF.fullmatch(line))]
+    around = [line for line in lines if not _LEAF.fullmatch(line)]
+    if len(leaves) != value.dim or not all(map(_AROUND.fullmatch, around)):
+        return "function"
+    return leaves[0] if value.dim == 1 else f"({', '.join(leaves)})"
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """HTML of a table, for notebooks; all text is escaped."""
+    names = "".join(f"<th>{escape(name)}</th>" for name in head)
+    lines = "".join(
+        "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+    )
+    return f"<table><thead><tr>{names}</tr></thead><tbody>{lines}</tbody></table>"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from .. import __version__
 from .archive import Kept, restored, save, state_of
 from .record import Number, _Recorded, record_of
-from .text import _Told, line_of
+from .text import _Told, html_of, line_of
 from .values import Solved, Values, values_at
 
 
@@ -85,6 +86,25 @@ class Readable:
         """
         return save(self, path, __version__)
 
+    def draw(self: Solved) -> object:
+        """Draw the displacement in a notebook with NGSolve's webgui.
+
+        Raises
+        ------
+        ImportError
+            What the extra `notebook` installs is not there.
+        """
+        for package in ("anywidget", "IPython"):
+            if find_spec(package) is None:
+                raise ImportError(
+                    f"draw() needs {package}, which is not installed: pip install "
+                    "'ngcontact[notebook]', or use plot(), which needs nothing"
+                )
+        with np.errstate():  # NGSolve's module changes how NumPy warns, for the whole process
+            from ngsolve.webgui import Draw
+
+        return Draw(self.displacement, self.mesh, deformation=True)
+
     def __getstate__(self: Kept) -> dict[str, Any]:
         """What is pickled and copied: factorisations stay behind."""
         return state_of(self)
@@ -96,3 +116,7 @@ class Readable:
     def __str__(self: _Told) -> str:
         """One line: unknowns, active points, steps, pairs' forces; estimate, bound if known."""
         return line_of(self)
+
+    def _repr_html_(self: _Told) -> str:
+        """What a notebook shows."""
+        return html_of(self)

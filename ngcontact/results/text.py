@@ -1,4 +1,4 @@
-"""A solution in one line."""
+"""A solution in one line, and as a table in a notebook."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from ..discrete import RigidMotion
+from ..problem import table
 from .record import _Recorded
 
 
@@ -48,3 +49,31 @@ def facts(solution: _Told) -> list[tuple[str, str]]:
     if solution.problem.contact:
         told.append(("force", forces(solution)))
     return told
+
+
+def html_of(solution: _Told) -> str:
+    """What a notebook shows: facts, then a line for each pair."""
+    rows = [(name, value.strip()) for name, value in _named(solution)]
+    about = table(("", ""), rows)
+    if not solution.problem.contact:
+        return about
+    lines = []
+    for number, (pair, contact) in enumerate(
+        zip(solution.pairs, solution.problem.contact, strict=True)
+    ):
+        x, y = solution.contact_force(number) + 0.0
+        peak = float(pair.pressure.max(initial=0.0))
+        active = f"{np.count_nonzero(pair.active)}/{pair.gap.size}"
+        force = f"({x:.6g}, {y:.6g})"
+        lines.append((str(number), contact.named(), force, f"{peak:.6g}", active))
+    return about + table(("contact", "of", "force", "peak pressure", "active"), lines)
+
+
+def _named(solution: _Told) -> list[tuple[str, str]]:
+    """Facts with a name each, without those of pairs."""
+    words = (
+        (name, value) if name else tuple(reversed(value.strip().split(" ", 1)))
+        for name, value in facts(solution)
+        if name != "force"
+    )
+    return [(name.rstrip(":"), value) for name, value in words]

@@ -60,6 +60,7 @@ SIGNATURES = {
         "tolerance": None,
         "max_dofs": 100_000,
         "guaranteed": False,
+        "progress": False,
     },
     "solve_qp": {
         "A": REQUIRED,
