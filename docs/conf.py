@@ -6,7 +6,9 @@ from pathlib import Path
 HERE = Path(__file__).parent
 sys.path[:0] = [str(HERE.parent), str(HERE / "extensions")]
 
-import ngcontact  # noqa: E402 - found by the line above
+from jupyter_client.manager import KernelManager  # noqa: E402
+
+import ngcontact  # noqa: E402 - found by the second line
 
 project = "ngcontact"
 author = "The ngcontact developers"
@@ -34,6 +36,8 @@ myst_heading_anchors = 3
 myst_links_external_new_tab = False
 
 # Notebooks: every one is executed, an error in one is an error of the build.
+if hasattr(KernelManager, "transport_encryption"):  # else kernels warn that others could listen
+    KernelManager.transport_encryption.default_value = "auto"
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(HERE.parent / "build" / "notebooks")
 nb_execution_in_temp = True
