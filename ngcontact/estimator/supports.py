@@ -42,11 +42,10 @@ def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTer
     squares = _rough_loads(solution, segment, s, residual)
     for pattern, components in problem.displacement.items():  # (3.6)
         at = boundary.lies_on(segment, pattern)
-        given = [axis for axis, value in enumerate(components) if value is not None]
+        given = {axis: value for axis, value in enumerate(components) if value is not None}
         for axis in given:
             residual[at, axis] = factor[at, axis] = 0.0
-        data = ng.CF(tuple(components[axis] for axis in given))
-        squares.append(_displacement(solution, boundary.segments(pattern), given, data))
+        squares.append(_displacement(solution, boundary.segments(pattern), given))
     guided = np.zeros(len(segment), dtype=bool)
     if problem.sliding is not None:  # (3.8): any force along the normal, none across it
         guided = boundary.lies_on(segment, str(problem.sliding))
@@ -104,27 +103,27 @@ def _rough_loads(
 
 
 def _displacement(
-    solution: ScaledSolution, segments: Index, axes: list[int], data: ng.CoefficientFunction
+    solution: ScaledSolution, segments: Index, data: dict[int, ng.CoefficientFunction]
 ) -> Squares:
-    """2 mu |w| max(|w| / h, |w'|) on `segments` (k,), with w = u_D - u_h of components given.
+    """2 mu |w| max(|w| / h, |w'|) on `segments` (k,), with w = u_D - u_h, `data` by component.
 
     |w| |w'| bounds the square of w in H^(1/2), and 2 mu times that the energy that w costs.
     """
     boundary, order = solution.boundary, 2 * solution.order + DATA_BONUS
     points, weights = gauss(order)
     size = boundary.lengths(segments)
+    u = solution.displacement
+    missed = ng.CF(tuple(value - u[axis] for axis, value in data.items()))
 
     def miss(segment: Index, s: Array) -> Array:
         """Values (k, m, c) at `s` (k, m) of segments (k,), without a unit."""
-        every, where = np.repeat(segment, s.shape[1]), s.ravel()
-        u = boundary.evaluate(solution.displacement, every, where)[:, axes]
-        w = boundary.evaluate(data, every, where) - u
-        return np.asarray(w.reshape(*s.shape, len(axes)) / solution.strain)
+        w = boundary.evaluate(missed, np.repeat(segment, s.shape[1]), s.ravel())
+        return np.asarray(w.reshape(*s.shape, len(data)) / solution.strain)
 
     count, mesh = len(segments), boundary.mesh
     number, start, length = np.arange(count), np.zeros(count), np.ones(count)
     w = miss(segments, np.tile(points, (count, 1)))
-    rough = rough_segments(data, mesh, segments, solution.strain * np.abs(w).max())
+    rough = rough_segments([*data.values()], mesh, segments, solution.strain * np.abs(w).max())
     if rough.any():
         found = pieces(
             lambda k, s: miss(segments[k], s), boundary.mesh, size, np.flatnonzero(rough)

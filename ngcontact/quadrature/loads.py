@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two
 from .cells import Cells, following, joined, whole
-from .lattice import divisions, extent
+from .lattice import divisions
 from .view import View, looked_at
 
 SHAPE = 0.05  # what they miss of a load at a point, relative to its largest value ...
@@ -20,6 +21,7 @@ SHARE = {
 }  # ... or over an element, relative to its integral, at which it is rough there
 POINTS = {1: 3, 2: 1}  # parts of a lattice that one of the rule is as good as
 LONG = 4000  # of what is printed; numbers are short
+KNOWN: WeakKeyDictionary[ng.CoefficientFunction, bool] = WeakKeyDictionary()  # numbers or not
 KEPT = "_ngcontact_loads"  # attribute of a mesh
 CURVED = 4  # quadrature orders for the maps of curved elements
 FINE = {1: 1e-6, 2: 1e-5}  # error of a part relative to that integral at which it is not halved
@@ -62,10 +64,13 @@ def moment_degree(order: int) -> int:
     return max(order, 2) + 1
 
 
-def numbers(load: ng.CoefficientFunction) -> bool:
-    """Whether a load is made of numbers alone: these are nowhere rough."""
-    text = str(load)
-    return len(text) < LONG and all(NUMBERS.fullmatch(line) for line in text.splitlines())
+def numbers(data: ng.CoefficientFunction) -> bool:
+    """Whether data are made of numbers alone: these are nowhere rough. Looked at once."""
+    if data not in KNOWN:  # printing a long expression costs as much as evaluating it
+        text = str(data)
+        lines = text.splitlines() if len(text) < LONG else [text]
+        KNOWN[data] = len(text) < LONG and all(map(NUMBERS.fullmatch, lines))
+    return KNOWN[data]
 
 
 def rough_load(load: ng.CoefficientFunction, region: ng.Region, degree: int) -> RoughLoad | None:
@@ -80,8 +85,6 @@ def rough_load(load: ng.CoefficientFunction, region: ng.Region, degree: int) -> 
     degree : int
         Of the polynomials with the same moments.
     """
-    if numbers(load):
-        return None
     view = View(region.mesh, 2 if region.VB() == ng.VOL else 1)
     inside = view.inside(region)
     rough, total = _rough(load, view, inside)
@@ -89,7 +92,7 @@ def rough_load(load: ng.CoefficientFunction, region: ng.Region, degree: int) -> 
         return None
     rough = view.with_neighbours(rough, inside)  # a part of a feature may have none of the points
     elements = np.flatnonzero(rough)
-    count = divisions(view.dim, view.sizes[elements], extent(region.mesh))
+    count = divisions(view.dim, view.sizes[elements], view.extent)
     count = np.maximum(count // POINTS[view.dim], 2)
     start = [whole(view.dim, elements[count == n]).divided(n) for n in np.unique(count).tolist()]
 
@@ -111,6 +114,8 @@ def known_rough_load(
 
     A mesh keeps it as long as it lives: loads are assembled, then the estimate asks again.
     """
+    if numbers(data):
+        return None
     key = (id(data), str(region.VB()), bytes(np.array(region.Mask())), degree)
     kept = getattr(region.mesh, KEPT, {})
     count = region.mesh.GetNE(region.VB())
@@ -123,7 +128,9 @@ def known_rough_load(
 def keep_rough_load(
     data: ng.CoefficientFunction, load: ng.CoefficientFunction, region: ng.Region, degree: int
 ) -> RoughLoad | None:
-    """`rough_load`, kept for `known_rough_load`."""
+    """`rough_load`, kept for `known_rough_load`; numbers are nowhere rough."""
+    if numbers(data):
+        return None
     found = rough_load(load, region, degree)
     key = (id(data), str(region.VB()), bytes(np.array(region.Mask())), degree)
     kept = getattr(region.mesh, KEPT, {})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import ngsolve as ng
 import numpy as np
@@ -20,16 +20,16 @@ FOLLOWED = 1e-3  # error of the squares on a part, relative to all of them
 
 
 def rough_segments(
-    values: ng.CoefficientFunction, mesh: ng.Mesh, segments: Index, missed: float
+    values: Sequence[ng.CoefficientFunction], mesh: ng.Mesh, segments: Index, missed: float
 ) -> Mask:
-    """Which `segments` (k,) have values that are not seen at a few points, (k,).
+    """Which `segments` (k,) have values, scalars, that are not seen at a few points, (k,).
 
     `missed` is how far a displacement is from them there. Numbers are nowhere rough.
     """
-    if numbers(values):
+    if all(map(numbers, values)):
         return np.zeros(len(segments), dtype=bool)
     left, largest = np.zeros(mesh.GetNE(ng.BND)), 0.0
-    for here, found, beyond in looked_at(values, View(mesh, 1), segments, ENOUGH):
+    for here, found, beyond in looked_at(ng.CF(tuple(values)), View(mesh, 1), segments, ENOUGH):
         left[here] = beyond
         largest = max(largest, float(np.abs(found).max()))
     return np.asarray(left[segments] > max(RESOLVED * missed, NOISE * largest))

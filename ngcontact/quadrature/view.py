@@ -13,7 +13,7 @@ import numpy as np
 from ..arrays import Array, Index, Mask
 from ..mesh import diameters
 from ..problem import Triangulation
-from .lattice import divisions, extent, lattice, mesh_points
+from .lattice import divisions, lattice, mesh_points
 
 DEGREE = 6  # of polynomials that the usual rules integrate against displacements
 
@@ -25,16 +25,24 @@ class View:
     mesh: ng.Mesh
     dim: int
 
+    @cached_property
+    def arrays(self) -> Triangulation:
+        """The mesh as arrays."""
+        return Triangulation(self.mesh)
+
+    @cached_property
+    def extent(self) -> float:
+        """Largest extent of the mesh along x or y, a length."""
+        return float(np.ptp(self.arrays.vertices, axis=0).max())
+
     def inside(self, region: ng.Region) -> Index:
         """Numbers (k,) of those in a region of the same dimension."""
-        view = Triangulation(self.mesh)
-        number = view.bodies if self.dim == 2 else view.boundaries
+        number = self.arrays.bodies if self.dim == 2 else self.arrays.boundaries
         return np.flatnonzero(np.array(region.Mask())[number])
 
     def with_neighbours(self, some: Mask, inside: Index) -> Mask:
         """Mask (n,) of `some` (n,) and of those `inside` (k,) that share a vertex with one."""
-        view = Triangulation(self.mesh)
-        ends = view.triangles if self.dim == 2 else view.segments
+        ends = self.arrays.triangles if self.dim == 2 else self.arrays.segments
         touched = np.zeros(self.mesh.nv, dtype=bool)
         touched[ends[some]] = True
         result = some.copy()
@@ -44,12 +52,10 @@ class View:
     @cached_property
     def sizes(self) -> Array:
         """Diameters or lengths (n,) of all elements."""
-        view = Triangulation(self.mesh)
         if self.dim == 2:
             return diameters(self.mesh)
-        return np.asarray(
-            np.linalg.norm(np.diff(view.vertices[view.segments], axis=1)[:, 0], axis=1)
-        )
+        ends = self.arrays.vertices[self.arrays.segments]
+        return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
     @property
     def measure(self) -> ng.CoefficientFunction:
@@ -113,7 +119,7 @@ def looked_at(
     fewest : int
         Parts of their sides at least.
     """
-    count = divisions(view.dim, view.sizes[elements], extent(view.mesh))
+    count = divisions(view.dim, view.sizes[elements], view.extent)
     count = np.maximum(count, fewest)
     for n in np.unique(count).tolist():
         here = elements[count == n]

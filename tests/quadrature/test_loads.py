@@ -113,7 +113,7 @@ def test_numbers_are_not_looked_at(data, monkeypatch):
     assert numbers(data)
     assert not numbers(ng.CF((ng.x, 0)))
     monkeypatch.delattr("ngcontact.quadrature.values.looked_at")
-    assert not rough_segments(data, mesh, np.arange(mesh.GetNE(ng.BND)), 1.0).any()
+    assert not rough_segments([data], mesh, np.arange(mesh.GetNE(ng.BND)), 1.0).any()
 
 
 def test_noise_is_said_to_be_missed():

@@ -149,10 +149,10 @@ def pressure_on_segments(values: Array, order: int) -> Array:
     values = np.where(missing, 0.0, values)
     for k in np.flatnonzero(missing.any(axis=1) & ~missing.all(axis=1)):
         known = ~missing[k]
-        degree = known.sum() - 1
-        scaled = None if degree else (0, 1)  # one node spans no interval, which old NumPy asks
-        fit = np.polynomial.Polynomial.fit(nodes[known], values[k, known], degree, scaled)
-        values[k, missing[k]] = fit(nodes[missing[k]])
+        powers = np.vander(2 * nodes - 1, np.count_nonzero(known))
+        values[k, missing[k]] = powers[missing[k]] @ np.linalg.solve(
+            powers[known], values[k, known]
+        )
     return values
 
 
