@@ -8,9 +8,10 @@ from functools import lru_cache
 
 import ngsolve as ng
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask
-from .lattice import parts
+from .lattice import monomials, parts
 
 ORDER = {1: 7, 2: 4}  # of the rule on a part
 DEEPEST = {1: 40, 2: 10}  # halvings of the sides of a part
@@ -35,12 +36,7 @@ def rule(dim: int) -> tuple[Array, Array, Array]:
     corners = np.vstack([np.zeros(dim), np.eye(dim)])
     corners = corners + CORNER * (middle - corners)
     degree = {1: 3, 2: 2}[dim]
-    powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i) if dim == 2 or j < 1]
-
-    def monomials(x: Array) -> Array:
-        return np.column_stack([x[:, 0] ** i * x[:, -1] ** j for i, j in powers])
-
-    through = monomials(corners) @ np.linalg.pinv(monomials(inner))
+    through = monomials(corners, degree) @ np.linalg.pinv(monomials(inner, degree))
     return (
         np.vstack([inner, corners]),
         np.append(made.weights, np.zeros(dim + 1)),
@@ -105,8 +101,13 @@ def _arrays(cells: Cells) -> tuple[Index, Array, Array]:
     return cells.element, cells.origin, cells.side
 
 
-def following(integrand: Integrand, cells: Cells, allowed: float) -> tuple[Cells, Array]:
+def following(
+    integrand: Integrand, cells: Cells, allowed: float, corners: Array | None = None
+) -> tuple[Cells, Array, Array]:
     """Parts of `cells` on which the rule integrates a function.
+
+    What is beside a part that is halved is halved, too, where `corners` tell: it may hold the rest
+    of what is there without any of the points.
 
     Parameters
     ----------
@@ -116,34 +117,55 @@ def following(integrand: Integrand, cells: Cells, allowed: float) -> tuple[Cells
         To start from.
     allowed : float
         Difference of the integrals over a part and over its halves at which it is not halved again.
+    corners : ndarray (n, 3, 2), optional
+        Of all triangles, lengths.
 
     Returns
     -------
     Cells
         The parts.
+    values : ndarray (k, m, c)
+        The function there.
     missed : ndarray (k,)
         That difference where a part is halved no more although it is larger, else 0.
     """
-    dim, found, missed = cells.origin.shape[1], [], []
+    dim = cells.origin.shape[1]
+    found, kept, missed = [], [], []
 
-    def integrals(cells: Cells) -> tuple[Array, Array]:
+    def integrals(cells: Cells) -> tuple[Array, Array, Array]:
         values = integrand(cells.element, cells.points)
         beyond = np.abs(rule(dim)[2] @ values).max(axis=(1, 2))
         integral = (cells.weights[:, None] @ values)[:, 0]
-        return integral, BEYOND * beyond * cells.weights.sum(axis=1)
+        return values, integral, BEYOND * beyond * cells.weights.sum(axis=1)
 
-    coarse, beyond = integrals(cells)
+    _, coarse, beyond = integrals(cells)
     for depth in range(DEEPEST[dim]):
         halves = cells.divided(2)
-        fine, next_beyond = integrals(halves)
+        values, fine, next_beyond = integrals(halves)
         error = np.abs(fine.reshape(len(coarse), 2**dim, -1).sum(axis=1) - coarse).max(axis=1)
         error = np.maximum(error, beyond)
         last = depth == DEEPEST[dim] - 1 or np.count_nonzero(error > allowed) > MOST_CELLS
-        again = np.repeat((error > allowed) & (not last), 2**dim)
+        some = (error > allowed) & (not last)
+        if corners is not None and some.any():
+            some = _with_those_beside(some, cells, corners)
+        again = np.repeat(some, 2**dim)
         found.append(halves[~again])
+        kept.append(values[~again])
         over = np.where(error > allowed, error, 0.0) * last / 2**dim
         missed.append(np.repeat(over, 2**dim)[~again])
         cells, coarse, beyond = halves[again], fine[again], next_beyond[again]
         if not len(coarse):
             break
-    return joined(found), np.concatenate(missed)
+    return joined(found), np.concatenate(kept), np.concatenate(missed)
+
+
+def _with_those_beside(some: Mask, cells: Cells, corners: Array) -> Mask:
+    """The cells `some` (k,) and those that may touch one, (k,); `corners` (n, 3, 2) as above."""
+    of = corners[cells.element]
+    sides = cells.side @ (of[:, :2] - of[:, 2:])
+    origin = of[:, 2] + (cells.origin[:, None] @ (of[:, :2] - of[:, 2:]))[:, 0]
+    middle = origin + sides.sum(axis=1) / 3
+    ends = np.concatenate([origin[:, None], origin[:, None] + sides], axis=1)
+    radius = np.linalg.norm(ends - middle[:, None], axis=2).max(axis=1)
+    apart, nearest = cKDTree(middle[some]).query(middle)
+    return np.asarray(apart <= radius + radius[some][nearest])

@@ -49,6 +49,15 @@ def lattice(dim: int, n: int) -> Array:
     return np.asarray(origin + side.sum(axis=1) / 3)
 
 
+def monomials(x: Array, degree: int) -> Array:
+    """Products of the coordinates up to a degree at points `x` (..., dim), (..., q)."""
+    found = [np.ones(x.shape[:-1])]  # each by one product, in the order of degrees
+    for d in range(1, degree + 1):
+        first = [x[..., 0] * previous for previous in found[-d if x.shape[-1] == 2 else -1 :]]
+        found += first + ([x[..., 1] * found[-1]] if x.shape[-1] == 2 else [])
+    return np.stack(found, axis=-1)
+
+
 @lru_cache
 def composite(n: int, order: int) -> ng.IntegrationRule:
     """Rule of an order on each of n^2 equal parts of a triangle."""

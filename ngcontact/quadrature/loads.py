@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two
 from .cells import Cells, following, joined, whole
-from .lattice import divisions
+from .lattice import divisions, monomials
 from .view import View, looked_at
 
 SHAPE = 0.05  # what they miss of a load at a point, relative to its largest value ...
@@ -19,12 +19,12 @@ SHARE = {
     1: 1e-4,
     2: 2e-3,
 }  # ... or over an element, relative to its integral, at which it is rough there
-POINTS = {1: 3, 2: 1}  # parts of a lattice that one of the rule is as good as
+POINTS = {1: 3, 2: 3}  # parts of a lattice that one of the rule is as good as
 LONG = 4000  # of what is printed; numbers are short
 KNOWN: WeakKeyDictionary[ng.CoefficientFunction, bool] = WeakKeyDictionary()  # numbers or not
 KEPT = "_ngcontact_loads"  # attribute of a mesh
 CURVED = 4  # quadrature orders for the maps of curved elements
-FINE = {1: 1e-6, 2: 1e-5}  # error of a part relative to that integral at which it is not halved
+FINE = {1: 1e-6, 2: 3e-5}  # error of a part relative to that integral at which it is not halved
 # What NGSolve prints of numbers, also times others and times the normal.
 NUMBER = r"[-+.\de]+"
 NUMBERS = re.compile(
@@ -50,6 +50,8 @@ class RoughLoad:
         Error of the integral of the load, a force.
     total : float
         Integral of the load's size, a force.
+    seen : int
+        Tells the values from which it was found rough.
     """
 
     rough: Mask
@@ -57,6 +59,7 @@ class RoughLoad:
     rest: Array
     missed: Array
     total: float
+    seen: int
 
 
 def moment_degree(order: int) -> int:
@@ -73,7 +76,12 @@ def numbers(data: ng.CoefficientFunction) -> bool:
     return KNOWN[data]
 
 
-def rough_load(load: ng.CoefficientFunction, region: ng.Region, degree: int) -> RoughLoad | None:
+def rough_load(
+    load: ng.CoefficientFunction,
+    region: ng.Region,
+    degree: int,
+    known: RoughLoad | None = None,
+) -> RoughLoad | None:
     """A load on a region, bodies or boundaries, where it is rough; None where it is nowhere.
 
     Parameters
@@ -84,12 +92,14 @@ def rough_load(load: ng.CoefficientFunction, region: ng.Region, degree: int) -> 
         Where it acts.
     degree : int
         Of the polynomials with the same moments.
+    known : RoughLoad, optional
+        What was found of it before, returned where nothing has changed.
     """
     view = View(region.mesh, 2 if region.VB() == ng.VOL else 1)
     inside = view.inside(region)
-    rough, total = _rough(load, view, inside)
-    if not rough.any():
-        return None
+    rough, total, seen = _rough(load, view, inside)
+    if not rough.any() or (known is not None and known.seen == seen):
+        return known if rough.any() else None
     rough = view.with_neighbours(rough, inside)  # a part of a feature may have none of the points
     elements = np.flatnonzero(rough)
     count = divisions(view.dim, view.sizes[elements], view.extent)
@@ -100,11 +110,12 @@ def rough_load(load: ng.CoefficientFunction, region: ng.Region, degree: int) -> 
         values = view.evaluate(load, elements, reference)
         return np.asarray(values * view.evaluate(view.measure, elements, reference))
 
-    cells, over = following(density, joined(start), FINE[view.dim] * total)
+    corners = view.arrays.corners if view.dim == 2 else None
+    cells, values, over = following(density, joined(start), FINE[view.dim] * total, corners)
     missed = np.bincount(cells.element, over, len(rough)).astype(float)
     order = np.argsort(cells.element, kind="stable")
-    projection, rest = _projected(load, view, cells[order], degree)
-    return RoughLoad(rough, projection, rest, missed, total)
+    projection, rest = _projected(values[order], view, cells[order], degree)
+    return RoughLoad(rough, projection, rest, missed, total, seen)
 
 
 def known_rough_load(
@@ -131,45 +142,54 @@ def keep_rough_load(
     """`rough_load`, kept for `known_rough_load`; numbers are nowhere rough."""
     if numbers(data):
         return None
-    found = rough_load(load, region, degree)
     key = (id(data), str(region.VB()), bytes(np.array(region.Mask())), degree)
-    kept = getattr(region.mesh, KEPT, {})
-    kept[key] = (data, region.mesh.GetNE(region.VB()), found)
+    kept, count = getattr(region.mesh, KEPT, {}), region.mesh.GetNE(region.VB())
+    before = kept[key][2] if key in kept and kept[key][:2] == (data, count) else None
+    found = rough_load(load, region, degree, before)
+    kept[key] = (data, count, found)
     setattr(region.mesh, KEPT, kept)
     return found
 
 
-def _rough(load: ng.CoefficientFunction, view: View, elements: Index) -> tuple[Mask, float]:
-    """Those (n,) of `elements` (k,) where a load is rough, and the integral of its size."""
+def _rough(load: ng.CoefficientFunction, view: View, elements: Index) -> tuple[Mask, float, int]:
+    """Those (n,) of `elements` (k,) where a load is rough, the integral of its size, what is seen.
+
+    The last is a number that other values, or other elements, change.
+    """
     sizes = view.sizes
-    miss, largest, total = np.zeros(len(sizes)), 0.0, 0.0
+    miss, largest, total, seen = np.zeros(len(sizes)), 0.0, 0.0, 0
     for here, values, left in looked_at(load, view, elements):
         miss[here] = left
+        seen = hash((seen, here.tobytes(), sizes[here].tobytes(), values.tobytes()))
         size = np.abs(values).max(axis=2)  # no squares: they may leave the range of numbers
         largest = max(largest, float(size.max(initial=0.0)))
         total += float(size.mean(axis=1) @ sizes[here] ** view.dim) / view.dim
     share = miss * sizes**view.dim / view.dim
-    return (miss > SHAPE * largest) | (share > SHARE[view.dim] * total), total
+    return (miss > SHAPE * largest) | (share > SHARE[view.dim] * total), total, seen
 
 
 def _projected(
-    load: ng.CoefficientFunction, view: View, cells: Cells, degree: int
+    values: Array, view: View, cells: Cells, degree: int
 ) -> tuple[ng.GridFunction, Array]:
-    """Polynomials with the moments of a load on `cells`, sorted by element; squares (n,) left."""
+    """Polynomials with the moments of a load on `cells`, sorted by element; squares (n,) left.
+
+    `values` (k, m, c) are the load times the measure at the points of the k cells.
+    """
     space, shapes = view.shapes(degree)
     elements, first = np.unique(cells.element, return_index=True)
-    values = view.evaluate(load, cells.element, cells.points)
-    density = cells.weights * view.evaluate(view.measure, cells.element, cells.points)[..., 0]
-    shape = view.evaluate(shapes, cells.element, cells.points)
-    moments = np.swapaxes(density[..., None] * shape, 1, 2) @ values
+    measure = view.evaluate(view.measure, cells.element, cells.points)
+    shape = monomials(2 * cells.points - 1, degree)
+    moments = np.swapaxes(cells.weights[..., None] * shape, 1, 2) @ values
     moments = np.add.reduceat(moments, first, axis=0)
+    moments = np.swapaxes(view.as_monomials(shapes, elements, degree), 1, 2) @ moments
+    density, values = cells.weights * measure[..., 0], values / measure
     unit = power_of_two(values)
     squares = np.add.reduceat((density * ((values / unit) ** 2).sum(axis=2)).sum(axis=1), first)
     coefficients = np.linalg.solve(view.mass(shapes, elements, 2 * degree + CURVED), moments)
-    projection = ng.GridFunction(type(space)(view.mesh, order=degree, dim=load.dim))
-    number = moments.shape[1]
+    _, number, count = moments.shape
+    projection = ng.GridFunction(type(space)(view.mesh, order=degree, dim=count))
     at = (elements[:, None] * number + np.arange(number)).ravel()
-    projection.vec.FV().NumPy().reshape(-1, load.dim)[at] = coefficients.reshape(-1, load.dim)
+    projection.vec.FV().NumPy().reshape(-1, count)[at] = coefficients.reshape(-1, count)
     rest = np.zeros(len(view.sizes))
     squares -= (coefficients / unit * (moments / unit)).sum(axis=(1, 2))
     rest[elements] = unit * np.sqrt(np.maximum(squares, 0.0))

@@ -60,5 +60,5 @@ def pieces(
     n = max(ENOUGH, int(divisions(1, sizes[at], extent(mesh)).max()))
     cells = whole(1, at).divided(n)
     total = float((cells.weights * squares(cells.element, cells.points).sum(axis=2)).sum())
-    cells, _ = following(squares, cells, FOLLOWED * total)
+    cells, *_ = following(squares, cells, FOLLOWED * total)
     return cells.element, cells.origin[:, 0], cells.side[:, 0, 0]

@@ -13,7 +13,7 @@ import numpy as np
 from ..arrays import Array, Index, Mask
 from ..mesh import diameters
 from ..problem import Triangulation
-from .lattice import divisions, lattice, mesh_points
+from .lattice import divisions, lattice, mesh_points, monomials
 
 DEGREE = 6  # of polynomials that the usual rules integrate against displacements
 
@@ -81,6 +81,14 @@ class View:
             functions[-1].vec.FV().NumPy()[j::number] = 1.0
         return space, ng.CF(tuple(functions))
 
+    def as_monomials(self, shapes: ng.CoefficientFunction, elements: Index, degree: int) -> Array:
+        """Matrices (j, q, q) from the monomials of 2x - 1 to the q functions of `elements` (j,)."""
+        i = np.arange(degree + 1) / degree
+        x = np.stack(np.meshgrid(*self.dim * [i], indexing="ij"), axis=-1).reshape(-1, self.dim)
+        x = x[x.sum(axis=1) < 1 + 0.5 / degree]  # one point for each
+        values = self.evaluate(shapes, elements, x)
+        return np.asarray(np.linalg.solve(monomials(2 * x - 1, degree), values))
+
     def mass(self, shapes: ng.CoefficientFunction, elements: Index, order: int) -> Array:
         """Integrals (j, q, q) of the products of an element's q functions over `elements` (j,)."""
         rule = ng.IntegrationRule(ng.SEGM if self.dim == 1 else ng.TRIG, order)
@@ -98,9 +106,7 @@ def polynomials(dim: int, n: int) -> Array:
     """
     x = 2 * lattice(dim, n) - 1
     degree = min({1: n - 2, 2: n - 1}[dim], DEGREE)
-    powers = [(i, j) for i in range(degree + 1) for j in range(degree + 1 - i) if dim == 2 or j < 1]
-    basis, _ = np.linalg.qr(np.column_stack([x[:, 0] ** i * x[:, -1] ** j for i, j in powers]))
-    return np.asarray(basis)
+    return np.asarray(np.linalg.qr(monomials(x, degree))[0])
 
 
 def looked_at(

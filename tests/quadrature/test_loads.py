@@ -11,8 +11,10 @@ from netgen.occ import OCCGeometry, Rectangle, X, Y
 
 from ngcontact import Elastic, Problem, solve
 from ngcontact.mesh import first_mesh
-from ngcontact.quadrature import rough_load, rough_segments
+from ngcontact.quadrature import keep_rough_load, known_rough_load, rough_load, rough_segments
+from ngcontact.quadrature.lattice import monomials
 from ngcontact.quadrature.loads import numbers
+from ngcontact.quadrature.view import View
 
 
 def square():
@@ -45,7 +47,11 @@ def test_a_narrow_strip_of_pressure_is_not_lost(start, order):
     assert force == pytest.approx([0, 1], abs=2e-5)
 
 
-@pytest.mark.parametrize(("x", "y"), [(0.533, 0.621), (0.05, 0.97), (0.25, 0.25)])
+@pytest.mark.parametrize(
+    ("x", "y"),
+    # Of the last two a part of 1 % lay between the points beside those that saw the rest.
+    [(0.533, 0.621), (0.05, 0.97), (0.25, 0.25), (0.884, 0.583), (0.871, 0.11)],
+)
 def test_a_small_patch_of_body_force_is_not_lost(x, y):
     inside = ng.IfPos(0.005**2 - (ng.x - x) ** 2 - (ng.y - y) ** 2, 1.0, 0.0)
     problem = loaded(force={"body": (0, -1e4 * inside)})
@@ -114,6 +120,31 @@ def test_numbers_are_not_looked_at(data, monkeypatch):
     assert not numbers(ng.CF((ng.x, 0)))
     monkeypatch.delattr("ngcontact.quadrature.values.looked_at")
     assert not rough_segments([data], mesh, np.arange(mesh.GetNE(ng.BND)), 1.0).any()
+
+
+def test_what_was_found_is_kept_until_a_value_changes():
+    """`Parameter`s change the values of a load that is the same object."""
+    mesh, position = first_mesh(loaded()), ng.Parameter(0.3)
+    load = ng.CF((0, ng.IfPos((ng.x - position) ** 2 - 0.01**2, 0.0, 1.0)))
+    region = mesh.Boundaries("top")
+    found = keep_rough_load(load, load, region, 3)
+    assert keep_rough_load(load, load, region, 3) is found
+    assert known_rough_load(load, load, region, 3) is found
+    position.Set(0.6)
+    moved = keep_rough_load(load, load, region, 3)
+    middles = ng.Integrate(ng.x * moved.projection[1], mesh, ng.BND, definedon=region)
+    assert middles == pytest.approx(0.6 * 0.02, rel=1e-4)  # parts are halved to 1e-6 of the load
+
+
+@pytest.mark.parametrize("dim", [1, 2])
+@pytest.mark.parametrize("degree", [1, 3, 5])
+def test_functions_of_an_element_as_monomials(dim, degree):
+    mesh = first_mesh(loaded())
+    view, some = View(mesh, dim), np.array([0, 3, 5])
+    _, shapes = view.shapes(degree)
+    x = np.random.default_rng(1).uniform(0, 0.5, (7, dim))
+    found = monomials(2 * x - 1, degree) @ view.as_monomials(shapes, some, degree)
+    assert found == pytest.approx(view.evaluate(shapes, some, x), abs=1e-12)
 
 
 def test_noise_is_said_to_be_missed():

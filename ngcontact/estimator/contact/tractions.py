@@ -149,7 +149,7 @@ def pressure_on_segments(values: Array, order: int) -> Array:
     values = np.where(missing, 0.0, values)
     for k in np.flatnonzero(missing.any(axis=1) & ~missing.all(axis=1)):
         known = ~missing[k]
-        powers = np.vander(2 * nodes - 1, np.count_nonzero(known))
+        powers = np.vander(2 * nodes - 1, int(known.sum()))
         values[k, missing[k]] = powers[missing[k]] @ np.linalg.solve(
             powers[known], values[k, known]
         )
