@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Index
+from ...arrays import Array
 from ...contact import ContactState
 from ...errors import ContactError
 from ...fem import BoundaryTrace
@@ -26,6 +26,7 @@ from .data import (
     EdgeConditions,
     Partition,
     Units,
+    bent_segments,
     degree_for,
     discrete_on,
     divided_elements,
@@ -43,7 +44,7 @@ from .liftings import (
     strip_norms,
 )
 from .parts import ErrorBound, complementarity, summed, work_of_supports
-from .pressures import pieces_of, selected, zone_of
+from .pressures import Pieces, facing_cuts, pieces_of, selected, zone_of
 from .record import Norms, Proof
 from .refusals import refuse_bound
 from .remainders import missed_tractions
@@ -77,11 +78,11 @@ def error_bound(
     """
     refuse_bound(problem, boundary, pairs)
     units = units_of(problem, boundary, stress)
-    partition = _partition(problem, boundary, pairs, units)
+    every_pieces = [pieces_of(pair.line, boundary) for pair in pairs]
+    partition = _partition(problem, boundary, every_pieces, units)
     discrete = discrete_on(problem, boundary, partition, stress, units)
     conditions = edge_conditions(problem, boundary, partition, discrete.degree, units.stress)
     zones = [zone_of(pair, boundary, discrete.degree - 1) for pair in pairs]
-    every_pieces = [pieces_of(pair.line, boundary) for pair in pairs]
     supported = np.unique(partition.ends[~conditions.constrained.all(axis=1)])
     gaps = [
         gap_of(zone, pieces, boundary, displacement, units, supported)
@@ -149,13 +150,18 @@ def _constitutive(discrete: Discrete, result: Equilibrated) -> Array:
 
 
 def _partition(
-    problem: Problem, boundary: BoundaryTrace, pairs: Sequence[ContactState], units: Units
+    problem: Problem, boundary: BoundaryTrace, every_pieces: Sequence[Pieces], units: Units
 ) -> Partition:
-    """The triangles of the mesh, those divided in whose corners given tractions meet."""
-    uneven = [pair.line.facing for pair in pairs if pair.line.means.any()]
-    facing: Index = np.concatenate([np.zeros(0, dtype=np.intp), *uneven])
-    divided = divided_elements(problem, boundary, degree_for(boundary), facing)
-    return partition_of(boundary, units.length, divided)
+    """The triangles of the mesh, some in parts."""
+    given = [*problem.displacement, *problem.traction, problem.sliding]
+    secondaries = [pair.secondary for pair in problem.contact]
+    at = boundary.segments(*(str(p) for p in (*given, *secondaries) if p is not None))
+    whole = np.union1d(at, bent_segments(boundary))
+    cuts, uneven = facing_cuts(every_pieces, boundary, whole)
+    divided = divided_elements(problem, boundary, degree_for(boundary), uneven)
+    # Two triangles meet at a cut: tractions that are not the same on both sides leave no freedom.
+    divided[boundary.element[[number for number in uneven if number in cuts]]] = True
+    return partition_of(boundary, units.length, divided, cuts)
 
 
 def _stress(proof: Proof, certificate: dict[str, float]) -> EquilibratedStress:

@@ -133,8 +133,8 @@ def _on_zone(
         sides.append((1.0, pieces.facing, at_points(c, t), np.abs(at_points(derivative(c), t))))
     found = []
     for sign, segment, place, slope in sides:
-        edge = partition.edge_of_segment[segment]
-        t = np.where(partition.along[edge][:, None], place, 1 - place)
+        edge = partition.edge_at(segment, place.mean(axis=1))
+        t, slope = partition.on_edges(edge, place), slope / partition.shares[edge][:, None]
         density, stretch = _density(discrete, stress, edge, t)
         chord = partition.edge_lengths[edge]
         slope = np.maximum(slope, np.finfo(float).tiny)

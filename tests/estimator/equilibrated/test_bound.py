@@ -120,16 +120,46 @@ def test_disc_on_a_rigid_plane():
     assert solution.relative_error_bound <= 0.03
 
 
-@pytest.mark.parametrize(("order", "largest"), [(1, 2.0), (2, 4.0)])
-def test_dual_rows(order, largest):
-    """Nodes that face no nodes; the remainder of p* on the primary enters with constants."""
-    case = cases.one_transition()
+def with_dual_rows(case):
+    """The case with nodes that face no nodes."""
     contact = [replace(pair, rows="dual") for pair in case.problem.contact]
     problem = replace(case.problem, geometry=unmatched_blocks(), contact=contact)
-    for solution in adapt(problem, order=order, max_dofs=1300):
-        assert 1 <= effectivity(solution, case.exact) <= largest
+    return cases.Case(problem, case.exact)
+
+
+@pytest.mark.parametrize(("order", "largest"), [(1, 1.6), (2, 3.5)])
+def test_dual_rows(order, largest):
+    """Measured at most 1.37 and 3.12, 1.76 where the relative error is below 1e-2."""
+    case = with_dual_rows(cases.one_transition())
+    for solution in adapt(case.problem, order=order, max_dofs=1300):
+        bound = effectivity(solution, case.exact)
+        assert 1 <= bound <= largest
+        assert bound <= 2 or relative_energy_error(solution, case.exact) > 1e-2
         low, high = solution.energy_bounds
         assert low <= ENERGY_ONE_TRANSITION <= high
+
+
+@pytest.mark.parametrize(("order", "size"), [(1, 400), (2, 1400), (4, 4500)])
+def test_dual_rows_of_a_small_zone(order, size):
+    """Triangles that face vertices are fans; measured at most 1.39, 2.26, 2.96, 32 without fans."""
+    case = with_dual_rows(cases.hertz_contact())
+    for solution in adapt(case.problem, order=order, max_dofs=size):
+        bound = effectivity(solution, case.exact)
+        assert 1 <= bound <= 3.2
+        assert bound <= 2 or relative_energy_error(solution, case.exact) > 1e-2
+
+
+def test_fans_carry_a_function_on_the_mesh():
+    """The stress with dual rows is one function; its distance to sigma_h is the largest part."""
+    solution = solve(with_dual_rows(cases.hertz_contact()).problem, maxh=0.4, order=2)
+    found, mesh = solution.equilibrated, solution.mesh
+    assert len(found.element) > mesh.ne
+    # In the middles of all triangles of the partition, away from the lines between them.
+    middles = found.triangles.mean(axis=1)
+    for (x, y), expected in zip(middles[::7], found.at_middles()[::7], strict=True):
+        xx, xy, _, yy = found.stress(mesh(x, y))
+        scale = np.abs(found.coefficients).max()
+        assert np.abs(np.array([xx, yy, xy]) - expected).max() <= 1e-9 * scale  # measured 1e-13
 
 
 def test_dual_rows_reproduce_a_patch():

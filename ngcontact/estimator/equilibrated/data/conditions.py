@@ -51,8 +51,8 @@ class EdgeConditions:
 
 def edge_parameters(partition: Partition, segment: Index, s: Array) -> tuple[Index, Array]:
     """Edge (k,) and parameter (k,) on it of points `s` (k,) of segments `segment` (k,)."""
-    edge = partition.edge_of_segment[segment]
-    return edge, np.where(partition.along[edge], s, 1 - s)
+    edge = partition.edge_at(segment, s)
+    return edge, partition.on_edges(edge, s)
 
 
 @lru_cache

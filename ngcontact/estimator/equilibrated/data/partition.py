@@ -1,8 +1,4 @@
-"""The triangles on which stresses are equilibrated: those of the mesh, some of them in three parts.
-
-A vertex of the boundary in one triangle, with tractions given on both sides, leaves a symmetric
-stress no freedom there: t1.n2 = t2.n1. Such triangles are divided from their middle.
-"""
+"""The triangles on which stresses are equilibrated: those of the mesh, some of them in parts."""
 
 from __future__ import annotations
 
@@ -14,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....arrays import Array, Index, Mask
-from ....fem import BoundaryTrace
-from ....problem import Triangulation
-from .polynomials import CORNERS, barycentric
+from .polynomials import barycentric
+
+BEFORE_ONE = 1 - 1e-9  # the last parameter that is looked up on a segment
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +41,8 @@ class Partition:
         Segment of the boundary, -1 of edges between two triangles.
     along : ndarray of bool (e,)
         Whether the segment runs as the edge does.
+    start, stop : ndarray (e,)
+        Its part of the segment's parameter, 0 and 1 but in fans.
     """
 
     mesh: ng.Mesh
@@ -57,6 +55,8 @@ class Partition:
     ends: Index
     segment: Index
     along: Mask
+    start: Array
+    stop: Array
 
     @cached_property
     def sides(self) -> Array:
@@ -110,11 +110,36 @@ class Partition:
 
     @cached_property
     def edge_of_segment(self) -> Index:
-        """Number of the edge of each segment of the boundary, (q,); -1 of lines inside a body."""
+        """Number of an edge of each segment of the boundary, (q,); -1 of lines inside a body."""
         numbers = np.full(int(self.segment.max(initial=-1)) + 1, -1)
         at = np.flatnonzero(self.segment >= 0)
         numbers[self.segment[at]] = at
         return numbers
+
+    @property
+    def shares(self) -> Array:
+        """Shares (e,) of the edges of the boundary in their segments."""
+        return self.stop - self.start
+
+    def edge_at(self, segment: Index, s: Array) -> Index:
+        """Edges (k,) at parameters `s` (k,) of segments `segment` (k,) of the boundary."""
+        edges, keys = self._in_order
+        places = segment + np.clip(s, 0.0, BEFORE_ONE)
+        return np.asarray(edges[np.searchsorted(keys, places, side="right") - 1])
+
+    def on_edges(self, edge: Index, s: Array) -> Array:
+        """Parameters on edges (k,), as they run, at those `s` (k, ...) of their segments."""
+        shape = (-1,) + (1,) * (s.ndim - 1)
+        start, stop, along = (x[edge].reshape(shape) for x in (self.start, self.stop, self.along))
+        t = (s - start) / (stop - start)
+        return np.where(along, t, 1 - t)
+
+    @cached_property
+    def _in_order(self) -> tuple[Index, Array]:
+        edges = np.flatnonzero(self.segment >= 0)
+        keys = self.segment[edges] + self.start[edges]
+        order = np.argsort(keys)
+        return edges[order], keys[order]
 
     @cached_property
     def _mesh_points(self) -> NDArray:
@@ -133,53 +158,6 @@ class Partition:
         corners = self.within[at]
         inner = np.stack([corners[:, 0] - corners[:, 2], corners[:, 1] - corners[:, 2]], axis=2)
         return np.asarray(to_element.reshape(len(at), -1, 2, 2) @ inner[:, None])
-
-
-def _with_middles(triangles: Index, divided: Mask, vertices: Array) -> tuple[Index, Array, Index]:
-    """Triangles with those `divided` (n,) in three parts, all vertices, and the parents."""
-    whole, cut = np.flatnonzero(~divided), np.flatnonzero(divided)
-    middle = len(vertices) + np.arange(len(cut))
-    old = triangles[cut]
-    parts = [np.column_stack([old[:, i], old[:, (i + 1) % 3], middle]) for i in range(3)]
-    vertices = np.concatenate([vertices, vertices[old].mean(axis=1)])
-    return np.concatenate([triangles[whole], *parts]), vertices, np.concatenate([whole, *[cut] * 3])
-
-
-def partition_of(boundary: BoundaryTrace, length: float, divided: Mask) -> Partition:
-    """The elements of a mesh, those `divided` (ne,) in three parts; coordinates over `length`."""
-    view = Triangulation(boundary.mesh)
-    triangles, vertices, parent = _with_middles(view.triangles, divided, view.vertices / length)
-    third = np.concatenate([CORNERS, [[1 / 3, 1 / 3]]])
-    within = np.tile(CORNERS, (len(triangles), 1, 1))
-    count = np.count_nonzero(divided)
-    for i in range(3):
-        at = slice(len(triangles) - (3 - i) * count, len(triangles) - (2 - i) * count)
-        within[at] = third[[i, (i + 1) % 3, 3]]
-    pairs = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
-    size = len(vertices)
-    keys, first, edges = np.unique(
-        pairs[:, 0] * size + pairs[:, 1], return_index=True, return_inverse=True
-    )
-    segment = np.full(len(keys), -1)
-    outer = np.flatnonzero(~boundary.inner)
-    ends = boundary.nodes[outer][:, [0, -1]]
-    low, high = np.sort(ends, axis=1).T
-    at = np.searchsorted(keys, low * size + high)
-    segment[at] = outer
-    along = np.ones(len(keys), dtype=bool)
-    along[at] = ends[:, 0] < ends[:, 1]
-    return Partition(
-        mesh=boundary.mesh,
-        vertices=vertices,
-        length=length,
-        triangles=triangles,
-        parent=parent,
-        within=within,
-        edges=edges.reshape(-1, 3),
-        ends=pairs[first],
-        segment=segment,
-        along=along,
-    )
 
 
 def of_body(mesh: ng.Mesh, pattern: str, region: Index) -> Index:

@@ -3,6 +3,7 @@
 from .balance import balanced as balanced
 from .pieces import Pieces as Pieces
 from .pieces import contact_directions as contact_directions
+from .pieces import facing_cuts as facing_cuts
 from .pieces import pieces_of as pieces_of
 from .selection import selected as selected
 from .zone import Zone as Zone

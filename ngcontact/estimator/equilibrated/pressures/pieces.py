@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ from ....fem import BoundaryTrace
 from ....problem import Contact
 
 SLIVER = 1e-9  # share of a segment below which a piece of it is none
+NARROW = 0.02  # share of a segment below which no part of it is cut off
 TOUCHING = 4 * np.finfo(float).eps  # round-off of a measured gap, relative to the coordinates
 
 
@@ -101,3 +103,39 @@ def pieces_of(line: ContactLine, boundary: BoundaryTrace) -> Pieces:
     d = contact_directions(line.contact, boundary, segment, middle)
     met, *_ = partners(boundary, line.facing, segment, boundary.point(segment, middle), d)
     return Pieces(line, local, start, stop, met)
+
+
+def facing_cuts(
+    every_pieces: Sequence[Pieces], boundary: BoundaryTrace, whole: Index
+) -> tuple[dict[int, Array], Index]:
+    """Where vertices of secondaries lie on the segments that they face.
+
+    `whole` (j,) are segments that must not be cut.
+
+    Returns
+    -------
+    cuts : dict of ndarray (j,)
+        Parameters by segment.
+    uneven : ndarray of int (k,)
+        Segments on which such a place is left: polynomials on one side are none on the other.
+    """
+    cuts: dict[int, Array] = {}
+    uneven = []
+    for pieces in every_pieces:
+        if pieces.whole:
+            continue
+        ends, _ = pieces.opposite(boundary, pieces.places(np.array([0.0, 1.0])))
+        segment, places = np.repeat(pieces.facing, 2), np.clip(ends.ravel(), 0.0, 1.0)
+        for number in np.unique(segment).tolist():
+            s = np.sort(np.append(cuts.get(number, []), places[segment == number]))
+            inside = s[(s > SLIVER) & (s < 1 - SLIVER)]
+            wide = inside[(inside > NARROW) & (inside < 1 - NARROW)]
+            kept = wide[np.diff(wide, prepend=-1.0) > NARROW]
+            apart = np.abs(inside[:, None] - np.concatenate([kept, [-1.0]])).min(axis=1)
+            if number in whole:
+                kept = kept[:0]
+            if (apart > SLIVER).any() or (number in whole and inside.size):
+                uneven.append(number)
+            if kept.size:
+                cuts[number] = kept
+    return cuts, np.array(uneven, dtype=np.intp)

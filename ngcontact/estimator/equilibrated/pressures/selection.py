@@ -10,7 +10,7 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from ....arrays import Array, Index
+from ....arrays import Array
 from ....fem import BoundaryTrace
 from ....lagrange import gauss
 from ..data import Discrete, EdgeConditions, Units
@@ -140,7 +140,7 @@ def _sides(
         normal, d = boundary.normal(segment[at], s[at]), points.direction[at]
         target = -sign * np.einsum("ki,kij,kj->k", d, sigma, normal) / units.stress
         target /= np.abs((normal * d).sum(axis=1))
-        edge: Index = discrete.partition.edge_of_segment[segment[at]]
+        edge = discrete.partition.edge_at(segment[at], s[at])
         softness = compliance[edge]
         weight = points.weight[at] * discrete.partition.edge_lengths[edge] * softness
         found.append((Side(p[at], target, weight), float(np.median(softness))))

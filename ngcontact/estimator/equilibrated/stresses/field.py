@@ -8,13 +8,14 @@ import numpy as np
 from ....arrays import Array, Index
 from ..data import basis
 
+ON_LINE = 1e-9  # barycentric coordinate of a point on the line between parts, but for round-off
 MIDDLE = 1 / 3  # both reference coordinates of the point about which monomials are taken
 
 
 def stress_field(
     mesh: ng.Mesh, triangles: Array, parent: Index, coefficients: Array, degree: int
 ) -> ng.CoefficientFunction:
-    """Stress (2, 2) of polynomials on triangles, some of them thirds of an element.
+    """Stress (2, 2) of polynomials on triangles, some of them parts of an element.
 
     Parameters
     ----------
@@ -23,7 +24,7 @@ def stress_field(
     triangles : ndarray (n, 3, 2)
         Corners.
     parent : ndarray of int (n,)
-        Element of each; the thirds of one lie opposite to its vertices 2, 0 and 1, in this order.
+        Element of each.
     coefficients : ndarray (n, 3, m)
         (xx, yy, xy) in the polynomials of `degree`, units of stress.
     """
@@ -32,20 +33,13 @@ def stress_field(
     first = np.concatenate([[0], np.cumsum(count)[:-1]])
     parts = [order[first + np.minimum(i, count - 1)] for i in range(int(count.max()))]
     fields = [_field(mesh, triangles[at], coefficients[at], degree) for at in parts]
-    if len(fields) == 1:
-        return fields[0]
-    # Third i begins with corner i of its element.
-    whole = np.stack([triangles[at, 0] for at in parts], axis=1)
-    single = count == 1
-    whole[single] = triangles[parts[0][single]]
-    u, v = _coordinates(mesh, whole)
-    shares = (u, v, 1 - u - v)
-    third = ng.IfPos(
-        shares[1] - shares[0],
-        ng.IfPos(shares[2] - shares[0], fields[1], fields[0]),
-        ng.IfPos(shares[2] - shares[1], fields[2], fields[0]),
-    )
-    return third.Reshape((2, 2))
+    total = fields[-1]
+    for at, field in zip(parts[-2::-1], fields[-2::-1], strict=True):
+        u, v = _coordinates(mesh, triangles[at])
+        least = ng.IfPos(u - v, v, u)
+        least = ng.IfPos(least + u + v - 1, 1 - u - v, least)
+        total = ng.IfPos(least + ON_LINE, field, total)
+    return total.Reshape((2, 2))
 
 
 def _coordinates(
