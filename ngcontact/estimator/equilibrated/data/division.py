@@ -146,7 +146,7 @@ def partition_of(
 ) -> Partition:
     """The elements of a mesh, those `divided` (ne,) in three parts; coordinates over `length`.
 
-    `cuts` are parameters (j,) at which straight segments are cut.
+    `cuts` (j,) of some straight segments are parameters at which they are cut.
     """
     view = Triangulation(boundary.mesh)
     chains = _chains(boundary, cuts, len(view.vertices))

@@ -128,7 +128,7 @@ class Partition:
         return np.asarray(edges[np.searchsorted(keys, places, side="right") - 1])
 
     def on_edges(self, edge: Index, s: Array) -> Array:
-        """Parameters on edges (k,), as they run, at those `s` (k, ...) of their segments."""
+        """Parameters on edges `edge` (k,), as they run, at `s` (k,) or (k, q) of segments."""
         shape = (-1,) + (1,) * (s.ndim - 1)
         start, stop, along = (x[edge].reshape(shape) for x in (self.start, self.stop, self.along))
         t = (s - start) / (stop - start)
