@@ -46,6 +46,10 @@ class SolutionData(Protocol):
         """Number (m,) of the pair of each point."""
 
     @property
+    def direction(self) -> Array:
+        """Unit direction (m, 2) of each point, from the secondary to the primary."""
+
+    @property
     def gap(self) -> Array:
         """Gap (m,) after deformation, a length."""
 

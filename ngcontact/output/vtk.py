@@ -28,9 +28,11 @@ def write_solution(path: str | os.PathLike[str], solution: SolutionData) -> Path
     body), ``hoop_stress`` of bodies of revolution, and ``von_mises`` (see `full_stress`). Cell
     data: ``body``, whose names are the field data ``body_names``, and ``indicators`` if they have
     been computed already.
-    Contact points: ``pressure``, ``gap``, ``force``, ``active`` and ``pair``. Any consistent
-    units. Returns the path. A file appears complete or not at all. Raises ``ValueError`` and
-    ``OSError`` as `check_path` does, before any work.
+    Contact points: ``pressure``, ``gap``, ``force``, ``active``, ``pair``, and the ``traction`` on
+    the secondary, a vector. Field data of both files: the names by number of the pair in
+    ``pair_names``, ``secondary_names``, ``primary_names``. Any consistent units. Returns the path.
+    A file appears complete or not at all. Raises ``ValueError`` and ``OSError`` as `check_path`
+    does, before any work.
     """
     target = check_path(path, ".vtu")
     beside = check_path(target.with_name(f"{target.stem}_contact.vtp"), ".vtp")
@@ -42,29 +44,52 @@ def write_solution(path: str | os.PathLike[str], solution: SolutionData) -> Path
     return target
 
 
-def write_series(path: str | os.PathLike[str], solutions: Iterable[SolutionData]) -> Path:
-    """Solutions, one per level, as a ``.pvd`` for ParaView; the level stands for the time.
+def write_series(
+    path: str | os.PathLike[str],
+    solutions: Iterable[SolutionData],
+    times: Iterable[float] | None = None,
+) -> Path:
+    """Solutions, one per level or load, as a ``.pvd`` for ParaView.
 
     Beside it the files of `write_solution`: ``<stem>_000.vtu``, ``<stem>_000_contact.vtp``, and
-    so on. `solutions` may be a generator: the ``.pvd`` lists the levels written so far.
+    so on. `solutions` may be a generator: the ``.pvd`` lists those written so far. `times` are
+    increasing numbers, such as loads, one for each; when left out 0, 1, 2, ...
 
-    Raises ``ValueError`` if there is no solution; otherwise as `check_path`, before any work.
+    Raises ``ValueError`` if there is no solution, or not one time for each, and ``TypeError`` if a
+    time is no number; otherwise as `check_path`, before any work.
     """
     target = check_path(path, ".pvd")
+    clock = None if times is None else iter(_increasing(times))
     root = ET.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
     collection = ET.SubElement(root, "Collection")
     for level, solution in enumerate(solutions):
+        time = float(level) if clock is None else next(clock, None)
+        if time is None:
+            raise ValueError(f"times has {level} entries, fewer than there are solutions")
         stem = f"{target.stem}_{level:03d}"
         write_solution(target.with_name(f"{stem}.vtu"), solution)
         for part, name in enumerate((f"{stem}.vtu", f"{stem}_contact.vtp")):
-            entry = {"timestep": str(level), "group": "", "part": str(part), "file": name}
+            entry = {"timestep": f"{time:.17g}", "group": "", "part": str(part), "file": name}
             ET.SubElement(collection, "DataSet", entry)
         ET.indent(root)
         with replacing(target) as (draft,):
             ET.ElementTree(root).write(draft, encoding="utf-8", xml_declaration=True)
     if len(collection) == 0:
         raise ValueError(f"no solution to write to {str(target)!r}: the series is empty")
+    if clock is not None and (left := len(list(clock))):
+        raise ValueError(f"times has {left} entries more than there are solutions: give as many")
     return target
+
+
+def _increasing(times: Iterable[float]) -> list[float]:
+    """Finite increasing numbers."""
+    values = list(times)
+    for before, time in zip([None, *values], values, strict=False):
+        if isinstance(time, bool) or not isinstance(time, int | float | np.number):
+            raise TypeError(f"times hold {time!r}: give numbers")
+        if not np.isfinite(time) or (before is not None and not time > before):
+            raise ValueError(f"times hold {time} after {before}: give finite, increasing numbers")
+    return [float(time) for time in values]
 
 
 def _bodies(solution: SolutionData) -> pyvista.UnstructuredGrid:
@@ -88,6 +113,7 @@ def _bodies(solution: SolutionData) -> pyvista.UnstructuredGrid:
     grid.point_data["von_mises"] = von_mises(stress)
     grid.cell_data["body"] = nodes.body
     grid.field_data["body_names"] = list(nodes.names)
+    _name_pairs(grid, solution)
     if solution.estimated:
         grid.cell_data["indicators"] = np.asarray(solution.indicators, dtype=float)
     return grid
@@ -99,7 +125,9 @@ def _contact_points(solution: SolutionData) -> pyvista.PolyData:
 
     points = np.asarray(solution.points, dtype=float).reshape(-1, 2)
     if len(points) == 0:
-        return pyvista.PolyData()
+        data = pyvista.PolyData()
+        _name_pairs(data, solution)
+        return data
     lines = []
     for pair in np.unique(solution.pair):
         rows = np.flatnonzero(solution.pair == pair)
@@ -113,13 +141,36 @@ def _contact_points(solution: SolutionData) -> pyvista.PolyData:
     for name in ("pressure", "gap", "force", "active", "pair"):
         kind = np.int32 if name in ("active", "pair") else float
         data.point_data[name] = np.asarray(getattr(solution, name), dtype=kind)
+    traction = np.zeros((len(points), 3))
+    traction[:, :2] = -np.asarray(solution.pressure)[:, None] * solution.direction
+    data.point_data["traction"] = traction
+    _name_pairs(data, solution)
     return data
 
 
+def _name_pairs(data: pyvista.DataSet, solution: SolutionData) -> None:
+    """Names of the pairs as field data, in the order of their numbers."""
+    contact = solution.problem.contact
+    if contact:  # VTK has no empty list of strings
+        sides = [(pair.secondary, pair.primary or "rigid obstacle") for pair in contact]
+        data.field_data["pair_names"] = [" with ".join(names) for names in sides]
+        data.field_data["secondary_names"], data.field_data["primary_names"] = zip(
+            *sides, strict=True
+        )
+
+
 def write_data(writer: Any, data: pyvista.DataSet, path: Path) -> None:
-    """Write a data set with a VTK XML writer; VTK raises nothing."""
+    """Write a data set with a VTK XML writer; VTK raises nothing, and prints in colours."""
+    from vtkmodules.vtkCommonCore import vtkObject
+
     writer.SetFileName(str(path))
     writer.SetInputData(data)
+    display = vtkObject.GetGlobalWarningDisplay()
+    vtkObject.SetGlobalWarningDisplay(0)
+    try:
+        written = writer.Write()
+    finally:
+        vtkObject.SetGlobalWarningDisplay(display)
     # Before VTK 9.7 a full disk shows in the code alone, a file that cannot be opened in neither.
-    if not writer.Write() or writer.GetErrorCode() or not path.exists():
+    if not written or writer.GetErrorCode() or not path.exists():
         raise OSError(f"VTK could not write {str(path)!r} (disk full?)")

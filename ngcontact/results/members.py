@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..arrays import Array
 from .archive import Kept, restored, save, state_of
 from .record import Number, _Recorded, record_of
 from .text import _Told, html_of, line_of
@@ -19,6 +20,14 @@ from .values import Solved, Values, values_at
 
 class Readable:
     """Members of `Solution` that read it."""
+
+    @property
+    def direction(self: _Recorded) -> Array:
+        """Unit direction d (m, 2) of each point, from the secondary to the primary, dimensionless.
+
+        The traction on the secondary is -pressure d, the force of a point on it -force d.
+        """
+        return np.concatenate([np.zeros((0, 2)), *(pair.line.direction for pair in self.pairs)])
 
     def at(self: Solved, points: Any, *, body: str | None = None, outside: str = "error") -> Values:
         """Displacement, stress, von Mises and principal stresses at points, any consistent units.

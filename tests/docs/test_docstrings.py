@@ -70,6 +70,7 @@ SOLUTION = {
     "out_of_plane_stress": "stress",
     "hoop_stress": "stress",
     "points": "length",
+    "direction": "none",
     "gap": "length",
     "force": "force",
     "pressure": "stress",

@@ -37,6 +37,7 @@ class Stub:
         self.force = self.pressure / 10
         self.active = self.pressure > 0.5
         self.pair = np.zeros(count, dtype=int)
+        self.direction = self.points - (0.0, 1.0)  # of the disc, of radius 1
 
     @property
     def indicators(self):

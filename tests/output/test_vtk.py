@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from pathlib import Path
 
 import ngsolve as ng
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 import pyvista
 from netgen.occ import Compound, Glue
 from ngsolve.meshes import MakeStructured2DMesh
+from vtkmodules.vtkCommonCore import mutable, vtkObject
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
@@ -18,6 +20,7 @@ from ngcontact import Elastic, Hooke
 from ngcontact.output import plot_solution, write_series, write_solution
 from ngcontact.output.nodes import lattice
 from ngcontact.output.vtk import write_data
+from ngcontact.quadrature import mesh_points
 from tests.output.stubs import MAXH, stub, two_bodies
 
 
@@ -63,6 +66,55 @@ def area_of_lagrange_cells(grid, order):
     nodes = grid.points[grid.cells.reshape(grid.n_cells, -1)[:, 1:], :2]
     (xr, yr), (xs, ys) = np.moveaxis(by_r @ nodes, 2, 0), np.moveaxis(by_s @ nodes, 2, 0)
     return np.sum(np.abs(xr * ys - xs * yr) @ np.array(rule.weights))
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_vtk_reads_areas_and_values_of_curved_cells(tmp_path, order):
+    """By VTK's own shape functions: of degree 4 at most, so that its stencil is exact."""
+    solution = stub(order)
+    mesh, u = solution.mesh, solution.displacement
+    grid = written(tmp_path, solution)
+    rule = ng.IntegrationRule(ng.TRIG, 2 * order)
+    area = 0.0
+    for k in range(0, mesh.ne, 3):
+        cell, own = grid.GetCell(k), 0.0
+        for (r, s), weight in zip(np.array(rule.points)[:, :2], rule.weights, strict=True):
+            place, shapes = vtk_location(cell, r, s)
+            # VTK's first vertex is at (0, 0), NGSolve's at (1, 0).
+            [at] = mesh_points(mesh, np.array([k]), np.array([[[1 - r - s, r]]]))
+            np.testing.assert_allclose(place, ng.CF((ng.x, ng.y))(at)[0], atol=1e-13)
+            nodes = [cell.GetPointId(j) for j in range(len(shapes))]
+            np.testing.assert_allclose(
+                shapes @ grid["displacement"][nodes][:, :2], u(at)[0], atol=1e-13
+            )
+            by_r, by_s = (derivative(cell, r, s, d) for d in ((1, 0), (0, 1)))
+            own += weight * (by_r[0] * by_s[1] - by_r[1] * by_s[0])
+        area += own
+        [exact] = element_areas(mesh, order, k)
+        assert own == pytest.approx(exact, rel=1e-11)  # steps of 1e-2 lose three digits
+    assert area > 1
+
+
+def vtk_location(cell, r, s):
+    """Point (2,) and shape functions (n,) of a VTK cell at its coordinates."""
+    place, shapes = [0.0] * 3, [0.0] * cell.GetNumberOfPoints()
+    cell.EvaluateLocation(mutable(0), (r, s, 0.0), place, shapes)
+    return np.array(place[:2]), np.array(shapes)
+
+
+def derivative(cell, r, s, direction, h=1e-2):
+    """Derivative (2,) of the place; exact for polynomials of degree 4."""
+    by = [vtk_location(cell, r + k * h * direction[0], s + k * h * direction[1])[0] for k in STEPS]
+    return (by[0] - 8 * by[1] + 8 * by[2] - by[3]) / (12 * h)
+
+
+STEPS = (-2, -1, 1, 2)
+
+
+def element_areas(mesh, order, element):
+    """Area (1,) of an element, by NGSolve."""
+    areas = ng.Integrate(ng.CF(1.0), mesh, order=2 * order, element_wise=True)
+    return [areas[element]]
 
 
 def test_curved_nodes_lie_on_the_circle(tmp_path):
@@ -163,6 +215,14 @@ def test_contact_points_carry_their_values(tmp_path):
     np.testing.assert_array_equal(data.points[:, :2], solution.points)
     for name in ("pressure", "gap", "force", "active", "pair"):
         np.testing.assert_array_equal(data[name], getattr(solution, name))
+    # The circle's middle is (0, 1): pressures pull its points towards it.
+    inwards = ((0.0, 1.0) - solution.points) * solution.pressure[:, None]
+    np.testing.assert_allclose(data["traction"][:, :2], inwards, atol=1e-15)
+    assert not data["traction"][:, 2].any()
+    for file in (data, pyvista.read(tmp_path / "a.b.vtu")):
+        assert list(file.field_data["pair_names"]) == ["disc_arc with block_top"]
+        assert list(file.field_data["secondary_names"]) == ["disc_arc"]
+        assert list(file.field_data["primary_names"]) == ["block_top"]
     assert np.issubdtype(data["active"].dtype, np.integer)
     assert data.n_verts == 9
     links = np.sort(data.lines.reshape(-1, 3)[:, 1:], axis=1)
@@ -172,7 +232,7 @@ def test_contact_points_carry_their_values(tmp_path):
 @pytest.mark.parametrize("count", [0, 1])
 def test_hardly_any_contact_points(tmp_path, count):
     solution = stub(2)
-    for name in ("points", "gap", "pressure", "force", "active", "pair"):
+    for name in ("points", "gap", "pressure", "force", "active", "pair", "direction"):
         setattr(solution, name, getattr(solution, name)[:count])
     write_solution(tmp_path / "a.vtu", solution)
     assert pyvista.read(tmp_path / "a_contact.vtp").n_points == count
@@ -195,6 +255,26 @@ def test_series_lists_levels_with_both_files(tmp_path):
     bodies, contact = reader.read()
     assert bodies.n_cells == stub(2).mesh.ne
     assert contact.n_points == 9
+
+
+def test_series_of_loads_have_their_times(tmp_path):
+    path = write_series(tmp_path / "run.pvd", [stub(1), stub(1)], times=[0.1, np.float64(2.5e6)])
+    assert pyvista.PVDReader(path).time_values == [0.1, 2.5e6]
+
+
+@pytest.mark.parametrize(
+    ("times", "error", "message"),
+    [
+        ([0.0], ValueError, "1 entries, fewer than there are solutions"),
+        ([0.0, 1.0, 2.0], ValueError, "1 entries more than there are solutions"),
+        ([1.0, 1.0], ValueError, "1.0 after 1.0: give finite, increasing"),
+        ([0.0, float("nan")], ValueError, "increasing"),
+        (["a", "b"], TypeError, "'a': give numbers"),
+    ],
+)
+def test_times_that_do_not_fit_are_refused(tmp_path, times, error, message):
+    with pytest.raises(error, match=message):
+        write_series(tmp_path / "run.pvd", [stub(1), stub(1)], times=times)
 
 
 def test_interrupted_series_lists_what_was_written(tmp_path):
@@ -244,6 +324,16 @@ def test_failure_of_vtk_is_an_error(tmp_path):
     missing = tmp_path / "missing" / "draft.vtp"
     with pytest.raises(OSError, match="VTK could not write"):
         write_data(vtkXMLPolyDataWriter(), pyvista.PolyData(), missing)
+
+
+def test_a_full_disk_is_an_error_without_noise(capfd):
+    full = Path("/dev/full")
+    if not full.exists():
+        pytest.skip("this system has no /dev/full")
+    with pytest.raises(OSError, match=r"disk full\?"):
+        write_data(vtkXMLPolyDataWriter(), pyvista.Sphere(), full)
+    assert capfd.readouterr() == ("", "")
+    assert vtkObject.GetGlobalWarningDisplay() == 1
 
 
 @pytest.mark.parametrize(

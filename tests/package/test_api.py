@@ -72,11 +72,11 @@ SIGNATURES = {
         "active": None,
     },
     "load": {"path": REQUIRED},
-    "write_series": {"path": REQUIRED, "solutions": REQUIRED},
+    "write_series": {"path": REQUIRED, "solutions": REQUIRED, "times": None},
 }
 MEMBERS = {
     *("problem", "mesh", "order", "element", "displacement", "stress", "work"),
-    *("points", "pair", "gap", "pressure", "force", "active", "steps"),
+    *("points", "pair", "direction", "gap", "pressure", "force", "active", "steps"),
     *("contact_force", "reactions", "transitions", "energy", "residuals"),
     *("indicators", "error_estimate", "relative_error_estimate"),
     *(
