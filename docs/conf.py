@@ -1,6 +1,7 @@
 """How `make docs` makes the site: Markdown pages, executed notebooks, reference from docstrings."""
 
 import sys
+from hashlib import sha256
 from pathlib import Path
 
 HERE = Path(__file__).parent
@@ -35,11 +36,14 @@ myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath"
 myst_heading_anchors = 3
 myst_links_external_new_tab = False
 
-# Notebooks: every one is executed, an error in one is an error of the build.
+# Notebooks: every one is executed, an error in one is an error of the build. Results are kept as
+# long as neither the notebook nor the package changes.
+SOURCES = [*HERE.parent.glob("ngcontact/**/*.py"), *HERE.parent.glob("geometries/*.py")]
+STATE = sha256(b"".join(path.read_bytes() for path in sorted(SOURCES))).hexdigest()[:16]
 if hasattr(KernelManager, "transport_encryption"):  # else kernels warn that others could listen
     KernelManager.transport_encryption.default_value = "auto"
 nb_execution_mode = "cache"
-nb_execution_cache_path = str(HERE.parent / "build" / "notebooks")
+nb_execution_cache_path = str(HERE.parent / "build" / "notebooks" / STATE)
 nb_execution_in_temp = True
 nb_execution_timeout = 120
 nb_execution_raise_on_error = True
