@@ -212,9 +212,10 @@ def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[
     ratio = SHARPER
     places = np.array([one.place for one in contradictions(problem, mesh)]).reshape(-1, 2)
     while unknowns(mesh, order, element) <= refinement.max_dofs:
+        if solution is not None:  # its factorisation is of no use to the next one
+            solution.discrete.systems.forget()
         solution = solve_on(problem, mesh, order, element, solution)
         solution = replace(solution, adaptive=True, estimator=refinement.estimator)
-        solution.discrete.systems.forget()  # a level's factorisation is of no use to the next one
         if refinement.guaranteed:
             refuse_bound(problem, solution.discrete.space.trace, solution.pairs)
             error, ratio = _bounded(solution, refinement, ratio)

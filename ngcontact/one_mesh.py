@@ -29,14 +29,12 @@ def solve_on(
     else:
         active = carried_active_set(discrete.lines, start.pairs)
     minimiser = minimise_energy(discrete, active)
-    displacement = ng.GridFunction(discrete.space.V)
-    displacement.vec.FV().NumPy()[:] = discrete.space.basis @ (discrete.basis.T @ minimiser.u)
     return Solution(
         problem=problem,
         mesh=mesh,
         order=order,
         element=element,
-        displacement=displacement,
+        displacement=discrete.displacement(minimiser.u),
         discrete=discrete,
         minimiser=minimiser,
         work={

@@ -7,5 +7,6 @@ from .discrete_problem import reassembled as reassembled
 from .initial_active_set import carried_active_set as carried_active_set
 from .initial_active_set import first_active_set as first_active_set
 from .linear_systems import MULTIGRID as MULTIGRID
+from .linear_systems import Influence as Influence
 from .rigid_motions import RigidMotion as RigidMotion
 from .supports import resultants as resultants

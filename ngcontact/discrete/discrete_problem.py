@@ -9,7 +9,7 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Index, Mask
+from ..arrays import Array, Index, Mask
 from ..constraints import BasisTransformation, Conditions
 from ..contact import ContactLine
 from ..errors import ConvergenceError
@@ -30,14 +30,9 @@ from ..qp import Iterate, LinearSystems, QuadraticProgram, minimise, no_null_spa
 from ..triplets import from_triplets
 from .admissible_set import AdmissibleSet, admissible_set
 from .equilibrium import Rigid, equilibrium
-from .linear_systems import linear_systems
+from .linear_systems import Influence, check_range, influence, linear_systems
 from .reuse import Reduced, Reusable, contact_lines, same_basis, same_mesh, same_stiffness
 from .supports import conditioned_segments
-
-LOWEST, HIGHEST = (
-    -306,
-    305,
-)  # powers of ten between which sums of products keep their digits
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,6 +74,23 @@ class DiscreteProblem:
     systems: LinearSystems
     rigid: Rigid | None
     assembled: bool
+
+    def influence(self, active: Mask, jumps: Array) -> tuple[ng.GridFunction, Influence]:
+        """The displacement that moves the `active` (m,) points by `jumps` (m,), without loads.
+
+        Raises
+        ------
+        ConvergenceError
+            Active points and supports leave a rigid motion free.
+        """
+        found = influence(self.program, self.systems, active, jumps)
+        return self.displacement(found.unknowns), found
+
+    def displacement(self, unknowns: Array) -> ng.GridFunction:
+        """The displacement with the given `unknowns` (2n,)."""
+        result = ng.GridFunction(self.space.V)
+        result.vec.FV().NumPy()[:] = self.space.basis @ (self.basis.T @ unknowns)
+        return result
 
 
 def discretise(
@@ -175,7 +187,7 @@ def _program(
             unknown=basis.unknown,
             null_space=no_null_space(K.shape[0]) if rigid is None else rigid.null_space,
         )
-        _check_range(result)
+        check_range(result)
         return result
 
     if known is not None and same_basis(basis, known.basis):
@@ -207,21 +219,6 @@ def reassembled(
     systems = linear_systems(again, matrix, basis.T, vertex_parents(trace.mesh), nodes)
     kept = arrays | {"rigid": rigid and rigid.on(space)}
     return DiscreteProblem(problem=problem, space=space, program=again, systems=systems, **kept)
-
-
-def _check_range(program: QuadraticProgram) -> None:
-    """Raise where double precision holds the data but neither the forces nor the displacements."""
-    p = program
-    stiffness, load = p.diagonal.max(initial=0.0), np.abs(p.b).max(initial=0.0)
-    given = max(np.abs(p.values).max(initial=0.0), -p.g.min(initial=0.0))
-    with np.errstate(divide="ignore"):
-        k, f, v = np.log10([stiffness, load, given])
-    for name, size in (("displacements", max(v, f - k)), ("forces", max(f, k + v))):
-        if not (size == -np.inf or LOWEST < size < HIGHEST):
-            raise ValueError(
-                f"moduli, loads and prescribed displacements make {name} of 1e{size:+.0f}, beyond "
-                f"the range of numbers (1e{LOWEST} to 1e+{HIGHEST}); choose other units"
-            )
 
 
 def minimise_energy(discrete: DiscreteProblem, active: Mask) -> Iterate:

@@ -1,14 +1,15 @@
-"""Which linear systems serve a discrete problem: a factorisation, or multigrid."""
+"""Which linear systems serve a discrete problem: a factorisation, or multigrid; one for a dual."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Integers, Mask
+from ..arrays import Array, Integers, Mask
+from ..errors import ConvergenceError
 from ..linalg import (
     COARSEST,
     Multigrid,
@@ -18,8 +19,12 @@ from ..linalg import (
     refined_share,
     truncated_multigrid,
 )
-from ..qp import LinearSystems, QuadraticProgram, bordered_systems
+from ..qp import LinearSystems, QuadraticProgram, SingularError, bordered_systems
 
+LOWEST, HIGHEST = (
+    -306,
+    305,
+)  # powers of ten between which sums of products keep their digits
 FEWEST = 0.7  # share of the unknowns that must be gone in the coarsest space
 
 
@@ -42,6 +47,21 @@ class MultigridUse:
 
 
 MULTIGRID = MultigridUse()  # may be set by who measures or tests
+
+
+def check_range(program: QuadraticProgram) -> None:
+    """Raise where double precision holds the data but neither the forces nor the displacements."""
+    p = program
+    stiffness, load = p.diagonal.max(initial=0.0), np.abs(p.b).max(initial=0.0)
+    given = max(np.abs(p.values).max(initial=0.0), -p.g.min(initial=0.0))
+    with np.errstate(divide="ignore"):
+        k, f, v = np.log10([stiffness, load, given])
+    for name, size in (("displacements", max(v, f - k)), ("forces", max(f, k + v))):
+        if not (size == -np.inf or LOWEST < size < HIGHEST):
+            raise ValueError(
+                f"moduli, loads and prescribed displacements make {name} of 1e{size:+.0f}, beyond "
+                f"the range of numbers (1e{LOWEST} to 1e+{HIGHEST}); choose other units"
+            )
 
 
 def linear_systems(
@@ -75,3 +95,47 @@ def linear_systems(
         return truncated_multigrid(matrix, coarsenings(T, parents, nodes, MULTIGRID.coarsest), free)
 
     return iterative_systems(program, factor, prepare)
+
+
+@dataclass(frozen=True, eq=False)
+class Influence:
+    """The displacement of least energy with given jumps at active points, without loads.
+
+    Attributes
+    ----------
+    unknowns : ndarray (2n,)
+        Of the displacement, lengths where the jumps are lengths.
+    force : ndarray (m,)
+        Nodal contact forces, force per thickness.
+    factorizations, back_solves : int
+        Work done: one back-solve where there is a factorisation for the active set.
+    """
+
+    unknowns: Array
+    force: Array
+    factorizations: int
+    back_solves: int
+
+
+def influence(
+    program: QuadraticProgram, systems: LinearSystems, active: Mask, jumps: Array
+) -> Influence:
+    """Move the `active` (m,) points by `jumps` (m,); supports rest, the other points are free.
+
+    Raises
+    ------
+    ConvergenceError
+        Active points and supports leave a rigid motion free.
+    """
+    null_space, zero = program.null_space, np.zeros_like(program.b)
+    if null_space.pins.size and not null_space.resisted(program.unknown[active]):
+        raise ConvergenceError("contact leaves a rigid motion free")
+    systems.restart(replace(program, b=zero, g=jumps, values=zero))
+    try:
+        y, force = systems.solve(active)
+    except SingularError as singular:
+        raise ConvergenceError(str(singular)) from None
+    finally:
+        work = systems.factorizations, systems.back_solves
+        systems.restart(program)
+    return Influence(y, force, *work)

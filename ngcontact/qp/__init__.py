@@ -18,4 +18,5 @@ from .systems import ROUGH as ROUGH
 from .systems import Anchor as Anchor
 from .systems import Approximation as Approximation
 from .systems import LinearSystems as LinearSystems
+from .systems import SingularError as SingularError
 from .systems import first_approximation as first_approximation

@@ -10,7 +10,7 @@ import pytest
 
 from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
-from ngcontact import Elastic, Solution, adapt, solve
+from ngcontact import ConvergenceError, Elastic, Solution, adapt, solve
 from ngcontact.adaptivity.refinement import refined
 from ngcontact.discrete.discrete_problem import minimise_energy
 from ngcontact.discrete.linear_systems import MULTIGRID
@@ -151,3 +151,30 @@ def test_a_mesh_refined_in_place(large):
     solution = solve(problem, mesh)
     assert solution.work["factorizations"] == 0
     same(solution, direct(problem, mesh))
+
+
+@pytest.mark.parametrize("order", [1, 3])
+def test_points_are_moved(order):
+    """The jumps are those asked for, forces act there alone, and do the work of the energy."""
+    solution = solve(cases.hertz_contact(half_width=0.5).problem, maxh=0.2, order=order)
+    discrete, active = solution.discrete, solution.active
+    jumps = np.where(active, 1.0, 0.0)
+    G, found = discrete.influence(active, jumps)
+    assert (found.factorizations, found.back_solves) == (0, 1)
+    g = G.vec.FV().NumPy()
+    nodes = discrete.basis.T @ found.unknowns
+    # Round-off of one back-solve: measured 1e-15 to 1e-13.
+    assert np.abs((discrete.B @ nodes - 1)[active]).max() <= 1e-12
+    assert np.all(found.force[~active] == 0)
+    energy = g @ (discrete.space.A @ g)
+    assert -found.force @ jumps == pytest.approx(energy, rel=1e-10)
+    assert discrete.systems.program is discrete.program
+
+
+def test_a_free_motion_is_refused():
+    problem = cases.partly_opening_block()
+    problem = replace(problem, sliding="lower_axis", traction={"pressed|top": 1.0})
+    solution = solve(problem, maxh=0.5, order=1)
+    none = np.zeros_like(solution.active)
+    with pytest.raises(ConvergenceError, match="rigid motion"):
+        solution.discrete.influence(none, np.zeros(none.size))

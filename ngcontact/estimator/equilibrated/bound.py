@@ -48,11 +48,10 @@ from .pressures import Pieces, facing_cuts, pieces_of, selected, zone_of
 from .record import Norms, Proof
 from .refusals import refuse_bound
 from .remainders import missed_tractions
-from .stress import ContactPressure, EquilibratedStress, certified
-from .stresses import Equilibrated, bubble_norms, equilibrated, improved
+from .stress import SETTLED, ContactPressure, EquilibratedStress, certified
+from .stresses import bubble_norms, equilibrated, improved
 
 COSTLY = 0.05  # lifting over constitutive part of the bound from which a better one is sought
-SETTLED = 1e-9  # residual of equilibrium, relative to the largest stress: measured 1e-15 to 1e-12
 
 
 def error_bound(
@@ -94,7 +93,7 @@ def error_bound(
     result = improved(discrete, conditions, equilibrated(discrete, conditions, given))
     raw, traction, certificate = certified(discrete, conditions, given, result)
     fields = on_supports(problem, boundary, displacement, discrete, units)
-    constitutive = _constitutive(discrete, result)
+    constitutive = result.norms(discrete)
     costly = COSTLY * float(constitutive @ constitutive)
     lifting = _lifting(problem, boundary, conditions, discrete, fields, gaps, units, costly)
     curves = missed_tractions(
@@ -138,15 +137,6 @@ def _lifting(
     strip = strip_norms(problem, boundary, conditions, discrete, moves, units)
     least = lifted(discrete, [], [*others, (np.arange(len(strip)), strip)])
     return least if least @ least < norms @ norms else norms
-
-
-def _constitutive(discrete: Discrete, result: Equilibrated) -> Array:
-    """Norms (n,) of s - sigma_h: of the polynomials, and of what these miss of sigma_h."""
-    norms = np.linalg.norm(result.change, axis=1)
-    if discrete.rough is not None:
-        at = discrete.rough.at
-        norms[at] = np.hypot(norms[at], discrete.rough.rest)
-    return np.asarray(norms)
 
 
 def _partition(

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Array
 from .data import Partition, Units, legendre_values
-from .liftings import EdgeField, Gap, at_points, coefficients
+from .liftings import EdgeField, Opened, at_points, coefficients
 from .record import Norms
 from .stress import EquilibratedStress
 
@@ -86,7 +86,7 @@ def summed(
     )
 
 
-def complementarity(gap: Gap, b: Array) -> tuple[float, float]:
+def complementarity(gap: Opened, b: Array) -> tuple[float, float]:
     """Integrals of p*, of coefficients `b` (m,), times the gap after lifting, and before."""
     zone, pieces = gap.zone, gap.pieces
     at = np.flatnonzero((zone.number[pieces.local] >= 0).any(axis=1))

@@ -16,6 +16,8 @@ from .data import Discrete, EdgeConditions, basis, dimension
 from .record import Proof
 from .stresses import Equilibrated, into_raw, raw_operators, stress_field
 
+SETTLED = 1e-9  # residual of equilibrium, relative to the largest stress: measured 1e-15 to 1e-12
+
 
 @dataclass(frozen=True, eq=False)
 class ContactPressure:

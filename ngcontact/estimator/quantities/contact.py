@@ -19,7 +19,7 @@ Star = tuple[Index, Array]  # segments (k,) of the secondary, Bernstein coeffici
 SECOND_ORDER = 10.0  # relative error of the force over the square of the relative bound: at most 10
 RESULTANTS = 3.0  # error of the force over the difference of both resultants, measured: at most 3
 NEAR_PEAK = 0.9  # share of the peak from which pressures count for it
-ON_LINE = 3  # points of which squared pressures are continued by a straight line
+FITS = ((1, 3), (2, 5))  # degrees of fits at an end of contact, and how many points they take
 
 
 def force_on(
@@ -90,26 +90,43 @@ def ends_of(pair: ContactState, boundary: BoundaryTrace) -> list[Quantity]:
     line, ends = pair.line, pair.transitions
     if len(ends.position) == 0:
         return []
-    inside = line.position[pair.active]
-    middle = (inside.min(axis=0) + inside.max(axis=0)) / 2
-    extent = float(np.linalg.norm(np.ptp(inside, axis=0)))
-    axis = int(np.ptp(inside, axis=0).argmax())
+    axis = int(np.ptp(line.position[pair.active], axis=0).argmax())
     name = f"end of contact, {'xy'[axis]}"
     beside = line.segments[ending_segments(line, ends)]
     h = float(boundary.lengths(beside).max(initial=0.0))
     found = []
-    for position in ends.position:
-        away = float(np.linalg.norm(position - middle))
-        towards = (position - middle) / max(away, np.finfo(float).tiny)
-        along = (line.position - middle) @ towards
-        chosen = np.flatnonzero(pair.active & (along > 0))
-        chosen = chosen[np.argsort(along[chosen])][-ON_LINE - 1 : -1]
-        other = away
-        if len(chosen) == ON_LINE:
-            fit = np.polynomial.Polynomial.fit(along[chosen], pair.pressure[chosen] ** 2, 1)
-            slope = fit.convert().coef[-1]
-            if slope < 0:
-                other = float(fit.roots()[0].real)
-        error = h**2 / max(extent, h) + abs(other - away)
+    for inner, outer, position in zip(ends.inner, ends.outer, ends.position, strict=True):
+        zone, spread = _spread(pair, int(inner), int(outer), position)
+        error = h**2 / max(zone / 2, h) + spread
         found.append(Quantity(name, float(position[axis]), error, "estimated", position))
     return found
+
+
+def _spread(pair: ContactState, inner: int, outer: int, position: Array) -> tuple[float, float]:
+    """Length of the zone that ends at `position` (2,), and how far fits of its end are from there.
+
+    Near the end gap^(2/3) outside and p^2 inside are smooth; their zeros are those of straight
+    lines and parabolas through few points.
+    """
+    x, active = pair.line.position, pair.active
+    away = x[outer] - x[inner]
+    size = float(np.linalg.norm(away))
+    if size == 0 or not active[inner]:  # both sides of a corner
+        return 0.0, 0.0
+    along = (x - position) @ (away / size)
+    order = np.argsort(along, kind="stable")
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    before, after = order[place[inner] :: -1], order[place[outer] :]
+    closed = before[: int(np.append(~active[before], True).argmax())]
+    opened = after[: int(np.append(active[after], True).argmax())]
+    gap, squares = np.maximum(pair.gap[opened], 0.0) ** (2 / 3), pair.pressure[closed] ** 2
+    zone, found = float(-along[closed[-1]]), [0.0]
+    for degree, points in FITS:
+        for t, y in ((along[opened], gap), (along[closed[1:]], squares[1:])):
+            if len(t) > degree:
+                zeros = np.polynomial.Polynomial.fit(t[:points], y[:points], degree).roots()
+                real = np.abs(zeros[np.isreal(zeros)].real)
+                found.append(float(real.min(initial=np.inf)))
+    spread = [off for off in found if off <= zone]
+    return zone, max(spread)

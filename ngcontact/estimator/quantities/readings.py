@@ -1,13 +1,13 @@
 """What a solution says of its quantities of interest.
 
-Only the bar of the energy is proved. The others are estimated, by measurement on Hertz contact at
-orders 1 to 4:
+The bars of the energy and of the force, the size of `contact_force`, are proved; that of the force
+takes a dual problem. The others are estimated, by measurement on Hertz contact at orders 1 to 4:
 
-* force, the size of `contact_force`: of second order in the error, 10 (B / |u_h|)^2 times the sum
-  of forces, and three times the difference to the integral of p*;
+* force, where its bar cannot be proved: of second order in the error, 10 (B / |u_h|)^2 times the
+  sum of forces, and three times the difference to the integral of p*;
 * peak pressure: largest difference to p* where the pressure is within a tenth of its peak;
-* end of contact: h^2 over the extent of the zone, h the length of the segment there, and the
-  distance to where a straight line through the last squares of the pressure vanishes;
+* end of contact: h^2 over half of the zone's length, h that of the segment there, and the largest
+  distance to where fits of gap^(2/3) outside and of p^2 inside vanish, of degrees 1 and 2;
 * von Mises stress, the largest anywhere, which grows with refinement where a corner is singular:
   its difference to that of the equilibrated stress in the middle of the element, or the jump
   between elements at the place if that is more.
@@ -18,41 +18,30 @@ secondary for p*, jumps around the element for the equilibrated stress.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Protocol
 
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array
-from ...contact import ContactState, state_of
+from ...contact import state_of
 from ...errors import ContactError, warn
-from ...fem import BoundaryTrace, Space
+from ...fem import BoundaryTrace
 from ..equilibrated import EquilibratedStress, Guaranteed
 from .contact import ends_of, force_on, peak_of
+from .force import Forced, proved_force_error
 from .stresses import largest_von_mises
 from .table import Quantities, Quantity
 
 
-class _Assembled(Protocol):
-    """A discrete problem, of which the space is asked."""
-
-    @property
-    def space(self) -> Space: ...
-
-
-class _Solved(Protocol):
+class _Solved(Forced, Protocol):
     """What of a solution is asked."""
 
-    @property
-    def discrete(self) -> _Assembled: ...
     @property
     def stress(self) -> ng.CoefficientFunction: ...
     @property
     def out_of_plane_stress(self) -> ng.CoefficientFunction: ...
-    @property
-    def pairs(self) -> Sequence[ContactState]: ...
     @property
     def energy(self) -> float: ...
     @property
@@ -64,10 +53,9 @@ class _Solved(Protocol):
     @property
     def relative_error_estimate(self) -> float: ...
     @property
-    def equilibrated(self) -> EquilibratedStress: ...
-    def contact_force(self, pair: int = 0) -> Array: ...
-    @property
     def _proved(self) -> tuple[EquilibratedStress | None, str]: ...
+    @property
+    def _force_errors(self) -> dict[int, tuple[float, str]]: ...
 
 
 class Measured(Guaranteed):
@@ -81,12 +69,17 @@ class Measured(Guaranteed):
         except (ContactError, ValueError) as error:
             return None, f"nothing is guaranteed: {error}"
 
+    @cached_property
+    def _force_errors(self) -> dict[int, tuple[float, str]]:
+        """By pair what is proved of the force, infinite where nothing is, and why."""
+        return {}
+
     def quantities(self: _Solved, pair: int = 0) -> Quantities:
         """Force, peak pressure, ends of contact, energy, largest von Mises stress, with errors.
 
-        Each in units of the data, any consistent units; printed as a table. The energy's bar is
-        proved, the others are estimated. Where no bound is known all of them are, and a
-        `ContactWarning` and a note below the table say why.
+        Each in units of the data, any consistent units; printed as a table. The bars of energy and,
+        as a rule, force are proved, the others are estimated. Where no bound is known all of them
+        are, and a `ContactWarning` and a note below the table say why.
         """
         state = state_of(self.pairs, pair)
         known = "_proved" in self.__dict__
@@ -100,14 +93,30 @@ class Measured(Guaranteed):
             relative = self.relative_error_bound
         boundary: BoundaryTrace = self.discrete.space.trace
         stresses = self.stress, self.out_of_plane_stress
+        force = force_on(state, self.contact_force(pair), boundary, star, relative)
+        if proof is not None:
+            error, reason = _force_error(self, pair)
+            if error < np.inf:
+                force = replace(force, error=error, kind="guaranteed")
         rows = [
-            force_on(state, self.contact_force(pair), boundary, star, relative),
+            force,
             *peak_of(state, boundary, self.stress, star),
             *ends_of(state, boundary),
             _energy(self, proof is not None),
             largest_von_mises(boundary.mesh, stresses, proof),
         ]
         return Quantities(tuple(rows), reason)
+
+
+def _force_error(solution: _Solved, pair: int) -> tuple[float, str]:
+    """What is proved of a pair's force, once for all: infinite where nothing is, and why."""
+    known = solution._force_errors
+    if pair not in known:
+        try:
+            known[pair] = proved_force_error(solution, pair), ""
+        except (ContactError, ValueError) as error:
+            known[pair] = np.inf, f"the error of the force is an estimate: {error}"
+    return known[pair]
 
 
 def _energy(solution: _Solved, proved: bool) -> Quantity:

@@ -66,31 +66,34 @@ def at_points(c: Array, t: Array) -> Array:
     return np.einsum("kqi,ki...->kq...", values, c)
 
 
-def panels(gap: Array) -> tuple[Array, Array]:
+def panels(*functions: Array) -> tuple[Array, Array]:
     """Points (k, q) and weights (k, q) on segments cut where functions change their sign.
 
-    `gap` (k, d + 1) are their coefficients. Cuts that a segment lacks are at its end.
+    Each of the `functions` (k, d + 1) are their coefficients. Cuts that a segment lacks are at its
+    end.
     """
     rule, w = gauss(2 * DEGREE)
     grid = np.linspace(0, 1, 8 * DEGREE + 1)
-    values = gap @ legendre_values(DEGREE, grid).T
+    every = np.stack(functions, axis=1).reshape(-1, DEGREE + 1)
+    values = every @ legendre_values(DEGREE, grid).T
     row, column = np.nonzero(values[:, 1:] * values[:, :-1] < 0)
-    slope = gap @ legendre_derivative(DEGREE).T
+    slope = every @ legendre_derivative(DEGREE).T
     low, high = grid[column], grid[column + 1]
     a, b = values[row, column], values[row, column + 1]
     t = low + (high - low) * a / (a - b)
     for _ in range(4):  # Newton, from within 1 / 128
-        f = (legendre_values(DEGREE, t) * gap[row]).sum(axis=1)
+        f = (legendre_values(DEGREE, t) * every[row]).sum(axis=1)
         df = (legendre_values(DEGREE, t) * slope[row]).sum(axis=1)
         t = np.clip(t - f / np.where(df == 0, 1.0, df), low, high)
-    count = np.bincount(row, minlength=len(gap))
-    cuts = np.ones((len(gap), int(count.max(initial=0)) + 2))
+    row //= len(functions)
+    count = np.bincount(row, minlength=len(functions[0]))
+    cuts = np.ones((len(count), int(count.max(initial=0)) + 2))
     cuts[:, 0] = 0.0
     place = np.arange(len(row)) - np.concatenate([[0], np.cumsum(count)[:-1]])[row]
     cuts[row, 1 + place] = t
-    length = np.diff(cuts, axis=1)
-    points = cuts[:, :-1, None] + length[:, :, None] * rule
-    return points.reshape(len(gap), -1), (length[:, :, None] * w).reshape(len(gap), -1)
+    length = np.diff(np.sort(cuts, axis=1), axis=1)
+    points = np.sort(cuts, axis=1)[:, :-1, None] + length[:, :, None] * rule
+    return points.reshape(len(count), -1), (length[:, :, None] * w).reshape(len(count), -1)
 
 
 def norms(discrete: Discrete, field: EdgeField) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import ngsolve as ng
 import numpy as np
@@ -15,6 +16,28 @@ from ..pressures import Pieces, Zone, ZonePoints, zone_points
 from .edges import EdgeField, at_points, coefficients, derivative, hat_norms, norms, panels, samples
 
 SHARP = 1e-9  # difference of displacements at a vertex, relative to the gap: more than round-off
+
+
+class Opened(Protocol):
+    """A function on the pieces of Gamma_K, and what is added to it: that of a `Gap`, say."""
+
+    @property
+    def zone(self) -> Zone:
+        """The pair."""
+
+    @property
+    def pieces(self) -> Pieces:
+        """Its parts."""
+
+    @property
+    def points(self) -> ZonePoints:
+        """Places on each."""
+
+    def lifted(self, at: Index, t: Array) -> tuple[Array, Array, Array]:
+        """The function (j, q), r (j, q), r' (j, q) at `t` (j, q) of pieces `at` (j,)."""
+
+    def panels(self, at: Index) -> tuple[Array, Array]:
+        """Points (j, q), weights (j, q) of pieces `at` (j,), cut where r has kinks."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +116,7 @@ def gap_of(
 
 
 def on_contact(
-    gap: Gap, boundary: BoundaryTrace, supported: Index, discrete: Discrete
+    gap: Opened, boundary: BoundaryTrace, supported: Index, discrete: Discrete
 ) -> tuple[list[EdgeField], list[tuple[Index, Array]]]:
     """What to lift so that K is met: fields on edges, or triangles (k,) and energy norms (k,).
 
@@ -150,7 +173,7 @@ def _field(
 
 
 def _on_secondary(
-    gap: Gap,
+    gap: Opened,
     at: Index,
     side: tuple[Index, Array, Array],
     parts: tuple[Array, Array, Array],

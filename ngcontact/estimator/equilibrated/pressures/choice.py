@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ....arrays import Array, Index, Mask
+from ....arrays import Array
 from ....errors import ContactError
 from ....qp import solve_qp
 
@@ -61,8 +61,8 @@ def best_pressure(
     sides: Sequence[Side],
     sums: Sequence[Sums],
     closing: Array,
-    nonnegative: Mask,
-    balance: tuple[Array, Array],
+    bounds: tuple[Array, Array],
+    balance: Sequence[Array],
 ) -> Array:
     """Coefficients (m,) of p*.
 
@@ -72,9 +72,9 @@ def best_pressure(
         What p* shall be near to.
     closing : ndarray (m,)
         Integrals of the basis functions times the open gap.
-    nonnegative : ndarray of bool (m,)
-        Coefficients of unilateral pairs.
-    balance : tuple of ndarray (c, m), (c,)
+    bounds : tuple of ndarray (m,), (m,)
+        The least and the largest coefficients: not negative on unilateral pairs.
+    balance : sequence of ndarray (c, m), (c,)
         Resultants that bodies without supports need.
 
     Raises
@@ -94,47 +94,48 @@ def best_pressure(
             C, c = C - C.mean(axis=0), c - c.mean()
         H += TOTALS * line.weight * C.T @ C
         f += TOTALS * line.weight * C.T @ c
-    return _minimiser(H, f, nonnegative, *balance)
+    return _minimiser(H, f, bounds, *balance)
 
 
-def _minimiser(H: Array, f: Array, nonnegative: Mask, A: Array, a: Array) -> Array:
-    """The least b.Hb / 2 - f.b with A b = a, by primal-dual active sets."""
-    m, c = len(f), len(a)
+def _minimiser(H: Array, f: Array, bounds: tuple[Array, Array], A: Array, a: Array) -> Array:
+    """The least b.Hb / 2 - f.b with A b = a within `bounds`, by primal-dual active sets."""
+    m, c, (low, high) = len(f), len(a), bounds
     if m == 0:
         if np.abs(a).max(initial=0.0) > 0:
             raise ContactError("no pressure balances the loads of a body that contact alone holds")
         return np.zeros(0)
-    zero = np.zeros(m, dtype=bool)
-    b = np.zeros(m)
+    side, b = np.zeros(m), np.zeros(m)  # at which of the bounds: -1, 0, +1
     for _ in range(STEPS):
-        free = np.flatnonzero(~zero)
+        b = np.where(side < 0, low, np.where(side > 0, high, 0.0))
+        free = np.flatnonzero(side == 0)
         K = np.zeros((len(free) + c, len(free) + c))
         K[: len(free), : len(free)] = H[np.ix_(free, free)]
         K[len(free) :, : len(free)] = A[:, free]
         K[: len(free), len(free) :] = A[:, free].T
         try:
-            x = np.linalg.solve(K, np.concatenate([f[free], a]))
+            x = np.linalg.solve(K, np.concatenate([(f - H @ b)[free], a - A @ b]))
         except np.linalg.LinAlgError:
             break
-        b[:] = 0.0
         b[free] = x[: len(free)]
         slope = H @ b - f + A.T @ x[len(free) :]
         smallest = NEGATIVE * np.abs(b).max(), NEGATIVE * np.abs(f).max()
-        leaving = nonnegative & ~zero & (b < -smallest[0])
-        entering = zero & (slope < -smallest[1])
-        if not leaving.any() and not entering.any():
-            return np.where(nonnegative, np.maximum(b, 0.0), b)
-        zero = (zero | leaving) & ~entering
-    return _surely(H, f, nonnegative, A, a)
+        under, over = b < low - smallest[0], b > high + smallest[0]
+        leaving = side * slope > smallest[1]
+        if not (under | over | leaving).any():
+            return np.clip(b, low, high)
+        side = np.where(leaving, 0.0, side + over - 1.0 * under)
+    return _surely(H, f, bounds, A, a)
 
 
-def _surely(H: Array, f: Array, nonnegative: Mask, A: Array, a: Array) -> Array:
+def _surely(H: Array, f: Array, bounds: tuple[Array, Array], A: Array, a: Array) -> Array:
     """The same by a method that always ends, if there is a solution at all."""
-    rows: Index = np.flatnonzero(nonnegative)
-    B = -sp.eye_array(len(f)).tocsr()[rows]
+    eye = sp.eye_array(len(f)).tocsr()
+    low, high = (np.flatnonzero(np.isfinite(bound)) for bound in bounds)
+    B = sp.vstack([-eye[low], eye[high]]).tocsr()
+    g = np.concatenate([-bounds[0][low], bounds[1][high]])
     equations = (sp.csr_array(A), a) if len(a) else (None, None)
     try:
-        b = solve_qp(sp.csr_array(H), f, B, np.zeros(len(rows)), *equations).u
+        b = solve_qp(sp.csr_array(H), f, B, g, *equations).u
     except (ContactError, ValueError) as error:
         raise ContactError(f"no pressure balances the loads: {error}") from error
-    return np.where(nonnegative, np.maximum(b, 0.0), b)
+    return np.clip(b, *bounds)

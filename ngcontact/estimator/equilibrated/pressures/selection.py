@@ -29,6 +29,7 @@ def selected(
     discrete: Discrete,
     conditions: EdgeConditions,
     units: Units,
+    limits: Sequence[Array] | None = None,
 ) -> tuple[Discrete, Array, list[Array]]:
     """Choose p*: the data with all loads in balance, all tractions (e, 2, r), p* of each pair.
 
@@ -44,6 +45,9 @@ def selected(
         Of the e edges.
     units : Units
         Of the latter two.
+    limits : sequence of ndarray (m,), optional
+        Sizes that coefficients of either sign do not exceed, wherever the gap is open; without
+        them p* >= 0 on unilateral pairs.
 
     Returns
     -------
@@ -66,10 +70,14 @@ def selected(
         exerted.append(tractions(discrete.partition, zone, points, e, discrete.degree))
         _add(wishes, zone, points, every[start:stop], boundary, stress, discrete, conditions, units)
     pressures = sp.hstack(exerted).tocsr()
-    unilateral = [np.full(z.size, not z.state.line.contact.bilateral) for z in zones]
-    nonnegative = np.concatenate([np.zeros(0, dtype=bool), *unilateral])
-    discrete, A, a = balanced(discrete, conditions, pressures)
-    b = best_pressure(wishes.sides, wishes.sums, wishes.closing, nonnegative, (A, a))
+    discrete, *balance = balanced(discrete, conditions, pressures)
+    if limits is None:
+        least = [-np.inf if zone.state.line.contact.bilateral else 0.0 for zone in zones]
+        bounds = np.repeat(least, np.diff(starts)), np.full(starts[-1], np.inf)
+    else:
+        high = np.concatenate([np.zeros(0), *limits])
+        wishes.closing[:], bounds = 0.0, (-high, high)
+    b = best_pressure(wishes.sides, wishes.sums, wishes.closing, bounds, balance)
     given = conditions.given + (pressures @ b).reshape(e, 2, r)
     return discrete, given, [b[i:j] for i, j in pairwise(starts)]
 

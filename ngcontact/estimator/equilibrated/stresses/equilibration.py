@@ -31,6 +31,14 @@ class Equilibrated:
     change: Array
     rest: float
 
+    def norms(self, discrete: Discrete) -> Array:
+        """Norms (n,) of s - sigma_h: of the polynomials, and of what these miss of sigma_h."""
+        norms = np.linalg.norm(self.change, axis=1)
+        if discrete.rough is not None:
+            at = discrete.rough.at
+            norms[at] = np.hypot(norms[at], discrete.rough.rest)
+        return np.asarray(norms)
+
 
 def blocks(count: int, size: int) -> Iterator[Index]:
     """Numbers (j,) of `count` triangles, part by part; a triangle needs `size` numbers."""

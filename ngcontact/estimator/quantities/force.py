@@ -1,0 +1,132 @@
+"""A bar of the contact force that is proved: which dual problems, and what they cost."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import ngsolve as ng
+import numpy as np
+
+from ...arrays import Array, Mask
+from ...contact import ContactState, by_line
+from ...fem import Space, load_vector, stress_of
+from ...problem import Problem
+from ..equilibrated import FINE, EquilibratedStress, Tested, force_bar
+
+STRAIGHT = 1e-12  # part of directions across the force that is round-off
+ROUND_OFF = 64 * np.finfo(float).eps  # of a force, relative to the terms that it is the sum of
+
+
+class _Influence(Protocol):
+    """Forces and work of a displacement that moves contact points."""
+
+    @property
+    def force(self) -> Array: ...
+    @property
+    def factorizations(self) -> int: ...
+    @property
+    def back_solves(self) -> int: ...
+
+
+class Movable(Protocol):
+    """A discrete problem whose contact points can be moved."""
+
+    @property
+    def space(self) -> Space:
+        """V_h."""
+
+    def influence(self, active: Mask, jumps: Array) -> tuple[ng.GridFunction, _Influence]:
+        """What moves the `active` (m,) points by `jumps` (m,)."""
+
+
+class Forced(Protocol):
+    """What of a solution is asked."""
+
+    @property
+    def work(self) -> dict[str, int]:
+        """Counts of what was done."""
+
+    @property
+    def problem(self) -> Problem:
+        """What was solved."""
+
+    @property
+    def displacement(self) -> ng.GridFunction:
+        """u_h."""
+
+    @property
+    def discrete(self) -> Movable:
+        """The discrete problem."""
+
+    @property
+    def pairs(self) -> Sequence[ContactState]:
+        """The state of each pair."""
+
+    @property
+    def active(self) -> Mask:
+        """Points in contact (m,)."""
+
+    @property
+    def equilibrated(self) -> EquilibratedStress:
+        """The stress that proves the bound."""
+
+    def contact_force(self, pair: int = 0) -> Array:
+        """Resultant (2,) of a pair."""
+
+
+def proved_force_error(solution: Forced, pair: int) -> float:
+    """How far the size of a pair's contact force is from the true one, at most.
+
+    Raises
+    ------
+    ValueError, ContactError
+        No bar is proved, or one beyond the force itself.
+    """
+    if not solution.problem.model.startswith("plane"):
+        raise ValueError(f'no bar of the force is proved for "{solution.problem.model}"')
+    force = solution.contact_force(pair)
+    size = float(np.linalg.norm(force))
+    e = force / size if size > 0 else np.array([1.0, 0.0])
+    across = np.array([-e[1], e[0]])
+    bars = [_component(solution, pair, e)]
+    if np.abs(solution.pairs[pair].line.direction @ across).max(initial=0.0) > STRAIGHT:
+        bars.append(_component(solution, pair, across))
+    error = float(np.linalg.norm(bars))
+    if error > size > 0:
+        raise ValueError(f"what is proved, {error:.2g}, is more than the force itself")
+    return error
+
+
+def _component(solution: Forced, pair: int, e: Array) -> float:
+    """How far the force's component along `e` (2,) is from the true one, at most."""
+    states, space, u = solution.pairs, solution.discrete.space, solution.displacement
+    directions = [e if number == pair else 0 * e for number in range(len(states))]
+    jumps = [s.line.direction @ d for s, d in zip(states, directions, strict=True)]
+    jump = np.where(solution.active, np.concatenate(jumps), 0.0)
+    G, found = solution.discrete.influence(solution.active, jump)
+    solution.work["factorizations"] += found.factorizations
+    solution.work["back_solves"] += found.back_solves
+    solution.work["equilibrations"] += 1
+    forces = by_line([state.line for state in states], found.force)
+    tested = Tested(G, stress_of(solution.problem, G), forces, directions)
+    proof = solution.equilibrated.proof
+    error = force_bar(solution.problem, space.trace, u, tested, proof)
+    a, b = (x.vec.FV().NumPy() for x in (u, G))
+    noise = ROUND_OFF * float(np.sqrt((space.diagonal @ a**2) * (space.diagonal @ b**2)))
+    return error + noise + _integrated(solution, G, proof.discrete.rough is not None)
+
+
+def _integrated(solution: Forced, G: ng.GridFunction, rough: bool) -> float:
+    """Size of what quadrature of stiffness and loads misses of A(u_h, G) - l(G)."""
+    space, problem, u = solution.discrete.space, solution.problem, solution.displacement
+    a, b = (x.vec.FV().NumPy() for x in (u, G))
+    missed = 0.0
+    if problem.force or problem.traction:
+        missed -= float((load_vector(problem, space.V, FINE) - space.f) @ b)
+    if rough:
+        p, geometry = space.trace.order, space.trace.geometry_order
+        work = ng.InnerProduct(stress_of(problem, u), ng.Sym(ng.Grad(G)))
+        fine = ng.Integrate(work, space.trace.mesh, order=2 * p * geometry + 2 * geometry + 8)
+        missed += float(fine) - float(a @ (space.A @ b))
+    return abs(missed)
