@@ -60,7 +60,7 @@ class Refinement:
 
     def __post_init__(self) -> None:
         """Validate."""
-        check_element(self.order, self.element)
+        object.__setattr__(self, "order", check_element(self.order, self.element))
         if not 0 < _number("theta", self.theta) <= 1:
             raise ValueError(f"theta={self.theta} must lie in (0, 1]; 0.5 is usual")
         if self.tolerance is not None and not _number("tolerance", self.tolerance) > 0:
@@ -129,7 +129,7 @@ def adapt(
     if not isinstance(progress, bool):
         raise TypeError(f"progress={progress!r}: give True or False")
     mesh = first_level(problem, maxh, refinement)
-    warn_of_implausible(problem, mesh, order)
+    warn_of_implausible(problem, mesh, refinement.order)
     solutions = with_warnings(levels(problem, mesh, refinement))
     return with_progress(solutions, tolerance, max_dofs) if progress else solutions
 

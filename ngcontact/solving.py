@@ -64,7 +64,7 @@ def solve(
     ConvergenceError
         The active set did not settle, or a body can still move rigidly; carries the last iterate.
     """
-    check_element(order, element)
+    order = check_element(order, element)
     if mesh is not None and maxh is not None:
         raise ValueError(f"maxh={maxh} has no effect on a given mesh; give one of mesh and maxh")
     _check_start(problem, start)
@@ -83,7 +83,7 @@ def solve(
 def _check_start(problem: Problem, start: Solution | None) -> None:
     """Raise unless `start` is a solution of as many pairs as the problem has."""
     if start is not None and not isinstance(start, Solution):
-        raise TypeError(f"start={start!r} is not a Solution")
+        raise TypeError(f"start is a {type(start).__name__}: give a Solution")
     if start is not None and len(start.discrete.lines) != len(problem.contact):
         raise ValueError(
             f"start has {len(start.discrete.lines)} contact pairs, the problem "

@@ -29,8 +29,8 @@ def unknowns_of(order: int, vertices: int, edges: int, elements: int) -> int:
     return 2 * (vertices + (order - 1) * edges + inner * elements)
 
 
-def check_element(order: int, element: str) -> None:
-    """Raise unless the element is one of `ELEMENTS` with an order it is available in."""
+def check_element(order: int, element: str) -> int:
+    """The order; raise unless the element is one of `ELEMENTS` with an order it is available in."""
     if element not in ELEMENTS:
         raise ValueError(f"element={element!r} is not available; choose one of {ELEMENTS}")
     orders = (1,) if element == "physical" else ORDERS
@@ -38,6 +38,7 @@ def check_element(order: int, element: str) -> None:
         raise TypeError(f"order={order!r} is not an integer; element={element!r} has {orders}")
     if order not in orders:
         raise ValueError(f"order={order} is not available; element={element!r} has {orders}")
+    return int(order)  # NGSolve knows no integers of NumPy
 
 
 def _physical_basis(V: ng.FESpace, trace: BoundaryTrace) -> sp.csr_array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from numbers import Real
 
 import netgen.occ as occ
 import ngsolve as ng
@@ -17,7 +18,7 @@ FINER = 2  # ... and that many times more on a bounded zone: contact may end any
 SHARED = threading.Lock()
 
 
-def _require_complete(mesh: ng.Mesh) -> None:
+def _require_complete(mesh: ng.Mesh, problem: Problem) -> None:
     """Raise where Netgen, which only prints a message, left a part of a body without elements."""
     view = Triangulation(mesh)
     side, rim = (
@@ -27,9 +28,13 @@ def _require_complete(mesh: ng.Mesh) -> None:
     known, count = np.unique(side, return_counts=True)
     missing = np.setxor1d(known[count == 1], rim[~np.isin(rim, known[count > 1])])
     if missing.size:
+        pairs = [f"contact {k} of {p.named()}" for k, p in enumerate(problem.contact)]
+        free = [name for name, p in zip(pairs, problem.contact, strict=True) if not p.direction]
+        right = f"if two bodies bulge towards each other give {' and '.join(free)} a direction; "
         raise ValueError(
-            f"Netgen left holes in the mesh, with {missing.size} sides; choose another maxh, or "
-            "name the parts of an edge that belong to several contact pairs apart"
+            f"Netgen left holes in the mesh, with {missing.size} sides; {right if free else ''}"
+            "choose another maxh, or name the parts of an edge that belong to several contact "
+            "pairs apart"
         )
 
 
@@ -75,12 +80,13 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
     extent = max(high.x - low.x, high.y - low.y)
     finer = FINER if maxh is None else 1
     maxh = extent / COARSE if maxh is None else maxh
-    if isinstance(maxh, bool) or not isinstance(maxh, int | float | np.number):
+    if isinstance(maxh, bool) or not isinstance(maxh, Real):
         raise TypeError(f"maxh={maxh!r} is not a number; give a length like {extent / COARSE:g}")
+    maxh = float(maxh)
     if not (np.isfinite(maxh) and maxh > 0):
         raise ValueError(f"maxh={maxh} must be positive and finite, like {extent / COARSE:g}")
     with SHARED:  # sizes and divisions are told to Netgen on the shape, which others may mesh, too
         edges = divided(problem, shape, maxh, maxh / finer)
         mesh = _generated(shape, edges, maxh)
-    _require_complete(mesh)
+    _require_complete(mesh, problem)
     return mesh

@@ -39,13 +39,23 @@ AT_ENDS: Places = (
     ng.IntegrationRule([(0, 0, 0), (0.5, 0, 0), (1, 0, 0)], [1 / 6, 2 / 3, 1 / 6]),
 )
 
+_OTHER = {
+    True: "it is a boundary, and bodies are asked for; ",
+    False: "it is a body, and boundaries are asked for; ",
+}
+
 FLAT = 16 * np.finfo(float).eps  # area of a triangle over its longest side squared, without height
 
 
 def check_mesh(mesh: ng.Mesh) -> None:
     """Refuse anything but a plane mesh of positively oriented, non-degenerate triangles."""
     if not isinstance(mesh, ng.Mesh):
-        raise TypeError(f"mesh is a {type(mesh).__name__}: give an ngsolve.Mesh")
+        raise TypeError(f"mesh is {kind_of(mesh)}: give an ngsolve.Mesh")
+    if mesh.deformation is not None:
+        raise ValueError(
+            "mesh has a deformation set, which would move contact and normals unseen: call "
+            "mesh.UnsetDeformation() first"
+        )
     if mesh.dim != 2:
         raise ValueError(f"mesh has dimension {mesh.dim}: make it with OCCGeometry(shape, dim=2)")
     if mesh.ne == 0:
@@ -67,6 +77,14 @@ def check_mesh(mesh: ng.Mesh) -> None:
         )
 
 
+def kind_of(value: Any) -> str:
+    """What a value is that should be a mesh or a geometry."""
+    kind = type(value)
+    if kind.__module__.startswith("netgen") and kind.__name__ == "Mesh":
+        return "a raw Netgen mesh, which ngsolve.Mesh(mesh) wraps"
+    return f"a {kind.__name__}"
+
+
 def regions_of(
     mesh: ng.Mesh,
     argument: str,
@@ -83,6 +101,8 @@ def regions_of(
                 known = sorted(set(names))
                 close = difflib.get_close_matches(part, known, n=1)
                 hint = f'did you mean "{close[0]}"? ' if close else ""
+                if part in (mesh.GetBoundaries() if mask_of is body_mask else mesh.GetMaterials()):
+                    hint = _OTHER[mask_of is body_mask]
                 raise ValueError(f'{argument} "{part}" selects no region; {hint}there are {known}')
         label = f'{argument} "{pattern}"'
         mask = {label: mask_of(mesh, pattern)}
@@ -171,7 +191,7 @@ def check_gaps(mesh: ng.Mesh, contact: Sequence[Masks], pairs: Sequence[Contact]
     for j, (sides, pair) in enumerate(zip(contact, pairs, strict=True)):
         if pair.gap is not None:
             points = _points(mesh, next(iter(sides.values())), AT_ENDS)
-            _check_gap(points, pair.gap, f"contact[{j}].gap")
+            _check_gap(points, pair.gap, f'contact[{j}].gap of "{pair.secondary}"')
 
 
 def _points(mesh: ng.Mesh, mask: np.ndarray, places: Places) -> np.ndarray:
@@ -196,7 +216,14 @@ def _check_gap(points: np.ndarray, gap: Any, label: str) -> None:
         _check_finite(points, ng.CF(gap), label)
         return
     x, y = ng.CF((ng.x, ng.y))(points).T.copy()
-    values = np.asarray(gap(x, y))
+    try:
+        values = np.asarray(gap(x, y))
+    except Exception as error:
+        kind = TypeError if isinstance(error, TypeError) else ValueError
+        raise kind(
+            f"{label} failed on arrays x, y of shape {x.shape} ({error}): it must take two arrays "
+            "and return one, with np.where(x > 0, a, b) in place of a if x > 0 else b"
+        ) from error
     if values.dtype.kind not in "iuf":
         raise TypeError(f"{label} returns values of type {values.dtype}: return real numbers")
     if values.shape != x.shape:

@@ -68,18 +68,21 @@ class Contact:
                 f'contact of "{self.secondary}" has primary=None and gap=None: a rigid obstacle '
                 "(primary=None) needs gap"
             )
+        who = f'contact of "{self.secondary}": '
         if self.direction is not None:
-            object.__setattr__(self, "direction", unit_vector(self.direction))
+            object.__setattr__(self, "direction", unit_vector(self.direction, f"{who}direction"))
         if isinstance(self.gap, ng.CoefficientFunction) or not callable(self.gap):
-            gap = None if self.gap is None else scalar_data(self.gap, "gap")
+            gap = None if self.gap is None else scalar_data(self.gap, f"{who}gap")
             object.__setattr__(self, "gap", gap)
         if not isinstance(self.bilateral, bool):
-            raise TypeError(f"bilateral = {self.bilateral!r}: give True or False")
+            raise TypeError(f"{who}bilateral = {self.bilateral!r}: give True or False")
         for what, value, known in (("rows", self.rows, ROWS), ("roles", self.roles, ROLES)):
             if value not in known:
-                raise ValueError(f"{what} = {value!r}: choose one of {known}")
+                raise ValueError(f"{who}{what} = {value!r}: choose one of {known}")
         if self.roles == "auto" and self.primary is None:
-            raise ValueError('roles = "auto" with primary=None: a rigid obstacle has no other side')
+            raise ValueError(
+                f'{who}roles = "auto" with primary=None: a rigid obstacle has no other side'
+            )
 
     def named(self) -> str:
         """Both sides, as a user knows them."""

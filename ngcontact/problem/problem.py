@@ -20,6 +20,7 @@ from .checks import (
     check_laws,
     check_mesh,
     check_pairs,
+    kind_of,
     refuse_common,
     regions_of,
     sides_of,
@@ -93,7 +94,7 @@ class Problem:
         """Validate types and numbers; names and CoefficientFunctions wait for `check`."""
         if not isinstance(self.geometry, OCCGeometry | ng.Mesh):
             raise TypeError(
-                f"geometry is a {type(self.geometry).__name__}: give an OCCGeometry or ngsolve.Mesh"
+                f"geometry is {kind_of(self.geometry)}: give an OCCGeometry or ngsolve.Mesh"
             )
         require_model(self.model)
         materials = by_region(self.materials, "materials", _law)
@@ -111,6 +112,11 @@ class Problem:
             "contact": _contacts(self.contact),
         }.items():
             object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        """In a few words, instead of all data."""
+        pairs = ", ".join(pair.named() for pair in self.contact) or "none"
+        return f"Problem({self.model}; bodies {', '.join(self.materials)}; contact {pairs})"
 
     def _repr_html_(self) -> str:
         """What a notebook shows: a table of the data, a line each."""

@@ -143,14 +143,17 @@ def region_pattern(value: Any) -> str | None:
     return "|".join(region_name(entry, "an entry of sliding") for entry in value) or None
 
 
-def unit_vector(value: Any) -> tuple[float, float]:
+def unit_vector(value: Any, what: str) -> tuple[float, float]:
     """Return a direction as a unit vector; the size of its entries never overflows."""
-    x, y = (scalar_data(entry, "direction") for entry in pair_of(value, "direction"))
+    right = "give a pair of numbers, like (0, -1), one direction for all"
+    if isinstance(value, str | ng.CoefficientFunction):
+        raise TypeError(f"{what} = {value!r:.60}: {right}")
+    x, y = (scalar_data(entry, what) for entry in pair_of(value, what))
     if not (isinstance(x, float) and isinstance(y, float)):
-        raise TypeError(f"direction = {value!r}: give a pair of numbers, one direction for all")
+        raise TypeError(f"{what} = {value!r:.60}: {right}")
     size = max(abs(x), abs(y))
     if size == 0:
-        raise ValueError(f"direction = ({x}, {y}): give a vector from secondary to primary body")
+        raise ValueError(f"{what} = ({x}, {y}): give a vector from secondary to primary body")
     length = math.hypot(x / size, y / size)
     return x / size / length, y / size / length
 

@@ -535,3 +535,23 @@ def test_meshes_made_in_several_threads_do_not_see_each_other():
     for thread in threads:
         thread.join()
     assert found == {size: [alone[size]] * 4 for size in sizes}
+
+
+def test_two_cams_without_a_direction_are_told_to_give_one():
+    """Normals of one full ellipse divide the other, which faces away for the most part."""
+    parts = []
+    for name, y in (("upper", 1.2), ("lower", 0.0)):
+        face = occ.WorkPlane(occ.Axes((0, y, 0), n=occ.Z, h=occ.X)).Ellipse(1.0, 0.6).Face()
+        face.name, face.edges.name = name, f"{name}_rim"
+        parts.append(face)
+    steel = Elastic(E=1.0, nu=0.3)
+    problem = Problem(
+        geometry=OCCGeometry(occ.Compound(parts), dim=2),
+        materials={"upper": steel, "lower": steel},
+        contact=[Contact("upper_rim", "lower_rim")],
+    )
+    message = 'bulge towards each other give contact 0 of "upper_rim" with "lower_rim" a direction'
+    with pytest.raises(ValueError, match=message):
+        first_mesh(problem, 0.2)
+    along = replace(problem, contact=[Contact("upper_rim", "lower_rim", direction=(0, -1))])
+    assert first_mesh(along, 0.2).ne > 50
