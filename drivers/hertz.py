@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Annotated, TypeAlias
 
 import ngsolve as ng
+import numpy as np
 from cyclopts import Parameter
 
 from drivers.command_line import Count, Order, Positive, run
@@ -82,6 +83,18 @@ COLUMNS: dict[str, Callable[[Quantities], str]] = {
 }
 
 
+def draw(
+    path: Path, solution: Solution, peak: float, half_width: float, mirror: str | None = None
+) -> None:
+    """Picture in mm and MPa, Hertz's pressure p0 (1 - (x/a)^2)^(1/2) over the computed one."""
+
+    def pressure(x: np.ndarray) -> np.ndarray:
+        return peak * np.sqrt(np.maximum(1 - (x / half_width) ** 2, 0.0))
+
+    units = {"length": ("mm", 1e-3), "stress": ("MPa", 1e6)}
+    solution.plot(path, units=units, profile={"Hertz": pressure}, mirror=mirror)
+
+
 def main(
     *,
     radius: Positive = 0.01,
@@ -139,7 +152,7 @@ def main(
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         solution.write(out / "hertz.vtu")
-        solution.plot(out / "hertz.png")
+        draw(out / "hertz.png", solution, expected.peak, expected.half_width, mirror="axis")
         print(f"\nWritten: {out}/hertz.vtu, hertz_contact.vtp, hertz.png")
     return computed, expected
 

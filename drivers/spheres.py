@@ -18,7 +18,7 @@ from pathlib import Path
 import ngsolve as ng
 
 from drivers.command_line import Count, Order, Positive, run
-from drivers.hertz import ALUMINIUM, STEEL, Law
+from drivers.hertz import ALUMINIUM, STEEL, Law, draw
 from drivers.tables import last_level, print_comparison
 from ngcontact import Contact, Elastic, Problem, Solution, adapt
 from ngcontact.geometries import disc_on_disc
@@ -130,7 +130,7 @@ def main(
         out.mkdir(parents=True, exist_ok=True)
         solution.write(out / "spheres.vtu")
         solution.revolved(out / "spheres_revolved.vtu")
-        solution.plot(out / "spheres.png")
+        draw(out / "spheres.png", solution, expected.peak, expected.radius)
         print(f"\nWritten: {out}/spheres.vtu, _contact.vtp, _revolved.vtu, spheres.png")
     return computed, expected
 

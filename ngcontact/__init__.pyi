@@ -3,6 +3,8 @@ from .errors import ContactError as ContactError
 from .errors import ContactWarning as ContactWarning
 from .errors import ConvergenceError as ConvergenceError
 from .errors import NoEquilibriumError as NoEquilibriumError
+from .output import plot_convergence as plot_convergence
+from .output import write_film as write_film
 from .output import write_series as write_series
 from .problem import Contact as Contact
 from .problem import Elastic as Elastic

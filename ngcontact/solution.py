@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 
 import ngsolve as ng
 import numpy as np
@@ -16,14 +15,14 @@ from .contact import ContactState, contact_states, state_of
 from .discrete import DiscreteProblem, RigidMotion, resultants
 from .estimator import Estimate, Estimator, Measured, estimate
 from .fem import energy_norm, model_of, normal_stress_of, potential_energy, stress_of
-from .output import plot_solution, write_revolved, write_solution
+from .output import Shown
 from .problem import Problem
 from .qp import Iterate, kkt_residuals
 from .results import Readable, read
 
 
 @dataclass(frozen=True, eq=False)
-class Solution(Measured, Readable):
+class Solution(Measured, Readable, Shown):
     """Exact minimiser u_h of L over K_h on one mesh: HH81 (P_1h), (P_2h).
 
     Contact quantities are arrays over the m contact points, all pairs in order.
@@ -218,21 +217,6 @@ class Solution(Measured, Readable):
         `complementarity`: sum of force times gap over force times length.
         """
         return kkt_residuals(self.discrete.program, self.minimiser)
-
-    def write(self, path: str | os.PathLike[str]) -> Path:
-        """Write `path` (.vtu) and, beside it, ``<stem>_contact.vtp``."""
-        return write_solution(path, self)
-
-    def revolved(self, path: str | os.PathLike[str], angle: float = 270.0) -> Path:
-        """Write the body of revolution, turned by `angle` degrees, to `path` (.vtu)."""
-        return write_revolved(path, self, angle)
-
-    def plot(self, path: str | os.PathLike[str] | None = None, scale: float | None = None) -> None:
-        """Picture of the deformed bodies and the pressure; a file when `path` (.png) is given.
-
-        `scale` magnifies the displacement; chosen to be seen when left out.
-        """
-        plot_solution(self, path, scale)
 
     __repr__ = Readable.__str__  # instead of all arrays
 

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from drivers.adaptive_study.runs import Row, triangles
 from ngcontact import Solution
+from ngcontact.output import slope_triangle
 
 
 def draw_errors(path: Path, name: str, runs: dict[tuple[str, int], list[Row]]) -> None:
@@ -30,12 +31,10 @@ def draw_errors(path: Path, name: str, runs: dict[tuple[str, int], list[Row]]) -
         )
         right.loglog([r.seconds for r in rows], errors, "o", ms=3, **style)
         if strategy == "adaptive":
-            end = np.array([rows[-1].unknowns / 10, rows[-1].unknowns])
-            left.loglog(
-                end, 0.6 * errors[-1] * (end / end[-1]) ** (-order / 2), color="0.6", lw=0.8
-            )
+            unknowns = np.array([row.unknowns for row in rows])
+            slope_triangle(left, unknowns, np.array(errors), order / 2)
     left.set(title=name, xlabel="unknowns N", ylabel="relative error, energy norm")
-    left.legend(fontsize=8, title="grey: N^(-p/2)", title_fontsize=8)
+    left.legend(fontsize=8, title="triangles: N^(-p/2)", title_fontsize=8)
     right.set(title="processor time from geometry to solution", xlabel="seconds, one thread")
     for axes in (left, right):
         axes.grid(which="major", alpha=0.3)

@@ -1,7 +1,11 @@
 """Files and pictures of a solution."""
 
+from .convergence import plot_convergence as plot_convergence
+from .convergence import slope_triangle as slope_triangle
 from .files import check_path as check_path
 from .files import replacing as replacing
+from .film import write_film as write_film
+from .members import Shown as Shown
 from .nodes import full_stress as full_stress
 from .nodes import von_mises as von_mises
 from .pictures import plot_solution as plot_solution

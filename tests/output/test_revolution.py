@@ -11,6 +11,7 @@ import pyvista
 
 from drivers.reference import axisymmetric_cases as cases
 from ngcontact import solve
+from ngcontact.output.pictures import Style
 from ngcontact.output.pictures.scene import picture
 
 
@@ -72,7 +73,7 @@ def test_values_on_the_axis_are_numbers(tmp_path):
 def test_the_picture_shows_both_sides(pressed):
     solid = solve(cases.pressed_cylinders(), maxh=0.5, order=2)
     for solution in (pressed, solid):
-        scene = picture(solution, 1.0)
+        scene = picture(solution, Style(1.0))
         half = len(scene.moved) // 2
         assert scene.axes == ("r", "z")
         assert np.array_equal(scene.moved[half:], scene.moved[:half] * (-1, 1))

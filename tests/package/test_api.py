@@ -28,8 +28,10 @@ PUBLIC = [
     "Solution",
     "adapt",
     "load",
+    "plot_convergence",
     "solve",
     "solve_qp",
+    "write_film",
     "write_series",
 ]
 REQUIRED = inspect.Parameter.empty
@@ -73,6 +75,14 @@ SIGNATURES = {
     },
     "load": {"path": REQUIRED},
     "write_series": {"path": REQUIRED, "solutions": REQUIRED, "times": None},
+    "write_film": {
+        "path": REQUIRED,
+        "solutions": REQUIRED,
+        "seconds": 0.6,
+        "titles": None,
+        "options": REQUIRED,
+    },
+    "plot_convergence": {"runs": REQUIRED, "path": None, "rates": None},
 }
 MEMBERS = {
     *("problem", "mesh", "order", "element", "displacement", "stress", "work"),

@@ -178,7 +178,7 @@ def while_writing() -> Iterator[Outcome]:
             before = {path.name: path.read_bytes() for path in Path(folder).iterdir()}
             raised = False
             try:
-                Solution.write(_Failing(second, name), target)  # type: ignore[arg-type]
+                Solution.write(_Failing(second, name), target)
             except KeyboardInterrupt:
                 raised = True
             after = {path.name: path.read_bytes() for path in Path(folder).iterdir()}

@@ -1,124 +1,135 @@
-"""Picture of a solution: deformed bodies with von Mises stress, contact pressure."""
+"""Picture of a solution: deformed bodies with a field, close-ups, contact pressure."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..files import check_path, replacing
 from ..solution_data import SolutionData
-from .scene import Scene, close_up, contact_lines, picture
+from .fields import check_field
+from .panels import draw_bodies, draw_pressure, draw_windows
+from .scene import Scene, names_of, picture
+from .style import Style
+from .windows import Window, close_ups, colour_range
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+HEIGHT = 5.0  # of a picture, inches
+
 
 def plot_solution(
-    solution: SolutionData, path: str | os.PathLike[str] | None = None, scale: float | None = None
+    solution: SolutionData,
+    path: str | os.PathLike[str] | None = None,
+    scale: float | None = None,
+    **options: Any,
 ) -> Figure:
-    """Picture of the deformed bodies with von Mises stress, and of the contact pressure.
+    """Picture of the deformed bodies with a field, and of the contact pressure.
 
-    A close-up stands between the two if the zone in contact is small. The pressure is drawn over
-    eta (P2) or the arc position (P1). Lengths and stresses in the consistent units of the data.
-    With a `path` (``.png``) the picture is written there without any window, otherwise it is
-    shown on the screen. `scale` multiplies the displacement; None chooses a factor that lets the
-    deformation be seen, but not so large that bodies seem to run into each other.
+    Close-ups of small zones in contact stand between the two. The pressure is drawn over eta (P2)
+    or the arc position (P1). Lengths and stresses in the consistent units of the data. With a
+    `path` (``.png``) the picture is written there without any window, otherwise it is shown on the
+    screen. `scale` multiplies the displacement; None chooses a factor that lets the deformation be
+    seen, but not so large that bodies seem to run into each other. `options` are those of `Style`.
 
-    Raises ``ValueError`` if `scale` is not a finite number, and ``ValueError`` or ``OSError`` as
-    `check_path` does, before any work.
+    Raises ``ValueError`` or ``TypeError`` where an option is none, and as `check_path` does, before
+    any work.
     """
-    if scale is not None and not np.isfinite(scale):
-        raise ValueError(f"scale = {scale}: give a finite factor, or None to have one chosen")
+    style = Style(scale, **options)
     if path is None:
+        check_field(style.field, *names_of(solution))
         from matplotlib import pyplot
 
         figure = pyplot.figure(layout="constrained")
-        _draw(figure, solution, scale)
+        draw(figure, solution, style)
         pyplot.show()
         return figure
+    target = check_path(path, ".png")
+    check_field(style.field, *names_of(solution))
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    target = check_path(path, ".png")
     figure = Figure(layout="constrained")
-    _draw(figure, solution, scale)
+    draw(figure, solution, style)
     with replacing(target) as (draft,):
         FigureCanvasAgg(figure).print_figure(draft, format="png", dpi=150)
     return figure
 
 
-def _draw(figure: Figure, solution: SolutionData, scale: float | None) -> None:
-    """Bodies on the left, a close-up of the contact if needed, the pressure on the right."""
-    from matplotlib.patches import Rectangle
+def draw(figure: Figure, solution: SolutionData, style: Style) -> None:
+    """Bodies on the left, close-ups of the contact if needed, the pressure on the right."""
+    scene = picture(solution, style)
+    windows = close_ups([scene])
+    limits = style.limits or colour_range(scene, windows)
+    draw_scene(figure, solution, scene, style, windows, limits)
 
-    scene = picture(solution, scale)
-    frame = close_up(scene)
-    top = scene.stress.max()
-    if frame is not None:  # peaks at supports and corners shall not take the colours away
-        seen = np.all((scene.moved >= frame[0]) & (scene.moved <= frame[1]), axis=1)
-        top = max(scene.stress[seen].max(initial=0), np.quantile(scene.stress, 0.995))
+
+def _panels(figure: Figure, scene: Scene, close: int) -> tuple[Axes, list[Axes], Axes]:
+    """Axes for the bodies, for `close` close-ups, two above each other, and for the pressure."""
     width, height = np.ptp(scene.moved, axis=0)
-    ratios = [np.clip(width / height, 0.6, 2), *([] if frame is None else [1]), 1.2]
-    figure.set_size_inches(2 + 4.5 * sum(ratios), 5)
-    bodies, *close, profile = figure.subplots(1, len(ratios), width_ratios=ratios)
-    shading, *_ = [_draw_bodies(axes, scene, top) for axes in (bodies, *close)]
+    tall = 1 if close < 2 else 2
+    columns = -(-close // tall)
+    ratios = [float(np.clip(width / height, 0.6, 2)), *[1.0 / tall] * columns, 1.2]
+    figure.set_size_inches(2 + HEIGHT * 0.9 * sum(ratios), HEIGHT)
+    grid = figure.add_gridspec(tall, columns + 2, width_ratios=ratios)
+    bodies = figure.add_subplot(grid[:, 0])
+    places = [grid[k % tall, 1 + k // tall] for k in range(close)]
+    return bodies, [figure.add_subplot(place) for place in places], figure.add_subplot(grid[:, -1])
+
+
+def draw_scene(
+    figure: Figure,
+    solution: SolutionData,
+    scene: Scene,
+    style: Style,
+    windows: Sequence[Window],
+    limits: tuple[float, float],
+) -> Axes:
+    """Draw a scene with its close-ups, its colours and the pressure; returns the axes of that."""
+    bodies, close, profile = _panels(figure, scene, len(windows))
+    shading, *_ = [draw_bodies(axes, scene, style, limits) for axes in (bodies, *close)]
     bodies.set_title(f"deformed bodies, displacement × {scene.scale:g}")
-    if frame is not None:
-        low, high = frame
-        box = Rectangle((low[0], low[1]), *(high - low), fill=False, color="crimson", lw=1.2)
-        bodies.add_patch(box)
-        close[0].set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title="zone in contact")
-        close[0].spines[:].set_color("crimson")
-    extend = "max" if top < scene.stress.max() else "neither"
-    figure.colorbar(shading, ax=[bodies, *close], label="von Mises stress", extend=extend)
-    _draw_pressure(profile, solution)
+    draw_windows(bodies, close, windows, style.unit("length")[1])
+    _colour_bar(figure, shading, [bodies, *close], scene, style, limits)
+    draw_pressure(profile, solution, style)
+    return profile
 
 
-def _draw_bodies(axes: Axes, scene: Scene, top: float) -> Any:
-    """Von Mises stress on the deformed bodies, thin element edges, body outlines."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.tri import Triangulation
-
-    mesh = Triangulation(scene.moved[:, 0], scene.moved[:, 1], scene.triangles)
-    shading = axes.tripcolor(mesh, scene.stress, shading="gouraud", vmin=0, vmax=top)
-    inner, outer = (list(scene.moved[scene.edges[at]]) for at in (~scene.outline, scene.outline))
-    axes.add_collection(LineCollection(inner, colors="w", lw=0.25, alpha=0.5))
-    axes.add_collection(LineCollection(outer, colors="k", lw=0.8))
-    axes.set(aspect="equal", xlabel=scene.axes[0], ylabel=scene.axes[1])
-    axes.locator_params(nbins=5)
-    axes.ticklabel_format(scilimits=(-2, 4))
-    return shading
-
-
-def _draw_pressure(axes: Axes, solution: SolutionData) -> None:
-    """Pressure along the contact lines, points in contact full and the others hollow."""
-    lines, contact = contact_lines(solution), solution.problem.contact
-    touching = []
-    for pair, rows, s in lines:
-        colour, active, p = f"C{pair % 10}", solution.active[rows], solution.pressure[rows]
-        title = f"pair {pair}: {contact[pair].secondary}" if len(contact) > 1 else None
-        axes.plot(s, p, color=colour, lw=1, label=title)
-        for state, fill, name in ((active, colour, "in contact"), (~active, "w", "open")):
-            label = name if state.any() and pair == lines[0][0] else None
-            axes.plot(s[state], p[state], "o", ms=4, mec=colour, mfc=fill, label=label)
-        touching.append(s[active])
-    if len(contact) > 1 or not solution.active.all():
-        axes.legend()
-    if (
-        solution.active.any() and len(solution.points) > 1
-    ):  # keep the zone in contact in sight on a long boundary
-        places, every = np.concatenate(touching), np.concatenate([s for *_, s in lines])
-        low, high = places.min(), places.max()
-        margin = max(0.75 * (high - low), 0.02 * np.ptp(every))
-        low, high = max(low - margin, every.min()), min(high + margin, every.max())
-        axes.set_xlim(low - 0.03 * margin, high + 0.03 * margin)
-    axes.axhline(0, color="0.6", lw=0.8, zorder=0)
-    names = {
-        "arc position" if pair.direction is None else "η, along the contact line"
-        for pair in contact
-    }
-    axes.set(xlabel=" or ".join(sorted(names)), ylabel="contact pressure", title="contact pressure")
-    axes.grid(alpha=0.3)
+def _colour_bar(
+    figure: Figure,
+    shading: Any,
+    axes: list[Axes],
+    scene: Scene,
+    style: Style,
+    limits: tuple[float, float],
+) -> None:
+    """Scale of colours; an arrow and a number say what lies beyond its ends."""
+    values, (_, unit) = scene.shown.values, style.unit(scene.shown.kind)
+    least, most = float(values.min()), float(values.max())
+    below, above = least < limits[0], most > limits[1]
+    extend = {(True, True): "both", (True, False): "min", (False, True): "max"}
+    bar = figure.colorbar(
+        shading,
+        ax=axes,
+        label=style.title(scene.shown.label, scene.shown.kind),
+        extend=extend.get((below, above), "neither"),
+    )
+    for beyond, value, y, va in ((above, most, 1.0, "bottom"), (below, least, 0.0, "top")):
+        if beyond:
+            offset = (0, 14 if va == "bottom" else -14)
+            text = f"{'largest' if va == 'bottom' else 'least'} {value / unit:.3g}"
+            bar.ax.annotate(
+                text,
+                (0.5, y),
+                xycoords="axes fraction",
+                xytext=offset,
+                textcoords="offset points",
+                ha="center",
+                va=va,
+                fontsize=8,
+            )

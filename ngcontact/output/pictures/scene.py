@@ -1,4 +1,4 @@
-"""What a picture shows of a solution: curved elements as triangles, lines of contact points."""
+"""What a picture shows of a solution: curved elements as triangles, and zones in contact."""
 
 from __future__ import annotations
 
@@ -6,15 +6,19 @@ from dataclasses import dataclass, replace
 
 import ngsolve as ng
 import numpy as np
-from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
 from ...arrays import Array, Index, Mask
-from ...problem import ABOUT_AN_AXIS, on_axis
-from ..nodes import full_stress, neighbour_tree, nodes_of, subdivision, von_mises
+from ...problem import ABOUT_AN_AXIS
+from ..nodes import nodes_of, subdivision
 from ..solution_data import SolutionData
+from .fields import Field, evaluated
+from .lines import zones_of
+from .style import Style
+from .symmetry import SymmetryLine, axis_of, symmetry_line
 
 MOST_TRIANGLES = 200_000  # of a picture: more cannot be seen
+NEAR = 0.25  # of a zone's size: distance to a line of symmetry up to which both halves are one zone
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,16 +29,16 @@ class Scene:
     ----------
     moved : ndarray (k, 2)
         Nodes after `scale` times the displacement, lengths.
-    stress : ndarray (k,)
-        Von Mises stress there, a force per area.
+    shown : Field
+        What colours show there.
     triangles : ndarray of int (t, 3)
         Nodes of each triangle.
     edges : ndarray of int (e, order + 1)
         Nodes of each element edge.
     outline : ndarray of bool (e,)
         Edges that bound a body.
-    zone : ndarray (c, 2)
-        The points in contact, moved as the nodes are.
+    zones : list of ndarray (c, 2)
+        Points of each zone in contact, moved as the nodes are, those of the largest force first.
     scale : float
         Factor of the displacement.
     axes : tuple of str
@@ -42,58 +46,30 @@ class Scene:
     """
 
     moved: Array
-    stress: Array
+    shown: Field
     triangles: Index
     edges: Index
     outline: Mask
-    zone: Array
+    zones: list[Array]
     scale: float
     axes: tuple[str, str] = ("x", "y")
 
-
-def contact_lines(solution: SolutionData) -> list[tuple[int, Index, Array]]:
-    """Contact points in order along their lines: (pair, rows, coordinate) for every line.
-
-    Of the k points of each line `rows` (k,) index ``solution.points``, and the coordinate (k,) is a
-    length: eta, across the fixed direction xi
-    (P2), or without one (P1) the arc position, a sum of chords. A pair whose points lie on
-    separate pieces of boundary gives several lines, one behind the other.
-    """
-    lines = []
-    for pair in np.unique(solution.pair).tolist():
-        rows = np.flatnonzero(solution.pair == pair)
-        points = solution.points[rows]
-        direction = solution.problem.contact[pair].direction
-        if direction is None:
-            lines += [(pair, rows[order], s) for order, s in _arcs(points)]
-        else:
-            dx, dy = np.asarray(direction, dtype=float) / np.hypot(*direction)
-            eta = points @ (-dy, dx)
-            order = np.argsort(eta, kind="stable")
-            lines.append((pair, rows[order], eta[order]))
-    return lines
+    def areas(self) -> Array:
+        """Areas (t,) of the triangles."""
+        a, b, c = self.moved[self.triangles].transpose(1, 0, 2)
+        (ux, uy), (vx, vy) = (b - a).T, (c - a).T
+        return np.asarray(np.abs(ux * vy - uy * vx) / 2)
 
 
-def _arcs(points: Array) -> list[tuple[Index, Array]]:
-    """Order and arc position of points on curves: walks along the tree of neighbours."""
-    tree = neighbour_tree(points)
-    count, piece = connected_components(tree, directed=False)
-    arcs: list[tuple[Index, Array]] = []
-    start = 0.0
-    for k in range(count):
-        members = np.flatnonzero(piece == k)
-        s = dijkstra(tree, directed=False, indices=members[0])[members]
-        s = dijkstra(tree, directed=False, indices=members[np.argmax(s)])[members]
-        s = start + (s.max() - s if s[0] > s[-1] else s)  # run as the points are numbered
-        order = np.argsort(s, kind="stable")
-        arcs.append((members[order], s[order]))
-        start = s.max()
-    return arcs
+def names_of(solution: SolutionData) -> tuple[tuple[str, str], str]:
+    """Names of both coordinates and of the stress normal to the plane."""
+    revolved = solution.problem.model in ABOUT_AN_AXIS
+    return (("r", "z"), "hoop") if revolved else (("x", "y"), "zz")
 
 
-def picture(solution: SolutionData, scale: float | None) -> Scene:
+def picture(solution: SolutionData, style: Style) -> Scene:
     """Evaluate a solution for the picture."""
-    mesh, u = solution.mesh, solution.displacement
+    mesh, u, scale = solution.mesh, solution.displacement, style.scale
     order = max(mesh.GetCurveOrder(), solution.order)
     if order > 1:  # enough to look smooth on coarse meshes, no more than can be seen on fine ones
         order = int(np.clip(np.sqrt(MOST_TRIANGLES / mesh.ne), 1, 2 * order))
@@ -104,37 +80,46 @@ def picture(solution: SolutionData, scale: float | None) -> Scene:
     _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
     place = nodes.values(ng.CF((ng.x, ng.y)))
     move = nodes.values(ng.CF((u[0], u[1])))
-    active = solution.points[solution.active]
-    at = KDTree(place).query(active)[1].astype(int)
     if scale is None:
         body = np.empty(len(place), dtype=np.intp)
         body[nodes.cells] = nodes.body[:, None]
         scale = _chosen_scale(solution, place, move, body)
+    tree = KDTree(place)
+    zones = [tree.query(solution.points[rows])[1].astype(int) for rows in zones_of(solution)]
+    axes, across = names_of(solution)
     scene = Scene(
         moved=place + scale * move,
-        stress=von_mises(nodes.values(full_stress(solution))),
+        shown=evaluated(solution, nodes, style.field, axes, across),
         triangles=nodes.cells[:, triangles].reshape(-1, 3),
         edges=edges[first],
         outline=count == 1,
-        zone=place[at] + scale * move[at],
+        zones=[place[at] + scale * move[at] for at in zones],
         scale=scale,
+        axes=axes,
     )
-    return mirrored(scene, place) if solution.problem.model in ABOUT_AN_AXIS else scene
+    if solution.problem.model in ABOUT_AN_AXIS:
+        return mirrored(scene, axis_of(place), place)
+    if style.mirror is None:
+        return scene
+    return mirrored(scene, symmetry_line(mesh, u, style.mirror), place)
 
 
-def mirrored(scene: Scene, place: Array) -> Scene:
-    """A meridian section on both sides of its axis; `place` (k, 2) are its nodes before."""
-    inside = on_axis(place)[scene.edges].all(axis=1)
-    count, other = len(scene.moved), np.array([-1.0, 1.0])
+def mirrored(scene: Scene, line: SymmetryLine, place: Array) -> Scene:
+    """A scene on both sides of a line of symmetry; `place` (k, 2) are its nodes before."""
+    inside = line.holds(place)[scene.edges].all(axis=1)
+    count = len(scene.moved)
+    zones = []
+    for zone in scene.zones:
+        near = np.abs(line.distance(zone)).min() <= NEAR * np.ptp(zone, axis=0).max()
+        zones.append(np.concatenate([zone, line.reflected(zone)]) if near else zone)
     return replace(
         scene,
-        moved=np.concatenate([scene.moved, scene.moved * other]),
-        stress=np.tile(scene.stress, 2),
+        moved=np.concatenate([scene.moved, line.reflected(scene.moved)]),
+        shown=replace(scene.shown, values=np.tile(scene.shown.values, 2)),
         triangles=np.concatenate([scene.triangles, scene.triangles[:, ::-1] + count]),
         edges=np.concatenate([scene.edges, scene.edges + count]),
         outline=np.tile(scene.outline & ~inside, 2),
-        zone=np.concatenate([scene.zone, scene.zone * other]),
-        axes=("r", "z"),
+        zones=zones,
     )
 
 
@@ -157,17 +142,3 @@ def _chosen_scale(solution: SolutionData, place: Array, move: Array, body: Index
             factor = min(factor, ((initial + overlap) / closed).min())
     power = 10.0 ** np.floor(np.log10(factor))
     return float(max(1.0, *(k * power for k in (0.5, 1, 2, 5) if k * power <= factor)))
-
-
-def close_up(scene: Scene) -> tuple[Array, Array] | None:
-    """Corners (2,) each of a close-up of the zone in contact; None if the picture shows it."""
-    if len(scene.zone) == 0:
-        return None
-    size = np.ptp(scene.moved, axis=0).max()
-    low, high = scene.zone.min(axis=0), scene.zone.max(axis=0)
-    half = max(0.9 * (high - low).max(), 0.02 * size)
-    middle = (low + high) / 2
-    # At the rim of the picture, as on a symmetry plane, the window moves inwards.
-    inner, outer = scene.moved.min(axis=0) + 0.95 * half, scene.moved.max(axis=0) - 0.95 * half
-    middle = np.where(inner < outer, np.clip(middle, inner, outer), middle)
-    return (middle - half, middle + half) if half < 0.2 * size else None

@@ -1,0 +1,152 @@
+"""Panels of a picture: bodies with a field, pressures along the contact lines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...arrays import Array, Index
+from ..solution_data import SolutionData
+from .lines import contact_lines
+from .scene import Scene
+from .style import COLOURS, MARKS, RISING, SIGNED, Style
+from .windows import Window
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SAMPLES = 400  # of a function that is drawn over the pressure
+
+
+def draw_bodies(axes: Axes, scene: Scene, style: Style, limits: tuple[float, float]) -> Any:
+    """The field on the deformed bodies, element edges where asked for, outlines of the bodies."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.tri import Triangulation
+
+    _, length = style.unit("length")
+    _, unit = style.unit(scene.shown.kind)
+    moved = scene.moved / length
+    triangles = Triangulation(moved[:, 0], moved[:, 1], scene.triangles)
+    shading = axes.tripcolor(
+        triangles,
+        scene.shown.values / unit,
+        shading="gouraud",
+        vmin=limits[0] / unit,
+        vmax=limits[1] / unit,
+        cmap=SIGNED if limits[0] < 0 < limits[1] else RISING,
+    )
+    light = "0.35" if shading.get_cmap().name == SIGNED else "w"
+    inner, outer = (list(moved[scene.edges[at]]) for at in (~scene.outline, scene.outline))
+    if style.mesh:
+        axes.add_collection(LineCollection(inner, colors=light, lw=0.25, alpha=0.5))
+    axes.add_collection(LineCollection(outer, colors="k", lw=0.8))
+    x, y = scene.axes
+    axes.set(aspect="equal", xlabel=style.title(x, "length"), ylabel=style.title(y, "length"))
+    axes.locator_params(nbins=5)
+    axes.ticklabel_format(scilimits=(-2, 4))
+    return shading
+
+
+def draw_windows(
+    bodies: Axes, close: Sequence[Axes], windows: Sequence[Window], unit: float
+) -> None:
+    """Frames of the windows in the picture of the bodies, and the close-ups cut to them."""
+    from matplotlib.patches import Rectangle
+
+    for k, (axes, window) in enumerate(zip(close, windows, strict=True)):
+        low, high = (corner / unit for corner in window)
+        frame = Rectangle((low[0], low[1]), *(high - low), fill=False, color="crimson", lw=1.2)
+        bodies.add_patch(frame)
+        name = "zone in contact" if len(windows) == 1 else f"zone {k + 1}"
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=name)
+        axes.locator_params(nbins=5 if len(windows) == 1 else 3)
+        axes.spines[:].set_color("crimson")
+        if len(windows) > 1:
+            bodies.annotate(
+                str(k + 1),
+                (high[0], high[1]),
+                xytext=(2, 2),
+                textcoords="offset points",
+                color="crimson",
+                weight="bold",
+            )
+
+
+def shown_part(solution: SolutionData, lines: list[tuple[int, Index, Array]]) -> Array | None:
+    """Ends (2,) of what is shown of long boundaries: the zones in contact and what is beside.
+
+    Of each of the `lines` (l,) its pair, numbers (k,) of contact points, their coordinates (k,).
+    """
+    if not solution.active.any() or len(solution.points) < 2:
+        return None
+    places = np.concatenate([s[solution.active[rows]] for _, rows, s in lines])
+    every = np.concatenate([s for *_, s in lines])
+    low, high = places.min(), places.max()
+    margin = max(0.75 * (high - low), 0.02 * np.ptp(every))
+    low, high = max(low - margin, every.min()), min(high + margin, every.max())
+    return np.array([low - 0.03 * margin, high + 0.03 * margin])
+
+
+def draw_pressure(axes: Axes, solution: SolutionData, style: Style) -> None:
+    """Pressure along the contact lines, points in contact full and the others hollow."""
+    (_, length), (_, stress) = style.unit("length"), style.unit("stress")
+    lines, contact = contact_lines(solution), solution.problem.contact
+    several = len(contact) > 1
+    for k, (pair, rows, s) in enumerate(lines):
+        colour, mark = _look(pair)
+        active, p, at = solution.active[rows], solution.pressure[rows] / stress, s / length
+        new = several and pair not in [other for other, *_ in lines[:k]]
+        title = f"pair {pair}: {contact[pair].secondary}" if new else None
+        axes.plot(at, p, color=colour, lw=1, marker=mark, ms=4, markevery=[], label=title)
+        for state, fill, name in ((active, colour, "in contact"), (~active, "w", "open")):
+            label = name if state.any() and not several and k == 0 else None
+            axes.plot(at[state], p[state], mark, ms=4, mec=colour, mfc=fill, label=label)
+    for state, fill, name in (
+        (solution.active, "0.4", "in contact"),
+        (~solution.active, "w", "open"),
+    ):
+        if several and state.any():
+            axes.plot([], [], "o", ms=4, mec="0.4", mfc=fill, label=name)
+    part = shown_part(solution, lines)
+    if part is not None:
+        axes.set_xlim(*part / length)
+    _draw_profiles(axes, style, part, lines)
+    if several or style.profile or not solution.active.all():
+        axes.legend()
+    axes.axhline(0, color="0.6", lw=0.8, zorder=0)
+    names = {
+        "arc position" if pair.direction is None else "η, along the contact line"
+        for pair in contact
+    }
+    axes.set(
+        xlabel=style.title(" or ".join(sorted(names)), "length"),
+        ylabel=style.title("contact pressure", "stress"),
+        title="contact pressure",
+    )
+    axes.grid(alpha=0.3)
+
+
+def _look(pair: int) -> tuple[str, str]:
+    """Colour and mark of a pair."""
+    return COLOURS[pair % len(COLOURS)], MARKS[pair % len(MARKS)]
+
+
+def _draw_profiles(
+    axes: Axes, style: Style, part: Array | None, lines: list[tuple[int, Index, Array]]
+) -> None:
+    """What the user wants to see over the pressure."""
+    (_, length), (_, stress) = style.unit("length"), style.unit("stress")
+    if part is None:
+        every = np.concatenate([s for *_, s in lines] or [np.zeros(1)])
+        part = np.array([every.min(), every.max()])
+    strokes = ("-", "--", ":", "-.")
+    for k, (label, profile) in enumerate(style.profile.items()):
+        if callable(profile):
+            s = np.linspace(part[0], part[1], SAMPLES)
+            p = np.broadcast_to(np.asarray(profile(s), dtype=float), s.shape)
+        else:
+            s, p = (np.asarray(values, dtype=float) for values in profile)
+        stroke = strokes[k % len(strokes)]
+        axes.plot(s / length, p / stress, stroke, color="k", lw=1.2, label=label, zorder=3)

@@ -1,0 +1,155 @@
+"""What a picture shows when it is asked to: fields, units, curves, mirror images, close-ups."""
+
+from __future__ import annotations
+
+import ngsolve as ng
+import numpy as np
+import pytest
+
+from drivers.reference import cases
+from ngcontact import solve
+from ngcontact.output import plot_solution
+from ngcontact.output.pictures import Style
+from ngcontact.output.pictures.scene import picture
+from ngcontact.output.pictures.windows import close_ups, colour_range
+from tests.output.stubs import MAXH, stub
+
+UNIFORM = ((3.0, 1.0), (1.0, -2.0))  # in-plane stress
+ACROSS = 0.5  # normal to the plane
+
+
+@pytest.fixture(scope="module")
+def uniform():
+    """A stub with one stress everywhere."""
+    solution = stub(2)
+    solution.stress = ng.CF((3.0, 1.0, 1.0, -2.0), dims=(2, 2))
+    solution.out_of_plane_stress = ng.CF(ACROSS)
+    return solution
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("stress_xx", 3.0),
+        ("stress_yy", -2.0),
+        ("stress_xy", 1.0),
+        ("stress_zz", ACROSS),
+        ("largest_principal", 0.5 + np.sqrt(2.5**2 + 1)),
+        ("smallest_principal", 0.5 - np.sqrt(2.5**2 + 1)),
+        ("mean_pressure", -(3.0 - 2.0 + 0.5) / 3),
+        ("von_mises", np.sqrt((25 + 2.5**2 + 2.5**2) / 2 + 3)),
+    ],
+)
+def test_fields_of_a_uniform_stress(uniform, field, value):
+    shown = picture(uniform, Style(field=field)).shown
+    np.testing.assert_allclose(shown.values, value, rtol=1e-12)  # round-off
+    assert shown.kind == "stress"
+
+
+def test_displacements_and_any_function_are_fields(uniform):
+    scene = picture(uniform, Style(scale=1.0, field="displacement_y"))
+    still = picture(uniform, Style(scale=0.0, field=ng.x))
+    np.testing.assert_allclose(scene.shown.values, (scene.moved - still.moved)[:, 1], atol=1e-14)
+    np.testing.assert_allclose(still.shown.values, still.moved[:, 0], atol=1e-14)
+    length = picture(uniform, Style(field="displacement")).shown
+    assert length.kind == "length"
+    assert length.values.max() == pytest.approx(
+        np.linalg.norm(scene.moved - still.moved, axis=1).max()
+    )
+
+
+def test_units_name_axes_and_divide_values(tmp_path, uniform):
+    units = {"length": ("mm", 1e-3), "stress": "Pa"}
+    figure = plot_solution(uniform, tmp_path / "a.png", units=units, scale=0.0)
+    bodies, profile = figure.axes[0], figure.axes[-2]
+    assert bodies.get_xlabel() == "x [mm]"
+    assert bodies.get_xlim()[1] > 1000  # the block ends at x = 2
+    assert figure.axes[-1].get_ylabel() == "von Mises stress [Pa]" or any(
+        axes.get_ylabel() == "von Mises stress [Pa]" for axes in figure.axes
+    )
+    assert any(axes.get_ylabel() == "contact pressure [Pa]" for axes in (profile, *figure.axes))
+
+
+def test_curves_over_the_pressure(tmp_path, uniform):
+    curves = {"twice": lambda s: 2 * s, "measured": ([0.0, 1.0], [3.0, 4.0])}
+    figure = plot_solution(uniform, tmp_path / "a.png", profile=curves)
+    lines = {line.get_label(): line.get_xydata() for axes in figure.axes for line in axes.lines}
+    np.testing.assert_allclose(lines["twice"][:, 1], 2 * lines["twice"][:, 0])
+    np.testing.assert_allclose(lines["measured"], [(0, 3), (1, 4)])
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "text"),
+    [
+        ({"field": "stress"}, ValueError, 'field = "stress"'),
+        ({"field": "stress_hoop"}, ValueError, "stress_zz"),  # a plane model
+        ({"field": 3}, TypeError, "field = 3"),
+        ({"field": ng.CF((1, 2))}, ValueError, "2 components"),
+        ({"limits": (2.0, 1.0)}, ValueError, "the smaller first"),
+        ({"units": {"force": "N"}}, ValueError, '"force" is none of'),
+        ({"units": {"stress": ("MPa", 0.0)}}, ValueError, "its size"),
+        ({"profile": {"a": ([1, 2], [3])}}, TypeError, 'profile\\["a"\\]'),
+    ],
+)
+def test_options_that_are_none_are_refused(tmp_path, uniform, options, error, text):
+    with pytest.raises(error, match=text):
+        plot_solution(uniform, tmp_path / "a.png", **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_symmetric_half_is_mirrored(pressed_half):
+    half = picture(pressed_half, Style(scale=1.0))
+    whole = picture(pressed_half, Style(scale=1.0, mirror="axis"))
+    count = len(half.moved)
+    np.testing.assert_allclose(whole.moved[count:], half.moved * (-1, 1), atol=1e-12)
+    assert whole.areas().sum() == pytest.approx(2 * half.areas().sum())
+    inside = np.abs(whole.moved[whole.edges][..., 0]).max(axis=1) < 1e-9
+    assert inside.any()
+    assert not whole.outline[inside].any()  # no line along the middle
+
+
+@pytest.mark.parametrize(
+    ("mirror", "text"),
+    [
+        ("axes", "is no boundary"),
+        ("disc_arc", "is not straight"),
+        ("disc_top", "moves across its line"),
+        ("block_top", "moves across its line"),
+    ],
+)
+def test_only_lines_of_symmetry_mirror(tmp_path, pressed_half, mirror, text):
+    with pytest.raises(ValueError, match=text):
+        plot_solution(pressed_half, tmp_path / "a.png", mirror=mirror)
+
+
+def test_each_small_zone_has_a_close_up(tmp_path):
+    solution = stub(2)
+    x = solution.points[:, 0]
+    solution.active[:] = False
+    solution.active[[np.argmin(np.abs(x + 0.4)), np.argmin(np.abs(x - 0.4))]] = True
+    windows = close_ups([picture(solution, Style(scale=0.0))])
+    middles = sorted((low[0] + high[0]) / 2 for low, high in windows)
+    # The nearest nodes of a picture, whose spacing is MAXH over twice the order.
+    assert middles == pytest.approx(sorted(x[solution.active]), abs=MAXH / 8)
+    figure = plot_solution(solution, tmp_path / "a.png")
+    assert [axes.get_title() for axes in figure.axes[1:3]] == ["zone 1", "zone 2"]
+
+
+def test_a_singular_corner_leaves_the_colours(tmp_path, uniform):
+    """A peak r^(-1/2) at one point: colours end where all but 0.5 % of the area lie below."""
+    r = ng.sqrt((ng.x + 2) ** 2 + (ng.y + 1) ** 2 + 1e-12)
+    scene = picture(uniform, Style(scale=0.0, field=r**-0.5))
+    low, high = colour_range(scene, [])
+    # Area pi r^2 / 4 beyond the value r^(-1/2): 0.5 % of 4 + pi / 2 are r = 0.188, value 2.3; means
+    # of triangles blur that.
+    assert low == 0
+    assert 1.8 < high < 2.8
+    assert scene.shown.values.max() > 900
+    figure = plot_solution(uniform, tmp_path / "a.png", field=r**-0.5)
+    [text] = [t.get_text() for axes in figure.axes for t in axes.texts if "largest" in t.get_text()]
+    assert float(text.split()[1]) == pytest.approx(1000, rel=0.01)
+
+
+@pytest.fixture(scope="module")
+def pressed_half():
+    return solve(cases.pressed_disc(), maxh=0.4, order=2)
