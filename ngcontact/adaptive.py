@@ -12,21 +12,18 @@ import ngsolve as ng
 import numpy as np
 
 from .adaptivity import at_ends, doerfler, refined, settled, together
-from .arrays import Mask, power_of_two, root_of_squares
+from .arrays import Mask, root_of_squares
 from .errors import ConvergenceError, warn
 from .estimator import Estimator, estimate, refuse_bound
-from .fem import check_element, incompressibilities, unknowns
+from .fem import check_element, unknowns
 from .mesh import curve, diameters, first_mesh
 from .one_mesh import solve_on, with_warnings
-from .plausibility import contradictions, warn_of_implausible
+from .plausibility import EXACT, at_round_off, contradictions, warn_of_implausible
 from .problem import Problem
 from .quadrature import jumping_moduli
 from .results import with_progress
 from .solution import Solution
 
-EXACT = 1e-12  # relative estimate at which refinement stops: the solution is exact
-BEYOND_NOISE = 1e-4  # ... above which no round-off reaches
-STRESS_NOISE = 100 * np.finfo(float).eps  # relative to its terms; measured 0.5 to 50 eps
 SHARPER = 0.2  # bound over estimate that is hoped for at first; measured: 0.17 to 1
 
 log = logging.getLogger("ngcontact")
@@ -170,21 +167,6 @@ def _marked(solution: Solution, refinement: Refinement, small: Mask) -> Mask:
     return marked | at_ends(solution.discrete.space.trace, solution.pairs, share)
 
 
-def _at_round_off(solution: Solution) -> bool:
-    """Whether the estimate is round-off of terms that cancel, as where bodies move rigidly.
-
-    Where div u cancels the terms of the stress are of size kappa |grad u|. The estimate divides
-    them by the root of mu, their energy by the root of kappa only.
-    """
-    u = solution.displacement.vec.FV().NumPy()
-    size = power_of_two(u)  # squares must stay in range
-    terms = size * float(np.sqrt(solution.discrete.space.diagonal @ (u / size) ** 2))
-    if solution.error_estimate > BEYOND_NOISE * terms:  # as nearly always
-        return False
-    ratio = float(incompressibilities(solution.problem, solution.mesh).max())
-    return solution.error_estimate <= max(EXACT, STRESS_NOISE * math.sqrt(ratio)) * terms
-
-
 def _bounded(solution: Solution, refinement: Refinement, ratio: float) -> tuple[float, float]:
     """The relative bound where it may meet the tolerance, else inf; and the bound per estimate.
 
@@ -232,7 +214,9 @@ def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[
         small = settled(solution.mesh, places)
         if small.any() and not refinement.guaranteed:  # no mesh makes the estimate less there
             error *= root_of_squares(solution.indicators[~small]) / solution.error_estimate
-        if error <= max(refinement.tolerance or 0.0, EXACT) or _at_round_off(solution):
+        if error <= max(refinement.tolerance or 0.0, EXACT) or at_round_off(
+            problem, solution.discrete.space, solution.displacement, solution.error_estimate
+        ):
             return
         mesh = refined(problem, solution.mesh, _marked(solution, refinement, small))
         mesh, _ = curve(mesh, order, element)

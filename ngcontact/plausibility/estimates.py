@@ -1,17 +1,39 @@
-"""Whether refinement helps: estimates that rise from level to level."""
+"""Whether refinement helps: estimates that are round-off, or rise from level to level."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, root_of_squares
-from ..problem import Triangulation
+from ..arrays import Array, power_of_two, root_of_squares
+from ..fem import Space, incompressibilities
+from ..problem import Problem, Triangulation
 
 LEVELS = 3  # after the best one, from which estimates are not those of a mesh still too coarse
+EXACT = 1e-12  # relative estimate at which refinement stops: the solution is exact
+BEYOND_NOISE = 1e-4  # ... above which no round-off reaches
+STRESS_NOISE = 100 * np.finfo(float).eps  # relative to its terms; measured 0.5 to 50 eps
 RISE = 1.1  # over the best one, which is more than the noise of one level
+
+
+def at_round_off(
+    problem: Problem, space: Space, displacement: ng.GridFunction, estimate: float
+) -> bool:
+    """Whether an error estimate is round-off of terms that cancel, as where bodies move rigidly.
+
+    Where div u cancels the terms of the stress are of size kappa |grad u|. The estimate divides
+    them by the root of mu, their energy by the root of kappa only.
+    """
+    u = displacement.vec.FV().NumPy()
+    size = power_of_two(u)  # squares must stay in range
+    terms = size * float(np.sqrt(space.diagonal @ (u / size) ** 2))
+    if estimate > BEYOND_NOISE * terms:  # as nearly always
+        return False
+    ratio = float(incompressibilities(problem, space.trace.mesh).max())
+    return estimate <= max(EXACT, STRESS_NOISE * math.sqrt(ratio)) * terms
 
 
 def estimates_rise(estimates: Sequence[float]) -> bool:
