@@ -11,12 +11,12 @@ from numbers import Real
 import ngsolve as ng
 import numpy as np
 
-from .adaptivity import at_ends, doerfler, refined, settled, together
+from .adaptivity import at_ends, at_limit, doerfler, refined, settled, together, warn_of_limit
 from .arrays import Mask, root_of_squares
 from .errors import ConvergenceError, warn
 from .estimator import Estimator, estimate, refuse_bound
 from .fem import check_element, unknowns
-from .mesh import curve, diameters, first_mesh
+from .mesh import curve, diameters, first_mesh, unresolved
 from .one_mesh import solve_on, with_warnings
 from .plausibility import EXACT, at_round_off, contradictions, warn_of_implausible
 from .problem import Problem
@@ -116,9 +116,8 @@ def adapt(
     Raises
     ------
     ValueError, TypeError
-        Bad input, before any assembly; also a first mesh of more than `max_dofs` unknowns, or a
-        mesh with segments of curved edges below 1e-6 units; with `guaranteed`, at the first level,
-        a problem for which no bound is known.
+        Bad input, before any assembly; also a first mesh of more than `max_dofs` unknowns; with
+        `guaranteed`, at the first level, a problem for which no bound is known.
     ConvergenceError
         The active set of a level did not settle.
     """
@@ -152,19 +151,25 @@ def _number(name: str, value: object) -> float:
     return float(value)
 
 
-def _marked(solution: Solution, refinement: Refinement, small: Mask) -> Mask:
+def _marked(solution: Solution, refinement: Refinement, small: Mask) -> tuple[Mask, bool]:
     """Elements (ne,) to refine: Doerfler's, and those in which contact ends.
+
+    And whether some of these are not marked as their curves are at the geometry kernel's limit.
 
     The end of contact is known to the square of these elements' size, the energy to the square of
     the relative error: both stay of one size. Elements in which moduli jump are refined together,
     those at corners where supports contradict each other no more once they are `small` (ne,).
     """
-    mesh = solution.mesh
+    mesh, limit = solution.mesh, at_limit(solution.discrete.space.trace)
     rest = np.where(small, 0.0, solution.indicators)
-    marked = doerfler(rest if rest.any() else solution.indicators, refinement.theta)
+    rest = rest if rest.any() else solution.indicators
+    marked = doerfler(rest, refinement.theta)
+    if (marked & limit).any():  # for ever: the others are refined instead
+        marked |= doerfler(np.where(limit, 0.0, rest), refinement.theta)
     marked = together(marked, jumping_moduli(solution.problem, mesh), diameters(mesh))
     share = refinement.ending * solution.relative_error_estimate
-    return marked | at_ends(solution.discrete.space.trace, solution.pairs, share)
+    marked |= at_ends(solution.discrete.space.trace, solution.pairs, share)
+    return marked & ~limit, bool((marked & limit).any())
 
 
 def _bounded(solution: Solution, refinement: Refinement, ratio: float) -> tuple[float, float]:
@@ -184,14 +189,13 @@ def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[
 
     Parameters
     ----------
-    problem, mesh
-        The continuous problem; the first mesh, curved as the element asks.
-    refinement : Refinement
-        What is refined, and when to stop.
+    problem, mesh, refinement
+        The continuous problem; the first mesh, curved as the element asks; what is refined, and
+        when to stop.
     """
     order, element = refinement.order, refinement.element
     solution: Solution | None = None
-    ratio = SHARPER
+    ratio, told = SHARPER, False
     places = np.array([one.place for one in contradictions(problem, mesh)]).reshape(-1, 2)
     while unknowns(mesh, order, element) <= refinement.max_dofs:
         if solution is not None:  # its factorisation is of no use to the next one
@@ -218,8 +222,14 @@ def levels(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Iterator[
             problem, solution.discrete.space, solution.displacement, solution.error_estimate
         ):
             return
-        mesh = refined(problem, solution.mesh, _marked(solution, refinement, small))
-        mesh, _ = curve(mesh, order, element)
+        marked, stuck = _marked(solution, refinement, small)
+        mesh, _ = curve(refined(problem, solution.mesh, marked), order, element)
+        ends = unresolved(mesh) or not marked.any()
+        if ends or (stuck and not told):
+            told = True
+            warn_of_limit(solution.discrete.space.trace, ends=ends)
+        if ends:
+            return
     if refinement.guaranteed and solution is not None:
         error = solution.relative_error_bound
     if refinement.tolerance is not None and error > refinement.tolerance:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from dataclasses import replace
+from functools import partial
 
 import ngsolve as ng
 import numpy as np
@@ -25,6 +26,7 @@ from ngcontact import (
 )
 from ngcontact.estimator import Estimate
 from ngcontact.geometries import blocks, disc_on_block
+from ngcontact.geometries import disc as quarter_disc
 from ngcontact.mesh import first_mesh
 from tests.scenes import unmatched_blocks
 
@@ -489,3 +491,30 @@ def test_small_errors_are_no_round_off(nu, part, tolerance):
     )
     assert first.relative_error_estimate > 3 * tolerance
     assert last.relative_error_estimate <= tolerance
+
+
+def small_disc(radius):
+    """Problem A of a radius, whose segments at the end of contact come to the kernel's digits."""
+    problem = cases.disc_on_rigid_plane()
+    displacement = {"top": (None, -0.005 * radius)}
+    return replace(problem, geometry=quarter_disc(radius), displacement=displacement)
+
+
+def test_segments_at_the_limit_of_the_kernel_are_left_alone():
+    """There was a ValueError that blamed the input; 0.2232663 R is half of Problem A's force."""
+    with pytest.warns(ContactWarning, match=r'"arc" near \(0\.00254.*not divided any more') as said:
+        solutions = list(adapt(small_disc(0.05), order=4, max_dofs=30_000))
+    assert len(said) == 1
+    last, before = solutions[-1], solutions[-2]
+    assert last.displacement.space.ndof > 20_000
+    assert last.error_estimate < 0.7 * before.error_estimate
+    # From the levels of the whole disc: 0.223266 to six digits from 6000 unknowns on.
+    assert np.hypot(*last.contact_force()) == pytest.approx(0.2232663 * 0.05, rel=1e-5)
+
+
+def test_refinement_ends_where_no_curve_can_be_divided(monkeypatch):
+    every = partial(np.ones, dtype=bool)
+    monkeypatch.setattr(adaptive, "at_limit", lambda trace: every(trace.mesh.ne))
+    with pytest.warns(ContactWarning, match="refinement ends here"):
+        [solution] = adapt(small_disc(1.0), order=2, max_dofs=3000)
+    assert solution.relative_error_estimate > 1e-3

@@ -9,9 +9,12 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from ..contact import ContactState, ending_segments
+from ..errors import warn
 from ..fem import BoundaryTrace
+from ..mesh import resolved_lengths
 from ..problem import Triangulation
 
+HALVED = 2.5  # least length that halves need, whose sizes differ by a quarter at most
 SETTLED = 1e-3  # radius of discs in which nothing is refined, over the extent of the mesh
 
 
@@ -24,6 +27,27 @@ def at_ends(trace: BoundaryTrace, pairs: Sequence[ContactState], share: float) -
         extent = np.linalg.norm(np.ptp(line.position, axis=0)) if line.node.size else 0.0
         marked[trace.element[segments[trace.lengths(segments) > share * extent]]] = True
     return marked
+
+
+def at_limit(trace: BoundaryTrace) -> Mask:
+    """Elements (ne,) at segments of curved edges whose halves no geometry kernel resolves."""
+    limit = np.zeros(trace.mesh.ne, dtype=bool)
+    if trace.geometry_order > 1:  # straight segments have no middles to place
+        limit[trace.element[resolved_lengths(trace.mesh) < HALVED]] = True
+    return limit
+
+
+def warn_of_limit(trace: BoundaryTrace, *, ends: bool) -> None:
+    """Warn of the shortest segment `at_limit`, and of what follows: whether refinement `ends`."""
+    shortest = int(np.argmin(resolved_lengths(trace.mesh)))
+    x, y = trace.curve[shortest].mean(axis=0)
+    name = trace.mesh.GetBoundaries()[trace.region[shortest]]
+    what = "refinement ends here" if ends else "it is not divided any more, others are"
+    warn(
+        f'a segment of the curved edge "{name}" near ({x:.4g}, {y:.4g}) has the length '
+        f"{trace.lengths(np.array([shortest]))[0]:.2g}, and the geometry kernel loses digits on "
+        f"its halves: {what}; choose a smaller unit of length if the estimate is too large"
+    )
 
 
 def settled(mesh: ng.Mesh, places: Array) -> Mask:

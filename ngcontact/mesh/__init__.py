@@ -4,6 +4,8 @@ from .cad import CadEdge as CadEdge
 from .cad import cad_edges as cad_edges
 from .curving import check_curves as check_curves
 from .curving import curve as curve
+from .curving import resolved_lengths as resolved_lengths
+from .curving import unresolved as unresolved
 from .elements import diameters as diameters
 from .elements import neighbours as neighbours
 from .elements import rightward as rightward

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ngsolve as ng
 import numpy as np
 
+from ..arrays import Array
 from ..problem import Triangulation
 from .cad import cad_edges
 from .parents import copied
@@ -18,6 +19,25 @@ SHORTEST_ON_SMALL = 1e-5  # ... of a smaller arc; measured: middles displaced fr
 ON_CURVE = 1e-12  # distance, relative to the geometry's size, at which an element misses its curve
 
 
+def resolved_lengths(mesh: ng.Mesh) -> Array:
+    """Length (k,) of each boundary segment over the least on its curve; inf on straight edges."""
+    view = Triangulation(mesh)
+    ends = view.vertices[view.segments]
+    least = [
+        0.0 if edge.straight else SHORTEST_ON_SMALL if edge.size < SMALLEST else SHORTEST
+        for edge in cad_edges(mesh) or []
+    ]
+    if not least:
+        return np.full(len(ends), np.inf)
+    with np.errstate(divide="ignore"):
+        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / np.array(least)[view.boundaries]
+
+
+def unresolved(mesh: ng.Mesh) -> bool:
+    """Whether segments of curved elements are too short for OCC."""
+    return mesh.GetCurveOrder() > 1 and bool((resolved_lengths(mesh) < 1).any())
+
+
 def check_curves(mesh: ng.Mesh) -> None:
     """Raise if curved edges are too small for OCC to curve the elements beside them.
 
@@ -26,22 +46,19 @@ def check_curves(mesh: ng.Mesh) -> None:
     ValueError
         Names the edge and its length; another unit of length mends it.
     """
-    edges = cad_edges(mesh) or []
-    view = Triangulation(mesh)
-    ends = view.vertices[view.segments]
-    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    for number, edge in enumerate(edges):
+    boundaries, length = Triangulation(mesh).boundaries, resolved_lengths(mesh)
+    for number, edge in enumerate(cad_edges(mesh) or []):
         if edge.straight:
             continue
         small = edge.size < SMALLEST
         limit = SHORTEST_ON_SMALL if small else SHORTEST
-        shortest = float(length[view.boundaries == number].min(initial=np.inf))
-        if shortest < limit or (small and not edge.uniform):
+        shortest = float(length[boundaries == number].min(initial=np.inf))
+        if shortest < 1 or (small and not edge.uniform):
             raise ValueError(
                 f'the curved edge "{edge.name}" has the extent {edge.size:g} and segments of '
-                f"{shortest:g}, on which the geometry kernel loses digits; choose a smaller unit "
-                f"of length: curved edges of {SMALLEST:g} and more may have segments down to "
-                f"{SHORTEST:g}"
+                f"{shortest * limit:g}, on which the geometry kernel loses digits; choose a "
+                f"smaller unit of length: curved edges of {SMALLEST:g} and more may have segments "
+                f"down to {SHORTEST:g}"
             )
 
 
