@@ -44,7 +44,7 @@ from .liftings import (
     strip_norms,
 )
 from .parts import ErrorBound, complementarity, summed, work_of_supports
-from .pressures import Pieces, facing_cuts, pieces_of, selected, zone_of
+from .pressures import Pieces, Zone, facing_cuts, pieces_of, selected, zone_of
 from .record import Norms, Proof
 from .refusals import refuse_bound
 from .remainders import missed_tractions
@@ -81,15 +81,15 @@ def error_bound(
     partition = _partition(problem, boundary, every_pieces, units)
     discrete = discrete_on(problem, boundary, partition, stress, units)
     conditions = edge_conditions(problem, boundary, partition, discrete.degree, units.stress)
-    zones = [zone_of(pair, boundary, discrete.degree - 1) for pair in pairs]
+    solved = displacement, stress
+    zones, (discrete, given, coefficients) = _pressures(
+        pairs, every_pieces, boundary, solved, discrete, conditions, units
+    )
     supported = np.unique(partition.ends[~conditions.constrained.all(axis=1)])
     gaps = [
         gap_of(zone, pieces, boundary, displacement, units, supported)
         for zone, pieces in zip(zones, every_pieces, strict=True)
     ]
-    discrete, given, coefficients = selected(
-        zones, every_pieces, boundary, displacement, stress, discrete, conditions, units
-    )
     result = improved(discrete, conditions, equilibrated(discrete, conditions, given))
     raw, traction, certificate = certified(discrete, conditions, given, result)
     fields = on_supports(problem, boundary, displacement, discrete, units)
@@ -112,6 +112,29 @@ def error_bound(
     proof = Proof(discrete, conditions, given, raw, gaps, coefficients, norms, bound, units)
     reaction = work_of_supports(fields, partition, traction)
     return summed(units, norms, closed, signed, reaction, _stress(proof, certificate))
+
+
+def _pressures(
+    pairs: Sequence[ContactState],
+    every_pieces: Sequence[Pieces],
+    boundary: BoundaryTrace,
+    solved: tuple[ng.GridFunction, ng.CoefficientFunction],
+    discrete: Discrete,
+    conditions: EdgeConditions,
+    units: Units,
+) -> tuple[list[Zone], tuple[Discrete, Array, list[Array]]]:
+    """p* near to the forces; on all of the lines if those resultants are out of its reach."""
+
+    def chosen(everywhere: bool) -> tuple[list[Zone], tuple[Discrete, Array, list[Array]]]:
+        degree = discrete.degree - 1
+        zones = [zone_of(pair, boundary, degree, everywhere) for pair in pairs]
+        data = boundary, *solved, discrete, conditions, units
+        return zones, selected(zones, every_pieces, *data)
+
+    try:
+        return chosen(everywhere=False)
+    except ContactError:
+        return chosen(everywhere=True)
 
 
 def _lifting(
@@ -146,8 +169,8 @@ def _partition(
     given = [*problem.displacement, *problem.traction, problem.sliding]
     secondaries = [pair.secondary for pair in problem.contact]
     at = boundary.segments(*(str(p) for p in (*given, *secondaries) if p is not None))
-    whole = np.union1d(at, bent_segments(boundary))
-    cuts, uneven = facing_cuts(every_pieces, boundary, whole)
+    bent = bent_segments(boundary)
+    cuts, uneven = facing_cuts(every_pieces, boundary, np.union1d(at, bent), bent)
     divided = divided_elements(problem, boundary, degree_for(boundary), uneven)
     # Two triangles meet at a cut: tractions that are not the same on both sides leave no freedom.
     divided[boundary.element[[number for number in uneven if number in cuts]]] = True

@@ -5,7 +5,7 @@ There stresses are polynomials in x, too, of which norms and moments are integra
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import ngsolve as ng
 import numpy as np
@@ -66,6 +66,17 @@ class Rough:
     distortion: Array
     least: Array
     most: Array
+
+    def with_load(self, number: Index, load: Array) -> Rough:
+        """With a `load` (j, 2, 3) of degree 1 in addition in those of `number` (j,)."""
+        divergence, force = self.divergence.copy(), self.force.copy()
+        moments, means = self.moments.copy(), self.force_means.copy()
+        moment = np.einsum("jpq,jcq->jcp", self.gram[number], load)
+        divergence[number, ..., :3] -= load[:, None] / 3
+        moments[number] -= moment[:, None] / 3
+        force[number, :, :3] += load
+        means[number, :, :3] += moment
+        return replace(self, divergence=divergence, force=force, moments=moments, force_means=means)
 
 
 @dataclass(frozen=True, eq=False)

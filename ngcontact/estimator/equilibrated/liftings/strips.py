@@ -55,6 +55,8 @@ def strip_norms(
         moved = np.abs(c).max(axis=(1, 2), initial=0.0) > 0
         touched[partition.ends[field.edge[moved]]] = True
     strip: Mask = np.any(touched[Triangulation(mesh).triangles], axis=1, keepdims=True)[:, 0]
+    if not strip.any():
+        return total
     given = _given(problem, boundary, conditions, discrete)
     fixed = np.zeros(values.shape, dtype=bool)
     for number, el in enumerate(mesh.Elements(ng.BND)):

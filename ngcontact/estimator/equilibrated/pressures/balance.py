@@ -129,12 +129,18 @@ def balanced(
         A = functional @ pressures
         terms = functional * conditions.given.ravel()
         a = -terms.sum(axis=1) - work.sum(axis=1)
-        met = np.abs(A).max(axis=1, initial=0.0) > MET * np.abs(functional).max()
+        # Motions by what pressures can do: a disc's rotation about its middle is a combination.
+        turn, size, _ = np.linalg.svd(A, full_matrices=True)
+        size = np.append(size, np.zeros(len(turn) - len(size)))
+        met = size > MET * np.abs(functional).max()
+        A, a = turn.T @ A, turn.T @ a
         if not met.all():
             largest = np.abs(terms).sum() + np.abs(work).sum()
             if np.abs(a[~met]).max() > BALANCED * largest:
                 raise ContactError("the loads on a body that can move are not in equilibrium")
-            discrete = _with_rigid_load(discrete, inside, fields[~met], a[~met])
+            # One that does no work on the others: these are met by pressures.
+            turned = np.einsum("im,mjcp->ijcp", turn.T, fields)
+            discrete = _with_rigid_load(discrete, inside, turned, np.where(met, 0.0, a))
         rows.append(A[met])
         sides.append(a[met])
     m = pressures.shape[1]
@@ -190,13 +196,14 @@ def _work(
 
 def _with_rigid_load(discrete: Discrete, inside: Index, fields: Array, missing: Array) -> Discrete:
     """With the rigid load in the `inside` (j,) that does the work `missing` (m,) on `fields`."""
-    if discrete.rough is not None:
-        smooth = discrete.rough.number[inside] < 0
-        inside, fields = inside[smooth], fields[:, smooth]
-    area = discrete.partition.areas[inside]
-    gram = np.einsum("j,mjcp,njcp->mn", area, fields, fields)
+    area, means = discrete.partition.areas[inside], discrete.motions_gram()[inside]
+    gram = np.einsum("j,mjcp,jpq,njcq->mn", area, fields, means, fields, optimize=True)
     load = np.einsum("m,mjcp->jcp", np.linalg.solve(gram, missing), fields)
-    hatted = np.einsum("aip,jcp->jaci", basis(2).hats, load)
-    force = discrete.force.copy()
-    force[inside, :, :, : dimension(2)] += hatted
-    return replace(discrete, force=force)
+    force, rough = discrete.force.copy(), discrete.rough
+    force[inside, :, :, : dimension(2)] += np.einsum("aip,jcp->jaci", basis(2).hats, load)
+    if rough is not None:
+        number = rough.number[inside]
+        mine = number >= 0
+        rough = rough.with_load(number[mine], load[mine])
+        force[rough.at] = rough.force_means[:, None] / 3
+    return replace(discrete, force=force, rough=rough)

@@ -15,6 +15,7 @@ from ....qp import solve_qp
 NEARNESS = 0.3  # weight of |p* + sigma_n|^2 h / E; measured best for the bound, and flat about it
 TOTALS = 1.0  # ... of the squared sums of what forces and p* differ by, over E
 STEPS = 30
+UNBALANCED = 1e-12  # resultants, relative, that are met but for round-off
 NEGATIVE = 1e-13  # relative, what a pressure or a multiplier must exceed to change sides
 
 
@@ -138,4 +139,8 @@ def _surely(H: Array, f: Array, bounds: tuple[Array, Array], A: Array, a: Array)
         b = solve_qp(sp.csr_array(H), f, B, g, *equations).u
     except (ContactError, ValueError) as error:
         raise ContactError(f"no pressure balances the loads: {error}") from error
-    return np.clip(b, *bounds)
+    b = np.clip(b, *bounds)
+    off = np.abs(A @ b - a).max(initial=0.0)
+    if off > UNBALANCED * (np.abs(A) @ np.abs(b)).max(initial=0.0):
+        raise ContactError("no pressure of one sign balances the loads of a body that it holds")
+    return b

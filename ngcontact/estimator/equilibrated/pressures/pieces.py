@@ -106,22 +106,26 @@ def pieces_of(line: ContactLine, boundary: BoundaryTrace) -> Pieces:
 
 
 def facing_cuts(
-    every_pieces: Sequence[Pieces], boundary: BoundaryTrace, whole: Index
+    every_pieces: Sequence[Pieces], boundary: BoundaryTrace, whole: Index, bent: Index
 ) -> tuple[dict[int, Array], Index]:
     """Where vertices of secondaries lie on the segments that they face.
 
-    `whole` (j,) are segments that must not be cut.
+    `whole` (j,) are segments that must not be cut, `bent` (j,) those that are curved.
 
     Returns
     -------
     cuts : dict of ndarray (j,)
         Parameters by segment.
     uneven : ndarray of int (k,)
-        Segments on which such a place is left: polynomials on one side are none on the other.
+        Segments on which such a place is left, so that polynomials on one side are none on the
+        other, or on which p* may jump, since the secondary ends there and the primary does not, or
+        which are straight and face a curve.
     """
     cuts: dict[int, Array] = {}
-    uneven = []
+    uneven: list[int] = []
     for pieces in every_pieces:
+        uneven += _where_one_ends(pieces, boundary)
+        uneven += pieces.facing[np.isin(pieces.segment, bent) & (pieces.facing >= 0)].tolist()
         if pieces.whole:
             continue
         ends, _ = pieces.opposite(boundary, pieces.places(np.array([0.0, 1.0])))
@@ -139,3 +143,23 @@ def facing_cuts(
             if kept.size:
                 cuts[number] = kept
     return cuts, np.array(uneven, dtype=np.intp)
+
+
+def _where_one_ends(pieces: Pieces, boundary: BoundaryTrace) -> list[int]:
+    """Facing segments on which the secondary ends, where the primary goes on."""
+    line = pieces.line
+    if line.contact.primary is None or pieces.local.size == 0:
+        return []
+    nodes = boundary.nodes[line.segments][:, [0, -1]]
+    vertices, count = np.unique(nodes[line.faces], return_counts=True)
+    number = nodes[pieces.local]
+    last = np.isin(number, vertices[count == 1])
+    last &= np.column_stack([pieces.start == 0, pieces.stop == 1])
+    row, side = np.nonzero(last)
+    s, _ = pieces.opposite(boundary, pieces.places(np.array([0.0, 1.0])))
+    facing, s = pieces.facing[row], s[row, side]
+    ends = boundary.nodes[line.facing][:, [0, -1]]
+    vertices, count = np.unique(ends, return_counts=True)
+    nearest = np.where(s < 0.5, boundary.nodes[facing, 0], boundary.nodes[facing, -1])
+    inside = (s > SLIVER) & (s < 1 - SLIVER)
+    return [int(n) for n in facing[inside | np.isin(nearest, vertices[count == 2])]]

@@ -92,8 +92,13 @@ class Zone:
         return np.asarray(np.append(self.state.active, True)[self.state.line.rows].all(axis=1))
 
 
-def zone_of(state: ContactState, boundary: BoundaryTrace, degree: int) -> Zone:
-    """Where p* may differ from 0, as polynomials of a degree: where forces are, and beside."""
+def zone_of(
+    state: ContactState, boundary: BoundaryTrace, degree: int, everywhere: bool = False
+) -> Zone:
+    """Where p* may differ from 0, as polynomials of a degree: where forces are, and beside.
+
+    Or `everywhere` on the line, if such pressures cannot balance the loads.
+    """
     line = state.line
     faces = np.flatnonzero(line.faces)
     segment, nodes = line.segments[faces], boundary.nodes[line.segments[faces]]
@@ -102,7 +107,7 @@ def zone_of(state: ContactState, boundary: BoundaryTrace, degree: int) -> Zone:
     point, _ = boundary.number_points(np.repeat(segment, 2), nodes[:, [0, -1]].ravel(), normal)
     point = point.reshape(-1, 2)
     force = np.append(state.force, 0.0)[line.rows[faces]]
-    carries = (force != 0).any(axis=1) | line.contact.bilateral
+    carries = (force != 0).any(axis=1) | line.contact.bilateral | everywhere
     touched = np.zeros(point.max(initial=-1) + 1, dtype=bool)
     touched[point[carries]] = True
     near = touched[point].any(axis=1)

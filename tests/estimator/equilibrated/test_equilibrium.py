@@ -1,0 +1,87 @@
+"""Stresses in equilibrium where bodies move, where one line ends on another, where lines curve."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.reference import cases
+from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact.geometries import rings
+from ngcontact.geometries.region import body, compound, polygon
+
+RESIDUAL = 1e-10  # of equilibrium, jumps and tractions; measured at most 5e-13
+LAW = Elastic(E=1.0, nu=0.3)
+
+
+def settled(problem, maxh, order):
+    """The solution, whose equilibrated stress is one."""
+    solution = solve(problem, maxh=maxh, order=order)
+    certificate = dict(solution.equilibrated.certificate)
+    assert certificate.pop("least pressure") >= 0
+    assert max(certificate.values()) <= RESIDUAL
+    return solution
+
+
+@pytest.mark.parametrize(("order", "maxh"), [(1, 0.5), (2, 0.5), (3, 0.5), (2, 0.3)])
+def test_a_pin_that_may_turn(order, maxh):
+    """No pressure along the normals does work on its rotation, nor loads but for round-off.
+
+    Once that was asked of p* all the same: bounds of 64 times the estimate, or a singular matrix
+    where all triangles are curved.
+    """
+    problem = Problem(
+        geometry=rings(0.5, 1.0, 2.0, interference=-1e-2),
+        materials={"inner|outer": LAW},
+        displacement={"rim": (0, 0)},
+        traction={"hole": (0, -1e-3)},
+        contact=[Contact("outer_contact", "inner_contact")],
+    )
+    solution = settled(problem, maxh, order)
+    assert solution.error_bound < 2 * solution.error_estimate
+
+
+def test_an_excentric_load_on_a_disc_that_may_turn():
+    """A rigid load balances what is left on its rotation, without work on translations."""
+    problem = Problem(
+        geometry=rings(0.5, 1.0, 2.0, interference=1e-3),
+        materials={"inner|outer": LAW},
+        displacement={"rim": (0, 0)},
+        force={"inner": (-1e-4, -1e-3)},
+        contact=[Contact("inner_contact", "outer_contact")],
+    )
+    solution = settled(problem, maxh=0.4, order=1)
+    assert solution.error_bound < 2 * solution.error_estimate
+
+
+def on_a_wide_block(left, right):
+    """A block from x = `left` to `right`, pressed on one from -1 to 1."""
+    upper = [(left, 0), (right, 0), (right, 0.5), (left, 0.5)]
+    lower = [(-1, -0.7), (1, -0.7), (1, 0), (-1, 0)]
+    return compound(
+        body("upper", polygon(upper, ["foot", "side", "top", "side"])),
+        body("lower", polygon(lower, ["bottom", "wall", "seat", "wall"])),
+    )
+
+
+@pytest.mark.parametrize("rows", ["nodal", "dual"])
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_pressures_that_end_on_a_straight_line(order, rows):
+    """On the wide block they jump to 0 at a vertex with perhaps two triangles, or at a cut."""
+    problem = Problem(
+        geometry=on_a_wide_block(-0.37, 0.42),
+        materials={"upper|lower": LAW},
+        displacement={"bottom": (0, 0), "top": (0, -1e-3)},
+        contact=[Contact("foot", "seat", rows=rows)],
+    )
+    coarse = settled(problem, maxh=0.5, order=order)
+    fine = settled(problem, maxh=0.1, order=2)
+    (low, high), (lower, upper) = coarse.energy_bounds, fine.energy_bounds
+    assert low <= upper
+    assert lower <= high
+
+
+@pytest.mark.parametrize("order", [2, 4])
+def test_a_curve_on_a_straight_line(order):
+    """p* on the arc is no polynomial on the line: what it misses jumps at vertices."""
+    solution = settled(cases.pressed_disc(), maxh=0.5, order=order)
+    assert solution.bound_parts["curves"] > 0
