@@ -44,6 +44,14 @@ HELP = {
         "max-dofs": ("Number of unknowns", "6000"),
         "out": ("Folder", "out"),
     },
+    "parameter_study": {
+        "solves": ("Number of problems", "64"),
+        "processes": ("Number of workers", "2"),
+        "engine": ("joblib or Dask", "processes"),
+        "order": ("1 to 4", "3"),
+        "tolerance": ("relative in the energy norm", "0.01"),
+        "out": ("Folder", "out"),
+    },
     "convergence": {
         "parts": ("problems", "patch S1 S3 S7 S8 S9"),
         "levels": ("Number of meshes", "5"),

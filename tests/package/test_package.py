@@ -52,7 +52,9 @@ def test_a_wheel_brings_one_package_and_its_types(wheel):
     assert "ngcontact/geometries/straight.py" in brought
     metadata = Parser().parsestr(wheel.read(information).decode())
     assert metadata["Version"] == ngcontact.__version__
-    assert {"notebook", "test", "dev", "docs", "bench"} == set(metadata.get_all("Provides-Extra"))
+    assert {"notebook", "parallel", "test", "dev", "docs", "bench"} == set(
+        metadata.get_all("Provides-Extra")
+    )
 
 
 def test_one_version_everywhere():
