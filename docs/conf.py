@@ -16,6 +16,7 @@ author = "The ngcontact developers"
 copyright = f"2026, {author}"
 version = release = ngcontact.__version__
 language = "en"
+smartquotes = False  # messages and names are quoted as they are
 
 extensions = [
     "myst_nb",
