@@ -7,7 +7,8 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 
-from .adaptive import Refinement, first_level, levels, log
+from .adaptive import first_level, levels, log
+from .adaptivity import Refinement
 from .errors import ContactError
 from .fem import check_element, unknowns
 from .mesh import first_mesh

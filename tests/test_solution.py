@@ -782,7 +782,7 @@ def test_a_body_guided_on_its_circular_rim_can_rotate(order):
     ("order", "unknowns", "force", "peak", "width", "energy"),
     [
         (2, 2500, 2e-4, 5e-3, 2e-3, 2e-4),
-        (3, 3000, 2e-5, 2e-4, 1e-3, 1e-5),
+        (3, 3600, 2e-5, 2e-4, 1e-3, 1e-5),
     ],
 )
 def test_problem_a(order, unknowns, force, peak, width, energy):
@@ -791,7 +791,7 @@ def test_problem_a(order, unknowns, force, peak, width, energy):
     x >= 0, x^2 + (y - 1)^2 <= 1, y <= 1; E = 200, nu = 0.3, plane strain; u_x = 0 on x = 0,
     u_y = -0.005 and u_x free on y = 1; plane y = 0, direction (0, -1), gap y. References: force of
     the whole disc 0.4465326(2), greatest pressure 5.5919(1), half-width 0.05082(1), strain energy
-    of the half 5.221032(1)e-4. Measured: 5e-5, 2e-3, 2e-4, 5e-5 and 5e-6, 2e-5, 3e-5, 2e-6.
+    of the half 5.221032(1)e-4. Measured: 5e-5, 6e-5, 7e-4, 9e-5 and 3e-6, 7e-6, 7e-5, 1e-6.
     """
     problem = Problem(
         geometry=disc(),
@@ -819,7 +819,7 @@ def test_problem_b(order, unknowns, energy, end, peak):
     """Problem B, see `partly_open`: strain energy 7.164124(1)e-4, end of contact x = 1.5453(1),
     greatest pressure 0.97572(2) at x = 0, contact force 1.
 
-    Measured: 6e-5, 2e-4, 7e-4 and 9e-6, 1e-5, 1e-5.
+    Measured: 5e-5, 3e-4, 7e-4 and 2e-5, 1e-5, 1e-5.
     """  # noqa: D205
     *_, solution = adapt(partly_open(), order=order, max_dofs=unknowns)
     u = values(solution)

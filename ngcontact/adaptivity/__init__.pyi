@@ -2,6 +2,15 @@ from .exceptions import at_ends as at_ends
 from .exceptions import at_limit as at_limit
 from .exceptions import settled as settled
 from .exceptions import warn_of_limit as warn_of_limit
+from .forecast import Aim as Aim
+from .forecast import Forecast as Forecast
+from .forecast import planned as planned
 from .marking import doerfler as doerfler
 from .marking import together as together
+from .refinement import Refining as Refining
 from .refinement import refined as refined
+from .settings import Refinement as Refinement
+from .singularities import Singularities as Singularities
+from .singularities import corners as corners
+from .singularities import ends_of_contact as ends_of_contact
+from .singularities import unresolvable as unresolvable

@@ -11,7 +11,7 @@ from ..arrays import Array, Mask
 from ..contact import ContactState, ending_segments
 from ..errors import warn
 from ..fem import BoundaryTrace
-from ..mesh import resolved_lengths
+from ..mesh import neighbours, resolved_lengths
 from ..problem import Triangulation
 
 HALVED = 2.5  # least length that halves need, whose sizes differ by a quarter at most
@@ -29,11 +29,16 @@ def at_ends(trace: BoundaryTrace, pairs: Sequence[ContactState], share: float) -
     return marked
 
 
-def at_limit(trace: BoundaryTrace) -> Mask:
-    """Elements (ne,) at segments of curved edges whose halves no geometry kernel resolves."""
-    limit = np.zeros(trace.mesh.ne, dtype=bool)
-    if trace.geometry_order > 1:  # straight segments have no middles to place
-        limit[trace.element[resolved_lengths(trace.mesh) < HALVED]] = True
+def at_limit(mesh: ng.Mesh, degree: int) -> Mask:
+    """Elements (ne,) at segments of curved edges whose halves no geometry kernel resolves.
+
+    `degree` is the one of the curves that the mesh will have.
+    """
+    limit = np.zeros(mesh.ne, dtype=bool)
+    if degree > 1:  # straight segments have no middles to place
+        view = Triangulation(mesh)
+        element, _ = neighbours(view.segments, view.triangles, mesh.nv)
+        limit[element[resolved_lengths(mesh) < HALVED]] = True
     return limit
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask
 from ..contact import nodal_line
-from ..fem import BoundaryTrace, boundary_trace
+from ..fem import BoundaryTrace, boundary_trace, unknowns_of
 from ..mesh import CadEdge, copied
 from ..problem import Contact, Problem, Triangulation, bisect, move_vertices
 
@@ -150,8 +150,10 @@ def _without_inversion(mesh: ng.Mesh, old: Array, new: Array) -> Array:
         new[turned] = old[turned]
 
 
-def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.Mesh:
-    """Refined copy of a mesh, straight-sided, with matched contact lines kept matched.
+class Refining:
+    """A copy of a mesh that is bisected, several times if need be, before it is handed on.
+
+    Between bisections new nodes of facing segments are as many, but not yet at common C_j.
 
     Parameters
     ----------
@@ -159,31 +161,85 @@ def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.M
         Its contact pairs say which lines face each other.
     mesh : ng.Mesh
         Stays as it is.
+
+    Attributes
+    ----------
+    mesh : ng.Mesh
+        The copy, straight-sided; refined elements keep their number and have further ones behind.
+    """
+
+    def __init__(self, problem: Problem, mesh: ng.Mesh) -> None:
+        trace = boundary_trace(mesh, 1)
+        self.problem = problem
+        self.mesh = copied(mesh)
+        self._pairs = [matched_vertices(trace, contact) for contact in problem.contact]
+        self._first = mesh.nv
+        self._characteristic = mesh.nv - mesh.nedge + mesh.ne
+        self._curved = mesh.GetCurveOrder() > 1
+
+    def unknowns(self, order: int, element: str) -> int:
+        """Number of unknowns of the displacement, as `fem.unknowns` of the finished mesh."""
+        now = self.mesh
+        edges = now.nv + now.ne - self._characteristic  # Euler; NGSolve counts those of a copy only
+        extra = now.GetNE(ng.BND) if element == "physical" and self._curved else 0
+        return unknowns_of(order, now.nv + extra, edges, now.ne)
+
+    def bisect(self, marked: Mask) -> Index:
+        """Refine the elements `marked` (ne,), and what keeps contact lines matched.
+
+        Returns
+        -------
+        ndarray of int (k,)
+            The element of which each of the k elements is a part, by its former number.
+        """
+        flags, count = np.array(marked), self.mesh.ne
+        matched = any(self._pairs)
+        if matched:
+            flags[_facing_elements(self._pairs, boundary_trace(self.mesh, 1), flags)] = True
+        for _ in range(ROUNDS):
+            bisect(self.mesh, flags)
+            if not matched:
+                break
+            trace = boundary_trace(self.mesh, 1)
+            segments, children = _boundary_edges(trace), _children(trace, self._first)
+            lagging = [i for p in self._pairs for i in _match_children(p, children, segments)]
+            if not lagging:
+                break
+            flags = np.zeros(self.mesh.ne, dtype=bool)
+            flags[lagging] = True
+        parent = np.arange(self.mesh.ne)
+        new = (self.mesh.GetParentElement(ng.ElementId(ng.VOL, i)).nr for i in parent[count:])
+        parent[count:] = np.fromiter(new, dtype=np.intp, count=len(parent) - count)
+        while (parent >= count).any():  # parts of parts
+            parent = parent[parent]
+        return parent
+
+    def finished(self) -> ng.Mesh:
+        """The mesh, to be curved by the caller, with new nodes of an enlarging zone at common C_j.
+
+        They are moved along their curves.
+        """
+        trace = boundary_trace(self.mesh, 1)
+        for contact, pair in zip(self.problem.contact, self._pairs, strict=True):
+            _move_to_partners(trace, contact, pair, self._first)
+        return copied(self.mesh)  # numbers only the edges that are left
+
+
+def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.Mesh:
+    """Refined copy of a mesh, straight-sided, with matched contact lines kept matched.
+
+    Parameters
+    ----------
+    problem, mesh
+        As in `Refining`.
     marked : ndarray of bool (ne,), optional
         Elements to refine; all when left out.
 
     Returns
     -------
     ng.Mesh
-        To be curved by the caller. Facing segments have the same number of new nodes, and the
-        new nodes of an enlarging zone are moved along their curves to common C_j.
+        As of `Refining.finished`. Facing segments have the same number of new nodes.
     """
-    trace = boundary_trace(mesh, 1)
-    pairs = [matched_vertices(trace, contact) for contact in problem.contact]
-    copy = copied(mesh)
-    first = copy.nv
-    flags = np.ones(copy.ne, dtype=bool) if marked is None else np.array(marked)
-    flags[_facing_elements(pairs, trace, flags)] = True
-    for _ in range(ROUNDS):
-        bisect(copy, flags)
-        trace = boundary_trace(copy, 1)
-        segments = _boundary_edges(trace)
-        children = _children(trace, first)
-        lagging = [i for pair in pairs for i in _match_children(pair, children, segments)]
-        if not lagging:
-            break
-        flags = np.zeros(copy.ne, dtype=bool)
-        flags[lagging] = True
-    for contact, pair in zip(problem.contact, pairs, strict=True):
-        _move_to_partners(trace, contact, pair, first)
-    return copied(copy)  # numbers only the edges that are left
+    refining = Refining(problem, mesh)
+    refining.bisect(np.ones(mesh.ne, dtype=bool) if marked is None else marked)
+    return refining.finished()

@@ -12,7 +12,7 @@ from ..arrays import Array, power_of_two, root_of_squares
 from ..fem import Space, incompressibilities
 from ..problem import Problem, Triangulation
 
-LEVELS = 3  # after the best one, from which estimates are not those of a mesh still too coarse
+LEVELS = 2  # after the best one: at twice the unknowns each no mesh is still too coarse
 EXACT = 1e-12  # relative estimate at which refinement stops: the solution is exact
 BEYOND_NOISE = 1e-4  # ... above which no round-off reaches
 STRESS_NOISE = 100 * np.finfo(float).eps  # relative to its terms; measured 0.5 to 50 eps

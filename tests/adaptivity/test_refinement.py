@@ -14,10 +14,12 @@ from netgen.meshing import Element1D, Element2D, FaceDescriptor, Mesh, MeshPoint
 from netgen.occ import OCCGeometry
 
 from ngcontact import Contact, Elastic, Problem
-from ngcontact.adaptivity.refinement import refined
+from ngcontact.adaptivity import Refining, refined
+from ngcontact.adaptivity.forecast import touching
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, rings
 from ngcontact.mesh import curve, first_mesh
+from ngcontact.problem import Triangulation
 from tests.scenes import coordinates, unmatched_blocks, vertices
 
 SOFT = Elastic(E=1.0, nu=0.3)
@@ -102,7 +104,12 @@ ALL = {f"bounded {k}": v for k, v in BOUNDED.items()} | {
 def shapes(mesh):
     """Signed areas (ne,) and smallest angles in degrees (ne,) of the straight triangles."""
     corners = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
-    side = np.roll(coordinates(mesh)[corners], -1, axis=1) - coordinates(mesh)[corners]
+    return shapes_of(coordinates(mesh)[corners])
+
+
+def shapes_of(corners):
+    """The same of triangles with the corners (ne, 3, 2)."""
+    side = np.roll(corners, -1, axis=1) - corners
     area = (side[:, 0, 0] * side[:, 1, 1] - side[:, 0, 1] * side[:, 1, 0]) / 2
     length = np.linalg.norm(side, axis=2)
     cosine = -(side * np.roll(side, 1, axis=1)).sum(axis=2) / length / np.roll(length, 1, axis=1)
@@ -307,6 +314,45 @@ def test_names_and_geometry_survive():
     result.Curve(4)
     # The half disc and the block of the geometry, exact to the order of the curve.
     assert ng.Integrate(ng.CF(1), result) == pytest.approx(math.pi / 4 + 4, rel=1e-6)
+
+
+@SIDES
+@pytest.mark.parametrize("name", ["bounded polygon", "enlarging blocks"])
+def test_parts_lie_in_their_parents_and_fill_them(name, side):
+    problem = ALL[name].problem()
+    refining = Refining(problem, first_mesh(problem, 0.4))
+    for level in range(4):
+        old = Triangulation(refining.mesh).corners
+        marked = near_tip(refining.mesh, getattr(ALL[name].contact, side), 0.5 / 2**level)
+        parent = refining.bisect(marked)
+        new = Triangulation(refining.mesh).corners
+        assert (parent[: len(old)] == np.arange(len(old))).all()
+        centres = new.mean(axis=1)
+        inside = [touching(old[i : i + 1], centres[k : k + 1])[0, 0] for k, i in enumerate(parent)]
+        assert all(inside)
+        area = shapes(refining.mesh)[0]
+        assert np.bincount(parent, area) == pytest.approx(shapes_of(old)[0], rel=1e-12)
+        assert (np.bincount(parent)[marked] >= 2).all()
+
+
+@pytest.mark.parametrize("name", ["enlarging disc on block", "bounded rings"])
+def test_several_bisections_keep_contact_lines_matched(name):
+    """As after as many refinements one by one; curves are met when all of them are done."""
+    pair = ALL[name]
+    problem = pair.problem()
+    refining = Refining(problem, first_mesh(problem, 0.4))
+    for level in range(3):
+        refining.bisect(near_tip(refining.mesh, pair.contact.primary, 0.5 / 2**level))
+    mesh = refining.finished()
+    here, there = vertices(mesh, pair.contact.secondary), vertices(mesh, pair.contact.primary)
+    if pair.contact.direction is not None:  # common eta, not common points
+        here, there = (points[np.abs(points[:, 0]) < pair.part, :1] for points in (here, there))
+    assert (
+        len(here) == len(there) > len(vertices(first_mesh(problem, 0.4), pair.contact.primary)) / 2
+    )
+    distance = np.linalg.norm(here[:, None] - there, axis=2)
+    assert distance.min(axis=0).max() < ROUND_OFF
+    assert distance.min(axis=1).max() < ROUND_OFF
 
 
 def squares_without_cad(n=4):

@@ -43,7 +43,8 @@ def test_uniform_refinement_is_slower_at_order_2():
 @pytest.mark.parametrize(("order", "unknowns"), [(1, 8000), (2, 12_000)])
 def test_effectivity(name, order, unknowns):
     _, rows = levels(name, "adaptive", order, unknowns)
-    effectivities = np.array([row.effectivity for row in rows])[3:]
+    effectivities = np.array([row.effectivity for row in rows])[2:]
+    assert len(effectivities) >= 2
     assert ((effectivities >= 1) & (effectivities <= 6)).all()
     assert effectivities.max() / effectivities.min() < 1.2  # measured drift at most 14 %
 
@@ -85,9 +86,11 @@ def test_force_and_peak_pressure():
 def test_newton_steps_and_factorisations(name):
     for order, unknowns in ((1, 8000), (2, 12_000)):
         solutions, rows = levels(name, "adaptive", order, unknowns)
+        # A level has two to four times the contact points of the one that starts it, and one run
+        # a third of the levels that it takes without planning: the means are 1 to 2.5.
         steps = [row.steps for row in rows[2:]]
         assert max(steps) <= 3
-        assert np.mean(steps) <= 2
+        assert np.mean(steps) <= 2.5
         assert all(s.work["factorizations"] == 1 for s in solutions[1:])
 
 
@@ -156,10 +159,11 @@ def test_effectivity_on_curves():
     study = STUDIES["disc on rigid plane"]()
     error = error_measure(study, reference=12_000)
     for order in (1, 2):
-        levels = run_of("disc on rigid plane", study, "adaptive", order, error, 3000)
-        effectivities = np.array([row.effectivity for _, row in levels])[3:]
+        levels = run_of("disc on rigid plane", study, "adaptive", order, error, 9000)
+        effectivities = np.array([row.effectivity for _, row in levels])[1:]
+        assert len(effectivities) >= 3
         assert ((effectivities >= 1) & (effectivities <= 6)).all()
-        assert effectivities.max() / effectivities.min() < 1.2  # measured 1.07 and 1.06
+        assert effectivities.max() / effectivities.min() < 1.2  # measured 1.06 and 1.04
 
 
 def test_every_study_has_its_name():

@@ -30,7 +30,7 @@ from tests.quadrature.test_loads import loaded
 )
 def test_as_the_error_against_the_exact_stress(make, order, element):
     case = make()
-    *_, finest = adapt(case.problem, order=4, max_dofs=12_000)
+    *_, finest = adapt(case.problem, order=4, max_dofs=18_000)
     known = relative_energy_error(finest, case.exact)
     solution = solve(case.problem, maxh=0.12, order=order, element=element)
     exact = relative_energy_error(solution, case.exact)

@@ -70,7 +70,7 @@ def test_effectivity_on_uniform_meshes(name, order):
 @pytest.mark.parametrize("name", CASES)
 def test_effectivity_on_adaptive_meshes(name, order):
     problem = CASES[name]().problem
-    levels = adapt(problem, maxh=0.28, order=order, max_dofs=1000 * (order + 1))
+    levels = adapt(problem, maxh=0.28, order=order, max_dofs=4000 * (order + 1))
     found = [effectivity(solution, name) for solution in levels][1:]
     assert len(found) >= 3
     assert min(found) >= 1

@@ -15,7 +15,8 @@ from ngcontact.plausibility import estimates_rise
     [
         ([0.3, 0.2, 0.1, 0.12, 0.13, 0.18], True),
         ([0.3, 0.1, 0.14, 0.13, 0.16], True),
-        ([0.1, 0.12, 0.13], False),  # two levels
+        ([0.1, 0.12, 0.13], True),  # two levels, of twice the unknowns each
+        ([0.1, 0.13], False),  # one level
         ([0.8, 11.0, 8.0, 2.2], False),  # falls again
         ([1e-3, 1.01e-3, 1.02e-3, 1.03e-3], False),  # noise
         ([0.4, 0.2, 0.1, 0.05], False),
@@ -42,10 +43,10 @@ def test_a_gap_rougher_than_every_mesh_is_told_once_with_its_place():
         ],
     )
     with pytest.warns(ContactWarning) as caught:
-        levels = list(adapt(problem, order=1, max_dofs=9000))
+        levels = list(adapt(problem, order=1, max_dofs=20_000))
     messages = [str(warning.message) for warning in caught]
     [message] = [message for message in messages if "refinement does not help" in message]
-    assert len(levels) > 8  # it goes on to rise after it was told
+    assert len(levels) > 7  # it goes on after it was told, at the seventh
     y = float(message.split("near (")[1].split(")")[0].split(",")[1])
     assert abs(y) < 0.1  # at the contact line
     assert "a gap or a load" in message

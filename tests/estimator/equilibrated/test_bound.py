@@ -307,10 +307,14 @@ def test_adapt_stops_at_the_bound():
     assert f"bound {levels[-1].relative_error_bound:.2e}" in str(levels[-1])
     assert relative_energy_error(levels[-1], case.exact) <= tolerance
     assert sum(level.work["equilibrations"] for level in levels[:-1]) <= 2
-    marked = [
-        level.displacement.space.ndof for level in adapt(case.problem, order=3, max_dofs=4000)
-    ]
-    assert [level.displacement.space.ndof for level in levels] == marked[: len(levels)]
+    # The bound that is forecast ends the plan: no more unknowns than the estimate's own first
+    # level that meets the tolerance needs.
+    fine = next(
+        level
+        for level in adapt(case.problem, order=3, max_dofs=8000)
+        if level.relative_error_bound <= tolerance
+    )
+    assert levels[-1].displacement.space.ndof <= 1.2 * fine.displacement.space.ndof
 
 
 def test_the_bound_is_there_when_a_level_is():

@@ -1,0 +1,59 @@
+"""How a sequence of levels is refined, and when it ends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from numbers import Real
+
+from ..fem import check_element
+
+GROWTH = 2.0  # of the unknowns up to which the next level is planned at first
+
+
+def _number(name: str, value: object) -> float:
+    """`value`, or a TypeError unless it is a real number."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise TypeError(f"{name}={value!r} is not a number")
+    return float(value)
+
+
+@dataclass(frozen=True)
+class Refinement:
+    """How a sequence of levels is refined, and when it ends.
+
+    Raises `ValueError` or `TypeError` with the offending value and what would be right.
+
+    Parameters
+    ----------
+    order, element, theta, tolerance, max_dofs, guaranteed
+        As in `adapt`.
+    ending : float
+        Size from which elements in which contact ends are refined: their segment's length over
+        that of its contact line, relative to the relative estimate.
+    growth : float
+        Of the unknowns up to which the next level is planned at first, and at most; with a
+        tolerance, at which planning stops anyway, at most its square. 1 marks once a level.
+    """
+
+    order: int
+    element: str
+    theta: float
+    tolerance: float | None
+    max_dofs: float
+    guaranteed: bool = False
+    ending: float = 0.1
+    growth: float = GROWTH
+
+    def __post_init__(self) -> None:
+        """Validate."""
+        object.__setattr__(self, "order", check_element(self.order, self.element))
+        if not 0 < _number("theta", self.theta) <= 1:
+            raise ValueError(f"theta={self.theta} must lie in (0, 1]; 0.5 is usual")
+        if self.tolerance is not None and not _number("tolerance", self.tolerance) > 0:
+            raise ValueError(f"tolerance={self.tolerance} must be positive, like 1e-3, or None")
+        if not _number("max_dofs", self.max_dofs) > 0:
+            raise ValueError(f"max_dofs={self.max_dofs} must be positive, like 100_000")
+        if not isinstance(self.guaranteed, bool):
+            raise TypeError(f"guaranteed={self.guaranteed!r}: give True or False")
+        if self.guaranteed and self.tolerance is None:
+            raise ValueError("guaranteed=True with tolerance=None: give a tolerance, like 1e-3")

@@ -1,0 +1,128 @@
+"""Points at which displacements are less smooth than elsewhere: ends of contact, corners."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arrays import Array, Index
+from ..contact import ContactState
+from ..fem import BoundaryTrace
+from ..problem import Problem, Triangulation
+
+AT_ENDS = 1.5  # u ~ r^(3/2) where contact ends: the squared error of an element is ~ h^3
+AT_CHANGES = 0.75  # of conditions: u ~ r^0.71 where right angles are clamped to one side
+AT_CORNERS = 0.5  # that point inwards: u ~ r^0.54 where 270 degrees are free, r^(1/2) at slits
+BLUNT = 0.1  # radians by which the normal turns at a corner that points inwards
+
+
+@dataclass(frozen=True, eq=False)
+class Singularities:
+    """Points, and how the squared error of an element there falls with its area.
+
+    Attributes
+    ----------
+    places : ndarray (k, 2)
+        Lengths.
+    powers : ndarray (k,)
+        Of the area.
+    extents : ndarray (k,)
+        Lengths of the contact lines that end there, infinite elsewhere.
+    """
+
+    places: Array
+    powers: Array
+    extents: Array
+
+    @property
+    def unresolvable(self) -> Array:
+        """Places (j, 2) of infinite energy, lengths."""
+        return self.places[self.powers == 0]
+
+    def joined(self, other: Singularities) -> Singularities:
+        """Those of both."""
+        return Singularities(
+            np.concatenate([self.places, other.places]),
+            np.concatenate([self.powers, other.powers]),
+            np.concatenate([self.extents, other.extents]),
+        )
+
+
+def unresolvable(places: Sequence[Array]) -> Singularities:
+    """Those at `places` (k, 2) at which supports contradict each other."""
+    return _at(np.array(places).reshape(-1, 2), 0.0)
+
+
+def _at(places: Array, power: float, extents: Array | float = np.inf) -> Singularities:
+    """Those at `places` (k, 2), all of one power."""
+    count = len(places)
+    return Singularities(places, np.full(count, power), np.full(count, extents))
+
+
+def ends_of_contact(pairs: Sequence[ContactState]) -> Singularities:
+    """Where contact turns from binding to non-binding, on both bodies."""
+    found = _at(np.empty((0, 2)), AT_ENDS)
+    for pair in pairs:
+        line, ends = pair.line, pair.transitions
+        extent = float(np.linalg.norm(np.ptp(line.position, axis=0))) if line.node.size else 0.0
+        found = found.joined(_at(ends.position, AT_ENDS, extent))
+        if line.contact.primary is not None:
+            inner, outer = line.position[ends.inner], line.position[ends.outer]
+            apart = np.linalg.norm(outer - inner, axis=1)
+            s = np.linalg.norm(ends.position - inner, axis=1) / np.where(apart > 0, apart, np.inf)
+            gap = (1 - s) * line.gap[ends.inner] + s * line.gap[ends.outer]
+            facing = ends.position + gap[:, None] * line.direction[ends.inner]
+            found = found.joined(_at(facing, AT_ENDS, extent))
+    return found
+
+
+def _conditions(problem: Problem, trace: BoundaryTrace) -> Index:
+    """Number (k,) of what is prescribed on each segment: one for equal conditions."""
+    segments, supports = np.arange(len(trace.region)), problem.displacement.items()
+    masks = [
+        trace.lies_on(segments, *(name for name, u in supports if u[axis] is not None))
+        for axis in (0, 1)
+    ]
+    masks += [trace.lies_on(segments, name) for name in problem.traction]
+    others = [(contact.secondary, contact.primary) for contact in problem.contact]
+    for names in [(problem.sliding, None), *others]:
+        masks += [trace.lies_on(segments, None if name is None else str(name)) for name in names]
+    return np.unique(np.array(masks), axis=1, return_inverse=True)[1].ravel()
+
+
+def _reentrant(trace: BoundaryTrace) -> Index:
+    """Vertices (j,) of the geometry at which a body has an angle of more than 180 degrees."""
+    view = Triangulation(trace.mesh)
+    side = np.roll(view.corners, -1, axis=1) - view.corners
+    back = -np.roll(side, 1, axis=1)
+    sine = side[..., 0] * back[..., 1] - side[..., 1] * back[..., 0]
+    angles = np.arctan2(sine, (side * back).sum(axis=2))
+    angle = np.bincount(view.triangles.ravel(), angles.ravel(), trace.mesh.nv)
+    outer = np.flatnonzero(~trace.inner)
+    segment, s = np.repeat(outer, 2), np.tile([0.0, 1.0], len(outer))
+    vertex = trace.nodes[outer][:, [0, -1]].ravel()
+    wide = angle[vertex] > np.pi
+    segment, s, vertex = segment[wide], s[wide], vertex[wide]
+    order = np.argsort(vertex, kind="stable")
+    first, second = order[:-1], order[1:]
+    met = vertex[first] == vertex[second]
+    first, second = first[met], second[met]
+    ends = trace.region[segment[first]] != trace.region[segment[second]]  # as CAD edges do
+    first, second = first[ends], second[ends]
+    one, other = (trace.exact_normal(segment[at], s[at]) for at in (first, second))
+    return vertex[first[np.linalg.norm(one - other, axis=1) > BLUNT]]
+
+
+def corners(problem: Problem, trace: BoundaryTrace) -> Singularities:
+    """Vertices where one condition ends and another begins, and those that point inwards."""
+    view = Triangulation(trace.mesh)
+    outer = ~trace.inner
+    ends, kind = view.segments[outer].ravel(), np.repeat(_conditions(problem, trace)[outer], 2)
+    least, most = (np.full(trace.mesh.nv, start) for start in (kind.max(initial=0), -1))
+    np.minimum.at(least, ends, kind)
+    np.maximum.at(most, ends, kind)
+    changing, inwards = np.flatnonzero(least < most), _reentrant(trace)
+    found = _at(view.vertices[np.setdiff1d(changing, inwards)], AT_CHANGES)
+    return found.joined(_at(view.vertices[inwards], AT_CORNERS))

@@ -1,0 +1,161 @@
+"""Forecasts: exact where the behaviour is known, close on real fields; plans and their ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import ngsolve as ng
+import numpy as np
+import pytest
+
+from drivers.reference import cases
+from ngcontact import Elastic, Problem, adapt, adaptive
+from ngcontact.adaptivity import Aim, Forecast, Refinement, Refining, planned, unresolvable
+from ngcontact.adaptivity.forecast import touching
+from ngcontact.estimator import Estimate
+from ngcontact.fem import unknowns
+from ngcontact.geometries import blocks
+from ngcontact.mesh import first_mesh
+from ngcontact.problem import Triangulation
+
+NONE = unresolvable([])
+TRIANGLE = np.array([[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]])
+
+
+def problem() -> Problem:
+    """Two blocks, for their mesh."""
+    return Problem(geometry=blocks(), materials={"upper|lower": Elastic(E=1.0, nu=0.3)})
+
+
+def forecast(mesh, order=2, singular=NONE):
+    """Of equal indicators."""
+    return Forecast(Triangulation(mesh).corners, np.full(mesh.ne, 1 / mesh.ne), order, singular)
+
+
+def aim(**changes):
+    """Without an end but for the `changes`."""
+    default = {"unknowns": np.inf, "most": np.inf, "error": 0.0, "theta": 0.5, "ending": 0.1}
+    return Aim(**(default | changes))
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_smooth_errors_fall_with_the_power_of_the_size(order):
+    """Half the size everywhere: the error is 2^-p of what it was."""
+    mesh = first_mesh(problem(), 0.5)
+    everything = aim(unknowns=0)
+    _, error = planned(
+        problem(), mesh, np.ones(mesh.ne, bool), forecast(mesh, order), everything, "isoparametric"
+    )
+    assert error == pytest.approx(2.0**-order, rel=1e-12)
+
+
+def test_the_error_at_a_singular_point_falls_with_its_own_power():
+    """One element of the four at a corner keeps 4^-3/2 of the square, the others 4^-3 each."""
+    parts = np.array([[0, 0, 0.5], [0.5, 0, 0.5], [0, 0.5, 0.5], [0.5, 0.5, -0.5]])
+    corners = parts[:, None, :2] + parts[:, 2, None, None] * TRIANGLE[0]
+    singular = replace(unresolvable([np.zeros(2)]), powers=np.array([1.5]))
+    new = Forecast(TRIANGLE, np.ones(1), 2, singular).after(corners, np.zeros(4, dtype=int))
+    assert new.squares == pytest.approx([1 / 8, 1 / 64, 1 / 64, 1 / 64], rel=1e-14)
+    assert new.error == pytest.approx(np.sqrt(11 / 64), rel=1e-14)
+
+
+def test_elements_that_touch_a_point():
+    places = np.array([[0.3, 0.3], [0.0, 0.0], [0.5, 0.5], [-0.05, 0.3], [-0.2, 0.3], [0.7, 0.7]])
+    [found] = touching(TRIANGLE, places)
+    assert found.tolist() == [True, True, True, True, False, False]
+    turned = touching(7 * TRIANGLE[:, ::-1] + 3, 7 * places + 3)
+    assert (turned == found).all()
+
+
+def test_plans_end_at_the_aim_and_never_exceed_the_most():
+    mesh = first_mesh(problem(), 0.25)
+    marked = np.arange(mesh.ne) < 5
+    shares = 0.8 ** np.arange(mesh.ne)
+    steep = replace(forecast(mesh), squares=shares / shares.sum())
+
+    def plan(**changes):
+        result, error = planned(problem(), mesh, marked, steep, aim(**changes), "isoparametric")
+        return unknowns(result, 2, "isoparametric"), error
+
+    sizes, errors = np.array([plan(unknowns=n) for n in (0, 2000, 4000)]).T
+    assert (sizes >= [0, 2000, 4000]).all()
+    assert (np.diff(sizes) > 0).all()
+    assert (np.diff(errors) < 0).all()
+    assert plan(error=errors[1]) == (sizes[1], errors[1])
+    # One unknown too many: all markings but the last; the first one is refined whatever comes.
+    assert plan(unknowns=4000, most=sizes[2] - 1)[0] < sizes[2]
+    assert plan(unknowns=4000, most=sizes[2]) == (sizes[2], errors[2])
+    assert plan(unknowns=4000, most=1) == (sizes[0], errors[0])
+
+
+def test_large_elements_at_ends_of_contact_are_marked():
+    mesh = first_mesh(problem(), 0.25)
+    place = Triangulation(mesh).vertices[:1]
+    singular = replace(unresolvable(list(place)), powers=np.array([1.5]), extents=np.array([2.0]))
+    base = forecast(mesh, singular=singular)
+    base = replace(base, squares=np.where(np.arange(mesh.ne) == mesh.ne - 1, 1.0, 0.0))
+    at = touching(base.corners, place)[:, 0]
+    few, many = base.marked(0.5, 10.0), base.marked(0.5, 0.01)
+    assert np.flatnonzero(few).tolist() == [mesh.ne - 1]
+    assert (many == (few | at)).all()
+    assert many.sum() > few.sum()
+
+
+@pytest.mark.parametrize(
+    ("make", "order"),
+    [
+        (cases.partly_opening_block, 2),
+        (cases.partly_opening_block, 4),
+        (lambda: cases.hertz_contact().problem, 3),
+        (cases.flat_punch, 3),
+    ],
+)
+def test_estimates_are_as_forecast(monkeypatch, make, order):
+    """From the second level on: the first mesh may be too coarse to see its error."""
+    forecasts, estimates = [], []
+
+    def watched(*args):
+        forecasts.append(planned(*args))
+        return forecasts[-1]
+
+    monkeypatch.setattr(adaptive, "planned", watched)
+    for solution in adapt(make(), order=order, max_dofs=12_000):
+        estimates.append(solution.error_estimate)
+    errors = [error for _, error in forecasts[: len(estimates) - 1]]
+    ratios = np.divide(estimates[1:], estimates[:-1]) / errors
+    assert len(ratios) >= 2
+    # Measured: 0.95 to 1.08, at the punch, whose corners are worse than supposed, 1.17 to 1.24.
+    assert ratios[1:] == pytest.approx(1, abs=0.3)
+
+
+def test_forecasts_that_prove_wrong_shorten_the_plan():
+    """Indicators that do not fall with the size of elements: then levels mark once."""
+
+    def stubborn(problem, boundary, displacement, stress, pairs):
+        corners = Triangulation(boundary.mesh).corners
+        return Estimate(
+            indicators=np.where((corners[..., 0] > 0.9).any(axis=1), 1.0, 1e-3), parts={}
+        )
+
+    problem, sizes = cases.one_transition().problem, []
+    refinement = Refinement(4, "isoparametric", 0.1, None, 6000)
+    for solution in adaptive.levels(problem, first_mesh(problem, 0.5), refinement, stubborn):
+        sizes.append(solution.displacement.space.ndof)
+    growth = np.divide(sizes[1:], sizes[:-1])  # measured 2.9, 1.2, 2.3, 1.4
+    assert growth[0] >= 2
+    assert growth[1] < 1.5
+    assert growth[2] >= 2  # what one marking changes was forecast well enough
+
+
+def test_unknowns_of_meshes_being_refined():
+    for element, order in (("isoparametric", 3), ("superparametric", 2), ("physical", 1)):
+        problem = cases.ring_in_ring().problem
+        mesh = ng.Mesh(first_mesh(problem, 0.6).ngmesh.Copy())
+        mesh.Curve(2)
+        refining = Refining(problem, mesh)
+        for _ in range(3):
+            refining.bisect(np.arange(refining.mesh.ne) % 5 == 0)
+        finished = refining.finished()
+        predicted = refining.unknowns(order, element)
+        finished.Curve(2)
+        assert predicted == unknowns(finished, order, element)
