@@ -10,7 +10,7 @@ import numpy as np
 from ..arrays import Array, Index, Mask
 from ..contact import nodal_line
 from ..fem import BoundaryTrace, boundary_trace, unknowns_of
-from ..mesh import CadEdge, copied
+from ..mesh import CadEdge, copied, neighbours
 from ..problem import Contact, Problem, Triangulation, bisect, move_vertices
 
 TOUCHING = 1e-12  # distance, relative to the geometry, up to which two vertices are at one place
@@ -27,22 +27,25 @@ def matched_vertices(trace: BoundaryTrace, contact: Contact) -> dict[int, int]:
     return dict(zip(line.node[end].tolist(), partner.tolist(), strict=True))
 
 
-def _boundary_edges(trace: BoundaryTrace) -> dict[tuple[int, int], int]:
+def _boundary_edges(mesh: ng.Mesh) -> dict[tuple[int, int], int]:
     """Element at each boundary segment, by its vertices."""
-    ends = np.sort(trace.nodes[:, [0, -1]], axis=1)
-    return {(a, b): el for (a, b), el in zip(ends.tolist(), trace.element.tolist(), strict=True)}
+    view = Triangulation(mesh)
+    element, _ = neighbours(view.segments, view.triangles, mesh.nv)
+    ends = np.sort(view.segments, axis=1).tolist()
+    return {(a, b): el for (a, b), el in zip(ends, element.tolist(), strict=True)}
 
 
-def _children(trace: BoundaryTrace, first: int) -> dict[tuple[int, int], int]:
+def _children(mesh: ng.Mesh, first: int) -> dict[tuple[int, int], int]:
     """New vertex on each bisected boundary segment, by the segment's vertices."""
-    new = np.unique(trace.nodes[trace.nodes >= first])
-    parents = ((v, trace.mesh.GetParentVertices(v)) for v in new.tolist())
+    ends = Triangulation(mesh).segments
+    parents = ((v, mesh.GetParentVertices(v)) for v in np.unique(ends[ends >= first]).tolist())
     return {(min(a, b), max(a, b)): v for v, (a, b) in parents}
 
 
-def _facing_elements(pairs: list[dict[int, int]], trace: BoundaryTrace, flags: Mask) -> list[int]:
+def _facing_elements(
+    pairs: list[dict[int, int]], segments: dict[tuple[int, int], int], flags: Mask
+) -> list[int]:
     """Elements at segments that face those of flagged elements: marked late, they cost a round."""
-    segments = _boundary_edges(trace)
     found = []
     for pair in pairs:
         for here in (pair, {b: a for a, b in pair.items()}):
@@ -169,10 +172,12 @@ class Refining:
     """
 
     def __init__(self, problem: Problem, mesh: ng.Mesh) -> None:
-        trace = boundary_trace(mesh, 1)
         self.problem = problem
         self.mesh = copied(mesh)
-        self._pairs = [matched_vertices(trace, contact) for contact in problem.contact]
+        paired = any(contact.primary is not None for contact in problem.contact)
+        trace = boundary_trace(mesh, 1) if paired else None
+        self._pairs = [matched_vertices(trace, contact) for contact in problem.contact if trace]
+        self._segments = _boundary_edges(self.mesh) if any(self._pairs) else {}
         self._first = mesh.nv
         self._characteristic = mesh.nv - mesh.nedge + mesh.ne
         self._curved = mesh.GetCurveOrder() > 1
@@ -195,14 +200,14 @@ class Refining:
         flags, count = np.array(marked), self.mesh.ne
         matched = any(self._pairs)
         if matched:
-            flags[_facing_elements(self._pairs, boundary_trace(self.mesh, 1), flags)] = True
+            flags[_facing_elements(self._pairs, self._segments, flags)] = True
         for _ in range(ROUNDS):
             bisect(self.mesh, flags)
             if not matched:
                 break
-            trace = boundary_trace(self.mesh, 1)
-            segments, children = _boundary_edges(trace), _children(trace, self._first)
-            lagging = [i for p in self._pairs for i in _match_children(p, children, segments)]
+            self._segments, children = _boundary_edges(self.mesh), _children(self.mesh, self._first)
+            matching = (_match_children(pair, children, self._segments) for pair in self._pairs)
+            lagging = [element for elements in matching for element in elements]
             if not lagging:
                 break
             flags = np.zeros(self.mesh.ne, dtype=bool)
@@ -219,9 +224,10 @@ class Refining:
 
         They are moved along their curves.
         """
-        trace = boundary_trace(self.mesh, 1)
-        for contact, pair in zip(self.problem.contact, self._pairs, strict=True):
-            _move_to_partners(trace, contact, pair, self._first)
+        if any(self._pairs):
+            trace = boundary_trace(self.mesh, 1)
+            for contact, pair in zip(self.problem.contact, self._pairs, strict=True):
+                _move_to_partners(trace, contact, pair, self._first)
         return copied(self.mesh)  # numbers only the edges that are left
 
 
