@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import ngsolve as ng
 import numpy as np
@@ -13,8 +13,8 @@ import numpy as np
 from .adaptivity import (
     Aim,
     Forecast,
+    Plan,
     Refinement,
-    Singularities,
     at_ends,
     at_limit,
     corners,
@@ -116,32 +116,6 @@ def first_level(problem: Problem, maxh: float | None, refinement: Refinement) ->
             f"max_dofs={max_dofs}; give a larger maxh or max_dofs"
         )
     return mesh
-
-
-@dataclass(frozen=True)
-class Plan:
-    """A level before it is solved.
-
-    Attributes
-    ----------
-    mesh : ng.Mesh
-        Curved.
-    corners : Singularities
-        Of the domain, the same on all levels.
-    error : float
-        Root of the sum of squared indicators that is forecast.
-    growth : float
-        Of the unknowns up to which it was planned.
-    stuck, ends : bool
-        Whether elements at the geometry kernel's limit are left alone, and whether it cannot be.
-    """
-
-    mesh: ng.Mesh
-    corners: Singularities
-    error: float
-    growth: float
-    stuck: bool = False
-    ends: bool = False
 
 
 def _first_plan(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Plan:

@@ -456,7 +456,7 @@ def test_a_start_of_other_pairs_is_refused():
     solution = solve(problem, maxh=0.5)
     with pytest.raises(ValueError, match="start has 1 contact pairs, the problem 0"):
         solve(replace(problem, contact=[]), maxh=0.5, start=solution)
-    with pytest.raises(TypeError, match="start='warm' is not a Solution"):
+    with pytest.raises(TypeError, match="start is a str: give a Solution"):
         solve(problem, maxh=0.5, start="warm")
 
 
