@@ -69,6 +69,14 @@ class Condensed:
         x = np.linalg.solve(self.R.transpose(0, 2, 1), rho.transpose(0, 2, 1))
         return np.asarray((self.Q @ x).transpose(0, 2, 1))
 
+    def of_multipliers(self, y: Array) -> Array:
+        """Stresses (b, n) without divergence that multipliers `y` (b, E) cause.
+
+        They cancel in thin triangles, where multipliers are large, and the divergence with them.
+        """
+        c = self.K @ y[:, :, None]
+        return np.asarray((c - self.Q @ (self.Q.transpose(0, 2, 1) @ c))[:, :, 0])
+
 
 def condensed(D: Array, N: Array) -> Condensed:
     """Condense operators `D` (b, m, n), `N` (b, E, n) on orthonormal coefficients."""

@@ -158,5 +158,5 @@ def equilibrated(discrete: Discrete, conditions: EdgeConditions, given: Array) -
         block = _block(discrete, at, conditions.frames, 0 * theta)  # their sum is 0
         y = gathered(lam[at], X[at], x[at])
         change[at] = block.parts.with_divergence(block.rho.sum(axis=1, keepdims=True))[:, 0]
-        change[at] -= (block.parts.K @ y[:, :, None])[:, :, 0]
+        change[at] -= block.parts.of_multipliers(y)
     return Equilibrated(change, rest)

@@ -105,5 +105,5 @@ class _Region:
         for part in blocks(n, 3 * b.shape[1] ** 2):
             parts = operators(self.discrete, self.at[part], self.conditions.frames)
             y = gathered(lam[part], X[part], x[part])
-            total[part] -= (parts.K @ y[:, :, None])[:, :, 0]
+            total[part] -= parts.of_multipliers(y)
         return total
