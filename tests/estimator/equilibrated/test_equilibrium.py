@@ -84,7 +84,7 @@ def test_pressures_that_end_on_a_straight_line(order, rows):
 
 @pytest.mark.parametrize("order", [1, 3])
 def test_thin_triangles_of_fans(order):
-    """The edge above lies a twenty-fifth of a segment beside a vertex; divergences keep their digits.
+    """An edge lies a twenty-fifth of a segment beside a vertex; divergences keep their digits.
 
     Measured 1e-13; 1e-10 where what cancels in thin triangles is left in.
     """
