@@ -102,9 +102,9 @@ def test_body_forces_with_kinks_inside_triangles():
         assert 1 <= effectivity(solution, case.exact) <= 3
 
 
-@pytest.mark.parametrize(("order", "largest"), [(1, 1.5), (2, 1.5), (4, 2.0)])
+@pytest.mark.parametrize(("order", "largest"), [(1, 1.5), (2, 1.3), (4, 1.5)])
 def test_rings(order, largest):
-    """Curved lines, with all constants; measured at most 1.22, 1.22, 1.58."""
+    """Curved lines, with all constants; measured at most 1.22, 1.11, 1.30."""
     case = cases.ring_in_ring()
     for solution in adapt(case.problem, order=order, max_dofs=(500, 800, 0, 2700)[order - 1]):
         assert 1 <= effectivity(solution, case.exact) <= largest
