@@ -13,6 +13,7 @@ from .energy import energy_norm as energy_norm
 from .energy import normal_stress_of as normal_stress_of
 from .energy import potential_energy as potential_energy
 from .energy import stress_of as stress_of
+from .energy import voigt_stress as voigt_stress
 from .model import MODELS as MODELS
 from .model import Model as Model
 from .model import model_of as model_of

@@ -32,11 +32,14 @@ class Model(Protocol):
         Quadrature orders above the default that its forms need.
     polynomial : bool
         Whether the stress of a polynomial displacement is one of one degree less.
+    extent : int
+        Powers of a length in `measure`.
     """
 
     motions: tuple[bool, bool, bool]
     bonus: int
     polynomial: bool
+    extent: int
 
     def strain(self, u: CF) -> CF:
         """Voigt strain (q,) of a displacement or trial function, e_ij in HH81 (2.6)."""
@@ -78,27 +81,29 @@ class Model(Protocol):
         """The hoop stress, `normal` to the plane; a `ValueError` without an axis."""
 
     def divergence(self, plane: CF, stress: CF, normal: Callable[[], CF]) -> CF:
-        """Divergence (2,) of a stress by that of its part in the plane, `plane` (2,).
-
-        `stress` (2, 2) is that part, `normal` makes the stress normal to the plane.
-        """
+        """Divergence (2,) by that in the plane, `plane` (2,), `stress` (2, 2), `normal` to it."""
 
 
-class _Plane:
+class _Linear:
+    """What all models share."""
+
+    def stress(self, C: CF, e: CF) -> CF:
+        """Hooke's law."""
+        return C * e  # (2.6)
+
+
+class _Plane(_Linear):
     """A slice of unit thickness: xx, yy, xy."""
 
     motions = (True, True, True)
     bonus = 0
     polynomial = True
+    extent = 0
 
     def strain(self, u: CF) -> CF:
         """(e_xx, e_yy, 2 e_xy)."""
         grad = ng.Grad(u)
         return ng.CF((grad[0, 0], grad[1, 1], grad[0, 1] + grad[1, 0]))  # (2.6)
-
-    def stress(self, C: CF, e: CF) -> CF:
-        """(xx, yy, xy)."""
-        return C * e  # (2.6)
 
     def work(self, C: CF, u: CF, v: CF) -> list[CF]:
         """The one."""
@@ -167,15 +172,13 @@ class PlaneStress(_Plane):
 PLANE: Model = PlaneStrain()
 
 
-class Axisymmetric:
-    """A body of revolution about x = 0, by its meridian section x = r >= 0: rr, zz, hoop, rz.
-
-    Forces are those of the whole body.
-    """
+class Axisymmetric(_Linear):
+    """A body of revolution by its section x = r >= 0: rr, zz, hoop, rz; forces of the whole."""
 
     motions = (False, True, False)
     bonus = 1  # order 2 has points on the sides of elements, where r may be 0
     polynomial = False
+    extent = 1
 
     def strain(self, u: CF) -> CF:
         """(e_rr, e_zz, u_r / r, 2 e_rz); the hoop strain of a solution is e_rr on the axis."""
@@ -186,13 +189,9 @@ class Axisymmetric:
             hoop = ng.IfPos(ng.x - tiny, hoop, grad[0, 0])
         return ng.CF((grad[0, 0], grad[1, 1], hoop, grad[0, 1] + grad[1, 0]))  # (2.6)
 
-    def stress(self, C: CF, e: CF) -> CF:
-        """(rr, zz, hoop, rz)."""
-        return C * e  # (2.6)
-
     def work(self, C: CF, u: CF, v: CF) -> list[CF]:
-        """Of gradients alone, with hoop strains, of these alone: half the time of all at once."""
-        e, d = (PLANE.strain(w) for w in (u, v))
+        """Of gradients, with hoop strains, of these alone: half the time of all at once."""
+        e, d = PLANE.strain(u), PLANE.strain(v)
         plane = ng.CF(tuple(C[i, j] for i in MERIDIAN for j in MERIDIAN), dims=(3, 3))
         across = ng.CF(tuple(C[i, 2] for i in MERIDIAN))
         mixed = ng.InnerProduct(across, e) * v[0] + u[0] * ng.InnerProduct(across, d)

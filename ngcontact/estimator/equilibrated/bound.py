@@ -18,7 +18,7 @@ import numpy as np
 from ...arrays import Array
 from ...contact import ContactState
 from ...errors import ContactError
-from ...fem import BoundaryTrace
+from ...fem import BoundaryTrace, voigt_stress
 from ...problem import Problem
 from .constants import data_terms
 from .data import (
@@ -79,8 +79,9 @@ def error_bound(
     units = units_of(problem, boundary, stress)
     every_pieces = [pieces_of(pair.line, boundary) for pair in pairs]
     partition = _partition(problem, boundary, every_pieces, units)
-    discrete = discrete_on(problem, boundary, partition, stress, units)
-    conditions = edge_conditions(problem, boundary, partition, discrete.degree, units.stress)
+    hoop = voigt_stress(problem, displacement)[2] if units.extent else None
+    discrete = discrete_on(problem, boundary, partition, stress, units, hoop)
+    conditions = edge_conditions(problem, boundary, partition, discrete.degree, units.traction)
     solved = displacement, stress
     zones, (discrete, given, coefficients) = _pressures(
         pairs, every_pieces, boundary, solved, discrete, conditions, units
@@ -126,7 +127,7 @@ def _pressures(
     """p* near to the forces; on all of the lines if those resultants are out of its reach."""
 
     def chosen(everywhere: bool) -> tuple[list[Zone], tuple[Discrete, Array, list[Array]]]:
-        degree = discrete.degree - 1
+        degree = discrete.degree - 1 - units.extent
         zones = [zone_of(pair, boundary, degree, everywhere) for pair in pairs]
         data = boundary, *solved, discrete, conditions, units
         return zones, selected(zones, every_pieces, *data)
@@ -198,7 +199,7 @@ def _stress(proof: Proof, certificate: dict[str, float]) -> EquilibratedStress:
         degree=discrete.degree,
         triangles=partition.vertices[partition.triangles] * units.length,
         element=partition.parent,
-        coefficients=proof.raw * units.stress,
+        coefficients=proof.raw * units.traction,
         pressure=pressure,
         certificate=certificate | {"least pressure": least},
         proof=proof,

@@ -28,9 +28,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...arrays import Array, Index
-from .data import MANDEL, Discrete, edge_places
-
-PLACES = 17  # on each edge, at which curves are looked at
+from .data import MANDEL, PLACES, Discrete, edge_places
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,12 +93,13 @@ def data_terms(discrete: Discrete, inside: Array, on_edges: Array) -> Array:
     D = np.zeros(len(inside))
     if loaded.size == 0:
         return D
-    least = np.linalg.eigvalsh(discrete.law[loaded] * MANDEL[:, None] * MANDEL)[:, 0]
+    mandel = MANDEL[discrete.law.shape[1]]
+    least = np.linalg.eigvalsh(discrete.law[loaded] * mandel[:, None] * mandel)[:, 0]
     if discrete.rough is not None:
         number = discrete.rough.number[loaded]
         least = np.where(number >= 0, discrete.rough.least[number], least)
     shapes = _shapes(discrete, loaded)
     total = shapes.poincare * inside[loaded]
     total = total + (np.sqrt(shapes.trace) * on_edges[edges[loaded]]).sum(axis=1)
-    D[loaded] = shapes.korn * total / np.sqrt(least)
+    D[loaded] = shapes.korn * total / np.sqrt(least * discrete.least_measure(loaded))
     return D

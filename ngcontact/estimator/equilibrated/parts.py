@@ -62,7 +62,7 @@ def summed(
     `closed` is the integral of p* (gap_h + r), `signed` that of p* gap_h, `reaction` the work of
     s n on u_D - u_h.
     """
-    energy = units.stress**2 / units.modulus * units.length**2
+    energy = units.energy
     constitutive, lifting, loads = norms.constitutive, norms.lifting, norms.loads + norms.curves
     smooth = constitutive + norms.loads
     both = constitutive + loads

@@ -33,7 +33,7 @@ class Norms:
         """B, in the units of the data."""
         both = self.constitutive + self.loads + self.curves
         square = float(both @ both + self.lifting @ self.lifting) + 2 * closed
-        return math.sqrt(square) * units.stress / math.sqrt(units.modulus) * units.length
+        return math.sqrt(square) * units.root
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,14 +85,14 @@ class Proof:
         discrete, partition, units = self.discrete, self.discrete.partition, self.units
         if discrete.rough is not None:
             raise ValueError(
-                f"{len(discrete.rough.at)} triangles are curved or of a law that varies: "
-                "a certificate can be saved where all are straight and of constant laws"
+                f"{len(discrete.rough.at)} triangles are curved, of a law that varies or about an "
+                "axis: a certificate can be saved of plane triangles, straight and of constant laws"
             )
         k = discrete.degree
         points = lattice(k)
         values = basis(k).values(points)
         low, force = discrete.stress.shape[2], discrete.force.sum(axis=1)
-        root = units.stress / math.sqrt(units.modulus) * units.length
+        root = units.root
         arrays = {
             "degree": np.array(k),
             "vertices": partition.vertices * units.length,

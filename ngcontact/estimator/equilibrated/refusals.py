@@ -21,13 +21,16 @@ def refuse_bound(problem: Problem, boundary: BoundaryTrace, pairs: Sequence[Cont
         What stands in the way.
     """
     no_bound = "no guaranteed bound is known for"
-    if problem.model not in ("plane strain", "plane stress"):
-        raise ValueError(f'{no_bound} the model "{problem.model}"; use error_estimate')
     names = boundary.mesh.GetBoundaries()
     bent = bent_segments(boundary)
     if boundary.inner[bent].any():
         name = names[boundary.region[bent[boundary.inner[bent]][0]]]
         raise ValueError(f'{no_bound} curved lines inside a body, as "{name}"; use error_estimate')
+    axis = boundary.model.on_axis(boundary.curve[:, [0, -1]].reshape(-1, 2))
+    at_axis = bent[axis.reshape(-1, 2)[bent].any(axis=1)]
+    if at_axis.size:
+        name = names[boundary.region[at_axis[0]]]
+        raise ValueError(f'{no_bound} curves that meet the axis, as "{name}"; use error_estimate')
     guided = bent[boundary.lies_on(bent, None if problem.sliding is None else str(problem.sliding))]
     if guided.size:
         name = names[boundary.region[guided[0]]]

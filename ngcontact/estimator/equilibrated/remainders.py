@@ -45,7 +45,7 @@ def missed_tractions(
     covered = np.zeros(len(squares), dtype=bool)
     largest = np.abs(stress[0]).max(initial=0.0)
     for zone, pieces, b in zip(zones, every_pieces, pressures, strict=True):
-        for edge, square in _on_zone(zone, pieces, b, boundary, discrete, stress):
+        for edge, square in _on_zone(zone, pieces, b, boundary, discrete, stress, units):
             np.add.at(squares, edge, square)
             covered[edge] = True
     if discrete.curves.edge.size:
@@ -100,7 +100,8 @@ def _on_curves(
         on = boundary.lies_on(segment, pattern)
         points = np.repeat(on, len(rule))
         P = boundary.evaluate(problem.traction_vector(pattern), at[points], flat[points])
-        density[on] -= P.reshape(-1, len(rule), 2) * stretch[on][:, :, None] / units.stress
+        P = P * boundary.measure(at[points], flat[points])[:, None] / units.traction
+        density[on] -= P.reshape(-1, len(rule), 2) * stretch[on][:, :, None]
     density[np.broadcast_to(free[:, None], density.shape)] = 0.0
     chord = partition.edge_lengths[edge]
     return edge, chord * (w * (density**2).sum(axis=2) / stretch).sum(axis=1)
@@ -113,6 +114,7 @@ def _on_zone(
     boundary: BoundaryTrace,
     discrete: Discrete,
     stress: tuple[Array, Array],
+    units: Units,
 ) -> list[tuple[Index, Array]]:
     """Edges (k,) of both sides, and squared norms (k,) of p* less their tractions."""
     line, partition = zone.state.line, discrete.partition
@@ -123,7 +125,7 @@ def _on_zone(
     at, flat = np.repeat(pieces.segment, len(rule)), s.ravel()
     p = (zone.values(np.repeat(pieces.local, len(rule)), flat) @ b).reshape(s.shape)
     d = contact_directions(line.contact, boundary, at, flat).reshape(*s.shape, 2)
-    ds = contact_jacobian(boundary, line.contact, at, flat).reshape(s.shape) / partition.length
+    ds = contact_jacobian(boundary, line.contact, at, flat).reshape(s.shape) / units.measure
     asked = (p * ds * (pieces.stop - pieces.start)[:, None])[:, :, None] * d
     length = pieces.stop - pieces.start
     sides = [(-1.0, pieces.segment, s, np.repeat(length[:, None], len(rule), axis=1))]

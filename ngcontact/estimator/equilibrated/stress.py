@@ -12,7 +12,7 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
-from .data import Discrete, EdgeConditions, basis, dimension
+from .data import Discrete, EdgeConditions, dimension
 from .record import Proof
 from .stresses import Equilibrated, into_raw, raw_operators, stress_field
 
@@ -49,7 +49,8 @@ class EquilibratedStress:
     element : ndarray of int (n,)
         Elements of the mesh that they are, or parts of.
     coefficients : ndarray (n, 3, m)
-        (xx, yy, xy) in the m orthonormal polynomials on each triangle, units of stress.
+        (xx, yy, xy) in the m orthonormal polynomials on each triangle, units of stress; about an
+        axis of the stress times 2 pi r.
     pressure : list of ContactPressure
         p* of each pair.
     certificate : dict of float
@@ -71,12 +72,17 @@ class EquilibratedStress:
     def stress(self) -> ng.CoefficientFunction:
         """The stress in the plane, (2, 2), in units of stress."""
         mesh = self.proof.discrete.partition.mesh
-        return stress_field(mesh, self.triangles, self.element, self.coefficients, self.degree)
+        T = stress_field(mesh, self.triangles, self.element, self.coefficients, self.degree)
+        return self.proof.discrete.balance.stress(T)
 
     def at_middles(self) -> Array:
-        """(xx, yy, xy) in the middles of the triangles, (n, 3), units of stress."""
-        values = basis(self.degree).values(np.array([[1 / 3, 1 / 3]]))[0]
-        return np.asarray(self.coefficients @ values)
+        """Stress in the middles of the triangles, units of stress.
+
+        (xx, yy, xy), (n, 3), or (rr, zz, rz, hoop) about an axis, (n, 4).
+        """
+        discrete, raw = self.proof.discrete, self.proof.raw
+        values = discrete.balance.in_middles(discrete.partition, raw, discrete.radial)
+        return values * self.proof.units.stress
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write `path` (.npz): arrays that drivers/check_certificate.py checks with NumPy alone.
@@ -115,26 +121,26 @@ def certified(
     `given` (e, 2, r) are the tractions asked for, those of contact included.
     """
     partition, k = discrete.partition, discrete.degree
-    n, m, low = len(partition.triangles), dimension(k), dimension(k - 1)
+    n, m = len(partition.triangles), dimension(k)
     coefficients, traction = np.empty((n, 3, m)), np.empty((n, 3, 2 * (k + 1)))
-    divergence = np.empty((n, 2, low))
+    force, unbalanced = discrete.force.sum(axis=1), np.empty(n)
+    if discrete.rough is not None:
+        force[discrete.rough.at] = discrete.rough.force
+    asked = force[:, discrete.balance.equations].reshape(n, -1)
     step = max(1, 1_000_000 // (9 * m * m))
     for start in range(0, n, step):
         at = np.arange(start, min(start + step, n))
         c = coefficients[at] = raw_coefficients(discrete, result, at)
         D, N = raw_operators(discrete, at, conditions.frames)
         flat = c.reshape(len(at), -1, 1)
-        divergence[at] = (D @ flat).reshape(len(at), 2, low)
+        rest = np.abs((D @ flat)[..., 0] + asked[at]).max(axis=1)
+        unbalanced[at] = rest * partition.diameters[at]
         traction[at] = (N @ flat).reshape(len(at), 3, -1)
     largest = max(np.abs(coefficients).max(initial=0.0), np.finfo(float).tiny)
-    force = discrete.force.sum(axis=1)
-    if discrete.rough is not None:
-        force[discrete.rough.at] = discrete.rough.force
-    unbalanced = np.abs(divergence + force).max(axis=(1, 2)) * partition.diameters
     total = np.zeros_like(given[:, 0])
     np.add.at(total, partition.edges, traction)
-    asked = conditions.constrained & ~conditions.soft
-    missing = np.where(asked, total - given.sum(axis=1), 0.0)
+    met = conditions.constrained & ~conditions.soft
+    missing = np.where(met, total - given.sum(axis=1), 0.0)
     missing = np.abs(missing).max(axis=1)
     inner = partition.segment < 0
     residuals = {

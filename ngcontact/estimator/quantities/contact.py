@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Array, Index
 from ...contact import ContactState, ending_segments
 from ...fem import BoundaryTrace
-from ...lagrange import gauss_lobatto
+from ...lagrange import gauss
 from ..equilibrated import bernstein
 from .table import Quantity
 
@@ -37,12 +37,14 @@ def force_on(
     error = SECOND_ORDER * relative**2 * abs(force)
     if star is not None:
         segments, c = star
-        length = boundary.lengths(segments)
+        length, (t, w) = boundary.lengths(segments), gauss(c.shape[1] + boundary.model.extent)
         direction = pair.line.contact.direction
         if direction is not None:
             chord = boundary.curve[segments, -1] - boundary.curve[segments, 0]
             length = np.abs(chord @ np.array([-direction[1], direction[0]]))
-        error += RESULTANTS * abs(float(length @ c.mean(axis=1)) - force)
+        at, s = np.repeat(segments, len(t)), np.tile(t, len(segments))
+        p = c @ bernstein(c.shape[1] - 1, t).T * boundary.measure(at, s).reshape(-1, len(t))
+        error += RESULTANTS * abs(float(length @ p @ w) - force)
     return Quantity("force", float(np.linalg.norm(resultant)), error, "estimated")
 
 
@@ -55,15 +57,16 @@ def peak_of(
     at = int(pair.pressure.argmax())
     peak = float(pair.pressure[at])
     near = pair.pressure >= NEAR_PEAK * peak
-    off = _off_stress(pair, boundary, stress) if star is None else _off_star(pair, star)
+    off = _off_stress(pair, boundary, stress) if star is None else _off_star(pair, boundary, star)
     place = pair.line.position[at]
     return [Quantity("peak pressure", peak, float(off[near].max(initial=0.0)), "estimated", place)]
 
 
-def _off_star(pair: ContactState, star: Star) -> Array:
+def _off_star(pair: ContactState, boundary: BoundaryTrace, star: Star) -> Array:
     """Differences (m,) of pressures to p* at contact points, of the last segment where two meet."""
     rows, c = pair.line.rows, star[1]
-    values = c @ bernstein(c.shape[1] - 1, gauss_lobatto(rows.shape[1] - 1)).T
+    basis = bernstein(c.shape[1] - 1, boundary.places(pair.line.segments).ravel())
+    values = np.einsum("kj,kij->ki", c, basis.reshape(*rows.shape, -1))
     result = np.zeros(len(pair.force) + 1)
     result[rows] = values
     return np.abs(result[:-1] - pair.pressure)
@@ -74,7 +77,7 @@ def _off_stress(
 ) -> Array:
     """Differences (m,) of pressures to the discrete stress of the secondary, the larger of two."""
     rows = pair.line.rows
-    s = np.tile(gauss_lobatto(rows.shape[1] - 1), len(rows))
+    s = boundary.places(pair.line.segments).ravel()
     point, segment = rows.ravel(), np.repeat(pair.line.segments, rows.shape[1])
     s, segment, point = s[point >= 0], segment[point >= 0], point[point >= 0]
     sigma = boundary.evaluate(ng.BoundaryFromVolumeCF(stress), segment, s).reshape(-1, 2, 2)

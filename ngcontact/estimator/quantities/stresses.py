@@ -42,13 +42,13 @@ def largest_von_mises(
         jumps = [np.ptp(mises[_same(xy, xy[own], x)]) for x in xy[own]]
         error = float(max(error, *jumps))
     else:
-        other = equilibrated.at_middles()[np.flatnonzero(equilibrated.element == element)]
-        # Out of the plane the stress follows that in it: nu times the trace, or 0.
+        other = equilibrated.at_middles()[equilibrated.element == element]
+        # Out of a plane the stress follows that in it: nu times the trace, or 0.
         first = element * n  # the lattice begins with the middle
         trace = values[first, 0] + values[first, 1]
         ratio = normal[first, 0] / trace if trace != 0 else 0.0
-        across = ratio * (other[:, :1] + other[:, 1:2])
-        off = np.abs(von_mises(np.hstack([other, across])) - mises[first]).max()
+        across = ratio * (other[:, :1] + other[:, 1:2]) if other.shape[1] == 3 else other[:, 3:]
+        off = np.abs(von_mises(np.hstack([other[:, :3], across])) - mises[first]).max()
         error = max(error, float(off))
     if equilibrated is None and mesh.ne == 1:  # nothing to compare with
         return Quantity("largest von Mises", float(mises[at]), np.nan, "none", xy[at])

@@ -26,10 +26,10 @@ def test_curved_guides_are_refused():
         next(levels)
 
 
-def test_bodies_of_revolution_are_refused():
+def test_curves_that_meet_the_axis_are_refused():
     problem = replace(cases.disc_on_rigid_plane(), model="axisymmetric")
     solution = solve(problem, maxh=0.5, order=2)
-    with pytest.raises(ValueError, match='the model "axisymmetric"'):
+    with pytest.raises(ValueError, match='curves that meet the axis, as "arc"'):
         _ = solution.error_bound
 
 

@@ -1,10 +1,16 @@
 """The triangles, the polynomials on them, the discrete solution and its data there."""
 
+from .balance import OF_AXIS as OF_AXIS
+from .balance import Balance as Balance
+from .balance import Units as Units
+from .balance import balance_of as balance_of
+from .balance import divergence as divergence
 from .conditions import HIGHER as HIGHER
 from .conditions import EdgeConditions as EdgeConditions
 from .conditions import edge_conditions as edge_conditions
 from .conditions import edge_parameters as edge_parameters
 from .conditions import with_hats as with_hats
+from .curves import PLACES as PLACES
 from .curves import CurvedEdges as CurvedEdges
 from .curves import bent_segments as bent_segments
 from .curves import edge_places as edge_places
@@ -24,10 +30,9 @@ from .polynomials import lattice as lattice
 from .polynomials import legendre_derivative as legendre_derivative
 from .polynomials import legendre_values as legendre_values
 from .polynomials import triangle_rule as triangle_rule
-from .rough import Rough as Rough
-from .solution import MANDEL as MANDEL
+from .sampled import MANDEL as MANDEL
+from .sampled import Rough as Rough
 from .solution import Discrete as Discrete
-from .solution import Units as Units
 from .solution import degree_for as degree_for
 from .solution import discrete_on as discrete_on
 from .solution import units_of as units_of

@@ -12,10 +12,12 @@ from ....arrays import Array, Index, Mask
 from ....fem import BoundaryTrace
 from ....lagrange import gauss
 from ....problem import Problem
+from .balance import balance_of
 from .curves import bent_segments
 from .partition import Partition
 from .polynomials import legendre_values
 
+NOISE = 1e-13  # of a load, relative: met but for round-off
 HIGHER = 4  # degrees above that of the stress up to which loads are met triangle by triangle
 DATA_BONUS = 10  # quadrature order above that of the polynomials, for loads
 
@@ -85,11 +87,17 @@ def projected_loads(
         at, s = np.repeat(segments, len(rule)), np.tile(rule, len(segments))
         P = boundary.evaluate(problem.traction_vector(pattern), at, s)
         ds = np.linalg.norm(boundary.derivative(at, s), axis=1) / boundary.lengths(at)
-        P = P * ds[:, None]
+        P = P * (ds * boundary.measure(at, s))[:, None]
         P = P.reshape(len(segments), -1, 2)
         c = np.einsum("q,qi,jqc->jci", w, values, P)
         rest = P - np.einsum("qi,jci->jqc", values, c)
         yield segments, c, np.einsum("q,jqc->j", w, rest**2)
+
+
+def axis_segments(boundary: BoundaryTrace) -> Index:
+    """Segments (j,) of the boundary where the body has no extent: tractions there do no work."""
+    ends = boundary.curve[:, [0, -1]]
+    return np.flatnonzero(boundary.model.on_axis(ends.reshape(-1, 2)).reshape(-1, 2).all(axis=1))
 
 
 def edge_conditions(
@@ -113,6 +121,7 @@ def edge_conditions(
         normal = boundary.normal(segments, np.full(len(segments), 0.5))
         frames[edges] = np.stack([normal, np.column_stack([-normal[:, 1], normal[:, 0]])], axis=1)
         constrained[edges, 0] = False
+    constrained[partition.edge_of_segment[axis_segments(boundary)]] = False
     given, higher, missed = np.zeros((e, 2, 2, q)), np.zeros((e, 2, HIGHER)), np.zeros(e)
     signs = (-1.0) ** np.arange(degree + HIGHER)
     for segments, c, squares in projected_loads(problem, boundary, degree):
@@ -126,6 +135,10 @@ def edge_conditions(
     curved = partition.edge_of_segment[bent_segments(boundary)]
     soft[curved, :, -1] = True
     higher[curved], missed[curved] = 0.0, 0.0
+    touching = balance_of(boundary.model).at_axis(partition)[partition.ends].any(axis=1)
+    rest = np.hypot(missed, np.sqrt((higher**2).sum(axis=(1, 2)) * partition.edge_lengths))
+    rest[rest <= NOISE * np.sqrt(partition.edge_lengths) * np.abs(given).max(initial=0.0)] = 0.0
+    higher[touching], missed[touching] = 0.0, rest[touching]
     return EdgeConditions(
         frames=frames,
         constrained=constrained.reshape(e, -1),

@@ -12,6 +12,7 @@ from ....lagrange import gauss, gauss_lobatto, lagrange, lagrange_derivative
 from .partition import Partition
 from .polynomials import basis, dimension, legendre_values
 
+PLACES = 17  # on each edge, at which curves are looked at
 BENT = 1e-12  # distance of a segment from its chord, relative, up to which it is straight
 
 

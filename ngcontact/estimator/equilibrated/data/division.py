@@ -16,7 +16,7 @@ import numpy as np
 from ....arrays import Array, Index, Mask
 from ....fem import BoundaryTrace
 from ....problem import Problem, Triangulation
-from .conditions import projected_loads
+from .conditions import axis_segments, projected_loads
 from .curves import bent_segments
 from .partition import Partition
 from .polynomials import CORNERS, legendre_values
@@ -36,6 +36,7 @@ def divided_elements(problem: Problem, boundary: BoundaryTrace, degree: int, une
     for pattern, components in problem.displacement.items():
         if all(value is not None for value in components):
             free[boundary.segments(pattern)] = True
+    free[axis_segments(boundary)] = True
     sides = [side for pair in problem.contact for side in (pair.secondary, pair.primary)]
     touching = np.zeros(len(free), dtype=bool)
     touching[boundary.segments(*sides)] = True

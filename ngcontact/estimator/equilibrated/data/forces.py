@@ -5,13 +5,14 @@ Where forces are not smooth, triangles are looked at in `PARTS`^2 equal parts.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
+import ngsolve as ng
 import numpy as np
 
 from ....arrays import Array, Index
-from ....problem import Problem
 from .conditions import DATA_BONUS, HIGHER
 from .partition import Partition, of_body
 from .polynomials import barycentric, basis, dimension, triangle_rule
@@ -70,9 +71,13 @@ class Forces:
 
 
 def forces_on(
-    problem: Problem, partition: Partition, region: Index, degree: int, unit: float
+    loads: Mapping[str, ng.CoefficientFunction],
+    partition: Partition,
+    region: Index,
+    degree: int,
+    unit: float,
 ) -> Forces:
-    """Look at the forces; `region` (n,) are the bodies, `degree` is k, forces are over `unit`."""
+    """Look at `loads` over `unit`, by body; `region` (n,) are the bodies, `degree` is k."""
     n, low, high = len(partition.triangles), dimension(degree - 1), degree - 1 + HIGHER
     whole = np.zeros((n, 3, 2, dimension(high)))
     missed, largest = np.zeros(n), np.zeros(n)
@@ -81,7 +86,7 @@ def forces_on(
     parted, parts = [np.zeros(0, dtype=np.intp)], []
     i = dimension(PART_DEGREE)
     parts.append(np.zeros((0, len(part_corners()), 2, i)))
-    for pattern, F in problem.force.items():  # (3.5)
+    for pattern, F in loads.items():  # (3.5)
         at = of_body(partition.mesh, pattern, region)
         f = partition.evaluate(F, at, rule) / unit
         whole[at], rest = _projected(f, rule, weights, high)

@@ -152,6 +152,10 @@ class Partition:
         places["x"], places["y"] = where.reshape(-1, 2).T
         return np.asarray(function(places)).reshape(len(at), len(points), -1)
 
+    def places(self, at: Index, points: Array) -> Array:
+        """Places (k, q, 2) of reference `points` (q, 2) of the triangles `at` (k,)."""
+        return self.evaluate(ng.CF((ng.x, ng.y)), at, points) / self.length
+
     def jacobians(self, at: Index, points: Array) -> Array:
         """Jacobians (k, q, 2, 2) of the triangles `at` (k,), curved ones, at `points` (q, 2)."""
         to_element = self.evaluate(ng.specialcf.JacobianMatrix(2), at, points) / self.length

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import ngsolve as ng
 import numpy as np
@@ -10,27 +11,12 @@ import numpy as np
 from ....arrays import Array, Index, Mask, power_of_two
 from ....fem import BoundaryTrace, shear_moduli
 from ....problem import Problem, Triangulation, varies
-from .curves import CurvedEdges, bent_segments, curved_edges, curved_moments
+from .balance import Balance, Units, balance_of
+from .curves import PLACES, CurvedEdges, bent_segments, curved_edges, curved_moments, edge_places
 from .forces import Forces, forces_on
 from .partition import Partition, of_body
 from .polynomials import basis, dimension, lattice
-from .rough import Rough, rough_triangles
-
-MANDEL = np.sqrt([1.0, 1.0, 2.0])  # by which (xx, yy, xy) have the products of tensors
-
-
-@dataclass(frozen=True)
-class Units:
-    """Powers of 2 by which all numbers are divided: a stress, a modulus and a length."""
-
-    stress: float
-    modulus: float
-    length: float
-
-    @property
-    def strain(self) -> float:
-        """The strain that belongs to stress and modulus."""
-        return self.stress / self.modulus
+from .sampled import Rough, meridian_triangles, rough_triangles
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,11 +27,13 @@ class Discrete:
     ----------
     partition : Partition
         The triangles.
+    balance : Balance
+        What equilibrium is.
     order : int
         Degree p of the displacement.
-    law : ndarray (n, 3, 3)
+    law : ndarray (n, v, v)
         Moduli.
-    root : ndarray (n, 3, 3)
+    root : ndarray (n, v, v)
         Their Cholesky factors.
     stress : ndarray (n, 3, m)
         (xx, yy, xy) of sigma_h, coefficients of polynomials of degree p - 1.
@@ -57,6 +45,8 @@ class Discrete:
         Degree k of the equilibrated stress.
     geometry : int
         Degree of the curves.
+    radial : ndarray (n,)
+        Radial forces times r in the middles; 0 in the plane.
     rough : Rough or None
         Triangles for which the polynomials above do not hold; there `force` are means over the
         triangle of the forces times polynomials.
@@ -67,6 +57,7 @@ class Discrete:
     """
 
     partition: Partition
+    balance: Balance
     order: int
     law: Array
     root: Array
@@ -75,9 +66,35 @@ class Discrete:
     forces: Forces
     degree: int
     geometry: int
+    radial: Array
     rough: Rough | None
     curves: CurvedEdges
     moments: Array
+
+    def least_measure(self, at: Index) -> Array:
+        """What places in the triangles `at` (b,) count for at least, (b,).
+
+        Raises
+        ------
+        ValueError
+            Triangles at an axis, where that is nothing.
+        """
+        partition, triangles = self.partition, self.partition.triangles[at]
+        if self.balance.at_axis(partition)[triangles].any():
+            raise ValueError(
+                "no guaranteed bound is known where loads at the axis are no polynomials; "
+                "use error_estimate"
+            )
+        edges = partition.edges[at]
+        t = np.broadcast_to(np.linspace(0, 1, PLACES), (edges.size, PLACES))
+        x, _ = edge_places(partition, edges.ravel(), self.curves, t)
+        return np.asarray(self.balance.measure(x).reshape(len(at), -1).min(axis=1))
+
+    @cached_property
+    def lacking(self) -> Mask:
+        """Triangles (n,) with a side on an axis, which lack some tractions."""
+        partition = self.partition
+        return np.asarray(self.balance.at_axis(partition)[partition.triangles].sum(axis=1) > 1)
 
     def motions_gram(self) -> Array:
         """Means (n, 3, 3) over the straight area of products of polynomials of degree 1."""
@@ -95,7 +112,7 @@ def degree_for(boundary: BoundaryTrace) -> int:
     """
     if bent_segments(boundary).size:
         return max(5, boundary.order + 2, boundary.geometry_order + 1)
-    return max(3, boundary.order + 1)
+    return max(3, boundary.order + 1) + boundary.model.extent
 
 
 def units_of(problem: Problem, boundary: BoundaryTrace, stress: ng.CoefficientFunction) -> Units:
@@ -106,6 +123,7 @@ def units_of(problem: Problem, boundary: BoundaryTrace, stress: ng.CoefficientFu
         stress=power_of_two(np.asarray(stress(points))),
         modulus=power_of_two(shear_moduli(problem, mesh)),
         length=power_of_two(np.ptp(Triangulation(mesh).vertices, axis=0)),
+        extent=boundary.model.extent,
     )
 
 
@@ -115,23 +133,22 @@ def discrete_on(
     partition: Partition,
     stress: ng.CoefficientFunction,
     units: Units,
+    hoop: ng.CoefficientFunction | None = None,
 ) -> Discrete:
-    """A discrete stress and its data on the triangles of a partition."""
-    every, middle = np.arange(len(partition.triangles)), np.array([[1 / 3, 1 / 3]])
-    law = np.zeros((len(every), 3, 3))
+    """A discrete stress, and a hoop stress about an axis, with data on a partition's triangles."""
+    every = np.arange(len(partition.triangles))
+    xx, xy, _, yy = stress
+    if hoop is not None:
+        return _about_axis(problem, boundary, partition, ng.CF((xx, yy, hoop, xy)), units)
     region = Triangulation(partition.mesh).bodies[partition.parent]
-    for pattern, material in problem.materials.items():
-        at = of_body(partition.mesh, pattern, region)
-        C = material.voigt(problem.model)
-        law[at] = partition.evaluate(C, at[:1], middle).reshape(-1, 3, 3) / units.modulus
+    law = _laws(problem, partition, region, 3) / units.modulus
     order, degree, geometry = boundary.order, degree_for(boundary), boundary.geometry_order
     points = lattice(order - 1)
-    xx, xy, _, yy = stress
     components = ng.CF((xx, yy, xy)).Compile()
     values = partition.evaluate(components, every, points) / units.stress
     fit = basis(max(order - 1, 1)).values(points)[:, : dimension(order - 1)]
     coefficients = np.einsum("iq,nqc->nci", np.linalg.inv(fit), values)
-    forces = forces_on(problem, partition, region, degree, units.stress / units.length)
+    forces = forces_on(problem.force, partition, region, degree, units.stress / units.length)
     force = forces.hatted.copy()
     bent = bent_segments(boundary)
     curves = curved_edges(partition, boundary, bent)
@@ -145,6 +162,7 @@ def discrete_on(
         forces = forces.but_on(at[curved], rough.missed[curved])
     return Discrete(
         partition=partition,
+        balance=balance_of(boundary.model),
         order=order,
         law=law,
         root=np.asarray(np.linalg.cholesky(law)),
@@ -153,6 +171,55 @@ def discrete_on(
         forces=forces,
         degree=degree,
         geometry=geometry,
+        radial=np.zeros(len(every)),
+        rough=rough,
+        curves=curves,
+        moments=curved_moments(partition, curves, degree, geometry),
+    )
+
+
+def _laws(problem: Problem, partition: Partition, region: Index, size: int) -> Array:
+    """Moduli (n, v, v), v = `size`, by the body of each triangle; one of it stands for all."""
+    law = np.zeros((len(region), size, size))
+    for pattern, material in problem.materials.items():
+        at = of_body(partition.mesh, pattern, region)
+        C = partition.evaluate(material.voigt(problem.model), at[:1], np.array([[1 / 3, 1 / 3]]))
+        law[at] = C.reshape(-1, size, size)
+    return law
+
+
+def _about_axis(
+    problem: Problem,
+    boundary: BoundaryTrace,
+    partition: Partition,
+    voigt: ng.CoefficientFunction,
+    units: Units,
+) -> Discrete:
+    """The same in a meridian section."""
+    region = Triangulation(partition.mesh).bodies[partition.parent]
+    law = _laws(problem, partition, region, 4) / units.modulus
+    degree, geometry = degree_for(boundary), boundary.geometry_order
+    curves = curved_edges(partition, boundary, bent_segments(boundary))
+    scales = units.stress, units.modulus
+    rough = meridian_triangles(problem, partition, geometry, degree, voigt.Compile(), law, scales)
+    F = partition.mesh.MaterialCF(problem.force, default=ng.CF((0, 0)))
+    radial = partition.evaluate(ng.x * F[0], np.arange(len(region)), np.array([[1 / 3, 1 / 3]]))
+    axial = {body: ng.CF((0, boundary.model.weighted(F[1]))) for body, F in problem.force.items()}
+    forces = forces_on(axial, partition, region, degree, units.traction / units.length)
+    axis = balance_of(boundary.model).at_axis(partition)[partition.triangles].any(axis=1)
+    near = np.flatnonzero(axis | (curves.number[partition.edges] >= 0).any(axis=1))
+    return Discrete(
+        partition=partition,
+        balance=balance_of(boundary.model),
+        order=boundary.order,
+        law=law,
+        root=np.asarray(np.linalg.cholesky(law)),
+        stress=np.zeros((len(region), 3, 0)),
+        force=np.repeat(rough.force_means[:, None] / 3, 3, axis=1),
+        forces=forces.but_on(near, rough.missed[near]),
+        degree=degree,
+        geometry=geometry,
+        radial=radial.reshape(-1) / units.stress,
         rough=rough,
         curves=curves,
         moments=curved_moments(partition, curves, degree, geometry),

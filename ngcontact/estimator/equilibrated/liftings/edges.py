@@ -12,10 +12,12 @@ import numpy as np
 
 from ....arrays import Array, Index
 from ....lagrange import gauss, gauss_lobatto
-from ..data import Discrete, edge_places, legendre_derivative, legendre_values
+from ..data import Discrete, edge_places, legendre_derivative, legendre_values, triangle_rule
 
 DEGREE = 16  # of the polynomials that stand for prescribed displacements and gaps on a segment
 LEAST_POWER = 1.0
+POINTS = 12  # of quadrature from an edge to the opposite vertex
+MERIDIAN = np.array([0, 1, 3])  # components of rr, zz, hoop, rz without the hoop
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,6 +104,8 @@ def norms(discrete: Discrete, field: EdgeField) -> Array:
     On curved edges the continuation is from the curve to the opposite vertex.
     """
     triangle, opposite = (x[field.edge] for x in discrete.partition.owner)
+    if discrete.balance.extent:
+        return _norms_about_axis(discrete, field)
     along, inwards, weight = _towards(discrete, triangle, opposite, field.edge, field.t)
     first, second = _strain(field.slope, along), _strain(field.value, inwards)
     C, weight = discrete.law[triangle], field.weight * weight
@@ -122,6 +126,8 @@ def hat_norms(discrete: Discrete, triangle: Index, corner: Index, moves: Array) 
 
     On curved `triangle` (k,) hats are linear on lines from the curve to the opposite vertex.
     """
+    if discrete.balance.extent:
+        return _hats_about_axis(discrete, triangle, corner, moves)
     partition = discrete.partition
     opposite = (discrete.curves.number[partition.edges[triangle]] >= 0).argmax(axis=1)
     edge = partition.edges[triangle, opposite]
@@ -168,3 +174,57 @@ def _strain(r: Array, gradient: Array) -> Array:
         ],
         axis=-1,
     )
+
+
+def _norms_about_axis(discrete: Discrete, field: EdgeField) -> Array:
+    """The same (k,) about an axis, where the hoop strain w_r / r is another part."""
+    triangle, opposite = (x[field.edge] for x in discrete.partition.owner)
+    partition, balance = discrete.partition, discrete.balance
+    along, inwards, weight = _towards(discrete, triangle, opposite, field.edge, field.t)
+    weight = field.weight * weight
+    apex = partition.vertices[partition.triangles[triangle, opposite]]
+    x, _ = edge_places(partition, field.edge, discrete.curves, field.t)
+    first, second = _strain(field.slope, along), _strain(field.value, inwards)
+    law = discrete.law[triangle]
+    C = law[:, MERIDIAN[:, None], MERIDIAN]
+    # The best m of the plane: the hoop strain matters but near the axis.
+    at_edge = weight * balance.measure(x)
+
+    def product(a: Array, b: Array) -> Array:
+        return np.einsum("kq,kqi,kij,kqj->k", at_edge, a, C, b, optimize=True)
+
+    one, two = product(first, first), product(second, second)
+    ratio = np.sqrt(np.divide(one, two, out=np.ones_like(one), where=two > 0))
+    m = np.maximum(ratio, LEAST_POWER)
+    rule, w = gauss(2 * POINTS)
+    t = 1 - rule ** (1 / (2 * m[:, None]))  # (1 - t)^(2 m - 1) dt is even in these
+    square = np.zeros(len(m))
+    for j in range(len(rule)):
+        place = x + t[:, j, None, None] * (apex[:, None] - x)
+        radius = place[..., 0]
+        e = np.zeros((*first.shape[:2], 4))
+        e[..., MERIDIAN] = first - m[:, None, None] * second
+        e[..., 2] = (1 - t[:, j, None]) * field.value[..., 0] / np.where(radius > 0, radius, 1.0)
+        share = weight * balance.measure(place) * w[j] / (2 * m[:, None])
+        square += np.einsum("kq,kqi,kij,kqj->k", share, e, law, e, optimize=True)
+    return np.sqrt(square * _most(discrete, triangle))
+
+
+def _hats_about_axis(discrete: Discrete, triangle: Index, corner: Index, moves: Array) -> Array:
+    """The norms of hats about an axis, of straight triangles."""
+    partition = discrete.partition
+    if (discrete.curves.number[partition.edges[triangle]] >= 0).any():
+        raise ValueError(
+            "no guaranteed bound is known for rows that are means on curves about an axis; "
+            "use error_estimate"
+        )
+    rule, w = triangle_rule(POINTS)
+    x, law = partition.places(triangle, rule), discrete.law[triangle]
+    hat = np.column_stack([rule, 1 - rule.sum(axis=1)])[:, corner].T
+    gradient = partition.hat_gradients[triangle, corner]
+    e = np.zeros((*hat.shape, 4))
+    e[..., MERIDIAN] = _strain(moves, gradient)[:, None]
+    e[..., 2] = moves[:, :1] * hat / x[..., 0]
+    weight = w * discrete.balance.measure(x) * partition.areas[triangle][:, None]
+    square = np.einsum("kq,kqi,kij,kqj->k", weight, e, law, e, optimize=True)
+    return np.sqrt(square * _most(discrete, triangle))

@@ -94,8 +94,7 @@ def gap_of(
     and at vertices between the two, or `supported` (j,) ones, the positive part is kept.
     """
     s, line = samples(), zone.state.line
-    scales = units.strain, units.length
-    points = zone_points(zone.state, pieces, boundary, displacement, scales, s, np.ones(len(s)))
+    points = zone_points(zone.state, pieces, boundary, displacement, units, s, np.ones(len(s)))
     sampled = points.gap.reshape(len(pieces.local), len(s))
     values = coefficients(sampled)
     closed = (zone.full | line.contact.bilateral) & line.faces

@@ -139,9 +139,10 @@ def _norms_on(
     if any(varies(law) for law in problem.materials.values()):
         laws = {body: law.voigt(problem.model) for body, law in problem.materials.items()}
         C = partition.evaluate(partition.mesh.MaterialCF(laws), at, rule) / units.modulus
-        C = C.reshape(*C.shape[:2], 3, 3)
+        C = C.reshape(*e.shape, -1)
     else:
         C = discrete.law[at][:, None]
     weight = weights * np.linalg.det(partition.jacobians(at, rule)) / 2
-    energy = np.einsum("bqi,bqij,bqj->bq", e, np.broadcast_to(C, (*e.shape, 3)), e)
+    weight = weight * discrete.balance.measure(partition.places(at, rule))
+    energy = np.einsum("bqi,bqij,bqj->bq", e, np.broadcast_to(C, (*e.shape, e.shape[2])), e)
     return np.sqrt((weight * energy).sum(axis=1))

@@ -65,9 +65,8 @@ def selected(
     exerted = [sp.csr_array((2 * e * r, 0))]
     for zone, pieces, (start, stop) in zip(zones, every_pieces, pairwise(starts), strict=True):
         t, w = gauss(2 * discrete.degree + 2)
-        scales = units.strain, units.length
-        points = zone_points(zone.state, pieces, boundary, displacement, scales, t, w)
-        exerted.append(tractions(discrete.partition, zone, points, e, discrete.degree))
+        points = zone_points(zone.state, pieces, boundary, displacement, units, t, w)
+        exerted.append(tractions(discrete, zone, points, e))
         _add(wishes, zone, points, every[start:stop], boundary, stress, discrete, conditions, units)
     pressures = sp.hstack(exerted).tocsr()
     discrete, *balance = balanced(discrete, conditions, pressures)
@@ -119,7 +118,8 @@ def _add(
     for side, softness in _sides(zone, points, p, boundary, stress, discrete, units):
         wishes.sides.append(Side(side.p @ into, side.target, side.weight))
         total += softness
-    line = line_sums(zone, boundary, points, supported, units.stress * units.length, total)
+    unit = units.energy / units.strain / units.length
+    line = line_sums(zone, boundary, points, supported, unit, total)
     wishes.sums.append(Sums(line.moments @ into, line.forces, line.weight, line.open_))
     open_ = np.where(zone.full[points.local], 0.0, np.maximum(points.gap, 0.0))
     wishes.closing[:] += into.T @ (p.T @ (points.weight * open_))

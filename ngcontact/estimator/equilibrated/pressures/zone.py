@@ -14,7 +14,7 @@ from ....contact import ContactState, prescribed_gap
 from ....contact.line import jacobian as contact_jacobian
 from ....fem import BoundaryTrace
 from ....triplets import from_triplets
-from ..data import Partition, edge_parameters, legendre_values, with_hats
+from ..data import Discrete, Units, edge_parameters, legendre_values, with_hats
 from .pieces import Pieces, contact_directions
 
 GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
@@ -43,7 +43,7 @@ class ZonePoints:
     facing_s : ndarray (q,)
         Parameter there.
     weight : ndarray (q,)
-        Of quadrature in arc length (P1) or eta (P2), in units of length.
+        Of quadrature in arc length (P1) or eta (P2), times what a length counts for.
     direction : ndarray (q, 2)
         d.
     gap : ndarray (q,)
@@ -150,16 +150,13 @@ def zone_points(
     pieces: Pieces,
     boundary: BoundaryTrace,
     displacement: ng.GridFunction,
-    units: tuple[float, float],
+    units: Units,
     t: Array,
     weight: Array,
 ) -> ZonePoints:
-    """Points at `t` (q,) on each piece, with weights `weight` (q,) there.
-
-    `units` are the strain by which displacements and the length by which places are divided.
-    """
+    """Points at `t` (q,) on each piece, with weights `weight` (q,) there."""
     line, contact = state.line, state.line.contact
-    strain, length = units
+    strain, length = units.strain, units.length
     places = pieces.places(t)
     there, distance = (x.ravel() for x in pieces.opposite(boundary, places))
     q, s = len(t), places.ravel()
@@ -185,16 +182,15 @@ def zone_points(
         segment=segment,
         facing=facing,
         facing_s=there,
-        weight=scale * contact_jacobian(boundary, contact, segment, s) / length,
+        weight=scale * contact_jacobian(boundary, contact, segment, s) / units.measure,
         direction=d,
         gap=gap / strain / length,
     )
 
 
-def tractions(
-    partition: Partition, zone: Zone, points: ZonePoints, edges: int, degree: int
-) -> sp.csr_array:
+def tractions(discrete: Discrete, zone: Zone, points: ZonePoints, edges: int) -> sp.csr_array:
     """Matrix (e * 2 * r, m) from p* to what `EdgeConditions.given` needs of it, on both bodies."""
+    partition, degree = discrete.partition, discrete.degree
     p = zone.values(points.local, points.s)
     r = 2 * (degree + 1)
     total = sp.csr_array((edges * 2 * r, zone.size))

@@ -190,11 +190,12 @@ def _beside_edges(discrete: Discrete, conditions: EdgeConditions, edge: Index) -
 
 def _norms(discrete: Discrete, at: Index, sides: Array, t: Array) -> Array:
     """Energy norms (b,) of J t J^T in triangles `at` (b,), of `t` (b, p, 3, n) in equal parts."""
-    compliance, rough = np.linalg.inv(discrete.law[at]), discrete.rough
+    compliance, rough = np.linalg.inv(discrete.law[at])[:, :3, :3], discrete.rough
     if rough is not None:
         number = rough.number[at]
         mine = np.flatnonzero(number >= 0)
         compliance[mine] = np.diag([1.0, 1.0, 2.0]) / rough.least[number[mine], None, None]
+    compliance = compliance / discrete.least_measure(at)[:, None, None]
     tau = _turned(sides)[:, None] @ t
     mean = np.einsum("bpsn,bst,bptn->b", tau, compliance, tau, optimize=True) / t.shape[1]
     return np.sqrt(discrete.partition.areas[at] * mean)

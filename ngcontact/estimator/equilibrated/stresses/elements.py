@@ -12,26 +12,25 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....arrays import Array, Index
-from ..data import Discrete, basis, dimension
+from ....arrays import Array, Index, Mask
+from ..data import OF_AXIS, Discrete, basis, dimension, divergence
+
+TRUNCATED = 1e-11  # eigenvalues, relative, of tractions that a triangle at the axis lacks
 
 
 def raw_operators(discrete: Discrete, at: Index, frames: Array) -> tuple[Array, Array]:
-    """Divergence (b, 2 m, 3 n) and tractions (b, 6 (k + 1), 3 n) of the triangles `at` (b,).
+    """Divergence (b, m, 3 n) and tractions (b, 6 (k + 1), 3 n) of the triangles `at` (b,).
 
-    Of the coefficients of (xx, yy, xy) in the n polynomials of degree k; the divergence in the m
-    of degree k - 1, the tractions, by edge, component along `frames` (e, 2, 2) and Legendre
-    polynomial, in the direction in which each edge runs. On curved edges, where these are moments,
-    tractions count per chord.
+    Of the coefficients of (xx, yy, xy) in the n polynomials of degree k; the divergence in those of
+    degree k - 1, for each equation, the tractions, by edge, component along `frames` (e, 2, 2) and
+    Legendre polynomial, in the direction in which each edge runs. On curved edges, where these are
+    moments, tractions count per chord.
     """
     partition, degree = discrete.partition, discrete.degree
     table, b = basis(degree), len(at)
-    n, m = dimension(degree), dimension(degree - 1)
-    of_axis = np.zeros((2, 2, 3))  # which derivative of which stress in which component
-    of_axis[0, 0, 0] = of_axis[0, 1, 2] = of_axis[1, 0, 2] = of_axis[1, 1, 1] = 1.0
-    by_reference = np.einsum("cds,brd->bcrs", of_axis, partition.inverses[at])
-    D = np.einsum("bcrs,rij->bcisj", by_reference, table.derivatives).reshape(b, 2 * m, 3 * n)
-    along = np.einsum("cds,bed->becs", of_axis, partition.normals[at])
+    n = dimension(degree)
+    D = divergence(partition, at, degree)[:, discrete.balance.equations].reshape(b, -1, 3 * n)
+    along = np.einsum("cds,bed->becs", OF_AXIS, partition.normals[at])
     along = np.einsum("befc,becs->befs", frames[partition.edges[at]], along)
     signs = np.where(partition.flips[at][:, :, None], (-1.0) ** np.arange(degree + 1), 1.0)
     N = np.einsum("befs,beq,eqj->befqsj", along, signs, table.traces, optimize=True)
@@ -87,7 +86,24 @@ def condensed(D: Array, N: Array) -> Condensed:
     return Condensed(Q=across, R=R, N=N, K=K, G=K.transpose(0, 2, 1) @ K)
 
 
-def without_opposite(G: Array, t: Array) -> tuple[Array, Array, Array, Array]:
+def _solved(G: Array, right: Array, lacking: Mask, size: Array) -> Array:
+    """Solutions (b, r, j) for `G` (b, r, r), semidefinite on the triangles `lacking` (b,).
+
+    `size` (b,) is that of the whole of which G is a part.
+    """
+    result = np.empty_like(right)
+    full = ~lacking
+    result[full] = np.linalg.solve(G[full], right[full])
+    if lacking.any():
+        values, vectors = np.linalg.eigh(G[lacking])
+        kept = values > TRUNCATED * size[lacking, None]
+        inverse = np.where(kept, 1 / np.where(kept, values, 1.0), 0.0)
+        turned = vectors.transpose(0, 2, 1) @ right[lacking]
+        result[lacking] = vectors @ (inverse[:, :, None] * turned)
+    return result
+
+
+def without_opposite(G: Array, t: Array, lacking: Mask) -> tuple[Array, Array, Array, Array]:
     """Eliminate the edge opposite to each of the three vertices.
 
     Parameters
@@ -96,6 +112,8 @@ def without_opposite(G: Array, t: Array) -> tuple[Array, Array, Array, Array]:
         Tractions by multipliers.
     t : ndarray (b, 3, 3 r)
         Tractions without them, for each vertex.
+    lacking : ndarray of bool (b,)
+        Triangles without some of the tractions.
 
     Returns
     -------
@@ -107,15 +125,19 @@ def without_opposite(G: Array, t: Array) -> tuple[Array, Array, Array, Array]:
     b, r = len(G), G.shape[1] // 3
     S, g = np.empty((b, 3, 2 * r, 2 * r)), np.empty((b, 3, 2 * r))
     X, x = np.empty((b, 3, r, 2 * r)), np.empty((b, 3, r))
+    whole = np.einsum("bii->bi", G).max(axis=1)
     for i in range(3):
         away = i * r + np.arange(r)
         here = np.concatenate([(i + j) % 3 * r + np.arange(r) for j in (1, 2)])
         right = np.concatenate([G[:, away[:, None], here], t[:, i, away][:, :, None]], axis=2)
-        solved = np.linalg.solve(G[:, away[:, None], away], right)
+        solved = _solved(G[:, away[:, None], away], right, lacking, whole)
         X[:, i], x[:, i] = solved[:, :, :-1], solved[:, :, -1]
         across = G[:, here[:, None], away]
         S[:, i] = G[:, here[:, None], here] - across @ X[:, i]
         g[:, i] = t[:, i, here] - (across @ x[:, i, :, None])[:, :, 0]
+    if lacking.any():
+        kept = np.einsum("biss->bis", S[lacking]) > TRUNCATED * whole[lacking, None, None]
+        S[lacking] *= kept[:, :, :, None] & kept[:, :, None, :]
     return S, g, X, x
 
 

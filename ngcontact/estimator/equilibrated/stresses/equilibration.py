@@ -61,12 +61,14 @@ class _Block:
 
 def into_raw(discrete: Discrete, at: Index) -> Array:
     """Matrices (b, 3 n, 3 n) from orthonormal to raw coefficients of triangles `at` (b,)."""
-    n = dimension(discrete.degree)
+    n, rough = dimension(discrete.degree), discrete.rough
+    number = np.full(len(at), -1) if rough is None else rough.number[at]
+    if rough is not None and (number >= 0).all():
+        return rough.into[number]
     root = discrete.root[at] / np.sqrt(discrete.partition.areas[at])[:, None, None]
     into = np.einsum("bij,kl->bikjl", root, np.eye(n)).reshape(len(at), 3 * n, 3 * n)
-    if discrete.rough is not None:
-        number = discrete.rough.number[at]
-        into[number >= 0] = discrete.rough.into[number[number >= 0]]
+    if rough is not None:
+        into[number >= 0] = rough.into[number[number >= 0]]
     return into
 
 
@@ -81,22 +83,26 @@ def _block(discrete: Discrete, at: Index, frames: Array, theta: Array) -> _Block
     n, b = dimension(discrete.degree), len(at)
     into = into_raw(discrete, at)
     D, N = (M @ into for M in raw_operators(discrete, at, frames))
-    sigma, rho = _loads(discrete, at)
-    wide = np.zeros((b, 3, 3, n))
-    inverse = (
-        np.linalg.inv(discrete.root[at]) * np.sqrt(discrete.partition.areas[at])[:, None, None]
-    )
-    wide[..., : sigma.shape[-1]] = np.einsum("bij,bajl->bail", inverse, sigma)
-    c = wide.reshape(b, 3, 3 * n)
-    if discrete.rough is not None:
-        number = discrete.rough.number[at]
-        mine, number = np.flatnonzero(number >= 0), number[number >= 0]
-        c[mine] = discrete.rough.hatted[number]
-        lacks = discrete.rough.divergence[number].reshape(len(mine), 3, D.shape[1])
-        lacks = lacks - c[mine] @ D[mine].transpose(0, 2, 1)
-        rho[mine] = lacks.reshape(len(mine), *rho.shape[1:])
-    rho[..., :3] += theta[at]
-    return _Block(condensed(D, N), c, rho.reshape(b, 3, -1))
+    c, rho, rough = np.zeros((b, 3, 3 * n)), np.zeros((b, 3, D.shape[1])), discrete.rough
+    number = np.full(b, -1) if rough is None else rough.number[at]
+    mine, smooth = np.flatnonzero(number >= 0), np.flatnonzero(number < 0)
+    if smooth.size:
+        sigma, lacks = _loads(discrete, at[smooth])
+        root, areas = discrete.root[at[smooth]], discrete.partition.areas[at[smooth]]
+        wide = np.zeros((len(smooth), 3, 3, n))
+        inverse = np.linalg.inv(root) * np.sqrt(areas)[:, None, None]
+        wide[..., : sigma.shape[-1]] = np.einsum("bij,bajl->bail", inverse, sigma)
+        lacks[..., :3] += theta[at[smooth]]
+        c[smooth] = wide.reshape(len(smooth), 3, 3 * n)
+        rho[smooth] = lacks.reshape(len(smooth), 3, -1)
+    if rough is not None and mine.size:
+        c[mine], load = rough.hatted[number[mine]], rough.divergence[number[mine]].copy()
+        more = discrete.balance.rigid_load(discrete.partition, at[mine], theta[at[mine]])
+        load[..., : more.shape[3]] += more
+        c[mine] += theta[at[mine], :, 0] @ rough.around[number[mine]]
+        rho[mine] = load[:, :, discrete.balance.equations].reshape(len(mine), 3, -1)
+        rho[mine] -= c[mine] @ D[mine].transpose(0, 2, 1)
+    return _Block(condensed(D, N), c, rho)
 
 
 def _loads(discrete: Discrete, at: Index) -> tuple[Array, Array]:
@@ -147,11 +153,12 @@ def equilibrated(discrete: Discrete, conditions: EdgeConditions, given: Array) -
     S, g = np.empty((n, 3, 2 * r, 2 * r)), np.empty((n, 3, 2 * r))
     X, x = np.empty((n, 3, r, 2 * r)), np.empty((n, 3, r))
     size = 9 * dimension(k) ** 2
+    lacking = discrete.lacking
     for at in blocks(n, size):
         block = _block(discrete, at, conditions.frames, theta)
         c = block.hatted + block.parts.with_divergence(block.rho)
         t = c @ block.parts.N.transpose(0, 2, 1)
-        S[at], g[at], X[at], x[at] = without_opposite(block.parts.G, t)
+        S[at], g[at], X[at], x[at] = without_opposite(block.parts.G, t, lacking[at])
     lam = multipliers(partition, S, g, conditions, given)
     change = np.empty((n, 3 * dimension(k)))
     for at in blocks(n, size):

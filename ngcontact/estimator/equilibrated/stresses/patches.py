@@ -78,7 +78,8 @@ def _solved(A: Array, b: Array, size: Array) -> Array:
 
     `size` (k,) is that of the terms of the right sides, before they cancel.
     """
-    scale = np.sqrt(np.maximum(np.einsum("kii->ki", A), np.finfo(float).tiny))
+    size_of = np.einsum("kii->ki", A)
+    scale = np.sqrt(np.where(size_of > 0, size_of, 1.0))
     A = A / scale[:, :, None] / scale[:, None, :]
     size = size / scale.min(axis=1)
     b = b / scale

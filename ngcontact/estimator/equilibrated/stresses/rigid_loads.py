@@ -19,6 +19,7 @@ from ..data import CORNERS, Discrete, EdgeConditions, Partition, basis, rigid_mo
 RESISTED = 1e-6  # square of a motion on free edges, relative, from which their tractions resist it
 SHIFT = 1e-11  # relative, of a matrix that is singular where a body is free to move
 REFINEMENTS = 3
+OTHERS = 1e-4  # relative: balance of motions that another stress resists is better, not needed
 
 
 def _motions(partition: Partition) -> tuple[Array, Array]:
@@ -39,8 +40,13 @@ def _motions(partition: Partition) -> tuple[Array, Array]:
     return values @ np.linalg.inv(basis(1).values(CORNERS)).T, size
 
 
-def _admitted(partition: Partition, on_edges: Array, constrained: Mask) -> Array:
-    """Projectors (v, 3, 3) to the motions of each patch that no free traction resists."""
+def _admitted(discrete: Discrete, on_edges: Array, constrained: Mask) -> Array:
+    """Projectors (v, 3, 3) to the motions of each patch that no free traction resists.
+
+    On an axis there are no tractions, and no motions of patches but rigid ones of the body.
+    """
+    partition, axis = discrete.partition, discrete.balance.at_axis(discrete.partition)
+    constrained = constrained | axis[partition.ends].all(axis=1, keepdims=True)
     e, r = constrained.shape
     free = ~constrained.reshape(e, 2, r // 2)[:, :, : on_edges.shape[-1]]
     squares = np.einsum("eaifq,eajfq,efq->eaij", on_edges, on_edges, free)
@@ -48,7 +54,10 @@ def _admitted(partition: Partition, on_edges: Array, constrained: Mask) -> Array
     np.add.at(total, partition.ends, squares)
     values, vectors = np.linalg.eigh(total)
     kept = values <= RESISTED
-    return np.einsum("vij,vj,vkj->vik", vectors, kept, vectors)
+    P = np.einsum("vij,vj,vkj->vik", vectors, kept, vectors)
+    some = discrete.balance.motions
+    P[axis] *= some[:, None] & some
+    return P
 
 
 def exchanged_loads(
@@ -81,7 +90,7 @@ def exchanged_loads(
     every = np.arange(len(partition.ends))
     frames, degree = conditions.frames, discrete.geometry
     on_edges = rigid_motions_on(partition, discrete.curves, every, frames, about, degree)
-    P = _admitted(partition, on_edges, constrained)
+    P = _admitted(discrete, on_edges, constrained)
     area, triangles, v = partition.areas, partition.triangles, len(partition.vertices)
     inside = area[:, None, None] * np.einsum("tacq,taicq->tai", load, motions)
     e, r = constrained.shape
@@ -100,7 +109,7 @@ def exchanged_loads(
     weight = stiffness / partition.diameters**2
     weighed = motions @ discrete.motions_gram()[:, None, None]
     A = _exchange(partition, motions, weighed, weight * area)
-    mu = _least(A, P, -defect)
+    mu = _least(A, P, -defect, discrete.balance.motions)
     rho = np.einsum("tai,taicq->tacq", mu[triangles], motions)
     theta = weight[:, None, None, None] * (rho - rho.mean(axis=1, keepdims=True))
     left = defect.copy()
@@ -122,7 +131,7 @@ def _exchange(partition: Partition, motions: Array, weighed: Array, weight: Arra
     return from_triplets(full.ravel(), row.ravel(), column.ravel(), (3 * v, 3 * v))
 
 
-def _least(A: sp.csr_array, P: Array, right: Array) -> Array:
+def _least(A: sp.csr_array, P: Array, right: Array, needed: Mask) -> Array:
     """Solution (v, 3) of the consistent system on the admitted motions, `P` (v, 3, 3)."""
     v = len(P)
     project = sp.bsr_array((P, np.arange(v), np.arange(v + 1)), shape=(3 * v, 3 * v)).tocsr()
@@ -133,6 +142,8 @@ def _least(A: sp.csr_array, P: Array, right: Array) -> Array:
     rest = sp.bsr_array((np.eye(3) - P, np.arange(v), np.arange(v + 1)), shape=(3 * v, 3 * v))
     unit = sp.diags_array(np.repeat(block, 3))
     A = A + unit @ rest.tocsr()
+    if not needed.all():
+        A = A + sp.diags_array(np.tile(~needed * OTHERS, v) * np.repeat(block, 3))
     half = sp.diags_array(1 / np.sqrt(np.repeat(block, 3)))
     scaled = (half @ A @ half).tocsc()
     lu = splu(

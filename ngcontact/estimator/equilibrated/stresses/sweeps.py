@@ -49,8 +49,9 @@ def improved(discrete: Discrete, conditions: EdgeConditions, found: Equilibrated
 def _region(discrete: Discrete, squares: Array) -> Index:
     """Triangles (j,) around those that are far, by squares (n,)."""
     n, partition = len(squares), discrete.partition
-    moduli = np.linalg.eigvalsh(discrete.law * MANDEL[:, None] * MANDEL)
-    stiff = np.flatnonzero(moduli[:, 2] > STIFF * moduli[:, 0])
+    mandel = MANDEL[discrete.law.shape[1]]
+    moduli = np.linalg.eigvalsh(discrete.law * mandel[:, None] * mandel)
+    stiff = np.flatnonzero(moduli[:, -1] > STIFF * moduli[:, 0])
     if squares[stiff].sum() > SHARE * squares.sum():
         return stiff
     order = np.argsort(-squares)[: max(FEWEST, int(MOST * n))]
@@ -99,7 +100,8 @@ class _Region:
             c = b[part, :, None]
             free[part] = (parts.Q @ (parts.Q.transpose(0, 2, 1) @ c) - c)[:, :, 0]
             t = np.repeat(free[part][:, None], 3, axis=1) @ parts.N.transpose(0, 2, 1)
-            S[part], g[part], X[part], x[part] = without_opposite(parts.G, t)
+            lacking = self.discrete.lacking[self.at[part]]
+            S[part], g[part], X[part], x[part] = without_opposite(parts.G, t, lacking)
         lam = multipliers(self.partition, S, g, self.mine, self.given)
         total = 3 * free
         for part in blocks(n, 3 * b.shape[1] ** 2):

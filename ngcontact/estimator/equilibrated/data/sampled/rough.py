@@ -10,12 +10,14 @@ from dataclasses import dataclass, replace
 import ngsolve as ng
 import numpy as np
 
-from ....arrays import Array, Index
-from ....problem import Problem
-from .partition import Partition
-from .polynomials import basis, dimension, triangle_rule
+from .....arrays import Array, Index
+from .....problem import Problem
+from ..partition import Partition
+from ..polynomials import dimension, triangle_rule
+from .places import places_in
 
 LAW_BONUS = 8  # quadrature order above that of polynomials, for laws that vary
+MANDEL = {3: np.sqrt([1.0, 1.0, 2.0]), 4: np.sqrt([1.0, 1.0, 1.0, 2.0])}  # by Voigt components
 AT_ONCE = 2_000_000  # values of polynomials at quadrature points that are looked at together
 
 
@@ -39,6 +41,9 @@ class Rough:
         Projected body forces, and their means over the straight area times polynomials.
     moments : ndarray (r, 3, 2, 3)
         Means over the triangle's straight area of `divergence` times polynomials of degree 1.
+    around : ndarray (r, 3, 3 j)
+        Orthonormal coefficients of the hoop stress that balances radial loads of degree 1; 0 in the
+        plane, where others do.
     gram : ndarray (r, 3, 3)
         The same of products of these polynomials.
     rest : ndarray (r,)
@@ -60,6 +65,7 @@ class Rough:
     force: Array
     force_means: Array
     moments: Array
+    around: Array
     gram: Array
     rest: Array
     missed: Array
@@ -79,34 +85,26 @@ class Rough:
         return replace(self, divergence=divergence, force=force, moments=moments, force_means=means)
 
 
-@dataclass(frozen=True, eq=False)
-class _Points:
-    """Quadrature in b triangles: weights over the straight area, values, gradients of hats."""
-
-    weight: Array
-    values: Array
-    hats: Array
-    gradients: Array
-    distortion: Array
-
-
-def _points(partition: Partition, at: Index, order: int, degree: int) -> _Points:
-    rule, w = triangle_rule(order)
-    jacobian = partition.jacobians(at, rule)
-    x = partition.evaluate(ng.CF((ng.x, ng.y)), at, rule) / partition.length
-    origin = partition.vertices[partition.triangles[at, 2]]
-    flat = np.einsum("bij,bqj->bqi", partition.inverses[at], x - origin[:, None])
-    weight = w * np.linalg.det(jacobian) / (2 * partition.areas[at][:, None])
-    inverse = np.linalg.inv(jacobian)
-    gradients = np.concatenate([inverse, -inverse.sum(axis=2, keepdims=True)], axis=2)
-    values = basis(degree).values(flat.reshape(-1, 2)).reshape(*x.shape[:2], -1)
-    hats = np.column_stack([rule, 1 - rule.sum(axis=1)])
-    # |w|^2 <= max det (h / pi)^2 |grad of w in the straight triangle|^2, which is at most
-    # max |D|^2 / min det |grad w|^2.
-    D = jacobian @ partition.inverses[at][:, None]
-    det, largest = np.linalg.det(D), np.linalg.norm(D, ord=2, axis=(2, 3)).max(axis=1)
-    distortion = largest * np.sqrt(det.max(axis=1) / det.min(axis=1))
-    return _Points(weight, values, hats, gradients, distortion)
+def blank(at: Index, number: Index, n: int, m: int) -> Rough:
+    """Triangles `at` (r,), of `number` (t,), of which nothing is known yet."""
+    r = len(at)
+    return Rough(
+        at=at,
+        number=number,
+        into=np.empty((r, 3 * n, 3 * n)),
+        hatted=np.empty((r, 3, 3 * n)),
+        divergence=np.zeros((r, 3, 2, m)),
+        force=np.zeros((r, 2, m)),
+        force_means=np.zeros((r, 2, m)),
+        moments=np.zeros((r, 3, 2, 3)),
+        around=np.zeros((r, 3, 3 * n)),
+        gram=np.empty((r, 3, 3)),
+        rest=np.empty(r),
+        missed=np.empty(r),
+        distortion=np.empty(r),
+        least=np.empty(r),
+        most=np.empty(r),
+    )
 
 
 def rough_triangles(
@@ -138,22 +136,7 @@ def rough_triangles(
     order = 2 * degree * geometry + 2 * (geometry - 1) + LAW_BONUS
     number = np.full(len(partition.triangles), -1)
     number[at] = np.arange(r)
-    result = Rough(
-        at=at,
-        number=number,
-        into=np.empty((r, 3 * n, 3 * n)),
-        hatted=np.empty((r, 3, 3 * n)),
-        divergence=np.empty((r, 3, 2, m)),
-        force=np.empty((r, 2, m)),
-        force_means=np.empty((r, 2, m)),
-        moments=np.empty((r, 3, 2, 3)),
-        gram=np.empty((r, 3, 3)),
-        rest=np.empty(r),
-        missed=np.empty(r),
-        distortion=np.empty(r),
-        least=np.empty(r),
-        most=np.empty(r),
-    )
+    result = blank(at, number, n, m)
     moduli = partition.mesh.MaterialCF(
         {name: body.voigt(problem.model) for name, body in problem.materials.items()}
     )
@@ -178,7 +161,7 @@ def _look(
     """Fill in a part of the triangles."""
     at, m = result.at[part], dimension(degree - 1)
     rule, _ = triangle_rule(order)
-    points = _points(partition, at, order, degree)
+    points = places_in(partition, at, triangle_rule(order), degree)
     C, sigma, F = (partition.evaluate(f, at, rule) for f in functions)
     C, sigma = C.reshape(*C.shape[:2], 3, 3) / units[1], sigma / units[0]
     F = F * (partition.length / units[0])
@@ -211,7 +194,7 @@ def _look(
     off_force = F - np.einsum("bci,bqi->bqc", result.force[part], low)
     result.missed[part] = np.sqrt(area * np.einsum("bq,bqc->b", w, off_force**2))
     result.distortion[part] = points.distortion
-    mandel = np.array([1.0, 1.0, np.sqrt(2.0)])
+    mandel = MANDEL[3]
     result.least[part] = np.linalg.eigvalsh(C * mandel[:, None] * mandel)[..., 0].min(axis=1)
     half = np.linalg.inv(np.linalg.cholesky(law[at]))[:, None]
     ratio = np.linalg.eigvalsh(half @ C @ half.transpose(0, 1, 3, 2))[..., -1]
