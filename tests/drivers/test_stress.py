@@ -76,6 +76,7 @@ def test_estimates_of_data_that_hurt(seed):
     assert data.outcome(seed).passed
 
 
-def test_an_estimate_below_the_error_fails(monkeypatch):
-    monkeypatch.setattr(Solution, "error_estimate", property(lambda solution: 1e-6))
+@pytest.mark.parametrize("name", ["error_estimate", "error_bound"])
+def test_an_estimate_or_bound_below_the_error_fails(monkeypatch, name):
+    monkeypatch.setattr(Solution, name, property(lambda solution: 1e-6))
     assert not data.outcome(2).passed

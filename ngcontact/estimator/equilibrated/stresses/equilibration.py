@@ -13,7 +13,7 @@ from .elements import Condensed, condensed, gathered, raw_operators, without_opp
 from .patches import multipliers
 from .rigid_loads import exchanged_loads
 
-AT_ONCE = 1_000_000  # numbers in the operators of elements that are made together
+AT_ONCE = 300_000  # numbers in the operators of elements that are made together
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from scipy.linalg.lapack import dpotrf, dpotrs
 from ....arrays import Array, Index
 from ..data import EdgeConditions, Partition
 
-AT_ONCE = 1_000_000  # numbers in the matrices of patches that are solved together
+AT_ONCE = 300_000  # numbers in the matrices of patches that are solved together
 SHIFT = 1e-10  # relative, by which singular matrices are solved; refined away where it matters
 REFINEMENTS = 3
 SOLVED = 1e-12  # residual, relative, above which a patch is solved by its eigenvectors

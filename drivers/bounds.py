@@ -1,0 +1,155 @@
+"""Guaranteed bounds beside estimates, level by level: effectivities, seconds, a picture.
+
+Errors are those of stresses, as in `drivers.adaptive_study`. Seconds are those of one thread's
+processor. Writes bounds.csv, and bounds.png, the picture of docs/bounds.md.
+
+    python -m drivers.bounds
+    python -m drivers.bounds "hertz a=0.3" --orders 2 --max-dofs 30_000
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import astuple, dataclass, fields
+from pathlib import Path
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from drivers.adaptive_study.studies import STUDIES, Name, error_measure
+from drivers.command_line import Count, Order, run
+from ngcontact import adapt
+
+SHOWN: tuple[Name, ...] = ("one transition", "hertz a=0.3", "flat punch", "disc on rigid plane")
+ROUND = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)  # effectivities with a tick
+
+
+@dataclass(frozen=True)
+class Row:
+    """One level: relative error, effectivities, seconds of the run so far and of what is proved."""
+
+    case: str
+    order: int
+    unknowns: int
+    error: float
+    estimate: float
+    bound: float
+    width: float
+    run: float
+    bounding: float
+    quantities: float
+
+
+def rows_of(name: Name, order: int, max_dofs: int, reference: int) -> Iterator[Row]:
+    """The levels of an adaptive run."""
+    study = STUDIES[name]()
+    measure = error_measure(study, reference)
+    spent, started = 0.0, time.process_time()
+    for level in adapt(study.problem, order=order, max_dofs=max_dofs):
+        estimate = level.relative_error_estimate
+        spent += time.process_time() - started
+        begun = time.process_time()
+        bound, (low, high) = level.relative_error_bound, level.energy_bounds
+        proved = time.process_time()
+        level.quantities()
+        told = time.process_time()
+        error = measure(level)
+        yield Row(
+            case=name,
+            order=order,
+            unknowns=level.displacement.space.ndof,
+            error=error,
+            estimate=estimate / error,
+            bound=bound / error,
+            width=(high - low) / level.error_bound**2,
+            run=spent,
+            bounding=proved - begun,
+            quantities=told - proved,
+        )
+        started = time.process_time()
+
+
+def draw(path: Path, rows: Sequence[Row]) -> None:
+    """Effectivities against unknowns: bounds solid, estimates dashed."""
+    names = list(dict.fromkeys(row.case for row in rows))
+    orders = sorted({row.order for row in rows})
+    wide = math.ceil(len(names) / 2)
+    figure = Figure(figsize=(10, 4 * wide), layout="constrained")
+    every = figure.subplots(wide, 2, sharey=True, squeeze=False).ravel()
+    for axes in every[len(names) :]:
+        axes.set_visible(False)
+    for axes, name in zip(every, names, strict=False):
+        for order in orders:
+            mine = [row for row in rows if (row.case, row.order) == (name, order)]
+            n = [row.unknowns for row in mine]
+            axes.loglog(n, [row.bound for row in mine], "o-", ms=3, color=f"C{order - 1}")
+            axes.loglog(n, [row.estimate for row in mine], "s--", ms=3, color=f"C{order - 1}")
+        axes.axhline(1, color="k", lw=0.8)
+        axes.set(title=name, xlabel="unknowns")
+        axes.set_yticks(ROUND, [f"{tick:g}" for tick in ROUND])
+        axes.minorticks_off()
+        axes.grid(axis="y", alpha=0.3)
+    for axes in every[::2]:
+        axes.set_ylabel("over the error")
+    lines = [Line2D([], [], color=f"C{order - 1}", label=f"order {order}") for order in orders]
+    styles = (("-", "guaranteed bound"), ("--", "residual estimate"))
+    lines += [Line2D([], [], color="0.3", ls=ls, label=label) for ls, label in styles]
+    figure.legend(handles=lines, loc="outside lower center", ncols=len(lines))
+    FigureCanvasAgg(figure).print_png(path)
+
+
+def main(
+    studies: Sequence[Name] = SHOWN,
+    *,
+    orders: Sequence[Order] = (2, 4),
+    max_dofs: Count = 15_000,
+    reference: Count = 40_000,
+    out: Path = Path("out"),
+) -> list[Row]:
+    """Guaranteed bounds beside estimates, level by level: effectivities, seconds, a picture.
+
+    Parameters
+    ----------
+    studies : sequence of str
+        Problems, by name.
+    orders : sequence of int
+        Degrees of the displacement on each element, 1 to 4.
+    max_dofs : int
+        Unknowns that no level exceeds.
+    reference : int
+        Unknowns of the solution that stands for an unknown exact one.
+    out : path
+        Folder of the files.
+
+    Returns
+    -------
+    list of Row
+        All levels.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    found = []
+    print(f"{'case':20s}  p  unknowns  error     estimate  bound  width  run s  bound s  bars s")
+    for name in studies:
+        for order in orders:
+            for row in rows_of(name, order, max_dofs, reference):
+                found.append(row)
+                print(
+                    f"{row.case:20s} {row.order:2d}  {row.unknowns:8d}  {row.error:.2e}  "
+                    f"{row.estimate:8.2f}  {row.bound:5.2f}  {row.width:5.2f}  {row.run:5.2f}  "
+                    f"{row.bounding:7.2f}  {row.quantities:6.2f}",
+                    flush=True,
+                )
+    with (out / "bounds.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow([field.name for field in fields(Row)])
+        writer.writerows(map(astuple, found))
+    draw(out / "bounds.png", found)
+    return found
+
+
+if __name__ == "__main__":
+    run(main)
