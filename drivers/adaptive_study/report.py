@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 from drivers.adaptive_study.runs import Row, rate, seconds_to
+from drivers.markdown import table
 
 Runs = dict[tuple[str, int, str], list[Row]]
 
@@ -21,12 +22,6 @@ def tables(rows: Sequence[Row]) -> Iterator[str]:
     yield _half_widths(runs)
 
 
-def _table(titles: str, lines: Iterable[Sequence[object]]) -> str:
-    """Markdown of a table with `titles` a | b | c."""
-    head = [f"| {titles} |", "|" + "---|" * (titles.count("|") + 1)]
-    return "\n".join([*head, *("| " + " | ".join(map(str, line)) + " |" for line in lines)])
-
-
 def _rates(runs: Runs) -> str:
     """Exponents of N, both strategies side by side."""
     lines = []
@@ -34,7 +29,7 @@ def _rates(runs: Runs) -> str:
         if strategy == "adaptive":
             uniform = rate(runs[case, order, "uniform"])
             lines.append((case, order, f"{uniform:.2f}", f"{rate(rows):.2f}", f"{-order / 2:.1f}"))
-    return _table("case | order | uniform | adaptive | optimal", lines)
+    return table(("case", "order", "uniform", "adaptive", "optimal"), lines)
 
 
 def _seconds(runs: Runs) -> str:
@@ -44,7 +39,7 @@ def _seconds(runs: Runs) -> str:
         if strategy == "adaptive" and order > 1:
             times = [seconds_to(rows, 10.0**-k) for k in (2, 3, 4)]
             lines.append((case, order, *("-" if math.isnan(t) else f"{t:.2f}" for t in times)))
-    return _table("case | order | 1e-2 | 1e-3 | 1e-4", lines)
+    return table(("case", "order", "1e-2", "1e-3", "1e-4"), lines)
 
 
 def _effectivities(runs: Runs) -> str:
@@ -57,7 +52,7 @@ def _effectivities(runs: Runs) -> str:
             values = [row.effectivity for row in runs[case, order, "adaptive"][3:]]
             ranges.append(f"{min(values):.1f} - {max(values):.1f}" if values else "-")
         lines.append((case, *ranges))
-    return _table("case | " + " | ".join(f"order {order}" for order in orders), lines)
+    return table(("case", *(f"order {order}" for order in orders)), lines)
 
 
 def _half_widths(runs: Runs) -> str:
@@ -68,4 +63,4 @@ def _half_widths(runs: Runs) -> str:
             known = [row for row in rows if row.half_width == row.half_width]
             for row in known[len(known) // 2 :: 2]:
                 lines.append((order, row.unknowns, f"{row.half_width:.1e}"))
-    return _table("order | N | relative error", lines)
+    return table(("order", "N", "relative error"), lines)

@@ -65,7 +65,7 @@ class Overkill:
         result = np.empty((len(points), 3, 3))
         for pattern, law in problem.materials.items():
             mask = np.array(list(mesh.Materials(pattern).Mask()), dtype=bool)
-            at = mask[_bodies(mesh, points)]
+            at = mask[Triangulation(mesh).bodies[points["nr"]]]
             result[at] = np.linalg.inv(law.voigt(problem.model)(points[at]).reshape(-1, 3, 3))
         return result
 
@@ -91,8 +91,9 @@ def _quadrature(mesh: ng.Mesh, order: int) -> tuple[NDArray[np.void], Array]:
 
 
 def _bodies(mesh: ng.Mesh, points: NDArray[np.void]) -> NDArray[np.intp]:
-    """Material region (n,) of points."""
-    return np.asarray(Triangulation(mesh).bodies, dtype=np.intp)[points["nr"]]
+    """Number (n,) of the body at points; the parts of one body have one name."""
+    _, number = np.unique(mesh.GetMaterials(), return_inverse=True)
+    return np.asarray(number[Triangulation(mesh).bodies], dtype=np.intp)[points["nr"]]
 
 
 def _stress_at(solution: Solution, place: Array, body: NDArray[np.intp]) -> Array:

@@ -34,7 +34,10 @@ Trial: TypeAlias = Literal[
 ]
 RANDOM = ("algebra", "data", "scenes", "symmetry")  # whose cases are drawn
 SCENES = 66  # every kind six times, in two minutes
-SUMMARY = "drivers.stress.scenes.checks.report"  # loaded, with its solver, only where it is needed
+SUMMARIES = {  # modules with the tables of drawn scenes; loaded only where they are needed
+    "data": "drivers.stress.trials.data",
+    "scenes": "drivers.stress.scenes.checks.report",
+}
 
 
 def line(outcome: Outcome) -> str:
@@ -49,7 +52,7 @@ def outcomes(name: Trial, seed: int, scenes: int = SCENES) -> Iterator[Outcome]:
     """Outcomes of one module, which is loaded only now; `scenes` of them where scenes are drawn."""
     trial = importlib.import_module(f"drivers.stress.trials.{name}")
     given = {"seed": seed} if name in RANDOM else {}
-    if name in ("data", "scenes"):
+    if name in SUMMARIES:
         given["count"] = scenes
     found: Iterator[Outcome] = trial.outcomes(**given)
     return found
@@ -89,8 +92,8 @@ def main(
                 found.append(outcome)
                 failed += not outcome.passed
                 print(line(outcome), flush=True)
-            if name == "scenes":
-                print(*importlib.import_module(SUMMARY).summary(found), sep="\n")
+            if name in SUMMARIES:
+                print(*importlib.import_module(SUMMARIES[name]).summary(found), sep="\n")
         except ContactError as error:  # the rest of a module falls with a case that raises
             count, failed = count + 1, failed + 1
             print(f"{name:32} {type(error).__name__}: {error} FAIL", flush=True)

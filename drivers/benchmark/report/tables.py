@@ -21,12 +21,7 @@ from drivers.benchmark.studies.levels import Level
 from drivers.benchmark.studies.skip import Scene
 from drivers.benchmark.studies.stages import Stages
 from drivers.benchmark.studies.tax import Tax
-
-
-def table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Markdown table of the strings of all cells."""
-    lines = [titles, ["---"] * len(titles), *rows]
-    return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
+from drivers.markdown import table
 
 
 def seconds(value: float) -> str:

@@ -9,17 +9,19 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass, replace
 
 import ngsolve as ng
 import numpy as np
-from netgen.occ import OCCGeometry, Rectangle, X, Y
+from netgen.occ import Glue, OCCGeometry
 
+from drivers.markdown import table
 from drivers.reference.overkill import Overkill
 from drivers.stress import Outcome, solved
 from ngcontact import Contact, ContactWarning, Elastic, Hooke, Problem, Solution, adapt, solve
 from ngcontact.geometries import blocks
+from ngcontact.geometries.region import Point, body, compound, polygon
 
 Draw = np.random.Generator
 
@@ -33,20 +35,38 @@ DOFS = 8_000  # of the overkill solution
 
 @dataclass(frozen=True)
 class Drawn:
-    """A scene, and the force (2,) of its loads where that is known."""
+    """A scene, and the force (2,) of its loads where that is known.
+
+    `resolved` is the same scene with edges of the geometry where its data jump, if it has one:
+    what the finer solution is of, which must not depend on the quadrature that is tried.
+    """
 
     problem: Problem
     load: tuple[float, float] | None = None
+    resolved: Problem | None = None
+
+
+@dataclass(frozen=True)
+class DataOutcome(Outcome):
+    """The line of one scene: its kind, estimate over error, and whether there was a warning."""
+
+    kind: str
+    effectivity: float
+    warned: bool
+
+
+def _square(*strip: float) -> OCCGeometry:
+    """Unit square; the part of the top between two abscissae is "loaded"."""
+    top: list[Point] = [(x, 1.0) for x in strip[::-1]]
+    names = ["bottom", "right", "top", *(["loaded", "top"] if strip else []), "left"]
+    face = body("body", polygon([(0, 0), (1, 0), (1, 1), *top, (0, 1)], names))
+    return compound(face)
 
 
 def square(draw: Draw) -> Problem:
     """A clamped square under a uniform load."""
-    face = Rectangle(1, 1).Face()
-    face.faces.name = "body"
-    face.edges.Max(Y).name, face.edges.Min(Y).name = "top", "bottom"
-    face.edges.Min(X).name, face.edges.Max(X).name = "left", "right"
     return Problem(
-        geometry=OCCGeometry(face, dim=2),
+        geometry=_square(),
         materials={"body": Elastic(1.0, float(draw.uniform(0, 0.4)))},
         displacement={"bottom": (0, 0)},
         traction={"top": (float(draw.uniform(-1, 1)), -1.0)},
@@ -61,8 +81,13 @@ def _inside(x: ng.CoefficientFunction, middle: float, half: float) -> ng.Coeffic
 def narrow_traction(draw: Draw) -> Drawn:
     """A pressure of force 1 on a strip from a thousandth of a side on."""
     half = float(10 ** draw.uniform(-3, -1))
-    p = _inside(ng.x, float(draw.uniform(half, 1 - half)), half) / (2 * half)
-    return Drawn(replace(square(draw), traction={"top": p}), (0.0, -1.0))
+    middle = float(draw.uniform(half, 1 - half))
+    scene, p = square(draw), 1 / (2 * half)
+    resolved = replace(
+        scene, geometry=_square(middle - half, middle + half), traction={"loaded": p}
+    )
+    rough = replace(scene, traction={"top": p * _inside(ng.x, middle, half)})
+    return Drawn(rough, (0.0, -1.0), resolved)
 
 
 def small_force(draw: Draw) -> Drawn:
@@ -95,6 +120,37 @@ def varying_modulus(draw: Draw) -> Drawn:
     along = math.cos(turn) * ng.x + math.sin(turn) * ng.y
     E = ng.exp(float(draw.uniform(0, math.log(10))) * ng.cos(k * along))
     return Drawn(replace(square(draw), materials={"body": Elastic(E, 0.3)}))
+
+
+def _split(left: float, right: float, *names: str) -> OCCGeometry:
+    """Unit square with an edge from (0, left) to (1, right); the parts below and above, glued."""
+    below = polygon([(0, 0), (1, 0), (1, right), (0, left)], ["bottom", "right", "between", "left"])
+    above = polygon([(0, left), (1, right), (1, 1), (0, 1)], ["between", "right", "top", "left"])
+    faces = (body(name, loop) for name, loop in zip(names, (below, above), strict=True))
+    return OCCGeometry(Glue(list(faces)), dim=2)
+
+
+def _modulus_above(draw: Draw) -> tuple[tuple[float, float], float]:
+    """Heights of a line on both sides of the square, and a modulus above it; 1 below."""
+    left, right = draw.uniform(0.15, 0.85, 2).tolist()
+    return (left, right), float(10 ** draw.uniform(-3, 3))
+
+
+def glued_layers(draw: Draw) -> Drawn:
+    """Moduli that jump by up to 1e3 across an edge of the geometry."""
+    ends, E = _modulus_above(draw)
+    laws = {"below": Elastic(1.0, float(draw.uniform(0, 0.4))), "above": Elastic(E, 0.3)}
+    geometry = _split(*ends, "below", "above")
+    return Drawn(replace(square(draw), geometry=geometry, materials=laws))
+
+
+def jumping_modulus(draw: Draw) -> Drawn:
+    """The same jumps where there is no edge: a warning asks for one."""
+    (left, right), above = _modulus_above(draw)
+    E = ng.IfPos(ng.y - left - (right - left) * ng.x, above, 1.0)
+    scene = replace(square(draw), materials={"body": Elastic(E, 0.3)})
+    resolved = replace(scene, geometry=_split(left, right, "body", "body"))
+    return Drawn(scene, resolved=resolved)
 
 
 def anisotropy(draw: Draw) -> Drawn:
@@ -136,6 +192,8 @@ KINDS: tuple[Callable[[Draw], Drawn], ...] = (
     varying_modulus,
     anisotropy,
     interference,
+    glued_layers,
+    jumping_modulus,
 )
 
 
@@ -147,7 +205,7 @@ def finest(problem: Problem, estimate: float) -> Solution:
     return solution
 
 
-def outcome(seed: int) -> Outcome:
+def outcome(seed: int) -> DataOutcome:
     """The scene of a seed: what the estimate, the bound, and the supports lack.
 
     A warning excuses all but the bound.
@@ -159,25 +217,41 @@ def outcome(seed: int) -> Outcome:
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", ContactWarning)
         solution = solve(drawn.problem, maxh=maxh, order=order)
+        estimate = solution.error_estimate
     warned = any(issubclass(w.category, ContactWarning) for w in caught)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ContactWarning)
-        reference = finest(drawn.problem, solution.error_estimate)
+        reference = finest(drawn.resolved or drawn.problem, estimate)
     error = Overkill(reference).relative_error(solution) * reference.energy_norm
-    ratio, bound = solution.error_estimate / error, solution.error_bound / error
+    ratio, bound = estimate / error, solution.error_bound / error
     lack = max(LEAST / ratio, LEAST / bound)
     if drawn.load is not None:
         force = solution.reactions["bottom"]
         lack = max(lack, math.hypot(*(force + np.array(drawn.load))) / LOST)
-    return solved(
+    line = solved(
         f"{kind.__name__}, order {order}, seed {seed}",
         f"estimate / error {ratio:.2f}, bound {bound:.2f}{', warned' if warned else ''}",
         solution,
         lack,
         math.inf if warned and bound >= LEAST else 1.0,
     )
+    return DataOutcome(
+        **asdict(line), kind=kind.__name__, effectivity=ratio, warned=warned
+    )
 
 
-def outcomes(seed: int = 0, count: int = 66) -> Iterator[Outcome]:
+def summary(found: Sequence[Outcome]) -> Iterator[str]:
+    """Table of all scenes by kind: how many, how many warned, effectivities."""
+    rows = []
+    for kind in KINDS:
+        mine = [o for o in found if isinstance(o, DataOutcome) and o.kind == kind.__name__]
+        if mine:
+            ratio = np.array([o.effectivity for o in mine])
+            figures = (f"{f(ratio):.2f}" for f in (np.min, np.median, np.max))
+            rows.append((kind.__name__, len(mine), sum(o.warned for o in mine), *figures))
+    yield table(("data", "scenes", "warned", "least", "median", "largest"), rows)
+
+
+def outcomes(seed: int = 0, count: int = 66) -> Iterator[DataOutcome]:
     """The scenes of `count` seeds from `seed` on."""
     return map(outcome, range(seed, seed + count))

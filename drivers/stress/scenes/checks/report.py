@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
+from drivers.markdown import table
 from drivers.stress import Outcome
 from drivers.stress.scenes.checks.judging import Verdict
 from drivers.stress.scenes.checks.variants import Finding
@@ -50,14 +51,6 @@ def _state(verdict: Verdict) -> str:
     return "warned" if verdict.answer.warned else "solved"
 
 
-def _table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> Iterator[str]:
-    """Lines of a Markdown table."""
-    yield f"| {' | '.join(head)} |"
-    yield "|" + "---|" * len(head)
-    for row in rows:
-        yield f"| {' | '.join(str(cell) for cell in row)} |"
-
-
 def _kind(name: str, verdicts: Sequence[Verdict]) -> list[object]:
     """The row of a kind."""
     state = Counter(map(_state, verdicts))
@@ -85,7 +78,7 @@ def summary(outcomes: Sequence[Outcome]) -> Iterator[str]:
     verdicts = [o.verdict for o in outcomes if isinstance(o, SceneOutcome)]
     kinds = dict.fromkeys(v.scene.kind for v in verdicts)
     rows = [_kind(k, [v for v in verdicts if v.scene.kind == k]) for k in kinds]
-    yield from _table(
+    yield table(
         ["kind", "scenes", "solved", "warned", "refused", "checks", "warned of", "silent"],
         [*rows, _kind("all", verdicts)],
     )
@@ -93,7 +86,7 @@ def summary(outcomes: Sequence[Outcome]) -> Iterator[str]:
     found: dict[str, list[Finding]] = {}
     for finding in (f for v in verdicts for f in v.findings):
         found.setdefault(_what(finding), []).append(finding)
-    yield from _table(
+    yield table(
         ["check", "times", "median share of the allowed", "largest"],
         [_check(what, found[what]) for what in sorted(found)],
     )
@@ -103,7 +96,7 @@ def summary(outcomes: Sequence[Outcome]) -> Iterator[str]:
         for v in verdicts
         if v.answer.solution is None
     )
-    yield from _table(
+    yield table(
         ["kind", "refused with", "message", "times"],
         [[*cause, times] for cause, times in refusals.most_common()],
     )
