@@ -71,9 +71,11 @@ def half_width_error(study: Study, solution: Solution) -> float:
     return float(np.abs(ends / study.exact.half_width - 1).max())
 
 
-def uniform(problem: Problem, order: int, max_dofs: int) -> Iterator[Solution]:
+def uniform(
+    problem: Problem, order: int, max_dofs: int, maxh: float | None = None
+) -> Iterator[Solution]:
     """Solutions on uniformly refined meshes, warm started; the first one of any size."""
-    solution = solve(problem, first_mesh(problem), order=order)
+    solution = solve(problem, first_mesh(problem, maxh), order=order)
     while True:
         yield solution
         mesh = refined(problem, solution.mesh)

@@ -8,5 +8,6 @@ from .elements import raw_operators as raw_operators
 from .equilibration import Equilibrated as Equilibrated
 from .equilibration import equilibrated as equilibrated
 from .equilibration import into_raw as into_raw
+from .equilibration import settled as settled
 from .field import stress_field as stress_field
 from .sweeps import improved as improved

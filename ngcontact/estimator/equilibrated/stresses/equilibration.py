@@ -167,3 +167,48 @@ def equilibrated(discrete: Discrete, conditions: EdgeConditions, given: Array) -
         change[at] = block.parts.with_divergence(block.rho.sum(axis=1, keepdims=True))[:, 0]
         change[at] -= block.parts.of_multipliers(y)
     return Equilibrated(change, rest)
+
+
+def settled(discrete: Discrete, conditions: EdgeConditions, given: Array) -> Equilibrated:
+    """The stress of all patches together, without what round-off leaves between triangles.
+
+    Where laws are strongly anisotropic tractions are small differences of large multipliers. What
+    is left of them on each patch goes to stresses that are least in a plain norm, where nothing
+    cancels: too small for their energy to matter. `given` (e, 2, r) as in `equilibrated`.
+    """
+    partition, k, frames = discrete.partition, discrete.degree, conditions.frames
+    n, r, size = len(partition.triangles), 2 * (k + 1), 9 * dimension(k) ** 2
+    theta, rest = exchanged_loads(discrete, patch_loads(discrete), given, conditions)
+    scale = 1 / np.sqrt(partition.areas)[:, None, None]
+    y = [np.zeros((n, 3, 3 * r)), np.zeros((n, 3, 3 * r))]
+
+    def plain(at: Index) -> Condensed:
+        return condensed(*(M * scale[at] for M in raw_operators(discrete, at, frames)))
+
+    def added(block: _Block, at: Index) -> Array:
+        return block.parts.with_divergence(block.rho) - _caused(block.parts, y[0][at])
+
+    for step in (0, 1):
+        S, g = np.empty((n, 3, 2 * r, 2 * r)), np.empty((n, 3, 2 * r))
+        X, x = np.empty((n, 3, r, 2 * r)), np.empty((n, 3, r))
+        for at in blocks(n, size):
+            block = _block(discrete, at, frames, theta)
+            t = (block.hatted + added(block, at)) @ block.parts.N.transpose(0, 2, 1)
+            G = plain(at).G if step else block.parts.G
+            S[at], g[at], X[at], x[at] = without_opposite(G, t)
+        lam = multipliers(partition, S, g, conditions, given)
+        for i in range(3):  # the patch of each vertex for itself
+            mine = np.eye(3)[i][:, None]
+            y[step][:, i] = gathered(lam * mine, X, x * mine)
+    change = np.empty((n, 3 * dimension(k)))
+    for at in blocks(n, size):
+        raw = _caused(plain(at), y[1][at].sum(axis=1, keepdims=True))[:, 0] * scale[at, 0]
+        rest_of = np.linalg.solve(into_raw(discrete, at), raw[:, :, None])[:, :, 0]
+        change[at] = added(_block(discrete, at, frames, theta), at).sum(axis=1) - rest_of
+    return Equilibrated(change, rest)
+
+
+def _caused(parts: Condensed, y: Array) -> Array:
+    """Stresses (b, j, n) that multipliers `y` (b, j, E) cause, their divergence taken off again."""
+    c = y @ parts.K.transpose(0, 2, 1)
+    return np.asarray(c - (c @ parts.Q) @ parts.Q.transpose(0, 2, 1))
