@@ -56,6 +56,12 @@ HELP = {
         "parts": ("problems", "patch S1 S3 S7 S8 S9"),
         "levels": ("Number of meshes", "5"),
     },
+    "laws": {
+        "studies": ("layers of two stiffnesses", "'pressed fibres' 'bent fibres' layers graded"),
+        "contrasts": ("largest modulus over the smallest", "1 100 10000 1e+06"),
+        "orders": ("1 to 4", "1 2 3 4"),
+        "max-dofs": ("Number of unknowns", "10000"),
+    },
     "adaptive_study": {
         "studies": ("Problems", "'one transition' 'hertz a=0.3' 'hertz a=0.05'"),
         "orders": ("1 to 4", "1 2 3 4"),
