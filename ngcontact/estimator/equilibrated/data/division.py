@@ -2,8 +2,8 @@
 
 With tractions t1, t2 given on both sides of a vertex in one triangle, a symmetric stress needs
 t1.n2 = t2.n1; in two triangles a jump of the load is one that the edge between them must carry.
-Inside, where four edges lie on two lines, such a condition holds by itself; where they all but do,
-it holds nearly, and a stress that meets it in full would have no bound.
+Two triangles without traction on sides that lie on one line, as patches have them, leave no freedom
+either, and need none; where the sides are bent a little, the little that is missing cannot be met.
 Such triangles are divided from their middle. Those at segments that face vertices of the other body
 are fans from the opposite vertex to these places.
 """
@@ -24,7 +24,7 @@ from .partition import Partition
 from .polynomials import CORNERS, legendre_values
 
 SAME = 1e-12  # difference of tractions, relative to the largest
-STRAIGHT = 1e-11  # sine of the angle between edges of one line, by round-off
+STRAIGHT = 1e-11  # sine of the angle between sides of one line, by round-off
 NEARLY_STRAIGHT = 1e-4  # ... below which its square is lost among eigenvalues of a patch
 
 
@@ -68,33 +68,33 @@ def divided_elements(problem: Problem, boundary: BoundaryTrace, degree: int, une
     # On curves tractions are met in the mean, and curved triangles have no straight parts.
     bent = boundary.element[bent_segments(boundary)]
     divided[bent] = False
-    fixed = divided.copy()
-    fixed[bent] = True
-    divided[_nearly_crossing(view, boundary.nodes[outer], fixed)] = True
+    fixed = np.isin(np.arange(len(divided)), bent)
+    divided[_beside_a_bend(view, fixed)] = True
     return np.asarray(divided)
 
 
-def _nearly_crossing(view: Triangulation, outer: Index, fixed: Mask) -> Index:
-    """A triangle at each vertex whose four edges nearly, but not quite, lie on two lines.
+def _beside_a_bend(view: Triangulation, fixed: Mask) -> Index:
+    """One of each two triangles with a common edge whose other sides at its end are nearly a line.
 
-    Not on the boundary, whose segments have the nodes `outer` (q, p + 1), and not where one of the
-    four triangles is `fixed` (ne,), as those in parts, which have an edge more, and curved ones.
+    Nearly, but not quite, and none that is `fixed` (ne,).
     """
     triangles, x = view.triangles, view.vertices
-    count = np.bincount(triangles.ravel(), minlength=len(x))
-    count[outer[:, [0, -1]]] = 0
-    count[triangles[fixed]] = 0
-    order = np.argsort(triangles.ravel(), kind="stable")
-    start = np.searchsorted(triangles.ravel()[order], np.flatnonzero(count == 4))
-    around, corner = np.divmod(order[start[:, None] + np.arange(4)], 3)
-    # Of the two edges of a triangle at the vertex the first: every edge once.
-    edge = x[triangles[around, (corner + 1) % 3]] - x[triangles[around, corner]]
-    edge /= np.linalg.norm(edge, axis=2, keepdims=True)
-    turn = np.argsort(np.arctan2(edge[..., 1], edge[..., 0]), axis=1)
-    edge = np.take_along_axis(edge, turn[:, :, None], axis=1)
-    one, other = edge[:, :2], edge[:, 2:]
-    bend = np.abs(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0]).max(axis=1)
-    return np.asarray(around[(bend > STRAIGHT) & (bend < NEARLY_STRAIGHT), 0])
+    ends = np.sort(triangles[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+    keys = ends[:, 0] * len(x) + ends[:, 1]
+    order = np.argsort(keys, kind="stable")
+    inner = np.flatnonzero(keys[order][1:] == keys[order][:-1])
+    both = order[np.column_stack([inner, inner + 1])]
+    # (k, side, end, component): from both ends of k edges to the vertices opposite
+    side = x[triangles.ravel()[both]][:, :, None] - x[ends[both[:, 0]]][:, None]
+    side /= np.linalg.norm(side, axis=3, keepdims=True)
+    one, other = side[:, 0], side[:, 1]
+    bend = np.abs(one[..., 0] * other[..., 1] - one[..., 1] * other[..., 0])
+    bent = (bend > STRAIGHT) & (bend < NEARLY_STRAIGHT) & ((one * other).sum(axis=2) < 0)
+    chosen: set[int] = set()
+    for pair in (both[bent.any(axis=1)] // 3).tolist():
+        if chosen.isdisjoint(pair):
+            chosen.update([number for number in pair if not fixed[number]][:1])
+    return np.array(sorted(chosen), dtype=np.intp)
 
 
 def _with_middles(
