@@ -24,7 +24,7 @@ from drivers.command_line import Count, Order, Positive, run
 from drivers.markdown import table
 from drivers.reference.cases import Case
 from drivers.reference.laws import bent_fibres, graded, pressed_fibres, stiff_and_soft
-from drivers.reference.straight import relative_energy_error
+from drivers.reference.straight import energy_error
 from ngcontact import ContactWarning, adapt
 
 Name: TypeAlias = Literal["pressed fibres", "bent fibres", "layers", "graded"]
@@ -85,10 +85,9 @@ def levels(case: Case, strategy: Strategy, order: int, max_dofs: int) -> list[Le
         else:
             solutions = adapt(problem, order=order, max_dofs=max_dofs, maxh=MAXH)
         for solution in solutions:
-            error = relative_energy_error(solution, case.exact)
-            ratios = (solution.relative_error_estimate, solution.relative_error_bound)
-            N = solution.displacement.space.ndof
-            found.append(Level(N, error, *(ratio / error for ratio in ratios)))
+            error, norm = energy_error(solution, case.exact)
+            ratios = (solution.error_estimate / error, solution.error_bound / error)
+            found.append(Level(solution.displacement.space.ndof, error / norm, *ratios))
     return found
 
 
