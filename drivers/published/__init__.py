@@ -1,0 +1,1 @@
+"""Problems that other codes publish: their numbers and ours side by side."""

@@ -1,0 +1,48 @@
+"""Problems that other codes publish: statements, closed forms, and small runs."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import pytest
+
+from drivers.published import __main__ as driver
+from drivers.published.problems import PUBLISHED, Hertz, lame
+
+
+def test_every_problem_can_be_asked_for_and_has_its_source():
+    assert get_args(driver.Name) == tuple(PUBLISHED)
+    assert len(PUBLISHED) >= 8
+    for problem in PUBLISHED.values():
+        assert len(problem.source) > 20
+        assert problem.why.endswith(".")
+        assert problem.figures
+
+
+def test_closed_forms_give_the_published_figures():
+    """Four to six digits, as the sources print them."""
+    roller = Hertz(35e3, 50.0, 1 / (0.91 / 210e3 + 0.91 / 70e3))
+    assert roller.cylinder() == pytest.approx((6.2146, 3585.37), rel=1e-5)
+    spheres = Hertz(1e4, 1.0, 7.5e6)
+    assert spheres.sphere()[0] == pytest.approx(0.1, rel=1e-12)
+    plane = Hertz(188.49556, 8.0, 1000 / 0.91)
+    assert plane.sphere()[0] == pytest.approx(1.010, rel=5e-4)
+    assert lame() == pytest.approx((161.4, 175.0), rel=2e-4)
+
+
+@pytest.mark.parametrize(("name", "max_dofs"), [("patch test", 1000), ("rotating rings", 3000)])
+def test_computed_figures_are_the_published_ones(name, max_dofs):
+    published = PUBLISHED[name]
+    solution = driver.solved(published, 2, max_dofs)
+    for figure, (_, _, _, difference) in zip(
+        published.figures, driver.rows_of(published.figures, solution), strict=True
+    ):
+        assert abs(difference) <= figure.within
+
+
+def test_a_page_is_written(tmp_path, capsys):
+    driver.main(("patch test",), order=1, max_dofs=500, page=tmp_path / "page.md")
+    text = (tmp_path / "page.md").read_text()
+    assert "| mean pressure, Pa | 100000 | 100000 |" in text
+    assert PUBLISHED["patch test"].source in text
+    assert "Contact patch test" in capsys.readouterr().out
