@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias
+from typing import Annotated, Literal, TypeAlias, get_args
 
 import ngsolve as ng
 from cyclopts import Parameter
@@ -95,8 +95,9 @@ def main(
     dict
         The last level of each problem.
     """
-    solutions, sections = {}, []
-    for name in names or tuple(PUBLISHED):
+    solutions: dict[str, Solution] = {}
+    sections = []
+    for name in names or get_args(Name):
         started = time.perf_counter()
         solutions[name] = solved(PUBLISHED[name], order, max_dofs)
         sections.append(section(PUBLISHED[name], solutions[name]))

@@ -243,9 +243,9 @@ def lame() -> tuple[float, float]:
         )
 
     radii = [(outside, inside) for *_, outside, inside in RINGS.values()]
-    for row, (k, r, pressure) in enumerate(((0, radii[0][0], 150.0), (2, radii[2][1], 30.0))):
+    for row, (k, r, given) in enumerate(((0, radii[0][0], 150.0), (2, radii[2][1], 30.0))):
         *M[row, 2 * k : 2 * k + 2], load, _ = radial(k, r)
-        b[row] = -pressure - load
+        b[row] = -given - load
     for k, interference in enumerate((0.025, 0.010)):
         r = radii[k][1]
         (a, b1, load, c), (a2, b2, load2, c2) = radial(k, r), radial(k + 1, r)
@@ -256,6 +256,7 @@ def lame() -> tuple[float, float]:
     x = np.linalg.solve(M, b)
 
     def pressure(k: int) -> float:
+        """Inside ring `k`."""
         a, b1, load, _ = radial(k, radii[k][1])
         return float(-(a * x[2 * k] + b1 * x[2 * k + 1] + load))
 
