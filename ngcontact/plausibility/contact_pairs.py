@@ -11,6 +11,7 @@ from ..arrays import Array, Mask
 from ..contact import ContactState
 from ..fem import BoundaryTrace, Space, bulk_moduli, shear_moduli
 from ..problem import Problem
+from .estimates import moves_rigidly
 from .inclinations import INCLINED, inclinations
 from .penetration import penetration
 from .zones import Zones, zones_of
@@ -58,7 +59,7 @@ def doubts(
 
     Fixed directions far from the normals and strains that are not small, which no mesh mends; of
     the `last` mesh also zones in contact that are too short for it, and bodies that pass through
-    each other between contact points.
+    each other between contact points. Of all pairs together, bodies that nothing resists.
 
     Parameters
     ----------
@@ -87,10 +88,28 @@ def doubts(
     for number, state in enumerate(pairs) if last else ():  # with forces or without
         known = ("strain", number) in found
         if not known and (text := _passed(problem, space, displacement, state, peak)):
-            found["penetration", number] = (
-                f"{f'contact {number} of {state.line.contact.named()}'}: {text}"
-            )
+            name = f"contact {number} of {state.line.contact.named()}"
+            found["penetration", number] = f"{name}: {text}"
+    if text := _unresisted(problem, space, displacement, pairs):
+        found["rigid", 0] = text
     return found
+
+
+def _unresisted(
+    problem: Problem, space: Space, displacement: ng.GridFunction, pairs: Sequence[ContactState]
+) -> str:
+    """Message where bodies in contact move without any deformation, or nothing."""
+    u = displacement.vec.FV().NumPy()
+    touching = any(state.active.any() for state in pairs)
+    if not touching or not u.any() or any(True for _ in _loaded(space, u, pairs)):
+        return ""
+    if not moves_rigidly(problem, space, displacement):
+        return ""
+    return (
+        "nothing deforms: bodies in contact move rigidly, as nothing resists them, and all contact "
+        "forces are round-off; relative errors mean nothing here. Hold the body that is pushed by "
+        "a support or a load if it should resist"
+    )
 
 
 def _inclined(trace: BoundaryTrace, state: ContactState) -> str:

@@ -9,11 +9,12 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, power_of_two, root_of_squares
-from ..fem import Space, incompressibilities
+from ..fem import Space, energy_norm, incompressibilities
 from ..problem import Problem, Triangulation
 
 LEVELS = 2  # after the best one: at twice the unknowns each no mesh is still too coarse
 EXACT = 1e-12  # relative estimate at which refinement stops: the solution is exact
+RIGID = 1e-8  # estimate, relative to its terms, of bodies that do not deform; measured 4e-9
 BEYOND_NOISE = 1e-4  # ... above which no round-off reaches
 STRESS_NOISE = 100 * np.finfo(float).eps  # relative to its terms; measured 0.5 to 50 eps
 RISE = 1.1  # over the best one, which is more than the noise of one level
@@ -27,13 +28,25 @@ def at_round_off(
     Where div u cancels the terms of the stress are of size kappa |grad u|. The estimate divides
     them by the root of mu, their energy by the root of kappa only.
     """
-    u = displacement.vec.FV().NumPy()
-    size = power_of_two(u)  # squares must stay in range
-    terms = size * float(np.sqrt(space.diagonal @ (u / size) ** 2))
+    terms = _terms(space, displacement)
     if estimate > BEYOND_NOISE * terms:  # as nearly always
         return False
+    if estimate <= RIGID * terms and moves_rigidly(problem, space, displacement):
+        return True  # nothing deforms, and the rest is the round-off of gaps
     ratio = float(incompressibilities(problem, space.trace.mesh).max())
     return estimate <= max(EXACT, STRESS_NOISE * math.sqrt(ratio)) * terms
+
+
+def _terms(space: Space, displacement: ng.GridFunction) -> float:
+    """Root of the sum of squares whose differences the energy of a displacement is."""
+    u = displacement.vec.FV().NumPy()
+    size = power_of_two(u)  # squares must stay in range
+    return size * float(np.sqrt(space.diagonal @ (u / size) ** 2))
+
+
+def moves_rigidly(problem: Problem, space: Space, displacement: ng.GridFunction) -> bool:
+    """Whether the energy of a displacement is round-off: no body deforms."""
+    return energy_norm(problem, space, displacement) <= EXACT * _terms(space, displacement)
 
 
 def estimates_rise(estimates: Sequence[float]) -> bool:

@@ -271,3 +271,35 @@ def test_fits_are_silent_at_interferences_that_strains_can_bear():
         contact=[Contact("outer_contact", "inner_contact")],
     )
     assert quiet(finest(problem, order=2, unknowns=2000))
+
+
+PUSHED = "nothing deforms"
+
+
+def pushed(**data):
+    """A block without support, pushed down by 0.1 by another one that is displaced."""
+    given = {
+        "geometry": blocks(),
+        "materials": {"upper": SOFT, "lower": SOFT},
+        "displacement": {"top": (0, -0.1)},
+        "contact": [Contact("lower_contact", "upper_contact")],
+    }
+    return Problem(**(given | data))
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_body_that_nothing_resists_is_told(order):
+    solution = solve(pushed(), maxh=0.5, order=order)
+    assert solution.at((0.3, -0.5)).displacement == pytest.approx((0, -0.1), abs=1e-12)
+    assert only(lambda: solve(pushed(), maxh=0.5, order=order), PUSHED)
+    assert only(lambda: list(adapt(pushed(), order=order)), PUSHED)
+    assert len(list(adapt(pushed(), order=order, tolerance=1e-3))) == 1
+
+
+def test_a_body_that_something_resists_is_not_told():
+    assert quiet(lambda: solve(pushed(force={"lower": (0, 1e-9)}), maxh=0.5, order=2))
+    held = {"top": (0, -0.1), "bottom": (None, 0)}
+    assert quiet(lambda: solve(pushed(displacement=held), maxh=0.5, order=2))
+    open_gap = [Contact("lower_contact", "upper_contact", gap=1.0)]
+    held = {"top": (0, -0.1), "bottom": (0, 0)}
+    assert quiet(lambda: solve(pushed(displacement=held, contact=open_gap), maxh=0.5, order=2))
