@@ -235,9 +235,7 @@ def outcome(seed: int) -> DataOutcome:
         lack,
         math.inf if warned and bound >= LEAST else 1.0,
     )
-    return DataOutcome(
-        **asdict(line), kind=kind.__name__, effectivity=ratio, warned=warned
-    )
+    return DataOutcome(**asdict(line), kind=kind.__name__, effectivity=ratio, warned=warned)
 
 
 def summary(found: Sequence[Outcome]) -> Iterator[str]:

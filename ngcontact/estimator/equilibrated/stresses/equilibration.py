@@ -195,7 +195,7 @@ def settled(discrete: Discrete, conditions: EdgeConditions, given: Array) -> Equ
             block = _block(discrete, at, frames, theta)
             t = (block.hatted + added(block, at)) @ block.parts.N.transpose(0, 2, 1)
             G = plain(at).G if step else block.parts.G
-            S[at], g[at], X[at], x[at] = without_opposite(G, t)
+            S[at], g[at], X[at], x[at] = without_opposite(G, t, discrete.lacking[at])
         lam = multipliers(partition, S, g, conditions, given)
         for i in range(3):  # the patch of each vertex for itself
             mine = np.eye(3)[i][:, None]
