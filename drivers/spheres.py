@@ -2,7 +2,7 @@
 
 Half of the upper ball and half of the lower one by their meridian sections, each held or moved on
 its plane of symmetry; how far the circle of contact spreads is found by the adaptive loop. Writes
-spheres.vtu, spheres_contact.vtp, spheres_revolved.vtu and spheres.png.
+spheres.vtu, spheres_contact.vtp, spheres_revolved.vtu, spheres_revolved_contact.vtp, spheres.png.
 
     python -m drivers.spheres
     python -m drivers.spheres --lower-radius 0.02 --tolerance 1e-3 --out out/

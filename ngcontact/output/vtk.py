@@ -113,7 +113,7 @@ def _bodies(solution: SolutionData) -> pyvista.UnstructuredGrid:
     grid.point_data["von_mises"] = von_mises(stress)
     grid.cell_data["body"] = nodes.body
     grid.field_data["body_names"] = list(nodes.names)
-    _name_pairs(grid, solution)
+    name_pairs(grid, solution)
     if solution.estimated:
         grid.cell_data["indicators"] = np.asarray(solution.indicators, dtype=float)
     return grid
@@ -126,7 +126,7 @@ def _contact_points(solution: SolutionData) -> pyvista.PolyData:
     points = np.asarray(solution.points, dtype=float).reshape(-1, 2)
     if len(points) == 0:
         data = pyvista.PolyData()
-        _name_pairs(data, solution)
+        name_pairs(data, solution)
         return data
     lines = []
     for pair in np.unique(solution.pair):
@@ -144,11 +144,11 @@ def _contact_points(solution: SolutionData) -> pyvista.PolyData:
     traction = np.zeros((len(points), 3))
     traction[:, :2] = -np.asarray(solution.pressure)[:, None] * solution.direction
     data.point_data["traction"] = traction
-    _name_pairs(data, solution)
+    name_pairs(data, solution)
     return data
 
 
-def _name_pairs(data: pyvista.DataSet, solution: SolutionData) -> None:
+def name_pairs(data: pyvista.DataSet, solution: SolutionData) -> None:
     """Names of the pairs as field data, in the order of their numbers."""
     contact = solution.problem.contact
     if contact:  # VTK has no empty list of strings

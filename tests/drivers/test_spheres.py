@@ -72,6 +72,7 @@ def test_the_driver_agrees_with_the_formulas(tmp_path, capsys):
     assert computed.radius == pytest.approx(expected.radius, rel=3e-3)
     assert "radius of contact, mm" in capsys.readouterr().out
     names = {"spheres.vtu", "spheres_contact.vtp", "spheres_revolved.vtu", "spheres.png"}
+    names.add("spheres_revolved_contact.vtp")
     assert {path.name for path in tmp_path.iterdir()} == names
     contact = pyvista.read(tmp_path / "spheres_contact.vtp")
     assert contact["pressure"].max() == computed.peak

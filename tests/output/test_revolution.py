@@ -39,6 +39,34 @@ def test_the_body_is_turned(tmp_path, pressed, angle, sections):
     assert grid["von_mises"] == pytest.approx(1, abs=1e-9)
 
 
+@pytest.mark.parametrize(("angle", "sections"), [(360.0, 60), (90.0, 16)])
+def test_the_surface_of_contact_is_turned(tmp_path, pressed, angle, sections):
+    """Its area between chords, and the pressure of 1 that pushes the upper body up."""
+    pressed.revolved(tmp_path / "body.vtu", angle=angle)
+    surface = pyvista.read(tmp_path / "body_contact.vtp")
+    steps = sections if angle == 360 else sections - 1
+    turn = math.radians(angle)
+    chords = math.sin(turn / steps) / (turn / steps)
+    assert surface.area == pytest.approx(turn / 2 * (1 - 0.25) * chords, rel=1e-6)  # single floats
+    assert surface.n_points == sections * len(pressed.points)
+    assert surface["pressure"] == pytest.approx(1, abs=1e-9)
+    assert surface["traction"] == pytest.approx(np.tile([0.0, 0.0, 1.0], (surface.n_points, 1)))
+    assert np.abs(surface["gap"]).max() < 1e-9
+    assert surface["active"].all()
+    assert list(surface.field_data["secondary_names"]) == ["upper_contact"]
+
+
+def test_radial_tractions_turn_with_the_surface(tmp_path):
+    problem, exact = cases.fitted_rings()
+    solve(problem, maxh=0.3, order=2).revolved(tmp_path / "fit.vtu")
+    surface = pyvista.read(tmp_path / "fit_contact.vtp")
+    x, y, _ = surface.points.T
+    # On the sleeve, inwards.
+    radial = -(surface["traction"][:, :2] * np.column_stack([x, y])).sum(axis=1) / np.hypot(x, y)
+    assert radial == pytest.approx(surface["pressure"], rel=1e-6)
+    assert radial == pytest.approx(np.full(len(radial), exact.p), rel=0.1)
+
+
 def test_what_is_refused(tmp_path, pressed):
     for angle in (0, -1, 361, math.nan):
         with pytest.raises(ValueError, match="give degrees above 0, at most 360"):
