@@ -34,6 +34,13 @@ def test_uniform_pressure_has_no_error(inner, order):
     assert high - low <= IN_SPACE * solution.energy_norm**2
 
 
+@pytest.mark.parametrize("inner", [0.0, 0.5])
+def test_uniform_pressure_on_rows_that_are_means(inner):
+    solution = solve(cases.pressed_cylinders(inner, rows="dual"), maxh=0.5, order=2)
+    assert solution.relative_error_bound <= IN_SPACE
+    certified(solution)
+
+
 def with_shear(inner, factor=1.0):
     """U = (r z, r^2 + z^2) / 100 with what it takes of body forces, held on all sides."""
     r, z, law = ng.x, ng.y, moduli(FIRST)

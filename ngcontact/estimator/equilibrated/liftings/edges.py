@@ -213,6 +213,8 @@ def _norms_about_axis(discrete: Discrete, field: EdgeField) -> Array:
 def _hats_about_axis(discrete: Discrete, triangle: Index, corner: Index, moves: Array) -> Array:
     """The norms of hats about an axis, of straight triangles."""
     partition = discrete.partition
+    if triangle.size == 0:
+        return np.zeros(0)
     if (discrete.curves.number[partition.edges[triangle]] >= 0).any():
         raise ValueError(
             "no guaranteed bound is known for rows that are means on curves about an axis; "
