@@ -155,6 +155,23 @@ def test_a_slip_along_a_curved_zone_is_no_gap(order):
     assert found[1] == pytest.approx(found[0], rel=2e-3)
 
 
+@pytest.mark.parametrize("turn", [0.1, 1.0])
+def test_the_estimate_of_a_slip_falls_as_the_mesh_size(turn):
+    """By the mesh's normals it fell like its root, at order 1."""
+    exact = ring_solution(cases.FIRST, cases.SECOND, q0=1e-3)
+    problem = Problem(
+        geometry=rings(quarter=False),
+        materials={"outer": cases.FIRST, "inner": cases.SECOND},
+        displacement={
+            "rim": exact.displacement["outer"] + turn * ng.CF((-ng.y, ng.x)),
+            "hole": exact.displacement["inner"],
+        },
+        contact=[Contact("outer_contact", "inner_contact")],
+    )
+    coarse, fine = (solve(problem, maxh=h).relative_error_estimate for h in (0.4, 0.1))
+    assert np.log2(coarse / fine) / 2 > 0.85  # meshes made anew; 0.5 before
+
+
 def reference_error(solution, reference):
     """Stress of a solution less that of another on other elements, relative, by energy."""
     points = reference.mesh.MapToAllElements(ng.IntegrationRule(ng.TRIG, 8), ng.VOL)
