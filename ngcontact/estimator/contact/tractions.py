@@ -11,7 +11,6 @@ import numpy as np
 from ...arrays import Array, Index, Mask
 from ...contact import ContactLine, ContactState
 from ...fem import BoundaryTrace
-from ...lagrange import gauss_lobatto
 from ..terms import (
     DATA_BONUS,
     BoundaryResidual,
@@ -68,7 +67,7 @@ def on_contact(
         return BoundaryTerms()
     order = 2 * solution.order + DATA_BONUS
     points = facing_points(boundary, line, following_gap(boundary, line, pieces, order), order)
-    nodal = pressure_on_segments(nodal, solution.order)
+    nodal = pressure_on_segments(nodal, boundary.places(line.segments))
     pressure = (boundary.shapes(points.segment, points.s) * nodal[points.local]).sum(axis=1)
     pressure /= solution.unit
     full = np.asarray(active.all(axis=1))[points.local]
@@ -132,7 +131,7 @@ def at_nodes(
     return pressure, active
 
 
-def pressure_on_segments(values: Array, order: int) -> Array:
+def pressure_on_segments(values: Array, places: Array) -> Array:
     """Nodal values (k, order + 1) of pi_h on each segment of the secondary.
 
     At a node without a value, NaN, what the polynomial through the segment's other nodes has there;
@@ -142,14 +141,14 @@ def pressure_on_segments(values: Array, order: int) -> Array:
     ----------
     values : ndarray (k, order + 1)
         Pressures at the nodes.
-    order : int
-        Degree of pi_h.
+    places : ndarray (k, order + 1)
+        Parameters of the nodes.
     """
-    nodes, missing = gauss_lobatto(order), np.isnan(values)
+    missing = np.isnan(values)
     values = np.where(missing, 0.0, values)
     for k in np.flatnonzero(missing.any(axis=1) & ~missing.all(axis=1)):
         known = ~missing[k]
-        powers = np.vander(2 * nodes - 1, int(known.sum()))
+        powers = np.vander(2 * places[k] - 1, int(known.sum()))
         values[k, missing[k]] = powers[missing[k]] @ np.linalg.solve(
             powers[known], values[k, known]
         )
