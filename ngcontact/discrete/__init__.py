@@ -1,4 +1,4 @@
-"""The discrete problems (P_1h), (P_2h) of HH81: assembled, in equilibrium, started, re-used."""
+"""The discrete problems (P_1h), (P_2h) of HH81: assembled, in equilibrium, started, reused."""
 
 from .discrete_problem import DiscreteProblem as DiscreteProblem
 from .discrete_problem import discretise as discretise
