@@ -11,10 +11,9 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Literal, TypeAlias, get_args
+from typing import Literal, TypeAlias, get_args
 
 import ngsolve as ng
-from cyclopts import Parameter
 
 from drivers.command_line import Count, Order, run
 from drivers.published.problems import PUBLISHED, Figure, Published
@@ -71,7 +70,7 @@ def section(published: Published, solution: Solution) -> str:
 
 
 def main(
-    names: Annotated[tuple[Name, ...], Parameter(negative="")] = (),
+    names: Sequence[Name] = get_args(Name),
     *,
     order: Order = 3,
     max_dofs: Count = 15_000,
@@ -81,8 +80,8 @@ def main(
 
     Parameters
     ----------
-    names : tuple of str
-        Problems; all where none is named.
+    names : sequence of str
+        Problems, by name.
     order : int
         Degree of the displacement on each element, 1 to 4.
     max_dofs : int
@@ -97,7 +96,7 @@ def main(
     """
     solutions: dict[str, Solution] = {}
     sections = []
-    for name in names or get_args(Name):
+    for name in names:
         started = time.perf_counter()
         solutions[name] = solved(PUBLISHED[name], order, max_dofs)
         sections.append(section(PUBLISHED[name], solutions[name]))

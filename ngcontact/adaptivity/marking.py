@@ -7,10 +7,14 @@ import numpy as np
 from ..arrays import Array, Mask
 
 SPARE = 1e-14  # share of a sum that round-off may keep from being carried
+DIGITS = 30  # binary ones in which squares are compared: what round-off tells apart is one number
 
 
 def doerfler(indicators: Array, theta: float) -> Mask:
     """Smallest set of elements that carries the share `theta` of the squared indicators.
+
+    Of equal ones the first are marked, also where round-off makes a difference: elements that are
+    mirror images of each other, or parts of one, have the same indicators on any machine.
 
     Parameters
     ----------
@@ -30,7 +34,9 @@ def doerfler(indicators: Array, theta: float) -> Mask:
     array([False,  True, False])
     """
     squares = (indicators / max(indicators.max(initial=0.0), np.finfo(float).tiny)) ** 2
-    order = np.argsort(-squares, kind="stable")
+    mantissa, exponent = np.frexp(squares)
+    compared = np.ldexp(np.round(np.ldexp(mantissa, DIGITS)), exponent - DIGITS)
+    order = np.argsort(-compared, kind="stable")
     carried = np.cumsum(squares[order])
     marked = np.zeros(len(indicators), dtype=bool)
     if carried.size and carried[-1] > 0:

@@ -121,7 +121,8 @@ def test_a_mesh_changed_in_place_is_another_mesh() -> None:
 def test_a_level_of_an_adaptive_run_starts_a_sequence() -> None:
     *_, level = adapt(pressed(), order=2, max_dofs=3000)
     second = solve(pressed(2.0), level.mesh, order=2, start=level)
-    assert (second.work["assemblies"], second.work["factorizations"]) == (0, 1)
+    # The last level of a run keeps its factorisation; those before lose theirs to the next one.
+    assert (second.work["assemblies"], second.work["factorizations"]) == (0, 0)
     third = solve(pressed(3.0), level.mesh, order=2, start=second)
     assert (third.work["assemblies"], third.work["factorizations"]) == (0, 0)
     same(third, solve(pressed(3.0), level.mesh, order=2))

@@ -52,6 +52,19 @@ HELP = {
         "tolerance": ("relative in the energy norm", "0.01"),
         "out": ("Folder", "out"),
     },
+    "published": {
+        "names": ("Problems", "roller 'crushed spheres'"),
+        "order": ("1 to 4", "3"),
+        "max-dofs": ("Number of unknowns", "15000"),
+        "page": ("File", "none"),
+    },
+    "bounds": {
+        "studies": ("Problems", "'one transition' 'hertz a=0.3' 'flat punch'"),
+        "orders": ("1 to 4", "2 4"),
+        "max-dofs": ("Unknowns", "15000"),
+        "reference": ("Unknowns", "40000"),
+        "out": ("Folder", "out"),
+    },
     "convergence": {
         "parts": ("problems", "patch S1 S3 S7 S8 S9"),
         "levels": ("Number of meshes", "5"),

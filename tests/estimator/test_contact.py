@@ -22,4 +22,6 @@ def test_a_node_without_a_point_continues_the_others(order, axis):
 
 
 def test_segments_without_points_have_no_pressure():
-    assert pressure_on_segments(np.full((1, 2), np.nan), np.array([[0.0, 1.0]])).tolist() == [[0, 0]]
+    assert pressure_on_segments(np.full((1, 2), np.nan), np.array([[0.0, 1.0]])).tolist() == [
+        [0, 0]
+    ]
