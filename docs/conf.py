@@ -30,7 +30,6 @@ extensions = [
     "source_lines",
 ]
 exclude_patterns = ["extensions"]
-suppress_warnings = ["toc.empty_glob"]  # the gallery lists what is there
 
 # Pages.
 myst_enable_extensions = ["attrs_inline", "colon_fence", "deflist", "dollarmath", "fieldlist"]
