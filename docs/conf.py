@@ -28,6 +28,7 @@ extensions = [
     "mathml",
     "docstrings",
     "source_lines",
+    "thumbnails",
 ]
 exclude_patterns = ["extensions"]
 
