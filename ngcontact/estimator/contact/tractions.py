@@ -245,4 +245,4 @@ def _gap_squares(
     closed = np.maximum(pressure, 0) * opening  # (3.12), (3.12')
     closing = np.minimum(closed, cost(opening))
     # (3.9), (3.9')
-    return np.where(full, closing, closed), cost(depth)
+    return np.where(full, closing, closed), cost(depth, or_more=True)

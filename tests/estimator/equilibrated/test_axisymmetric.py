@@ -9,7 +9,8 @@ from drivers.reference import axisymmetric_cases as cases
 from drivers.reference.axisymmetric import relative_energy_error
 from drivers.reference.cases import FIRST
 from drivers.reference.westergaard import moduli
-from ngcontact import Problem, adapt, solve
+from ngcontact import Contact, Elastic, Problem, adapt, solve
+from ngcontact.geometries import rounded_punch
 
 RESIDUAL = 1e-10  # of equilibrium, jumps and tractions, relative to the largest stress
 IN_SPACE = 1e-11  # bounds of solutions that elements contain: round-off; measured 4e-13
@@ -124,3 +125,22 @@ def test_loads_that_are_no_polynomials():
     assert solution.error_bound**2 >= 2 * (solution.energy - finer.energy_bounds[1])
     with pytest.raises(ValueError, match="loads at the axis are no polynomials"):
         solve(loaded(0.0), maxh=0.3, order=2).error_bound  # noqa: B018
+
+
+@pytest.mark.filterwarnings("ignore::ngcontact.ContactWarning")  # a zone of three segments
+def test_a_punch_whose_dual_rows_move_no_vertex():
+    """The bound was refused with an error of NumPy's, of an empty array.
+
+    Whatever the mesh, |u - u_h|^2 is at least twice what the energy is above that of a finer one.
+    """
+    problem = Problem(
+        geometry=rounded_punch(0.6, 0.3),
+        materials={"indenter": Elastic(1.0, 0.3), "block": Elastic(0.2, 0.4)},
+        displacement={"block_bottom": (0, 0)},
+        traction={"indenter_top": (0, -0.01)},
+        contact=[Contact("end", "block_top", direction=(0, -1))],
+        model="axisymmetric",
+    )
+    solution, finer = solve(problem, maxh=0.35, order=2), solve(problem, maxh=0.1, order=3)
+    assert solution.error_bound**2 > 2 * (solution.energy - finer.energy) > 0
+    certified(solution)

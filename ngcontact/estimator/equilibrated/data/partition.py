@@ -150,7 +150,7 @@ class Partition:
         where = barycentric(points) @ self.within[at]
         places = self._mesh_points[np.repeat(self.parent[at], len(points))].copy()
         places["x"], places["y"] = where.reshape(-1, 2).T
-        return np.asarray(function(places)).reshape(len(at), len(points), -1)
+        return np.asarray(function(places)).reshape(len(at), len(points), function.dim)
 
     def places(self, at: Index, points: Array) -> Array:
         """Places (k, q, 2) of reference `points` (q, 2) of the triangles `at` (k,)."""
