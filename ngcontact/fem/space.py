@@ -74,7 +74,7 @@ def _check_normals(trace: BoundaryTrace, boundary: str) -> None:
     if ((normal * trace.normal(segments, s)).sum(axis=1) < 0).any():
         raise ValueError(
             f'the normals of the boundary "{boundary}" point into the body; its segments must run '
-            "with the body on their left"
+            "with the body on their left: exchange the ends of each"
         )
 
 

@@ -14,6 +14,7 @@ from drivers.reference import cases
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
 from ngcontact.estimator import Quantity
 from ngcontact.estimator.equilibrated import bound
+from ngcontact.geometries import disc_on_disc
 from tests.scenes import unmatched_blocks
 
 
@@ -223,6 +224,24 @@ def test_refused_scenes_have_quantities():
     q = said_once(solution)
     assert "curves that meet the axis" in q.note
     assert q["force"].value == pytest.approx(np.linalg.norm(solution.contact_force()), rel=1e-12)
+
+
+def test_a_contact_on_few_elements_at_the_axis_is_refused_in_words():
+    """Of balls at order 1 no row is a mean over inner elements: an empty list is no failure."""
+    problem = Problem(
+        geometry=disc_on_disc(5.0, 8.0),
+        materials={"upper": Elastic(210e3, 0.3), "lower": Elastic(70e3, 0.33)},
+        displacement={"bottom": (None, 0), "top": (None, -0.1)},
+        contact=[Contact("upper_arc", "lower_arc", direction=(0, -1))],
+        model="axisymmetric",
+    )
+    with pytest.warns(ContactWarning, match="0.5 segments long"):
+        solution = solve(problem, maxh=1.0)
+    q = said_once(solution)
+    assert "no guaranteed bound is known" in q.note
+    (peak,) = (row for row in q if row.name == "peak pressure")
+    assert tuple(peak.place) == (0.0, 0.0)  # not the 1e-31 of the CAD kernel
+    assert "at (0, 0)" in str(peak)
 
 
 def test_one_element_has_no_neighbour_to_compare_with():

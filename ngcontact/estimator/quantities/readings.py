@@ -105,7 +105,15 @@ class Measured(Guaranteed):
             _energy(self, proof is not None),
             largest_von_mises(boundary.mesh, stresses, proof),
         ]
-        return Quantities(tuple(rows), reason)
+        size = float(np.abs(boundary.curve).max())
+        return Quantities(tuple(_without_round_off(row, size) for row in rows), reason)
+
+
+def _without_round_off(row: Quantity, size: float) -> Quantity:
+    """The row with 0 for coordinates of its place that are round-off of bodies of extent `size`."""
+    if row.place is None:
+        return row
+    return replace(row, place=np.where(np.abs(row.place) < 1e-14 * size, 0.0, row.place))
 
 
 def _force_error(solution: _Solved, pair: int) -> tuple[float, str]:
@@ -125,4 +133,4 @@ def _energy(solution: _Solved, proved: bool) -> Quantity:
     if not proved:
         return Quantity("energy", value, solution.error_estimate**2, "estimated")
     low, high = solution.energy_bounds
-    return Quantity("energy", value, max(high - value, value - low), "guaranteed")
+    return Quantity("energy", value, float(max(high - value, value - low)), "guaranteed")
