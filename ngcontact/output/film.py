@@ -135,4 +135,11 @@ def _images(
         canvas.draw()
         images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
     size = images[0].size
-    return [(image if image.size == size else image.resize(size)).quantize(256) for image in images]
+    images = [image if image.size == size else image.resize(size) for image in images]
+    # One palette for all: of its own each frame would show one stress in another colour.
+    strip = Image.fromarray(np.vstack([np.asarray(image) for image in images]))
+    colours = np.array(strip.quantize(256).getpalette() or [255] * 3).reshape(-1, 3)
+    colours[(colours >= 240).all(axis=1)] = 255  # Pillow would take a neighbour of white
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(colours.ravel().tolist())
+    return [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]

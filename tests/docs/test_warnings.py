@@ -30,6 +30,8 @@ def texts():
             match node:
                 case ast.Call(func=ast.Name(id="warn"), args=[ast.JoinedStr() as message]):
                     warned.append(fixed(message))
+                case ast.Return(value=ast.Constant(value=str(message))):
+                    every.append(message)
     return every, warned
 
 
