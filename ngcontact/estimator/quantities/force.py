@@ -10,7 +10,7 @@ import numpy as np
 
 from ...arrays import Array, Mask
 from ...contact import ContactState, by_line
-from ...fem import Space, load_vector, stress_of
+from ...fem import Space, has_rough_loads, load_vector, stress_of
 from ...problem import Problem
 from ..equilibrated import FINE, EquilibratedStress, Tested, force_bar
 
@@ -85,6 +85,8 @@ def proved_force_error(solution: Forced, pair: int) -> float:
     """
     if not solution.problem.model.startswith("plane"):
         raise ValueError(f'no bar of the force is proved for "{solution.problem.model}"')
+    if has_rough_loads(solution.problem, solution.discrete.space.V):
+        raise ValueError("loads that are rougher than the mesh count as they are integrated")
     force = solution.contact_force(pair)
     size = float(np.linalg.norm(force))
     e = force / size if size > 0 else np.array([1.0, 0.0])

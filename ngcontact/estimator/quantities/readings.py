@@ -106,7 +106,16 @@ class Measured(Guaranteed):
             largest_von_mises(boundary.mesh, stresses, proof),
         ]
         size = float(np.abs(boundary.curve).max())
-        return Quantities(tuple(_without_round_off(row, size) for row in rows), reason)
+        notes = [reason, "" if proof is None else _domain(proof, boundary)]
+        note = "; ".join(text for text in notes if text)
+        return Quantities(tuple(_without_round_off(row, size) for row in rows), note)
+
+
+def _domain(proof: EquilibratedStress, boundary: BoundaryTrace) -> str:
+    """What is to be said of curved boundaries: what is proved is proved on the mesh's domain."""
+    if not (proof.proof.discrete.curves.number >= 0).any():
+        return ""
+    return f"guaranteed on the domain of the mesh, of curves of degree {boundary.geometry_order}"
 
 
 def _without_round_off(row: Quantity, size: float) -> Quantity:
