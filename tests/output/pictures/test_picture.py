@@ -90,6 +90,7 @@ def test_without_a_path_the_picture_is_shown(monkeypatch):
     matplotlib.use("Agg")
     from matplotlib import pyplot
 
+    pyplot.close("all")  # of pages that were run
     shown = []
     monkeypatch.setattr(pyplot, "show", lambda: shown.append(pyplot.get_fignums()))
     figure = plot_solution(stub(1))
