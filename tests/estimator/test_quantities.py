@@ -240,7 +240,7 @@ def test_a_contact_on_few_elements_at_the_axis_has_a_bound_or_is_refused_in_word
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ContactWarning)
         q = solution.quantities()
-    # Round-off in loads at the axis, other with other NumPy, decides which: a bound, or these words.
+    # Round-off in loads at the axis, which depends on NumPy, decides: a bound, or these words.
     assert q["energy"].guaranteed or "no guaranteed bound is known" in q.note
     assert q["energy"].error > 0
     (peak,) = (row for row in q if row.name == "peak pressure")
