@@ -57,9 +57,12 @@ def solved(task: Task) -> Row:
 
 
 def one_thread() -> None:
-    """Let the libraries of all workers to come use one thread: there is one for each core."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"
+    """Let the libraries of all workers to come use one thread: there is one for each core.
+
+    NGSolve's, too: its Cholesky factorisation starts threads of its own, which wait by spinning.
+    """
+    for library in ("OMP", "OPENBLAS", "MKL", "NGS"):
+        os.environ[f"{library}_NUM_THREADS"] = "1"
 
 
 def by_processes(tasks: Sequence[Task], processes: int) -> list[Row]:
@@ -71,10 +74,10 @@ def by_processes(tasks: Sequence[Task], processes: int) -> list[Row]:
 
 def by_joblib(tasks: Sequence[Task], processes: int) -> list[Row]:
     """Rows by joblib, whose workers are new interpreters, too."""
-    from joblib import Parallel, delayed
+    from joblib import Parallel, delayed, parallel_config
 
-    with Parallel(n_jobs=processes, backend="loky") as parallel:
-        return list(parallel(delayed(solved)(task) for task in tasks))
+    with parallel_config("loky", n_jobs=processes, inner_max_num_threads=1):
+        return list(Parallel()(delayed(solved)(task) for task in tasks))
 
 
 def by_dask(tasks: Sequence[Task], processes: int) -> list[Row]:
