@@ -115,7 +115,7 @@ def main(
     Parameters
     ----------
     studies : sequence of str
-        Problems, by name.
+        Problems of the adaptive study, by name.
     orders : sequence of int
         Degrees of the displacement on each element, 1 to 4.
     max_dofs : int

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -117,27 +118,15 @@ def sphere_on_plane(radius: float, law: Elastic, load: float) -> Callable[[], Pr
     )
 
 
-def pressed_spheres() -> Problem:
-    """Two hemispheres, a pressure on the upper one."""
-    return Problem(
-        geometry=disc_on_disc(2.0, 2.0),
-        materials={"upper|lower": Elastic(E=1.40625e7, nu=0.25)},
+def pressed_halves(radius: float, law: Elastic, load: float, **kind: Any) -> Callable[[], Problem]:
+    """Two equal halves of spheres or cylinders of one law, a pressure `load` on the upper one."""
+    return lambda: Problem(
+        geometry=disc_on_disc(radius, radius),
+        materials={"upper|lower": law},
         displacement={"bottom": (None, 0)},
-        traction={"top": (0, -1e4 / (np.pi * 2**2))},
+        traction={"top": (0, -load)},
         contact=[Contact("upper_arc", "lower_arc", direction=(0, -1))],
-        model="axisymmetric",
-    )
-
-
-def cylinders() -> Problem:
-    """Halves of two cylinders, mm and MPa."""
-    return Problem(
-        geometry=disc_on_disc(5.0, 5.0),
-        materials={"upper|lower": Elastic(E=200e3, nu=0.3)},
-        displacement={"bottom": (None, 0)},
-        traction={"top": (0, -20.0)},
-        sliding="axis",
-        contact=[Contact("upper_arc", "lower_arc", direction=(0, -1))],
+        **kind,
     )
 
 
@@ -314,7 +303,12 @@ PUBLISHED: dict[str, Published] = {
         title="Two spheres under a force",
         source="MOOSE, modules/contact/test/tests/hertz_spherical, comments of hertz_contact_rz.i",
         statement="Spheres R = 2, E = 1.40625e7, nu = 0.25; F = 10 000.",
-        problem=pressed_spheres,
+        problem=pressed_halves(
+            2.0,
+            Elastic(E=1.40625e7, nu=0.25),
+            1e4 / (np.pi * 2**2),
+            model="axisymmetric",
+        ),
         figures=(
             Figure("radius of contact", 0.1, half_width(), 5e-3),
             Figure("peak pressure", Hertz(1e4, 1.0, 7.5e6).sphere()[1], peak(), 5e-3),
@@ -326,7 +320,7 @@ PUBLISHED: dict[str, Published] = {
         source="GetFEM, Python example of Hertz contact between two cylinders",
         statement="Cylinders R = 5 mm, E = 200 GPa, nu = 0.3, plane strain; 20 MPa on the "
         "equator, 200 N per mm. The figures are Hertz's.",
-        problem=cylinders,
+        problem=pressed_halves(5.0, Elastic(E=200e3, nu=0.3), 20.0, sliding="axis"),
         figures=(
             Figure("half-width, mm", Hertz(200, 2.5, 1e5 / 0.91).cylinder()[0], half_width(), 2e-3),
             Figure("peak pressure, MPa", Hertz(200, 2.5, 1e5 / 0.91).cylinder()[1], peak(), 2e-3),
