@@ -17,6 +17,7 @@ from ....arrays import Array, Index
 from ..data import (
     CORNERS,
     HIGHER,
+    OF_AXIS,
     PART_DEGREE,
     PARTS,
     Discrete,
@@ -40,12 +41,10 @@ def _operators(degree: int, corners: Array) -> tuple[Array, Array]:
     table = basis(degree)
     sides = np.stack([corners[0] - corners[2], corners[1] - corners[2]], axis=1)
     inverse = np.linalg.inv(sides)
-    of_axis = np.zeros((2, 2, 3))  # which derivative of which stress in which component
-    of_axis[0, 0, 0] = of_axis[0, 1, 2] = of_axis[1, 0, 2] = of_axis[1, 1, 1] = 1.0
-    D = np.einsum("cds,rd,rij->cisj", of_axis, inverse, table.derivatives)
+    D = np.einsum("cds,rd,rij->cisj", OF_AXIS, inverse, table.derivatives)
     edges = np.roll(corners, -2, axis=0) - np.roll(corners, -1, axis=0)
     normals = np.stack([edges[:, 1], -edges[:, 0]], axis=1)
-    N = np.einsum("cds,ed,eqj->ecqsj", of_axis, normals, table.traces)
+    N = np.einsum("cds,ed,eqj->ecqsj", OF_AXIS, normals, table.traces)
     return D.reshape(-1, 3 * dimension(degree)), N.reshape(3, 2 * (degree + 1), -1)
 
 
