@@ -8,5 +8,6 @@ from .multigrid import Multigrid as Multigrid
 from .multigrid import truncated_multigrid as truncated_multigrid
 from .sparse import cholesky as cholesky
 from .sparse import congruent as congruent
+from .sparse import inverse_of as inverse_of
 from .sparse import lower_half as lower_half
 from .sparse import shared as shared

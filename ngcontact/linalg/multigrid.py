@@ -10,7 +10,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Mask
 from .coarse_spaces import Coarsening
-from .sparse import handed_over
+from .sparse import handed_over, inverse_of
 
 TRIAL = 25  # V-cycles after which is judged whether the target will be reached
 
@@ -175,5 +175,5 @@ def truncated_multigrid(matrix: ng.BaseMatrix, steps: list[Coarsening], free: Ma
         coarse = free[step.kept]
         matrix = _galerkin(matrix, step.P, free, coarse)
         free = coarse
-    inverse = matrix.Inverse(ng.BitArray(free), inverse="sparsecholesky")
+    inverse = inverse_of(matrix, ng.BitArray(free))
     return Multigrid(levels=levels, inverse=inverse)

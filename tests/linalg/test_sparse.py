@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from ngcontact.linalg.sparse import cholesky, congruent, lower_half, shared
+from ngcontact.linalg.sparse import cholesky, congruent, lower_half, one_thread, shared
 
 SIZE = 40
 
@@ -85,3 +85,60 @@ def test_factorisation_of_principal_parts():
     solution = cholesky(lower_half(K))(free)(right)
     assert (solution[~free] == 0).all()
     np.testing.assert_allclose((K @ solution)[free], right[free], atol=1e-13 * np.abs(right).max())
+
+
+@pytest.fixture
+def two_threads():
+    before = ng.ngsglobals.numthreads
+    ng.SetNumThreads(2)
+    yield
+    ng.SetNumThreads(before)
+
+
+def managed():
+    """Threads of a manager that is started, or already there."""
+    with ng.TaskManager():
+        return ng.GetNumThreads()
+
+
+@pytest.mark.usefixtures("two_threads")
+def test_one_thread_within_and_as_many_as_before_after():
+    with one_thread():
+        assert managed() == 1
+        with one_thread():
+            assert managed() == 1
+        assert managed() == 1
+    assert managed() == 2
+    with pytest.raises(KeyError), one_thread():
+        raise KeyError
+    assert managed() == 2
+    assert ng.GetNumThreads() == 1  # none is left running
+
+
+@pytest.mark.usefixtures("two_threads")
+def test_the_callers_threads_stay():
+    with ng.TaskManager():
+        with one_thread():
+            assert ng.GetNumThreads() == 2
+        assert ng.GetNumThreads() == 2
+
+
+@pytest.mark.usefixtures("two_threads")
+def test_small_factorisations_are_the_same_on_any_number_of_threads(monkeypatch):
+    """To the last bit, since one thread makes them."""
+    inside = []
+    inverse = ng.BaseMatrix.Inverse
+
+    def watched(matrix, *given, **named):
+        inside.append(managed())
+        return inverse(matrix, *given, **named)
+
+    monkeypatch.setattr(ng.BaseMatrix, "Inverse", watched)
+    rng = np.random.default_rng(4)
+    K, right = definite(rng, 400), rng.normal(size=400)
+    solutions = []
+    for count in (1, 2):
+        ng.SetNumThreads(count)
+        solutions.append(cholesky(lower_half(K))(np.ones(400, dtype=bool))(right))
+    np.testing.assert_array_equal(*solutions)
+    assert inside == [1, 1]

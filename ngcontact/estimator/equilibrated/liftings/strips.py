@@ -16,6 +16,7 @@ from numpy.polynomial import legendre
 from ....arrays import Array, Index, Mask
 from ....fem import BoundaryTrace, edge_bubbles, model_of
 from ....lagrange import gauss_lobatto
+from ....linalg import inverse_of
 from ....problem import Problem, Triangulation, varies
 from ..data import Discrete, EdgeConditions, Units, legendre_values, triangle_rule
 from .edges import EdgeField, norms
@@ -119,7 +120,7 @@ def _relax(
     a.Assemble()
     residual = w.vec.CreateVector()
     residual.data = a.mat * w.vec
-    w.vec.data -= a.mat.Inverse(free, inverse="sparsecholesky") * residual
+    w.vec.data -= inverse_of(a.mat, free) * residual
 
 
 def _norms_on(
