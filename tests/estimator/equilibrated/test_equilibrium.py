@@ -83,11 +83,12 @@ def test_pressures_that_end_on_a_straight_line(order, rows):
     assert lower <= high
 
 
-@pytest.mark.parametrize(("order", "largest"), [(1, 1.4), (2, 2.7)])
-def test_a_line_that_goes_on_beyond_the_other_body(order, largest):
-    """Segments beside the block touch its corners, where the largest forces are.
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_line_that_goes_on_beyond_the_other_body(order):
+    """Segments beside the block touch its corners, where p* jumps to 0 and the largest forces are.
 
-    Against order 4, estimated to 2e-2 of 1.6e-2 and more: measured at most 1.27, 2.62.
+    Against order 4, whose error is at most a third: measured at most 1.10, 1.22; where p* falls to
+    0 on the last segment 1.27, 2.62.
     """
     problem = Problem(
         geometry=on_a_wide_block(-0.37, 0.42),
@@ -95,12 +96,13 @@ def test_a_line_that_goes_on_beyond_the_other_body(order, largest):
         displacement={"bottom": (0, 0), "top": (0, -1e-3)},
         contact=[Contact("seat", "foot")],
     )
-    *_, fine = adapt(problem, order=4, max_dofs=6000)
+    *_, fine = adapt(problem, order=4, max_dofs=8000)
     reference = Overkill(fine)
     for solution in adapt(problem, order=order, max_dofs=1500):
+        assert 3 * fine.error_bound <= solution.error_bound
         line = solution.pairs[0].line
         assert np.isin(line.rows[~line.faces], line.rows[line.faces]).any()
-        assert 1 <= solution.relative_error_bound / reference.relative_error(solution) <= largest
+        assert 1 <= solution.relative_error_bound / reference.relative_error(solution) <= 1.3
 
 
 @pytest.mark.parametrize("order", [1, 3])

@@ -16,6 +16,7 @@ from ....problem import Contact
 
 SLIVER = 1e-9  # share of a segment below which a piece of it is none
 NARROW = 0.02  # share of a segment below which no part of it is cut off
+STRAIGHT_ON = 0.1  # turn up to which a boundary runs straight on beyond the end of a line
 TOUCHING = 4 * np.finfo(float).eps  # round-off of a measured gap, relative to the coordinates
 
 
@@ -118,13 +119,15 @@ def facing_cuts(
         Parameters by segment.
     uneven : ndarray of int (k,)
         Segments on which such a place is left, so that polynomials on one side are none on the
-        other, or on which p* may jump, since the secondary ends there and the primary does not, or
-        which are straight and face a curve.
+        other, or on which p* may jump, since one line ends there and the other does not, or its own
+        boundary runs straight on, or which are straight and face a curve.
     """
     cuts: dict[int, Array] = {}
     uneven: list[int] = []
     for pieces in every_pieces:
         uneven += _where_one_ends(pieces, boundary)
+        segments = pieces.line.segments[pieces.line.faces]
+        uneven += segments[straight_ends(boundary, segments).any(axis=1)].tolist()
         uneven += pieces.facing[np.isin(pieces.segment, bent) & (pieces.facing >= 0)].tolist()
         if pieces.whole:
             continue
@@ -143,6 +146,21 @@ def facing_cuts(
             if kept.size:
                 cuts[number] = kept
     return cuts, np.array(uneven, dtype=np.intp)
+
+
+def straight_ends(boundary: BoundaryTrace, segments: Index) -> Mask:
+    """Ends (k, 2) of `segments` (k,), of one line, at which it ends but its boundary runs on."""
+    nodes = boundary.nodes[segments][:, [0, -1]]
+    vertices, count = np.unique(nodes, return_counts=True)
+    found = np.isin(nodes, vertices[count == 1])
+    others = np.setdiff1d(np.flatnonzero(~boundary.inner), segments)
+    ends = boundary.nodes[others][:, [0, -1]]
+    for row, side in zip(*np.nonzero(found), strict=True):
+        at, which = np.nonzero(ends == nodes[row, side])
+        places = np.concatenate([[side], which]).astype(float)
+        normal = boundary.normal(np.append(segments[row], others[at]), places)
+        found[row, side] = (normal[1:] @ normal[0] > 1 - STRAIGHT_ON**2 / 2).any()
+    return found
 
 
 def _where_one_ends(pieces: Pieces, boundary: BoundaryTrace) -> list[int]:

@@ -14,11 +14,10 @@ from ....contact import ContactState, prescribed_gap
 from ....contact.line import jacobian as contact_jacobian
 from ....fem import BoundaryTrace
 from ....triplets import from_triplets
-from ..data import Discrete, Units, edge_parameters, legendre_values, with_hats
-from .pieces import Pieces, contact_directions
+from ..data import Discrete, Units, bent_segments, edge_parameters, legendre_values, with_hats
+from .pieces import Pieces, contact_directions, straight_ends
 
 GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
-STRAIGHT_ON = 0.1  # turn up to which a boundary runs straight on, so that tractions must not jump
 
 
 def bernstein(degree: int, s: Array) -> Array:
@@ -113,7 +112,8 @@ def zone_of(
     near = touched[point].any(axis=1)
     fixed = np.zeros(len(touched), dtype=bool)  # the ends of what is near, within the line
     fixed[point[~near]] = True
-    fixed[_continued(boundary, line.segments[faces], point, nodes[:, [0, -1]])] = True
+    bent = np.isin(segment, bent_segments(boundary))  # not divided: tractions must not jump
+    fixed[point[straight_ends(boundary, segment) & bent[:, None]]] = True
     number = np.full((len(line.segments), degree + 1), -1)
     coefficient = np.full(len(touched), -1)
     used = np.zeros(len(touched), dtype=bool)
@@ -125,24 +125,6 @@ def zone_of(
     number[faces[near], 1:-1] = inner
     number[np.ix_(faces[near], np.array([0, degree]))] = coefficient[point[near]]
     return Zone(state, number, int(size + inner.size))
-
-
-def _continued(boundary: BoundaryTrace, segments: Index, point: Index, nodes: Index) -> Index:
-    """Points at which the line ends but the boundary runs straight on, without a support."""
-    count = np.bincount(point.ravel())
-    single = count[point] == 1
-    others = np.setdiff1d(np.flatnonzero(~boundary.inner), segments)
-    ends = boundary.nodes[others][:, [0, -1]]
-    found = []
-    for row, side in zip(*np.nonzero(single), strict=True):
-        at, which = np.nonzero(ends == nodes[row, side])
-        for other, end in zip(others[at], which, strict=True):
-            pair = segments[[row, row]]
-            pair[1] = other
-            a, b = boundary.normal(pair, np.array([float(side), float(end)]))
-            if a @ b > 1 - STRAIGHT_ON**2 / 2:
-                found.append(point[row, side])
-    return np.array(found, dtype=np.intp)
 
 
 def zone_points(
