@@ -59,7 +59,8 @@ def solved(task: Task) -> Row:
 def one_thread() -> None:
     """Let the libraries of all workers to come use one thread: there is one for each core.
 
-    NGSolve's, too: its Cholesky factorisation starts threads of its own, which wait by spinning.
+    NGSolve's, too: its Cholesky factorisation of large systems starts threads, which wait by
+    spinning.
     """
     for library in ("OMP", "OPENBLAS", "MKL", "NGS"):
         os.environ[f"{library}_NUM_THREADS"] = "1"
