@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two
 from .cells import Cells, following, joined, whole
-from .lattice import divisions, monomials
+from .lattice import divisions, lattice, monomials
 from .view import View, looked_at
 
 SHAPE = 0.05  # what they miss of a load at a point, relative to its largest value ...
@@ -20,6 +20,10 @@ SHARE = {
     2: 2e-3,
 }  # ... or over an element, relative to its integral, at which it is rough there
 POINTS = {1: 3, 2: 3}  # parts of a lattice that one of the rule is as good as
+FRAMES = {1: 2, 2: 1}  # in which values are compared with those of neighbours
+STEP = (
+    2  # times what values vary in an element: smooth functions leave neighbours' no further apart
+)
 LONG = 4000  # of what is printed; numbers are short
 KNOWN: WeakKeyDictionary[ng.CoefficientFunction, bool] = WeakKeyDictionary()  # numbers or not
 KEPT = "_ngcontact_loads"  # attribute of a mesh
@@ -158,14 +162,50 @@ def _rough(load: ng.CoefficientFunction, view: View, elements: Index) -> tuple[M
     """
     sizes = view.sizes
     miss, largest, total, seen = np.zeros(len(sizes)), 0.0, 0.0, 0
+    least, most = np.zeros((2, len(sizes), FRAMES[view.dim], load.dim))
     for here, values, left in looked_at(load, view, elements):
         miss[here] = left
         seen = hash((seen, here.tobytes(), sizes[here].tobytes(), values.tobytes()))
         size = np.abs(values).max(axis=2)  # no squares: they may leave the range of numbers
         largest = max(largest, float(size.max(initial=0.0)))
         total += float(size.mean(axis=1) @ sizes[here] ** view.dim) / view.dim
+        frames = _frames(values, view, here)
+        least[here], most[here] = frames.min(axis=1), frames.max(axis=1)
+    miss[elements] = np.maximum(
+        miss[elements], _steps(least[elements], most[elements], view, elements)
+    )
     share = miss * sizes**view.dim / view.dim
     return (miss > SHAPE * largest) | (share > SHARE[view.dim] * total), total, seen
+
+
+def _frames(values: Array, view: View, elements: Index) -> Array:
+    """Values (j, n, f, c) as they are and, on sides, along normal and side: either may turn."""
+    if view.dim == 2 or values.shape[2] != 2:
+        return np.repeat(values[:, :, None], FRAMES[view.dim], axis=2)
+    x, y = np.moveaxis(values, 2, 0)
+    normal = view.evaluate(ng.specialcf.normal(2), elements, lattice(1, values.shape[1]))
+    across, along = (
+        x * normal[..., 0] + y * normal[..., 1],
+        y * normal[..., 0] - x * normal[..., 1],
+    )
+    return np.stack([values, np.stack([across, along], axis=2)], axis=2)
+
+
+def _steps(least: Array, most: Array, view: View, elements: Index) -> Array:
+    """How far apart (k,) the values are at a vertex of each element that no element's own explain.
+
+    A step whose far side has none of the points leaves values of neighbours that do not meet.
+    `least` and `most` (k, f, c) are those of the `elements`. Those of a linear function are apart
+    by up to 4/3 of what it varies at the points of one of them.
+    """
+    ends = view.arrays.triangles if view.dim == 2 else view.arrays.segments
+    at, shape = ends[elements], (view.mesh.nv, *least.shape[1:])
+    lowest, highest, varies = np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape)
+    np.minimum.at(lowest, at, most[:, None])
+    np.maximum.at(highest, at, least[:, None])
+    np.maximum.at(varies, at, (most - least)[:, None])
+    apart = (highest - lowest - STEP * varies).max(axis=2).min(axis=1)
+    return np.asarray(np.maximum(apart, 0.0)[at].max(axis=1, initial=0.0))
 
 
 def _projected(

@@ -8,7 +8,9 @@ import ngsolve as ng
 import numpy as np
 import pytest
 from netgen.occ import OCCGeometry, Rectangle, X, Y
+from ngsolve.meshes import MakeStructured2DMesh
 
+from drivers.reference import cases
 from ngcontact import Elastic, Problem, solve
 from ngcontact.mesh import first_mesh
 from ngcontact.quadrature import keep_rough_load, known_rough_load, rough_load, rough_segments
@@ -57,6 +59,46 @@ def test_a_small_patch_of_body_force_is_not_lost(x, y):
     problem = loaded(force={"body": (0, -1e4 * inside)})
     force = solve(problem, order=2).reactions["bottom"]
     assert force[1] == pytest.approx(1e4 * math.pi * 0.005**2, rel=1e-3)
+
+
+@pytest.mark.parametrize("outside", [0.0, -1.0])
+@pytest.mark.parametrize("start", [-3e-4, -1e-4, 1e-4, 5e-4])
+@pytest.mark.parametrize("end", [-5e-4, 1e-4, 3e-4, 5.7e-4])
+def test_a_strip_that_ends_beside_vertices_is_not_lost(start, end, outside):
+    """On segments of half its width: of one that reaches into a third no point need tell."""
+    mesh = MakeStructured2DMesh(quads=False, nx=200, ny=2)
+    a, b = 0.3 + start, 0.31 + end
+    load = ng.IfPos(ng.x - a, ng.IfPos(b - ng.x, 1.0, 0.0), outside)
+    top = mesh.Boundaries("top")
+    rough = rough_load(ng.CF((0, load)), top, 3)
+    usual = np.array(ng.Integrate(load, mesh, definedon=top, element_wise=True))
+    found = ng.Integrate(rough.projection[1], mesh, ng.BND, definedon=top, element_wise=True)
+    total = np.where(rough.rough, found, usual).sum()
+    # Up to 5 % of the strip was lost. Parts are halved to 1e-6 of the load's size.
+    assert total == pytest.approx(b - a + a * outside, abs=2e-6 * (b - a - a * outside))
+
+
+@pytest.mark.parametrize("shift", [0.0, 1e-3, 2e-3, 3e-3, 4e-3])
+def test_a_disc_on_elements_of_half_its_size_is_not_lost(shift):
+    """Up to 7 times 1e-3 of it lay in elements of which the points were all inside or outside."""
+    mesh = MakeStructured2DMesh(quads=False, nx=100, ny=100)
+    x, y, r = 0.3 + shift, 0.62 + shift / 3, 0.01
+    inside = ng.IfPos(r**2 - (ng.x - x) ** 2 - (ng.y - y) ** 2, 1.0, 0.0)
+    rough = rough_load(inside, mesh.Materials(".*"), 3)
+    usual = np.array(ng.Integrate(inside, mesh, element_wise=True))
+    found = np.array(ng.Integrate(rough.projection, mesh, element_wise=True))
+    total = np.where(rough.rough, found, usual).sum()
+    assert total == pytest.approx(math.pi * r**2, rel=1e-3)
+
+
+@pytest.mark.parametrize("maxh", [0.3, 0.03])
+def test_loads_that_turn_with_a_curved_side_are_smooth(maxh):
+    """Both a pressure and a load of one direction, of which the values of neighbours differ."""
+    problem = cases.ring_in_ring().problem
+    mesh = first_mesh(problem, maxh)
+    normal, angle = ng.specialcf.normal(2), ng.atan2(ng.y, ng.x)
+    for load in (normal * (1 + 0.3 * ng.cos(2 * angle)), ng.CF((0, 1 + 1e-9 * ng.x))):
+        assert rough_load(load, mesh.Boundaries("rim"), 3) is None
 
 
 def test_a_load_that_is_infinite_at_an_end():
