@@ -1,4 +1,4 @@
-"""What may be wrong with a solution: fixed directions, unresolved zones, large strains."""
+"""What may be wrong with a solution: directions, gaps, unresolved zones, large strains."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from ..arrays import Array, Mask
 from ..contact import ContactState
 from ..fem import BoundaryTrace, Space, bulk_moduli, shear_moduli
 from ..problem import Problem
+from .drawn import apart, contradicted
 from .estimates import moves_rigidly
 from .inclinations import INCLINED, inclinations
 from .penetration import penetration
@@ -57,9 +58,10 @@ def doubts(
 ) -> Doubts:
     """What may be wrong with a solution, pair by pair.
 
-    Fixed directions far from the normals and strains that are not small, which no mesh mends; of
-    the `last` mesh also zones in contact that are too short for it, and bodies that pass through
-    each other between contact points. Of all pairs together, bodies that nothing resists.
+    Fixed directions far from the normals, bodies that are drawn far apart or otherwise than their
+    gap is given, and strains that are not small, which no mesh mends; of the `last` mesh also zones
+    in contact that are too short for it, and bodies that pass through each other between contact
+    points. Of all pairs together, bodies that nothing resists.
 
     Parameters
     ----------
@@ -80,7 +82,8 @@ def doubts(
         zones = zones_of(state)
         messages = {"strain": _large(problem, space.trace, state, zones)}
         if not messages["strain"]:  # which leaves nothing else to believe
-            messages["direction"] = _inclined(space.trace, state)
+            messages["direction"] = _inclined(space.trace, state) or apart(space.trace, state)
+            messages["gap"] = contradicted(space.trace, state)
             messages["zone"] = _unresolved(state, zones) if last else ""
         name = f"contact {number} of {state.line.contact.named()}"
         found |= {(what, number): f"{name}: {text}" for what, text in messages.items() if text}

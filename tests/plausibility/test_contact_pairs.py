@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -11,32 +10,14 @@ import pytest
 from netgen.occ import Axis, Z
 
 from drivers.reference import cases
-from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
+from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.geometries import blocks, punch, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
+from tests.plausibility.messages import only, quiet, told
 
 SOFT = Elastic(E=1.0, nu=0.3)
 DOWN = (0, -1)
 DIRECTION, STRAIN, ZONE = "inclined to direction", "mean pressure", "segments long"
-
-
-def told(call) -> list[str]:
-    """Messages of the package's warnings during a call."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        call()
-    assert {warning.category for warning in caught} <= {ContactWarning}
-    return [str(warning.message) for warning in caught]
-
-
-def quiet(call) -> bool:
-    return told(call) == []
-
-
-def only(call, *parts: str) -> bool:
-    """Whether there is one warning, with all these parts."""
-    [message] = told(call)
-    return all(part in message for part in parts)
 
 
 def whole_disc(y: float, radius: float = 1.0):
