@@ -637,7 +637,7 @@ def test_three_bodies_in_a_stack():
     assert solution.reactions["a_below"] == pytest.approx([0, 0.25], abs=1e-12)
     assert set(solution.pair) == {0, 1}
     names = [contact.secondary for contact in solution.problem.contact]
-    assert str(solution).endswith(f"force {names[0]} 0.25, {names[1]} 0.2")
+    assert str(solution).endswith(f"force {names[0]} 0.250000, {names[1]} 0.200000")
     for pair, height in ((0, 1.0), (1, 1.5)):
         assert solution.points[solution.pair == pair][:, 1] == pytest.approx(height)
 

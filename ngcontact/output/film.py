@@ -13,7 +13,7 @@ import numpy as np
 from .files import check_path, replacing
 from .pictures.fields import check_field
 from .pictures.lines import contact_lines
-from .pictures.panels import shown_part
+from .pictures.panels import cut_pressure, shown_part
 from .pictures.picture import draw_scene
 from .pictures.scene import Scene, names_of, picture
 from .pictures.style import Style
@@ -112,23 +112,23 @@ def _images(
     if style.limits is None and limits[0] < 0:
         limits = -max(-limits[0], limits[1]), max(-limits[0], limits[1])
     unit = style.unit("stress")[1]
-    top = max(float(frame.pressure.max(initial=0.0)) for frame in frames) / unit
+    tops = [cut_pressure(s) or HEADROOM * float(s.pressure.max(initial=0.0)) for s in frames]
+    top = max(tops) / unit
     low = np.min([scene.moved.min(axis=0) for scene in scenes], axis=0) / style.unit("length")[1]
     high = np.max([scene.moved.max(axis=0) for scene in scenes], axis=0) / style.unit("length")[1]
     margin = 0.03 * (high - low).max()
     parts = [shown_part(frame, contact_lines(frame)) for frame in frames]
-    along = np.array([part for part in parts if part is not None]) / style.unit("length")[1]
+    ends = np.array([part for part in parts if part is not None])
+    along = [np.array([ends.min(), ends.max()])] if len(ends) else [np.zeros(2)]
     images = []
     for solution, scene, name in zip(frames, scenes, names, strict=True):
         figure = Figure(layout="constrained")
-        profile = draw_scene(figure, solution, scene, style, windows, limits)
+        [profile] = draw_scene(figure, solution, scene, style, windows, limits, along)
         figure.axes[0].set(
             xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin)
         )
-        if len(along):
-            profile.set_xlim(along.min(), along.max())
         if top > 0:
-            profile.set_ylim(min(profile.get_ylim()[0], -0.02 * top), HEADROOM * top)
+            profile.set_ylim(min(profile.get_ylim()[0], -0.02 * top), top)
         figure.suptitle(name)
         canvas = FigureCanvasAgg(figure)
         figure.set_dpi(DPI)

@@ -4,9 +4,9 @@ Without a direction the gap is measured along the normals of the secondary as it
 On the way g over which a translation closes it, points slide by g theta where their normals are
 turned by theta; there the gap has changed by its slope times that way. Between circles of radii R
 and S (negative in a hole) the curvature of the gap, on which Hertz's formulas rest, comes out too
-large by 2 g / R + g**2 / (R (R + S)), and the peak of the pressure by half of that: by g / R between
-discs, by g / (2 R) for a pin that was drawn in the middle of its hole; too small by that where the
-hole is the secondary.
+large by 2 g / R + g**2 / (R (R + S)), and the peak of the pressure by half of that: by g / R
+between discs, by g / (2 R) for a pin that was drawn in the middle of its hole; too small by that
+where the hole is the secondary.
 """
 
 from __future__ import annotations

@@ -20,34 +20,40 @@ class _Told(_Recorded, Protocol):
 
 def line_of(solution: _Told) -> str:
     """Unknowns, active points, steps, forces of all pairs; estimate and bound where known."""
-    return ", ".join(f"{name} {value}".strip() for name, value in facts(solution))
+    return ", ".join(f"{name} {value}" if name else value for name, value in facts(solution))
 
 
 def forces(solution: _Told) -> str:
     """Sizes of the forces of all pairs, with the names of the secondaries if there are several."""
     contact = solution.problem.contact
-    sizes = [f"{np.hypot(*solution.contact_force(k)):.6g}" for k in range(len(contact))]
+    sizes = [_six_digits(np.hypot(*solution.contact_force(k))) for k in range(len(contact))]
     if len(contact) < 2:
         return "".join(sizes)
     return ", ".join(f"{pair.secondary} {size}" for pair, size in zip(contact, sizes, strict=True))
 
 
+def _six_digits(size: float) -> str:
+    """Always so many, that columns of neighbouring lines agree."""
+    return f"{size:#.6g}".rstrip(".")
+
+
 def facts(solution: _Told) -> list[tuple[str, str]]:
-    """What is worth a word, by name."""
+    """What is worth a word, by name; of one width in all lines of a run but for the last ones."""
+    active = f"{np.count_nonzero(solution.active)}/{solution.active.size}"
     told = [
         ("order", f"{solution.order}"),
         ("", f"{solution.displacement.space.ndof:7d} unknowns"),
-        ("", f"{np.count_nonzero(solution.active):4d}/{solution.active.size} active"),
-        ("", f"{len(solution.steps)} steps"),
+        ("", f"{active:>9} active"),
+        ("", f"{len(solution.steps):2d} steps"),
     ]
-    if solution.free_motions:
-        told.append(("free:", "; ".join(map(str, solution.free_motions))))
     if solution.estimated or solution.adaptive:
         told.append(("estimate", f"{solution.relative_error_estimate:.2e}"))
     if solution.bounded:
         told.append(("bound", f"{solution.relative_error_bound:.2e}"))
     if solution.problem.contact:
         told.append(("force", forces(solution)))
+    if solution.free_motions:
+        told.append(("free:", "; ".join(map(str, solution.free_motions))))
     return told
 
 

@@ -8,7 +8,8 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from ngcontact import Contact, Elastic, Hooke, Problem, solve
+from drivers.reference import cases
+from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
 from ngcontact.geometries import blocks
 from ngcontact.problem.values import told
 
@@ -92,3 +93,39 @@ def test_a_solution_shows_every_pair():
     assert "estimate" not in shown
     assert solution.relative_error_estimate > 0
     assert "estimate" in cells(solution._repr_html_())
+
+
+def loaded(load):
+    """A block of width 2 that presses another with that pressure."""
+    return Problem(
+        geometry=blocks(),
+        materials={".*": Elastic(1.0, 0.3)},
+        displacement={"bottom": (0, 0)},
+        sliding="upper_left|upper_right",
+        traction={"top": load},
+        contact=[Contact("upper_contact", "lower_contact")],
+    )
+
+
+def test_lines_of_a_run_have_their_columns_below_each_other():
+    """Numbers of one to five digits each; forces have six digits, also those that end in zeros."""
+    lines = [
+        str(solve(loaded(load), maxh=maxh, order=order))
+        for load, maxh, order in ((0.01, 1.0, 1), (0.02, 0.1, 2), (0.012345, 0.3, 3))
+    ]
+    for word in (" unknowns, ", " active, ", " steps, ", "force "):
+        assert len({line.index(word) for line in lines}) == 1
+    assert lines[0].endswith("force 0.0200000")
+    assert lines[2].endswith("force 0.0246900")
+
+
+def test_the_lines_of_adapt_have_their_columns_below_each_other():
+    lines = [str(s) for s in adapt(cases.pressed_disc(), order=2, tolerance=0.03)]
+    assert len(lines) > 2
+    assert re.fullmatch(
+        r"order 2, +\d+ unknowns, +\d+/\d+ active, +\d+ steps, estimate \d\.\d\de-\d\d, "
+        r"force \d\.\d+",
+        lines[-1],
+    )
+    for word in (" unknowns, ", " active, ", " steps, ", "estimate ", "force "):
+        assert len({line.index(word) for line in lines}) == 1

@@ -16,7 +16,12 @@ from .windows import Window
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.ticker import ScalarFormatter
 
+BESIDE, LEAST = 0.75, 0.002  # shown beside a zone: of its length, and of all that is shown
+FAR, MOST = 0.4, 4  # zones have panels of their own where they fill less than that, and are so many
+SINGLE, SPARE = 0.1, 4.0  # share of a zone whose pressures are cut if they are so much above others
+POWERS = -2, 4  # of ten, from which numbers on a scale are given with one for all
 SAMPLES = 400  # of a function that is drawn over the pressure
 
 
@@ -45,8 +50,23 @@ def draw_bodies(axes: Axes, scene: Scene, style: Style, limits: tuple[float, flo
     x, y = scene.axes
     axes.set(aspect="equal", xlabel=style.title(x, "length"), ylabel=style.title(y, "length"))
     axes.locator_params(nbins=5)
-    axes.ticklabel_format(scilimits=(-2, 4))
+    _format(axes)
     return shading
+
+
+def powers() -> ScalarFormatter:
+    """Numbers of a scale, with one power of ten for all where they are large or small."""
+    from matplotlib.ticker import ScalarFormatter
+
+    formatter = ScalarFormatter(useMathText=True)
+    formatter.set_powerlimits(POWERS)
+    return formatter
+
+
+def _format(axes: Axes) -> None:
+    """The same on both axes."""
+    axes.xaxis.set_major_formatter(powers())
+    axes.yaxis.set_major_formatter(powers())
 
 
 def draw_windows(
@@ -89,8 +109,85 @@ def shown_part(solution: SolutionData, lines: list[tuple[int, Index, Array]]) ->
     return np.array([low - 0.03 * margin, high + 0.03 * margin])
 
 
-def draw_pressure(axes: Axes, solution: SolutionData, style: Style) -> None:
-    """Pressure along the contact lines, points in contact full and the others hollow."""
+def shown_parts(solution: SolutionData) -> list[Array]:
+    """Ends (2,) of each interval of the coordinate in which pressures are shown.
+
+    One for each zone, where zones are small and far from each other, or one for all.
+    """
+    lines = contact_lines(solution)
+    whole = shown_part(solution, lines)
+    if whole is None:
+        every = np.concatenate([s for *_, s in lines] or [np.zeros(1)])
+        return [np.array([every.min(), every.max()])]
+    parts: list[Array] = []
+    for zone in sorted(_zones(solution, lines), key=lambda zone: float(zone[0].min())):
+        low, high = zone[0].min(), zone[0].max()
+        margin = max(BESIDE * (high - low), LEAST * np.ptp(whole))
+        part = np.array([low - margin, high + margin])
+        if parts and part[0] <= parts[-1][1]:
+            parts[-1][1] = max(parts[-1][1], part[1])
+        else:
+            parts.append(part)
+    far = 1 < len(parts) <= MOST and sum(map(np.ptp, parts)) < FAR * np.ptp(whole)
+    return parts if far else [whole]
+
+
+def _zones(
+    solution: SolutionData, lines: list[tuple[int, Index, Array]]
+) -> list[tuple[Array, Array]]:
+    """Coordinates (c,) and pressures (c,) of each zone in contact."""
+    zones = []
+    for _, rows, s in lines:
+        run = np.cumsum(np.diff(solution.active[rows], prepend=False))  # odd in contact
+        at = [run == k for k in range(1, run[-1] + 1, 2)]
+        zones += [(s[zone], solution.pressure[rows][zone]) for zone in at]
+    return zones
+
+
+def cut_pressure(solution: SolutionData) -> float | None:
+    """End of the scale of pressures where single points, as at corners, lie far above the others.
+
+    In each zone all but `SINGLE` of its length lie below.
+    """
+    typical = 0.0
+    for s, p in _zones(solution, contact_lines(solution)):
+        order = np.argsort(p, kind="stable")
+        share = np.cumsum(np.gradient(s)[order]) if len(s) > 1 else np.ones(1)
+        last = int(np.searchsorted(share, (1 - SINGLE) * share[-1]))
+        typical = max(typical, float(p[order][min(last, len(p) - 1)]))
+    largest = float(solution.pressure.max(initial=0.0))
+    return SPARE / 2 * typical if largest > SPARE * typical > 0 else None
+
+
+def draw_pressures(
+    several: Sequence[Axes], solution: SolutionData, style: Style, parts: Sequence[Array]
+) -> None:
+    """Pressure along the contact lines: one panel for each of the `parts` (2,), with one scale."""
+    (_, stress), top = style.unit("stress"), cut_pressure(solution)
+    for axes, part in zip(several, parts, strict=True):
+        draw_pressure(axes, solution, style, part)
+    first, *others = several
+    if top is not None:
+        first.set_ylim(-0.03 * top / stress, top / stress)
+        text = f"↑ largest {solution.pressure.max() / stress:.3g}"
+        first.annotate(text, (0.5, 0.98), xycoords="axes fraction", ha="center", va="top")
+    if others:
+        low = min(axes.get_ylim()[0] for axes in several)
+        first.set_ylim(low, max(axes.get_ylim()[1] for axes in several))
+        for axes in others:
+            axes.sharey(first)
+            axes.set(ylabel="", title="")
+            axes.tick_params(labelleft=False)
+            axes.yaxis.get_offset_text().set_visible(False)
+        for axes in several[:-1]:
+            if (legend := axes.get_legend()) is not None:
+                legend.remove()
+        if others[-1].get_legend() is not None:
+            others[-1].legend(fontsize="small")
+
+
+def draw_pressure(axes: Axes, solution: SolutionData, style: Style, part: Array) -> None:
+    """Pressure along one `part` (2,) of the lines, full where in contact and hollow where open."""
     (_, length), (_, stress) = style.unit("length"), style.unit("stress")
     lines, contact = contact_lines(solution), solution.problem.contact
     several = len(contact) > 1
@@ -99,20 +196,20 @@ def draw_pressure(axes: Axes, solution: SolutionData, style: Style) -> None:
         active, p, at = solution.active[rows], solution.pressure[rows] / stress, s / length
         new = several and pair not in [other for other, *_ in lines[:k]]
         title = f"pair {pair}: {contact[pair].secondary}" if new else None
+        size = 4 + 2 * min(len(contact) - 1 - pair, 2)  # seen behind those of later pairs
         axes.plot(at, p, color=colour, lw=1, marker=mark, ms=4, markevery=[], label=title)
         for state, fill, name in ((active, colour, "in contact"), (~active, "w", "open")):
             label = name if state.any() and not several and k == 0 else None
-            axes.plot(at[state], p[state], mark, ms=4, mec=colour, mfc=fill, label=label)
+            axes.plot(at[state], p[state], mark, ms=size, mec=colour, mfc=fill, label=label)
     for state, fill, name in (
         (solution.active, "0.4", "in contact"),
         (~solution.active, "w", "open"),
     ):
         if several and state.any():
             axes.plot([], [], "o", ms=4, mec="0.4", mfc=fill, label=name)
-    part = shown_part(solution, lines)
-    if part is not None:
+    if np.ptp(part) > 0:
         axes.set_xlim(*part / length)
-    _draw_profiles(axes, style, part, lines)
+    _draw_profiles(axes, style, part)
     if several or style.profile or not solution.active.all():
         axes.legend()
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
@@ -125,6 +222,7 @@ def draw_pressure(axes: Axes, solution: SolutionData, style: Style) -> None:
         ylabel=style.title("contact pressure", "stress"),
         title="contact pressure",
     )
+    _format(axes)
     axes.grid(alpha=0.3)
 
 
@@ -133,14 +231,9 @@ def _look(pair: int) -> tuple[str, str]:
     return COLOURS[pair % len(COLOURS)], MARKS[pair % len(MARKS)]
 
 
-def _draw_profiles(
-    axes: Axes, style: Style, part: Array | None, lines: list[tuple[int, Index, Array]]
-) -> None:
+def _draw_profiles(axes: Axes, style: Style, part: Array) -> None:
     """What the user wants to see over the pressure."""
     (_, length), (_, stress) = style.unit("length"), style.unit("stress")
-    if part is None:
-        every = np.concatenate([s for *_, s in lines] or [np.zeros(1)])
-        part = np.array([every.min(), every.max()])
     strokes = ("-", "--", ":", "-.")
     for k, (label, profile) in enumerate(style.profile.items()):
         if callable(profile):

@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...arrays import Array
 from ..files import check_path, replacing
 from ..solution_data import SolutionData
 from .fields import check_field
-from .panels import draw_bodies, draw_pressure, draw_windows
+from .panels import draw_bodies, draw_pressures, draw_windows, powers, shown_parts
 from .scene import Scene, names_of, picture
 from .style import Style
 from .windows import Window, close_ups, colour_range
@@ -57,7 +58,9 @@ def plot_solution(
     figure = Figure(layout="constrained")
     draw(figure, solution, style)
     with replacing(target) as (draft,):
-        FigureCanvasAgg(figure).print_figure(draft, format="png", dpi=150)
+        FigureCanvasAgg(figure).print_figure(
+            draft, format="png", dpi=150, bbox_inches="tight", pad_inches=0.05
+        )
     return figure
 
 
@@ -67,19 +70,35 @@ def draw(figure: Figure, solution: SolutionData, style: Style) -> None:
     windows = close_ups([scene])
     limits = style.limits or colour_range(scene, windows)
     draw_scene(figure, solution, scene, style, windows, limits)
+    if (engine := figure.get_layout_engine()) is not None:
+        for _ in range(2):  # labels move with the ticks that a first layout leaves
+            engine.execute(figure)
 
 
-def _panels(figure: Figure, scene: Scene, close: int) -> tuple[Axes, list[Axes], Axes]:
-    """Axes for the bodies, for `close` close-ups, two above each other, and for the pressure."""
+def _width(scene: Scene) -> float:
+    """Of the bodies, over their height."""
     width, height = np.ptp(scene.moved, axis=0)
+    return float(width / height)
+
+
+def _panels(
+    figure: Figure, scene: Scene, close: int, parts: int
+) -> tuple[Axes, list[Axes], list[Axes]]:
+    """Axes for the bodies, for `close` close-ups, two above each other, and of the pressures."""
     tall = 1 if close < 2 else 2
     columns = -(-close // tall)
-    ratios = [float(np.clip(width / height, 0.6, 2)), *[1.0 / tall] * columns, 1.2]
+    ratios = [float(np.clip(_width(scene), 0.6, 2)), *[1.0 / tall] * columns]
+    ratios.append(1.2 if parts == 1 else 0.8 * parts)
     figure.set_size_inches(2 + HEIGHT * 0.9 * sum(ratios), HEIGHT)
     grid = figure.add_gridspec(tall, columns + 2, width_ratios=ratios)
     bodies = figure.add_subplot(grid[:, 0])
     places = [grid[k % tall, 1 + k // tall] for k in range(close)]
-    return bodies, [figure.add_subplot(place) for place in places], figure.add_subplot(grid[:, -1])
+    pressures = grid[:, -1].subgridspec(1, parts, wspace=0.05)
+    return (
+        bodies,
+        [figure.add_subplot(place) for place in places],
+        [figure.add_subplot(pressures[k]) for k in range(parts)],
+    )
 
 
 def draw_scene(
@@ -89,15 +108,21 @@ def draw_scene(
     style: Style,
     windows: Sequence[Window],
     limits: tuple[float, float],
-) -> Axes:
-    """Draw a scene with its close-ups, its colours and the pressure; returns the axes of that."""
-    bodies, close, profile = _panels(figure, scene, len(windows))
+    parts: Sequence[Array] | None = None,
+) -> list[Axes]:
+    """Draw a scene with its close-ups, its colours and the pressure; returns the axes of that.
+
+    Pressures are shown on `parts` (2,) of the contact lines, which are chosen when left out.
+    """
+    parts = parts or shown_parts(solution)
+    bodies, close, pressures = _panels(figure, scene, len(windows), len(parts))
     shading, *_ = [draw_bodies(axes, scene, style, limits) for axes in (bodies, *close)]
-    bodies.set_title(f"deformed bodies, displacement × {scene.scale:g}")
+    space = " " if _width(scene) > 0.9 else "\n"
+    bodies.set_title(f"deformed bodies,{space}displacement × {scene.scale:g}")
     draw_windows(bodies, close, windows, style.unit("length")[1])
     _colour_bar(figure, shading, [bodies, *close], scene, style, limits)
-    draw_pressure(profile, solution, style)
-    return profile
+    draw_pressures(pressures, solution, style, parts)
+    return pressures
 
 
 def _colour_bar(
@@ -118,18 +143,19 @@ def _colour_bar(
         ax=axes,
         label=style.title(scene.shown.label, scene.shown.kind),
         extend=extend.get((below, above), "neither"),
+        format=powers(),
     )
-    for beyond, value, y, va in ((above, most, 1.0, "bottom"), (below, least, 0.0, "top")):
+    bar.formatter.set_locs(bar.get_ticks().tolist())
+    power = 16 if bar.formatter.get_offset() else 0  # which stands above the bar
+    for beyond, value, y, offset in ((above, most, 1.0, 14 + power), (below, least, 0.0, -14)):
         if beyond:
-            offset = (0, 14 if va == "bottom" else -14)
-            text = f"{'largest' if va == 'bottom' else 'least'} {value / unit:.3g}"
             bar.ax.annotate(
-                text,
+                f"{'largest' if offset > 0 else 'least'} {value / unit:.3g}",
                 (0.5, y),
                 xycoords="axes fraction",
-                xytext=offset,
+                xytext=(0, offset),
                 textcoords="offset points",
                 ha="center",
-                va=va,
+                va="bottom" if offset > 0 else "top",
                 fontsize=8,
             )

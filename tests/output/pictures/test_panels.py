@@ -1,0 +1,105 @@
+"""Panels of a picture: labels seen whole, a panel for each far zone, singular peaks cut."""
+
+from __future__ import annotations
+
+import ngsolve as ng
+import numpy as np
+import pytest
+from matplotlib import pyplot
+
+from ngcontact import Contact
+from ngcontact.output import plot_solution, write_film
+from ngcontact.output.pictures.panels import cut_pressure, shown_parts
+from tests.output.stubs import stub
+
+
+@pytest.fixture
+def solution():
+    """A stub with 201 points on -1 < x < 1, none of them in contact."""
+    made = stub(2)
+    count = 201
+    made.points = np.column_stack([np.linspace(-1, 1, count), np.zeros(count)])
+    made.problem.contact = [Contact("disc_arc", "block_top", direction=(0, -1))]
+    made.__post_init__()
+    made.active[:] = False
+    made.pressure[:], made.gap[:] = 0.0, 0.0
+    return made
+
+
+def touch(solution, places, width, pressure=lambda t: np.sqrt(1 - t**2)):
+    """Zones of that half-width about the `places`, with that pressure over -1 < t < 1."""
+    for place in places:
+        t = (solution.points[:, 0] - place) / width
+        inside = np.abs(t) < 1
+        solution.active[inside] = True
+        solution.pressure[inside] = pressure(t[inside])
+    return solution
+
+
+@pytest.mark.parametrize("factor", [1.0, 1e9, 1e-7])
+def test_labels_lie_inside_and_apart(monkeypatch, solution, factor):
+    """As drawn on the screen, where nothing is cut to fit."""
+    monkeypatch.setattr(pyplot, "show", lambda: None)
+    peak = ((ng.x + 2) ** 2 + (ng.y + 1) ** 2 + 1e-12) ** -0.25
+    figure = plot_solution(touch(solution, [0.0], 0.5), field=factor * peak)
+    figure.draw_without_rendering()
+    bars = [axes for axes in figure.axes if axes.get_label() == "<colorbar>"]
+    [note] = bars[0].texts
+    assert "largest" in note.get_text()
+    offset = bars[0].yaxis.get_offset_text()
+    assert bool(offset.get_text()) == (factor != 1.0)
+    labels = [a.yaxis.label for a in figure.axes] + [a.xaxis.label for a in figure.axes]
+    for text in [note, offset, *labels, *(axes.title for axes in figure.axes)]:
+        if text.get_text():
+            box = text.get_window_extent()
+            assert box.x0 >= 0
+            assert box.y0 >= 0
+            assert box.x1 <= figure.bbox.x1
+            assert box.y1 <= figure.bbox.y1
+    if offset.get_text():
+        assert not note.get_window_extent().overlaps(offset.get_window_extent())
+    pyplot.close(figure)
+
+
+def test_small_zones_far_apart_have_a_panel_each(tmp_path, solution):
+    touch(solution, [-0.5, 0.6], 0.06)
+    parts = shown_parts(solution)
+    assert len(parts) == 2
+    for part, place in zip(parts, (-0.5, 0.6), strict=True):
+        assert part.mean() == pytest.approx(place, abs=0.06)
+        assert part[0] < place < part[1]
+    figure = plot_solution(solution, tmp_path / "a.png")
+    panels = [axes for axes in figure.axes if "contact line" in axes.get_xlabel()]
+    assert len(panels) == 2
+    assert panels[0].get_ylim() == panels[1].get_ylim()
+    assert [axes.get_ylabel() for axes in panels] == ["contact pressure", ""]
+    write_film(tmp_path / "a.gif", [solution, solution])  # on one panel, as zones may move
+
+
+def test_zones_that_fill_the_line_share_a_panel(solution):
+    assert len(shown_parts(touch(solution, [-0.3, 0.3], 0.25))) == 1
+
+
+def test_without_contact_the_whole_line_is_shown(solution):
+    [part] = shown_parts(solution)
+    assert part == pytest.approx([solution.points[:, 0].min(), solution.points[:, 0].max()])
+
+
+def test_singular_ends_are_cut_and_marked(tmp_path, solution):
+    """(1 - t**2)**-1/2 with ends of a thousand: all but a tenth lie below 2.3."""
+    touch(solution, [0.0], 0.9, lambda t: (1 - t**2) ** -0.5)
+    solution.pressure[solution.active.nonzero()[0][[0, -1]]] = 1e3
+    top = cut_pressure(solution)
+    assert top == pytest.approx(2 * 2.3, rel=0.1)
+    figure = plot_solution(solution, tmp_path / "a.png", units={"stress": ("kPa", 10.0)})
+    [axes] = [a for a in figure.axes if a.get_title() == "contact pressure"]
+    assert axes.get_ylim()[1] == pytest.approx(top / 10)
+    assert any("largest 100" in text.get_text() for text in axes.texts)
+
+
+@pytest.mark.parametrize(
+    "pressure", [lambda t: np.sqrt(1 - t**2), lambda t: 1 + t, lambda t: 1 + 1.5 * t**8]
+)
+def test_other_peaks_are_not_cut(solution, pressure):
+    """Hertz's, a linear one, that of a punch with rounded corners."""
+    assert cut_pressure(touch(solution, [0.0], 0.9, pressure)) is None
