@@ -15,7 +15,8 @@ def test_one_process_and_two_find_the_same(tmp_path, capsys, engine):
     if engine != "processes":
         pytest.importorskip({"joblib": "joblib", "dask": "distributed"}[engine])
     rows, worst = study.main(solves=3, engine=engine, tolerance=0.05, out=tmp_path)
-    # Sums of the same terms: round-off depends on where arrays lie in memory; measured 1.3e-11 in 64 peaks.
+    # Sums of the same terms: round-off depends on where arrays lie in memory; measured 1.3e-11 in
+    # 64 peaks.
     assert worst < 1e-10
     assert len({row["contact_0_force_y"] for row in rows}) == 3
     for row in rows:
