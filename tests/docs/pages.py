@@ -19,12 +19,16 @@ _OPTION = re.compile(r"^:[\w-]+:.*\n", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Block:
-    """Python in a page: `code` from `line` on; a `cell` is one that the site executes, too."""
+    """Python in a page: `code` from `line` on.
+
+    A `cell` is one that the site executes, too; `quiet` where the page speaks of its warning.
+    """
 
     page: str
     line: int
     code: str
     cell: bool
+    quiet: bool = False
 
     def __str__(self) -> str:
         """As an editor opens it."""
@@ -40,7 +44,7 @@ def blocks(page: str, text: str) -> Iterator[Block]:
             body = textwrap.dedent(fence["body"])
             options = re.match(r"(?::[\w-]+:.*\n)*", body).group()
             line = text.count("\n", 0, fence.start("body")) + options.count("\n") + 1
-            yield Block(page, line, body[len(options) :], cell)
+            yield Block(page, line, body[len(options) :], cell, "remove-stderr" in options)
 
 
 def listed(page: Path) -> set[Path]:
