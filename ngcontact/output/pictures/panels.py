@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 BESIDE, LEAST = 0.75, 0.002  # shown beside a zone: of its length, and of all that is shown
 FAR, MOST = 0.4, 4  # zones have panels of their own where they fill less than that, and are so many
 SINGLE, SPARE = 0.1, 4.0  # share of a zone whose pressures are cut if they are so much above others
-POWERS = -2, 4  # of ten, from which numbers on a scale are given with one for all
+POWERS = -3, 4  # of ten, from which numbers on a scale are given with one for all
 SAMPLES = 400  # of a function that is drawn over the pressure
 
 
