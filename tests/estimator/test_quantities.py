@@ -226,7 +226,7 @@ def test_refused_scenes_have_quantities():
     assert q["force"].value == pytest.approx(np.linalg.norm(solution.contact_force()), rel=1e-12)
 
 
-def test_a_contact_on_few_elements_at_the_axis_has_a_bound_or_is_refused_in_words():
+def test_a_contact_on_few_elements_at_the_axis_has_a_bound():
     """Of balls at order 1 no row is a mean over inner elements: an empty list is no failure."""
     problem = Problem(
         geometry=disc_on_disc(5.0, 8.0),
@@ -237,11 +237,9 @@ def test_a_contact_on_few_elements_at_the_axis_has_a_bound_or_is_refused_in_word
     )
     with pytest.warns(ContactWarning, match="0.5 segments long"):
         solution = solve(problem, maxh=1.0)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ContactWarning)
-        q = solution.quantities()
-    # Round-off in loads at the axis, which depends on NumPy, decides: a bound, or these words.
-    assert q["energy"].guaranteed or "no guaranteed bound is known" in q.note
+    q = solution.quantities()
+    # Tractions 1e-15 beside polynomials are none, whatever NumPy's round-off is.
+    assert q["energy"].guaranteed
     assert q["energy"].error > 0
     (peak,) = (row for row in q if row.name == "peak pressure")
     assert tuple(peak.place) == (0.0, 0.0)  # not the 1e-31 of the CAD kernel

@@ -10,7 +10,7 @@ from ...arrays import Array, Index
 from ...fem import BoundaryTrace
 from ...lagrange import gauss
 from ...problem import Problem
-from .data import Discrete, Units, legendre_values, tractions_on_curves
+from .data import ROUND_OFF, Discrete, Units, legendre_values, tractions_on_curves
 from .liftings import at_points, coefficients, derivative, samples
 from .pressures import Pieces, Zone, contact_directions, contact_jacobian
 
@@ -53,8 +53,10 @@ def missed_tractions(
         kept = ~covered[edge]
         squares[edge[kept]] += square[kept]
     norms = np.sqrt(squares)
-    scale = np.sqrt(discrete.partition.edge_lengths) * largest
-    return np.where(norms > NOISE * scale, norms, 0.0)
+    partition = discrete.partition
+    touching = partition.touching(discrete.balance.at_axis(partition))
+    noise = np.where(touching, ROUND_OFF, NOISE) * np.sqrt(partition.edge_lengths) * largest
+    return np.where(norms > noise, norms, 0.0)
 
 
 def _density(

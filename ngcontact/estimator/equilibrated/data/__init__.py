@@ -1,6 +1,7 @@
 """The triangles, the polynomials on them, the discrete solution and its data there."""
 
 from .balance import OF_AXIS as OF_AXIS
+from .balance import ROUND_OFF as ROUND_OFF
 from .balance import Balance as Balance
 from .balance import Units as Units
 from .balance import balance_of as balance_of

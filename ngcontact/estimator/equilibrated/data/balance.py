@@ -25,6 +25,8 @@ from ....problem import on_axis
 from .partition import Partition
 from .polynomials import basis, dimension
 
+ROUND_OFF = 1e-11  # of a load or traction, relative to the largest: met, as is asked at an axis
+
 # Which derivative, or part of the normal, of which stress (xx, yy, xy) in which component.
 OF_AXIS = np.array([[[1.0, 0, 0], [0, 0, 1.0]], [[0, 0, 1.0], [0, 1.0, 0]]])
 

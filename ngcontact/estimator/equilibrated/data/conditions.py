@@ -12,12 +12,11 @@ from ....arrays import Array, Index, Mask
 from ....fem import BoundaryTrace
 from ....lagrange import gauss
 from ....problem import Problem
-from .balance import balance_of
+from .balance import ROUND_OFF, balance_of
 from .curves import bent_segments
 from .partition import Partition
 from .polynomials import legendre_values
 
-NOISE = 1e-13  # of a load, relative: met but for round-off
 HIGHER = 4  # degrees above that of the stress up to which loads are met triangle by triangle
 DATA_BONUS = 10  # quadrature order above that of the polynomials, for loads
 
@@ -135,9 +134,10 @@ def edge_conditions(
     curved = partition.edge_of_segment[bent_segments(boundary)]
     soft[curved, :, -1] = True
     higher[curved], missed[curved] = 0.0, 0.0
-    touching = balance_of(boundary.model).at_axis(partition)[partition.ends].any(axis=1)
+    # Triangles at an axis have no constants: what they miss but for round-off is refused.
+    touching = partition.touching(balance_of(boundary.model).at_axis(partition))
     rest = np.hypot(missed, np.sqrt((higher**2).sum(axis=(1, 2)) * partition.edge_lengths))
-    rest[rest <= NOISE * np.sqrt(partition.edge_lengths) * np.abs(given).max(initial=0.0)] = 0.0
+    rest[rest <= ROUND_OFF * np.sqrt(partition.edge_lengths) * np.abs(given).max(initial=0.0)] = 0.0
     higher[touching], missed[touching] = 0.0, rest[touching]
     return EdgeConditions(
         frames=frames,

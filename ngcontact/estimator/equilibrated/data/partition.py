@@ -116,6 +116,11 @@ class Partition:
         numbers[self.segment[at]] = at
         return numbers
 
+    def touching(self, vertices: Mask) -> Mask:
+        """Edges (e,) of which a triangle has one of some `vertices` (v,)."""
+        at: Mask = np.any(vertices[self.triangles], axis=1, keepdims=True)[:, 0]
+        return np.asarray(at[self.owner[0]])
+
     @property
     def shares(self) -> Array:
         """Shares (e,) of the edges of the boundary in their segments."""

@@ -11,11 +11,13 @@ from scipy.sparse.csgraph import connected_components
 from ....arrays import Array, Index, Mask
 from ....errors import ContactError
 from ....fem import BoundaryTrace
+from ....problem import Triangulation
 from ....triplets import from_triplets
 from ..data import (
     CORNERS,
     Discrete,
     EdgeConditions,
+    Units,
     basis,
     dimension,
     rigid_motions_on,
@@ -48,14 +50,15 @@ def line_sums(
     boundary: BoundaryTrace,
     points: ZonePoints,
     supported: Index,
-    unit: float,
+    units: Units,
     compliance: float,
 ) -> Sums:
-    """Hat moments of p* and of the discrete forces, over `unit`, along the secondary.
+    """Hat moments of p* and of the discrete forces, over their unit, along the secondary.
 
     Vertices `supported` (j,) take no part: there a support takes what is missing.
     """
-    line = zone.state.line
+    line, length = zone.state.line, units.length
+    unit = units.energy / units.strain / length
     faces = np.flatnonzero(line.faces)
     nodes = boundary.nodes[line.segments[faces]][:, [0, -1]]
     order = _in_order(nodes)
@@ -77,7 +80,11 @@ def line_sums(
     moments = from_triplets(hats.ravel(), ends.ravel(), column, shape)
     kept = ~np.isin(order, supported)
     moments = (moments @ zone.values(points.local, points.s)).tocsr()[np.flatnonzero(kept)]
-    return Sums(moments, forces[kept], compliance, not kept.all())
+    # About an axis forces spread over a circumference: the squares of sums are energies times it.
+    x = Triangulation(boundary.mesh).vertices[order]
+    past = (x[1:] + x[:-1]) / 2 / length
+    weight = compliance / boundary.model.measure(np.concatenate([past, past[-1:]])[kept])
+    return Sums(moments, forces[kept], weight, not kept.all())
 
 
 def _bodies(discrete: Discrete) -> Index:

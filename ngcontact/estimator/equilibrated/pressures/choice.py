@@ -48,13 +48,13 @@ class Sums:
         Of p*, vertex after vertex along the line.
     forces : ndarray (v,)
         The same of the discrete forces.
-    weight : float
-        One over a modulus.
+    weight : ndarray (v,)
+        One over a modulus and what the circumference adds to a length, past each vertex.
     """
 
     moments: sp.csr_array
     forces: Array
-    weight: float
+    weight: Array
     open_: bool
 
 
@@ -93,8 +93,9 @@ def best_pressure(
         C, c = np.cumsum(line.moments.toarray(), axis=0), np.cumsum(line.forces)
         if line.open_:
             C, c = C - C.mean(axis=0), c - c.mean()
-        H += TOTALS * line.weight * C.T @ C
-        f += TOTALS * line.weight * C.T @ c
+        weighted = (TOTALS * line.weight[:, None] * C).T
+        H += weighted @ C
+        f += weighted @ c
     return _minimiser(H, f, bounds, *balance)
 
 

@@ -118,8 +118,7 @@ def _add(
     for side, softness in _sides(zone, points, p, boundary, stress, discrete, units):
         wishes.sides.append(Side(side.p @ into, side.target, side.weight))
         total += softness
-    unit = units.energy / units.strain / units.length
-    line = line_sums(zone, boundary, points, supported, unit, total)
+    line = line_sums(zone, boundary, points, supported, units, total)
     wishes.sums.append(Sums(line.moments @ into, line.forces, line.weight, line.open_))
     open_ = np.where(zone.full[points.local], 0.0, np.maximum(points.gap, 0.0))
     wishes.closing[:] += into.T @ (p.T @ (points.weight * open_))

@@ -19,7 +19,7 @@ from ..data import CORNERS, Discrete, EdgeConditions, Partition, basis, rigid_mo
 RESISTED = 1e-6  # square of a motion on free edges, relative, from which their tractions resist it
 SHIFT = 1e-11  # relative, of a matrix that is singular where a body is free to move
 REFINEMENTS = 3
-OTHERS = 1e-4  # relative: balance of motions that another stress resists is better, not needed
+OTHERS = 1e-8  # relative: balance of motions that a hoop stress resists is better, not needed
 
 
 def _motions(partition: Partition) -> tuple[Array, Array]:

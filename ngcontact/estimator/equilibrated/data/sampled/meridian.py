@@ -15,14 +15,13 @@ import numpy as np
 from .....arrays import Array, Index
 from .....lagrange import gauss
 from .....problem import Problem
-from ..balance import ABOUT_AXIS
+from ..balance import ABOUT_AXIS, ROUND_OFF
 from ..partition import Partition
 from ..polynomials import CORNERS, basis, dimension, triangle_rule
 from .places import Places, places_in
 from .rough import MANDEL, Rough, blank
 
 POINTS_BONUS = 8  # quadrature order above that of polynomials, for laws, loads and divisions by r
-NOISE = 1e-13  # of a load, relative: met but for round-off
 AT_ONCE = 4_000_000  # values of stresses at quadrature points that are looked at together
 
 
@@ -197,4 +196,4 @@ def _loads(
     F = measure * F
     off = F - (low @ result.force[at, 1, :, None])[..., 0]
     missed, size = (np.sqrt(area * (w * f**2).sum(axis=1)) for f in (off, F))
-    result.missed[at] = np.where(missed > NOISE * size, missed, 0.0)
+    result.missed[at] = np.where(missed > ROUND_OFF * size, missed, 0.0)
