@@ -11,34 +11,25 @@ import ngsolve as ng
 import numpy as np
 
 from .adaptivity import (
-    Aim,
-    Forecast,
     Plan,
     Refinement,
-    at_ends,
-    at_limit,
     corners,
-    doerfler,
-    ends_of_contact,
-    planned,
+    next_plan,
     settled,
-    together,
     unresolvable,
     warn_of_limit,
 )
-from .arrays import Array, root_of_squares
+from .arrays import root_of_squares
 from .errors import ConvergenceError, warn
 from .estimator import Estimator, estimate, refuse_bound
 from .fem import boundary_trace, unknowns
-from .mesh import curve, diameters, first_mesh, unresolved
+from .mesh import curve, first_mesh
 from .one_mesh import solve_on, with_warnings
 from .plausibility import EXACT, at_round_off, contradictions, warn_of_implausible
-from .problem import Problem, Triangulation
-from .quadrature import jumping_moduli
+from .problem import Problem
 from .results import with_progress
 from .solution import Solution
 
-WRONG = 2.0  # estimate over its forecast from which it is planned half as far; measured .2 to 1.4
 SHARPER = 0.2  # bound over estimate that is hoped for at first; measured: 0.17 to 1
 
 log = logging.getLogger("ngcontact")
@@ -125,51 +116,6 @@ def _first_plan(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Plan
     return Plan(mesh, found, math.inf, refinement.growth)
 
 
-def _next_plan(
-    solution: Solution, refinement: Refinement, last: Plan, indicators: Array, share: float
-) -> Plan:
-    """The level after `solution`, planned until a `share` of its error by `indicators` is left.
-
-    Marked are Doerfler's elements and those in which contact ends, known to the square of their
-    size as the energy is to that of the relative error. Elements in which moduli jump are refined
-    together, and nothing is forecast.
-    """
-    if not indicators.any():
-        indicators = solution.indicators
-    problem, mesh, order, theta = (
-        solution.problem,
-        solution.mesh,
-        refinement.order,
-        refinement.theta,
-    )
-    size = refinement.ending * solution.relative_error_estimate
-    jumping, limit = jumping_moduli(problem, mesh), at_limit(mesh, mesh.GetCurveOrder())
-    marked = doerfler(indicators, theta)
-    if (marked & limit).any():  # for ever: the others are refined instead
-        marked |= doerfler(np.where(limit, 0.0, indicators), theta)
-    marked = together(marked, jumping, diameters(mesh))
-    marked |= at_ends(solution.discrete.space.trace, solution.pairs, size)
-    stuck, marked = bool((marked & limit).any()), marked & ~limit
-    if not marked.any():
-        return replace(last, ends=True)
-
-    error = root_of_squares(indicators)
-    most = refinement.growth if refinement.tolerance is None else refinement.growth**2
-    growth = max(last.growth / 2, 1.0) if error > WRONG * last.error else min(2 * last.growth, most)
-    now = unknowns(mesh, order, refinement.element)
-    forecast = Forecast(
-        corners=Triangulation(mesh).corners,
-        squares=(indicators / error) ** 2,
-        order=order,
-        singular=last.corners.joined(ends_of_contact(solution.pairs)),
-    )
-    growth = 1.0 if jumping.any() else growth
-    aim = Aim(now * growth, refinement.max_dofs, share, theta, size)
-    mesh, share = planned(problem, mesh, marked, forecast, aim, refinement.element)
-    mesh, _ = curve(mesh, order, refinement.element)
-    return Plan(mesh, last.corners, share * error, growth, stuck, unresolved(mesh))
-
-
 def _bounded(solution: Solution, refinement: Refinement, ratio: float) -> tuple[float, float]:
     """The relative bound where it may meet the tolerance, else inf; and the bound per estimate.
 
@@ -223,7 +169,8 @@ def levels(
             return
         now = ratio * solution.relative_error_estimate if refinement.guaranteed else error
         rest = np.where(small, 0.0, solution.indicators)
-        plan = _next_plan(solution, refinement, plan, rest, (refinement.tolerance or 0.0) / now)
+        share = (refinement.tolerance or 0.0) / now
+        plan = next_plan(solution, solution.discrete.space.trace, refinement, plan, rest, share)
         if plan.ends or (plan.stuck and not told):
             told = True
             warn_of_limit(solution.discrete.space.trace, ends=plan.ends)

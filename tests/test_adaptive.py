@@ -552,7 +552,7 @@ def test_segments_at_the_limit_of_the_kernel_are_left_alone():
 
 def test_refinement_ends_where_no_curve_can_be_divided(monkeypatch):
     every = partial(np.ones, dtype=bool)
-    monkeypatch.setattr(adaptive, "at_limit", lambda mesh, _: every(mesh.ne))
+    monkeypatch.setattr("ngcontact.adaptivity.planning.at_limit", lambda mesh, _: every(mesh.ne))
     with pytest.warns(ContactWarning, match="refinement ends here"):
         [solution] = adapt(small_disc(1.0), order=2, max_dofs=3000)
     assert solution.relative_error_estimate > 1e-3

@@ -4,10 +4,11 @@ from .exceptions import settled as settled
 from .exceptions import warn_of_limit as warn_of_limit
 from .forecast import Aim as Aim
 from .forecast import Forecast as Forecast
-from .forecast import Plan as Plan
 from .forecast import planned as planned
 from .marking import doerfler as doerfler
 from .marking import together as together
+from .planning import Plan as Plan
+from .planning import next_plan as next_plan
 from .refinement import Refining as Refining
 from .refinement import refined as refined
 from .settings import Refinement as Refinement

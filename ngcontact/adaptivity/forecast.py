@@ -115,32 +115,6 @@ class Aim:
     ending: float
 
 
-@dataclass(frozen=True)
-class Plan:
-    """A level before it is solved.
-
-    Attributes
-    ----------
-    mesh : ng.Mesh
-        Curved.
-    corners : Singularities
-        Of the domain, the same on all levels.
-    error : float
-        Root of the sum of squared indicators that is forecast.
-    growth : float
-        Of the unknowns up to which it was planned.
-    stuck, ends : bool
-        Whether elements at the geometry kernel's limit are left alone, and whether it cannot be.
-    """
-
-    mesh: ng.Mesh
-    corners: Singularities
-    error: float
-    growth: float
-    stuck: bool = False
-    ends: bool = False
-
-
 def planned(
     problem: Problem,
     mesh: ng.Mesh,
