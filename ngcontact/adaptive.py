@@ -11,11 +11,14 @@ import ngsolve as ng
 import numpy as np
 
 from .adaptivity import (
+    Descent,
     Plan,
     Refinement,
+    continued,
     corners,
     next_plan,
     settled,
+    truth,
     unresolvable,
     warn_of_limit,
 )
@@ -24,7 +27,7 @@ from .errors import ConvergenceError, warn
 from .estimator import Estimator, estimate, refuse_bound
 from .fem import boundary_trace, unknowns
 from .mesh import curve, first_mesh
-from .one_mesh import solve_on, with_warnings
+from .one_mesh import check_continuation, solve_on, with_warnings
 from .plausibility import EXACT, at_round_off, contradictions, warn_of_implausible
 from .problem import Problem
 from .results import with_progress
@@ -45,6 +48,7 @@ def adapt(
     tolerance: float | None = None,
     max_dofs: int = 100_000,
     guaranteed: bool = False,
+    start: Solution | None = None,
     progress: bool = False,
 ) -> Iterator[Solution]:
     """Solve, estimate, mark, refine: one `Solution` per level.
@@ -57,8 +61,7 @@ def adapt(
         Largest element size of the first mesh; when left out an eighth of the geometry, half of
         that on bounded contact zones.
     order, element
-        As in `solve`. Order 4 reaches errors of 1e-3 to 1e-5 soonest (docs/adaptivity.md), order 3
-        errors of a percent.
+        As in `solve`. Order 4 reaches errors of 1e-3 to 1e-5 soonest (docs/adaptivity.md).
     theta : float
         Doerfler's share of the squared indicators that is marked, in (0, 1].
     tolerance : float, optional
@@ -69,6 +72,9 @@ def adapt(
     guaranteed : bool
         Stop at `Solution.relative_error_bound` instead of the estimate. The estimate still marks;
         the bound is made where the estimate suggests that it meets the tolerance.
+    start : Solution, optional
+        Of another load on the same geometry, with the same pairs, order and element. The first
+        level has a mesh that fits it, finer or coarser than its own, and starts from its contact.
     progress : bool
         Tell each level when it is done: a line in a terminal, a growing table in a notebook.
 
@@ -87,18 +93,25 @@ def adapt(
         The active set of a level did not settle.
     """
     refinement = Refinement(order, element, theta, tolerance, max_dofs, guaranteed)
-    if not isinstance(progress, bool):
-        raise TypeError(f"progress={progress!r}: give True or False")
-    mesh = first_level(problem, maxh, refinement)
+    truth("progress", progress)
+    mesh = first_level(problem, maxh, refinement, start)
     warn_of_implausible(problem, mesh, refinement.order)
-    solutions = with_warnings(levels(problem, mesh, refinement))
+    solutions = with_warnings(levels(problem, mesh, refinement, start=start))
     return with_progress(solutions, tolerance, max_dofs) if progress else solutions
 
 
-def first_level(problem: Problem, maxh: float | None, refinement: Refinement) -> ng.Mesh:
+def first_level(
+    problem: Problem, maxh: float | None, refinement: Refinement, start: Solution | None = None
+) -> ng.Mesh:
     """The first mesh of `levels`, checked and curved; arguments and errors of `adapt`."""
     order, element, max_dofs = refinement.order, refinement.element, refinement.max_dofs
-    mesh = first_mesh(problem, maxh)
+    if start is None:
+        mesh = first_mesh(problem, maxh)
+    elif maxh is not None:
+        raise ValueError(f"maxh={maxh} has no effect on the mesh of start; give one of them")
+    else:
+        check_continuation(problem, start, order, element)
+        mesh = _descent(start).mesh
     problem.check(mesh)
     mesh, _ = curve(mesh, order, element)
     if unknowns(mesh, order, element) > max_dofs:
@@ -109,11 +122,32 @@ def first_level(problem: Problem, maxh: float | None, refinement: Refinement) ->
     return mesh
 
 
-def _first_plan(problem: Problem, mesh: ng.Mesh, refinement: Refinement) -> Plan:
-    """The first level, of which nothing is forecast."""
+def _descent(start: Solution) -> Descent:
+    """Of the elements of `start`; its own mesh is the first one of a sequence that starts there."""
+    return start.descent or Descent.first(start.mesh)
+
+
+def _first_plan(
+    problem: Problem, mesh: ng.Mesh, refinement: Refinement, start: Solution | None
+) -> Plan:
+    """The first level, of which nothing is forecast but by `start`."""
     found = corners(problem, boundary_trace(mesh, 1))
     found = found.joined(unresolvable([one.place for one in contradictions(problem, mesh)]))
-    return Plan(mesh, found, math.inf, refinement.growth)
+    plan = Plan(mesh, found, math.inf, refinement.growth, Descent.first(mesh))
+    if start is None or at_round_off(
+        start.problem, start.discrete.space, start.displacement, start.error_estimate
+    ):
+        return plan
+    goal, plan = refinement.tolerance, replace(plan, descent=_descent(start))
+    if refinement.guaranteed and goal is not None:
+        goal /= _ratio(start) if start.bounded else SHARPER
+    return continued(problem, start, plan, refinement, goal)
+
+
+def _ratio(solution: Solution) -> float:
+    """Bound over estimate."""
+    estimate = solution.relative_error_estimate
+    return solution.relative_error_bound / estimate if estimate > 0 else SHARPER
 
 
 def _bounded(solution: Solution, refinement: Refinement, ratio: float) -> tuple[float, float]:
@@ -124,12 +158,15 @@ def _bounded(solution: Solution, refinement: Refinement, ratio: float) -> tuple[
     estimate = solution.relative_error_estimate
     if not solution.bounded and not ratio * estimate <= (refinement.tolerance or 0.0):
         return math.inf, ratio
-    bound = solution.relative_error_bound
-    return bound, bound / estimate if estimate > 0 else ratio
+    return solution.relative_error_bound, _ratio(solution) if estimate > 0 else ratio
 
 
 def levels(
-    problem: Problem, mesh: ng.Mesh, refinement: Refinement, estimator: Estimator = estimate
+    problem: Problem,
+    mesh: ng.Mesh,
+    refinement: Refinement,
+    estimator: Estimator = estimate,
+    start: Solution | None = None,
 ) -> Iterator[Solution]:
     """Levels from a first mesh on, of which names and values are known to be right.
 
@@ -138,15 +175,17 @@ def levels(
     problem, mesh, refinement, estimator
         The continuous problem; the first mesh, curved as the element asks; what is refined, and
         when to stop; what tells the indicators.
+    start
+        A solution for another load, of whose sequence `mesh` is the first.
     """
     order, element = refinement.order, refinement.element
     solution: Solution | None = None
-    ratio, told, plan = SHARPER, False, _first_plan(problem, mesh, refinement)
+    ratio, told, plan = SHARPER, False, _first_plan(problem, mesh, refinement, start)
     while unknowns(plan.mesh, order, element) <= refinement.max_dofs:
         if solution is not None:  # its factorisation is of no use to the next one
             solution.discrete.systems.forget()
-        solution = solve_on(problem, plan.mesh, order, element, solution)
-        solution = replace(solution, adaptive=True, estimator=estimator)
+        solution = solve_on(problem, plan.mesh, order, element, solution or start)
+        solution = replace(solution, adaptive=True, estimator=estimator, descent=plan.descent)
         if refinement.guaranteed:
             refuse_bound(problem, solution.discrete.space.trace, solution.pairs)
             error, ratio = _bounded(solution, refinement, ratio)
@@ -176,11 +215,22 @@ def levels(
             warn_of_limit(solution.discrete.space.trace, ends=plan.ends)
         if plan.ends:
             return
-    if refinement.guaranteed and solution is not None:
+    if solution is not None:
+        _warn_of_missed(solution, refinement, error, outside=bool(small.any()))
+
+
+def _warn_of_missed(
+    solution: Solution, refinement: Refinement, error: float, *, outside: bool
+) -> None:
+    """Warn where `max_dofs` keeps the last solution out of the tolerance.
+
+    By its `error` estimate, `outside` of the corners of contradictory supports, or by its bound.
+    """
+    if refinement.guaranteed:
         error = solution.relative_error_bound
     if refinement.tolerance is not None and error > refinement.tolerance:
         what = "bound" if refinement.guaranteed else "estimate"
-        what += " outside of the corners of contradictory supports" if small.any() else ""
+        what += " outside of the corners of contradictory supports" if outside else ""
         warn(
             f"the {what} is {error:.2e}, more than tolerance={refinement.tolerance:g}: the next "
             f"level would exceed max_dofs={refinement.max_dofs:g}; give a larger max_dofs or "

@@ -8,10 +8,39 @@ import ngsolve as ng
 
 from .discrete import carried_active_set, discretise, first_active_set, minimise_energy
 from .errors import warn
-from .mesh import check_curves, curve
+from .mesh import check_curves, curve, same_geometry
 from .plausibility import doubt_of_refinement, doubts, estimates_rise
 from .problem import Problem
 from .solution import Solution
+
+
+def check_start(problem: Problem, start: object) -> None:
+    """Raise unless `start` is a solution of as many pairs as the problem has."""
+    if not isinstance(start, Solution):
+        raise TypeError(f"start is a {type(start).__name__}: give a Solution")
+    if len(start.discrete.lines) != len(problem.contact):
+        raise ValueError(
+            f"start has {len(start.discrete.lines)} contact pairs, the problem "
+            f"{len(problem.contact)}; a warm start needs the same pairs"
+        )
+
+
+def check_continuation(problem: Problem, start: Solution, order: int, element: str) -> None:
+    """Raise unless meshes of `start` serve the problem, and its indicators such elements."""
+    check_start(problem, start)
+    if (start.order, start.element) != (order, element):
+        raise ValueError(
+            f"start has order={start.order} and element={start.element!r}, not order={order} and "
+            f"element={element!r}: give the same, its indicators tell nothing of others"
+        )
+    here, there = ([(c.secondary, c.primary) for c in p.contact] for p in (problem, start.problem))
+    if here != there:
+        raise ValueError(f"the contact pairs of start are {there}, not {here}: keep them")
+    if not same_geometry(problem.geometry, start.problem.geometry):
+        raise ValueError(
+            "the geometry is not the one of start: bodies, edges and names must be the same; leave "
+            "start out, or change loads, supports, materials or gaps alone"
+        )
 
 
 def solve_on(

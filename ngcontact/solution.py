@@ -10,6 +10,7 @@ import ngsolve as ng
 import numpy as np
 
 from . import __version__
+from .adaptivity import Descent
 from .arrays import Array, Index, Mask, root_of_squares
 from .contact import ContactState, contact_states, state_of
 from .discrete import DiscreteProblem, RigidMotion, resultants
@@ -53,6 +54,9 @@ class Solution(Measured, Readable, Shown):
         Whether it is a level of `adapt`, whose estimate is needed anyway.
     estimator : Estimator
         What tells `indicators`.
+    descent : Descent or None
+        Of a level of `adapt`: the first mesh, and which of its elements those of `mesh` are parts
+        of.
     """
 
     problem: Problem
@@ -66,6 +70,7 @@ class Solution(Measured, Readable, Shown):
     coarse_levels: int = 0
     adaptive: bool = False
     estimator: Estimator = estimate
+    descent: Descent | None = None
 
     @cached_property
     def stress(self) -> ng.CoefficientFunction:

@@ -12,7 +12,7 @@ from .adaptivity import Refinement
 from .errors import ContactError
 from .fem import check_element, unknowns
 from .mesh import first_mesh
-from .one_mesh import solve_on, warn_of_doubts
+from .one_mesh import check_start, solve_on, warn_of_doubts
 from .plausibility import warn_of_implausible
 from .problem import Problem, Triangulation
 from .solution import Solution
@@ -68,7 +68,8 @@ def solve(
     order = check_element(order, element)
     if mesh is not None and maxh is not None:
         raise ValueError(f"maxh={maxh} has no effect on a given mesh; give one of mesh and maxh")
-    _check_start(problem, start)
+    if start is not None:
+        check_start(problem, start)
     mesh = first_mesh(problem, maxh) if mesh is None else mesh
     problem.check(mesh)
     if start is None:
@@ -79,17 +80,6 @@ def solve(
     log.info("%s", solution)
     warn_of_doubts(solution, set(), last=True)
     return solution
-
-
-def _check_start(problem: Problem, start: Solution | None) -> None:
-    """Raise unless `start` is a solution of as many pairs as the problem has."""
-    if start is not None and not isinstance(start, Solution):
-        raise TypeError(f"start is a {type(start).__name__}: give a Solution")
-    if start is not None and len(start.discrete.lines) != len(problem.contact):
-        raise ValueError(
-            f"start has {len(start.discrete.lines)} contact pairs, the problem "
-            f"{len(problem.contact)}; a warm start needs the same pairs"
-        )
 
 
 def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> list[Solution]:

@@ -20,3 +20,15 @@ def reproduced(request):
 
     name, order = request.param
     return REPRODUCED[name](), order
+
+
+@pytest.fixture
+def no_work(monkeypatch):
+    """Nothing can be assembled, so nothing can be solved."""
+    import ngsolve as ng
+
+    def forbidden(*args, **kwargs):
+        raise AssertionError("a form was made before the arguments were checked")
+
+    monkeypatch.setattr(ng, "BilinearForm", forbidden)
+    monkeypatch.setattr(ng, "LinearForm", forbidden)

@@ -324,17 +324,6 @@ def test_no_level_exceeds_the_number_of_unknowns(order, element):
 # --- arguments ---
 
 
-@pytest.fixture
-def no_work(monkeypatch):
-    """Nothing can be assembled, so nothing can be solved."""
-
-    def forbidden(*args, **kwargs):
-        raise AssertionError("a form was made before the arguments were checked")
-
-    monkeypatch.setattr(ng, "BilinearForm", forbidden)
-    monkeypatch.setattr(ng, "LinearForm", forbidden)
-
-
 BAD = [
     ("theta", 0, ValueError),
     ("theta", -0.5, ValueError),

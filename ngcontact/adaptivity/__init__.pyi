@@ -1,3 +1,4 @@
+from .continuation import Descent as Descent
 from .exceptions import at_ends as at_ends
 from .exceptions import at_limit as at_limit
 from .exceptions import settled as settled
@@ -8,10 +9,12 @@ from .forecast import planned as planned
 from .marking import doerfler as doerfler
 from .marking import together as together
 from .planning import Plan as Plan
+from .planning import continued as continued
 from .planning import next_plan as next_plan
 from .refinement import Refining as Refining
 from .refinement import refined as refined
 from .settings import Refinement as Refinement
+from .settings import truth as truth
 from .singularities import Singularities as Singularities
 from .singularities import corners as corners
 from .singularities import ends_of_contact as ends_of_contact

@@ -18,21 +18,36 @@ BESIDE = 0.1  # barycentric coordinate: a point so far outside of an element sti
 MARKINGS = 8  # most that one estimate is good for
 
 
-def _areas(corners: Array) -> Array:
-    """Areas (k,) of triangles with the corners (k, 3, 2)."""
+def areas(corners: Array) -> Array:
+    """Areas (k,) of triangles with the `corners` (k, 3, 2)."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     return np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2
 
 
-def touching(corners: Array, places: Array) -> Mask:
-    """Whether triangles with `corners` (n, 3, 2) touch points `places` (k, 2), (n, k)."""
-    origin = corners[:, :1]
-    first, second = (corners[:, i : i + 1] - origin for i in (1, 2))
-    to = places - origin
+def depths(corners: Array, places: Array) -> Array:
+    """Least barycentric coordinate of points in triangles, negative outside.
+
+    Parameters
+    ----------
+    corners : ndarray (n, 3, 2) or (n, 1, 3, 2)
+        Lengths.
+    places : ndarray (n, 2) or (k, 2)
+
+    Returns
+    -------
+    ndarray (n,) or (n, k)
+    """
+    origin = corners[..., 0, :]
+    first, second, to = corners[..., 1, :] - origin, corners[..., 2, :] - origin, places - origin
     whole = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
     along = (to[..., 0] * second[..., 1] - to[..., 1] * second[..., 0]) / whole
     across = (first[..., 0] * to[..., 1] - first[..., 1] * to[..., 0]) / whole
-    return np.asarray(np.minimum(np.minimum(along, across), 1 - along - across) >= -BESIDE)
+    return np.asarray(np.minimum(np.minimum(along, across), 1 - along - across))
+
+
+def touching(corners: Array, places: Array) -> Mask:
+    """Whether triangles with `corners` (n, 3, 2) touch points `places` (k, 2), (n, k)."""
+    return depths(corners[:, None], places) >= -BESIDE
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,8 +82,8 @@ class Forecast:
 
     def after(self, corners: Array, parent: Index) -> Forecast:
         """On elements with `corners` (k, 3, 2), each of them a part of a `parent` (k,)."""
-        area = _areas(corners)
-        share = np.minimum(area / _areas(self.corners)[parent], 1.0)
+        area = areas(corners)
+        share = np.minimum(area / areas(self.corners)[parent], 1.0)
         power = np.full(len(parent), self.order + 1.0)
         new = np.flatnonzero(share < 1)
         at = touching(corners[new], self.singular.places)
@@ -84,7 +99,7 @@ class Forecast:
         """
         marked = doerfler(np.sqrt(self.squares), theta)
         ends = np.isfinite(self.singular.extents)
-        sizes = np.sqrt(2 * _areas(self.corners))  # the legs, if two are equal at a right angle
+        sizes = np.sqrt(2 * areas(self.corners))  # the legs, if two are equal at a right angle
         large = np.flatnonzero(sizes > share * self.singular.extents[ends].min(initial=np.inf))
         at = touching(self.corners[large], self.singular.places[ends])
         limits = share * self.singular.extents[ends]
@@ -106,6 +121,8 @@ class Aim:
         Over the one that was estimated, from which it is enough.
     theta, ending : float
         Doerfler's share, and the size of elements at ends of contact over their line per error.
+    markings : float
+        Most that the forecast is good for.
     """
 
     unknowns: float
@@ -113,6 +130,7 @@ class Aim:
     error: float
     theta: float
     ending: float
+    markings: float = MARKINGS
 
 
 def planned(
@@ -122,11 +140,12 @@ def planned(
     forecast: Forecast,
     aim: Aim,
     element: str,
-) -> tuple[ng.Mesh, float]:
-    """The next level's mesh, straight-sided, and the error that is forecast on it.
+) -> tuple[ng.Mesh, float, Index]:
+    """The next level's mesh, straight-sided, the error that is forecast on it, and parents (k,).
 
-    The elements `marked` (ne,) are refined, then again and again those that the forecast marks.
-    Elements at unresolvable corners count no more once they are small, as in `settled`.
+    These are the elements of `mesh` of which its own are parts. The elements `marked` (ne,) are
+    refined, then again and again those that the forecast marks. Elements at unresolvable corners
+    count no more once they are small, as in `settled`.
     """
     refining, marks, forecasts = Refining(problem, mesh), [marked], [forecast]
     while True:
@@ -139,10 +158,10 @@ def planned(
             refining = Refining(problem, mesh)
             for again in marks[:-1]:
                 refining.bisect(again)
-            return refining.finished(), forecasts[-2].error
-        if unknowns >= aim.unknowns or error <= aim.error or len(marks) == MARKINGS:
-            return refining.finished(), error
+            return refining.finished(), forecasts[-2].error, refining.origin
+        if unknowns >= aim.unknowns or error <= aim.error or len(marks) >= aim.markings:
+            return refining.finished(), error, refining.origin
         limit = at_limit(refining.mesh, mesh.GetCurveOrder())
         marks.append(forecasts[-1].marked(aim.theta, aim.ending * error) & ~limit)
         if not marks[-1].any():
-            return refining.finished(), error
+            return refining.finished(), error, refining.origin

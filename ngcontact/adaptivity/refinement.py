@@ -169,11 +169,14 @@ class Refining:
     ----------
     mesh : ng.Mesh
         The copy, straight-sided; refined elements keep their number and have further ones behind.
+    origin : ndarray of int (ne,)
+        The element of the given mesh of which each of the copy's is a part.
     """
 
     def __init__(self, problem: Problem, mesh: ng.Mesh) -> None:
         self.problem = problem
         self.mesh = copied(mesh)
+        self.origin = np.arange(mesh.ne)
         paired = any(contact.primary is not None for contact in problem.contact)
         trace = boundary_trace(mesh, 1) if paired else None
         self._pairs = [matched_vertices(trace, contact) for contact in problem.contact if trace]
@@ -217,6 +220,7 @@ class Refining:
         parent[count:] = np.fromiter(new, dtype=np.intp, count=len(parent) - count)
         while (parent >= count).any():  # parts of parts
             parent = parent[parent]
+        self.origin = self.origin[parent]
         return parent
 
     def finished(self) -> ng.Mesh:

@@ -17,6 +17,12 @@ def _number(name: str, value: object) -> float:
     return float(value)
 
 
+def truth(name: str, value: object) -> None:
+    """Raise a TypeError unless `value` is True or False."""
+    if not isinstance(value, bool):
+        raise TypeError(f"{name}={value!r}: give True or False")
+
+
 @dataclass(frozen=True)
 class Refinement:
     """How a sequence of levels is refined, and when it ends.
@@ -53,7 +59,6 @@ class Refinement:
             raise ValueError(f"tolerance={self.tolerance} must be positive, like 1e-3, or None")
         if not _number("max_dofs", self.max_dofs) > 0:
             raise ValueError(f"max_dofs={self.max_dofs} must be positive, like 100_000")
-        if not isinstance(self.guaranteed, bool):
-            raise TypeError(f"guaranteed={self.guaranteed!r}: give True or False")
+        truth("guaranteed", self.guaranteed)
         if self.guaranteed and self.tolerance is None:
             raise ValueError("guaranteed=True with tolerance=None: give a tolerance, like 1e-3")

@@ -2,6 +2,7 @@
 
 from .cad import CadEdge as CadEdge
 from .cad import cad_edges as cad_edges
+from .cad import same_geometry as same_geometry
 from .curving import check_curves as check_curves
 from .curving import curve as curve
 from .curving import resolved_lengths as resolved_lengths

@@ -158,3 +158,21 @@ def cad_edges(mesh: ng.Mesh) -> list[CadEdge] | None:
     if [edge.name or "default" for edge in edges] != [name or "default" for name in names]:
         return None
     return edges
+
+
+def same_geometry(one: OCCGeometry | ng.Mesh, other: OCCGeometry | ng.Mesh) -> bool:
+    """Whether two geometries have the same bodies and edges, names included, up to round-off.
+
+    A mesh is the same as itself alone.
+    """
+    if one is other:
+        return True
+    if not (isinstance(one, OCCGeometry) and isinstance(other, OCCGeometry)):
+        return False
+    names = [[face.name for face in geometry.shape.faces] for geometry in (one, other)]
+    edges, others = _edges(one), _edges(other)
+    if names[0] != names[1] or [edge.name for edge in edges] != [edge.name for edge in others]:
+        return False
+    points, other_points = (np.array([e.samples()[1] for e in each]) for each in (edges, others))
+    size = np.ptp(points.reshape(-1, 2), axis=0).max()
+    return bool(np.abs(points - other_points).max() <= MISSED * size)

@@ -98,6 +98,7 @@ SOLUTION = {
 # ... and those that are no quantities: objects, names, numbers of things, truth values, files.
 PLAIN = {
     *("problem", "mesh", "order", "element", "discrete", "minimiser", "work", "coarse_levels"),
+    "descent",
     *("adaptive", "pair", "active", "steps", "free_motions", "estimated", "bounded"),
     *("pairs", "estimator", "write", "revolved", "plot", "draw", "save"),
 }

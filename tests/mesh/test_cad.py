@@ -22,7 +22,7 @@ from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact import geometries
 from ngcontact.geometries import blocks, disc, disc_on_block, disc_on_disc, graphs, punch, rings
-from ngcontact.mesh.cad import CadEdge, cad_edges
+from ngcontact.mesh.cad import CadEdge, cad_edges, same_geometry
 
 RNG = np.random.default_rng(3)
 CENTRES = [(0.0, 0.0, 1.0), (0.3, 0.7, 0.1), (100.0, -50.0, 2.0)]
@@ -260,3 +260,19 @@ def test_meshes_without_cad_have_no_edges():
     spline = SplineGeometry()
     spline.AddCircle((0, 0), 1, bc="rim")
     assert cad_edges(ng.Mesh(spline.GenerateMesh(maxh=0.5))) is None
+
+
+def test_geometries_are_the_same_by_shape_and_names():
+    one = disc_on_block(radius=10.0)
+    assert same_geometry(one, one)
+    assert same_geometry(one, disc_on_block(radius=10.0))
+    assert not same_geometry(one, disc_on_block(radius=10.0 * (1 + 1e-6)))
+    renamed = disc_on_block(radius=10.0)
+    for edge in renamed.shape.edges:
+        edge.name = "other" if edge.name == "disc_arc" else edge.name
+    assert not same_geometry(one, renamed)
+    assert not same_geometry(one, disc(radius=10.0))
+    mesh = ng.Mesh(one.GenerateMesh(maxh=5.0))
+    assert same_geometry(mesh, mesh)
+    assert not same_geometry(mesh, one)
+    assert not same_geometry(mesh, ng.Mesh(mesh.ngmesh.Copy()))

@@ -62,6 +62,7 @@ SIGNATURES = {
         "tolerance": None,
         "max_dofs": 100_000,
         "guaranteed": False,
+        "start": None,
         "progress": False,
     },
     "solve_qp": {

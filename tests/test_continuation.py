@@ -1,0 +1,154 @@
+"""Load sequences: `adapt` goes on from another load's solution, for no more than its own levels."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from drivers.reference import cases
+from ngcontact import Contact, Elastic, Problem, adapt, load, solve
+from ngcontact.geometries import blocks, disc_on_block
+from ngcontact.mesh import diameters
+from ngcontact.problem import Triangulation
+from tests.scenes import vertices
+
+SOFT = Elastic(E=1.0, nu=0.3)
+
+
+def pressed(way):
+    """Problem A, pressed so far; 0.005 is the benchmark's."""
+    return replace(cases.disc_on_rigid_plane(), displacement={"top": (None, -way)})
+
+
+def unknowns(solution):
+    return solution.displacement.space.ndof
+
+
+def size_at(solution, place):
+    """Diameter of the element whose centre is nearest to a place."""
+    centres = Triangulation(solution.mesh).corners.mean(axis=1)
+    return diameters(solution.mesh)[np.linalg.norm(centres - place, axis=1).argmin()]
+
+
+@pytest.fixture(scope="module")
+def sequence():
+    """Deeper and back: all levels of each load."""
+    loads = [list(adapt(pressed(0.002), tolerance=1e-3))]
+    for way in (0.005, 0.008, 0.005, 0.002):
+        loads.append(list(adapt(pressed(way), tolerance=1e-3, start=loads[-1][-1])))
+    return loads
+
+
+def test_each_load_takes_two_levels_of_less_than_twice_the_unknowns(sequence):
+    for levels in sequence[1:]:
+        assert len(levels) == 2
+        assert levels[-1].relative_error_estimate <= 1e-3
+        assert sum(map(unknowns, levels)) < 2 * unknowns(levels[-1])
+        assert levels[0].work["factorizations"] <= 2
+        assert levels[1].work["factorizations"] == 1
+        assert len(levels[1].steps) <= 2
+
+
+def test_loads_have_the_forces_of_a_run_of_their_own(sequence):
+    # Of an error of 1e-3 in the energy norm, forces have about the square.
+    assert 2 * sequence[1][-1].contact_force()[1] == pytest.approx(0.4465326527, rel=1e-5)
+    forces = [levels[-1].contact_force()[1] for levels in sequence]
+    assert forces[:2] == pytest.approx(forces[:2:-1], rel=1e-5)
+    assert forces[0] < 0.3 * forces[2]
+
+
+def test_meshes_do_not_grow_with_the_sequence(sequence):
+    *_, alone = adapt(pressed(0.002), tolerance=1e-3)
+    assert unknowns(sequence[-1][-1]) <= 1.3 * unknowns(alone)  # measured 1.0
+    # Where contact ended under the largest load, elements are large again.
+    [end] = sequence[2][-1].transitions()
+    assert size_at(sequence[4][-1], end) > 4 * size_at(sequence[2][-1], end)
+
+
+def test_without_a_tolerance_it_goes_on_from_the_estimate_of_start(sequence):
+    start = sequence[0][0]
+    first, second, *_ = adapt(pressed(0.0025), start=start, max_dofs=10_000)
+    assert unknowns(first) <= unknowns(start) < unknowns(second)
+    assert second.relative_error_estimate < first.relative_error_estimate
+
+
+@pytest.mark.filterwarnings("ignore:.*segments long")
+def test_a_proof_is_continued_too():
+    options = {"tolerance": 5e-2, "order": 2, "guaranteed": True}
+    *_, start = adapt(pressed(0.005), **options)
+    levels = list(adapt(pressed(0.006), **options, start=start))
+    assert levels[-1].relative_error_bound <= 5e-2
+    assert len(levels) <= 3
+
+
+def test_two_bodies_with_matched_nodes_stay_matched():
+    def disc(way):
+        return Problem(
+            geometry=disc_on_block(),
+            materials={"disc": SOFT, "block": SOFT},
+            displacement={"block_bottom": (0, 0), "disc_top": (0, -way)},
+            sliding="axis",
+            contact=[Contact("disc_arc", "block_top", direction=(0, -1))],
+        )
+
+    *_, start = adapt(disc(0.02), order=3, tolerance=2e-2)
+    levels = list(adapt(disc(0.01), order=3, tolerance=2e-2, start=start))
+    assert len(levels) <= 3
+    for level in levels:
+        arc, top = (vertices(level.mesh, name)[:, 0] for name in ("disc_arc", "block_top"))
+        facing = arc[arc < 0.9]  # farther out nodes of the first mesh do not face each other
+        assert np.abs(facing[:, None] - top).min(axis=1).max() < 1e-9
+    *_, alone = adapt(disc(0.01), order=3, tolerance=2e-2)
+    assert levels[-1].contact_force()[1] == pytest.approx(alone.contact_force()[1], rel=1e-3)
+
+
+@pytest.mark.filterwarnings("ignore:.*segments long")
+def test_a_saved_solution_and_one_of_solve_are_starts_too(sequence, tmp_path):
+    saved = load(sequence[0][-1].save(tmp_path / "last.ngcontact"))
+    again = list(adapt(pressed(0.005), tolerance=1e-3, start=saved))
+    assert [unknowns(level) for level in again] == [unknowns(level) for level in sequence[1]]
+    # The mesh of `solve` is the first of a sequence: it is not made coarser.
+    single = solve(pressed(0.005), maxh=0.03, order=4)
+    first, *_, last = adapt(pressed(0.006), tolerance=1e-2, start=single)
+    assert first.mesh.ne >= single.mesh.ne
+    assert last.relative_error_estimate <= 1e-2
+
+
+def test_nothing_is_recalled_where_nothing_was_estimated():
+    """Bodies that only move rigidly have no indicators: the first mesh is taken."""
+    lifted = Problem(
+        geometry=blocks(),
+        materials={"upper|lower": SOFT},
+        displacement={"bottom": (0, 0), "top": (0, 0.1)},
+        contact=[Contact("upper_contact", "lower_contact")],
+    )
+    [apart] = adapt(lifted, order=2, tolerance=1e-2)
+    pressed_on = replace(lifted, displacement={"bottom": (0, 0), "top": (0, -0.1)})
+    first, *_ = adapt(pressed_on, order=2, tolerance=1e-2, start=apart)
+    assert first.mesh.ne == apart.mesh.ne
+
+
+@pytest.mark.usefixtures("no_work")
+def test_what_cannot_be_continued_is_refused(sequence):
+    start, problem = sequence[0][0], pressed(0.005)
+    other = replace(problem, geometry=disc_on_block())
+
+    def refused(error, words, problem=problem, **options):
+        with pytest.raises(error, match=re.escape(words)):
+            adapt(problem, **({"start": start} | options))
+
+    refused(TypeError, "start is a list: give a Solution", start=[start])
+    refused(ValueError, "start has order=4", order=3)
+    refused(ValueError, "element='superparametric'", element="superparametric")
+    refused(ValueError, "maxh=0.1 has no effect", maxh=0.1)
+    refused(ValueError, "start has 1 contact pairs, the problem 0", replace(problem, contact=[]))
+    renamed = [replace(problem.contact[0], secondary="top")]
+    refused(ValueError, "('arc', None)", replace(problem, contact=renamed))
+    refused(ValueError, "the geometry is not the one of start", other)
+    refused(
+        ValueError, "the geometry is not the one of start", replace(problem, geometry=start.mesh)
+    )
+    refused(ValueError, "more than max_dofs=100", max_dofs=100)
