@@ -90,9 +90,10 @@ def next_plan(
 ) -> Plan:
     """The level after `solution`, planned until a `share` of its error is left.
 
-    By its `indicators` (ne,), but for those that no mesh makes less. Marked are Doerfler's elements and those in which contact ends, known to the square of their
-    size as the energy is to that of the relative error. Elements in which moduli jump are refined
-    together, and nothing is forecast. `trace` is that of the mesh.
+    By its `indicators` (ne,), but for those that no mesh makes less. Marked are Doerfler's
+    elements and those in which contact ends, known to the square of their size as the energy is to
+    that of the relative error. Elements in which moduli jump are refined together, and nothing is
+    forecast. `trace` is that of the mesh.
     """
     if not indicators.any():
         indicators = solution.indicators
