@@ -73,13 +73,15 @@ class Elastic:
 
         In the plane (xx, yy, xy) from (xx, yy, gamma_xy); about an axis (rr, zz, hoop, rz).
         """
+        # NGSolve takes exp(0 x) and cos(0 x) for 0 in bilinear forms; no sum with a parameter.
+        E, nu = (v if isinstance(v, float) else v + ng.Parameter(0.0) for v in (self.E, self.nu))
         if require_model(model) != "plane stress":
-            scale = self.E / ((1 + self.nu) * (1 - 2 * self.nu))
-            normal, cross = scale * (1 - self.nu), scale * self.nu
+            scale = E / ((1 + nu) * (1 - 2 * nu))
+            normal, cross = scale * (1 - nu), scale * nu
         else:
-            normal = self.E / (1 - self.nu * self.nu)
-            cross = normal * self.nu
-        shear = self.E / (2 * (1 + self.nu))
+            normal = E / (1 - nu * nu)
+            cross = normal * nu
+        shear = E / (2 * (1 + nu))
         # NGSolve takes numbers in a tuple slowly, and loses an interruption that comes meanwhile.
         n, c, s, zero = (ng.CF(value) for value in (normal, cross, shear, 0.0))
         if len(VOIGT[model]) == 4:

@@ -235,3 +235,18 @@ def test_check_at_accepts(points):
     good = Elastic(1 + ng.x, ng.y / 3)
     for law in (Elastic(1, 0.3), good, Hooke(np.eye(3)), Hooke(good.voigt("plane stress"))):
         assert law.check_at(points, "body") is None
+
+
+@pytest.mark.parametrize("model", PLANE)
+def test_functions_of_zero_are_not_zero_in_forms(mesh, model):
+    """NGSolve makes a zero of 0 x, and takes exp and cos of it for zero in bilinear forms."""
+    one = ng.exp(0 * ng.x)
+
+    space = ng.L2(mesh, order=0) ** 3
+    u, v = map(ng.CF, space.TnT())
+    matrices = []
+    for law in (Elastic(2.0, 0.3), Elastic(2.0 * one, 0.3), Elastic(2.0, 0.3 * ng.cos(0 * ng.y))):
+        form = ng.BilinearForm(ng.InnerProduct(law.voigt(model) * u, v) * ng.dx).Assemble()
+        matrices.append(form.mat.ToDense().NumPy())
+    for matrix in matrices[1:]:
+        np.testing.assert_allclose(matrix, matrices[0], rtol=1e-13, atol=1e-15)
