@@ -73,8 +73,7 @@ class Elastic:
 
         In the plane (xx, yy, xy) from (xx, yy, gamma_xy); about an axis (rr, zz, hoop, rz).
         """
-        # NGSolve takes exp(0 x) and cos(0 x) for 0 in bilinear forms; no sum with a parameter.
-        E, nu = (v if isinstance(v, float) else v + ng.Parameter(0.0) for v in (self.E, self.nu))
+        E, nu = (v if isinstance(v, float) else _kept(v) for v in (self.E, self.nu))
         if require_model(model) != "plane stress":
             scale = E / ((1 + nu) * (1 - 2 * nu))
             normal, cross = scale * (1 - nu), scale * nu
@@ -146,7 +145,7 @@ class Hooke:
         self.check_model(model, "the law")
         if isinstance(self.C, np.ndarray):
             return ng.CF(tuple(self.C.ravel().tolist()), dims=self.C.shape)
-        return ng.CF(self.C)
+        return _kept(ng.CF(self.C))
 
     def told(self) -> str:
         """Its matrix, in a few words."""
@@ -176,6 +175,17 @@ class Hooke:
 def varies(law: Elastic | Hooke) -> bool:
     """Whether a law is given by functions rather than by numbers."""
     return any(isinstance(value, ng.CoefficientFunction) for value in vars(law).values())
+
+
+def _kept(modulus: ng.CoefficientFunction) -> ng.CoefficientFunction:
+    """The same function, of which NGSolve drops nothing in bilinear forms.
+
+    It takes exp(0 x) and cos(0 x) for 0 there; no sum with a parameter.
+    """
+    zero = ng.Parameter(0.0)
+    if modulus.dim == 1:
+        return modulus + zero
+    return modulus + ng.CF((zero,) * modulus.dim, dims=tuple(modulus.dims))
 
 
 def _real_matrix(data: Any) -> np.ndarray:

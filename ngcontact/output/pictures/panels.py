@@ -183,7 +183,9 @@ def draw_pressures(
             if (legend := axes.get_legend()) is not None:
                 legend.remove()
         if others[-1].get_legend() is not None:
-            others[-1].legend(fontsize="small")
+            # Above its panel, which has no title: inside it would cover points.
+            above = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.3}
+            others[-1].legend(fontsize="small", ncols=2, **above)
 
 
 def draw_pressure(axes: Axes, solution: SolutionData, style: Style, part: Array) -> None:
