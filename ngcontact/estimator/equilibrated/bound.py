@@ -45,7 +45,7 @@ from .liftings import (
 )
 from .parts import ErrorBound, complementarity, summed, work_of_supports
 from .pressures import Pieces, Zone, facing_cuts, pieces_of, selected, zone_of
-from .record import Norms, Proof
+from .proofs import Norms, Proof
 from .refusals import refuse_bound
 from .remainders import missed_tractions
 from .stress import SETTLED, ContactPressure, EquilibratedStress, certified

@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Array
 from .data import Partition, Units, legendre_values
 from .liftings import EdgeField, Opened, at_points, coefficients
-from .record import Norms
+from .proofs import Norms
 from .stress import EquilibratedStress
 
 

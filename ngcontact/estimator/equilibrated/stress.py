@@ -13,7 +13,7 @@ import numpy as np
 
 from ...arrays import Array, Index
 from .data import Discrete, EdgeConditions, dimension
-from .record import Proof
+from .proofs import Proof
 from .stresses import Equilibrated, into_raw, raw_operators, stress_field
 
 SETTLED = 1e-9  # residual of equilibrium, relative to the largest stress: measured 1e-15 to 1e-12

@@ -12,7 +12,7 @@ from ....problem import Problem
 from ..data import Units
 from ..liftings import on_supports
 from ..parts import complementarity, work_of_supports
-from ..record import Proof
+from ..proofs import Proof
 from .dual import Dual, Tested, dual_of
 
 

@@ -16,7 +16,7 @@ from ..constants import data_terms
 from ..data import Units, discrete_on
 from ..liftings import lifted, on_contact
 from ..pressures import selected
-from ..record import Proof
+from ..proofs import Proof
 from ..remainders import missed_tractions
 from ..stress import SETTLED, certified
 from ..stresses import equilibrated, improved

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...arrays import Array
-from ...lagrange import gauss
-from .data import Discrete, EdgeConditions, Units, basis, lattice, legendre_values
-from .liftings import Gap
+from ....arrays import Array
+from ....lagrange import gauss
+from ..data import Discrete, EdgeConditions, Units, basis, lattice, legendre_values
+from ..liftings import Gap
 
 
 @dataclass(frozen=True, eq=False)
