@@ -2,10 +2,14 @@
 
 The file is written by `Solution.equilibrated.save`. Nothing of the package or of NGSolve is used.
 The stress is interpolated from its values at lattice points of each triangle, so it is a
-polynomial. Checked are that its divergence balances the body force, that tractions are continuous
-between triangles and as given on the boundary, that p* >= 0 is the traction of the secondary, that
-the gap is open, and that B follows from the arrays. Taken as told are the problem's data, the
-discrete stress, the gap, and the norms of the lifting and of loads that no polynomial meets.
+polynomial in x, on curved triangles, too. Checked are that its divergence balances the body force,
+that tractions are continuous between triangles and as given on straight edges of the boundary, that
+on curves and on Gamma_K what is missed of them is orthogonal to rigid motions and as small as the
+norms of `curves` say, that p* >= 0 acts on both bodies alike, that the gap is open, and that B
+follows from the arrays. Triangles that are curved, or of laws that vary, have maps (polynomials),
+laws and discrete stresses at points of a quadrature, of which the order is checked. Taken as told
+are the problem's data, the discrete stress, the gap, and the norms of the lifting and of loads that
+no polynomial meets.
 
     python -m drivers.check_certificate certificate.npz
 """
@@ -15,12 +19,16 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterator
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 
 TOLERANCE = 1e-9  # relative, of sums of round-off; measured 1e-15 to 1e-12
-ROUND_OFF = 1e-12  # of B, relative to the energy norm of the discrete stress
+ROUND_OFF = 1e-12  # of norms, relative to the discrete stress
+COVERED = 1e-6  # share of an edge of the boundary that may be without tractions asked for
+STRAIGHT = 1e-12  # distance of a curve from its chord, relative, up to which it is straight
+PLACES = 17  # on each edge, at which shapes of curved triangles are looked at
 Arrays = dict[str, np.ndarray]
 
 
@@ -39,59 +47,179 @@ def edge_points(side: np.ndarray, t: np.ndarray) -> np.ndarray:
     return first[:, None] + t[..., None] * (last - first)[:, None]
 
 
+class Shapes:
+    """Triangles, some of them images of the reference triangle under polynomials."""
+
+    def __init__(self, arrays: Arrays) -> None:
+        self.a = a = arrays
+        x = a["vertices"][a["triangles"]]
+        self.sides = np.stack([x[:, 0] - x[:, 2], x[:, 1] - x[:, 2]], axis=2)
+        self.area = np.linalg.det(self.sides) / 2
+        self.inverse = np.linalg.inv(self.sides)
+        hats = np.concatenate([self.inverse, -self.inverse.sum(axis=1, keepdims=True)], axis=1)
+        size = np.linalg.norm(hats, axis=2)
+        self.normals, self.lengths = -hats / size[:, :, None], 2 * self.area[:, None] * size
+        self.sampled = a.get("sampled_triangle", np.zeros(0, dtype=int))
+        self.number = np.full(len(x), -1)
+        self.number[self.sampled] = np.arange(len(self.sampled))
+        if self.sampled.size:
+            self.fit = np.linalg.inv(powers(int(a["sampled_degree"]), a["sampled_lattice"])[0])
+
+    def places(self, triangle: np.ndarray, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Places (n, q, 2) and Jacobians (n, q, 2, 2) at reference points `at` (n, q, 2)."""
+        x = self.a["vertices"][self.a["triangles"][triangle, 2]][:, None]
+        x = x + np.einsum("nij,nqj->nqi", self.sides[triangle], at)
+        jacobian = np.tile(self.sides[triangle][:, None], (1, at.shape[1], 1, 1))
+        mine = np.flatnonzero(self.number[triangle] >= 0)
+        if mine.size:
+            maps = self.fit @ self.a["sampled_map"][self.number[triangle[mine]]]
+            found = powers(int(self.a["sampled_degree"]), at[mine].reshape(-1, 2))
+            value, du, dv = (v.reshape(*at[mine].shape[:2], -1) @ maps for v in found)
+            x[mine], jacobian[mine] = value, np.stack([du, dv], axis=3)
+        return x, jacobian
+
+    def straight(self, triangle: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Reference points (n, q, 2) of which places `x` are the affine images."""
+        origin = self.a["vertices"][self.a["triangles"][triangle, 2]][:, None]
+        return np.einsum("nij,nqj->nqi", self.inverse[triangle], x - origin)
+
+    def along(
+        self, triangle: np.ndarray, side: np.ndarray, t: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Places (n, q, 2) on edges, and outward normals times ds over the chord and dt."""
+        x, jacobian = self.places(triangle, edge_points(side, t))
+        way = edge_points(side, np.array([[0.0, 1.0]] * len(side)))
+        dx = np.einsum("nqij,nj->nqi", jacobian, way[:, 1] - way[:, 0])
+        chord = self.lengths[triangle, side][:, None, None]
+        return x, np.stack([dx[..., 1], -dx[..., 0]], axis=2) / chord
+
+    @cached_property
+    def bends(self) -> np.ndarray:
+        """Distances (n, 3) of the edges from straight, evenly run ones, over their lengths."""
+        bends = np.zeros_like(self.lengths)
+        t = np.tile(np.linspace(0, 1, PLACES), (len(self.sampled), 1))
+        for side in range(3):
+            at = edge_points(np.full(len(self.sampled), side), t)
+            flat = self.straight(self.sampled, self.places(self.sampled, at)[0]) - at
+            off = np.einsum("nij,nqj->nqi", self.sides[self.sampled], flat)
+            bends[self.sampled, side] = np.linalg.norm(off, axis=2).max(axis=1, initial=0.0)
+        return bends / self.lengths
+
+    def constants(self, triangle: int, D: np.ndarray) -> tuple[float, np.ndarray]:
+        """Korn's constant, and squares (3,) of those of traces; `D` (q, 2, 2) by places.
+
+        docs/bounds.md has the inequalities.
+        """
+        at = np.full(3, triangle)
+        x, normal = self.along(at, np.arange(3), np.tile(np.linspace(0, 1, PLACES), (3, 1)))
+        normal /= np.linalg.norm(normal, axis=2, keepdims=True)
+        corners, lengths = self.a["vertices"][self.a["triangles"][triangle]], self.lengths[triangle]
+        middle = lengths @ corners / lengths.sum()
+        away = x - middle
+        ratio = (away * normal).sum(axis=2).min() / np.linalg.norm(away, axis=2).max()
+        beta = ratio / math.sqrt(2) / math.sqrt(1 + math.sqrt(1 - ratio**2))
+        det = np.linalg.det(D)
+        distortion = np.linalg.norm(D, ord=2, axis=(1, 2)).max() * math.sqrt(det.max() / det.min())
+        poincare = lengths.max() / math.pi * distortion
+        several = (self.bends[triangle] > STRAIGHT).sum() > 1
+        away = x - (middle if several else corners[:, None])
+        least = (away * normal).sum(axis=2).min(axis=1)
+        far = np.linalg.norm(away, axis=2).max(axis=1)
+        return math.sqrt(1 + 2 / beta**2), 2 * (poincare**2 + far * poincare) / least
+
+
 class Certificate:
-    """The arrays, and what follows from the triangles."""
+    """The arrays, and what follows from them."""
 
     def __init__(self, arrays: Arrays) -> None:
         self.a = arrays
         self.k = int(arrays["degree"])
-        x = arrays["vertices"][arrays["triangles"]]
-        self.sides = np.stack([x[:, 0] - x[:, 2], x[:, 1] - x[:, 2]], axis=2)
-        self.area = np.linalg.det(self.sides) / 2
-        inverse = np.linalg.inv(self.sides)
-        self.gradients = inverse
-        hats = np.concatenate([inverse, -inverse.sum(axis=1, keepdims=True)], axis=1)
-        size = np.linalg.norm(hats, axis=2)
-        self.normals, self.lengths = -hats / size[:, :, None], 2 * self.area[:, None] * size
+        self.shapes = shapes = Shapes(arrays)
+        self.area, self.normals, self.lengths = shapes.area, shapes.normals, shapes.lengths
         self.inverse = np.linalg.inv(powers(self.k, arrays["lattice"])[0])
         self.stress = np.einsum("iq,nqc->nci", self.inverse, arrays["stress"])
         self.largest = max(np.abs(arrays["stress"]).max(), np.finfo(float).tiny)
 
+    def stress_at(self, triangle: np.ndarray, x: np.ndarray) -> np.ndarray:
+        """Stresses (n, q, 3) at places `x` (n, q, 2)."""
+        at = self.shapes.straight(triangle, x)
+        values = powers(self.k, at.reshape(-1, 2))[0].reshape(*x.shape[:2], -1)
+        return np.einsum("nqi,nci->nqc", values, self.stress[triangle])
+
     def traction(self, triangle: np.ndarray, side: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """Tractions (n, q, 2) at places t (n, q) of edges."""
-        x = edge_points(side, t)
-        values = powers(self.k, x.reshape(-1, 2))[0].reshape(*t.shape, -1)
-        s = np.einsum("nqi,nci->nqc", values, self.stress[triangle])
-        nx, ny = self.normals[triangle, side].T[:, :, None]
-        return np.stack([nx * s[..., 0] + ny * s[..., 2], nx * s[..., 2] + ny * s[..., 1]], axis=2)
+        """Tractions (n, q, 2) per chord at places t (n, q) of edges."""
+        x, n = self.shapes.along(triangle, side, t)
+        s = self.stress_at(triangle, x)
+        return np.stack(
+            [
+                n[..., 0] * s[..., 0] + n[..., 1] * s[..., 2],
+                n[..., 0] * s[..., 2] + n[..., 1] * s[..., 1],
+            ],
+            axis=2,
+        )
 
     def checks(self) -> Iterator[tuple[str, float]]:
         """Name of each check, and by how much it fails; at most `TOLERANCE` if it holds."""
-        a, n = self.a, len(self.area)
+        a = self.a
         finite = all(np.isfinite(v).all() for v in a.values())
         yield "all numbers are finite", 0.0 if finite else math.inf
         yield "triangles are oriented", 0.0 if (self.area > 0).all() else math.inf
-        skew = np.abs(a["law"] - a["law"].transpose(0, 2, 1)).max() / np.abs(a["law"]).max()
-        definite = (np.linalg.eigvalsh(a["law"]) > 0).all()
-        yield "laws are symmetric and definite", skew if definite else math.inf
+        for name in ("law", "sampled_law"):
+            if name in a:
+                skew = np.abs(a[name] - np.swapaxes(a[name], -1, -2)).max() / np.abs(a[name]).max()
+                definite = (np.linalg.eigvalsh(a[name]) > 0).all()
+                yield "laws are symmetric and definite", skew if definite else math.inf
         d = np.stack(powers(self.k, a["lattice"])[1:])
-        slope = np.einsum("nrx,rqi,nci->nqcx", self.gradients, d, self.stress, optimize=True)
+        slope = np.einsum("nrx,rqi,nci->nqcx", self.shapes.inverse, d, self.stress, optimize=True)
         div = np.stack(
             [slope[..., 0, 0] + slope[..., 2, 1], slope[..., 2, 0] + slope[..., 1, 1]], 2
         )
         h = self.lengths.max(axis=1)[:, None, None]
         yield "div s + F = 0", np.abs(h * (div + a["force"])).max() / self.largest
-        yield from self.edge_checks(n)
+        if self.shapes.sampled.size:
+            yield from self.sampled_checks()
+        yield from self.edge_checks()
+        if "strip_triangle" in a:
+            yield from self.strip_checks()
         if "contact_pair" in a:
             yield from self.contact_checks()
-        signs = (a["loads"] >= 0).all() and (a["lifting"] >= 0).all() and a["bound"] >= 0
+        norms = ("loads", "curves", "lifting", "bound")
+        signs = all((a[name] >= 0).all() for name in norms)
         yield "norms are not negative", 0.0 if signs else math.inf
-        noise = ROUND_OFF * math.sqrt((self.norms(a["discrete_stress"]) ** 2).sum())
-        off = max(abs(self.bound() - float(a["bound"])) - noise, 0.0)
+        off = max(abs(self.bound() - float(a["bound"])) - self.noise(), 0.0)
         yield "B follows", off / max(float(a["bound"]), np.finfo(float).tiny)
 
-    def edge_checks(self, n: int) -> Iterator[tuple[str, float]]:
-        """Continuity inside, and what is given on the boundary."""
+    def noise(self) -> float:
+        """Round-off of norms."""
+        own = self.norms(self.a["discrete_stress"], self.a.get("sampled_stress"))
+        return ROUND_OFF * math.sqrt((own**2).sum())
+
+    def sampled_checks(self) -> Iterator[tuple[str, float]]:
+        """Maps, and the quadrature on them."""
+        a, shapes = self.a, self.shapes
+        corners = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
+        x, _ = shapes.places(shapes.sampled, np.tile(corners, (len(shapes.sampled), 1, 1)))
+        off = np.abs(x - a["vertices"][a["triangles"][shapes.sampled]]).max(axis=(1, 2))
+        yield "maps keep vertices", (off / shapes.lengths[shapes.sampled].min(axis=1)).max()
+        order, geometry = int(a["sampled_exact"]), int(a["sampled_degree"])
+        enough = order >= 2 * self.k * geometry + 2 * (geometry - 1)
+        u, v = a["sampled_points"].T
+        i, j = np.array([(d - j, j) for d in range(order + 1) for j in range(d + 1)]).T
+        exact = [
+            2 / math.comb(m + n, n) / ((m + n + 1) * (m + n + 2)) for m, n in zip(i, j, strict=True)
+        ]
+        off = np.abs(a["sampled_weights"] @ (u[:, None] ** i * v[:, None] ** j) - exact).max()
+        yield "quadrature is exact for polynomials", off if enough else math.inf
+        _, jacobian = self.sampled_places()
+        yield "maps keep the orientation", 0.0 if (np.linalg.det(jacobian) > 0).all() else math.inf
+
+    def sampled_places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Places and Jacobians of the sampled triangles at the points of quadrature."""
+        points = np.tile(self.a["sampled_points"], (len(self.shapes.sampled), 1, 1))
+        return self.shapes.places(self.shapes.sampled, points)
+
+    def edge_checks(self) -> Iterator[tuple[str, float]]:
+        """Continuity inside, and what is given on straight edges of the boundary."""
         a, t = self.a, self.a["edge_points"]
         ends = np.stack([np.roll(a["triangles"], -1, 1), np.roll(a["triangles"], -2, 1)], axis=2)
         keys = np.sort(ends.reshape(-1, 2), axis=1) @ np.array([len(a["vertices"]), 1])
@@ -99,6 +227,10 @@ class Certificate:
         outer = np.flatnonzero(count[number] == 1)
         listed = 3 * a["edge_triangle"] + a["edge_side"]
         yield "the boundary is complete", float(not np.array_equal(outer, np.sort(listed)))
+        others = self.strip_edges()
+        yield "strips lie on the boundary", float(not np.isin(others, outer).all())
+        inner = np.delete(self.shapes.bends.ravel(), others)
+        yield "other edges are straight", inner.max(initial=0.0)
         order = np.argsort(number, kind="stable")
         order = order[count[number[order]] == 2].reshape(-1, 2)
         yield "edges join two triangles", float(count.max(initial=0) > 2)
@@ -113,28 +245,95 @@ class Certificate:
         off = np.where(a["edge_constrained"][:, None], own - a["edge_traction"], 0.0)
         yield "tractions are as given", np.abs(off).max() / self.largest
 
+    def strip_edges(self) -> np.ndarray:
+        """Numbers of the edges on which tractions are asked for at points."""
+        a = self.a
+        if "strip_triangle" not in a:
+            return np.zeros(0, dtype=int)
+        return np.unique(3 * a["strip_triangle"] + a["strip_side"])
+
+    def strip_checks(self) -> Iterator[tuple[str, float]]:
+        """Tractions on curves and on Gamma_K: what is missed of them, and its norm."""
+        a, t, w = self.a, self.a["strip_place"], self.a["strip_weight"]
+        triangle, side = a["strip_triangle"], a["strip_side"]
+        edges, number = np.unique(3 * triangle + side, return_inverse=True)
+        total = np.bincount(number, w.sum(axis=1))
+        off = max(np.abs(total - 1).max() - COVERED, 0.0)
+        yield "strips cover their edges", off if (w >= 0).all() else math.inf
+        asked = a["strip_load"].copy()
+        p = np.flatnonzero(a["strip_piece"] >= 0)
+        if p.size:
+            pressure = self.pressure(a["strip_piece"][p, None], a["strip_s"][p])
+            asked[p] += pressure[:, :, None] * a["strip_action"][p]
+        off = (self.traction(triangle, side, t) - asked) * a["strip_counts"][:, None]
+        x, n = self.shapes.along(triangle, side, t)
+        middle = a["vertices"][a["triangles"][triangle]].mean(axis=1)[:, None]
+        arm = (x - middle) / self.lengths.max(axis=1)[triangle, None, None]
+        turn = off[..., 1] * arm[..., 0] - off[..., 0] * arm[..., 1]
+        rigid = np.stack([off[..., 0], off[..., 1], turn], axis=2)
+        moments = np.zeros((len(edges), 3))
+        np.add.at(moments, number, (w[:, :, None] * rigid).sum(axis=1))
+        yield "what is missed has no resultants", np.abs(moments).max() / self.largest
+        square = (w * (off**2).sum(axis=2) / np.linalg.norm(n, axis=2)).sum(axis=1)
+        chord = self.lengths.ravel()[edges]
+        missed = np.sqrt(chord * np.bincount(number, square))
+        missed = np.maximum(missed - ROUND_OFF * np.sqrt(chord) * self.largest, 0.0)
+        yield "what is missed is bounded", self.shortfall(edges, missed)
+
+    def shortfall(self, edges: np.ndarray, missed: np.ndarray) -> float:
+        """By how much, relative, `curves` falls short of constants times `missed` (e,)."""
+        a = self.a
+        owner, side = np.divmod(edges, 3)
+        worst = 0.0
+        jacobians = self.sampled_places()[1] if self.shapes.sampled.size else np.zeros(0)
+        mandel = np.sqrt([1.0, 1.0, 2.0])
+        for triangle in np.unique(owner):
+            mine = owner == triangle
+            number = self.shapes.number[triangle]
+            law = a["law"][triangle] if number < 0 else a["sampled_law"][number]
+            least = np.linalg.eigvalsh(law * mandel[:, None] * mandel)[..., 0].min()
+            if least <= 0:
+                return math.inf
+            D = np.eye(2)[None]
+            if number >= 0:
+                D = jacobians[number] @ self.shapes.inverse[triangle]
+            korn, trace = self.shapes.constants(triangle, D)
+            needed = korn * (np.sqrt(trace[side[mine]]) * missed[mine]).sum() / math.sqrt(least)
+            if needed > 0:
+                worst = max(worst, 1 - a["curves"][triangle] / needed)
+        return worst
+
     def contact_checks(self) -> Iterator[tuple[str, float]]:
         """Signs of p* and of the gap; what p* does to both bodies."""
         a, p = self.a, self.a["contact_pressure"]
         one_sided = a["contact_unilateral"]
         yield "p* >= 0", -min(p[one_sided].min(initial=0.0), 0.0) / self.largest * 1e9
         yield "gaps are open", -a["gap_open"].min() * math.inf if a["gap_open"].min() < 0 else 0.0
+        piece = a["strip_piece"]
+        acting = self.lengths[a["strip_triangle"], a["strip_side"]][:, None] * a["strip_weight"]
+        acting = acting[:, :, None] * a["strip_action"]
+        order = np.argsort(piece, kind="stable")
+        order = order[piece[order] >= 0]
+        first = np.searchsorted(piece[order], np.arange(len(p)))
+        count = np.bincount(piece[order], minlength=len(p))
+        whole = np.array_equal(count, np.where(a["contact_obstacle"], 1, 2))
+        yield "pieces act on all bodies", 0.0 if whole else math.inf
+        if not whole:
+            return
+        both = ~a["contact_obstacle"]
+        one, other = order[first[both]], order[first[both] + 1]
+        largest = np.abs(acting).max(axis=(1, 2))
+        off = np.abs(acting[one] + acting[other]).max(axis=(1, 2)) / largest[one]
+        yield "actions are opposite", off.max(initial=0.0)
+        same = np.abs(a["strip_s"][one] - a["strip_s"][other]).max(initial=0.0)
+        yield "they are of the same places", same
         total = np.bincount(a["gap_piece"], a["gap_weight"], minlength=len(p))
-        edge = 3 * a["contact_triangle"] + a["contact_side"]
-        _, first, number = np.unique(edge, return_index=True, return_inverse=True)
-        length = self.lengths[a["contact_triangle"], a["contact_side"]] * a["contact_stretch"]
-        off = np.abs(np.bincount(number, total) / length[first] - 1).max()
+        size = np.linalg.norm(acting[order[first]], axis=2).sum(axis=1)
+        off = np.abs(total / size - 1).max()
         yield "weights cover the zone", off if (a["gap_weight"] >= 0).all() else math.inf
-        d = a["contact_direction"]
-        yield "directions are unit vectors", np.abs(np.linalg.norm(d, axis=1) - 1).max()
-        t = np.tile(a["edge_points"], (len(p), 1))
-        asked = -(self.pressure(np.arange(len(p))[:, None], t) * a["contact_stretch"][:, None])
-        own = self.traction(a["contact_triangle"], a["contact_side"], t)
-        off = own - asked[:, :, None] * d[:, None]
-        yield "p* acts on the secondary", np.abs(off).max() / self.largest
 
     def pressure(self, piece: np.ndarray, t: np.ndarray) -> np.ndarray:
-        """The pressure p* of contact pieces at places t of their edges."""
+        """The pressure p* of contact pieces at parameters t of their segments."""
         p = self.a["contact_pressure"][piece]
         k = p.shape[-1] - 1
         i = np.arange(k + 1)
@@ -143,8 +342,8 @@ class Certificate:
             (p * binomial * t[..., None] ** i * (1 - t[..., None]) ** (k - i)).sum(-1)
         )
 
-    def norms(self, stress: np.ndarray) -> np.ndarray:
-        """Energy norms (n,) of stresses given at the lattice points, (n, m, 3)."""
+    def norms(self, stress: np.ndarray, sampled: np.ndarray | None) -> np.ndarray:
+        """Energy norms (n,) of stresses at the lattice points (n, m, 3), or `sampled` (r, q, 3)."""
         s, w = np.polynomial.legendre.leggauss(self.k + 2)
         s, w = (1 + s) / 2, w / 2
         u, v = (g.ravel() for g in np.meshgrid(s, s, indexing="ij"))
@@ -152,15 +351,25 @@ class Certificate:
         weight = 2 * np.outer(w, w).ravel() * (1 - v)
         at = np.einsum("qi,nic->nqc", powers(self.k, points)[0] @ self.inverse, stress)
         solved = np.linalg.solve(self.a["law"][:, None], at[..., None])[..., 0]
-        return np.sqrt(self.area * np.einsum("q,nqc,nqc->n", weight, at, solved))
+        norms = np.sqrt(self.area * np.einsum("q,nqc,nqc->n", weight, at, solved))
+        if sampled is not None:
+            _, jacobian = self.sampled_places()
+            solved = np.linalg.solve(self.a["sampled_law"], sampled[..., None])[..., 0]
+            weight = self.a["sampled_weights"] * np.linalg.det(jacobian) / 2
+            square = np.einsum("nq,nqc,nqc->n", weight, sampled, solved)
+            norms[self.shapes.sampled] = np.sqrt(square)
+        return np.asarray(norms)
 
     def bound(self) -> float:
         """B from the arrays."""
-        a = self.a
-        norm = self.norms(a["stress"] - a["discrete_stress"])
-        square = ((norm + a["loads"]) ** 2).sum() + (a["lifting"] ** 2).sum()
+        a, sampled = self.a, None
+        if self.shapes.sampled.size:
+            x, _ = self.sampled_places()
+            sampled = self.stress_at(self.shapes.sampled, x) - a["sampled_stress"]
+        norm = self.norms(a["stress"] - a["discrete_stress"], sampled)
+        square = ((norm + a["loads"] + a["curves"]) ** 2).sum() + (a["lifting"] ** 2).sum()
         if "gap_open" in a:
-            p = self.pressure(a["gap_piece"], a["gap_place"])
+            p = self.pressure(a["gap_piece"], a["gap_s"])
             square += 2 * (a["gap_weight"] * p * a["gap_open"]).sum()
         return math.sqrt(square)
 

@@ -47,7 +47,7 @@ from .parts import ErrorBound, complementarity, summed, work_of_supports
 from .pressures import Pieces, Zone, facing_cuts, pieces_of, selected, zone_of
 from .proofs import Norms, Proof
 from .refusals import refuse_bound
-from .remainders import missed_tractions
+from .remainders import asked_tractions, missed_tractions
 from .stress import SETTLED, ContactPressure, EquilibratedStress, certified
 from .stresses import Equilibrated, bubble_norms, equilibrated, improved, settled
 
@@ -96,9 +96,8 @@ def error_bound(
     constitutive = result.norms(discrete)
     costly = COSTLY * float(constitutive @ constitutive)
     lifting = _lifting(problem, boundary, conditions, discrete, fields, gaps, units, costly)
-    curves = missed_tractions(
-        problem, boundary, discrete, (raw, traction), zones, every_pieces, coefficients, units
-    )
+    strips = asked_tractions(problem, boundary, discrete, zones, every_pieces, coefficients, units)
+    curves = missed_tractions(discrete, (raw, traction), strips)
     norms = Norms(
         constitutive=constitutive,
         loads=bubble_norms(discrete, conditions)
@@ -109,7 +108,8 @@ def error_bound(
     works = [complementarity(gap, b) for gap, b in zip(gaps, coefficients, strict=True)]
     closed, signed = sum(w for w, _ in works), sum(w for _, w in works)
     bound = norms.bound(closed, units)
-    proof = Proof(discrete, conditions, given, raw, gaps, coefficients, norms, bound, units)
+    data = discrete, conditions, given, raw, gaps, coefficients, strips
+    proof = Proof(*data, norms, bound, units, problem, stress)
     reaction = work_of_supports(fields, partition, traction)
     return summed(units, norms, closed, signed, reaction, _stress(proof, certificate))
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...arrays import Array, Index
 from .data import Discrete, EdgeConditions, dimension
-from .proofs import Proof
+from .proofs import Proof, certificate_arrays
 from .stresses import Equilibrated, into_raw, raw_operators, stress_field
 
 SETTLED = 1e-9  # residual of equilibrium, relative to the largest stress: measured 1e-15 to 1e-12
@@ -90,12 +90,12 @@ class EquilibratedStress:
         Raises
         ------
         ValueError
-            Curved triangles or laws that vary.
+            Bodies of revolution.
         """
         path = Path(path)
         if path.suffix != ".npz":
             raise ValueError(f'path="{path}" must end in .npz')
-        arrays: dict[str, Any] = dict(self.proof.arrays())
+        arrays: dict[str, Any] = dict(certificate_arrays(self.proof))
         np.savez_compressed(path, **arrays)
         return path
 

@@ -17,7 +17,7 @@ from ..data import Units, discrete_on
 from ..liftings import lifted, on_contact
 from ..pressures import selected
 from ..proofs import Proof
-from ..remainders import missed_tractions
+from ..remainders import asked_tractions, missed_tractions
 from ..stress import SETTLED, certified
 from ..stresses import equilibrated, improved
 from .excess import Excess, jump_beside, least_kappa
@@ -116,7 +116,8 @@ def dual_of(problem: Problem, boundary: BoundaryTrace, tested: Tested, proof: Pr
     raw, traction, certificate = certified(discrete, conditions, given, result)
     if max(certificate.values()) > SETTLED:
         raise ContactError(f"no dual stress was found: residuals {certificate}")
-    curves = missed_tractions(free, boundary, discrete, (raw, traction), zones, pieces, q, units)
+    strips = asked_tractions(free, boundary, discrete, zones, pieces, q, units)
+    curves = missed_tractions(discrete, (raw, traction), strips)
     supported = np.unique(partition.ends[~conditions.constrained.all(axis=1)])
     lifting = np.zeros(len(partition.triangles))
     for one in excess:

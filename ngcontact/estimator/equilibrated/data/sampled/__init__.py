@@ -4,3 +4,4 @@ from .meridian import meridian_triangles as meridian_triangles
 from .rough import MANDEL as MANDEL
 from .rough import Rough as Rough
 from .rough import rough_triangles as rough_triangles
+from .rough import sampling_order as sampling_order

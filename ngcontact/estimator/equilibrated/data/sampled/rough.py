@@ -107,6 +107,11 @@ def blank(at: Index, number: Index, n: int, m: int) -> Rough:
     )
 
 
+def sampling_order(degree: int, geometry: int) -> int:
+    """Order of the quadrature on rough triangles: exact for products of stresses on curves."""
+    return 2 * degree * geometry + 2 * (geometry - 1) + LAW_BONUS
+
+
 def rough_triangles(
     problem: Problem,
     partition: Partition,
@@ -133,7 +138,7 @@ def rough_triangles(
         Of stress and modulus.
     """
     n, m, r = dimension(degree), dimension(degree - 1), len(at)
-    order = 2 * degree * geometry + 2 * (geometry - 1) + LAW_BONUS
+    order = sampling_order(degree, geometry)
     number = np.full(len(partition.triangles), -1)
     number[at] = np.arange(r)
     result = blank(at, number, n, m)

@@ -1,0 +1,82 @@
+"""Tractions on curves and on Gamma_K, p* and the gap, as arrays of a certificate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ....arrays import Array
+from ..liftings import at_points, coefficients
+from .record import Proof
+
+
+def strip_arrays(proof: Proof) -> dict[str, Array]:
+    """Tractions asked for at points of edges, less p*, and by what p* is multiplied in them.
+
+    By name, (k, q) of k strips. Places run from vertex i + 1 to i + 2 of the triangle; pieces are counted over all pairs.
+    """
+    if not proof.strips:
+        return {}
+    partition = proof.discrete.partition
+    count = [len(gap.pieces.local) for gap in proof.gaps]
+    parts: list[dict[str, Any]] = []
+    for strip in proof.strips:
+        triangle, side = (x[strip.edge] for x in partition.owner)
+        own = (strip.piece < 0)[:, None, None]
+        parts.append(
+            {
+                "strip_triangle": triangle,
+                "strip_side": side,
+                "strip_place": np.where(
+                    partition.flips[triangle, side][:, None], 1 - strip.t, strip.t
+                ),
+                "strip_weight": strip.weight,
+                "strip_load": np.where(own, strip.asked, 0.0) * proof.units.stress,
+                "strip_counts": strip.counts,
+                "strip_piece": np.where(own[:, 0, 0], -1, sum(count[: strip.pair]) + strip.piece),
+                "strip_s": strip.s,
+                "strip_action": strip.action,
+            }
+        )
+    return _joined(parts)
+
+
+def contact_arrays(proof: Proof) -> dict[str, Array]:
+    """p* on the pieces of all pairs, and the gap there, by the segments' own parameters.
+
+    By name: (k, d + 1) coefficients of k pieces, (q,) at points of all of them.
+    """
+    units, before = proof.units, 0
+    parts: list[dict[str, Any]] = []
+    for number, (gap, b) in enumerate(zip(proof.gaps, proof.pressures, strict=True)):
+        pieces, every = gap.pieces, np.arange(len(gap.pieces.local))
+        if every.size == 0:
+            continue
+        t, w = gap.panels(every)
+        value, r, _ = gap.lifted(every, t)
+        stretch = coefficients(gap.points.weight.reshape(len(every), -1))
+        place = pieces.start[:, None] + (pieces.stop - pieces.start)[:, None] * t
+        opened = np.maximum(value + r, 0.0) * units.strain * units.length
+        contact = pieces.line.contact
+        parts.append(
+            {
+                "contact_pair": np.full(len(every), number),
+                "contact_pressure": np.append(b, 0.0)[gap.zone.number[pieces.local]] * units.stress,
+                "contact_unilateral": np.full(len(every), not contact.bilateral),
+                "contact_obstacle": np.full(len(every), contact.primary is None),
+                "gap_piece": np.repeat(before + every, t.shape[1]),
+                "gap_s": place.ravel(),
+                "gap_weight": (at_points(stretch, t) * w).ravel() * units.length,
+                "gap_open": opened.ravel(),
+            }
+        )
+        before += len(every)
+    return _joined(parts)
+
+
+def _joined(parts: Sequence[dict[str, Any]]) -> dict[str, Array]:
+    return (
+        {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else {}
+    )
