@@ -15,7 +15,8 @@ from .record import Proof
 def strip_arrays(proof: Proof) -> dict[str, Array]:
     """Tractions asked for at points of edges, less p*, and by what p* is multiplied in them.
 
-    By name, (k, q) of k strips. Places run from vertex i + 1 to i + 2 of the triangle; pieces are counted over all pairs.
+    By name, (k, q) of k strips. Places run from vertex i + 1 to i + 2 of the triangle; pieces are
+    counted over all pairs.
     """
     if not proof.strips:
         return {}
