@@ -141,11 +141,16 @@ def _equilibrated(
     discrete: Discrete, conditions: EdgeConditions, given: Array
 ) -> tuple[Equilibrated, tuple[Array, Array, dict[str, float]]]:
     """The equilibrated stress for tractions `given` (e, 2, r), and what `certified` says of it."""
-    result = improved(discrete, conditions, equilibrated(discrete, conditions, given))
+    result = equilibrated(discrete, conditions, given)
     found = certified(discrete, conditions, given, result)
     if max(found[2].values()) > SETTLED:
         result = settled(discrete, conditions, given)
-        found = certified(discrete, conditions, given, result)
+        return result, certified(discrete, conditions, given, result)
+    better = improved(discrete, conditions, result)
+    if better is not result:
+        nearer = certified(discrete, conditions, given, better)
+        if max(nearer[2].values()) <= SETTLED:
+            return better, nearer
     return result, found
 
 

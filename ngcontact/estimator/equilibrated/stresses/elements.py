@@ -63,6 +63,11 @@ class Condensed:
     K: Array
     G: Array
 
+    @property
+    def size(self) -> int:
+        """Count of all numbers."""
+        return sum(x.size for x in (self.Q, self.R, self.N, self.K, self.G))
+
     def with_divergence(self, rho: Array) -> Array:
         """Least stresses (b, j, n) of divergences `rho` (b, j, m)."""
         x = np.linalg.solve(self.R.transpose(0, 2, 1), rho.transpose(0, 2, 1))

@@ -1,8 +1,9 @@
 """Steps towards the nearest of all equilibrated stresses where that of the patches is far.
 
 What a patch finds is near to hat times sigma_h, and not to sigma_h. Where these differ much, as in
-corners between supports of nearly incompressible bodies, the sum of all patches is improved by
-stresses of patches without divergence: a direction of a conjugate gradient method is their sum.
+corners between supports of nearly incompressible bodies, or where laws are stiff in one direction,
+the sum of all patches is improved by stresses of patches without divergence: a direction of a
+conjugate gradient method is their sum.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 
 from ....arrays import Array, Index
 from ..data import MANDEL, Discrete, EdgeConditions
-from .elements import gathered, without_opposite
+from .elements import Condensed, gathered, without_opposite
 from .equilibration import Equilibrated, blocks, operators
 from .patches import multipliers
 
@@ -22,47 +23,54 @@ FAR = 6.0  # square on a triangle, over the mean of all, from which it is far
 SHARE = 0.2  # of the sum of squares on far triangles from which steps pay
 MOST = 0.03  # share of triangles that are called far
 FEWEST = 60  # which may be far on any mesh
+KEPT = 5_000_000  # numbers in operators of triangles that are kept from step to step
 STEPS = 3
+STIFF_STEPS = 24  # at most, where laws are stiff in one direction and a step brings less
+PAYS = 0.04  # of the square of the norm, what a step must take off for another to be made
 
 
 def improved(discrete: Discrete, conditions: EdgeConditions, found: Equilibrated) -> Equilibrated:
     """The same stress, nearer to the discrete one around the triangles on which it is far."""
-    region = _region(discrete, (found.change**2).sum(axis=1))
+    region, stiff = _region(discrete, (found.change**2).sum(axis=1))
     if region.size == 0:
         return found
-    problem = _Region(discrete, conditions, region)
+    problem, whole = _Region(discrete, conditions, region), float((found.change**2).sum())
     b = found.change[region]
     direction, last = np.zeros_like(b), 1.0
-    for _ in range(STEPS):
+    for _ in range(STIFF_STEPS if stiff else STEPS):
         d = problem.direction(b)
         slope = float((b * d).sum())
         if slope >= 0:  # but for round-off it is the nearest
             break
         direction = d + slope / last * direction
-        b -= float((b * direction).sum() / (direction**2).sum()) * direction
-        last = slope
+        along, square = float((b * direction).sum()), float((direction**2).sum())
+        b -= along / square * direction
+        last, gain = slope, along**2 / square
+        if gain < PAYS * whole:
+            break
+        whole -= gain
     change = found.change.copy()
     change[region] = b
     return replace(found, change=change)
 
 
-def _region(discrete: Discrete, squares: Array) -> Index:
-    """Triangles (j,) around those that are far, by squares (n,)."""
+def _region(discrete: Discrete, squares: Array) -> tuple[Index, bool]:
+    """Triangles (j,) around those that are far, by squares (n,); whether for their laws."""
     n, partition = len(squares), discrete.partition
     mandel = MANDEL[discrete.law.shape[1]]
     moduli = np.linalg.eigvalsh(discrete.law * mandel[:, None] * mandel)
     stiff = np.flatnonzero(moduli[:, -1] > STIFF * moduli[:, 0])
     if squares[stiff].sum() > SHARE * squares.sum():
-        return stiff
+        return stiff, True
     order = np.argsort(-squares)[: max(FEWEST, int(MOST * n))]
     far = order[squares[order] > FAR * squares.mean()]
     if squares[far].sum() <= SHARE * squares.sum():
-        return np.zeros(0, dtype=np.intp)
+        return np.zeros(0, dtype=np.intp), False
     near = np.zeros(len(partition.vertices), dtype=bool)
     for _ in range(2):
         near[partition.triangles[far]] = True
         far = np.flatnonzero(near[partition.triangles].any(axis=1))
-    return far
+    return far, False
 
 
 class _Region:
@@ -88,6 +96,17 @@ class _Region:
             soft=conditions.soft[edges],
         )
         self.given = np.zeros_like(conditions.given[edges])
+        self.kept: dict[int, Condensed] = {}
+
+    def operators(self, part: Index) -> Condensed:
+        """Those of a part (b,) of the triangles; of the first parts they are kept."""
+        number = int(part[0])
+        if number in self.kept:
+            return self.kept[number]
+        found = operators(self.discrete, self.at[part], self.conditions.frames)
+        if (number + len(part)) * found.size <= KEPT * len(part):
+            self.kept[number] = found
+        return found
 
     def direction(self, b: Array) -> Array:
         """The sum (j, n) of the least stresses of all patches added to `b` (j, n)."""
@@ -96,7 +115,7 @@ class _Region:
         X, x = np.empty((n, 3, r, 2 * r)), np.empty((n, 3, r))
         free = np.empty_like(b)
         for part in blocks(n, 3 * b.shape[1] ** 2):
-            parts = operators(self.discrete, self.at[part], self.conditions.frames)
+            parts = self.operators(part)
             c = b[part, :, None]
             free[part] = (parts.Q @ (parts.Q.transpose(0, 2, 1) @ c) - c)[:, :, 0]
             t = np.repeat(free[part][:, None], 3, axis=1) @ parts.N.transpose(0, 2, 1)
@@ -105,7 +124,7 @@ class _Region:
         lam = multipliers(self.partition, S, g, self.mine, self.given)
         total = 3 * free
         for part in blocks(n, 3 * b.shape[1] ** 2):
-            parts = operators(self.discrete, self.at[part], self.conditions.frames)
+            parts = self.operators(part)
             y = gathered(lam[part], X[part], x[part])
             total[part] -= parts.of_multipliers(y)
         return total
