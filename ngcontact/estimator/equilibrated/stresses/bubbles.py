@@ -163,11 +163,12 @@ def bubble_norms(discrete: Discrete, conditions: EdgeConditions) -> Array:
         load = np.linalg.inv(sides) @ forces.higher[at]
         t = np.einsum("bcj,cjsn->bsn", load, inside(k, k + HIGHER))
         total[at] += _norms(discrete, at, sides, t[:, None])
-    if forces.parted.size:
-        at, sides = forces.parted, partition.sides[forces.parted]
-        load = np.linalg.inv(sides)[:, None] @ forces.parts
+    for parts in forces.parts:
+        sides = partition.sides[parts.at] @ parts.sides
+        load = np.linalg.inv(sides)[:, None] @ parts.values
         t = np.einsum("bpcj,pcjqsn->bqsn", load, on_parts(), optimize=True)
-        total[at] += _norms(discrete, at, sides, t)
+        squares = _norms(discrete, parts.at, sides, t) ** 2 * np.linalg.det(parts.sides)
+        total += np.sqrt(np.bincount(parts.at, squares, minlength=len(total)))
     edge = np.flatnonzero(np.abs(conditions.higher).max(axis=(1, 2)) > 0)
     if edge.size:
         np.add.at(total, partition.owner[0][edge], _beside_edges(discrete, conditions, edge))
