@@ -138,7 +138,8 @@ def forces_on(
         before = np.cumsum(missed[at[rough]] ** 2) - missed[at[rough]] ** 2
         rough = rough[before <= (1 - LEFT) * (missed[at] ** 2).sum()][:FINEST]
         rough = rough[mean[rough] > SMOOTH**2 * largest]
-        for some in np.split(rough, np.arange(AT_ONCE, len(rough), AT_ONCE)) if rough.size else []:
+        for start in range(0, len(rough), AT_ONCE):
+            some = rough[start : start + AT_ONCE]
             fine = partition, F, at[some], unit, high
             whole[at[some]], c[some], missed[at[some]], finer = _twice_divided(*fine)
             parts.append(finer)
