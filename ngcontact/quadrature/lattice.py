@@ -50,6 +50,16 @@ def lattice(dim: int, n: int) -> Array:
     return np.asarray(origin + side.sum(axis=1) / 3)
 
 
+@lru_cache
+def beside_edges(dim: int) -> Array:
+    """Points (m, dim) inside the unit segment or triangle, 1e-4 of it from its ends or edges."""
+    t = np.arange(8)[:, None] / 8
+    corners = np.vstack([np.zeros(dim), np.eye(dim)])
+    edges = [(1 - t) * a + t * b for a, b in zip(corners, np.roll(corners, 1, axis=0), strict=True)]
+    x = corners if dim == 1 else np.vstack(edges)
+    return np.asarray(x + 1e-4 * (1 / (dim + 1) - x))
+
+
 def monomials(x: Array, degree: int) -> Array:
     """Products of the coordinates up to a degree at points `x` (..., dim), (..., q)."""
     found = [np.ones(x.shape[:-1])]  # each by one product, in the order of degrees

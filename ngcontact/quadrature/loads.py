@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two
 from .cells import Cells, following, joined, whole
-from .lattice import divisions, lattice, monomials
+from .lattice import beside_edges, divisions, monomials
 from .view import View, looked_at
 
 SHAPE = 0.05  # what they miss of a load at a point, relative to its largest value ...
@@ -20,10 +20,7 @@ SHARE = {
     2: 2e-3,
 }  # ... or over an element, relative to its integral, at which it is rough there
 POINTS = {1: 3, 2: 3}  # parts of a lattice that one of the rule is as good as
-FRAMES = {1: 2, 2: 1}  # in which values are compared with those of neighbours
-STEP = (
-    2  # times what values vary in an element: smooth functions leave neighbours' no further apart
-)
+STEP = 2  # times what values vary at the points: no others are further apart in smooth functions
 LONG = 4000  # of what is printed; numbers are short
 KNOWN: WeakKeyDictionary[ng.CoefficientFunction, bool] = WeakKeyDictionary()  # numbers or not
 KEPT = "_ngcontact_loads"  # attribute of a mesh
@@ -162,50 +159,42 @@ def _rough(load: ng.CoefficientFunction, view: View, elements: Index) -> tuple[M
     """
     sizes = view.sizes
     miss, largest, total, seen = np.zeros(len(sizes)), 0.0, 0.0, 0
-    least, most = np.zeros((2, len(sizes), FRAMES[view.dim], load.dim))
+    least, most = np.zeros((2, len(sizes), load.dim))
     for here, values, left in looked_at(load, view, elements):
         miss[here] = left
         seen = hash((seen, here.tobytes(), sizes[here].tobytes(), values.tobytes()))
         size = np.abs(values).max(axis=2)  # no squares: they may leave the range of numbers
         largest = max(largest, float(size.max(initial=0.0)))
         total += float(size.mean(axis=1) @ sizes[here] ** view.dim) / view.dim
-        frames = _frames(values, view, here)
-        least[here], most[here] = frames.min(axis=1), frames.max(axis=1)
-    miss[elements] = np.maximum(
-        miss[elements], _steps(least[elements], most[elements], view, elements)
-    )
+        least[here], most[here] = values.min(axis=1), values.max(axis=1)
+    here, beyond = _steps(load, view, elements, least[elements], most[elements])
+    miss[here] = np.maximum(miss[here], beyond)
     share = miss * sizes**view.dim / view.dim
     return (miss > SHAPE * largest) | (share > SHARE[view.dim] * total), total, seen
 
 
-def _frames(values: Array, view: View, elements: Index) -> Array:
-    """Values (j, n, f, c) as they are and, on sides, along normal and side: either may turn."""
-    if view.dim == 2 or values.shape[2] != 2:
-        return np.repeat(values[:, :, None], FRAMES[view.dim], axis=2)
-    x, y = np.moveaxis(values, 2, 0)
-    normal = view.evaluate(ng.specialcf.normal(2), elements, lattice(1, values.shape[1]))
-    across, along = (
-        x * normal[..., 0] + y * normal[..., 1],
-        y * normal[..., 0] - x * normal[..., 1],
-    )
-    return np.stack([values, np.stack([across, along], axis=2)], axis=2)
+def _steps(
+    load: ng.CoefficientFunction, view: View, elements: Index, least: Array, most: Array
+) -> tuple[Index, Array]:
+    """Those (j,) of `elements` (k,) with steps beside the points looked at, and how large (j,).
 
-
-def _steps(least: Array, most: Array, view: View, elements: Index) -> Array:
-    """How far apart (k,) the values are at a vertex of each element that no element's own explain.
-
-    A step whose far side has none of the points leaves values of neighbours that do not meet.
-    `least` and `most` (k, f, c) are those of the `elements`. Those of a linear function are apart
-    by up to 4/3 of what it varies at the points of one of them.
+    A step whose far side has none of the points leaves values of neighbours that do not meet: there
+    it is looked for at the edges. `least` and `most` (k, c) are those at the points.
     """
     ends = view.arrays.triangles if view.dim == 2 else view.arrays.segments
-    at, shape = ends[elements], (view.mesh.nv, *least.shape[1:])
-    lowest, highest, varies = np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape)
+    at, shape, varies = ends[elements], (view.mesh.nv, load.dim), most - least
+    lowest, highest, most_varied = np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape)
     np.minimum.at(lowest, at, most[:, None])
     np.maximum.at(highest, at, least[:, None])
-    np.maximum.at(varies, at, (most - least)[:, None])
-    apart = (highest - lowest - STEP * varies).max(axis=2).min(axis=1)
-    return np.asarray(np.maximum(apart, 0.0)[at].max(axis=1, initial=0.0))
+    np.maximum.at(most_varied, at, varies[:, None])
+    apart = np.any(highest - lowest > STEP * most_varied, axis=1)
+    some = np.flatnonzero(np.any(apart[at], axis=1))
+    if not len(some):
+        return elements[some], np.empty(0)
+    values = view.evaluate(load, elements[some], beside_edges(view.dim))
+    beyond = np.maximum(values - most[some, None], least[some, None] - values)
+    beyond = np.maximum(beyond - STEP * varies[some, None], 0.0)
+    return elements[some], np.asarray(beyond.max(axis=(1, 2), initial=0.0))
 
 
 def _projected(

@@ -91,6 +91,15 @@ def test_a_disc_on_elements_of_half_its_size_is_not_lost(shift):
     assert total == pytest.approx(math.pi * r**2, rel=1e-3)
 
 
+@pytest.mark.parametrize("nx", [10, 100])
+def test_loads_that_jump_along_edges_are_left_to_the_usual_rule(nx):
+    """It is exact for them: no part of an element is on the other side."""
+    mesh = MakeStructured2DMesh(quads=False, nx=nx, ny=nx)
+    load = ng.IfPos(ng.x - 0.3, (1 + ng.x * ng.y) * ng.x**2, -7.0)
+    assert rough_load(load, mesh.Materials(".*"), 3) is None
+    assert rough_load(ng.CF((load, 0)), mesh.Boundaries("top"), 3) is None
+
+
 @pytest.mark.parametrize("maxh", [0.3, 0.03])
 def test_loads_that_turn_with_a_curved_side_are_smooth(maxh):
     """Both a pressure and a load of one direction, of which the values of neighbours differ."""
