@@ -12,7 +12,7 @@ import numpy as np
 
 from ....arrays import Array, Index
 from ....lagrange import gauss, gauss_lobatto
-from ..data import Discrete, edge_places, legendre_derivative, legendre_values, triangle_rule
+from ..data import Discrete, edge_places, legendre_derivative, legendre_values
 
 DEGREE = 16  # of the polynomials that stand for prescribed displacements and gaps on a segment
 LEAST_POWER = 1.0
@@ -128,21 +128,39 @@ def hat_norms(discrete: Discrete, triangle: Index, corner: Index, moves: Array) 
     """
     if discrete.balance.extent:
         return _hats_about_axis(discrete, triangle, corner, moves)
+    opposite, t, w = _from_curve(discrete, triangle, 2 * discrete.geometry + 4)
+    slope, weight, _ = _hat_slopes(discrete, triangle, corner, opposite, t)
+    e = _strain(np.broadcast_to(moves[:, None], slope.shape), slope)
+    C = discrete.law[triangle]
+    square = np.einsum("kq,kqi,kij,kqj->k", weight * w, e, C, e, optimize=True) / 2
+    return np.sqrt(square * _most(discrete, triangle))
+
+
+def _from_curve(discrete: Discrete, triangle: Index, order: int) -> tuple[Index, Array, Array]:
+    """Vertices (k,) opposite to a curved edge or any, points (k, q) and weights (q,) on it."""
+    edges = discrete.partition.edges[triangle]
+    opposite = (discrete.curves.number[edges] >= 0).argmax(axis=1)
+    rule, w = gauss(order)
+    return opposite, np.tile(rule, (len(triangle), 1)), w
+
+
+def _hat_slopes(
+    discrete: Discrete, triangle: Index, corner: Index, opposite: Index, t: Array
+) -> tuple[Array, Array, Array]:
+    """Gradients (k, q, 2) of hats, the same on lines from the edge to the vertex `opposite` (k,).
+
+    With twice the area per parameter (k, q), and the values (k, q) on the edge.
+    """
     partition = discrete.partition
-    opposite = (discrete.curves.number[partition.edges[triangle]] >= 0).argmax(axis=1)
     edge = partition.edges[triangle, opposite]
-    rule, w = gauss(2 * discrete.geometry + 4)
-    t = np.tile(rule, (len(triangle), 1))
     along, inwards, weight = _towards(discrete, triangle, opposite, edge, t)
     first = np.where(partition.flips[triangle, opposite], 2, 1)
     starts = (opposite + first) % 3 == corner
     share = np.where(starts[:, None], t - 1, -t)[:, :, None] * inwards
     slope = np.where(starts[:, None, None], -along, along) + share
-    slope = np.where((opposite == corner)[:, None, None], inwards, slope)
-    e = _strain(np.broadcast_to(moves[:, None], slope.shape), slope)
-    C = discrete.law[triangle]
-    square = np.einsum("kq,kqi,kij,kqj->k", weight * w, e, C, e, optimize=True) / 2
-    return np.sqrt(square * _most(discrete, triangle))
+    at_apex = (opposite == corner)[:, None]
+    value = np.where(at_apex, 0.0, np.where(starts[:, None], 1 - t, t))
+    return np.where(at_apex[:, :, None], inwards, slope), weight, value
 
 
 def _most(discrete: Discrete, triangle: Index) -> Array:
@@ -211,22 +229,22 @@ def _norms_about_axis(discrete: Discrete, field: EdgeField) -> Array:
 
 
 def _hats_about_axis(discrete: Discrete, triangle: Index, corner: Index, moves: Array) -> Array:
-    """The norms of hats about an axis, of straight triangles."""
-    partition = discrete.partition
+    """The norms of hats about an axis, which lie between an edge and the vertex opposite."""
+    partition, balance = discrete.partition, discrete.balance
     if triangle.size == 0:
         return np.zeros(0)
-    if (discrete.curves.number[partition.edges[triangle]] >= 0).any():
-        raise ValueError(
-            "no guaranteed bound is known for rows that are means on curves about an axis; "
-            "use error_estimate"
-        )
-    rule, w = triangle_rule(POINTS)
-    x, law = partition.places(triangle, rule), discrete.law[triangle]
-    hat = np.column_stack([rule, 1 - rule.sum(axis=1)])[:, corner].T
-    gradient = partition.hat_gradients[triangle, corner]
-    e = np.zeros((*hat.shape, 4))
-    e[..., MERIDIAN] = _strain(moves, gradient)[:, None]
-    e[..., 2] = moves[:, :1] * hat / x[..., 0]
-    weight = w * discrete.balance.measure(x) * partition.areas[triangle][:, None]
-    square = np.einsum("kq,kqi,kij,kqj->k", weight, e, law, e, optimize=True)
+    opposite, t, w = _from_curve(discrete, triangle, 2 * discrete.geometry + 2 * POINTS)
+    slope, weight, value = _hat_slopes(discrete, triangle, corner, opposite, t)
+    x, _ = edge_places(partition, partition.edges[triangle, opposite], discrete.curves, t)
+    apex = partition.vertices[partition.triangles[triangle, opposite]]
+    top = (opposite == corner)[:, None]
+    law, e = discrete.law[triangle], np.zeros((*t.shape, 4))
+    e[..., MERIDIAN] = _strain(np.broadcast_to(moves[:, None], slope.shape), slope)
+    square = np.zeros(len(triangle))
+    for up, of_up in zip(*gauss(2 * POINTS), strict=True):
+        place = x + up * (apex[:, None] - x)
+        hat = np.where(top, up, (1 - up) * value)
+        e[..., 2] = moves[:, :1] * hat / place[..., 0]
+        share = weight * w * (1 - up) * of_up * balance.measure(place)
+        square += np.einsum("kq,kqi,kij,kqj->k", share, e, law, e, optimize=True)
     return np.sqrt(square * _most(discrete, triangle))
