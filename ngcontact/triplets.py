@@ -21,3 +21,16 @@ def from_triplets(
     index = np.int32 if largest <= np.iinfo(np.int32).max else np.int64
     at = np.asarray(rows, dtype=index), np.asarray(columns, dtype=index)
     return sp.csr_array((values, at), shape=shape)
+
+
+def for_both_components(S: sp.csr_array) -> sp.csr_array:
+    """Sparse array (2m, 2n) that acts as `S` (m, n) on x components and on y components."""
+    m, n = S.shape
+    return sp.csr_array(
+        (
+            np.concatenate([S.data, S.data]),
+            np.concatenate([S.indices, S.indices + n]),
+            np.concatenate([S.indptr, S.indptr[1:] + S.nnz]),
+        ),
+        shape=(2 * m, 2 * n),
+    )

@@ -83,18 +83,15 @@ def _frames(n: int, conditions: Conditions) -> tuple[Array, Mask, Array]:
 def _blocks(blocks: Array) -> sp.csr_array:
     """Matrix (2n, 2n) of (n, 2, 2) node blocks in the numbering x first, then y."""
     n = len(blocks)
-    i = np.arange(n)
-    rows = np.concatenate([i, i, i + n, i + n])
-    cols = np.concatenate([i, i + n, i, i + n])
-    values = np.concatenate([blocks[:, 0, 0], blocks[:, 0, 1], blocks[:, 1, 0], blocks[:, 1, 1]])
-    matrix = from_triplets(values, rows, cols, (2 * n, 2 * n))
+    columns = np.tile(np.arange(n, dtype=np.int32)[:, None] + np.array([0, n], np.int32), (2, 1))
+    starts = np.arange(0, 4 * n + 1, 2, dtype=np.int32)
+    values = blocks.transpose(1, 0, 2).flatten()  # a copy, which loses its zeros
+    matrix = sp.csr_array((values, columns.ravel(), starts), shape=(2 * n, 2 * n))
     matrix.eliminate_zeros()
     return matrix
 
 
-def _local_systems(
-    host: Index, coefficients: Array, fixed: Mask
-) -> tuple[Index, Array, Array, sp.csr_array]:
+def _local_systems(host: Index, coefficients: Array, fixed: Mask) -> tuple[Index, Array, Array]:
     """Make each row's part at its host an unknown there.
 
     Parameters
@@ -110,12 +107,8 @@ def _local_systems(
     -------
     unknown : ndarray of int (k,)
         Slot of the row: the first free one of its host, the second for a second row.
-    local : ndarray (k, 2)
-        The coefficients at free slots.
-    M : ndarray (n, 2, 2)
-        2 x 2 systems of rows, completed by the direction across a single row.
-    G : sparse (2n, 2n)
-        Their inverses.
+    M, inverse : ndarray (n, 2, 2)
+        2 x 2 systems of rows, completed by the direction across a single row; their inverses.
     """
     n = len(fixed)
     order = np.argsort(host, kind="stable")
@@ -131,7 +124,42 @@ def _local_systems(
     M[host[single], 1] = across / np.linalg.norm(across, axis=1)[:, None]
     inverse = np.tile(np.eye(2), (n, 1, 1))
     inverse[host] = np.linalg.inv(M[host])
-    return host + n * slot, local, M, _blocks(inverse)
+    return host + n * slot, M, inverse
+
+
+def _elsewhere(Bz: sp.csr_array, host: Index, fixed: Mask) -> sp.csr_array:
+    """What rows `Bz` (k, 2n) contain but for the slots of their `host` (k,) not `fixed` (2n,)."""
+    row = np.repeat(np.arange(len(host)), np.diff(Bz.indptr))
+    other = (Bz.indices % (Bz.shape[1] // 2) != host[row]) | fixed[Bz.indices]
+    other &= Bz.data != 0
+    if not other.any():
+        return sp.csr_array(Bz.shape)
+    return from_triplets(Bz.data[other], row[other], Bz.indices[other], Bz.shape)
+
+
+def _solved(inverse: Array, unknown: Index, rest: sp.csr_array) -> sp.csr_array:
+    """H (2n, 2n) in z = H y: what rows contain of other unknowns moves to the right, z = G y + N z.
+
+    Parameters
+    ----------
+    inverse : ndarray (n, 2, 2)
+        The blocks of G.
+    unknown : ndarray of int (k,)
+        Slots of the rows.
+    rest : sparse (k, 2n)
+        The other unknowns in them.
+    """
+    G = _blocks(inverse)
+    k = np.arange(len(unknown))
+    N = -(G @ from_triplets(np.ones(len(k)), unknown, k, rest.shape[::-1]) @ rest)
+    N.eliminate_zeros()
+    N, G = _without_rings(N, G)
+    H, term = G, N @ G
+    while term.nnz:  # as often as bodies in a row have contact lines that share nodes
+        H = H + term
+        term = N @ term
+        term.eliminate_zeros()
+    return H
 
 
 def _without_rings(N: sp.csr_array, G: sp.csr_array) -> tuple[sp.csr_array, sp.csr_array]:
@@ -183,29 +211,19 @@ def change_of_basis(
     n = rows.coupling.shape[1]
     frame, fixed, values = _frames(n, conditions)
     R = _blocks(frame)
-    Bz = (rows.matrix() @ R).tocsr()
+    Bz = (rows.matrix @ R).tocsr()
     flat_fixed, flat_values = fixed.T.ravel(), values.T.ravel()
     host = pivots(rows, Bz, fixed, np.ones(n) if stiffness is None else stiffness)
     check_prescribed(rows, Bz, flat_fixed, flat_values, np.flatnonzero(host < 0), length)
     kept = np.flatnonzero(host >= 0)
-    host = host[kept]
-    unknown, local, M, G = _local_systems(host, coefficients_at(Bz, kept, host), fixed)
-
-    # What the rows contain of other unknowns moves to the right: z = G y + N z.
-    k = np.arange(len(host))
-    hosted = np.concatenate([host, host + n])
-    rest = Bz[kept] - from_triplets(local.T.ravel(), np.tile(k, 2), hosted, (len(k), 2 * n))
-    place = from_triplets(np.ones(len(k)), unknown, k, (2 * n, len(k)))
-    N = -(G @ place @ rest)
-    N.eliminate_zeros()
-    N, G = _without_rings(N, G)
-    H, term = G, N @ G
-    while term.nnz:  # as often as bodies in a row have contact lines that share nodes
-        H = H + term
-        term = N @ term
-        term.eliminate_zeros()
+    if len(kept) < len(host):
+        host, Bz = host[kept], Bz[kept]
+    coefficients = coefficients_at(Bz, np.arange(len(host)), host)
+    unknown, M, inverse = _local_systems(host, coefficients, fixed)
+    rest = _elsewhere(Bz, host, flat_fixed)
+    T = _blocks(frame @ inverse) if rest.nnz == 0 else R @ _solved(inverse, unknown, rest)
     return BasisTransformation(
-        T=(R @ H).tocsr(),
+        T=T.tocsr(),
         fixed=flat_fixed,
         values=flat_values,
         unknown=unknown,

@@ -63,6 +63,8 @@ def coefficients_at(Bz: sp.csr_array, row: Index, node: Index) -> Array:
 
 def _preferred(rows: Rows, stiffness: Array) -> Index:
     """Node (m,) of the secondary, or the nearest one that faces it where that is much softer."""
+    if rows.coupling.nnz == 0:
+        return rows.node
     coupling = rows.coupling.tocoo()
     falling = np.argsort(-np.abs(coupling.data), kind="stable")
     facing = rows.node.copy()  # where nothing does

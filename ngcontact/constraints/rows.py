@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
@@ -61,6 +62,7 @@ class Rows:
     g: Array
     equality: Mask
 
+    @cached_property
     def matrix(self) -> sp.csr_array:
         """B (m, 2n) on node values: x components first, then y."""
         m, n = self.coupling.shape
@@ -77,6 +79,8 @@ class Rows:
 
     def select(self, rows: Index) -> Rows:
         """Some of the rows, by their numbers `rows` (k,)."""
+        if np.array_equal(rows, np.arange(len(self.node))):
+            return self
         return Rows(
             node=self.node[rows],
             direction=self.direction[rows],
@@ -95,7 +99,7 @@ class Rows:
         alike = self.node[order][1:] == self.node[order][:-1]
         if not alike.any():
             return number
-        B = self.matrix()
+        B = self.matrix
         for first, second in zip(order[:-1][alike], order[1:][alike], strict=True):
             if abs(B[first : first + 1] - B[second : second + 1]).max() <= REPEATED:
                 number[second] = number[first]

@@ -140,6 +140,8 @@ def _numbered(
 
 def _coupling(trace: BoundaryTrace, partner: Index, partner_s: Array) -> sp.csr_array:
     """Basis functions (m, n) of the facing nodes at the partner points; none of an obstacle."""
+    if (partner < 0).all():
+        return sp.csr_array((len(partner), trace.space.ndof))
     share = trace.shapes(partner, snap(partner_s, trace.places(partner)))
     share[partner < 0] = 0.0
     row, place = np.nonzero(share)
@@ -213,6 +215,8 @@ def nodal_line(
 
 def without(line: ContactLine, dropped: Index) -> ContactLine:
     """The line without its points `dropped` (j,); the segments still face the primary."""
+    if dropped.size == 0:
+        return line
     m = len(line.node)
     keep = np.ones(m, dtype=bool)
     keep[dropped] = False

@@ -56,12 +56,13 @@ def admissible_set(problem: Problem, space: Space, found: Sequence[ContactLine])
     conditions = support_conditions(problem, trace)  # (3.6), (3.8)
     lines, rows = merged(list(found), joined(list(found), trace))  # (2.3), (2.5), (2.10)
     length = float(np.abs(trace.curve).max())
-    basis = change_of_basis(conditions, rows, length, space.stiffness())
+    stiffness = space.stiffness() if rows.coupling.nnz else None  # else all rows have one host
+    basis = change_of_basis(conditions, rows, length, stiffness)
     rows = rows.select(basis.kept)
     return AdmissibleSet(
         lines=kept_lines(lines, basis.kept),
         conditions=conditions,
-        B=rows.matrix(),
+        B=rows.matrix,
         g=rows.g,
         equality=rows.equality,
         basis=basis,

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 
 from ..arrays import Index
 from ..problem import Triangulation
-from ..triplets import from_triplets
+from ..triplets import for_both_components, from_triplets
 from .boundary import BoundaryTrace
 from .nodal_basis import edge_bubbles, nodal_basis
 
@@ -95,4 +95,4 @@ def vector_space(mesh: ng.Mesh, order: int, element: str) -> ng.FESpace:
 def node_basis(V: ng.FESpace, trace: BoundaryTrace, nodal: Index, element: str) -> sp.csr_array:
     """`Space.basis` (2N, 2n) for node values on the segments `nodal` (k,)."""
     scalar = _physical_basis(V, trace) if element == "physical" else nodal_basis(trace, nodal)
-    return sp.block_diag([scalar, scalar], format="csr")
+    return for_both_components(scalar)

@@ -177,18 +177,19 @@ def incompressibilities(problem: Problem, mesh: ng.Mesh) -> Array:
 
 def rough_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
     """Elements (ne,) in which the law varies by more than a part of itself, or jumps."""
-    region, diameter = Triangulation(mesh).bodies, diameters(mesh)
     rough = np.zeros(mesh.ne, dtype=bool)
     for pattern, law in problem.materials.items():
-        if varies(law):
-            at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
-            C = law.voigt(problem.model)
-            for here, points in on_lattice(mesh, at, diameter):
-                values = np.asarray(C(points.ravel())).reshape(*points.shape, -1)
-                size = round(math.sqrt(values.shape[-1]))
-                diagonal = values[..., :: size + 1].mean(axis=2)
-                change = np.ptp(values, axis=1).max(axis=1)
-                rough[here] = change > ROUGH * diagonal.min(axis=1)
+        if not varies(law):
+            continue
+        region, diameter = Triangulation(mesh).bodies, diameters(mesh)
+        at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
+        C = law.voigt(problem.model)
+        for here, points in on_lattice(mesh, at, diameter):
+            values = np.asarray(C(points.ravel())).reshape(*points.shape, -1)
+            size = round(math.sqrt(values.shape[-1]))
+            diagonal = values[..., :: size + 1].mean(axis=2)
+            change = np.ptp(values, axis=1).max(axis=1)
+            rough[here] = change > ROUGH * diagonal.min(axis=1)
     return rough
 
 

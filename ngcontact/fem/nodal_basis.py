@@ -52,7 +52,12 @@ def nodal_basis(trace: BoundaryTrace, segments: Index) -> sp.csr_array:
         values[axis == end] = bubbles @ np.column_stack([s - 1, np.eye(order - 1), -s])
     rows = np.repeat(nodes[:, 1:-1, None], order + 1, axis=2)
     cols = np.repeat(nodes[:, None, :], order - 1, axis=1)
-    diagonal = np.ones(size)
-    diagonal[nodes[:, 1:-1].ravel()] = 0.0
-    edges = from_triplets(values.ravel(), rows.ravel(), cols.ravel(), (size, size))
-    return (sp.diags_array(diagonal) + edges).tocsr()
+    rest = np.ones(size, dtype=bool)
+    rest[nodes[:, 1:-1]] = False
+    same = np.flatnonzero(rest)
+    return from_triplets(
+        np.concatenate([np.ones(len(same)), values.ravel()]),
+        np.concatenate([same, rows.ravel()]),
+        np.concatenate([same, cols.ravel()]),
+        (size, size),
+    )

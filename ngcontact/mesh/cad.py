@@ -20,6 +20,8 @@ NEWTON_STEPS = 30
 MISSED = 1e-9  # distance, relative to the edge, beyond which a level counts as not reached
 UNIFORM = 1e-9  # relative change of speed along an arc of a circle
 STRAIGHT = 1e-12  # distance from the chord, relative to the edge; OCC keeps about 1e-15
+LONG_ARC = 0.5  # parameters, angles on arcs of circles, from which the arc is fitted
+EXACT = 8 * np.finfo(float).eps  # distance, relative to the edge, at which a formula is its curve
 SETTLED = 1e-15  # relative change of a parameter at which Newton's method has arrived
 
 
@@ -41,11 +43,26 @@ class CadEdge:
         self.start, self.stop = edge.parameter_interval
         self._t = np.linspace(self.start, self.stop, SAMPLES)
         self.straight = False  # as far as is known
+        self._axes: Array | None = None
         self._x = self.point(self._t)
         self.size = float(np.abs(np.ptp(self._x, axis=0)).max())
         chord = self._x[0] + np.linspace(0, 1, SAMPLES)[:, None] * (self._x[-1] - self._x[0])
         self.straight = bool(np.abs(self._x - chord).max() <= STRAIGHT * self.size)
         self.closed = bool(np.abs(self._x[-1] - self._x[0]).max() <= MISSED * self.size)
+        if not self.straight:
+            self._axes = self._fitted()
+
+    def _fitted(self) -> Array | None:
+        """Rows (3, 2) c, a, b of x = c + a cos t + b sin t on arcs of circles and ellipses."""
+        if abs(self.stop - self.start) < LONG_ARC:  # cosines and sines would lose digits
+            return None
+        shapes = np.column_stack([np.cos(self._t), np.sin(self._t)])
+        two = [0, int(np.abs(np.sin(self._t - self._t[0])).argmax())]  # as perpendicular as can be
+        slopes = np.column_stack([-shapes[two, 1], shapes[two, 0]])
+        axes = np.linalg.solve(slopes, self.derivative(self._t[two]))
+        centre = (self._x - shapes @ axes)[two].mean(axis=0)
+        exact = np.abs(centre + shapes @ axes - self._x).max() <= EXACT * self.size
+        return np.vstack([centre, axes]) if exact else None
 
     @property
     def name(self) -> str:
@@ -63,6 +80,8 @@ class CadEdge:
         if self.straight:  # without a call for every point
             share = (np.asarray(t) - self.start) / (self.stop - self.start)
             return self._x[0] + share[:, None] * (self._x[-1] - self._x[0])
+        if self._axes is not None:
+            return self._axes[0] + np.column_stack([np.cos(t), np.sin(t)]) @ self._axes[1:]
         values = (self._edge.Value(float(ti)) for ti in t)
         return np.array([(p.x, p.y) for p in values]).reshape(-1, 2)
 
@@ -70,6 +89,8 @@ class CadEdge:
         """Derivatives (k, 2) with respect to the parameter, at `t` (k,)."""
         if self.straight:
             return np.tile((self._x[-1] - self._x[0]) / (self.stop - self.start), (len(t), 1))
+        if self._axes is not None:
+            return np.column_stack([-np.sin(t), np.cos(t)]) @ self._axes[1:]
         values = (self._edge.Tangent(float(ti)) for ti in t)
         return np.array([(v.x, v.y) for v in values]).reshape(-1, 2)
 

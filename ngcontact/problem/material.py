@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import lru_cache
+from typing import Any, TypeAlias
 
 import ngsolve as ng
 import numpy as np
@@ -27,6 +28,8 @@ _RIGHT_NU = "Poisson's ratio must lie in -1 < nu < 1/2"
 _RIGHT_SHAPE = "a Voigt matrix has (3, 3), of a body of revolution (4, 4)"
 SHAPES = {(len(names), len(names)) for names in VOIGT.values()}
 
+Value: TypeAlias = float | ng.CoefficientFunction
+
 
 def require_model(model: str) -> str:
     """Return a name of `MODEL_NAMES`; anything else is a `TypeError` or a `ValueError`."""
@@ -35,6 +38,19 @@ def require_model(model: str) -> str:
     if model not in MODEL_NAMES:
         raise ValueError(f'model "{model}" is unknown: choose one of {MODEL_NAMES}')
     return model
+
+
+def _isotropic(normal: Value, cross: Value, shear: Value, size: int) -> ng.CoefficientFunction:
+    """Return a law, dims (size, size), by its entries on the diagonal, beside it, and of shear."""
+    # NGSolve takes numbers in a tuple slowly, and loses an interruption that comes meanwhile.
+    n, c, s, zero = (ng.CF(value) for value in (normal, cross, shear, 0.0))
+    if size == 4:
+        rows = (n, c, c, zero, c, n, c, zero, c, c, n, zero, zero, zero, zero, s)
+        return ng.CF(rows, dims=(4, 4))
+    return ng.CF((n, c, zero, c, n, zero, zero, zero, s), dims=(3, 3))
+
+
+_isotropic_numbers = lru_cache(_isotropic)  # asked for several times by each level
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +97,8 @@ class Elastic:
             normal = E / (1 - nu * nu)
             cross = normal * nu
         shear = E / (2 * (1 + nu))
-        # NGSolve takes numbers in a tuple slowly, and loses an interruption that comes meanwhile.
-        n, c, s, zero = (ng.CF(value) for value in (normal, cross, shear, 0.0))
-        if len(VOIGT[model]) == 4:
-            rows = (n, c, c, zero, c, n, c, zero, c, c, n, zero, zero, zero, zero, s)
-            return ng.CF(rows, dims=(4, 4))
-        return ng.CF((n, c, zero, c, n, zero, zero, zero, s), dims=(3, 3))
+        made = _isotropic if varies(self) else _isotropic_numbers
+        return made(normal, cross, shear, len(VOIGT[model]))
 
     def told(self) -> str:
         """Its constants, in a few words."""

@@ -32,12 +32,12 @@ def _mask(select: Callable[[str], ng.Region], pattern: str) -> np.ndarray:
 
 def body_of_vertex(mesh: ng.Mesh) -> np.ndarray:
     """Return the number of the connected piece of the mesh each vertex belongs to, int (nv,)."""
-    from scipy.sparse.csgraph import connected_components  # not needed to state a problem
+    from scipy.sparse import csr_array  # not needed to state a problem
+    from scipy.sparse.csgraph import connected_components
 
-    from ..triplets import from_triplets
-
-    view = Triangulation(mesh)
-    nodes, size = view.triangles, len(view.vertices)
-    start, end = nodes[:, [0, 1]].ravel(), nodes[:, [1, 2]].ravel()
-    graph = from_triplets(np.ones(len(start), dtype=bool), start, end, (size, size))
-    return connected_components(graph, directed=False)[1]
+    nodes = Triangulation(mesh).triangles
+    # Vertices first, to be numbered first, then triangles, each joined to its vertices.
+    starts = np.concatenate([np.zeros(mesh.nv), 3 * np.arange(len(nodes) + 1)]).astype(np.int32)
+    size = mesh.nv + len(nodes)
+    graph = csr_array((np.ones(nodes.size), nodes.ravel().astype(np.int32), starts), (size, size))
+    return connected_components(graph, directed=False)[1][: mesh.nv]

@@ -102,6 +102,12 @@ class Border:
         return float(max(np.abs(part).max(initial=0.0) for part in parts))
 
 
+def _without_border(base: Base, active: Mask, anchor: Anchor | None, none: Index) -> Border:
+    """The base itself as a system; `none` (0,) are the unknowns and rows of its border."""
+    V = np.zeros((0, 0))
+    return Border(base, active, anchor, none, none, none, none, V, V.diagonal(), V)
+
+
 def bordered(
     p: QuadraticProgram, base: Base, active: Mask, anchor: Anchor | None, back_solve: Solve
 ) -> Border:
@@ -121,8 +127,11 @@ def bordered(
     at = p.null_space.pins
     if p.unit_rows:
         at = np.concatenate([p.unknown[base.active & ~active], at])
+    keys = np.concatenate([at, ~rows])
+    if keys.size == 0:
+        return _without_border(base, active, anchor, keys)
     V = sp.vstack([p.K[at], p.R[rows]], format="csr")
-    column = base.columns(np.concatenate([at, ~rows]).tolist(), V, back_solve)
+    column = base.columns(keys.tolist(), V, back_solve)
     touched = np.unique(V.indices)  # few of the unknowns
     dense = V[:, touched].toarray()
     D = np.zeros((len(column), len(column)))

@@ -18,7 +18,7 @@ def check(given_, contact, tolerance=1e-13, **options):
     """Solve the defining equations of a basis for what holds at every y; return the basis."""
     basis = change_of_basis(given_, contact, **options)
     n = contact.coupling.shape[1]
-    T, B = basis.T.toarray(), contact.matrix().toarray()
+    T, B = basis.T.toarray(), contact.matrix.toarray()
     assert np.linalg.cond(T) < 1e8
     assert len(basis.unknown) == len(basis.kept)
     assert len(set(basis.unknown)) == len(basis.unknown)

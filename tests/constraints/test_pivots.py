@@ -37,7 +37,7 @@ def test_a_much_softer_node_that_is_held_does_not_host():
 
 
 def test_coefficients_of_rows_at_nodes():
-    B = rows(3, (0, (0.6, 0.8), {1: 0.5}), (1, X, {2: 1.0})).matrix()
+    B = rows(3, (0, (0.6, 0.8), {1: 0.5}), (1, X, {2: 1.0})).matrix
     found = coefficients_at(B, np.array([0, 0, 1]), np.array([0, 1, 0]))
     np.testing.assert_array_equal(found, [[0.6, 0.8], [-0.3, -0.4], [0, 0]])
     none = np.zeros(0, dtype=np.intp)

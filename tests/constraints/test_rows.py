@@ -12,21 +12,21 @@ from tests.constraints.given import X, Y, clamped, conditions, rows, unit
 
 def test_matrix_of_rows():
     contact = rows(4, (0, (0.6, 0.8), {2: 0.25, 3: 0.75}), (1, X, {}))
-    B = contact.matrix()
+    B = contact.matrix
     expected = [
         [0.6, 0, -0.15, -0.45, 0.8, 0, -0.2, -0.6],
         [0, 1, 0, 0, 0, 0, 0, 0],
     ]
     np.testing.assert_allclose(B.toarray(), expected, atol=1e-16)
     assert B.nnz == 7  # nothing stored where the partner has no share
-    assert rows(3).matrix().shape == (0, 6)
+    assert rows(3).matrix.shape == (0, 6)
 
 
 def test_the_left_side_of_a_row_is_a_jump():
     rng = np.random.default_rng(0)
     u = rng.normal(size=(5, 2))
     d, share = unit(0.7), lagrange(1, 0.3)[0]
-    B = rows(5, (4, d, {1: share[0], 2: share[1]})).matrix()
+    B = rows(5, (4, d, {1: share[0], 2: share[1]})).matrix
     jump = d @ (u[4] - share[0] * u[1] - share[1] * u[2])
     assert B @ u.T.ravel() == pytest.approx(jump, rel=1e-14)
 
@@ -37,7 +37,7 @@ def test_rows_of_any_support():
     u = np.random.default_rng(1).normal(size=(2, 6))
     jump = [u[1, 0] - u[1] @ [0, 0, 0.5, 0.25, 0, 0.25], u[1, 1] - 1.1 * u[1, 3] + 0.1 * u[1, 2]]
     # Sums of four numbers of size 1.
-    np.testing.assert_allclose(contact.matrix() @ u.ravel(), [*jump, u[0, 1]], atol=1e-15)
+    np.testing.assert_allclose(contact.matrix @ u.ravel(), [*jump, u[0, 1]], atol=1e-15)
 
 
 def test_rows_concatenated_and_selected_are_the_same():
@@ -49,11 +49,11 @@ def test_rows_concatenated_and_selected_are_the_same():
         (joined, whole),
         (whole.select(np.array([2, 0])), concatenated(parts[::-2])),
     ):
-        assert (one.matrix() != other.matrix()).nnz == 0
+        assert (one.matrix != other.matrix).nnz == 0
         np.testing.assert_array_equal(one.node, other.node)
         np.testing.assert_array_equal(one.g, other.g)
         np.testing.assert_array_equal(one.equality, other.equality)
-    assert no_rows(5).matrix().shape == (0, 10)
+    assert no_rows(5).matrix.shape == (0, 10)
 
 
 def test_conditions_concatenated():

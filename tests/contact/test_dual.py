@@ -133,7 +133,7 @@ def test_a_rotation_of_a_disc_about_its_centre_closes_no_gap(share):
     motion = np.zeros((2, trace.space.ndof))
     x = trace.point(*trace.at_nodes(line.segments))
     motion[:, trace.nodes[line.segments].ravel()] = np.array([1 - x[:, 1], x[:, 0]])
-    assert np.abs(joined([line], trace).matrix() @ motion.ravel()).max() < EXACT
+    assert np.abs(joined([line], trace).matrix @ motion.ravel()).max() < EXACT
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

@@ -47,11 +47,16 @@ def test_memory_outlives_the_matrix_of_ngsolve():
         np.testing.assert_array_equal(part, K.data)
 
 
+@pytest.mark.parametrize("full", [False, True])
 @pytest.mark.parametrize("changed", [0, 1, SIZE])
-def test_congruent_matrices(changed):
-    """T differs from the identity in that many rows."""
+def test_congruent_matrices(changed, full):
+    """T differs from the identity in that many rows; a full A has places for all that changes."""
     rng = np.random.default_rng(changed)
-    A = for_ngsolve(definite(rng))
+    given = definite(rng)
+    if full:
+        rows, columns = np.indices(given.shape).reshape(2, -1)
+        given = sp.coo_matrix((given.toarray().ravel(), (rows, columns)), given.shape)
+    A = for_ngsolve(given)
     T = np.eye(SIZE)
     T[rng.permutation(SIZE)[:changed]] += rng.normal(size=(changed, SIZE))
     K, total = congruent(A, shared(A), sp.csr_matrix(T))
@@ -59,6 +64,7 @@ def test_congruent_matrices(changed):
     # Sums of at most SIZE^2 terms: 1e-13 is round-off.
     np.testing.assert_allclose(K.toarray(), expected, atol=1e-13 * np.abs(expected).max())
     assert np.shares_memory(K.data, np.asarray(total.CSR()[0]))
+    np.testing.assert_array_equal(shared(A).toarray(), given.toarray())  # as it was
     right, product = total.CreateRowVector(), total.CreateColVector()
     right.FV().NumPy()[:] = rng.normal(size=SIZE)
     product.data = total * right

@@ -276,3 +276,20 @@ def test_geometries_are_the_same_by_shape_and_names():
     assert same_geometry(mesh, mesh)
     assert not same_geometry(mesh, one)
     assert not same_geometry(mesh, ng.Mesh(mesh.ngmesh.Copy()))
+
+
+@pytest.mark.parametrize("angle", [10.0, 70.0, 250.0])
+@pytest.mark.parametrize("turned", [0.0, 33.0])
+def test_arcs_are_those_of_the_geometry_kernel(angle, turned):
+    """Also where no formula is fitted, as on the arc of 10 degrees."""
+    face = WorkPlane().Arc(2.0, angle).LineTo(0.3, 5.0).Close().Face()
+    [arc] = [
+        edge
+        for edge in face.Rotate(Axis((1, 2, 0), (0, 0, 1)), turned).edges
+        if not CadEdge(edge).straight
+    ]
+    edge = CadEdge(arc)
+    t = np.linspace(edge.start, edge.stop, 37)
+    for found, exact in ((edge.point(t), arc.Value), (edge.derivative(t), arc.Tangent)):
+        expected = np.array([(v.x, v.y) for v in map(exact, t.tolist())])
+        np.testing.assert_allclose(found, expected, rtol=0, atol=8e-15)  # 8 eps of a size of 4

@@ -33,6 +33,14 @@ def test_numbers_are_those_of_ngsolve(mesh):
     assert view.others() == 0
 
 
+def test_layouts_of_netgen_are_told_apart(mesh):
+    """Records of quadrilaterals are longer than those of triangles."""
+    quadrilaterals = MakeStructured2DMesh(quads=True, nx=2, ny=2)
+    for one in (mesh, quadrilaterals, mesh):
+        expected = one.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
+        np.testing.assert_array_equal(Triangulation(one).triangles, expected)
+
+
 def test_triangles_run_anticlockwise(mesh):
     a, b, c = np.moveaxis(Triangulation(mesh).corners, 1, 0)
     area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
