@@ -42,7 +42,7 @@ def adapt(
     problem: Problem,
     *,
     maxh: float | None = None,
-    order: int = 4,
+    order: int | None = 4,
     element: str = "isoparametric",
     theta: float = 0.5,
     tolerance: float | None = None,
@@ -61,7 +61,8 @@ def adapt(
         Largest element size of the first mesh; when left out an eighth of the geometry, half of
         that on bounded contact zones.
     order, element
-        As in `solve`. Order 4 reaches errors of 1e-3 to 1e-5 soonest (docs/adaptivity.md).
+        As in `solve`. Order 4 reaches errors of 1e-3 to 1e-5 soonest (docs/adaptivity.md); None
+        is 3 for a `tolerance` of percents, that of `start`, or 3 and then 4 without either.
     theta : float
         Doerfler's share of the squared indicators that is marked, in (0, 1].
     tolerance : float, optional
@@ -92,7 +93,10 @@ def adapt(
     ConvergenceError
         The active set of a level did not settle.
     """
-    refinement = Refinement(order, element, theta, tolerance, max_dofs, guaranteed)
+    first = 1 if order is None else order
+    refinement = Refinement(first, element, theta, tolerance, max_dofs, guaranteed)
+    if order is None:
+        refinement = refinement.choosing(start.order if isinstance(start, Solution) else None)
     truth("progress", progress)
     mesh = first_level(problem, maxh, refinement, start)
     warn_of_implausible(problem, mesh, refinement.order)
@@ -133,7 +137,7 @@ def _first_plan(
     """The first level, of which nothing is forecast but by `start`."""
     found = corners(problem, boundary_trace(mesh, 1))
     found = found.joined(unresolvable([one.place for one in contradictions(problem, mesh)]))
-    plan = Plan(mesh, found, math.inf, refinement.growth, Descent.first(mesh))
+    plan = Plan(mesh, refinement.order, found, math.inf, refinement.growth, Descent.first(mesh))
     if start is None or at_round_off(
         start.problem, start.discrete.space, start.displacement, start.error_estimate
     ):
@@ -178,13 +182,13 @@ def levels(
     start
         A solution for another load, of whose sequence `mesh` is the first.
     """
-    order, element = refinement.order, refinement.element
+    element = refinement.element
     solution: Solution | None = None
     ratio, told, plan = SHARPER, False, _first_plan(problem, mesh, refinement, start)
-    while unknowns(plan.mesh, order, element) <= refinement.max_dofs:
+    while unknowns(plan.mesh, plan.order, element) <= refinement.max_dofs:
         if solution is not None:  # its factorisation is of no use to the next one
             solution.discrete.systems.forget()
-        solution = solve_on(problem, plan.mesh, order, element, solution or start)
+        solution = solve_on(problem, plan.mesh, plan.order, element, solution or start)
         solution = replace(solution, adaptive=True, estimator=estimator, descent=plan.descent)
         if refinement.guaranteed:
             refuse_bound(problem, solution.discrete.space.trace, solution.pairs)

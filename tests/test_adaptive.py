@@ -211,6 +211,33 @@ def test_planned_levels_are_few_and_as_good(half_width, order):
         assert relative_energy_error(solution, case.exact) <= 1.5 * expected
 
 
+def test_orders_rise_with_accuracy():
+    """Without order and tolerance: 3 as long as errors are of percents, then 4."""
+    case = cases.hertz_contact()
+    levels = list(adapt(case.problem, order=None, max_dofs=16_000))
+    assert [level.order for level in levels] == [3, 3, 4, 4]
+    sizes, errors = [unknowns(s) for s in levels], []
+    for level in levels:
+        errors.append(relative_energy_error(level, case.exact))
+        assert level.displacement.space.globalorder == level.order
+        # The estimate is one of the level's own order; measured 4.2, 5.4, 6.0, 6.2.
+        assert 3 < level.relative_error_estimate / errors[-1] < 8
+    assert (np.diff(sizes) > 0).all()
+    assert len(levels[2].steps) <= 2  # the contact of another order warms the start; measured 1
+    single = list(adapt(case.problem, max_dofs=16_000))
+    assert errors[-1] <= 1.5 * relative_energy_error(single[-1], case.exact)
+
+
+def test_the_order_is_chosen_for_a_tolerance():
+    problem = cases.partly_opening_block()
+    assert {level.order for level in adapt(problem, order=None, tolerance=0.05)} == {3}
+    *_, last = adapt(problem, order=None, tolerance=0.01)
+    assert last.order == 4
+    *_, other = adapt(problem, order=2, tolerance=0.1)
+    assert {s.order for s in adapt(problem, order=None, tolerance=0.1, start=other)} == {2}
+    assert {s.order for s in adapt(problem, order=None, element="physical", max_dofs=2000)} == {1}
+
+
 def test_with_a_tolerance_planning_ends_there():
     """Meshes hardly larger than those of single markings, which grow by a tenth to a half."""
     problem = cases.partly_opening_block()

@@ -35,6 +35,8 @@ class Plan:
     ----------
     mesh : ng.Mesh
         Curved.
+    order : int
+        Degree of the displacement.
     corners : Singularities
         Of the domain, the same on all levels.
     error : float
@@ -48,6 +50,7 @@ class Plan:
     """
 
     mesh: ng.Mesh
+    order: int
     corners: Singularities
     error: float
     growth: float
@@ -97,12 +100,8 @@ def next_plan(
     """
     if not indicators.any():
         indicators = solution.indicators
-    problem, mesh, order, theta = (
-        solution.problem,
-        solution.mesh,
-        refinement.order,
-        refinement.theta,
-    )
+    problem, mesh, theta = solution.problem, solution.mesh, refinement.theta
+    order = refinement.next_order(last.order, solution.relative_error_estimate)
     size = refinement.ending * solution.relative_error_estimate
     jumping, limit = jumping_moduli(problem, mesh), at_limit(mesh, mesh.GetCurveOrder())
     marked = doerfler(indicators, theta)
@@ -118,9 +117,11 @@ def next_plan(
     most = refinement.growth if refinement.tolerance is None else refinement.growth**2
     growth = max(last.growth / 2, 1.0) if error > WRONG * last.error else min(2 * last.growth, most)
     now = unknowns(mesh, order, refinement.element)
+    relative = min(solution.relative_error_estimate, 1.0)
+    scale = relative ** (order / last.order - 1)  # errors of orders p on one mesh are c^p
     forecast = Forecast(
         corners=Triangulation(mesh).corners,
-        squares=(indicators / error) ** 2,
+        squares=(scale * indicators / error) ** 2,
         order=order,
         singular=last.corners.joined(ends_of_contact(solution.pairs)),
     )
@@ -129,7 +130,7 @@ def next_plan(
     mesh, share, parent = planned(problem, mesh, marked, forecast, aim, refinement.element)
     mesh, _ = curve(mesh, order, refinement.element)
     descent = last.descent.of_parts(parent)
-    return Plan(mesh, last.corners, share * error, growth, descent, stuck, unresolved(mesh))
+    return Plan(mesh, order, last.corners, share * error, growth, descent, stuck, unresolved(mesh))
 
 
 def continued(

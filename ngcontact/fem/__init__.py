@@ -5,6 +5,7 @@ from .bodies import body_of_unknown as body_of_unknown
 from .bodies import connected_bodies as connected_bodies
 from .boundary import BoundaryTrace as BoundaryTrace
 from .boundary import boundary_trace as boundary_trace
+from .element import ORDERS as ORDERS
 from .element import check_element as check_element
 from .element import node_basis as node_basis
 from .element import unknowns as unknowns

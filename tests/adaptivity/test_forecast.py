@@ -109,6 +109,8 @@ def test_large_elements_at_ends_of_contact_are_marked():
         (cases.partly_opening_block, 4),
         (lambda: cases.hertz_contact().problem, 3),
         (cases.flat_punch, 3),
+        (cases.partly_opening_block, None),
+        (lambda: cases.hertz_contact().problem, None),
     ],
 )
 def test_estimates_are_as_forecast(monkeypatch, make, order):
@@ -125,8 +127,9 @@ def test_estimates_are_as_forecast(monkeypatch, make, order):
     errors = [error for _, error, _ in forecasts[: len(estimates) - 1]]
     ratios = np.divide(estimates[1:], estimates[:-1]) / errors
     assert len(ratios) >= 2
-    # Measured: 0.95 to 1.08, at the punch, whose corners are worse than supposed, 1.17 to 1.24.
-    assert ratios[1:] == pytest.approx(1, abs=0.3)
+    # Measured: 0.95 to 1.08, at the punch, whose corners are worse than supposed, 1.17 to 1.24;
+    # where the order rises 0.56 to 1.46.
+    assert ratios[1:] == pytest.approx(1, abs=0.5 if order is None else 0.3)
 
 
 def test_forecasts_that_prove_wrong_shorten_the_plan():
