@@ -61,8 +61,7 @@ def adapt(
         Largest element size of the first mesh; when left out an eighth of the geometry, half of
         that on bounded contact zones.
     order, element
-        As in `solve`. Order 4 reaches errors of 1e-3 to 1e-5 soonest (docs/adaptivity.md); None
-        is 3 for a `tolerance` of percents, that of `start`, or 3 and then 4 without either.
+        As in `solve`. 4 is best for errors of 1e-3 and less; None chooses (docs/adaptivity.md).
     theta : float
         Doerfler's share of the squared indicators that is marked, in (0, 1].
     tolerance : float, optional
@@ -71,8 +70,8 @@ def adapt(
     max_dofs : int
         Number of unknowns that no level exceeds.
     guaranteed : bool
-        Stop at `Solution.relative_error_bound` instead of the estimate. The estimate still marks;
-        the bound is made where the estimate suggests that it meets the tolerance.
+        Stop at `Solution.relative_error_bound`, which is made where the estimate suggests that it
+        meets the tolerance.
     start : Solution, optional
         Of another load on the same geometry, with the same pairs, order and element. The first
         level has a mesh that fits it, finer or coarser than its own, and starts from its contact.
@@ -82,8 +81,7 @@ def adapt(
     Yields
     ------
     Solution
-        Every one stays valid. Its estimate is made when it is asked for, printing it included, or
-        when the next level is.
+        Every one stays valid. Its estimate is made when it is printed, asked for, or refined.
 
     Raises
     ------
@@ -93,15 +91,20 @@ def adapt(
     ConvergenceError
         The active set of a level did not settle.
     """
-    first = 1 if order is None else order
-    refinement = Refinement(first, element, theta, tolerance, max_dofs, guaranteed)
-    if order is None:
-        refinement = refinement.choosing(start.order if isinstance(start, Solution) else None)
+    plain = Refinement(1, element, theta, tolerance, max_dofs, guaranteed)
+    refinement = _with_order(plain, order, start)
     truth("progress", progress)
     mesh = first_level(problem, maxh, refinement, start)
     warn_of_implausible(problem, mesh, refinement.order)
     solutions = with_warnings(levels(problem, mesh, refinement, start=start))
     return with_progress(solutions, tolerance, max_dofs) if progress else solutions
+
+
+def _with_order(plain: Refinement, order: int | None, start: object) -> Refinement:
+    """With the order that is given, or that of a `start`, or the best one."""
+    if order is not None:
+        return replace(plain, order=order)
+    return plain.choosing(start.order if isinstance(start, Solution) else None)
 
 
 def first_level(
