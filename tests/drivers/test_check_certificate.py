@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import copy
+import pickle
 import subprocess
 import sys
 from dataclasses import replace
@@ -199,6 +201,14 @@ def test_the_driver_needs_nothing_but_numpy(saved):
     done = subprocess.run([sys.executable, DRIVER, path], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
     assert float(arrays["bound"]) == solution.error_bound
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))])
+def test_certificates_of_copies_pass(copied, tmp_path):
+    solution = solve(BENT["graded"](), maxh=0.5, order=2)
+    assert solution.error_bound > 0
+    path = copied(solution).equilibrated.save(tmp_path / "certificate.npz")
+    assert check_certificate.check(path)
 
 
 def test_certificates_of_revolution_are_refused(tmp_path):

@@ -45,7 +45,7 @@ from .liftings import (
 )
 from .parts import ErrorBound, complementarity, summed, work_of_supports
 from .pressures import Pieces, Zone, facing_cuts, pieces_of, selected, zone_of
-from .proofs import Norms, Proof
+from .proofs import Norms, Proof, sampled_stress
 from .refusals import refuse_bound
 from .remainders import asked_tractions, missed_tractions
 from .stress import SETTLED, ContactPressure, EquilibratedStress, certified
@@ -109,7 +109,8 @@ def error_bound(
     closed, signed = sum(w for w, _ in works), sum(w for _, w in works)
     bound = norms.bound(closed, units)
     data = discrete, conditions, given, raw, gaps, coefficients, strips
-    proof = Proof(*data, norms, bound, units, problem, stress)
+    sampled = sampled_stress(discrete, stress)
+    proof = Proof(*data, norms, bound, units, problem, sampled)
     reaction = work_of_supports(fields, partition, traction)
     return summed(units, norms, closed, signed, reaction, _stress(proof, certificate))
 

@@ -6,8 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import ngsolve as ng
-
 from ....arrays import Array
 from ....problem import Problem
 from ..data import Discrete, EdgeConditions, Units
@@ -65,8 +63,8 @@ class Proof:
         Of the data.
     problem : Problem
         The problem.
-    sigma : ng.CoefficientFunction
-        Discrete stress (2, 2), units of stress.
+    sampled : ndarray (r, q, 3)
+        (xx, yy, xy) of the discrete stress at points of sampled triangles, units of stress.
     """
 
     discrete: Discrete
@@ -80,4 +78,4 @@ class Proof:
     bound: float
     units: Units
     problem: Problem
-    sigma: ng.CoefficientFunction
+    sampled: Array

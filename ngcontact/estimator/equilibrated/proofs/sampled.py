@@ -6,8 +6,18 @@ import ngsolve as ng
 import numpy as np
 
 from ....arrays import Array, Index
-from ..data import lattice, sampling_order, triangle_rule
+from ..data import Discrete, lattice, sampling_order, triangle_rule
 from .record import Proof
+
+
+def sampled_stress(discrete: Discrete, stress: ng.CoefficientFunction) -> Array:
+    """(xx, yy, xy) of a `stress` (2, 2) at q points of r sampled triangles, (r, q, 3)."""
+    if discrete.rough is None or discrete.balance.extent:
+        return np.zeros((0, 0, 3))
+    rule, _ = triangle_rule(sampling_order(discrete.degree, discrete.geometry))
+    xx, xy, _, yy = stress
+    function = ng.CF((xx, yy, xy)).Compile()
+    return discrete.partition.evaluate(function, discrete.rough.at, rule)
 
 
 def sampled_arrays(proof: Proof, at: Index) -> dict[str, Array]:
@@ -18,7 +28,6 @@ def sampled_arrays(proof: Proof, at: Index) -> dict[str, Array]:
     discrete, units = proof.discrete, proof.units
     partition, geometry = discrete.partition, discrete.geometry
     rule, weights = triangle_rule(sampling_order(discrete.degree, geometry))
-    xx, xy, _, yy = proof.sigma
     laws = {name: law.voigt(proof.problem.model) for name, law in proof.problem.materials.items()}
     moduli = partition.evaluate(partition.mesh.MaterialCF(laws), at, rule)
     C = moduli.reshape(*moduli.shape[:2], 3, 3)
@@ -32,6 +41,6 @@ def sampled_arrays(proof: Proof, at: Index) -> dict[str, Array]:
         "sampled_points": rule,
         "sampled_weights": weights,
         "sampled_exact": np.array(sampling_order(discrete.degree, geometry)),
-        "sampled_stress": partition.evaluate(ng.CF((xx, yy, xy)), at, rule),
+        "sampled_stress": proof.sampled,
         "sampled_law": C[:, :1] if same else C,
     }
