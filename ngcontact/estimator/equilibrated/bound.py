@@ -40,11 +40,12 @@ from .liftings import (
     gap_of,
     lifted,
     on_contact,
+    on_secondaries,
     on_supports,
     strip_norms,
 )
 from .parts import ErrorBound, complementarity, summed, work_of_supports
-from .pressures import Pieces, Zone, facing_cuts, pieces_of, selected, zone_of
+from .pressures import Pieces, Reach, Zone, facing_cuts, pieces_of, reaches_of, selected, zone_of
 from .proofs import Norms, Proof, sampled_stress
 from .refusals import refuse_bound
 from .remainders import asked_tractions, missed_tractions
@@ -78,13 +79,13 @@ def error_bound(
     refuse_bound(problem, boundary, pairs)
     units = units_of(problem, boundary, stress)
     every_pieces = [pieces_of(pair.line, boundary) for pair in pairs]
-    partition = _partition(problem, boundary, every_pieces, units)
+    partition, reaches = _partition(problem, boundary, every_pieces, units)
     hoop = voigt_stress(problem, displacement)[2] if units.extent else None
     discrete = discrete_on(problem, boundary, partition, stress, units, hoop)
     conditions = edge_conditions(problem, boundary, partition, discrete.degree, units.traction)
     solved = displacement, stress
     zones, (discrete, given, coefficients) = _pressures(
-        pairs, every_pieces, boundary, solved, discrete, conditions, units
+        pairs, (every_pieces, reaches), boundary, solved, discrete, conditions, units
     )
     supported = np.unique(partition.ends[~conditions.constrained.all(axis=1)])
     gaps = [
@@ -117,7 +118,7 @@ def error_bound(
 
 def _pressures(
     pairs: Sequence[ContactState],
-    every_pieces: Sequence[Pieces],
+    parts: tuple[Sequence[Pieces], Sequence[Reach]],
     boundary: BoundaryTrace,
     solved: tuple[ng.GridFunction, ng.CoefficientFunction],
     discrete: Discrete,
@@ -128,7 +129,11 @@ def _pressures(
 
     def chosen(everywhere: bool) -> tuple[list[Zone], tuple[Discrete, Array, list[Array]]]:
         degree = discrete.degree - 1 - units.extent
-        zones = [zone_of(pair, boundary, degree, everywhere) for pair in pairs]
+        every_pieces, reaches = parts
+        zones = [
+            zone_of(pair, reach, boundary, degree, everywhere)
+            for pair, reach in zip(pairs, reaches, strict=True)
+        ]
         data = boundary, *solved, discrete, conditions, units
         return zones, selected(zones, every_pieces, *data)
 
@@ -166,12 +171,9 @@ def _lifting(
     costly: float,
 ) -> Array:
     """Norms (n,) of w: edge by edge, or of least energy where that is `costly`."""
-    supported = np.unique(discrete.partition.ends[~conditions.constrained.all(axis=1)])
-    moves, others = list(fields), []
-    for gap in gaps:
-        on_edges, elsewhere = on_contact(gap, boundary, supported, discrete)
-        moves += on_edges
-        others += elsewhere
+    whole = [gap for gap in gaps if gap.pieces.whole]
+    moves = [*fields, *(field for gap in whole for field in on_contact(gap, discrete))]
+    others = on_secondaries(gaps, boundary, conditions, discrete)
     norms = lifted(discrete, moves, others)
     if norms @ norms <= costly:
         return norms
@@ -182,17 +184,21 @@ def _lifting(
 
 def _partition(
     problem: Problem, boundary: BoundaryTrace, every_pieces: Sequence[Pieces], units: Units
-) -> Partition:
-    """The triangles of the mesh, some in parts."""
+) -> tuple[Partition, list[Reach]]:
+    """The triangles of the mesh, some in parts; where p* acts."""
     given = [*problem.displacement, *problem.traction, problem.sliding]
     secondaries = [pair.secondary for pair in problem.contact]
-    at = boundary.segments(*(str(p) for p in (*given, *secondaries) if p is not None))
+    loaded = boundary.segments(*(str(p) for p in given if p is not None))
     bent = bent_segments(boundary)
-    cuts, uneven = facing_cuts(every_pieces, boundary, np.union1d(at, bent), bent)
+    reaches, own = reaches_of(every_pieces, np.union1d(loaded, bent))
+    at = np.union1d(loaded, boundary.segments(*secondaries))
+    cuts, uneven = facing_cuts(every_pieces, reaches, boundary, np.union1d(at, bent), bent)
+    uneven = np.append(uneven, np.array(list(own), dtype=np.intp))
+    cuts |= own
     divided = divided_elements(problem, boundary, degree_for(boundary), uneven)
     # Two triangles meet at a cut: tractions that are not the same on both sides leave no freedom.
     divided[boundary.element[[number for number in uneven if number in cuts]]] = True
-    return partition_of(boundary, units.length, divided, cuts)
+    return partition_of(boundary, units.length, divided, cuts), reaches
 
 
 def _stress(proof: Proof, certificate: dict[str, float]) -> EquilibratedStress:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...contact import ContactState, divided
+from ...contact import ContactState
 from ...fem import BoundaryTrace
 from ...problem import Problem
 from .data import bent_segments
@@ -40,22 +40,13 @@ def refuse_bound(problem: Problem, boundary: BoundaryTrace, pairs: Sequence[Cont
         if boundary.inner[at].any():
             raise ValueError(f'{no_bound} conditions on a line inside a body, as on "{pattern}"')
     for pair in pairs:
-        if _in_part(pair, boundary):
+        line = pair.line
+        if line.contact.primary is not None:
+            continue
+        loaded = (np.append(pair.force, 0.0)[line.rows] != 0).any(axis=1)
+        ends = np.isin(line.rows, [-1, *line.rows[line.faces].ravel()]).all(axis=1)
+        if (loaded & ~line.faces & ~ends).any():
             raise ValueError(
-                f"{no_bound} segments that face the other body in part, as on "
-                f'"{pair.line.contact.secondary}"'
+                f"{no_bound} segments that face an obstacle in part, as on "
+                f'"{line.contact.secondary}"'
             )
-
-
-def _in_part(pair: ContactState, boundary: BoundaryTrace) -> bool:
-    """Whether forces act on segments of which a part faces the other body, a part does not.
-
-    Others, which have but an end in common with the line of contact, touch it at one point.
-    """
-    line = pair.line
-    loaded = (np.append(pair.force, 0.0)[line.rows] != 0).any(axis=1)
-    partly = np.flatnonzero(loaded & ~line.faces)
-    if line.contact.primary is None:
-        known = np.isin(line.rows[partly], [-1, *line.rows[line.faces].ravel()])
-        return not known.all()
-    return divided(boundary, line.contact, line.segments[partly], line.facing).local.size > 0

@@ -12,4 +12,5 @@ from .gaps import gap_of as gap_of
 from .gaps import on_contact as on_contact
 from .misses import lifted as lifted
 from .misses import on_supports as on_supports
+from .secondaries import on_secondaries as on_secondaries
 from .strips import strip_norms as strip_norms

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import ngsolve as ng
@@ -12,10 +11,8 @@ import numpy as np
 from ....arrays import Array, Index, Mask
 from ....fem import BoundaryTrace
 from ..data import Discrete, Units
-from ..pressures import Pieces, Zone, ZonePoints, zone_points
-from .edges import EdgeField, at_points, coefficients, derivative, hat_norms, norms, panels, samples
-
-SHARP = 1e-9  # difference of displacements at a vertex, relative to the gap: more than round-off
+from ..pressures import SLIVER, Pieces, Zone, ZonePoints, zone_points
+from .edges import EdgeField, at_points, coefficients, derivative, norms, panels, samples
 
 
 class Opened(Protocol):
@@ -91,15 +88,16 @@ def gap_of(
     """The gap after deformation.
 
     Where rows are means it does not vanish at vertices: r is -gap in contact and (gap)_- beside,
-    and at vertices between the two, or `supported` (j,) ones, the positive part is kept.
+    and at vertices between the two, or `supported` (j,) ones, the positive part is kept, but of
+    bilateral contact.
     """
     s, line = samples(), zone.state.line
     points = zone_points(zone.state, pieces, boundary, displacement, units, s, np.ones(len(s)))
     sampled = points.gap.reshape(len(pieces.local), len(s))
     values = coefficients(sampled)
-    closed = (zone.full | line.contact.bilateral) & line.faces
+    closed = zone.full | line.contact.bilateral
     kept = np.zeros_like(values)
-    if not pieces.whole:
+    if not pieces.whole and not line.contact.bilateral:
         nodes = boundary.nodes[line.segments][:, [0, -1]]
         vertices, count = np.unique(nodes, return_counts=True)
         loose = np.union1d(np.union1d(nodes[~closed], supported), vertices[count == 1])
@@ -111,29 +109,41 @@ def gap_of(
             np.add.at(at, pieces.local, size)
             hats = pieces.places(s) if side else 1 - pieces.places(s)
             kept += coefficients(at[pieces.local, None] * hats)
-    return Gap(zone, pieces, points, values, kept, closed[pieces.local])
+    gap = Gap(zone, pieces, points, values, kept, closed[pieces.local])
+    return gap if line.contact.bilateral else _without_steps(gap, boundary)
 
 
-def on_contact(
-    gap: Opened, boundary: BoundaryTrace, supported: Index, discrete: Discrete
-) -> tuple[list[EdgeField], list[tuple[Index, Array]]]:
-    """What to lift so that K is met: fields on edges, or triangles (k,) and energy norms (k,).
+def _without_steps(gap: Gap, boundary: BoundaryTrace) -> Gap:
+    """A gap after whose lifting next to nothing that is bare need not stretch over a step.
 
-    On both bodies, shared by compliance, where rows are at nodes; on the secondary where they are
-    means, since then vertices move, too, but for the `supported` (j,) ones.
-
-    Raises
-    ------
-    ValueError
-        Corners with such rows, and supports that overlap the other body.
+    Where p* falls to 0 beside a bare end, as over the edge of a slot, the gap may stay open.
     """
+    pieces, reach, kept = gap.pieces, gap.zone.reach, gap.kept.copy()
+    nodes = boundary.nodes[pieces.line.segments][:, [0, -1]]
+    ends = np.tile([0.0, 1.0], (len(pieces.local), 1))
+    value, r, _ = gap.lifted(np.arange(len(ends)), ends)
+    s = pieces.places(ends)
+    for local, side in zip(*np.nonzero(reach.falls), strict=True):
+        low, high = reach.start[local], reach.stop[local]
+        mine, place = pieces.local == local, (low, high)[side]
+        row = np.flatnonzero(mine & (np.abs(s[:, side] - place) <= SLIVER))
+        at_vertex = (nodes[pieces.local] == nodes[local, side]) & (np.abs(s - [0, 1]) == 0)
+        beyond = float(r[at_vertex & ~mine[:, None]].max(initial=0.0))
+        if row.size and gap.closed[row[0]]:
+            hat = np.abs(pieces.places(samples())[mine] - (low, high)[1 - side]) / (high - low)
+            kept[mine] += coefficients(max(float(value[row[0], side]) + beyond, 0.0) * hat)
+    return replace(gap, kept=kept)
+
+
+def on_contact(gap: Opened, discrete: Discrete) -> list[EdgeField]:
+    """What to lift so that K is met where nodes face nodes, on both bodies, by compliance."""
     pieces = gap.pieces
     every = np.arange(len(pieces.local))
     shape = len(every), -1
     _, r, _ = gap.lifted(every, np.tile(samples(), (len(every), 1)))
     at = np.flatnonzero(np.abs(r).max(axis=1, initial=0.0) > 0)
     if at.size == 0:
-        return [], []
+        return []
     t, weight = gap.panels(at)
     _, r, dr = gap.lifted(at, t)
     d = coefficients(gap.points.direction.reshape(*shape, 2)[at])
@@ -141,18 +151,15 @@ def on_contact(
     value, slope = r[:, :, None] * direction, dr[:, :, None] * direction + r[:, :, None] * turn
     length = (pieces.stop - pieces.start)[at, None]
     sides = [(pieces.segment[at], pieces.start[at, None] + length * t, length * np.ones_like(t))]
-    if not pieces.whole:
-        parts = value, slope, weight
-        return [], _on_secondary(gap, at, sides[0], parts, boundary, supported, discrete)
     if pieces.line.contact.primary is not None:
         c = coefficients(gap.points.facing_s.reshape(shape)[at])
         sides.append((pieces.facing[at], at_points(c, t), at_points(derivative(c), t)))
     fields = [_field(discrete, *one, (value, slope, weight)) for one in sides]
     if len(fields) == 1:
-        return fields, []
+        return fields
     one, other = (norms(discrete, field) ** 2 for field in fields)
     share = np.divide(other, one + other, out=np.zeros_like(one), where=one + other > 0)
-    return [fields[0].scaled(share), fields[1].scaled(1 - share)], []
+    return [fields[0].scaled(share), fields[1].scaled(1 - share)]
 
 
 def _field(
@@ -169,73 +176,3 @@ def _field(
         value=value,
         slope=slope / np.where(along, ds, -ds)[:, :, None],
     )
-
-
-def _on_secondary(
-    gap: Opened,
-    at: Index,
-    side: tuple[Index, Array, Array],
-    parts: tuple[Array, Array, Array],
-    boundary: BoundaryTrace,
-    supported: Index,
-    discrete: Discrete,
-) -> list[tuple[Index, Array]]:
-    """Liftings on the secondary alone: hats of the vertices, and the rest on the edges."""
-    partition, pieces = discrete.partition, gap.pieces
-    v, seen = np.zeros((len(partition.vertices), 2)), np.zeros(len(partition.vertices), dtype=bool)
-    nodes = boundary.nodes[pieces.segment][:, [0, -1]]
-    directions = gap.points.direction.reshape(len(pieces.local), -1, 2)
-    largest = SHARP * np.abs(gap.points.gap).max(initial=0.0)
-    for which, ends in ((0, pieces.start == 0), (-1, pieces.stop == 1)):
-        mine = np.flatnonzero(ends)
-        t = np.full((len(mine), 1), float(-which))
-        _, r, _ = gap.lifted(mine, t)
-        move, vertex = r * directions[mine, which], nodes[mine, which]
-        old = np.abs(v[vertex] - move).max(axis=1) * seen[vertex]
-        if (old > largest).any():
-            raise ValueError(
-                "no guaranteed bound is known for dual rows on both sides of a corner, as on "
-                f'"{pieces.line.contact.secondary}"; use error_estimate'
-            )
-        v[vertex], seen[vertex] = move, True
-    if np.abs(v[supported]).max(initial=0.0) > largest:
-        raise ValueError(
-            "no guaranteed bound is known where a support overlaps the other body, as at an end of "
-            f'"{pieces.line.contact.secondary}"; use error_estimate'
-        )
-    v[supported] = 0.0
-    segment, s, ds = side
-    field = _field(discrete, segment, s, ds, parts)
-    ends = v[partition.ends[field.edge]]
-    t = field.t[:, :, None]
-    rest = EdgeField(
-        edge=field.edge,
-        t=field.t,
-        weight=field.weight,
-        value=field.value - (1 - t) * ends[:, None, 0] - t * ends[:, None, 1],
-        slope=field.slope - (ends[:, 1] - ends[:, 0])[:, None],
-    )
-    triangle, corner = np.nonzero((v[partition.triangles] != 0).any(axis=2))
-    moves = v[partition.triangles[triangle, corner]]
-    return [
-        *_by_edge(discrete, rest),
-        (triangle, hat_norms(discrete, triangle, corner, moves)),
-    ]
-
-
-def _by_edge(discrete: Discrete, field: EdgeField) -> Sequence[tuple[Index, Array]]:
-    """Triangles and norms of a field given on several pieces of an edge, which one m continues."""
-    edge, number = np.unique(field.edge, return_inverse=True)
-    order = np.argsort(number, kind="stable")
-    count = np.bincount(number)
-    place = np.arange(len(number)) - np.concatenate([[0], np.cumsum(count)[:-1]])[number[order]]
-    q = field.t.shape[1]
-
-    def merged(values: Array) -> Array:
-        result = np.zeros((len(edge), int(count.max()), *values.shape[1:]))
-        result[number[order], place] = values[order]
-        return result.reshape(len(edge), int(count.max()) * q, *values.shape[2:])
-
-    t = merged(field.t)
-    whole = EdgeField(edge, t, merged(field.weight), merged(field.value), merged(field.slope))
-    return [(discrete.partition.owner[0][edge], norms(discrete, whole))]

@@ -1,10 +1,13 @@
 """The pressure p* on Gamma_K of an equilibrated stress."""
 
 from .balance import balanced as balanced
+from .cuts import facing_cuts as facing_cuts
+from .pieces import SLIVER as SLIVER
 from .pieces import Pieces as Pieces
 from .pieces import contact_directions as contact_directions
-from .pieces import facing_cuts as facing_cuts
 from .pieces import pieces_of as pieces_of
+from .reach import Reach as Reach
+from .reach import reaches_of as reaches_of
 from .selection import selected as selected
 from .zone import Zone as Zone
 from .zone import ZonePoints as ZonePoints

@@ -59,7 +59,7 @@ def line_sums(
     """
     line, length = zone.state.line, units.length
     unit = units.energy / units.strain / length
-    faces = np.flatnonzero(line.faces)
+    faces = np.flatnonzero(zone.reach.acts)
     nodes = boundary.nodes[line.segments[faces]][:, [0, -1]]
     order = _in_order(nodes)
     number = np.full(int(order.max(initial=-1)) + 1, -1)
@@ -73,9 +73,13 @@ def line_sums(
     forces = np.zeros(len(order))
     np.add.at(forces, number[nodes[segment, 0]], force * (1 - s))
     np.add.at(forces, number[nodes[segment, 1]], force * s)
-    ends = number[boundary.nodes[points.segment][:, [0, -1]]]
-    hats = np.stack([1 - points.s, points.s], axis=1) * points.weight[:, None]
-    column = np.repeat(np.arange(len(points.s)), 2)
+    vertex, force = _beside(zone, boundary, order)
+    np.add.at(forces, number[vertex], force / unit)
+    at = np.flatnonzero(zone.reach.acts[points.local])
+    ends = number[boundary.nodes[points.segment[at]][:, [0, -1]]]
+    s = points.s[at]
+    hats = np.stack([1 - s, s], axis=1) * points.weight[at, None]
+    column = np.repeat(at, 2)
     shape = len(order), len(points.s)
     moments = from_triplets(hats.ravel(), ends.ravel(), column, shape)
     kept = ~np.isin(order, supported)
@@ -85,6 +89,18 @@ def line_sums(
     past = (x[1:] + x[:-1]) / 2 / length
     weight = compliance / boundary.model.measure(np.concatenate([past, past[-1:]])[kept])
     return Sums(moments, forces[kept], weight, not kept.all())
+
+
+def _beside(zone: Zone, boundary: BoundaryTrace, order: Index) -> tuple[Index, Array]:
+    """Forces (k,) on segments without p*, and those of the vertices `order` (v,) beside them."""
+    line, acts = zone.state.line, zone.reach.acts
+    ends = boundary.nodes[line.segments][:, [0, -1]]
+    inside: Mask = np.isin(ends, order) & ~acts[:, None]
+    rows = np.where(inside.any(axis=1, keepdims=True), line.rows, -1)
+    known, first = np.unique(rows, return_index=True)
+    left = np.setdiff1d(np.flatnonzero(known >= 0), np.flatnonzero(np.isin(known, line.rows[acts])))
+    segment = first[left] // rows.shape[1]
+    return ends[segment, inside[segment].argmax(axis=1)], zone.state.force[known[left]]
 
 
 def _bodies(discrete: Discrete) -> Index:

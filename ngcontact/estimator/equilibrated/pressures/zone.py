@@ -15,7 +15,9 @@ from ....contact.line import jacobian as contact_jacobian
 from ....fem import BoundaryTrace
 from ....triplets import from_triplets
 from ..data import Discrete, Units, bent_segments, edge_parameters, legendre_values, with_hats
-from .pieces import Pieces, contact_directions, straight_ends
+from .cuts import straight_ends
+from .pieces import Pieces, contact_directions
+from .reach import Reach
 
 GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
 
@@ -67,45 +69,57 @@ class Zone:
     ----------
     state : ContactState
         The pair.
+    reach : Reach
+        Where it acts.
     number : ndarray of int (j, d + 1)
-        Coefficients of Bernstein polynomials on each segment of the line, -1 where p* is 0.
+        Coefficients of Bernstein polynomials there on each segment of the line, -1 where p* is 0.
     size : int
         m.
     """
 
     state: ContactState
+    reach: Reach
     number: Index
     size: int
 
     def values(self, local: Index, s: Array) -> sp.csr_array:
         """Matrix (q, m) to the values at `s` (q,) of the segments `local` (q,) of the line."""
         degree = self.number.shape[1] - 1
-        share, column = bernstein(degree, s), self.number[local]
+        t = self.reach.places(local, s)
+        share, column = bernstein(degree, t), self.number[local]
         row = np.broadcast_to(np.arange(len(s))[:, None], column.shape)
-        kept = column >= 0
+        kept = (column >= 0) & ((t >= 0) & (t <= 1))[:, None]
         return from_triplets(share[kept], row[kept], column[kept], (len(s), self.size))
 
     @property
     def full(self) -> Mask:
-        """Segments (j,) of the line that are in contact with all nodes."""
-        return np.asarray(np.append(self.state.active, True)[self.state.line.rows].all(axis=1))
+        """Segments (j,) of the line, facing or with a p*, that are in contact with all nodes."""
+        line = self.state.line
+        full = np.append(self.state.active, True)[line.rows].all(axis=1)
+        return np.asarray(full & (line.faces | (self.reach.acts & (line.rows >= 0).any(axis=1))))
 
 
 def zone_of(
-    state: ContactState, boundary: BoundaryTrace, degree: int, everywhere: bool = False
+    state: ContactState,
+    reach: Reach,
+    boundary: BoundaryTrace,
+    degree: int,
+    everywhere: bool = False,
 ) -> Zone:
     """Where p* may differ from 0, as polynomials of a degree: where forces are, and beside.
 
     Or `everywhere` on the line, if such pressures cannot balance the loads.
     """
     line = state.line
-    faces = np.flatnonzero(line.faces)
-    segment, nodes = line.segments[faces], boundary.nodes[line.segments[faces]]
-    ends = np.tile([0.0, 1.0], len(faces))
+    at = np.flatnonzero(reach.acts)
+    segment, nodes = line.segments[at], boundary.nodes[line.segments[at]]
+    ends = np.tile([0.0, 1.0], len(at))
     normal = boundary.exact_normal(np.repeat(segment, 2), ends)
     point, _ = boundary.number_points(np.repeat(segment, 2), nodes[:, [0, -1]].ravel(), normal)
     point = point.reshape(-1, 2)
-    force = np.append(state.force, 0.0)[line.rows[faces]]
+    inner, falls = reach.inner[at], reach.falls[at]  # ends that no other segment shares
+    point[inner] = point.max(initial=-1) + 1 + np.arange(np.count_nonzero(inner))
+    force = np.append(state.force, 0.0)[line.rows[at]]
     carries = (force != 0).any(axis=1) | line.contact.bilateral | everywhere
     touched = np.zeros(point.max(initial=-1) + 1, dtype=bool)
     touched[point[carries]] = True
@@ -114,6 +128,7 @@ def zone_of(
     fixed[point[~near]] = True
     bent = np.isin(segment, bent_segments(boundary))  # not divided: tractions must not jump
     fixed[point[straight_ends(boundary, segment) & bent[:, None]]] = True
+    fixed[point[falls]] = True
     number = np.full((len(line.segments), degree + 1), -1)
     coefficient = np.full(len(touched), -1)
     used = np.zeros(len(touched), dtype=bool)
@@ -121,10 +136,12 @@ def zone_of(
     used &= ~fixed
     coefficient[used] = np.arange(np.count_nonzero(used))
     size = np.count_nonzero(used)
-    inner = size + np.arange(np.count_nonzero(near) * (degree - 1)).reshape(-1, degree - 1)
-    number[faces[near], 1:-1] = inner
-    number[np.ix_(faces[near], np.array([0, degree]))] = coefficient[point[near]]
-    return Zone(state, number, int(size + inner.size))
+    free = np.ones((np.count_nonzero(near), degree - 1), dtype=bool)
+    free[falls[near, 0], 0] = free[falls[near, 1], -1] = False
+    inside = np.where(free, size + np.cumsum(free).reshape(free.shape) - 1, -1)
+    number[at[near], 1:-1] = inside
+    number[np.ix_(at[near], np.array([0, degree]))] = coefficient[point[near]]
+    return Zone(state, reach, number, int(size + np.count_nonzero(free)))
 
 
 def zone_points(

@@ -9,6 +9,8 @@ import numpy as np
 
 from ....arrays import Array
 from ..liftings import at_points, coefficients
+from ..pressures import SLIVER
+from ..remainders import Strip
 from .record import Proof
 
 
@@ -37,7 +39,7 @@ def strip_arrays(proof: Proof) -> dict[str, Array]:
                 "strip_load": np.where(own, strip.asked, 0.0) * proof.units.stress,
                 "strip_counts": strip.counts,
                 "strip_piece": np.where(own[:, 0, 0], -1, sum(count[: strip.pair]) + strip.piece),
-                "strip_s": strip.s,
+                "strip_s": _in_reach(proof, strip),
                 "strip_action": strip.action,
             }
         )
@@ -45,7 +47,7 @@ def strip_arrays(proof: Proof) -> dict[str, Array]:
 
 
 def contact_arrays(proof: Proof) -> dict[str, Array]:
-    """p* on the pieces of all pairs, and the gap there, by the segments' own parameters.
+    """p* on the pieces of all pairs, and the gap there, by parameters of where p* acts.
 
     By name: (k, d + 1) coefficients of k pieces, (q,) at points of all of them.
     """
@@ -55,6 +57,10 @@ def contact_arrays(proof: Proof) -> dict[str, Array]:
         pieces, every = gap.pieces, np.arange(len(gap.pieces.local))
         if every.size == 0:
             continue
+        reach = gap.zone.reach
+        ends = reach.places(pieces.local, np.column_stack([pieces.start, pieces.stop]))
+        beyond = (ends[:, 0] < -SLIVER) | (ends[:, 1] > 1 + SLIVER)  # p* is 0 there
+        p = np.append(b, 0.0)[np.where(beyond[:, None], -1, gap.zone.number[pieces.local])]
         t, w = gap.panels(every)
         value, r, _ = gap.lifted(every, t)
         stretch = coefficients(gap.points.weight.reshape(len(every), -1))
@@ -64,17 +70,25 @@ def contact_arrays(proof: Proof) -> dict[str, Array]:
         parts.append(
             {
                 "contact_pair": np.full(len(every), number),
-                "contact_pressure": np.append(b, 0.0)[gap.zone.number[pieces.local]] * units.stress,
+                "contact_pressure": p * units.stress,
                 "contact_unilateral": np.full(len(every), not contact.bilateral),
                 "contact_obstacle": np.full(len(every), contact.primary is None),
                 "gap_piece": np.repeat(before + every, t.shape[1]),
-                "gap_s": place.ravel(),
+                "gap_s": reach.places(pieces.local, place).ravel(),
                 "gap_weight": (at_points(stretch, t) * w).ravel() * units.length,
                 "gap_open": opened.ravel(),
             }
         )
         before += len(every)
     return _joined(parts)
+
+
+def _in_reach(proof: Proof, strip: Strip) -> Array:
+    """Parameters (k, q) of a strip by which p* is a polynomial."""
+    if strip.pair < 0:
+        return strip.s
+    gap = proof.gaps[strip.pair]
+    return gap.zone.reach.places(gap.pieces.local[strip.piece], strip.s)
 
 
 def _joined(parts: Sequence[dict[str, Any]]) -> dict[str, Array]:
