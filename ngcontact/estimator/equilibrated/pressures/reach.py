@@ -52,7 +52,15 @@ class Reach:
 def reaches_of(
     every_pieces: Sequence[Pieces], uncut: Index
 ) -> tuple[list[Reach], dict[int, Array]]:
-    """The reach of p* on each pair, and where to cut segments for it; none of `uncut` (j,)."""
+    """The reach of p* on each pair, and where to cut segments for that, none of `uncut` (j,).
+
+    Returns
+    -------
+    reaches : list of Reach
+        Of all pairs.
+    cuts : dict of ndarray (c,)
+        Parameters by segment.
+    """
     facing = [pieces.line.facing for pieces in every_pieces]
     uncut = np.concatenate([uncut, *facing]).astype(np.intp)
     cuts: dict[int, Array] = {}
