@@ -43,6 +43,7 @@ from .liftings import (
     on_secondaries,
     on_supports,
     strip_norms,
+    without_idle,
 )
 from .parts import ErrorBound, complementarity, summed, work_of_supports
 from .pressures import Pieces, Reach, Zone, facing_cuts, pieces_of, reaches_of, selected, zone_of
@@ -92,6 +93,8 @@ def error_bound(
         gap_of(zone, pieces, boundary, displacement, units, supported)
         for zone, pieces in zip(zones, every_pieces, strict=True)
     ]
+    gaps = without_idle(gaps, boundary)
+    every_pieces = [gap.pieces for gap in gaps]
     result, (raw, traction, certificate) = _equilibrated(discrete, conditions, given)
     fields = on_supports(problem, boundary, displacement, discrete, units)
     constitutive = result.norms(discrete)

@@ -10,6 +10,7 @@ from .gaps import Gap as Gap
 from .gaps import Opened as Opened
 from .gaps import gap_of as gap_of
 from .gaps import on_contact as on_contact
+from .gaps import without_idle as without_idle
 from .misses import lifted as lifted
 from .misses import on_supports as on_supports
 from .secondaries import on_secondaries as on_secondaries

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 from typing import Protocol
 
 import ngsolve as ng
@@ -135,6 +136,41 @@ def _without_steps(gap: Gap, boundary: BoundaryTrace) -> Gap:
     return replace(gap, kept=kept)
 
 
+def without_idle(gaps: Sequence[Gap], boundary: BoundaryTrace) -> list[Gap]:
+    """Gaps without parts of segments that need nothing: no p*, no r, no vertex that moves.
+
+    As those of arcs that turn away from the other body, on which gaps are no polynomials.
+    """
+    idle, moving = [], []
+    for gap in gaps:
+        local, line = gap.pieces.local, gap.pieces.line
+        _, r, _ = gap.lifted(np.arange(len(local)), np.tile(samples(), (len(local), 1)))
+        still = (r == 0).all(axis=1)
+        idle.append(still & ~line.faces[local] & (gap.zone.number[local] < 0).all(axis=1))
+        moving.append(boundary.nodes[line.segments[local[~still]]][:, [0, -1]].ravel())
+    vertices = np.concatenate([np.zeros(0, dtype=np.intp), *moving])
+    found = []
+    for gap, rests in zip(gaps, idle, strict=True):
+        pieces, points = gap.pieces, gap.points
+        ends = boundary.nodes[pieces.segment][:, [0, -1]]
+        at = np.flatnonzero(~rests | np.isin(ends, vertices).any(axis=1))
+        if len(at) == len(rests):
+            found.append(gap)
+            continue
+        rows = (at[:, None] * len(samples()) + np.arange(len(samples()))).ravel()
+        found.append(
+            replace(
+                gap,
+                pieces=pieces.only(at),
+                points=ZonePoints(*(getattr(points, one.name)[rows] for one in fields(points))),
+                values=gap.values[at],
+                kept=gap.kept[at],
+                closed=gap.closed[at],
+            )
+        )
+    return found
+
+
 def on_contact(gap: Opened, discrete: Discrete) -> list[EdgeField]:
     """What to lift so that K is met where nodes face nodes, on both bodies, by compliance."""
     pieces = gap.pieces
@@ -154,12 +190,12 @@ def on_contact(gap: Opened, discrete: Discrete) -> list[EdgeField]:
     if pieces.line.contact.primary is not None:
         c = coefficients(gap.points.facing_s.reshape(shape)[at])
         sides.append((pieces.facing[at], at_points(c, t), at_points(derivative(c), t)))
-    fields = [_field(discrete, *one, (value, slope, weight)) for one in sides]
-    if len(fields) == 1:
-        return fields
-    one, other = (norms(discrete, field) ** 2 for field in fields)
+    both = [_field(discrete, *one, (value, slope, weight)) for one in sides]
+    if len(both) == 1:
+        return both
+    one, other = (norms(discrete, field) ** 2 for field in both)
     share = np.divide(other, one + other, out=np.zeros_like(one), where=one + other > 0)
-    return [fields[0].scaled(share), fields[1].scaled(1 - share)]
+    return [both[0].scaled(share), both[1].scaled(1 - share)]
 
 
 def _field(

@@ -57,6 +57,11 @@ class Pieces:
         """Segments (r,) of the boundary."""
         return np.asarray(self.line.segments[self.local])
 
+    def only(self, at: Index) -> Pieces:
+        """Those `at` (q,) of them."""
+        start, stop = self.start[at], self.stop[at]
+        return Pieces(self.line, self.local[at], start, stop, self.facing[at], self.whole)
+
     def places(self, t: Array) -> Array:
         """Parameters (r, q) on the segments at parameters `t` (q,), or (r, q), on the pieces."""
         return np.asarray(self.start[:, None] + (self.stop - self.start)[:, None] * t)
