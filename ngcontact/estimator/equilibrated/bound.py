@@ -88,12 +88,7 @@ def error_bound(
     zones, (discrete, given, coefficients) = _pressures(
         pairs, (every_pieces, reaches), boundary, solved, discrete, conditions, units
     )
-    supported = np.unique(partition.ends[~conditions.constrained.all(axis=1)])
-    gaps = [
-        gap_of(zone, pieces, boundary, displacement, units, supported)
-        for zone, pieces in zip(zones, every_pieces, strict=True)
-    ]
-    gaps = without_idle(gaps, boundary)
+    gaps = _gaps(zones, every_pieces, boundary, displacement, partition, conditions, units)
     every_pieces = [gap.pieces for gap in gaps]
     result, (raw, traction, certificate) = _equilibrated(discrete, conditions, given)
     fields = on_supports(problem, boundary, displacement, discrete, units)
@@ -144,6 +139,24 @@ def _pressures(
         return chosen(everywhere=False)
     except ContactError:
         return chosen(everywhere=True)
+
+
+def _gaps(
+    zones: Sequence[Zone],
+    every_pieces: Sequence[Pieces],
+    boundary: BoundaryTrace,
+    displacement: ng.GridFunction,
+    partition: Partition,
+    conditions: EdgeConditions,
+    units: Units,
+) -> list[Gap]:
+    """The gap of each pair, on the pieces that need something."""
+    supported = np.unique(partition.ends[~conditions.constrained.all(axis=1)])
+    gaps = [
+        gap_of(zone, pieces, boundary, displacement, units, supported)
+        for zone, pieces in zip(zones, every_pieces, strict=True)
+    ]
+    return without_idle(gaps, boundary)
 
 
 def _equilibrated(
