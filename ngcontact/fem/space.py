@@ -10,7 +10,7 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Array, Index
+from ..arrays import Array, Index, Mask
 from ..linalg import shared
 from ..problem import Problem, Triangulation, varies
 from ..quadrature import keep_rough_load, known_rough_load, moment_degree
@@ -105,6 +105,16 @@ def has_rough_loads(problem: Problem, V: ng.FESpace) -> bool:
         for boundary, p in problem.traction.items()
     ]
     return any(known_rough_load(*load, degree) is not None for load in [*forces, *tractions])
+
+
+def narrow_forces(problem: Problem, mesh: ng.Mesh, order: int) -> Mask:
+    """Elements (ne,) in which quadrature of the usual order would miss a part of a body force."""
+    narrow = np.zeros(mesh.ne, dtype=bool)
+    for body, F in problem.force.items():
+        found = known_rough_load(F, F, mesh.Materials(body), moment_degree(order))
+        if found is not None:
+            narrow |= found.rough
+    return narrow
 
 
 def _smooth_and_rough(

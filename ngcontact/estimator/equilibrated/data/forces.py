@@ -1,7 +1,8 @@
 """Body forces on the triangles: what stresses of degree k balance, what is balanced inside each.
 
 Where forces are not smooth, triangles are looked at in `PARTS`^2 equal parts, and where these do
-not suffice, in as many parts of each of them.
+not suffice, in as many parts of each of them; so are those with features that points of a whole
+triangle may not see.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from functools import lru_cache
 import ngsolve as ng
 import numpy as np
 
-from ....arrays import Array, Index
+from ....arrays import Array, Index, Mask
 from .conditions import DATA_BONUS, HIGHER
 from .partition import Partition, of_body
 from .polynomials import CORNERS, barycentric, basis, dimension, triangle_rule
@@ -109,8 +110,12 @@ def forces_on(
     region: Index,
     degree: int,
     unit: float,
+    narrow: Mask,
 ) -> Forces:
-    """Look at `loads` over `unit`, by body; `region` (n,) are the bodies, `degree` is k."""
+    """Look at `loads` over `unit`, by body; `region` (n,) are the bodies, `degree` is k.
+
+    On the `narrow` (n,) triangles loads have features that quadrature may miss.
+    """
     n, low, high = len(partition.triangles), dimension(degree - 1), degree - 1 + HIGHER
     whole = np.zeros((n, 3, 2, dimension(high)))
     missed = np.zeros(n)
@@ -124,7 +129,7 @@ def forces_on(
         mean = np.einsum("q,nqc->n", weights, rest**2)
         largest = np.einsum("q,nqc->n", weights, f**2).max(initial=0.0)
         missed[at] = np.sqrt(partition.areas[at] * mean)
-        at = at[mean > SMOOTH**2 * largest]
+        at = at[(mean > SMOOTH**2 * largest) | narrow[at]]
         if at.size == 0:
             continue
         points, w = _rule_on_parts(order)
@@ -136,8 +141,9 @@ def forces_on(
         missed[at] = np.sqrt(partition.areas[at] * mean) / PARTS
         rough = np.argsort(-missed[at])
         before = np.cumsum(missed[at[rough]] ** 2) - missed[at[rough]] ** 2
-        rough = rough[before <= (1 - LEFT) * (missed[at] ** 2).sum()][:FINEST]
-        rough = rough[mean[rough] > SMOOTH**2 * largest]
+        rough = rough[before <= (1 - LEFT) * (missed[at] ** 2).sum()]
+        rough = rough[(mean[rough] > SMOOTH**2 * largest) & ~narrow[at[rough]]]
+        rough = np.concatenate([np.flatnonzero(narrow[at]), rough])[:FINEST]
         for start in range(0, len(rough), AT_ONCE):
             some = rough[start : start + AT_ONCE]
             fine = partition, F, at[some], unit, high

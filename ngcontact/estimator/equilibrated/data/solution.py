@@ -9,7 +9,7 @@ import ngsolve as ng
 import numpy as np
 
 from ....arrays import Array, Index, Mask, power_of_two
-from ....fem import BoundaryTrace, shear_moduli
+from ....fem import BoundaryTrace, narrow_forces, shear_moduli
 from ....problem import Problem, Triangulation, varies
 from .balance import Balance, Units, balance_of
 from .curves import PLACES, CurvedEdges, bent_segments, curved_edges, curved_moments, edge_places
@@ -148,7 +148,9 @@ def discrete_on(
     values = partition.evaluate(components, every, points) / units.stress
     fit = basis(max(order - 1, 1)).values(points)[:, : dimension(order - 1)]
     coefficients = np.einsum("iq,nqc->nci", np.linalg.inv(fit), values)
-    forces = forces_on(problem.force, partition, region, degree, units.stress / units.length)
+    narrow = narrow_forces(problem, partition.mesh, order)[partition.parent]
+    unit = units.stress / units.length
+    forces = forces_on(problem.force, partition, region, degree, unit, narrow)
     force = forces.hatted.copy()
     bent = bent_segments(boundary)
     curves = curved_edges(partition, boundary, bent)
@@ -205,7 +207,9 @@ def _about_axis(
     F = partition.mesh.MaterialCF(problem.force, default=ng.CF((0, 0)))
     radial = partition.evaluate(ng.x * F[0], np.arange(len(region)), np.array([[1 / 3, 1 / 3]]))
     axial = {body: ng.CF((0, boundary.model.weighted(F[1]))) for body, F in problem.force.items()}
-    forces = forces_on(axial, partition, region, degree, units.traction / units.length)
+    narrow = narrow_forces(problem, partition.mesh, boundary.order)[partition.parent]
+    unit = units.traction / units.length
+    forces = forces_on(axial, partition, region, degree, unit, narrow)
     axis = balance_of(boundary.model).at_axis(partition)[partition.triangles].any(axis=1)
     near = np.flatnonzero(axis | (curves.number[partition.edges] >= 0).any(axis=1))
     return Discrete(
