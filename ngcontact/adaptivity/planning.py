@@ -23,7 +23,6 @@ from .settings import Refinement
 from .singularities import Singularities, ends_of_contact
 
 WRONG = 2.0  # estimate over its forecast from which it is planned half as far; measured .2 to 1.4
-
 HALF = 0.5  # of the unknowns that the tolerance asks for: a first level that knows another load
 
 
