@@ -50,8 +50,8 @@ from .pressures import Pieces, Reach, Zone, facing_cuts, pieces_of, reaches_of, 
 from .proofs import Norms, Proof, sampled_stress
 from .refusals import refuse_bound
 from .remainders import asked_tractions, missed_tractions
-from .stress import SETTLED, ContactPressure, EquilibratedStress, certified
-from .stresses import Equilibrated, bubble_norms, equilibrated, improved, settled
+from .stress import SETTLED, ContactPressure, EquilibratedStress, settled
+from .stresses import bubble_norms
 
 COSTLY = 0.05  # lifting over constitutive part of the bound from which a better one is sought
 
@@ -90,13 +90,13 @@ def error_bound(
     )
     gaps = _gaps(zones, every_pieces, boundary, displacement, partition, conditions, units)
     every_pieces = [gap.pieces for gap in gaps]
-    result, (raw, traction, certificate) = _equilibrated(discrete, conditions, given)
+    balanced = settled(discrete, conditions, given)
     fields = on_supports(problem, boundary, displacement, discrete, units)
-    constitutive = result.norms(discrete)
+    constitutive = balanced.found.norms(discrete)
     costly = COSTLY * float(constitutive @ constitutive)
     lifting = _lifting(problem, boundary, conditions, discrete, fields, gaps, units, costly)
     strips = asked_tractions(problem, boundary, discrete, zones, every_pieces, coefficients, units)
-    curves = missed_tractions(discrete, (raw, traction), strips)
+    curves = missed_tractions(discrete, (balanced.raw, balanced.traction), strips)
     norms = Norms(
         constitutive=constitutive,
         loads=bubble_norms(discrete, conditions)
@@ -107,11 +107,11 @@ def error_bound(
     works = [complementarity(gap, b) for gap, b in zip(gaps, coefficients, strict=True)]
     closed, signed = sum(w for w, _ in works), sum(w for _, w in works)
     bound = norms.bound(closed, units)
-    data = discrete, conditions, given, raw, gaps, coefficients, strips
+    data = discrete, conditions, given, balanced.raw, gaps, coefficients, strips
     sampled = sampled_stress(discrete, stress)
     proof = Proof(*data, norms, bound, units, problem, sampled)
-    reaction = work_of_supports(fields, partition, traction)
-    return summed(units, norms, closed, signed, reaction, _stress(proof, certificate))
+    reaction = work_of_supports(fields, partition, balanced.traction)
+    return summed(units, norms, closed, signed, reaction, _stress(proof, balanced.residuals))
 
 
 def _pressures(
@@ -157,23 +157,6 @@ def _gaps(
         for zone, pieces in zip(zones, every_pieces, strict=True)
     ]
     return without_idle(gaps, boundary)
-
-
-def _equilibrated(
-    discrete: Discrete, conditions: EdgeConditions, given: Array
-) -> tuple[Equilibrated, tuple[Array, Array, dict[str, float]]]:
-    """The equilibrated stress for tractions `given` (e, 2, r), and what `certified` says of it."""
-    result = equilibrated(discrete, conditions, given)
-    found = certified(discrete, conditions, given, result)
-    if max(found[2].values()) > SETTLED:
-        result = settled(discrete, conditions, given)
-        return result, certified(discrete, conditions, given, result)
-    better = improved(discrete, conditions, result)
-    if better is not result:
-        nearer = certified(discrete, conditions, given, better)
-        if max(nearer[2].values()) <= SETTLED:
-            return better, nearer
-    return result, found
 
 
 def _lifting(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import ngsolve as ng
+import numpy as np
 import pytest
 from netgen.meshing import Element1D, Element2D, FaceDescriptor, Mesh, MeshPoint, Pnt
 
 from drivers.reference import cases
 from drivers.reference.laws import bent_fibres, pressed_fibres
 from drivers.reference.straight import relative_energy_error
+from drivers.stress.scenes.drawing import scene_of
+from drivers.stress.scenes.posing import answer
 from ngcontact import Elastic, Problem, solve
 from ngcontact.adaptivity import refined
 from ngcontact.mesh import first_mesh
@@ -22,16 +25,17 @@ def residual(solution):
     return max(certificate.values())
 
 
-@pytest.mark.parametrize("stiffness", [1e4, 1e8])
+@pytest.mark.parametrize(("stiffness", "largest"), [(1e2, 1.4), (1e4, 6.0), (1e8, np.inf)])
 @pytest.mark.parametrize("order", [1, 2])
-def test_stiff_fibres(order, stiffness):
-    # Tractions are small differences of large multipliers: 2e-9 and 3e-5 after one pass, and an
-    # error in place of the bound.
+def test_stiff_fibres(order, stiffness, largest):
+    # Tractions are small differences of large multipliers: 1e-8 and 7e-5 at 1e4 and 1e8 before what
+    # is missed is balanced once more. Measured at most 1.33 and 4.8; once 36, as no steps towards
+    # the nearest stress were made then.
     case = bent_fibres(stiffness, 0.0)
     solution = solve(case.problem, maxh=0.1, order=order)
-    # Required 1e-9, from which the second pass follows: measured up to 2e-10, and 3e-14 after it.
-    assert residual(solution) <= 1e-9
-    assert solution.relative_error_bound >= relative_energy_error(solution, case.exact)
+    assert residual(solution) <= 1e-11  # divergences; measured 4e-12
+    found = solution.relative_error_bound / relative_energy_error(solution, case.exact)
+    assert 1 <= found <= largest
 
 
 @pytest.mark.parametrize(("stiffness", "largest"), [(1e2, 1.3), (1e4, 4.5)])
@@ -41,9 +45,21 @@ def test_stiff_fibres_cost_little(order, stiffness, largest):
     # for the stiffer ones.
     case = pressed_fibres(stiffness, 0.5)
     solution = solve(case.problem, maxh=0.15, order=order)
-    assert residual(solution) <= 1e-9
+    assert residual(solution) <= SETTLED
     found = solution.relative_error_bound / relative_energy_error(solution, case.exact)
     assert 1 <= found <= largest
+
+
+@pytest.mark.parametrize("seed", [43, 123])
+def test_thin_triangles_of_cuts(seed):
+    # A vertex that faces a segment a hundredth beside its end cuts a triangle in two: 2e-10 and
+    # 6e-10 were left between the parts.
+    solution = answer(scene_of(seed)).solution
+    assert residual(solution) <= SETTLED
+    x = solution.equilibrated.triangles
+    sides = np.linalg.norm(x - np.roll(x, 1, axis=1), axis=2)
+    area = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / 2
+    assert (2 * area / sides.max(axis=1) ** 2).min() < 0.02
 
 
 def crossed(bend):

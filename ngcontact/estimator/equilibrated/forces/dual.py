@@ -18,8 +18,7 @@ from ..liftings import lifted, on_contact
 from ..pressures import selected
 from ..proofs import Proof
 from ..remainders import asked_tractions, missed_tractions
-from ..stress import SETTLED, certified
-from ..stresses import equilibrated, improved
+from ..stress import SETTLED, settled
 from .excess import Excess, jump_beside, least_kappa
 
 ROOM = 2.0  # largest |q*| / p* over the ratio of their means, where contact has no open end
@@ -112,17 +111,16 @@ def dual_of(problem: Problem, boundary: BoundaryTrace, tested: Tested, proof: Pr
     discrete, given, q = selected(
         zones, pieces, boundary, G, sigma, discrete, conditions, units, limits
     )
-    result = improved(discrete, conditions, equilibrated(discrete, conditions, given))
-    raw, traction, certificate = certified(discrete, conditions, given, result)
-    if max(certificate.values()) > SETTLED:
-        raise ContactError(f"no dual stress was found: residuals {certificate}")
+    balanced = settled(discrete, conditions, given)
+    if balanced.worst > SETTLED:
+        raise ContactError(f"no dual stress was found: residuals {balanced.residuals}")
     strips = asked_tractions(free, boundary, discrete, zones, pieces, q, units)
-    curves = missed_tractions(discrete, (raw, traction), strips)
+    curves = missed_tractions(discrete, (balanced.raw, balanced.traction), strips)
     lifting = np.zeros(len(partition.triangles))
     for one in excess:
         lifting += lifted(discrete, on_contact(one, discrete), [])
-    norms = result.norms(discrete) + data_terms(discrete, 0 * lifting, curves) + lifting
-    return Dual(units, kappa, excess, traction, q, lifting, norms)
+    norms = balanced.found.norms(discrete) + data_terms(discrete, 0 * lifting, curves) + lifting
+    return Dual(units, kappa, excess, balanced.traction, q, lifting, norms)
 
 
 def _excess(
