@@ -124,7 +124,10 @@ def _minimiser(H: Array, f: Array, bounds: tuple[Array, Array], A: Array, a: Arr
         under, over = b < low - smallest[0], b > high + smallest[0]
         leaving = side * slope > smallest[1]
         if not (under | over | leaving).any():
-            return np.clip(b, low, high)
+            b = np.clip(b, low, high)
+            if _balances(b, A, a):  # too few are free, and K singular but for round-off
+                return b
+            break
         side = np.where(leaving, 0.0, side + over - 1.0 * under)
     return _surely(H, f, bounds, A, a)
 
@@ -141,7 +144,15 @@ def _surely(H: Array, f: Array, bounds: tuple[Array, Array], A: Array, a: Array)
     except (ContactError, ValueError) as error:
         raise ContactError(f"no pressure balances the loads: {error}") from error
     b = np.clip(b, *bounds)
-    off = np.abs(A @ b - a).max(initial=0.0)
-    if off > UNBALANCED * (np.abs(A) @ np.abs(b)).max(initial=0.0):
-        raise ContactError("no pressure of one sign balances the loads of a body that it holds")
+    if not _balances(b, A, a):
+        raise ContactError(
+            "no pressure that is a polynomial of one sign on each segment balances the loads of a "
+            "body that contact holds; give a finer mesh where it is held"
+        )
     return b
+
+
+def _balances(b: Array, A: Array, a: Array) -> bool:
+    """Whether A b = a but for round-off."""
+    terms = (np.abs(A) @ np.abs(b)).max(initial=0.0)
+    return bool(np.abs(A @ b - a).max(initial=0.0) <= UNBALANCED * terms)
