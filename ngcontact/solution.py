@@ -172,7 +172,7 @@ class Solution(Measured, Readable, Shown):
     @cached_property
     def energy(self) -> float:
         """Total potential energy L(u_h) of HH81 (2.6), per unit thickness."""
-        return potential_energy(self.discrete.space, self.displacement)
+        return potential_energy(self.problem, self.discrete.space, self.displacement)
 
     @cached_property
     def energy_norm(self) -> float:

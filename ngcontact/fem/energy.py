@@ -14,16 +14,26 @@ from .space import Space
 CANCELLED = 1e-6  # energy relative to its terms below which fewer than ten digits are left
 
 
-def potential_energy(space: Space, displacement: ng.GridFunction) -> float:
+def potential_energy(problem: Problem, space: Space, displacement: ng.GridFunction) -> float:
     """L(u_h) of HH81 (2.6), per unit thickness."""
-    u = displacement.vec.FV().NumPy()
-    size = power_of_two(u)  # squares of displacements may leave the range where these do not
-    u, f = u / size, space.f / size
-    return float(u @ (space.A @ u) / 2 - f @ u) * size * size  # (2.6)
+    size, energy = _scaled_energy(problem, space, displacement)
+    work = float(space.f / size @ (displacement.vec.FV().NumPy() / size))
+    return (energy / 2 - work) * size * size  # (2.6)
 
 
 def energy_norm(problem: Problem, space: Space, displacement: ng.GridFunction) -> float:
-    """A(u_h, u_h)^(1/2), from the strains where large rigid motions would cancel."""
+    """A(u_h, u_h)^(1/2), root of an energy per unit thickness."""
+    size, energy = _scaled_energy(problem, space, displacement)
+    return math.sqrt(energy) * size
+
+
+def _scaled_energy(
+    problem: Problem, space: Space, displacement: ng.GridFunction
+) -> tuple[float, float]:
+    """A size s of the displacement, whose squares may leave the range, and A(u_h / s, u_h / s).
+
+    From the strains where large rigid motions would cancel.
+    """
     u, mesh, order = displacement.vec.FV().NumPy(), space.trace.mesh, space.trace.order
     size = power_of_two(u)
     u = u / size
@@ -35,7 +45,7 @@ def energy_norm(problem: Problem, space: Space, displacement: ng.GridFunction) -
             stress = model.stress(law.voigt(problem.model), e)
             density = model.weighted(ng.InnerProduct(stress, e)).Compile()
             energy += ng.Integrate(density, mesh.Materials(body), order=2 * order + 2)
-    return math.sqrt(energy) * size
+    return size, energy
 
 
 def voigt_stress(problem: Problem, displacement: ng.GridFunction) -> list[ng.CoefficientFunction]:

@@ -102,7 +102,7 @@ class Guaranteed:
         space, u = self.discrete.space, self.displacement
         if self.problem.force or self.problem.traction:
             space = replace(space, f=load_vector(self.problem, space.V, FINE))
-        energy = potential_energy(space, u)
+        energy = potential_energy(self.problem, space, u)
         noise = ROUND_OFF * (self.energy_norm**2 + abs(energy))
         return energy - self._bound.below - noise, energy + self._bound.above + noise
 

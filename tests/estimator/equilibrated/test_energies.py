@@ -61,3 +61,15 @@ def test_energies_are_enclosed(scene):
         assert lower <= high
         noise = 1e-12 * (level.energy_norm**2 + abs(level.energy))
         assert high - low <= 1.5 * level.error_bound**2 + noise
+
+
+def test_energies_of_stiff_bodies_keep_their_digits():
+    """A body 1e8 times stiffer moves by what the soft one gives way: nothing of that is energy.
+
+    Summed as u.Au two levels enclosed values 7e-12 apart, 30 times the distance of the finer ones.
+    """
+    problem = opening(materials={"upper": Elastic(1e11, 0.3), "lower": Elastic(1e3, 0.2)})
+    *_, coarse, fine = (level.energy_bounds for level in adapt(problem, order=4, max_dofs=7000))
+    assert coarse[0] <= fine[1]
+    assert fine[0] <= coarse[1]
+    assert fine[1] - fine[0] <= 3e-9 * abs(fine[0])
