@@ -12,9 +12,17 @@ from scipy.linalg import block_diag
 
 from ..arrays import Array, Index
 from ..constraints import Conditions
-from ..fem import Bodies, BoundaryTrace, Space, body_of_unknown, connected_bodies
-from ..problem import Triangulation
+from ..fem import (
+    Bodies,
+    BoundaryTrace,
+    Space,
+    body_of_unknown,
+    connected_bodies,
+    loads_of,
+)
+from ..problem import Problem, Triangulation
 from ..qp import FREE, vanishing_combinations
+from ..quadrature import View, integral_over, known_rough_load, moment_degree, numbers
 
 NOT_RIGID = 1e-9  # force of a rigid motion, relative to its terms, that shows it is not in V_h
 
@@ -218,3 +226,35 @@ def free_motions(
             'supports leave free; use element="isoparametric"'
         )
     return FreeMotions(space, bodies, combinations, of_unknown, nodal, values)
+
+
+def measured_work(problem: Problem, free: FreeMotions) -> tuple[Array, Array] | None:
+    """Work (r,) of the load on the free motions, by the mesh, and the error (r,) measured of it.
+
+    None where all loads are numbers: those of V_h are exact.
+    """
+    trace, bodies = free.space.trace, free.bodies
+    mesh, model = trace.mesh, trace.model
+    loads, degree = loads_of(problem, mesh), moment_degree(free.space.V.globalorder)
+    if all(numbers(data) for data, _, _ in loads):
+        return None
+    work, error = np.zeros((2, free.combinations.shape[1]))
+    for data, load, region in loads:
+        view = View(mesh, 2 if region.VB() == ng.VOL else 1)
+        found = known_rough_load(data, load, region, degree)
+        rough = None if found is None else found.rough
+        ends = view.arrays.triangles if view.dim == 2 else view.arrays.segments
+        inside = view.inside(region)
+        for b, ((x, y), size) in enumerate(zip(bodies.middle, bodies.size, strict=True)):
+            amounts = free.combinations[3 * b : 3 * b + 3]
+            moving = np.flatnonzero(amounts.any(axis=0))
+            here = inside[bodies.of_vertex[ends[inside, 0]] == b]
+            if here.size and moving.size:
+                turn = ((ng.x - x) * load[1] - (ng.y - y) * load[0]) / size
+                parts = amounts[:, moving].T.tolist()
+                powers = [r * load[0] + s * load[1] + t * turn for r, s, t in parts]
+                density = model.weighted(ng.CF(tuple(powers)))
+                done, missed = integral_over(density, view, here, rough)
+                work[moving] += done
+                error[moving] += missed
+    return work, error

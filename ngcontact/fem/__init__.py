@@ -33,4 +33,5 @@ from .space import Space as Space
 from .space import assemble as assemble
 from .space import has_rough_loads as has_rough_loads
 from .space import load_vector as load_vector
+from .space import loads_of as loads_of
 from .space import narrow_forces as narrow_forces

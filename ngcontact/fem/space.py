@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TypeAlias
 
 import ngsolve as ng
 import numpy as np
@@ -18,6 +19,8 @@ from .boundary import BoundaryTrace
 from .element import node_basis, vector_space
 from .model import model_of
 from .moduli import constant_measures, law_measures, rough_moduli
+
+Load: TypeAlias = tuple[ng.CoefficientFunction, ng.CoefficientFunction, ng.Region]
 
 LOAD_BONUS = 6  # quadrature orders above the default: loads may be as rough as r^(-1/2)
 
@@ -78,6 +81,16 @@ def _check_normals(trace: BoundaryTrace, boundary: str) -> None:
         )
 
 
+def loads_of(problem: Problem, mesh: ng.Mesh) -> list[Load]:
+    """The data, the force per volume or area that they are, and the region of each load."""
+    forces = [(F, F, mesh.Materials(body)) for body, F in problem.force.items()]
+    tractions = [
+        (p, problem.traction_vector(boundary), mesh.Boundaries(boundary))
+        for boundary, p in problem.traction.items()
+    ]
+    return [*forces, *tractions]
+
+
 def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
     """f(v) of (3.2), (2N,), with quadrature `bonus` orders above the default.
 
@@ -85,26 +98,18 @@ def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
     """
     v, model, mesh = V.TestFunction(), model_of(problem), V.mesh
     f = ng.LinearForm(V)
-    for body, F in problem.force.items():
-        for load, dx in _smooth_and_rough(F, F, mesh.Materials(body), V, bonus):
-            f += model.weighted(load * v) * dx  # (3.2)
-    for boundary in problem.traction:
-        p, P = problem.traction[boundary], problem.traction_vector(boundary)
-        for load, ds in _smooth_and_rough(p, P, mesh.Boundaries(boundary), V, bonus):
-            f += model.weighted(load * v.Trace()) * ds  # (3.2)
+    for data, whole, region in loads_of(problem, mesh):
+        w = v if region.VB() == ng.VOL else v.Trace()
+        for load, dx in _smooth_and_rough(data, whole, region, V, bonus):
+            f += model.weighted(load * w) * dx  # (3.2)
     f.Assemble()
     return f.vec.FV().NumPy().copy()
 
 
 def has_rough_loads(problem: Problem, V: ng.FESpace) -> bool:
     """Whether quadrature of the usual order would miss a part of a load on the mesh of `V`."""
-    degree, mesh = moment_degree(V.globalorder), V.mesh
-    forces = [(F, F, mesh.Materials(body)) for body, F in problem.force.items()]
-    tractions = [
-        (p, problem.traction_vector(boundary), mesh.Boundaries(boundary))
-        for boundary, p in problem.traction.items()
-    ]
-    return any(known_rough_load(*load, degree) is not None for load in [*forces, *tractions])
+    degree = moment_degree(V.globalorder)
+    return any(known_rough_load(*load, degree) is not None for load in loads_of(problem, V.mesh))
 
 
 def narrow_forces(problem: Problem, mesh: ng.Mesh, order: int) -> Mask:

@@ -1,6 +1,7 @@
 """Quadrature that follows the data: where functions are rough, and rules that resolve them."""
 
 from .doubts import warn_of_data as warn_of_data
+from .integrals import integral_over as integral_over
 from .jumps import jumping_moduli as jumping_moduli
 from .jumps import warn_of_jumps as warn_of_jumps
 from .lattice import composite as composite
@@ -11,6 +12,8 @@ from .loads import RoughLoad as RoughLoad
 from .loads import keep_rough_load as keep_rough_load
 from .loads import known_rough_load as known_rough_load
 from .loads import moment_degree as moment_degree
+from .loads import numbers as numbers
 from .loads import rough_load as rough_load
 from .values import pieces as pieces
 from .values import rough_segments as rough_segments
+from .view import View as View

@@ -23,25 +23,29 @@ BEYOND = 0.05  # share of a part beyond the last point of the rule
 Integrand = Callable[[Index, Array], Array]
 
 
-@lru_cache
-def rule(dim: int) -> tuple[Array, Array, Array]:
-    """Points and weights on the unit segment or triangle, those of its corners at the end.
+def with_corners(inner: Array, weights: Array, degree: int) -> tuple[Array, Array, Array]:
+    """A rule with points `inner` (m, dim) and `weights` (m,), and corners at its end.
 
-    Points (m, dim); weights (m,), 0 at the corners; a matrix (dim + 1, m) to what a polynomial
-    through the others misses at the corners. Steps beyond the last point of a rule are seen there.
+    Points (n, dim); weights (n,), 0 at the corners; a matrix (dim + 1, n) to what a polynomial of
+    a degree through the others misses at the corners. Steps beyond the last point are seen there.
     """
-    made = ng.IntegrationRule(ng.SEGM if dim == 1 else ng.TRIG, ORDER[dim])
-    inner = np.array([p[:dim] for p in made.points]).reshape(-1, dim)
-    middle = np.full(dim, 1 / (dim + 1))
+    dim = inner.shape[1]
     corners = np.vstack([np.zeros(dim), np.eye(dim)])
-    corners = corners + CORNER * (middle - corners)
-    degree = {1: 3, 2: 2}[dim]
+    corners = corners + CORNER * (1 / (dim + 1) - corners)
     through = monomials(corners, degree) @ np.linalg.pinv(monomials(inner, degree))
     return (
         np.vstack([inner, corners]),
-        np.append(made.weights, np.zeros(dim + 1)),
+        np.append(weights, np.zeros(dim + 1)),
         np.hstack([-through, np.eye(dim + 1)]),
     )
+
+
+@lru_cache
+def rule(dim: int) -> tuple[Array, Array, Array]:
+    """Points (m, dim), weights (m,) on the unit simplex, a matrix (dim + 1, m): `with_corners`."""
+    made = ng.IntegrationRule(ng.SEGM if dim == 1 else ng.TRIG, ORDER[dim])
+    inner = np.array([p[:dim] for p in made.points]).reshape(-1, dim)
+    return with_corners(inner, np.array(made.weights), {1: 3, 2: 2}[dim])
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,7 +151,7 @@ def following(
         last = depth == DEEPEST[dim] - 1 or np.count_nonzero(error > allowed) > MOST_CELLS
         some = (error > allowed) & (not last)
         if corners is not None and some.any():
-            some = _with_those_beside(some, cells, corners)
+            some = with_those_beside(some, cells, corners)
         again = np.repeat(some, 2**dim)
         found.append(halves[~again])
         kept.append(values[~again])
@@ -159,7 +163,7 @@ def following(
     return joined(found), np.concatenate(kept), np.concatenate(missed)
 
 
-def _with_those_beside(some: Mask, cells: Cells, corners: Array) -> Mask:
+def with_those_beside(some: Mask, cells: Cells, corners: Array) -> Mask:
     """The cells `some` (k,) and those that may touch one, (k,); `corners` (n, 3, 2) as above."""
     of = corners[cells.element]
     sides = cells.side @ (of[:, :2] - of[:, 2:])

@@ -10,8 +10,8 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two
-from .cells import Cells, following, joined, whole
-from .lattice import beside_edges, divisions, monomials
+from .cells import Cells, following
+from .lattice import beside_edges, monomials
 from .view import View, looked_at
 
 SHAPE = 0.05  # what they miss of a load at a point, relative to its largest value ...
@@ -19,7 +19,6 @@ SHARE = {
     1: 1e-4,
     2: 2e-3,
 }  # ... or over an element, relative to its integral, at which it is rough there
-POINTS = {1: 3, 2: 3}  # parts of a lattice that one of the rule is as good as
 STEP = 2  # times what values vary at the points: no others are further apart in smooth functions
 LONG = 4000  # of what is printed; numbers are short
 KNOWN: WeakKeyDictionary[ng.CoefficientFunction, bool] = WeakKeyDictionary()  # numbers or not
@@ -102,17 +101,14 @@ def rough_load(
     if not rough.any() or (known is not None and known.seen == seen):
         return known if rough.any() else None
     rough = view.with_neighbours(rough, inside)  # a part of a feature may have none of the points
-    elements = np.flatnonzero(rough)
-    count = divisions(view.dim, view.sizes[elements], view.extent)
-    count = np.maximum(count // POINTS[view.dim], 2)
-    start = [whole(view.dim, elements[count == n]).divided(n) for n in np.unique(count).tolist()]
+    start = view.in_parts(np.flatnonzero(rough))
 
     def density(elements: Index, reference: Array) -> Array:
         values = view.evaluate(load, elements, reference)
         return np.asarray(values * view.evaluate(view.measure, elements, reference))
 
     corners = view.arrays.corners if view.dim == 2 else None
-    cells, values, over = following(density, joined(start), FINE[view.dim] * total, corners)
+    cells, values, over = following(density, start, FINE[view.dim] * total, corners)
     missed = np.bincount(cells.element, over, len(rough)).astype(float)
     order = np.argsort(cells.element, kind="stable")
     projection, rest = _projected(values[order], view, cells[order], degree)

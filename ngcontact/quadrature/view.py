@@ -13,8 +13,10 @@ import numpy as np
 from ..arrays import Array, Index, Mask
 from ..mesh import diameters
 from ..problem import Triangulation
+from .cells import Cells, joined, whole
 from .lattice import divisions, lattice, mesh_points, monomials
 
+POINTS = {1: 3, 2: 3}  # parts of a lattice that one of the rule is as good as
 DEGREE = 6  # of polynomials that the usual rules integrate against displacements
 
 
@@ -70,6 +72,13 @@ class View:
         reference = np.broadcast_to(reference, (len(elements), *reference.shape[-2:]))
         points = mesh_points(self.mesh, elements, reference)
         return np.asarray(function(points.ravel())).reshape(*points.shape, -1)
+
+    def in_parts(self, elements: Index) -> Cells:
+        """The `elements` (k,) in parts, on which rules see what the points of a lattice see."""
+        count = divisions(self.dim, self.sizes[elements], self.extent)
+        count = np.maximum(count // POINTS[self.dim], 2)
+        several = np.unique(count).tolist()
+        return joined([whole(self.dim, elements[count == n]).divided(n) for n in several])
 
     def shapes(self, degree: int) -> tuple[ng.FESpace, ng.CoefficientFunction]:
         """Discontinuous polynomials, and the functions of an element, numbered one by one."""
