@@ -32,3 +32,14 @@ def no_work(monkeypatch):
 
     monkeypatch.setattr(ng, "BilinearForm", forbidden)
     monkeypatch.setattr(ng, "LinearForm", forbidden)
+
+
+@pytest.fixture
+def two_threads():
+    """Managers take two threads; as many as before afterwards."""
+    import ngsolve as ng
+
+    before = ng.ngsglobals.numthreads
+    ng.SetNumThreads(2)
+    yield
+    ng.SetNumThreads(before)

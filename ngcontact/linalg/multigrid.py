@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import ngsolve as ng
@@ -10,6 +11,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Mask
 from .coarse_spaces import Coarsening
+from .smoothing import Smoother, fastest
 from .sparse import handed_over, inverse_of
 
 TRIAL = 25  # V-cycles after which is judged whether the target will be reached
@@ -26,38 +28,55 @@ class _Level:
     Attributes
     ----------
     matrix : ng.BaseMatrix (n, n)
-    P, transposed : sparse (n, k) and (k, n)
+    P, transposed : ng.BaseMatrix (n, k) and (k, n)
         Prolongation.
     free : ndarray of bool (n,)
         Unknowns that are corrected.
-    smoother : ng.BaseSmoother
-        Gauss-Seidel sweeps over them.
+    projector : ng.BaseMatrix
+        Onto them.
+    smoother : Smoother
+        Of them.
     residual : ng.BaseVector (n,)
     right, solution : ng.BaseVector (k,)
     """
 
     matrix: ng.BaseMatrix
-    P: sp.csr_array
-    transposed: sp.csc_array
+    P: ng.BaseMatrix
+    transposed: ng.BaseMatrix
     free: Mask
-    smoother: ng.BaseSmoother
+    projector: ng.BaseMatrix
+    smoother: Smoother
     residual: ng.BaseVector
     right: ng.BaseVector
     solution: ng.BaseVector
 
     def holding(self, free: Mask) -> _Level:
         """The same with other free unknowns (n,); work vectors are shared."""
-        return replace(self, free=free, smoother=self.matrix.CreateSmoother(ng.BitArray(free)))
+        return replace(
+            self, free=free, projector=_projector(free), smoother=self.smoother.holding(free)
+        )
 
 
-def _level(matrix: ng.BaseMatrix, free: Mask, step: Coarsening) -> _Level:
+def _projector(free: Mask) -> ng.BaseMatrix:
+    """Onto the `free` unknowns (n,)."""
+    return ng.Projector(ng.BitArray(free), True)
+
+
+def _level(
+    matrix: ng.BaseMatrix,
+    free: Mask,
+    step: Coarsening,
+    smoother: Callable[[ng.BaseMatrix, Mask], Smoother],
+) -> _Level:
     """The space of `matrix` above that of a step."""
+    P = handed_over(step.P)
     return _Level(
         matrix=matrix,
-        P=step.P,
-        transposed=step.P.T,
+        P=P,
+        transposed=P.CreateTranspose(),
         free=free,
-        smoother=matrix.CreateSmoother(ng.BitArray(free)),
+        projector=_projector(free),
+        smoother=smoother(matrix, free),
         residual=matrix.CreateColVector(),
         right=ng.BaseVector(step.kept.size),
         solution=ng.BaseVector(step.kept.size),
@@ -76,9 +95,8 @@ def _galerkin(matrix: ng.BaseMatrix, P: sp.csr_array, free: Mask, coarse: Mask) 
 class Multigrid:
     """Solver of the systems of the free unknowns of a symmetric positive definite matrix.
 
-    One Gauss-Seidel sweep over all unknowns before a coarser space corrects, the reverse one
-    after it, and a Cholesky factor of the coarsest space: a symmetric positive definite
-    preconditioner. `truncated_multigrid` makes it.
+    A smoother before a coarser space corrects, its adjoint after it, and a Cholesky factor of the
+    coarsest space: a symmetric positive definite preconditioner. `truncated_multigrid` makes it.
 
     Attributes
     ----------
@@ -101,16 +119,15 @@ class Multigrid:
             solution.data = self.inverse * right
             return
         here = self.levels[level]
-        solution[:] = 0.0
-        here.smoother.Smooth(solution, right)
+        here.smoother.before(right, solution)
         here.residual.data = right - here.matrix * solution
-        residual = here.residual.FV().NumPy()
-        residual *= here.free
-        here.right.FV().NumPy()[:] = here.transposed @ residual
+        here.projector.Project(here.residual)
+        here.right.data = here.transposed * here.residual
         self.cycle(here.right, here.solution, level + 1)
-        np.multiply(here.P @ here.solution.FV().NumPy(), here.free, out=residual)
-        solution.data += here.residual
-        here.smoother.SmoothBack(solution, right)
+        here.residual.data = here.P * here.solution
+        here.projector.Project(here.residual)
+        solution += here.residual
+        here.smoother.after(right, solution)
 
     def solve(self, right: Array, target: float, most: int) -> tuple[Array, int]:
         """Solution (n,), its largest residual at most `target`, and the number of V-cycles.
@@ -131,7 +148,7 @@ class Multigrid:
         """
         finest = self.levels[0]
         x, r, z, d, q = (finest.matrix.CreateColVector() for _ in range(5))
-        residual, image = r.FV().NumPy(), q.FV().NumPy()
+        residual = r.FV().NumPy()
         np.multiply(right, finest.free, out=residual)
         x[:] = 0.0
         d[:] = 0.0
@@ -148,14 +165,19 @@ class Multigrid:
             d *= product / last
             d.data += z
             q.data = finest.matrix * d
-            image *= finest.free
+            finest.projector.Project(q)
             step = product / ng.InnerProduct(d, q)
             x.data += step * d
             r.data -= step * q
         raise StalledError(f"{count} V-cycles left {size / first:.1e} of a residual")
 
 
-def truncated_multigrid(matrix: ng.BaseMatrix, steps: list[Coarsening], free: Mask) -> Multigrid:
+def truncated_multigrid(
+    matrix: ng.BaseMatrix,
+    steps: list[Coarsening],
+    free: Mask,
+    smoother: Callable[[ng.BaseMatrix, Mask], Smoother] = fastest,
+) -> Multigrid:
     """Multigrid whose coarser functions vanish at the unknowns that are not free.
 
     As in truncated monotone multigrid (Kornhuber 1994, Numer. Math. 69:167).
@@ -168,10 +190,12 @@ def truncated_multigrid(matrix: ng.BaseMatrix, steps: list[Coarsening], free: Ma
         At least one, finest first.
     free : ndarray of bool (n,)
         Unknowns of the systems.
+    smoother : callable
+        Makes that of a matrix and its free unknowns.
     """
     levels: list[_Level] = []
     for step in steps:
-        levels.append(_level(matrix, free, step))
+        levels.append(_level(matrix, free, step, smoother))
         coarse = free[step.kept]
         matrix = _galerkin(matrix, step.P, free, coarse)
         free = coarse

@@ -60,6 +60,22 @@ def test_solutions_are_those_of_a_factor(large, name: str, order: int):
     same(solution, direct(problem, mesh, order=order))
 
 
+@pytest.mark.usefixtures("large", "two_threads")
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("name", REFINED)
+def test_two_threads_find_what_one_finds(name: str, order: int):
+    problem = REFINED[name]
+    mesh = uniform_mesh(problem, order, 6000)
+    one = solve(problem, mesh, order=order)
+    with ng.TaskManager():
+        two = solve(problem, mesh, order=order)
+    assert two.work["factorizations"] == 0
+    # Polynomials in place of sweeps: measured 0.55 to 0.6 of the V-cycles.
+    assert two.work["back_solves"] < 0.7 * one.work["back_solves"]
+    same(two, one)
+    np.testing.assert_allclose(two.indicators, one.indicators, rtol=1e-8)
+
+
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", REFINED)
 def test_adaptive_meshes(large, name: str, order: int):

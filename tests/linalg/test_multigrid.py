@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 
 from ngcontact.linalg.multigrid import Multigrid, StalledError, truncated_multigrid
+from ngcontact.linalg.smoothing import chebyshev, gauss_seidel
 from ngcontact.linalg.sparse import congruent
 from tests.scenes import REFINED, discrete, steps_of
 
+SMOOTHERS = (gauss_seidel, chebyshev)
 
-def prepared(name: str, order: int, rounds: int, maxh: float = 0.5):
+
+def prepared(name: str, order: int, rounds: int, maxh: float = 0.5, smoother=gauss_seidel):
     """Matrix, multigrid and free unknowns, every second contact row active."""
     problem = discrete(REFINED[name], order, rounds, maxh)
     p = problem.program
@@ -19,7 +22,7 @@ def prepared(name: str, order: int, rounds: int, maxh: float = 0.5):
     )
     free = ~p.fixed
     free[p.unknown[: len(p.unknown) // 2]] = False
-    return K, truncated_multigrid(matrix, steps_of(problem, 0), free), free
+    return K, truncated_multigrid(matrix, steps_of(problem, 0), free, smoother), free
 
 
 def cycles(multigrid: Multigrid, size: int) -> np.ndarray:
@@ -34,11 +37,14 @@ def cycles(multigrid: Multigrid, size: int) -> np.ndarray:
     return columns
 
 
+@pytest.mark.parametrize("smoother", SMOOTHERS)
 @pytest.mark.parametrize("released", [False, True])
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", REFINED)
-def test_a_cycle_is_symmetric_and_positive_definite(name: str, order: int, released: bool):
-    K, multigrid, free = prepared(name, order, 1 if order > 1 else 2, 1.0)
+def test_a_cycle_is_symmetric_and_positive_definite(
+    name: str, order: int, released: bool, smoother
+):
+    K, multigrid, free = prepared(name, order, 1 if order > 1 else 2, 1.0, smoother)
     if released:  # coarser matrices are those of another set
         free = free.copy()
         held = np.flatnonzero(~free)[::3]
@@ -58,22 +64,29 @@ def test_a_cycle_is_symmetric_and_positive_definite(name: str, order: int, relea
         assert values[-1] <= 1 + 1e-12
 
 
-@pytest.mark.parametrize(("order", "most"), [(1, 38), (2, 50), (3, 64), (4, 75)])
+@pytest.mark.parametrize(
+    ("smoother", "order", "most"),
+    # Measured 30, 40, 52 and 61 at most for ten digits with sweeps, 13, 21, 28 and 38
+    # with polynomials.
+    [
+        *((gauss_seidel, *counts) for counts in ((1, 38), (2, 50), (3, 64), (4, 75))),
+        *((chebyshev, *counts) for counts in ((1, 16), (2, 26), (3, 35), (4, 47))),
+    ],
+)
 @pytest.mark.parametrize("name", REFINED)
-def test_cycles_do_not_grow_with_the_mesh(name: str, order: int, most: int):
+def test_cycles_do_not_grow_with_the_mesh(name: str, smoother, order: int, most: int):
     rng = np.random.default_rng(order)
     counts = []
     for rounds in (1, 2, 3):
-        K, multigrid, free = prepared(name, order, rounds)
+        K, multigrid, free = prepared(name, order, rounds, smoother=smoother)
         b = np.where(free, rng.normal(size=K.shape[0]), 0.0)
         x, count = multigrid.solve(b, 1e-10 * np.abs(b).max(), 100)
         # The iteration's own residual drifts from this one by round-off.
         assert np.abs(b - K @ x)[free].max() < 2e-10 * np.abs(b).max()
         assert not x[~free].any()
         counts.append(count)
-    # Measured 30, 40, 52 and 61 at most for ten digits, the last mesh 1.2 times the one before.
     assert max(counts) <= most
-    assert counts[-1] <= 1.25 * counts[-2]
+    assert counts[-1] <= 1.25 * counts[-2] + 1  # measured 1.2; and a whole one
 
 
 def test_the_solution_is_that_of_a_factor():

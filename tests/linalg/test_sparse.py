@@ -93,14 +93,6 @@ def test_factorisation_of_principal_parts():
     np.testing.assert_allclose((K @ solution)[free], right[free], atol=1e-13 * np.abs(right).max())
 
 
-@pytest.fixture
-def two_threads():
-    before = ng.ngsglobals.numthreads
-    ng.SetNumThreads(2)
-    yield
-    ng.SetNumThreads(before)
-
-
 def managed():
     """Threads of a manager that is started, or already there."""
     with ng.TaskManager():
