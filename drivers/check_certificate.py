@@ -7,9 +7,10 @@ that tractions are continuous between triangles and as given on straight edges o
 on curves and on Gamma_K what is missed of them is orthogonal to rigid motions and as small as the
 norms of `curves` say, that p* >= 0 acts on both bodies alike, that the gap is open, and that B
 follows from the arrays. Triangles that are curved, or of laws that vary, have maps (polynomials),
-laws and discrete stresses at points of a quadrature, of which the order is checked. Taken as told
-are the problem's data, the discrete stress, the gap, and the norms of the lifting and of loads that
-no polynomial meets.
+laws and discrete stresses at points of a quadrature, of which the order is checked. Of a body of
+revolution the polynomials are T = 2 pi r s: the axial equation is checked, the hoop stress is what
+the radial one says of T. Taken as told are the problem's data, the discrete stress, the gap, and
+the norms of the lifting and of loads that no polynomial meets.
 
     python -m drivers.check_certificate certificate.npz
 """
@@ -88,7 +89,7 @@ class Shapes:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Places (n, q, 2) on edges, and outward normals times ds over the chord and dt."""
         x, jacobian = self.places(triangle, edge_points(side, t))
-        way = edge_points(side, np.array([[0.0, 1.0]] * len(side)))
+        way = edge_points(side, np.tile([0.0, 1.0], (len(side), 1)))
         dx = np.einsum("nqij,nj->nqi", jacobian, way[:, 1] - way[:, 0])
         chord = self.lengths[triangle, side][:, None, None]
         return x, np.stack([dx[..., 1], -dx[..., 0]], axis=2) / chord
@@ -131,6 +132,8 @@ class Shapes:
 class Certificate:
     """The arrays, and what follows from them."""
 
+    equations = slice(0, 2)  # components of the divergence that the file's force balances
+
     def __init__(self, arrays: Arrays) -> None:
         self.a = arrays
         self.k = int(arrays["degree"])
@@ -143,8 +146,19 @@ class Certificate:
     def stress_at(self, triangle: np.ndarray, x: np.ndarray) -> np.ndarray:
         """Stresses (n, q, 3) at places `x` (n, q, 2)."""
         at = self.shapes.straight(triangle, x)
-        values = powers(self.k, at.reshape(-1, 2))[0].reshape(*x.shape[:2], -1)
+        values = powers(self.k, at.reshape(-1, 2))[0].reshape(*x.shape[:2], len(self.inverse))
         return np.einsum("nqi,nci->nqc", values, self.stress[triangle])
+
+    def divergence(self, triangle: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Divergences (n, q, 2) at straight reference `points` (q, 2) or (n, q, 2)."""
+        d = np.stack(powers(self.k, points.reshape(-1, 2))[1:])
+        d = d.reshape(2, *points.shape[:-1], -1) if points.ndim == 3 else d[:, None]
+        d = np.broadcast_to(d, (2, len(triangle), *d.shape[2:]))
+        inverse = self.shapes.inverse[triangle]
+        slope = np.einsum("nrx,rnqi,nci->nqcx", inverse, d, self.stress[triangle], optimize=True)
+        return np.stack(
+            [slope[..., 0, 0] + slope[..., 2, 1], slope[..., 2, 0] + slope[..., 1, 1]], 2
+        )
 
     def traction(self, triangle: np.ndarray, side: np.ndarray, t: np.ndarray) -> np.ndarray:
         """Tractions (n, q, 2) per chord at places t (n, q) of edges."""
@@ -164,18 +178,15 @@ class Certificate:
         finite = all(np.isfinite(v).all() for v in a.values())
         yield "all numbers are finite", 0.0 if finite else math.inf
         yield "triangles are oriented", 0.0 if (self.area > 0).all() else math.inf
-        for name in ("law", "sampled_law"):
-            if name in a:
-                skew = np.abs(a[name] - np.swapaxes(a[name], -1, -2)).max() / np.abs(a[name]).max()
-                definite = (np.linalg.eigvalsh(a[name]) > 0).all()
-                yield "laws are symmetric and definite", skew if definite else math.inf
-        d = np.stack(powers(self.k, a["lattice"])[1:])
-        slope = np.einsum("nrx,rqi,nci->nqcx", self.shapes.inverse, d, self.stress, optimize=True)
-        div = np.stack(
-            [slope[..., 0, 0] + slope[..., 2, 1], slope[..., 2, 0] + slope[..., 1, 1]], 2
-        )
+        worst = 0.0
+        for C in (a[name] for name in a if name.endswith("law")):
+            skew = np.abs(C - np.swapaxes(C, -1, -2)).max() / np.abs(C).max()
+            worst = max(worst, float(skew) if (np.linalg.eigvalsh(C) > 0).all() else math.inf)
+        yield "laws are symmetric and definite", worst
+        every = np.arange(len(a["triangles"]))
+        rest = (self.divergence(every, a["lattice"]) + a["force"])[..., self.equations]
         h = self.lengths.max(axis=1)[:, None, None]
-        yield "div s + F = 0", np.abs(h * (div + a["force"])).max() / self.largest
+        yield "div s + F = 0", np.abs(h * rest).max() / self.largest
         if self.shapes.sampled.size:
             yield from self.sampled_checks()
         yield from self.edge_checks()
@@ -191,27 +202,35 @@ class Certificate:
 
     def noise(self) -> float:
         """Round-off of norms."""
-        own = self.norms(self.a["discrete_stress"], self.a.get("sampled_stress"))
-        return ROUND_OFF * math.sqrt((own**2).sum())
+        return ROUND_OFF * math.sqrt((self.norms(equilibrated=False) ** 2).sum())
 
     def sampled_checks(self) -> Iterator[tuple[str, float]]:
         """Maps, and the quadrature on them."""
+        yield from self.map_checks()
+        yield "quadrature is exact for polynomials", self.inexact("sampled")
+        _, jacobian = self.sampled_places()
+        yield "maps keep the orientation", 0.0 if (np.linalg.det(jacobian) > 0).all() else math.inf
+
+    def map_checks(self) -> Iterator[tuple[str, float]]:
+        """Maps have the vertices of their triangles."""
         a, shapes = self.a, self.shapes
         corners = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
         x, _ = shapes.places(shapes.sampled, np.tile(corners, (len(shapes.sampled), 1, 1)))
         off = np.abs(x - a["vertices"][a["triangles"][shapes.sampled]]).max(axis=(1, 2))
         yield "maps keep vertices", (off / shapes.lengths[shapes.sampled].min(axis=1)).max()
+
+    def inexact(self, name: str) -> float:
+        """By how much a quadrature fails to integrate what it should."""
+        a = self.a
         order, geometry = int(a["sampled_exact"]), int(a["sampled_degree"])
         enough = order >= 2 * self.k * geometry + 2 * (geometry - 1)
-        u, v = a["sampled_points"].T
+        u, v = a[f"{name}_points"].T
         i, j = np.array([(d - j, j) for d in range(order + 1) for j in range(d + 1)]).T
         exact = [
             2 / math.comb(m + n, n) / ((m + n + 1) * (m + n + 2)) for m, n in zip(i, j, strict=True)
         ]
-        off = np.abs(a["sampled_weights"] @ (u[:, None] ** i * v[:, None] ** j) - exact).max()
-        yield "quadrature is exact for polynomials", off if enough else math.inf
-        _, jacobian = self.sampled_places()
-        yield "maps keep the orientation", 0.0 if (np.linalg.det(jacobian) > 0).all() else math.inf
+        off = np.abs(a[f"{name}_weights"] @ (u[:, None] ** i * v[:, None] ** j) - exact).max()
+        return float(off) if enough else math.inf
 
     def sampled_places(self) -> tuple[np.ndarray, np.ndarray]:
         """Places and Jacobians of the sampled triangles at the points of quadrature."""
@@ -285,23 +304,31 @@ class Certificate:
         a = self.a
         owner, side = np.divmod(edges, 3)
         worst = 0.0
-        jacobians = self.sampled_places()[1] if self.shapes.sampled.size else np.zeros(0)
-        mandel = np.sqrt([1.0, 1.0, 2.0])
-        for triangle in np.unique(owner):
+        mandel = np.sqrt([1.0] * (a["law"].shape[1] - 1) + [2.0])
+        for triangle in np.unique(owner[missed > 0]):
             mine = owner == triangle
-            number = self.shapes.number[triangle]
-            law = a["law"][triangle] if number < 0 else a["sampled_law"][number]
+            law, D = self.law_and_map(triangle)
             least = np.linalg.eigvalsh(law * mandel[:, None] * mandel)[..., 0].min()
+            least *= self.least_measure(triangle)
             if least <= 0:
                 return math.inf
-            D = np.eye(2)[None]
-            if number >= 0:
-                D = jacobians[number] @ self.shapes.inverse[triangle]
             korn, trace = self.shapes.constants(triangle, D)
             needed = korn * (np.sqrt(trace[side[mine]]) * missed[mine]).sum() / math.sqrt(least)
             if needed > 0:
                 worst = max(worst, 1 - a["curves"][triangle] / needed)
         return worst
+
+    def law_and_map(self, triangle: int) -> tuple[np.ndarray, np.ndarray]:
+        """Moduli, and Jacobians (q, 2, 2) of the map from the straight triangle."""
+        number = self.shapes.number[triangle]
+        if number < 0:
+            return self.a["law"][triangle], np.eye(2)[None]
+        jacobian = self.sampled_places()[1][number]
+        return self.a["sampled_law"][number], jacobian @ self.shapes.inverse[triangle]
+
+    def least_measure(self, triangle: int) -> float:
+        """What a place in a triangle counts for at least."""
+        return 1.0
 
     def contact_checks(self) -> Iterator[tuple[str, float]]:
         """Signs of p* and of the gap; what p* does to both bodies."""
@@ -342,42 +369,113 @@ class Certificate:
             (p * binomial * t[..., None] ** i * (1 - t[..., None]) ** (k - i)).sum(-1)
         )
 
-    def norms(self, stress: np.ndarray, sampled: np.ndarray | None) -> np.ndarray:
-        """Energy norms (n,) of stresses at the lattice points (n, m, 3), or `sampled` (r, q, 3)."""
+    def norms(self, equilibrated: bool = True) -> np.ndarray:
+        """Energy norms (n,) of s - sigma_h; of sigma_h alone if not `equilibrated`."""
+        a, share = self.a, 1.0 if equilibrated else 0.0
         s, w = np.polynomial.legendre.leggauss(self.k + 2)
         s, w = (1 + s) / 2, w / 2
         u, v = (g.ravel() for g in np.meshgrid(s, s, indexing="ij"))
         points = np.column_stack([(1 - v) * u, (1 - v) * (1 - u)])
         weight = 2 * np.outer(w, w).ravel() * (1 - v)
-        at = np.einsum("qi,nic->nqc", powers(self.k, points)[0] @ self.inverse, stress)
-        solved = np.linalg.solve(self.a["law"][:, None], at[..., None])[..., 0]
-        norms = np.sqrt(self.area * np.einsum("q,nqc,nqc->n", weight, at, solved))
-        if sampled is not None:
-            _, jacobian = self.sampled_places()
-            solved = np.linalg.solve(self.a["sampled_law"], sampled[..., None])[..., 0]
-            weight = self.a["sampled_weights"] * np.linalg.det(jacobian) / 2
-            square = np.einsum("nq,nqc,nqc->n", weight, sampled, solved)
-            norms[self.shapes.sampled] = np.sqrt(square)
-        return np.asarray(norms)
+        off = share * a["stress"] - a["discrete_stress"]
+        off = np.einsum("qi,nic->nqc", powers(self.k, points)[0] @ self.inverse, off)
+        norms = energy_norms(self.area[:, None] * weight, off, a["law"][:, None])
+        if self.shapes.sampled.size:
+            x, jacobian = self.sampled_places()
+            off = share * self.stress_at(self.shapes.sampled, x) - a["sampled_stress"]
+            weight = a["sampled_weights"] * np.linalg.det(jacobian) / 2
+            norms[self.shapes.sampled] = energy_norms(weight, off, a["sampled_law"])
+        return norms
 
     def bound(self) -> float:
         """B from the arrays."""
-        a, sampled = self.a, None
-        if self.shapes.sampled.size:
-            x, _ = self.sampled_places()
-            sampled = self.stress_at(self.shapes.sampled, x) - a["sampled_stress"]
-        norm = self.norms(a["stress"] - a["discrete_stress"], sampled)
-        square = ((norm + a["loads"] + a["curves"]) ** 2).sum() + (a["lifting"] ** 2).sum()
+        a = self.a
+        square = ((self.norms() + a["loads"] + a["curves"]) ** 2).sum() + (a["lifting"] ** 2).sum()
         if "gap_open" in a:
             p = self.pressure(a["gap_piece"], a["gap_s"])
             square += 2 * (a["gap_weight"] * p * a["gap_open"]).sum()
         return math.sqrt(square)
 
 
+class Revolved(Certificate):
+    """The same of a body of revolution: polynomials T = 2 pi r s, all triangles in points.
+
+    2 pi s_hoop is the radial part of div T + 2 pi r F, whatever T is; the axial one is 0.
+    """
+
+    equations = slice(1, 2)
+
+    def __init__(self, arrays: Arrays) -> None:
+        super().__init__(arrays)
+        r = arrays["vertices"][arrays["triangles"], 0]
+        self.on_axis = np.abs(r) <= STRAIGHT * np.abs(arrays["vertices"]).max()
+        self.rules = [f"rule{i}" for i in range(len(arrays)) if f"rule{i}_triangle" in arrays]
+
+    def places(self, rule: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Triangles (r,) of a rule, places (r, q, 2) and Jacobians there."""
+        at = self.a[f"{rule}_triangle"]
+        return at, *self.shapes.places(at, np.tile(self.a[f"{rule}_points"], (len(at), 1, 1)))
+
+    def sampled_checks(self) -> Iterator[tuple[str, float]]:
+        """Radii, stresses on the axis, maps, and the quadratures on them."""
+        a = self.a
+        r = a["vertices"][:, 0]
+        yield "radii are not negative", max(-r.min() / np.abs(a["vertices"]).max(), 0.0)
+        triangle, corner = np.nonzero(~self.on_axis & (self.on_axis.sum(axis=1) == 2)[:, None])
+        t = np.tile(np.linspace(0, 1, PLACES), (len(triangle), 1))
+        s = self.stress_at(triangle, self.shapes.along(triangle, corner, t)[0])
+        yield "r s vanishes on the axis", np.abs(s).max(initial=0.0) / self.largest
+        yield from self.map_checks()
+        yield "quadrature is exact for polynomials", max(map(self.inexact, self.rules))
+        maps = [self.places(rule)[1:] for rule in self.rules]
+        inside = all((np.linalg.det(D) > 0).all() and (x[..., 0] > 0).all() for x, D in maps)
+        yield "maps keep orientation and side", 0.0 if inside else math.inf
+        known = np.sort(np.concatenate([a[f"{rule}_triangle"] for rule in self.rules]))
+        whole = np.array_equal(known, np.arange(len(a["triangles"])))
+        yield "all triangles are integrated", 0.0 if whole else math.inf
+
+    def law_and_map(self, triangle: int) -> tuple[np.ndarray, np.ndarray]:
+        """Moduli, and Jacobians (q, 2, 2) of the map from the straight triangle."""
+        for rule in self.rules:
+            at, _, jacobian = self.places(rule)
+            for number in np.flatnonzero(at == triangle):
+                D = jacobian[number] @ self.shapes.inverse[triangle]
+                return self.a[f"{rule}_law"][number], D
+        raise ValueError(f"triangle {triangle} is in no rule")
+
+    def least_measure(self, triangle: int) -> float:
+        """The least circumference on the edges of a triangle."""
+        at, t = np.full(3, triangle), np.tile(np.linspace(0, 1, PLACES), (3, 1))
+        return float(2 * math.pi * self.shapes.along(at, np.arange(3), t)[0][..., 0].min())
+
+    def norms(self, equilibrated: bool = True) -> np.ndarray:
+        """Energy norms (n,) of s - sigma_h over the body, with hoop stresses."""
+        a, norms = self.a, np.zeros(len(self.area))
+        for rule in self.rules:
+            at, x, jacobian = self.places(rule)
+            r = x[..., 0]
+            off = -a[f"{rule}_stress"]
+            if equilibrated:
+                T = self.stress_at(at, x) / (2 * math.pi * r[..., None])
+                radial = self.divergence(at, self.shapes.straight(at, x))[..., 0]
+                hoop = radial / (2 * math.pi) + r * a[f"{rule}_radial"]
+                off = off + np.stack([T[..., 0], T[..., 1], hoop, T[..., 2]], axis=2)
+            weight = a[f"{rule}_weights"] * np.linalg.det(jacobian) / 2 * 2 * math.pi * r
+            norms[at] = energy_norms(weight, off, a[f"{rule}_law"])
+        return norms
+
+
+def energy_norms(weight: np.ndarray, s: np.ndarray, law: np.ndarray) -> np.ndarray:
+    """Norms (n,) of stresses (n, q, v) with weights (n, q) and laws (n, q, v, v)."""
+    solved = np.linalg.solve(law, s[..., None])[..., 0]
+    return np.asarray(np.sqrt(np.einsum("nq,nqc,nqc->n", weight, s, solved)))
+
+
 def check(path: str | Path) -> bool:
     """Print every check of a file, and whether all hold."""
     with np.load(path, allow_pickle=False) as file:
-        certificate = Certificate(dict(file))
+        arrays = dict(file)
+    certificate = (Revolved if "rule0_triangle" in arrays else Certificate)(arrays)
     good = True
     for name, off in certificate.checks():
         holds = bool(off <= TOLERANCE)  # False for NaN

@@ -108,7 +108,7 @@ def error_bound(
     closed, signed = sum(w for w, _ in works), sum(w for _, w in works)
     bound = norms.bound(closed, units)
     data = discrete, conditions, given, balanced.raw, gaps, coefficients, strips
-    sampled = sampled_stress(discrete, stress)
+    sampled = sampled_stress(discrete, stress, hoop)
     proof = Proof(*data, norms, bound, units, problem, sampled)
     reaction = work_of_supports(fields, partition, balanced.traction)
     return summed(units, norms, closed, signed, reaction, _stress(proof, balanced.residuals))

@@ -95,13 +95,7 @@ class EquilibratedStress:
         return values * self.proof.units.stress
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write `path` (.npz): arrays that drivers/check_certificate.py checks with NumPy alone.
-
-        Raises
-        ------
-        ValueError
-            Bodies of revolution.
-        """
+        """Write `path` (.npz): arrays that drivers/check_certificate.py checks with NumPy alone."""
         path = Path(path)
         if path.suffix != ".npz":
             raise ValueError(f'path="{path}" must end in .npz')

@@ -33,6 +33,7 @@ from .polynomials import legendre_values as legendre_values
 from .polynomials import triangle_rule as triangle_rule
 from .sampled import MANDEL as MANDEL
 from .sampled import Rough as Rough
+from .sampled import meridian_rules as meridian_rules
 from .sampled import sampling_order as sampling_order
 from .solution import Discrete as Discrete
 from .solution import degree_for as degree_for

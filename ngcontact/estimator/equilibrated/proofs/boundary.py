@@ -36,11 +36,11 @@ def strip_arrays(proof: Proof) -> dict[str, Array]:
                     partition.flips[triangle, side][:, None], 1 - strip.t, strip.t
                 ),
                 "strip_weight": strip.weight,
-                "strip_load": np.where(own, strip.asked, 0.0) * proof.units.stress,
+                "strip_load": np.where(own, strip.asked, 0.0) * proof.units.traction,
                 "strip_counts": strip.counts,
                 "strip_piece": np.where(own[:, 0, 0], -1, sum(count[: strip.pair]) + strip.piece),
                 "strip_s": _in_reach(proof, strip),
-                "strip_action": strip.action,
+                "strip_action": strip.action * (proof.units.traction / proof.units.stress),
             }
         )
     return _joined(parts)
@@ -75,7 +75,7 @@ def contact_arrays(proof: Proof) -> dict[str, Array]:
                 "contact_obstacle": np.full(len(every), contact.primary is None),
                 "gap_piece": np.repeat(before + every, t.shape[1]),
                 "gap_s": reach.places(pieces.local, place).ravel(),
-                "gap_weight": (at_points(stretch, t) * w).ravel() * units.length,
+                "gap_weight": (at_points(stretch, t) * w).ravel() * units.measure,
                 "gap_open": opened.ravel(),
             }
         )

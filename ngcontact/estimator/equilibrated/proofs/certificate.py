@@ -16,18 +16,8 @@ def certificate_arrays(proof: Proof) -> dict[str, Array]:
     """All arrays by name; docs/bounds.md says what they are.
 
     Each is in units of the data: lengths, stresses (n, 3, m), roots of energies (n,).
-
-    Raises
-    ------
-    ValueError
-        Bodies of revolution.
     """
     discrete, units, norms = proof.discrete, proof.units, proof.norms
-    if discrete.balance.extent:
-        raise ValueError(
-            "no certificate can be saved of a body of revolution: about an axis equilibrium is no "
-            "condition on polynomials"
-        )
     partition, k, rough = discrete.partition, discrete.degree, discrete.rough
     points = lattice(k)
     values = basis(k).values(points)
@@ -40,10 +30,10 @@ def certificate_arrays(proof: Proof) -> dict[str, Array]:
         "vertices": partition.vertices * units.length,
         "triangles": partition.triangles,
         "lattice": points,
-        "stress": np.einsum("qi,nci->nqc", values, proof.raw) * units.stress,
+        "stress": np.einsum("qi,nci->nqc", values, proof.raw) * units.traction,
         "discrete_stress": sigma * units.stress,
         "force": np.einsum("qi,nci->nqc", values[:, : force.shape[2]], force)
-        * (units.stress / units.length),
+        * (units.traction / units.length),
         "law": discrete.law * units.modulus,
         "loads": norms.loads * units.root,
         "curves": norms.curves * units.root,
@@ -51,7 +41,7 @@ def certificate_arrays(proof: Proof) -> dict[str, Array]:
         "bound": np.array(proof.bound),
     }
     if rough is not None:
-        arrays |= sampled_arrays(proof, rough.at)
+        arrays |= sampled_arrays(proof)
     return arrays | _edges(proof) | strip_arrays(proof) | contact_arrays(proof)
 
 
@@ -76,5 +66,5 @@ def _edges(proof: Proof) -> dict[str, Array]:
         "edge_points": s,
         "edge_frame": proof.conditions.frames[edge],
         "edge_constrained": constrained,
-        "edge_traction": np.einsum("eqi,efi->eqf", values, total) * proof.units.stress,
+        "edge_traction": np.einsum("eqi,efi->eqf", values, total) * proof.units.traction,
     }

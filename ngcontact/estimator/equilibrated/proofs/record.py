@@ -63,8 +63,9 @@ class Proof:
         Of the data.
     problem : Problem
         The problem.
-    sampled : ndarray (r, q, 3)
-        (xx, yy, xy) of the discrete stress at points of sampled triangles, units of stress.
+    sampled : sequence of ndarray (r, q, v)
+        The v components of the discrete stress at points of sampled triangles, units of stress; by
+        their rules of quadrature.
     """
 
     discrete: Discrete
@@ -78,4 +79,4 @@ class Proof:
     bound: float
     units: Units
     problem: Problem
-    sampled: Array
+    sampled: Sequence[Array]

@@ -49,7 +49,6 @@ def meridian_triangles(
     units : tuple of float
         Of stress and modulus.
     """
-    order = 2 * degree * geometry + 2 * geometry + POINTS_BONUS
     every = np.arange(len(partition.triangles))
     result = blank(every, every, dimension(degree), dimension(degree - 1))
     mesh = partition.mesh
@@ -58,7 +57,7 @@ def meridian_triangles(
     )
     force = mesh.MaterialCF(problem.force, default=ng.CF((0, 0)))
     functions = moduli, voigt, force
-    for at, lacking, rule in _with_rules(partition, order):  # some of them none
+    for at, lacking, rule in meridian_rules(partition, degree, geometry):  # some of them none
         step = max(1, AT_ONCE // (len(rule[1]) * 12 * dimension(degree)))
         for low in range(0, len(at), step):
             some = at[low : low + step]
@@ -67,10 +66,21 @@ def meridian_triangles(
     return result
 
 
-def _with_rules(
-    partition: Partition, order: int
+def meridian_rules(
+    partition: Partition, degree: int, geometry: int
 ) -> Iterator[tuple[Index, bool, tuple[Array, Array]]]:
-    """Triangles (j,), whether they have a side on the axis, and their points and weights."""
+    """Rules of quadrature for stresses of a `degree`, on curves of degree `geometry`.
+
+    Yields
+    ------
+    at : ndarray of int (j,)
+        Triangles, perhaps none.
+    lacking : bool
+        Whether they have a side on the axis.
+    points, weights : ndarray (q, 2), (q,)
+        The rule, as a pair.
+    """
+    order = 2 * degree * geometry + 2 * geometry + POINTS_BONUS
     axis = ABOUT_AXIS.at_axis(partition)[partition.triangles]
     count = axis.sum(axis=1)
     yield np.flatnonzero(count == 0), False, triangle_rule(order)
