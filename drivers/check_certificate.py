@@ -29,6 +29,7 @@ TOLERANCE = 1e-9  # relative, of sums of round-off; measured 1e-15 to 1e-12
 ROUND_OFF = 1e-12  # of norms, relative to the discrete stress
 COVERED = 1e-6  # share of an edge of the boundary that may be without tractions asked for
 STRAIGHT = 1e-12  # distance of a curve from its chord, relative, up to which it is straight
+MIDDLES = 12  # degree of the lattice on which the best balls of Korn's constant are sought
 PLACES = 17  # on each edge, at which shapes of curved triangles are looked at
 Arrays = dict[str, np.ndarray]
 
@@ -115,9 +116,17 @@ class Shapes:
         x, normal = self.along(at, np.arange(3), np.tile(np.linspace(0, 1, PLACES), (3, 1)))
         normal /= np.linalg.norm(normal, axis=2, keepdims=True)
         corners, lengths = self.a["vertices"][self.a["triangles"][triangle]], self.lengths[triangle]
-        middle = lengths @ corners / lengths.sum()
-        away = x - middle
-        ratio = (away * normal).sum(axis=2).min() / np.linalg.norm(away, axis=2).max()
+        shares = [lengths / lengths.sum()]
+        shares += [
+            np.array([i, j, MIDDLES - i - j]) / MIDDLES
+            for i in range(1, MIDDLES)
+            for j in range(1, MIDDLES - i)
+        ]
+        tried = np.array(shares) @ corners
+        away = x - tried[:, None, None]
+        rho = (away * normal).sum(axis=3).min(axis=(1, 2))
+        ratios = rho / np.linalg.norm(away, axis=3).max(axis=(1, 2))
+        ratio, middle = ratios.max(), tried[ratios.argmax()]
         beta = ratio / math.sqrt(2) / math.sqrt(1 + math.sqrt(1 - ratio**2))
         det = np.linalg.det(D)
         distortion = np.linalg.norm(D, ord=2, axis=(1, 2)).max() * math.sqrt(det.max() / det.min())

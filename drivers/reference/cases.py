@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import ngsolve as ng
 import numpy as np
 
-from drivers.reference.curved import Curved, curved, rings
+from drivers.reference.curved import Curved, bearing, curved, rings
 from drivers.reference.straight import (
     Exact,
     hertz,
@@ -24,7 +24,15 @@ from drivers.reference.straight import (
 from ngcontact import Contact, Elastic, Problem, Solution
 from ngcontact.geometries import blocks, disc, disc_on_block, graphs, punch
 from ngcontact.geometries import rings as ring_geometry
-from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.geometries.region import (
+    RIGHT,
+    UP,
+    body,
+    compound,
+    polygon,
+    quarter_arc,
+    segment,
+)
 
 FIRST = Elastic(E=1.0, nu=0.3)
 SECOND = Elastic(E=3.0, nu=0.2)
@@ -167,6 +175,27 @@ def ring_in_ring(qn: float = 0.3, n: int = 2) -> Case:
         contact=[Contact(secondary="outer_contact", primary="inner_contact")],
     )
     return Case(problem, exact)
+
+
+def ring_in_bearing(outer: float = 1.0) -> Case:
+    """A quarter of a ring, pressed inside by 1 + 0.6 cos(2 theta), in a rigid bearing.
+
+    Guided on the cuts and on the curved rim.
+    """
+    hole = outer / 2
+    edges = [
+        ("cut_y", segment((hole, 0.0), (outer, 0.0))),
+        ("rim", quarter_arc((0.0, 0.0), outer, RIGHT, UP)),
+        ("cut_x", segment((0.0, outer), (0.0, hole))),
+        ("hole", quarter_arc((0.0, 0.0), hole, UP, RIGHT)),
+    ]
+    problem = Problem(
+        geometry=compound(body("ring", edges)),
+        materials={"ring": FIRST},
+        sliding="cut_x|cut_y|rim",
+        traction={"hole": 1 + 0.6 * ng.cos(2 * ng.atan2(ng.y, ng.x))},
+    )
+    return Case(problem, bearing(FIRST, radii=(hole, outer)))
 
 
 def flat_punch() -> Problem:

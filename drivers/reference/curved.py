@@ -162,6 +162,44 @@ def rings(
     )
 
 
+def bearing(
+    material: Elastic,
+    *,
+    radii: tuple[float, float] = (0.5, 1.0),
+    loads: dict[int, float] | None = None,
+) -> Exact:
+    """Ring R0 < r < R1 ("ring") in a rigid bearing: u_r = 0 without shear on r = R1.
+
+    Pressed on r = R0 by the sum of q_n cos(n theta), `loads` q_n by n = 0 or even n; 1 + 0.6 cos(2
+    theta) by default. From Michell's series; for even n the axes are symmetry planes. Raises
+    ValueError for radii that do not increase from above zero, or other n.
+    """
+    loads = {0: 1.0, 2: 0.6} if loads is None else loads
+    if not 0 < radii[0] < radii[1] < math.inf:
+        raise ValueError(f"radii = {radii!r}: must be positive and increasing")
+    if any(n < 0 or n % 2 for n in loads):
+        raise ValueError(f"loads = {loads!r}: harmonics must be even")
+    series = {}
+    for n, q in loads.items():
+        hole, rim = _mode(n, radii[0] / radii[1], material), _mode(n, 1.0, material)
+        equations = [(hole[0], -q), (rim[3], 0.0)]
+        if n:
+            equations += [(hole[1], 0.0), (rim[1], 0.0)]
+        matrix = np.array([row for row, _ in equations])
+        scale = np.abs(matrix).max(axis=1)
+        right = np.array([value for _, value in equations])
+        series[n] = np.linalg.solve(matrix / scale[:, None], right / scale)
+    displacement, stress = _series(series, radii[1], material)
+    return Exact(
+        compiled({"ring": displacement}),
+        compiled({"ring": stress}),
+        {"ring": NO_FORCE},
+        pressure=np.zeros_like,
+        gap=np.zeros_like,
+        initial_gap=ng.CF(0.0),
+    )
+
+
 def _mode(n: int, r: float, material: Elastic) -> NDArray[np.float64]:
     """Michell's functions of harmonic n at the radius r R1: rows srr, srt, stt, ur / R1, ut / R1.
 

@@ -34,12 +34,14 @@ from .data import (
     partition_of,
     units_of,
 )
+from .guides import Reactions, reactions_of, work_of_guides
 from .liftings import (
     EdgeField,
     Gap,
     gap_of,
     lifted,
     on_contact,
+    on_guides,
     on_secondaries,
     on_supports,
     strip_norms,
@@ -49,8 +51,8 @@ from .parts import ErrorBound, complementarity, summed, work_of_supports
 from .pressures import Pieces, Reach, Zone, facing_cuts, pieces_of, reaches_of, selected, zone_of
 from .proofs import Norms, Proof, sampled_stress
 from .refusals import refuse_bound
-from .remainders import asked_tractions, missed_tractions
-from .stress import SETTLED, ContactPressure, EquilibratedStress, settled
+from .remainders import Strip, asked_tractions, missed_tractions
+from .stress import SETTLED, Certified, ContactPressure, EquilibratedStress, settled
 from .stresses import bubble_norms
 
 COSTLY = 0.05  # lifting over constitutive part of the bound from which a better one is sought
@@ -91,27 +93,40 @@ def error_bound(
     gaps = _gaps(zones, every_pieces, boundary, displacement, partition, conditions, units)
     every_pieces = [gap.pieces for gap in gaps]
     balanced = settled(discrete, conditions, given)
-    fields = on_supports(problem, boundary, displacement, discrete, units)
-    constitutive = balanced.found.norms(discrete)
+    solution = problem, boundary, displacement, discrete, units
+    fields, across = on_supports(*solution), on_guides(*solution)
+    constitutive, off = balanced.found.norms(discrete), [*fields, *across]
     costly = COSTLY * float(constitutive @ constitutive)
-    lifting = _lifting(problem, boundary, conditions, discrete, fields, gaps, units, costly)
+    lifting = _lifting(problem, boundary, conditions, discrete, off, gaps, units, costly)
     strips = asked_tractions(problem, boundary, discrete, zones, every_pieces, coefficients, units)
-    curves = missed_tractions(discrete, (balanced.raw, balanced.traction), strips)
+    stressed = balanced.raw, balanced.traction
+    guides = _with_guides(discrete, balanced, strips, len(gaps))
+    loads = data_terms(discrete, discrete.forces.missed, conditions.missed)
     norms = Norms(
         constitutive=constitutive,
-        loads=bubble_norms(discrete, conditions)
-        + data_terms(discrete, discrete.forces.missed, conditions.missed),
-        curves=data_terms(discrete, np.zeros(len(partition.triangles)), curves),
+        loads=bubble_norms(discrete, conditions) + loads,
+        curves=data_terms(discrete, 0 * loads, missed_tractions(discrete, stressed, strips)),
         lifting=lifting,
     )
     works = [complementarity(gap, b) for gap, b in zip(gaps, coefficients, strict=True)]
-    closed, signed = sum(w for w, _ in works), sum(w for _, w in works)
-    bound = norms.bound(closed, units)
-    data = discrete, conditions, given, balanced.raw, gaps, coefficients, strips
-    sampled = sampled_stress(discrete, stress, hoop)
-    proof = Proof(*data, norms, bound, units, problem, sampled)
-    reaction = work_of_supports(fields, partition, balanced.traction)
-    return summed(units, norms, closed, signed, reaction, _stress(proof, balanced.residuals))
+    closed, signed = (sum(part) for part in zip((0.0, 0.0), *works, strict=True))
+    signed -= work_of_guides(discrete, guides, across)
+    data = discrete, conditions, given, balanced.raw, gaps, coefficients, guides, strips
+    more = units, problem, sampled_stress(discrete, stress, hoop)
+    proof = Proof(*data, norms, norms.bound(closed, units), *more)
+    work = work_of_supports(fields, partition, balanced.traction)
+    return summed(units, norms, closed, signed, work, _stress(proof, balanced.residuals))
+
+
+def _with_guides(
+    discrete: Discrete, balanced: Certified, strips: list[Strip], pair: int
+) -> Reactions | None:
+    """What turning guides exert, as pair number `pair`: one more of the strips and residuals."""
+    guides = reactions_of(discrete, (balanced.raw, balanced.traction), pair)
+    if guides is not None:
+        strips.append(guides.strip)
+        balanced.residuals["tractions"] = max(balanced.residuals["tractions"], guides.unmet)
+    return guides
 
 
 def _pressures(

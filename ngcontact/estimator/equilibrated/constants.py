@@ -7,7 +7,7 @@ Weinberger 1960, Arch. Rational Mech. Anal. 5:286; Bebendorf 2003) on a convex T
 
 since the rotation omega of v - r, of mean 0, is the divergence of a z that vanishes on the boundary
 with |grad z| <= |omega| / beta, and the gradient of omega consists of derivatives of e. With a ball
-of radius rho about the middle of the inscribed circle, inside, and R, outside of T,
+of radius rho, with respect to which T is star-shaped, and one of R about the same place around T,
 
     beta >= rho / (sqrt 2 R) (1 + sqrt(1 - rho^2 / R^2))^(-1/2)
 
@@ -29,6 +29,8 @@ import numpy as np
 
 from ...arrays import Array, Index
 from .data import MANDEL, PLACES, Discrete, edge_places
+
+MIDDLES = 12  # degree of the lattice of places at which the middle of both balls is sought
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +56,8 @@ def _shapes(discrete: Discrete, at: Index) -> _Shapes:
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     outward = (normal * partition.normals[at][:, :, None]).sum(axis=-1).mean(axis=-1)
     normal *= np.sign(outward)[:, :, None, None]
-    opposite = np.linalg.norm(np.roll(corners, -1, 1) - np.roll(corners, -2, 1), axis=2)
-    middle = (opposite[:, :, None] * corners).sum(axis=1) / opposite.sum(axis=1)[:, None]
-    away = x - middle[:, None, None]
-    rho = (away * normal).sum(axis=-1).min(axis=(1, 2))
-    radius = np.linalg.norm(away, axis=-1).max(axis=(1, 2))
-    ratio = np.maximum(rho / radius, np.finfo(float).tiny)
+    ratio, middle = _star(corners, x, normal)
+    ratio = np.maximum(ratio, np.finfo(float).tiny)
     beta = ratio / math.sqrt(2) / np.sqrt(1 + np.sqrt(1 - ratio**2))
     poincare = partition.diameters[at] / math.pi
     several = np.zeros(len(at), dtype=bool)
@@ -74,6 +72,29 @@ def _shapes(discrete: Discrete, at: Index) -> _Shapes:
     far = np.linalg.norm(away, axis=-1).max(axis=-1)
     p = poincare[:, None]
     return _Shapes(poincare, np.sqrt(1 + 2 / beta**2), 2 * (p**2 + far * p) / least)
+
+
+def _star(corners: Array, x: Array, normal: Array) -> tuple[Array, Array]:
+    """Largest rho / R (b,) of triangles, and the middle (b, 2) of these two balls.
+
+    Of all middles looked at, that of the inscribed circle and a lattice; `x` and `normal`
+    (b, 3, q, 2) are places on the edges.
+    """
+    opposite = np.linalg.norm(np.roll(corners, -1, 1) - np.roll(corners, -2, 1), axis=2)
+    shares = [opposite / opposite.sum(axis=1, keepdims=True)]
+    steps = [(i, j) for i in range(1, MIDDLES) for j in range(1, MIDDLES - i)]
+    for i, j in steps:
+        share = np.array([i, j, MIDDLES - i - j]) / MIDDLES
+        shares.append(np.tile(share, (len(corners), 1)))
+    best, middle = np.full(len(corners), -np.inf), np.zeros((len(corners), 2))
+    for share in shares:
+        tried = np.einsum("bi,bic->bc", share, corners)
+        away = x - tried[:, None, None]
+        rho = (away * normal).sum(axis=-1).min(axis=(1, 2))
+        ratio = rho / np.linalg.norm(away, axis=-1).max(axis=(1, 2))
+        better = ratio > best
+        best[better], middle[better] = ratio[better], tried[better]
+    return best, middle
 
 
 def data_terms(discrete: Discrete, inside: Array, on_edges: Array) -> Array:

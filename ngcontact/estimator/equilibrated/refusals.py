@@ -9,7 +9,7 @@ import numpy as np
 from ...contact import ContactState
 from ...fem import BoundaryTrace
 from ...problem import Problem
-from .data import bent_segments
+from .data import bent_segments, turning_guides
 
 
 def refuse_bound(problem: Problem, boundary: BoundaryTrace, pairs: Sequence[ContactState]) -> None:
@@ -31,11 +31,14 @@ def refuse_bound(problem: Problem, boundary: BoundaryTrace, pairs: Sequence[Cont
     if at_axis.size:
         name = names[boundary.region[at_axis[0]]]
         raise ValueError(f'{no_bound} curves that meet the axis, as "{name}"; use error_estimate')
-    guided = bent[boundary.lies_on(bent, None if problem.sliding is None else str(problem.sliding))]
-    if guided.size:
-        name = names[boundary.region[guided[0]]]
-        raise ValueError(f'{no_bound} curved guides, as "{name}"; use error_estimate')
-    for pattern in (*problem.displacement, *problem.traction):
+    turning = turning_guides(problem, boundary)
+    if turning.size and boundary.model.extent:
+        name = names[boundary.region[turning[0]]]
+        raise ValueError(
+            f'{no_bound} curved guides of bodies of revolution, as "{name}"; use error_estimate'
+        )
+    guides = () if problem.sliding is None else (str(problem.sliding),)
+    for pattern in (*problem.displacement, *problem.traction, *guides):
         at = boundary.segments(pattern)
         if boundary.inner[at].any():
             raise ValueError(f'{no_bound} conditions on a line inside a body, as on "{pattern}"')

@@ -67,6 +67,8 @@ def asked_tractions(
 ) -> list[Strip]:
     """Tractions that the stress shall have on curved edges and on both sides of Gamma_K.
 
+    But on turning guides, where what the stress is decides.
+
     Parameters
     ----------
     problem, boundary, discrete, units
@@ -80,8 +82,9 @@ def asked_tractions(
     for pair, (zone, pieces, b) in enumerate(zip(zones, every_pieces, pressures, strict=True)):
         if pieces.local.size:
             strips += _on_zone(pair, zone, pieces, b, boundary, discrete, units)
+    curves = discrete.curves
     covered = np.unique(np.concatenate([[-1], *(strip.edge for strip in strips)]))
-    edge = np.setdiff1d(discrete.curves.edge, covered)
+    edge = np.setdiff1d(curves.edge[~curves.guided], covered)
     if edge.size:
         strips.append(_on_curves(problem, boundary, discrete, edge, units))
     return strips
@@ -102,7 +105,7 @@ def missed_tractions(
     squares = np.zeros(len(discrete.partition.ends))
     largest = np.abs(stress[0]).max(initial=0.0)
     for strip in strips:
-        density, stretch = _density(discrete, stress, strip.edge, strip.t)
+        density, stretch = traction_density(discrete, stress, strip.edge, strip.t)
         off = (density - strip.asked) * strip.counts[:, None]
         square = (strip.weight * (off**2).sum(axis=2) / stretch).sum(axis=1)
         np.add.at(squares, strip.edge, discrete.partition.edge_lengths[strip.edge] * square)
@@ -113,10 +116,13 @@ def missed_tractions(
     return np.where(norms > noise, norms, 0.0)
 
 
-def _density(
+def traction_density(
     discrete: Discrete, stress: tuple[Array, Array], edge: Index, t: Array
 ) -> tuple[Array, Array]:
-    """Tractions (k, q, 2) of the stress per chord at `t` (k, q) of edges, and ds per chord."""
+    """Tractions (k, q, 2) per chord at `t` (k, q) of edges `edge` (k,), and ds per chord (k, q).
+
+    Of a `stress`, its coefficients (n, 3, m) and its tractions (n, 3, r) on the edges.
+    """
     partition, (raw, traction) = discrete.partition, stress
     triangle, side = (x[edge] for x in partition.owner)
     c = traction[triangle, side].reshape(len(edge), 2, -1)

@@ -9,23 +9,7 @@ import pytest
 from drivers.reference import cases
 from drivers.stress.scenes.drawing import scene_of
 from drivers.stress.scenes.posing import answer
-from ngcontact import ContactError, adapt, solve
-
-
-def guided_rings():
-    """Rings whose outer rim slides on a circle."""
-    problem = cases.ring_in_ring().problem
-    return replace(problem, traction={}, sliding=f"{problem.sliding}|rim")
-
-
-def test_curved_guides_are_refused():
-    problem = guided_rings()
-    solution = solve(problem, maxh=0.5, order=2)
-    with pytest.raises(ValueError, match='curved guides, as "rim"'):
-        _ = solution.error_bound
-    levels = adapt(problem, maxh=0.5, order=2, tolerance=1e-2, guaranteed=True)
-    with pytest.raises(ValueError, match='curved guides, as "rim"'):
-        next(levels)
+from ngcontact import ContactError, solve
 
 
 def test_curves_that_meet_the_axis_are_refused():

@@ -15,8 +15,10 @@ from .curves import PLACES as PLACES
 from .curves import CurvedEdges as CurvedEdges
 from .curves import bent_segments as bent_segments
 from .curves import edge_places as edge_places
+from .curves import guide_frames as guide_frames
 from .curves import rigid_motions_on as rigid_motions_on
 from .curves import tractions_on_curves as tractions_on_curves
+from .curves import turning_guides as turning_guides
 from .division import divided_elements as divided_elements
 from .division import partition_of as partition_of
 from .forces import PART_DEGREE as PART_DEGREE

@@ -13,7 +13,7 @@ from ....fem import BoundaryTrace
 from ....lagrange import gauss
 from ....problem import Problem
 from .balance import ROUND_OFF, balance_of
-from .curves import bent_segments
+from .curves import bent_segments, turning_guides
 from .partition import Partition
 from .polynomials import legendre_values
 
@@ -28,7 +28,7 @@ class EdgeConditions:
     Attributes
     ----------
     frames : ndarray (e, 2, 2)
-        Directions of the components, as rows.
+        Directions of the components, as rows; `CurvedEdges` has those of turning guides.
     constrained : ndarray of bool (e, r)
         Components that are continuous or given; the others are the supports'.
     soft : ndarray of bool (e, r)
@@ -131,7 +131,8 @@ def edge_conditions(
         higher[edge] += np.einsum("kfc,kfj->kcj", frames[edge], c[..., degree:])
         missed[edge] += np.sqrt(partition.edge_lengths[edge] * squares) / unit
     soft = np.zeros_like(constrained)
-    curved = partition.edge_of_segment[bent_segments(boundary)]
+    bent = np.union1d(bent_segments(boundary), turning_guides(problem, boundary))
+    curved = partition.edge_of_segment[bent]
     soft[curved, :, -1] = True
     higher[curved], missed[curved] = 0.0, 0.0
     # Triangles at an axis have no constants: what they miss but for round-off is refused.

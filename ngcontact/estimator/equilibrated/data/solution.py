@@ -90,6 +90,11 @@ class Discrete:
         x, _ = edge_places(partition, edges.ravel(), self.curves, t)
         return np.asarray(self.balance.measure(x).reshape(len(at), -1).min(axis=1))
 
+    @property
+    def motion_degree(self) -> int:
+        """Degree of the polynomials that stand for rigid motions on edges."""
+        return self.degree if self.curves.guided.any() else self.geometry
+
     @cached_property
     def lacking(self) -> Mask:
         """Triangles (n,) with a side on an axis, which lack some tractions."""
@@ -152,8 +157,7 @@ def discrete_on(
     unit = units.stress / units.length
     forces = forces_on(problem.force, partition, region, degree, unit, narrow)
     force = forces.hatted.copy()
-    bent = bent_segments(boundary)
-    curves = curved_edges(partition, boundary, bent)
+    curves = curved_edges(problem, boundary, partition)
     at = _rough(problem, partition, curves, region)
     rough = None
     if at.size:
@@ -201,7 +205,7 @@ def _about_axis(
     region = Triangulation(partition.mesh).bodies[partition.parent]
     law = _laws(problem, partition, region, 4) / units.modulus
     degree, geometry = degree_for(boundary), boundary.geometry_order
-    curves = curved_edges(partition, boundary, bent_segments(boundary))
+    curves = curved_edges(problem, boundary, partition)
     scales = units.stress, units.modulus
     rough = meridian_triangles(problem, partition, geometry, degree, voigt.Compile(), law, scales)
     F = partition.mesh.MaterialCF(problem.force, default=ng.CF((0, 0)))

@@ -10,7 +10,8 @@ import numpy as np
 from ....fem import BoundaryTrace
 from ....problem import Problem
 from ..data import Units
-from ..liftings import on_supports
+from ..guides import work_of_guides
+from ..liftings import on_guides, on_supports
 from ..parts import complementarity, work_of_supports
 from ..proofs import Proof
 from .dual import Dual, Tested, dual_of
@@ -46,12 +47,16 @@ def force_bar(
     M, kappa = float(np.linalg.norm(dual.norms)), dual.kappa
     # The largest M e + kappa (X + Y) with e^2 + 2 X + 2 Y <= B^2.
     error = M * B if M >= kappa * B else (M**2 / kappa + kappa * B**2) / 2
-    fields = on_supports(problem, boundary, displacement, proof.discrete, units)
-    work = work_of_supports(fields, proof.discrete.partition, dual.traction)
+    discrete = proof.discrete
+    fields = on_supports(problem, boundary, displacement, discrete, units)
+    work = work_of_supports(fields, discrete.partition, dual.traction)
     for gap, q in zip(proof.gaps, dual.pressures, strict=True):
         work -= complementarity(gap, q)[1]
+    own = on_guides(problem, boundary, displacement, discrete, units)
+    work += work_of_guides(discrete, dual.guides, own)
+    crossed = work_of_guides(discrete, proof.guides, dual.across)
     norms = proof.norms.constitutive + proof.norms.loads + proof.norms.curves
-    error += abs(work) + float(norms @ dual.lifting) + _opened(dual, proof)
+    error += abs(work) + abs(crossed) + float(norms @ dual.lifting) + _opened(dual, proof)
     return error * _unit(units, dual.units)
 
 

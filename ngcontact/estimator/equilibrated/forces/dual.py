@@ -14,7 +14,8 @@ from ....fem import BoundaryTrace
 from ....problem import Problem
 from ..constants import data_terms
 from ..data import Units, discrete_on
-from ..liftings import lifted, on_contact
+from ..guides import Reactions, reactions_of
+from ..liftings import EdgeField, lifted, on_contact, on_guides
 from ..pressures import selected
 from ..proofs import Proof
 from ..remainders import asked_tractions, missed_tractions
@@ -62,6 +63,10 @@ class Dual:
         Of the dual stress on edges.
     pressures : list of ndarray (m,)
         Coefficients of q* of each pair.
+    guides : Reactions or None
+        What it exerts on turning guides.
+    across : list of EdgeField
+        What is lifted there.
     lifting, norms : ndarray (n,)
         |w|, and |t - C e(G)| + |w| with what data leave.
     """
@@ -71,6 +76,8 @@ class Dual:
     excess: list[Excess]
     traction: Array
     pressures: list[Array]
+    guides: Reactions | None
+    across: list[EdgeField]
     lifting: Array
     norms: Array
 
@@ -115,12 +122,16 @@ def dual_of(problem: Problem, boundary: BoundaryTrace, tested: Tested, proof: Pr
     if balanced.worst > SETTLED:
         raise ContactError(f"no dual stress was found: residuals {balanced.residuals}")
     strips = asked_tractions(free, boundary, discrete, zones, pieces, q, units)
-    curves = missed_tractions(discrete, (balanced.raw, balanced.traction), strips)
-    lifting = np.zeros(len(partition.triangles))
+    stressed = balanced.raw, balanced.traction
+    guides = reactions_of(discrete, stressed, len(zones))
+    strips += [] if guides is None else [guides.strip]
+    curves = missed_tractions(discrete, stressed, strips)
+    across = on_guides(problem, boundary, G, discrete, units)
+    lifting = lifted(discrete, across, [])
     for one in excess:
         lifting += lifted(discrete, on_contact(one, discrete), [])
     norms = balanced.found.norms(discrete) + data_terms(discrete, 0 * lifting, curves) + lifting
-    return Dual(units, kappa, excess, balanced.traction, q, lifting, norms)
+    return Dual(units, kappa, excess, balanced.traction, q, guides, across, lifting, norms)
 
 
 def _excess(

@@ -1,4 +1,4 @@
-"""Where the discrete displacement misses its conditions on Gamma_u and Gamma_K, and liftings."""
+"""Where the discrete displacement misses its conditions on Gamma_u and Gamma_0, and liftings."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ....arrays import Array, Index
 from ....fem import BoundaryTrace
 from ....lagrange import gauss
 from ....problem import Problem
-from ..data import Discrete, Units
+from ..data import Discrete, Units, guide_frames
 from .edges import (
     DEGREE,
     EdgeField,
@@ -58,12 +58,58 @@ def on_supports(
         r[:, [0, -1]] = 0.0
         edge = partition.edge_of_segment[segments]
         r = np.where(partition.along[edge][:, None, None], r, r[:, ::-1])
-        c = coefficients(r / (units.strain * units.length))
-        rule, w = gauss(2 * DEGREE + 4)
-        t = np.tile(rule, (len(segments), 1))
-        weight = np.tile(w, (len(segments), 1))
-        fields.append(EdgeField(edge, t, weight, at_points(c, t), at_points(derivative(c), t)))
+        fields.append(_smooth_field(edge, r / (units.strain * units.length)))
     return fields
+
+
+def on_guides(
+    problem: Problem,
+    boundary: BoundaryTrace,
+    displacement: ng.GridFunction,
+    discrete: Discrete,
+    units: Units,
+) -> list[EdgeField]:
+    """-(u_h.d) d on the guides along which d turns; on others u_h.d is 0.
+
+    Raises
+    ------
+    ValueError
+        Guides that are crossed at a vertex: by displacements prescribed beside them, or since
+        their normals jump there.
+    """
+    if problem.sliding is None:
+        return []
+    name, s, curves = str(problem.sliding), samples(), discrete.curves
+    every = boundary.segments(name)
+    ends = np.repeat(every, 2), np.tile([0.0, 1.0], len(every))
+    across = (boundary.evaluate(displacement, *ends) * boundary.exact_normal(*ends)).sum(axis=1)
+    size = float(np.abs(displacement.vec.FV().NumPy()).max(initial=0.0))
+    if np.abs(across).max(initial=0.0) > AT_ENDS * size:
+        raise ValueError(
+            f'no guaranteed bound is known where a displacement leads across the guide "{name}" at '
+            "a vertex: by what is prescribed beside it, or as normals of a mesh without CAD differ"
+        )
+    guides = np.flatnonzero(curves.guided)
+    if guides.size == 0:
+        return []
+    edge = curves.edge[guides]
+    t = np.tile(s, (len(edge), 1))
+    d = guide_frames(curves, guides, t)[:, :, 0]
+    segment, along = discrete.partition.segment[edge], discrete.partition.along[edge]
+    places = np.where(along[:, None], t, 1 - t).ravel()
+    u = boundary.evaluate(displacement, np.repeat(segment, len(s)), places).reshape(d.shape)
+    off = -(u * d).sum(axis=2) / (units.strain * units.length)
+    off[:, [0, -1]] = 0.0
+    return [_smooth_field(edge, off[:, :, None] * d)]
+
+
+def _smooth_field(edge: Index, values: Array) -> EdgeField:
+    """A field with `values` (k, d + 1, 2) at the `samples` of edges (k,), as they run."""
+    c = coefficients(values)
+    rule, w = gauss(2 * DEGREE + 4)
+    t = np.tile(rule, (len(edge), 1))
+    weight = np.tile(w, (len(edge), 1))
+    return EdgeField(edge, t, weight, at_points(c, t), at_points(derivative(c), t))
 
 
 def lifted(

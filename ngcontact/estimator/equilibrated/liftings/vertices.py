@@ -112,7 +112,8 @@ def vertex_moves(
     v = np.einsum("kij,kj->ki", np.linalg.pinv(M, rcond=ALIKE**2, hermitian=True), b)
     v[np.abs(v) <= ROUND_OFF * largest] = 0.0
     off = np.abs((d * v[vertex]).sum(axis=1) - r)
-    turning = np.concatenate([_turning(side, boundary) for side in sides])
+    guides = partition.ends[discrete.curves.edge[discrete.curves.guided]].ravel()
+    turning = np.concatenate([guides, *(_turning(side, boundary) for side in sides)])
     if (off > largest).any() or np.abs(v[turning]).max(initial=0.0) > largest:
         names = {side.gap.pieces.line.contact.secondary for side in sides}
         raise ValueError(
@@ -127,6 +128,7 @@ def _held_by_supports(conditions: EdgeConditions, discrete: Discrete) -> tuple[I
     """Vertices (k,) of supports, and directions (k, 2) along which they do not move."""
     e = len(conditions.frames)
     given = ~conditions.constrained.reshape(e, 2, -1)[:, :, 0]
+    given[discrete.curves.edge[discrete.curves.guided]] = False  # there nothing may move
     edge, component = np.nonzero(given)
     vertex = discrete.partition.ends[edge]
     return vertex.ravel(), np.repeat(conditions.frames[edge, component], 2, axis=0)

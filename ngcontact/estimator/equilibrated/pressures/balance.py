@@ -184,7 +184,7 @@ def _functionals(
     x = partition.vertices[mine]
     centre, size = x.mean(axis=0), np.ptp(x, axis=0).max()
     about = np.tile(centre, (len(edges), 1, 1)), np.full((len(edges), 1), size)
-    frames, degree = conditions.frames[edges], discrete.geometry
+    frames, degree = conditions.frames[edges], discrete.motion_degree
     low = rigid_motions_on(partition, discrete.curves, edges, frames, about, degree)[:, 0]
     free = ~conditions.constrained[edges].reshape(len(edges), 2, r // 2)[:, :, 0]
     axis = discrete.balance.at_axis(partition)[partition.ends[edges]]

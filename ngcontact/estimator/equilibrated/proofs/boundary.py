@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ....arrays import Array
+from ..guides import Reactions
 from ..liftings import at_points, coefficients
 from ..pressures import SLIVER
 from ..remainders import Strip
@@ -47,7 +48,7 @@ def strip_arrays(proof: Proof) -> dict[str, Array]:
 
 
 def contact_arrays(proof: Proof) -> dict[str, Array]:
-    """p* on the pieces of all pairs, and the gap there, by parameters of where p* acts.
+    """p* on the pieces of all pairs and guides, and the gap there, by parameters of where it acts.
 
     By name: (k, d + 1) coefficients of k pieces, (q,) at points of all of them.
     """
@@ -80,12 +81,43 @@ def contact_arrays(proof: Proof) -> dict[str, Array]:
             }
         )
         before += len(every)
+    if proof.guides is not None:
+        parts.append(_guide_arrays(proof, proof.guides, before))
+    degree = max((part["contact_pressure"].shape[1] for part in parts), default=0) - 1
+    for part in parts:
+        part["contact_pressure"] = _elevated(part["contact_pressure"], degree)
     return _joined(parts)
+
+
+def _elevated(b: Array, degree: int) -> Array:
+    """Coefficients (k, degree + 1) of the Bernstein polynomials that `b` (k, d + 1) are of."""
+    for d in range(b.shape[1], degree + 1):
+        share = np.arange(d + 1) / d
+        wide = np.pad(b, ((0, 0), (1, 1)))
+        b = share * wide[:, :-1] + (1 - share) * wide[:, 1:]
+    return b
+
+
+def _guide_arrays(proof: Proof, guides: Reactions, before: int) -> dict[str, Any]:
+    """The same of q* on turning guides, which is bilateral contact with an obstacle."""
+    strip, k = guides.strip, len(guides.strip.edge)
+    length = proof.discrete.partition.edge_lengths[strip.edge] * proof.units.measure
+    weight = length[:, None] * strip.weight * np.linalg.norm(strip.action, axis=2)
+    return {
+        "contact_pair": np.full(k, strip.pair),
+        "contact_pressure": guides.coefficients * proof.units.stress,
+        "contact_unilateral": np.zeros(k, dtype=bool),
+        "contact_obstacle": np.ones(k, dtype=bool),
+        "gap_piece": np.repeat(before + np.arange(k), strip.t.shape[1]),
+        "gap_s": strip.t.ravel(),
+        "gap_weight": weight.ravel(),
+        "gap_open": np.zeros(strip.t.size),
+    }
 
 
 def _in_reach(proof: Proof, strip: Strip) -> Array:
     """Parameters (k, q) of a strip by which p* is a polynomial."""
-    if strip.pair < 0:
+    if not 0 <= strip.pair < len(proof.gaps):
         return strip.s
     gap = proof.gaps[strip.pair]
     return gap.zone.reach.places(gap.pieces.local[strip.piece], strip.s)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from ....arrays import Array
 from ....problem import Problem
 from ..data import Discrete, EdgeConditions, Units
+from ..guides import Reactions
 from ..liftings import Gap
 from ..remainders import Strip
 
@@ -53,8 +54,10 @@ class Proof:
         The pairs.
     pressures : sequence of ndarray (m,)
         Coefficients of p* of each.
+    guides : Reactions or None
+        What turning guides exert.
     strips : sequence of Strip
-        Tractions asked for on curves and on Gamma_K.
+        Tractions asked for on curves, on Gamma_K and on turning guides.
     norms : Norms
         On the triangles.
     bound : float
@@ -74,6 +77,7 @@ class Proof:
     raw: Array
     gaps: Sequence[Gap]
     pressures: Sequence[Array]
+    guides: Reactions | None
     strips: Sequence[Strip]
     norms: Norms
     bound: float

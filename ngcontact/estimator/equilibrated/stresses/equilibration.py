@@ -13,6 +13,7 @@ from .elements import Condensed, condensed, gathered, raw_operators, without_opp
 from .patches import multipliers
 from .rigid_loads import exchanged_loads
 
+ROUNDS = 3  # until what guides exert and what patches exchange fit each other
 AT_ONCE = 300_000  # numbers in the operators of elements that are made together
 
 
@@ -142,6 +143,31 @@ def patch_loads(discrete: Discrete) -> Array:
     return result
 
 
+def _exchanged(discrete: Discrete, conditions: EdgeConditions, given: Array) -> tuple[Array, float]:
+    """See `exchanged_loads`; with what the stresses of patches exert along d on turning guides.
+
+    Motions that this resists hardly must be balanced with it: on a curve that is nearly a circle a
+    small work would need large reactions.
+    """
+    partition, curves, load = discrete.partition, discrete.curves, patch_loads(discrete)
+    found = exchanged_loads(discrete, load, given, conditions)
+    edge = curves.edge[curves.guided]
+    if edge.size == 0:
+        return found
+    known, q = given.copy(), given.shape[2] // 2
+    triangle, side = (x[edge] for x in partition.owner)
+    for _ in range(ROUNDS):
+        block = _block(discrete, triangle, conditions.frames, found[0])
+        c = block.hatted + block.parts.with_divergence(block.rho)
+        t = (c @ block.parts.N.transpose(0, 2, 1)).reshape(len(edge), 3, 3, 2, q)
+        for corner in ((side + 1) % 3, (side + 2) % 3):
+            end = partition.ends[edge, 1] == partition.triangles[triangle, corner]
+            mine = t[np.arange(len(edge)), corner, side, 0]
+            known[edge, end.astype(np.intp), :q] = mine
+        found = exchanged_loads(discrete, load, known, conditions)
+    return found
+
+
 def equilibrated(discrete: Discrete, conditions: EdgeConditions, given: Array) -> Equilibrated:
     """The stress of all patches together.
 
@@ -149,7 +175,7 @@ def equilibrated(discrete: Discrete, conditions: EdgeConditions, given: Array) -
     """
     partition, k = discrete.partition, discrete.degree
     n, r = len(partition.triangles), 2 * (k + 1)
-    theta, rest = exchanged_loads(discrete, patch_loads(discrete), given, conditions)
+    theta, rest = _exchanged(discrete, conditions, given)
     S, g = np.empty((n, 3, 2 * r, 2 * r)), np.empty((n, 3, 2 * r))
     X, x = np.empty((n, 3, r, 2 * r)), np.empty((n, 3, r))
     size = 9 * dimension(k) ** 2

@@ -17,6 +17,7 @@ from ....triplets import from_triplets
 from ..data import CORNERS, Discrete, EdgeConditions, Partition, basis, rigid_motions_on
 
 RESISTED = 1e-6  # square of a motion on free edges, relative, from which their tractions resist it
+WEAKLY = 1e-2  # ... on turning guides: what these exert is known, and balanced
 SHIFT = 1e-11  # relative, of a matrix that is singular where a body is free to move
 REFINEMENTS = 3
 OTHERS = 1e-8  # relative: balance of motions that a hoop stress resists is better, not needed
@@ -53,7 +54,10 @@ def _admitted(discrete: Discrete, on_edges: Array, constrained: Mask) -> Array:
     total = np.zeros((len(partition.vertices), 3, 3))
     np.add.at(total, partition.ends, squares)
     values, vectors = np.linalg.eigh(total)
-    kept = values <= RESISTED
+    least = np.full((len(total), 1), RESISTED)
+    curves = discrete.curves
+    least[partition.ends[curves.edge[curves.guided]]] = WEAKLY
+    kept = values <= least
     P = np.einsum("vij,vj,vkj->vik", vectors, kept, vectors)
     some = discrete.balance.motions
     P[axis] *= some[:, None] & some
@@ -88,7 +92,7 @@ def exchanged_loads(
     motions, size = _motions(partition)
     about = partition.vertices[partition.ends], size[partition.ends]
     every = np.arange(len(partition.ends))
-    frames, degree = conditions.frames, discrete.geometry
+    frames, degree = conditions.frames, discrete.motion_degree
     on_edges = rigid_motions_on(partition, discrete.curves, every, frames, about, degree)
     P = _admitted(discrete, on_edges, constrained)
     area, triangles, v = partition.areas, partition.triangles, len(partition.vertices)
