@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Index
 from ..errors import warn
 from ..fem import BoundaryTrace, boundary_trace
 from ..problem import Problem
+from ..quadrature import steps_on
 
 APART = 1e-6  # values of two supports at one corner, relative to the largest, that are two values
+BESIDE = 1e-9  # of a segment, how far from a jump its sides are looked at
 NOISE = 64 * np.finfo(float).eps  # ... and to the largest of all values: below it is round-off
 
 
@@ -39,7 +41,7 @@ class Contradiction:
 
 
 def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
-    """All of Gamma_u with itself, and of Gamma_u with guides, by corner and component."""
+    """All of Gamma_u with itself, within a boundary, too, and with guides, by component."""
     trace = boundary_trace(mesh, 1)
     known: dict[tuple[int, int], tuple[str, float]] = {}
     found = []
@@ -49,10 +51,11 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
         for axis, value in enumerate(components):
             if value is None or not len(segment):
                 continue
+            found += _steps(trace, value, segment[::2], pattern, axis)
             values = trace.evaluate(value, segment, s)[:, 0].tolist()
             for k, (vertex, u) in enumerate(zip(node, values, strict=True)):
                 name, other = known.setdefault((vertex, axis), (pattern, u))
-                if name != pattern and abs(u - other) > APART * max(abs(other), abs(u)):
+                if abs(u - other) > APART * max(abs(other), abs(u)):
                     found.append(
                         Contradiction(
                             (name, pattern),
@@ -65,6 +68,30 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
     found += _across_guides(problem, trace, known)
     largest = max((abs(u) for _, u in known.values()), default=0.0)
     return [one for one in found if one.amount > NOISE * largest]
+
+
+def _steps(
+    trace: BoundaryTrace, value: ng.CoefficientFunction, segments: Index, name: str, axis: int
+) -> list[Contradiction]:
+    """Where what is prescribed on the `segments` (k,) of one boundary jumps."""
+
+    def values(segment: Index, s: Array) -> Array:
+        return trace.evaluate(value, segment, s)[:, 0]
+
+    at, s = steps_on(values, segments)
+    sides = [
+        values(at, np.clip(s + side, 0.0, 1.0)) if at.size else s for side in (-BESIDE, BESIDE)
+    ]
+    places = trace.point(at, s)
+    return [
+        Contradiction(
+            (name, name),
+            place,
+            f'displacement "{name}" jumps by {abs(step):.6g} along {"xy"[axis]}',
+            abs(float(step)),
+        )
+        for place, step in zip(places, sides[1] - sides[0], strict=True)
+    ]
 
 
 def _across_guides(
@@ -98,6 +125,11 @@ def warn_of_contradictions(found: list[Contradiction]) -> None:
             told.add(one.supports)
             x, y = one.place
             warn(
-                f"{one.message} at their corner ({x:.6g}, {y:.6g}): the energy is infinite and no "
+                f"{one.message} at {_place(one)} ({x:.6g}, {y:.6g}): the energy is infinite and no "
                 "mesh resolves it; make them equal there"
             )
+
+
+def _place(one: Contradiction) -> str:
+    """What is at the place of a contradiction."""
+    return "a point" if one.supports[0] == one.supports[1] else "their corner"

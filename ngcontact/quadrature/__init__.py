@@ -14,6 +14,7 @@ from .loads import known_rough_load as known_rough_load
 from .loads import moment_degree as moment_degree
 from .loads import numbers as numbers
 from .loads import rough_load as rough_load
+from .steps import steps_on as steps_on
 from .values import pieces as pieces
 from .values import rough_segments as rough_segments
 from .view import View as View

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import ngsolve as ng
+import numpy as np
 import pytest
 
 from drivers.reference import cases
 from drivers.stress.scenes.drawing import scene_of
 from drivers.stress.scenes.posing import answer
-from ngcontact import ContactError, solve
+from ngcontact import ContactError, ContactWarning, solve
 
 
 def test_curves_that_meet_the_axis_are_refused():
@@ -27,6 +29,34 @@ def test_jumping_displacements_have_no_energy():
     solution = solve(problem, maxh=0.5, order=2)
     with pytest.raises(ValueError, match=r'prescribed on "(top|upper_left)" differs at a vertex'):
         _ = solution.error_bound
+
+
+@pytest.mark.parametrize("place", [0.1, 0.25, 0.5])  # inside a segment, at a vertex or beside one
+def test_displacements_that_jump_inside_a_boundary(place):
+    """They had a finite bound, 0.6 to 8 of the norm, for a solution that does not exist."""
+    step = ng.IfPos(ng.x - place, -0.01, 0.0)
+    problem = replace(
+        cases.one_transition().problem, displacement={"top": (0, step), "bottom": (0, 0)}
+    )
+    with pytest.warns(ContactWarning, match=r'"top" jumps by 0.01 along y at a point \('):
+        solution = solve(problem, maxh=0.25, order=2)
+    with pytest.raises(ValueError, match=rf'"top" jumps near \({place}, 1\)'):
+        _ = solution.error_bound
+
+
+@pytest.mark.parametrize(
+    "steep",
+    [
+        lambda x: ng.atan(1e4 * (x - 0.1)),
+        lambda x: ng.sqrt(ng.IfPos(x, x, 0)),
+        lambda x: ng.IfPos(x, x, 0),
+    ],
+    ids=["steep", "root", "kink"],
+)
+def test_steep_displacements_are_none_that_jump(steep):
+    law = cases.one_transition().problem
+    problem = replace(law, displacement={"top": (0, -0.01 * steep(ng.x)), "bottom": (0, 0)})
+    assert solve(problem, maxh=0.5, order=1).error_bound < np.inf
 
 
 @pytest.mark.parametrize("seed", [333, 470])

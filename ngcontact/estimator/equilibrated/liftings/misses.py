@@ -11,6 +11,7 @@ from ....arrays import Array, Index
 from ....fem import BoundaryTrace
 from ....lagrange import gauss
 from ....problem import Problem
+from ....quadrature import steps_on
 from ..data import Discrete, Units, guide_frames
 from .edges import (
     DEGREE,
@@ -37,7 +38,7 @@ def on_supports(
     Raises
     ------
     ValueError
-        Prescribed displacements that jump where boundaries meet.
+        Prescribed displacements that jump, on a boundary or where two of them meet.
     """
     partition, fields, s = discrete.partition, [], samples()
     size = float(np.abs(displacement.vec.FV().NumPy()).max(initial=0.0))
@@ -48,6 +49,7 @@ def on_supports(
         r = np.zeros_like(u)
         for axis, value in enumerate(components):
             if value is not None:
+                _refuse_steps(boundary, value, segments, pattern)
                 r[:, axis] = boundary.evaluate(value, at, places)[:, 0] - u[:, axis]
         r = r.reshape(len(segments), -1, 2)
         if np.abs(r[:, [0, -1]]).max(initial=0.0) > AT_ENDS * size:
@@ -60,6 +62,20 @@ def on_supports(
         r = np.where(partition.along[edge][:, None, None], r, r[:, ::-1])
         fields.append(_smooth_field(edge, r / (units.strain * units.length)))
     return fields
+
+
+def _refuse_steps(
+    boundary: BoundaryTrace, value: ng.CoefficientFunction, segments: Index, name: str
+) -> None:
+    """Raise where a prescribed displacement jumps on the `segments` (k,) of one boundary."""
+    at, s = steps_on(lambda i, s: boundary.evaluate(value, i, s)[:, 0], segments)
+    if at.size:
+        x, y = boundary.point(at[:1], s[:1])[0]
+        raise ValueError(
+            f'the displacement prescribed on "{name}" jumps near ({x:.6g}, {y:.6g}): no '
+            "displacement of finite energy does; make it continuous, or leave a gap between "
+            "boundaries"
+        )
 
 
 def on_guides(
