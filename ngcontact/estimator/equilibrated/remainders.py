@@ -121,7 +121,7 @@ def traction_density(
 ) -> tuple[Array, Array]:
     """Tractions (k, q, 2) per chord at `t` (k, q) of edges `edge` (k,), and ds per chord (k, q).
 
-    Of a `stress`, its coefficients (n, 3, m) and its tractions (n, 3, r) on the edges.
+    Of `stress` (n, 3, m), (n, 3, r): coefficients, and tractions on the edges of triangles.
     """
     partition, (raw, traction) = discrete.partition, stress
     triangle, side = (x[edge] for x in partition.owner)

@@ -194,3 +194,12 @@ def test_an_obstacle_in_bilateral_contact_is_a_guide():
     (low, high), (lower, upper) = one.energy_bounds, two.energy_bounds
     assert max(low, lower) <= min(high, upper)
     assert one.error_bound <= 1.2 * two.error_bound
+
+
+def test_curved_guides_of_bodies_of_revolution_are_refused():
+    problem = cases.ring_in_bearing().problem
+    away = OCCGeometry(problem.geometry.shape.Move((2, 0, 0)), dim=2)
+    problem = replace(problem, geometry=away, model="axisymmetric", sliding="cut_y|rim")
+    solution = solve(problem, maxh=0.4, order=2)
+    with pytest.raises(ValueError, match='curved guides of bodies of revolution, as "rim"'):
+        _ = solution.error_bound
