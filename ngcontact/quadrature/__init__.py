@@ -3,6 +3,7 @@
 from .doubts import warn_of_data as warn_of_data
 from .integrals import integral_over as integral_over
 from .jumps import jumping_moduli as jumping_moduli
+from .jumps import steps_on as steps_on
 from .jumps import warn_of_jumps as warn_of_jumps
 from .lattice import composite as composite
 from .lattice import extent as extent
@@ -14,7 +15,6 @@ from .loads import known_rough_load as known_rough_load
 from .loads import moment_degree as moment_degree
 from .loads import numbers as numbers
 from .loads import rough_load as rough_load
-from .steps import steps_on as steps_on
 from .values import pieces as pieces
 from .values import rough_segments as rough_segments
 from .view import View as View
