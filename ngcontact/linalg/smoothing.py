@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Array, Mask
 from .sparse import shared
 
-DEGREE = 4  # of the polynomial: of 2 to 5 the fastest in whole solves of a million unknowns
+DEGREE = 4  # of the polynomial: of 2 to 4 the fastest in whole solves of a million unknowns
 LANCZOS = 6  # steps for the largest eigenvalue; they find 0.9 of it and more
 ABOVE = 1.1  # what it is taken for, over what is found; 0.82 of it would do for convergence
 

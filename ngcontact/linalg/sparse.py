@@ -77,7 +77,8 @@ def congruent(
     if places is None:
         total = (matrix + handed_over(change)).CreateSparseMatrix()
         return shared(total), total
-    total = (1.0 * matrix).CreateSparseMatrix()
+    total = matrix.CreateMatrix()
+    total.AsVector().data = matrix.AsVector()
     K = shared(total)
     K.data[places] += change.data
     return K, total
