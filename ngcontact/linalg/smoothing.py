@@ -23,7 +23,7 @@ class Smoother(Protocol):
     """
 
     def holding(self, free: Mask) -> Smoother:
-        """The same for other free unknowns (n,)."""
+        """The same where other unknowns are `free` (n,)."""
 
     def before(self, right: ng.BaseVector, solution: ng.BaseVector) -> None:
         """Set `solution` (n,), starting from zero."""
@@ -33,7 +33,7 @@ class Smoother(Protocol):
 
 
 def fastest(matrix: ng.BaseMatrix, free: Mask) -> Smoother:
-    """The faster one on the threads of the caller's manager, for a symmetric matrix (n, n).
+    """The faster one for the `free` (n,) unknowns of a matrix, on the caller's threads.
 
     A sweep runs on one thread; a polynomial takes more products with the matrix, which use all.
     """
@@ -68,7 +68,7 @@ class GaussSeidel:
     sweeps: ng.BaseSmoother
 
     def holding(self, free: Mask) -> GaussSeidel:
-        """See `Smoother`."""
+        """The same where other unknowns are `free` (n,)."""
         return gauss_seidel(self.matrix, free)
 
     def before(self, right: ng.BaseVector, solution: ng.BaseVector) -> None:
@@ -109,7 +109,7 @@ class Chebyshev:
     step: ng.BaseVector
 
     def holding(self, free: Mask) -> Chebyshev:
-        """See `Smoother`."""
+        """The same where other unknowns are `free` (n,)."""
         return replace(self, inverse=_inverse(self.diagonal, free))
 
     def before(self, right: ng.BaseVector, solution: ng.BaseVector) -> None:
