@@ -138,16 +138,20 @@ def discrete_on(
     partition: Partition,
     stress: ng.CoefficientFunction,
     units: Units,
+    degree: int,
     hoop: ng.CoefficientFunction | None = None,
 ) -> Discrete:
-    """A discrete stress, and a hoop stress about an axis, with data on a partition's triangles."""
+    """A discrete stress, and a hoop stress about an axis, with data on a partition's triangles.
+
+    `degree` is that of the equilibrated stress.
+    """
     every = np.arange(len(partition.triangles))
     xx, xy, _, yy = stress
     if hoop is not None:
-        return _about_axis(problem, boundary, partition, ng.CF((xx, yy, hoop, xy)), units)
+        return _about_axis(problem, boundary, partition, ng.CF((xx, yy, hoop, xy)), units, degree)
     region = Triangulation(partition.mesh).bodies[partition.parent]
     law = _laws(problem, partition, region, 3) / units.modulus
-    order, degree, geometry = boundary.order, degree_for(boundary), boundary.geometry_order
+    order, geometry = boundary.order, boundary.geometry_order
     points = lattice(order - 1)
     components = ng.CF((xx, yy, xy)).Compile()
     values = partition.evaluate(components, every, points) / units.stress
@@ -200,11 +204,12 @@ def _about_axis(
     partition: Partition,
     voigt: ng.CoefficientFunction,
     units: Units,
+    degree: int,
 ) -> Discrete:
     """The same in a meridian section."""
     region = Triangulation(partition.mesh).bodies[partition.parent]
     law = _laws(problem, partition, region, 4) / units.modulus
-    degree, geometry = degree_for(boundary), boundary.geometry_order
+    geometry = boundary.geometry_order
     curves = curved_edges(problem, boundary, partition)
     scales = units.stress, units.modulus
     rough = meridian_triangles(problem, partition, geometry, degree, voigt.Compile(), law, scales)

@@ -97,7 +97,7 @@ def dual_of(problem: Problem, boundary: BoundaryTrace, tested: Tested, proof: Pr
     values = np.asarray(tested.stress(boundary.mesh.MapToAllElements(middle, ng.VOL)))
     units = replace(proof.units, stress=power_of_two(values))
     free = replace(problem, force={}, traction={})
-    discrete = discrete_on(free, boundary, partition, tested.stress, units)
+    discrete = discrete_on(free, boundary, partition, tested.stress, units, proof.discrete.degree)
     conditions = replace(
         proof.conditions,
         given=np.zeros_like(proof.conditions.given),
