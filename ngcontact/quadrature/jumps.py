@@ -15,7 +15,7 @@ from ..problem import Problem, Triangulation, varies
 from .lattice import mesh_points, on_lattice
 
 JUMP = 0.5  # change of a law over its least value from which it is told
-PARTS = 32  # of a segment, at whose ends a function is looked at: of narrower bumps it sees none
+PARTS = 256  # of a segment, at whose ends a function is looked at: of narrower bumps it sees none
 QUARTERS = np.linspace(0, 1, 5)
 STEPS = 18  # in which a part is quartered: what still changes across 1e-12 of a segment jumps
 KEPT = 0.9  # share of a change that the last half of the steps leave of a jump; of x^(1/10), 0.3

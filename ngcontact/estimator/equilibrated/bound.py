@@ -11,6 +11,7 @@ where gap_h + r >= 0 is the gap of u_h + w; docs/bounds.md has the proof.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -34,28 +35,34 @@ from .data import (
     partition_of,
     units_of,
 )
-from .guides import Reactions, reactions_of, work_of_guides
+from .guides import exerted, work_of_guides
 from .liftings import (
-    EdgeField,
     Gap,
     gap_of,
-    lifted,
-    on_contact,
+    least_lifting,
     on_guides,
-    on_secondaries,
     on_supports,
-    strip_norms,
     without_idle,
 )
 from .parts import ErrorBound, complementarity, summed, work_of_supports
-from .pressures import Pieces, Reach, Zone, facing_cuts, pieces_of, reaches_of, selected, zone_of
+from .pressures import (
+    Pieces,
+    Reach,
+    Zone,
+    contact_ends,
+    facing_cuts,
+    pieces_of,
+    reaches_of,
+    selected,
+    split,
+    zone_of,
+)
 from .proofs import Norms, Proof, sampled_stress
 from .refusals import refuse_bound
-from .remainders import Strip, asked_tractions, missed_tractions
-from .stress import SETTLED, Certified, ContactPressure, EquilibratedStress, settled
+from .remainders import asked_tractions, missed_tractions
+from .stress import SETTLED, ContactPressure, EquilibratedStress, settled
 from .stresses import bubble_norms
 
-COSTLY = 0.05  # lifting over constitutive part of the bound from which a better one is sought
 MOSTLY = 0.5  # share of what tractions miss on curves in B^2 from which a higher degree is tried
 HIGHER = 2  # degrees; one more is of no use, odd and even ones meet a turning normal alike
 
@@ -83,16 +90,25 @@ def error_bound(
     """
     refuse_bound(problem, boundary, pairs)
     data, degree = (problem, boundary, displacement, stress, pairs), degree_for(boundary)
-    found = _of_degree(*data, degree)
+    found = _with_ends(*data, degree)
     if found.parts["curves"] <= MOSTLY * found.bound**2:
         return found
     try:
-        return min(found, _of_degree(*data, degree + HIGHER), key=lambda one: one.bound)
+        return min(found, _with_ends(*data, degree + HIGHER), key=lambda one: one.bound)
     except ContactError:  # the first one is a bound, too
         return found
 
 
-def _of_degree(
+def _with_ends(*data: Any) -> ErrorBound:
+    """The bound by a stress of a degree; its p* ends where contact does, if that balances."""
+    try:
+        return _bound(True, *data)
+    except ContactError:
+        return _bound(False, *data)
+
+
+def _bound(
+    ending: bool,
     problem: Problem,
     boundary: BoundaryTrace,
     displacement: ng.GridFunction,
@@ -100,10 +116,9 @@ def _of_degree(
     pairs: Sequence[ContactState],
     degree: int,
 ) -> ErrorBound:
-    """The bound by an equilibrated stress of a degree."""
+    """The same with a p* that ends where contact does, if it is `ending`, or on whole segments."""
     units = units_of(problem, boundary, stress)
-    every_pieces = [pieces_of(pair.line, boundary) for pair in pairs]
-    partition, reaches = _partition(problem, boundary, every_pieces, units, degree)
+    partition, every_pieces, reaches = _partition(problem, boundary, pairs, units, degree, ending)
     hoop = voigt_stress(problem, displacement)[2] if units.extent else None
     discrete = discrete_on(problem, boundary, partition, stress, units, degree, hoop)
     conditions = edge_conditions(problem, boundary, partition, discrete.degree, units.traction)
@@ -117,13 +132,14 @@ def _of_degree(
     solution = problem, boundary, displacement, discrete, units
     fields, across = on_supports(*solution), on_guides(*solution)
     constitutive, off = balanced.found.norms(discrete), [*fields, *across]
-    costly = COSTLY * float(constitutive @ constitutive)
-    lifting = _lifting(problem, boundary, conditions, discrete, off, gaps, units, costly)
+    square = float(constitutive @ constitutive)
+    lifting = least_lifting(problem, boundary, conditions, discrete, off, gaps, units, square)
     strips = asked_tractions(problem, boundary, discrete, zones, every_pieces, coefficients, units)
     stressed = balanced.raw, balanced.traction
-    guides = _with_guides(discrete, balanced, strips, len(gaps))
+    guides = exerted(discrete, stressed, strips, balanced.residuals, len(gaps))
     loads = data_terms(discrete, discrete.forces.missed, conditions.missed)
     norms = Norms(
+        partition=partition,
         constitutive=constitutive,
         loads=bubble_norms(discrete, conditions) + loads,
         curves=data_terms(discrete, 0 * loads, missed_tractions(discrete, stressed, strips)),
@@ -137,17 +153,6 @@ def _of_degree(
     proof = Proof(*data, norms, norms.bound(closed, units), *more)
     work = work_of_supports(fields, partition, balanced.traction)
     return summed(units, norms, closed, signed, work, _stress(proof, balanced.residuals))
-
-
-def _with_guides(
-    discrete: Discrete, balanced: Certified, strips: list[Strip], pair: int
-) -> Reactions | None:
-    """What turning guides exert, as pair number `pair`: one more of the strips and residuals."""
-    guides = reactions_of(discrete, (balanced.raw, balanced.traction), pair)
-    if guides is not None:
-        strips.append(guides.strip)
-        balanced.residuals["tractions"] = max(balanced.residuals["tractions"], guides.unmet)
-    return guides
 
 
 def _pressures(
@@ -195,41 +200,24 @@ def _gaps(
     return without_idle(gaps, boundary)
 
 
-def _lifting(
-    problem: Problem,
-    boundary: BoundaryTrace,
-    conditions: EdgeConditions,
-    discrete: Discrete,
-    fields: Sequence[EdgeField],
-    gaps: Sequence[Gap],
-    units: Units,
-    costly: float,
-) -> Array:
-    """Norms (n,) of w: edge by edge, or of least energy where that is `costly`."""
-    whole = [gap for gap in gaps if gap.pieces.whole]
-    moves = [*fields, *(field for gap in whole for field in on_contact(gap, discrete))]
-    others = on_secondaries(gaps, boundary, conditions, discrete)
-    norms = lifted(discrete, moves, others)
-    if norms @ norms <= costly:
-        return norms
-    strip = strip_norms(problem, boundary, conditions, discrete, moves, units)
-    least = lifted(discrete, [], [*others, (np.arange(len(strip)), strip)])
-    return least if least @ least < norms @ norms else norms
-
-
 def _partition(
     problem: Problem,
     boundary: BoundaryTrace,
-    every_pieces: Sequence[Pieces],
+    pairs: Sequence[ContactState],
     units: Units,
     degree: int,
-) -> tuple[Partition, list[Reach]]:
-    """The triangles of the mesh, some in parts; where p* acts."""
+    ending: bool,
+) -> tuple[Partition, list[Pieces], list[Reach]]:
+    """The triangles of the mesh, some in parts; the parts of the lines; where p* acts."""
+    every_pieces = [pieces_of(pair.line, boundary) for pair in pairs]
     given = [*problem.displacement, *problem.traction, problem.sliding]
     secondaries = [pair.secondary for pair in problem.contact]
     loaded = boundary.segments(*(str(p) for p in given if p is not None))
     bent = bent_segments(boundary)
-    reaches, own = reaches_of(every_pieces, np.union1d(loaded, bent))
+    uncut = np.union1d(loaded, bent)
+    spans = contact_ends(pairs, every_pieces, boundary, uncut, ending)
+    every_pieces = [split(p, s) for p, s in zip(every_pieces, spans, strict=True)]
+    reaches, own = reaches_of(every_pieces, spans, uncut)
     at = np.union1d(loaded, boundary.segments(*secondaries))
     cuts, uneven = facing_cuts(every_pieces, reaches, boundary, np.union1d(at, bent), bent)
     uneven = np.append(uneven, np.array(list(own), dtype=np.intp))
@@ -237,7 +225,7 @@ def _partition(
     divided = divided_elements(problem, boundary, degree, uneven)
     # Two triangles meet at a cut: tractions that are not the same on both sides leave no freedom.
     divided[boundary.element[[number for number in uneven if number in cuts]]] = True
-    return partition_of(boundary, units.length, divided, cuts), reaches
+    return partition_of(boundary, units.length, divided, cuts), every_pieces, reaches
 
 
 def _stress(proof: Proof, certificate: dict[str, float]) -> EquilibratedStress:

@@ -87,6 +87,21 @@ def reactions_of(discrete: Discrete, stress: tuple[Array, Array], pair: int) -> 
     return Reactions(coefficients, strip, float(np.abs(left).max() / largest))
 
 
+def exerted(
+    discrete: Discrete,
+    stress: tuple[Array, Array],
+    strips: list[Strip],
+    residuals: dict[str, float],
+    pair: int,
+) -> Reactions | None:
+    """The reactions to a `stress` (n, 3, m), (n, 3, r), which join the strips and the residuals."""
+    guides = reactions_of(discrete, stress, pair)
+    if guides is not None:
+        strips.append(guides.strip)
+        residuals["tractions"] = max(residuals["tractions"], guides.unmet)
+    return guides
+
+
 def _rigid(arm: Array) -> Array:
     """Two translations and a rotation (..., 3, 2) at places `arm` (..., 2) from its centre."""
     motions = np.zeros((*arm.shape[:-1], 3, 2))

@@ -73,10 +73,11 @@ def summed(
         "loads": float(smooth @ smooth - constitutive @ constitutive),
         "curves": float(both @ both - smooth @ smooth),
     }
-    crossed = float(constitutive @ lifting)
-    data = float(loads @ (constitutive + 2 * lifting) + loads @ loads / 2)
+    of_elements = norms.partition.of_elements
+    crossed, worked = (float(of_elements(x) @ lifting) for x in (constitutive, loads))
+    data = float(loads @ constitutive + loads @ loads / 2) + 2 * worked
     below = parts["constitutive"] / 2 + signed - reaction + data
-    above = crossed + reaction + closed - signed + parts["lifting"] / 2 + float(loads @ lifting)
+    above = crossed + reaction + closed - signed + parts["lifting"] / 2 + worked
     return ErrorBound(
         bound=norms.bound(closed, units),
         parts={name: part * energy for name, part in parts.items()},

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import ngsolve as ng
 import pytest
 
 from drivers.reference import cases
@@ -50,15 +51,18 @@ def test_energies_are_enclosed(scene):
     """By bounds of order 2 on all levels; the reference is what one of order 4 encloses.
 
     The width is at most B^2, and 1.5 times what data that no polynomial meets add; measured 0.5 to
-    0.8 B^2.
+    0.8 B^2. Curved meshes have domains of their own, by up to 3.1e-5 of the area (rings, where
+    energies were 1.0e-5 apart): by as much of it the energies of both may differ.
     """
     problem = SCENES[scene]()
     *_, finest = adapt(problem, order=4, max_dofs=4000)
     lower, upper = finest.energy_bounds
+    area = ng.Integrate(1, finest.mesh)
     for level in adapt(problem, order=2, max_dofs=1300):
         low, high = level.energy_bounds
-        assert low <= upper
-        assert lower <= high
+        apart = abs(upper) * abs(ng.Integrate(1, level.mesh) / area - 1)
+        assert low <= upper + apart
+        assert lower <= high + apart
         noise = 1e-12 * (level.energy_norm**2 + abs(level.energy))
         assert high - low <= 1.5 * level.error_bound**2 + noise
 

@@ -69,11 +69,15 @@ def test_segments_that_face_in_part(ends, order):
     assert zone.reach.falls.any() == (ends == "next to nothing is bare")
 
 
-def test_levels_of_segments_that_face_in_part():
-    """Triangles are cut on all levels: measured at most 2.21, and 1.25 from 2394 unknowns on."""
+@pytest.mark.parametrize("order", [2, 4])
+def test_levels_of_segments_that_face_in_part(order):
+    """Triangles are cut on all levels: measured at most 2.21 and 1.94.
+
+    At order 4 it was 4.7 with liftings edge by edge.
+    """
     problem = overhanging(ENDS["triangles are cut"], rows="dual")
     problem = replace(problem, geometry=divided(problem.geometry, "seat", [0.25, 0.5, 0.75]))
-    for solution in adapt(problem, maxh=0.5, order=2, max_dofs=1500):
+    for solution in adapt(problem, maxh=0.5, order=order, max_dofs=1600):
         certified(solution, residual=1e-9)  # of thin triangles: measured 1.1e-10
         error = exact("triangles are cut").relative_error(solution)
         assert 1 <= solution.relative_error_bound / error <= 2.4

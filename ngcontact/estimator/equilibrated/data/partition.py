@@ -110,11 +110,19 @@ class Partition:
 
     @cached_property
     def edge_of_segment(self) -> Index:
-        """Number of an edge of each segment of the boundary, (q,); -1 of lines inside a body."""
+        """Number of an edge of each segment of the boundary, (q,); -1 of lines inside a body.
+
+        Of several that at the end with the lower number, so that both run the same way.
+        """
         numbers = np.full(int(self.segment.max(initial=-1)) + 1, -1)
         at = np.flatnonzero(self.segment >= 0)
+        at = at[np.argsort(-self.ends[at, 0], kind="stable")]
         numbers[self.segment[at]] = at
         return numbers
+
+    def of_elements(self, norms: Array) -> Array:
+        """Norms (ne,) on the elements from those `norms` (n,) on the triangles."""
+        return np.sqrt(np.bincount(self.parent, norms**2, minlength=self.mesh.ne))
 
     def touching(self, vertices: Mask) -> Mask:
         """Edges (e,) of which a triangle has one of some `vertices` (v,)."""

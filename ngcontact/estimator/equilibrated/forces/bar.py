@@ -56,6 +56,7 @@ def force_bar(
     work += work_of_guides(discrete, dual.guides, own)
     crossed = work_of_guides(discrete, proof.guides, dual.across)
     norms = proof.norms.constitutive + proof.norms.loads + proof.norms.curves
+    norms = discrete.partition.of_elements(norms)
     error += abs(work) + abs(crossed) + float(norms @ dual.lifting) + _opened(dual, proof)
     return error * _unit(units, dual.units)
 

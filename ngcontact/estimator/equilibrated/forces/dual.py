@@ -67,7 +67,7 @@ class Dual:
         What it exerts on turning guides.
     across : list of EdgeField
         What is lifted there.
-    lifting, norms : ndarray (n,)
+    lifting, norms : ndarray (ne,)
         |w|, and |t - C e(G)| + |w| with what data leave.
     """
 
@@ -127,10 +127,10 @@ def dual_of(problem: Problem, boundary: BoundaryTrace, tested: Tested, proof: Pr
     strips += [] if guides is None else [guides.strip]
     curves = missed_tractions(discrete, stressed, strips)
     across = on_guides(problem, boundary, G, discrete, units)
-    lifting = lifted(discrete, across, [])
-    for one in excess:
-        lifting += lifted(discrete, on_contact(one, discrete), [])
-    norms = balanced.found.norms(discrete) + data_terms(discrete, 0 * lifting, curves) + lifting
+    moves = [*across, *(field for one in excess for field in on_contact(one, discrete))]
+    lifting = lifted(discrete, moves)
+    missed = data_terms(discrete, np.zeros(len(partition.triangles)), curves)
+    norms = partition.of_elements(balanced.found.norms(discrete) + missed) + lifting
     return Dual(units, kappa, excess, balanced.traction, q, guides, across, lifting, norms)
 
 

@@ -58,7 +58,7 @@ class Excess:
         gap, change = (
             at_points(c, t) for c in (self.gap.values[at], derivative(self.gap.values[at]))
         )
-        closed, sign, kappa = self.gap.closed[at, None], np.sign(value), self.kappa
+        closed, sign, kappa = self.gap.shut(at, t), np.sign(value), self.kappa
         room, opens = np.where(closed, 0.0, kappa * np.maximum(gap, 0.0)), (gap > 0) & ~closed
         over = np.abs(value) > room
         r = np.where(over, value - sign * room, 0.0)
@@ -66,7 +66,7 @@ class Excess:
 
     def panels(self, at: Index) -> tuple[Array, Array]:
         """Points (j, q), weights (j, q) of pieces `at` (j,), cut where r has kinks."""
-        closed = self.gap.closed[at, None]
+        closed = (self.gap.closed[at] == [0, 1]).all(axis=1)[:, None]
         value = np.where(closed, 0.0, self.values[at])
         gap = np.where(closed, 0.0, self.gap.values[at])
         room = self.kappa * gap
@@ -95,7 +95,9 @@ def least_kappa(gap: Gap, values: Array) -> float:
     """
     ends = np.tile([0.0, 1.0], (len(values), 1))
     value, room = np.abs(at_points(values, ends)), at_points(gap.values, ends)
-    open_ = ~gap.closed[:, None] & (value > NOISE * np.abs(value).max(initial=0.0))
+    at_vertex = np.column_stack([gap.pieces.start == 0, gap.pieces.stop == 1])
+    open_ = ~gap.shut(np.arange(len(ends)), ends) & at_vertex
+    open_ &= value > NOISE * np.abs(value).max(initial=0.0)
     # Ends that a closed piece shares are closed.
     ratio = np.divide(value, room, out=np.full_like(value, np.inf), where=room > 0)
     return float(ratio[open_].max(initial=0.0))

@@ -11,8 +11,7 @@ from .gaps import Opened as Opened
 from .gaps import gap_of as gap_of
 from .gaps import on_contact as on_contact
 from .gaps import without_idle as without_idle
+from .misses import least_lifting as least_lifting
 from .misses import lifted as lifted
 from .misses import on_guides as on_guides
 from .misses import on_supports as on_supports
-from .secondaries import on_secondaries as on_secondaries
-from .strips import strip_norms as strip_norms

@@ -17,19 +17,20 @@ from ..data import Discrete, edge_places, legendre_derivative, legendre_values
 DEGREE = 16  # of the polynomials that stand for prescribed displacements and gaps on a segment
 LEAST_POWER = 1.0
 POINTS = 12  # of quadrature from an edge to the opposite vertex
+PARTS = ("t", "weight", "value", "slope")
 MERIDIAN = np.array([0, 1, 3])  # components of rr, zz, hoop, rz without the hoop
 
 
 @dataclass(frozen=True, eq=False)
 class EdgeField:
-    """A displacement on k edges, at q points each, without its values at their ends.
+    """A displacement on k segments, at q points each, without its values at their ends.
 
     Attributes
     ----------
     edge : ndarray of int (k,)
-        Edges, in whose direction the parameter runs.
+        Their edges, see `Partition.edge_of_segment`, in whose direction the parameter runs.
     t, weight : ndarray (k, q)
-        Parameters in [0, 1] and weights of quadrature.
+        Parameters on the segments, in [0, 1], and weights of quadrature.
     value, slope : ndarray (k, q, 2)
         The displacement, over strain times length, and its derivative with respect to t.
     """
@@ -98,16 +99,42 @@ def panels(*functions: Array) -> tuple[Array, Array]:
     return points.reshape(len(count), -1), (length[:, :, None] * w).reshape(len(count), -1)
 
 
-def norms(discrete: Discrete, field: EdgeField) -> Array:
-    """Energy norms (k,) of the liftings into the triangles beside the edges, with the best m.
+def by_segment(field: EdgeField, segment: Index) -> EdgeField:
+    """A field given on pieces of segments `segment` (k,) as one on the whole of each, in order."""
+    kept, first, number = np.unique(segment, return_index=True, return_inverse=True)
+    if len(kept) == len(segment):
+        return EdgeField(*(getattr(field, name)[first] for name in ("edge", *PARTS)))
+    order = np.argsort(number, kind="stable")
+    count = np.bincount(number)
+    place = np.arange(len(number)) - np.concatenate([[0], np.cumsum(count)[:-1]])[number[order]]
+    q = field.t.shape[1]
 
-    On curved edges the continuation is from the curve to the opposite vertex.
+    def merged(values: Array) -> Array:
+        result = np.zeros((len(kept), int(count.max()), *values.shape[1:]))
+        result[number[order], place] = values[order]
+        return result.reshape(len(kept), int(count.max()) * q, *values.shape[2:])
+
+    return EdgeField(field.edge[first], *(merged(getattr(field, name)) for name in PARTS))
+
+
+def norms(discrete: Discrete, field: EdgeField) -> Array:
+    """Energy norms (k,) of the liftings into the elements beside the segments, with the best m.
+
+    On curved edges the continuation is from the curve to the opposite vertex; from segments of
+    several edges it is to that of the first, into the triangle that it makes with all of them.
     """
+    share = discrete.partition.shares[field.edge][:, None]
+    field = replace(
+        field,
+        t=field.t / share,
+        weight=field.weight / share,
+        slope=field.slope * share[:, :, None],
+    )
     triangle, opposite = (x[field.edge] for x in discrete.partition.owner)
     if discrete.balance.extent:
         return _norms_about_axis(discrete, field)
-    along, inwards, weight = _towards(discrete, triangle, opposite, field.edge, field.t)
-    first, second = _strain(field.slope, along), _strain(field.value, inwards)
+    along, inwards, weight = towards(discrete, triangle, opposite, field.edge, field.t)
+    first, second = strain_of(field.slope, along), strain_of(field.value, inwards)
     C, weight = discrete.law[triangle], field.weight * weight
 
     def product(a: Array, b: Array) -> Array:
@@ -118,52 +145,10 @@ def norms(discrete: Discrete, field: EdgeField) -> Array:
     ratio = np.sqrt(np.divide(one, two, out=np.ones_like(one), where=two > 0))
     m = np.maximum(ratio, LEAST_POWER)
     square = (one / m - 2 * mixed + m * two) / 2
-    return np.sqrt(np.maximum(square, 0.0) * _most(discrete, triangle))
+    return np.sqrt(np.maximum(square, 0.0) * most_of_law(discrete, triangle))
 
 
-def hat_norms(discrete: Discrete, triangle: Index, corner: Index, moves: Array) -> Array:
-    """Energy norms (k,) of the hats of a `corner` (k,) of triangles (k,) times `moves` (k, 2).
-
-    On curved `triangle` (k,) hats are linear on lines from the curve to the opposite vertex.
-    """
-    if discrete.balance.extent:
-        return _hats_about_axis(discrete, triangle, corner, moves)
-    opposite, t, w = _from_curve(discrete, triangle, 2 * discrete.geometry + 4)
-    slope, weight, _ = _hat_slopes(discrete, triangle, corner, opposite, t)
-    e = _strain(np.broadcast_to(moves[:, None], slope.shape), slope)
-    C = discrete.law[triangle]
-    square = np.einsum("kq,kqi,kij,kqj->k", weight * w, e, C, e, optimize=True) / 2
-    return np.sqrt(square * _most(discrete, triangle))
-
-
-def _from_curve(discrete: Discrete, triangle: Index, order: int) -> tuple[Index, Array, Array]:
-    """Vertices (k,) opposite to a curved edge or any, points (k, q) and weights (q,) on it."""
-    edges = discrete.partition.edges[triangle]
-    opposite = (discrete.curves.number[edges] >= 0).argmax(axis=1)
-    rule, w = gauss(order)
-    return opposite, np.tile(rule, (len(triangle), 1)), w
-
-
-def _hat_slopes(
-    discrete: Discrete, triangle: Index, corner: Index, opposite: Index, t: Array
-) -> tuple[Array, Array, Array]:
-    """Gradients (k, q, 2) of hats, the same on lines from the edge to the vertex `opposite` (k,).
-
-    With twice the area per parameter (k, q), and the values (k, q) on the edge.
-    """
-    partition = discrete.partition
-    edge = partition.edges[triangle, opposite]
-    along, inwards, weight = _towards(discrete, triangle, opposite, edge, t)
-    first = np.where(partition.flips[triangle, opposite], 2, 1)
-    starts = (opposite + first) % 3 == corner
-    share = np.where(starts[:, None], t - 1, -t)[:, :, None] * inwards
-    slope = np.where(starts[:, None, None], -along, along) + share
-    at_apex = (opposite == corner)[:, None]
-    value = np.where(at_apex, 0.0, np.where(starts[:, None], 1 - t, t))
-    return np.where(at_apex[:, :, None], inwards, slope), weight, value
-
-
-def _most(discrete: Discrete, triangle: Index) -> Array:
+def most_of_law(discrete: Discrete, triangle: Index) -> Array:
     """Factors (k,) by which the law exceeds that in the middle of each triangle."""
     if discrete.rough is None:
         return np.ones(len(triangle))
@@ -171,7 +156,7 @@ def _most(discrete: Discrete, triangle: Index) -> Array:
     return np.where(number >= 0, discrete.rough.most[number], 1.0)
 
 
-def _towards(
+def towards(
     discrete: Discrete, triangle: Index, opposite: Index, edge: Index, t: Array
 ) -> tuple[Array, Array, Array]:
     """Gradients (k, q, 2) along an edge, times 1 - t, and from it; twice the area per parameter."""
@@ -182,7 +167,7 @@ def _towards(
     return inverse[:, :, 0], inverse[:, :, 1], 1 / np.abs(np.linalg.det(inverse))
 
 
-def _strain(r: Array, gradient: Array) -> Array:
+def strain_of(r: Array, gradient: Array) -> Array:
     """Voigt strain (k, q, 3) of the products of vectors `r` and gradients, (k, q, 2)."""
     return np.stack(
         [
@@ -198,11 +183,11 @@ def _norms_about_axis(discrete: Discrete, field: EdgeField) -> Array:
     """The same (k,) about an axis, where the hoop strain w_r / r is another part."""
     triangle, opposite = (x[field.edge] for x in discrete.partition.owner)
     partition, balance = discrete.partition, discrete.balance
-    along, inwards, weight = _towards(discrete, triangle, opposite, field.edge, field.t)
+    along, inwards, weight = towards(discrete, triangle, opposite, field.edge, field.t)
     weight = field.weight * weight
     apex = partition.vertices[partition.triangles[triangle, opposite]]
     x, _ = edge_places(partition, field.edge, discrete.curves, field.t)
-    first, second = _strain(field.slope, along), _strain(field.value, inwards)
+    first, second = strain_of(field.slope, along), strain_of(field.value, inwards)
     law = discrete.law[triangle]
     C = law[:, MERIDIAN[:, None], MERIDIAN]
     # The best m of the plane: the hoop strain matters but near the axis.
@@ -225,26 +210,4 @@ def _norms_about_axis(discrete: Discrete, field: EdgeField) -> Array:
         e[..., 2] = (1 - t[:, j, None]) * field.value[..., 0] / np.where(radius > 0, radius, 1.0)
         share = weight * balance.measure(place) * w[j] / (2 * m[:, None])
         square += np.einsum("kq,kqi,kij,kqj->k", share, e, law, e, optimize=True)
-    return np.sqrt(square * _most(discrete, triangle))
-
-
-def _hats_about_axis(discrete: Discrete, triangle: Index, corner: Index, moves: Array) -> Array:
-    """The norms of hats about an axis, which lie between an edge and the vertex opposite."""
-    partition, balance = discrete.partition, discrete.balance
-    if triangle.size == 0:
-        return np.zeros(0)
-    opposite, t, w = _from_curve(discrete, triangle, 2 * discrete.geometry + 2 * POINTS)
-    slope, weight, value = _hat_slopes(discrete, triangle, corner, opposite, t)
-    x, _ = edge_places(partition, partition.edges[triangle, opposite], discrete.curves, t)
-    apex = partition.vertices[partition.triangles[triangle, opposite]]
-    top = (opposite == corner)[:, None]
-    law, e = discrete.law[triangle], np.zeros((*t.shape, 4))
-    e[..., MERIDIAN] = _strain(np.broadcast_to(moves[:, None], slope.shape), slope)
-    square = np.zeros(len(triangle))
-    for up, of_up in zip(*gauss(2 * POINTS), strict=True):
-        place = x + up * (apex[:, None] - x)
-        hat = np.where(top, up, (1 - up) * value)
-        e[..., 2] = moves[:, :1] * hat / place[..., 0]
-        share = weight * w * (1 - up) * of_up * balance.measure(place)
-        square += np.einsum("kq,kqi,kij,kqj->k", share, e, law, e, optimize=True)
-    return np.sqrt(square * _most(discrete, triangle))
+    return np.sqrt(square * most_of_law(discrete, triangle))

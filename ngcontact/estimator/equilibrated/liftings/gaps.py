@@ -13,7 +13,17 @@ from ....arrays import Array, Index, Mask
 from ....fem import BoundaryTrace
 from ..data import Discrete, Units
 from ..pressures import SLIVER, Pieces, Zone, ZonePoints, zone_points
-from .edges import EdgeField, at_points, coefficients, derivative, norms, panels, samples
+from .closing import closed_beside
+from .edges import (
+    EdgeField,
+    at_points,
+    by_segment,
+    coefficients,
+    derivative,
+    norms,
+    panels,
+    samples,
+)
 
 
 class Opened(Protocol):
@@ -54,8 +64,9 @@ class Gap:
         Legendre coefficients of the gap, over strain times length.
     kept : ndarray (k, d + 1)
         The same of what stays of the gap where contact closes it; 0 at nodal rows.
-    closed : ndarray of bool (k,)
-        Pieces on which the gap is closed but for that, others keep theirs or open to 0.
+    closed : ndarray (k, 2)
+        Interval of each piece on which the gap is closed but for that, from 1 to 0 where there is
+        none; elsewhere it stays or opens to 0.
     """
 
     zone: Zone
@@ -63,19 +74,24 @@ class Gap:
     points: ZonePoints
     values: Array
     kept: Array
-    closed: Mask
+    closed: Array
 
     def lifted(self, at: Index, t: Array) -> tuple[Array, Array, Array]:
         """The gap (j, q) at `t` (j, q) of pieces `at` (j,), r (j, q), and its derivative (j, q)."""
         gap, slope = (at_points(c, t) for c in (self.values[at], derivative(self.values[at])))
         kept, more = (at_points(c, t) for c in (self.kept[at], derivative(self.kept[at])))
-        closed = self.closed[at, None]
+        closed = self.shut(at, t)
         r = np.where(closed, kept - gap, np.maximum(-gap, 0.0))
         return gap, r, np.where(closed, more - slope, -slope * (gap < 0))
 
+    def shut(self, at: Index, t: Array) -> Mask:
+        """Whether the gap is closed at `t` (j, q) of pieces `at` (j,)."""
+        return np.asarray((t >= self.closed[at, :1]) & (t <= self.closed[at, 1:]))
+
     def panels(self, at: Index) -> tuple[Array, Array]:
         """Points (j, q), weights (j, q) of pieces `at` (j,), cut where an open gap changes sign."""
-        return panels(np.where(self.closed[at, None], 0.0, self.values[at]))
+        whole = (self.closed[at] == [0, 1]).all(axis=1)
+        return panels(np.where(whole[:, None], 0.0, self.values[at]))
 
 
 def gap_of(
@@ -97,11 +113,17 @@ def gap_of(
     sampled = points.gap.reshape(len(pieces.local), len(s))
     values = coefficients(sampled)
     closed = zone.full | line.contact.bilateral
+    nodes = boundary.nodes[line.segments][:, [0, -1]]
+    shut = np.where(closed[pieces.local, None], [0.0, 1.0], [1.0, 0.0])
+    beside = closed_beside(zone, pieces, values, nodes, supported)
+    shut = np.where(closed[pieces.local, None], shut, beside)
     kept = np.zeros_like(values)
     if not pieces.whole and not line.contact.bilateral:
-        nodes = boundary.nodes[line.segments][:, [0, -1]]
         vertices, count = np.unique(nodes, return_counts=True)
-        loose = np.union1d(np.union1d(nodes[~closed], supported), vertices[count == 1])
+        open_ = np.repeat(~closed[:, None], 2, axis=1)
+        for side, ends in enumerate((pieces.start, pieces.stop)):
+            open_[pieces.local[(ends == side) & (shut[:, side] == side)], side] = False
+        loose = np.union1d(np.union1d(nodes[open_], supported), vertices[count == 1])
         for side, place in ((0, pieces.start == 0), (1, pieces.stop == 1)):
             end = np.isin(nodes[pieces.local, side], loose) & place & closed[pieces.local]
             size = np.maximum(sampled[:, -side], 0.0) * end
@@ -110,7 +132,7 @@ def gap_of(
             np.add.at(at, pieces.local, size)
             hats = pieces.places(s) if side else 1 - pieces.places(s)
             kept += coefficients(at[pieces.local, None] * hats)
-    gap = Gap(zone, pieces, points, values, kept, closed[pieces.local])
+    gap = Gap(zone, pieces, points, values, kept, shut)
     return gap if line.contact.bilateral else _without_steps(gap, boundary)
 
 
@@ -130,7 +152,7 @@ def _without_steps(gap: Gap, boundary: BoundaryTrace) -> Gap:
         row = np.flatnonzero(mine & (np.abs(s[:, side] - place) <= SLIVER))
         at_vertex = (nodes[pieces.local] == nodes[local, side]) & (np.abs(s - [0, 1]) == 0)
         beyond = float(r[at_vertex & ~mine[:, None]].max(initial=0.0))
-        if row.size and gap.closed[row[0]]:
+        if row.size and gap.closed[row[0], 1] > gap.closed[row[0], 0]:
             hat = np.abs(pieces.places(samples())[mine] - (low, high)[1 - side]) / (high - low)
             kept[mine] += coefficients(max(float(value[row[0], side]) + beyond, 0.0) * hat)
     return replace(gap, kept=kept)
@@ -172,7 +194,7 @@ def without_idle(gaps: Sequence[Gap], boundary: BoundaryTrace) -> list[Gap]:
 
 
 def on_contact(gap: Opened, discrete: Discrete) -> list[EdgeField]:
-    """What to lift so that K is met where nodes face nodes, on both bodies, by compliance."""
+    """What to lift so that [w] = -r where nodes face nodes, on both bodies, by compliance."""
     pieces = gap.pieces
     every = np.arange(len(pieces.local))
     shape = len(every), -1
@@ -190,12 +212,13 @@ def on_contact(gap: Opened, discrete: Discrete) -> list[EdgeField]:
     if pieces.line.contact.primary is not None:
         c = coefficients(gap.points.facing_s.reshape(shape)[at])
         sides.append((pieces.facing[at], at_points(c, t), at_points(derivative(c), t)))
-    both = [_field(discrete, *one, (value, slope, weight)) for one in sides]
+    fields = [_field(discrete, *one, (value, slope, weight)) for one in sides]
+    both = [by_segment(field, pieces.segment[at]) for field in fields]
     if len(both) == 1:
-        return both
+        return [both[0].scaled(-np.ones(len(both[0].edge)))]
     one, other = (norms(discrete, field) ** 2 for field in both)
     share = np.divide(other, one + other, out=np.zeros_like(one), where=one + other > 0)
-    return [both[0].scaled(share), both[1].scaled(1 - share)]
+    return [both[0].scaled(-share), both[1].scaled(1 - share)]
 
 
 def _field(

@@ -1,7 +1,7 @@
 """Liftings on the secondary alone, where its nodes do not face nodes and so its vertices move, too.
 
-The hats of the vertices carry their moves into all triangles around them, and what is left on the
-edges is 0 at their ends.
+The hats of the vertices carry their moves into all elements around them, and what is left on the
+segments is 0 at their ends.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ....arrays import Array, Index, Mask
+from ....arrays import Array, Mask
 from ....fem import BoundaryTrace
 from ....lagrange import gauss
 from ..data import Discrete, EdgeConditions
@@ -19,10 +19,9 @@ from .edges import (
     DEGREE,
     EdgeField,
     at_points,
+    by_segment,
     coefficients,
     derivative,
-    hat_norms,
-    norms,
     samples,
 )
 from .gaps import Opened
@@ -36,32 +35,35 @@ def on_secondaries(
     boundary: BoundaryTrace,
     conditions: EdgeConditions,
     discrete: Discrete,
-) -> list[tuple[Index, Array]]:
-    """Triangles (k,) and energy norms (k,) of what opens all gaps whose pieces are not `whole`.
+) -> tuple[Array, list[EdgeField]]:
+    """What opens all gaps whose pieces are not `whole`.
+
+    Returns
+    -------
+    moves : ndarray (nv, 2)
+        Displacements of the vertices of the mesh.
+    fields : list of EdgeField
+        What is left between them.
 
     Raises
     ------
     ValueError
         Vertices where that cannot be met, as where a support overlaps the other body.
     """
-    sides = [side_of(gap, discrete) for gap in gaps if gap.pieces.local.size]
+    sides = [side_of(gap, boundary, discrete) for gap in gaps if gap.pieces.local.size]
     moved = [side for side in sides if not side.gap.pieces.whole]
     if not moved:
-        return []
+        return np.zeros((boundary.mesh.nv, 2)), []
     largest = SHARP * max(float(np.abs(side.gap.points.gap).max(initial=0.0)) for side in moved)
     v = vertex_moves(sides, boundary, conditions, discrete, largest)
-    rests = [rest for side in moved for rest in _rest(side, v, discrete)]
-    rests += _bridges(moved, v, discrete, largest)
-    found = [_by_edge(discrete, _together(rests))] if rests else []
-    triangles = discrete.partition.triangles
-    triangle, corner = np.nonzero((v[triangles] != 0).any(axis=2))
-    moves = v[triangles[triangle, corner]]
-    return [*found, (triangle, hat_norms(discrete, triangle, corner, moves))]
+    rests = [rest for side in moved for rest in _rest(side, v)]
+    rests += _bridges(moved, v, largest)
+    return -v, [_merged(rests)] if rests else []
 
 
-def _rest(side: Side, v: Array, discrete: Discrete) -> list[EdgeField]:
+def _rest(side: Side, v: Array) -> list[EdgeField]:
     """What the moves `v` (nv, 2) of vertices leave along d, where that is not 0."""
-    corner = v[discrete.partition.ends[side.edge]]
+    corner = v[side.corners]
     at = np.flatnonzero(_asks(side, corner))
     if at.size == 0:
         return []
@@ -87,15 +89,13 @@ def _asks(side: Side, corner: Array) -> Mask:
     return np.asarray((r != 0).any(axis=1) | (corner != 0).any(axis=(1, 2)))
 
 
-def _bridges(
-    sides: Sequence[Side], v: Array, discrete: Discrete, largest: float
-) -> list[EdgeField]:
-    """Between pieces, where an edge faces nothing, the rest is linear."""
+def _bridges(sides: Sequence[Side], v: Array, largest: float) -> list[EdgeField]:
+    """Between pieces, where a segment faces nothing, the rest is linear."""
     edge = np.concatenate([side.edge for side in sides])
     ends = np.concatenate([side.ends for side in sides])
     d = np.concatenate([side.toward for side in sides])
     asked = np.concatenate([side.asked for side in sides])
-    corner = v[discrete.partition.ends[edge]][:, None]
+    corner = v[np.concatenate([side.corners for side in sides])][:, None]
     linear = corner[:, :, 0] + ends[:, :, None] * (corner[:, :, 1] - corner[:, :, 0])
     value = (asked - (linear * d).sum(axis=2))[:, :, None] * d
     backwards = ends[:, 0] > ends[:, 1]
@@ -129,8 +129,8 @@ def _bridges(
     return [EdgeField(edge[at], t, length[at, None] * w, value, slopes)]
 
 
-def _together(fields: Sequence[EdgeField]) -> EdgeField:
-    """All fields as one, of as many points on each piece."""
+def _merged(fields: Sequence[EdgeField]) -> EdgeField:
+    """All fields as one, with the sign of -r."""
     q = max(field.t.shape[1] for field in fields)
 
     def filled(name: str) -> Array:
@@ -142,22 +142,5 @@ def _together(fields: Sequence[EdgeField]) -> EdgeField:
         return np.concatenate(parts)
 
     edge = np.concatenate([field.edge for field in fields])
-    return EdgeField(edge, *(filled(name) for name in ("t", "weight", "value", "slope")))
-
-
-def _by_edge(discrete: Discrete, field: EdgeField) -> tuple[Index, Array]:
-    """Triangles and norms of a field given on several pieces of an edge, which one m continues."""
-    edge, number = np.unique(field.edge, return_inverse=True)
-    order = np.argsort(number, kind="stable")
-    count = np.bincount(number)
-    place = np.arange(len(number)) - np.concatenate([[0], np.cumsum(count)[:-1]])[number[order]]
-    q = field.t.shape[1]
-
-    def merged(values: Array) -> Array:
-        result = np.zeros((len(edge), int(count.max()), *values.shape[1:]))
-        result[number[order], place] = values[order]
-        return result.reshape(len(edge), int(count.max()) * q, *values.shape[2:])
-
-    t = merged(field.t)
-    whole = EdgeField(edge, t, merged(field.weight), merged(field.value), merged(field.slope))
-    return discrete.partition.owner[0][edge], norms(discrete, whole)
+    every = EdgeField(edge, *(filled(name) for name in ("t", "weight", "value", "slope")))
+    return by_segment(every.scaled(-np.ones(len(edge))), edge)

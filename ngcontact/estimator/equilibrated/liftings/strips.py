@@ -31,11 +31,13 @@ def strip_norms(
     conditions: EdgeConditions,
     discrete: Discrete,
     fields: Sequence[EdgeField],
+    moves: Array,
     units: Units,
 ) -> Array:
-    """Energy norms (n,) on each triangle of a displacement that is `fields` on their edges.
+    """Energy norms (ne,) on each element of a displacement that is `fields` on their segments.
 
-    And 0 in what else is given on Gamma_u, Gamma_0 and Gamma_K.
+    With the displacements `moves` (nv, 2) of the vertices beneath, and 0 in what else is given on
+    Gamma_u, Gamma_0 and Gamma_K.
     """
     q, mesh = boundary.order + RICHER, boundary.mesh
     space = ng.VectorH1(mesh, order=q)
@@ -45,17 +47,19 @@ def strip_norms(
     bubbles = np.linalg.inv(edge_bubbles(scalar))
     numbers = np.array([scalar.GetDofNrs(el.edges[0]) for el in mesh.Elements(ng.BND)])
     nodes = legendre_values(q, gauss_lobatto(q)[1:-1])
-    total, touched = np.zeros(len(discrete.partition.triangles)), np.zeros(mesh.nv, dtype=bool)
-    partition = discrete.partition
+    partition, total = discrete.partition, np.zeros(mesh.ne)
+    touched, view = (moves != 0).any(axis=1), Triangulation(mesh)
+    values[:, : mesh.nv] += moves.T
     for field in fields:
         c, rest = _split(field, q)
         values[:, numbers[partition.segment[field.edge]]] += np.einsum(
             "ij,jl,klc->cki", bubbles, nodes, c
         )
-        np.add.at(total, partition.owner[0][field.edge], norms(discrete, rest))
+        element = partition.parent[partition.owner[0][field.edge]]
+        np.add.at(total, element, norms(discrete, rest))
         moved = np.abs(c).max(axis=(1, 2), initial=0.0) > 0
-        touched[partition.ends[field.edge[moved]]] = True
-    strip: Mask = np.any(touched[Triangulation(mesh).triangles], axis=1, keepdims=True)[:, 0]
+        touched[boundary.nodes[partition.segment[field.edge[moved]]][:, [0, -1]]] = True
+    strip: Mask = np.any(touched[view.triangles], axis=1, keepdims=True)[:, 0]
     if not strip.any():
         return total
     given = _given(problem, boundary, conditions, discrete)
@@ -67,8 +71,8 @@ def strip_norms(
             fixed[:, scalar.GetDofNrs(el)] = True
     _relax(problem, space, w, ng.BitArray(strip), ng.BitArray(~fixed.ravel()))
     at = np.flatnonzero(strip[partition.parent])
-    total[at] += _norms_on(problem, discrete, at, w, q, units)
-    return total
+    squares = _norms_on(problem, discrete, at, w, q, units) ** 2
+    return total + np.sqrt(np.bincount(partition.parent[at], squares, minlength=mesh.ne))
 
 
 def _split(field: EdgeField, degree: int) -> tuple[Array, EdgeField]:

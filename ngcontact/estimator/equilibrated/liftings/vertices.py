@@ -13,6 +13,7 @@ import numpy as np
 
 from ....arrays import Array, Index, Mask
 from ....fem import BoundaryTrace
+from ....problem import Triangulation
 from ..data import Discrete, EdgeConditions
 from ..pressures import SLIVER
 from .gaps import Opened
@@ -31,11 +32,13 @@ class Side:
     gap : Opened
         Their gaps.
     edge : ndarray of int (k,)
-        Edges on which they lie.
+        Edges of their segments, see `Partition.edge_of_segment`.
+    corners : ndarray of int (k, 2)
+        Vertices of the mesh between which the segments run, as these edges do.
     ends : ndarray (k, 2)
         Parameters there of their starts and stops.
     vertex : ndarray of int (k, 2)
-        Vertices of the partition there, -1 where none is.
+        Vertices there, -1 where none is.
     asked : ndarray (k, 2)
         r at both ends.
     directions : ndarray (k, d + 1, 2)
@@ -44,6 +47,7 @@ class Side:
 
     gap: Opened
     edge: Index
+    corners: Index
     ends: Array
     vertex: Index
     asked: Array
@@ -60,19 +64,18 @@ class Side:
         return np.asarray(np.ptp(self.directions, axis=1).max(axis=1, initial=0.0) > TURNS)
 
 
-def side_of(gap: Opened, discrete: Discrete) -> Side:
-    """Where the pieces of a gap lie on the edges of the partition."""
+def side_of(gap: Opened, boundary: BoundaryTrace, discrete: Discrete) -> Side:
+    """Where the pieces of a gap lie on the segments of the mesh."""
     pieces, partition = gap.pieces, discrete.partition
     k = len(pieces.local)
-    middle = (pieces.start + pieces.stop) / 2
-    edge = partition.edge_at(pieces.segment, middle)
-    ends = partition.on_edges(edge, np.column_stack([pieces.start, pieces.stop]))
-    vertex = np.full((k, 2), -1)
-    for number in (0, 1):
-        at = np.abs(ends - number) <= SLIVER
-        vertex[at] = np.repeat(partition.ends[edge, number], 2).reshape(k, 2)[at]
+    edge = partition.edge_of_segment[pieces.segment]
+    corners = np.sort(boundary.nodes[pieces.segment][:, [0, -1]], axis=1)
+    ends = np.column_stack([pieces.start, pieces.stop])
+    ends = np.where(partition.along[edge][:, None], ends, 1 - ends)
+    at = np.abs(ends[:, :, None] - [0.0, 1.0]) <= SLIVER
+    vertex = np.where(at.any(axis=2), corners[np.arange(k)[:, None], at.argmax(axis=2)], -1)
     _, asked, _ = gap.lifted(np.arange(k), np.tile([0.0, 1.0], (k, 1)))
-    return Side(gap, edge, ends, vertex, asked, gap.points.direction.reshape(k, -1, 2))
+    return Side(gap, edge, corners, ends, vertex, asked, gap.points.direction.reshape(k, -1, 2))
 
 
 def vertex_moves(
@@ -83,7 +86,6 @@ def vertex_moves(
     largest: float,
 ) -> Array:
     """Displacements (nv, 2) of the vertices, the least that lines and supports ask for."""
-    partition = discrete.partition
     asked, held = [], [_held_by_supports(conditions, discrete)]
     for side in sides:
         mine = side.vertex >= 0
@@ -100,19 +102,20 @@ def vertex_moves(
     on = np.isin(where, vertex)
     vertex, d = np.concatenate([vertex, where[on]]), np.concatenate([d, along[on]])
     r = np.append(r, np.zeros(np.count_nonzero(on)))
-    far, move = _beyond(sides, discrete)
+    far, move = _beyond(sides, boundary)
     free = ~np.isin(far, np.concatenate([vertex, where]))
     far, move = far[free], move[free]
     vertex = np.concatenate([vertex, far, far])
     d = np.concatenate([d, np.tile([1.0, 0.0], (len(far), 1)), np.tile([0.0, 1.0], (len(far), 1))])
     r = np.concatenate([r, move[:, 0], move[:, 1]])
-    M, b = np.zeros((len(partition.vertices), 2, 2)), np.zeros((len(partition.vertices), 2))
+    size = len(Triangulation(boundary.mesh).vertices)
+    M, b = np.zeros((size, 2, 2)), np.zeros((size, 2))
     np.add.at(M, vertex, d[:, :, None] * d[:, None, :])
     np.add.at(b, vertex, d * r[:, None])
     v = np.einsum("kij,kj->ki", np.linalg.pinv(M, rcond=ALIKE**2, hermitian=True), b)
     v[np.abs(v) <= ROUND_OFF * largest] = 0.0
     off = np.abs((d * v[vertex]).sum(axis=1) - r)
-    guides = partition.ends[discrete.curves.edge[discrete.curves.guided]].ravel()
+    guides = discrete.partition.ends[discrete.curves.edge[discrete.curves.guided]].ravel()
     turning = np.concatenate([guides, *(_turning(side, boundary) for side in sides)])
     if (off > largest).any() or np.abs(v[turning]).max(initial=0.0) > largest:
         names = {side.gap.pieces.line.contact.secondary for side in sides}
@@ -144,22 +147,20 @@ def _turning(side: Side, boundary: BoundaryTrace) -> Index:
     return np.asarray(every[every >= 0], dtype=np.intp)
 
 
-def _beyond(sides: Sequence[Side], discrete: Discrete) -> tuple[Index, Array]:
+def _beyond(sides: Sequence[Side], boundary: BoundaryTrace) -> tuple[Index, Array]:
     """Vertices (k,) beyond the places where segments cease to face, and r d (k, 2) there."""
-    partition = discrete.partition
     found: list[Index] = [np.zeros(0, dtype=np.intp)]
     moves: list[Array] = [np.zeros((0, 2))]
     for side in sides:
         pieces = side.gap.pieces
         one = pieces.local[1:] == pieces.local[:-1]
         joined = one & (pieces.start[1:] - pieces.stop[:-1] <= SLIVER)
-        for end, s, joins, step in (
-            (0, pieces.start, np.append(False, joined), -2 * SLIVER),
-            (1, pieces.stop, np.append(joined, False), 2 * SLIVER),
+        for end, s, joins in (
+            (0, pieces.start, np.append(False, joined)),
+            (1, pieces.stop, np.append(joined, False)),
         ):
             at = np.flatnonzero((s > SLIVER) & (s < 1 - SLIVER) & ~joins)
-            edge = partition.edge_at(pieces.segment[at], s[at] + step)
-            found.append(partition.ends[edge, (partition.along[edge] == (end == 1)).astype(int)])
+            found.append(boundary.nodes[pieces.segment[at], -end])
             moves.append(side.asked[at, end, None] * side.toward[at, end])
     far, first = np.unique(np.concatenate(found), return_index=True)
     return far, np.concatenate(moves)[first]

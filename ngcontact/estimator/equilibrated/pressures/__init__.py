@@ -2,6 +2,8 @@
 
 from .balance import balanced as balanced
 from .cuts import facing_cuts as facing_cuts
+from .ends import contact_ends as contact_ends
+from .ends import split as split
 from .pieces import SLIVER as SLIVER
 from .pieces import Pieces as Pieces
 from .pieces import contact_directions as contact_directions

@@ -41,9 +41,11 @@ def facing_cuts(
         segments = pieces.line.segments[reach.acts]
         uneven += segments[straight_ends(boundary, segments).any(axis=1)].tolist()
         uneven += pieces.facing[np.isin(pieces.segment, bent) & (pieces.facing >= 0)].tolist()
-        if pieces.whole:
+        if pieces.line.contact.primary is None:
             continue
         ends, _ = pieces.opposite(boundary, pieces.places(np.array([0.0, 1.0])))
+        if pieces.whole:
+            ends = np.where(np.column_stack([pieces.start > 0, pieces.stop < 1]), ends, 0.0)
         segment, places = np.repeat(pieces.facing, 2), np.clip(ends.ravel(), 0.0, 1.0)
         for number in np.unique(segment).tolist():
             s = np.sort(np.append(cuts.get(number, []), places[segment == number]))
@@ -87,7 +89,7 @@ def _where_one_ends(pieces: Pieces, reach: Reach, boundary: BoundaryTrace) -> li
     last &= np.column_stack([pieces.start == 0, pieces.stop == 1])
     off = np.column_stack([pieces.start, pieces.stop])
     off -= np.column_stack([reach.start, reach.stop])[pieces.local]
-    last |= (np.abs(off) <= SLIVER) & reach.inner[pieces.local]
+    last |= (np.abs(off) <= SLIVER) & (reach.inner & ~reach.closes)[pieces.local]
     row, side = np.nonzero(last & acts[pieces.local, None])
     s, _ = pieces.opposite(boundary, pieces.places(np.array([0.0, 1.0])))
     facing, s = pieces.facing[row], s[row, side]

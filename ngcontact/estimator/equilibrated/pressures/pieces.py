@@ -42,7 +42,7 @@ class Pieces:
     facing : ndarray of int (r,)
         Segment of the boundary that it faces, -1 for an obstacle.
     whole : bool
-        Whether each is a segment, and so is what it faces, node to node.
+        Whether each is a segment, or a part of one, and so is what it faces, node to node.
     """
 
     line: ContactLine
@@ -61,6 +61,16 @@ class Pieces:
         """Those `at` (q,) of them."""
         start, stop = self.start[at], self.stop[at]
         return Pieces(self.line, self.local[at], start, stop, self.facing[at], self.whole)
+
+    def divided(self, at: Index, places: Array) -> Pieces:
+        """With those `at` (q,) in two parts at `places` (q,)."""
+        stop = self.stop.copy()
+        stop[at] = places
+        local, facing = (np.append(x, x[at]) for x in (self.local, self.facing))
+        start, stop = np.append(self.start, places), np.append(stop, self.stop[at])
+        order = np.lexsort([start, local])
+        local, start, stop, facing = local[order], start[order], stop[order], facing[order]
+        return Pieces(self.line, local, start, stop, facing, self.whole)
 
     def places(self, t: Array) -> Array:
         """Parameters (r, q) on the segments at parameters `t` (q,), or (r, q), on the pieces."""

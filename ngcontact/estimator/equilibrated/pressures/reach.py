@@ -26,11 +26,14 @@ class Reach:
         Parameters of their ends, the same where p* is 0.
     falls : ndarray of bool (j, 2)
         Whether p* vanishes with its slope at start and stop.
+    closes : ndarray of bool (j, 2)
+        Whether contact ends there, and p* vanishes.
     """
 
     start: Array
     stop: Array
     falls: Mask
+    closes: Mask
 
     @property
     def acts(self) -> Mask:
@@ -50,9 +53,12 @@ class Reach:
 
 
 def reaches_of(
-    every_pieces: Sequence[Pieces], uncut: Index
+    every_pieces: Sequence[Pieces], every_spans: Sequence[Array], uncut: Index
 ) -> tuple[list[Reach], dict[int, Array]]:
-    """The reach of p* on each pair, and where to cut segments for that, none of `uncut` (j,).
+    """The reach of p* on each pair, and where to cut segments for that.
+
+    Contact is on the parts `every_spans` (j, 2) of the segments of each, see `contact_ends`; none
+    of the segments `uncut` (k,) is cut elsewhere.
 
     Returns
     -------
@@ -65,7 +71,7 @@ def reaches_of(
     uncut = np.concatenate([uncut, *facing]).astype(np.intp)
     cuts: dict[int, Array] = {}
     reaches = []
-    for pieces in every_pieces:
+    for pieces, spans in zip(every_pieces, every_spans, strict=True):
         ends = _longest(pieces)
         falls = np.zeros(ends.shape, dtype=bool)
         bare = np.column_stack([ends[:, 0], 1 - ends[:, 1]])
@@ -82,7 +88,12 @@ def reaches_of(
             falls[local] = (bare[local] > 0) & (bare[local] <= NARROW)
             if wide.size:
                 cuts[number] = np.union1d(others, wide)
-        reaches.append(Reach(ends[:, 0], ends[:, 1], falls))
+        closes = (spans != [0.0, 1.0]) & (spans > ends[:, :1]) & (spans < ends[:, 1:])
+        for local, end in zip(*np.nonzero(closes), strict=True):
+            number = int(pieces.line.segments[local])
+            cuts[number] = np.union1d(cuts.get(number, np.zeros(0)), spans[local, end])
+        ends = np.where(closes, spans, ends)
+        reaches.append(Reach(ends[:, 0], ends[:, 1], falls & ~closes, closes))
     return reaches, cuts
 
 

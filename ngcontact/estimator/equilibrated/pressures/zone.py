@@ -129,6 +129,7 @@ def zone_of(
     bent = np.isin(segment, bent_segments(boundary))  # not divided: tractions must not jump
     fixed[point[straight_ends(boundary, segment) & bent[:, None]]] = True
     fixed[point[falls]] = True
+    fixed[point[reach.closes[at]]] = True
     number = np.full((len(line.segments), degree + 1), -1)
     coefficient = np.full(len(touched), -1)
     used = np.zeros(len(touched), dtype=bool)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from ....arrays import Array
 from ....problem import Problem
-from ..data import Discrete, EdgeConditions, Units
+from ..data import Discrete, EdgeConditions, Partition, Units
 from ..guides import Reactions
 from ..liftings import Gap
 from ..remainders import Strip
@@ -16,14 +16,19 @@ from ..remainders import Strip
 
 @dataclass(frozen=True, eq=False)
 class Norms:
-    """Norms on the n triangles.
+    """Norms on n triangles and ne elements.
 
     Attributes
     ----------
-    constitutive, loads, curves, lifting : ndarray (n,)
+    partition : Partition
+        The triangles.
+    constitutive, loads, curves : ndarray (n,)
         By what they are of.
+    lifting : ndarray (ne,)
+        |w|.
     """
 
+    partition: Partition
     constitutive: Array
     loads: Array
     curves: Array

@@ -24,7 +24,7 @@ SHARE = 0.2  # of the sum of squares on far triangles from which steps pay
 MOST = 0.03  # share of triangles that are called far
 FEWEST = 60  # which may be far on any mesh
 KEPT = 5_000_000  # numbers in operators of triangles that are kept from step to step
-STEPS = 3
+STEPS = 12
 STIFF_STEPS = 24  # at most, where laws are stiff in one direction and a step brings less
 PAYS = 0.04  # of the square of the norm, what a step must take off for another to be made
 
