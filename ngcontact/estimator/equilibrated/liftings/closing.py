@@ -20,7 +20,7 @@ def closed_beside(
     Where contact ends inside of a segment, up to the last zero of the gap, with Legendre
     coefficients `values` (k, d + 1): there r = -gap has no kink, and p* need not meet the gap.
     At the other end it starts where it does beside, or at the first zero where supports or open
-    segments are beside. `nodes` (j, 2) are the ends of the segments, `supported` vertices.
+    segments are beside. `nodes` (j, 2) are the ends of the segments, `supported` (v,) vertices.
     """
     found, reach = np.tile([1.0, 0.0], (len(values), 1)), zone.reach
     t = np.linspace(0, 1, GRID)

@@ -149,7 +149,7 @@ def norms(discrete: Discrete, field: EdgeField) -> Array:
 
 
 def most_of_law(discrete: Discrete, triangle: Index) -> Array:
-    """Factors (k,) by which the law exceeds that in the middle of each triangle."""
+    """Factors (k,) by which laws exceed those in the middle of triangles `triangle` (k,)."""
     if discrete.rough is None:
         return np.ones(len(triangle))
     number = discrete.rough.number[triangle]
@@ -159,7 +159,20 @@ def most_of_law(discrete: Discrete, triangle: Index) -> Array:
 def towards(
     discrete: Discrete, triangle: Index, opposite: Index, edge: Index, t: Array
 ) -> tuple[Array, Array, Array]:
-    """Gradients (k, q, 2) along an edge, times 1 - t, and from it; twice the area per parameter."""
+    """Gradients along edges, times 1 - t, and from them; twice the area per parameter.
+
+    Parameters
+    ----------
+    discrete : Discrete
+    triangle, opposite, edge : ndarray of int (k,)
+        Triangles, which of their vertices lies opposite, and the edge there.
+    t : ndarray (k, q)
+        Places on the edge.
+
+    Returns
+    -------
+    ndarray (k, q, 2), (k, q, 2), (k, q)
+    """
     partition = discrete.partition
     apex = partition.vertices[partition.triangles[triangle, opposite]]
     x, dx = edge_places(partition, edge, discrete.curves, t)
@@ -168,7 +181,7 @@ def towards(
 
 
 def strain_of(r: Array, gradient: Array) -> Array:
-    """Voigt strain (k, q, 3) of the products of vectors `r` and gradients, (k, q, 2)."""
+    """Voigt strains (k, q, 3) of products of vectors `r` (k, q, 2) and `gradient` (k, q, 2)."""
     return np.stack(
         [
             r[..., 0] * gradient[..., 0],

@@ -85,7 +85,7 @@ class Gap:
         return gap, r, np.where(closed, more - slope, -slope * (gap < 0))
 
     def shut(self, at: Index, t: Array) -> Mask:
-        """Whether the gap is closed at `t` (j, q) of pieces `at` (j,)."""
+        """Whether the gap is closed at `t` (j, q) of pieces `at` (j,); (j, q)."""
         return np.asarray((t >= self.closed[at, :1]) & (t <= self.closed[at, 1:]))
 
     def panels(self, at: Index) -> tuple[Array, Array]:
@@ -114,9 +114,8 @@ def gap_of(
     values = coefficients(sampled)
     closed = zone.full | line.contact.bilateral
     nodes = boundary.nodes[line.segments][:, [0, -1]]
-    shut = np.where(closed[pieces.local, None], [0.0, 1.0], [1.0, 0.0])
     beside = closed_beside(zone, pieces, values, nodes, supported)
-    shut = np.where(closed[pieces.local, None], shut, beside)
+    shut = np.where(closed[pieces.local, None], [0.0, 1.0], beside)
     kept = np.zeros_like(values)
     if not pieces.whole and not line.contact.bilateral:
         vertices, count = np.unique(nodes, return_counts=True)
