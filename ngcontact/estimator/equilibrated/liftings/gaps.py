@@ -25,6 +25,8 @@ from .edges import (
     samples,
 )
 
+STEEP = 12  # power of a vertex's hat by which what stays open there falls: p* is small near it
+
 
 class Opened(Protocol):
     """A function on the pieces of Gamma_K, and what is added to it: that of a `Gap`, say."""
@@ -126,11 +128,11 @@ def gap_of(
         for side, place in ((0, pieces.start == 0), (1, pieces.stop == 1)):
             end = np.isin(nodes[pieces.local, side], loose) & place & closed[pieces.local]
             size = np.maximum(sampled[:, -side], 0.0) * end
-            # The hat of the vertex is linear on the segment: on every piece of it.
+            # The hat of the vertex is one on the whole segment: on every piece of it.
             at = np.zeros(len(line.segments))
             np.add.at(at, pieces.local, size)
             hats = pieces.places(s) if side else 1 - pieces.places(s)
-            kept += coefficients(at[pieces.local, None] * hats)
+            kept += coefficients(at[pieces.local, None] * hats**STEEP)
     gap = Gap(zone, pieces, points, values, kept, shut)
     return gap if line.contact.bilateral else _without_steps(gap, boundary)
 
