@@ -1,4 +1,4 @@
-"""Each thing stands in one place of the package, and objects have their attributes from the start."""
+"""Each thing stands in one place of the package; objects have their attributes from the start."""
 
 from __future__ import annotations
 
