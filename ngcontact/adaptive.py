@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import replace
+from typing import NoReturn
 
 import ngsolve as ng
 import numpy as np
@@ -34,6 +35,11 @@ from .results import with_progress
 from .solution import Solution
 
 SHARPER = 0.2  # bound over estimate that is hoped for at first; measured: 0.17 to 1
+
+ONE_PER_LEVEL = (
+    "adapt(...) {}: it yields one Solution per level; loop over it, or take the last one by "
+    "*_, solution = adapt(...)"
+)
 
 log = logging.getLogger("ngcontact")
 
@@ -65,8 +71,8 @@ def adapt(
     theta : float
         Doerfler's share of the squared indicators that is marked, in (0, 1].
     tolerance : float, optional
-        Relative estimated error in the energy norm at which to stop. Elements within a thousandth
-        of the extent of corners where supports contradict each other do not count.
+        Relative estimated error in the energy norm, less than 1, at which to stop. Elements within
+        a thousandth of the extent of corners where supports contradict each other do not count.
     max_dofs : int
         Number of unknowns that no level exceeds.
     guaranteed : bool
@@ -97,7 +103,36 @@ def adapt(
     mesh = first_level(problem, maxh, refinement, start)
     warn_of_implausible(problem, mesh, refinement.order)
     solutions = with_warnings(levels(problem, mesh, refinement, start=start))
-    return with_progress(solutions, tolerance, max_dofs) if progress else solutions
+    return Run(with_progress(solutions, tolerance, max_dofs) if progress else solutions)
+
+
+class Run(Iterator[Solution]):
+    """The levels of `adapt`, made one by one; told from a `Solution`, which it is easily taken for.
+
+    Parameters
+    ----------
+    solutions : iterator of Solution
+        A generator.
+    """
+
+    def __init__(self, solutions: Generator[Solution]) -> None:
+        self._solutions = solutions
+
+    def __next__(self) -> Solution:
+        """The next level."""
+        return next(self._solutions)
+
+    def close(self) -> None:
+        """Make no more levels."""
+        self._solutions.close()
+
+    def __getattr__(self, name: str) -> NoReturn:
+        """Say that a level has what is asked for."""
+        raise AttributeError(ONE_PER_LEVEL.format(f"has no {name}"))
+
+    def __getitem__(self, number: object) -> NoReturn:
+        """Say how to get the last level."""
+        raise TypeError(ONE_PER_LEVEL.format(f"has no [{number!r}]"))
 
 
 def _with_order(plain: Refinement, order: int | None, start: object) -> Refinement:
@@ -174,7 +209,7 @@ def levels(
     refinement: Refinement,
     estimator: Estimator = estimate,
     start: Solution | None = None,
-) -> Iterator[Solution]:
+) -> Generator[Solution]:
     """Levels from a first mesh on, of which names and values are known to be right.
 
     Parameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import ngsolve as ng
 
@@ -91,7 +91,7 @@ def warn_of_doubts(solution: Solution, told: set[object], *, last: bool) -> None
     told.update(found)
 
 
-def with_warnings(solutions: Iterator[Solution]) -> Iterator[Solution]:
+def with_warnings(solutions: Iterator[Solution]) -> Generator[Solution]:
     """The levels of a run, with a warning of whatever may be wrong, once.
 
     What no mesh mends is said at the first level that shows it, what refinement mends at the last.

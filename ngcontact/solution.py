@@ -166,7 +166,10 @@ class Solution(Measured, Readable, Shown):
         return [] if rigid is None else rigid.left_free(self.active)
 
     def transitions(self, pair: int = 0) -> Array:
-        """Points (k, 2) where a pair's contact turns from binding to non-binding, each a length."""
+        """Points (k, 2) where a pair's contact turns from binding to non-binding, each a length.
+
+        None, k = 0, where all of the pair is in contact, or nothing.
+        """
         return state_of(self.pairs, pair).transitions.position
 
     @cached_property

@@ -297,6 +297,29 @@ def test_solutions_print_on_one_line():
 # --- where it stops ---
 
 
+@pytest.mark.parametrize(
+    ("ask", "error", "asked"),
+    [
+        (lambda run: run.pressure, AttributeError, "has no pressure"),
+        (lambda run: run[-1], TypeError, r"has no \[-1\]"),
+    ],
+)
+def test_a_run_that_is_taken_for_a_solution_says_how_to_get_one(ask, error, asked):
+    run = adapt(cases.one_transition().problem, order=2, max_dofs=3000)
+    with pytest.raises(error, match=rf"{asked}: .*\*_, solution = adapt\(...\)"):
+        ask(run)
+    first = next(run)  # which is still to be had
+    *_, last = run
+    assert last.displacement.space.ndof > first.displacement.space.ndof
+
+
+def test_a_run_that_is_closed_ends():
+    run = adapt(cases.one_transition().problem, order=2)
+    next(run)
+    run.close()
+    assert list(run) == []
+
+
 @pytest.mark.parametrize("tolerance", [0.2, 0.05])
 def test_it_stops_at_the_tolerance(tolerance):
     problem = cases.one_transition().problem
@@ -362,6 +385,8 @@ BAD = [
     ("tolerance", -1e-3, ValueError),
     ("tolerance", math.nan, ValueError),
     ("tolerance", "1e-3", TypeError),
+    ("tolerance", 5, ValueError),  # percent is not meant, nor an absolute error
+    ("tolerance", 1, ValueError),
     ("max_dofs", 0, ValueError),
     ("max_dofs", -100, ValueError),
     ("max_dofs", math.nan, ValueError),
@@ -465,6 +490,15 @@ def test_a_pair_that_does_not_face_is_refused_before_assembly():
     contact = [Contact("disc_arc", "block_top", direction=(0, 1))]  # away from the block
     with pytest.raises(ValueError, match='"disc_arc" faces the primary "block_top"'):
         solve(replace(disc(), contact=contact))
+
+
+@pytest.mark.usefixtures("no_work")
+def test_normals_that_meet_nothing_are_told_without_a_direction():
+    """Normals of the block's bottom look down, away from the disc."""
+    contact = [Contact("block_bottom", "disc_arc")]
+    problem = replace(disc(), contact=contact, displacement={"disc_top": (0, 0)})
+    with pytest.raises(ValueError, match="along its outward normals: choose boundaries that"):
+        solve(problem)
 
 
 def test_a_start_of_other_pairs_is_refused():

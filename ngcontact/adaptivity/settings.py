@@ -69,8 +69,11 @@ class Refinement:
         object.__setattr__(self, "order", check_element(self.order, self.element))
         if not 0 < _number("theta", self.theta) <= 1:
             raise ValueError(f"theta={self.theta} must lie in (0, 1]; 0.5 is usual")
-        if self.tolerance is not None and not _number("tolerance", self.tolerance) > 0:
-            raise ValueError(f"tolerance={self.tolerance} must be positive, like 1e-3, or None")
+        if self.tolerance is not None and not 0 < _number("tolerance", self.tolerance) < 1:
+            raise ValueError(
+                f"tolerance={self.tolerance} is the error in the energy norm relative to that norm "
+                "and must lie between 0 and 1, like 1e-3 (0.1 %); or None"
+            )
         if not _number("max_dofs", self.max_dofs) > 0:
             raise ValueError(f"max_dofs={self.max_dofs} must be positive, like 100_000")
         truth("guaranteed", self.guaranteed)

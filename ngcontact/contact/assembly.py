@@ -68,10 +68,23 @@ def contact_line(trace: BoundaryTrace, contact: Contact, taken: Index | None = N
     if len(line.segments) and not facing.any():
         raise ValueError(
             f'no point of the secondary "{contact.secondary}" faces the primary '
-            f'"{contact.primary}" along direction={contact.direction}: the direction points from '
-            "the secondary body to the primary one"
+            f'"{contact.primary}" {_along(contact)}'
         )
     return without(line, np.flatnonzero(~facing))
+
+
+def _along(contact: Contact) -> str:
+    """Along what nothing faces, and what would be right."""
+    if contact.direction is None:
+        return (
+            "along its outward normals: choose boundaries that look at each other, or give the "
+            "direction from the secondary body to the primary one"
+        )
+    x, y = contact.direction
+    return (
+        f"along direction=({x:.6g}, {y:.6g}): the direction points from the secondary body to the "
+        "primary one"
+    )
 
 
 def _rows(line: ContactLine) -> Rows:

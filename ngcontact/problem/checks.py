@@ -57,7 +57,11 @@ def check_mesh(mesh: ng.Mesh) -> None:
             "mesh.UnsetDeformation() first"
         )
     if mesh.dim != 2:
-        raise ValueError(f"mesh has dimension {mesh.dim}: make it with OCCGeometry(shape, dim=2)")
+        raise ValueError(
+            f"mesh has dimension {mesh.dim}, and bodies lie in the plane: make it with "
+            "OCCGeometry(shape, dim=2); a file of Gmsh has to hold triangles of first order "
+            "(Mesh.ElementOrder = 1)"
+        )
     if mesh.ne == 0:
         raise ValueError("mesh has 0 elements: generate it first")
     view = Triangulation(mesh)

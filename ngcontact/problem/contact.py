@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from functools import wraps
+from typing import Any, TypeAlias
 
 import ngsolve as ng
 import numpy as np
@@ -13,6 +14,10 @@ from .values import region_name, scalar_data, told, unit_vector
 
 Gap: TypeAlias = float | ng.CoefficientFunction | Callable[[np.ndarray, np.ndarray], np.ndarray]
 
+NO_FRICTION = (
+    "contact is frictionless, so that Contact takes no friction={!r}: leave it out; "
+    "docs/topics/limits.md says what that means and which codes have friction"
+)
 ROWS = ("auto", "nodal", "dual")
 ROLES = ("given", "auto")
 
@@ -102,3 +107,18 @@ class Contact:
             raise ValueError("a rigid obstacle (primary=None) cannot be the secondary")
         back = None if self.direction is None else (-self.direction[0], -self.direction[1])
         return replace(self, secondary=self.primary, primary=self.secondary, direction=back)
+
+
+def _without_friction(initialise: Callable[..., None]) -> Callable[..., None]:
+    """`Contact.__init__`, which says what to do about friction before it refuses unknown names."""
+
+    @wraps(initialise)
+    def initialised(self: Contact, *values: Any, **options: Any) -> None:
+        if "friction" in options:
+            raise TypeError(NO_FRICTION.format(options["friction"]))
+        initialise(self, *values, **options)
+
+    return initialised
+
+
+Contact.__init__ = _without_friction(Contact.__init__)  # type: ignore[method-assign]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from typing import Any, Protocol, TypeVar
 
 import ngsolve as ng
@@ -34,7 +34,7 @@ Level = TypeVar("Level", bound=_Level)
 
 def with_progress(
     solutions: Iterator[Level], tolerance: float | None, max_dofs: float
-) -> Iterator[Level]:
+) -> Generator[Level]:
     """The same levels, each told when it is done.
 
     A line of `sys.stderr` each, or one table in a notebook that grows; with a bar that is full at

@@ -192,6 +192,7 @@ def test_errors_carry_their_data_and_survive_pickling():
         ({"gap": ng.CF((1, 2))}, ValueError, "gap is a CoefficientFunction of dim 2: give a sca"),
         ({"gap": "0"}, TypeError, "gap = '0': give a real number"),
         ({"bilateral": 1}, TypeError, "bilateral = 1: give True or False"),
+        ({"friction": 0.2}, TypeError, r"frictionless, .* no friction=0\.2.*topics/limits\.md"),
     ],
 )
 def test_contact_refuses(arguments, error, message):
@@ -397,7 +398,7 @@ def quadrilaterals():
     [
         (lambda: "mesh", TypeError, "mesh is a str: give an ngsolve.Mesh"),
         (empty, ValueError, "mesh has 0 elements: generate it"),
-        (solid, ValueError, r"mesh has dimension 3: make it with OCCGeometry\(shape, dim=2\)"),
+        (solid, ValueError, r"mesh has dimension 3.*make it with OCCGeometry\(shape, dim=2\)"),
         (quadrilaterals, ValueError, "mesh has 2 quadrilaterals: it must be a triangulation"),
     ],
 )

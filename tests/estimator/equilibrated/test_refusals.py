@@ -12,6 +12,7 @@ from drivers.reference import cases
 from drivers.stress.scenes.drawing import scene_of
 from drivers.stress.scenes.posing import answer
 from ngcontact import ContactError, ContactWarning, solve
+from tests.given_meshes import two_blocks
 
 
 def test_curves_that_meet_the_axis_are_refused():
@@ -70,3 +71,21 @@ def test_bodies_held_at_few_points_of_large_segments(seed):
     with pytest.raises(ContactError, match="give a finer mesh where it is held"):
         _ = coarse.error_bound
     assert fine.error_bound <= 2 * fine.error_estimate
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3])
+def test_nodal_rows_where_nodes_do_not_face_nodes(angle):
+    """What they leave open has no bound; it has one with the rows that the message names."""
+    mesh = two_blocks(np.linspace(-1, 1, 6), np.linspace(-1, 1, 8), angle)
+    problem = replace(
+        cases.pressure_patch().problem,
+        geometry=mesh,
+        displacement={"bottom": (0, 0), "top": (0, -0.01)},
+        sliding=None,
+        traction={},
+    )
+    pairs = [replace(pair, rows="nodal", direction=None) for pair in problem.contact]
+    with pytest.raises(ValueError, match=r'rows="nodal" .* "upper_contact"; use rows="auto"'):
+        _ = solve(replace(problem, contact=pairs)).error_bound
+    pairs = [replace(pair, rows="auto") for pair in pairs]
+    assert solve(replace(problem, contact=pairs)).relative_error_bound < 1

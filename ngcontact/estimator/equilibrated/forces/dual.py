@@ -142,7 +142,9 @@ def _excess(
     for gap, e in zip(proof.gaps, tested.directions, strict=True):
         if not gap.pieces.whole:
             name = gap.pieces.line.contact.secondary
-            raise ValueError(f'no bar of the force is proved for dual rows, as on "{name}"')
+            raise ValueError(
+                f'no bar of the force is proved where nodes do not face nodes, as on "{name}"'
+            )
         found.append((gap, jump_beside(gap, tested.displacement, boundary, e, units)))
     kappa = max(least_kappa(gap, values) for gap, values in found)
     kappa = max(kappa, _mean_ratio(tested, proof) * proof.units.stress / units.stress)

@@ -118,10 +118,15 @@ def vertex_moves(
     guides = discrete.partition.ends[discrete.curves.edge[discrete.curves.guided]].ravel()
     turning = np.concatenate([guides, *(_turning(side, boundary) for side in sides)])
     if (off > largest).any() or np.abs(v[turning]).max(initial=0.0) > largest:
-        names = {side.gap.pieces.line.contact.secondary for side in sides}
+        pairs = [s.gap.pieces.line.contact for s in sides if not s.gap.pieces.whole]
+        nodal = [pair for pair in pairs if pair.rows == "nodal"]
+        names = sorted({f'"{pair.secondary}"' for pair in nodal or pairs})
         raise ValueError(
-            "no guaranteed bound is known where supports or lines hold a vertex that is in contact "
-            f"by dual rows, as at an end of {' or '.join(sorted(map(repr, names)))}; "
+            'no guaranteed bound is known for rows="nodal" where nodes do not face nodes, as on '
+            f'{" or ".join(names)}; use rows="auto", or error_estimate'
+            if nodal
+            else "no guaranteed bound is known where supports or lines hold a vertex of a contact "
+            f"line whose nodes do not face nodes, as at an end of {' or '.join(names)}; "
             "use error_estimate"
         )
     return np.asarray(v)
