@@ -72,9 +72,19 @@ class Solution(Measured, Readable, Shown):
     estimator: Estimator = estimate
     descent: Descent | None = None
 
-    @cached_property
+    @property
     def stress(self) -> ng.CoefficientFunction:
-        """In-plane stress, a (2, 2) CoefficientFunction, in units of stress."""
+        """In-plane stress, a (2, 2) CoefficientFunction, in units of stress.
+
+        What is computed on first use and looks at the mesh asks for it: estimate, bound, values at
+        points, files and pictures.
+
+        Raises
+        ------
+        RuntimeError
+            The mesh was refined or moved in place since.
+        """
+        self.discrete.space.require_mesh()
         return stress_of(self.problem, self.displacement)
 
     @cached_property

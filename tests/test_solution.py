@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import math
 from dataclasses import replace
 from itertools import pairwise
@@ -885,3 +886,52 @@ def test_part_of_the_zone_in_bilateral_contact(order):
     assert solution.gap[~glued].min() > 0
     total = sum(solution.reactions.values(), np.zeros(2))
     assert np.abs(total).max() < 1e-10 * np.abs(solution.force).sum()
+
+
+READ = {
+    "indicators": lambda s, folder: s.indicators,
+    "error_estimate": lambda s, folder: s.error_estimate,
+    "error_bound": lambda s, folder: s.error_bound,
+    "quantities": lambda s, folder: s.quantities(),
+    "stress": lambda s, folder: s.stress,
+    "at": lambda s, folder: s.at((0.3, 0.3)),
+    "write": lambda s, folder: s.write(folder / "moved.vtu"),
+    "plot": lambda s, folder: s.plot(folder / "moved.png", field="displacement"),
+    "save": lambda s, folder: s.save(folder / "moved.ngcontact"),
+    "copy": lambda s, folder: copy.deepcopy(s),
+    "record": lambda s, folder: s.record(),
+    "draw": lambda s, folder: s.draw(),
+    "adapt": lambda s, folder: next(adapt(s.problem, order=2, start=s)),
+}
+
+
+def refined(mesh):
+    mesh.Refine()
+
+
+def shifted(mesh):
+    for point in mesh.ngmesh.Points():
+        point[0] += 0.125
+
+
+@pytest.mark.parametrize("change", [refined, shifted])
+@pytest.mark.parametrize("name", READ)
+def test_a_mesh_that_was_changed_after_solving_is_told(name, change, tmp_path):
+    """The bound answered for other elements, the estimate ended in a product of matrices."""
+    solution = solve(two_blocks(), maxh=0.5, order=2)
+    pressure, vertices = solution.pressure.copy(), solution.mesh.nv
+    change(solution.mesh)
+    with pytest.raises(RuntimeError, match=f"changed after solving: {vertices} vertices then"):
+        READ[name](solution, tmp_path)
+    assert not list(tmp_path.iterdir())
+    np.testing.assert_array_equal(solution.pressure, pressure)  # what was read stays
+
+
+def test_what_was_estimated_before_a_mesh_is_changed_stays():
+    solution = solve(two_blocks(), maxh=0.5, order=2)
+    estimate, bound, energy = solution.error_estimate, solution.error_bound, solution.energy
+    refined(solution.mesh)
+    assert (solution.error_estimate, solution.error_bound) == (estimate, bound)
+    assert solution.energy == energy
+    with pytest.raises(RuntimeError, match="changed after solving"):
+        solution.quantities()

@@ -39,6 +39,7 @@ def _scaled_energy(
     u = u / size
     energy = float(u @ (space.A @ u))
     if energy <= CANCELLED * float(space.diagonal @ u**2):
+        space.require_mesh()
         model = model_of(problem)
         e, energy = model.strain(displacement) / size, 0.0
         for body, law in problem.materials.items():

@@ -63,6 +63,18 @@ class Space:
         """Diagonal of A, (2N,), force per displacement and unit thickness."""
         return np.asarray(self.A.diagonal())
 
+    def require_mesh(self) -> None:
+        """Raise a RuntimeError where the mesh was changed in place, so that no data fit it."""
+        here = Triangulation(self.V.mesh).vertices
+        if not np.array_equal(here, self.vertices):
+            moved = (
+                "other places of them" if len(here) == len(self.vertices) else f"{len(here)} now"
+            )
+            raise RuntimeError(
+                f"the mesh was changed after solving: {len(self.vertices)} vertices then, {moved}; "
+                "solve again, or refine a copy, ngsolve.Mesh(mesh.ngmesh.Copy())"
+            )
+
     def stiffness(self) -> Array:
         """Force per displacement of the nodes, (n,), by its order of magnitude."""
         diagonal = self.basis.power(2).T @ self.diagonal

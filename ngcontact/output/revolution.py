@@ -68,6 +68,7 @@ def _grid(solution: SolutionData, angle: float) -> pyvista.UnstructuredGrid:
     """The wedges with their fields."""
     import pyvista
 
+    components = full_stress(solution)
     order = max(solution.mesh.GetCurveOrder(), solution.order)
     nodes = nodes_of(solution.mesh, order)
     triangles = nodes.cells[:, subdivision(order)[0]].reshape(-1, 3)
@@ -81,7 +82,7 @@ def _grid(solution: SolutionData, angle: float) -> pyvista.UnstructuredGrid:
     kinds = np.full(len(wedges), VTK_WEDGE, dtype=np.uint8)
     grid = pyvista.UnstructuredGrid(cells, kinds, _turned(place, turns))
     grid.point_data["displacement"] = _turned(nodes.values(ng.CF((u[0], u[1]))), turns)
-    rr, zz, rz, hoop = nodes.values(full_stress(solution)).T
+    rr, zz, rz, hoop = nodes.values(components).T
     grid.point_data["stress"] = np.tile(np.column_stack([rr, zz, hoop, rz]), (sections, 1))
     for k, component in enumerate(("rr", "zz", "hoop", "rz")):
         grid.GetPointData().GetAbstractArray("stress").SetComponentName(k, component)

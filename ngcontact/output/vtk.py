@@ -96,6 +96,7 @@ def _bodies(solution: SolutionData) -> pyvista.UnstructuredGrid:
     """Both bodies with their fields as a VTK grid."""
     import pyvista
 
+    components = full_stress(solution)
     order = max(solution.mesh.GetCurveOrder(), solution.order)
     nodes = nodes_of(solution.mesh, order)
     count, size = nodes.cells.shape
@@ -104,7 +105,7 @@ def _bodies(solution: SolutionData) -> pyvista.UnstructuredGrid:
     grid = pyvista.UnstructuredGrid(cells, kinds, nodes.values(ng.CF((ng.x, ng.y, 0))))
     u = solution.displacement
     grid.point_data["displacement"] = nodes.values(ng.CF((u[0], u[1], 0)))
-    stress = nodes.values(full_stress(solution))
+    stress = nodes.values(components)
     grid.point_data["stress"] = stress[:, :3]
     for k, component in enumerate(("xx", "yy", "xy")):
         grid.GetPointData().GetAbstractArray("stress").SetComponentName(k, component)

@@ -54,6 +54,7 @@ class Kept(Protocol):
 def state_of(solution: Kept) -> dict[str, Any]:
     """What a solution is made of again by `restored`, all of it fit to be pickled."""
     discrete, plain = solution.discrete, {"discrete", "displacement"}
+    discrete.space.require_mesh()
     own = {name: getattr(solution, name) for name in _names(solution) if name not in plain}
     own |= {name: vars(solution)[name] for name in MADE if name in vars(solution)}
     arrays = {name: getattr(discrete, name) for name in _names(discrete)}
@@ -95,6 +96,7 @@ def _names(data: Any) -> list[str]:
 def save(solution: Kept, path: str | os.PathLike[str], version: str) -> Path:
     """Write a solution to `path`; see `Readable.save`."""
     target = check_path(path, SUFFIX)
+    solution.discrete.space.require_mesh()
     try:
         data = pickle.dumps(solution)
     except Exception as error:

@@ -103,6 +103,7 @@ class Readable:
         ImportError
             What the extra `notebook` installs is not there.
         """
+        self.discrete.space.require_mesh()
         for package in ("anywidget", "IPython"):
             if find_spec(package) is None:
                 raise ImportError(

@@ -50,6 +50,7 @@ Number = int | float
 
 def record_of(solution: _Recorded) -> dict[str, Number]:
     """A flat dict of numbers; see `Readable.record`."""
+    solution.discrete.space.require_mesh()
     estimated = solution.estimated or solution.adaptive
     row: dict[str, Number] = {
         "order": int(solution.order),

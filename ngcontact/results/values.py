@@ -109,13 +109,13 @@ def values_at(
     """Values at `points`, (..., 2) lengths; see `Readable.at`."""
     if outside not in OUTSIDE:
         raise ValueError(f"outside={outside!r}: choose one of {OUTSIDE}")
-    where = _points(points)
+    where, stress = _points(points), full_stress(solution)
     flat = where.reshape(-1, 2)
     mesh, trace = solution.mesh, solution.discrete.space.trace
     found = _in_bodies(trace, flat, body, outside)
     at = mesh_points(mesh, found.element, found.reference[:, None]).ravel()
     u = solution.displacement
-    read = ng.CF((u[0], u[1], full_stress(solution)))
+    read = ng.CF((u[0], u[1], stress))
     known = np.asarray(read(at)).reshape(-1, 6) if len(at) else np.zeros((0, 6))
     count = np.bincount(found.point, minlength=len(flat))
     sums = [np.bincount(found.point, column, minlength=len(flat)) for column in known.T]

@@ -101,6 +101,7 @@ class Guaranteed:
         """Energies per unit thickness between which L(u) of HH81 (2.6) lies."""
         space, u = self.discrete.space, self.displacement
         if self.problem.force or self.problem.traction:
+            space.require_mesh()
             space = replace(space, f=load_vector(self.problem, space.V, FINE))
         energy = potential_energy(self.problem, space, u)
         noise = ROUND_OFF * (self.energy_norm**2 + abs(energy))

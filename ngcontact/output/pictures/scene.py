@@ -69,6 +69,7 @@ def names_of(solution: SolutionData) -> tuple[tuple[str, str], str]:
 
 def picture(solution: SolutionData, style: Style) -> Scene:
     """Evaluate a solution for the picture."""
+    _ = solution.stress  # refuses a mesh that was changed, whatever field is shown
     mesh, u, scale = solution.mesh, solution.displacement, style.scale
     order = max(mesh.GetCurveOrder(), solution.order)
     if order > 1:  # enough to look smooth on coarse meshes, no more than can be seen on fine ones
