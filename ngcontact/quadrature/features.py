@@ -13,7 +13,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import Any, Literal, TypeAlias
 from weakref import WeakKeyDictionary
 
 import ngsolve as ng
@@ -33,8 +33,13 @@ IN_BODY = 5.2e-3  # between samples of a body, over its extent: discs of radius 
 TURN = 0.3  # angle of their lattice, out of step with edges
 # Samples in windows, each of twice the last and one. Only small ones see features at ends of lines,
 # by reflection: wide ones would take the last half of a wave for one.
-WINDOWS = {"symmetric": (3, 7, 15, 31), "edge": (31, 63, 127, 255)}
-IN_PLANE = (5, 11)  # the same in bodies
+WINDOWS: list[tuple[Literal["symmetric", "edge"], tuple[int, ...]]] = [
+    ("symmetric", (3, 7, 15, 31)),
+    ("edge", (31, 63, 127, 255)),
+]
+# The same in bodies; laws are not integrated on parts of elements that follow them.
+IN_PLANE = {"force": (5, 11), "materials": (5, 11, 23, 47)}
+BESIDE = 4  # samples, half of them on each side
 SATURATED = 1.5  # times what a window loses, from which the next one loses more than a feature
 # Departures that count: of loads relative to their mean size, of laws in their logarithm, of
 # displacements and gaps relative to their range.
@@ -175,21 +180,23 @@ def _told(kind: str, values: Array) -> tuple[Array, float]:
     return values, max(SHARE[kind] * unit, ROUND_OFF * size)
 
 
-def _lost(values: Array, window: int, inside: Mask | None = None, mode: str = "reflect") -> Array:
+def _lost(values: Array, window: int, inside: Mask | None = None) -> Array:
     """What the opening or the closing of `values` in a window of so many samples has lost.
 
-    Along all axes; of the samples `inside`.
+    Along all axes; of the samples `inside`, there but for what is beside values that are kept: the
+    window does not fit into convex corners.
     """
+    again = window if inside is None else window + BESIDE
 
-    def filtered(x: Array, least: bool) -> Array:
+    def filtered(x: Array, size: int, least: bool) -> Array:
         if inside is not None:
             x = np.where(inside, x, np.inf if least else -np.inf)
         for axis in range(x.ndim):
-            x = (minimum_filter1d if least else maximum_filter1d)(x, window, axis)
+            x = (minimum_filter1d if least else maximum_filter1d)(x, size, axis)
         return x
 
-    opened = filtered(filtered(values, least=True), least=False)
-    closed = filtered(filtered(values, least=False), least=True)
+    opened = filtered(filtered(values, window, least=True), again, least=False)
+    closed = filtered(filtered(values, window, least=False), again, least=True)
     return np.maximum(values - opened, closed - values)
 
 
@@ -203,7 +210,7 @@ def _on_line(
     looked = []
     for at, turned in chains:
         ends = np.append(0.0, np.cumsum(view.sizes[at]))
-        n = max(round(ON_LINE * ends[-1] / whole), len(at), WINDOWS["symmetric"][0])
+        n = max(round(ON_LINE * ends[-1] / whole), len(at), WINDOWS[0][1][0])
         t = (np.arange(n) + 0.25 + 0.5 * (GOLDEN * np.arange(n) % 1)) / n * ends[-1]
         looked.append((at, turned, ends, t, _values(function, view, *_on(at, turned, ends, t))))
     _, limit = _told(kind, np.concatenate([one[-1] for one in looked]))
@@ -211,9 +218,10 @@ def _on_line(
         count, vanishes = count + len(t), vanishes and not values.any()
         flagged = np.zeros(len(t), dtype=bool)
         for component in values.T:
-            for mode, windows in WINDOWS.items():
-                longer = np.pad(component, windows[-1], mode)
-                lost = [_lost(longer, window)[windows[-1] : -windows[-1]] for window in windows]
+            for mode, windows in WINDOWS:
+                width = windows[-1]
+                longer = np.pad(component, width, mode)
+                lost = [_lost(longer, window)[width:-width] for window in windows]
                 for now, then in pairwise(lost):
                     flagged |= (now > limit) & (then < SATURATED * now)
         runs = np.flatnonzero(np.diff(np.concatenate([[False], flagged, [False]]).astype(int)))
@@ -282,25 +290,24 @@ def _in_body(
     vanishes, (told, limit) = not values.any(), _told(kind, values)
     inside = np.zeros(shape, dtype=bool)
     inside[i, j] = True
-    flagged = np.zeros(shape, dtype=bool)
+    flagged, windows = np.zeros(shape, dtype=bool), IN_PLANE[kind]
+    wide = windows[-1]
     for component in told.T:
         array = np.full(shape, np.nan)
         array[i, j] = component
         some = np.zeros(shape, dtype=bool)  # a feature is left within half of the smaller window
         for axis in (0, 1):
-            step = np.abs(np.diff(array, axis=axis, append=np.nan)) > limit / IN_PLANE[0]
+            step = np.abs(np.diff(array, axis=axis, append=np.nan)) > limit / windows[0]
             some |= step
         if not some.any():
             continue
-        part = tuple(
-            slice(max(k.min() - IN_PLANE[1], 0), k.max() + IN_PLANE[1] + 2)
-            for k in np.nonzero(some)
-        )
+        part = tuple(slice(max(k.min() - wide, 0), k.max() + wide + 2) for k in np.nonzero(some))
         here = inside[part]
-        now, then = (np.where(here, _lost(array[part], w, here), 0.0) for w in IN_PLANE)
-        # Around convex corners of a part more is lost in the larger window, if not at a sample.
-        around = [uniform_filter(x, 2 * IN_PLANE[1] + 1, mode="constant") for x in (now, then)]
-        flagged[part] |= (now > limit) & (around[1] < SATURATED * around[0])
+        lost = [np.where(here, _lost(array[part], w, here), 0.0) for w in windows]
+        # Around convex corners of a part more is lost in the wide window, if not at a sample.
+        for window, (now, then) in zip(windows[1:], pairwise(lost), strict=True):
+            around = [uniform_filter(x, 2 * window + 1, mode="constant") for x in (now, then)]
+            flagged[part] |= (now > limit) & (around[1] < SATURATED * around[0])
     x = (np.argwhere(flagged) + origin) @ sides
     widths = np.full(len(x), 2 * spacing)
     if kind == "materials" and len(x):
@@ -341,9 +348,10 @@ def _widths(law: ng.CoefficientFunction, mesh: ng.Mesh, places: Array, spacing: 
     known = points["nr"] >= 0
     told = np.zeros(len(x))
     told[known] = _told("materials", np.asarray(law(points[known])))[0][:, 0]
-    told, known = (v.reshape(len(some), MEASURED, 4) for v in (told, known))
-    middle = MEASURED // 2
-    away = np.where(known, np.abs(told - told[:, middle : middle + 1]), 0.0)
+    shape, middle = (len(some), MEASURED, 4), MEASURED // 2
+    table = told.reshape(shape)
+    away = np.abs(table - table[:, middle : middle + 1])
+    away[~known.reshape(shape)] = 0.0
     same = away <= away.max(axis=1, keepdims=True) / 2
     up = np.cumprod(same[:, middle:], axis=1).sum(axis=1)
     down = np.cumprod(same[:, middle::-1], axis=1).sum(axis=1)

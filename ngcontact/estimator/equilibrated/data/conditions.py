@@ -101,7 +101,8 @@ def projected_loads(
         c = np.zeros((len(rough), 2, values.shape[1]))
         np.add.at(c, at, np.einsum("n,ni,nc->nci", weight, values, f))
         rest = f - np.einsum("ni,nci->nc", values, c[at])
-        squares = np.bincount(at, weight * (rest**2).sum(axis=1), len(rough))
+        squares = np.zeros(len(rough))
+        np.add.at(squares, at, weight * (rest**2).sum(axis=1))
         yield segments, c[segments], squares[segments]
 
 
