@@ -31,6 +31,7 @@ from .mesh import curve, first_mesh
 from .one_mesh import check_continuation, solve_on, with_warnings
 from .plausibility import EXACT, at_round_off, contradictions, warn_of_implausible
 from .problem import Problem
+from .quadrature import look, unresolved
 from .results import with_progress
 from .solution import Solution
 
@@ -101,6 +102,7 @@ def adapt(
     refinement = _with_order(plain, order, start)
     truth("progress", progress)
     mesh = first_level(problem, maxh, refinement, start)
+    look(problem, mesh)
     warn_of_implausible(problem, mesh, refinement.order)
     solutions = with_warnings(levels(problem, mesh, refinement, start=start))
     return Run(with_progress(solutions, tolerance, max_dofs) if progress else solutions)
@@ -228,9 +230,10 @@ def levels(
             solution.discrete.systems.forget()
         solution = solve_on(problem, plan.mesh, plan.order, element, solution or start)
         solution = replace(solution, adaptive=True, estimator=estimator, descent=plan.descent)
+        narrow = unresolved(problem, solution.mesh, in_bounds=refinement.guaranteed)
         if refinement.guaranteed:
             refuse_bound(problem, solution.discrete.space.trace, solution.pairs)
-            error, ratio = _bounded(solution, refinement, ratio)
+            error, ratio = (math.inf, ratio) if narrow else _bounded(solution, refinement, ratio)
         yield solution
         if not refinement.guaranteed:
             error = solution.relative_error_estimate
@@ -244,21 +247,28 @@ def levels(
         small = settled(solution.mesh, plan.corners.unresolvable)
         if small.any() and not refinement.guaranteed:  # no mesh makes the estimate less there
             error *= root_of_squares(solution.indicators[~small]) / solution.error_estimate
-        if error <= max(refinement.tolerance or 0.0, EXACT) or at_round_off(
-            problem, solution.discrete.space, solution.displacement, solution.error_estimate
+        if not narrow and (
+            error <= max(refinement.tolerance or 0.0, EXACT)
+            or at_round_off(
+                problem, solution.discrete.space, solution.displacement, solution.error_estimate
+            )
         ):
             return
         now = ratio * solution.relative_error_estimate if refinement.guaranteed else error
         rest = np.where(small, 0.0, solution.indicators)
-        share = (refinement.tolerance or 0.0) / now
-        plan = next_plan(solution, solution.discrete.space.trace, refinement, plan, rest, share)
+        share = (refinement.tolerance or 0.0) / now if now else 1.0
+        seen = np.any([one.elements for one in narrow], axis=0) if narrow else np.zeros_like(small)
+        plan = next_plan(
+            solution, solution.discrete.space.trace, refinement, plan, rest, share, seen
+        )
         if plan.ends or (plan.stuck and not told):
             told = True
             warn_of_limit(solution.discrete.space.trace, ends=plan.ends)
         if plan.ends:
             return
     if solution is not None:
-        _warn_of_missed(solution, refinement, error, outside=bool(small.any()))
+        if not narrow:  # of which there is a warning
+            _warn_of_missed(solution, refinement, error, outside=bool(small.any()))
 
 
 def _warn_of_missed(

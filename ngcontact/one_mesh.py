@@ -11,6 +11,7 @@ from .errors import warn
 from .mesh import check_curves, curve, same_geometry
 from .plausibility import doubt_of_refinement, doubts, estimates_rise
 from .problem import Problem
+from .quadrature import warn_of_unresolved
 from .solution import Solution
 
 
@@ -89,6 +90,8 @@ def warn_of_doubts(solution: Solution, told: set[object], *, last: bool) -> None
         if doubt not in told:
             warn(message)
     told.update(found)
+    if last:
+        warn_of_unresolved(solution.problem, solution.mesh)
 
 
 def with_warnings(solutions: Iterator[Solution]) -> Generator[Solution]:

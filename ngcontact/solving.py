@@ -15,6 +15,7 @@ from .mesh import first_mesh
 from .one_mesh import check_start, solve_on, warn_of_doubts
 from .plausibility import warn_of_implausible
 from .problem import Problem, Triangulation
+from .quadrature import look
 from .solution import Solution
 
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
@@ -72,6 +73,7 @@ def solve(
         check_start(problem, start)
     mesh = first_mesh(problem, maxh) if mesh is None else mesh
     problem.check(mesh)
+    look(problem, mesh)
     if start is None:
         warn_of_implausible(problem, mesh, order)
     coarse = _coarse_run(problem, mesh, order, element) if start is None else []

@@ -9,7 +9,7 @@ from typing import Protocol
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, root_of_squares
+from ..arrays import Array, Mask, root_of_squares
 from ..contact import ContactState
 from ..fem import BoundaryTrace, unknowns
 from ..mesh import curve, diameters, unresolved
@@ -89,13 +89,14 @@ def next_plan(
     last: Plan,
     indicators: Array,
     share: float,
+    narrow: Mask,
 ) -> Plan:
     """The level after `solution`, planned until a `share` of its error is left.
 
     By its `indicators` (ne,), but for those that no mesh makes less. Marked are Doerfler's
     elements and those in which contact ends, known to the square of their size as the energy is to
     that of the relative error. Elements in which moduli jump are refined together, and nothing is
-    forecast. `trace` is that of the mesh.
+    forecast. `trace` is that of the mesh; in elements `narrow` (ne,) data are narrower than these.
     """
     if not indicators.any():
         indicators = solution.indicators
@@ -107,12 +108,12 @@ def next_plan(
     if (marked & limit).any():  # for ever: the others are refined instead
         marked |= doerfler(np.where(limit, 0.0, indicators), theta)
     marked = together(marked, jumping, diameters(mesh))
-    marked |= at_ends(trace, solution.pairs, size)
+    marked |= at_ends(trace, solution.pairs, size) | narrow
     stuck, marked = bool((marked & limit).any()), marked & ~limit
     if not marked.any():
         return replace(last, ends=True)
 
-    error = root_of_squares(indicators)
+    error = root_of_squares(indicators) or 1.0
     most = refinement.growth if refinement.tolerance is None else refinement.growth**2
     growth = max(last.growth / 2, 1.0) if error > WRONG * last.error else min(2 * last.growth, most)
     now = unknowns(mesh, order, refinement.element)

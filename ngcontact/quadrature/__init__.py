@@ -1,6 +1,11 @@
 """Quadrature that follows the data: where functions are rough, and rules that resolve them."""
 
+from .constant_data import numbers as numbers
+from .doubts import Unresolved as Unresolved
+from .doubts import unresolved as unresolved
 from .doubts import warn_of_data as warn_of_data
+from .doubts import warn_of_unresolved as warn_of_unresolved
+from .features import look as look
 from .integrals import integral_over as integral_over
 from .jumps import jumping_moduli as jumping_moduli
 from .jumps import steps_on as steps_on
@@ -13,7 +18,6 @@ from .loads import RoughLoad as RoughLoad
 from .loads import keep_rough_load as keep_rough_load
 from .loads import known_rough_load as known_rough_load
 from .loads import moment_degree as moment_degree
-from .loads import numbers as numbers
 from .loads import rough_load as rough_load
 from .values import pieces as pieces
 from .values import rough_segments as rough_segments

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
-from weakref import WeakKeyDictionary
 
 import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two
 from .cells import Cells, following
+from .constant_data import numbers
+from .features import features_in, touched, towards
 from .lattice import beside_edges, monomials
 from .view import View, looked_at
 
@@ -20,18 +20,13 @@ SHARE = {
     2: 2e-3,
 }  # ... or over an element, relative to its integral, at which it is rough there
 STEP = 2  # times what values vary at the points: no others are further apart in smooth functions
-LONG = 4000  # of what is printed; numbers are short
-KNOWN: WeakKeyDictionary[ng.CoefficientFunction, bool] = WeakKeyDictionary()  # numbers or not
 KEPT = "_ngcontact_loads"  # attribute of a mesh
+COARSE = 4  # elements in the width of a feature, from which it is looked at as all else is
 CURVED = 4  # quadrature orders for the maps of curved elements
 FINE = {1: 1e-6, 2: 3e-5}  # error of a part relative to that integral at which it is not halved
-# What NGSolve prints of numbers, also times others and times the normal.
-NUMBER = r"[-+.\de]+"
-NUMBERS = re.compile(
-    rf"ZeroCoefficientFunction|\s*({NUMBER}\*\()?"
-    rf"(coef (unary operation ' '|VectorialCoefficientFunction|ZeroCF|{NUMBER}|"
-    rf"scale {NUMBER}|scalar-vector multiply|normal vector), real(, dim=\d+)?)?\s*\)?\s*"
-)
+
+
+NO_FEATURES = np.empty((0, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +47,8 @@ class RoughLoad:
         Integral of the load's size, a force.
     seen : int
         Tells the values from which it was found rough.
+    cells : Cells
+        Parts of the rough elements on which a rule integrates the load.
     """
 
     rough: Mask
@@ -60,6 +57,7 @@ class RoughLoad:
     missed: Array
     total: float
     seen: int
+    cells: Cells
 
 
 def moment_degree(order: int) -> int:
@@ -67,20 +65,12 @@ def moment_degree(order: int) -> int:
     return max(order, 2) + 1
 
 
-def numbers(data: ng.CoefficientFunction) -> bool:
-    """Whether data are made of numbers alone: these are nowhere rough. Looked at once."""
-    if data not in KNOWN:  # printing a long expression costs as much as evaluating it
-        text = str(data)
-        lines = text.splitlines() if len(text) < LONG else [text]
-        KNOWN[data] = len(text) < LONG and all(map(NUMBERS.fullmatch, lines))
-    return KNOWN[data]
-
-
 def rough_load(
     load: ng.CoefficientFunction,
     region: ng.Region,
     degree: int,
     known: RoughLoad | None = None,
+    features: Array = NO_FEATURES,
 ) -> RoughLoad | None:
     """A load on a region, bodies or boundaries, where it is rough; None where it is nowhere.
 
@@ -94,14 +84,21 @@ def rough_load(
         Of the polynomials with the same moments.
     known : RoughLoad, optional
         What was found of it before, returned where nothing has changed.
+    features : ndarray (k, 3)
+        Places and widths of narrow features, lengths.
     """
     view = View(region.mesh, 2 if region.VB() == ng.VOL else 1)
     inside = view.inside(region)
     rough, total, seen = _rough(load, view, inside)
+    near, feature = touched(features, view, inside, 1.0)
+    rough[near[view.sizes[near] > features[feature, 2] / COARSE]] = True
+    seen = hash((seen, features.tobytes()))
     if not rough.any() or (known is not None and known.seen == seen):
         return known if rough.any() else None
     rough = view.with_neighbours(rough, inside)  # a part of a feature may have none of the points
     start = view.in_parts(np.flatnonzero(rough))
+    if len(features):
+        start = towards(features, start, view)
 
     def density(elements: Index, reference: Array) -> Array:
         values = view.evaluate(load, elements, reference)
@@ -112,7 +109,7 @@ def rough_load(
     missed = np.bincount(cells.element, over, len(rough)).astype(float)
     order = np.argsort(cells.element, kind="stable")
     projection, rest = _projected(values[order], view, cells[order], degree)
-    return RoughLoad(rough, projection, rest, missed, total, seen)
+    return RoughLoad(rough, projection, rest, missed, total, seen, cells)
 
 
 def known_rough_load(
@@ -142,7 +139,7 @@ def keep_rough_load(
     key = (id(data), str(region.VB()), bytes(np.array(region.Mask())), degree)
     kept, count = getattr(region.mesh, KEPT, {}), region.mesh.GetNE(region.VB())
     before = kept[key][2] if key in kept and kept[key][:2] == (data, count) else None
-    found = rough_load(load, region, degree, before)
+    found = rough_load(load, region, degree, before, features_in(data))
     kept[key] = (data, count, found)
     setattr(region.mesh, KEPT, kept)
     return found

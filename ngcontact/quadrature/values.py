@@ -9,8 +9,8 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask
 from .cells import following, whole
+from .constant_data import numbers
 from .lattice import divisions, extent
-from .loads import numbers
 from .view import View, looked_at
 
 ENOUGH = 8  # points on a segment at least, which show any interpolation error

@@ -58,7 +58,7 @@ from .pressures import (
     zone_of,
 )
 from .proofs import Norms, Proof, sampled_stress
-from .refusals import refuse_bound
+from .refusals import refuse_bound, refuse_narrow
 from .remainders import asked_tractions, missed_tractions
 from .stress import SETTLED, ContactPressure, EquilibratedStress, settled
 from .stresses import bubble_norms
@@ -89,6 +89,7 @@ def error_bound(
         Loads that no pressure balances, or no equilibrated stress.
     """
     refuse_bound(problem, boundary, pairs)
+    refuse_narrow(problem, boundary)
     data, degree = (problem, boundary, displacement, stress, pairs), degree_for(boundary)
     found = _with_ends(*data, degree)
     if found.parts["curves"] <= MOSTLY * found.bound**2:

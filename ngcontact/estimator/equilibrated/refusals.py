@@ -9,6 +9,7 @@ import numpy as np
 from ...contact import ContactState
 from ...fem import BoundaryTrace
 from ...problem import Problem
+from ...quadrature import unresolved
 from .data import bent_segments, turning_guides
 
 
@@ -53,3 +54,15 @@ def refuse_bound(problem: Problem, boundary: BoundaryTrace, pairs: Sequence[Cont
                 f"{no_bound} segments that face an obstacle in part, as on "
                 f'"{line.contact.secondary}"'
             )
+
+
+def refuse_narrow(problem: Problem, boundary: BoundaryTrace) -> None:
+    """Raise where data are narrower than the elements on which the bound looks at them.
+
+    Raises
+    ------
+    ValueError
+        The first function, with place and width.
+    """
+    for one in unresolved(problem, boundary.mesh, in_bounds=True):
+        raise ValueError(f"no guaranteed bound is known where {one}; refine the mesh there")

@@ -12,6 +12,7 @@ from ....arrays import Array, Index, Mask
 from ....fem import BoundaryTrace
 from ....lagrange import gauss
 from ....problem import Problem
+from ....quadrature import known_rough_load, moment_degree
 from .balance import ROUND_OFF, balance_of
 from .curves import bent_segments, turning_guides
 from .partition import Partition
@@ -80,17 +81,29 @@ def projected_loads(
         Means of the squares of what these miss.
     """
     rule, w = gauss(2 * degree + DATA_BONUS)
-    values = legendre_values(degree - 1 + HIGHER, rule)
     for pattern in problem.traction:  # (3.7)
-        segments = boundary.segments(pattern)
-        at, s = np.repeat(segments, len(rule)), np.tile(rule, len(segments))
-        P = boundary.evaluate(problem.traction_vector(pattern), at, s)
+        segments, P = boundary.segments(pattern), problem.traction_vector(pattern)
+        region = boundary.mesh.Boundaries(pattern)
+        found = known_rough_load(
+            problem.traction[pattern], P, region, moment_degree(boundary.order)
+        )
+        rough = np.zeros(len(boundary.region), dtype=bool) if found is None else found.rough
+        smooth = segments[~rough[segments]]
+        at, s = np.repeat(smooth, len(rule)), np.tile(rule, len(smooth))
+        weight = np.tile(w, len(smooth))
+        if found is not None:  # points that see what the usual ones may not
+            at = np.append(at, np.repeat(found.cells.element, found.cells.weights.shape[1]))
+            s = np.append(s, 1 - found.cells.points[..., 0])  # NGSolve's parameter
+            weight = np.append(weight, found.cells.weights)
+        values = legendre_values(degree - 1 + HIGHER, s)
         ds = np.linalg.norm(boundary.derivative(at, s), axis=1) / boundary.lengths(at)
-        P = P * (ds * boundary.measure(at, s))[:, None]
-        P = P.reshape(len(segments), -1, 2)
-        c = np.einsum("q,qi,jqc->jci", w, values, P)
-        rest = P - np.einsum("qi,jci->jqc", values, c)
-        yield segments, c, np.einsum("q,jqc->j", w, rest**2)
+        f = boundary.evaluate(P, at, s) * (ds * boundary.measure(at, s))[:, None]
+        c = np.zeros((len(rough), 2, values.shape[1]))
+        np.add.at(c, at, np.einsum("n,ni,nc->nci", weight, values, f))
+        rest = f - np.einsum("ni,nci->nc", values, c[at])
+        squares = np.zeros(len(rough))
+        np.add.at(squares, at, weight * (rest**2).sum(axis=1))
+        yield segments, c[segments], squares[segments]
 
 
 def axis_segments(boundary: BoundaryTrace) -> Index:
