@@ -81,18 +81,6 @@ class Space:
         return diagonal.reshape(2, -1).max(axis=0)
 
 
-def _check_normals(trace: BoundaryTrace, boundary: str) -> None:
-    """Raise unless NGSolve's normals, the direction of pressures, point outwards."""
-    segments = trace.segments(boundary)
-    s = np.full(len(segments), 0.5)
-    normal = trace.evaluate(ng.specialcf.normal(2), segments, s)
-    if ((normal * trace.normal(segments, s)).sum(axis=1) < 0).any():
-        raise ValueError(
-            f'the normals of the boundary "{boundary}" point into the body; its segments must run '
-            "with the body on their left: exchange the ends of each"
-        )
-
-
 def loads_of(problem: Problem, mesh: ng.Mesh) -> list[Load]:
     """The data, the force per volume or area that they are, and the region of each load."""
     forces = [(F, F, mesh.Materials(body)) for body, F in problem.force.items()]
@@ -174,8 +162,6 @@ def assemble(
         for work in model.work(law.voigt(problem.model), u, v):  # (3.1)
             for dx in measures:
                 a += work * dx
-    for boundary in problem.traction:
-        _check_normals(trace, boundary)
     a.Assemble()
     return Space(
         V=V,

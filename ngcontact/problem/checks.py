@@ -166,6 +166,28 @@ def check_pairs(mesh: ng.Mesh, contact: Sequence[Masks]) -> None:
                 )
 
 
+def check_pressures(
+    mesh: ng.Mesh, traction: Masks, loads: Iterable[ng.CoefficientFunction]
+) -> None:
+    """Refuse pressures, one for each mask (r,), on lines inside a body: these have two normals."""
+    pressures = [
+        (label, mask)
+        for (label, mask), load in zip(traction.items(), loads, strict=True)
+        if load.dim == 1
+    ]
+    if not pressures:
+        return
+    view, names = Triangulation(mesh), mesh.GetBoundaries()
+    inner = np.bincount(view.boundaries[_has_two_sides(view)], minlength=len(names)) > 0
+    for label, mask in pressures:
+        if (mask & inner).any():
+            name = names[int(np.argmax(mask & inner))]
+            raise ValueError(
+                f'{label} is a pressure, and "{name}" lies inside a body or between two that are '
+                "glued, where no normal is the outward one: give the traction as a pair"
+            )
+
+
 def _has_two_sides(view: Triangulation) -> np.ndarray:
     """Return which boundary segments (k,) lie between two triangles, bool (k,)."""
     size, ends = len(view.vertices), view.segments

@@ -20,6 +20,7 @@ from .checks import (
     check_laws,
     check_mesh,
     check_pairs,
+    check_pressures,
     kind_of,
     refuse_common,
     regions_of,
@@ -61,8 +62,9 @@ class Problem:
         Gamma_0, u.n = 0 without shear: a name or several. Kept as one pattern, or None.
     traction
         Gamma_tau: per boundary a number or a scalar CoefficientFunction, the pressure p of the
-        traction -p n, or a pair, or a CoefficientFunction of dim 2, in units of stress. Kept as
-        CoefficientFunction of dim 1 or 2; `traction_vector` is the traction itself.
+        traction -p n with the outward normal n of the body, or a pair, or a CoefficientFunction
+        of dim 2, in units of stress. Kept as CoefficientFunction of dim 1 or 2;
+        `traction_vector` is the traction itself.
     force
         F per body and area: a pair or a CoefficientFunction of dim 2, any consistent units.
         Kept as the latter.
@@ -136,9 +138,14 @@ class Problem:
         return table(("", "where", "what"), rows)
 
     def traction_vector(self, pattern: str) -> ng.CoefficientFunction:
-        """Return P of HH81 (3.7) on a key of `traction`, dim 2; a pressure p becomes -p n."""
+        """Return P of HH81 (3.7) on a key of `traction`, dim 2; a pressure p becomes -p n.
+
+        The normal n is that of the element beside a segment, outward whichever way this runs.
+        """
         load: ng.CoefficientFunction = self.traction[pattern]
-        return -load * ng.specialcf.normal(2) if load.dim == 1 else load  # P in (3.7)
+        if load.dim > 1:
+            return load  # P in (3.7)
+        return -load * ng.BoundaryFromVolumeCF(ng.specialcf.normal(2))
 
     def check(self, mesh: ng.Mesh) -> None:
         """Refuse names and data that do not fit a mesh.
@@ -172,6 +179,7 @@ class Problem:
         for sides in contact:
             refuse_common(names, sides, others, "a contact boundary takes no other condition")
         check_pairs(mesh, contact)
+        check_pressures(mesh, traction, self.traction.values())
 
         check_laws(mesh, materials, self.materials.values())
         check_data(mesh, force, self.force.values(), IN_BODIES)
