@@ -43,3 +43,13 @@ def two_threads():
     ng.SetNumThreads(2)
     yield
     ng.SetNumThreads(before)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(config, items):
+    """The rows of a study that are its witness are tests: they keep no mark."""
+    for item in items:
+        study = item.get_closest_marker("study")
+        if study and getattr(item, "callspec", None) is not None:
+            if item.callspec.id in study.kwargs.get("witness", ()):
+                item.own_markers[:] = [m for m in item.own_markers if m.name != "study"]

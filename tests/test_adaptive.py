@@ -196,6 +196,7 @@ def test_hertz_contact_decays_at_the_optimal_rate(order):
 
 
 @pytest.mark.parametrize(("half_width", "order"), [(0.3, 4), (0.05, 3)])
+@pytest.mark.study(witness=["0.3-4"])
 def test_planned_levels_are_few_and_as_good(half_width, order):
     """Energy errors at equal unknowns, against one marking a level."""
     case, most = cases.hertz_contact(half_width=half_width), 10_000
@@ -248,6 +249,7 @@ def test_with_a_tolerance_planning_ends_there():
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.study(witness=["2"])
 def test_warm_starts_leave_few_newton_steps(order):
     for make in (disc, lambda: cases.hertz_contact().problem):
         levels = list(adapt(make(), maxh=0.3, order=order, max_dofs=4000 * order))
@@ -355,6 +357,7 @@ def test_no_load_is_exact_as_well():
         (1, "physical"),
     ],
 )
+@pytest.mark.study(witness=["4-isoparametric", "3-isoparametric", "2-superparametric"])
 def test_no_level_exceeds_the_number_of_unknowns(order, element):
     # Rings: curved edges, on which functions linear in physical coordinates need edge functions.
     problem = cases.ring_in_ring().problem
@@ -565,6 +568,7 @@ def nearly_exact(nu, part):
 
 @pytest.mark.parametrize("nu", [0.3, 0.499999, 0.49999999])
 @pytest.mark.parametrize("order", [2, 3, 4])
+@pytest.mark.study(witness=["2-0.3", "3-0.3", "4-0.3"])
 def test_an_exact_solution_takes_one_level(order, nu):
     """Its estimate is round-off, which grows with kappa / mu: at 5e7 it is 6e-8 of the norm."""
     [solution] = adapt(nearly_exact(nu, 0.0), maxh=0.3, order=order, max_dofs=6000)

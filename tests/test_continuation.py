@@ -106,6 +106,7 @@ def test_two_bodies_with_matched_nodes_stay_matched():
 
 
 @pytest.mark.filterwarnings("ignore:.*segments long")
+@pytest.mark.study
 def test_a_saved_solution_and_one_of_solve_are_starts_too(sequence, tmp_path):
     saved = load(sequence[0][-1].save(tmp_path / "last.ngcontact"))
     again = list(adapt(pressed(0.005), tolerance=1e-3, start=saved))

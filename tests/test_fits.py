@@ -71,6 +71,7 @@ def fit(interference, swap=False, **options):
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("interference", [1e-5, 1e-1])
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
+@pytest.mark.study(witness=["4-0.1-False"])
 def test_press_fits_converge_to_lame(order, interference, swap):
     stress, pressure = exact(interference)
     right = pressure["inner" if swap else "outer"]

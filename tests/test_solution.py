@@ -240,6 +240,7 @@ def test_an_unwritable_path_is_refused_before_any_work(tmp_path, name):
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.study(witness=["B-1", "S9-2", "S9-1"])
 def test_optimality_conditions(name, order):
     solution = solve(PROBLEMS[name](), maxh=0.4, order=order)
     assert max(solution.residuals.values()) < EXACT
@@ -254,6 +255,7 @@ def test_optimality_conditions(name, order):
 
 @pytest.mark.parametrize("order", [1, 4])
 @pytest.mark.parametrize("name", SIDES)
+@pytest.mark.study(witness=["B-1", "B-4", "S9-4"])
 def test_every_body_is_in_equilibrium(name, order):
     problem = PROBLEMS[name]()
     solution = solve(problem, maxh=0.4, order=order)
@@ -276,6 +278,7 @@ def test_every_body_is_in_equilibrium(name, order):
 
 @pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.study(witness=["S9-1", "stack-3", "disc-1"])
 def test_energy_identity(name, order):
     """Work of loads, supports and gaps: u'Au = f'u + r'u - g'force, r the nodal reactions."""
     solution = solve(PROBLEMS[name](), maxh=0.4, order=order)
@@ -419,6 +422,7 @@ def test_full_contact_takes_one_system():
 
 @pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize("name", ["S1", "S7", "S9", "B", "polygon"])
+@pytest.mark.study(witness=["S9-1", "B-1", "S9-3"])
 def test_secondary_and_primary_may_be_swapped_on_matched_lines(name, order):
     problem = PROBLEMS[name]()
     [contact] = problem.contact
@@ -428,6 +432,7 @@ def test_secondary_and_primary_may_be_swapped_on_matched_lines(name, order):
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.study(witness=["3"])
 def test_secondary_and_primary_may_be_swapped_with_a_direction(order):
     problem = cases.hertz_contact().problem
     [contact] = problem.contact

@@ -65,6 +65,7 @@ def over_a_slot(width, middle, pairs):
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("primaries", [["a_top|b_top"], ["a_top", "b_top"]])
+@pytest.mark.study(witness=["primaries0-True-1", "primaries0-False-1", "primaries0-False-2"])
 def test_a_slot_of_any_width_leaves_pressures_right(order, swap, primaries):
     """Nodes at one end of a narrow slot only, at both of a wide one, inside the widest."""
     pairs = [("plate_bottom", name)[:: -1 if swap else 1] for name in primaries]
@@ -101,6 +102,13 @@ LINES = {  # nodes of the upper and of the lower line
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("lines", LINES)
+@pytest.mark.study(
+    witness=[
+        "refined in one place-False-1",
+        "refined in one place-True-1",
+        "only the lower one refined-True-1",
+    ]
+)
 def test_meshes_as_given_are_exact(lines, swap, order):
     """Pressures of degree p - 1, whichever side has more nodes."""
     case = cases.pressure_patch(p1=0.0 if order == 1 else 0.5)
@@ -140,6 +148,7 @@ def test_an_overhang_of_a_mesh_as_given_is_exact(order, end):
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("direction", [None, (0.0, -1.0)])
+@pytest.mark.study(witness=["direction1-1"])
 def test_round_off_at_corners_decides_nothing(order, direction):
     """A block whose sides belong to its secondary: at its corners these graze the plate."""
 
@@ -206,6 +215,7 @@ def pin_in_hole(clearance, swap, touching, settle=-0.02):
 
 
 @pytest.mark.parametrize(("clearance", "touching"), [(1e-3, False), (1e-5, True)])
+@pytest.mark.study(witness=["0.001-False"])
 def test_pins_do_not_depend_on_orders_and_roles(clearance, touching):
     """Force and peak of order 1 within 2 and 6 %, of order 2 within 0.1 and 0.3 % of order 3.
 
@@ -296,6 +306,7 @@ VEE_PAIRS = {
 
 @pytest.mark.parametrize("maxh", [0.4, 0.23])
 @pytest.mark.parametrize("pairs", VEE_PAIRS)
+@pytest.mark.study(witness=["disc, both-0.4", "disc, both-0.23", "disc-0.4"])
 def test_both_curves_have_a_node_where_they_touch(pairs, maxh):
     """And feel a settlement to which nodes beside it, .02 apart, were blind without a word.
 
@@ -347,6 +358,7 @@ def test_what_a_mesh_as_given_does_not_see_is_told(pairs, order, modulus):
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 @pytest.mark.parametrize("settle", [-0.01, -0.05])
+@pytest.mark.study(witness=["-0.01-1", "-0.01-2"])
 def test_overlaps_between_points_in_contact_are_not_told(settle, order):
     """Of O(h^2) where a single point touches, up to 0.12 of the peak in these scenes."""
     for pairs in ("disc, both", "flanks"):

@@ -42,6 +42,7 @@ def test_what_is_not_asked_for_is_not_done():
     assert solution.work["estimates"] == 1
 
 
+@pytest.mark.study
 def test_a_cold_start_factorises_twice_at_most():
     problem = cases.disc_on_rigid_plane()
     for order in (1, 2):
@@ -52,6 +53,7 @@ def test_a_cold_start_factorises_twice_at_most():
         assert solution.work["factorizations"] <= 2
 
 
+@pytest.mark.study
 def test_a_large_cold_start_follows_a_coarse_run():
     problem = cases.disc_on_rigid_plane()
     mesh = uniform_mesh(problem, 2, 30_000)
@@ -68,6 +70,7 @@ def test_a_large_cold_start_follows_a_coarse_run():
     np.testing.assert_allclose(u, v, rtol=0, atol=1e-10 * np.abs(v).max())
 
 
+@pytest.mark.study
 def test_levels_are_factorised_once():
     for order in (1, 2, 4):
         levels = list(adapt(two_blocks(), order=order, max_dofs=6000))
@@ -75,6 +78,7 @@ def test_levels_are_factorised_once():
         assert all(s.work["back_solves"] <= 12 for s in levels[2:])  # measured 4 at most
 
 
+@pytest.mark.study
 def test_the_mesh_of_a_size_has_it():
     for order in (1, 2, 4):
         mesh = uniform_mesh(two_blocks(), order, 10_000)

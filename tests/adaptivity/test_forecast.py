@@ -113,6 +113,7 @@ def test_large_elements_at_ends_of_contact_are_marked():
         (lambda: cases.hertz_contact().problem, None),
     ],
 )
+@pytest.mark.study(witness=["partly_opening_block-2", "partly_opening_block-None"])
 def test_estimates_are_as_forecast(monkeypatch, make, order):
     """From the second level on: the first mesh may be too coarse to see its error."""
     forecasts, estimates = [], []

@@ -26,6 +26,7 @@ ORDERS = [1, 2, 3, 4]
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("ratio", RATIOS)
 @pytest.mark.parametrize(("slope", "order"), [(0.0, 1), *((0.5, p) for p in (2, 3, 4))])
+@pytest.mark.study(witness=["0.0-1-ratio3-True", "0.0-1-ratio0-False", "0.0-1-ratio3-False"])
 def test_pressures_of_degree_p_minus_1_are_exact(slope, order, ratio, swap):
     case = cases.pressure_patch(p1=min(slope, 0.5))
     solution = solve(pressed(case, ratio, swap), maxh=0.5, order=order)
@@ -150,6 +151,7 @@ def test_rings_converge_at_the_best_rates(order):
 
 
 @pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.study(witness=["2"])
 def test_no_worse_than_matched_meshes_of_the_coarser_spacing(order):
     errors = []
     for ratio in ((16, 24), (16, 16)):

@@ -234,6 +234,7 @@ def test_an_end_stays_next_to_the_last_active_point():
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.study(witness=["2"])
 def test_transition_of_two_blocks(order):
     # S1: the gap ~ x^(3/2) closes at the origin. Spacing of the points: 0.125 / order.
     solution = solve(cases.one_transition().problem, maxh=0.13, order=order)
@@ -244,6 +245,7 @@ def test_transition_of_two_blocks(order):
 
 
 @pytest.mark.parametrize(("order", "allowed"), [(1, 1e-2), (2, 2.5e-3), (3, 2e-3)])
+@pytest.mark.study(witness=["3-0.002"])
 def test_half_width_of_hertz_contact(order, allowed):
     # S3, a = 0.3; measured 1.8e-3, 1.2e-3 and 7e-4 of a.
     *_, solution = adapt(cases.hertz_contact().problem, maxh=0.28, order=order, max_dofs=4000)

@@ -136,6 +136,7 @@ def with_imbalance(problem, share):
 
 
 @pytest.mark.parametrize(("order", "meshes"), [(1, 40)])
+@pytest.mark.study
 def test_loads_with_kinks_and_infinite_slopes_are_in_equilibrium_on_any_mesh(order, meshes):
     """S7 on 40 meshes: its own imbalance is none, what rules leave of its load reaches 1e-3.
 
@@ -153,6 +154,7 @@ def test_loads_with_kinks_and_infinite_slopes_are_in_equilibrium_on_any_mesh(ord
 
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize(("order", "maxh"), [(1, 0.26), (2, 0.477), (4, 0.2)])
+@pytest.mark.study(witness=["1-0.26-1", "1-0.26--1", "4-0.2--1"])
 def test_a_small_imbalance_of_such_loads_is_refused(order, maxh, sign):
     """Also where the rules of V_h leave a hundred times as much, of either sign."""
     problem = with_imbalance(cases.guided_transition().problem, sign * IMBALANCE)

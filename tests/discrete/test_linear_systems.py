@@ -50,6 +50,7 @@ def same(one: Solution, other: Solution) -> None:
 
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("name", REFINED)
+@pytest.mark.study(witness=["disc-3"])
 def test_solutions_are_those_of_a_factor(large, name: str, order: int):
     problem = REFINED[name]
     mesh = uniform_mesh(problem, order, 6000)
@@ -63,6 +64,7 @@ def test_solutions_are_those_of_a_factor(large, name: str, order: int):
 @pytest.mark.usefixtures("large", "two_threads")
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", REFINED)
+@pytest.mark.study(witness=["disc-2"])
 def test_two_threads_find_what_one_finds(name: str, order: int):
     problem = REFINED[name]
     mesh = uniform_mesh(problem, order, 6000)
@@ -78,6 +80,7 @@ def test_two_threads_find_what_one_finds(name: str, order: int):
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", REFINED)
+@pytest.mark.study(witness=["disc-2", "block-2"])
 def test_adaptive_meshes(large, name: str, order: int):
     *_, solution = adapt(REFINED[name], order=order, max_dofs=6000)
     assert solution.work["factorizations"] == 0

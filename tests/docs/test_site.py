@@ -23,6 +23,7 @@ BLOCKS = [
 ]
 BY_THE_SITE = ("docs/howto/pandas.md",)  # needs pandas
 BY_OTHER_TESTS = ("README.md", "docs/results.md")  # with their figures
+SLOW = ("docs/tutorials/own_geometry.md", "docs/howto/two_round_bodies.md")  # by `make studies`
 
 # What a page that is no program of its own takes for granted.
 PRESS = """
@@ -112,7 +113,12 @@ def run(tmp_path_factory) -> Callable[[Block], None]:
 
 
 @pytest.mark.parametrize(
-    "block", [b for b in BLOCKS if not b.page.startswith((*BY_THE_SITE, *BY_OTHER_TESTS))], ids=str
+    "block",
+    [
+        pytest.param(b, id=str(b), marks=[pytest.mark.study] if b.page in SLOW else [])
+        for b in BLOCKS
+        if not b.page.startswith((*BY_THE_SITE, *BY_OTHER_TESTS))
+    ],
 )
 def test_block_runs(block, run):
     run(block)

@@ -26,6 +26,7 @@ def levels(name, strategy, order, unknowns):
 
 @pytest.mark.parametrize("name", ["one transition", "hertz a=0.3"])
 @pytest.mark.parametrize(("order", "unknowns"), [(1, 8000), (2, 12_000), (3, 40_000)])
+@pytest.mark.study(witness=["2-12000-hertz a=0.3"])
 def test_optimal_rates(name, order, unknowns):
     _, rows = levels(name, "adaptive", order, unknowns)
     # N^(-p/2), over the last factor 10 in N, which must not reach back to the first meshes of 2000
@@ -41,6 +42,7 @@ def test_uniform_refinement_is_slower_at_order_2():
 
 @pytest.mark.parametrize("name", ["one transition", "hertz a=0.3", "hertz a=0.05"])
 @pytest.mark.parametrize(("order", "unknowns"), [(1, 8000), (2, 12_000)])
+@pytest.mark.study(witness=["2-12000-hertz a=0.05"])
 def test_effectivity(name, order, unknowns):
     _, rows = levels(name, "adaptive", order, unknowns)
     effectivities = np.array([row.effectivity for row in rows])[2:]
@@ -94,6 +96,7 @@ def test_newton_steps_and_factorisations(name):
         assert all(s.work["factorizations"] == 1 for s in solutions[1:])
 
 
+@pytest.mark.study
 def test_punch_regains_the_rate():
     """Corner r^(-1/2): N^-1/4 uniformly, N^-1/2 adaptively, both of order 1."""
     study = STUDIES["flat punch"]()
@@ -123,6 +126,7 @@ def test_elements_follow_the_optimal_density():
     assert 0.023 < np.mean(shares) < 0.092  # within a factor 2 of the optimum
 
 
+@pytest.mark.study
 def test_driver_writes_rows_and_pictures(tmp_path, capsys):
     sizes = {"max_dofs": 2000, "reference": 6000}
     rows = main(["disc on rigid plane"], orders=(1, 2), **sizes, out=tmp_path)
@@ -154,6 +158,7 @@ def test_problem_a_references():
     assert abs(solution.energy / 5.221032e-4 - 1) < 2e-6
 
 
+@pytest.mark.study
 def test_effectivity_on_curves():
     """By stresses: the same band as against exact solutions on straight lines."""
     study = STUDIES["disc on rigid plane"]()

@@ -64,6 +64,7 @@ def test_active_set_finds_the_references(name: str):
 
 
 @pytest.mark.parametrize("name", COMMON)
+@pytest.mark.study(witness=["disc"])
 def test_large_penalties_find_the_references(name: str):
     runs = list(ngsolve_penalty.runs(COMMON[name], ["graded"], [1000]))
     assert [run.order for run in runs] == [1, 1, 1, 2, 2, 2]
@@ -140,6 +141,7 @@ def test_a_missing_package_is_named():
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", COMMON)
+@pytest.mark.study(witness=["block-2"])
 def test_energy_converges_on_graded_meshes(name: str, order: int):
     meshes = [made(COMMON[name], "graded", order, size) for size in (500, 2000, 8000)]
     runs = [ngsolve_active_set.run(COMMON[name], "graded", order, mesh) for mesh in meshes]
@@ -169,6 +171,7 @@ def test_references_are_those_of_the_package(name: str):
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("name", COMMON)
+@pytest.mark.study(witness=["block-uniform-2", "disc-uniform-2", "disc-uniform-1"])
 def test_meshes_have_the_size_asked_for(name: str, kind: str, order: int):
     for size in (1000, 20_000):  # the larger ones are refined after meshing
         mesh = made(COMMON[name], kind, order, size)
@@ -227,6 +230,7 @@ def test_forces_of_a_uniform_strain():
     assert np.abs(force[inside]).max() < 1e-12 * np.abs(force).max()
 
 
+@pytest.mark.study
 def test_large_problems_take_the_path_asked_for():
     usual = MULTIGRID.large
     rows = [large.measure("block", 1, 20_000, path) for path in large.PATHS]
@@ -244,6 +248,7 @@ def test_small_problems_do_not_stay_iterative():
         large.measure("block", 1, 1000, "iterative")
 
 
+@pytest.mark.study
 def test_driver_writes_the_parts_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     found = main(["tax"], problems=["block"], rounds=1, max_dofs=10_000, out=tmp_path)
     assert list(found) == ["tax"]
@@ -260,6 +265,7 @@ def test_every_part_has_its_name():
     assert get_args(Part) == tuple(PARTS)
 
 
+@pytest.mark.study
 def test_one_size_grows_by_no_exponent():
     rows = [growth.measure("block", 1, 1000, kind) for kind in ("linear", "contact")]
     assert "exponent" not in of_growth(rows)
@@ -277,6 +283,7 @@ def test_every_stage_of_a_level_is_found():
     assert {pair for functions in stages.STAGES.values() for pair in functions} <= defined
 
 
+@pytest.mark.study
 def test_stages_fill_a_level():
     if sys.version_info < (3, 12):
         found = stages.stages(COMMON["block"], 1000).seconds

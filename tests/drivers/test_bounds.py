@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import csv
 
+import pytest
+
 from drivers.bounds import main
 
 
+@pytest.mark.study
 def test_bounds_are_measured_and_drawn(tmp_path, capsys):
     rows = main(["one transition"], orders=[2], max_dofs=1500, out=tmp_path)
     said = capsys.readouterr().out.splitlines()

@@ -110,6 +110,16 @@ def cases_of(scenes, orders):
     ]
 
 
+@pytest.mark.study(
+    witness=[
+        "transition-1",
+        "hertz-2",
+        "dual rows-1",
+        "dual rings-2",
+        "cylinders-2",
+        "shrink fit-2",
+    ]
+)
 @pytest.mark.parametrize(
     ("scene", "order"),
     cases_of(SCENES, [1, 2, 3]) + cases_of(BENT, [2, 3]) + cases_of(REVOLVED, [1, 2]),
@@ -176,6 +186,7 @@ TAMPERED = {
 
 
 @pytest.mark.parametrize("name", TAMPERED)
+@pytest.mark.study(witness=["an inverted triangle", "a pressure", "not a number"])
 def test_tampered_certificates_fail(name, saved, tmp_path, capsys):
     path, arrays, _ = saved
     assert check_certificate.check(path)

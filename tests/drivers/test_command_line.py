@@ -139,6 +139,7 @@ def test_the_list_is_a_command(tmp_path):
 
 
 @pytest.mark.parametrize("name", HELP)
+@pytest.mark.study(witness=["stress"])
 def test_help_states_units_and_defaults_and_runs_nothing(name, tmp_path):
     done = python(tmp_path, f"drivers.{name}", "--help")
     assert done.returncode == 0
@@ -178,6 +179,7 @@ def test_names_with_spaces():
     assert given == {"studies": words[:2], "out": Path("here")}
 
 
+@pytest.mark.study
 def test_numbers_come_back(tmp_path, capsys):
     words = "--radius 0.02 --order 1 --max-dofs 300".split()
     computed, _ = run(hertz.main, [*words, "--out", str(tmp_path / "results")])

@@ -42,6 +42,7 @@ def test_patch_tests_are_exact(name):
         (cases.hertz_contact, 2, 3, 7556, 1.75e-2, 1.5, 0.15),
     ],
 )
+@pytest.mark.study(witness=["one_transition-2-3-7556-0.00181-1.5-0.05"])
 def test_straight_lines(make, order, levels, unknowns, reference, rate, band):
     _, rows = rows_of(make(), order=order, maxh=0.28, levels=levels)
     last = rows[-1]
@@ -68,6 +69,7 @@ def test_straight_lines(make, order, levels, unknowns, reference, rate, band):
         ("theorem 3.5", 1, 0.28, 3),  # 0.53
     ],
 )
+@pytest.mark.study(witness=["theorem 3.3-1-0.24-4"])
 def test_theorems_and_remarks(part, run, maxh, levels):
     table = TABLES[part]
     one = table.runs[run]
@@ -113,6 +115,7 @@ def test_tension_on_the_bilateral_part_only():
     assert np.abs(error[middle]).max() < 0.2  # of pressures from -1 to 1; measured 0.154
 
 
+@pytest.mark.study
 def test_zone_that_parts_on_a_circle():
     """Two ends of contact and the pressure of a unilateral zone that K_h does not lie in."""
     case = paper.opening_ring()
@@ -139,6 +142,7 @@ def test_zlamals_and_the_isoparametric_element_differ():
     assert 1e-3 < errors["physical"] < errors["superparametric"] < 1e-2
 
 
+@pytest.mark.study
 def test_both_lines_curved():
     """Zlamal's element (2.8): first order, and no worse than straight-sided triangles."""
     case = cases.curved_lines()
@@ -187,6 +191,7 @@ def test_mean_rate_of_a_power():
     assert np.isnan(mean_rate(rows[:1]))
 
 
+@pytest.mark.study
 def test_driver_prints_every_table(capsys):
     """The tables of the driver, on first meshes only."""
     found = convergence.main(levels=2)

@@ -30,6 +30,7 @@ def test_hertz_agrees_with_the_formulas(tmp_path, capsys):
     assert contact["pressure"].max() == computed.peak
 
 
+@pytest.mark.study
 def test_similar_discs_have_the_same_pressure():
     options = {"order": 2, "max_dofs": 2000, "out": None}
     (one, _), (other, formulas) = (hertz.main(radius=r, **options) for r in (0.01, 0.04))

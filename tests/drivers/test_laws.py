@@ -51,6 +51,7 @@ def test_bent_fibres_do_not_stretch():
     np.testing.assert_allclose(stiff, soft, atol=1e-9)  # 1e6 times round-off
 
 
+@pytest.mark.study
 def test_the_study_prints_a_table(capsys):
     found = main(["layers"], contrasts=[1e2], orders=[1], max_dofs=400)
     assert set(found) == {f"layers, 100, order 1, {s}" for s in ("uniform", "adaptive")}

@@ -28,6 +28,7 @@ from tests.quadrature.test_loads import loaded
         (paper.opening_ring, 2, "isoparametric"),
     ],
 )
+@pytest.mark.study(witness=["ring_in_ring-1-physical"])
 def test_as_the_error_against_the_exact_stress(make, order, element):
     case = make()
     *_, finest = adapt(case.problem, order=4, max_dofs=18_000)

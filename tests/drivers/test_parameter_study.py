@@ -11,6 +11,7 @@ from drivers import parameter_study as study
 
 
 @pytest.mark.parametrize("engine", ["processes", "joblib", "dask"])
+@pytest.mark.study
 def test_one_process_and_two_find_the_same(tmp_path, capsys, engine):
     if engine != "processes":
         pytest.importorskip({"joblib": "joblib", "dask": "distributed"}[engine])

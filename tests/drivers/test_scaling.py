@@ -28,6 +28,9 @@ def worst(scene, motion, order, compared=None):
 
 @pytest.mark.parametrize("make", [parting, hertz_scene, disc_scene, cornered])
 @pytest.mark.parametrize(("length", "modulus"), [(1e-9, 1e9), (1e9, 1e9), (1.0, 1e-9)])
+@pytest.mark.study(
+    witness=["1e-09-1000000000.0-cornered", "1e-09-1000000000.0-disc_scene", "1.0-1e-09-cornered"]
+)
 def test_units_do_not_matter(make, length, modulus):
     # Asked for: 1e-10. Measured: 1e-12 and below.
     assert worst(make(), Motion("units", length=length, modulus=modulus), 2) < 1e-10
@@ -35,6 +38,7 @@ def test_units_do_not_matter(make, length, modulus):
 
 @pytest.mark.parametrize("make", [parting, hertz_scene, cornered])
 @pytest.mark.parametrize("load", [1e-300, 1e-170, 1e170, 1e300])
+@pytest.mark.study(witness=["1e-300-cornered", "1e-170-cornered", "1e+300-cornered"])
 def test_loads_of_any_size(make, load):
     """Touching bodies feel the smallest load; squares of the largest do not spoil estimates."""
     assert worst(make(), Motion("load", load=load), 2) < 1e-10
@@ -46,6 +50,7 @@ def test_moduli_of_any_size(modulus):
 
 
 @pytest.mark.parametrize("load", [1e-300, 1e300])
+@pytest.mark.study(witness=["1e-300"])
 def test_adaptive_runs_do_not_depend_on_the_load(load):
     def unknowns(motion):
         problem, *_ = posed(parting(), motion)
@@ -109,12 +114,20 @@ def test_von_mises_stress_of_any_size(size):
     ],
     ids=lambda motion: motion.name,
 )
+@pytest.mark.study(
+    witness=[
+        "numbered otherwise-cornered",
+        "numbered otherwise-disc_scene",
+        "mirrored, turned, numbered otherwise-cornered",
+    ]
+)
 def test_symmetries_of_the_plane(make, motion):
     # Asked for: 1e-9. Measured: 2e-13, and 2e-10 where coordinates are rounded to 1e-12.
     assert worst(make(), motion, 2) < symmetry.SAME
 
 
 @pytest.mark.parametrize("make", [parting, hertz_scene, disc_scene, graph_scene, cornered])
+@pytest.mark.study(witness=["cornered", "disc_scene"])
 def test_swapped_bodies(make):
     """The same pressure, whichever of the matched sides carries the contact points."""
     scene = make()

@@ -45,6 +45,7 @@ def column(finer: float) -> Scene:
     )
 
 
+@pytest.mark.study
 def test_every_kind_passes():
     verdicts = [judged(seed) for seed in SEEDS]
     assert [(v.seed, v.silent) for v in verdicts if v.silent] == []

@@ -42,6 +42,9 @@ PROBLEMS = {  # geometry, bodies, supports, contact, radius of curvature
 
 @pytest.mark.parametrize("order", [2, 3, 4])
 @pytest.mark.parametrize("name", PROBLEMS)
+@pytest.mark.study(
+    witness=["ball on rigid plane-3", "ball on rigid plane-2", "ball on rigid plane-4"]
+)
 def test_hertz_on_full_bodies(name, order):
     """A/R <= .03, at most 6000 unknowns: required .3 %, measured .1 % and .2 %."""
     geometry, laws, displacement, pair, radius = PROBLEMS[name]
@@ -64,6 +67,7 @@ def test_hertz_on_full_bodies(name, order):
     assert solution.pressure.max() == pytest.approx(peak, rel=3e-3)
 
 
+@pytest.mark.study
 def test_the_driver_agrees_with_the_formulas(tmp_path, capsys):
     computed, expected = spheres.main(max_dofs=4500, out=tmp_path)
     # The formulas hold up to O((a/R)^2) = 1e-3; measured 0.05 %.

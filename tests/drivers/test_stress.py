@@ -45,6 +45,7 @@ def test_seeds_draw_other_cases():
 
 
 @pytest.mark.parametrize("name", QUICK)
+@pytest.mark.study
 def test_outcomes(name):
     assert [outcome for outcome in outcomes(name, seed=0) if not outcome.passed] == []
 
@@ -59,6 +60,7 @@ def test_the_exit_status_tells_of_failures(monkeypatch, capsys):
 
 @pytest.mark.parametrize("length", [1e-9, 1.0, 1e9])
 @pytest.mark.parametrize("modulus", [1e-9, 1.0, 1e9])
+@pytest.mark.study(witness=["1.0-1.0"])
 def test_units_change_nothing(length, modulus):
     scene = parting()
     first = solve(posed(scene, Motion("as it is"))[0], order=2)
@@ -73,6 +75,7 @@ def test_units_change_nothing(length, modulus):
 
 
 @pytest.mark.parametrize("seed", [0, 2, 3, 5, 6, 7, 8])  # the quick kinds
+@pytest.mark.study(witness=["0", "7", "3"])
 def test_estimates_of_data_that_hurt(seed):
     assert data.outcome(seed).passed
 

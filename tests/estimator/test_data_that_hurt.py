@@ -51,6 +51,7 @@ SUPPORTS = {
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", SUPPORTS)
+@pytest.mark.study(witness=["a kink-1"])
 def test_supports(name, order):
     # Measured 1.4 to 5.4.
     found, _ = of_levels(replace(loaded(), displacement=SUPPORTS[name]), order)
@@ -67,6 +68,7 @@ GAPS = {
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", GAPS)
+@pytest.mark.study(witness=["a kink-1"])
 def test_bilateral_gaps(name, order):
     gap, stiffness = GAPS[name]
     problem = Problem(
@@ -131,6 +133,7 @@ LOADS = {
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", LOADS)
+@pytest.mark.study(witness=["a strip of shear beside the corner-1", "two strips that cancel-1"])
 def test_loads(name, order):
     data, edges, force = LOADS[name]
     problem = replace(loaded(), **data)
@@ -189,6 +192,7 @@ JUMPS = {
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", JUMPS)
+@pytest.mark.study(witness=["a soft half, 1e-4-1"])
 def test_moduli_that_jump_inside_elements(name, order):
     E, edges = JUMPS[name]
     problem = replace(loaded(traction={"top": (0.3, -1.0)}), materials={"body": Elastic(E, 0.3)})
@@ -214,6 +218,7 @@ SLIPS = {
 
 
 @pytest.mark.parametrize("name", SLIPS)
+@pytest.mark.study
 def test_slips_along_a_curved_zone(name):
     turns, laws, loads = SLIPS[name]
     exact = ring_solution(laws["outer"], laws["inner"], **loads)

@@ -133,6 +133,7 @@ def test_what_hangs_over_is_free_and_no_more(start, stop, swap):
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.study(witness=["3"])
 def test_a_slip_along_a_curved_zone_is_no_gap(order):
     """A ring turned about its centre by 1 while the load strains it by 1e-3: nothing changes.
 
@@ -156,6 +157,7 @@ def test_a_slip_along_a_curved_zone_is_no_gap(order):
 
 
 @pytest.mark.parametrize("turn", [0.1, 1.0])
+@pytest.mark.study(witness=["1.0"])
 def test_the_estimate_of_a_slip_falls_as_the_mesh_size(turn):
     """By the mesh's normals it fell like its root, at order 1."""
     exact = ring_solution(cases.FIRST, cases.SECOND, q0=1e-3)
@@ -213,6 +215,7 @@ def wavy(request):
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
+@pytest.mark.study(witness=["unilateral-2", "bilateral-2", "unilateral-3"])
 def test_gaps_that_nodes_do_not_resolve_are_estimated(wavy, order):
     """Three waves on each segment: measured 2.3 to 3.0."""
     problem, reference = wavy

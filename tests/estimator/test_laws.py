@@ -36,6 +36,7 @@ def levels(case, order, unknowns):
         (graded, 1e6, 2, 5000, 1.9),
     ],
 )
+@pytest.mark.study
 def test_moduli_that_vary_along_the_mesh(make, contrast, order, unknowns, rate):
     errors, estimates, finest, last = levels(make(contrast), order, unknowns)
     assert estimates.min() >= 1
@@ -50,6 +51,7 @@ def test_moduli_that_vary_along_the_mesh(make, contrast, order, unknowns, rate):
     ("order", "unknowns", "stiffness", "angle"),
     [(1, 1200, 1e2, 30), (1, 1200, 1e4, 71), (2, 5000, 1e2, 0), (2, 5000, 1e4, 30)],
 )
+@pytest.mark.study
 def test_stiff_fibres(order, unknowns, stiffness, angle):
     case = pressed_fibres(stiffness, math.radians(angle))
     errors, estimates, finest, rate = levels(case, order, unknowns)

@@ -78,6 +78,7 @@ def layers(k, profile="page"):
 
 @pytest.mark.parametrize("order", [1, 2, 4])
 @pytest.mark.parametrize("k", [4, 8])
+@pytest.mark.study(witness=["4-1", "4-2", "8-1"])
 def test_moduli_finer_than_the_mesh(k, order):
     # Effectivity without the oscillation: .74 at k = 4, .51 at k = 8. Measured 3.8 to 6.8.
     problem, E = layers(k)
@@ -90,6 +91,7 @@ def test_moduli_finer_than_the_mesh(k, order):
 
 @pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.parametrize("profile", ["exponential", "other length", "steep"])
+@pytest.mark.study(witness=["other length-1", "exponential-1", "steep-1"])
 def test_other_moduli_finer_than_the_mesh(profile, order):
     problem, E = layers(6, profile)
     solution = solve(problem, order=order)
@@ -122,6 +124,7 @@ LAWS = [
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("C", LAWS)
+@pytest.mark.study(witness=["C1-1", "C2-1", "C1-2"])
 def test_the_softest_strain_counts(C, order):
     # Under a body force; the shear entry as modulus left 0.11 of the error in the first case.
     problem = replace(pressed(as_function(Hooke(C))), force={BODY: (1.0, -2.0)})

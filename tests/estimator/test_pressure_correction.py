@@ -63,6 +63,7 @@ TOWARDS_INCOMPRESSIBILITY = [
 
 @pytest.mark.parametrize(("nu", "order"), TOWARDS_INCOMPRESSIBILITY)
 @pytest.mark.parametrize("make", [one_transition, hertz_contact])
+@pytest.mark.study(witness=["one_transition-0.4-4", "one_transition-0.4-3"])
 def test_effectivity_towards_incompressibility(make, nu, order):
     problem, exact = make(Elastic(E=1.0, nu=nu), Elastic(E=3.0, nu=nu))
     solution = solve(problem, maxh=0.14 if order < 3 else 0.28, order=order)
@@ -71,6 +72,7 @@ def test_effectivity_towards_incompressibility(make, nu, order):
 
 @pytest.mark.parametrize("nu", [0.499, 0.4999, 0.499999])
 @pytest.mark.parametrize("make", [one_transition, hertz_contact])
+@pytest.mark.study(witness=["one_transition-0.4999"])
 def test_locking_is_not_underestimated(make, nu):
     # Where the error exceeds the solution the contact forces are wrong, too, and effectivities
     # grow: S1 measured 1.3, 2.2, 20; S3, with errors from 110 to 3300 %, 2.2, 6.0, 60.
@@ -82,6 +84,7 @@ def test_locking_is_not_underestimated(make, nu):
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize(("first", "second"), [(0.4999, 0.2), (0.2, 0.4999)])
+@pytest.mark.study(witness=["0.2-0.4999-1"])
 def test_effectivity_where_one_body_is_nearly_incompressible(first, second, order):
     problem, exact = one_transition(Elastic(E=1.0, nu=first), Elastic(E=3.0, nu=second))
     assert 1 <= effectivity(solve(problem, maxh=0.14, order=order), exact) <= 6
@@ -89,6 +92,7 @@ def test_effectivity_where_one_body_is_nearly_incompressible(first, second, orde
 
 @pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.parametrize("n", [4, 8])
+@pytest.mark.study(witness=["4-1", "4-3"])
 def test_locking_is_seen(order, n):
     """A clamped square, u = curl of (sin pi x sin pi y)^2: order 1 does not move at all.
 

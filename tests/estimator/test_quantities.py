@@ -37,6 +37,7 @@ def bars_of(case, half_width, order):
     assert q["force"].guaranteed
 
 
+@pytest.mark.study
 def test_bars_contain_the_exact_values():
     """Of the force and of both ends on every level; and are not idle."""
     force, ends = [], []
@@ -86,6 +87,7 @@ SCENES = {
 
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.filterwarnings("ignore:.*segments long")
+@pytest.mark.study(witness=["rigid plane"])
 def test_proved_bars_of_the_force_overlap(scene):
     """Those of a coarse and of a fine solution contain the same value, the fine one is shorter."""
     problem = SCENES[scene]()
@@ -122,6 +124,7 @@ def test_dual_rows_have_an_estimated_force():
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e9])
+@pytest.mark.study(witness=["1e-09"])
 def test_bars_scale(scale):
     """Moduli and lengths: a force per thickness is a modulus times a length."""
     problem = cases.flat_punch()
@@ -145,6 +148,7 @@ def test_largest_stress_lies_under_the_surface():
 
 
 @pytest.mark.parametrize("order", [2, 3, 4])
+@pytest.mark.study(witness=["2"])
 def test_largest_stress_lies_on_the_bore_of_a_press_fit(order):
     """Lame: radial -p, hoop 5/3 p in a hub of twice the radius; full circles, resultant zero."""
     R, d, E, nu = 20.0, 0.02, 210e3, 0.3
@@ -199,6 +203,7 @@ def said_once(solution):
     return q
 
 
+@pytest.mark.study
 def test_without_a_stress_in_equilibrium_all_rows_are_estimates(monkeypatch):
     """Residuals are called too large: the same values as ever, bars that contain the truth."""
     case = cases.hertz_contact(half_width=0.5)

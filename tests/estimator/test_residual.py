@@ -55,6 +55,7 @@ def effectivity(solution, name):
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.study(witness=["S1-2"])
 def test_effectivity_on_uniform_meshes(name, order):
     problem = CASES[name]().problem
     mesh, found = first_mesh(problem, 0.28), []
@@ -68,6 +69,7 @@ def test_effectivity_on_uniform_meshes(name, order):
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", CASES)
+@pytest.mark.study(witness=["S1-2"])
 def test_effectivity_on_adaptive_meshes(name, order):
     problem = CASES[name]().problem
     levels = adapt(problem, maxh=0.28, order=order, max_dofs=4000 * (order + 1))
@@ -80,6 +82,7 @@ def test_effectivity_on_adaptive_meshes(name, order):
 
 @pytest.mark.parametrize("order", [1, 2, 4])
 @pytest.mark.parametrize("contrast", [1e-6, 1e-3, 1e3, 1e12])
+@pytest.mark.study(witness=["1000.0-1", "0.001-2"])
 def test_effectivity_does_not_depend_on_the_contrast_of_moduli(contrast, order):
     # Measured 3.6 to 4.0. With the stiff body's modulus at penetrations it grows as the root of
     # the contrast.
@@ -142,6 +145,7 @@ def test_squares_stay_in_range(nu, modulus, load):
         cases.polygonal_patch,
     ],
 )
+@pytest.mark.study(witness=["ring_in_ring-3", "ring_in_ring-1", "polygonal_patch-1"])
 def test_parts_are_not_negative_and_sum_to_the_squares(make, order):
     solution = solve(make().problem, maxh=0.4, order=order)
     parts = solution.estimate_parts

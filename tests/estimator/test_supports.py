@@ -43,6 +43,7 @@ ROUGH = {
 
 @pytest.mark.parametrize("order", [1, 2, 4])
 @pytest.mark.parametrize("name", ROUGH)
+@pytest.mark.study(witness=["a dent of a support-1"])
 def test_effectivity_of_rough_data(name, order):
     # Waves at order 2: .15 without a slope and without points that follow. Measured 1.3 to 6.6,
     # 8.4 on the second mesh of the dent.

@@ -471,6 +471,13 @@ def test_pressure_and_traction_loads():
         (partial(cases.ring_in_ring, 0.2, 4), 4),
     ],
 )
+@pytest.mark.study(
+    witness=[
+        "ring_in_ring-3-isoparametric",
+        "ring_in_ring-1-isoparametric",
+        "ring_in_ring-3-superparametric",
+    ]
+)
 def test_quadrature_on_curved_elements_is_no_part_of_the_error(make, order, element, monkeypatch):
     case = make()
     found = []

@@ -256,6 +256,7 @@ def test_names_are_as_promised(case: Case) -> None:
 
 
 @every_case
+@pytest.mark.study(witness=["disc-10", "disc_on_disc-15", "disc_on_disc-14"])
 def test_areas_are_exact(case: Case) -> None:
     geometry = case.make()
     mass = {face.name: face.mass for face in geometry.shape.faces}
@@ -314,6 +315,7 @@ CURVES = {
 
 
 @pytest.mark.parametrize("curve", CURVES)
+@pytest.mark.study(witness=["hole", "Bezier", "spline"])
 def test_curved_mesh_follows_the_exact_curve(curve: str) -> None:
     make, boundary, distance = CURVES[curve]
     at = [(t, 0, 0) for t in np.linspace(0, 1, 7)]

@@ -41,6 +41,9 @@ def cycles(multigrid: Multigrid, size: int) -> np.ndarray:
 @pytest.mark.parametrize("released", [False, True])
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", REFINED)
+@pytest.mark.study(
+    witness=["disc-1-True-gauss_seidel", "disc-2-False-gauss_seidel", "disc-1-False-gauss_seidel"]
+)
 def test_a_cycle_is_symmetric_and_positive_definite(
     name: str, order: int, released: bool, smoother
 ):
@@ -74,6 +77,9 @@ def test_a_cycle_is_symmetric_and_positive_definite(
     ],
 )
 @pytest.mark.parametrize("name", REFINED)
+@pytest.mark.study(
+    witness=["disc-gauss_seidel-1-38", "disc-gauss_seidel-2-50", "disc-chebyshev-1-16"]
+)
 def test_cycles_do_not_grow_with_the_mesh(name: str, smoother, order: int, most: int):
     rng = np.random.default_rng(order)
     counts = []

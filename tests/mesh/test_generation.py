@@ -137,6 +137,7 @@ def unmatched(a, b):
 
 @pytest.mark.parametrize("maxh", SIZES)
 @pytest.mark.parametrize("name", BOUNDED)
+@pytest.mark.study(witness=["blocks-1.0", "punch-1.0", "polygon-1.0"])
 def test_vertices_coincide_on_a_bounded_zone(name, maxh):
     if name == "punch" and maxh is not None:
         maxh = max(maxh, 0.4)  # the foundation is large
@@ -149,6 +150,7 @@ def test_vertices_coincide_on_a_bounded_zone(name, maxh):
 
 @pytest.mark.parametrize("maxh", SIZES)
 @pytest.mark.parametrize("name", ENLARGING)
+@pytest.mark.study(witness=["blocks-1.0", "disc on block-None", "disc on block-0.4"])
 def test_vertices_have_common_eta_on_an_enlarging_zone(name, maxh):
     pair = ENLARGING[name]
     mesh = first_mesh(pair.problem(), maxh)

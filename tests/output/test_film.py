@@ -12,6 +12,7 @@ from ngcontact.output import slope_triangle
 from tests.output.stubs import stub
 
 
+@pytest.mark.study
 def test_a_film_has_a_frame_for_each_solution(tmp_path):
     path = write_film(tmp_path / "a.gif", [stub(1), stub(2), stub(1)], seconds=0.25)
     with Image.open(path) as film:

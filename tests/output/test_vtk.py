@@ -230,6 +230,7 @@ def test_contact_points_carry_their_values(tmp_path):
 
 
 @pytest.mark.parametrize("count", [0, 1])
+@pytest.mark.study(witness=["0"])
 def test_hardly_any_contact_points(tmp_path, count):
     solution = stub(2)
     for name in ("points", "gap", "pressure", "force", "active", "pair", "direction"):

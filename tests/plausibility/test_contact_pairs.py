@@ -85,11 +85,13 @@ def test_one_direction_for_both_flanks_is_told_once(unit, modulus, turn):
 @pytest.mark.parametrize(
     ("slope", "contact"), [(45.0, along_normals), (45.0, pair_per_flank), (10.0, vertical)]
 )
+@pytest.mark.study(witness=["10.0-vertical"])
 def test_flanks_across_their_direction_are_silent(slope, contact):
     run = finest(groove(slope, contact), unknowns=4000)
     assert not any(DIRECTION in message for message in told(run))
 
 
+@pytest.mark.study
 def test_inclined_rigid_obstacles_are_told():
     """The same groove as a gap: its flank is the line y = x + 1 - 2^(1/2) below the disc."""
     disc = cases.disc_on_rigid_plane()
@@ -158,6 +160,7 @@ def test_the_last_level_resolves_the_zone_of_a_load_however_small(press):
 
 
 @pytest.mark.parametrize(("order", "maxh"), [(1, 0.058), (2, 0.06), (3, 0.06), (4, 0.06)])
+@pytest.mark.study
 def test_zones_without_a_warning_have_their_peak(order, maxh):
     """Hertz, half-width 0.1 in blocks of width 2: measured 3.1 % at order 1, the worst."""
     case = cases.hertz_contact(half_width=0.1)

@@ -48,6 +48,7 @@ def measured(problem, exact):
 
 
 @pytest.mark.parametrize("radii", [(1.0, 1.0), (1.0, 3.0), (3.0, 1.0)])
+@pytest.mark.study(witness=["radii1"])
 def test_peaks_are_wrong_by_what_is_said(radii):
     """By way / radius of the secondary, to first order; without the way to 0.1 %."""
     radius = 1 / (1 / radii[0] + 1 / radii[1])
@@ -59,6 +60,7 @@ def test_peaks_are_wrong_by_what_is_said(radii):
 
 
 @pytest.mark.parametrize(("unit", "turn"), [(1.0, 0.0), (1e3, 30.0), (1e-2, 180.0)])
+@pytest.mark.study(witness=["1000.0-30.0"])
 def test_discs_far_apart_are_told_once(unit, turn):
     problem = discs(0.04, unit=unit, turn=turn)
     assert only(
@@ -77,6 +79,7 @@ def test_discs_far_apart_are_told_once(unit, turn):
     ],
     ids=["touching", "near", "direction", "flatter", "flatter below"],
 )
+@pytest.mark.study(witness=["direction"])
 def test_bodies_whose_normals_are_right_are_silent(problem):
     assert quiet(lambda: list(adapt(problem, order=2, tolerance=0.1)))
 
@@ -108,6 +111,7 @@ def pin(clearance, down, secondary="pin_surface", primary="hole"):
 @pytest.mark.parametrize(
     ("pair", "sign"), [(("pin_surface", "hole"), 1), (("hole", "pin_surface"), -1)]
 )
+@pytest.mark.study
 def test_pins_in_the_middle_are_wrong_by_half_their_clearance(pair, sign):
     """Compared with the same pin drawn where it touches, of which nothing is said."""
     *_, touching = adapt(pin(0.1, 0.1, *pair), order=3, tolerance=1e-2)

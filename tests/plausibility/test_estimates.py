@@ -28,6 +28,7 @@ def test_rises_of_several_levels_are_found(estimates, rise, unit):
     assert estimates_rise([unit * estimate for estimate in estimates]) == rise
 
 
+@pytest.mark.study
 def test_a_gap_rougher_than_every_mesh_is_told_once_with_its_place():
     """Its waves are 6e-5 long: finer meshes only see more of them."""
     problem = Problem(

@@ -42,6 +42,7 @@ def test_matrix_of_a_cycle_that_is_not_symmetric_is_refused():
 
 
 @pytest.mark.parametrize("m", range(1, 9))
+@pytest.mark.study(witness=["1"])
 def test_random_problems_against_brute_force(m):
     rng = np.random.default_rng(m)
     for _ in range(125):  # 1000 problems in all
@@ -63,6 +64,7 @@ def another_solver(A, f, B, g):
 
 @settings(max_examples=1000, deadline=None)
 @given(*SIZES_AND_SEEDS)
+@pytest.mark.study
 def test_random_problems_against_another_solver(m, seed):
     rng = np.random.default_rng(seed)
     program = random_program(rng, m)
@@ -77,6 +79,7 @@ def test_random_problems_against_another_solver(m, seed):
 
 @settings(max_examples=1000, deadline=None)
 @given(*SIZES_AND_SEEDS)
+@pytest.mark.study
 def test_ties_of_small_integers(m, seed):
     """Rows with neither force nor slack, a load matrix of half the rank: the solution is known."""
     rng = np.random.default_rng(seed)

@@ -36,6 +36,13 @@ def over(mesh, function, dim):
     ],
 )
 @pytest.mark.parametrize("unit", [1e-150, 1.0, 1e150])
+@pytest.mark.study(
+    witness=[
+        "1.0-function6-1-0.32599999999999996",
+        "1e-150-function6-1-0.32599999999999996",
+        "1e+150-function6-1-0.32599999999999996",
+    ]
+)
 def test_the_error_is_not_more_than_is_measured(function, dim, value, unit):
     found, error = over(MESH, ng.CF(unit) * function, dim)
     assert abs(found / unit - value) <= error / unit + 1e-14 * abs(value)

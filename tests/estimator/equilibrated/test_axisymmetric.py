@@ -59,6 +59,7 @@ def with_shear(inner, factor=1.0):
 
 @pytest.mark.parametrize("order", [2, 3])
 @pytest.mark.parametrize("inner", [0.0, 0.5])
+@pytest.mark.study(witness=["0.5-3"])
 def test_a_quadratic_field_with_forces_has_no_error(inner, order):
     solution = solve(with_shear(inner), maxh=0.4, order=order)
     assert solution.relative_error_bound <= IN_SPACE
@@ -75,6 +76,7 @@ SHARP = {1: (1.4, 1.2), 2: (2.0, 1.25), 3: (2.7, 1.8)}
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.study(witness=["2"])
 def test_huber(order):
     problem, exact = cases.hertz_contact()
     levels = list(adapt(problem, order=order, max_dofs=1500 if order > 1 else 500))
@@ -171,6 +173,7 @@ def test_a_ring_of_large_radius_has_the_bound_of_the_plane(order):
 
 
 @pytest.mark.filterwarnings("ignore::ngcontact.ContactWarning")  # the first mesh is coarse
+@pytest.mark.study
 def test_an_o_ring_whose_curves_do_not_match():
     """Hats of vertices that rows move, on curved triangles: they were refused.
 

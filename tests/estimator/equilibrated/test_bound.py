@@ -41,6 +41,7 @@ def test_a_solution_in_the_space_has_no_error(reproduced):
 
 
 @pytest.mark.parametrize(("order", "largest"), [(1, 1.25), (2, 1.15), (3, 2.0)])
+@pytest.mark.study(witness=["2-1.15"])
 def test_one_transition(order, largest):
     """Measured: at most 1.18, 1.09, 1.54 on these levels."""
     case = cases.one_transition()
@@ -62,6 +63,7 @@ def one_transition_of(nu):
 
 
 @pytest.mark.parametrize(("order", "size"), [(2, 2700), (3, 2700), (4, 4400)])
+@pytest.mark.study
 def test_nearly_incompressible(order, size):
     """Nothing need pay for the bulk modulus; measured at most 1.46, 1.19, 1.93; once 5.4."""
     case = one_transition_of(nu=0.4999)
@@ -71,6 +73,7 @@ def test_nearly_incompressible(order, size):
 
 @pytest.mark.parametrize("half_width", [0.3, 0.05])
 @pytest.mark.parametrize("order", [1, 2, 4])
+@pytest.mark.study(witness=["4-0.05"])
 def test_hertz(order, half_width):
     """The zone ends inside an element: up to 4 there, 1.5 from where it is resolved."""
     case = cases.hertz_contact(half_width=half_width)
@@ -88,6 +91,7 @@ def test_hertz(order, half_width):
 
 
 @pytest.mark.parametrize(("order", "size"), [(1, 400), (2, 1300), (4, 4000)])
+@pytest.mark.study(witness=["4-4000"])
 def test_body_forces_and_tractions(order, size):
     """Balanced triangle by triangle beyond the degree of the stress; measured at most 1.29."""
     case = cases.clamped_transition()
@@ -97,6 +101,7 @@ def test_body_forces_and_tractions(order, size):
 
 
 @pytest.mark.parametrize(("order", "size", "largest"), [(2, 1800, 1.5), (4, 2500, 2.6)])
+@pytest.mark.study
 def test_body_forces_with_kinks_inside_triangles(order, size, largest):
     """In parts of parts; measured at most 1.28 and 2.3, 2.4 and 8 in parts alone."""
     case = cases.curved_lines()
@@ -105,6 +110,7 @@ def test_body_forces_with_kinks_inside_triangles(order, size, largest):
 
 
 @pytest.mark.parametrize(("order", "largest"), [(1, 1.5), (2, 1.3), (4, 1.5)])
+@pytest.mark.study(witness=["1-1.5", "2-1.3"])
 def test_rings(order, largest):
     """Curved lines, with all constants; measured at most 1.22, 1.11, 1.30."""
     case = cases.ring_in_ring()
@@ -114,6 +120,7 @@ def test_rings(order, largest):
 
 
 @pytest.mark.parametrize(("order", "from_", "largest"), [(3, bound.MOSTLY, 4.2), (4, 0.1, 1.2)])
+@pytest.mark.study(witness=["3-0.5-4.2"])
 def test_a_higher_degree_where_coarse_meshes_turn_far(monkeypatch, order, from_, largest):
     """Sixteen half waves around a circle: measured 4.06, 1.12; by one degree alone 4.33, 1.27."""
     monkeypatch.setattr(bound, "MOSTLY", from_)
@@ -141,6 +148,7 @@ def with_dual_rows(case):
 
 
 @pytest.mark.parametrize(("order", "largest"), [(1, 1.6), (2, 3.5)])
+@pytest.mark.study(witness=["1-1.6"])
 def test_dual_rows(order, largest):
     """Measured at most 1.37 and 3.12, 1.76 where the relative error is below 1e-2."""
     case = with_dual_rows(cases.one_transition())
@@ -153,6 +161,7 @@ def test_dual_rows(order, largest):
 
 
 @pytest.mark.parametrize(("order", "size"), [(1, 400), (2, 1400), (4, 4500)])
+@pytest.mark.study(witness=["2-1400"])
 def test_dual_rows_of_a_small_zone(order, size):
     """Triangles that face vertices are fans; measured at most 1.39, 2.26, 2.96, 32 without fans."""
     case = with_dual_rows(cases.hertz_contact())
@@ -183,6 +192,7 @@ def test_dual_rows_reproduce_a_patch():
     assert solution.relative_error_bound <= 1e-12  # round-off; measured 1e-14
 
 
+@pytest.mark.study
 def test_moduli_that_vary():
     """Bounds of the energy on all levels contain those on the last one."""
     law = Elastic(1000 * (1.1 + ng.cos(6 * ng.x)), 0.3)
@@ -235,6 +245,7 @@ def test_parts_are_the_square_of_the_bound():
 
 
 @pytest.mark.parametrize("scale", [1e-9, 1e9])
+@pytest.mark.study(witness=["1000000000.0"])
 def test_moduli_and_stresses_scale(scale):
     """B is the root of a modulus times a length squared, per thickness."""
     problem = cases.hertz_contact().problem

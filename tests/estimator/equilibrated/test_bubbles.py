@@ -106,6 +106,7 @@ LOADS = {
 
 
 @pytest.mark.parametrize("name", list(LOADS))
+@pytest.mark.study(witness=["traction"])
 def test_energies_with_loads_that_no_polynomial_meets(name):
     """Bounds of the energy on a fine mesh lie within those on a coarse one."""
     problem = loaded(**LOADS[name])

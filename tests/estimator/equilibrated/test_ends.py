@@ -16,6 +16,7 @@ HALF_WIDTH = 0.3
 
 
 @pytest.mark.parametrize(("order", "size"), [(2, 1500), (3, 1500), (4, 2500)])
+@pytest.mark.study(witness=["3-1500"])
 def test_hertz_on_coarse_meshes(order, size):
     """Measured at most 1.24, 1.28, 1.26; 1.71, 2.21, 3.36 with one polynomial on each segment."""
     case = cases.hertz_contact(half_width=HALF_WIDTH)
@@ -24,6 +25,7 @@ def test_hertz_on_coarse_meshes(order, size):
 
 
 @pytest.mark.parametrize("rows", ["nodal", "dual"])
+@pytest.mark.study
 def test_p_ends_where_contact_does(rows):
     """Within a tenth of a segment of the exact ends, where p* is 0."""
     case = cases.hertz_contact(half_width=HALF_WIDTH)
@@ -42,6 +44,7 @@ def test_p_ends_where_contact_does(rows):
         assert (zone.number[one] >= 0).any()
 
 
+@pytest.mark.study
 def test_dual_rows_of_order_4():
     """Measured 2.11, 1.56 and 1.61; 3.17, 2.47 and 3.23 before p* ended where contact does."""
     case = with_dual_rows(cases.one_transition())
@@ -52,6 +55,7 @@ def test_dual_rows_of_order_4():
 
 
 @pytest.mark.parametrize(("swapped", "size"), [(False, 2500), (True, 5300)])
+@pytest.mark.study(witness=["False-2500"])
 def test_dual_rows_that_end_at_a_vertex(swapped, size):
     """Measured at most 1.91 and 1.86; 3.20 and 3.67 where what stays open falls like a hat."""
     case = cases.one_transition()
@@ -60,6 +64,7 @@ def test_dual_rows_that_end_at_a_vertex(swapped, size):
 
 
 @pytest.mark.parametrize("rows", ["nodal", "dual"])
+@pytest.mark.study(witness=["dual"])
 def test_certificates_of_cut_segments(rows, tmp_path, capsys):
     case = cases.hertz_contact(half_width=HALF_WIDTH)
     case = with_dual_rows(cases.one_transition()) if rows == "dual" else case

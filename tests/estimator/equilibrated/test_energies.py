@@ -47,6 +47,7 @@ SCENES = {
 
 @pytest.mark.parametrize("scene", SCENES)
 @pytest.mark.filterwarnings("ignore:.*segments long")
+@pytest.mark.study(witness=["bilateral"])
 def test_energies_are_enclosed(scene):
     """By bounds of order 2 on all levels; the reference is what one of order 4 encloses.
 

@@ -26,6 +26,7 @@ def settled(problem, maxh, order):
 
 
 @pytest.mark.parametrize(("order", "maxh"), [(1, 0.5), (2, 0.5), (3, 0.5), (2, 0.3)])
+@pytest.mark.study(witness=["1-0.5"])
 def test_a_pin_that_may_turn(order, maxh):
     """No pressure along the normals does work on its rotation, nor loads but for round-off.
 
@@ -84,6 +85,7 @@ def test_pressures_that_end_on_a_straight_line(order, rows):
 
 
 @pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.study(witness=["2"])
 def test_a_line_that_goes_on_beyond_the_other_body(order):
     """Segments beside the block touch its corners, where p* jumps to 0 and the largest forces are.
 

@@ -27,6 +27,7 @@ def passes(solution, path):
 
 
 @pytest.mark.parametrize(("order", "largest"), [(1, 1.35), (2, 1.15), (3, 1.7), (4, 1.2)], ids=str)
+@pytest.mark.study(witness=["1-1.35"])
 def test_ring_in_a_bearing(order, largest, tmp_path):
     """Measured: at most 1.26, 1.06, 1.44, 1.06; at order 1 segments are straight, the guide not."""
     case = cases.ring_in_bearing()
@@ -75,6 +76,7 @@ def test_moduli_and_loads_scale(scale):
     assert two == pytest.approx(one, rel=1e-6)
 
 
+@pytest.mark.study
 def test_a_ring_that_turns_freely():
     """Pressed all around in its bearing: the rotation that nothing resists needs no reaction."""
     around = [RIGHT, UP, LEFT, DOWN, RIGHT]
@@ -97,6 +99,7 @@ def test_a_ring_that_turns_freely():
 
 
 @pytest.mark.parametrize(("guided", "row"), [("rim", "auto"), ("hole", "auto"), ("rim", "dual")])
+@pytest.mark.study(witness=["rim-dual"])
 def test_rings_in_contact_and_guided(guided, row, tmp_path):
     """Curved contact beside a curved guide, which a stiffer bearing approaches."""
     problem = cases.ring_in_ring().problem
@@ -131,6 +134,7 @@ def half_ellipse(angle=0.0):
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.study(witness=["2"])
 def test_a_guide_that_is_no_circle(order, tmp_path):
     """Each patch can nearly turn along it: reactions take that up but for what is balanced."""
     *_, fine = adapt(half_ellipse(27.0), order=4, max_dofs=9000)

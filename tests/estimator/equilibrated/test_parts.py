@@ -57,6 +57,9 @@ def certified(solution, residual=RESIDUAL):
 
 @pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.parametrize("ends", ENDS)
+@pytest.mark.study(
+    witness=["triangles are cut-2", "next to nothing is bare-3", "next to nothing is bare-2"]
+)
 def test_segments_that_face_in_part(ends, order):
     """Contact ends inside of large segments: measured 1.6 to 6.6, errors of 11 % and more."""
     problem = overhanging(ENDS[ends], rows="dual")
@@ -114,6 +117,7 @@ def in_a_step(rows, slope=0.0):
 
 
 @pytest.mark.parametrize("slope", [0.0, -0.5, 0.4])
+@pytest.mark.study(witness=["0.0"])
 def test_dual_rows_on_both_sides_of_a_corner(slope):
     """The corner's vertex takes what both sides ask for: measured 1.46 to 1.66.
 

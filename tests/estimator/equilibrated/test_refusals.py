@@ -61,6 +61,7 @@ def test_steep_displacements_are_none_that_jump(steep):
 
 
 @pytest.mark.parametrize("seed", [333, 470])
+@pytest.mark.study(witness=["333"])
 def test_bodies_held_at_few_points_of_large_segments(seed):
     """Forces in vertices balance the load, polynomials of one sign have no resultants so near.
 

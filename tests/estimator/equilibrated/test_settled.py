@@ -27,6 +27,7 @@ def residual(solution):
 
 @pytest.mark.parametrize(("stiffness", "largest"), [(1e2, 1.4), (1e4, 6.0), (1e8, np.inf)])
 @pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.study(witness=["2-100.0-1.4"])
 def test_stiff_fibres(order, stiffness, largest):
     # Tractions are small differences of large multipliers: 1e-8 and 7e-5 at 1e4 and 1e8 before what
     # is missed is balanced once more. Measured at most 1.33 and 4.8; once 36, as no steps towards
@@ -40,6 +41,7 @@ def test_stiff_fibres(order, stiffness, largest):
 
 @pytest.mark.parametrize(("stiffness", "largest"), [(1e2, 1.3), (1e4, 4.5)])
 @pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.study(witness=["2-100.0-1.3"])
 def test_stiff_fibres_cost_little(order, stiffness, largest):
     # Steps are made as long as they pay: measured 1.18 and 1.06, 3.7 and 1.7; once 7.1 and 3.2
     # for the stiffer ones.
@@ -83,6 +85,7 @@ def crossed(bend):
 
 @pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.parametrize("bend", [1e-13, 1e-11, 1e-9, 1e-7, 1e-5, 1e-3])
+@pytest.mark.study(witness=["1e-09-2", "1e-05-1", "1e-07-1"])
 def test_edges_that_all_but_cross(bend, order):
     # Two lines that cross leave a symmetric stress a condition less. Bent by 1e-9 to 1e-5 they left
     # jumps of that size, as on blocks of maxh = .4, refined once.
