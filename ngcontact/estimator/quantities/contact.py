@@ -15,35 +15,13 @@ from .table import Quantity, unknown
 
 Star = tuple[Index, Array]  # segments (k,) of the secondary, Bernstein coefficients (k, d + 1)
 
-SECOND_ORDER = 10.0  # relative error of the force over the square of the relative bound: at most 10
-RESULTANTS = 3.0  # error of the force over the difference of both resultants, measured: at most 3
 NEAR_PEAK = 0.9  # share of the peak from which pressures count for it
 FITS = ((1, 3), (2, 5))  # degrees of fits at an end of contact, and how many points they take
-PEAK = 1.0  # error of the peak over the largest difference of two pressures near it: measured
-SEEN = 2  # segments in contact below which nothing is known of the peak
+# Error of the peak over the largest difference near it to p*, and to the discrete stress: measured
+# on half of 60 random scenes, orders 1 to 4, the other half agrees.
+OFF_STAR, OFF_STRESS = 2.0, 0.75
+ENDS = 0.6  # error of an end over h^2 / zone and the spread of fits, measured: at most 0.55
 SAMPLES = np.linspace(0, 1, 9)  # where pressures are looked at on a segment
-
-
-def error_of_sum(
-    pair: ContactState, boundary: BoundaryTrace, star: Star | None, relative: float
-) -> float:
-    """Error of the sum of the forces of a pair along their directions.
-
-    `star` is p*, if there is one; `relative` the error of the displacement, relative.
-    """
-    force = float(pair.force.sum())
-    error = SECOND_ORDER * relative**2 * abs(force)
-    if star is not None:
-        segments, c = star
-        length, (t, w) = boundary.lengths(segments), gauss(c.shape[1] + boundary.model.extent)
-        direction = pair.line.contact.direction
-        if direction is not None:
-            chord = boundary.curve[segments, -1] - boundary.curve[segments, 0]
-            length = np.abs(chord @ np.array([-direction[1], direction[0]]))
-        at, s = np.repeat(segments, len(t)), np.tile(t, len(segments))
-        p = c @ bernstein(c.shape[1] - 1, t).T * boundary.measure(at, s).reshape(-1, len(t))
-        error += RESULTANTS * abs(float(length @ p @ w) - force)
-    return error
 
 
 def peak_of(
@@ -52,27 +30,36 @@ def peak_of(
     stress: ng.CoefficientFunction,
     star: Star | None,
     corners: Singular,
+    relative: float,
 ) -> Quantity:
-    """The largest pressure, away from corners at which it is infinite."""
+    """The largest pressure, away from corners at which it is infinite.
+
+    `star` is p*, if there is one; `relative` the estimated error of the displacement.
+    """
     line, pressure = pair.line, pair.pressure
     infinite = corners.places[corners.pressed & _beside(corners.places, line.position)]
+    infinite = np.unique(infinite, axis=0)
     away = ~corners.near(line.position, pressed=True)
     if not (pair.active & away).any():
         return unknown("peak pressure", 0.0 if not pair.active.any() else np.nan, infinite=infinite)
     at = int(np.where(away, pressure, -np.inf).argmax())
     peak, place = float(pressure[at]), line.position[at]
-    off = _off_stress(pair, boundary, stress)
+    off = OFF_STRESS * _off_stress(pair, boundary, stress)
     most = peak
     if star is not None and len(star[0]):
         other, values = _off_star(pair, boundary, star)
-        off = np.maximum(off, other)
+        off = np.maximum(off, OFF_STAR * other)
         segment = np.repeat(star[0], len(SAMPLES))
         x = boundary.point(segment, np.tile(SAMPLES, len(star[0])))
         most = float(values[~corners.near(x, pressed=True)].max(initial=peak))
     near = (pressure >= NEAR_PEAK * peak) & away
-    error = PEAK * max(float(off[near].max(initial=0.0)), most - peak)
-    alone = np.count_nonzero(pair.active) < SEEN * boundary.order
-    if alone or (len(infinite) and corners.near(place[None], pressed=True, reach=2.0)[0]):
+    error = max(float(off[near].max(initial=0.0)), OFF_STAR * (most - peak))
+    alone = np.count_nonzero(pair.active) <= boundary.order  # not even one segment
+    if (
+        relative > 1
+        or alone
+        or (len(infinite) and corners.near(place[None], pressed=True, reach=2.0)[0])
+    ):
         return unknown("peak pressure", peak, place, infinite)
     return Quantity("peak pressure", peak, error, "estimated", place, infinite=infinite)
 
@@ -141,7 +128,7 @@ def _errors_of_ends(pair: ContactState, boundary: BoundaryTrace) -> list[float]:
     errors = []
     for number in range(len(ends.position)):
         zone, spread = _spread(pair, number)
-        errors.append(h**2 / max(zone / 2, h) + spread if h > 0 else spread)
+        errors.append(ENDS * (h**2 / max(zone / 2, h) + spread) if h > 0 else spread)
     return errors
 
 
@@ -180,7 +167,8 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
 
     Each interval between two points in contact counts, and what is left of the way to an end of
     contact. Where a point in contact has no neighbour that faces the other body, half of the way
-    counts, with a bar of that size.
+    counts, with a bar of that size. A curve of degree 1 is shorter than its arc by the square of
+    half of its turn over 6, one of degree p by less than that power 2 p.
     """
     line, ends = pair.line, pair.transitions
     if not pair.active.any():
@@ -202,4 +190,11 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
         measure = boundary.model.measure(ends.position)
         area += float((ends.beyond * measure).sum())
         error += float((np.array(_errors_of_ends(pair, boundary)) * measure).sum())
-    return max(area, 0.0), error
+    return max(area, 0.0), error + float((sizes.sum(axis=1) * _bent(boundary, line.segments)).sum())
+
+
+def _bent(boundary: BoundaryTrace, segments: Index) -> Array:
+    """Relative errors (k,) of the lengths of curved segments, by the turn of their normals."""
+    ends = [boundary.exact_normal(segments, np.full(len(segments), s)) for s in (0.0, 1.0)]
+    half = np.linalg.norm(ends[1] - ends[0], axis=1) / 2
+    return np.asarray(half ** (2 * boundary.geometry_order) / 6)

@@ -43,6 +43,11 @@ class Singular:
     reach: Array
     pressed: Mask
 
+    @property
+    def distinct(self) -> Array:
+        """Places (j, 2), each once where several bodies meet."""
+        return np.unique(self.places, axis=0)
+
     def near(self, points: Array, pressed: bool = False, reach: float = 1.0) -> Mask:
         """Which of the `points` (m, 2) lie within `reach` times the reach of a corner, (m,)."""
         result = np.zeros(len(points), dtype=bool)
