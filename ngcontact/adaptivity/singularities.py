@@ -94,12 +94,7 @@ def _conditions(problem: Problem, trace: BoundaryTrace) -> Index:
 
 def _reentrant(trace: BoundaryTrace) -> Index:
     """Vertices (j,) of the geometry at which a body has an angle of more than 180 degrees."""
-    view = Triangulation(trace.mesh)
-    side = np.roll(view.corners, -1, axis=1) - view.corners
-    back = -np.roll(side, 1, axis=1)
-    sine = side[..., 0] * back[..., 1] - side[..., 1] * back[..., 0]
-    angles = np.arctan2(sine, (side * back).sum(axis=2))
-    angle = np.bincount(view.triangles.ravel(), angles.ravel(), trace.mesh.nv)
+    angle = Triangulation(trace.mesh).angles
     outer = np.flatnonzero(~trace.inner)
     segment, s = np.repeat(outer, 2), np.tile([0.0, 1.0], len(outer))
     vertex = trace.nodes[outer][:, [0, -1]].ravel()

@@ -74,11 +74,19 @@ class Transitions:
         The last active and the first open contact point; at a corner the next but one.
     position : ndarray (k, 2)
         The transition itself.
+    beyond : ndarray (k,)
+        How far it lies from the last active point, along the line, outwards; a length.
+    closed, opened : list of ndarray of int (k)
+        Points from the last active one inwards, and from the first open one outwards, in the order
+        of the line, as far as contact is closed or open.
     """
 
     inner: Index
     outer: Index
     position: Array
+    beyond: Array
+    closed: list[Index]
+    opened: list[Index]
 
 
 def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
@@ -102,13 +110,19 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
     neighbours, links = _neighbours(line)
     active = in_contact(line, active)
     x, order = line.position, line.rows.shape[1] - 1
-    ends, found = [], []
+    ends, found, beyond = [], [], []
+    inwards: list[Index] = []
+    outwards: list[Index] = []
     for link in links[active[links[:, 0]] != active[links[:, 1]]].tolist():
         inner, outer = sorted(link, key=lambda i: not active[i])
         opened = _run(outer, inner, neighbours, active)
+        closed = _run(inner, outer, neighbours, active)
+        inwards.append(np.array(closed))
+        outwards.append(np.array(opened))
         if line.node[inner] == line.node[outer]:  # the node touches one side of a corner only
             ends.append((inner, opened[min(1, len(opened) - 1)]))
             found.append(x[inner])
+            beyond.append(0.0)
             continue
         if len(opened) > 1 and any(active[i] for i in neighbours[opened[-1]]):
             opened = opened[: (len(opened) + 1) // 2]  # the other half belongs to its other end
@@ -117,14 +131,17 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
         at = _closing_point(distance, gap[opened], order)
         if at is None:
             at = distance[0] / 2
-        closed = _run(inner, outer, neighbours, active)[:2]
+        closed = closed[:2]
+        beyond.append(at)
         path = np.array([*closed[::-1], *opened])
         along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x[path], axis=0), axis=1))])
         at += along[len(closed) - 1]
         ends.append((inner, outer))
         found.append([np.interp(at, along, x[path, axis]) for axis in (0, 1)])
     inner_outer = np.array(ends, dtype=np.intp).reshape(-1, 2)
-    return Transitions(inner_outer[:, 0], inner_outer[:, 1], np.array(found).reshape(-1, 2))
+    position = np.array(found).reshape(-1, 2)
+    inner, outer = inner_outer.T
+    return Transitions(inner, outer, position, np.array(beyond), inwards, outwards)
 
 
 def ending_segments(line: ContactLine, ends: Transitions) -> Index:

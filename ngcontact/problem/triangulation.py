@@ -67,6 +67,16 @@ class Triangulation:
         """Coordinates (ne, 3, 2) of the vertices of each triangle, lengths."""
         return self.vertices[self.triangles]
 
+    @cached_property
+    def angles(self) -> Array:
+        """Sum (nv,) of the triangles' angles at each vertex, radians."""
+        side = np.roll(self.corners, -1, axis=1) - self.corners
+        back = -np.roll(side, 1, axis=1)
+        sine = side[..., 0] * back[..., 1] - side[..., 1] * back[..., 0]
+        angles = np.arctan2(sine, (side * back).sum(axis=2))
+        sums = np.bincount(self.triangles.ravel(), angles.ravel(), len(self.vertices))
+        return np.asarray(sums, dtype=float)
+
     def others(self) -> int:
         """Number of elements that are no triangles."""
         types = _records(self.mesh.ngmesh.Elements2D())["type"]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from ...arrays import Array
@@ -24,6 +25,10 @@ class Quantity:
         a rule it does; "none": nothing is known of the error, which is NaN.
     place : ndarray (2,) or None
         Where it is.
+    proved : float or None
+        The proved error beside an estimated one; None where none is proved.
+    infinite : ndarray (k, 2) or None
+        Corners at which the true one is infinite; the value is the largest away from them.
     """
 
     name: str
@@ -31,17 +36,41 @@ class Quantity:
     error: float
     kind: Literal["guaranteed", "estimated", "none"]
     place: Array | None = None
+    proved: float | None = None
+    infinite: Array | None = None
 
     @property
     def guaranteed(self) -> bool:
-        """Whether the error is proved."""
+        """Whether `error` is proved."""
         return self.kind == "guaranteed"
+
+    def with_proof(self, proved: float) -> Quantity:
+        """With a proved error, the error itself where the estimate is no less."""
+        if self.kind == "estimated" and self.error < proved:
+            return replace(self, proved=proved)
+        return replace(self, error=proved, kind="guaranteed", proved=proved)
 
     def __str__(self) -> str:
         """One line: value, bar, how sure it is, where."""
         bar = " " * 11 if self.kind == "none" else f"+- {self.error:8.2g}"
-        at = "" if self.place is None else f"  at ({self.place[0]:.6g}, {self.place[1]:.6g})"
+        at = "" if self.place is None else f"  at {_point(self.place)}"
+        if self.kind == "estimated" and self.proved is not None:
+            at += f"  (guaranteed +- {self.proved:.2g})"
+        if self.infinite is not None and len(self.infinite):
+            several = f" and {len(self.infinite) - 3} more" if len(self.infinite) > 3 else ""
+            at += f"  infinite at {', '.join(map(_point, self.infinite[:3]))}{several}"
         return f"{self.name:22s} {self.value:14.7g} {bar}  {self.kind:10s}{at}".rstrip()
+
+
+def unknown(
+    name: str, value: float, place: Array | None = None, infinite: Array | None = None
+) -> Quantity:
+    """A figure without a bar."""
+    return Quantity(name, value, math.nan, "none", place, infinite=infinite)
+
+
+def _point(x: Array) -> str:
+    return f"({x[0]:.6g}, {x[1]:.6g})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +82,7 @@ class Quantities:
     rows : tuple of Quantity
         In order.
     note : str
-        Why nothing is guaranteed; empty where something is.
+        What is to be said of all: why nothing is guaranteed, along what the force is told.
     """
 
     rows: tuple[Quantity, ...]
