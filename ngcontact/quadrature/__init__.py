@@ -1,6 +1,8 @@
 """Quadrature that follows the data: where functions are rough, and rules that resolve them."""
 
 from .doubts import warn_of_data as warn_of_data
+from .evaluations import evaluations as evaluations
+from .evaluations import looked as looked
 from .integrals import integral_over as integral_over
 from .jumps import jumping_moduli as jumping_moduli
 from .jumps import steps_on as steps_on
