@@ -175,8 +175,9 @@ def _first_plan(
     problem: Problem, mesh: ng.Mesh, refinement: Refinement, start: Solution | None
 ) -> Plan:
     """The first level, of which nothing is forecast but by `start`."""
-    found = corners(problem, boundary_trace(mesh, 1))
-    found = found.joined(unresolvable([one.place for one in contradictions(problem, mesh)]))
+    trace = boundary_trace(mesh, 1)
+    found = corners(problem, trace)
+    found = found.joined(unresolvable([one.place for one in contradictions(problem, trace)]))
     plan = Plan(mesh, refinement.order, found, math.inf, refinement.growth, Descent.first(mesh))
     if start is None or at_round_off(
         start.problem, start.discrete.space, start.displacement, start.error_estimate

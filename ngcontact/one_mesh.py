@@ -11,7 +11,7 @@ from .errors import warn
 from .mesh import check_curves, curve, same_geometry
 from .plausibility import doubt_of_refinement, doubts, estimates_rise
 from .problem import Problem
-from .quadrature import warn_of_unresolved
+from .quadrature import evaluations, warn_of_unresolved
 from .solution import Solution
 
 
@@ -48,6 +48,7 @@ def solve_on(
     problem: Problem, mesh: ng.Mesh, order: int, element: str, start: Solution | None
 ) -> Solution:
     """Solution on one mesh, of which names and values are known to be right."""
+    before = evaluations()
     mesh, curved = curve(mesh, order, element)
     if curved and mesh.GetCurveOrder() > 1:  # straight sides have no middles to place
         check_curves(mesh)
@@ -75,6 +76,7 @@ def solve_on(
             "curved_elements": curved,
             "estimates": 0,
             "equilibrations": 0,
+            "evaluations": evaluations() - before,
         },
     )
 

@@ -47,7 +47,10 @@ class Solution(Measured, Readable, Shown):
     work : dict
         Counts of assemblies, factorizations, back_solves, gap_searches, curved_elements, estimates
         and equilibrations spent on this solution, on its mesh. Without factorisation V-cycles of
-        multigrid count as back_solves.
+        multigrid count as back_solves. And evaluations: points at which functions among the data
+        were looked at for warnings, jumps and roughness, in `adapt` by the level itself; beside
+        those are checks that data are finite, interpolation and quadrature. 0 where all data are
+        numbers.
     coarse_levels : int
         Levels of the coarse adaptive run that told `solve` the first active set of a large mesh.
     adaptive : bool

@@ -168,6 +168,7 @@ def test_attributes_of_the_contract(order):
         "curved_elements",
         "estimates",
         "equilibrations",
+        "evaluations",
     }
     assert set(solution.reactions) == {"block_bottom", "disc_top", "axis"}
     assert all(force.shape == (2,) for force in solution.reactions.values())

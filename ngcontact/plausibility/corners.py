@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index
+from ..arrays import Array, Mask
 from ..errors import warn
-from ..fem import BoundaryTrace, boundary_trace
+from ..fem import BoundaryTrace, prescribed
 from ..problem import Problem
-from ..quadrature import steps_on
+from ..quadrature import looked, numbers
 
 APART = 1e-6  # values of two supports at one corner, relative to the largest, that are two values
-BESIDE = 1e-9  # of a segment, how far from a jump its sides are looked at
 NOISE = 64 * np.finfo(float).eps  # ... and to the largest of all values: below it is round-off
 
 
@@ -40,19 +38,35 @@ class Contradiction:
     amount: float
 
 
-def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
-    """All of Gamma_u with itself, within a boundary, too, and with guides, by component."""
-    trace = boundary_trace(mesh, 1)
+def contradictions(problem: Problem, trace: BoundaryTrace) -> list[Contradiction]:
+    """All of Gamma_u with itself, within a boundary, too, and with guides, by component.
+
+    `trace` is that of order 1.
+    """
+    if not problem.displacement:
+        return []
+    seen, shared = prescribed(problem, trace), _shared(problem, trace)
     known: dict[tuple[int, int], tuple[str, float]] = {}
-    found = []
+    found = [
+        Contradiction(
+            (one.name, one.name),
+            one.place,
+            f'displacement "{one.name}" jumps by {one.amount:.6g} along {"xy"[one.axis]}',
+            one.amount,
+        )
+        for one in seen.steps
+    ]
     for pattern, components in problem.displacement.items():
         segment, s = trace.at_nodes(trace.segments(pattern))
-        node = trace.nodes[segment, np.round(s).astype(int)].tolist()
+        node = trace.nodes[segment, np.round(s).astype(int)]
+        segment, s, node = segment[shared[node]], s[shared[node]], node[shared[node]].tolist()
         for axis, value in enumerate(components):
             if value is None or not len(segment):
                 continue
-            found += _steps(trace, value, segment[::2], pattern, axis)
-            values = trace.evaluate(value, segment, s)[:, 0].tolist()
+            points = trace.mesh_points(segment, s)
+            values = (
+                value(points).ravel() if numbers(value) else looked(value, points).ravel()
+            ).tolist()
             for k, (vertex, u) in enumerate(zip(node, values, strict=True)):
                 name, other = known.setdefault((vertex, axis), (pattern, u))
                 if abs(u - other) > APART * max(abs(other), abs(u)):
@@ -66,32 +80,18 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
                         )
                     )
     found += _across_guides(problem, trace, known)
-    largest = max((abs(u) for _, u in known.values()), default=0.0)
-    return [one for one in found if one.amount > NOISE * largest]
+    return [one for one in found if one.amount > NOISE * seen.largest]
 
 
-def _steps(
-    trace: BoundaryTrace, value: ng.CoefficientFunction, segments: Index, name: str, axis: int
-) -> list[Contradiction]:
-    """Where what is prescribed on the `segments` (k,) of one boundary jumps."""
-
-    def values(segment: Index, s: Array) -> Array:
-        return trace.evaluate(value, segment, s)[:, 0]
-
-    at, s = steps_on(values, segments)
-    sides = [
-        values(at, np.clip(s + side, 0.0, 1.0)) if at.size else s for side in (-BESIDE, BESIDE)
-    ]
-    places = trace.point(at, s)
-    return [
-        Contradiction(
-            (name, name),
-            place,
-            f'displacement "{name}" jumps by {abs(step):.6g} along {"xy"[axis]}',
-            abs(float(step)),
-        )
-        for place, step in zip(places, sides[1] - sides[0], strict=True)
-    ]
+def _shared(problem: Problem, trace: BoundaryTrace) -> Mask:
+    """Vertices at which segments of several prescribed regions, or of guides, meet."""
+    guides = [str(problem.sliding)] if problem.sliding is not None else []
+    at = trace.segments(*problem.displacement, *guides)
+    vertex, region = trace.nodes[at][:, [0, -1]], trace.region[at]
+    low, high = np.full(trace.mesh.nv, len(trace.mesh.GetBoundaries())), np.full(trace.mesh.nv, -1)
+    np.minimum.at(low, vertex, region[:, None])
+    np.maximum.at(high, vertex, region[:, None])
+    return np.asarray(low < high)
 
 
 def _across_guides(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ngsolve as ng
 
-from ..fem import warn_of_locking
+from ..fem import boundary_trace, look_at_prescribed, warn_of_locking
 from ..problem import Problem
 from ..quadrature import warn_of_data, warn_of_jumps
 from .corners import contradictions, warn_of_contradictions
@@ -17,5 +17,7 @@ def warn_of_implausible(problem: Problem, mesh: ng.Mesh, order: int) -> None:
     """
     warn_of_locking(problem, mesh, order)
     warn_of_data(problem, mesh, order)
-    warn_of_contradictions(contradictions(problem, mesh))
+    trace = boundary_trace(mesh, 1)
+    look_at_prescribed(problem, trace)
+    warn_of_contradictions(contradictions(problem, trace))
     warn_of_jumps(problem, mesh)

@@ -6,6 +6,8 @@ from .doubts import unresolved as unresolved
 from .doubts import warn_of_data as warn_of_data
 from .doubts import warn_of_unresolved as warn_of_unresolved
 from .features import look as look
+from .evaluations import evaluations as evaluations
+from .evaluations import looked as looked
 from .integrals import integral_over as integral_over
 from .jumps import jumping_moduli as jumping_moduli
 from .jumps import steps_on as steps_on

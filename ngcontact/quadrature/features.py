@@ -161,7 +161,7 @@ def _parts(view: View, region: ng.Region) -> list[Index]:
 def _values(function: Function, view: View, elements: Index, reference: Array) -> Array:
     """Values (n, c) at a point `reference` (n, dim) of each of `elements` (n,)."""
     if isinstance(function, ng.CoefficientFunction):
-        return view.evaluate(function, elements, reference[:, None])[:, 0]
+        return view.look(function, elements, reference[:, None])[:, 0]
     return np.asarray(function(*_positions(view, elements, reference).T), dtype=float)[:, None]
 
 

@@ -12,10 +12,12 @@ from ..arrays import Array, Index, Mask
 from ..errors import warn
 from ..mesh import diameters
 from ..problem import Problem, Triangulation, varies
+from .evaluations import looked
 from .lattice import mesh_points, on_lattice
 
 JUMP = 0.5  # change of a law over its least value from which it is told
-PARTS = 256  # of a segment, at whose ends a function is looked at: of narrower bumps it sees none
+PLACES = 2048  # of a boundary, at which a function is looked at: of narrower bumps it sees none
+FEWEST = 5  # ... of a segment: the changes between them show a bend
 QUARTERS = np.linspace(0, 1, 5)
 STEPS = 18  # in which a part is quartered: what still changes across 1e-12 of a segment jumps
 KEPT = 0.9  # share of a change that the last half of the steps leave of a jump; of x^(1/10), 0.3
@@ -66,7 +68,7 @@ def _found(
     """
     found = [Jumps(np.empty(0, np.intp), np.empty((0, 2)), np.empty(0), np.empty(0))]
     for here, points in on_lattice(mesh, elements, sizes):
-        values = np.asarray(function(points.ravel())).reshape(*points.shape, -1)
+        values = looked(function, points)
         step = round(values.shape[-1] ** 0.5) + 1
         limit = share * values[..., ::step].mean(axis=2).min(axis=1)
         change = np.ptp(values, axis=1)
@@ -81,7 +83,7 @@ def _found(
         for _ in range(HALVINGS):
             middle = x.mean(axis=1)
             at = mesh_points(mesh, here[k], middle[:, None])
-            v = np.asarray(function(at.ravel())).reshape(len(k), -1)[row, which]
+            v = looked(function, at)[row, 0, which]
             side = (np.abs(v - u[:, 0]) > np.abs(v - u[:, 1])).astype(int)  # which end to move
             x[row, side], u[row, side] = middle, v
         kept = np.abs(u[:, 1] - u[:, 0]) > limit[k]
@@ -127,11 +129,15 @@ def warn_of_jumps(problem: Problem, mesh: ng.Mesh) -> None:
             )
 
 
-def steps_on(values: Callable[[Index, Array], Array], segments: Index) -> tuple[Index, Array]:
-    """Segments (j,) on which a function jumps, and parameters (j,) there; at ends, too.
+def steps_on(
+    values: Callable[[Index, Array], Array], segments: Index
+) -> tuple[Index, Array, float]:
+    """Segments (j,) on which a function jumps, parameters (j,) there; its largest size seen.
 
-    Of the quarters of each part in which it changes the one is kept whose change differs most from
-    that of the others, again and again: a smooth change shrinks by that, that of a jump does not.
+    At ends, too. Looked into are parts whose change is not between those of their neighbours, as
+    where a smooth function does not bend from one side to the other. Of their quarters the one is
+    kept whose change differs most from that of the others, again and again: a smooth change
+    shrinks by that, that of a jump does not.
 
     Parameters
     ----------
@@ -140,11 +146,14 @@ def steps_on(values: Callable[[Index, Array], Array], segments: Index) -> tuple[
     segments : ndarray of int (n,)
         Which.
     """
-    s = np.linspace(0, 1, PARTS + 1)
-    found = values(np.repeat(segments, len(s)), np.tile(s, len(segments))).reshape(-1, len(s))
-    largest = np.abs(found).max(initial=0.0)
-    row, part = np.nonzero(np.abs(np.diff(found, axis=1)) > STEADY * largest)
-    at, low, size = segments[row], s[part], 1 / PARTS
+    if not len(segments):
+        return segments, np.empty(0), 0.0
+    count = max(PLACES // len(segments), FEWEST)
+    s = np.linspace(0, 1, count)
+    found = values(np.repeat(segments, count), np.tile(s, len(segments))).reshape(-1, count)
+    largest = float(np.abs(found).max())
+    row, part = np.nonzero(_odd(np.diff(found, axis=1), STEADY * largest))
+    at, low, size = segments[row], s[part], s[1]
     change = before = np.abs(found[row, part + 1] - found[row, part])
     every = np.arange(len(at))
     for number in range(STEPS if at.size else 0):
@@ -156,4 +165,17 @@ def steps_on(values: Callable[[Index, Array], Array], segments: Index) -> tuple[
             before = change
     jumps = (change >= KEPT * before) & (change > STEADY * largest)
     at, first_of = np.unique(at[jumps], return_index=True)
-    return at, low[jumps][first_of]
+    return at, low[jumps][first_of], largest
+
+
+def _odd(change: Array, noise: float) -> Mask:
+    """Which changes (n, k) are not between those of their neighbours, by more than `noise`.
+
+    At ends not between that of the neighbour and one that goes on as the next two do, twice as far.
+    """
+    first = 3 * change[:, 1] - 2 * change[:, 2]
+    last = 3 * change[:, -2] - 2 * change[:, -3]
+    left = np.column_stack([change[:, 1], change[:, :-1]])
+    right = np.column_stack([first, change[:, 2:], last])
+    low, high = np.minimum(left, right), np.maximum(left, right)
+    return np.asarray((change < low - noise) | (change > high + noise))

@@ -101,7 +101,7 @@ def rough_load(
         start = towards(features, start, view)
 
     def density(elements: Index, reference: Array) -> Array:
-        values = view.evaluate(load, elements, reference)
+        values = view.look(load, elements, reference)
         return np.asarray(values * view.evaluate(view.measure, elements, reference))
 
     corners = view.arrays.corners if view.dim == 2 else None
@@ -184,7 +184,7 @@ def _steps(
     some = np.flatnonzero(np.any(apart[at], axis=1))
     if not len(some):
         return elements[some], np.empty(0)
-    values = view.evaluate(load, elements[some], beside_edges(view.dim))
+    values = view.look(load, elements[some], beside_edges(view.dim))
     beyond = np.maximum(values - most[some, None], least[some, None] - values)
     beyond = np.maximum(beyond - STEP * varies[some, None], 0.0)
     return elements[some], np.asarray(beyond.max(axis=(1, 2), initial=0.0))

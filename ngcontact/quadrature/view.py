@@ -9,11 +9,13 @@ from functools import cached_property, lru_cache
 
 import ngsolve as ng
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask
 from ..mesh import diameters
 from ..problem import Triangulation
 from .cells import Cells, joined, whole
+from .evaluations import looked
 from .lattice import divisions, lattice, mesh_points, monomials
 
 POINTS = {1: 3, 2: 3}  # parts of a lattice that one of the rule is as good as
@@ -69,9 +71,17 @@ class View:
         self, function: ng.CoefficientFunction, elements: Index, reference: Array
     ) -> Array:
         """Values (j, n, c) at `reference` (j, n, dim), or (n, dim), of `elements` (j,)."""
-        reference = np.broadcast_to(reference, (len(elements), *reference.shape[-2:]))
-        points = mesh_points(self.mesh, elements, reference)
+        points = self._points(elements, reference)
         return np.asarray(function(points.ravel())).reshape(*points.shape, -1)
+
+    def look(self, data: ng.CoefficientFunction, elements: Index, reference: Array) -> Array:
+        """The same of `data`, counted."""
+        return looked(data, self._points(elements, reference))
+
+    def _points(self, elements: Index, reference: Array) -> NDArray:
+        """NGSolve's points (j, n)."""
+        reference = np.broadcast_to(reference, (len(elements), *reference.shape[-2:]))
+        return mesh_points(self.mesh, elements, reference)
 
     def in_parts(self, elements: Index) -> Cells:
         """The `elements` (k,) in parts, on which rules see what the points of a lattice see."""
@@ -138,6 +148,6 @@ def looked_at(
     count = np.maximum(count, fewest)
     for n in np.unique(count).tolist():
         here = elements[count == n]
-        values = view.evaluate(function, here, lattice(view.dim, n))
+        values = view.look(function, here, lattice(view.dim, n))
         basis = polynomials(view.dim, n)
         yield here, values, np.abs(values - basis @ (basis.T @ values)).max(axis=(1, 2))

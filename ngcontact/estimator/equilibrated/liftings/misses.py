@@ -8,10 +8,9 @@ import ngsolve as ng
 import numpy as np
 
 from ....arrays import Array, Index
-from ....fem import BoundaryTrace
+from ....fem import BoundaryTrace, prescribed
 from ....lagrange import gauss
 from ....problem import Problem
-from ....quadrature import steps_on
 from ..data import Discrete, EdgeConditions, Units, guide_frames
 from .edges import (
     DEGREE,
@@ -45,6 +44,7 @@ def on_supports(
     ValueError
         Prescribed displacements that jump, on a boundary or where two of them meet.
     """
+    _refuse_steps(problem, boundary)
     partition, fields, s = discrete.partition, [], samples()
     size = float(np.abs(displacement.vec.FV().NumPy()).max(initial=0.0))
     for pattern, components in problem.displacement.items():  # (3.6)
@@ -54,7 +54,6 @@ def on_supports(
         r = np.zeros_like(u)
         for axis, value in enumerate(components):
             if value is not None:
-                _refuse_steps(boundary, value, segments, pattern)
                 r[:, axis] = boundary.evaluate(value, at, places)[:, 0] - u[:, axis]
         r = r.reshape(len(segments), -1, 2)
         if np.abs(r[:, [0, -1]]).max(initial=0.0) > AT_ENDS * size:
@@ -69,15 +68,12 @@ def on_supports(
     return fields
 
 
-def _refuse_steps(
-    boundary: BoundaryTrace, value: ng.CoefficientFunction, segments: Index, name: str
-) -> None:
-    """Raise where a prescribed displacement jumps on the `segments` (k,) of one boundary."""
-    at, s = steps_on(lambda i, s: boundary.evaluate(value, i, s)[:, 0], segments)
-    if at.size:
-        x, y = boundary.point(at[:1], s[:1])[0]
+def _refuse_steps(problem: Problem, boundary: BoundaryTrace) -> None:
+    """Raise where a prescribed displacement jumps inside a boundary."""
+    for step in prescribed(problem, boundary).steps:
+        x, y = step.place
         raise ValueError(
-            f'the displacement prescribed on "{name}" jumps near ({x:.6g}, {y:.6g}): no '
+            f'the displacement prescribed on "{step.name}" jumps near ({x:.6g}, {y:.6g}): no '
             "displacement of finite energy does; make it continuous, or leave a gap between "
             "boundaries"
         )
