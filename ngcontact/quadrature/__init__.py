@@ -5,9 +5,9 @@ from .doubts import Unresolved as Unresolved
 from .doubts import unresolved as unresolved
 from .doubts import warn_of_data as warn_of_data
 from .doubts import warn_of_unresolved as warn_of_unresolved
-from .features import look as look
 from .evaluations import evaluations as evaluations
 from .evaluations import looked as looked
+from .features import look as look
 from .integrals import integral_over as integral_over
 from .jumps import jumping_moduli as jumping_moduli
 from .jumps import steps_on as steps_on
