@@ -95,9 +95,22 @@ def adapt(
     refinement = _with_order(plain, order, start)
     truth("progress", progress)
     mesh = first_level(problem, maxh, refinement, start)
+    if guaranteed:
+        _refuse_infinite_energy(problem, mesh)
     warn_of_implausible(problem, mesh, refinement.order)
     solutions = with_warnings(levels(problem, mesh, refinement, start=start))
     return with_progress(solutions, tolerance, max_dofs) if progress else solutions
+
+
+def _refuse_infinite_energy(problem: Problem, mesh: ng.Mesh) -> None:
+    """Raise where supports contradict each other: no refinement makes a bound there."""
+    if found := contradictions(problem, mesh):
+        x, y = found[0].place
+        raise ValueError(
+            f"no guaranteed bound is known for supports that contradict each other: "
+            f"{found[0].message} at ({x:.6g}, {y:.6g}), and no displacement of finite energy takes "
+            "both values; make them equal there, or leave guaranteed out"
+        )
 
 
 def _with_order(plain: Refinement, order: int | None, start: object) -> Refinement:
