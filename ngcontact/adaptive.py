@@ -29,9 +29,9 @@ from .estimator import Estimator, estimate, refuse_bound
 from .fem import boundary_trace, unknowns
 from .mesh import curve, first_mesh
 from .one_mesh import check_continuation, solve_on, with_warnings
-from .plausibility import EXACT, at_round_off, contradictions, warn_of_implausible
+from .plausibility import EXACT, at_round_off, contradictions, look_at_data, warn_of_implausible
 from .problem import Problem
-from .quadrature import look, unresolved
+from .quadrature import unresolved
 from .results import with_progress
 from .solution import Solution
 
@@ -102,7 +102,9 @@ def adapt(
     refinement = _with_order(plain, order, start)
     truth("progress", progress)
     mesh = first_level(problem, maxh, refinement, start)
-    look(problem, mesh)
+    look_at_data(problem, mesh)
+    if guaranteed:
+        _refuse_infinite_energy(problem, mesh)
     warn_of_implausible(problem, mesh, refinement.order)
     solutions = with_warnings(levels(problem, mesh, refinement, start=start))
     return Run(with_progress(solutions, tolerance, max_dofs) if progress else solutions)
@@ -135,6 +137,17 @@ class Run(Iterator[Solution]):
     def __getitem__(self, number: object) -> NoReturn:
         """Say how to get the last level."""
         raise TypeError(ONE_PER_LEVEL.format(f"has no [{number!r}]"))
+
+
+def _refuse_infinite_energy(problem: Problem, mesh: ng.Mesh) -> None:
+    """Raise where supports contradict each other: no refinement makes a bound there."""
+    if found := contradictions(problem, boundary_trace(mesh, 1)):
+        x, y = found[0].place
+        raise ValueError(
+            f"no guaranteed bound is known for supports that contradict each other: "
+            f"{found[0].message} at ({x:.6g}, {y:.6g}), and no displacement of finite energy takes "
+            "both values; make them equal there, or leave guaranteed out"
+        )
 
 
 def _with_order(plain: Refinement, order: int | None, start: object) -> Refinement:

@@ -10,12 +10,12 @@ import numpy as np
 from .adaptive import first_level, levels, log
 from .adaptivity import Refinement
 from .errors import ContactError
-from .fem import boundary_trace, check_element, look_at_prescribed, unknowns
+from .fem import check_element, unknowns
 from .mesh import first_mesh
 from .one_mesh import check_start, solve_on, warn_of_doubts
-from .plausibility import warn_of_implausible
+from .plausibility import look_at_data, warn_of_implausible
 from .problem import Problem, Triangulation
-from .quadrature import evaluations, look
+from .quadrature import evaluations
 from .solution import Solution
 
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
@@ -74,11 +74,9 @@ def solve(
     mesh = first_mesh(problem, maxh) if mesh is None else mesh
     problem.check(mesh)
     before = evaluations()
-    look(problem, mesh)
+    look_at_data(problem, mesh)
     if start is None:
         warn_of_implausible(problem, mesh, order)
-    else:
-        look_at_prescribed(problem, boundary_trace(mesh, 1))
     coarse = _coarse_run(problem, mesh, order, element) if start is None else []
     solution = solve_on(problem, mesh, order, element, coarse[-1] if coarse else start)
     solution = replace(solution, coarse_levels=len(coarse))

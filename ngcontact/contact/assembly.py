@@ -126,10 +126,43 @@ def _same_point(lines: list[ContactLine], rows: Rows) -> tuple[Index, Mask]:
     order = np.lexsort((y, x, rows.node))
     for a, b in pairwise(order) if means.any() else ():
         alike = np.abs(rows.direction[a] - rows.direction[b]).max() <= ALIKE
-        if rows.node[a] == rows.node[b] and alike and (means[a] or means[b]):
+        apart = number[a] != number[b]
+        if rows.node[a] == rows.node[b] and apart and alike and (means[a] or means[b]):
             number[b] = number[a]
             averaged[[a, b]] = True
     return number, averaged
+
+
+def _own_weights(lines: list[ContactLine], number: Index, weight: Array) -> Array:
+    """Weights (m,) of rows without what others of the same point count on the same segments.
+
+    Of rows of one point, `number` (m,), on one segment the one of the largest `weight` (m,) keeps
+    it; pairs of other primaries face another part of the segment, which counts, too.
+    """
+    start, found = 0, []
+    for line in lines:
+        at, place = np.nonzero(line.rows >= 0)
+        primary = next(j for j, one in enumerate(lines) if _share_primary(one, line))
+        group = np.full(len(at), primary)
+        row = start + line.rows[at, place]
+        found.append((row, line.segments[at], group, line.shares[at, place]))
+        start += len(line.node)
+    row, segment, group, share = (np.concatenate(x) for x in zip(*found, strict=True))
+    order = np.lexsort((row, -weight[row], group, segment, number[row]))
+    keys = np.column_stack([number[row], segment, group])[order]
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = (keys[1:] != keys[:-1]).any(axis=1)
+    kept = np.zeros(len(order), dtype=bool)
+    kept[order] = first
+    whole, own = (np.bincount(row, share * part, len(weight)) for part in (1.0, kept))
+    return np.asarray(weight * np.where(whole > 0, own / np.where(whole > 0, whole, 1.0), 1.0))
+
+
+def _share_primary(one: ContactLine, other: ContactLine) -> bool:
+    """Whether two lines face segments in common, or an obstacle both."""
+    if len(one.facing) == 0 or len(other.facing) == 0:
+        return len(one.facing) == len(other.facing)
+    return bool(np.intersect1d(one.facing, other.facing).size)
 
 
 def _averaged(rows: Rows, number: Index, averaged: Mask, weight: Array) -> Rows:
@@ -147,18 +180,26 @@ def merged(lines: list[ContactLine], rows: Rows) -> tuple[list[ContactLine], Row
     first = np.unique(number)
     if len(first) == len(number):
         return lines, rows
-    weight = np.concatenate([line.weight for line in lines])
+    weight = _own_weights(lines, number, np.concatenate([line.weight for line in lines]))
     repeated = number != np.arange(len(number))
     if averaged.any():
         rows = _averaged(rows, number, averaged, weight)
     g, equality = rows.g.copy(), np.zeros(len(number), dtype=bool)
     np.logical_or.at(equality, number, rows.equality)
     # An equality is the tightest; what another pair at that node asks for follows or is refused.
-    tight = np.where(rows.equality | ~equality[number], rows.g, np.inf)
+    tight = np.where(rows.equality | averaged | ~equality[number], rows.g, np.inf)
     tight[averaged & repeated] = np.inf  # in the mean already
     g[first] = np.inf
     np.minimum.at(g, number, tight)
     np.add.at(weight, number[repeated], weight[repeated])
     parts = zip(lines, by_line(lines, weight), strict=True)
     lines = [replace(line, weight=part) for line, part in parts]
-    return kept_lines(lines, first), replace(rows, g=g, equality=equality).select(first)
+    kept = [_left(*both) for both in zip(lines, kept_lines(lines, first), strict=True)]
+    return kept, replace(rows, g=g, equality=equality).select(first)
+
+
+def _left(before: ContactLine, line: ContactLine) -> ContactLine:
+    """The line on the segments of which other lines have not taken all points it had `before`."""
+    left = (line.rows >= 0).any(axis=1) | (before.rows < 0).all(axis=1)
+    parts = {name: getattr(line, name)[left] for name in ("segments", "rows", "faces", "shares")}
+    return replace(line, **parts)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
+from ..arrays import Index
 from ..constraints import BasisTransformation
 from ..contact import ContactLine, contact_line
 from ..fem import BoundaryTrace, Space
@@ -94,15 +95,15 @@ def contact_lines(
 ) -> list[ContactLine]:
     """The line of each pair, a known one where it is the same.
 
-    What an earlier pair with the same other side, direction and gap covers is left to that one.
+    What an earlier pair of the same direction and gap covers is left to that one where both know
+    the facing segments.
     """
     lines: list[ContactLine] = []
     for number, contact in enumerate(problem.contact):
         same = (line for line in known if _same_pair(line.contact, contact))
-        earlier = [pair for pair in problem.contact[:number] if _same_row(pair, contact)]
-        line = None if earlier else next(same, None)
+        taken = _taken(trace, contact, problem.contact[:number], lines)
+        line = None if taken.size else next(same, None)
         if line is None:
-            taken = trace.segments(*(pair.secondary for pair in earlier))
             line = contact_line(trace, contact, taken)
         else:
             line = replace(line, searches=0)
@@ -110,9 +111,27 @@ def contact_lines(
     return lines
 
 
+def _taken(
+    trace: BoundaryTrace,
+    contact: Contact,
+    earlier: Sequence[Contact],
+    lines: Sequence[ContactLine],
+) -> Index:
+    """Segments (j,) of the secondary that `earlier` pairs, of these `lines`, leave nothing of."""
+    taken, facing = [np.zeros(0, dtype=np.intp)], trace.segments(contact.primary)
+    for pair, line in zip(earlier, lines, strict=True):
+        if not _same_row(pair, contact):
+            continue
+        if pair.primary == contact.primary:
+            taken.append(line.segments)
+        elif np.intersect1d(line.facing, facing).size:
+            taken.append(line.segments[line.faces])
+    return np.intersect1d(np.concatenate(taken), trace.segments(contact.secondary))
+
+
 def _same_row(one: Contact, other: Contact) -> bool:
-    """Whether two pairs ask for the same rows on what their secondaries have in common."""
-    names = ("primary", "direction", "gap", "bilateral", "rows", "roles")
+    """Whether two pairs ask for the same rows where their secondaries and primaries overlap."""
+    names = ("direction", "gap", "bilateral", "rows", "roles")
     return all(getattr(one, name) == getattr(other, name) for name in names)
 
 

@@ -6,8 +6,14 @@ import ngsolve as ng
 
 from ..fem import boundary_trace, look_at_prescribed, warn_of_locking
 from ..problem import Problem
-from ..quadrature import warn_of_data, warn_of_jumps
+from ..quadrature import look, warn_of_data, warn_of_jumps
 from .corners import contradictions, warn_of_contradictions
+
+
+def look_at_data(problem: Problem, mesh: ng.Mesh) -> None:
+    """Look at all functions among the data anew, once per run: parameters may have changed."""
+    look(problem, mesh)
+    look_at_prescribed(problem, boundary_trace(mesh, 1))
 
 
 def warn_of_implausible(problem: Problem, mesh: ng.Mesh, order: int) -> None:
@@ -17,7 +23,5 @@ def warn_of_implausible(problem: Problem, mesh: ng.Mesh, order: int) -> None:
     """
     warn_of_locking(problem, mesh, order)
     warn_of_data(problem, mesh, order)
-    trace = boundary_trace(mesh, 1)
-    look_at_prescribed(problem, trace)
-    warn_of_contradictions(contradictions(problem, trace))
+    warn_of_contradictions(contradictions(problem, boundary_trace(mesh, 1)))
     warn_of_jumps(problem, mesh)

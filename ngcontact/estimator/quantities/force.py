@@ -85,6 +85,8 @@ def proved_force_errors(solution: Forced, pair: int, e: Array) -> tuple[float, f
     """
     if not solution.problem.model.startswith("plane"):
         raise ValueError(f'no bar of the force is proved for "{solution.problem.model}"')
+    if len(solution.pairs[pair].line.node) == 0:
+        raise ValueError("the points of this pair belong to other pairs, which have its force")
     if has_rough_loads(solution.problem, solution.discrete.space.V):
         raise ValueError("loads that are rougher than the mesh count as they are integrated")
     across = np.array([-e[1], e[0]])
