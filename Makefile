@@ -3,6 +3,8 @@
 #   make demo    a steel disc on an aluminium block, compared with Hertz's formulas
 #   make test    linter, formatter, type checker, import contracts, doctests, tests
 #
+# `make studies` runs what takes longer and says more of the same: tables over many levels and cases.
+#
 # `make test PYTHON=python3.13` does it with another Python, in an environment of its own.
 PYTHON ?= python3
 # The one Python for which types are checked: with others come other annotations of NumPy and SciPy.
@@ -17,15 +19,21 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed-$(VERSION)
 DEVELOPING := $(VENV)/developing-$(VERSION)
 DOCUMENTING := $(VENV)/documenting-$(VERSION)
+# One process for each core, and one thread in each; a file stays in one process with its solutions.
+PARALLEL := -n auto --dist loadfile
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: demo test smoke check lint types imports spelling pages docs dev dist clean
+.PHONY: demo test studies smoke check lint types imports spelling pages docs dev dist clean
 
 demo: $(INSTALLED)
 	$(BIN)/python -m drivers.hertz
 
 test: check
-	$(BIN)/python -m pytest
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m "not study" $(PARALLEL)
+
+# Rates and effectivities over many levels, drivers as a whole, every row of long tables.
+studies: $(INSTALLED)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -m study $(PARALLEL)
 
 # The demo, and the first test of every file: half a minute.
 smoke: demo

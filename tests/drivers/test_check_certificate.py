@@ -299,6 +299,55 @@ def test_tampered_bodies_of_revolution_fail(name, revolved, tmp_path, capsys):
     assert "FAIL" in capsys.readouterr().out
 
 
+def negative_at_its_least(array, share):
+    """The entry of least size replaced by a negative share of the largest."""
+    array = array.copy()
+    array.flat[np.abs(array).argmin()] = -share * np.abs(array).max()
+    return array
+
+
+def with_another_point(a, share):
+    """One more point of the gap, of which the weight is a negative share of the largest."""
+    more = {"gap_piece": 0, "gap_s": 0.5, "gap_open": 0.0}
+    more["gap_weight"] = -share * a["gap_weight"].max()
+    return {name: np.append(a[name], value) for name, value in more.items()}
+
+
+SIGNED = {
+    "gap_weight": with_another_point,
+    "gap_open": lambda a, share: {"gap_open": negative_at_its_least(a["gap_open"], share)},
+    "pressure": lambda a, share: {
+        "contact_pressure": negative_at_its_least(a["contact_pressure"], share)
+    },
+    "lifting": lambda a, share: {"lifting": negative_at_its_least(a["lifting"], share)},
+}
+
+
+@pytest.mark.parametrize("name", SIGNED)
+@pytest.mark.parametrize(("share", "passes"), [(1e-20, True), (1e-8, False)])
+def test_zero_may_be_round_off_of_either_sign(name, share, passes, revolved, tmp_path, capsys):
+    """A circumference on the axis is -1e-20 with some kernels of BLAS and NumPy."""
+    _, arrays = revolved
+    np.savez(tmp_path / "other.npz", **(arrays | SIGNED[name](arrays, share)))
+    assert check_certificate.check(tmp_path / "other.npz") == passes, capsys.readouterr().out
+
+
+def test_round_off_of_weights_does_not_lower_the_bound(revolved, tmp_path, capsys):
+    """A huge gap where a weight is round-off below 0 would, if that weight counted."""
+    _, arrays = revolved
+    weight, gap = arrays["gap_weight"].copy(), arrays["gap_open"].copy()
+    p = arrays["contact_pressure"][arrays["gap_piece"]].min(axis=1)
+    at = np.argmax(p)
+    weight[at] = -1e-15 * weight.max()
+    wanted = 0.1 * arrays["bound"] ** 2
+    gap[at] = wanted / (2e-15 * weight.max() * p[at])
+    lower = np.sqrt(arrays["bound"] ** 2 - wanted)
+    changes = {"gap_weight": weight, "gap_open": gap, "bound": lower}
+    np.savez(tmp_path / "other.npz", **(arrays | changes))
+    assert not check_certificate.check(tmp_path / "other.npz")
+    assert "FAIL  B follows" in capsys.readouterr().out
+
+
 def test_the_driver_needs_nothing_but_numpy(saved):
     path, arrays, solution = saved
     tree = ast.parse(DRIVER.read_text())
