@@ -89,6 +89,7 @@ SOLUTION = {
     "bound_parts": "energy",
     "energy_bounds": "energy",
     "quantities": "any",
+    "contact_area": "any",
     "equilibrated": "stress",
     "residuals": "none",
     "at": "any",

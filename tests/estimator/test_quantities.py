@@ -8,7 +8,7 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Circle, Compound, OCCGeometry
+from netgen.occ import Circle, Compound, MoveTo, OCCGeometry, Y
 
 from drivers.reference import cases
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
@@ -26,15 +26,18 @@ def bars_of(case, half_width, order):
         spent = {name: level.work[name] - before[name] for name in before}
         assert spent["equilibrations"] == 2  # of the solution, and of the force's dual problem
         assert (spent["factorizations"], spent["back_solves"]) == (0, 1)
-        assert q["force"].guaranteed or "more than the force itself" in q.note
+        proved = q["force"].proved
+        assert proved is not None or "more than the force itself" in q.note
         assert q["energy"].guaranteed
         low, high = level.energy_bounds
         assert q["energy"].error == max(high - level.energy, level.energy - low)
         found = [row for row in q if row.name == "end of contact, x"]
         assert sorted(np.sign(row.value) for row in found) == [-1, 1]
         ends = [row.error / abs(abs(row.value) - half_width) for row in found]
-        yield q["force"].error / abs(q["force"].value - case.exact.P), ends
-    assert q["force"].guaranteed
+        off = abs(q["force"].value - case.exact.P)
+        assert proved is None or off <= proved
+        yield q["force"].error / off, ends
+    assert proved is not None
 
 
 @pytest.mark.study
@@ -47,7 +50,7 @@ def test_bars_contain_the_exact_values():
             force.append(one)
             ends += both
     assert min(force) >= 1
-    assert np.median(force) <= 50
+    assert np.median(force) <= 10  # measured 4
     assert min(ends) >= 1
     assert np.median(ends) <= 100
 
@@ -94,10 +97,8 @@ def test_proved_bars_of_the_force_overlap(scene):
     coarse, fine = (solve(problem, maxh=h, order=2) for h in (0.2, 0.12))
     for pair in range(len(problem.contact)):
         one, other = coarse.quantities(pair)["force"], fine.quantities(pair)["force"]
-        assert one.guaranteed
-        assert other.guaranteed
-        assert abs(one.value - other.value) <= one.error + other.error
-        assert other.error < one.error
+        assert abs(one.value - other.value) <= one.proved + other.proved
+        assert other.proved < one.proved
 
 
 def test_a_force_known_by_statics_has_no_error():
@@ -134,13 +135,14 @@ def test_bars_scale(scale):
         for m in (problem.materials, law)
     )
     assert other.error == pytest.approx(one.error * scale, rel=1e-6)
+    assert other.proved == pytest.approx(one.proved * scale, rel=1e-6)
 
 
 def test_largest_stress_lies_under_the_surface():
     """Johnson 1985: the largest shear is 0.3 p0 at 0.78 a; von Mises 0.56 p0 at nu = 0.3, 0.7 a."""
     case = cases.hertz_contact(half_width=0.3)
     *_, finest = adapt(case.problem, order=4, max_dofs=4500)
-    row = finest.quantities()["largest von Mises"]
+    row = finest.quantities()["von Mises"]
     assert 0.5 * case.exact.p0 < row.value < 0.65 * case.exact.p0
     assert abs(row.place[0]) < 0.1
     assert 0.15 < abs(row.place[1]) < 0.3
@@ -165,7 +167,7 @@ def test_largest_stress_lies_on_the_bore_of_a_press_fit(order):
     q = solve(problem, maxh=6.0, order=order).quantities()
     stress = np.array([-p, 5 / 3 * p, nu * 2 / 3 * p])
     mises = np.sqrt(((stress - np.roll(stress, 1)) ** 2).sum() / 2)
-    row = q["largest von Mises"]
+    row = q["von Mises"]
     assert np.linalg.norm(row.place) == pytest.approx(R, rel=1e-3)
     # The gap of the drawing is closed to first order: d / R of the pressure besides.
     assert abs(row.value - mises) <= row.error + 2 * d / R * mises
@@ -177,13 +179,14 @@ def test_the_table_reads():
     solution = solve(cases.hertz_contact().problem, maxh=0.25, order=2)
     q = solution.quantities()
     names = [row.name for row in q]
-    assert names[:2] == ["force", "peak pressure"]
-    assert names[-2:] == ["energy", "largest von Mises"]
+    assert names[:5] == ["force", "force, x", "force, y", "contact area", "mean pressure"]
+    assert names[-2:] == ["energy", "von Mises"]
     lines = str(q).splitlines()
-    assert len(lines) == len(names)
+    assert len(lines) == len(names) + 1
+    assert lines[-1] == "force along the pair's direction, (0, -1)"
     proved = ("energy", "force")
-    assert all(("guaranteed" in line) == line.startswith(proved) for line in lines)
-    assert all("+-" in line for line in lines)
+    assert all(("guaranteed" in line) == line.startswith(proved) for line in lines[:-1])
+    assert all(("+-" in line) == (" none" not in line) for line in lines[:-1])
     with pytest.raises(KeyError, match="'torque' is none of"):
         q["torque"]
     with pytest.raises(ValueError, match="pair=1 is not a contact pair"):
@@ -197,9 +200,10 @@ def said_once(solution):
         q, again = solution.quantities(), solution.quantities()
     (message,) = [str(w.message) for w in caught]
     assert str(q) == str(again)
-    assert all(row.kind == "estimated" and row.error > 0 for row in q)
+    assert all(row.proved is None and not row.guaranteed for row in q)
+    assert all(row.error >= 0 for row in q if row.kind == "estimated")
     assert str(q).splitlines()[-1] == q.note
-    assert message.startswith(q.note)
+    assert message.split(";")[0] in q.note
     return q
 
 
@@ -251,9 +255,111 @@ def test_a_contact_on_few_elements_at_the_axis_has_a_bound():
     assert "at (0, 0)" in str(peak)
 
 
+def free_pin(half=False):
+    """A pin with clearance, pressed into its hole by a body force of 500 on the half of it."""
+    hole, pin = (Circle((0, 0), r).Face() for r in (10.0, 9.95))
+    lug = MoveTo(-30, -30).Rectangle(60, 60).Face()
+    hole.edges.name, pin.edges.name, lug.edges.name = "hole", "pin", "outside"
+    lug.edges.Max(Y).name = "top"
+    lug = lug - hole
+    if half:
+        right = MoveTo(0, -100).Rectangle(100, 200).Face()
+        right.edges.name = "symmetry"
+        lug, pin = lug * right, pin * right
+    lug.faces.name, pin.faces.name = "lug", "pin"
+    return Problem(
+        geometry=OCCGeometry(Compound([lug, pin]), dim=2),
+        materials={"lug|pin": Elastic(E=210e3, nu=0.3)},
+        displacement={"top": (0, 0)},
+        sliding="symmetry" if half else None,
+        force={"pin": (0, -1000 / (np.pi * 9.95**2))},
+        contact=[Contact("pin", "hole")],
+    )
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.filterwarnings("ignore:.*segments long")
+def test_contact_that_wraps_round_has_quantities(order):
+    """No projection on a line is monotone there; the force is the load."""
+    solution = solve(free_pin(), maxh=3.5, order=order)
+    without_proof(solution)
+    q = solution.quantities()
+    assert q["force"].value == pytest.approx(
+        1000, rel=3e-2
+    )  # a polygon at order 1, measured 2.0e-2
+    assert sum(row.name.startswith("end of contact") for row in q) == 2
+    assert q["contact area"].value == pytest.approx(solution.contact_area(), rel=1e-14)
+
+
+def without_proof(solution):
+    """As if no bound were known, which spares its time."""
+    vars(solution)["_proved"] = None, "not asked for"
+
+
+def test_the_force_of_half_a_model_is_the_load():
+    """The guide takes a component across, which the length of the vector counts."""
+    solution = solve(free_pin(half=True), maxh=3.5, order=2)
+    without_proof(solution)
+    q = solution.quantities()
+    assert q["force"].value == pytest.approx(500, rel=1e-3)  # measured 1e-4, of the arcs
+    assert np.linalg.norm(solution.contact_force()) > 505
+    assert q["force, y"].value == pytest.approx(q["force"].value, rel=1e-12)
+    assert "along the load, (0, 1)" in q.note
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_figures_of_hertz_lie_in_their_bars(order):
+    case = cases.hertz_contact(half_width=0.3)
+    *_, solution = adapt(case.problem, order=order, max_dofs=1500 if order < 4 else 4500)
+    without_proof(solution)
+    q, P = solution.quantities(), case.exact.P
+    exact = {
+        "force": P,
+        "contact area": 0.6,
+        "mean pressure": P / 0.6,
+        "peak pressure": case.exact.p0,
+    }
+    for name, value in exact.items():
+        assert abs(q[name].value - value) <= q[name].error <= 0.2 * value
+
+
+def test_pairs_given_twice_have_quantities():
+    problem = partly_lifted()
+    solution = solve(replace(problem, contact=problem.contact * 2), maxh=0.5, order=2)
+    without_proof(solution)
+    for pair in (0, 1):
+        assert np.isfinite(solution.quantities(pair)["force"].value)
+
+
+def test_no_contact_has_quantities():
+    pair = Contact("arc", direction=(0, -1), gap=1.0)
+    problem = replace(cases.disc_on_rigid_plane(), contact=[pair], displacement={"top": (0, 0)})
+    q = solve(problem, maxh=0.5, order=2).quantities()
+    assert q["force"].value == q["contact area"].value == q["mean pressure"].value == 0
+    assert q["peak pressure"].kind == "none"
+
+
+def test_corners_of_infinite_stress_are_named():
+    """Both ends of a punch; of a clamp with an axis beside it the other one."""
+    solution = solve(cases.flat_punch(), maxh=0.3, order=2)
+    without_proof(solution)
+    q = solution.quantities()
+    half = q["contact area"].value / 2
+    assert sorted(q["peak pressure"].infinite[:, 0]) == pytest.approx([-half, half])
+    assert q["peak pressure"].infinite[:, 1] == pytest.approx([0, 0])
+    assert len(partly_lifted_corners()) == 1
+
+
+def partly_lifted_corners():
+    """Of a block whose lower side is clamped, with a line of symmetry at its left end."""
+    solution = solve(partly_lifted(), maxh=0.5, order=2)
+    without_proof(solution)
+    return solution.quantities()["von Mises"].infinite
+
+
 def test_one_element_has_no_neighbour_to_compare_with():
     """The bar of a stress that nothing is known of reads as none."""
-    row = Quantity("largest von Mises", 2.0, np.nan, "none")
+    row = Quantity("von Mises", 2.0, np.nan, "none")
     assert "none" in str(row)
     assert "+-" not in str(row)
     assert not row.guaranteed

@@ -97,6 +97,7 @@ MEMBERS = {
         "energy_bounds",
         "equilibrated",
         "quantities",
+        "contact_area",
     ),
     *("write", "plot", "draw"),
     *("at", "along", "record", "save"),

@@ -19,7 +19,7 @@ NEAR_PEAK = 0.9  # share of the peak from which pressures count for it
 FITS = ((1, 3), (2, 5))  # degrees of fits at an end of contact, and how many points they take
 # Error of the peak over the largest difference near it to p*, and to the discrete stress: measured
 # on half of 60 random scenes, orders 1 to 4, the other half agrees.
-OFF_STAR, OFF_STRESS = 2.0, 0.75
+OFF_STAR, OFF_STRESS, OFF_ALONE = 2.0, 0.75, 1.5  # the last where there is no p*: at most 1.1
 ENDS = 0.6  # error of an end over h^2 / zone and the spread of fits, measured: at most 0.55
 SAMPLES = np.linspace(0, 1, 9)  # where pressures are looked at on a segment
 
@@ -44,7 +44,8 @@ def peak_of(
         return unknown("peak pressure", 0.0 if not pair.active.any() else np.nan, infinite=infinite)
     at = int(np.where(away, pressure, -np.inf).argmax())
     peak, place = float(pressure[at]), line.position[at]
-    off = OFF_STRESS * _off_stress(pair, boundary, stress)
+    share = OFF_ALONE if star is None else OFF_STRESS
+    off = share * _off_stress(pair, boundary, stress)
     most = peak
     if star is not None and len(star[0]):
         other, values = _off_star(pair, boundary, star)

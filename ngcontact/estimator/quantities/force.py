@@ -81,7 +81,7 @@ def proved_force_errors(solution: Forced, pair: int, e: Array) -> tuple[float, f
     Raises
     ------
     ValueError, ContactError
-        No bar is proved.
+        No bar is proved, or one beyond the force itself.
     """
     if not solution.problem.model.startswith("plane"):
         raise ValueError(f'no bar of the force is proved for "{solution.problem.model}"')
@@ -92,7 +92,10 @@ def proved_force_errors(solution: Forced, pair: int, e: Array) -> tuple[float, f
     across = np.array([-e[1], e[0]])
     straight = np.abs(solution.pairs[pair].line.direction @ across).max(initial=0.0) <= STRAIGHT
     other = 0.0 if straight else _component(solution, pair, across)
-    return _component(solution, pair, e), other
+    along, size = _component(solution, pair, e), float(np.linalg.norm(solution.contact_force(pair)))
+    if max(along, other) > size > 0:
+        raise ValueError(f"what is proved, {max(along, other):.2g}, is more than the force itself")
+    return along, other
 
 
 def _component(solution: Forced, pair: int, e: Array) -> float:
