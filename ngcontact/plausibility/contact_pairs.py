@@ -179,8 +179,8 @@ def _unresolved(state: ContactState, zones: Zones) -> str:
     worst = short[np.argmin(zones.segments[short] / needed[short])]
     return (
         f"a zone in contact is {zones.segments[worst]:.2g} segments long, shorter than "
-        f"{needed[worst]:.2g}: the force is better than the pressure, whose peak may be wrong by half; "
-        "use adapt, or a smaller maxh"
+        f"{needed[worst]:.2g}: the force is better than the pressure, whose peak may be wrong by "
+        "half; use adapt, or a smaller maxh"
     )
 
 
