@@ -96,11 +96,13 @@ def _found(
 
 def _jumps(problem: Problem, mesh: ng.Mesh) -> Iterator[tuple[str, Jumps]]:
     """Where the laws that vary jump inside elements, by pattern of bodies."""
+    laws = [(pattern, law) for pattern, law in problem.materials.items() if varies(law)]
+    if not laws:
+        return
     region, diameter = Triangulation(mesh).bodies, diameters(mesh)
-    for pattern, law in problem.materials.items():
-        if varies(law):
-            at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
-            yield pattern, _found(law.voigt(problem.model), mesh, at, diameter, JUMP)
+    for pattern, law in laws:
+        at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
+        yield pattern, _found(law.voigt(problem.model), mesh, at, diameter, JUMP)
 
 
 def jumping_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:

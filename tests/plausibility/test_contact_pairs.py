@@ -156,7 +156,7 @@ def test_the_last_level_resolves_the_zone_of_a_load_however_small(press):
     supports = {"block_bottom": (0, 0), "disc_top": (0, -press)}
     problem = replace(cases.pressed_disc(), displacement=supports)
     assert quiet(finest(problem, unknowns=11_000))
-    assert only(finest(problem, unknowns=1500), ZONE)  # the first levels do not
+    assert only(finest(problem, unknowns=1000), ZONE)  # the first levels do not
 
 
 @pytest.mark.parametrize(("order", "maxh"), [(1, 0.058), (2, 0.06), (3, 0.06), (4, 0.06)])
@@ -287,3 +287,19 @@ def test_a_body_that_something_resists_is_not_told():
     open_gap = [Contact("lower_contact", "upper_contact", gap=1.0)]
     held = {"top": (0, -0.1), "bottom": (0, 0)}
     assert quiet(lambda: solve(pushed(displacement=held, contact=open_gap), maxh=0.5, order=2))
+
+
+@pytest.mark.parametrize(("order", "maxh"), [(3, 0.35), (4, 0.5)])
+def test_zones_below_three_segments_may_have_their_peak(order, maxh):
+    """Half-width 0.3: 1.7 and 1.3 segments, peaks measured 3.0 and 1.6 % off."""
+    case = cases.hertz_contact()
+    assert quiet(lambda: solve(case.problem, maxh=maxh, order=order))
+    peak = solve(case.problem, maxh=maxh, order=order).pressure.max()
+    assert peak == pytest.approx(case.exact.p0, rel=0.04)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_zones_whose_peak_is_wrong_are_told(order):
+    """Half-width 0.15 on maxh 0.35: 1 and 1.5 segments, peaks measured 19 and 34 % off."""
+    case = cases.hertz_contact(half_width=0.15)
+    assert only(lambda: solve(case.problem, maxh=0.35, order=order), ZONE)
