@@ -103,7 +103,7 @@ def _met(features: Features, view: View) -> tuple[Index, Index]:
         at = mesh(x[:, 0].copy(), x[:, 1].copy())["nr"].astype(np.intp)
         return at[at >= 0], every[at >= 0]
     region = mesh.Boundaries(features.name)
-    return touched(np.column_stack([x, features.widths]), view, view.inside(region), 1.0)
+    return touched(np.column_stack([x, features.widths]), view, view.inside(region))
 
 
 def _bent(view: View, segments: Index) -> Mask:
