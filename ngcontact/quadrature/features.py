@@ -18,7 +18,14 @@ from weakref import WeakKeyDictionary
 
 import ngsolve as ng
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter
+from scipy.ndimage import (
+    distance_transform_edt,
+    label,
+    maximum,
+    maximum_filter1d,
+    minimum_filter1d,
+    uniform_filter,
+)
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask
@@ -332,7 +339,10 @@ def _in_body(
             around = [uniform_filter(x, 2 * window + 1, mode="constant") for x in (now, then)]
             flagged[part] |= (now > limit) & (around[1] < SATURATED * around[0])
     x = (np.argwhere(flagged) + origin) @ sides
-    widths = np.full(len(x), 2 * spacing)
+    parts, _ = label(flagged, np.ones((3, 3)))
+    depth = distance_transform_edt(np.pad(flagged, 1))[1:-1, 1:-1]  # samples, 1 at the rim
+    depth = np.append(0.0, maximum(depth, parts, np.arange(1, parts.max() + 1)))[parts[flagged]]
+    widths = spacing * (2 * depth - 1)
     if kind == "materials" and len(x):
         widths = _widths(function, view.mesh, x, spacing)
     return x, widths, len(values), vanishes
@@ -403,7 +413,7 @@ def towards(features: Array, cells: Cells, view: View) -> Cells:
 def touched(features: Array, view: View, elements: Index) -> tuple[Index, Index]:
     """Elements (j,) of `elements` (k,) and features (j,) of `features` (n, 3) that meet.
 
-    Features reach their width; in bodies, where all have one width, the nearest stands for all.
+    Features reach their width; in bodies the nearest stands for all.
     """
     if not len(features):
         return elements[:0], elements[:0]
