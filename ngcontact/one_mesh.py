@@ -11,7 +11,7 @@ from .errors import warn
 from .mesh import check_curves, curve, same_geometry
 from .plausibility import doubt_of_refinement, doubts, estimates_rise
 from .problem import Problem
-from .quadrature import evaluations, warn_of_unresolved
+from .quadrature import evaluations, unresolved, warn_of_unresolved
 from .solution import Solution
 
 
@@ -107,6 +107,8 @@ def with_warnings(solutions: Iterator[Solution]) -> Generator[Solution]:
     for solution in solutions:
         warn_of_doubts(solution, told, last=False)
         yield solution
+        if unresolved(solution.problem, solution.mesh):  # estimates rise when data are seen
+            estimates.clear()
         estimates.append(solution.relative_error_estimate)
         if "estimates" not in told and estimates_rise(estimates):
             told.add("estimates")

@@ -18,7 +18,7 @@ LOST = 1e-3  # of a load that quadrature may miss without a word
 # Size of an element over the width of a feature in it, up to which it is resolved. Loads are
 # integrated on parts of elements, but stresses in equilibrium meet body forces on so many of them.
 RESOLVED = {"displacement": 2.0, "gap": 2.0, "materials": 2.0}
-IN_BOUNDS = RESOLVED | {"force": 8.0, "traction": 2.0}  # the last one on curves
+IN_BOUNDS = RESOLVED | {"force": 32.0, "traction": 2.0}  # the last one on curves
 BENT = 1e-9  # of a segment, its distance from a chord
 
 
@@ -103,7 +103,7 @@ def _met(features: Features, view: View) -> tuple[Index, Index]:
         at = mesh(x[:, 0].copy(), x[:, 1].copy())["nr"].astype(np.intp)
         return at[at >= 0], every[at >= 0]
     region = mesh.Boundaries(features.name)
-    return touched(np.column_stack([x, features.widths]), view, view.inside(region), 1.0)
+    return touched(np.column_stack([x, features.widths]), view, view.inside(region))
 
 
 def _bent(view: View, segments: Index) -> Mask:

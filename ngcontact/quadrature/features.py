@@ -13,12 +13,19 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any, Literal, TypeAlias
+from typing import Any, TypeAlias
 from weakref import WeakKeyDictionary
 
 import ngsolve as ng
 import numpy as np
-from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter
+from scipy.ndimage import (
+    distance_transform_edt,
+    label,
+    maximum,
+    maximum_filter1d,
+    minimum_filter1d,
+    uniform_filter,
+)
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask
@@ -31,12 +38,10 @@ from .view import View
 ON_LINE = 2048  # samples of a boundary: none are further apart than 1 / 1365 of it
 IN_BODY = 5.2e-3  # between samples of a body, over its extent: discs of radius 3e-3 hold one
 TURN = 0.3  # angle of their lattice, out of step with edges
-# Samples in windows, each of twice the last and one. Only small ones see features at ends of lines,
-# by reflection: wide ones would take the last half of a wave for one.
-WINDOWS: list[tuple[Literal["symmetric", "edge"], tuple[int, ...]]] = [
-    ("symmetric", (3, 7, 15, 31)),
-    ("edge", (31, 63, 127, 255)),
-]
+WINDOWS = (3, 7, 15, 31, 63, 127, 255)  # samples, each of twice the last and one
+STEEP = 0.5  # of the change in a window, what is lost there of a feature
+AT_ENDS = 31  # of these, for features at ends of lines, where the end of a wave looks like one ...
+HIGH = 0.05  # ... of less than this share of the range
 # The same in bodies; laws are not integrated on parts of elements that follow them.
 IN_PLANE = {"force": (5, 11), "materials": (5, 11, 23, 47)}
 BESIDE = 4  # samples, half of them on each side
@@ -45,6 +50,7 @@ SATURATED = 1.5  # times what a window loses, from which the next one loses more
 # displacements and gaps relative to their range.
 SHARE = {"traction": 0.1, "force": 0.1, "materials": 0.1, "displacement": 1e-5, "gap": 1e-5}
 ROUND_OFF = 1e-10  # of values, relative to the largest
+FEW = 6  # samples in a feature up to which what is between them is looked at
 MEASURED = 65  # points across a feature, to tell its width
 FEATURES = 200  # that are measured; others have the least width of these
 NARROWEST = 0.1  # samples: no feature is taken for narrower
@@ -159,10 +165,13 @@ def _parts(view: View, region: ng.Region) -> list[Index]:
 
 
 def _values(function: Function, view: View, elements: Index, reference: Array) -> Array:
-    """Values (n, c) at a point `reference` (n, dim) of each of `elements` (n,)."""
+    """Values (n, c) at a point `reference` (n, dim) of each of `elements` (n,), 0 if infinite."""
     if isinstance(function, ng.CoefficientFunction):
-        return view.look(function, elements, reference[:, None])[:, 0]
-    return np.asarray(function(*_positions(view, elements, reference).T), dtype=float)[:, None]
+        values = view.look(function, elements, reference[:, None])[:, 0]
+    else:
+        x, y = _positions(view, elements, reference).T
+        values = np.asarray(function(x, y), dtype=float)[:, None]
+    return np.where(np.isfinite(values), values, 0.0)
 
 
 def _positions(view: View, elements: Index, reference: Array) -> Array:
@@ -173,7 +182,8 @@ def _told(kind: str, values: Array) -> tuple[Array, float]:
     """What is looked at of `values` (n, c), (n, c'), and what counts as a departure."""
     if kind == "materials":
         diagonal = values[:, :: round(values.shape[1] ** 0.5) + 1]
-        return np.log(np.abs(diagonal)).mean(axis=1, keepdims=True), SHARE[kind]
+        stiffness = np.log(np.maximum(np.abs(diagonal), np.finfo(float).tiny))
+        return stiffness.mean(axis=1, keepdims=True), SHARE[kind]
     size = float(np.abs(values).max(initial=0.0))
     unit = float(np.abs(values).max(axis=1).mean()) if kind in ("traction", "force") else 0.0
     unit = unit or float(np.ptp(values, axis=0).max(initial=0.0))
@@ -181,23 +191,24 @@ def _told(kind: str, values: Array) -> tuple[Array, float]:
 
 
 def _lost(values: Array, window: int, inside: Mask | None = None) -> Array:
-    """What the opening or the closing of `values` in a window of so many samples has lost.
+    """What the opening of `values` in a window of so many samples has lost: of peaks.
 
-    Along all axes; of the samples `inside`, there but for what is beside values that are kept: the
-    window does not fit into convex corners.
+    Along all axes. On a line windows do not reach beyond its ends; in a plane they do not beyond
+    the samples `inside`, and nothing is lost beside values that are kept, as windows do not fit
+    into convex corners.
     """
-    again = window if inside is None else window + BESIDE
-
-    def filtered(x: Array, size: int, least: bool) -> Array:
-        if inside is not None:
-            x = np.where(inside, x, np.inf if least else -np.inf)
-        for axis in range(x.ndim):
-            x = (minimum_filter1d if least else maximum_filter1d)(x, size, axis)
-        return x
-
-    opened = filtered(filtered(values, window, least=True), again, least=False)
-    closed = filtered(filtered(values, window, least=False), again, least=True)
-    return np.maximum(values - opened, closed - values)
+    least, again = values, window if inside is None else window + BESIDE
+    if inside is not None:
+        least = np.where(inside, least, np.inf)
+    for axis in range(values.ndim):
+        least = minimum_filter1d(least, window, axis)
+    if inside is None:
+        least[: window // 2] = least[-(window // 2) :] = -np.inf
+    else:
+        least = np.where(inside, least, -np.inf)
+    for axis in range(values.ndim):
+        least = maximum_filter1d(least, again, axis)
+    return np.asarray(values - least)
 
 
 def _on_line(
@@ -210,36 +221,52 @@ def _on_line(
     looked = []
     for at, turned in chains:
         ends = np.append(0.0, np.cumsum(view.sizes[at]))
-        n = max(round(ON_LINE * ends[-1] / whole), len(at), WINDOWS[0][1][0])
+        n = max(round(ON_LINE * ends[-1] / whole), len(at), WINDOWS[0])
         t = (np.arange(n) + 0.25 + 0.5 * (GOLDEN * np.arange(n) % 1)) / n * ends[-1]
         looked.append((at, turned, ends, t, _values(function, view, *_on(at, turned, ends, t))))
     _, limit = _told(kind, np.concatenate([one[-1] for one in looked]))
     for at, turned, ends, t, values in looked:
         count, vanishes = count + len(t), vanishes and not values.any()
-        flagged = np.zeros(len(t), dtype=bool)
-        for component in values.T:
-            for mode, windows in WINDOWS:
-                width = windows[-1]
-                longer = np.pad(component, width, mode)
-                lost = [_lost(longer, window)[width:-width] for window in windows]
-                for now, then in pairwise(lost):
-                    flagged |= (now > limit) & (then < SATURATED * now)
-        runs = np.flatnonzero(np.diff(np.concatenate([[False], flagged, [False]]).astype(int)))
-        for first, last in runs.reshape(-1, 2)[:FEATURES]:
-            low = t[first - 1] if first else 0.0
-            high = t[last] if last < len(t) else ends[-1]
-            fine = np.linspace(low, high, MEASURED)
-            here = _on(at, turned, ends, fine)
-            found = _values(function, view, *here)
-            base = found[:1] + (found[-1:] - found[:1]) * np.linspace(0, 1, MEASURED)[:, None]
-            if first == 0 or last == len(t):
-                base = found[-1:] if first == 0 else found[:1]
-            away = np.abs(found - base).max(axis=1)
-            share = max(np.count_nonzero(away > away.max() / 2) / MEASURED, 1 / MEASURED)
-            widths.append(np.array([max(share * (high - low), NARROWEST * whole / ON_LINE)]))
-            middle = np.median(np.flatnonzero(away >= away.max() / 2)).astype(int)
-            places.append(_positions(view, here[0][[middle]], here[1][[middle]]))
+        for component in np.hstack([values, -values]).T:
+            departure = _departures(component, limit)
+            for first, last in _runs(departure > 0)[:FEATURES]:
+                low = t[first - 1] if first else 0.0
+                high = t[last] if last < len(t) else ends[-1]
+                if last - first < FEW:  # what is between samples counts
+                    fine = low + (high - low) * (np.arange(MEASURED) + 0.5) / MEASURED
+                    found = _values(function, view, *_on(at, turned, ends, fine))
+                    # Both ends are beside the feature, unless the line ends there.
+                    base = found[[0 if first else -1, -1 if last < len(t) else 0]].mean(axis=0)
+                    away = np.abs(found - base).max(axis=1)
+                else:
+                    fine, away = t[first:last], departure[first:last]
+                most = away > away.max() / 2
+                width = np.count_nonzero(most) / len(most) * (high - low)
+                widths.append(np.array([max(width, NARROWEST * whole / ON_LINE)]))
+                middle = np.median(fine[most]) if most.any() else (low + high) / 2
+                places.append(_positions(view, *_on(at, turned, ends, np.array([middle]))))
     return np.concatenate(places), np.concatenate(widths), count, vanishes
+
+
+def _runs(some: Mask) -> list[list[int]]:
+    """Where each run of `some` (n,) begins, and where the rest begins again."""
+    changes = np.diff(np.concatenate([[0], some.astype(int), [0]]))
+    return np.flatnonzero(changes).reshape(-1, 2).tolist()
+
+
+def _departures(values: Array, limit: float) -> Array:
+    """By how much each of `values` (n,) departs in a peak, by more than a limit, (n,); else 0."""
+    found = np.zeros(len(values))
+    windows = [window for window in WINDOWS if window <= len(values) / 2]
+    lost = [_lost(values, window) for window in windows]
+    for window, (now, then) in zip(windows, pairwise(lost), strict=False):
+        some = (now > limit) & (then < SATURATED * now)
+        around = maximum_filter1d(values, window) - minimum_filter1d(values, window)
+        some &= now > STEEP * around
+        for end in (slice(window // 2), slice(-(window // 2), None)):
+            some[end] &= window <= AT_ENDS and now[end] > HIGH * np.ptp(values)
+        found = np.maximum(found, np.where(some, now, 0.0))
+    return found
 
 
 def _on(at: Index, turned: Mask, ends: Array, t: Array) -> tuple[Index, Array]:
@@ -303,13 +330,19 @@ def _in_body(
             continue
         part = tuple(slice(max(k.min() - wide, 0), k.max() + wide + 2) for k in np.nonzero(some))
         here = inside[part]
-        lost = [np.where(here, _lost(array[part], w, here), 0.0) for w in windows]
+        lost = [
+            np.where(here, np.maximum(*(_lost(x, w, here) for x in (array[part], -array[part]))), 0)
+            for w in windows
+        ]
         # Around convex corners of a part more is lost in the wide window, if not at a sample.
         for window, (now, then) in zip(windows[1:], pairwise(lost), strict=True):
             around = [uniform_filter(x, 2 * window + 1, mode="constant") for x in (now, then)]
             flagged[part] |= (now > limit) & (around[1] < SATURATED * around[0])
     x = (np.argwhere(flagged) + origin) @ sides
-    widths = np.full(len(x), 2 * spacing)
+    parts, _ = label(flagged, np.ones((3, 3)))
+    depth = distance_transform_edt(np.pad(flagged, 1))[1:-1, 1:-1]  # samples, 1 at the rim
+    depth = np.append(0.0, maximum(depth, parts, np.arange(1, parts.max() + 1)))[parts[flagged]]
+    widths = spacing * (2 * depth - 1)
     if kind == "materials" and len(x):
         widths = _widths(function, view.mesh, x, spacing)
     return x, widths, len(values), vanishes
@@ -377,16 +410,19 @@ def towards(features: Array, cells: Cells, view: View) -> Cells:
     return joined(done)
 
 
-def touched(features: Array, view: View, elements: Index, reach: float) -> tuple[Index, Index]:
-    """Those of `elements` (k,) that features (n, 3) may lie in, (j,), and the nearest, (j,).
+def touched(features: Array, view: View, elements: Index) -> tuple[Index, Index]:
+    """Elements (j,) of `elements` (k,) and features (j,) of `features` (n, 3) that meet.
 
-    Features reach `reach` times their width.
+    Features reach their width; in bodies the nearest stands for all.
     """
     if not len(features):
         return elements[:0], elements[:0]
     middle = np.full((len(elements), view.dim), 1 / (view.dim + 1))
-    x = _positions(view, elements, middle)
-    distance, nearest = cKDTree(features[:, :2]).query(x)
-    far = view.sizes[elements] * {1: 0.5, 2: 0.6}[view.dim]
-    some = distance <= far + reach * features[nearest, 2]
-    return elements[some], nearest[some]
+    x, size = _positions(view, elements, middle), view.sizes[elements]
+    if view.dim == 2:
+        distance, nearest = cKDTree(features[:, :2]).query(x)
+        some = distance <= 0.6 * size + features[nearest, 2]
+        return elements[some], nearest[some]
+    distance = np.linalg.norm(x[:, None] - features[:, :2], axis=2)
+    k, feature = np.nonzero(distance <= 0.5 * size[:, None] + features[:, 2])
+    return elements[k], feature

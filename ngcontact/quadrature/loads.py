@@ -90,7 +90,7 @@ def rough_load(
     view = View(region.mesh, 2 if region.VB() == ng.VOL else 1)
     inside = view.inside(region)
     rough, total, seen = _rough(load, view, inside)
-    near, feature = touched(features, view, inside, 1.0)
+    near, feature = touched(features, view, inside)
     rough[near[view.sizes[near] > features[feature, 2] / COARSE]] = True
     seen = hash((seen, features.tobytes()))
     if not rough.any() or (known is not None and known.seen == seen):

@@ -1,0 +1,191 @@
+"""Narrow features of data: found wherever they lie, told with place and width, or resolved."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from dataclasses import replace
+
+import ngsolve as ng
+import numpy as np
+import pytest
+from netgen.occ import Circle, OCCGeometry
+
+from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
+from ngcontact.mesh import first_mesh
+from ngcontact.quadrature import look, unresolved
+from ngcontact.quadrature.features import features_of
+from tests.quadrature.test_loads import box, loaded
+
+PLACES = [0.0, 0.123456, 0.5, 0.6180339]
+
+
+def bump(x, start, width):
+    return box(x, start, width) * ng.sin(math.pi * (x - start) / width) ** 2
+
+
+def found(problem, kind, maxh=0.3):
+    mesh = first_mesh(problem, maxh)
+    look(problem, mesh)
+    return next(one for one in features_of(problem, mesh) if one.kind == kind and one.samples)
+
+
+def given(kind, f):
+    """A problem with a function of one kind, on the side "top" or in the body."""
+    if kind == "traction":
+        return loaded(traction={"top": f})
+    if kind == "force":
+        return loaded(force={"body": (0, f)})
+    if kind == "displacement":
+        return replace(loaded(), displacement={"bottom": (0, 0), "top": (None, f)})
+    if kind == "gap":
+        pair = Contact("top", direction=(0, 1), gap=f, bilateral=True)
+        return loaded(contact=[pair])
+    return replace(loaded(), materials={"body": Elastic(f, 0.3)})
+
+
+@pytest.mark.parametrize("kind", ["traction", "displacement", "gap"])
+@pytest.mark.parametrize("start", PLACES)
+@pytest.mark.parametrize("width", [1e-3, 7e-3, 0.05])
+def test_a_strip_is_found_with_its_place_and_width(kind, start, width):
+    """On a slope that is higher. What is left between it and an end may be told, too."""
+    if start == 0 and width > 7e-3:
+        start = 0.05  # at an end, half a wave looks the same
+    f = 3 * ng.x + box(ng.x, start, width)
+    one = found(given(kind, f), kind)
+    assert len(one.places) <= 2
+    off = np.linalg.norm(one.places - [start + width / 2, 1], axis=1)
+    assert off.min() < width / 4
+    assert one.widths[off.argmin()] == pytest.approx(width, rel=0.25)  # measured: 0.2 at the end
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.1, 0.2), (0.3333, 0.7777), (0.985, 0.41)])
+def test_a_box_of_six_thousandths_of_a_body_is_found(x, y):
+    f = 1.0 + 1e4 * box(ng.x, x, 6e-3) * box(ng.y, y, 6e-3)
+    one = found(given("force", f), "force")
+    assert len(one.places) >= 1
+    # In a circle about it, and half a sample more.
+    assert np.abs(one.places - [x + 3e-3, y + 3e-3]).max() < 6e-3
+
+
+@pytest.mark.parametrize("slope", [0.0, 0.31])
+@pytest.mark.parametrize("width", [2e-3, 0.02])
+def test_a_soft_layer_is_found_with_its_width(slope, width):
+    along = ng.y - 0.4321 - slope * ng.x
+    one = found(given("materials", 1 - 0.99 * box(along, 0, width)), "materials")
+    assert len(one.places) > 50
+    off = one.places[:, 1] - 0.4321 - slope * one.places[:, 0] - width / 2
+    assert np.abs(off).max() < width
+    across = width / math.hypot(1, slope)
+    assert one.widths.min() == pytest.approx(across, rel=0.5)  # at most 8 % by direction, and steps
+
+
+SMOOTH = [
+    ng.x,
+    1 + ng.sin(3 * ng.x) * ng.cos(20 * ng.y),
+    ng.sin(18 * ng.x),
+    ng.exp(-(((ng.x - 0.4) / 0.1) ** 2)),
+    ng.sqrt((ng.x - 0.3) ** 2),
+    (ng.x - 0.4) ** 2,
+    ng.IfPos(ng.x - 0.4, 1.0, 2.0),
+]
+
+
+@pytest.mark.parametrize("kind", ["traction", "displacement", "gap", "force"])
+@pytest.mark.parametrize("number", range(len(SMOOTH)))
+def test_slopes_waves_kinks_and_steps_are_no_features(kind, number):
+    assert not len(found(given(kind, SMOOTH[number]), kind).places)
+
+
+def test_corners_and_arcs_of_wide_parts_are_no_features():
+    disc = ng.IfPos((ng.x - 0.5) ** 2 + (ng.y - 0.4) ** 2 - 0.1**2, 0.0, 1.0)
+    corner = ng.IfPos(ng.x - 0.31, ng.IfPos(ng.y - 0.3, 1.0, 0.0), 0.0)
+    for f in (disc, corner):
+        assert not len(found(given("force", f), "force").places)
+
+
+def test_a_function_on_a_circle_is_seen_across_its_seam():
+    face = Circle((0, 0), 2).Face()
+    face.faces.name, face.edges.name = "body", "rim"
+    load = ng.IfPos(ng.x - 1.999, 1.0, 0.0)  # over an angle of 0.06
+    problem = Problem(OCCGeometry(face, dim=2), {"body": Elastic(1, 0.3)}, traction={"rim": load})
+    one = found(problem, "traction", 1.0)
+    assert np.linalg.norm(one.places - [2, 0], axis=1).max() < 0.05
+
+
+def test_functions_are_looked_at_once_in_a_run():
+    calls = []
+
+    def gap(x, y):
+        calls.append(len(x))
+        return 1 + x
+
+    problem = given("gap", gap)
+    mesh = first_mesh(problem, 0.3)
+    look(problem, mesh)
+    count = len(calls)
+    for maxh in (0.3, 0.1):
+        assert not unresolved(problem, first_mesh(problem, maxh))
+    assert len(calls) == count
+    assert sum(calls) < 2100
+
+
+@pytest.mark.parametrize("order", [1, 3])
+@pytest.mark.parametrize("width", [1e-3, 0.03])
+def test_a_strip_on_a_uniform_load_is_carried(order, width):
+    """The supports carried half of it; the error was 40 times the bound."""
+    problem = loaded(traction={"top": 1 + box(ng.x, 0.38713, width) / width})
+    solution = solve(problem, maxh=0.4, order=order)
+    assert solution.reactions["bottom"] == pytest.approx([0, 2], abs=1e-5)  # halved to 1e-6 of it
+    fine = list(adapt(problem, maxh=0.4, order=4, max_dofs=3000))[-1]
+    least = 2 * (solution.energy - fine.energy)  # of |u - u_h|^2: the fine one's energy is higher
+    assert solution.error_bound**2 > least
+    assert solution.error_estimate**2 > least
+    lower, upper = solution.energy_bounds
+    assert lower < fine.energy < upper
+
+
+@pytest.mark.parametrize(("x", "y"), [(0.41, 0.63), (0.7071, 0.1234)])
+def test_a_box_on_a_uniform_force_is_carried(x, y):
+    width = 6e-3
+    f = 1 + box(ng.x, x, width) * box(ng.y, y, width) / width**2
+    solution = solve(loaded(force={"body": (0, -f)}), maxh=0.3, order=2)
+    assert solution.reactions["bottom"] == pytest.approx([0, 2], rel=1e-3)
+    with pytest.raises(ValueError, match=r'where force "body" has a feature 0\.0\d+ wide near'):
+        _ = solution.error_bound
+
+
+@pytest.mark.parametrize(
+    ("kind", "f", "place"),
+    [
+        ("displacement", 0.1 * ng.x**2 + 0.01 * bump(ng.x, 0.4, 4e-3), r"\(0\.40\d*, 1\)"),
+        ("gap", -0.1 * ng.x**2 - 0.01 * bump(ng.x, 0.4, 4e-3), r"\(0\.40\d*, 1\)"),
+        ("materials", 1 - 0.99 * box(ng.y, 0.5, 3e-3), r"\(.*, 0\.5\d*\)"),
+    ],
+)
+def test_data_narrower_than_the_mesh_are_told_and_not_bounded(kind, f, place):
+    problem = given(kind, f)
+    with pytest.warns(ContactWarning, match=rf"{kind} .* has a feature 0\.00\d+ wide near {place}"):
+        solution = solve(problem, maxh=0.3, order=2)
+    with pytest.raises(ValueError, match=rf"no guaranteed bound is known where {kind}"):
+        _ = solution.error_bound
+
+
+@pytest.mark.parametrize("kind", ["displacement", "gap"])
+def test_adapt_refines_towards_what_is_narrow(kind):
+    """The residual does not see it on the first mesh, whose error would meet the tolerance."""
+    f = (1 if kind == "displacement" else -1) * 0.01 * (ng.x + bump(ng.x, 0.4, 2e-3))
+    problem = given(kind, f)
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", message=".*has a feature")
+        *_, last = adapt(problem, maxh=0.3, order=3, tolerance=0.2, guaranteed=True)
+    assert last.relative_error_bound < 0.2
+    assert not unresolved(problem, last.mesh, in_bounds=True)
+    middle = last.displacement(last.mesh(0.401, 1.0))[1]
+    assert abs(middle) == pytest.approx(0.01 * 1.401, rel=0.02)
+
+
+def test_what_is_too_narrow_for_max_dofs_is_told():
+    f = 0.1 * ng.x + 0.01 * bump(ng.x, 0.4, 1e-3)
+    with pytest.warns(ContactWarning, match='displacement "top" has a feature 0.000'):
+        list(adapt(given("displacement", f), maxh=0.3, order=2, max_dofs=150))
