@@ -111,7 +111,8 @@ def main(
 ) -> dict[str, list[Level]]:
     """Estimates, bounds and rates under any law, uniform and adaptive, against exact solutions.
 
-    Prints a table in Markdown as it comes. All of it takes minutes.
+    Prints a table in Markdown as it comes. All of it is 224 runs of some 8 s of processor
+    time each, as measured on the first eleven.
 
     Parameters
     ----------
