@@ -27,6 +27,7 @@ extensions = [
     "sphinx_design",
     "mathml",
     "docstrings",
+    "downloads",
     "source_lines",
     "thumbnails",
 ]
@@ -46,7 +47,7 @@ if hasattr(KernelManager, "transport_encryption"):  # else kernels warn that oth
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(HERE.parent / "build" / "notebooks" / STATE)
 nb_execution_in_temp = True
-nb_execution_timeout = 120
+nb_execution_timeout = 1800  # seconds of a cell; a busy machine may need many times its usual ones
 nb_execution_raise_on_error = True
 nb_merge_streams = True
 

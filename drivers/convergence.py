@@ -14,12 +14,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
 import ngsolve as ng
 import numpy as np
 
-from drivers.command_line import Count, run
+from drivers.command_line import Count, printed_in, run
 from drivers.reference import cases, paper
 from drivers.reference.cases import Case
 from drivers.reference.curved import Rings
@@ -251,7 +252,7 @@ def print_table(title: str, table: Table, one: Run, levels: int) -> list[Level]:
 
 
 def main(
-    parts: Sequence[Part] = get_args(Part), *, levels: Count = LEVELS
+    parts: Sequence[Part] = get_args(Part), *, levels: Count = LEVELS, out: Path | None = None
 ) -> dict[str, list[Level]]:
     """Errors against exact solutions under uniform refinement, one table a problem and element.
 
@@ -264,12 +265,20 @@ def main(
         Patch tests, which need one mesh, and problems with exact solutions.
     levels : int
         Number of meshes of order 1, each of half the size of the one before; one less at order 2.
+    out : path, optional
+        Folder in which what is printed is written, too, as convergence.txt.
 
     Returns
     -------
     dict of list of Level
         Rows by title of the table.
     """
+    with printed_in(out, "convergence.txt"):
+        return _tables(parts, levels)
+
+
+def _tables(parts: Sequence[Part], levels: int) -> dict[str, list[Level]]:
+    """Print all tables; their rows by title."""
     found: dict[str, list[Level]] = {}
     for part in parts:
         if part == "patch":

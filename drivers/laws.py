@@ -15,12 +15,13 @@ import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 
 from drivers.adaptive_study.runs import uniform
-from drivers.command_line import Count, Order, Positive, run
+from drivers.command_line import Count, Order, Positive, printed_in, run
 from drivers.markdown import table
 from drivers.reference.cases import Case
 from drivers.reference.laws import bent_fibres, graded, pressed_fibres, stiff_and_soft
@@ -106,10 +107,12 @@ def main(
     contrasts: Sequence[Positive] = CONTRASTS,
     orders: Sequence[Order] = (1, 2, 3, 4),
     max_dofs: Count = 10_000,
+    out: Path | None = None,
 ) -> dict[str, list[Level]]:
     """Estimates, bounds and rates under any law, uniform and adaptive, against exact solutions.
 
-    Prints a table in Markdown as it comes. All of it takes minutes.
+    Prints a table in Markdown as it comes. All of it is 224 runs of some 8 s of processor
+    time each, as measured on the first eleven.
 
     Parameters
     ----------
@@ -122,6 +125,8 @@ def main(
         Degrees of the displacement on each element, 1 to 4.
     max_dofs : int
         Number of unknowns that no level exceeds.
+    out : path, optional
+        Folder in which the table is written, too, as laws.md.
 
     Returns
     -------
@@ -129,14 +134,19 @@ def main(
         All levels, by case, order and strategy.
     """
     found = {}
-    print(table(TITLES, []))
-    for name in studies:
-        for title, case in cases(name, contrasts):
-            for order in orders:
-                for strategy in get_args(Strategy):
-                    rows = levels(case, strategy, order, max_dofs)
-                    found[f"{title}, order {order}, {strategy}"] = rows
-                    print(line(title, order, strategy, rows), flush=True)
+    runs = (
+        (title, case, order, strategy)
+        for name in studies
+        for title, case in cases(name, contrasts)
+        for order in orders
+        for strategy in get_args(Strategy)
+    )
+    with printed_in(out, "laws.md"):
+        print(table(TITLES, []))
+        for title, case, order, strategy in runs:
+            rows = levels(case, strategy, order, max_dofs)
+            found[f"{title}, order {order}, {strategy}"] = rows
+            print(line(title, order, strategy, rows), flush=True)
     return found
 
 

@@ -30,8 +30,12 @@ def rings(
 
     Parameters
     ----------
-    inner, interface, outer : float
-        Radius of the hole, outer radius of the inner ring, radius of the rim; increasing.
+    inner : float
+        Radius of the hole.
+    interface : float
+        Outer radius of the inner ring, larger than `inner`.
+    outer : float
+        Radius of the rim, larger than `interface`.
     interference : float
         Outer radius of the inner ring minus inner radius of the outer ring; negative: clearance.
     quarter : bool
@@ -90,11 +94,14 @@ def ball_in_socket(
 
     Parameters
     ----------
-    radius, clearance : float
-        Radius of the ball about the origin; that of the socket is larger by the clearance.
-    width, depth : float, optional
-        The socket's block covers x <= `width` and y >= -`depth`. Default: 2 `radius` each, and more
-        than the radius of the socket.
+    radius : float
+        Of the ball about the origin.
+    clearance : float
+        By which the radius of the socket is larger.
+    width : float, optional
+        The socket's block covers x <= `width`, more than the socket's radius. Default: 2 `radius`.
+    depth : float, optional
+        It covers y >= -`depth`, more than the socket's radius. Default: 2 `radius`.
 
     Returns
     -------

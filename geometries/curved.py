@@ -27,10 +27,16 @@ def graphs(
 
     Parameters
     ----------
-    upper, lower : callable
-        y as a function of x, called with one number at a time.
-    a, b, height : float
-        The bodies cover `a` <= x <= `b`, and reach to y = `height` and y = -`height`.
+    upper : callable
+        Lower side of the upper body, y as a function of x, called with one number at a time.
+    lower : callable
+        The same of the upper side of the lower body.
+    a : float
+        Left end: the bodies cover `a` <= x <= `b`.
+    b : float
+        Right end.
+    height : float
+        The bodies reach to y = `height` and y = -`height`.
     samples : int
         Points of each graph for a quintic spline, at least 16; degrees up to 8 are exact anyway.
 

@@ -40,8 +40,10 @@ def cone_on_block(
         Angle between the cone and the surface y = 0, degrees, between 0 and 90.
     height : float, optional
         Of the indenter. More than that of the cone; default: that and `radius`.
-    width, depth : float, optional
-        The block covers x <= `width` and y >= -`depth`. Default: 2 `radius` each.
+    width : float, optional
+        The block covers x <= `width`. Default: 2 `radius`.
+    depth : float, optional
+        The block covers y >= -`depth`. Default: 2 `radius`.
 
     Returns
     -------
@@ -93,12 +95,16 @@ def rounded_punch(
 
     Parameters
     ----------
-    flat, rounding : float
-        Radius of the flat part of its end, and of its edge: the punch has the radius of both.
+    flat : float
+        Radius of the flat part of its end.
+    rounding : float
+        Radius of its edge; that of the punch is `flat` and `rounding`.
     height : float, optional
         Of the punch, more than `rounding`. Default: `flat` and `rounding`.
-    width, depth : float, optional
-        The block covers x <= `width` and y >= -`depth`. Default: twice the punch's radius each.
+    width : float, optional
+        The block covers x <= `width`. Default: twice the punch's radius.
+    depth : float, optional
+        The block covers y >= -`depth`. Default: twice the punch's radius.
 
     Returns
     -------
@@ -153,10 +159,14 @@ def ring_in_groove(
 
     Parameters
     ----------
-    radius, section : float
-        Radius of the ring's middle line, and of its circular section.
-    width, depth : float, optional
-        Of the groove: more and less than 2 `section`. Default: 2.8 and 1.5 `section`.
+    radius : float
+        Of the ring's middle line.
+    section : float
+        Radius of the ring's circular section.
+    width : float, optional
+        Of the groove, more than 2 `section`. Default: 2.8 `section`.
+    depth : float, optional
+        Of the groove, less than 2 `section`. Default: 1.5 `section`.
     wall : float, optional
         Thickness of housing and plate. Default: 2 `section`.
 

@@ -143,10 +143,14 @@ def sleeve_on_shaft(
 
     Parameters
     ----------
-    radius, outer : float
-        Of the shaft and of the sleeve's rim.
-    length, overhang : float
-        The sleeve covers |y| <= `length` / 2, the shaft the overhang more on both sides.
+    radius : float
+        Of the shaft.
+    outer : float
+        Radius of the sleeve's rim.
+    length : float
+        The sleeve covers |y| <= `length` / 2.
+    overhang : float
+        By which the shaft is longer on both sides.
     interference : float
         Radius of the shaft minus that of the sleeve's bore; negative: clearance.
 

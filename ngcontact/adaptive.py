@@ -67,8 +67,10 @@ def adapt(
     maxh : float, optional
         Largest element size of the first mesh; when left out an eighth of the geometry, half of
         that on bounded contact zones.
-    order, element
-        As in `solve`. 4 is best for errors of 1e-3 and less; None chooses (docs/adaptivity.md).
+    order : int, optional
+        Degree, 1 to 4. 4 is best for errors of 1e-3 and less; None chooses (docs/adaptivity.md).
+    element : str
+        As in `solve`.
     theta : float
         Doerfler's share of the squared indicators that is marked, in (0, 1].
     tolerance : float, optional

@@ -15,7 +15,7 @@ from typing import Literal, TypeAlias, get_args
 
 import ngsolve as ng
 
-from drivers.command_line import Count, Order, run
+from drivers.command_line import Count, Order, printed_in, run
 from drivers.published.problems import PUBLISHED, Figure, Published
 from ngcontact import Solution, adapt
 
@@ -75,6 +75,7 @@ def main(
     order: Order = 3,
     max_dofs: Count = 15_000,
     page: Path | None = None,
+    out: Path | None = None,
 ) -> dict[str, Solution]:
     """Published problems, one after the other.
 
@@ -87,7 +88,9 @@ def main(
     max_dofs : int
         Number of unknowns that no level exceeds.
     page : path, optional
-        File in which the table is written.
+        File in which the table is written as a page.
+    out : path, optional
+        Folder in which what is printed is written, too, as published.md.
 
     Returns
     -------
@@ -96,11 +99,12 @@ def main(
     """
     solutions: dict[str, Solution] = {}
     sections = []
-    for name in names:
-        started = time.perf_counter()
-        solutions[name] = solved(PUBLISHED[name], order, max_dofs)
-        sections.append(section(PUBLISHED[name], solutions[name]))
-        print(sections[-1], f"\n({time.perf_counter() - started:.1f} s)")
+    with printed_in(out, "published.md"):
+        for name in names:
+            started = time.perf_counter()
+            solutions[name] = solved(PUBLISHED[name], order, max_dofs)
+            sections.append(section(PUBLISHED[name], solutions[name]))
+            print(sections[-1], f"\n({time.perf_counter() - started:.1f} s)")
     if page is not None:
         page.write_text(HEAD.format(order=order, max_dofs=max_dofs) + "\n".join(sections) + "\n")
     return solutions

@@ -240,8 +240,10 @@ def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.M
 
     Parameters
     ----------
-    problem, mesh
-        As in `Refining`.
+    problem : Problem
+        Its contact pairs tell which vertices face each other.
+    mesh : ng.Mesh
+        The mesh, which stays as it is.
     marked : ndarray of bool (ne,), optional
         Elements to refine; all when left out.
 

@@ -15,6 +15,12 @@ from .matching import Edge, divided
 COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given ...
 FINER = 2  # ... and that many times more on a bounded zone: contact may end anywhere on it
 
+# Lengths that OCC and Netgen serve; given meshes have no such limits. Measured with discs, blocks,
+# rings and splines: meshes are as at size 1 up to 4e8, from 1e9 on Netgen ignores sizes or never
+# returns. OCC merges points within 1e-7; a body of twice that has no mesh, of 2e-6 it has one.
+FARTHEST = 5e8  # from the origin
+SMALLEST = 1e-6  # extent
+
 SHARED = threading.Lock()
 
 
@@ -67,7 +73,8 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
     ------
     ValueError, TypeError
         `maxh` is not a positive finite number, or given for a geometry that is a Mesh; the geometry
-        contains solids; Netgen failed to fill a body.
+        contains solids, or has lengths beyond what the kernel and Netgen mesh; Netgen failed to
+        fill a body.
     """
     if isinstance(problem.geometry, ng.Mesh):
         if maxh is not None:
@@ -78,6 +85,13 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
         raise ValueError("the geometry contains solids; bodies are faces in the plane z = 0")
     low, high = shape.bounding_box
     extent = max(high.x - low.x, high.y - low.y)
+    far = max(abs(low.x), abs(low.y), abs(high.x), abs(high.y))
+    if not (extent >= SMALLEST and far <= FARTHEST):
+        raise ValueError(
+            f"the geometry has the extent {extent:g} and reaches {far:g} from the origin: the "
+            f"geometry kernel and Netgen mesh extents from {SMALLEST:g} and places up to "
+            f"{FARTHEST:g}; choose another unit of length, or another origin"
+        )
     finer = FINER if maxh is None else 1
     maxh = extent / COARSE if maxh is None else maxh
     if isinstance(maxh, bool) or not isinstance(maxh, Real):

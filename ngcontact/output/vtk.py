@@ -19,14 +19,18 @@ from .solution_data import SolutionData
 if TYPE_CHECKING:
     import pyvista
 
+PLANE = ("xx", "yy", "xy", "zz")  # components of a stress, as `full_stress` orders them
+MERIDIAN = ("rr", "zz", "rz", "hoop")
+
 
 def write_solution(path: str | os.PathLike[str], solution: SolutionData) -> Path:
     """Bodies of a solution as ``.vtu``, contact points beside it as ``<stem>_contact.vtp``.
 
     The cells are Lagrange triangles of the order of the geometry or of the displacement,
-    whichever is higher. Point data: ``displacement``, ``stress`` (xx, yy, xy; means inside each
-    body), ``hoop_stress`` of bodies of revolution, and ``von_mises`` (see `full_stress`). Cell
-    data: ``body``, whose names are the field data ``body_names``, and ``indicators`` if they have
+    whichever is higher. Point data: ``displacement``, ``stress`` (xx, yy, xy and zz, the one
+    normal to the plane; of bodies of revolution rr, zz, rz and hoop; means inside each body),
+    ``hoop_stress`` of bodies of revolution, and ``von_mises``, made of ``stress``. Cell data:
+    ``body``, whose names are the field data ``body_names``, and ``indicators`` if they have
     been computed already.
     Contact points: ``pressure``, ``gap``, ``force``, ``active``, ``pair``, and the ``traction`` on
     the secondary, a vector. Field data of both files: the names by number of the pair in
@@ -106,10 +110,11 @@ def _bodies(solution: SolutionData) -> pyvista.UnstructuredGrid:
     u = solution.displacement
     grid.point_data["displacement"] = nodes.values(ng.CF((u[0], u[1], 0)))
     stress = nodes.values(components)
-    grid.point_data["stress"] = stress[:, :3]
-    for k, component in enumerate(("xx", "yy", "xy")):
+    about_an_axis = solution.problem.model in ABOUT_AN_AXIS
+    grid.point_data["stress"] = stress
+    for k, component in enumerate(MERIDIAN if about_an_axis else PLANE):
         grid.GetPointData().GetAbstractArray("stress").SetComponentName(k, component)
-    if solution.problem.model in ABOUT_AN_AXIS:
+    if about_an_axis:
         grid.point_data["hoop_stress"] = stress[:, 3]
     grid.point_data["von_mises"] = von_mises(stress)
     grid.cell_data["body"] = nodes.body

@@ -76,8 +76,10 @@ class Iterate:
         Rows that hold with equality.
     steps : list of int
         Changes of the active set after each linear system; the last one is 0.
-    factorizations, back_solves : int
-        Work done; large problems without factorisation count V-cycles as back-solves.
+    factorizations : int
+        Number of factorisations.
+    back_solves : int
+        Number of back-solves; V-cycles of large problems without factorisation count as such.
     """
 
     u: Array

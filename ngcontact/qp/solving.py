@@ -106,10 +106,15 @@ def solve_qp(
         Symmetric and positive definite.
     f : array (n,)
         Load.
-    B, g : (m, n) and (m,)
-        Inequalities; the rows that can be active together, with those of E, are independent.
-    E, e : (k, n) and (k,), optional
-        Equations.
+    B : (m, n)
+        Left sides of inequalities; rows that can be active together are independent, with those
+        of E, too.
+    g : (m,)
+        Their right sides.
+    E : (k, n), optional
+        Left sides of equations.
+    e : (k,), optional
+        Their right sides.
     active : array of bool (m,), optional
         First active set; empty when left out.
 

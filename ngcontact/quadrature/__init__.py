@@ -1,12 +1,12 @@
 """Quadrature that follows the data: where functions are rough, and rules that resolve them."""
 
 from .constant_data import numbers as numbers
+from .counted import evaluations as evaluations
+from .counted import looked as looked
 from .doubts import Unresolved as Unresolved
 from .doubts import unresolved as unresolved
 from .doubts import warn_of_data as warn_of_data
 from .doubts import warn_of_unresolved as warn_of_unresolved
-from .evaluations import evaluations as evaluations
-from .evaluations import looked as looked
 from .features import look as look
 from .integrals import integral_over as integral_over
 from .jumps import jumping_moduli as jumping_moduli

@@ -12,7 +12,7 @@ from ..arrays import Array, Index, Mask
 from ..errors import warn
 from ..mesh import diameters
 from ..problem import Problem, Triangulation, varies
-from .evaluations import looked
+from .counted import looked
 from .lattice import mesh_points, on_lattice
 
 JUMP = 0.5  # change of a law over its least value from which it is told

@@ -15,7 +15,7 @@ from ..arrays import Array, Index, Mask
 from ..mesh import diameters
 from ..problem import Triangulation
 from .cells import Cells, joined, whole
-from .evaluations import looked
+from .counted import looked
 from .lattice import divisions, lattice, mesh_points, monomials
 
 POINTS = {1: 3, 2: 3}  # parts of a lattice that one of the rule is as good as

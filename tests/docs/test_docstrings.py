@@ -32,6 +32,8 @@ from tests.docs.docstrings import (
     sections,
     shapes_returned,
 )
+from tests.docs.names import resolved
+from tests.docs.pages import DOCS
 
 TREES = modules()
 TYPES = array_types(TREES)
@@ -250,3 +252,19 @@ def test_no_shapes(text):
 )
 def test_arrays_in_annotations(annotation, count):
     assert arrays_in(ast.parse(annotation, mode="eval").body, TYPES) == count
+
+
+def test_entries_of_the_reference_have_a_text_of_their_own():
+    """`order, element : ...` becomes two entries of one text on the site."""
+    pages = "".join(page.read_text() for page in (DOCS / "reference").glob("*.md"))
+    names = re.findall(r"^\.\. auto\w+:: (?:ngcontact\.)?([\w.]+)$", pages, re.MULTILINE)
+    assert len(names) > 20
+    joint = re.compile(r"^ *(\w+(?:, \w+)+)(?: : .*)?\n +[A-Z0-9]", re.MULTILINE)
+    found = []
+    for name in names:
+        top = resolved(name)
+        members = set(dir(top)) - set(getattr(top, "__dataclass_fields__", ()))
+        for thing in (top, *(getattr(top, member, None) for member in sorted(members))):
+            text = re.split(r"\n *Raises\n", getattr(thing, "__doc__", None) or "")[0]
+            found += [f"{name}: {entry}" for entry in joint.findall(text)]
+    assert not found

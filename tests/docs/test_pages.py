@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from drivers.__main__ import drivers
 from tests.docs.names import resolved
 
 ROOT = Path(__file__).parents[2]
@@ -85,3 +86,14 @@ def test_links_lead_somewhere(page):
     links = re.findall(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)", PAGES[page])
     missing = [link for link in links if not (ROOT / page).parent.joinpath(link).exists()]
     assert not missing
+
+
+def test_the_page_of_drivers_has_all_of_them():
+    page = PAGES["docs/gallery/drivers.md"]
+    assert not [name for name in drivers() if f"`python -m drivers.{name}`" not in page]
+
+
+@pytest.mark.parametrize("word", ["thermal", "bolt", "seal", "press fit", "bearing"])
+def test_words_of_machine_design_lead_somewhere(word):
+    """What a reader types into the search stands on a page, with a link or an answer beside it."""
+    assert re.search(rf"\*\*{word}\*\*", PAGES["docs/topics/limits.md"])

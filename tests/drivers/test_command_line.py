@@ -57,6 +57,7 @@ HELP = {
         "order": ("1 to 4", "3"),
         "max-dofs": ("Number of unknowns", "15000"),
         "page": ("File", "none"),
+        "out": ("Folder", "none"),
     },
     "bounds": {
         "studies": ("Problems", "'one transition' 'hertz a=0.3' 'flat punch'"),
@@ -68,12 +69,14 @@ HELP = {
     "convergence": {
         "parts": ("problems", "patch S1 S3 S7 S8 S9"),
         "levels": ("Number of meshes", "5"),
+        "out": ("Folder", "none"),
     },
     "laws": {
         "studies": ("layers of two stiffnesses", "'pressed fibres' 'bent fibres' layers graded"),
         "contrasts": ("largest modulus over the smallest", "1 100 10000 1e+06"),
         "orders": ("1 to 4", "1 2 3 4"),
         "max-dofs": ("Number of unknowns", "10000"),
+        "out": ("Folder", "none"),
     },
     "adaptive_study": {
         "studies": ("Problems", "'one transition' 'hertz a=0.3' 'hertz a=0.05'"),

@@ -19,6 +19,7 @@ from ngcontact.adaptivity.refinement import matched_vertices
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
+from ngcontact.mesh import generation
 from ngcontact.mesh.curving import check_curves
 from ngcontact.mesh.generation import first_mesh
 from tests.scenes import coordinates, vertices
@@ -557,3 +558,37 @@ def test_two_cams_without_a_direction_are_told_to_give_one():
         first_mesh(problem, 0.2)
     along = replace(problem, contact=[Contact("upper_rim", "lower_rim", direction=(0, -1))])
     assert first_mesh(along, 0.2).ne > 50
+
+
+PRESSED = pressed(blocks(), BLOCKS, BOUNDED["blocks"].contact)
+
+
+@pytest.mark.parametrize(
+    ("unit", "offset"), [(1e9, 0.0), (1e12, 0.0), (1.0, 1e9), (1e-7, 0.0)], ids=str
+)
+@pytest.mark.parametrize("angle", [0.0, 17.3])
+def test_lengths_that_are_not_meshed_are_refused(unit, offset, angle, monkeypatch):
+    """Netgen never returned, at angles that depend on the shape."""
+    monkeypatch.setattr(generation, "_generated", lambda *_: pytest.fail("meshed"))
+    turned = PRESSED.geometry.shape.Rotate(occ.Axis((0, 0, 0), occ.Z), angle)
+    shape = turned.Scale(occ.Pnt(0, 0, 0), unit).Move(occ.Vec(offset, 0, 0))
+    problem = replace(PRESSED, geometry=OCCGeometry(shape, dim=2))
+    with pytest.raises(ValueError, match=r"has the extent \S+ and reaches \S+ .* unit of length"):
+        first_mesh(problem)
+
+
+@pytest.mark.parametrize("unit", [1e-6, 2e8])
+@pytest.mark.parametrize("angle", [0.0, 17.3])
+def test_lengths_that_are_meshed(unit, angle):
+    """Areas scale; the kernel's tolerance is 1e-7 of a length, 0.1 of one of 1e-6."""
+    turned = PRESSED.geometry.shape.Rotate(occ.Axis((0, 0, 0), occ.Z), angle)
+    shape = turned.Scale(occ.Pnt(0, 0, 0), unit)
+    mesh = first_mesh(replace(PRESSED, geometry=OCCGeometry(shape, dim=2)))
+    area = ng.Integrate(ng.CF(1.0), first_mesh(PRESSED))
+    assert ng.Integrate(ng.CF(1.0), mesh) / unit**2 == pytest.approx(area, rel=1e-9)
+
+
+def test_given_meshes_have_no_limits():
+    mesh = ng.Mesh(first_mesh(PRESSED).ngmesh.Copy())
+    mesh.ngmesh.Scale(1e12)
+    assert first_mesh(replace(PRESSED, geometry=mesh)) is mesh

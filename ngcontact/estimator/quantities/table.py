@@ -18,8 +18,10 @@ class Quantity:
     ----------
     name : str
         What it is.
-    value, error : float
+    value : float
         In the units of the data, forces and energies per unit thickness.
+    error : float
+        At most or about so far from the truth, in the same unit; see `kind`.
     kind : str
         "guaranteed": the true value of the problem lies within `error` of `value`; "estimated": as
         a rule it does; "none": nothing is known of the error, which is NaN.
