@@ -23,7 +23,7 @@ SHARE = 0.01
 # half a zone has one end, as its pressure has the peak in the middle. On 153 coarse meshes (discs,
 # blocks with Hertz's gap, pins in holes, orders 1 to 4) the peak was wrong by more than 10 % in 30
 # of 55 zones below, in 1 of 98 above (12 %), by more than 20 % in 24 and none. Three segments at
-# all orders told 93, of which 31 were wrong by 10 %.
+# all orders told 93, of which 30 were wrong by 10 %.
 RESOLVED = 2
 # Contact forces of this size, relative to the largest term of a force, are round-off.
 NOISE = 100 * np.finfo(float).eps
