@@ -76,9 +76,9 @@ class Transitions:
         The transition itself.
     beyond : ndarray (k,)
         How far it lies from the last active point, along the line, outwards; a length.
-    closed, opened : list of ndarray of int (k)
-        Points from the last active one inwards, and from the first open one outwards, in the order
-        of the line, as far as contact is closed or open.
+    closed, opened : list
+        By end the points (q,) from the last active one inwards, and from the first open one
+        outwards, in the order of the line, as far as contact is closed or open.
     """
 
     inner: Index

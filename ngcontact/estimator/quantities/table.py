@@ -67,11 +67,12 @@ class Quantity:
 def unknown(
     name: str, value: float, place: Array | None = None, infinite: Array | None = None
 ) -> Quantity:
-    """A figure without a bar."""
+    """A figure without a bar, at `place` (2,), infinite at `infinite` (k, 2)."""
     return Quantity(name, value, math.nan, "none", place, infinite=infinite)
 
 
 def _point(x: Array) -> str:
+    """A point `x` (2,) in brackets."""
     return f"({x[0]:.6g}, {x[1]:.6g})"
 
 
