@@ -48,8 +48,15 @@ def two_threads():
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
     """The rows of a study that are its witness are tests: they keep no mark."""
+    missing = {}
     for item in items:
         study = item.get_closest_marker("study")
-        if study and getattr(item, "callspec", None) is not None:
-            if item.callspec.id in study.kwargs.get("witness", ()):
+        if study and (witness := study.kwargs.get("witness")):
+            missing.setdefault((item.path, item.originalname), set(witness)).discard(
+                item.callspec.id
+            )
+            if item.callspec.id in witness:
                 item.own_markers[:] = [m for m in item.own_markers if m.name != "study"]
+    missing = {name: rows for (_, name), rows in missing.items() if rows}
+    if missing and not any("::" in argument for argument in config.args):
+        raise pytest.UsageError(f"no such rows to be a witness of a study: {missing}")
