@@ -54,12 +54,14 @@ def largest_von_mises(
         trace = (values[:, 0] + values[:, 1]).reshape(-1, n)
         square = (trace**2).sum(axis=1)
         ratio = (trace * normal.reshape(-1, n)).sum(axis=1) / np.where(square > 0, square, 1.0)
+        known = np.isfinite(other).all(axis=1)  # it divides by r, 0 on the axis
+        other = np.where(known[:, None], other, 0.0)
         change = (other[:, :2] - values[:, :2]).sum(axis=1) * np.repeat(ratio, n)
         if equilibrated.proof.discrete.radial is not None:
-            change *= 0.0
+            change = np.zeros(len(change))
         proved = von_mises(np.hstack([other, normal + change[:, None]]))
-        error = max(error, float(np.abs(proved - mises)[beside].max()))
-        most = float(proved[away].max())
+        error = max(error, float(np.abs(proved - mises)[beside & known].max(initial=0.0)))
+        most = max(most, float(proved[away & known].max(initial=0.0)))
     elif mesh.ne == 1:  # nothing to compare with
         return unknown("von Mises", value, place, corners.distinct)
     if relative > 1 or corners.near(place[None], reach=2.0)[0]:
