@@ -194,12 +194,18 @@ def merged(lines: list[ContactLine], rows: Rows) -> tuple[list[ContactLine], Row
     np.add.at(weight, number[repeated], weight[repeated])
     parts = zip(lines, by_line(lines, weight), strict=True)
     lines = [replace(line, weight=part) for line, part in parts]
-    kept = [_left(*both) for both in zip(lines, kept_lines(lines, first), strict=True)]
+    kept = kept_lines(lines, first)
+    kept = [_left(lines[:k], line, kept[k]) for k, line in enumerate(lines)]
     return kept, replace(rows, g=g, equality=equality).select(first)
 
 
-def _left(before: ContactLine, line: ContactLine) -> ContactLine:
-    """The line on the segments of which other lines have not taken all points it had `before`."""
-    left = (line.rows >= 0).any(axis=1) | (before.rows < 0).all(axis=1)
+def _left(earlier: list[ContactLine], before: ContactLine, line: ContactLine) -> ContactLine:
+    """The `line` without segments of which `earlier` ones have all points it had `before`.
+
+    Where these face another primary the segment faces both of them in part, and stays.
+    """
+    others = [one.segments for one in earlier if _share_primary(one, before)]
+    taken = np.isin(line.segments, np.concatenate([np.zeros(0, np.intp), *others]))
+    left = (line.rows >= 0).any(axis=1) | (before.rows < 0).all(axis=1) | ~taken
     parts = {name: getattr(line, name)[left] for name in ("segments", "rows", "faces", "shares")}
     return replace(line, **parts)

@@ -21,6 +21,6 @@ def evaluations() -> int:
 
 
 def looked(function: ng.CoefficientFunction, points: NDArray) -> Array:
-    """Values (..., c) of a function among the data at NGSolve's mesh points (...), counted."""
+    """Values (..., c) of a function among the data at mesh `points` (j, n) or (n,), counted."""
     _Count.points += points.size
     return np.asarray(function(points.ravel())).reshape(*points.shape, -1)

@@ -97,13 +97,15 @@ def rough_load(
         return known if rough.any() else None
     rough = view.with_neighbours(rough, inside)  # a part of a feature may have none of the points
     start = view.in_parts(np.flatnonzero(rough))
-    if len(features):
-        start = towards(features, start, view)
 
     def density(elements: Index, reference: Array) -> Array:
         values = view.look(load, elements, reference)
         return np.asarray(values * view.evaluate(view.measure, elements, reference))
 
+    if len(features):  # of which the points of the lattice may have seen nothing
+        start = towards(features, start, view)
+        size = np.abs(density(start.element, start.points)).max(axis=2)
+        total = max(total, float((size * start.weights).sum()))
     corners = view.arrays.corners if view.dim == 2 else None
     cells, values, over = following(density, start, FINE[view.dim] * total, corners)
     missed = np.bincount(cells.element, over, len(rough)).astype(float)

@@ -75,7 +75,7 @@ class View:
         return np.asarray(function(points.ravel())).reshape(*points.shape, -1)
 
     def look(self, data: ng.CoefficientFunction, elements: Index, reference: Array) -> Array:
-        """The same of `data`, counted."""
+        """Values (j, n, c) of `data` at `reference` (j, n, dim) of `elements` (j,), counted."""
         return looked(data, self._points(elements, reference))
 
     def _points(self, elements: Index, reference: Array) -> NDArray:

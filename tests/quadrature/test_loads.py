@@ -116,7 +116,7 @@ def test_a_load_that_is_infinite_at_an_end():
     assert force[1] == pytest.approx(2, rel=1e-4)
 
 
-@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e8])
 def test_rough_loads_in_any_unit(unit):
     def found(unit, load):
         shape = square().shape.Scale((0, 0, 0), unit)
