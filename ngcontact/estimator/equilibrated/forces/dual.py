@@ -140,8 +140,12 @@ def _excess(
     """The least kappa for which nothing is left at vertices, and what is left elsewhere."""
     found = []
     for gap, e in zip(proof.gaps, tested.directions, strict=True):
+        name = gap.pieces.line.contact.secondary
+        if not len(gap.pieces.local):
+            raise ValueError(
+                f'no bar of the force is proved beside a pair whose points belong to another, "{name}"'
+            )
         if not gap.pieces.whole:
-            name = gap.pieces.line.contact.secondary
             raise ValueError(
                 f'no bar of the force is proved where nodes do not face nodes, as on "{name}"'
             )
