@@ -143,7 +143,7 @@ def _excess(
         name = gap.pieces.line.contact.secondary
         if not len(gap.pieces.local):
             raise ValueError(
-                f'no bar of the force is proved beside a pair whose points belong to another, "{name}"'
+                f'no bar of the force is proved beside a pair, "{name}", without points of its own'
             )
         if not gap.pieces.whole:
             raise ValueError(
