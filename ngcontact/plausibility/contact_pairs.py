@@ -13,7 +13,7 @@ from ..fem import BoundaryTrace, Space, bulk_moduli, shear_moduli, stiffer_than
 from ..problem import Problem
 from .drawn import apart, contradicted
 from .estimates import moves_rigidly
-from .inclinations import INCLINED, inclinations
+from .inclinations import INCLINED, inclinations, lies_across
 from .penetration import penetration
 from .zones import Zones, zones_of
 
@@ -122,6 +122,8 @@ def _unresisted(
 
 def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
     """Message where surfaces that carry force are inclined to the fixed direction, or nothing."""
+    if lies_across(trace, state):
+        return ""
     angle, force = inclinations(trace, state), np.abs(state.force)
     inclined = angle > INCLINED
     if force[inclined].sum() <= SHARE * force.sum():

@@ -59,9 +59,9 @@ def zones_of(state: ContactState) -> Zones:
     both = np.concatenate([along, across])
     joined = both[closed[both].all(axis=1)]
     number = connected(len(closed), joined)
-    kept, number[closed] = np.unique(number[closed], return_inverse=True)
-    number[~closed] = -1
-    k = len(kept)
+    first = closed & (number == np.arange(len(closed)))
+    k = np.count_nonzero(first)
+    number = np.where(closed, (np.cumsum(first) - 1)[number], -1)
 
     def summed(points: Index, values: Array) -> Array:
         return np.asarray(np.bincount(number[points], values, minlength=k), dtype=float)
