@@ -252,6 +252,27 @@ def test_a_guarantee_is_refused_at_once_where_supports_contradict_each_other(ord
         adapt(problem, order=order, guaranteed=True, tolerance=1e-3)
 
 
+@pytest.mark.parametrize(("width", "shift"), [(1, 0.3), (0.05, 0.96), (0.02, 0.5)])
+def test_overlaps_are_found_on_fine_meshes(width, shift):
+    """By a sample: 70 or 80 % of a body, or all of it, on a square of 4000 triangles."""
+    both = [
+        rectangle(0, 0, 1, 1, "square", "side"),
+        rectangle(shift, 0.3, width, 0.4, "bar", "end"),
+    ]
+    for shapes in (both, both[::-1]):
+        geometry = OCCGeometry(Compound(shapes), dim=2)
+        mesh = ng.Mesh(geometry.GenerateMesh(maxh=0.025))
+        with pytest.raises(ValueError, match="lie on top of each other"):
+            Problem(geometry, {"square|bar": STEEL}, {"side": (0, 0)}).check(mesh)
+
+
+def test_small_overlaps_are_not_refused_on_fine_meshes():
+    both = [rectangle(0, 0, 1, 1, "square", "side"), rectangle(0.95, 0, 1, 1, "other", "side")]
+    geometry = OCCGeometry(Compound(both), dim=2)
+    mesh = ng.Mesh(geometry.GenerateMesh(maxh=0.025))
+    Problem(geometry, {"square|other": STEEL}, {"side": (0, 0)}).check(mesh)
+
+
 def test_bodies_on_top_of_each_other_are_refused():
     """Two circles in one face are two discs for OCC; a press fit is drawn with an interference."""
     twice = WorkPlane().Circle(RIM).Circle(BORE).Face()

@@ -25,6 +25,7 @@ from .moduli import law_measures as law_measures
 from .moduli import nearly_incompressible as nearly_incompressible
 from .moduli import rough_moduli as rough_moduli
 from .moduli import shear_moduli as shear_moduli
+from .moduli import stiffer_than as stiffer_than
 from .moduli import stiffnesses as stiffnesses
 from .moduli import warn_of_locking as warn_of_locking
 from .nodal_basis import edge_bubbles as edge_bubbles

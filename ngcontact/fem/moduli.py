@@ -26,6 +26,8 @@ MODULUS_BONUS = 4  # quadrature orders above the default: moduli may be as rough
 CURVED = 2  # ... and for the map of a curved element
 
 CONSTANT: WeakKeyDictionary[Elastic | Hooke, dict[str, Array]] = WeakKeyDictionary()
+# Bulk and shear modulus of laws of numbers, by the model.
+NUMBERS: WeakKeyDictionary[Elastic | Hooke, dict[str, tuple[float, float]]] = WeakKeyDictionary()
 
 # Voigt strains of a unit of volume, without change of volume, and of shear, as rows.
 VOLUMETRIC = {
@@ -249,9 +251,33 @@ def nearly_incompressible(
     return {name: value for name, value in most.items() if value > limit}
 
 
+def _of_laws(problem: Problem, mesh: ng.Mesh) -> list[tuple[float, float]] | None:
+    """Bulk and shear modulus of each law, wherever it applies; None where one of them varies."""
+    laws, found = problem.materials.values(), []
+    if any(map(varies, laws)):
+        return None
+    for law in laws:
+        kept = NUMBERS.setdefault(law, {})
+        if problem.model not in kept:
+            C = _constant(law, problem.model, mesh)
+            kept[problem.model] = float(_bulk(C)), float(_smallest(C)) / 2
+        found.append(kept[problem.model])
+    return found
+
+
+def stiffer_than(problem: Problem, mesh: ng.Mesh, pressure: float) -> bool:
+    """Whether no body, as far as is known without a look at elements, is softer than a pressure.
+
+    In confined compression, kappa + mu.
+    """
+    moduli = _of_laws(problem, mesh)
+    return moduli is not None and all(pressure <= kappa + mu for kappa, mu in moduli)
+
+
 def warn_of_locking(problem: Problem, mesh: ng.Mesh, order: int) -> None:
     """Warn of every body that elements of order 1 are too stiff for."""
-    if order > 1:
+    moduli = _of_laws(problem, mesh) if order == 1 else []
+    if moduli is not None and all(kappa <= LOCKING * mu for kappa, mu in moduli):
         return
     for name, ratio in nearly_incompressible(problem, mesh, LOCKING).items():
         warn(

@@ -11,8 +11,9 @@ import numpy as np
 from ..arrays import Array, Index
 from ..problem import Problem
 from ..quadrature import looked, numbers, steps_on
-from .boundary import BoundaryTrace
+from .boundary import BoundaryTrace, boundary_trace
 
+MIDDLE = ng.IntegrationRule([(0.5, 0, 0)], [1])  # of a segment
 BESIDE = 1e-9  # of a segment, how far from a jump its sides are looked at
 
 
@@ -57,28 +58,28 @@ class Prescribed:
 SEEN: WeakKeyDictionary[Problem, Prescribed] = WeakKeyDictionary()  # of the last run of each
 
 
-def look_at_prescribed(problem: Problem, trace: BoundaryTrace) -> Prescribed:
+def look_at_prescribed(problem: Problem, mesh: ng.Mesh) -> Prescribed:
     """Look at the prescribed displacements anew, as each run does: parameters may have changed."""
-    steps, largest = [], 0.0
+    steps, largest, trace = [], 0.0, None
     for name, components in problem.displacement.items():
-        segments = trace.segments(name)
+        first = mesh.MapToAllElements(MIDDLE, mesh.Boundaries(name))[:1]
         for axis, value in enumerate(components):
-            if value is None or not len(segments):
+            if value is None or not len(first):
                 continue
             if numbers(value):
-                first = trace.evaluate(value, segments[:1], np.zeros(1))
-                largest = max(largest, float(np.abs(first).max()))
+                largest = max(largest, float(np.abs(value(first)).max()))
                 continue
-            found, size = _steps(trace, value, segments, name, axis)
+            trace = trace or boundary_trace(mesh, 1)  # functions alone ask for it
+            found, size = _steps(trace, value, trace.segments(name), name, axis)
             steps += found
             largest = max(largest, size)
     SEEN[problem] = Prescribed(steps, largest)
     return SEEN[problem]
 
 
-def prescribed(problem: Problem, trace: BoundaryTrace) -> Prescribed:
+def prescribed(problem: Problem, mesh: ng.Mesh) -> Prescribed:
     """What the last look at a problem has shown; there is one if it is asked for first."""
-    return SEEN[problem] if problem in SEEN else look_at_prescribed(problem, trace)
+    return SEEN[problem] if problem in SEEN else look_at_prescribed(problem, mesh)
 
 
 def _steps(

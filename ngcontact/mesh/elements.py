@@ -20,14 +20,18 @@ def neighbours(segments: Index, triangles: Index, vertices: int) -> tuple[Index,
 
     `segments` (k, 2) and `triangles` (ne, 3) are those of a mesh of so many `vertices`.
     """
-    sides = np.sort(triangle_sides(triangles), axis=1)
+    marked = np.zeros(vertices, dtype=bool)
+    marked[segments] = True
+    sides = triangle_sides(triangles)
+    some = np.flatnonzero(marked[sides].all(axis=1))  # few, which are sorted in no time
+    sides = np.sort(sides[some], axis=1)
     keys = sides[:, 0] * vertices + sides[:, 1]
     order = np.argsort(keys)
     low, high = np.sort(segments, axis=1).T
     wanted = low * vertices + high
     first = np.searchsorted(keys[order], wanted)
     last = np.searchsorted(keys[order], wanted, side="right")
-    return order[first] // 3, last - first > 1
+    return some[order[first]] // 3, last - first > 1
 
 
 def rightward(vectors: Array) -> Array:

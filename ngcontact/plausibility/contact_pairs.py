@@ -9,11 +9,11 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from ..contact import ContactState
-from ..fem import BoundaryTrace, Space, bulk_moduli, shear_moduli
+from ..fem import BoundaryTrace, Space, bulk_moduli, shear_moduli, stiffer_than
 from ..problem import Problem
 from .drawn import apart, contradicted
 from .estimates import moves_rigidly
-from .inclinations import INCLINED, inclinations
+from .inclinations import INCLINED, inclinations, lies_across
 from .penetration import penetration
 from .zones import Zones, zones_of
 
@@ -82,7 +82,8 @@ def doubts(
     """
     found: Doubts = {}
     u = displacement.vec.FV().NumPy()
-    for number, state in _loaded(space, u, pairs):
+    loaded = list(_loaded(space, u, pairs))
+    for number, state in loaded:
         zones = zones_of(state)
         messages = {"strain": _large(problem, space.trace, state, zones)}
         if not messages["strain"]:  # which leaves nothing else to believe
@@ -97,7 +98,7 @@ def doubts(
         if not known and (text := _passed(problem, space, displacement, state, peak)):
             name = f"contact {number} of {state.line.contact.named()}"
             found["penetration", number] = f"{name}: {text}"
-    if text := _unresisted(problem, space, displacement, pairs):
+    if not loaded and (text := _unresisted(problem, space, displacement, pairs)):
         found["rigid", 0] = text
     return found
 
@@ -105,10 +106,10 @@ def doubts(
 def _unresisted(
     problem: Problem, space: Space, displacement: ng.GridFunction, pairs: Sequence[ContactState]
 ) -> str:
-    """Message where bodies in contact move without any deformation, or nothing."""
+    """Message where bodies move without any deformation under no forces, or nothing."""
     u = displacement.vec.FV().NumPy()
     touching = any(state.active.any() for state in pairs)
-    if not touching or not u.any() or any(True for _ in _loaded(space, u, pairs)):
+    if not touching or not u.any():
         return ""
     if not moves_rigidly(problem, space, displacement):
         return ""
@@ -121,6 +122,8 @@ def _unresisted(
 
 def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
     """Message where surfaces that carry force are inclined to the fixed direction, or nothing."""
+    if lies_across(trace, state):
+        return ""
     angle, force = inclinations(trace, state), np.abs(state.force)
     inclined = angle > INCLINED
     if force[inclined].sum() <= SHARE * force.sum():
@@ -136,6 +139,8 @@ def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
 def _large(problem: Problem, trace: BoundaryTrace, state: ContactState, zones: Zones) -> str:
     """Message where strains are far from small, or nothing."""
     pressure = float((np.abs(zones.force) / zones.weight).max(initial=0.0))
+    if stiffer_than(problem, trace.mesh, pressure / LARGE):
+        return ""
     modulus = _softer(_confined_moduli, problem, trace, state)
     if pressure <= LARGE * modulus:
         return ""

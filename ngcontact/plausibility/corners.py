@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Mask
 from ..errors import warn
-from ..fem import BoundaryTrace, prescribed
-from ..problem import Problem
+from ..fem import BoundaryTrace, boundary_trace, prescribed
+from ..problem import Problem, Triangulation, boundary_mask
 from ..quadrature import looked, numbers
 
 APART = 1e-6  # values of two supports at one corner, relative to the largest, that are two values
@@ -45,7 +46,7 @@ def contradictions(problem: Problem, trace: BoundaryTrace) -> list[Contradiction
     """
     if not problem.displacement:
         return []
-    seen, shared = prescribed(problem, trace), _shared(problem, trace)
+    seen, shared = prescribed(problem, trace.mesh), _shared(problem, trace.mesh)
     known: dict[tuple[int, int], tuple[str, float]] = {}
     found = [
         Contradiction(
@@ -83,12 +84,14 @@ def contradictions(problem: Problem, trace: BoundaryTrace) -> list[Contradiction
     return [one for one in found if one.amount > NOISE * seen.largest]
 
 
-def _shared(problem: Problem, trace: BoundaryTrace) -> Mask:
+def _shared(problem: Problem, mesh: ng.Mesh) -> Mask:
     """Vertices at which segments of several prescribed regions, or of guides, meet."""
     guides = [str(problem.sliding)] if problem.sliding is not None else []
-    at = trace.segments(*problem.displacement, *guides)
-    vertex, region = trace.nodes[at][:, [0, -1]], trace.region[at]
-    low, high = np.full(trace.mesh.nv, len(trace.mesh.GetBoundaries())), np.full(trace.mesh.nv, -1)
+    masks = [boundary_mask(mesh, pattern) for pattern in (*problem.displacement, *guides)]
+    view = Triangulation(mesh)
+    at = np.logical_or.reduce(masks)[view.boundaries]
+    vertex, region = view.segments[at], view.boundaries[at]
+    low, high = np.full(mesh.nv, len(mesh.GetBoundaries())), np.full(mesh.nv, -1)
     np.minimum.at(low, vertex, region[:, None])
     np.maximum.at(high, vertex, region[:, None])
     return np.asarray(low < high)
@@ -117,10 +120,13 @@ def _across_guides(
     return found
 
 
-def warn_of_contradictions(found: list[Contradiction]) -> None:
+def warn_of_contradictions(problem: Problem, mesh: ng.Mesh) -> None:
     """Warn of the first corner of each two supports."""
     told: set[tuple[str, str]] = set()
-    for one in found:
+    possible = bool(problem.displacement) and (
+        prescribed(problem, mesh).steps or _shared(problem, mesh).any()
+    )
+    for one in contradictions(problem, boundary_trace(mesh, 1)) if possible else ():
         if one.supports not in told:
             told.add(one.supports)
             x, y = one.place

@@ -90,10 +90,12 @@ def contradicted(trace: BoundaryTrace, state: ContactState) -> str:
     contact = state.line.contact
     if contact.gap is None or contact.primary is None:
         return ""
-    given, drawn = state.line.gap, drawn_gap(trace, state)
-    sign = np.sign(given[0])
-    least, other = (sign * given).min(), (-sign * drawn).min(initial=np.inf)
-    if not (0 < least and OTHERWISE * least <= other < np.inf):
+    sign = np.sign(state.line.gap[0])
+    least = (sign * state.line.gap).min()
+    if not least > 0:
+        return ""
+    other = (-sign * drawn_gap(trace, state)).min(initial=np.inf)
+    if not OTHERWISE * least <= other < np.inf:
         return ""
     words = ("apart", "into each other")
     says, draws = words if sign > 0 else words[::-1]

@@ -75,6 +75,19 @@ def _of_obstacle(state: ContactState, points: Index, xi: Array) -> tuple[Array, 
     return cosine[points], np.ones(len(points), dtype=bool)
 
 
+def lies_across(trace: BoundaryTrace, state: ContactState) -> bool:
+    """Whether the secondary has straight edges alone in contact, none inclined to the direction."""
+    line = state.line
+    if line.contact.direction is None or trace.edges is None:
+        return False
+    touching = np.append(state.active, False)[line.rows].any(axis=1)
+    segments = line.segments[touching]
+    chord = trace.curve[segments, -1] - trace.curve[segments, 0]
+    along = np.abs(chord @ np.array(line.contact.direction))
+    straight = all(trace.edges[k].straight for k in set(trace.region[segments].tolist()))
+    return straight and bool((along <= np.sin(INCLINED) * trace.lengths(segments)).all())
+
+
 def inclinations(trace: BoundaryTrace, state: ContactState) -> Array:
     """Angles (m,) in radians between a pair's fixed direction and the surfaces; 0 where open.
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Array, Index
 from ..contact import ContactLine, ContactState, in_contact, twins
-from ..triplets import from_triplets
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,18 +39,29 @@ def links(line: ContactLine) -> tuple[Index, Index]:
     return pairs[(pairs >= 0).all(axis=1)], twins(line)
 
 
+def connected(count: int, pairs: Index) -> Index:
+    """Least number (count,) to which each is joined by `pairs` (k, 2): a graph costs more."""
+    number = np.arange(count)
+    while True:
+        ends = number[pairs]
+        low = ends.min(axis=1)
+        if np.array_equal(low, ends.max(axis=1)):
+            return number
+        np.minimum.at(number, ends, low[:, None])
+        while (number[number] != number).any():
+            number = number[number]
+
+
 def zones_of(state: ContactState) -> Zones:
     """The zones of one pair."""
     line, closed = state.line, in_contact(state.line, state.active)
     along, across = links(line)
     both = np.concatenate([along, across])
     joined = both[closed[both].all(axis=1)]
-    m = len(closed)
-    graph = from_triplets(np.ones(len(joined)), joined[:, 0], joined[:, 1], (m, m))
-    _, number = connected_components(graph, directed=False)
-    kept, number[closed] = np.unique(number[closed], return_inverse=True)
-    number[~closed] = -1
-    k = len(kept)
+    number = connected(len(closed), joined)
+    first = closed & (number == np.arange(len(closed)))
+    k = np.count_nonzero(first)
+    number = np.where(closed, (np.cumsum(first) - 1)[number], -1)
 
     def summed(points: Index, values: Array) -> Array:
         return np.asarray(np.bincount(number[points], values, minlength=k), dtype=float)

@@ -10,6 +10,7 @@ import numpy as np
 from ..arrays import Array, Index, Mask
 from ..errors import warn
 from ..problem import Problem
+from .constant_data import numbers
 from .features import Features, features_of, touched
 from .loads import known_rough_load, moment_degree
 from .view import View
@@ -30,9 +31,12 @@ def warn_of_data(problem: Problem, mesh: ng.Mesh, order: int) -> None:
                 f'{one.kind} "{one.name}" is zero at all {one.samples} points at which it was '
                 "looked at: if it acts on a smaller part, make that a boundary or a body of its own"
             )
-    loads = [("force", k, F, F, mesh.Materials(k)) for k, F in problem.force.items()]
+    loads = [
+        ("force", k, F, F, mesh.Materials(k)) for k, F in problem.force.items() if not numbers(F)
+    ]
     for k, p in problem.traction.items():
-        loads.append(("traction", k, p, problem.traction_vector(k), mesh.Boundaries(k)))
+        if not numbers(p):
+            loads.append(("traction", k, p, problem.traction_vector(k), mesh.Boundaries(k)))
     for kind, name, data, load, region in loads:
         found = known_rough_load(data, load, region, moment_degree(order))
         if found is not None and found.missed.sum() > LOST * found.total:

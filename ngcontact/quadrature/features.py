@@ -96,12 +96,14 @@ def _functions(
 ) -> Iterator[tuple[str, str, object, Function, ng.Region]]:
     """Kind, name, owner, function and region of all data that are no numbers."""
     for name, F in problem.force.items():
-        yield "force", name, F, F, mesh.Materials(name)
+        if not numbers(F):
+            yield "force", name, F, F, mesh.Materials(name)
     for name, p in problem.traction.items():
-        yield "traction", name, p, p, mesh.Boundaries(name)
+        if not numbers(p):
+            yield "traction", name, p, p, mesh.Boundaries(name)
     for name, components in problem.displacement.items():
         for value in components:
-            if value is not None:
+            if value is not None and not numbers(value):
                 yield "displacement", name, value, value, mesh.Boundaries(name)
     for pair in problem.contact:
         if pair.gap is not None and not isinstance(pair.gap, float):

@@ -10,7 +10,7 @@ import pytest
 
 from ngcontact import adapt, solve
 from ngcontact.adaptivity import refined
-from ngcontact.fem import boundary_trace, prescribed
+from ngcontact.fem import prescribed
 from ngcontact.mesh import first_mesh
 from tests.quadrature.test_loads import loaded
 
@@ -40,8 +40,8 @@ def test_numbers_are_not_looked_at():
 def test_refinement_costs_no_looks():
     """A search on each segment and mesh took 257 points a segment, and 90 for each of its parts."""
     counts = [solve(moved(), mesh, order=2).work["evaluations"] for mesh in meshes(moved(), 4)]
-    assert PLACES / 2 < counts[0]
-    assert max(counts) <= 1.2 * PLACES
+    assert PLACES < counts[0]  # one look for narrow features, one for jumps
+    assert max(counts) <= 2.2 * PLACES
 
 
 def test_levels_do_not_look_again():
@@ -52,9 +52,8 @@ def test_levels_do_not_look_again():
 
 def test_bounds_share_what_was_seen():
     solution = solve(moved(), maxh=0.25, order=2)
-    trace = boundary_trace(solution.mesh, 1)
-    seen = prescribed(solution.problem, trace)
-    assert prescribed(solution.problem, trace) is seen
+    seen = prescribed(solution.problem, solution.mesh)
+    assert prescribed(solution.problem, solution.mesh) is seen
     assert seen.largest == pytest.approx(0.1 * np.sin(1), rel=1e-12)
 
 

@@ -70,7 +70,7 @@ def on_supports(
 
 def _refuse_steps(problem: Problem, boundary: BoundaryTrace) -> None:
     """Raise where a prescribed displacement jumps inside a boundary."""
-    for step in prescribed(problem, boundary).steps:
+    for step in prescribed(problem, boundary.mesh).steps:
         x, y = step.place
         raise ValueError(
             f'the displacement prescribed on "{step.name}" jumps near ({x:.6g}, {y:.6g}): no '
