@@ -278,7 +278,7 @@ def test_bodies_on_top_of_each_other_are_refused():
     twice = WorkPlane().Circle(RIM).Circle(BORE).Face()
     twice.faces.name, twice.edges.name = "tube", "side"
     both = Compound([disc(2, "one", "side"), rectangle(-1, -1, 4, 1, "other", "side")])
-    for shape, names in ((twice, '"tube" .* "tube"'), (both, '"one" .* "other"')):
+    for shape, names in ((twice, '"tube" .* "tube"'), (both, '"other" .* "one"')):
         geometry = OCCGeometry(shape, dim=2)
         mesh = ng.Mesh(geometry.GenerateMesh(maxh=0.5))
         laws = dict.fromkeys(mesh.GetMaterials(), STEEL)

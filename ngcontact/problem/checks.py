@@ -45,7 +45,7 @@ _OTHER = {
 }
 
 OVERLAP = 0.5  # of the smaller of two bodies, from which they lie on top of each other
-PLACES = 200  # of each connected piece that are looked up: 8 microseconds each
+PLACES = 200  # of a connected piece that are looked for in another one
 
 FLAT = 16 * np.finfo(float).eps  # area of a triangle over its longest side squared, without height
 
@@ -194,34 +194,53 @@ def check_pressures(
 def check_overlaps(mesh: ng.Mesh) -> None:
     """Refuse bodies drawn on top of each other, and a face drawn over a part of itself.
 
-    An interference at a contact line is none. Places at equal steps of the area of each connected
-    piece are looked up in the mesh, which finds them in one of the pieces that they lie in.
+    An interference at a contact line is none. Of each two connected pieces whose boxes overlap by
+    so much, places at equal steps of the smaller one's area are looked for in the larger one.
     """
     view, body = Triangulation(mesh), body_of_vertex(mesh)
-    piece, corners = body[view.triangles[:, 0]], view.corners
-    if piece.max(initial=0) == 0:
+    piece = body[view.triangles[:, 0]]
+    parts = [np.flatnonzero(piece == k) for k in range(piece.max(initial=0) + 1)]
+    if len(parts) == 1:
         return
-    edge, middle = corners[:, 1:] - corners[:, :1], corners.mean(axis=1)
+    edge = view.corners[:, 1:] - view.corners[:, :1]
     area = (edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0]) / 2
-    size = np.bincount(piece, area)
-    common = np.zeros((len(size), len(size)))
-    for k in range(len(size)):
-        part = np.flatnonzero(piece == k)
-        upto = np.cumsum(area[part])
-        at = part[np.searchsorted(upto, (np.arange(PLACES) + 0.5) / PLACES * upto[-1])]
-        found = mesh(*middle[at].T)["nr"]
-        other = piece[found[found >= 0]]
-        np.add.at(common[k], other[other != k], size[k] / PLACES)
-    common += common.T
-    over = common > OVERLAP * np.minimum(size[:, None], size)
-    for one, other in np.argwhere(over):
-        names = mesh.GetMaterials()
-        name, beside = (names[view.bodies[np.argmax(piece == k)]] for k in (one, other))
-        raise ValueError(
-            f'body "{name}" of area {size[one]:.4g} and body "{beside}" of area {size[other]:.4g} '
-            f"lie on top of each other on an area of about {common[one, other]:.2g}: cut one out "
-            "of the other (outer - inner) or draw them side by side"
-        )
+    size = np.array([area[part].sum() for part in parts])
+    box = np.array([[view.corners[p].min((0, 1)), view.corners[p].max((0, 1))] for p in parts])
+    for small, large in itertools.combinations(np.argsort(size, kind="stable").tolist(), 2):
+        width = np.minimum(box[small, 1], box[large, 1]) - np.maximum(box[small, 0], box[large, 0])
+        if min(width) <= 0 or width.prod() <= OVERLAP * size[small]:
+            continue
+        upto = np.cumsum(area[parts[small]])
+        at = np.searchsorted(upto, (np.arange(PLACES) + 0.5) / PLACES * upto[-1])
+        middle = view.corners[parts[small][at]].mean(axis=1)
+        share = float(_inside(middle, view, parts[large]).mean())
+        if share > OVERLAP:
+            names = mesh.GetMaterials()
+            name, beside = (names[view.bodies[parts[k][0]]] for k in (small, large))
+            raise ValueError(
+                f'body "{name}" of area {size[small]:.4g} and body "{beside}" of area '
+                f"{size[large]:.4g} lie on top of each other on an area of about "
+                f"{share * size[small]:.2g}: cut one out of the other (outer - inner) or draw them "
+                "side by side"
+            )
+
+
+def _inside(points: np.ndarray, view: Triangulation, part: np.ndarray) -> np.ndarray:
+    """Return which points (k, 2) lie in the triangles `part` (n,) of a mesh, bool (k,).
+
+    Where a line to the right crosses their boundary, the sides of one triangle alone, an odd number
+    of times.
+    """
+    sides = triangle_sides(view.triangles[part])
+    keys, count = np.unique(
+        sides.min(axis=1) * len(view.vertices) + sides.max(axis=1), return_counts=True
+    )
+    a, b = (view.vertices[k] for k in np.divmod(keys[count == 1], len(view.vertices)))
+    x, y = points[:, 0, None], points[:, 1, None]
+    crossed = (a[:, 1] > y) != (b[:, 1] > y)
+    rise = np.where(a[:, 1] == b[:, 1], 1.0, b[:, 1] - a[:, 1])
+    right = x < a[:, 0] + (y - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
+    return np.asarray((crossed & right).sum(axis=1) % 2 == 1)
 
 
 def _has_two_sides(view: Triangulation) -> np.ndarray:
