@@ -40,7 +40,7 @@ def links(line: ContactLine) -> tuple[Index, Index]:
 
 
 def connected(count: int, pairs: Index) -> Index:
-    """Least number (count,) to which each is joined by `pairs` (k, 2): a graph costs more."""
+    """Least number (n,), of a `count` n, to which each is joined by `pairs` (k, 2)."""
     number = np.arange(count)
     while True:
         ends = number[pairs]
