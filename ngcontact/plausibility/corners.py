@@ -10,8 +10,8 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..errors import warn
 from ..fem import BoundaryTrace, boundary_trace, prescribed
-from ..problem import Problem, Triangulation, boundary_mask
-from ..quadrature import looked, numbers
+from ..problem import Problem
+from ..quadrature import View, looked, numbers
 
 APART = 1e-6  # values of two supports at one corner, relative to the largest, that are two values
 NOISE = 64 * np.finfo(float).eps  # ... and to the largest of all values: below it is round-off
@@ -87,10 +87,9 @@ def contradictions(problem: Problem, trace: BoundaryTrace) -> list[Contradiction
 def _shared(problem: Problem, mesh: ng.Mesh) -> Mask:
     """Vertices at which segments of several prescribed regions, or of guides, meet."""
     guides = [str(problem.sliding)] if problem.sliding is not None else []
-    masks = [boundary_mask(mesh, pattern) for pattern in (*problem.displacement, *guides)]
-    view = Triangulation(mesh)
-    at = np.logical_or.reduce(masks)[view.boundaries]
-    vertex, region = view.segments[at], view.boundaries[at]
+    view, patterns = View(mesh, 1), (*problem.displacement, *guides)
+    at = np.concatenate([view.inside(mesh.Boundaries(pattern)) for pattern in patterns])
+    vertex, region = view.arrays.segments[at], view.arrays.boundaries[at]
     low, high = np.full(mesh.nv, len(mesh.GetBoundaries())), np.full(mesh.nv, -1)
     np.minimum.at(low, vertex, region[:, None])
     np.maximum.at(high, vertex, region[:, None])

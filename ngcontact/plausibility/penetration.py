@@ -42,6 +42,8 @@ def _suspected(state: ContactState) -> Index:
     segment and its neighbours.
     """
     line, gap = state.line, np.maximum(state.gap, 0.0)
+    if state.active.all():
+        return line.segments[:0]
     whole = np.flatnonzero((line.rows >= 0).all(axis=1))
     rows = line.rows[whole]
     high = np.zeros(len(gap))

@@ -40,7 +40,7 @@ def links(line: ContactLine) -> tuple[Index, Index]:
 
 
 def connected(count: int, pairs: Index) -> Index:
-    """Least number (count,) to which each is joined by `pairs` (k, 2): a graph costs more."""
+    """Least number (n,), of a `count` n, to which each is joined by `pairs` (k, 2)."""
     number = np.arange(count)
     while True:
         ends = number[pairs]
@@ -54,11 +54,12 @@ def connected(count: int, pairs: Index) -> Index:
 
 def zones_of(state: ContactState) -> Zones:
     """The zones of one pair."""
-    line, closed = state.line, in_contact(state.line, state.active)
+    line = state.line
     along, across = links(line)
+    closed = in_contact(line, state.active) if len(across) else state.active
     both = np.concatenate([along, across])
-    joined = both[closed[both].all(axis=1)]
-    number = connected(len(closed), joined)
+    touching = np.count_nonzero(closed[both], axis=1)
+    number = connected(len(closed), both[touching == 2])
     first = closed & (number == np.arange(len(closed)))
     k = np.count_nonzero(first)
     number = np.where(closed, (np.cumsum(first) - 1)[number], -1)
@@ -70,8 +71,7 @@ def zones_of(state: ContactState) -> Zones:
         return np.bincount(number[points], minlength=k)
 
     at = np.flatnonzero(closed)
-    inside = along[closed[along].all(axis=1)]
-    ending = both[closed[both].sum(axis=1) == 1]
+    inside, ending = along[touching[: len(along)] == 2], both[touching == 1]
     ends = counted(ending[closed[ending]])
     return Zones(
         number=number,
