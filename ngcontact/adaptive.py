@@ -245,6 +245,7 @@ def levels(
         if solution is not None:  # its factorisation is of no use to the next one
             solution.discrete.systems.forget()
         solution = solve_on(problem, plan.mesh, plan.order, element, solution or start)
+        problem = solution.problem  # roles that fail are exchanged once
         solution = replace(solution, adaptive=True, estimator=estimator, descent=plan.descent)
         narrow = unresolved(problem, solution.mesh, in_bounds=refinement.guaranteed)
         if refinement.guaranteed:

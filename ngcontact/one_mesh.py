@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
+from dataclasses import replace
 
 import ngsolve as ng
+import numpy as np
 
-from .discrete import carried_active_set, discretise, first_active_set, minimise_energy
-from .errors import warn
+from .arrays import Mask
+from .discrete import (
+    DiscreteProblem,
+    carried_active_set,
+    discretise,
+    first_active_set,
+    minimise_energy,
+)
+from .errors import ContactError, ConvergenceError, warn
 from .mesh import check_curves, curve, same_geometry
 from .plausibility import doubt_of_refinement, doubts, estimates_rise
-from .problem import Problem
+from .problem import Contact, Problem
 from .quadrature import evaluations, unresolved, warn_of_unresolved
 from .solution import Solution
 
@@ -47,7 +56,11 @@ def check_continuation(problem: Problem, start: Solution, order: int, element: s
 def solve_on(
     problem: Problem, mesh: ng.Mesh, order: int, element: str, start: Solution | None
 ) -> Solution:
-    """Solution on one mesh, of which names and values are known to be right."""
+    """Solution on one mesh, of which names and values are known to be right.
+
+    Roles of pairs that fail are tried the other way round, once; `Solution.problem` has the pairs
+    as they were solved.
+    """
     before = evaluations()
     mesh, curved = curve(mesh, order, element)
     if curved and mesh.GetCurveOrder() > 1:  # straight sides have no middles to place
@@ -55,11 +68,22 @@ def solve_on(
     here = (mesh, order, element)
     same = start is not None and (start.mesh, start.order, start.element) == here
     discrete = discretise(problem, *here, start.discrete if start is not None and same else None)
-    if start is None:
-        active = first_active_set(discrete)
-    else:
-        active = carried_active_set(discrete.lines, start.pairs)
-    minimiser = minimise_energy(discrete, active)
+    tried = [discrete]
+    try:
+        minimiser = minimise_energy(discrete, _first_active_set(discrete, start))
+    except ConvergenceError as error:
+        exchanged = _exchanged(discrete)
+        if not exchanged:
+            raise
+        pairs = [exchanged.get(i, contact) for i, contact in enumerate(problem.contact)]
+        problem = replace(problem, contact=pairs)
+        try:
+            discrete = discretise(problem, *here, discrete)
+            minimiser = minimise_energy(discrete, _first_active_set(discrete, start))
+        except (ContactError, ValueError):
+            raise error from None
+        tried.append(discrete)
+        warn(_told(list(exchanged.values())))
     return Solution(
         problem=problem,
         mesh=mesh,
@@ -69,15 +93,54 @@ def solve_on(
         discrete=discrete,
         minimiser=minimiser,
         work={
-            "assemblies": int(discrete.assembled),
+            "assemblies": sum(one.assembled for one in tried),
             "factorizations": minimiser.factorizations,
             "back_solves": minimiser.back_solves,
-            "gap_searches": sum(line.searches for line in discrete.lines),
+            "gap_searches": sum(line.searches for one in tried for line in one.lines),
             "curved_elements": curved,
             "estimates": 0,
             "equilibrations": 0,
             "evaluations": evaluations() - before,
         },
+    )
+
+
+def _first_active_set(discrete: DiscreteProblem, start: Solution | None) -> Mask:
+    """Cold (m,), or warm from a solution."""
+    if start is None:
+        return first_active_set(discrete)
+    return carried_active_set(discrete.lines, start.pairs)
+
+
+def _exchanged(discrete: DiscreteProblem) -> dict[int, Contact]:
+    """Pairs by number, with roles exchanged, whose primary belongs to a body without support.
+
+    Normals of a hole, at points of a pin that lies elsewhere in it, all but resist the turning of
+    the pin; its own normals leave it free.
+    """
+    if discrete.rigid is None:
+        return {}
+    free = discrete.rigid.free
+    moves = free.combinations.any(axis=1).reshape(-1, 3).any(axis=1)
+    primaries = [moves[np.unique(free.bodies.of_segment[line.facing])] for line in discrete.lines]
+    return {
+        number: contact.swapped()
+        for number, contact in enumerate(discrete.problem.contact)
+        if primaries[number].any()
+        and contact.roles == "given"
+        and contact.gap is None
+        and not contact.bilateral
+    }
+
+
+def _told(exchanged: list[Contact]) -> str:
+    """What is said of pairs that were solved with roles `exchanged`."""
+    names = ", ".join(f'Contact("{c.primary}", "{c.secondary}")' for c in exchanged)
+    secondaries = ", ".join(f'"{c.secondary}"' for c in exchanged)
+    return (
+        f"no solution was found with the roles given in {names}, and was found with roles "
+        f"exchanged: {secondaries} carries the contact points, and contact_force acts on its body. "
+        'Exchange the names, or give roles="auto", which mostly chooses the body without support'
     )
 
 

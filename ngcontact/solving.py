@@ -78,7 +78,9 @@ def solve(
     if start is None:
         warn_of_implausible(problem, mesh, order)
     coarse = _coarse_run(problem, mesh, order, element) if start is None else []
-    solution = solve_on(problem, mesh, order, element, coarse[-1] if coarse else start)
+    if coarse:  # with roles that can be solved
+        problem, start = coarse[-1].problem, coarse[-1]
+    solution = solve_on(problem, mesh, order, element, start)
     solution = replace(solution, coarse_levels=len(coarse))
     solution.work["evaluations"] = evaluations() - before
     log.info("%s", solution)

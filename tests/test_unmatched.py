@@ -13,7 +13,16 @@ from netgen.occ import Compound, OCCGeometry, WorkPlane, Y
 
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
-from ngcontact import Contact, ContactWarning, Elastic, Problem, solve
+from ngcontact import (
+    Contact,
+    ContactError,
+    ContactWarning,
+    ConvergenceError,
+    Elastic,
+    Problem,
+    one_mesh,
+    solve,
+)
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import rings
 from ngcontact.geometries.region import (
@@ -250,6 +259,63 @@ def test_a_loose_pin_is_held_by_its_hole(swap):
         solution.contact_force(), (0, (1 if swap else -1) * 1e-3 * math.pi), atol=1e-5
     )
     assert max(solution.residuals.values()) < 1e-12
+
+
+def pin_at_the_bottom(*pairs):
+    """A pin that touches its hole, and that contact alone holds against a slanting body force."""
+    hole = WorkPlane().Circle(1.0).Face()
+    plate = WorkPlane().MoveTo(-3, -3).Rectangle(6, 6).Face() - hole
+    pin = WorkPlane().MoveTo(0, -1e-3).Circle(0.999).Face()
+    for face, name in ((plate, "plate"), (pin, "pin")):
+        face.faces.name = name
+        face.edges.name = name
+    for edge in plate.edges:
+        edge.name = "hole" if abs(edge.center.x) + abs(edge.center.y) < 1.1 else "rim"
+    return Problem(
+        geometry=OCCGeometry(Compound([plate, pin]), dim=2),
+        materials={"pin|plate": Elastic(E=210e3, nu=0.3)},
+        displacement={"rim": (0, 0)},
+        force={"pin": (0.3, -1.0)},
+        contact=[Contact(*pair) for pair in pairs],
+    )
+
+
+def test_roles_that_fail_are_exchanged_with_a_warning():
+    """What is solved is the problem with roles the other way round, on the same mesh."""
+    given = pin_at_the_bottom(("hole", "pin"))
+    mesh = first_mesh(given, 0.35)
+    with pytest.warns(ContactWarning, match=r'given in Contact\("hole", "pin"\).*roles="auto"'):
+        solution = solve(given, mesh, order=2)
+    assert [(c.secondary, c.primary) for c in solution.problem.contact] == [("pin", "hole")]
+    right = solve(replace(given, contact=[given.contact[0].swapped()]), mesh, order=2)
+    np.testing.assert_allclose(solution.energy, right.energy, rtol=1e-9)  # round-off, amplified
+    assert np.array_equal(solution.active, right.active)
+    np.testing.assert_allclose(solution.contact_force(), right.contact_force(), rtol=1e-9)
+    area = ng.Integrate(1.0, solution.mesh, definedon=solution.mesh.Materials("pin"), order=4)
+    load = area * np.array((0.3, -1.0))
+    np.testing.assert_allclose(solution.contact_force(), -load, atol=1e-9 * abs(load).max())
+
+
+@pytest.mark.parametrize("options", [{"gap": 0.01}, {"roles": "auto"}, {"bilateral": True}])
+def test_other_roles_are_not_tried_for_what_depends_on_them(monkeypatch, options):
+    """The error of the roles that were given is raised, as where the others fail, too."""
+    problem = pin_at_the_bottom(("hole", "pin"))
+    calls = []
+
+    def fail(discrete, active):
+        calls.append(discrete.problem.contact)
+        raise ConvergenceError(f"attempt {len(calls)}")
+
+    monkeypatch.setattr(one_mesh, "minimise_energy", fail)
+    mesh = first_mesh(problem, 0.5)
+    with pytest.raises(ConvergenceError, match="attempt 1"):
+        solve(problem, mesh, order=2)
+    assert [pairs[0].secondary for pairs in calls] == ["hole", "pin"]
+    calls.clear()
+    problem = replace(problem, contact=[replace(problem.contact[0], **options)])
+    with pytest.raises(ContactError):
+        solve(problem, mesh, order=2)
+    assert len(calls) <= 1
 
 
 def disc_in_vee(contact, settle):
