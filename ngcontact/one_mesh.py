@@ -121,7 +121,7 @@ def _exchanged(discrete: DiscreteProblem) -> dict[int, Contact]:
     if discrete.rigid is None:
         return {}
     free = discrete.rigid.free
-    moves = free.combinations.any(axis=1).reshape(-1, 3).any(axis=1)
+    moves = np.abs(free.combinations).sum(axis=1).reshape(-1, 3).sum(axis=1) > 0
     primaries = [moves[np.unique(free.bodies.of_segment[line.facing])] for line in discrete.lines]
     return {
         number: contact.swapped()

@@ -280,10 +280,20 @@ def pin_at_the_bottom(*pairs):
     )
 
 
-def test_roles_that_fail_are_exchanged_with_a_warning():
-    """What is solved is the problem with roles the other way round, on the same mesh."""
+def test_roles_that_fail_are_exchanged_with_a_warning(monkeypatch):
+    """What is solved is the problem with roles the other way round, on the same mesh.
+
+    Whether the first roles fail hangs on round-off, so that here they do not depend on it.
+    """
     given = pin_at_the_bottom(("hole", "pin"))
-    mesh = first_mesh(given, 0.35)
+    mesh, solved = first_mesh(given, 0.35), one_mesh.minimise_energy
+
+    def fails_with_the_hole(discrete, active):
+        if discrete.problem.contact[0].secondary == "hole":
+            raise ConvergenceError("the active set did not settle")
+        return solved(discrete, active)
+
+    monkeypatch.setattr(one_mesh, "minimise_energy", fails_with_the_hole)
     with pytest.warns(ContactWarning, match=r'given in Contact\("hole", "pin"\).*roles="auto"'):
         solution = solve(given, mesh, order=2)
     assert [(c.secondary, c.primary) for c in solution.problem.contact] == [("pin", "hole")]

@@ -52,7 +52,7 @@ SHARE = {"traction": 0.1, "force": 0.1, "materials": 0.1, "displacement": 1e-5, 
 ROUND_OFF = 1e-10  # of values, relative to the largest
 FEW = 6  # samples in a feature up to which what is between them is looked at
 MEASURED = 65  # points across a feature, to tell its width
-FEATURES = 200  # that are measured; others have the least width of these
+FEATURES = 200  # of one function on a line, or that are measured in a body
 NARROWEST = 0.1  # samples: no feature is taken for narrower
 
 Function: TypeAlias = ng.CoefficientFunction | Callable[[Array, Array], Array]
@@ -231,7 +231,10 @@ def _on_line(
         count, vanishes = count + len(t), vanishes and not values.any()
         for component in np.hstack([values, -values]).T:
             departure = _departures(component, limit)
-            for first, last in _runs(departure > 0)[:FEATURES]:
+            runs = _runs(departure > 0)
+            if len(runs) > FEATURES:  # no features but roughness, which the estimate tells
+                continue
+            for first, last in runs:
                 low = t[first - 1] if first else 0.0
                 high = t[last] if last < len(t) else ends[-1]
                 if last - first < FEW:  # what is between samples counts
