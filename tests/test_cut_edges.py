@@ -94,6 +94,7 @@ def energy_error(solution):
 
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("part", GUIDES)
+@pytest.mark.study(witness=["quarter-1", "quarter-4", "half-3", "whole-2"])
 def test_pressure_in_a_bore_is_the_one_of_lame(part, order):
     solution = solve(pressed_tube(part), maxh=0.5, order=order)
     assert radial_error(solution) < MISSED[order]

@@ -192,6 +192,7 @@ def test_overlapping_and_repeated_pairs_are_one(order, lower):
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 @pytest.mark.parametrize("matched", [True, False])
 @pytest.mark.parametrize("change", [{}, {"bilateral": True}, {"gap": 0.0}])
+@pytest.mark.study(witness=["change0-True-2", "change1-False-1", "change2-False-3"])
 def test_overlapping_pairs_of_other_primaries_are_one(change, matched, order):
     """Weights of points that two pairs share count once; measured: 2e-11 and less."""
     case = cases.pressure_patch()
