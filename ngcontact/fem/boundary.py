@@ -150,15 +150,20 @@ class BoundaryTrace:
         return np.flatnonzero(self.lies_on(np.arange(len(self.region)), *patterns))
 
     @cached_property
+    def curved_segments(self) -> Mask:
+        """Segments (k,) that leave their chords."""
+        ends = self.curve[:, :1], self.curve[:, -1:]
+        nodes = gauss_lobatto(self.geometry_order)[:, None]
+        off = np.abs(self.curve - ends[0] - nodes * (ends[1] - ends[0])).max(axis=(1, 2))
+        return np.asarray(off > BENT * self.lengths(np.arange(len(self.curve))))
+
+    @cached_property
     def curved_elements(self) -> Mask:
         """Elements (ne,) with a curved side."""
         view = Triangulation(self.mesh)
         if self.geometry_order == 1:
             return np.zeros(self.mesh.ne, dtype=bool)
-        ends = self.curve[:, :1], self.curve[:, -1:]
-        nodes = gauss_lobatto(self.geometry_order)[:, None]
-        off = np.abs(self.curve - ends[0] - nodes * (ends[1] - ends[0])).max(axis=(1, 2))
-        bent = off > BENT * self.lengths(np.arange(len(self.curve)))
+        bent = self.curved_segments
         sides = np.sort(triangle_sides(view.triangles), axis=1)
         low, high = np.sort(view.segments[bent], axis=1).T
         keys = sides[:, 0] * self.mesh.nv + sides[:, 1]

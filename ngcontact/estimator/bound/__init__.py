@@ -1,0 +1,1 @@
+"""A bound of the error that is proved, by one dual contact problem."""

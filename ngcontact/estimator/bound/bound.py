@@ -1,0 +1,211 @@
+"""A bound of the error that is proved: the identity of Prager and Synge with contact.
+
+With a stress s in equilibrium with the loads, p* >= 0 on Gamma_K, and w that corrects what u_h
+misses on Gamma_u and Gamma_K, without a constant
+
+    |u - u_h|^2 <= B^2 = |s - sigma_h|^2 + 2 int p* (gap_h + r) + |w|^2,
+
+where gap_h + r >= 0 is the gap of u_h + w; docs/bounds.md has the proof. s and p* minimise B^2: they
+are the solution of the dual contact problem.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+
+from ...arrays import Array
+from ...contact import ContactState
+from ...errors import ContactError
+from ...fem import BoundaryTrace
+from ...problem import Problem
+from .cells import Cells, cells_of
+from .elements import Element, Multipliers
+from .elements import elements as elements_of
+from .facing import PLACES, WEIGHTS, Facing, bernstein, cuts_of, facing_of, guides_of
+from .lifting import _carried, asked_on_contact, asked_on_supports, lifting_of
+from .missed import data_norms
+from .program import Rows, Solved, rows_of, solved
+from .tractions import Given, given_on, moments_of
+
+LIFTED = 3  # degrees by which w is above u_h
+SETTLED = 1e-10  # residual of equilibrium, relative to the largest stress
+
+
+@dataclass(frozen=True, eq=False)
+class Proof:
+    """What a bound was made of."""
+
+    cells: Cells
+    mu: Multipliers
+    elements: Sequence[Element]
+    lines: Sequence[Rows]
+    found: Solved
+    coefficients: Sequence[Array]
+    bound: float
+    parts: dict[str, float]
+    below: float
+    above: float
+
+
+def error_bound(
+    problem: Problem,
+    trace: BoundaryTrace,
+    displacement: ng.GridFunction,
+    pairs: Sequence[ContactState],
+    order: int,
+    degree: int | None = None,
+) -> Proof:
+    """Bound of the error of a displacement in the energy norm."""
+    extent = trace.model.extent
+    degree = max(order + 1, 2 + extent) if degree is None else degree
+    cuts, steps, ends = cuts_of(trace, displacement, pairs)
+    cells = cells_of(trace, cuts, steps, np.zeros(trace.mesh.ne, dtype=bool))
+    mu, elements = elements_of(problem, cells, displacement, degree)
+    given = given_on(problem, cells)
+    facing = [
+        facing_of(cells, displacement, pair, end, order + LIFTED)
+        for pair, end in zip(pairs, ends, strict=True)
+    ]
+    lines = [rows_of(mu, one, degree - extent) for one in facing]
+    for k in np.unique(mu.degree[given.guides]).tolist():
+        side = given.guides[mu.degree[given.guides] == k]
+        guide = guides_of(cells, displacement, side, order + LIFTED)
+        lines.append(rows_of(mu, guide, k - extent))
+    moments, fixed = moments_of(problem, cells, mu, given)
+    found = solved(mu, elements, moments, fixed, lines)
+    return _summed(problem, cells, displacement, mu, elements, lines, found, given, order)
+
+
+def _summed(problem, cells, displacement, mu, elements, lines, found, given, order) -> Proof:
+    n, extent = len(cells.triangles), cells.trace.model.extent
+    constitutive, forces, least = np.zeros(n), np.zeros(n), np.zeros(n)
+    coefficients, largest = [], 0.0
+    for e in elements:
+        c = e.coefficients(found.mu)
+        coefficients.append(c)
+        s = e.stress(c, e.places.x)
+        if extent:
+            s[..., 2] += e.radial
+        D = e.compliance
+        off = (D @ s[..., None])[..., 0] - e.strain
+        both = off * (np.linalg.inv(D) @ off[..., None])[..., 0]
+        at = e.places.at
+        constitutive[at] = np.sqrt((e.weight * both.sum(axis=2)).sum(axis=1))
+        forces[at] = e.missed
+        largest = max(largest, float(np.abs(s).max()))
+        half = np.ones(D.shape[-1])
+        half[-1] = 0.5**0.5
+        eig = np.linalg.eigvalsh(D * half * half[:, None])[..., -1].max(axis=1)
+        least[at] = 1 / eig
+    if extent:
+        least *= np.maximum(cells.trace.model.measure(cells.corners.reshape(-1, 2)).reshape(n, 3).min(axis=1), 1e-300)
+    missed, reaction = _missed(problem, cells, displacement, elements, coefficients, lines, found, given, largest)
+    loads = data_norms(cells, forces, missed, least)
+    shares = [_share(problem, cells, line.facing) for line in lines]
+    asked = asked_on_supports(problem, cells, displacement)
+    for line, share in zip(lines, shares, strict=True):
+        asked += asked_on_contact(cells, line.facing, share)
+    u = np.abs(cells.trace.evaluate(displacement, np.arange(len(cells.trace.region)), np.zeros(len(cells.trace.region)))).max()
+    lifting = lifting_of(problem, cells, asked, order + LIFTED, float(u))
+    closed = signed = 0.0
+    for line, p in zip(lines, found.pressure, strict=True):
+        closed += float((p * line.bound).sum())
+        density = p @ bernstein(p.shape[1] - 1, PLACES).T * line.facing.weight
+        signed += float((density * line.facing.gap).sum())
+    squares = float(((constitutive + loads) ** 2).sum())
+    parts = {
+        "constitutive": float(constitutive @ constitutive),
+        "complementarity": 2 * closed,
+        "lifting": float(lifting @ lifting),
+        "loads": squares - float(constitutive @ constitutive),
+    }
+    crossed, worked = float(constitutive @ lifting), float(loads @ lifting)
+    data = float(loads @ constitutive + loads @ loads / 2) + 2 * worked
+    below = parts["constitutive"] / 2 + signed - reaction + data
+    above = crossed + reaction + closed - signed + parts["lifting"] / 2 + worked
+    bound = (squares + 2 * closed + parts["lifting"]) ** 0.5
+    return Proof(cells, mu, elements, lines, found, coefficients, bound, parts, below, above)
+
+
+def _share(problem: Problem, cells: Cells, facing: Facing) -> float:
+    """Of the lifting, that the secondary takes: by compliance."""
+    if len(facing.side) == 0 or (facing.other < 0).any():
+        return 1.0
+    return 0.5
+
+
+def _missed(problem, cells, displacement, elements, coefficients, lines, found, given, largest):
+    """L2 norms (n, 3) of tractions that s misses on the boundary; work of s n on u_D - u_h."""
+    trace = cells.trace
+    side = np.flatnonzero(cells.segment >= 0)
+    position = np.full(len(cells.ends), -1)
+    position[side] = np.arange(len(side))
+    k, j = len(side), len(PLACES)
+    every, t = np.repeat(side, j), np.tile(PLACES, k)
+    x, dx = cells.points(every, t)
+    x, dx = x.reshape(k, j, 2), dx.reshape(k, j, 2)
+    measure = trace.model.measure(x.reshape(-1, 2)).reshape(k, j)
+    length = np.linalg.norm(dx, axis=2)
+    # tractions of s, per ds
+    have = np.zeros((k, j, 2))
+    for e, c in zip(elements, coefficients, strict=True):
+        number = np.full(len(cells.triangles), -1)
+        number[e.places.at] = np.arange(len(e.places.at))
+        mine = np.flatnonzero(number[cells.owner[side]] >= 0)
+        if not mine.size:
+            continue
+        some = number[cells.owner[side[mine]]]
+        at = e.places.at[some]
+        s = e.stress(c, x[mine], some)
+        back = cells.backward[at, cells.local[side[mine]]]
+        slope = np.where(back[:, None, None], -dx[mine], dx[mine])
+        nx, ny = slope[..., 1], -slope[..., 0]
+        have[mine] = np.stack([s[:, :, 0] * nx + s[:, :, -1] * ny, s[:, :, -1] * nx + s[:, :, 1] * ny], axis=-1)
+    have /= length[..., None]
+    asked = np.zeros_like(have)
+    for pattern, at in given.loads:
+        segment, s = cells.on_side(np.repeat(at, j), np.tile(PLACES, len(at)))
+        asked[position[at]] += trace.evaluate(problem.traction_vector(pattern), segment, s).reshape(-1, j, 2)
+    for line, p in zip(lines, found.pressure, strict=True):
+        f = line.facing
+        density = (p @ bernstein(p.shape[1] - 1, PLACES).T * f.weight / WEIGHTS)[..., None] * f.direction
+        at = position[f.side]
+        asked[at] -= density / (length[at] * measure[at])[..., None]
+        if (f.other >= 0).all() and len(f.other):
+            at = position[f.other]
+            rate = np.abs(_rates(f))
+            asked[at] += _carried(f, density) * rate[..., None] / (length[at] * measure[at])[..., None]
+    miss = np.where(given.held[side][:, None], 0.0, asked - have)
+    square = ((WEIGHTS * length * measure**2)[..., None] * miss**2).sum(axis=(1, 2))
+    # Round-off
+    size = length.mean(axis=1) * (measure**2).mean(axis=1)
+    square = np.where(square <= (1e-12 * largest) ** 2 * size, 0.0, square)
+    norms = np.zeros((len(cells.triangles), 3))
+    norms[cells.owner[side], cells.local[side]] = np.sqrt(square)
+    reaction = 0.0
+    for pattern, values in problem.displacement.items():
+        at = np.flatnonzero(np.isin(cells.segment, trace.segments(pattern)))
+        segment, s = cells.on_side(np.repeat(at, j), np.tile(PLACES, len(at)))
+        u = trace.evaluate(displacement, segment, s)
+        p = position[at]
+        ds = WEIGHTS * length[p] * measure[p]
+        for c, value in enumerate(values):
+            if value is not None:
+                rest = (trace.evaluate(ng.CF(value), segment, s)[:, 0] - u[:, c]).reshape(-1, j)
+                reaction += float((ds * have[p][..., c] * rest).sum())
+    return norms, reaction
+
+
+def _rates(facing: Facing) -> Array:
+    """dt / dt' (k, j) at the Gauss points of the primary's sides."""
+    from ...lagrange import lagrange_derivative
+    from .facing import DATA
+    from .lifting import THROUGH, _inverse
+
+    at = _inverse(facing.there)
+    slopes = lagrange_derivative(DATA, at.ravel()).reshape(*at.shape, -1)
+    return 1 / np.einsum("kji,il,kl->kj", slopes, THROUGH, facing.there)

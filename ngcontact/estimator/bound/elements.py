@@ -1,0 +1,303 @@
+"""Stresses on triangles, condensed to multipliers of their tractions on sides.
+
+On a triangle the stress is s = T c + s_p: T are the polynomials of `polynomials`, and s_p balances
+the body force. With mu, the trace of a displacement, on the sides, 1/2 |s - C e(u_h)|^2 - <s n, mu>
+is least for
+
+    A c = g + N mu,  A = (T, T), g = (T, e(u_h) - C^-1 s_p), N = <T n, mu>,
+
+in the norm of C^-1, and the tractions of s are N'A^-1 N mu + N'A^-1 g + <s_p n, .>.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+from numpy.polynomial import legendre
+
+from ...arrays import Array, Index
+from ...fem import model_of
+from ...lagrange import gauss
+from ...problem import Problem, varies
+from .cells import Cells, Places, places
+from .polynomials import Frame, balancing, frame_of, projected, scalars, stresses
+
+ON_CURVES = 3  # degrees by which stresses on triangles with a curved side are higher
+CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+BLOCK = 4000  # triangles at once: bounds the memory
+
+
+def traces(degree: int, t: Array) -> Array:
+    """Orthonormal polynomials (..., degree + 1) on sides, at t (...) in [0, 1]."""
+    values = legendre.legvander(2 * t - 1, degree)
+    return np.asarray(values * np.sqrt(2 * np.arange(degree + 1) + 1))
+
+
+@dataclass(frozen=True, eq=False)
+class Element:
+    """b triangles of one kind: m stresses, d multipliers on each.
+
+    Attributes
+    ----------
+    places : Places
+        Quadrature points, q in each.
+    weight : ndarray (b, q)
+        With the model's measure.
+    frame : Frame
+    degree : int
+    on_axis : bool
+        Whether a side of each lies on the axis.
+    compliance : ndarray (b or 1, q or 1, v, v)
+        C^-1.
+    strain : ndarray (b, q, v)
+        e(u_h), Voigt.
+    force : ndarray (b, j, 2)
+        Coefficients of the body force that s_p balances, of degree `force_degree`.
+    radial : ndarray (b, q)
+        Radial force times r about an axis: a part of the hoop stress.
+    missed : ndarray (b,)
+        Norm of what of the body force s_p does not balance.
+    root : ndarray (b, m, m)
+        L of A = L L'.
+    N : ndarray (b, m, d)
+        L^-1 N.
+    g : ndarray (b, m)
+        L^-1 g.
+    own : ndarray (b, d)
+        Moments of s_p n.
+    dofs : ndarray of int (b, d)
+        Numbers of the multipliers.
+    """
+
+    places: Places
+    weight: Array
+    frame: Frame
+    degree: int
+    on_axis: bool
+    compliance: Array
+    strain: Array
+    force: Array
+    radial: Array
+    missed: Array
+    root: Array
+    N: Array
+    g: Array
+    own: Array
+    dofs: Index
+
+    @property
+    def force_degree(self) -> int:
+        """Of the body force that is balanced."""
+        return _force_degree(self.degree, self.strain.shape[2] > 3)
+
+    def coefficients(self, mu: Array) -> Array:
+        """c (b, m) for all multipliers `mu` (k,)."""
+        y = self.g + np.einsum("bmd,bd->bm", self.N, mu[self.dofs])
+        return np.linalg.solve(self.root.transpose(0, 2, 1), y[..., None])[..., 0]
+
+    def stress(self, c: Array, x: Array, some: Index | slice = slice(None)) -> Array:
+        """s (b, q, v) at points `x` (b, q, 2) for coefficients `c` (b, m), without radial forces."""
+        axial = self.strain.shape[2] > 3
+        frame = self.frame[some]
+        T = stresses(self.degree, frame, x, frame.local(x), axial, self.on_axis)
+        s = np.einsum("bqvm,bm->bqv", T, c[some])
+        if self.force.any():
+            s = s + balancing(self.force_degree, frame, x, self.force[some], axial)
+        return s
+
+
+def _force_degree(degree: int, axial: bool) -> int:
+    return max(0, degree - 1 - axial)
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Numbers of the multipliers: on each of e sides (x, y) by polynomials of its degree.
+
+    `degree` (e,), `start` (e + 1,): those of side i are start[i], ..., start[i + 1] - 1.
+    """
+
+    degree: Index
+    start: Index
+
+    def of(self, side: int) -> Index:
+        """All of one side."""
+        return np.arange(self.start[side], self.start[side + 1])
+
+
+def multipliers(cells: Cells, degree: int) -> tuple[Index, Multipliers]:
+    """Degree (n,) of the stress in each triangle, and the multipliers that it asks for."""
+    own = np.where(cells.curved, degree + ON_CURVES, degree)
+    of_side = np.zeros(len(cells.ends), dtype=np.intp)
+    np.maximum.at(of_side, cells.sides, own[:, None])
+    start = np.concatenate([[0], np.cumsum(2 * (of_side + 1))])
+    return own, Multipliers(of_side, start)
+
+
+def elements(
+    problem: Problem, cells: Cells, displacement: ng.CoefficientFunction, degree: int
+) -> tuple[Multipliers, list[Element]]:
+    """The condensed triangles of a solution, and their multipliers."""
+    own, mu = multipliers(cells, degree)
+    on_axis = cells.trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1)[cells.sides]
+    key = np.column_stack([own, mu.degree[cells.sides], on_axis.any(axis=1), cells.curved])
+    varying = _varying(problem, cells)
+    key = np.column_stack([key, varying, _body(cells) ])
+    kinds, number = np.unique(key, axis=0, return_inverse=True)
+    found = []
+    for kind in range(len(kinds)):
+        every = np.flatnonzero(number.ravel() == kind)
+        for start in range(0, len(every), BLOCK):
+            at = every[start : start + BLOCK]
+            found.append(_element(problem, cells, displacement, mu, at, int(kinds[kind, 0]), bool(kinds[kind, 4])))
+    return mu, found
+
+
+def _body(cells: Cells) -> Index:
+    return cells.bodies
+
+
+def _varying(problem: Problem, cells: Cells) -> Index:
+    mesh = cells.trace.mesh
+    flags = np.zeros(len(mesh.GetMaterials()), dtype=np.intp)
+    for pattern, law in problem.materials.items():
+        flags[np.array(mesh.Materials(pattern).Mask())] = varies(law)
+    return flags[cells.bodies]
+
+
+def law_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunction:
+    """The law of a body, (v, v)."""
+    mesh = cells.trace.mesh
+    for pattern, law in problem.materials.items():
+        if mesh.Materials(pattern).Mask()[body]:
+            return law.voigt(problem.model)
+    raise AssertionError
+
+
+def compliance_at(problem: Problem, cells: Cells, points: Places) -> Array:
+    """C^-1 at places of one body, (b, q, v, v) or, of a law of numbers, (1, 1, v, v)."""
+    at = points.at
+    law = law_of(problem, cells, int(cells.bodies[at[0]]))
+    if _varying(problem, cells)[at[0]]:
+        C = points.evaluate(cells, law)
+    else:
+        C = cells.evaluate(law, at[:1], np.full((1, 2), 1 / 3))[None]
+    v = round(C.shape[-1] ** 0.5)
+    return np.linalg.inv(C.reshape(*C.shape[:2], v, v))
+
+
+def _force_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunction | None:
+    mesh = cells.trace.mesh
+    for pattern, force in problem.force.items():
+        if mesh.Materials(pattern).Mask()[body]:
+            return ng.CF(force)
+    return None
+
+
+def _element(
+    problem: Problem,
+    cells: Cells,
+    displacement: ng.CoefficientFunction,
+    mu: Multipliers,
+    at: Index,
+    degree: int,
+    on_axis: bool,
+) -> Element:
+    model = model_of(problem)
+    axial = model.extent > 0
+    body = int(cells.bodies[at[0]])
+    curved, varying = bool(cells.curved[at[0]]), bool(_varying(problem, cells)[at[0]])
+    order = 2 * degree + 4 * (curved or varying or axial)
+    points = places(cells, at, order)
+    b, q = points.weight.shape
+    weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(b, q)
+    frame = frame_of(cells.corners[at])
+    compliance = compliance_at(problem, cells, points)
+    strain = points.evaluate(cells, model.strain(displacement))
+    force, radial, missed = _forces(problem, cells, points, frame, degree, body, axial)
+    local = frame.local(points.x) if curved else points.local[None]
+    T = stresses(degree, frame, points.x, local, axial, on_axis)
+    root = np.sqrt(weight)[..., None]
+    D = compliance
+    v, m = T.shape[-2:]
+    DT = D @ T
+    wT = (root[..., None] * T).reshape(b, q * v, m)
+    A = wT.transpose(0, 2, 1) @ (root[..., None] * DT).reshape(b, q * v, m)
+    rest = strain
+    if force.any() or radial.any():
+        s_p = balancing(_force_degree(degree, axial), frame, points.x, force, axial)
+        if axial:
+            s_p[..., 2] += radial
+        rest = strain - (D @ s_p[..., None])[..., 0]
+    g = np.einsum("bxm,bx->bm", wT, (root * rest).reshape(b, -1))
+    scale = 1 / np.sqrt(np.einsum("bmm->bm", A))
+    N, own = _moments(cells, mu, at, degree, frame, on_axis, force, axial, m)
+    L = np.linalg.cholesky(A * scale[:, :, None] * scale[:, None, :])
+    right = scale[..., None] * np.concatenate([N, g[..., None]], axis=2)
+    solved = np.linalg.solve(L, right)
+    dofs = np.concatenate(
+        [mu.start[cells.sides[at, i], None] + np.arange(2 * (mu.degree[cells.sides[at[0], i]] + 1)) for i in range(3)],
+        axis=1,
+    )
+    return Element(points, weight, frame, degree, on_axis, compliance, strain, force, radial, missed,
+                   L / scale[:, :, None], solved[..., :-1], solved[..., -1], own, dofs)
+
+
+def _moments(cells, mu, at, degree, frame, on_axis, force, axial, m):
+    """N (b, m, d), and the moments (b, d) of s_p n."""
+    found, given = [], []
+    for i in range(3):
+        side = cells.sides[at, i]
+        k = int(mu.degree[side[0]])
+        bent = bool(cells.bent[side[0]])
+        t, w = gauss(degree + k + 2 * axial + (4 * cells.trace.geometry_order if bent else 0))
+        own = np.where(cells.backward[at, i, None], 1 - t, t)
+        x, dx = (z.reshape(len(at), -1, 2) for z in cells.points(np.repeat(side, len(t)), own.ravel()))
+        dx = np.where(cells.backward[at, i, None, None], -dx, dx)
+        normal = np.stack([dx[..., 1], -dx[..., 0]], axis=-1)  # times ds / dt
+        weight = w * cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), -1)
+        chi = weight[..., None] * traces(k, own)
+        local = frame.local(x) if bent else (CORNERS[(i + 1) % 3] + t[:, None] * (CORNERS[(i + 2) % 3] - CORNERS[(i + 1) % 3]))[None]
+        T = stresses(degree, frame, x, local, axial, on_axis)
+        found.append(_tractions(T, normal, chi))
+        if force.any():
+            s = balancing(_force_degree(degree, axial), frame, x, force, axial)[..., None]
+            given.append(_tractions(s, normal, chi)[:, 0])
+        else:
+            given.append(np.zeros((len(at), 2 * (k + 1))))
+    return np.concatenate(found, axis=2), np.concatenate(given, axis=1)
+
+
+def _tractions(T: Array, normal: Array, chi: Array) -> Array:
+    """Moments (b, m, 2 r) of tractions of T (b, q, v, m) with chi (b, q, r)."""
+    nx, ny = normal[..., :1], normal[..., 1:]
+    tx = T[:, :, 0] * nx + T[:, :, -1] * ny
+    ty = T[:, :, -1] * nx + T[:, :, 1] * ny
+    return np.concatenate([tx.transpose(0, 2, 1) @ chi, ty.transpose(0, 2, 1) @ chi], axis=2)
+
+
+def _forces(problem, cells, points, frame, degree, body, axial):
+    """Coefficients of the force that is balanced, r F_r, and the norm of the rest."""
+    b, q = points.weight.shape
+    n = _force_degree(degree, axial)
+    j = (n + 1) * (n + 2) // 2
+    F = _force_of(problem, cells, body)
+    if F is None:
+        return np.zeros((b, j, 2)), np.zeros((b, q)), np.zeros(b)
+    fine = places(cells, points.at, 2 * degree + 10)
+    values = fine.evaluate(cells, F)
+    measure = cells.trace.model.measure(fine.x.reshape(-1, 2)).reshape(b, -1)
+    weight = fine.weight * measure
+    force = projected(n, frame, fine.x, weight, values)
+    rest = values - scalars(n, frame, fine.x) @ force
+    if axial:
+        rest[..., 0] = 0.0
+        radial = points.x[..., 0] * points.evaluate(cells, F)[..., 0]
+        force[..., 0] = 0.0
+    else:
+        radial = np.zeros((b, q))
+    missed = np.sqrt(np.einsum("bq,bqd->b", weight, rest**2))
+    return force, radial, missed

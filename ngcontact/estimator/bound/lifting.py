@@ -1,0 +1,366 @@
+"""A displacement w of little energy that corrects u_h on Gamma_u, Gamma_K and curved guides.
+
+On sides d.w is asked for: u_D - u_h on Gamma_u, r shared by compliance between both bodies on
+Gamma_K, -u_h.d on guides. On the triangles around these sides w is the displacement of least energy
+of a degree with the values asked for at nodes; what is no polynomial of that degree is continued
+from its side to the opposite corner in proportion to the distance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+
+from ...arrays import Array, Index, Mask
+from ...errors import ContactError
+from ...fem import model_of
+from ...lagrange import gauss_lobatto, lagrange, lagrange_derivative
+from ...linalg import cholesky, lower_half
+from ...problem import Problem
+from ...triplets import from_triplets
+from .cells import Cells, Places, places
+from .elements import CORNERS, compliance_at
+from .facing import DATA, PLACES, Facing
+from .polynomials import legendre_table, products
+
+NOISE = 1e-13  # of what is asked for, relative to the displacement: round-off
+PARALLEL = 1e-8  # sine of the angle between directions at a vertex that are one
+INCONSISTENT = 1e-9  # of what is asked for at a vertex, relative to it
+THROUGH = np.linalg.inv(lagrange(DATA, PLACES))  # from values at `PLACES` to Gauss-Lobatto points
+
+
+@dataclass(frozen=True, eq=False)
+class Asked:
+    """d.w on k sides: `direction` (k, j, 2) and `amount` (k, j) at the j Gauss points."""
+
+    side: Index
+    direction: Array
+    amount: Array
+
+
+def asked_on_supports(
+    problem: Problem, cells: Cells, displacement: ng.CoefficientFunction
+) -> list[Asked]:
+    """u_D - u_h in each prescribed component."""
+    trace, found = cells.trace, []
+    for pattern, values in problem.displacement.items():
+        side = np.flatnonzero(np.isin(cells.segment, trace.segments(pattern)))
+        k, j = len(side), len(PLACES)
+        segment, s = cells.on_side(np.repeat(side, j), np.tile(PLACES, k))
+        u = trace.evaluate(displacement, segment, s)
+        for c, value in enumerate(values):
+            if value is not None:
+                wanted = trace.evaluate(ng.CF(value), segment, s)[:, 0] - u[:, c]
+                d = np.broadcast_to(np.eye(2)[c], (k, j, 2))
+                found.append(Asked(side, d, wanted.reshape(k, j)))
+    return found
+
+
+def asked_on_contact(cells: Cells, facing: Facing, share: float) -> list[Asked]:
+    """-r on the secondary and r on the primary, of which the secondary takes a share."""
+    found = [Asked(facing.side, facing.direction, -share * facing.lift)]
+    if share < 1:
+        # At the places of the secondary; the primary's own are other ones.
+        r = (1 - share) * facing.lift
+        d, values = _carried(facing, facing.direction), _carried(facing, r[..., None])[..., 0]
+        found.append(Asked(facing.other, d, values))
+    return found
+
+
+def _carried(facing: Facing, values: Array) -> Array:
+    """Functions (k, j, c) of the secondary's t at the Gauss points of the primary's sides."""
+    k, j = facing.there.shape
+    at = _inverse(facing.there)
+    shapes = lagrange(DATA, at.ravel()).reshape(k, j, -1)
+    return np.einsum("kji,il,klc->kjc", shapes, THROUGH, values)
+
+
+def _inverse(there: Array) -> Array:
+    """Secondary's t (k, j) of the primary's Gauss points, for monotone maps `there` (k, j)."""
+    nodes = there @ THROUGH.T
+    back = nodes[:, -1] < nodes[:, 0]
+    t = np.where(back[:, None], 1 - PLACES, PLACES)
+    for _ in range(20):
+        flat = t.ravel()
+        value = np.einsum("kji,ki->kj", lagrange(DATA, flat).reshape(*t.shape, -1), nodes)
+        slope = np.einsum("kji,ki->kj", lagrange_derivative(DATA, flat).reshape(*t.shape, -1), nodes)
+        step = (value - PLACES) / slope
+        t = np.clip(t - step, 0.0, 1.0)
+        if np.abs(step).max(initial=0.0) < 1e-14:
+            break
+    return t
+
+
+def lifting_of(
+    problem: Problem, cells: Cells, asked: Sequence[Asked], degree: int, extent: float
+) -> Array:
+    """Energy norms (n,) of w, of a degree, for displacements of a size `extent`."""
+    norms = np.zeros(len(cells.triangles))
+    needed = [one.side[np.abs(one.amount).max(axis=1, initial=0.0) > NOISE * extent] for one in asked]
+    if not sum(map(len, needed)):
+        return norms
+    touched = np.zeros(len(cells.vertices), dtype=bool)
+    touched[cells.ends[np.concatenate(needed)]] = True
+    layer = np.flatnonzero(touched[cells.triangles].any(axis=1))
+    nodes = _Nodes(cells, layer, degree)
+    conditions = _conditions(cells, nodes, asked)
+    squares = _least(problem, cells, nodes, conditions, asked)
+    norms[layer] = np.sqrt(np.maximum(squares, 0.0))
+    return norms
+
+
+class _Nodes:
+    """Nodes of continuous polynomials on a layer of b triangles.
+
+    `number` (b, m): of vertices, sides and inside in turn; `local` (m, 2) their coordinates.
+    """
+
+    def __init__(self, cells: Cells, layer: Index, degree: int) -> None:
+        self.layer, self.degree = layer, degree
+        inner = gauss_lobatto(degree)[1:-1]
+        q = degree - 1
+        local = [CORNERS]
+        for i in range(3):
+            a, b = CORNERS[(i + 1) % 3], CORNERS[(i + 2) % 3]
+            local.append(a + inner[:, None] * (b - a))
+        inside = [(i / degree, j / degree) for i in range(1, degree) for j in range(1, degree - i)]
+        self.local = np.concatenate([*local, np.array(inside).reshape(-1, 2)])
+        vertices, triangle = np.unique(cells.triangles[layer], return_inverse=True)
+        sides, side = np.unique(cells.sides[layer], return_inverse=True)
+        triangle, side = triangle.reshape(-1, 3), side.reshape(-1, 3)
+        self.vertices, self.sides = vertices, sides
+        along = np.arange(q)
+        start = len(vertices) + side[..., None] * q
+        back = cells.backward[layer][..., None]
+        own = start + np.where(back, q - 1 - along, along)
+        count = len(vertices) + len(sides) * q
+        rest = count + np.arange(len(layer) * len(inside)).reshape(len(layer), -1)
+        self.number = np.concatenate([triangle, own.reshape(len(layer), -1), rest], axis=1)
+        self.count = count + rest.size
+        self.components = np.concatenate([2 * self.number, 2 * self.number + 1], axis=1)
+        self.inverse = np.linalg.inv(_values(degree, self.local))
+
+    def on_sides(self, cells: Cells, side: Index) -> Index:
+        """Nodes (k, degree + 1) from t = 0 to t = 1; of sides of the layer."""
+        at = np.searchsorted(self.sides, side)
+        q = self.degree - 1
+        ends = np.searchsorted(self.vertices, cells.ends[side])
+        inner = len(self.vertices) + at[:, None] * q + np.arange(q)
+        return np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1)
+
+
+def _values(degree: int, local: Array) -> Array:
+    a, b = (legendre_table(degree, 2 * local[..., c] - 1)[0] for c in (0, 1))
+    i, j = products(degree)
+    return np.asarray(a[..., i] * b[..., j])
+
+
+def _gradients(degree: int, local: Array) -> Array:
+    """By (a, b): (..., m, 2)."""
+    a, b = (legendre_table(degree, 2 * local[..., c] - 1) for c in (0, 1))
+    i, j = products(degree)
+    return 2 * np.stack([a[1][..., i] * b[0][..., j], a[0][..., i] * b[1][..., j]], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class _Conditions:
+    """Frames (c, 2, 2) by rows at c nodes, which of their components are held, and their values."""
+
+    frame: Array
+    held: Mask
+    value: Array
+
+
+def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked]) -> _Conditions:
+    """What is asked for at the nodes; 0 on the rim of the layer."""
+    frame = np.tile(np.eye(2), (nodes.count, 1, 1))
+    held, value = np.zeros((nodes.count, 2), dtype=bool), np.zeros((nodes.count, 2))
+    number, d, amount = [], [], []
+    t = gauss_lobatto(nodes.degree)
+    carry = lagrange(DATA, t) @ THROUGH
+    for one in asked:
+        here = np.isin(one.side, nodes.sides)
+        number.append(nodes.on_sides(cells, one.side[here]).ravel())
+        vectors = np.einsum("ij,kjc->kic", carry, one.direction[here]).reshape(-1, 2)
+        length = np.linalg.norm(vectors, axis=1, keepdims=True)
+        d.append(vectors / length)
+        amount.append((one.amount[here] @ carry.T).ravel() / length[:, 0])
+    number, d, amount = np.concatenate(number), np.concatenate(d), np.concatenate(amount)
+    # Normal equations at each node: two directions, or one and the one across, which is free.
+    M, right = np.zeros((nodes.count, 2, 2)), np.zeros((nodes.count, 2))
+    np.add.at(M, number, d[:, :, None] * d[:, None])
+    np.add.at(right, number, d * amount[:, None])
+    at = np.unique(number)
+    size, vectors = np.linalg.eigh(M[at])
+    vectors = vectors[:, :, ::-1].transpose(0, 2, 1)
+    size = size[:, ::-1]
+    both = size > PARALLEL * size[:, :1]
+    frame[at], held[at] = vectors, both
+    value[at] = np.where(both, np.einsum("kij,kj->ki", vectors, right[at]) / np.where(both, size, 1.0), 0.0)
+    w = np.einsum("kij,ki->kj", frame, value)
+    missed = np.abs((w[number] * d).sum(axis=1) - amount)
+    if missed.max(initial=0.0) > INCONSISTENT * np.abs(amount).max(initial=0.0):
+        raise ContactError("conditions that meet at a vertex ask for different displacements")
+    rim = _rim(cells, nodes)
+    free = rim & ~held.any(axis=1)
+    held[free] = True
+    return _Conditions(frame, held, value)
+
+
+def _rim(cells: Cells, nodes: _Nodes) -> Mask:
+    """Nodes on sides whose other triangle is outside of the layer, and their vertices."""
+    inside = np.zeros(len(cells.triangles), dtype=bool)
+    inside[nodes.layer] = True
+    count = np.bincount(cells.sides[inside].ravel(), minlength=len(cells.ends))
+    side = np.flatnonzero((count == 1) & cells.inner)
+    rim = np.zeros(nodes.count, dtype=bool)
+    rim[nodes.on_sides(cells, side)] = True
+    return rim
+
+
+def _groups(cells: Cells, at: Index, others: Mask) -> list[Index]:
+    """Positions in `at` (b,) of triangles of one kind and body; `others` (b,) tell two kinds."""
+    key = np.column_stack([cells.bodies[at], cells.curved[at], others])
+    kinds, number = np.unique(key, axis=0, return_inverse=True)
+    return [np.flatnonzero(number.ravel() == kind) for kind in range(len(kinds))]
+
+
+def _least(
+    problem: Problem,
+    cells: Cells,
+    nodes: _Nodes,
+    conditions: _Conditions,
+    asked: Sequence[Asked],
+) -> Array:
+    """Squares (b,) of the norms of the w of least energy."""
+    model, degree, layer = model_of(problem), nodes.degree, nodes.layer
+    values, rows, columns = [], [], []
+    for some in _groups(cells, layer, np.zeros(len(layer), dtype=bool)):
+        bent = bool(cells.curved[layer[some[0]]])
+        points = places(cells, layer[some], 2 * degree + 4 * bent)
+        B, law, weight, _ = _operators(problem, cells, nodes, points)
+        b, q, v, m = B.shape
+        root = (weight[..., None, None] * B).reshape(b, q * v, m)
+        K = root.transpose(0, 2, 1) @ (law @ B).reshape(b, q * v, m)
+        values.append(K.ravel())
+        rows.append(np.repeat(nodes.components[some], m, axis=1).ravel())
+        columns.append(np.tile(nodes.components[some], (1, m)).ravel())
+    size = 2 * nodes.count
+    K = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
+    n = 2 * np.arange(nodes.count)[:, None] + [0, 1]
+    R = from_triplets(  # w = R (components in the frames)
+        conditions.frame.transpose(0, 2, 1).ravel(),
+        np.repeat(n, 2, axis=1).ravel(),
+        np.tile(n, (1, 2)).ravel(),
+        (size, size),
+    )
+    K = (R.T @ K @ R).tocsr()
+    held, y = conditions.held.ravel(), conditions.value.ravel()
+    if not held.all():
+        y = y + cholesky(lower_half(K))(~held)(np.where(held, 0.0, -(K @ y)))
+    w = R @ y
+    rest = _remainders(cells, nodes, w.reshape(-1, 2), asked)
+    squares = np.zeros(len(layer))
+    for some in _groups(cells, layer, rest.reached):
+        bent, rough = bool(cells.curved[layer[some[0]]]), bool(rest.reached[some[0]])
+        order = max(2 * degree + 4 * bent, 2 * DATA + 4 if rough else 0)
+        points = places(cells, layer[some], order)
+        B, law, weight, into = _operators(problem, cells, nodes, points)
+        e = np.einsum("bqvm,bm->bqv", B, w[nodes.components[some]])
+        if rough:
+            e = e + rest.strains(some, points, into, model.extent)
+        squares[some] = (weight * (e * (law @ e[..., None])[..., 0]).sum(axis=2)).sum(axis=1)
+    return squares
+
+
+def _operators(
+    problem: Problem, cells: Cells, nodes: _Nodes, points: Places
+) -> tuple[Array, Array, Array, Array]:
+    """Strains (b, q, v, 2 m) of the nodes' functions, C, weights, and d(a, b) / dx."""
+    model, degree = model_of(problem), nodes.degree
+    weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
+    law = np.linalg.inv(compliance_at(problem, cells, points))
+    into = np.linalg.inv(points.spread)
+    by = np.einsum("qma,mn->qan", _gradients(degree, points.local), nodes.inverse)
+    gradient = np.einsum("qan,bqac->bqcn", by, into)
+    shape = _values(degree, points.local) @ nodes.inverse
+    return _strains(gradient, shape, points.x, model.extent), law, weight, into
+
+
+def _strains(gradient: Array, shape: Array, x: Array, extent: int) -> Array:
+    """Voigt strains (b, q, v, 2 m) of both components; with the hoop's about an axis."""
+    b, q, _, m = gradient.shape
+    v = 3 + extent
+    B = np.zeros((b, q, v, 2 * m))
+    B[:, :, 0, :m], B[:, :, 1, m:] = gradient[:, :, 0], gradient[:, :, 1]
+    B[:, :, -1, :m], B[:, :, -1, m:] = gradient[:, :, 1], gradient[:, :, 0]
+    if extent:
+        B[:, :, 2, :m] = shape / x[..., :1]
+    return B
+
+
+@dataclass(frozen=True, eq=False)
+class _Remainders:
+    """What of d.w is no polynomial: vectors rho (b, 3, DATA + 1, 2) on sides of b triangles.
+
+    At Gauss-Lobatto points of the triangle's own sense; `reached` (b,) says where.
+    """
+
+    rho: Array
+    reached: Mask
+
+    def strains(self, some: Index, points: Places, into: Array, extent: int) -> Array:
+        b, q = points.weight.shape
+        share = np.column_stack([1 - points.local.sum(axis=1), points.local])
+        slope = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])  # of the shares by (a, b)
+        grad = np.einsum("sa,bqac->bqsc", slope, into)
+        total = np.zeros((b, q, 2, 2))
+        value = np.zeros((b, q, 2))
+        for i in range(3):
+            rho = self.rho[some, i]
+            if not rho.any():
+                continue
+            j, k = (i + 1) % 3, (i + 2) % 3
+            sigma = share[:, j] + share[:, k]
+            t = share[:, k] / sigma
+            f = np.einsum("qi,bic->bqc", lagrange(DATA, t), rho)
+            df = np.einsum("qi,bic->bqc", lagrange_derivative(DATA, t), rho)
+            by_sigma = grad[:, :, j] + grad[:, :, k]
+            by_t = grad[:, :, k] - t[:, None] * by_sigma
+            total += f[..., None] * by_sigma[:, :, None] + df[..., None] * by_t[:, :, None]
+            value += sigma[:, None] * f
+        e = [total[..., 0, 0], total[..., 1, 1], total[..., 0, 1] + total[..., 1, 0]]
+        if extent:
+            e.insert(2, value[..., 0] / points.x[..., 0])
+        return np.stack(e, axis=-1)
+
+
+def _remainders(
+    cells: Cells, nodes: _Nodes, w: Array, asked: Sequence[Asked]
+) -> _Remainders:
+    """d.w as asked for less that of the polynomial with values `w` (c, 2) at the nodes."""
+    layer = nodes.layer
+    position = np.full(len(cells.triangles), -1)
+    position[layer] = np.arange(len(layer))
+    rho = np.zeros((len(layer), 3, DATA + 1, 2))
+    largest = max(float(np.abs(one.amount).max(initial=0.0)) for one in asked)
+    fine = lagrange(nodes.degree, gauss_lobatto(DATA))
+    for one in asked:
+        here = np.isin(one.side, nodes.sides)
+        side = one.side[here]
+        if not side.size:
+            continue
+        d = np.einsum("ij,kjc->kic", THROUGH, one.direction[here])
+        amount = one.amount[here] @ THROUGH.T
+        have = np.einsum("iq,kqc->kic", fine, w[nodes.on_sides(cells, side)])
+        miss = (amount - (have * d).sum(axis=2))[..., None] * d
+        miss[np.abs(miss) <= NOISE * largest] = 0.0
+        triangle, local = cells.owner[side], cells.local[side]
+        back = cells.backward[triangle, local]
+        miss = np.where(back[:, None, None], miss[:, ::-1], miss)
+        at = position[triangle]
+        rho[at, local] += miss
+    return _Remainders(rho, rho.any(axis=(1, 2, 3)))

@@ -1,0 +1,189 @@
+"""The dual contact problem: traces of displacements on sides, with the gap as bound.
+
+Over all sides the tractions of `elements` add up to the given ones, K mu = b - R'p*, with
+
+    R mu <= int psi_j (gap_h + r),    R mu = int psi_j d.(mu_secondary - mu_primary),
+
+psi_j Bernstein polynomials: a quadratic program whose forces are the coefficients of p* >= 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+
+from ...arrays import Array, Index, Mask
+from ...linalg import cholesky, lower_half
+from ...qp import QuadraticProgram, bordered_systems, minimise
+from ...triplets import from_triplets
+from .elements import Element, Multipliers, traces
+from .facing import PLACES, Facing, bernstein
+
+DEFINITE = 1e-11  # of the diagonal, added to what is factorised: vertices where tractions depend
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """R on the multipliers of k sides and of those that they face, for pressures of j functions.
+
+    Attributes
+    ----------
+    facing : Facing
+    own : list of ndarray (j, d)
+        On each side.
+    opposite : list of ndarray (j, d)
+        On each side that it faces; empty without a primary.
+    bound : ndarray (k, j)
+    """
+
+    facing: Facing
+    own: list[Array]
+    opposite: list[Array]
+    bound: Array
+
+
+def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
+    """The rows of one line, with a pressure of a degree."""
+    psi = bernstein(degree, PLACES)
+    gap = facing.after @ bernstein(facing.after.shape[1] - 1, PLACES).T
+    bound = (gap * facing.weight) @ psi
+    load = facing.weight[..., None] * facing.direction
+    own = [_tested(mu, side, PLACES, psi, f) for side, f in zip(facing.side, load, strict=True)]
+    opposite = [
+        -_tested(mu, side, t, psi, f)
+        for side, t, f in zip(facing.other, facing.there, load, strict=True)
+        if side >= 0
+    ]
+    return Rows(facing, own, opposite, bound)
+
+
+def _tested(mu: Multipliers, side: int, t: Array, psi: Array, load: Array) -> Array:
+    """(j, d): integrals of psi (q, j) load (q, 2) times the multipliers of a side at t (q,)."""
+    chi = traces(int(mu.degree[side]), t)
+    return np.concatenate([psi.T @ (load[:, c, None] * chi) for c in (0, 1)], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """All multipliers mu, and the coefficients (k, j) of p* dx/dt of each line."""
+
+    mu: Array
+    pressure: list[Array]
+    residual: float
+    steps: int
+
+
+def assembled(elements: Sequence[Element], size: int) -> tuple[sp.csr_array, Array]:
+    """K, and what s without multipliers exerts on the sides (size,)."""
+    values, rows, columns = [], [], []
+    load = np.zeros(size)
+    for e in elements:
+        G = e.N.transpose(0, 2, 1) @ e.N
+        d = e.dofs.shape[1]
+        values.append(G.ravel())
+        rows.append(np.repeat(e.dofs, d, axis=1).ravel())
+        columns.append(np.tile(e.dofs, (1, d)).ravel())
+        np.add.at(load, e.dofs, e.own + np.einsum("bmd,bm->bd", e.N, e.g))
+    K = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
+    return K, load
+
+
+def solved(
+    mu: Multipliers,
+    elements: Sequence[Element],
+    given: Array,
+    fixed: Mask,
+    lines: Sequence[Rows],
+) -> Solved:
+    """Minimise over the multipliers.
+
+    Parameters
+    ----------
+    given : ndarray (d,)
+        Moments of the given tractions.
+    fixed : ndarray of bool (d,)
+        Multipliers of components on which no traction is given.
+    """
+    size = int(mu.start[-1])
+    K, load = assembled(elements, size)
+    T, unknown, bound, equality, start = _basis(mu, lines, size)
+    if len(unknown):
+        K, b = (T.T @ K @ T).tocsr(), T.T @ (given - load)
+    else:
+        b = given - load
+    diagonal = K.diagonal()
+    fixed = fixed | (diagonal <= 0)
+    program = QuadraticProgram(
+        K=K,
+        b=b,
+        R=from_triplets(np.ones(len(unknown)), np.arange(len(unknown)), unknown, (len(unknown), size)),
+        g=bound,
+        equality=equality,
+        fixed=fixed,
+        values=np.zeros(size),
+        unknown=unknown,
+    )
+    factor = cholesky(lower_half((K + sp.diags_array(DEFINITE * diagonal)).tocsr()))
+    found = minimise(bordered_systems(program, factor), start)
+    force = np.where(equality, found.force, np.maximum(found.force, 0.0))
+    left = b - K @ found.u
+    left[unknown] -= force
+    left[fixed] = 0.0
+    sizes = [line.bound.size for line in lines]
+    parts = np.split(force, np.cumsum(sizes)[:-1]) if lines else []
+    pressure = [p.reshape(line.bound.shape) for p, line in zip(parts, lines, strict=True)]
+    return Solved(T @ found.u, pressure, left, len(found.steps))
+
+
+def _basis(
+    mu: Multipliers, lines: Sequence[Rows], size: int
+) -> tuple[sp.csr_array, Index, Array, Mask, Mask]:
+    """mu = T y with a y for each row: its unknown, bound, whether it is an equation, and closed."""
+    values, rows, columns, unknown, bound, equality, start = [], [], [], [], [], [], []
+    plain = np.ones(size, dtype=bool)
+    steps = []
+
+    def put(i: Index, j: Index, block: Array) -> None:
+        values.append(block.ravel())
+        rows.append(np.repeat(i, len(j)))
+        columns.append(np.tile(j, len(i)))
+
+    for line in lines:
+        j = line.bound.shape[1]
+        for i, side in enumerate(line.facing.side):
+            own = mu.of(int(side))
+            plain[own] = False
+            U, S, Vt = np.linalg.svd(line.own[i])
+            inverse = Vt[:j].T @ (U.T / S[:, None])
+            put(own, own[:j], inverse)
+            put(own, own[j:], Vt[j:].T)
+            if line.opposite:
+                steps.append((own, mu.of(int(line.facing.other[i])), -inverse @ line.opposite[i]))
+            unknown.append(own[:j])
+        bound.append(line.bound.ravel())
+        equality.append(np.full(line.bound.size, line.facing.equality))
+        start.append(np.repeat(line.facing.closed, j))
+    rest = np.flatnonzero(plain)
+    values.append(np.ones(len(rest)))
+    rows.append(rest)
+    columns.append(rest)
+    G = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
+    T = G
+    if steps:  # mu = G y + M mu, M from the primary's sides to the secondary's
+        M = from_triplets(
+            np.concatenate([b.ravel() for _, _, b in steps]),
+            np.concatenate([np.repeat(i, len(j)) for i, j, _ in steps]),
+            np.concatenate([np.tile(j, len(i)) for i, j, _ in steps]),
+            (size, size),
+        )
+        term = M @ G
+        while term.nnz:  # as often as bodies stand in a row
+            T = T + term
+            term = M @ term
+    if not lines:
+        none = np.zeros(0)
+        return T, none.astype(np.intp), none, none.astype(bool), none.astype(bool)
+    return T, np.concatenate(unknown), np.concatenate(bound), np.concatenate(equality), np.concatenate(start)
