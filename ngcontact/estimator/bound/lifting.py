@@ -106,7 +106,7 @@ def lifting_of(
     touched[cells.ends[np.concatenate(needed)]] = True
     layer = np.flatnonzero(touched[cells.triangles].any(axis=1))
     nodes = _Nodes(cells, layer, degree)
-    conditions = _conditions(cells, nodes, asked)
+    conditions = _conditions(cells, nodes, asked, 100 * NOISE * extent)
     squares = _least(problem, cells, nodes, conditions, asked)
     norms[layer] = np.sqrt(np.maximum(squares, 0.0))
     return norms
@@ -174,7 +174,9 @@ class _Conditions:
     value: Array
 
 
-def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked]) -> _Conditions:
+def _conditions(
+    cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: float
+) -> _Conditions:
     """What is asked for at the nodes; 0 on the rim of the layer."""
     frame = np.tile(np.eye(2), (nodes.count, 1, 1))
     held, value = np.zeros((nodes.count, 2), dtype=bool), np.zeros((nodes.count, 2))
@@ -202,7 +204,7 @@ def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked]) -> _Conditi
     value[at] = np.where(both, np.einsum("kij,kj->ki", vectors, right[at]) / np.where(both, size, 1.0), 0.0)
     w = np.einsum("kij,ki->kj", frame, value)
     missed = np.abs((w[number] * d).sum(axis=1) - amount)
-    if missed.max(initial=0.0) > INCONSISTENT * np.abs(amount).max(initial=0.0):
+    if missed.max(initial=0.0) > max(INCONSISTENT * np.abs(amount).max(initial=0.0), noise):
         raise ContactError("conditions that meet at a vertex ask for different displacements")
     rim = _rim(cells, nodes)
     free = rim & ~held.any(axis=1)
