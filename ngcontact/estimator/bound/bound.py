@@ -32,6 +32,8 @@ from .refusals import refuse_bound, refuse_narrow
 from .tractions import Given, boundary_tractions, given_on, missed_tractions, moments_of
 
 LIFTED = 3  # degrees by which w is above u_h
+FELT = 1e-4  # of modulus times displacement over an element's size: stresses beside whose round-off
+# equilibrium is measured
 SETTLED = 1e-10  # residual of equilibrium, relative to the largest stress
 
 
@@ -158,8 +160,10 @@ def error_bound(
     balanced = program.nearest(moments - exerted(elements, np.zeros_like(moments)))
     n = len(cells.triangles)
     stress = stress_norms(elements, balanced.mu, n)
+    extent_of_u = _size(trace, displacement)
+    scale = max(stress.largest, FELT * _stiffest(elements) * extent_of_u / cells.diameters.min())
     left = moments - exerted(elements, balanced.mu) - pushed(mu, lines, balanced.pressure)
-    residual = _residual(cells, mu, np.where(fixed, 0.0, left), stress.largest)
+    residual = _residual(cells, mu, np.where(fixed, 0.0, left), scale)
     if residual > SETTLED:
         raise ContactError(
             f"no equilibrated stress was found: the residual relative to the largest stress is "
@@ -174,7 +178,7 @@ def error_bound(
     asked = asked_on_supports(cells, given, displacement)
     for line, share in zip(lines, shares, strict=True):
         asked += asked_on_line(line.facing, line.facing.lift, share)
-    lifting = lifting_of(problem, cells, asked, lifted, _size(trace, displacement))
+    lifting = lifting_of(problem, cells, asked, lifted, extent_of_u)
     closed, signed = 0.0, 0.0
     for line, p in zip(lines, balanced.pressure, strict=True):
         closed += float((p * line.bound).sum())
@@ -261,6 +265,11 @@ def _residual(cells: Cells, mu: Multipliers, left: Array, largest: float) -> flo
     size = cells.diameters[cells.owner] * cells.trace.model.measure(middle) * (largest or 1.0)
     at = np.flatnonzero(size[side] > 0)  # on the axis there is no traction
     return float((np.abs(left[at]) / size[side[at]]).max(initial=0.0))
+
+
+def _stiffest(elements: Sequence[Element]) -> float:
+    """The largest modulus, of stresses in place of its inverse, C^-1."""
+    return max(1 / float(np.diagonal(e.compliance, axis1=-2, axis2=-1).min()) for e in elements)
 
 
 def _share(facing: Facing) -> float:
