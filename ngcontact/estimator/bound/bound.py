@@ -62,8 +62,11 @@ def error_bound(
     """Bound of the error of a displacement in the energy norm."""
     extent = trace.model.extent
     degree = max(order + 1, 2 + extent) if degree is None else degree
-    cuts, steps, ends = cuts_of(trace, displacement, pairs)
-    cells = cells_of(trace, cuts, steps, np.zeros(trace.mesh.ne, dtype=bool))
+    cuts, ends = cuts_of(trace, displacement, pairs)
+    sides = [(pair.secondary, pair.primary) for pair in problem.contact]
+    loaded = trace.segments(*problem.traction, problem.sliding, *sum(sides, ()))
+    whole = [name for name, u in problem.displacement.items() if None not in u]
+    cells = cells_of(trace, cuts, loaded, trace.segments(*whole))
     mu, elements = elements_of(problem, cells, displacement, degree)
     given = given_on(problem, cells)
     facing = [
