@@ -143,8 +143,11 @@ def error_bound(
     refuse_narrow(problem, trace)
     order, extent = trace.order, trace.model.extent
     degree, lifted = max(order + 1, 2 + extent), order + LIFTED
-    cuts, steps, ends = cuts_of(trace, displacement, pairs)
-    cells = cells_of(trace, cuts, steps, np.zeros(trace.mesh.ne, dtype=bool))
+    cuts, ends = cuts_of(trace, displacement, pairs)
+    lines = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
+    loaded = trace.segments(*problem.traction, problem.sliding, *lines)
+    whole = [name for name, values in problem.displacement.items() if None not in values]
+    cells = cells_of(trace, cuts, loaded, trace.segments(*whole))
     mu, elements = elements_of(problem, cells, displacement, degree)
     given = given_on(problem, cells)
     lines = [

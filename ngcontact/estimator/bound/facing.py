@@ -78,21 +78,18 @@ def met(
 
 def cuts_of(
     trace: BoundaryTrace, displacement: ng.CoefficientFunction, pairs: Sequence[ContactState]
-) -> tuple[dict[int, Array], dict[int, Array], list[dict[int, tuple[float, int]]]]:
-    """Places s of vertices to come, by segment; those where p* may jump; where contact ends.
+) -> tuple[dict[int, Array], list[dict[int, tuple[float, int]]]]:
+    """Places s of vertices to come, by segment; where contact ends.
 
     The latter pair by pair as (s, sign): contact lies towards s = 0 for the sign 1.
     """
     cuts: dict[int, list[float]] = {}
-    steps: dict[int, list[float]] = {}
     every = []
     for pair in pairs:
         line, contact = pair.line, pair.line.contact
         ends = _ends(trace, displacement, pair)
         every.append(ends)
         mine: dict[int, list[float]] = {k: [s] for k, (s, _) in ends.items()}
-        for k, (s, _) in ends.items():
-            steps.setdefault(k, []).append(s)
         if contact.primary is not None:
             parts = divided(trace, contact, line.segments, line.facing)
             own = line.segments[parts.local]
@@ -102,16 +99,12 @@ def cuts_of(
             s = np.concatenate([np.zeros(len(line.segments)), np.ones(len(line.segments)), *mine.values()])
             d = directions(trace, contact, k, s)
             there, t, *_ = partners(trace, line.facing, k, trace.point(k, s), d)
-            ended = np.isin(s, [at for at, _ in ends.values()])
             for m in np.flatnonzero(there >= 0):
                 cuts.setdefault(int(there[m]), []).append(float(t[m]))
-                if ended[m]:
-                    steps.setdefault(int(there[m]), []).append(float(t[m]))
         for k, places in mine.items():
             cuts.setdefault(k, []).extend(places)
     inside = {k: _inside(np.array(s)) for k, s in cuts.items()}
-    loose = {k: _inside(np.array(s)) for k, s in steps.items()}
-    return {k: s for k, s in inside.items() if s.size}, loose, every
+    return {k: s for k, s in inside.items() if s.size}, every
 
 
 def _inside(s: Array) -> Array:
