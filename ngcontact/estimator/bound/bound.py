@@ -22,10 +22,19 @@ from ...contact import ContactState
 from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
-from .cells import Cells, cells_of
-from .elements import Element, Multipliers
+from .cells import Cells, cells_of, places
+from .elements import Element, Multipliers, compliance_at
 from .elements import elements as elements_of
-from .facing import PLACES, WEIGHTS, Facing, bernstein, cuts_of, facing_of, guides_of
+from .facing import (
+    PLACES,
+    WEIGHTS,
+    Facing,
+    bernstein,
+    cuts_of,
+    facing_of,
+    guides_of,
+    held_motions,
+)
 from .lifting import _carried, asked_on_contact, asked_on_supports, lifting_of
 from .missed import data_norms
 from .program import Rows, Solved, rows_of, solved
@@ -69,21 +78,24 @@ def error_bound(
     cells = cells_of(trace, cuts, loaded, trace.segments(*whole))
     mu, elements = elements_of(problem, cells, displacement, degree)
     given = given_on(problem, cells)
-    facing = [
-        facing_of(cells, displacement, pair, end, order + LIFTED)
-        for pair, end in zip(pairs, ends, strict=True)
-    ]
-    lines = [rows_of(mu, one, degree - extent) for one in facing]
+    asked = asked_on_supports(problem, cells, displacement)
+    lines = []
     for k in np.unique(mu.degree[given.guides]).tolist():
         side = given.guides[mu.degree[given.guides] == k]
         guide = guides_of(cells, displacement, side, order + LIFTED)
         lines.append(rows_of(mu, guide, k - extent))
+    holding = [*asked, *(line.facing for line in lines)]
+    held = held_motions(cells, [x.side for x in holding], [x.direction for x in holding])
+    for pair, end in zip(pairs, ends, strict=True):
+        share = _share(problem, cells, pair)
+        facing = facing_of(cells, displacement, pair, end, order + LIFTED, held, share)
+        lines.append(rows_of(mu, facing, degree - extent))
     moments, fixed = moments_of(problem, cells, mu, given)
     found = solved(mu, elements, moments, fixed, lines)
-    return _summed(problem, cells, displacement, mu, elements, lines, found, given, order)
+    return _summed(problem, cells, displacement, mu, elements, lines, found, given, asked, order)
 
 
-def _summed(problem, cells, displacement, mu, elements, lines, found, given, order) -> Proof:
+def _summed(problem, cells, displacement, mu, elements, lines, found, given, asked, order) -> Proof:
     n, extent = len(cells.triangles), cells.trace.model.extent
     constitutive, forces, least = np.zeros(n), np.zeros(n), np.zeros(n)
     coefficients, largest = [], 0.0
@@ -108,12 +120,8 @@ def _summed(problem, cells, displacement, mu, elements, lines, found, given, ord
         least *= np.maximum(cells.trace.model.measure(cells.corners.reshape(-1, 2)).reshape(n, 3).min(axis=1), 1e-300)
     missed, reaction = _missed(problem, cells, displacement, elements, coefficients, lines, found, given, largest)
     loads = data_norms(cells, forces, missed, least)
-    shares = [_share(problem, cells, line.facing) for line in lines]
-    asked = asked_on_supports(problem, cells, displacement)
-    for line, share in zip(lines, shares, strict=True):
-        asked += asked_on_contact(cells, line.facing, share)
     u = np.abs(cells.trace.evaluate(displacement, np.arange(len(cells.trace.region)), np.zeros(len(cells.trace.region)))).max()
-    lifting = lifting_of(problem, cells, asked, order + LIFTED, float(u))
+    lifting = _lifted(problem, cells, asked, lines, order + LIFTED, float(u))
     closed = signed = 0.0
     for line, p in zip(lines, found.pressure, strict=True):
         closed += float((p * line.bound).sum())
@@ -134,11 +142,27 @@ def _summed(problem, cells, displacement, mu, elements, lines, found, given, ord
     return Proof(cells, mu, elements, lines, found, coefficients, bound, parts, below, above)
 
 
-def _share(problem: Problem, cells: Cells, facing: Facing) -> float:
+def _lifted(problem, cells, asked, lines, degree, extent) -> Array:
+    """Norms of w; where conditions at a vertex disagree, of one on secondaries alone."""
+    for alone in (False, True):
+        on_lines = [one for line in lines for one in asked_on_contact(line.facing, alone)]
+        try:
+            return lifting_of(problem, cells, [*asked, *on_lines], degree, extent)
+        except ContactError:
+            if alone:
+                raise
+    raise AssertionError
+
+
+def _share(problem: Problem, cells: Cells, pair: ContactState) -> float:
     """Of the lifting, that the secondary takes: by compliance."""
-    if len(facing.side) == 0 or (facing.other < 0).any():
-        return 1.0
-    return 0.5
+    sizes = []
+    for segments in (pair.line.segments, pair.line.facing):
+        at = cells.owner[np.isin(cells.segment, segments)][:1]
+        if not at.size:
+            return 1.0
+        sizes.append(np.trace(compliance_at(problem, cells, places(cells, at, 0))[0, 0]))
+    return float(sizes[0] / sum(sizes))
 
 
 def _missed(problem, cells, displacement, elements, coefficients, lines, found, given, largest):
@@ -184,9 +208,9 @@ def _missed(problem, cells, displacement, elements, coefficients, lines, found, 
             asked[at] += _carried(f, density) * rate[..., None] / (length[at] * measure[at])[..., None]
     miss = np.where(given.held[side][:, None], 0.0, asked - have)
     square = ((WEIGHTS * length * measure**2)[..., None] * miss**2).sum(axis=(1, 2))
-    # Round-off
+    # Round-off, of which there is more than equilibrium is refused for nowhere.
     size = length.mean(axis=1) * (measure**2).mean(axis=1)
-    square = np.where(square <= (1e-12 * largest) ** 2 * size, 0.0, square)
+    square = np.where(square <= (SETTLED * largest) ** 2 * size, 0.0, square)
     norms = np.zeros((len(cells.triangles), 3))
     norms[cells.owner[side], cells.local[side]] = np.sqrt(square)
     reaction = 0.0
@@ -207,7 +231,8 @@ def _rates(facing: Facing) -> Array:
     """dt / dt' (k, j) at the Gauss points of the primary's sides."""
     from ...lagrange import lagrange_derivative
     from .facing import DATA
-    from .lifting import THROUGH, _inverse
+    from .facing import THROUGH
+    from .lifting import _inverse
 
     at = _inverse(facing.there)
     slopes = lagrange_derivative(DATA, at.ravel()).reshape(*at.shape, -1)

@@ -13,7 +13,7 @@ from ...arrays import Array, Index, Mask
 from ...contact import FACING, ContactState, divided, jacobian, partners, prescribed_gap
 from ...errors import ContactError
 from ...fem import BoundaryTrace
-from ...lagrange import gauss
+from ...lagrange import gauss, lagrange
 from ...problem import Contact
 from .cells import Cells
 
@@ -21,7 +21,9 @@ SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
+STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
 PLACES, WEIGHTS = gauss(2 * DATA)
+THROUGH = np.linalg.inv(lagrange(DATA, PLACES))  # from values there to Gauss-Lobatto points
 SAMPLES = 200  # places on a segment among which the last zero of the gap is sought
 
 
@@ -152,6 +154,8 @@ class Facing:
         Bernstein coefficients of the gap of u_h + w, not negative.
     closed : ndarray of bool (k,)
         Sides in contact as a whole.
+    share : ndarray (k, 2)
+        Of what w adds to the gap, that the secondary takes at t = 0 and t = 1.
     equality : bool
         Whether the gap is 0 and forces have any sign.
     """
@@ -165,6 +169,7 @@ class Facing:
     gap: Array
     after: Array
     closed: Mask
+    share: Array
     equality: bool
 
     @property
@@ -179,8 +184,14 @@ def facing_of(
     pair: ContactState,
     ends: dict[int, tuple[float, int]],
     degree: int,
+    held: Array,
+    share: float,
 ) -> Facing:
-    """What of a pair faces, and the gap after a lifting of `degree`."""
+    """What of a pair faces, and the gap after a lifting of `degree`.
+
+    The secondary takes a `share` of that, but for vertices that cannot move along d; `held` (nv, 2,
+    2) are the projections of motions of all vertices on those that are prescribed.
+    """
     trace, line, contact = cells.trace, pair.line, pair.line.contact
     side = np.flatnonzero(np.isin(cells.segment, line.segments))
     j = len(PLACES)
@@ -211,9 +222,56 @@ def facing_of(
         on = cells.segment[side] == k
         closed[on] = (cells.span[side[on]].mean(axis=1) < at) == (sign > 0)
     closed = closed | contact.bilateral
-    after = _after(cells.ends[side], gap, closed, degree)
+    shares, stiff = _shares(cells, side, other, there, d, held, share)
+    after = _after(cells.ends[side], gap, closed, stiff, degree)
     after = np.zeros_like(after) if contact.bilateral else after
-    return Facing(pair, side, other, there, d, weight, gap, after, closed, contact.bilateral)
+    kept = side, other, there, d, weight, gap, after, closed, shares
+    return Facing(pair, *kept, contact.bilateral)
+
+
+def held_motions(cells: Cells, sides: Sequence[Index], directions: Sequence[Array]) -> Array:
+    """Projections (nv, 2, 2) of vertices' motions on those that sides (k,) hold.
+
+    They hold motions along `directions` (k, j, 2).
+    """
+    M = np.zeros((len(cells.vertices), 2, 2))
+    for side, direction in zip(sides, directions, strict=True):
+        d = _at_ends(direction)
+        np.add.at(M, cells.ends[side], d[..., :, None] * d[..., None, :])
+    size, vectors = np.linalg.eigh(M)
+    vectors = np.where(size[:, None] > STIFF**2 * size[:, None, -1:], vectors, 0.0)
+    vectors[size[:, -1] == 0] = 0.0
+    return np.asarray(vectors @ vectors.transpose(0, 2, 1))
+
+
+def _at_ends(values: Array) -> Array:
+    """Functions (k, j, c) at the Gauss points of sides: at their ends, (k, 2, c)."""
+    return np.einsum("ej,kjc->kec", THROUGH[[0, -1]], values)
+
+
+def _shares(
+    cells: Cells,
+    side: Index,
+    other: Index,
+    there: Array,
+    direction: Array,
+    held: Array,
+    share: float,
+) -> tuple[Array, Mask]:
+    """`Facing.share` (k, 2), and whether neither body can move along d there."""
+    d = _at_ends(direction)
+
+    def moves(vertex: Index) -> Mask:
+        rest = d - np.einsum("keij,kej->kei", held[vertex], d)
+        return np.asarray(np.linalg.norm(rest, axis=2) > STIFF)
+
+    own = moves(cells.ends[side])
+    if (other < 0).any():
+        return np.ones((len(side), 2)), ~own
+    facing = (_at_ends(there[..., None])[..., 0] > 0.5).astype(np.intp)
+    opposite = moves(cells.ends[other[:, None], facing])
+    shares = np.where(own == opposite, share, np.where(own, 1.0, 0.0))
+    return shares, ~own & ~opposite
 
 
 def guides_of(cells: Cells, displacement: ng.CoefficientFunction, side: Index, degree: int) -> Facing:
@@ -235,15 +293,16 @@ def guides_of(cells: Cells, displacement: ng.CoefficientFunction, side: Index, d
         gap=gap.reshape(k, j),
         after=np.zeros((k, degree + 1)),
         closed=np.ones(k, dtype=bool),
+        share=np.ones((k, 2)),
         equality=True,
     )
 
 
-def _after(ends: Index, gap: Array, closed: Mask, degree: int) -> Array:
+def _after(ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int) -> Array:
     """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
 
     `ends` (k, 2) are the vertices of the sides, at which the gaps of neighbours are one number: 0
-    where all of them are `closed` (k,).
+    where all of them are `closed` (k,), but for `stiff` ones (k, 2), where bodies do not move.
     """
     B = bernstein(degree, PLACES) * np.sqrt(WEIGHTS)[:, None]
     c = np.linalg.lstsq(B, (np.sqrt(WEIGHTS) * gap).T, rcond=None)[0].T
@@ -252,6 +311,7 @@ def _after(ends: Index, gap: Array, closed: Mask, degree: int) -> Array:
     value, bare = np.zeros(number.size), np.zeros(number.size, dtype=bool)
     np.maximum.at(value, number, c[:, [0, -1]])
     np.logical_or.at(bare, number[~closed], True)
+    np.logical_or.at(bare, number[stiff], True)
     value[~bare] = 0.0
     after = np.where(closed[:, None], 0.0, np.maximum(c, 0.0))
     after[:, [0, -1]] = value[number]

@@ -23,13 +23,12 @@ from ...problem import Problem
 from ...triplets import from_triplets
 from .cells import Cells, Places, places
 from .elements import CORNERS, compliance_at
-from .facing import DATA, PLACES, Facing
+from .facing import DATA, PLACES, THROUGH, Facing
 from .polynomials import legendre_table, products
 
 NOISE = 1e-13  # of what is asked for, relative to the displacement: round-off
 PARALLEL = 1e-8  # sine of the angle between directions at a vertex that are one
 INCONSISTENT = 1e-9  # of what is asked for at a vertex, relative to it
-THROUGH = np.linalg.inv(lagrange(DATA, PLACES))  # from values at `PLACES` to Gauss-Lobatto points
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,11 +58,12 @@ def asked_on_supports(
     return found
 
 
-def asked_on_contact(cells: Cells, facing: Facing, share: float) -> list[Asked]:
-    """-r on the secondary and r on the primary, of which the secondary takes a share."""
+def asked_on_contact(facing: Facing, alone: bool) -> list[Asked]:
+    """-r on the secondary and r on the primary, by shares or on the secondary `alone`."""
+    start, stop = np.ones((2, len(facing.side), 1)) if alone else facing.share.T[:, :, None]
+    share = start + (stop - start) * PLACES
     found = [Asked(facing.side, facing.direction, -share * facing.lift)]
-    if share < 1:
-        # At the places of the secondary; the primary's own are other ones.
+    if (share < 1).any():  # at the places of the secondary; the primary's own are other ones
         r = (1 - share) * facing.lift
         d, values = _carried(facing, facing.direction), _carried(facing, r[..., None])[..., 0]
         found.append(Asked(facing.other, d, values))
