@@ -362,7 +362,9 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
         left = left[np.abs(line[left] - one[vertex[left]]) > TURN]
     at_two[vertex[left]] = False
     chosen = np.full(count, -1)
-    order = np.argsort(~cells.curved, kind="stable")  # straight ones if there are any
+    x = cells.corners  # straight ones, and wide ones, if there are any
+    wide = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / cells.diameters**2
+    order = np.lexsort((wide, ~cells.curved))
     chosen[cells.triangles[order]] = order[:, None]
     return np.unique(chosen[at_two])
 

@@ -23,7 +23,7 @@ from ...fem import model_of
 from ...lagrange import gauss
 from ...problem import Problem, varies
 from .cells import Cells, Places, places
-from .polynomials import Frame, balancing, frame_of, projected, scalars, stresses
+from .polynomials import Frame, balancing, frame_of, in_frame, projected, scalars, stresses
 
 ON_CURVES = 3  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -254,7 +254,7 @@ def _element(
     strain = points.evaluate(cells, model.strain(displacement))
     source = _force_of(problem, cells, body)
     force, radial, missed = _forces(source, cells, points, frame, degree, axial)
-    local = frame.local(points.x) if curved else points.local[None]
+    local = frame.local(points.x) if curved else in_frame(points.local)[None]
     T = stresses(degree, frame, points.x, local, axial, on_axis)
     root = np.sqrt(weight)[..., None]
     D = compliance
@@ -296,7 +296,8 @@ def _moments(cells, mu, at, degree, frame, on_axis, force, axial, m):
         normal = np.stack([dx[..., 1], -dx[..., 0]], axis=-1)  # times ds / dt
         weight = w * cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), -1)
         chi = weight[..., None] * traces(k, own)
-        local = frame.local(x) if bent else (CORNERS[(i + 1) % 3] + t[:, None] * (CORNERS[(i + 2) % 3] - CORNERS[(i + 1) % 3]))[None]
+        start, stop = CORNERS[(i + 1) % 3], CORNERS[(i + 2) % 3]
+        local = frame.local(x) if bent else in_frame(start + t[:, None] * (stop - start))[None]
         T = stresses(degree, frame, x, local, axial, on_axis)
         found.append(_tractions(T, normal, chi))
         if force.any():

@@ -58,14 +58,38 @@ def asked_on_supports(
     return found
 
 
-def asked_on_line(facing: Facing, r: Array, share: float) -> list[Asked]:
-    """-r (k, j) on the secondary and r on the primary; the secondary takes a share."""
+def asked_on_line(facing: Facing, r: Array, alone: bool) -> list[Asked]:
+    """-r (k, j) on the secondary and r on the primary, by shares, or on the secondary `alone`."""
+    start, stop = np.ones((2, len(facing.side), 1)) if alone else facing.share.T[:, :, None]
+    share = start + (stop - start) * PLACES
     found = [Asked(facing.side, facing.direction, -share * r)]
-    if share < 1:
-        both = np.concatenate([facing.direction, (1 - share) * r[..., None]], axis=2)
+    if (share < 1).any():
+        both = np.concatenate([facing.direction, ((1 - share) * r)[..., None]], axis=2)
         there = facing.on_primary(both)
         found.append(Asked(facing.other, there[..., :2], there[..., 2]))
     return found
+
+
+def lifted(
+    problem: Problem,
+    cells: Cells,
+    asked: Sequence[Asked],
+    lines: Sequence[tuple[Facing, Array]],
+    degree: int,
+    extent: float,
+) -> Array:
+    """Norms (n,) of w, with r (k, j) on each line; on secondaries alone where vertices disagree.
+
+    See `lifting_of`.
+    """
+    for alone in (False, True):
+        every = [*asked, *(one for line in lines for one in asked_on_line(*line, alone))]
+        try:
+            return lifting_of(problem, cells, every, degree, extent)
+        except ContactError:
+            if alone:
+                raise
+    raise AssertionError
 
 
 def lifting_of(
