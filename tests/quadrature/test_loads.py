@@ -12,6 +12,7 @@ from ngsolve.meshes import MakeStructured2DMesh
 
 from drivers.reference import cases
 from ngcontact import Elastic, Problem, solve
+from ngcontact.fem.space import LOAD_BONUS, load_vector
 from ngcontact.mesh import first_mesh
 from ngcontact.quadrature import keep_rough_load, known_rough_load, rough_load, rough_segments
 from ngcontact.quadrature.lattice import monomials
@@ -47,6 +48,23 @@ def test_a_narrow_strip_of_pressure_is_not_lost(start, order):
     problem = loaded(traction={"top": 100 * box(ng.x, start, 0.01)})
     force = solve(problem, maxh=1 / 8, order=order).reactions["bottom"]
     assert force == pytest.approx([0, 1], abs=2e-5)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_a_narrow_strip_about_an_axis_does_its_work(order):
+    """On the displacement r^p, of which 2 pi r v has a degree more."""
+    a, b = 0.3, 0.31
+    data = {"materials": {".*": Elastic(1.0, 0.3)}, "displacement": {"bottom": (0, 0)}}
+    load = {"top": ng.CF((0, box(ng.x, a, b - a)))}
+    mesh = MakeStructured2DMesh(quads=False, nx=2, ny=1)
+    problem = Problem(mesh, **data, traction=load, model="axisymmetric")
+    V = ng.VectorH1(mesh, order=order)
+    v = ng.GridFunction(V)
+    v.Set(ng.CF((0, ng.x**order)))
+    work = load_vector(problem, V, LOAD_BONUS) @ v.vec.FV().NumPy()
+    k = order + 2
+    expected = 2 * math.pi * (b**k - a**k) / k
+    assert work == pytest.approx(expected, rel=1e-4)  # parts are halved to 1e-6 of the whole load
 
 
 @pytest.mark.parametrize(
