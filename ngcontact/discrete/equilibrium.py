@@ -199,7 +199,7 @@ def _allowed(residue: Array, error: Array, carried: float) -> float:
     return float(np.abs(residue / unit) @ error) + BALANCED * carried
 
 
-def _work_of_load(problem: Problem, mesh: ng.Mesh, motion: RigidMotion) -> float:
+def work_of_load(problem: Problem, mesh: ng.Mesh, motion: RigidMotion) -> float:
     """Work of the load on a rigid motion of bodies with names of their own, by the mesh's shape."""
     z = {}
     parts = zip(motion.bodies, motion.translation, motion.rotation, motion.middle, strict=True)
@@ -220,7 +220,7 @@ def _work_by_shape(problem: Problem, mesh: ng.Mesh, motion: RigidMotion) -> floa
         return 0.0
     copy = ng.Mesh(mesh.ngmesh.Copy())
     copy.Curve(mesh.GetCurveOrder() + CURVED)
-    return _work_of_load(problem, copy, motion) - _work_of_load(problem, mesh, motion)
+    return work_of_load(problem, copy, motion) - work_of_load(problem, mesh, motion)
 
 
 def _check_work(
