@@ -203,6 +203,29 @@ def test_reactions_balance_loads_on_cuts(make, order):
         assert load == pytest.approx(expected, abs=1e-12 * scale)
 
 
+def test_a_cut_that_takes_nothing_away_is_told():
+    """OCC subtracts no face that was drawn clockwise; its outline stays as a line in the body."""
+    corners = [(1, 4), (2, 1), (3, 4)]
+    for outline in (corners, corners[::-1]):
+        pen = WorkPlane().MoveTo(*outline[-1])
+        for corner in outline:
+            pen.LineTo(*corner)
+        notch = pen.Face()
+        notch.edges.name = "flank"
+        shape = rectangle(0, 0, 4, 3, "body", "side") - notch
+        shape.edges.Min(Y).name = "below"
+        problem = Problem(
+            OCCGeometry(shape, dim=2), {"body": STEEL}, {"below": (0, 0)}, traction={"flank": 1.0}
+        )
+        if outline is corners:
+            solution = solve(problem, maxh=0.5)
+            width = 4 / 3  # of the notch at the top
+            assert solution.reactions["below"] == pytest.approx([0, width], abs=1e-12)
+        else:
+            with pytest.raises(ValueError, match="draw what is cut off anticlockwise"):
+                solve(problem, maxh=0.5)
+
+
 def test_a_pressure_between_bodies_has_no_outward_normal():
     """A line inside a body takes a pair; a number is refused with that advice."""
     from netgen.occ import Glue
