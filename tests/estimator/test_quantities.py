@@ -14,7 +14,7 @@ from drivers.reference import cases
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
 from ngcontact.estimator import Quantity
 from ngcontact.estimator.equilibrated import bound
-from ngcontact.geometries import disc_on_disc
+from ngcontact.geometries import blocks, disc_on_disc
 from tests.scenes import unmatched_blocks
 
 
@@ -321,6 +321,27 @@ def test_figures_of_hertz_lie_in_their_bars(order):
     }
     for name, value in exact.items():
         assert abs(q[name].value - value) <= q[name].error <= 0.2 * value
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("pressed", [False, True])
+def test_the_approach_is_that_of_supports_and_middles(pressed, swap):
+    """Blocks in uniform compression, of height 1 and nu = 0, on a base that moves up by 0.2.
+
+    A load moves the upper one: by that of its middle, one and a half blocks above the base.
+    """
+    pair = Contact("upper_contact", "lower_contact")
+    held = {"bottom": (0, 0.2), **({} if pressed else {"top": (0, -0.1)})}
+    problem = Problem(
+        geometry=blocks(),
+        materials={"upper|lower": Elastic(E=10.0, nu=0.0)},
+        displacement=held,
+        traction={"top": (0, -0.5)} if pressed else {},
+        contact=[pair.swapped() if swap else pair],
+    )
+    approach = solve(problem, maxh=0.5, order=2).quantities()["approach"]
+    expected = 1.5 * 0.5 / 10.0 if pressed else 0.2 + 0.1
+    assert approach.value == pytest.approx(expected, rel=1e-10)
 
 
 def test_pairs_given_twice_have_quantities():
