@@ -103,6 +103,14 @@ def test_inclined_rigid_obstacles_are_told():
     assert quiet(lambda: solve(disc, maxh=0.015, order=2))
 
 
+def test_a_flat_obstacle_under_an_inclined_surface_is_silent():
+    """A disc pressed by 0.2 of its radius, with normals 25 degrees off where contact ends."""
+    disc = cases.disc_on_rigid_plane()
+    assert quiet(
+        lambda: solve(replace(disc, displacement={"top": (None, -0.2)}), maxh=0.1, order=2)
+    )
+
+
 def edge_of(name: str, left: float):
     corners = [(left, -1), (left + 1, -1), (left + 1, 0), (left, 0)]
     return body(name, polygon(corners, ["base", "side", "top", "side"]))
