@@ -9,19 +9,24 @@ import ngsolve as ng
 import numpy as np
 
 from .arrays import Mask
+from .contact import with_roles
 from .discrete import (
     DiscreteProblem,
     carried_active_set,
     discretise,
     first_active_set,
+    hardly_held,
     minimise_energy,
 )
-from .errors import ContactError, ConvergenceError, warn
+from .errors import ContactError, ConvergenceError, NoEquilibriumError, warn
+from .fem import boundary_trace, model_of
 from .mesh import check_curves, curve, same_geometry
 from .plausibility import doubt_of_refinement, doubts, estimates_rise
 from .problem import Contact, Problem
 from .quadrature import evaluations, unresolved, warn_of_unresolved
 from .solution import Solution
+
+ALIKE = 0.1  # relative difference of energies up to which two coarse solutions are one
 
 
 def check_start(problem: Problem, start: object) -> None:
@@ -44,7 +49,7 @@ def check_continuation(problem: Problem, start: Solution, order: int, element: s
             f"element={element!r}: give the same, its indicators tell nothing of others"
         )
     here, there = ([(c.secondary, c.primary) for c in p.contact] for p in (problem, start.problem))
-    if here != there:
+    if [set(pair) for pair in here] != [set(pair) for pair in there]:  # roles may be exchanged
         raise ValueError(f"the contact pairs of start are {there}, not {here}: keep them")
     if not same_geometry(problem.geometry, start.problem.geometry):
         raise ValueError(
@@ -58,8 +63,8 @@ def solve_on(
 ) -> Solution:
     """Solution on one mesh, of which names and values are known to be right.
 
-    Roles of pairs that fail are tried the other way round, once; `Solution.problem` has the pairs
-    as they were solved.
+    Roles of pairs that fail, or that leave a body all but free, are tried the other way round,
+    once; `Solution.problem` has the pairs as they were solved.
     """
     before = evaluations()
     mesh, curved = curve(mesh, order, element)
@@ -67,42 +72,56 @@ def solve_on(
         check_curves(mesh)
     here = (mesh, order, element)
     same = start is not None and (start.mesh, start.order, start.element) == here
-    discrete = discretise(problem, *here, start.discrete if start is not None and same else None)
-    tried = [discrete]
-    try:
-        minimiser = minimise_energy(discrete, _first_active_set(discrete, start))
-    except ConvergenceError as error:
-        exchanged = _exchanged(discrete)
-        if not exchanged:
-            raise
-        pairs = [exchanged.get(i, contact) for i, contact in enumerate(problem.contact)]
-        problem = replace(problem, contact=pairs)
-        try:
-            discrete = discretise(problem, *here, discrete)
-            minimiser = minimise_energy(discrete, _first_active_set(discrete, start))
-        except (ContactError, ValueError):
-            raise error from None
+    tried: list[DiscreteProblem] = []
+
+    def attempt(problem: Problem, known: DiscreteProblem | None) -> Solution:
+        discrete = discretise(problem, *here, known)
         tried.append(discrete)
-        warn(_told(list(exchanged.values())))
-    return Solution(
-        problem=problem,
-        mesh=mesh,
-        order=order,
-        element=element,
-        displacement=discrete.displacement(minimiser.u),
-        discrete=discrete,
-        minimiser=minimiser,
-        work={
-            "assemblies": sum(one.assembled for one in tried),
-            "factorizations": minimiser.factorizations,
-            "back_solves": minimiser.back_solves,
-            "gap_searches": sum(line.searches for one in tried for line in one.lines),
-            "curved_elements": curved,
-            "estimates": 0,
-            "equilibrations": 0,
-            "evaluations": evaluations() - before,
-        },
-    )
+        minimiser = minimise_energy(discrete, _first_active_set(discrete, start))
+        return Solution(
+            problem=problem,
+            mesh=mesh,
+            order=order,
+            element=element,
+            displacement=discrete.displacement(minimiser.u),
+            discrete=discrete,
+            minimiser=minimiser,
+            work={
+                "assemblies": sum(one.assembled for one in tried),
+                "factorizations": minimiser.factorizations,
+                "back_solves": minimiser.back_solves,
+                "gap_searches": sum(line.searches for one in tried for line in one.lines),
+                "curved_elements": curved,
+                "estimates": 0,
+                "equilibrations": 0,
+                "evaluations": evaluations() - before,
+            },
+        )
+
+    first = None
+    try:
+        first = attempt(problem, start.discrete if start is not None and same else None)
+        doubt: ContactError | None = hardly_held(first.discrete, first.minimiser)
+        if doubt is None:
+            return first
+    except (ConvergenceError, NoEquilibriumError) as error:
+        doubt = error
+    other = _exchanged(problem, mesh, order, doubt, tried)
+    if other is not None:
+        try:
+            second = attempt(other, tried[0] if tried else None)
+        except (ContactError, ValueError):
+            raise doubt from None
+        if hardly_held(second.discrete, second.minimiser) is None:
+            warn(_told(problem, other))
+            return second
+        if first is not None and abs(first.energy - second.energy) > ALIKE * abs(second.energy):
+            raise doubt
+    elif first is not None:
+        warn(str(doubt))
+    if first is None:
+        raise doubt
+    return first
 
 
 def _first_active_set(discrete: DiscreteProblem, start: Solution | None) -> Mask:
@@ -112,31 +131,38 @@ def _first_active_set(discrete: DiscreteProblem, start: Solution | None) -> Mask
     return carried_active_set(discrete.lines, start.pairs)
 
 
-def _exchanged(discrete: DiscreteProblem) -> dict[int, Contact]:
-    """Pairs by number, with roles exchanged, whose primary belongs to a body without support.
+def _exchanged(
+    problem: Problem, mesh: ng.Mesh, order: int, error: ContactError, tried: list[DiscreteProblem]
+) -> Problem | None:
+    """With roles exchanged of pairs whose primary belongs to a body that supports leave free.
 
     Normals of a hole, at points of a pin that lies elsewhere in it, all but resist the turning of
-    the pin; its own normals leave it free.
+    the pin, with forces that are not there; its own normals leave it free. None without such pairs.
     """
-    if discrete.rigid is None:
-        return {}
-    free = discrete.rigid.free
-    moves = np.abs(free.combinations).sum(axis=1).reshape(-1, 3).sum(axis=1) > 0
-    primaries = [moves[np.unique(free.bodies.of_segment[line.facing])] for line in discrete.lines]
-    return {
-        number: contact.swapped()
-        for number, contact in enumerate(discrete.problem.contact)
-        if primaries[number].any()
-        and contact.roles == "given"
-        and contact.gap is None
-        and not contact.bilateral
-    }
+    if isinstance(error, NoEquilibriumError):
+        bodies = error.motion.bodies
+    else:
+        bodies = [name for one in tried if one.rigid for name in one.rigid.free.names]
+    trace = boundary_trace(mesh, order, model_of(problem))
+    materials = mesh.GetMaterials()
+
+    def exchanged(contact: Contact) -> Contact:
+        decided = with_roles(trace, contact)
+        segments = trace.segments(decided.primary)
+        free = any(materials[body] in bodies for body in np.unique(trace.body[segments]))
+        return decided.swapped() if free and decided.gap is None else contact
+
+    pairs = [exchanged(contact) for contact in problem.contact]
+    same = all(one is other for one, other in zip(pairs, problem.contact, strict=True))
+    return None if same else replace(problem, contact=pairs)
 
 
-def _told(exchanged: list[Contact]) -> str:
-    """What is said of pairs that were solved with roles `exchanged`."""
-    names = ", ".join(f'Contact("{c.primary}", "{c.secondary}")' for c in exchanged)
-    secondaries = ", ".join(f'"{c.secondary}"' for c in exchanged)
+def _told(given: Problem, solved: Problem) -> str:
+    """What is said of pairs that were `solved` with other roles than `given`."""
+    both = zip(given.contact, solved.contact, strict=True)
+    pairs = [c for one, c in both if one is not c]
+    names = ", ".join(f'Contact("{c.primary}", "{c.secondary}")' for c in pairs)
+    secondaries = ", ".join(f'"{c.secondary}"' for c in pairs)
     return (
         f"no solution was found with the roles given in {names}, and was found with roles "
         f"exchanged: {secondaries} carries the contact points, and contact_force acts on its body. "

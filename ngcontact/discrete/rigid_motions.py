@@ -183,6 +183,12 @@ class FreeMotions:
     nodal: Array
     values: Array
 
+    @property
+    def names(self) -> list[str]:
+        """Of the bodies that can move."""
+        parts = np.split(self.combinations, len(self.bodies.names))
+        return [name for name, part in zip(self.bodies.names, parts, strict=True) if part.any()]
+
     @cached_property
     def means(self) -> Array:
         """Integrals (2N, r) of v.z over the boundaries for the motions z, made when asked for."""
