@@ -106,22 +106,23 @@ def solve_on(
             return first
     except (ConvergenceError, NoEquilibriumError) as error:
         doubt = error
-    other = _exchanged(problem, mesh, order, doubt, tried)
-    if other is not None:
-        try:
-            second = attempt(other, tried[0] if tried else None)
-        except (ContactError, ValueError):
-            raise doubt from None
-        if hardly_held(second.discrete, second.minimiser) is None:
-            warn(_told(problem, other))
-            return second
-        if first is not None and abs(first.energy - second.energy) > ALIKE * abs(second.energy):
-            raise doubt
-    elif first is not None:
-        warn(str(doubt))
-    if first is None:
+    doubted = _doubted(problem, mesh, order, doubt, tried)
+    if first is not None and not doubted:
+        return first
+    exchanged = {i: pair.swapped() for i, pair in doubted.items() if pair.gap is None}
+    if not exchanged:
         raise doubt
-    return first
+    pairs = [exchanged.get(i, contact) for i, contact in enumerate(problem.contact)]
+    try:
+        second = attempt(replace(problem, contact=pairs), tried[0] if tried else None)
+    except (ContactError, ValueError):
+        raise doubt from None
+    if hardly_held(second.discrete, second.minimiser) is None:
+        warn(_told(list(exchanged.values())))
+        return second
+    if first is None or abs(first.energy - second.energy) > ALIKE * abs(second.energy):
+        raise doubt
+    return first  # so are the bodies made, not the rows
 
 
 def _first_active_set(discrete: DiscreteProblem, start: Solution | None) -> Mask:
@@ -131,38 +132,32 @@ def _first_active_set(discrete: DiscreteProblem, start: Solution | None) -> Mask
     return carried_active_set(discrete.lines, start.pairs)
 
 
-def _exchanged(
+def _doubted(
     problem: Problem, mesh: ng.Mesh, order: int, error: ContactError, tried: list[DiscreteProblem]
-) -> Problem | None:
-    """With roles exchanged of pairs whose primary belongs to a body that supports leave free.
+) -> dict[int, Contact]:
+    """Pairs by number, with roles decided, whose primary is of a body that supports leave free.
 
     Normals of a hole, at points of a pin that lies elsewhere in it, all but resist the turning of
-    the pin, with forces that are not there; its own normals leave it free. None without such pairs.
+    the pin, with forces that are not there; its own normals leave it free.
     """
     if isinstance(error, NoEquilibriumError):
         bodies = error.motion.bodies
     else:
         bodies = [name for one in tried if one.rigid for name in one.rigid.free.names]
-    trace = boundary_trace(mesh, order, model_of(problem))
-    materials = mesh.GetMaterials()
-
-    def exchanged(contact: Contact) -> Contact:
-        decided = with_roles(trace, contact)
-        segments = trace.segments(decided.primary)
-        free = any(materials[body] in bodies for body in np.unique(trace.body[segments]))
-        return decided.swapped() if free and decided.gap is None else contact
-
-    pairs = [exchanged(contact) for contact in problem.contact]
-    same = all(one is other for one, other in zip(pairs, problem.contact, strict=True))
-    return None if same else replace(problem, contact=pairs)
+    trace, names = boundary_trace(mesh, order, model_of(problem)), mesh.GetMaterials()
+    decided = [with_roles(trace, contact) for contact in problem.contact]
+    primaries = [trace.body[trace.segments(pair.primary)] for pair in decided]
+    return {
+        number: pair
+        for number, (pair, body) in enumerate(zip(decided, primaries, strict=True))
+        if pair.primary is not None and any(names[i] in bodies for i in np.unique(body))
+    }
 
 
-def _told(given: Problem, solved: Problem) -> str:
-    """What is said of pairs that were `solved` with other roles than `given`."""
-    both = zip(given.contact, solved.contact, strict=True)
-    pairs = [c for one, c in both if one is not c]
-    names = ", ".join(f'Contact("{c.primary}", "{c.secondary}")' for c in pairs)
-    secondaries = ", ".join(f'"{c.secondary}"' for c in pairs)
+def _told(exchanged: list[Contact]) -> str:
+    """What is said of pairs that were solved with roles `exchanged`."""
+    names = ", ".join(f'Contact("{c.primary}", "{c.secondary}")' for c in exchanged)
+    secondaries = ", ".join(f'"{c.secondary}"' for c in exchanged)
     return (
         f"no solution was found with the roles given in {names}, and was found with roles "
         f"exchanged: {secondaries} carries the contact points, and contact_force acts on its body. "

@@ -372,6 +372,34 @@ def test_a_pin_that_lies_askew_in_a_loose_bush_is_refused(swap):
             solve(problem, maxh=0.35, order=order)
 
 
+@pytest.mark.parametrize("swap", [False, True])
+def test_a_slender_wedge_keeps_its_roles(swap):
+    """It moves far for a small gap whichever roles: forces are its load over the slope, 1/200."""
+    slope = 0.005
+    outlines = {
+        "wedge": ([(0, 0), (2, 0), (2, 1 - 2 * slope), (0, 1)], ["down", "", "up", ""]),
+        "lower": ([(-1, -1), (3, -1), (3, 0), (-1, 0)], ["fixed", "", "floor", ""]),
+        "upper": (
+            [(-1, 1 + slope), (3, 1 - 3 * slope), (3, 2), (-1, 2)],
+            ["roof", "", "fixed", ""],
+        ),
+    }
+    bodies = [body(name, polygon(*outline)) for name, outline in outlines.items()]
+    pairs = [("down", "floor"), ("up", "roof")]
+    problem = Problem(
+        geometry=compound(*bodies),
+        materials={"wedge|lower|upper": Elastic(E=1e5, nu=0.3)},
+        displacement={"fixed": (0, 0)},
+        force={"wedge": (1.0, 0)},
+        contact=[Contact(*(pair[::-1] if swap else pair)) for pair in pairs],
+    )
+    solution = solve(problem, maxh=0.5, order=2)
+    assert solution.problem is problem
+    load = 2 - 2 * slope
+    expected = (-1 if swap else 1) * np.array((-load, -load / slope))
+    np.testing.assert_allclose(solution.contact_force(1), expected, rtol=1e-6)  # round-off / slope
+
+
 def test_roles_are_exchanged_in_adapt_and_from_its_solutions():
     """In `adapt` once, in the coarse run of `solve`, and from a start with exchanged roles."""
     given = pin_at_the_bottom(("hole", "pin"))

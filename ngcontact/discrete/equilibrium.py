@@ -83,8 +83,9 @@ class Rigid:
                 motion, work = free.motion(mine / size), float(mine @ self.work)
                 return NoEquilibriumError(
                     f"contact hardly holds a rigid {motion}: by {size:.3g} it opens or closes gaps "
-                    f"by {seen:.3g} only, and the load does the work {work:.6g}; hold that body by "
-                    "`displacement` or `sliding`, or draw it where the load presses it",
+                    f"by {seen:.3g} only, and the load does the work {work:.6g}; give that body as "
+                    "secondary, hold it by `displacement` or `sliding`, or draw it where the load "
+                    "presses it",
                     body=motion.bodies[0],
                     motion=motion,
                     work=work,
