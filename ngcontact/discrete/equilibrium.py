@@ -75,8 +75,7 @@ class Rigid:
         amounts = np.linalg.solve(free.nodal.T @ free.nodal, free.nodal.T @ values)
         lineal = vanishing_combinations(self.rows)
         amounts -= lineal @ np.linalg.lstsq(lineal, amounts)[0]
-        parts = [free.combinations, *np.split(free.combinations, len(free.bodies.names))]
-        for part in parts:  # all bodies, each of them
+        for part in (free.combinations, *free.of_bodies):
             mine = np.where(part.any(axis=0), amounts, 0.0)
             size, seen = (np.abs(x @ mine).max(initial=0.0) for x in (part, self.rows))
             if size > HARDLY * extent and seen < HARDLY * size:

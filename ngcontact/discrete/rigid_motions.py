@@ -184,10 +184,15 @@ class FreeMotions:
     values: Array
 
     @property
+    def of_bodies(self) -> Array:
+        """The combinations of each body, (b, 3, r)."""
+        return self.combinations.reshape(len(self.bodies.names), 3, -1)
+
+    @property
     def names(self) -> list[str]:
         """Of the bodies that can move."""
-        parts = np.split(self.combinations, len(self.bodies.names))
-        return [name for name, part in zip(self.bodies.names, parts, strict=True) if part.any()]
+        both = zip(self.bodies.names, self.of_bodies, strict=True)
+        return [name for name, part in both if part.any()]
 
     @cached_property
     def means(self) -> Array:
