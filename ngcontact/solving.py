@@ -65,6 +65,8 @@ def solve(
         Bad input, before any assembly.
     ConvergenceError
         The active set did not settle, or a body can still move rigidly; carries the last iterate.
+    NoEquilibriumError
+        The load drives a rigid motion that supports and contact do not resist, or hardly.
     """
     order = check_element(order, element)
     if mesh is not None and maxh is not None:
