@@ -84,13 +84,15 @@ def test_the_site_executes(block):
 def run(tmp_path_factory) -> Callable[[Block], None]:
     """Execute a block after those before it in its page, each once, in a folder of the page.
 
-    What a page shows to do is not warned of.
+    What a page shows to do is not warned of. Solutions of one page alone are in memory.
     """
     spaces: dict[str, dict[str, object]] = {}
     done: set[Block] = set()
 
     def upto(block: Block) -> None:
         if block.page not in spaces:
+            spaces.clear()
+            done.clear()
             spaces[block.page] = {"__name__": "__main__"}
             exec(GIVEN.get(block.page, ""), spaces[block.page])
         for other in BLOCKS:
