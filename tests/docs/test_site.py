@@ -6,6 +6,7 @@ needs more than the package; everything else is executed here, the cells of note
 
 from __future__ import annotations
 
+import gc
 import re
 import warnings
 from collections.abc import Callable
@@ -93,6 +94,7 @@ def run(tmp_path_factory) -> Callable[[Block], None]:
         if block.page not in spaces:
             spaces.clear()
             done.clear()
+            gc.collect()  # few objects of much memory lie in circles: Python would wait
             spaces[block.page] = {"__name__": "__main__"}
             exec(GIVEN.get(block.page, ""), spaces[block.page])
         for other in BLOCKS:
