@@ -15,6 +15,7 @@ from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
 from ngcontact.estimator import Quantity
 from ngcontact.estimator.equilibrated import bound
 from ngcontact.geometries import blocks, disc_on_disc
+from tests.runs import solved
 from tests.scenes import unmatched_blocks
 
 
@@ -140,8 +141,7 @@ def test_bars_scale(scale):
 
 def test_largest_stress_lies_under_the_surface():
     """Johnson 1985: the largest shear is 0.3 p0 at 0.78 a; von Mises 0.56 p0 at nu = 0.3, 0.7 a."""
-    case = cases.hertz_contact(half_width=0.3)
-    *_, finest = adapt(case.problem, order=4, max_dofs=4500)
+    case, finest = cases.hertz_contact(), solved(cases.hertz_contact, 4, 4500)
     row = finest.quantities()["von Mises"]
     assert 0.5 * case.exact.p0 < row.value < 0.65 * case.exact.p0
     assert abs(row.place[0]) < 0.1
@@ -309,8 +309,8 @@ def test_the_force_of_half_a_model_is_the_load():
 
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_figures_of_hertz_lie_in_their_bars(order):
-    case = cases.hertz_contact(half_width=0.3)
-    *_, solution = adapt(case.problem, order=order, max_dofs=1500 if order < 4 else 4500)
+    case = cases.hertz_contact()
+    solution = replace(solved(cases.hertz_contact, order, 1500 if order < 4 else 4500))
     without_proof(solution)
     q, P = solution.quantities(), case.exact.P
     exact = {

@@ -164,7 +164,9 @@ def test_the_last_level_resolves_the_zone_of_a_load_however_small(press):
     supports = {"block_bottom": (0, 0), "disc_top": (0, -press)}
     problem = replace(cases.pressed_disc(), displacement=supports)
     assert quiet(finest(problem, unknowns=11_000))
-    assert only(finest(problem, unknowns=1000), ZONE)  # the first levels do not
+    # One point in contact at 934 unknowns: the peak is 45 % off, 95 % of the lighter load. At 1438
+    # the heavier one has three, its peak is 5 % off, and no warning comes.
+    assert only(finest(problem, unknowns=1000), ZONE)
 
 
 @pytest.mark.parametrize(("order", "maxh"), [(1, 0.058), (2, 0.06), (3, 0.06), (4, 0.06)])
