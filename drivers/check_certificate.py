@@ -26,7 +26,10 @@ from pathlib import Path
 import numpy as np
 
 TOLERANCE = 1e-9  # relative, of sums of round-off; measured 1e-15 to 1e-12
-SIGN = 1e-14  # of what must not be negative, relative to the largest; measured 1e-20 and 0
+# Of what must not be negative, relative to the largest: 45 units of round-off, for a zero that is a
+# sum of some ten products, such as a circumference on the axis (measured 1e-20, with other kernels
+# 0). It changes a term of B^2 by 1e-14 of its size, of which `TOLERANCE` lets pass 1e-9.
+SIGN = 1e-14
 ROUND_OFF = 1e-12  # of norms, relative to the discrete stress
 COVERED = 1e-6  # share of an edge of the boundary that may be without tractions asked for
 STRAIGHT = 1e-12  # distance of a curve from its chord, relative, up to which it is straight

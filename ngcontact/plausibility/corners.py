@@ -87,8 +87,8 @@ def contradictions(problem: Problem, trace: BoundaryTrace) -> list[Contradiction
 def _shared(problem: Problem, mesh: ng.Mesh) -> Mask:
     """Vertices at which segments of several prescribed regions, or of guides, meet."""
     guides = [str(problem.sliding)] if problem.sliding is not None else []
-    view, patterns = View(mesh, 1), (*problem.displacement, *guides)
-    at = np.concatenate([view.inside(mesh.Boundaries(pattern)) for pattern in patterns])
+    view, pattern = View(mesh, 1), "|".join([*problem.displacement, *guides])
+    at = view.inside(mesh.Boundaries(pattern))
     vertex, region = view.arrays.segments[at], view.arrays.boundaries[at]
     low, high = np.full(mesh.nv, len(mesh.GetBoundaries())), np.full(mesh.nv, -1)
     np.minimum.at(low, vertex, region[:, None])
