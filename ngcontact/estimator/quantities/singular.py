@@ -34,7 +34,7 @@ class Singular:
     places : ndarray (k, 2)
         Lengths.
     reach : ndarray (k,)
-        How far from each of them the stress is its own, lengths.
+        How far from each of them the stress is its own, or not resolved by an element, lengths.
     pressed : ndarray of bool (k,)
         Corners at which bodies press on each other.
     """
@@ -48,12 +48,12 @@ class Singular:
         """Places (j, 2), each once where several bodies meet."""
         return np.unique(self.places, axis=0)
 
-    def near(self, points: Array, pressed: bool = False, reach: float = 1.0) -> Mask:
-        """Which of the `points` (m, 2) lie within `reach` times the reach of a corner, (m,)."""
+    def near(self, points: Array, pressed: bool = False) -> Mask:
+        """Which of the `points` (m, 2) lie within the reach of a corner, (m,)."""
         result = np.zeros(len(points), dtype=bool)
         for place, r, of_contact in zip(self.places, self.reach, self.pressed, strict=True):
             if of_contact or not pressed:
-                result |= np.linalg.norm(points - place, axis=1) <= reach * r
+                result |= np.linalg.norm(points - place, axis=1) <= r
         return result
 
 
@@ -75,14 +75,15 @@ def singular_corners(
     critical[(high == GUIDED) | ((low == GUIDED) & (high == HELD))] = np.pi / 2
     clamped = (low == FREE) & (high == HELD)
     critical[clamped] = _critical(problem, trace)[trace.body[first[clamped]]]
-    edge = (low == FREE) & (high == PRESSED)
-    critical[edge] = np.pi - _facing(place, angle, h, trace.body[first], rigid)[edge]
+    facing = _facing(place, angle, h, trace.body[first], rigid)
+    edge = (high == PRESSED) & ((low == FREE) | ((low == PRESSED) & (facing == np.pi)))
+    critical[edge] = (np.pi - facing)[edge]
     straight = (low == high) & (np.abs(angle - np.pi) <= SMOOTH)  # nothing changes
     found = ~straight & (angle > critical + SMOOTH)
     size, reach = float(np.ptp(trace.curve, axis=(0, 1)).max()), []
-    for x in place[found]:
+    for x, least in zip(place[found], h[found].tolist(), strict=True):
         away = np.linalg.norm(place - x, axis=1)
-        reach.append(NEAR * float(away[away > SAME * size].min(initial=size)))
+        reach.append(max(NEAR * float(away[away > SAME * size].min(initial=size)), least))
     return Singular(place[found] + 0.0, np.array(reach), (high == PRESSED)[found])
 
 
