@@ -16,7 +16,7 @@ from .table import Quantity, error_of_largest, unknown
 Star = tuple[Index, Array]  # segments (k,) of the secondary, Bernstein coefficients (k, d + 1)
 
 # Error of pressures over the largest difference on a segment to p*, and to the discrete stress:
-# chosen on 110 random scenes, orders 1 to 4.
+# chosen on 113 random scenes, orders 1 to 4.
 OFF_STAR, OFF_STRESS, OFF_ALONE = 2.0, 1.0, 2.0  # the last where there is no p*
 OF_STEP = 0.3  # of the distance of points, part of the bar of an end: chosen on 80 random scenes
 SAMPLES = np.linspace(0, 1, 17)  # where pressures are looked at on a segment

@@ -6,7 +6,7 @@ others are estimated, by measurement (docs/bounds.md):
 * force: of second order, 0.3 times the square of the relative estimate, 1.5 times at order 4;
 * peak pressure and von Mises stress: the largest lies between those of the discrete field less and
   plus an error, which is one number on each segment or element: of pressures twice the largest
-  difference to p* there, or once that to the discrete stress; of von Mises 1.25 times the largest
+  difference to p* there, or once that to the discrete stress; of von Mises 1.1 times the largest
   difference to that of the equilibrated stress, or half of the jump between elements;
 * end of contact: how far from it the lines through the first two values of gap^(2/3) outside and
   of p^2 inside vanish, and 0.3 of the distance of the points between which it lies; contact
