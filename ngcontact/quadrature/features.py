@@ -416,7 +416,10 @@ def _nodes_in(corners: Array) -> tuple[Index, Index, Index]:
 def _widths(
     kind: str, function: ng.CoefficientFunction, mesh: ng.Mesh, places: Array, spacing: float
 ) -> Array:
-    """Widths (k,) of features at `places` (k, 2): of the nearest of some the least chord."""
+    """Widths (k,) of features at `places` (k, 2): the least chord at the nearest of some of them.
+
+    Or at a wider place within whose width that lies.
+    """
     if not len(places):
         return np.empty(0)
     some = places[np.linspace(0, len(places) - 1, min(len(places), ACROSS)).astype(int)]
@@ -436,8 +439,11 @@ def _widths(
     up = np.cumprod(same[:, middle:], axis=1).sum(axis=1)
     down = np.cumprod(same[:, middle::-1], axis=1).sum(axis=1)
     width = (t[middle + up - 1] - t[middle - down + 1]).min(axis=1)
-    nearest = cKDTree(some).query(places)[1]
-    return np.maximum(width, NARROWEST * spacing)[nearest]
+    width = np.maximum(width, NARROWEST * spacing)
+    apart = np.linalg.norm(some[:, None] - some, axis=2)
+    width = np.where(apart <= width, width, 0.0).max(axis=1)  # chords near corners are shorter
+    nearest = ((some**2).sum(axis=1) - 2 * places @ some.T).argmin(axis=1)
+    return np.asarray(width[nearest])
 
 
 def towards(features: Array, cells: Cells, view: View) -> Cells:
