@@ -37,7 +37,7 @@ TURN = 0.3  # angle of their lattice, out of step with edges
 WINDOWS = (3, 7, 15, 31, 63, 127, 255)  # samples, each of twice the last and one
 STEEP = 0.5  # of the change in a window, what is lost there of a feature
 AT_ENDS = 31  # of these, for features at ends of lines, where the end of a wave looks like one ...
-HIGH = 0.05  # ... of less than this share of the range
+BESIDE_ENDS = 4  # ... but changes far more within so many windows
 # The same in bodies; laws are not integrated on parts of elements that follow them.
 IN_PLANE = {"force": (5, 11), "materials": (5, 11, 23, 47)}
 BESIDE = 4  # samples, half of them on each side
@@ -321,8 +321,11 @@ def _departures(values: Array, limit: float) -> Array:
         some = (now > limit) & (then < SATURATED * now)
         around = maximum_filter1d(values, window) - minimum_filter1d(values, window)
         some &= now > STEEP * around
-        for end in (slice(window // 2), slice(-(window // 2), None)):
-            some[end] &= window <= AT_ENDS and now[end] > HIGH * np.ptp(values)
+        for back in (1, -1):  # runs that reach an end
+            n = int(np.argmin(np.append(some[::back], False)))
+            beside = np.ptp(values[::back][: BESIDE_ENDS * window])
+            if window > AT_ENDS or now[::back][:n].max(initial=0.0) <= STEEP * beside:
+                some[::back][:n] = False
         found = np.maximum(found, np.where(some, now, 0.0))
     return found
 
