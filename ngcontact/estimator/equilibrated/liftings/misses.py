@@ -8,9 +8,10 @@ import ngsolve as ng
 import numpy as np
 
 from ....arrays import Array, Index
-from ....fem import BoundaryTrace, prescribed
+from ....fem import BoundaryTrace
 from ....lagrange import gauss
 from ....problem import Problem
+from ....quadrature import features_of
 from ..data import Discrete, EdgeConditions, Units, guide_frames
 from .edges import (
     DEGREE,
@@ -70,13 +71,13 @@ def on_supports(
 
 def _refuse_steps(problem: Problem, boundary: BoundaryTrace) -> None:
     """Raise where a prescribed displacement jumps inside a boundary."""
-    for step in prescribed(problem, boundary.mesh).steps:
-        x, y = step.place
-        raise ValueError(
-            f'the displacement prescribed on "{step.name}" jumps near ({x:.6g}, {y:.6g}): no '
-            "displacement of finite energy does; make it continuous, or leave a gap between "
-            "boundaries"
-        )
+    for one in features_of(problem, boundary.mesh):
+        for x, y, _ in one.jumps.tolist():
+            raise ValueError(
+                f'the displacement prescribed on "{one.name}" jumps near ({x:.6g}, {y:.6g}): '
+                "no displacement of finite energy does; make it continuous, or leave a gap between "
+                "boundaries"
+            )
 
 
 def on_guides(
