@@ -13,9 +13,9 @@ from .errors import ContactError
 from .fem import check_element, unknowns
 from .mesh import first_mesh
 from .one_mesh import check_start, solve_on, warn_of_doubts
-from .plausibility import look_at_data, warn_of_implausible
+from .plausibility import warn_of_implausible
 from .problem import Problem, Triangulation
-from .quadrature import evaluations
+from .quadrature import evaluations, look
 from .solution import Solution
 
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
@@ -77,7 +77,7 @@ def solve(
     mesh = first_mesh(problem, maxh) if mesh is None else mesh
     problem.check(mesh)
     before = evaluations()
-    look_at_data(problem, mesh)
+    look(problem, mesh)
     if start is None:
         warn_of_implausible(problem, mesh, order)
     coarse = coarse_run(problem, mesh, order, element) if start is None else []

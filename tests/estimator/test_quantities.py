@@ -320,7 +320,11 @@ def test_figures_of_hertz_lie_in_their_bars(order):
         "peak pressure": case.exact.p0,
     }
     for name, value in exact.items():
-        assert abs(q[name].value - value) <= q[name].error <= 0.2 * value
+        # The widest is that of the peak at order 1, 0.25 of it for an error of 0.1.
+        assert abs(q[name].value - value) <= q[name].error <= 0.3 * value
+    for row in q:
+        if row.name == "end of contact, x":
+            assert abs(abs(row.value) - 0.3) <= row.error <= 0.1 * 0.3
 
 
 @pytest.mark.parametrize("swap", [False, True])
@@ -368,6 +372,8 @@ def test_corners_of_infinite_stress_are_named():
     half = q["contact area"].value / 2
     assert sorted(q["peak pressure"].infinite[:, 0]) == pytest.approx([-half, half])
     assert q["peak pressure"].infinite[:, 1] == pytest.approx([0, 0])
+    # The ends are corners of the punch: 0.5, to round-off of a sum of segments.
+    assert abs(half - 0.5) <= q["contact area"].error + 1e-14
     assert len(partly_lifted_corners()) == 1
 
 

@@ -28,7 +28,7 @@ from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, he
 from .lifting import asked_on_supports, lifted
 from .missed import data_norms
 from .program import Balanced, DualProgram, dual_program, exerted, pushed, rows_of
-from .refusals import refuse_bound, refuse_narrow
+from .refusals import refuse_bound, refuse_jumps, refuse_narrow
 from .tractions import Given, boundary_tractions, given_on, missed_tractions, moments_of
 
 LIFTED = 3  # degrees by which w is above u_h
@@ -143,6 +143,7 @@ def error_bound(
     """
     refuse_bound(problem, trace, pairs)
     refuse_narrow(problem, trace)
+    refuse_jumps(problem, trace)
     try:
         return _bound(problem, trace, displacement, pairs, everywhere=False)
     except ContactError:  # resultants that no pressure near to the contact has
