@@ -198,9 +198,7 @@ def _bound(
             f"{residual:.1e}"
         )
     have = boundary_tractions(cells, elements, stress.coefficients)
-    missed = missed_tractions(
-        problem, cells, given, lines, balanced.pressure, have, stress.largest
-    )
+    missed = missed_tractions(problem, cells, given, lines, balanced.pressure, have, stress.largest)
     loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(cells, elements))
     lifts = [(line.facing, line.facing.lift) for line in lines]
     lifting = lifted(problem, cells, asked, lifts, lift, extent_of_u)

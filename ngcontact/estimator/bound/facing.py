@@ -41,7 +41,7 @@ def bernstein(degree: int, t: Array) -> Array:
 
 
 def directions(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
-    """d (k, 2) at `s` (k,) of segments `segment` (k,) of the secondary."""
+    """D (k, 2) at `s` (k,) of segments `segment` (k,) of the secondary."""
     if contact.direction is None:
         return trace.exact_normal(segment, s)
     return np.tile(contact.direction, (len(segment), 1))
@@ -165,7 +165,11 @@ def _ends(
         s = np.linspace(places[i, j], places[i, j + 1], SAMPLES)
         gap = met(trace, displacement, pair, np.full(SAMPLES, line.segments[i]), s).gap
         below = np.flatnonzero(gap < 0)
-        edge = (s[below[-1]] if below.size else s[0]) if sign > 0 else (s[below[0]] if below.size else s[-1])
+        edge = (
+            (s[below[-1]] if below.size else s[0])
+            if sign > 0
+            else (s[below[0]] if below.size else s[-1])
+        )
         at = float(edge + sign * MARGIN)
         if APART < at < 1 - APART:
             found[int(line.segments[i])] = (at, sign)
@@ -216,7 +220,7 @@ class Facing:
 
     @cached_property
     def back(self) -> Array:
-        """t (k, j) of the secondary opposite to the Gauss points of the primary's sides."""
+        """T (k, j) of the secondary opposite to the Gauss points of the primary's sides."""
         nodes = self.there @ THROUGH.T
         t = np.where((nodes[:, -1] < nodes[:, 0])[:, None], 1 - PLACES, PLACES)
         for _ in range(NEWTON_STEPS):
@@ -237,7 +241,7 @@ class Facing:
 
     @property
     def lift(self) -> Array:
-        """r (k, j): what w adds to the gap."""
+        """R (k, j): what w adds to the gap."""
         return np.asarray(self.after @ bernstein(self.after.shape[1] - 1, PLACES).T - self.gap)
 
 
@@ -334,7 +338,9 @@ def _shares(
     return shares, ~own & ~opposite
 
 
-def guides_of(cells: Cells, displacement: ng.CoefficientFunction, side: Index, degree: int) -> Facing:
+def guides_of(
+    cells: Cells, displacement: ng.CoefficientFunction, side: Index, degree: int
+) -> Facing:
     """Sides (k,) of Gamma_0, as bilateral contact with an obstacle without a gap."""
     k, j = len(side), len(PLACES)
     every, t = np.repeat(side, j), np.tile(PLACES, k)

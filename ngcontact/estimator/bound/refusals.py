@@ -12,7 +12,6 @@ from ...problem import Problem
 from ...quadrature import features_of, unresolved
 
 
-
 def refuse_bound(problem: Problem, boundary: BoundaryTrace, pairs: Sequence[ContactState]) -> None:
     """Raise unless the error of a problem's solutions can be bounded.
 

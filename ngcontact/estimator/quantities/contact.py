@@ -9,11 +9,9 @@ from ...arrays import Array, Index, Mask
 from ...contact import ContactState, in_contact
 from ...fem import BoundaryTrace
 from ...lagrange import gauss
-from ..bound import bernstein
+from ..bound import ContactPressure
 from .singular import Singular
 from .table import Quantity, error_of_largest, unknown
-
-Star = tuple[Index, Array]  # segments (k,) of the secondary, Bernstein coefficients (k, d + 1)
 
 # Error of pressures over the largest difference on a segment to p*, and to the discrete stress:
 # chosen on 113 random scenes, orders 1 to 4.
@@ -26,7 +24,7 @@ def peak_of(
     pair: ContactState,
     boundary: BoundaryTrace,
     stress: ng.CoefficientFunction,
-    star: Star | None,
+    star: ContactPressure | None,
     corners: Singular,
     relative: float,
 ) -> Quantity:
@@ -45,7 +43,7 @@ def peak_of(
     if relative > 1:
         return unknown("peak pressure", peak, place, infinite)
     off = (OFF_ALONE if star is None else OFF_STRESS) * _off_stress(pair, boundary, stress)
-    if star is not None and len(star[0]):
+    if star is not None:
         off = np.maximum(off, OFF_STAR * _off_star(pair, boundary, star))
     segment, s = np.repeat(line.segments, len(SAMPLES)), np.tile(SAMPLES, len(line.segments))
     rows = np.repeat(line.rows, len(SAMPLES), axis=0)
@@ -64,18 +62,13 @@ def _beside(places: Array, points: Array) -> Mask:
     return np.asarray(away <= 0.05 * np.ptp(points, axis=0).max())
 
 
-def _off_star(pair: ContactState, boundary: BoundaryTrace, star: Star) -> Array:
+def _off_star(pair: ContactState, boundary: BoundaryTrace, star: ContactPressure) -> Array:
     """Differences (m,) of pressures to p* at contact points, the larger of two."""
-    rows, (segments, c) = pair.line.rows, star
+    rows, line = pair.line.rows, pair.line
     result = np.zeros(len(pair.force) + 1)
-    order = np.argsort(segments, kind="stable")
-    at = np.searchsorted(segments, pair.line.segments, sorter=order)
-    known = order[np.minimum(at, len(order) - 1)]
-    met = segments[known] == pair.line.segments
-    basis = bernstein(c.shape[1] - 1, boundary.places(pair.line.segments).ravel())
-    values = np.einsum("kj,kij->ki", c[known], basis.reshape(*rows.shape, -1))
-    off = np.abs(values - np.append(pair.pressure, 0.0)[rows])
-    np.maximum.at(result, rows[met], off[met])
+    segment = np.repeat(line.segments, rows.shape[1])
+    values = star.values(segment, boundary.places(line.segments).ravel()).reshape(rows.shape)
+    np.maximum.at(result, rows, np.abs(values - np.append(pair.pressure, 0.0)[rows]))
     return result[:-1]
 
 

@@ -109,7 +109,7 @@ class Measured(Guaranteed):
         star, relative = None, self.relative_error_estimate
         if proof is not None:
             found = proof.pressure[pair]
-            star = found.segments, np.asarray(found.coefficients)
+            star = found
         boundary: BoundaryTrace = self.discrete.space.trace
         corners = singular_corners(self.problem, boundary, self.pairs)
         e, along = direction_of(self, pair, state)
