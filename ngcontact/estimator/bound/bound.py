@@ -84,7 +84,7 @@ def error_bound(
         side = given.guides[mu.degree[given.guides] == k]
         guide = guides_of(cells, displacement, side, order + LIFTED)
         lines.append(rows_of(mu, guide, k - extent))
-    holding = [*asked, *(line.facing for line in lines)]
+    holding = [*asked, *(one for line in lines for one in asked_on_contact(line.facing, True))]
     held = held_motions(cells, [x.side for x in holding], [x.direction for x in holding])
     for pair, end in zip(pairs, ends, strict=True):
         share = _share(problem, cells, pair)
@@ -98,10 +98,8 @@ def error_bound(
 def _summed(problem, cells, displacement, mu, elements, lines, found, given, asked, order) -> Proof:
     n, extent = len(cells.triangles), cells.trace.model.extent
     constitutive, forces, least = np.zeros(n), np.zeros(n), np.zeros(n)
-    coefficients, largest = [], 0.0
-    for e in elements:
-        c = e.coefficients(found.mu)
-        coefficients.append(c)
+    coefficients, largest = found.coefficients, 0.0
+    for e, c in zip(elements, coefficients, strict=True):
         s = e.stress(c, e.places.x)
         if extent:
             s[..., 2] += e.radial
@@ -118,6 +116,12 @@ def _summed(problem, cells, displacement, mu, elements, lines, found, given, ask
         least[at] = 1 / eig
     if extent:
         least *= np.maximum(cells.trace.model.measure(cells.corners.reshape(-1, 2)).reshape(n, 3).min(axis=1), 1e-300)
+    residual = _residual(cells, mu, found) 
+    if residual > SETTLED * largest:
+        raise ContactError(
+            "no equilibrated stress was found: residuals relative to the largest stress are "
+            f"{residual / largest:.1e}"
+        )
     missed, reaction = _missed(problem, cells, displacement, elements, coefficients, lines, found, given, largest)
     loads = data_norms(cells, forces, missed, least)
     u = np.abs(cells.trace.evaluate(displacement, np.arange(len(cells.trace.region)), np.zeros(len(cells.trace.region)))).max()
@@ -140,6 +144,14 @@ def _summed(problem, cells, displacement, mu, elements, lines, found, given, ask
     above = crossed + reaction + closed - signed + parts["lifting"] / 2 + worked
     bound = (squares + 2 * closed + parts["lifting"]) ** 0.5
     return Proof(cells, mu, elements, lines, found, coefficients, bound, parts, below, above)
+
+
+def _residual(cells: Cells, mu: Multipliers, found: Solved) -> float:
+    """The largest traction that does not balance."""
+    x, dx = cells.points(np.arange(len(cells.ends)), np.full(len(cells.ends), 0.5))
+    ds = np.linalg.norm(dx, axis=1) * cells.trace.model.measure(x)
+    size = np.where(ds > 0, ds, np.inf).repeat(np.diff(mu.start))
+    return float((np.abs(found.residual) / size).max(initial=0.0))
 
 
 def _lifted(problem, cells, asked, lines, degree, extent) -> Array:

@@ -232,11 +232,11 @@ def facing_of(
 def held_motions(cells: Cells, sides: Sequence[Index], directions: Sequence[Array]) -> Array:
     """Projections (nv, 2, 2) of vertices' motions on those that sides (k,) hold.
 
-    They hold motions along `directions` (k, j, 2).
+    They hold motions along `directions` (k, j, 2), from end to end.
     """
     M = np.zeros((len(cells.vertices), 2, 2))
     for side, direction in zip(sides, directions, strict=True):
-        d = _at_ends(direction)
+        d = direction[:, [0, -1]]
         np.add.at(M, cells.ends[side], d[..., :, None] * d[..., None, :])
     size, vectors = np.linalg.eigh(M)
     vectors = np.where(size[:, None] > STIFF**2 * size[:, None, -1:], vectors, 0.0)
@@ -309,7 +309,7 @@ def _after(ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int) -> A
     _, number = np.unique(ends, return_inverse=True)
     number = number.reshape(-1, 2)
     value, bare = np.zeros(number.size), np.zeros(number.size, dtype=bool)
-    np.maximum.at(value, number, c[:, [0, -1]])
+    np.maximum.at(value, number, np.where(stiff, gap @ THROUGH[[0, -1]].T, c[:, [0, -1]]))
     np.logical_or.at(bare, number[~closed], True)
     np.logical_or.at(bare, number[stiff], True)
     value[~bare] = 0.0

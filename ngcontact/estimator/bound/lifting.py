@@ -33,7 +33,7 @@ INCONSISTENT = 1e-9  # of what is asked for at a vertex, relative to it
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """d.w on k sides: `direction` (k, j, 2) and `amount` (k, j) at the j Gauss points."""
+    """d.w on k sides: `direction` (k, j, 2) and `amount` (k, j) at j Gauss-Lobatto points."""
 
     side: Index
     direction: Array
@@ -47,8 +47,8 @@ def asked_on_supports(
     trace, found = cells.trace, []
     for pattern, values in problem.displacement.items():
         side = np.flatnonzero(np.isin(cells.segment, trace.segments(pattern)))
-        k, j = len(side), len(PLACES)
-        segment, s = cells.on_side(np.repeat(side, j), np.tile(PLACES, k))
+        k, j = len(side), DATA + 1
+        segment, s = cells.on_side(np.repeat(side, j), np.tile(gauss_lobatto(DATA), k))
         u = trace.evaluate(displacement, segment, s)
         for c, value in enumerate(values):
             if value is not None:
@@ -62,11 +62,12 @@ def asked_on_contact(facing: Facing, alone: bool) -> list[Asked]:
     """-r on the secondary and r on the primary, by shares or on the secondary `alone`."""
     start, stop = np.ones((2, len(facing.side), 1)) if alone else facing.share.T[:, :, None]
     share = start + (stop - start) * PLACES
-    found = [Asked(facing.side, facing.direction, -share * facing.lift)]
+    d = np.einsum("ij,kjc->kic", THROUGH, facing.direction)
+    found = [Asked(facing.side, d, -(share * facing.lift) @ THROUGH.T)]
     if (share < 1).any():  # at the places of the secondary; the primary's own are other ones
         r = (1 - share) * facing.lift
-        d, values = _carried(facing, facing.direction), _carried(facing, r[..., None])[..., 0]
-        found.append(Asked(facing.other, d, values))
+        d, values = (THROUGH @ _carried(facing, x) for x in (facing.direction, r[..., None]))
+        found.append(Asked(facing.other, d, values[..., 0]))
     return found
 
 
@@ -182,7 +183,7 @@ def _conditions(
     held, value = np.zeros((nodes.count, 2), dtype=bool), np.zeros((nodes.count, 2))
     number, d, amount = [], [], []
     t = gauss_lobatto(nodes.degree)
-    carry = lagrange(DATA, t) @ THROUGH
+    carry = lagrange(DATA, t)
     for one in asked:
         here = np.isin(one.side, nodes.sides)
         number.append(nodes.on_sides(cells, one.side[here]).ravel())
@@ -355,8 +356,7 @@ def _remainders(
         side = one.side[here]
         if not side.size:
             continue
-        d = np.einsum("ij,kjc->kic", THROUGH, one.direction[here])
-        amount = one.amount[here] @ THROUGH.T
+        d, amount = one.direction[here], one.amount[here]
         have = np.einsum("iq,kqc->kic", fine, w[nodes.on_sides(cells, side)])
         miss = (amount - (have * d).sum(axis=2))[..., None] * d
         miss[np.abs(miss) <= NOISE * largest] = 0.0

@@ -22,6 +22,8 @@ from ...triplets import from_triplets
 from .elements import Element, Multipliers, traces
 from .facing import PLACES, Facing, bernstein
 
+REFINED = 8  # steps of refinement of the stress, at most ...
+ROUND_OFF = 1e-13  # ... until what does not balance is that little
 DEFINITE = 1e-11  # of the diagonal, added to what is factorised: vertices where tractions depend
 
 
@@ -68,11 +70,25 @@ def _tested(mu: Multipliers, side: int, t: Array, psi: Array, load: Array) -> Ar
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """All multipliers mu, and the coefficients (k, j) of p* dx/dt of each line."""
+    """The solution.
+
+    Attributes
+    ----------
+    mu : ndarray (d,)
+        All multipliers.
+    coefficients : list of ndarray (b, m)
+        Those of the stress in each group of triangles.
+    pressure : list of ndarray (k, j)
+        Coefficients of p* on each line.
+    residual : ndarray (d,)
+        Moments of tractions that do not balance.
+    steps : int
+    """
 
     mu: Array
+    coefficients: list[Array]
     pressure: list[Array]
-    residual: float
+    residual: Array
     steps: int
 
 
@@ -128,14 +144,31 @@ def solved(
     )
     factor = cholesky(lower_half((K + sp.diags_array(DEFINITE * diagonal)).tocsr()))
     found = minimise(bordered_systems(program, factor), start)
-    force = np.where(equality, found.force, np.maximum(found.force, 0.0))
-    left = b - K @ found.u
-    left[unknown] -= force
-    left[fixed] = 0.0
+    y, force = found.u, np.where(equality, found.force, np.maximum(found.force, 0.0))
+    coefficients = [e.coefficients(T @ y) for e in elements]
+    closed = equality | (force > 0)
+    free = ~fixed
+    free[unknown[closed]] = False
+    solve = factor(free)
+    for step in range(REFINED + 1):
+        exerted, largest = np.zeros(size), 0.0
+        for e, c in zip(elements, coefficients, strict=True):
+            each = e.tractions(c)
+            largest = max(largest, float(np.abs(each).max()))
+            np.add.at(exerted, e.dofs, each)
+        left = np.where(fixed, 0.0, T.T @ (given - exerted))
+        force[closed] = left[unknown[closed]]
+        force = np.where(equality, force, np.maximum(force, 0.0))
+        left[unknown] -= force
+        if step == REFINED or np.abs(left[free]).max(initial=0.0) <= ROUND_OFF * largest:
+            break
+        # Stresses of stiff bodies are small differences of multipliers.
+        change = T @ solve(np.where(free, left, 0.0))
+        coefficients = [c + e.answer(change) for e, c in zip(elements, coefficients, strict=True)]
     sizes = [line.bound.size for line in lines]
     parts = np.split(force, np.cumsum(sizes)[:-1]) if lines else []
     pressure = [p.reshape(line.bound.shape) for p, line in zip(parts, lines, strict=True)]
-    return Solved(T @ found.u, pressure, left, len(found.steps))
+    return Solved(T @ y, coefficients, pressure, left, len(found.steps))
 
 
 def _basis(
