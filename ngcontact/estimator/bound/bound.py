@@ -124,8 +124,10 @@ def _summed(problem, cells, displacement, mu, elements, lines, found, given, ask
         )
     missed, reaction = _missed(problem, cells, displacement, elements, coefficients, lines, found, given, largest)
     loads = data_norms(cells, forces, missed, least)
-    u = np.abs(cells.trace.evaluate(displacement, np.arange(len(cells.trace.region)), np.zeros(len(cells.trace.region)))).max()
-    lifting = _lifted(problem, cells, asked, lines, order + LIFTED, float(u))
+    segment = np.arange(len(cells.trace.region))
+    size = np.abs(cells.trace.evaluate(displacement, segment, np.zeros(len(segment)))).max()
+    gaps = [np.abs(line.facing.gap).max(initial=0.0) for line in lines]
+    lifting = _lifted(problem, cells, asked, lines, order + LIFTED, max(float(size), *gaps, 0.0))
     closed = signed = 0.0
     for line, p in zip(lines, found.pressure, strict=True):
         closed += float((p * line.bound).sum())

@@ -301,18 +301,21 @@ def guides_of(cells: Cells, displacement: ng.CoefficientFunction, side: Index, d
 def _after(ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int) -> Array:
     """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
 
-    `ends` (k, 2) are the vertices of the sides, at which the gaps of neighbours are one number: 0
-    where all of them are `closed` (k,), but for `stiff` ones (k, 2), where bodies do not move.
+    `ends` (k, 2) are the vertices of the sides, at which r is one number of all neighbours: that
+    closes the gap where they are `closed` (k,), but not at `stiff` ones (k, 2), which do not move.
     """
-    B = bernstein(degree, PLACES) * np.sqrt(WEIGHTS)[:, None]
-    c = np.linalg.lstsq(B, (np.sqrt(WEIGHTS) * gap).T, rcond=None)[0].T
+    B, root = bernstein(degree, PLACES), np.sqrt(WEIGHTS)
+    c = np.empty((len(gap), degree + 1))
+    c[:, [0, -1]] = gap @ THROUGH[[0, -1]].T
+    rest = root * (gap - c[:, [0, -1]] @ B[:, [0, -1]].T)
+    c[:, 1:-1] = np.linalg.lstsq(root[:, None] * B[:, 1:-1], rest.T, rcond=None)[0].T
     _, number = np.unique(ends, return_inverse=True)
     number = number.reshape(-1, 2)
-    value, bare = np.zeros(number.size), np.zeros(number.size, dtype=bool)
-    np.maximum.at(value, number, np.where(stiff, gap @ THROUGH[[0, -1]].T, c[:, [0, -1]]))
+    lift, bare = np.full(number.size, -np.inf), np.zeros(number.size, dtype=bool)
     np.logical_or.at(bare, number[~closed], True)
     np.logical_or.at(bare, number[stiff], True)
-    value[~bare] = 0.0
+    np.maximum.at(lift, number, -c[:, [0, -1]])
+    lift[bare] = np.maximum(lift[bare], 0.0)
     after = np.where(closed[:, None], 0.0, np.maximum(c, 0.0))
-    after[:, [0, -1]] = value[number]
+    after[:, [0, -1]] = c[:, [0, -1]] + lift[number]
     return after

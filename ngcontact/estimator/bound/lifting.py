@@ -98,7 +98,7 @@ def _inverse(there: Array) -> Array:
 def lifting_of(
     problem: Problem, cells: Cells, asked: Sequence[Asked], degree: int, extent: float
 ) -> Array:
-    """Energy norms (n,) of w, of a degree, for displacements of a size `extent`."""
+    """Energy norms (n,) of w, of a degree, for displacements and gaps of a size `extent`."""
     norms = np.zeros(len(cells.triangles))
     needed = [one.side[np.abs(one.amount).max(axis=1, initial=0.0) > NOISE * extent] for one in asked]
     if not sum(map(len, needed)):
