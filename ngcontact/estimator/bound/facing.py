@@ -152,6 +152,8 @@ class Facing:
         Gap of u_h, lengths.
     after : ndarray (k, degree + 1)
         Bernstein coefficients of the gap of u_h + w, not negative.
+    open : ndarray of bool (k,)
+        Sides on which w adds nothing; `after` only tells that the gap of u_h is not negative.
     closed : ndarray of bool (k,)
         Sides in contact as a whole.
     share : ndarray (k, 2)
@@ -168,6 +170,7 @@ class Facing:
     weight: Array
     gap: Array
     after: Array
+    open: Mask
     closed: Mask
     share: Array
     equality: bool
@@ -175,7 +178,8 @@ class Facing:
     @property
     def lift(self) -> Array:
         """r (k, j): what w adds to the gap."""
-        return np.asarray(self.after @ bernstein(self.after.shape[1] - 1, PLACES).T - self.gap)
+        lift = self.after @ bernstein(self.after.shape[1] - 1, PLACES).T - self.gap
+        return np.where(self.open[:, None], 0.0, lift)
 
 
 def facing_of(
@@ -223,9 +227,10 @@ def facing_of(
         closed[on] = (cells.span[side[on]].mean(axis=1) < at) == (sign > 0)
     closed = closed | contact.bilateral
     shares, stiff = _shares(cells, side, other, there, d, held, share)
-    after = _after(cells.ends[side], gap, closed, stiff, degree)
-    after = np.zeros_like(after) if contact.bilateral else after
-    kept = side, other, there, d, weight, gap, after, closed, shares
+    after, bare = _after(cells.ends[side], gap, closed, stiff, degree)
+    if contact.bilateral:
+        after, bare = np.zeros_like(after), np.zeros_like(bare)
+    kept = side, other, there, d, weight, gap, after, bare, closed, shares
     return Facing(pair, *kept, contact.bilateral)
 
 
@@ -292,14 +297,19 @@ def guides_of(cells: Cells, displacement: ng.CoefficientFunction, side: Index, d
         weight=WEIGHTS * ds.reshape(k, j),
         gap=gap.reshape(k, j),
         after=np.zeros((k, degree + 1)),
+        open=np.zeros(k, dtype=bool),
         closed=np.ones(k, dtype=bool),
         share=np.ones((k, 2)),
         equality=True,
     )
 
 
-def _after(ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int) -> Array:
+def _after(
+    ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int
+) -> tuple[Array, Mask]:
     """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
+
+    And whether `gap` itself is not negative, and stays.
 
     `ends` (k, 2) are the vertices of the sides, at which r is one number of all neighbours: that
     closes the gap where they are `closed` (k,), but not at `stiff` ones (k, 2), which do not move.
@@ -318,4 +328,6 @@ def _after(ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int) -> A
     lift[bare] = np.maximum(lift[bare], 0.0)
     after = np.where(closed[:, None], 0.0, np.maximum(c, 0.0))
     after[:, [0, -1]] = c[:, [0, -1]] + lift[number]
-    return after
+    off = np.abs(c @ B.T - gap).max(axis=1, initial=0.0)
+    bare = ~closed & (c.min(axis=1) > off) & (lift[number] == 0).all(axis=1)
+    return after, bare

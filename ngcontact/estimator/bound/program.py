@@ -50,8 +50,7 @@ class Rows:
 def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
     """The rows of one line, with a pressure of a degree."""
     psi = bernstein(degree, PLACES)
-    gap = facing.after @ bernstein(facing.after.shape[1] - 1, PLACES).T
-    bound = (gap * facing.weight) @ psi
+    bound = ((facing.gap + facing.lift) * facing.weight) @ psi
     load = facing.weight[..., None] * facing.direction
     own = [_tested(mu, side, PLACES, psi, f) for side, f in zip(facing.side, load, strict=True)]
     opposite = [
