@@ -49,6 +49,8 @@ class Proof:
     parts: dict[str, float]
     below: float
     above: float
+    loads: Array
+    lifting: Array
 
 
 def error_bound(
@@ -128,7 +130,7 @@ def _summed(problem, cells, displacement, mu, elements, lines, found, given, ord
     below = parts["constitutive"] / 2 + signed - reaction + data
     above = crossed + reaction + closed - signed + parts["lifting"] / 2 + worked
     bound = (squares + 2 * closed + parts["lifting"]) ** 0.5
-    return Proof(cells, mu, elements, lines, found, coefficients, bound, parts, below, above)
+    return Proof(cells, mu, elements, lines, found, coefficients, bound, parts, below, above, loads, lifting)
 
 
 def _share(problem: Problem, cells: Cells, facing: Facing) -> float:
