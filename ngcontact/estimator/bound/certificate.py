@@ -14,7 +14,7 @@ from ...arrays import Array, Index
 from ...problem import Problem
 from .bound import Proof
 from .cells import Cells
-from .facing import PLACES, WEIGHTS, Facing
+from .facing import PLACES, WEIGHTS
 from .polynomials import scalars
 from .tractions import given_on, moments_of
 
