@@ -6,7 +6,7 @@ misses on Gamma_u and Gamma_K, without a constant
     |u - u_h|^2 <= B^2 = |s - sigma_h|^2 + 2 int p* (gap_h + r) + |w|^2,
 
 where gap_h + r >= 0 is the gap of u_h + w; docs/bounds.md has the proof. s and p* minimise B^2: they
-are the solution of the dual contact problem.
+solve the dual contact problem.
 """
 
 from __future__ import annotations
@@ -23,34 +23,100 @@ from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
 from .cells import Cells, cells_of
-from .elements import Element, Multipliers
-from .elements import elements as elements_of
-from .facing import PLACES, WEIGHTS, Facing, bernstein, cuts_of, facing_of, guides_of
-from .lifting import _carried, asked_on_contact, asked_on_supports, lifting_of
+from .elements import Element, Multipliers, elements_of
+from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of
+from .lifting import asked_on_line, asked_on_supports, lifting_of
 from .missed import data_norms
-from .program import Rows, Solved, rows_of, solved
-from .tractions import Given, given_on, moments_of
+from .program import Balanced, DualProgram, dual_program, exerted, pushed, rows_of
+from .refusals import refuse_bound, refuse_narrow
+from .tractions import Given, boundary_tractions, given_on, missed_tractions, moments_of
 
 LIFTED = 3  # degrees by which w is above u_h
+FELT = 1e-4  # of modulus times displacement over an element's size: stresses beside whose round-off
+# equilibrium is measured
 SETTLED = 1e-10  # residual of equilibrium, relative to the largest stress
 
 
 @dataclass(frozen=True, eq=False)
+class StressNorms:
+    """Of a stress s on n triangles, beside that of a displacement.
+
+    Attributes
+    ----------
+    coefficients : list of ndarray (b, m)
+        Of s on the triangles of each `Element`.
+    distance : ndarray (n,)
+        |s - C e|, roots of energies.
+    largest : float
+        Largest component of s, a stress.
+    """
+
+    coefficients: list[Array]
+    distance: Array
+    largest: float
+
+
+def stress_norms(elements: Sequence[Element], mu: Array, n: int) -> StressNorms:
+    """The stress with multipliers `mu` (d,) on the n triangles of `elements`."""
+    coefficients, distance, largest = [], np.zeros(n), 0.0
+    for e in elements:
+        c = e.coefficients(mu)
+        s = e.whole_stress(c)
+        strain = (e.compliance @ s[..., None])[..., 0] - e.strain
+        stress = (np.linalg.inv(e.compliance) @ strain[..., None])[..., 0]
+        energy = (e.weight * (strain * stress).sum(axis=2)).sum(axis=1)
+        distance[e.places.at] = np.sqrt(energy)
+        coefficients.append(c)
+        largest = max(largest, float(np.abs(s).max()))
+    return StressNorms(coefficients, distance, largest)
+
+
+@dataclass(frozen=True, eq=False)
 class Proof:
-    """What a bound was made of."""
+    """What a bound was made of.
+
+    Attributes
+    ----------
+    cells : Cells
+        The mesh of the stress, n triangles.
+    multipliers : Multipliers
+    elements : list of Element
+    given : Given
+    program : DualProgram
+    balanced : Balanced
+        The stress in equilibrium, and p*.
+    stress : StressNorms
+    loads : ndarray (n,)
+        Norms of what s misses of the data.
+    lifting : ndarray (n,)
+        Norms of w.
+    shares : list of float
+        Of the lifting of each line, that of the secondary.
+    bound : float
+        B, root of an energy per thickness.
+    parts : dict of float
+        What B^2 is the sum of.
+    below, above : float
+        L(u_h) - below <= L(u) <= L(u_h) + above, energies per thickness.
+    residual : float
+        Of equilibrium, relative to the largest stress.
+    """
 
     cells: Cells
-    mu: Multipliers
-    elements: Sequence[Element]
-    lines: Sequence[Rows]
-    found: Solved
-    coefficients: Sequence[Array]
+    multipliers: Multipliers
+    elements: list[Element]
+    given: Given
+    program: DualProgram
+    balanced: Balanced
+    stress: StressNorms
+    loads: Array
+    lifting: Array
+    shares: list[float]
     bound: float
     parts: dict[str, float]
     below: float
     above: float
-    loads: Array
-    lifting: Array
+    residual: float
 
 
 def error_bound(
@@ -58,156 +124,163 @@ def error_bound(
     trace: BoundaryTrace,
     displacement: ng.GridFunction,
     pairs: Sequence[ContactState],
-    order: int,
-    degree: int | None = None,
 ) -> Proof:
-    """Bound of the error of a displacement in the energy norm."""
-    extent = trace.model.extent
-    degree = max(order + 1, 2 + extent) if degree is None else degree
-    cuts, steps, ends = cuts_of(trace, displacement, pairs)
-    cells = cells_of(trace, cuts, steps, np.zeros(trace.mesh.ne, dtype=bool))
+    """Bound of the error of a displacement in the energy norm.
+
+    Parameters
+    ----------
+    problem, trace, displacement, pairs
+        See `Estimator`.
+
+    Raises
+    ------
+    ValueError
+        A problem for which no bound is known.
+    ContactError
+        No equilibrated stress.
+    """
+    refuse_bound(problem, trace, pairs)
+    refuse_narrow(problem, trace)
+    order, extent = trace.order, trace.model.extent
+    degree, lifted = max(order + 1, 2 + extent), order + LIFTED
+    cuts, ends = cuts_of(trace, displacement, pairs)
+    lines = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
+    loaded = trace.segments(*problem.traction, problem.sliding, *lines)
+    whole = [name for name, values in problem.displacement.items() if None not in values]
+    cells = cells_of(trace, cuts, loaded, trace.segments(*whole))
     mu, elements = elements_of(problem, cells, displacement, degree)
     given = given_on(problem, cells)
-    facing = [
-        facing_of(cells, displacement, pair, end, order + LIFTED)
+    lines = [
+        rows_of(mu, facing_of(cells, displacement, pair, end, lifted), degree - extent)
         for pair, end in zip(pairs, ends, strict=True)
     ]
-    lines = [rows_of(mu, one, degree - extent) for one in facing]
-    for k in np.unique(mu.degree[given.guides]).tolist():
-        side = given.guides[mu.degree[given.guides] == k]
-        guide = guides_of(cells, displacement, side, order + LIFTED)
+    of_guides = mu.degree[given.guides]
+    for k in np.unique(of_guides).tolist():
+        guide = guides_of(cells, displacement, given.guides[of_guides == k], lifted)
         lines.append(rows_of(mu, guide, k - extent))
     moments, fixed = moments_of(problem, cells, mu, given)
-    found = solved(mu, elements, moments, fixed, lines)
-    return _summed(problem, cells, displacement, mu, elements, lines, found, given, order)
-
-
-def _summed(problem, cells, displacement, mu, elements, lines, found, given, order) -> Proof:
-    n, extent = len(cells.triangles), cells.trace.model.extent
-    constitutive, forces, least = np.zeros(n), np.zeros(n), np.zeros(n)
-    coefficients, largest = [], 0.0
-    for e in elements:
-        c = e.coefficients(found.mu)
-        coefficients.append(c)
-        s = e.stress(c, e.places.x)
-        if extent:
-            s[..., 2] += e.radial
-        D = e.compliance
-        off = (D @ s[..., None])[..., 0] - e.strain
-        both = off * (np.linalg.inv(D) @ off[..., None])[..., 0]
-        at = e.places.at
-        constitutive[at] = np.sqrt((e.weight * both.sum(axis=2)).sum(axis=1))
-        forces[at] = e.missed
-        largest = max(largest, float(np.abs(s).max()))
-        half = np.ones(D.shape[-1])
-        half[-1] = 0.5**0.5
-        eig = np.linalg.eigvalsh(D * half * half[:, None])[..., -1].max(axis=1)
-        least[at] = 1 / eig
-    if extent:
-        least *= np.maximum(cells.trace.model.measure(cells.corners.reshape(-1, 2)).reshape(n, 3).min(axis=1), 1e-300)
-    missed, reaction = _missed(problem, cells, displacement, elements, coefficients, lines, found, given, largest)
-    loads = data_norms(cells, forces, missed, least)
-    shares = [_share(problem, cells, line.facing) for line in lines]
-    asked = asked_on_supports(problem, cells, displacement)
+    program = dual_program(mu, elements, fixed, lines)
+    balanced = program.nearest(moments - exerted(elements, np.zeros_like(moments)))
+    n = len(cells.triangles)
+    stress = stress_norms(elements, balanced.mu, n)
+    extent_of_u = _size(trace, displacement)
+    scale = max(stress.largest, FELT * _stiffest(elements) * extent_of_u / cells.diameters.min())
+    left = moments - exerted(elements, balanced.mu) - pushed(mu, lines, balanced.pressure)
+    residual = _residual(cells, mu, np.where(fixed, 0.0, left), scale)
+    if residual > SETTLED:
+        raise ContactError(
+            f"no equilibrated stress was found: the residual relative to the largest stress is "
+            f"{residual:.1e}"
+        )
+    have = boundary_tractions(cells, elements, stress.coefficients)
+    missed = missed_tractions(
+        problem, cells, given, lines, balanced.pressure, have, stress.largest
+    )
+    loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(cells, elements))
+    shares = [_share(line.facing) for line in lines]
+    asked = asked_on_supports(cells, given, displacement)
     for line, share in zip(lines, shares, strict=True):
-        asked += asked_on_contact(cells, line.facing, share)
-    u = np.abs(cells.trace.evaluate(displacement, np.arange(len(cells.trace.region)), np.zeros(len(cells.trace.region)))).max()
-    lifting = lifting_of(problem, cells, asked, order + LIFTED, float(u))
-    closed = signed = 0.0
-    for line, p in zip(lines, found.pressure, strict=True):
+        asked += asked_on_line(line.facing, line.facing.lift, share)
+    lifting = lifting_of(problem, cells, asked, lifted, extent_of_u)
+    closed, signed = 0.0, 0.0
+    for line, p in zip(lines, balanced.pressure, strict=True):
         closed += float((p * line.bound).sum())
-        density = p @ bernstein(p.shape[1] - 1, PLACES).T * line.facing.weight
-        signed += float((density * line.facing.gap).sum())
-    squares = float(((constitutive + loads) ** 2).sum())
+        signed += work_on_gap(line.facing, p, line.facing.gap)
+    parts, below, above = _summed(
+        stress.distance, loads, lifting, closed, signed, have.work(cells, given, displacement)
+    )
+    return Proof(
+        cells=cells,
+        multipliers=mu,
+        elements=elements,
+        given=given,
+        program=program,
+        balanced=balanced,
+        stress=stress,
+        loads=loads,
+        lifting=lifting,
+        shares=shares,
+        bound=sum(parts.values()) ** 0.5,
+        parts=parts,
+        below=below,
+        above=above,
+        residual=residual,
+    )
+
+
+def _summed(
+    constitutive: Array,
+    loads: Array,
+    lifting: Array,
+    closed: float,
+    signed: float,
+    reaction: float,
+) -> tuple[dict[str, float], float, float]:
+    """The parts of B^2, and how far the energy is below and above that of u_h.
+
+    `closed` is the integral of p* (gap_h + r), `signed` that of p* gap_h, `reaction` the work of
+    s n on u_D - u_h.
+    """
+    both, own = constitutive + loads, float(constitutive @ constitutive)
     parts = {
-        "constitutive": float(constitutive @ constitutive),
+        "constitutive": own,
         "complementarity": 2 * closed,
         "lifting": float(lifting @ lifting),
-        "loads": squares - float(constitutive @ constitutive),
+        "loads": float(both @ both) - own,
     }
-    crossed, worked = float(constitutive @ lifting), float(loads @ lifting)
+    worked = float(loads @ lifting)
     data = float(loads @ constitutive + loads @ loads / 2) + 2 * worked
-    below = parts["constitutive"] / 2 + signed - reaction + data
-    above = crossed + reaction + closed - signed + parts["lifting"] / 2 + worked
-    bound = (squares + 2 * closed + parts["lifting"]) ** 0.5
-    return Proof(cells, mu, elements, lines, found, coefficients, bound, parts, below, above, loads, lifting)
+    below = own / 2 + signed - reaction + data
+    above = float(constitutive @ lifting) + reaction + closed - signed
+    return parts, below, above + parts["lifting"] / 2 + worked
 
 
-def _share(problem: Problem, cells: Cells, facing: Facing) -> float:
-    """Of the lifting, that the secondary takes: by compliance."""
-    if len(facing.side) == 0 or (facing.other < 0).any():
-        return 1.0
-    return 0.5
+def work_on_gap(facing: Facing, pressure: Array, gap: Array) -> float:
+    """Integral of a pressure (k, j) in Bernstein polynomials times a gap at Gauss points."""
+    density = pressure @ bernstein(pressure.shape[1] - 1, PLACES).T * facing.weight
+    return float((density * gap).sum())
 
 
-def _missed(problem, cells, displacement, elements, coefficients, lines, found, given, largest):
-    """L2 norms (n, 3) of tractions that s misses on the boundary; work of s n on u_D - u_h."""
-    trace = cells.trace
-    side = np.flatnonzero(cells.segment >= 0)
-    position = np.full(len(cells.ends), -1)
-    position[side] = np.arange(len(side))
-    k, j = len(side), len(PLACES)
-    every, t = np.repeat(side, j), np.tile(PLACES, k)
-    x, dx = cells.points(every, t)
-    x, dx = x.reshape(k, j, 2), dx.reshape(k, j, 2)
-    measure = trace.model.measure(x.reshape(-1, 2)).reshape(k, j)
-    length = np.linalg.norm(dx, axis=2)
-    # tractions of s, per ds
-    have = np.zeros((k, j, 2))
-    for e, c in zip(elements, coefficients, strict=True):
-        number = np.full(len(cells.triangles), -1)
-        number[e.places.at] = np.arange(len(e.places.at))
-        mine = np.flatnonzero(number[cells.owner[side]] >= 0)
-        if not mine.size:
-            continue
-        some = number[cells.owner[side[mine]]]
-        at = e.places.at[some]
-        s = e.stress(c, x[mine], some)
-        back = cells.backward[at, cells.local[side[mine]]]
-        slope = np.where(back[:, None, None], -dx[mine], dx[mine])
-        nx, ny = slope[..., 1], -slope[..., 0]
-        have[mine] = np.stack([s[:, :, 0] * nx + s[:, :, -1] * ny, s[:, :, -1] * nx + s[:, :, 1] * ny], axis=-1)
-    have /= length[..., None]
-    asked = np.zeros_like(have)
-    for pattern, at in given.loads:
-        segment, s = cells.on_side(np.repeat(at, j), np.tile(PLACES, len(at)))
-        asked[position[at]] += trace.evaluate(problem.traction_vector(pattern), segment, s).reshape(-1, j, 2)
-    for line, p in zip(lines, found.pressure, strict=True):
-        f = line.facing
-        density = (p @ bernstein(p.shape[1] - 1, PLACES).T * f.weight / WEIGHTS)[..., None] * f.direction
-        at = position[f.side]
-        asked[at] -= density / (length[at] * measure[at])[..., None]
-        if (f.other >= 0).all() and len(f.other):
-            at = position[f.other]
-            rate = np.abs(_rates(f))
-            asked[at] += _carried(f, density) * rate[..., None] / (length[at] * measure[at])[..., None]
-    miss = np.where(given.held[side][:, None], 0.0, asked - have)
-    square = ((WEIGHTS * length * measure**2)[..., None] * miss**2).sum(axis=(1, 2))
-    # Round-off
-    size = length.mean(axis=1) * (measure**2).mean(axis=1)
-    square = np.where(square <= (1e-12 * largest) ** 2 * size, 0.0, square)
-    norms = np.zeros((len(cells.triangles), 3))
-    norms[cells.owner[side], cells.local[side]] = np.sqrt(square)
-    reaction = 0.0
-    for pattern, values in problem.displacement.items():
-        at = np.flatnonzero(np.isin(cells.segment, trace.segments(pattern)))
-        segment, s = cells.on_side(np.repeat(at, j), np.tile(PLACES, len(at)))
-        u = trace.evaluate(displacement, segment, s)
-        p = position[at]
-        ds = WEIGHTS * length[p] * measure[p]
-        for c, value in enumerate(values):
-            if value is not None:
-                rest = (trace.evaluate(ng.CF(value), segment, s)[:, 0] - u[:, c]).reshape(-1, j)
-                reaction += float((ds * have[p][..., c] * rest).sum())
-    return norms, reaction
+def forces_missed(elements: Sequence[Element], n: int) -> Array:
+    """Norms (n,) of body forces that stresses do not balance."""
+    missed = np.zeros(n)
+    for e in elements:
+        missed[e.places.at] = e.missed
+    return missed
 
 
-def _rates(facing: Facing) -> Array:
-    """dt / dt' (k, j) at the Gauss points of the primary's sides."""
-    from ...lagrange import lagrange_derivative
-    from .facing import DATA
-    from .lifting import THROUGH, _inverse
+def smallest_moduli(cells: Cells, elements: Sequence[Element]) -> Array:
+    """Smallest eigenvalue (n,) of C in Mandel's scaling, times the least measure."""
+    found = np.zeros(len(cells.triangles))
+    for e in elements:
+        mandel = np.ones(e.compliance.shape[-1])
+        mandel[-1] = 0.5**0.5
+        scaled = e.compliance * mandel * mandel[:, None]
+        found[e.places.at] = 1 / np.linalg.eigvalsh(scaled)[..., -1].max(axis=1)
+    measure = cells.trace.model.measure(cells.corners.reshape(-1, 2))
+    return found * measure.reshape(-1, 3).min(axis=1)
 
-    at = _inverse(facing.there)
-    slopes = lagrange_derivative(DATA, at.ravel()).reshape(*at.shape, -1)
-    return 1 / np.einsum("kji,il,kl->kj", slopes, THROUGH, facing.there)
+
+def _residual(cells: Cells, mu: Multipliers, left: Array, largest: float) -> float:
+    """Largest force `left` (d,), over the triangle's diameter, its measure and largest stress."""
+    side = np.repeat(np.arange(len(cells.ends)), np.diff(mu.start))
+    middle = cells.vertices[cells.ends].mean(axis=1)
+    size = cells.diameters[cells.owner] * cells.trace.model.measure(middle) * (largest or 1.0)
+    at = np.flatnonzero(size[side] > 0)  # on the axis there is no traction
+    return float((np.abs(left[at]) / size[side[at]]).max(initial=0.0))
+
+
+def _stiffest(elements: Sequence[Element]) -> float:
+    """The largest modulus, of stresses in place of its inverse, C^-1."""
+    return max(1 / float(np.diagonal(e.compliance, axis1=-2, axis2=-1).min()) for e in elements)
+
+
+def _share(facing: Facing) -> float:
+    """Of the lifting, that the secondary takes."""
+    return 0.5 if len(facing.side) and (facing.other >= 0).all() else 1.0
+
+
+def _size(trace: BoundaryTrace, displacement: ng.GridFunction) -> float:
+    """The largest displacement at a vertex of the boundary."""
+    every = np.arange(len(trace.region))
+    return float(np.abs(trace.evaluate(displacement, every, np.zeros(len(every)))).max())

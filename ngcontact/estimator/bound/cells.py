@@ -22,6 +22,7 @@ from ...problem import Triangulation
 
 REFERENCE = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])  # NGSolve's corners, in this order
 NEWTON_STEPS = 8
+TURN = 0.01  # twice the sine of the angle between sides up to which they are on one line
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,10 +231,7 @@ def places(cells: Cells, at: Index, order: int) -> Places:
 
 
 def cells_of(
-    trace: BoundaryTrace,
-    cuts: Mapping[int, Sequence[float]],
-    steps: Mapping[int, Sequence[float]],
-    divided: Mask,
+    trace: BoundaryTrace, cuts: Mapping[int, Sequence[float]], loaded: Index, held: Index
 ) -> Cells:
     """Divide the mesh.
 
@@ -242,11 +240,8 @@ def cells_of(
     trace : BoundaryTrace
     cuts : dict of int to sequence of float
         Rising parameters s of new vertices on segments of the boundary.
-    steps : dict of int to sequence of float
-        Those of them at which tractions may jump: three triangles meet there, since two with one
-        straight line as sides leave symmetric stresses no freedom.
-    divided : ndarray of bool (ne,)
-        Elements that get a vertex in their middle.
+    loaded, held : ndarray of int (k,)
+        Segments that carry something, and those on which the whole displacement is prescribed.
     """
     view = Triangulation(trace.mesh)
     old, ends = view.triangles, view.segments
@@ -255,7 +250,7 @@ def cells_of(
     bent[:-1], cut[list(cuts)] = trace.curved_segments, True
     special = (bent | cut)[segment]
     beside = bent[segment].any(axis=1) & ((segment >= 0).sum(axis=1) > 1)
-    middle = divided | (special.sum(axis=1) > 1) | beside
+    middle = (special.sum(axis=1) > 1) | beside
     parts = np.flatnonzero(middle | cut[segment].any(axis=1))
     whole = np.setdiff1d(np.arange(len(old)), parts)
     roll = (special[whole].argmax(axis=1)[:, None] + np.arange(3)) % 3  # the base first
@@ -263,7 +258,7 @@ def cells_of(
     triangles = np.take_along_axis(old[whole], roll, axis=1)
     ahead = ends[own, 0] == np.roll(triangles, -1, axis=1)
     spans = np.where(ahead[:, :, None], [0.0, 1.0], [1.0, 0.0])
-    made = _Parts(trace, view, segment, cuts, steps)
+    made = _Parts(trace, view, segment, cuts)
     for e in parts.tolist():
         made.divide(e, None if middle[e] else int(special[e].argmax()))
     new = made.arrays()
@@ -271,10 +266,26 @@ def cells_of(
     triangles, reference, parent, own, spans = (
         np.concatenate(pair) for pair in zip(both, new, strict=True)
     )
+    vertices = np.concatenate([view.vertices, *made.places])
+    curved = bent[own[:, 0]]
+    cells = _joined(trace, vertices, triangles, reference, parent, own, spans, curved)
+    return _parted(cells, dependent(cells, loaded, held))
+
+
+def _joined(
+    trace: BoundaryTrace,
+    vertices: Array,
+    triangles: Index,
+    reference: Array,
+    parent: Index,
+    own: Index,
+    spans: Array,
+    curved: Mask,
+) -> Cells:
+    """Cells of which segments `own` (n, 3) and `spans` (n, 3, 2) at sides are known."""
     start = np.roll(triangles, -1, axis=1).ravel()
     stop = np.roll(triangles, -2, axis=1).ravel()
     low, high = np.minimum(start, stop), np.maximum(start, stop)
-    vertices = np.concatenate([view.vertices, *made.places])
     _, first, sides = np.unique(low * len(vertices) + high, return_index=True, return_inverse=True)
     span = spans.reshape(-1, 2)[first]
     return Cells(
@@ -289,8 +300,71 @@ def cells_of(
         local=first % 3,
         segment=np.where(trace.inner[own.ravel()[first]], -1, own.ravel()[first]),
         span=np.where((start > stop)[first, None], span[:, ::-1], span),
-        curved=bent[own[:, 0]],
+        curved=curved,
     )
+
+
+def _parted(cells: Cells, at: Index) -> Cells:
+    """Triangles `at` (k,) in three about their middles."""
+    own, spans = cells.segment[cells.sides], cells.span[cells.sides]
+    spans = np.where(cells.backward[..., None], spans[..., ::-1], spans)
+    rest = np.setdiff1d(np.arange(len(cells.triangles)), at)
+    middle = len(cells.vertices) + np.arange(len(at))
+    place, inside = cells.reference[at].mean(axis=1), np.full(len(at), -1)
+    parts = [[x[rest]] for x in (cells.triangles, cells.reference, cells.parent, own, spans)]
+    whole = np.broadcast_to([0.0, 1.0], (len(at), 2))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        corners, reference = cells.triangles[at], cells.reference[at]
+        new = (
+            np.stack([middle, corners[:, j], corners[:, k]], axis=1),
+            np.stack([place, reference[:, j], reference[:, k]], axis=1),
+            cells.parent[at],
+            np.stack([own[at, i], inside, inside], axis=1),
+            np.stack([spans[at, i], whole, whole], axis=1),
+        )
+        for values, value in zip(parts, new, strict=True):
+            values.append(value)
+    vertices = np.concatenate([cells.vertices, cells.corners[at].mean(axis=1)])
+    curved = np.concatenate([cells.curved[rest], cells.curved[at], np.zeros(2 * len(at), bool)])
+    return _joined(cells.trace, vertices, *(np.concatenate(x) for x in parts), curved)
+
+
+def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
+    """Triangles (k,) at vertices where given tractions may be those of no symmetric stress.
+
+    Where n and m are the normals of two sides of a triangle, n.(s m) = m.(s n) at their vertex.
+    Around a vertex of the boundary all sides of which lie on two lines, as at a corner of one
+    triangle or between two on a straight boundary, these equations have a sum without tractions of
+    inner sides: a condition on those that are given. Another triangle there takes it away.
+
+    Parameters
+    ----------
+    cells : Cells
+    loaded, held : ndarray of int (k,)
+        As of `cells_of`.
+    """
+    count = len(cells.vertices)
+    border = ~cells.inner
+    carries, free = np.zeros((2, count), dtype=bool)
+    carries[cells.ends[border & np.isin(cells.segment, loaded)]] = True
+    free[cells.ends[border & np.isin(cells.segment, held)]] = True
+    side, end = np.nonzero((carries & ~free)[cells.ends])
+    vertex = cells.ends[side, end]
+    _, along = cells.points(side, end.astype(float))
+    line = along @ np.array([1.0, 1j])
+    line = line**2 / np.abs(line) ** 2  # one number for both senses
+    at_two = np.zeros(count, dtype=bool)
+    at_two[vertex] = True
+    left = np.arange(len(vertex))
+    for _ in range(2):  # take away the sides of one line
+        one = np.zeros(count, dtype=complex)
+        one[vertex[left]] = line[left]
+        left = left[np.abs(line[left] - one[vertex[left]]) > TURN]
+    at_two[vertex[left]] = False
+    chosen = np.full(count, -1)
+    order = np.argsort(~cells.curved, kind="stable")  # straight ones if there are any
+    chosen[cells.triangles[order]] = order[:, None]
+    return np.unique(chosen[at_two])
 
 
 @dataclass(eq=False)
@@ -301,7 +375,6 @@ class _Parts:
     view: Triangulation
     segment: Index
     cuts: Mapping[int, Sequence[float]]
-    steps: Mapping[int, Sequence[float]]
 
     def __post_init__(self) -> None:
         self.count = len(self.view.vertices)
@@ -339,34 +412,14 @@ class _Parts:
                     own[2] = int(segment[k]) if m == 0 else -1
                 spans = [(s[m], s[m + 1]), *(self._whole(own[c], (j, k)[c - 1], e) for c in (1, 2))]
                 corners = [at, place[m], place[m + 1]]
-                loose = min(s[m], s[m + 1]) in self.steps.get(number, ())
-                self._put([apex, chain[m], chain[m + 1]], corners, e, own, spans, loose)
+                made = ([apex, chain[m], chain[m + 1]], corners, e, own, spans)
+                for values, value in zip(self.rows, made, strict=True):
+                    values.append(value)
 
     def _whole(self, segment: int, side: int, e: int) -> tuple[float, float]:
         """Parameters of a whole segment along a side of an element."""
         start = self.view.triangles[e, (side + 1) % 3]
         return (0.0, 1.0) if self.view.segments[segment, 0] == start else (1.0, 0.0)
-
-    def _put(
-        self, triangle: list, corners: list, e: int, own: list, spans: list, divided: bool
-    ) -> None:
-        """Keep a triangle, or three about its middle."""
-        if not divided:
-            for values, value in zip(self.rows, (triangle, corners, e, own, spans), strict=True):
-                values.append(value)
-            return
-        x = np.concatenate([self.view.vertices, *self.places])[triangle].mean(axis=0)
-        (middle,), at = self._added(x[None]), np.mean(corners, axis=0)
-        for i in range(3):
-            ends = (i + 1) % 3, (i + 2) % 3
-            self._put(
-                [middle, *(triangle[c] for c in ends)],
-                [at, *(corners[c] for c in ends)],
-                e,
-                [own[i], -1, -1],
-                [spans[i], (0.0, 1.0), (0.0, 1.0)],
-                divided=False,
-            )
 
     def arrays(self) -> tuple[Array, ...]:
         """Triangles, corners in the parents, parents, segments and their spans at the sides."""

@@ -12,7 +12,7 @@ in the norm of C^-1, and the tractions of s are N'A^-1 N mu + N'A^-1 g + <s_p n,
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import ngsolve as ng
 import numpy as np
@@ -98,14 +98,39 @@ class Element:
         y = self.g + np.einsum("bmd,bd->bm", self.N, mu[self.dofs])
         return np.linalg.solve(self.root.transpose(0, 2, 1), y[..., None])[..., 0]
 
+    def basis(self, x: Array, some: Index | slice = slice(None)) -> Array:
+        """T (b, q, v, m) at points `x` (b, q, 2)."""
+        frame, axial = self.frame[some], self.strain.shape[2] > 3
+        return stresses(self.degree, frame, x, frame.local(x), axial, self.on_axis)
+
+    def of_strain(self, strain: Array) -> Element:
+        """The same triangles for another displacement, strains (b, q, v), without body forces."""
+        b, q, v = strain.shape
+        T = self.basis(self.places.x)
+        g = np.einsum("bqvm,bqv->bm", T, self.weight[..., None] * strain)
+        return replace(
+            self,
+            strain=strain,
+            force=np.zeros_like(self.force),
+            radial=np.zeros_like(self.radial),
+            missed=np.zeros_like(self.missed),
+            g=np.linalg.solve(self.root, g[..., None])[..., 0],
+            own=np.zeros_like(self.own),
+        )
+
+    def whole_stress(self, c: Array) -> Array:
+        """s (b, q, v) at the quadrature points, the radial force's part of the hoop included."""
+        s = self.stress(c, self.places.x)
+        if s.shape[2] > 3:
+            s[..., 2] += self.radial
+        return s
+
     def stress(self, c: Array, x: Array, some: Index | slice = slice(None)) -> Array:
         """s (b, q, v) at points `x` (b, q, 2) for coefficients `c` (b, m), without radial forces."""
-        axial = self.strain.shape[2] > 3
-        frame = self.frame[some]
-        T = stresses(self.degree, frame, x, frame.local(x), axial, self.on_axis)
-        s = np.einsum("bqvm,bm->bqv", T, c[some])
+        s = np.einsum("bqvm,bm->bqv", self.basis(x, some), c[some])
         if self.force.any():
-            s = s + balancing(self.force_degree, frame, x, self.force[some], axial)
+            axial = self.strain.shape[2] > 3
+            s = s + balancing(self.force_degree, self.frame[some], x, self.force[some], axial)
         return s
 
 
@@ -137,7 +162,7 @@ def multipliers(cells: Cells, degree: int) -> tuple[Index, Multipliers]:
     return own, Multipliers(of_side, start)
 
 
-def elements(
+def elements_of(
     problem: Problem, cells: Cells, displacement: ng.CoefficientFunction, degree: int
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, and their multipliers."""

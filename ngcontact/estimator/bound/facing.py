@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import ngsolve as ng
 import numpy as np
@@ -13,7 +14,7 @@ from ...arrays import Array, Index, Mask
 from ...contact import FACING, ContactState, divided, jacobian, partners, prescribed_gap
 from ...errors import ContactError
 from ...fem import BoundaryTrace
-from ...lagrange import gauss
+from ...lagrange import gauss, lagrange, lagrange_derivative
 from ...problem import Contact
 from .cells import Cells
 
@@ -22,7 +23,14 @@ DATA = 16  # degree of the polynomials that stand for gaps and prescribed displa
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
 PLACES, WEIGHTS = gauss(2 * DATA)
+THROUGH = np.linalg.inv(lagrange(DATA, PLACES))  # from values at `PLACES` to Gauss-Lobatto points
+NEWTON_STEPS = 12
 SAMPLES = 200  # places on a segment among which the last zero of the gap is sought
+
+
+def at_places(shapes: Callable[[int, Array], Array], t: Array) -> Array:
+    """Polynomials (k, j, DATA + 1) of Gauss-Lobatto points, or their derivatives, at t (k, j)."""
+    return shapes(DATA, t.ravel()).reshape(*t.shape, -1)
 
 
 def bernstein(degree: int, t: Array) -> Array:
@@ -70,21 +78,18 @@ def met(
 
 def cuts_of(
     trace: BoundaryTrace, displacement: ng.CoefficientFunction, pairs: Sequence[ContactState]
-) -> tuple[dict[int, Array], dict[int, Array], list[dict[int, tuple[float, int]]]]:
-    """Places s of vertices to come, by segment; those where p* may jump; where contact ends.
+) -> tuple[dict[int, Array], list[dict[int, tuple[float, int]]]]:
+    """Places s of vertices to come, by segment; where contact ends.
 
     The latter pair by pair as (s, sign): contact lies towards s = 0 for the sign 1.
     """
     cuts: dict[int, list[float]] = {}
-    steps: dict[int, list[float]] = {}
     every = []
     for pair in pairs:
         line, contact = pair.line, pair.line.contact
         ends = _ends(trace, displacement, pair)
         every.append(ends)
         mine: dict[int, list[float]] = {k: [s] for k, (s, _) in ends.items()}
-        for k, (s, _) in ends.items():
-            steps.setdefault(k, []).append(s)
         if contact.primary is not None:
             parts = divided(trace, contact, line.segments, line.facing)
             own = line.segments[parts.local]
@@ -94,16 +99,12 @@ def cuts_of(
             s = np.concatenate([np.zeros(len(line.segments)), np.ones(len(line.segments)), *mine.values()])
             d = directions(trace, contact, k, s)
             there, t, *_ = partners(trace, line.facing, k, trace.point(k, s), d)
-            ended = np.isin(s, [at for at, _ in ends.values()])
             for m in np.flatnonzero(there >= 0):
                 cuts.setdefault(int(there[m]), []).append(float(t[m]))
-                if ended[m]:
-                    steps.setdefault(int(there[m]), []).append(float(t[m]))
         for k, places in mine.items():
             cuts.setdefault(k, []).extend(places)
     inside = {k: _inside(np.array(s)) for k, s in cuts.items()}
-    loose = {k: _inside(np.array(s)) for k, s in steps.items()}
-    return {k: s for k, s in inside.items() if s.size}, loose, every
+    return {k: s for k, s in inside.items() if s.size}, every
 
 
 def _inside(s: Array) -> Array:
@@ -173,6 +174,27 @@ class Facing:
     after: Array
     closed: Mask
     equality: bool
+
+    @cached_property
+    def back(self) -> Array:
+        """t (k, j) of the secondary opposite to the Gauss points of the primary's sides."""
+        nodes = self.there @ THROUGH.T
+        t = np.where((nodes[:, -1] < nodes[:, 0])[:, None], 1 - PLACES, PLACES)
+        for _ in range(NEWTON_STEPS):
+            value = np.einsum("kji,ki->kj", at_places(lagrange, t), nodes)
+            slope = np.einsum("kji,ki->kj", at_places(lagrange_derivative, t), nodes)
+            t = np.clip(t - (value - PLACES) / slope, 0.0, 1.0)
+        return t
+
+    @cached_property
+    def rates(self) -> Array:
+        """|dt| of the secondary per dt of the primary, (k, j), at the latter's Gauss points."""
+        slopes = at_places(lagrange_derivative, self.back)
+        return np.abs(1 / np.einsum("kji,il,kl->kj", slopes, THROUGH, self.there))
+
+    def on_primary(self, values: Array) -> Array:
+        """Functions (k, j, c) of the secondary's t at the Gauss points of the primary's sides."""
+        return np.einsum("kji,il,klc->kjc", at_places(lagrange, self.back), THROUGH, values)
 
     @property
     def lift(self) -> Array:

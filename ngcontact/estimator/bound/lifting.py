@@ -23,13 +23,13 @@ from ...problem import Problem
 from ...triplets import from_triplets
 from .cells import Cells, Places, places
 from .elements import CORNERS, compliance_at
-from .facing import DATA, PLACES, Facing
+from .facing import DATA, PLACES, THROUGH, Facing
 from .polynomials import legendre_table, products
+from .tractions import Given
 
 NOISE = 1e-13  # of what is asked for, relative to the displacement: round-off
 PARALLEL = 1e-8  # sine of the angle between directions at a vertex that are one
 INCONSISTENT = 1e-9  # of what is asked for at a vertex, relative to it
-THROUGH = np.linalg.inv(lagrange(DATA, PLACES))  # from values at `PLACES` to Gauss-Lobatto points
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,56 +42,30 @@ class Asked:
 
 
 def asked_on_supports(
-    problem: Problem, cells: Cells, displacement: ng.CoefficientFunction
+    cells: Cells, given: Given, displacement: ng.CoefficientFunction
 ) -> list[Asked]:
     """u_D - u_h in each prescribed component."""
-    trace, found = cells.trace, []
-    for pattern, values in problem.displacement.items():
-        side = np.flatnonzero(np.isin(cells.segment, trace.segments(pattern)))
-        k, j = len(side), len(PLACES)
+    trace, found, j = cells.trace, [], len(PLACES)
+    for values, side in given.supports:
+        k = len(side)
         segment, s = cells.on_side(np.repeat(side, j), np.tile(PLACES, k))
         u = trace.evaluate(displacement, segment, s)
         for c, value in enumerate(values):
             if value is not None:
-                wanted = trace.evaluate(ng.CF(value), segment, s)[:, 0] - u[:, c]
+                rest = trace.evaluate(ng.CF(value), segment, s)[:, 0] - u[:, c]
                 d = np.broadcast_to(np.eye(2)[c], (k, j, 2))
-                found.append(Asked(side, d, wanted.reshape(k, j)))
+                found.append(Asked(side, d, rest.reshape(k, j)))
     return found
 
 
-def asked_on_contact(cells: Cells, facing: Facing, share: float) -> list[Asked]:
-    """-r on the secondary and r on the primary, of which the secondary takes a share."""
-    found = [Asked(facing.side, facing.direction, -share * facing.lift)]
+def asked_on_line(facing: Facing, r: Array, share: float) -> list[Asked]:
+    """-r (k, j) on the secondary and r on the primary; the secondary takes a share."""
+    found = [Asked(facing.side, facing.direction, -share * r)]
     if share < 1:
-        # At the places of the secondary; the primary's own are other ones.
-        r = (1 - share) * facing.lift
-        d, values = _carried(facing, facing.direction), _carried(facing, r[..., None])[..., 0]
-        found.append(Asked(facing.other, d, values))
+        both = np.concatenate([facing.direction, (1 - share) * r[..., None]], axis=2)
+        there = facing.on_primary(both)
+        found.append(Asked(facing.other, there[..., :2], there[..., 2]))
     return found
-
-
-def _carried(facing: Facing, values: Array) -> Array:
-    """Functions (k, j, c) of the secondary's t at the Gauss points of the primary's sides."""
-    k, j = facing.there.shape
-    at = _inverse(facing.there)
-    shapes = lagrange(DATA, at.ravel()).reshape(k, j, -1)
-    return np.einsum("kji,il,klc->kjc", shapes, THROUGH, values)
-
-
-def _inverse(there: Array) -> Array:
-    """Secondary's t (k, j) of the primary's Gauss points, for monotone maps `there` (k, j)."""
-    nodes = there @ THROUGH.T
-    back = nodes[:, -1] < nodes[:, 0]
-    t = np.where(back[:, None], 1 - PLACES, PLACES)
-    for _ in range(20):
-        flat = t.ravel()
-        value = np.einsum("kji,ki->kj", lagrange(DATA, flat).reshape(*t.shape, -1), nodes)
-        slope = np.einsum("kji,ki->kj", lagrange_derivative(DATA, flat).reshape(*t.shape, -1), nodes)
-        step = (value - PLACES) / slope
-        t = np.clip(t - step, 0.0, 1.0)
-        if np.abs(step).max(initial=0.0) < 1e-14:
-            break
-    return t
 
 
 def lifting_of(

@@ -10,18 +10,19 @@ psi_j Bernstein polynomials: a quadratic program whose forces are the coefficien
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 
-from ...arrays import Array, Index, Mask
+from ...arrays import Array, Factor, Index, Mask
 from ...linalg import cholesky, lower_half
-from ...qp import QuadraticProgram, bordered_systems, minimise
+from ...qp import LinearSystems, QuadraticProgram, bordered_systems, minimise
 from ...triplets import from_triplets
 from .elements import Element, Multipliers, traces
 from .facing import PLACES, Facing, bernstein
 
+FALLING = 0.5  # ratio of two residuals from which more corrections take nothing off
 DEFINITE = 1e-11  # of the diagonal, added to what is factorised: vertices where tractions depend
 
 
@@ -67,82 +68,167 @@ def _tested(mu: Multipliers, side: int, t: Array, psi: Array, load: Array) -> Ar
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
-    """All multipliers mu, and the coefficients (k, j) of p* dx/dt of each line."""
+class Balanced:
+    """A stress in equilibrium: its multipliers, what acts on the lines, how nearly.
+
+    Attributes
+    ----------
+    mu : ndarray (d,)
+    pressure : list of ndarray (k, j)
+        Bernstein coefficients of p* on the sides of each line, per length (P1) or eta (P2).
+    """
 
     mu: Array
     pressure: list[Array]
-    residual: float
-    steps: int
 
 
-def assembled(elements: Sequence[Element], size: int) -> tuple[sp.csr_array, Array]:
-    """K, and what s without multipliers exerts on the sides (size,)."""
-    values, rows, columns = [], [], []
-    load = np.zeros(size)
-    for e in elements:
-        G = e.N.transpose(0, 2, 1) @ e.N
-        d = e.dofs.shape[1]
-        values.append(G.ravel())
-        rows.append(np.repeat(e.dofs, d, axis=1).ravel())
-        columns.append(np.tile(e.dofs, (1, d)).ravel())
-        np.add.at(load, e.dofs, e.own + np.einsum("bmd,bm->bd", e.N, e.g))
-    K = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
-    return K, load
+@dataclass(frozen=True, eq=False)
+class DualProgram:
+    """The matrix of the multipliers, factorised once, for several loads.
 
-
-def solved(
-    mu: Multipliers,
-    elements: Sequence[Element],
-    given: Array,
-    fixed: Mask,
-    lines: Sequence[Rows],
-) -> Solved:
-    """Minimise over the multipliers.
-
-    Parameters
+    Attributes
     ----------
-    given : ndarray (d,)
-        Moments of the given tractions.
-    fixed : ndarray of bool (d,)
-        Multipliers of components on which no traction is given.
+    lines : sequence of Rows
+    T : sparse (d, d)
+        mu = T y: each row is an unknown of y.
+    program : QuadraticProgram
+        Of y, with the bounds of the lines.
+    factor : Factor
+        Of its matrix, made definite.
+    """
+
+    lines: Sequence[Rows]
+    T: sp.csr_array
+    program: QuadraticProgram
+    factor: Factor
+
+    def nearest(self, load: Array) -> Balanced:
+        """The stress and the p* >= 0 that minimise B^2; `load` (d,) are the tractions to balance."""
+        program = replace(self.program, b=self.T.T @ load)
+        closed = np.concatenate(
+            [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines] or [[]]
+        )
+        systems = bordered_systems(program, self.factor)
+        active = minimise(systems, closed.astype(bool)).active
+        while True:  # any p* >= 0 proves a bound: coefficients below 0 by round-off become 0
+            y, force = _refined(systems, active)
+            pulling = (force < 0) & ~program.equality
+            if not pulling.any():
+                return self._balanced(y, force)
+            active = active & ~pulling
+
+    def within(self, load: Array, limits: Sequence[Array]) -> Balanced:
+        """The nearest stress to a load whose |q*| are at most `limits` (k, j) of each line.
+
+        Coefficients that would be more stay at their limit.
+        """
+        program = replace(self.program, b=self.T.T @ load, g=np.zeros_like(self.program.g))
+        limit = np.concatenate([x.ravel() for x in limits] or [np.zeros(0)])
+        free, force = limit > 0, np.zeros_like(limit)
+        while True:
+            b = program.b.copy()
+            b[program.unknown] -= np.where(free, 0.0, force)
+            rows = np.flatnonzero(free)
+            some = replace(
+                program,
+                b=b,
+                R=program.R[rows],
+                g=program.g[rows],
+                equality=np.ones(len(rows), dtype=bool),
+                unknown=program.unknown[rows],
+            )
+            every = np.ones(len(rows), dtype=bool)
+            y, force[rows] = _refined(bordered_systems(some, self.factor), every)
+            over = free & (np.abs(force) > limit)
+            if not over.any():
+                return self._balanced(y, force)
+            force[over] = np.sign(force[over]) * limit[over]
+            free &= ~over
+
+    def _balanced(self, y: Array, force: Array) -> Balanced:
+        shapes = [x.bound.shape for x in self.lines]
+        parts = np.split(force, np.cumsum([a * b for a, b in shapes]))[:-1]
+        return Balanced(
+            self.T @ y, [p.reshape(shape) for p, shape in zip(parts, shapes, strict=True)]
+        )
+
+
+def _refined(systems: LinearSystems, active: Mask) -> tuple[Array, Array]:
+    """The solution for the rows `active` (m,), corrected as long as that takes the residual down.
+
+    What is factorised is definite, which the matrix need not be.
+    """
+    p, last = systems.program, np.inf
+    while True:
+        y, force = systems.refine(active)
+        left = p.b - p.K @ y
+        left[p.unknown] -= force
+        left[p.fixed] = 0.0
+        size = float(np.abs(left).max(initial=0.0))
+        if not 0 < size < FALLING * last:
+            return y, force
+        last = size
+
+
+def dual_program(
+    mu: Multipliers, elements: Sequence[Element], fixed: Mask, lines: Sequence[Rows]
+) -> DualProgram:
+    """The program of the condensed triangles.
+
+    `fixed` (d,) are multipliers of components on which no traction is given.
     """
     size = int(mu.start[-1])
-    K, load = assembled(elements, size)
-    T, unknown, bound, equality, start = _basis(mu, lines, size)
+    values, rows, columns = [], [], []
+    for e in elements:
+        d = e.dofs.shape[1]
+        values.append((e.N.transpose(0, 2, 1) @ e.N).ravel())
+        rows.append(np.repeat(e.dofs, d, axis=1).ravel())
+        columns.append(np.tile(e.dofs, (1, d)).ravel())
+    K = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
+    T, unknown, bound, equality = _basis(mu, lines, size)
     if len(unknown):
-        K, b = (T.T @ K @ T).tocsr(), T.T @ (given - load)
-    else:
-        b = given - load
-    diagonal = K.diagonal()
-    fixed = fixed | (diagonal <= 0)
+        K = (T.T @ K @ T).tocsr()
+    diagonal, m = K.diagonal(), len(unknown)
     program = QuadraticProgram(
         K=K,
-        b=b,
-        R=from_triplets(np.ones(len(unknown)), np.arange(len(unknown)), unknown, (len(unknown), size)),
+        b=np.zeros(size),
+        R=from_triplets(np.ones(m), np.arange(m), unknown, (m, size)),
         g=bound,
         equality=equality,
-        fixed=fixed,
+        fixed=fixed | (diagonal <= 0),  # on the axis there is no traction
         values=np.zeros(size),
         unknown=unknown,
     )
-    factor = cholesky(lower_half((K + sp.diags_array(DEFINITE * diagonal)).tocsr()))
-    found = minimise(bordered_systems(program, factor), start)
-    force = np.where(equality, found.force, np.maximum(found.force, 0.0))
-    left = b - K @ found.u
-    left[unknown] -= force
-    left[fixed] = 0.0
-    sizes = [line.bound.size for line in lines]
-    parts = np.split(force, np.cumsum(sizes)[:-1]) if lines else []
-    pressure = [p.reshape(line.bound.shape) for p, line in zip(parts, lines, strict=True)]
-    return Solved(T @ found.u, pressure, left, len(found.steps))
+    definite = (K + sp.diags_array(DEFINITE * diagonal)).tocsr()
+    return DualProgram(lines, T, program, cholesky(lower_half(definite)))
+
+
+def exerted(elements: Sequence[Element], mu: Array) -> Array:
+    """Moments (d,) of the tractions of the stress with multipliers `mu` (d,), over all triangles."""
+    total = np.zeros_like(mu)
+    for e in elements:
+        y = e.g + np.einsum("bmd,bd->bm", e.N, mu[e.dofs])
+        np.add.at(total, e.dofs, e.own + np.einsum("bmd,bm->bd", e.N, y))
+    return total
+
+
+def pushed(mu: Multipliers, lines: Sequence[Rows], pressure: Sequence[Array]) -> Array:
+    """Moments (d,) of the tractions R'p that pressures of lines exert."""
+    total = np.zeros(int(mu.start[-1]))
+    for line, p in zip(lines, pressure, strict=True):
+        for i, side in enumerate(line.facing.side):
+            total[mu.of(int(side))] += p[i] @ line.own[i]
+            if line.opposite:
+                total[mu.of(int(line.facing.other[i]))] += p[i] @ line.opposite[i]
+    return total
 
 
 def _basis(
     mu: Multipliers, lines: Sequence[Rows], size: int
-) -> tuple[sp.csr_array, Index, Array, Mask, Mask]:
-    """mu = T y with a y for each row: its unknown, bound, whether it is an equation, and closed."""
-    values, rows, columns, unknown, bound, equality, start = [], [], [], [], [], [], []
+) -> tuple[sp.csr_array, Index, Array, Mask]:
+    """mu = T y with a y for each row: its unknown, its bound, and whether it is an equation."""
+    values, rows, columns = [], [], []
+    unknown, bound, equality = [np.zeros(0, np.intp)], [np.zeros(0)], [np.zeros(0, bool)]
     plain = np.ones(size, dtype=bool)
     steps = []
 
@@ -165,7 +251,6 @@ def _basis(
             unknown.append(own[:j])
         bound.append(line.bound.ravel())
         equality.append(np.full(line.bound.size, line.facing.equality))
-        start.append(np.repeat(line.facing.closed, j))
     rest = np.flatnonzero(plain)
     values.append(np.ones(len(rest)))
     rows.append(rest)
@@ -183,7 +268,4 @@ def _basis(
         while term.nnz:  # as often as bodies stand in a row
             T = T + term
             term = M @ term
-    if not lines:
-        none = np.zeros(0)
-        return T, none.astype(np.intp), none, none.astype(bool), none.astype(bool)
-    return T, np.concatenate(unknown), np.concatenate(bound), np.concatenate(equality), np.concatenate(start)
+    return T, np.concatenate(unknown), np.concatenate(bound), np.concatenate(equality)
