@@ -16,7 +16,7 @@ from .bound import Proof
 from .cells import Cells
 from .facing import PLACES, WEIGHTS
 from .polynomials import scalars
-from .tractions import given_on, moments_of
+from .tractions import moments_of
 
 INSET = 0.1  # of a step of the lattice: it keeps off an axis, where stresses are not defined
 
@@ -60,7 +60,7 @@ def _stresses(proof: Proof) -> dict[str, Array]:
     measure = model.measure(x.reshape(-1, 2)).reshape(*x.shape[:2], 1)
     stress, force = np.zeros((*x.shape[:2], 3)), np.zeros(x.shape)
     rules: dict[str, Array] = {}
-    for number, (e, c) in enumerate(zip(proof.elements, proof.coefficients, strict=True)):
+    for number, (e, c) in enumerate(zip(proof.elements, proof.stress.coefficients, strict=True)):
         at = e.places.at
         stress[at] = e.stress(c, x[at])[..., [0, 1, -1]]
         force[at] = scalars(e.force_degree, e.frame, x[at]) @ e.force
@@ -82,8 +82,7 @@ def _sides(proof: Proof, problem: Problem) -> dict[str, Array]:
 
     Tractions are per parameter t of the side and times the measure.
     """
-    cells, mu = proof.cells, proof.mu
-    given = given_on(problem, cells)
+    cells, mu, given = proof.cells, proof.multipliers, proof.given
     moments, _ = moments_of(problem, cells, mu, given)
     side = _boundary(cells)
     k = int(mu.degree[side[0]])
@@ -109,7 +108,7 @@ def _contact(proof: Proof) -> dict[str, Array]:
     position = np.full(len(proof.cells.ends), -1)
     boundary = _boundary(proof.cells)
     position[boundary] = np.arange(len(boundary))
-    faced = [line.facing for line in proof.lines]
+    faced = [line.facing for line in proof.program.lines]
 
     def joined(parts: Sequence[Array]) -> Array:
         return np.concatenate(parts) if parts else np.zeros(0)
@@ -124,7 +123,7 @@ def _contact(proof: Proof) -> dict[str, Array]:
         "contact_weight": joined([_at_ends(f.weight / WEIGHTS) for f in faced]),
         "contact_equality": joined([np.full(len(f.side), f.equality) for f in faced]).astype(bool),
         "contact_gap": joined([f.after for f in faced]),
-        "contact_pressure": joined(list(proof.found.pressure)),
+        "contact_pressure": joined(proof.balanced.pressure),
     }
 
 
