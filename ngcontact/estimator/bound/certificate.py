@@ -102,8 +102,8 @@ def _boundary(cells: Cells) -> Index:
 def _contact(proof: Proof) -> dict[str, Array]:
     """p* and the gap after lifting as Bernstein coefficients, in t of the secondary's sides.
 
-    Sides are numbers among those of the boundary. The weight and the primary's parameter are
-    linear in t and given at both ends.
+    Sides are numbers among those of the boundary. The primary's parameter is t, or 1 - t where it
+    is turned; the weight is linear and given at both ends.
     """
     position = np.full(len(proof.cells.ends), -1)
     boundary = _boundary(proof.cells)
@@ -118,7 +118,7 @@ def _contact(proof: Proof) -> dict[str, Array]:
         "contact_other": joined(
             [np.where(f.other < 0, -1, position[f.other]) for f in faced]
         ).astype(np.intp),
-        "contact_place": joined([_at_ends(f.there) for f in faced]),
+        "contact_turned": joined([f.there[:, -1] < f.there[:, 0] for f in faced]).astype(bool),
         "contact_direction": joined([f.direction[:, 0] for f in faced]),
         "contact_weight": joined([_at_ends(f.weight / WEIGHTS) for f in faced]),
         "contact_equality": joined([np.full(len(f.side), f.equality) for f in faced]).astype(bool),
