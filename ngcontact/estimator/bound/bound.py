@@ -118,6 +118,11 @@ class Proof:
     above: float
     residual: float
 
+    @property
+    def sampled(self) -> bool:
+        """Whether quadrature of the stiffness is not exact: curves, or laws that vary."""
+        return bool(self.cells.curved.any()) or any(e.compliance.size > 16 for e in self.elements)
+
 
 def error_bound(
     problem: Problem,

@@ -58,6 +58,8 @@ class Element:
         Coefficients of the body force that s_p balances, of degree `force_degree`.
     radial : ndarray (b, q)
         Radial force times r about an axis: a part of the hoop stress.
+    source : CoefficientFunction or None
+        The body force.
     missed : ndarray (b,)
         Norm of what of the body force s_p does not balance.
     root : ndarray (b, m, m)
@@ -81,6 +83,7 @@ class Element:
     strain: Array
     force: Array
     radial: Array
+    source: ng.CoefficientFunction | None
     missed: Array
     root: Array
     N: Array
@@ -113,6 +116,7 @@ class Element:
             strain=strain,
             force=np.zeros_like(self.force),
             radial=np.zeros_like(self.radial),
+            source=None,
             missed=np.zeros_like(self.missed),
             g=np.linalg.solve(self.root, g[..., None])[..., 0],
             own=np.zeros_like(self.own),
@@ -124,6 +128,12 @@ class Element:
         if s.shape[2] > 3:
             s[..., 2] += self.radial
         return s
+
+    def radial_at(self, cells: Cells, at: Index, reference: Array) -> Array:
+        """Radial force times r, (k,), in triangles (k,) at reference places (k, 2)."""
+        if self.source is None:
+            return np.zeros(len(at))
+        return cells.evaluate(ng.x * self.source[0], at, reference)[:, 0]
 
     def stress(self, c: Array, x: Array, some: Index | slice = slice(None)) -> Array:
         """s (b, q, v) at points `x` (b, q, 2) for coefficients `c` (b, m), without radial forces."""
@@ -242,7 +252,8 @@ def _element(
     frame = frame_of(cells.corners[at])
     compliance = compliance_at(problem, cells, points)
     strain = points.evaluate(cells, model.strain(displacement))
-    force, radial, missed = _forces(problem, cells, points, frame, degree, body, axial)
+    source = _force_of(problem, cells, body)
+    force, radial, missed = _forces(source, cells, points, frame, degree, axial)
     local = frame.local(points.x) if curved else points.local[None]
     T = stresses(degree, frame, points.x, local, axial, on_axis)
     root = np.sqrt(weight)[..., None]
@@ -267,7 +278,7 @@ def _element(
         [mu.start[cells.sides[at, i], None] + np.arange(2 * (mu.degree[cells.sides[at[0], i]] + 1)) for i in range(3)],
         axis=1,
     )
-    return Element(points, weight, frame, degree, on_axis, compliance, strain, force, radial, missed,
+    return Element(points, weight, frame, degree, on_axis, compliance, strain, force, radial, source, missed,
                    L / scale[:, :, None], solved[..., :-1], solved[..., -1], own, dofs)
 
 
@@ -304,12 +315,11 @@ def _tractions(T: Array, normal: Array, chi: Array) -> Array:
     return np.concatenate([tx.transpose(0, 2, 1) @ chi, ty.transpose(0, 2, 1) @ chi], axis=2)
 
 
-def _forces(problem, cells, points, frame, degree, body, axial):
+def _forces(F, cells, points, frame, degree, axial):
     """Coefficients of the force that is balanced, r F_r, and the norm of the rest."""
     b, q = points.weight.shape
     n = _force_degree(degree, axial)
     j = (n + 1) * (n + 2) // 2
-    F = _force_of(problem, cells, body)
     if F is None:
         return np.zeros((b, j, 2)), np.zeros((b, q)), np.zeros(b)
     fine = places(cells, points.at, 2 * degree + 10)

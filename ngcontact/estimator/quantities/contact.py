@@ -9,7 +9,7 @@ from ...arrays import Array, Index, Mask
 from ...contact import ContactState, ending_segments, in_contact
 from ...fem import BoundaryTrace
 from ...lagrange import gauss
-from ..equilibrated import bernstein
+from ..bound import bernstein
 from .singular import Singular
 from .table import Quantity, unknown
 

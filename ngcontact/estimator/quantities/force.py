@@ -12,7 +12,7 @@ from ...arrays import Array, Mask
 from ...contact import ContactState, by_line
 from ...fem import Space, has_rough_loads, load_vector, stress_of
 from ...problem import Problem
-from ..equilibrated import FINE, EquilibratedStress, Tested, force_bar
+from ..bound import FINE, EquilibratedStress, Tested, force_bar
 
 STRAIGHT = 1e-12  # part of directions across the force that is round-off
 ROUND_OFF = 64 * np.finfo(float).eps  # of a force, relative to the terms that it is the sum of
@@ -109,12 +109,11 @@ def _component(solution: Forced, pair: int, e: Array) -> float:
     solution.work["back_solves"] += found.back_solves
     solution.work["equilibrations"] += 1
     forces = by_line([state.line for state in states], found.force)
-    tested = Tested(G, stress_of(solution.problem, G), forces, directions)
     proof = solution.equilibrated.proof
-    error = force_bar(solution.problem, space.trace, u, tested, proof)
+    error = force_bar(solution.problem, u, Tested(G, forces, directions), proof)
     a, b = (x.vec.FV().NumPy() for x in (u, G))
     noise = ROUND_OFF * float(np.sqrt((space.diagonal @ a**2) * (space.diagonal @ b**2)))
-    return error + noise + _integrated(solution, G, proof.discrete.rough is not None)
+    return error + noise + _integrated(solution, G, proof.sampled)
 
 
 def _integrated(solution: Forced, G: ng.GridFunction, rough: bool) -> float:

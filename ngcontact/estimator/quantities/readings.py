@@ -33,7 +33,7 @@ from ...arrays import Array
 from ...contact import ContactState, state_of
 from ...errors import ContactError, warn
 from ...fem import BoundaryTrace
-from ..equilibrated import EquilibratedStress, Guaranteed
+from ..bound import EquilibratedStress, Guaranteed
 from .contact import area_in_contact, ends_of, peak_of
 from .force import Forced, proved_force_errors
 from .motion import approach_of, direction_of

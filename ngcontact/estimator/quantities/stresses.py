@@ -8,7 +8,7 @@ import numpy as np
 from ...arrays import Array, Mask
 from ...output import von_mises
 from ...problem import Triangulation, body_of_vertex
-from ..equilibrated import EquilibratedStress
+from ..bound import EquilibratedStress
 from .singular import Singular
 from .table import Quantity, unknown
 
@@ -49,7 +49,9 @@ def largest_von_mises(
     beside = np.repeat(near.reshape(-1, n).any(axis=1), n) & away
     error, most = _largest_jump(mesh, xy, mises, beside), value
     if equilibrated is not None:
-        other = np.asarray(equilibrated.stress(points)).reshape(-1, 4)[:, [0, 3, 1]]
+        every = np.repeat(np.arange(mesh.ne), n)
+        whole = equilibrated.values(every, np.tile(LATTICE, (mesh.ne, 1)))
+        other, around = whole[:, [0, 1, -1]], whole[:, 2:-1]
         # Out of a plane the stress follows that in it: nu times the trace, or 0.
         trace = (values[:, 0] + values[:, 1]).reshape(-1, n)
         square = (trace**2).sum(axis=1)
@@ -57,9 +59,8 @@ def largest_von_mises(
         known = np.isfinite(other).all(axis=1)  # it divides by r, 0 on the axis
         other = np.where(known[:, None], other, 0.0)
         change = (other[:, :2] - values[:, :2]).sum(axis=1) * np.repeat(ratio, n)
-        if equilibrated.proof.discrete.radial is not None:
-            change = np.zeros(len(change))
-        proved = von_mises(np.hstack([other, normal + change[:, None]]))
+        out = around if around.size else normal + change[:, None]
+        proved = von_mises(np.hstack([other, np.where(known[:, None], out, 0.0)]))
         error = max(error, float(np.abs(proved - mises)[beside & known].max(initial=0.0)))
         most = max(most, float(proved[away & known].max(initial=0.0)))
     elif mesh.ne == 1:  # nothing to compare with

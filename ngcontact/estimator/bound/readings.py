@@ -14,8 +14,7 @@ import numpy as np
 from ...contact import ContactState
 from ...fem import LOAD_BONUS, Space, load_vector, potential_energy
 from ...problem import Problem
-from .bound import error_bound
-from .parts import ErrorBound
+from .bound import Proof, error_bound
 from .stress import EquilibratedStress
 
 ROUND_OFF = 64 * np.finfo(float).eps  # of an energy, relative to its terms
@@ -47,17 +46,17 @@ class _Solved(Protocol):
     @property
     def energy_norm(self) -> float: ...
     @property
-    def _bound(self) -> ErrorBound: ...
+    def _bound(self) -> Proof: ...
 
 
 class Guaranteed:
     """Members of `Solution` that bound its error, made when the first of them is asked for."""
 
     @cached_property
-    def _bound(self: _Solved) -> ErrorBound:
+    def _bound(self: _Solved) -> Proof:
         self.work["equilibrations"] += 1
         boundary = self.discrete.space.trace
-        return error_bound(self.problem, boundary, self.displacement, self.stress, self.pairs)
+        return error_bound(self.problem, boundary, self.displacement, self.pairs)
 
     @property
     def bounded(self) -> bool:
@@ -92,7 +91,7 @@ class Guaranteed:
 
         `constitutive`: |s - sigma_h|^2 of the equilibrated stress s; `complementarity`: twice the
         integral of p* times the gap; `lifting`: what correcting u_h on Gamma_u and Gamma_K costs;
-        `loads`: what no polynomial meets of the loads; `curves`: the same of curved boundaries.
+        `loads`: what no polynomial meets of loads, also on curved boundaries.
         """
         return self._bound.parts
 
@@ -110,4 +109,4 @@ class Guaranteed:
     @property
     def equilibrated(self: _Solved) -> EquilibratedStress:
         """The stress that proves the bound, in equilibrium with the loads; units of stress."""
-        return self._bound.stress
+        return EquilibratedStress(self._bound)
