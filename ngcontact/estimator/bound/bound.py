@@ -82,6 +82,8 @@ class Proof:
     multipliers : Multipliers
     elements : list of Element
     given : Given
+    moments : ndarray (d,)
+        Of the given tractions with the multipliers.
     program : DualProgram
     balanced : Balanced
         The stress in equilibrium, and p*.
@@ -106,6 +108,7 @@ class Proof:
     multipliers: Multipliers
     elements: list[Element]
     given: Given
+    moments: Array
     program: DualProgram
     balanced: Balanced
     stress: StressNorms
@@ -199,6 +202,7 @@ def error_bound(
         multipliers=mu,
         elements=elements,
         given=given,
+        moments=moments,
         program=program,
         balanced=balanced,
         stress=stress,

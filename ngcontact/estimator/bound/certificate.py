@@ -11,17 +11,15 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...arrays import Array, Index
-from ...problem import Problem
 from .bound import Proof
 from .cells import Cells
 from .facing import PLACES, WEIGHTS
 from .polynomials import scalars
-from .tractions import moments_of
 
 INSET = 0.1  # of a step of the lattice: it keeps off an axis, where stresses are not defined
 
 
-def certificate_arrays(proof: Proof, problem: Problem) -> dict[str, Array]:
+def certificate_arrays(proof: Proof) -> dict[str, Array]:
     """All arrays by name; docs/bounds.md says what they are.
 
     Raises
@@ -43,7 +41,7 @@ def certificate_arrays(proof: Proof, problem: Problem) -> dict[str, Array]:
         "lifting": proof.lifting,
         "bound": np.array(proof.bound),
         **_stresses(proof),
-        **_sides(proof, problem),
+        **_sides(proof),
         **_contact(proof),
     }
 
@@ -77,17 +75,16 @@ def _stresses(proof: Proof) -> dict[str, Array]:
     return {"degree": np.array(k)} | found | rules
 
 
-def _sides(proof: Proof, problem: Problem) -> dict[str, Array]:
+def _sides(proof: Proof) -> dict[str, Array]:
     """The boundary: vertices, the lower number first, and in Legendre polynomials what is given.
 
     Tractions are per parameter t of the side and times the measure.
     """
     cells, mu, given = proof.cells, proof.multipliers, proof.given
-    moments, _ = moments_of(problem, cells, mu, given)
     side = _boundary(cells)
     k = int(mu.degree[side[0]])
     dofs = mu.start[side, None] + np.arange(2 * (k + 1))
-    traction = moments[dofs].reshape(len(side), 2, k + 1) * np.sqrt(2 * np.arange(k + 1) + 1)
+    traction = proof.moments[dofs].reshape(len(side), 2, k + 1) * np.sqrt(2 * np.arange(k + 1) + 1)
     return {
         "side_vertices": cells.ends[side],
         "side_held": given.held[side],
