@@ -22,13 +22,13 @@ from ...contact import ContactState
 from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
-from .cells import Cells, cells_of
-from .elements import Element, Multipliers, elements_of
-from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of
-from .lifting import asked_on_line, asked_on_supports, lifting_of
+from .cells import Cells, cells_of, places
+from .elements import Element, Multipliers, compliance_at, elements_of
+from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
+from .lifting import asked_on_supports, lifted
 from .missed import data_norms
 from .program import Balanced, DualProgram, dual_program, exerted, pushed, rows_of
-from .refusals import refuse_bound, refuse_narrow
+from .refusals import refuse_bound, refuse_jumps, refuse_narrow
 from .tractions import Given, boundary_tractions, given_on, missed_tractions, moments_of
 
 LIFTED = 3  # degrees by which w is above u_h
@@ -92,8 +92,6 @@ class Proof:
         Norms of what s misses of the data.
     lifting : ndarray (n,)
         Norms of w.
-    shares : list of float
-        Of the lifting of each line, that of the secondary.
     bound : float
         B, root of an energy per thickness.
     parts : dict of float
@@ -114,7 +112,6 @@ class Proof:
     stress: StressNorms
     loads: Array
     lifting: Array
-    shares: list[float]
     bound: float
     parts: dict[str, float]
     below: float
@@ -149,23 +146,46 @@ def error_bound(
     """
     refuse_bound(problem, trace, pairs)
     refuse_narrow(problem, trace)
+    refuse_jumps(problem, trace)
+    try:
+        return _bound(problem, trace, displacement, pairs, everywhere=False)
+    except ContactError:  # resultants that no pressure near to the contact has
+        return _bound(problem, trace, displacement, pairs, everywhere=True)
+
+
+def _bound(
+    problem: Problem,
+    trace: BoundaryTrace,
+    displacement: ng.GridFunction,
+    pairs: Sequence[ContactState],
+    everywhere: bool,
+) -> Proof:
+    """The bound with a p* that acts `everywhere` on the lines, or near to the contact."""
     order, extent = trace.order, trace.model.extent
-    degree, lifted = max(order + 1, 2 + extent), order + LIFTED
-    cuts, ends = cuts_of(trace, displacement, pairs)
-    lines = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
-    loaded = trace.segments(*problem.traction, problem.sliding, *lines)
+    degree, lift = max(order + 1, 2 + extent), order + LIFTED
+    reaches = [reach_of(trace, displacement, pair, everywhere) for pair in pairs]
+    touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
+    loaded = trace.segments(*problem.traction, problem.sliding, *touching)
     whole = [name for name, values in problem.displacement.items() if None not in values]
-    cells = cells_of(trace, cuts, loaded, trace.segments(*whole))
+    cells = cells_of(trace, cuts_of(trace, reaches), loaded, trace.segments(*whole))
     mu, elements = elements_of(problem, cells, displacement, degree)
     given = given_on(problem, cells)
-    lines = [
-        rows_of(mu, facing_of(cells, displacement, pair, end, lifted), degree - extent)
-        for pair, end in zip(pairs, ends, strict=True)
-    ]
+    asked = asked_on_supports(cells, given, displacement)
     of_guides = mu.degree[given.guides]
-    for k in np.unique(of_guides).tolist():
-        guide = guides_of(cells, displacement, given.guides[of_guides == k], lifted)
-        lines.append(rows_of(mu, guide, k - extent))
+    guides = [
+        (k, guides_of(cells, displacement, given.guides[of_guides == k], lift))
+        for k in np.unique(of_guides).tolist()
+    ]
+    held = held_motions(
+        cells,
+        [*(one.side for one in asked), *(guide.side for _, guide in guides)],
+        [*(one.direction for one in asked), *(guide.direction for _, guide in guides)],
+    )
+    lines = [rows_of(mu, guide, k - extent) for k, guide in guides]
+    for reach in reaches:
+        share = _share(problem, cells, reach.pair)
+        facing = facing_of(cells, displacement, reach, lift, held, share)
+        lines.append(rows_of(mu, facing, degree - extent))
     moments, fixed = moments_of(problem, cells, mu, given)
     program = dual_program(mu, elements, fixed, lines)
     balanced = program.nearest(moments - exerted(elements, np.zeros_like(moments)))
@@ -181,15 +201,10 @@ def error_bound(
             f"{residual:.1e}"
         )
     have = boundary_tractions(cells, elements, stress.coefficients)
-    missed = missed_tractions(
-        problem, cells, given, lines, balanced.pressure, have, stress.largest
-    )
+    missed = missed_tractions(problem, cells, given, lines, balanced.pressure, have, stress.largest)
     loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(cells, elements))
-    shares = [_share(line.facing) for line in lines]
-    asked = asked_on_supports(cells, given, displacement)
-    for line, share in zip(lines, shares, strict=True):
-        asked += asked_on_line(line.facing, line.facing.lift, share)
-    lifting = lifting_of(problem, cells, asked, lifted, extent_of_u)
+    lifts = [(line.facing, line.facing.lift) for line in lines]
+    lifting = lifted(problem, cells, asked, lifts, lift, extent_of_u)
     closed, signed = 0.0, 0.0
     for line, p in zip(lines, balanced.pressure, strict=True):
         closed += float((p * line.bound).sum())
@@ -208,7 +223,6 @@ def error_bound(
         stress=stress,
         loads=loads,
         lifting=lifting,
-        shares=shares,
         bound=sum(parts.values()) ** 0.5,
         parts=parts,
         below=below,
@@ -284,9 +298,15 @@ def _stiffest(elements: Sequence[Element]) -> float:
     return max(1 / float(np.diagonal(e.compliance, axis1=-2, axis2=-1).min()) for e in elements)
 
 
-def _share(facing: Facing) -> float:
-    """Of the lifting, that the secondary takes."""
-    return 0.5 if len(facing.side) and (facing.other >= 0).all() else 1.0
+def _share(problem: Problem, cells: Cells, pair: ContactState) -> float:
+    """Of the lifting, that the secondary takes: by compliance."""
+    sizes = []
+    for segments in (pair.line.segments, pair.line.facing):
+        at = cells.owner[np.isin(cells.segment, segments)][:1]
+        if not at.size:
+            return 1.0
+        sizes.append(np.trace(compliance_at(problem, cells, places(cells, at, 0))[0, 0]))
+    return float(sizes[0] / sum(sizes))
 
 
 def _size(trace: BoundaryTrace, displacement: ng.GridFunction) -> float:

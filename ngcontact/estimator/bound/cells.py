@@ -110,7 +110,7 @@ class Cells:
         return order[np.searchsorted(key, 4.0 * segment + s, side="right") - 1]
 
     def own_parameter(self, side: Index, s: Array) -> Array:
-        """t (k, j) of places `s` (k, j) of the segments of sides (k,)."""
+        """T (k, j) of places `s` (k, j) of the segments of sides (k,)."""
         a, b = self.span[side, 0, None], self.span[side, 1, None]
         return np.clip((s - a) / (b - a), 0.0, 1.0)
 
@@ -207,7 +207,9 @@ def places(cells: Cells, at: Index, order: int) -> Places:
         sigma, t = (z.ravel() for z in np.meshgrid(g, g, indexing="ij"))
         weight = np.outer(w * g, w).ravel()
         side = np.repeat(cells.sides[at, 0], len(t))
-        own = np.where(np.repeat(cells.backward[at, 0], len(t)), 1 - np.tile(t, len(at)), np.tile(t, len(at)))
+        own = np.where(
+            np.repeat(cells.backward[at, 0], len(t)), 1 - np.tile(t, len(at)), np.tile(t, len(at))
+        )
         base, slope = (z.reshape(len(at), -1, 2) for z in cells.points(side, own))
         slope = np.where(cells.backward[at, 0][:, None, None], -slope, slope)
         away = base - corners[:, :1]
@@ -362,7 +364,9 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
         left = left[np.abs(line[left] - one[vertex[left]]) > TURN]
     at_two[vertex[left]] = False
     chosen = np.full(count, -1)
-    order = np.argsort(~cells.curved, kind="stable")  # straight ones if there are any
+    x = cells.corners  # straight ones, and wide ones, if there are any
+    wide = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / cells.diameters**2
+    order = np.lexsort((wide, ~cells.curved))
     chosen[cells.triangles[order]] = order[:, None]
     return np.unique(chosen[at_two])
 

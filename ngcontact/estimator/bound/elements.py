@@ -11,7 +11,6 @@ in the norm of C^-1, and the tractions of s are N'A^-1 N mu + N'A^-1 g + <s_p n,
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import ngsolve as ng
@@ -23,7 +22,7 @@ from ...fem import model_of
 from ...lagrange import gauss
 from ...problem import Problem, varies
 from .cells import Cells, Places, places
-from .polynomials import Frame, balancing, frame_of, projected, scalars, stresses
+from .polynomials import Frame, balancing, frame_of, in_frame, projected, scalars, stresses
 
 ON_CURVES = 3  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -97,7 +96,7 @@ class Element:
         return _force_degree(self.degree, self.strain.shape[2] > 3)
 
     def coefficients(self, mu: Array) -> Array:
-        """c (b, m) for all multipliers `mu` (k,)."""
+        """C (b, m) for all multipliers `mu` (k,)."""
         y = self.g + np.einsum("bmd,bd->bm", self.N, mu[self.dofs])
         return np.linalg.solve(self.root.transpose(0, 2, 1), y[..., None])[..., 0]
 
@@ -123,7 +122,7 @@ class Element:
         )
 
     def whole_stress(self, c: Array) -> Array:
-        """s (b, q, v) at the quadrature points, the radial force's part of the hoop included."""
+        """S (b, q, v) at the quadrature points, the radial force's part of the hoop included."""
         s = self.stress(c, self.places.x)
         if s.shape[2] > 3:
             s[..., 2] += self.radial
@@ -136,7 +135,7 @@ class Element:
         return cells.evaluate(ng.x * self.source[0], at, reference)[:, 0]
 
     def stress(self, c: Array, x: Array, some: Index | slice = slice(None)) -> Array:
-        """s (b, q, v) at points `x` (b, q, 2) for coefficients `c` (b, m), without radial forces."""
+        """S (b, q, v) at points `x` (b, q, 2) for coefficients `c` (b, m), without radial forces."""
         s = np.einsum("bqvm,bm->bqv", self.basis(x, some), c[some])
         if self.force.any():
             axial = self.strain.shape[2] > 3
@@ -180,14 +179,18 @@ def elements_of(
     on_axis = cells.trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1)[cells.sides]
     key = np.column_stack([own, mu.degree[cells.sides], on_axis.any(axis=1), cells.curved])
     varying = _varying(problem, cells)
-    key = np.column_stack([key, varying, _body(cells) ])
+    key = np.column_stack([key, varying, _body(cells)])
     kinds, number = np.unique(key, axis=0, return_inverse=True)
     found = []
     for kind in range(len(kinds)):
         every = np.flatnonzero(number.ravel() == kind)
         for start in range(0, len(every), BLOCK):
             at = every[start : start + BLOCK]
-            found.append(_element(problem, cells, displacement, mu, at, int(kinds[kind, 0]), bool(kinds[kind, 4])))
+            found.append(
+                _element(
+                    problem, cells, displacement, mu, at, int(kinds[kind, 0]), bool(kinds[kind, 4])
+                )
+            )
     return mu, found
 
 
@@ -254,7 +257,7 @@ def _element(
     strain = points.evaluate(cells, model.strain(displacement))
     source = _force_of(problem, cells, body)
     force, radial, missed = _forces(source, cells, points, frame, degree, axial)
-    local = frame.local(points.x) if curved else points.local[None]
+    local = frame.local(points.x) if curved else in_frame(points.local)[None]
     T = stresses(degree, frame, points.x, local, axial, on_axis)
     root = np.sqrt(weight)[..., None]
     D = compliance
@@ -275,11 +278,31 @@ def _element(
     right = scale[..., None] * np.concatenate([N, g[..., None]], axis=2)
     solved = np.linalg.solve(L, right)
     dofs = np.concatenate(
-        [mu.start[cells.sides[at, i], None] + np.arange(2 * (mu.degree[cells.sides[at[0], i]] + 1)) for i in range(3)],
+        [
+            mu.start[cells.sides[at, i], None]
+            + np.arange(2 * (mu.degree[cells.sides[at[0], i]] + 1))
+            for i in range(3)
+        ],
         axis=1,
     )
-    return Element(points, weight, frame, degree, on_axis, compliance, strain, force, radial, source, missed,
-                   L / scale[:, :, None], solved[..., :-1], solved[..., -1], own, dofs)
+    return Element(
+        points,
+        weight,
+        frame,
+        degree,
+        on_axis,
+        compliance,
+        strain,
+        force,
+        radial,
+        source,
+        missed,
+        L / scale[:, :, None],
+        solved[..., :-1],
+        solved[..., -1],
+        own,
+        dofs,
+    )
 
 
 def _moments(cells, mu, at, degree, frame, on_axis, force, axial, m):
@@ -291,12 +314,15 @@ def _moments(cells, mu, at, degree, frame, on_axis, force, axial, m):
         bent = bool(cells.bent[side[0]])
         t, w = gauss(degree + k + 2 * axial + (4 * cells.trace.geometry_order if bent else 0))
         own = np.where(cells.backward[at, i, None], 1 - t, t)
-        x, dx = (z.reshape(len(at), -1, 2) for z in cells.points(np.repeat(side, len(t)), own.ravel()))
+        x, dx = (
+            z.reshape(len(at), -1, 2) for z in cells.points(np.repeat(side, len(t)), own.ravel())
+        )
         dx = np.where(cells.backward[at, i, None, None], -dx, dx)
         normal = np.stack([dx[..., 1], -dx[..., 0]], axis=-1)  # times ds / dt
         weight = w * cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), -1)
         chi = weight[..., None] * traces(k, own)
-        local = frame.local(x) if bent else (CORNERS[(i + 1) % 3] + t[:, None] * (CORNERS[(i + 2) % 3] - CORNERS[(i + 1) % 3]))[None]
+        start, stop = CORNERS[(i + 1) % 3], CORNERS[(i + 2) % 3]
+        local = frame.local(x) if bent else in_frame(start + t[:, None] * (stop - start))[None]
         T = stresses(degree, frame, x, local, axial, on_axis)
         found.append(_tractions(T, normal, chi))
         if force.any():

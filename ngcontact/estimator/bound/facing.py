@@ -22,6 +22,7 @@ SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
+STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
 PLACES, WEIGHTS = gauss(2 * DATA)
 THROUGH = np.linalg.inv(lagrange(DATA, PLACES))  # from values at `PLACES` to Gauss-Lobatto points
 NEWTON_STEPS = 12
@@ -40,7 +41,7 @@ def bernstein(degree: int, t: Array) -> Array:
 
 
 def directions(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
-    """d (k, 2) at `s` (k,) of segments `segment` (k,) of the secondary."""
+    """D (k, 2) at `s` (k,) of segments `segment` (k,) of the secondary."""
     if contact.direction is None:
         return trace.exact_normal(segment, s)
     return np.tile(contact.direction, (len(segment), 1))
@@ -48,12 +49,16 @@ def directions(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array)
 
 @dataclass(frozen=True, eq=False)
 class Met:
-    """k places of a secondary and what they meet: lengths, and the primary's place (-1: none)."""
+    """k places of a secondary and what they meet: lengths, and the primary's place (-1: none).
+
+    `faces` (k,) says whether they face the other body or the obstacle.
+    """
 
     gap: Array
     direction: Array
     segment: Index
     s: Array
+    faces: Mask
 
 
 def met(
@@ -73,38 +78,71 @@ def met(
     at = np.flatnonzero(other >= 0)
     if at.size:
         jump[at] -= trace.evaluate(displacement, other[at], place[at])
-    return Met(gap - (jump * d).sum(axis=1), d, other, place)
+    faces = other >= 0
+    if contact.primary is None:
+        faces = (trace.normal(segment, s) * d).sum(axis=1) > FACING
+    return Met(gap - (jump * d).sum(axis=1), d, other, place, faces)
 
 
-def cuts_of(
-    trace: BoundaryTrace, displacement: ng.CoefficientFunction, pairs: Sequence[ContactState]
-) -> tuple[dict[int, Array], list[dict[int, tuple[float, int]]]]:
-    """Places s of vertices to come, by segment; where contact ends.
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """Where p* of a pair may act.
 
-    The latter pair by pair as (s, sign): contact lies towards s = 0 for the sign 1.
+    Attributes
+    ----------
+    pair : ContactState
+    segments : ndarray of int (k,)
+        Of the secondary: in contact, beside such, or where u_h goes through the other body.
+    ends : dict of int to (float, int)
+        s where contact ends inside a segment, and 1 where it lies towards s = 0, -1 elsewhere.
     """
+
+    pair: ContactState
+    segments: Index
+    ends: dict[int, tuple[float, int]]
+
+
+def reach_of(
+    trace: BoundaryTrace,
+    displacement: ng.CoefficientFunction,
+    pair: ContactState,
+    everywhere: bool,
+) -> Reach:
+    """The reach of a pair; `everywhere` on its line if that is asked for."""
+    line = pair.line
+    if everywhere or line.contact.bilateral or not len(line.segments):
+        return Reach(pair, line.segments, {})
+    nodes = trace.nodes[line.segments][:, [0, -1]]
+    active = np.append(pair.active, False)[line.rows].any(axis=1)
+    near = np.isin(nodes, nodes[active]).any(axis=1)
+    rest, j = np.flatnonzero(~near), len(PLACES)
+    if rest.size:
+        segment = np.repeat(line.segments[rest], j)
+        found = met(trace, displacement, pair, segment, np.tile(PLACES, len(rest)))
+        near[rest] = ((found.gap < 0) & found.faces).reshape(-1, j).any(axis=1)
+    return Reach(pair, line.segments[near], _ends(trace, displacement, pair))
+
+
+def cuts_of(trace: BoundaryTrace, reaches: Sequence[Reach]) -> dict[int, Array]:
+    """Places s of vertices to come, by segment: ends of contact, opposite vertices."""
     cuts: dict[int, list[float]] = {}
-    every = []
-    for pair in pairs:
-        line, contact = pair.line, pair.line.contact
-        ends = _ends(trace, displacement, pair)
-        every.append(ends)
-        mine: dict[int, list[float]] = {k: [s] for k, (s, _) in ends.items()}
+    for reach in reaches:
+        line, contact = reach.pair.line, reach.pair.line.contact
+        own = [np.array(list(reach.ends), dtype=np.intp)]
+        places = [np.array([s for s, _ in reach.ends.values()])]
+        if contact.primary is not None and len(reach.segments):
+            parts = divided(trace, contact, reach.segments, line.facing)
+            own += [np.tile(reach.segments[parts.local], 2), np.tile(reach.segments, 2)]
+            places += [parts.start, parts.stop, np.repeat([0.0, 1.0], len(reach.segments))]
+        k, s = np.concatenate(own), np.concatenate(places)
         if contact.primary is not None:
-            parts = divided(trace, contact, line.segments, line.facing)
-            own = line.segments[parts.local]
-            for k, s in zip(np.tile(own, 2), np.append(parts.start, parts.stop), strict=True):
-                mine.setdefault(int(k), []).append(float(s))
-            k = np.concatenate([line.segments, line.segments, np.repeat(list(mine), [len(s) for s in mine.values()])]).astype(np.intp)
-            s = np.concatenate([np.zeros(len(line.segments)), np.ones(len(line.segments)), *mine.values()])
             d = directions(trace, contact, k, s)
             there, t, *_ = partners(trace, line.facing, k, trace.point(k, s), d)
-            for m in np.flatnonzero(there >= 0):
-                cuts.setdefault(int(there[m]), []).append(float(t[m]))
-        for k, places in mine.items():
-            cuts.setdefault(k, []).extend(places)
+            k, s = np.append(k, there[there >= 0]), np.append(s, t[there >= 0])
+        for segment, place in zip(k.tolist(), s.tolist(), strict=True):
+            cuts.setdefault(segment, []).append(place)
     inside = {k: _inside(np.array(s)) for k, s in cuts.items()}
-    return {k: s for k, s in inside.items() if s.size}, every
+    return {k: s for k, s in inside.items() if s.size}
 
 
 def _inside(s: Array) -> Array:
@@ -118,8 +156,6 @@ def _ends(
 ) -> dict[int, tuple[float, int]]:
     """Where contact ends inside segments that face the other body, away from their vertices."""
     line, found = pair.line, {}
-    if line.contact.bilateral:
-        return {}
     active = np.append(pair.active, False)[line.rows]
     places = trace.places(line.segments)
     turns = np.diff(active.astype(int), axis=1)
@@ -129,7 +165,11 @@ def _ends(
         s = np.linspace(places[i, j], places[i, j + 1], SAMPLES)
         gap = met(trace, displacement, pair, np.full(SAMPLES, line.segments[i]), s).gap
         below = np.flatnonzero(gap < 0)
-        edge = (s[below[-1]] if below.size else s[0]) if sign > 0 else (s[below[0]] if below.size else s[-1])
+        edge = (
+            (s[below[-1]] if below.size else s[0])
+            if sign > 0
+            else (s[below[0]] if below.size else s[-1])
+        )
         at = float(edge + sign * MARGIN)
         if APART < at < 1 - APART:
             found[int(line.segments[i])] = (at, sign)
@@ -160,6 +200,8 @@ class Facing:
         Bernstein coefficients of the gap of u_h + w, not negative.
     closed : ndarray of bool (k,)
         Sides in contact as a whole.
+    share : ndarray (k, 2)
+        Of what w adds to the gap, that the secondary takes at t = 0 and t = 1.
     equality : bool
         Whether the gap is 0 and forces have any sign.
     """
@@ -173,11 +215,12 @@ class Facing:
     gap: Array
     after: Array
     closed: Mask
+    share: Array
     equality: bool
 
     @cached_property
     def back(self) -> Array:
-        """t (k, j) of the secondary opposite to the Gauss points of the primary's sides."""
+        """T (k, j) of the secondary opposite to the Gauss points of the primary's sides."""
         nodes = self.there @ THROUGH.T
         t = np.where((nodes[:, -1] < nodes[:, 0])[:, None], 1 - PLACES, PLACES)
         for _ in range(NEWTON_STEPS):
@@ -198,27 +241,30 @@ class Facing:
 
     @property
     def lift(self) -> Array:
-        """r (k, j): what w adds to the gap."""
+        """R (k, j): what w adds to the gap."""
         return np.asarray(self.after @ bernstein(self.after.shape[1] - 1, PLACES).T - self.gap)
 
 
 def facing_of(
     cells: Cells,
     displacement: ng.CoefficientFunction,
-    pair: ContactState,
-    ends: dict[int, tuple[float, int]],
+    reach: Reach,
     degree: int,
+    held: Array,
+    share: float,
 ) -> Facing:
-    """What of a pair faces, and the gap after a lifting of `degree`."""
-    trace, line, contact = cells.trace, pair.line, pair.line.contact
-    side = np.flatnonzero(np.isin(cells.segment, line.segments))
+    """What of a pair's reach faces, and the gap after a lifting of `degree`.
+
+    The secondary takes a `share` of that, but for vertices that cannot move along d; `held` (nv, 2,
+    2) are the projections of motions of all vertices on those that are prescribed.
+    """
+    pair, trace = reach.pair, cells.trace
+    line, contact = pair.line, pair.line.contact
+    side = np.flatnonzero(np.isin(cells.segment, reach.segments))
     j = len(PLACES)
     segment, s = cells.on_side(np.repeat(side, j), np.tile(PLACES, len(side)))
     found = met(trace, displacement, pair, segment, s)
-    if contact.primary is None:
-        faces = (trace.normal(segment, s) * found.direction).sum(axis=1) > FACING
-    else:
-        faces = found.segment >= 0
+    faces = found.faces
     keep = faces.reshape(-1, j).all(axis=1)
     every = keep.repeat(j)
     if contact.primary is not None and (found.gap[faces & ~every] < 0).any():
@@ -236,16 +282,65 @@ def facing_of(
     order = np.argsort(line.segments)
     local = order[np.searchsorted(line.segments[order], cells.segment[side])]
     closed = np.append(pair.active, False)[line.rows[local]].all(axis=1)
-    for k, (at, sign) in ends.items():
+    for k, (at, sign) in reach.ends.items():
         on = cells.segment[side] == k
         closed[on] = (cells.span[side[on]].mean(axis=1) < at) == (sign > 0)
     closed = closed | contact.bilateral
-    after = _after(cells.ends[side], gap, closed, degree)
+    shares, stiff = _shares(cells, side, other, there, d, held, share)
+    after = _after(cells.ends[side], gap, closed, stiff, degree)
     after = np.zeros_like(after) if contact.bilateral else after
-    return Facing(pair, side, other, there, d, weight, gap, after, closed, contact.bilateral)
+    kept = side, other, there, d, weight, gap, after, closed, shares
+    return Facing(pair, *kept, contact.bilateral)
 
 
-def guides_of(cells: Cells, displacement: ng.CoefficientFunction, side: Index, degree: int) -> Facing:
+def held_motions(cells: Cells, sides: Sequence[Index], directions: Sequence[Array]) -> Array:
+    """Projections (nv, 2, 2) of vertices' motions on those that sides (k,) hold.
+
+    They hold motions along `directions` (k, j, 2).
+    """
+    M = np.zeros((len(cells.vertices), 2, 2))
+    for side, direction in zip(sides, directions, strict=True):
+        d = _at_ends(direction)
+        np.add.at(M, cells.ends[side], d[..., :, None] * d[..., None, :])
+    size, vectors = np.linalg.eigh(M)
+    vectors = np.where(size[:, None] > STIFF**2 * size[:, None, -1:], vectors, 0.0)
+    vectors[size[:, -1] == 0] = 0.0
+    return np.asarray(vectors @ vectors.transpose(0, 2, 1))
+
+
+def _at_ends(values: Array) -> Array:
+    """Functions (k, j, c) at the Gauss points of sides: at their ends, (k, 2, c)."""
+    return np.einsum("ej,kjc->kec", THROUGH[[0, -1]], values)
+
+
+def _shares(
+    cells: Cells,
+    side: Index,
+    other: Index,
+    there: Array,
+    direction: Array,
+    held: Array,
+    share: float,
+) -> tuple[Array, Mask]:
+    """`Facing.share` (k, 2), and whether neither body can move along d there."""
+    d = _at_ends(direction)
+
+    def moves(vertex: Index) -> Mask:
+        rest = d - np.einsum("keij,kej->kei", held[vertex], d)
+        return np.asarray(np.linalg.norm(rest, axis=2) > STIFF)
+
+    own = moves(cells.ends[side])
+    if (other < 0).any():
+        return np.ones((len(side), 2)), ~own
+    facing = (_at_ends(there[..., None])[..., 0] > 0.5).astype(np.intp)
+    opposite = moves(cells.ends[other[:, None], facing])
+    shares = np.where(own == opposite, share, np.where(own, 1.0, 0.0))
+    return shares, ~own & ~opposite
+
+
+def guides_of(
+    cells: Cells, displacement: ng.CoefficientFunction, side: Index, degree: int
+) -> Facing:
     """Sides (k,) of Gamma_0, as bilateral contact with an obstacle without a gap."""
     k, j = len(side), len(PLACES)
     every, t = np.repeat(side, j), np.tile(PLACES, k)
@@ -264,15 +359,16 @@ def guides_of(cells: Cells, displacement: ng.CoefficientFunction, side: Index, d
         gap=gap.reshape(k, j),
         after=np.zeros((k, degree + 1)),
         closed=np.ones(k, dtype=bool),
+        share=np.ones((k, 2)),
         equality=True,
     )
 
 
-def _after(ends: Index, gap: Array, closed: Mask, degree: int) -> Array:
+def _after(ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int) -> Array:
     """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
 
     `ends` (k, 2) are the vertices of the sides, at which the gaps of neighbours are one number: 0
-    where all of them are `closed` (k,).
+    where all of them are `closed` (k,), but for `stiff` ones (k, 2), where bodies do not move.
     """
     B = bernstein(degree, PLACES) * np.sqrt(WEIGHTS)[:, None]
     c = np.linalg.lstsq(B, (np.sqrt(WEIGHTS) * gap).T, rcond=None)[0].T
@@ -281,6 +377,7 @@ def _after(ends: Index, gap: Array, closed: Mask, degree: int) -> Array:
     value, bare = np.zeros(number.size), np.zeros(number.size, dtype=bool)
     np.maximum.at(value, number, c[:, [0, -1]])
     np.logical_or.at(bare, number[~closed], True)
+    np.logical_or.at(bare, number[stiff], True)
     value[~bare] = 0.0
     after = np.where(closed[:, None], 0.0, np.maximum(c, 0.0))
     after[:, [0, -1]] = value[number]

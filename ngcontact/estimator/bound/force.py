@@ -14,7 +14,7 @@ from ...fem import model_of
 from ...problem import Problem
 from .bound import LIFTED, Proof, smallest_moduli, stress_norms, work_on_gap
 from .facing import PLACES, WEIGHTS, Facing, bernstein
-from .lifting import asked_on_line, lifting_of
+from .lifting import lifted
 from .missed import data_norms
 from .program import exerted
 from .tractions import boundary_tractions, missed_tractions
@@ -79,10 +79,8 @@ def force_bar(
     free = replace(problem, force={}, traction={})
     missed = missed_tractions(free, cells, proof.given, lines, dual.pressure, have, norms.largest)
     data = data_norms(cells, np.zeros(n), missed, smallest_moduli(cells, elements))
-    asked = []
-    for line, r, share in zip(lines, lift, proof.shares, strict=True):
-        asked += asked_on_line(line.facing, -r, share)
-    lifting = lifting_of(problem, cells, asked, cells.trace.order + LIFTED, 1.0)
+    lifts = [(f, -r) for f, r in zip(facing, lift, strict=True)]
+    lifting = lifted(problem, cells, [], lifts, cells.trace.order + LIFTED, 1.0)
     M = float(np.linalg.norm(norms.distance + data + lifting))
     B = proof.bound
     # The largest M e + kappa (X + Y) with e^2 + 2 X + 2 Y <= B^2.

@@ -58,14 +58,38 @@ def asked_on_supports(
     return found
 
 
-def asked_on_line(facing: Facing, r: Array, share: float) -> list[Asked]:
-    """-r (k, j) on the secondary and r on the primary; the secondary takes a share."""
+def asked_on_line(facing: Facing, r: Array, alone: bool) -> list[Asked]:
+    """-r (k, j) on the secondary and r on the primary, by shares, or on the secondary `alone`."""
+    start, stop = np.ones((2, len(facing.side), 1)) if alone else facing.share.T[:, :, None]
+    share = start + (stop - start) * PLACES
     found = [Asked(facing.side, facing.direction, -share * r)]
-    if share < 1:
-        both = np.concatenate([facing.direction, (1 - share) * r[..., None]], axis=2)
+    if (share < 1).any():
+        both = np.concatenate([facing.direction, ((1 - share) * r)[..., None]], axis=2)
         there = facing.on_primary(both)
         found.append(Asked(facing.other, there[..., :2], there[..., 2]))
     return found
+
+
+def lifted(
+    problem: Problem,
+    cells: Cells,
+    asked: Sequence[Asked],
+    lines: Sequence[tuple[Facing, Array]],
+    degree: int,
+    extent: float,
+) -> Array:
+    """Norms (n,) of w, with r (k, j) on each line; on secondaries alone where vertices disagree.
+
+    See `lifting_of`.
+    """
+    for alone in (False, True):
+        every = [*asked, *(one for line in lines for one in asked_on_line(*line, alone))]
+        try:
+            return lifting_of(problem, cells, every, degree, extent)
+        except ContactError:
+            if alone:
+                raise
+    raise AssertionError
 
 
 def lifting_of(
@@ -73,7 +97,9 @@ def lifting_of(
 ) -> Array:
     """Energy norms (n,) of w, of a degree, for displacements of a size `extent`."""
     norms = np.zeros(len(cells.triangles))
-    needed = [one.side[np.abs(one.amount).max(axis=1, initial=0.0) > NOISE * extent] for one in asked]
+    needed = [
+        one.side[np.abs(one.amount).max(axis=1, initial=0.0) > NOISE * extent] for one in asked
+    ]
     if not sum(map(len, needed)):
         return norms
     touched = np.zeros(len(cells.vertices), dtype=bool)
@@ -148,9 +174,7 @@ class _Conditions:
     value: Array
 
 
-def _conditions(
-    cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: float
-) -> _Conditions:
+def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: float) -> _Conditions:
     """What is asked for at the nodes; 0 on the rim of the layer."""
     frame = np.tile(np.eye(2), (nodes.count, 1, 1))
     held, value = np.zeros((nodes.count, 2), dtype=bool), np.zeros((nodes.count, 2))
@@ -175,7 +199,9 @@ def _conditions(
     size = size[:, ::-1]
     both = size > PARALLEL * size[:, :1]
     frame[at], held[at] = vectors, both
-    value[at] = np.where(both, np.einsum("kij,kj->ki", vectors, right[at]) / np.where(both, size, 1.0), 0.0)
+    value[at] = np.where(
+        both, np.einsum("kij,kj->ki", vectors, right[at]) / np.where(both, size, 1.0), 0.0
+    )
     w = np.einsum("kij,ki->kj", frame, value)
     missed = np.abs((w[number] * d).sum(axis=1) - amount)
     if missed.max(initial=0.0) > max(INCONSISTENT * np.abs(amount).max(initial=0.0), noise):
@@ -314,9 +340,7 @@ class _Remainders:
         return np.stack(e, axis=-1)
 
 
-def _remainders(
-    cells: Cells, nodes: _Nodes, w: Array, asked: Sequence[Asked]
-) -> _Remainders:
+def _remainders(cells: Cells, nodes: _Nodes, w: Array, asked: Sequence[Asked]) -> _Remainders:
     """d.w as asked for less that of the polynomial with values `w` (c, 2) at the nodes."""
     layer = nodes.layer
     position = np.full(len(cells.triangles), -1)

@@ -92,7 +92,7 @@ def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array]:
 
 
 def _distortion(cells: Cells, at: Index, x: Array, slope: Array) -> Array:
-    """max |D| (max det D / min det D)^(1/2) (b,) of the map of straight triangles; 1 on those."""
+    """Max |D| (max det D / min det D)^(1/2) (b,) of the map of straight triangles; 1 on those."""
     found, bent = np.ones(len(at)), np.flatnonzero(cells.curved[at])
     if bent.size:
         corners = cells.corners[at[bent]]

@@ -13,17 +13,24 @@ Legendre's in the coordinates of each triangle.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
+from math import comb
 
+import ngsolve as ng
 import numpy as np
 from numpy.polynomial import legendre
 
 from ...arrays import Array, Index
 
 
+@lru_cache
 def products(degree: int) -> tuple[Index, Index]:
-    """Degrees (m,) in both coordinates of the products up to a total degree."""
-    pairs = [(i, d - i) for d in range(degree + 1) for i in range(d + 1)]
-    i, j = np.array(pairs, dtype=np.intp).T
+    """Degrees (m,) in both coordinates of the products up to a total degree, rising in the first.
+
+    Across a thin triangle, along its short base, those of degree 0 and 1 have no stress of the
+    large kind: combined with earlier ones alone they keep it so.
+    """
+    i, j = np.array([(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]).T
     return i, j
 
 
@@ -47,9 +54,9 @@ class Frame:
     Attributes
     ----------
     corner : ndarray (b, 2)
-        Corner 0, lengths.
+        Corner 1, lengths.
     edges : ndarray (b, 2, 2)
-        The edges from there to corners 1 and 2, columns: x = corner + edges (a, b).
+        The base from there to corner 2 and the edge to corner 0, columns: x = corner + edges (a, b).
     size : ndarray (b,)
         Half the extent along the axes, lengths.
     centre : ndarray (b, 2)
@@ -75,11 +82,16 @@ class Frame:
         return np.asarray((x - self.centre[:, None]) / self.size[:, None, None])
 
 
+def in_frame(local: Array) -> Array:
+    """`Frame.local` (q, 2) of places (q, 2) given by their shares of corners 1 and 2."""
+    return np.column_stack([local[:, 1], 1 - local.sum(axis=1)])
+
+
 def frame_of(corners: Array) -> Frame:
     """The frame of triangles `corners` (b, 3, 2)."""
-    edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)
+    edges = np.stack([corners[:, 2] - corners[:, 1], corners[:, 0] - corners[:, 1]], axis=-1)
     centre = (corners.max(axis=1) + corners.min(axis=1)) / 2
-    return Frame(corners[:, 0], edges, np.ptp(corners, axis=1).max(axis=1) / 2, centre)
+    return Frame(corners[:, 1], edges, np.ptp(corners, axis=1).max(axis=1) / 2, centre)
 
 
 def stresses(
@@ -97,8 +109,6 @@ def stresses(
     """
     highest = degree + (2 if not axial else -1 if on_axis else 1)
     i, j = products(highest)
-    if not axial:
-        i, j = i[3:], j[3:]  # linear functions have no stress
     a, b = (legendre_table(highest, 2 * local[..., c] - 1) for c in (0, 1))
     G = 2 * frame.size[:, None, None] * np.linalg.inv(frame.edges)  # by lengths of `size`
 
@@ -113,18 +123,44 @@ def stresses(
         return np.asarray(total)
 
     if not axial:
-        return np.stack([derivative(1, 1), derivative(0, 0), -derivative(0, 1)], axis=2)
+        psi = orthonormal(highest, 2)
+        parts = derivative(1, 1), derivative(0, 0), -derivative(0, 1)
+        return np.stack([part @ psi for part in parts], axis=2)
     r = x[..., :1] / frame.size[:, None, None]
     f = np.broadcast_to(a[0][..., i] * b[0][..., j], (*x.shape[:2], len(i)))
     f_r, f_z, f_zz, none = derivative(0), derivative(1), derivative(1, 1), np.zeros_like(f)
     if on_axis:  # T_rr = r f, chi = r^2 f
-        free = np.stack([f, none, f + r * f_r, none], axis=2)
-        bent = np.stack([none, -(2 * f + r * f_r), r**2 * f_zz, r * f_z], axis=2)
+        lower = chi = orthonormal(highest, 0)
+        free = [f, none, f + r * f_r, none]
+        bent = [none, -(2 * f + r * f_r), r**2 * f_zz, r * f_z]
     else:
-        lower = i + j <= degree
-        free = np.stack([f / r, none, f_r, none], axis=2)[..., lower]
-        bent = np.stack([none, -f_r / r, f_zz, f_z / r], axis=2)[..., 1:]
-    return np.concatenate([free, bent], axis=-1)
+        lower, chi = orthonormal(degree, 0), orthonormal(highest, 1)
+        free = [f / r, none, f_r, none]
+        bent = [none, -f_r / r, f_zz, f_z / r]
+    kept = i + j <= (degree if len(lower) < len(i) else highest)
+    one = np.stack([part[..., kept] @ lower for part in free], axis=2)
+    return np.concatenate([one, np.stack([part @ chi for part in bent], axis=2)], axis=-1)
+
+
+@lru_cache
+def orthonormal(degree: int, order: int) -> Array:
+    """Combinations (k, m) of the k `products` whose derivatives of an `order` are orthonormal.
+
+    On the triangle of reference; those without such derivatives are left out.
+    """
+    rule = ng.IntegrationRule(ng.TRIG, 2 * degree)
+    X, w = 2 * np.array(rule.points)[:, :2] - 1, np.array(rule.weights)
+    a, b = (legendre_table(degree, X[:, c]) for c in (0, 1))
+    i, j = products(degree)
+    rows = [
+        np.sqrt(w * comb(order, n))[:, None] * a[order - n][:, i] * b[n][:, j]
+        for n in range(order + 1)
+    ]
+    some = i + j >= order
+    R = np.linalg.qr(np.concatenate(rows)[:, some], mode="r")
+    found = np.zeros((len(i), len(R)))
+    found[some] = np.linalg.inv(R)
+    return found
 
 
 def projected(degree: int, frame: Frame, x: Array, weight: Array, values: Array) -> Array:

@@ -226,7 +226,7 @@ def pushed(mu: Multipliers, lines: Sequence[Rows], pressure: Sequence[Array]) ->
 def _basis(
     mu: Multipliers, lines: Sequence[Rows], size: int
 ) -> tuple[sp.csr_array, Index, Array, Mask]:
-    """mu = T y with a y for each row: its unknown, its bound, and whether it is an equation."""
+    """Mu = T y with a y for each row: its unknown, its bound, and whether it is an equation."""
     values, rows, columns = [], [], []
     unknown, bound, equality = [np.zeros(0, np.intp)], [np.zeros(0)], [np.zeros(0, bool)]
     plain = np.ones(size, dtype=bool)

@@ -9,8 +9,7 @@ import numpy as np
 from ...contact import ContactState
 from ...fem import BoundaryTrace
 from ...problem import Problem
-from ...quadrature import unresolved
-
+from ...quadrature import features_of, unresolved
 
 
 def refuse_bound(problem: Problem, boundary: BoundaryTrace, pairs: Sequence[ContactState]) -> None:
@@ -47,6 +46,23 @@ def refuse_bound(problem: Problem, boundary: BoundaryTrace, pairs: Sequence[Cont
             raise ValueError(
                 f"{no_bound} segments that face an obstacle in part, as on "
                 f'"{line.contact.secondary}"'
+            )
+
+
+def refuse_jumps(problem: Problem, boundary: BoundaryTrace) -> None:
+    """Raise where a prescribed displacement jumps inside a boundary.
+
+    Raises
+    ------
+    ValueError
+        The first one, with its place.
+    """
+    for one in features_of(problem, boundary.mesh):
+        for x, y, _ in one.jumps.tolist():
+            raise ValueError(
+                f'the displacement prescribed on "{one.name}" jumps near ({x:.6g}, {y:.6g}): '
+                "no displacement of finite energy does; make it continuous, or leave a gap between "
+                "boundaries"
             )
 
 

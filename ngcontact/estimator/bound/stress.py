@@ -13,6 +13,10 @@ import numpy as np
 from ...arrays import Array, Index
 from .bound import Proof
 from .certificate import certificate_arrays
+from .facing import bernstein
+
+AT_ONCE = 1000  # places beside all parts
+INSIDE = 1e-9  # parameters nearer to an end are inside of the part that begins there
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +37,24 @@ class ContactPressure:
     segments: Index
     span: Array
     coefficients: Array
+
+    def values(self, segment: Index, s: Array) -> Array:
+        """p* (k,) at `s` (k,) of segments `segment` (k,), 0 where it does not act.
+
+        At the end of two parts the one towards the middle of the segment.
+        """
+        inside = np.clip(s, INSIDE, 1 - INSIDE)[:, None]
+        low, high = np.sort(self.span, axis=1).T
+        found = np.zeros(len(segment))
+        for start in range(0, len(segment), AT_ONCE):
+            at = slice(start, start + AT_ONCE)
+            on = (segment[at, None] == self.segments) & (inside[at] >= low) & (inside[at] <= high)
+            point, part = np.nonzero(on)
+            a, b = self.span[part].T
+            t = (s[at][point] - a) / (b - a)
+            basis = bernstein(self.coefficients.shape[1] - 1, t)
+            found[start + point] = (basis * self.coefficients[part]).sum(axis=1)
+        return found
 
 
 @dataclass(frozen=True, eq=False)

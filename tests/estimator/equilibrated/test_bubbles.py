@@ -23,7 +23,7 @@ from ngcontact.estimator.equilibrated.stresses import beside, inside, on_parts
 from ngcontact.lagrange import gauss
 
 V = 6  # degree of the displacements that stresses are tested with
-ROUND_OFF = 1e-12  # measured 1e-14
+ROUND_OFF = 1e-11  # measured 1e-14 at degree 6 and, by the kernels of BLAS, up to 1.1e-12 at 9
 
 
 def strain_products(t, corners):

@@ -8,7 +8,7 @@ import ngsolve as ng
 import pytest
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Hooke, adapt
+from ngcontact import Contact, Elastic, Hooke, adapt, solve
 from tests.scenes import unmatched_blocks
 
 ANISOTROPIC = Hooke([[100.0, 20.0, 5.0], [20.0, 10.0, 1.0], [5.0, 1.0, 3.0]])
@@ -66,6 +66,18 @@ def test_energies_are_enclosed(scene):
         assert lower <= high + apart
         noise = 1e-12 * (level.energy_norm**2 + abs(level.energy))
         assert high - low <= 1.5 * level.error_bound**2 + noise
+
+
+@pytest.mark.parametrize("scene", ["dual rows", "one transition"])
+def test_energies_are_apart_by_half_of_the_squared_bound_and_what_crosses(scene):
+    """Under polynomial loads: |s - sigma_h| times |w| on each element is all that they add."""
+    solution = solve(SCENES[scene](), maxh=0.5, order=2)
+    proof, square = solution.equilibrated.proof, solution.error_bound**2
+    norms, (low, high) = proof.norms, solution.energy_bounds
+    crossed = norms.partition.of_elements(norms.constitutive) @ norms.lifting * proof.units.energy
+    assert solution.bound_parts["lifting"] > 1e-3 * square
+    # The energies are known to their round-off, of B^2 measured 3e-11.
+    assert high - low == pytest.approx(square / 2 + crossed, abs=1e-9 * square)
 
 
 def test_energies_of_stiff_bodies_keep_their_digits():
