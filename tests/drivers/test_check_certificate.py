@@ -228,12 +228,13 @@ def test_files_with_an_array_less_fail(missing, saved, tmp_path):
     assert not check_certificate.check(tmp_path / "tampered.npz")
 
 
-@pytest.mark.parametrize("name", ["contact_weight", "contact_gap", "contact_pressure", "lifting"])
+@pytest.mark.parametrize("name", ["contact_weight", "contact_gap", "contact_pressure"])
 @pytest.mark.parametrize(("share", "passes"), [(5e-15, True), (1e-12, False)])
 def test_zero_may_be_round_off_of_either_sign(name, share, passes, saved, tmp_path, capsys):
     """A circumference on the axis is -1e-20 with some kernels of BLAS and NumPy."""
     _, arrays, _ = saved["Huber"]
     array = arrays[name].copy()
+    assert np.abs(array).min() <= 1e-15 * np.abs(array).max()
     array.flat[np.abs(array).argmin()] = -share * np.abs(array).max()
     np.savez(tmp_path / "other.npz", **(arrays | {name: array}))
     assert check_certificate.check(tmp_path / "other.npz") == passes, capsys.readouterr().out
