@@ -44,8 +44,11 @@ class Asked:
 def asked_on_supports(
     cells: Cells, given: Given, displacement: ng.CoefficientFunction
 ) -> list[Asked]:
-    """u_D - u_h in each prescribed component."""
+    """u_D - u_h in each prescribed component; no radial motion on the axis."""
     trace, found, j = cells.trace, [], len(PLACES)
+    axis = np.flatnonzero(trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1))
+    along = np.broadcast_to([1.0, 0.0], (len(axis), j, 2))
+    found.append(Asked(axis, along, np.zeros((len(axis), j))))
     for values, side in given.supports:
         k = len(side)
         segment, s = cells.on_side(np.repeat(side, j), np.tile(PLACES, k))
@@ -206,9 +209,7 @@ def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: floa
     missed = np.abs((w[number] * d).sum(axis=1) - amount)
     if missed.max(initial=0.0) > max(INCONSISTENT * np.abs(amount).max(initial=0.0), noise):
         raise ContactError("conditions that meet at a vertex ask for different displacements")
-    rim = _rim(cells, nodes)
-    free = rim & ~held.any(axis=1)
-    held[free] = True
+    held[_rim(cells, nodes)] = True
     return _Conditions(frame, held, value)
 
 
