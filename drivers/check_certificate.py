@@ -159,7 +159,7 @@ class Certificate:
     def rules(self) -> list[tuple[np.ndarray, ...]]:
         """By quadratures: triangles, points, weights, e(u_h), C^-1, r F_r, and the measure."""
         names = ("triangle", "points", "weights", "strain", "compliance", "radial")
-        found = []
+        found: list[tuple[np.ndarray, ...]] = []
         while f"rule{len(found)}_triangle" in self.a:
             rule = [self.a[f"rule{len(found)}_{name}"] for name in names]
             r = self.corners[rule[0], :1, 0] + self.edges[rule[0], 0] @ rule[1].T

@@ -19,7 +19,7 @@ from .polynomials import scalars
 INSET = 0.1  # of a step of the lattice: it keeps off an axis, where stresses are not defined
 
 
-def certificate_arrays(proof: Proof) -> dict[str, Array]:
+def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
     """All arrays by name; docs/bounds.md says what they are.
 
     Raises
@@ -46,7 +46,7 @@ def certificate_arrays(proof: Proof) -> dict[str, Array]:
     }
 
 
-def _stresses(proof: Proof) -> dict[str, Array]:
+def _stresses(proof: Proof) -> dict[str, np.ndarray]:
     """T = measure s and measure F at a lattice; by rules of quadrature e(u_h) and C^-1."""
     cells = proof.cells
     model, corners = cells.trace.model, cells.corners
@@ -57,7 +57,7 @@ def _stresses(proof: Proof) -> dict[str, Array]:
     x = np.einsum("qc,ncd->nqd", share, corners)
     measure = model.measure(x.reshape(-1, 2)).reshape(*x.shape[:2], 1)
     stress, force = np.zeros((*x.shape[:2], 3)), np.zeros(x.shape)
-    rules: dict[str, Array] = {}
+    rules: dict[str, np.ndarray] = {}
     for number, (e, c) in enumerate(zip(proof.elements, proof.stress.coefficients, strict=True)):
         at = e.places.at
         stress[at] = e.stress(c, x[at])[..., [0, 1, -1]]
@@ -75,7 +75,7 @@ def _stresses(proof: Proof) -> dict[str, Array]:
     return {"degree": np.array(k)} | found | rules
 
 
-def _sides(proof: Proof) -> dict[str, Array]:
+def _sides(proof: Proof) -> dict[str, np.ndarray]:
     """The boundary: vertices, the lower number first, and in Legendre polynomials what is given.
 
     Tractions are per parameter t of the side and times the measure.
@@ -96,7 +96,7 @@ def _boundary(cells: Cells) -> Index:
     return np.flatnonzero(~cells.inner)
 
 
-def _contact(proof: Proof) -> dict[str, Array]:
+def _contact(proof: Proof) -> dict[str, np.ndarray]:
     """p* and the gap after lifting as Bernstein coefficients, in t of the secondary's sides.
 
     Sides are numbers among those of the boundary. The primary's parameter is t, or 1 - t where it
@@ -107,7 +107,7 @@ def _contact(proof: Proof) -> dict[str, Array]:
     position[boundary] = np.arange(len(boundary))
     faced = [line.facing for line in proof.program.lines]
 
-    def joined(parts: Sequence[Array]) -> Array:
+    def joined(parts: Sequence[np.ndarray]) -> np.ndarray:
         return np.concatenate(parts) if parts else np.zeros(0)
 
     return {
