@@ -25,7 +25,7 @@ from ...problem import Problem
 from .cells import Cells, cells_of, places
 from .elements import Element, Multipliers, compliance_at, elements_of
 from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
-from .lifting import asked_on_supports, lifted
+from .lifting import asked_on_line, asked_on_supports, lifted
 from .missed import data_norms
 from .program import Balanced, DualProgram, dual_program, exerted, pushed, rows_of
 from .refusals import refuse_bound, refuse_jumps, refuse_narrow
@@ -43,32 +43,29 @@ class StressNorms:
 
     Attributes
     ----------
-    coefficients : list of ndarray (b, m)
-        Of s on the triangles of each `Element`.
     distance : ndarray (n,)
         |s - C e|, roots of energies.
     largest : float
         Largest component of s, a stress.
     """
 
-    coefficients: list[Array]
     distance: Array
     largest: float
 
 
-def stress_norms(elements: Sequence[Element], mu: Array, n: int) -> StressNorms:
-    """The stress with multipliers `mu` (d,) on the n triangles of `elements`."""
-    coefficients, distance, largest = [], np.zeros(n), 0.0
-    for e in elements:
-        c = e.coefficients(mu)
+def stress_norms(
+    elements: Sequence[Element], coefficients: Sequence[Array], n: int
+) -> StressNorms:
+    """Norms of a stress on the n triangles of `elements`."""
+    distance, largest = np.zeros(n), 0.0
+    for e, c in zip(elements, coefficients, strict=True):
         s = e.whole_stress(c)
         strain = (e.compliance @ s[..., None])[..., 0] - e.strain
         stress = (np.linalg.inv(e.compliance) @ strain[..., None])[..., 0]
         energy = (e.weight * (strain * stress).sum(axis=2)).sum(axis=1)
         distance[e.places.at] = np.sqrt(energy)
-        coefficients.append(c)
         largest = max(largest, float(np.abs(s).max()))
-    return StressNorms(coefficients, distance, largest)
+    return StressNorms(distance, largest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,11 +173,8 @@ def _bound(
         (k, guides_of(cells, displacement, given.guides[of_guides == k], lift))
         for k in np.unique(of_guides).tolist()
     ]
-    held = held_motions(
-        cells,
-        [*(one.side for one in asked), *(guide.side for _, guide in guides)],
-        [*(one.direction for one in asked), *(guide.direction for _, guide in guides)],
-    )
+    holding = [*asked, *(x for _, g in guides for x in asked_on_line(g, g.gap, alone=True))]
+    held = held_motions(cells, [x.side for x in holding], [x.direction for x in holding])
     lines = [rows_of(mu, guide, k - extent) for k, guide in guides]
     for reach in reaches:
         share = _share(problem, cells, reach.pair)
@@ -188,19 +182,21 @@ def _bound(
         lines.append(rows_of(mu, facing, degree - extent))
     moments, fixed = moments_of(problem, cells, mu, given)
     program = dual_program(mu, elements, fixed, lines)
-    balanced = program.nearest(moments - exerted(elements, np.zeros_like(moments)))
+    balanced = program.nearest(elements, moments)
     n = len(cells.triangles)
-    stress = stress_norms(elements, balanced.mu, n)
-    extent_of_u = _size(trace, displacement)
+    stress = stress_norms(elements, balanced.coefficients, n)
+    gaps = [float(np.abs(line.facing.gap).max(initial=0.0)) for line in lines]
+    extent_of_u = max(_size(trace, displacement), *gaps, 0.0)
     scale = max(stress.largest, FELT * _stiffest(elements) * extent_of_u / cells.diameters.min())
-    left = moments - exerted(elements, balanced.mu) - pushed(mu, lines, balanced.pressure)
+    left = moments - exerted(elements, balanced.coefficients)[0]
+    left -= pushed(mu, lines, balanced.pressure)
     residual = _residual(cells, mu, np.where(fixed, 0.0, left), scale)
     if residual > SETTLED:
         raise ContactError(
             f"no equilibrated stress was found: the residual relative to the largest stress is "
             f"{residual:.1e}"
         )
-    have = boundary_tractions(cells, elements, stress.coefficients)
+    have = boundary_tractions(cells, elements, balanced.coefficients)
     missed = missed_tractions(problem, cells, given, lines, balanced.pressure, have, stress.largest)
     loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(cells, elements))
     lifts = [(line.facing, line.facing.lift) for line in lines]

@@ -198,6 +198,8 @@ class Facing:
         Gap of u_h, lengths.
     after : ndarray (k, degree + 1)
         Bernstein coefficients of the gap of u_h + w, not negative.
+    open : ndarray of bool (k,)
+        Sides on which w adds nothing; `after` only tells that the gap of u_h is not negative.
     closed : ndarray of bool (k,)
         Sides in contact as a whole.
     share : ndarray (k, 2)
@@ -214,13 +216,14 @@ class Facing:
     weight: Array
     gap: Array
     after: Array
+    open: Mask
     closed: Mask
     share: Array
     equality: bool
 
     @cached_property
     def back(self) -> Array:
-        """T (k, j) of the secondary opposite to the Gauss points of the primary's sides."""
+        """Parameters t (k, j) of the secondary opposite to the Gauss points of the primary's sides."""
         nodes = self.there @ THROUGH.T
         t = np.where((nodes[:, -1] < nodes[:, 0])[:, None], 1 - PLACES, PLACES)
         for _ in range(NEWTON_STEPS):
@@ -241,8 +244,9 @@ class Facing:
 
     @property
     def lift(self) -> Array:
-        """R (k, j): what w adds to the gap."""
-        return np.asarray(self.after @ bernstein(self.after.shape[1] - 1, PLACES).T - self.gap)
+        """What w adds to the gap, r (k, j)."""
+        lift = self.after @ bernstein(self.after.shape[1] - 1, PLACES).T - self.gap
+        return np.where(self.open[:, None], 0.0, lift)
 
 
 def facing_of(
@@ -287,20 +291,21 @@ def facing_of(
         closed[on] = (cells.span[side[on]].mean(axis=1) < at) == (sign > 0)
     closed = closed | contact.bilateral
     shares, stiff = _shares(cells, side, other, there, d, held, share)
-    after = _after(cells.ends[side], gap, closed, stiff, degree)
-    after = np.zeros_like(after) if contact.bilateral else after
-    kept = side, other, there, d, weight, gap, after, closed, shares
+    after, bare = _after(cells.ends[side], gap, closed, stiff, degree)
+    if contact.bilateral:
+        after, bare = np.zeros_like(after), np.zeros_like(bare)
+    kept = side, other, there, d, weight, gap, after, bare, closed, shares
     return Facing(pair, *kept, contact.bilateral)
 
 
 def held_motions(cells: Cells, sides: Sequence[Index], directions: Sequence[Array]) -> Array:
     """Projections (nv, 2, 2) of vertices' motions on those that sides (k,) hold.
 
-    They hold motions along `directions` (k, j, 2).
+    They hold motions along `directions` (k, j, 2), from end to end.
     """
     M = np.zeros((len(cells.vertices), 2, 2))
     for side, direction in zip(sides, directions, strict=True):
-        d = _at_ends(direction)
+        d = direction[:, [0, -1]]
         np.add.at(M, cells.ends[side], d[..., :, None] * d[..., None, :])
     size, vectors = np.linalg.eigh(M)
     vectors = np.where(size[:, None] > STIFF**2 * size[:, None, -1:], vectors, 0.0)
@@ -358,27 +363,37 @@ def guides_of(
         weight=WEIGHTS * ds.reshape(k, j),
         gap=gap.reshape(k, j),
         after=np.zeros((k, degree + 1)),
+        open=np.zeros(k, dtype=bool),
         closed=np.ones(k, dtype=bool),
         share=np.ones((k, 2)),
         equality=True,
     )
 
 
-def _after(ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int) -> Array:
+def _after(
+    ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int
+) -> tuple[Array, Mask]:
     """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
 
-    `ends` (k, 2) are the vertices of the sides, at which the gaps of neighbours are one number: 0
-    where all of them are `closed` (k,), but for `stiff` ones (k, 2), where bodies do not move.
+    And whether `gap` itself is not negative, and stays.
+
+    `ends` (k, 2) are the vertices of the sides, at which r is one number of all neighbours: that
+    closes the gap where they are `closed` (k,), but not at `stiff` ones (k, 2), which do not move.
     """
-    B = bernstein(degree, PLACES) * np.sqrt(WEIGHTS)[:, None]
-    c = np.linalg.lstsq(B, (np.sqrt(WEIGHTS) * gap).T, rcond=None)[0].T
+    B, root = bernstein(degree, PLACES), np.sqrt(WEIGHTS)
+    c = np.empty((len(gap), degree + 1))
+    c[:, [0, -1]] = gap @ THROUGH[[0, -1]].T
+    rest = root * (gap - c[:, [0, -1]] @ B[:, [0, -1]].T)
+    c[:, 1:-1] = np.linalg.lstsq(root[:, None] * B[:, 1:-1], rest.T, rcond=None)[0].T
     _, number = np.unique(ends, return_inverse=True)
     number = number.reshape(-1, 2)
-    value, bare = np.zeros(number.size), np.zeros(number.size, dtype=bool)
-    np.maximum.at(value, number, c[:, [0, -1]])
+    lift, bare = np.full(number.size, -np.inf), np.zeros(number.size, dtype=bool)
     np.logical_or.at(bare, number[~closed], True)
     np.logical_or.at(bare, number[stiff], True)
-    value[~bare] = 0.0
+    np.maximum.at(lift, number, -c[:, [0, -1]])
+    lift[bare] = np.maximum(lift[bare], 0.0)
     after = np.where(closed[:, None], 0.0, np.maximum(c, 0.0))
-    after[:, [0, -1]] = value[number]
-    return after
+    after[:, [0, -1]] = c[:, [0, -1]] + lift[number]
+    off = np.abs(c @ B.T - gap).max(axis=1, initial=0.0)
+    bare = ~closed & (c.min(axis=1) > off) & (lift[number] == 0).all(axis=1)
+    return after, bare

@@ -16,7 +16,6 @@ from .bound import LIFTED, Proof, smallest_moduli, stress_norms, work_on_gap
 from .facing import PLACES, WEIGHTS, Facing, bernstein
 from .lifting import lifted
 from .missed import data_norms
-from .program import exerted
 from .tractions import boundary_tractions, missed_tractions
 
 NOISE = 1e-13  # of a jump, relative to the largest displacement
@@ -73,9 +72,9 @@ def force_bar(
         np.full_like(p, math.inf) if x.facing.equality else kappa * p
         for x, p in zip(lines, proof.balanced.pressure, strict=True)
     ]
-    dual = proof.program.within(-exerted(elements, np.zeros_like(proof.balanced.mu)), limits)
-    norms = stress_norms(elements, dual.mu, n)
-    have = boundary_tractions(cells, elements, norms.coefficients)
+    dual = proof.program.within(elements, limits)
+    norms = stress_norms(elements, dual.coefficients, n)
+    have = boundary_tractions(cells, elements, dual.coefficients)
     free = replace(problem, force={}, traction={})
     missed = missed_tractions(free, cells, proof.given, lines, dual.pressure, have, norms.largest)
     data = data_norms(cells, np.zeros(n), missed, smallest_moduli(cells, elements))

@@ -25,6 +25,7 @@ from .elements import Element, Multipliers, traces
 from .facing import PLACES, Facing, bernstein
 
 FALLING = 0.5  # ratio of two residuals from which more corrections take nothing off
+ROUND_OFF = 1e-13  # of tractions, relative to the largest: nothing to correct
 DEFINITE = 1e-11  # of the diagonal, added to what is factorised: vertices where tractions depend
 
 
@@ -51,8 +52,7 @@ class Rows:
 def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
     """The rows of one line, with a pressure of a degree."""
     psi = bernstein(degree, PLACES)
-    gap = facing.after @ bernstein(facing.after.shape[1] - 1, PLACES).T
-    bound = (gap * facing.weight) @ psi
+    bound = ((facing.gap + facing.lift) * facing.weight) @ psi
     load = facing.weight[..., None] * facing.direction
     own = [_tested(mu, side, PLACES, psi, f) for side, f in zip(facing.side, load, strict=True)]
     opposite = [
@@ -71,16 +71,17 @@ def _tested(mu: Multipliers, side: int, t: Array, psi: Array, load: Array) -> Ar
 
 @dataclass(frozen=True, eq=False)
 class Balanced:
-    """A stress in equilibrium: its multipliers, what acts on the lines, how nearly.
+    """A stress in equilibrium, and what acts on the lines.
 
     Attributes
     ----------
-    mu : ndarray (d,)
+    coefficients : list of ndarray (b, m)
+        Of the stress on the triangles of each `Element`.
     pressure : list of ndarray (k, j)
         Bernstein coefficients of p* on the sides of each line, per length (P1) or eta (P2).
     """
 
-    mu: Array
+    coefficients: list[Array]
     pressure: list[Array]
 
 
@@ -111,9 +112,10 @@ class DualProgram:
         """All but the factor, which is made again."""
         return {name: value for name, value in vars(self).items() if name != "factor"}
 
-    def nearest(self, load: Array) -> Balanced:
-        """The stress and the p* >= 0 that minimise B^2; `load` (d,) are the tractions to balance."""
-        program = replace(self.program, b=self.T.T @ load)
+    def nearest(self, elements: Sequence[Element], moments: Array) -> Balanced:
+        """The stress and the p* >= 0 that minimise B^2 for given tractions, `moments` (d,)."""
+        alone, _ = exerted(elements, [e.alone() for e in elements])
+        program = replace(self.program, b=self.T.T @ (moments - alone))
         closed = np.concatenate(
             [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines] or [[]]
         )
@@ -123,19 +125,22 @@ class DualProgram:
             y, force = _refined(systems, active)
             pulling = (force < 0) & ~program.equality
             if not pulling.any():
-                return self._balanced(y, force)
+                signed = ~program.equality
+                return self._balanced(elements, moments, (y, force), active, signed)
             active = active & ~pulling
 
-    def within(self, load: Array, limits: Sequence[Array]) -> Balanced:
-        """The nearest stress to a load whose |q*| are at most `limits` (k, j) of each line.
+    def within(self, elements: Sequence[Element], limits: Sequence[Array]) -> Balanced:
+        """The nearest stress without loads whose |q*| are at most `limits` (k, j) of each line.
 
         Coefficients that would be more stay at their limit.
         """
-        program = replace(self.program, b=self.T.T @ load, g=np.zeros_like(self.program.g))
+        alone, _ = exerted(elements, [e.alone() for e in elements])
+        load = self.T.T @ -alone
+        program = replace(self.program, g=np.zeros_like(self.program.g))
         limit = np.concatenate([x.ravel() for x in limits] or [np.zeros(0)])
         free, force = limit > 0, np.zeros_like(limit)
         while True:
-            b = program.b.copy()
+            b = load.copy()
             b[program.unknown] -= np.where(free, 0.0, force)
             rows = np.flatnonzero(free)
             some = replace(
@@ -150,16 +155,49 @@ class DualProgram:
             y, force[rows] = _refined(bordered_systems(some, self.factor), every)
             over = free & (np.abs(force) > limit)
             if not over.any():
-                return self._balanced(y, force)
+                none = np.zeros_like(free)
+                return self._balanced(elements, np.zeros_like(load), (y, force), free, none)
             force[over] = np.sign(force[over]) * limit[over]
             free &= ~over
 
-    def _balanced(self, y: Array, force: Array) -> Balanced:
+    def _balanced(
+        self,
+        elements: Sequence[Element],
+        moments: Array,
+        solution: tuple[Array, Array],
+        held: Mask,
+        signed: Mask,
+    ) -> Balanced:
+        """The stress of a solution y, force, corrected until its tractions balance.
+
+        Stresses of stiff bodies are small differences of multipliers. Rows that are `held` (m,)
+        take what is left as their force, those that are `signed` (m,) none below 0.
+        """
+        p, (y, force) = self.program, solution
+        change, solve, last = self.T @ y, None, np.inf
+        coefficients = [e.alone() for e in elements]
+        while True:
+            coefficients = [
+                c + e.answer(change) for e, c in zip(elements, coefficients, strict=True)
+            ]
+            total, largest = exerted(elements, coefficients)
+            left = np.where(p.fixed, 0.0, self.T.T @ (moments - total))
+            force = np.where(held, left[p.unknown], force)
+            force = np.where(signed, np.maximum(force, 0.0), force)
+            left[p.unknown] -= force
+            size = float(np.abs(left).max(initial=0.0))
+            if not ROUND_OFF * largest < size < FALLING * last:
+                break
+            last = size
+            if solve is None:
+                free = ~p.fixed
+                free[p.unknown[held]] = False
+                solve = self.factor(free)
+            change = self.T @ solve(np.where(free, left, 0.0))
         shapes = [x.bound.shape for x in self.lines]
         parts = np.split(force, np.cumsum([a * b for a, b in shapes]))[:-1]
-        return Balanced(
-            self.T @ y, [p.reshape(shape) for p, shape in zip(parts, shapes, strict=True)]
-        )
+        pressure = [q.reshape(shape) for q, shape in zip(parts, shapes, strict=True)]
+        return Balanced(coefficients, pressure)
 
 
 def _refined(systems: LinearSystems, active: Mask) -> tuple[Array, Array]:
@@ -211,13 +249,14 @@ def dual_program(
     return DualProgram(lines, T, program)
 
 
-def exerted(elements: Sequence[Element], mu: Array) -> Array:
-    """Moments (d,) of the tractions of the stress with multipliers `mu` (d,), over all triangles."""
-    total = np.zeros_like(mu)
-    for e in elements:
-        y = e.g + np.einsum("bmd,bd->bm", e.N, mu[e.dofs])
-        np.add.at(total, e.dofs, e.own + np.einsum("bmd,bm->bd", e.N, y))
-    return total
+def exerted(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple[Array, float]:
+    """Moments (d,) of the tractions of a stress over all triangles, and the largest of one."""
+    total, largest = np.zeros(1 + max(int(e.dofs.max()) for e in elements)), 0.0
+    for e, c in zip(elements, coefficients, strict=True):
+        own = e.tractions(c)
+        np.add.at(total, e.dofs, own)
+        largest = max(largest, float(np.abs(own).max(initial=0.0)))
+    return total, largest
 
 
 def pushed(mu: Multipliers, lines: Sequence[Rows], pressure: Sequence[Array]) -> Array:

@@ -132,7 +132,7 @@ class EquilibratedStress:
             own[at[better]], best[at[better]] = triangle[better], inside[better]
         found = np.empty((len(element), proof.elements[0].strain.shape[2]))
         number = np.empty(len(cells.triangles), dtype=np.intp)
-        for e, c in zip(proof.elements, proof.stress.coefficients, strict=True):
+        for e, c in zip(proof.elements, proof.balanced.coefficients, strict=True):
             number[:] = -1
             number[e.places.at] = np.arange(len(e.places.at))
             at = np.flatnonzero(number[own] >= 0)
