@@ -23,7 +23,7 @@ from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
 from .cells import Cells, cells_of, places
-from .elements import Element, Multipliers, compliance_at
+from .elements import Element, Multipliers, compliance_at, rigid_motions
 from .elements import elements as elements_of
 from .facing import (
     PLACES,
@@ -91,7 +91,8 @@ def error_bound(
         facing = facing_of(cells, displacement, pair, end, order + LIFTED, held, share)
         lines.append(rows_of(mu, facing, degree - extent))
     moments, fixed = moments_of(problem, cells, mu, given)
-    found = solved(mu, elements, moments, fixed, lines)
+    motions = rigid_motions(cells, mu, fixed)
+    found = solved(mu, elements, moments, fixed, motions, lines)
     return _summed(problem, cells, displacement, mu, elements, lines, found, given, asked, order)
 
 

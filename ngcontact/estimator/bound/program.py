@@ -14,17 +14,28 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
+import scipy.sparse.linalg
 
 from ...arrays import Array, Index, Mask
+from ...errors import ContactError
 from ...linalg import cholesky, lower_half
-from ...qp import QuadraticProgram, bordered_systems, minimise
+from ...qp import (
+    NullSpace,
+    QuadraticProgram,
+    bordered_systems,
+    minimise,
+    no_null_space,
+    pinned_null_space,
+    vanishing_combinations,
+)
 from ...triplets import from_triplets
 from .elements import Element, Multipliers, traces
 from .facing import PLACES, Facing, bernstein
 
 REFINED = 8  # steps of refinement of the stress, at most ...
 ROUND_OFF = 1e-13  # ... until what does not balance is that little
-DEFINITE = 1e-11  # of the diagonal, added to what is factorised: vertices where tractions depend
+QUADRATURE = 1e-4  # of loads on motions that nothing resists, relative to their terms
+DEFINITE = 1e-13  # of the diagonal, added to what is factorised: vertices where tractions depend
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +122,7 @@ def solved(
     elements: Sequence[Element],
     given: Array,
     fixed: Mask,
+    motions: Array,
     lines: Sequence[Rows],
 ) -> Solved:
     """Minimise over the multipliers.
@@ -121,16 +133,21 @@ def solved(
         Moments of the given tractions.
     fixed : ndarray of bool (d,)
         Multipliers of components on which no traction is given.
+    motions : ndarray (d, r)
+        Those of rigid motions that supports leave free.
     """
     size = int(mu.start[-1])
     K, load = assembled(elements, size)
-    T, unknown, bound, equality, start = _basis(mu, lines, size)
-    if len(unknown):
-        K, b = (T.T @ K @ T).tocsr(), T.T @ (given - load)
-    else:
-        b = given - load
+    T, unknown, bound, equality, start, mass = _basis(mu, lines, size)
+    K, b = (T.T @ K @ T).tocsr(), T.T @ (given - load)
     diagonal = K.diagonal()
+    null_space = _null_space(motions, T, unknown, fixed, diagonal <= 0)
     fixed = fixed | (diagonal <= 0)
+    # Work on motions that nothing resists: quadrature leaves it, and the mesh of a curved body.
+    idle = _left_over(null_space.lineal, b)
+    if np.abs(idle).max(initial=0.0) > QUADRATURE * np.abs(b).max(initial=0.0):
+        raise ContactError("the loads on a body that moves freely are not in balance")
+    b = b - idle
     program = QuadraticProgram(
         K=K,
         b=b,
@@ -140,6 +157,7 @@ def solved(
         fixed=fixed,
         values=np.zeros(size),
         unknown=unknown,
+        null_space=null_space,
     )
     factor = cholesky(lower_half((K + sp.diags_array(DEFINITE * diagonal)).tocsr()))
     found = minimise(bordered_systems(program, factor), start)
@@ -159,22 +177,46 @@ def solved(
         force[closed] = left[unknown[closed]]
         force = np.where(equality, force, np.maximum(force, 0.0))
         left[unknown] -= force
+        left -= _left_over(null_space.lineal, left)
         if step == REFINED or np.abs(left[free]).max(initial=0.0) <= ROUND_OFF * largest:
             break
         # Stresses of stiff bodies are small differences of multipliers.
         change = T @ solve(np.where(free, left, 0.0))
         coefficients = [c + e.answer(change) for e, c in zip(elements, coefficients, strict=True)]
     sizes = [line.bound.size for line in lines]
-    parts = np.split(force, np.cumsum(sizes)[:-1]) if lines else []
+    parts = np.split(force / mass, np.cumsum(sizes)[:-1]) if lines else []
     pressure = [p.reshape(line.bound.shape) for p, line in zip(parts, lines, strict=True)]
     return Solved(T @ y, coefficients, pressure, left, len(found.steps))
 
 
+def _null_space(
+    motions: Array, T: sp.csr_array, unknown: Index, fixed: Mask, idle: Mask
+) -> NullSpace:
+    """Rigid motions (d, r) in the unknowns; where multipliers are `idle` (d,) they are of no use."""
+    if motions.shape[1] == 0:
+        return no_null_space(len(motions))
+    y = sp.linalg.splu(T.tocsc()).solve(motions)
+    y[fixed | idle] = 0.0
+    lineal = vanishing_combinations(y[unknown])
+    return pinned_null_space(y, lineal, (y @ lineal).T, unknown, fixed | idle)
+
+
+def _left_over(lineal: Array, b: Array) -> Array:
+    """The part (n,) of a load `b` (n,) that does work on motions `lineal` (n, l)."""
+    if lineal.shape[1] == 0:
+        return np.zeros(len(b))
+    return np.asarray(lineal @ np.linalg.solve(lineal.T @ lineal, lineal.T @ b))
+
+
 def _basis(
     mu: Multipliers, lines: Sequence[Rows], size: int
-) -> tuple[sp.csr_array, Index, Array, Mask, Mask]:
-    """mu = T y with a y for each row: its unknown, bound, whether it is an equation, and closed."""
+) -> tuple[sp.csr_array, Index, Array, Mask, Mask, Array]:
+    """mu = T y with a y for each row over the integral of psi_j.
+
+    Its unknown, bound, whether it is an equation, and closed; that integral.
+    """
     values, rows, columns, unknown, bound, equality, start = [], [], [], [], [], [], []
+    masses = [np.zeros(0)]
     plain = np.ones(size, dtype=bool)
     steps = []
 
@@ -185,17 +227,20 @@ def _basis(
 
     for line in lines:
         j = line.bound.shape[1]
+        mass = line.facing.weight @ bernstein(j - 1, PLACES)
+        masses.append(mass.ravel())
         for i, side in enumerate(line.facing.side):
             own = mu.of(int(side))
             plain[own] = False
-            U, S, Vt = np.linalg.svd(line.own[i])
+            U, S, Vt = np.linalg.svd(line.own[i] / mass[i, :, None])
             inverse = Vt[:j].T @ (U.T / S[:, None])
             put(own, own[:j], inverse)
             put(own, own[j:], Vt[j:].T)
             if line.opposite:
-                steps.append((own, mu.of(int(line.facing.other[i])), -inverse @ line.opposite[i]))
+                opposite = line.opposite[i] / mass[i, :, None]
+                steps.append((own, mu.of(int(line.facing.other[i])), -inverse @ opposite))
             unknown.append(own[:j])
-        bound.append(line.bound.ravel())
+        bound.append((line.bound / mass).ravel())
         equality.append(np.full(line.bound.size, line.facing.equality))
         start.append(np.repeat(line.facing.closed, j))
     rest = np.flatnonzero(plain)
@@ -217,5 +262,5 @@ def _basis(
             term = M @ term
     if not lines:
         none = np.zeros(0)
-        return T, none.astype(np.intp), none, none.astype(bool), none.astype(bool)
-    return T, np.concatenate(unknown), np.concatenate(bound), np.concatenate(equality), np.concatenate(start)
+        return T, none.astype(np.intp), none, none.astype(bool), none.astype(bool), none
+    return T, *(np.concatenate(x) for x in (unknown, bound, equality, start, masses))
