@@ -19,6 +19,7 @@ from .cells import Cells
 
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
+NEAR = 2e-3  # of a segment: vertices that face each other up to that are one; no point of `PLACES` lies between them
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
 STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
@@ -79,24 +80,35 @@ def cuts_of(
     """
     cuts: dict[int, list[float]] = {}
     every = []
+    length = trace.lengths(np.arange(len(trace.region)))
+    size = np.full(trace.space.ndof, np.inf)  # shortest segment at each vertex
+    np.minimum.at(size, trace.nodes[:, [0, -1]], length[:, None])
+
+    def keep(k: Index, s: Array, other: Index) -> None:
+        """Cut segments `k` (r,) at `s` (r,) but beside a vertex that all but faces one of `other`."""
+        end = trace.nodes[k, np.where(s < 0.5, 0, -1)]
+        near = NEAR * np.minimum(size[end], size[trace.nodes[other][:, [0, -1]]].min(axis=1))
+        apart = np.minimum(s, 1 - s) * length[k] > near
+        for number, place in zip(k[apart].tolist(), s[apart].tolist(), strict=True):
+            cuts.setdefault(number, []).append(place)
+
     for pair in pairs:
         line, contact = pair.line, pair.line.contact
         ends = _ends(trace, displacement, pair)
         every.append(ends)
-        mine: dict[int, list[float]] = {k: [s] for k, (s, _) in ends.items()}
+        k = np.array(list(ends), dtype=np.intp)
+        s = np.array([s for s, _ in ends.values()])
+        keep(k, s, k)
         if contact.primary is not None:
             parts = divided(trace, contact, line.segments, line.facing)
-            own = line.segments[parts.local]
-            for k, s in zip(np.tile(own, 2), np.append(parts.start, parts.stop), strict=True):
-                mine.setdefault(int(k), []).append(float(s))
-            k = np.concatenate([line.segments, line.segments, np.repeat(list(mine), [len(s) for s in mine.values()])]).astype(np.intp)
-            s = np.concatenate([np.zeros(len(line.segments)), np.ones(len(line.segments)), *mine.values()])
+            own = np.tile(line.segments[parts.local], 2)
+            places = np.append(parts.start, parts.stop)
+            keep(own, places, np.tile(parts.facing, 2))
+            k, s = np.append(k, own), np.append(s, places)
             d = directions(trace, contact, k, s)
             there, t, *_ = partners(trace, line.facing, k, trace.point(k, s), d)
-            for m in np.flatnonzero(there >= 0):
-                cuts.setdefault(int(there[m]), []).append(float(t[m]))
-        for k, places in mine.items():
-            cuts.setdefault(k, []).extend(places)
+            met = there >= 0
+            keep(there[met], t[met], k[met])
     inside = {k: _inside(np.array(s)) for k, s in cuts.items()}
     return {k: s for k, s in inside.items() if s.size}, every
 
@@ -214,9 +226,10 @@ def facing_of(
     other, there = np.full(len(side), -1), np.zeros((len(side), j))
     if contact.primary is not None:
         place = found.s[every].reshape(-1, j)
-        middle = found.segment[every].reshape(-1, j)[:, j // 2]
+        met_segment = found.segment[every].reshape(-1, j)
+        middle = met_segment[:, j // 2]
         other = cells.side_at(middle, place[:, j // 2])
-        there = cells.own_parameter(other, place)
+        there = _continued(cells.own_parameter(other, place), met_segment == middle[:, None])
     rate = np.abs(np.diff(cells.span[side], axis=1))
     weight = WEIGHTS * rate * jacobian(trace, contact, segment, s).reshape(-1, j)
     order = np.argsort(line.segments)
@@ -232,6 +245,15 @@ def facing_of(
         after, bare = np.zeros_like(after), np.zeros_like(bare)
     kept = side, other, there, d, weight, gap, after, bare, closed, shares
     return Facing(pair, *kept, contact.bilateral)
+
+
+def _continued(there: Array, own: Mask) -> Array:
+    """Parameters (k, j), of which those that are not `own` (k, j) lie beyond the nearer end."""
+    for i in np.flatnonzero(~own.all(axis=1)):
+        at = np.flatnonzero(own[i])
+        rise = np.polyfit(PLACES[at], there[i, at], 1)
+        there[i, ~own[i]] = np.clip(np.polyval(rise, PLACES[~own[i]]), 0.0, 1.0)
+    return there
 
 
 def held_motions(cells: Cells, sides: Sequence[Index], directions: Sequence[Array]) -> Array:

@@ -89,7 +89,7 @@ def _inverse(there: Array) -> Array:
         value = np.einsum("kji,ki->kj", lagrange(DATA, flat).reshape(*t.shape, -1), nodes)
         slope = np.einsum("kji,ki->kj", lagrange_derivative(DATA, flat).reshape(*t.shape, -1), nodes)
         step = (value - PLACES) / slope
-        t = np.clip(t - step, 0.0, 1.0)
+        t = t - step
         if np.abs(step).max(initial=0.0) < 1e-14:
             break
     return t
