@@ -27,6 +27,7 @@ from .elements import Element, Multipliers, compliance_at, rigid_motions
 from .elements import elements as elements_of
 from .facing import (
     PLACES,
+    ROUND_OFF,
     WEIGHTS,
     Facing,
     bernstein,
@@ -35,7 +36,7 @@ from .facing import (
     guides_of,
     held_motions,
 )
-from .lifting import _carried, asked_on_contact, asked_on_supports, lifting_of
+from .lifting import NOISE, _carried, asked_on_contact, asked_on_supports, lifting_of
 from .missed import data_norms
 from .program import Rows, Solved, rows_of, solved
 from .tractions import Given, given_on, moments_of
@@ -128,7 +129,8 @@ def _summed(problem, cells, displacement, mu, elements, lines, found, given, ask
     segment = np.arange(len(cells.trace.region))
     size = np.abs(cells.trace.evaluate(displacement, segment, np.zeros(len(segment)))).max()
     gaps = [np.abs(line.facing.gap).max(initial=0.0) for line in lines]
-    lifting = _lifted(problem, cells, asked, lines, order + LIFTED, max(float(size), *gaps, 0.0))
+    gaps.append(ROUND_OFF * np.abs(cells.vertices).max() / NOISE)
+    lifting = _lifted(problem, cells, asked, lines, order + LIFTED, max(float(size), *gaps))
     closed = signed = 0.0
     for line, p in zip(lines, found.pressure, strict=True):
         closed += float((p * line.bound).sum())

@@ -24,9 +24,12 @@ from ...fem import connected_bodies, model_of
 from ...lagrange import gauss
 from ...problem import Problem, Triangulation, varies
 from ...qp import vanishing_combinations
+from ...quadrature import numbers
 from .cells import Cells, Places, places
 from .polynomials import Frame, balancing, frame_of, projected, scalars, stresses
 
+ROUGH = 1e-4  # of a load on a triangle, that stresses of the usual degree may miss
+ON_ROUGH = 3  # degrees by which they are higher where they miss more
 ON_CURVES = 3  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 DEFINITE = (1e-15, 1e-14, 1e-13, 1e-12)  # of the diagonal, until it is enough
@@ -141,11 +144,16 @@ class Multipliers:
         return np.arange(self.start[side], self.start[side + 1])
 
 
-def multipliers(cells: Cells, degree: int) -> tuple[Index, Multipliers]:
-    """Degree (n,) of the stress in each triangle, and the multipliers that it asks for."""
+def multipliers(cells: Cells, degree: int, rough: Mask) -> tuple[Index, Multipliers]:
+    """Degree (n,) of the stress in each triangle, and the multipliers that it asks for.
+
+    In `rough` triangles (n,) it is higher, but tractions on inner sides are not.
+    """
     own = np.where(cells.curved, degree + ON_CURVES, degree)
     of_side = np.zeros(len(cells.ends), dtype=np.intp)
     np.maximum.at(of_side, cells.sides, own[:, None])
+    own = own + ON_ROUGH * rough
+    of_side = np.where(cells.inner, of_side, own[cells.owner])
     start = np.concatenate([[0], np.cumsum(2 * (of_side + 1))])
     return own, Multipliers(of_side, start)
 
@@ -176,7 +184,7 @@ def elements(
     problem: Problem, cells: Cells, displacement: ng.CoefficientFunction, degree: int
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, and their multipliers."""
-    own, mu = multipliers(cells, degree)
+    own, mu = multipliers(cells, degree, _rough(problem, cells, degree))
     on_axis = cells.trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1)[cells.sides]
     key = np.column_stack([own, mu.degree[cells.sides], on_axis.any(axis=1), cells.curved])
     varying = _varying(problem, cells)
@@ -189,6 +197,37 @@ def elements(
             at = every[start : start + BLOCK]
             found.append(_element(problem, cells, displacement, mu, at, int(kinds[kind, 0]), bool(kinds[kind, 4])))
     return mu, found
+
+
+def _rough(problem: Problem, cells: Cells, degree: int) -> Mask:
+    """Triangles (n,) on which loads are no polynomials that stresses of a degree balance."""
+    model = cells.trace.model
+    axial, rough = model.extent > 0, np.zeros(len(cells.triangles), dtype=bool)
+    n = _force_degree(degree, axial)
+    for pattern, force in problem.force.items():
+        mask = np.array(cells.trace.mesh.Materials(pattern).Mask())
+        for bent in (False, True):
+            at = np.flatnonzero(mask[cells.bodies] & (cells.curved == bent))
+            if numbers(force) or not at.size:
+                continue
+            points = places(cells, at, 2 * degree + 10)
+            F = points.evaluate(cells, ng.CF(force))[..., int(axial) :]
+            weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(len(at), -1)
+            frame = frame_of(cells.corners[at])
+            rest = F - scalars(n, frame, points.x) @ projected(n, frame, points.x, weight, F)
+            miss, size = (np.einsum("bq,bqd->b", weight, f**2) for f in (rest, F))
+            rough[at] = miss > ROUGH**2 * np.maximum(size, 1e-4 * size.mean())
+    for pattern in problem.traction:
+        side = np.flatnonzero(np.isin(cells.segment, cells.trace.segments(pattern)))
+        t, w = gauss(2 * degree + 10)
+        segment, s = cells.on_side(np.repeat(side, len(t)), np.tile(t, len(side)))
+        P = cells.trace.evaluate(problem.traction_vector(pattern), segment, s)
+        P = P.reshape(len(side), len(t), 2)
+        chi = traces(degree - model.extent, t)
+        rest = P - chi @ (chi.T @ (w[:, None] * P))
+        miss, size = (np.einsum("q,sqc->s", w, f**2) for f in (rest, P))
+        rough[cells.owner[side[miss > ROUGH**2 * size]]] = True
+    return rough
 
 
 def _body(cells: Cells) -> Index:
@@ -273,12 +312,29 @@ def _element(
     L = _cholesky(A * scale[:, :, None] * scale[:, None, :])
     right = scale[..., None] * np.concatenate([N, g[..., None]], axis=2)
     solved = np.linalg.solve(L, right)
+    of_side = mu.degree[cells.sides[at[0]]]
     dofs = np.concatenate(
-        [mu.start[cells.sides[at, i], None] + np.arange(2 * (mu.degree[cells.sides[at[0], i]] + 1)) for i in range(3)],
+        [start[:, None] + np.arange(2 * (k + 1)) for start, k in zip(mu.start[cells.sides[at]].T, of_side, strict=True)],
         axis=1,
     )
+    highest = np.maximum(of_side, degree)
+    shared = np.concatenate([np.tile(np.arange(j + 1) <= k, 2) for j, k in zip(highest, of_side, strict=True)])
+    N, g = solved[..., :-1], solved[..., -1]
+    if not shared.all():
+        N, g, own = _without(N, g, own, shared)
     return Element(points, weight, frame, degree, on_axis, compliance, strain, force, radial, missed,
-                   L / scale[:, :, None], solved[..., :-1], solved[..., -1], own, dofs)
+                   L / scale[:, :, None], N, g, own, dofs)
+
+
+def _without(N: Array, g: Array, own: Array, shared: Mask) -> tuple[Array, Array, Array]:
+    """N, g, moments of s_p n of the `shared` multipliers (d,), where all other moments vanish."""
+    Q, R = np.linalg.qr(N[:, :, ~shared])
+    fixed = -np.linalg.solve(R.transpose(0, 2, 1), own[:, ~shared, None])
+    N, g = N[:, :, shared], g[..., None]
+    along = Q.transpose(0, 2, 1) @ N
+    own = own[:, shared] + (along.transpose(0, 2, 1) @ fixed)[..., 0]
+    g = g - Q @ (Q.transpose(0, 2, 1) @ g - fixed)
+    return N - Q @ along, g[..., 0], own
 
 
 def _cholesky(A: Array) -> Array:
@@ -299,7 +355,7 @@ def _moments(cells, mu, at, degree, frame, on_axis, force, axial, m):
     found, given = [], []
     for i in range(3):
         side = cells.sides[at, i]
-        k = int(mu.degree[side[0]])
+        k = max(int(mu.degree[side[0]]), degree)
         bent = bool(cells.bent[side[0]])
         t, w = gauss(degree + k + 2 * axial + (4 * cells.trace.geometry_order if bent else 0))
         own = np.where(cells.backward[at, i, None], 1 - t, t)

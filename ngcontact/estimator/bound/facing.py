@@ -19,6 +19,7 @@ from .cells import Cells
 
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
+ROUND_OFF = 1e-14  # of gaps, relative to coordinates
 NEAR = 2e-3  # of a segment: vertices that face each other up to that are one; no point of `PLACES` lies between them
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
@@ -240,7 +241,8 @@ def facing_of(
         closed[on] = (cells.span[side[on]].mean(axis=1) < at) == (sign > 0)
     closed = closed | contact.bilateral
     shares, stiff = _shares(cells, side, other, there, d, held, share)
-    after, bare = _after(cells.ends[side], gap, closed, stiff, degree)
+    noise = ROUND_OFF * np.abs(cells.vertices).max()
+    after, bare = _after(cells.ends[side], gap, closed, stiff, degree, noise)
     if contact.bilateral:
         after, bare = np.zeros_like(after), np.zeros_like(bare)
     kept = side, other, there, d, weight, gap, after, bare, closed, shares
@@ -327,11 +329,11 @@ def guides_of(cells: Cells, displacement: ng.CoefficientFunction, side: Index, d
 
 
 def _after(
-    ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int
+    ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int, noise: float
 ) -> tuple[Array, Mask]:
     """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
 
-    And whether `gap` itself is not negative, and stays.
+    And whether `gap` itself is not negative, and stays. What is below `noise` is 0.
 
     `ends` (k, 2) are the vertices of the sides, at which r is one number of all neighbours: that
     closes the gap where they are `closed` (k,), but not at `stiff` ones (k, 2), which do not move.
@@ -350,6 +352,7 @@ def _after(
     lift[bare] = np.maximum(lift[bare], 0.0)
     after = np.where(closed[:, None], 0.0, np.maximum(c, 0.0))
     after[:, [0, -1]] = c[:, [0, -1]] + lift[number]
+    after[np.abs(after) <= noise] = 0.0
     off = np.abs(c @ B.T - gap).max(axis=1, initial=0.0)
     bare = ~closed & (c.min(axis=1) > off) & (lift[number] == 0).all(axis=1)
     return after, bare
