@@ -191,7 +191,7 @@ def _bound(
     scale = max(stress.largest, FELT * _stiffest(elements) * extent_of_u / cells.diameters.min())
     left = moments - exerted(elements, balanced.coefficients)[0]
     left -= pushed(mu, lines, balanced.pressure)
-    left = program.resisted(left, left)
+    left -= program.idle(left)
     residual = _residual(cells, mu, np.where(fixed, 0.0, left), scale)
     if residual > SETTLED:
         raise ContactError(

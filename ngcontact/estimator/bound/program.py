@@ -130,7 +130,7 @@ class DualProgram:
     def nearest(self, elements: Sequence[Element], moments: Array) -> Balanced:
         """The stress and the p* >= 0 that minimise B^2 for given tractions, `moments` (d,)."""
         alone, _ = exerted(elements, [e.alone() for e in elements])
-        moments = self.resisted(moments, moments - alone)
+        moments = self._resisted(moments, moments - alone)
         program = replace(self.program, b=self.T.T @ (moments - alone))
         closed = np.concatenate(
             [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines] or [[]]
@@ -151,7 +151,7 @@ class DualProgram:
         Coefficients that would be more stay at their limit.
         """
         alone, _ = exerted(elements, [e.alone() for e in elements])
-        moments = self.resisted(np.zeros_like(alone), -alone)
+        moments = self._resisted(np.zeros_like(alone), -alone)
         load = self.T.T @ (moments - alone)
         program = replace(self.program, g=np.zeros_like(self.program.g))
         every = zip(limits, self.lines, strict=True)
@@ -178,15 +178,19 @@ class DualProgram:
             force[over] = np.sign(force[over]) * limit[over]
             free &= ~over
 
-    def resisted(self, moments: Array, load: Array) -> Array:
-        """Given tractions, `moments` (d,), without the work of a load (d,) on free motions.
-
-        Nothing resists these motions; what a load does there is the error of quadrature.
-        """
+    def idle(self, load: Array) -> Array:
+        """The part (d,) of a load (d,) that does work on motions which nothing resists."""
         lineal = self.T @ self.program.null_space.lineal
         if lineal.shape[1] == 0:
-            return moments
-        idle = lineal @ np.linalg.solve(lineal.T @ lineal, lineal.T @ load)
+            return np.zeros_like(load)
+        return np.asarray(lineal @ np.linalg.solve(lineal.T @ lineal, lineal.T @ load))
+
+    def _resisted(self, moments: Array, load: Array) -> Array:
+        """Given tractions, `moments` (d,), without the idle part of the `load` (d,) that they are of.
+
+        That is the error of quadrature, and round-off.
+        """
+        idle = self.idle(load)
         if np.abs(idle).max() > QUADRATURE * np.abs(load).max():
             raise ContactError("the loads on a body that moves freely are not in balance")
         return np.asarray(moments - idle)
@@ -212,7 +216,8 @@ class DualProgram:
                 c + e.answer(change) for e, c in zip(elements, coefficients, strict=True)
             ]
             total, largest = exerted(elements, coefficients)
-            left = self.T.T @ (self.resisted(moments, moments - total) - total)
+            left = moments - total
+            left = self.T.T @ (left - self.idle(left))
             left[p.fixed] = 0.0
             force = np.where(held, left[p.unknown], force)
             force = np.where(signed, np.maximum(force, 0.0), force)
