@@ -23,7 +23,7 @@ from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
 from .cells import Cells, cells_of, places
-from .elements import Element, Multipliers, compliance_at, elements_of
+from .elements import Element, Multipliers, compliance_at, elements_of, rigid_motions
 from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
 from .lifting import asked_on_line, asked_on_supports, lifted
 from .missed import data_norms
@@ -79,6 +79,8 @@ class Proof:
     multipliers : Multipliers
     elements : list of Element
     given : Given
+    moments : ndarray (d,)
+        Of the given tractions with the multipliers.
     program : DualProgram
     balanced : Balanced
         The stress in equilibrium, and p*.
@@ -101,6 +103,7 @@ class Proof:
     multipliers: Multipliers
     elements: list[Element]
     given: Given
+    moments: Array
     program: DualProgram
     balanced: Balanced
     stress: StressNorms
@@ -178,7 +181,8 @@ def _bound(
         facing = facing_of(cells, displacement, reach, lift, held, share)
         lines.append(rows_of(mu, facing, degree - extent))
     moments, fixed = moments_of(problem, cells, mu, given)
-    program = dual_program(mu, elements, fixed, lines)
+    motions = rigid_motions(cells, mu, fixed)
+    program = dual_program(mu, elements, fixed, motions, lines)
     balanced = program.nearest(elements, moments)
     n = len(cells.triangles)
     stress = stress_norms(elements, balanced.coefficients, n)
@@ -187,6 +191,7 @@ def _bound(
     scale = max(stress.largest, FELT * _stiffest(elements) * extent_of_u / cells.diameters.min())
     left = moments - exerted(elements, balanced.coefficients)[0]
     left -= pushed(mu, lines, balanced.pressure)
+    left = program.resisted(left, left)
     residual = _residual(cells, mu, np.where(fixed, 0.0, left), scale)
     if residual > SETTLED:
         raise ContactError(
@@ -210,6 +215,7 @@ def _bound(
         multipliers=mu,
         elements=elements,
         given=given,
+        moments=moments,
         program=program,
         balanced=balanced,
         stress=stress,
