@@ -22,7 +22,7 @@ from ...problem import Triangulation
 
 REFERENCE = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])  # NGSolve's corners, in this order
 NEWTON_STEPS = 8
-TURN = 0.01  # twice the sine of the angle between sides up to which they are on one line
+TURN = 0.5  # twice the sine of the angle between sides up to which they are on one line
 
 
 @dataclass(frozen=True, eq=False)
