@@ -58,7 +58,7 @@ def _stresses(proof: Proof) -> dict[str, np.ndarray]:
     measure = model.measure(x.reshape(-1, 2)).reshape(*x.shape[:2], 1)
     stress, force = np.zeros((*x.shape[:2], 3)), np.zeros(x.shape)
     rules: dict[str, np.ndarray] = {}
-    for number, (e, c) in enumerate(zip(proof.elements, proof.stress.coefficients, strict=True)):
+    for number, (e, c) in enumerate(zip(proof.elements, proof.balanced.coefficients, strict=True)):
         at = e.places.at
         stress[at] = e.stress(c, x[at])[..., [0, 1, -1]]
         force[at] = scalars(e.force_degree, e.frame, x[at]) @ e.force
