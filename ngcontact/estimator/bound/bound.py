@@ -77,6 +77,8 @@ class Proof:
     multipliers : Multipliers
     elements : list of Element
     given : Given
+    moments : ndarray (d,)
+        Of the given tractions with the multipliers.
     program : DualProgram
     balanced : Balanced
         The stress in equilibrium, and p*.
@@ -99,6 +101,7 @@ class Proof:
     multipliers: Multipliers
     elements: list[Element]
     given: Given
+    moments: Array
     program: DualProgram
     balanced: Balanced
     stress: StressNorms
@@ -201,6 +204,7 @@ def _bound(
         multipliers=mu,
         elements=elements,
         given=given,
+        moments=moments,
         program=program,
         balanced=balanced,
         stress=stress,

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -94,14 +96,21 @@ class DualProgram:
         mu = T y: each row is an unknown of y.
     program : QuadraticProgram
         Of y, with the bounds of the lines.
-    factor : Factor
-        Of its matrix, made definite.
     """
 
     lines: Sequence[Rows]
     T: sp.csr_array
     program: QuadraticProgram
-    factor: Factor
+
+    @cached_property
+    def factor(self) -> Factor:
+        """Of the matrix, made definite."""
+        K = self.program.K
+        return cholesky(lower_half((K + sp.diags_array(DEFINITE * K.diagonal())).tocsr()))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the factor, which is made again."""
+        return {name: value for name, value in vars(self).items() if name != "factor"}
 
     def nearest(self, elements: Sequence[Element], moments: Array) -> Balanced:
         """The stress and the p* >= 0 that minimise B^2 for given tractions, `moments` (d,)."""
@@ -226,19 +235,18 @@ def dual_program(
     T, unknown, bound, equality = _basis(mu, lines, size)
     if len(unknown):
         K = (T.T @ K @ T).tocsr()
-    diagonal, m = K.diagonal(), len(unknown)
+    m = len(unknown)
     program = QuadraticProgram(
         K=K,
         b=np.zeros(size),
         R=from_triplets(np.ones(m), np.arange(m), unknown, (m, size)),
         g=bound,
         equality=equality,
-        fixed=fixed | (diagonal <= 0),  # on the axis there is no traction
+        fixed=fixed | (K.diagonal() <= 0),  # on the axis there is no traction
         values=np.zeros(size),
         unknown=unknown,
     )
-    definite = (K + sp.diags_array(DEFINITE * diagonal)).tocsr()
-    return DualProgram(lines, T, program, cholesky(lower_half(definite)))
+    return DualProgram(lines, T, program)
 
 
 def exerted(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple[Array, float]:

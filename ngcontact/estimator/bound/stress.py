@@ -12,6 +12,7 @@ import numpy as np
 
 from ...arrays import Array, Index
 from .bound import Proof
+from .certificate import certificate_arrays
 from .facing import bernstein
 
 AT_ONCE = 1000  # places beside all parts
@@ -149,8 +150,6 @@ class EquilibratedStress:
         ValueError
             Another suffix, or a stress on curved triangles, of which there is no certificate.
         """
-        from .certificate import certificate_arrays
-
         path = Path(path)
         if path.suffix != ".npz":
             raise ValueError(f'path="{path}" must end in .npz')

@@ -156,25 +156,23 @@ def missed_tractions(
     largest: float,
 ) -> Array:
     """L2 norms (n, 3) of what tractions miss, times the model's measure, for loads of a problem."""
-    asked = np.zeros_like(have.values)
+    asked = np.zeros_like(have.values)  # per t, with the measure: they vanish on an axis
     for pattern, side in given.loads:
         if pattern in problem.traction:
+            at = have.position[side]
             load = problem.traction_vector(pattern)
-            asked[have.position[side]] += _at(cells, load, side, PLACES)
+            asked[at] += have.ds[at][..., None] * _at(cells, load, side, PLACES)
     for line, p in zip(lines, pressure, strict=True):
         f = line.facing
         density = p @ bernstein(p.shape[1] - 1, PLACES).T * f.weight / WEIGHTS
         force = density[..., None] * f.direction
-        own = have.position[f.side]
-        asked[own] -= force / have.ds[own][..., None]
+        asked[have.position[f.side]] -= force
         if line.opposite:
-            there = have.position[f.other]
-            force = f.on_primary(force) * f.rates[..., None]
-            asked[there] += force / have.ds[there][..., None]
-    miss = np.where(given.held[have.side][:, None], 0.0, asked - have.values)
-    miss[np.abs(miss) <= ROUND_OFF * largest] = 0.0
-    weight = WEIGHTS * have.ds**2 / have.length
+            asked[have.position[f.other]] += f.on_primary(force) * f.rates[..., None]
+    free = ~given.held[have.side][:, None]
+    miss = np.where(free, asked - have.ds[..., None] * have.values, 0.0)
+    miss[np.abs(miss) <= ROUND_OFF * largest * have.ds.max(axis=1)[:, None, None]] = 0.0
     norms = np.zeros((len(cells.triangles), 3))
-    square = (weight[..., None] * miss**2).sum(axis=(1, 2))
+    square = ((WEIGHTS / have.length)[..., None] * miss**2).sum(axis=(1, 2))
     norms[cells.owner[have.side], cells.local[have.side]] = np.sqrt(square)
     return norms
