@@ -5,8 +5,8 @@ misses on Gamma_u and Gamma_K, without a constant
 
     |u - u_h|^2 <= B^2 = |s - sigma_h|^2 + 2 int p* (gap_h + r) + |w|^2,
 
-where gap_h + r >= 0 is the gap of u_h + w; docs/bounds.md has the proof. s and p* minimise B^2: they
-solve the dual contact problem.
+where gap_h + r >= 0 is the gap of u_h + w; docs/bounds.md has the proof. s and p* minimise B^2:
+they solve the dual contact problem.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Mask
 from ...contact import ContactState
 from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
 from .cells import Cells, cells_of, places
-from .elements import Element, Multipliers, compliance_at, elements_of
+from .elements import Element, Multipliers, compliance_at, elements_of, rigid_motions
 from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
 from .lifting import asked_on_line, asked_on_supports, lifted
 from .missed import data_norms
@@ -179,14 +179,15 @@ def _bound(
         facing = facing_of(cells, displacement, reach, lift, held, share)
         lines.append(rows_of(mu, facing, degree - extent))
     moments, fixed = moments_of(problem, cells, mu, given)
-    program = dual_program(mu, elements, fixed, lines)
+    motions = rigid_motions(cells, mu, fixed)
+    program = dual_program(mu, elements, fixed, motions, lines)
     balanced = program.nearest(elements, moments)
     n = len(cells.triangles)
     stress = stress_norms(elements, balanced.coefficients, n)
     gaps = [float(np.abs(line.facing.gap).max(initial=0.0)) for line in lines]
     extent_of_u = max(_size(trace, displacement), *gaps, 0.0)
     scale = max(stress.largest, FELT * _stiffest(elements) * extent_of_u / cells.diameters.min())
-    residual = settled(cells, mu, elements, program, balanced, moments, scale)
+    residual = settled(cells, mu, elements, program, balanced, moments, fixed, scale)
     have = boundary_tractions(cells, elements, balanced.coefficients)
     missed = missed_tractions(problem, cells, given, lines, balanced.pressure, have, stress.largest)
     loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(elements, n))
@@ -277,11 +278,13 @@ def settled(
     program: DualProgram,
     balanced: Balanced,
     moments: Array,
+    fixed: Mask,
     largest: float,
 ) -> float:
     """What is left of equilibrium with given tractions, `moments` (d,).
 
-    The largest force over the triangle's diameter, its measure and the `largest` stress.
+    The largest force over the triangle's diameter, its measure and the `largest` stress; `fixed`
+    (d,) multipliers take any force.
 
     Raises
     ------
@@ -290,7 +293,7 @@ def settled(
     """
     left = moments - exerted(elements, balanced.coefficients)[0]
     left -= pushed(mu, program.lines, balanced.pressure)
-    left[program.program.fixed] = 0.0
+    left = np.where(fixed, 0.0, program.resisted(left, left))
     side = np.repeat(np.arange(len(cells.ends)), np.diff(mu.start))
     middle = cells.vertices[cells.ends].mean(axis=1)
     size = cells.diameters[cells.owner] * cells.trace.model.measure(middle) * (largest or 1.0)

@@ -17,11 +17,12 @@ import ngsolve as ng
 import numpy as np
 from numpy.polynomial import legendre
 
-from ...arrays import Array, Index
+from ...arrays import Array, Index, Mask
 from ...errors import ContactError
-from ...fem import model_of
+from ...fem import connected_bodies, model_of
 from ...lagrange import gauss
-from ...problem import Problem, varies
+from ...problem import Problem, Triangulation, varies
+from ...qp import vanishing_combinations
 from .cells import Cells, Places, places
 from .polynomials import Frame, balancing, frame_of, in_frame, projected, scalars, stresses
 
@@ -181,6 +182,28 @@ def multipliers(cells: Cells, degree: int) -> tuple[Index, Multipliers]:
     np.maximum.at(of_side, cells.sides, own[:, None])
     start = np.concatenate([[0], np.cumsum(2 * (of_side + 1))])
     return own, Multipliers(of_side, start)
+
+
+def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
+    """Multipliers (d, r) of rigid motions, of size 1, that vanish where they are `fixed` (d,)."""
+    trace = cells.trace
+    bodies = connected_bodies(trace)
+    corner = Triangulation(trace.mesh).triangles[cells.parent[cells.owner], 0]
+    body = bodies.of_vertex[corner]
+    values = np.zeros((int(mu.start[-1]), len(bodies.names), 3))
+    for k in np.unique(mu.degree).tolist():
+        side = np.flatnonzero(mu.degree == k)
+        t, w = gauss(k + trace.geometry_order)
+        x, _ = cells.points(np.repeat(side, len(t)), np.tile(t, len(side)))
+        arm = x.reshape(len(side), -1, 2) - bodies.middle[body[side], None]
+        arm = arm / bodies.size[body[side], None, None]
+        chi = w[:, None] * traces(k, t)
+        along_x, at = mu.start[side, None] + np.arange(k + 1), body[side, None]
+        values[along_x, at, 0] = values[along_x + k + 1, at, 1] = chi.sum(axis=0)
+        values[along_x, at, 2] = -arm[..., 1] @ chi
+        values[along_x + k + 1, at, 2] = arm[..., 0] @ chi
+    found = values[:, :, np.array(trace.model.motions)].reshape(len(values), -1)
+    return np.asarray(found @ vanishing_combinations(found[fixed]))
 
 
 def elements_of(

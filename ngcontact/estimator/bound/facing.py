@@ -20,6 +20,7 @@ from .cells import Cells
 
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
+NEAR = 2e-3  # of the shorter segment: vertices that face each other up to that are one
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
 STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
@@ -124,23 +125,38 @@ def reach_of(
 
 
 def cuts_of(trace: BoundaryTrace, reaches: Sequence[Reach]) -> dict[int, Array]:
-    """Places s of vertices to come, by segment: ends of contact, opposite vertices."""
+    """Places s of vertices to come, by segment: ends of contact, opposite vertices.
+
+    Vertices that all but face each other are one.
+    """
     cuts: dict[int, list[float]] = {}
+    length = trace.lengths(np.arange(len(trace.region)))
+    size = np.full(trace.space.ndof, np.inf)  # shortest segment at each vertex
+    np.minimum.at(size, trace.nodes[:, [0, -1]], length[:, None])
+
+    def keep(k: Index, s: Array, other: Index) -> None:
+        """Cut segments `k` (r,) at `s` (r,) but beside a vertex that all but faces `other`'s."""
+        end = trace.nodes[k, np.where(s < 0.5, 0, -1)]
+        near = NEAR * np.minimum(size[end], size[trace.nodes[other][:, [0, -1]]].min(axis=1))
+        apart = np.minimum(s, 1 - s) * length[k] > near
+        for number, place in zip(k[apart].tolist(), s[apart].tolist(), strict=True):
+            cuts.setdefault(number, []).append(place)
+
     for reach in reaches:
         line, contact = reach.pair.line, reach.pair.line.contact
-        own = [np.array(list(reach.ends), dtype=np.intp)]
-        places = [np.array([s for s, _ in reach.ends.values()])]
+        k = np.array(list(reach.ends), dtype=np.intp)
+        s = np.array([place for place, _ in reach.ends.values()])
+        keep(k, s, k)
         if contact.primary is not None and len(reach.segments):
             parts = divided(trace, contact, reach.segments, line.facing)
-            own += [np.tile(reach.segments[parts.local], 2), np.tile(reach.segments, 2)]
-            places += [parts.start, parts.stop, np.repeat([0.0, 1.0], len(reach.segments))]
-        k, s = np.concatenate(own), np.concatenate(places)
-        if contact.primary is not None:
+            own = np.tile(reach.segments[parts.local], 2)
+            places = np.append(parts.start, parts.stop)
+            keep(own, places, np.tile(parts.facing, 2))
+            k, s = np.append(k, own), np.append(s, places)
             d = directions(trace, contact, k, s)
             there, t, *_ = partners(trace, line.facing, k, trace.point(k, s), d)
-            k, s = np.append(k, there[there >= 0]), np.append(s, t[there >= 0])
-        for segment, place in zip(k.tolist(), s.tolist(), strict=True):
-            cuts.setdefault(segment, []).append(place)
+            met = there >= 0
+            keep(there[met], t[met], k[met])
     inside = {k: _inside(np.array(s)) for k, s in cuts.items()}
     return {k: s for k, s in inside.items() if s.size}
 
@@ -229,7 +245,7 @@ class Facing:
         for _ in range(NEWTON_STEPS):
             value = np.einsum("kji,ki->kj", at_places(lagrange, t), nodes)
             slope = np.einsum("kji,ki->kj", at_places(lagrange_derivative, t), nodes)
-            t = np.clip(t - (value - PLACES) / slope, 0.0, 1.0)
+            t = t - (value - PLACES) / slope
         return t
 
     @cached_property
@@ -278,9 +294,10 @@ def facing_of(
     other, there = np.full(len(side), -1), np.zeros((len(side), j))
     if contact.primary is not None:
         place = found.s[every].reshape(-1, j)
-        middle = found.segment[every].reshape(-1, j)[:, j // 2]
+        segments = found.segment[every].reshape(-1, j)
+        middle = segments[:, j // 2]
         other = cells.side_at(middle, place[:, j // 2])
-        there = cells.own_parameter(other, place)
+        there = _continued(cells.own_parameter(other, place), segments == middle[:, None])
     rate = np.abs(np.diff(cells.span[side], axis=1))
     weight = WEIGHTS * rate * jacobian(trace, contact, segment, s).reshape(-1, j)
     order = np.argsort(line.segments)
@@ -296,6 +313,15 @@ def facing_of(
         after, bare = np.zeros_like(after), np.zeros_like(bare)
     kept = side, other, there, d, weight, gap, after, bare, closed, shares
     return Facing(pair, *kept, contact.bilateral)
+
+
+def _continued(there: Array, own: Mask) -> Array:
+    """Parameters (k, j), of which those that are not `own` (k, j) lie beyond the nearer end."""
+    for i in np.flatnonzero(~own.all(axis=1)):
+        at = np.flatnonzero(own[i])
+        rise = np.polyfit(PLACES[at], there[i, at], 1)
+        there[i, ~own[i]] = np.polyval(rise, PLACES[~own[i]])
+    return there
 
 
 def held_motions(cells: Cells, sides: Sequence[Index], directions: Sequence[Array]) -> Array:
@@ -370,9 +396,7 @@ def guides_of(
     )
 
 
-def _after(
-    ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int
-) -> tuple[Array, Mask]:
+def _after(ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int) -> tuple[Array, Mask]:
     """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
 
     And whether `gap` itself is not negative, and stays.

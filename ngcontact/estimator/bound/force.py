@@ -76,7 +76,8 @@ def force_bar(
     dual = proof.program.within(elements, limits)
     norms = stress_norms(elements, dual.coefficients, n)
     none = np.zeros(int(proof.multipliers.start[-1]))
-    settled(cells, proof.multipliers, elements, proof.program, dual, none, norms.largest)
+    fixed = proof.program.program.fixed
+    settled(cells, proof.multipliers, elements, proof.program, dual, none, fixed, norms.largest)
     have = boundary_tractions(cells, elements, dual.coefficients)
     free = replace(problem, force={}, traction={})
     missed = missed_tractions(free, cells, proof.given, lines, dual.pressure, have, norms.largest)
