@@ -5,8 +5,8 @@ misses on Gamma_u and Gamma_K, without a constant
 
     |u - u_h|^2 <= B^2 = |s - sigma_h|^2 + 2 int p* (gap_h + r) + |w|^2,
 
-where gap_h + r >= 0 is the gap of u_h + w; docs/bounds.md has the proof. s and p* minimise B^2: they
-solve the dual contact problem.
+where gap_h + r >= 0 is the gap of u_h + w; docs/bounds.md has the proof. s and p* minimise B^2:
+they solve the dual contact problem.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Mask
 from ...contact import ContactState
 from ...errors import ContactError
 from ...fem import BoundaryTrace
@@ -53,9 +53,7 @@ class StressNorms:
     largest: float
 
 
-def stress_norms(
-    elements: Sequence[Element], coefficients: Sequence[Array], n: int
-) -> StressNorms:
+def stress_norms(elements: Sequence[Element], coefficients: Sequence[Array], n: int) -> StressNorms:
     """Norms of a stress on the n triangles of `elements`."""
     distance, largest = np.zeros(n), 0.0
     for e, c in zip(elements, coefficients, strict=True):
@@ -189,18 +187,10 @@ def _bound(
     gaps = [float(np.abs(line.facing.gap).max(initial=0.0)) for line in lines]
     extent_of_u = max(_size(trace, displacement), *gaps, 0.0)
     scale = max(stress.largest, FELT * _stiffest(elements) * extent_of_u / cells.diameters.min())
-    left = moments - exerted(elements, balanced.coefficients)[0]
-    left -= pushed(mu, lines, balanced.pressure)
-    left -= program.idle(left)
-    residual = _residual(cells, mu, np.where(fixed, 0.0, left), scale)
-    if residual > SETTLED:
-        raise ContactError(
-            f"no equilibrated stress was found: the residual relative to the largest stress is "
-            f"{residual:.1e}"
-        )
+    residual = settled(cells, mu, elements, program, balanced, moments, fixed, scale)
     have = boundary_tractions(cells, elements, balanced.coefficients)
     missed = missed_tractions(problem, cells, given, lines, balanced.pressure, have, stress.largest)
-    loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(cells, elements))
+    loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(elements, n))
     lifts = [(line.facing, line.facing.lift) for line in lines]
     lifting = lifted(problem, cells, asked, lifts, lift, extent_of_u)
     closed, signed = 0.0, 0.0
@@ -270,25 +260,51 @@ def forces_missed(elements: Sequence[Element], n: int) -> Array:
     return missed
 
 
-def smallest_moduli(cells: Cells, elements: Sequence[Element]) -> Array:
-    """Smallest eigenvalue (n,) of C in Mandel's scaling, times the least measure."""
-    found = np.zeros(len(cells.triangles))
+def smallest_moduli(elements: Sequence[Element], n: int) -> Array:
+    """Smallest eigenvalue (n,) of C in Mandel's scaling."""
+    found = np.zeros(n)
     for e in elements:
         mandel = np.ones(e.compliance.shape[-1])
         mandel[-1] = 0.5**0.5
         scaled = e.compliance * mandel * mandel[:, None]
         found[e.places.at] = 1 / np.linalg.eigvalsh(scaled)[..., -1].max(axis=1)
-    measure = cells.trace.model.measure(cells.corners.reshape(-1, 2))
-    return found * measure.reshape(-1, 3).min(axis=1)
+    return found
 
 
-def _residual(cells: Cells, mu: Multipliers, left: Array, largest: float) -> float:
-    """Largest force `left` (d,), over the triangle's diameter, its measure and largest stress."""
+def settled(
+    cells: Cells,
+    mu: Multipliers,
+    elements: Sequence[Element],
+    program: DualProgram,
+    balanced: Balanced,
+    moments: Array,
+    fixed: Mask,
+    largest: float,
+) -> float:
+    """What is left of equilibrium with given tractions, `moments` (d,).
+
+    The largest force over the triangle's diameter, its measure and the `largest` stress; `fixed`
+    (d,) multipliers take any force.
+
+    Raises
+    ------
+    ContactError
+        More than `SETTLED`.
+    """
+    left = moments - exerted(elements, balanced.coefficients)[0]
+    left -= pushed(mu, program.lines, balanced.pressure)
+    left = np.where(fixed, 0.0, left - program.idle(left))
     side = np.repeat(np.arange(len(cells.ends)), np.diff(mu.start))
     middle = cells.vertices[cells.ends].mean(axis=1)
     size = cells.diameters[cells.owner] * cells.trace.model.measure(middle) * (largest or 1.0)
     at = np.flatnonzero(size[side] > 0)  # on the axis there is no traction
-    return float((np.abs(left[at]) / size[side[at]]).max(initial=0.0))
+    residual = float((np.abs(left[at]) / size[side[at]]).max(initial=0.0))
+    if not residual <= SETTLED:
+        raise ContactError(
+            f"no equilibrated stress was found: the residual relative to the largest stress is "
+            f"{residual:.1e}"
+        )
+    return residual
 
 
 def _stiffest(elements: Sequence[Element]) -> float:

@@ -16,6 +16,7 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index, Mask
+from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...lagrange import gauss
 from ...problem import Triangulation
@@ -228,8 +229,10 @@ def places(cells: Cells, at: Index, order: int) -> Places:
     guess = np.einsum("qc,bcd->bqd", share, cells.reference[at])
     number = np.repeat(at, len(weight))
     found = cells.located(number, x.reshape(-1, 2), guess.reshape(-1, 2)).reshape(x.shape)
-    area = np.abs(np.linalg.det(spread)) * weight
-    return Places(at, x, area, found, spread, local)
+    area = np.linalg.det(spread)
+    if not (area > 0).all():
+        raise ContactError("a curved side of the mesh goes beyond the middle of its element")
+    return Places(at, x, area * weight, found, spread, local)
 
 
 def cells_of(

@@ -64,7 +64,7 @@ class Element:
     source : CoefficientFunction or None
         The body force.
     missed : ndarray (b,)
-        Norm of what of the body force s_p does not balance.
+        L2 norm of what of the body force s_p does not balance, times the measure.
     root : ndarray (b, m, m)
         L of A = L L'.
     N : ndarray (b, m, d)
@@ -408,6 +408,7 @@ def _forces(F, cells, points, frame, degree, axial):
         force[..., 0] = 0.0
     else:
         radial = np.zeros((b, q))
+    weight = weight * measure  # norms of F times the measure
     missed = np.sqrt(np.einsum("bq,bqd->b", weight, rest**2))
     size = np.sqrt(np.einsum("bq,bqd->b", weight, values**2))
     return force, radial, np.where(missed <= ROUND_OFF * size, 0.0, missed)
