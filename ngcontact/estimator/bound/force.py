@@ -12,12 +12,13 @@ import numpy as np
 from ...arrays import Array, Index
 from ...fem import model_of
 from ...problem import Problem
-from .bound import LIFTED, Proof, smallest_moduli, stress_norms, work_on_gap
+from .bound import LIFTED, Proof, work_on_gap
 from .facing import PLACES, WEIGHTS, Facing, bernstein
 from .lifting import lifted
 from .missed import data_norms
+from .norms import smallest_moduli, stress_norms
 from .program import exerted
-from .tractions import boundary_tractions, missed_tractions
+from .tractions import boundary_tractions, missed_tractions, requested
 
 NOISE = 1e-13  # of a jump, relative to the largest displacement
 ROOM = 2.0  # largest |q*| / p* over the ratio of their means, where contact has no open end
@@ -75,9 +76,10 @@ def force_bar(
     ]
     dual = proof.program.within(-exerted(elements, np.zeros_like(proof.balanced.mu)), limits)
     norms = stress_norms(elements, dual.mu, n)
-    have = boundary_tractions(cells, elements, norms.coefficients)
+    have = boundary_tractions(cells, proof.given, elements, norms.coefficients)
     free = replace(problem, force={}, traction={})
-    missed = missed_tractions(free, cells, proof.given, lines, dual.pressure, have, norms.largest)
+    wanted = requested(free, cells, proof.given, lines, dual.pressure)
+    missed = missed_tractions(wanted, cells, have, norms.largest)
     data = data_norms(cells, np.zeros(n), missed, smallest_moduli(cells, elements))
     lifts = [(f, -r) for f, r in zip(facing, lift, strict=True)]
     lifting = lifted(problem, cells, [], lifts, cells.trace.order + LIFTED, 1.0)
