@@ -13,7 +13,7 @@ from netgen.occ import Circle, Compound, MoveTo, OCCGeometry, Y
 from drivers.reference import cases
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
 from ngcontact.estimator import Quantity
-from ngcontact.estimator.equilibrated import bound
+from ngcontact.estimator.bound import bound
 from ngcontact.geometries import blocks, disc_on_disc
 from tests.runs import solved
 from tests.scenes import unmatched_blocks

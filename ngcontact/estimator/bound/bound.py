@@ -23,10 +23,10 @@ from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
 from .cells import Cells, cells_of, places
-from .elements import PARTED, WHOLE, Element, Multipliers, compliance_at, elements_of
+from .elements import PARTED, WHOLE, Element, Multipliers, compliance_at, elements_of, rigid_motions
 from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
 from .islands import Level, once_more
-from .lifting import asked_on_supports, lifted
+from .lifting import asked_on_line, asked_on_supports, lifted
 from .missed import data_norms
 from .norms import (
     SETTLED,
@@ -64,6 +64,8 @@ class Proof:
     multipliers : Multipliers
     elements : list of Element
     given : Given
+    moments : ndarray (d,)
+        Of the given tractions with the multipliers.
     program : DualProgram
     balanced : Balanced
         The stress in equilibrium, and p*.
@@ -86,6 +88,7 @@ class Proof:
     multipliers: Multipliers
     elements: list[Element]
     given: Given
+    moments: Array
     program: DualProgram
     balanced: Balanced
     stress: StressNorms
@@ -157,35 +160,36 @@ def _bound(
         (k, guides_of(cells, displacement, given.guides[of_guides == k], lift))
         for k in np.unique(of_guides).tolist()
     ]
-    held = held_motions(
-        cells,
-        [*(one.side for one in asked), *(guide.side for _, guide in guides)],
-        [*(one.direction for one in asked), *(guide.direction for _, guide in guides)],
-    )
+    holding = [*asked, *(x for _, g in guides for x in asked_on_line(g, g.gap, alone=True))]
+    held = held_motions(cells, [x.side for x in holding], [x.direction for x in holding])
     lines = [rows_of(mu, guide, k - extent) for k, guide in guides]
     for reach in reaches:
         share = _share(problem, cells, reach.pair)
         facing = facing_of(cells, displacement, reach, lift, held, share)
         lines.append(rows_of(mu, facing, degree - extent))
     moments, fixed = moments_of(problem, cells, mu, given)
-    program = dual_program(mu, elements, fixed, lines)
-    balanced = program.nearest(moments - exerted(elements, np.zeros_like(moments)))
+    motions = rigid_motions(cells, mu, fixed)
+    program = dual_program(mu, elements, fixed, motions, lines)
+    balanced = program.nearest(elements, moments)
     n = len(cells.triangles)
-    stress = stress_norms(elements, balanced.mu, n)
-    extent_of_u = _size(trace, displacement)
+    stress = stress_norms(elements, balanced.coefficients, n)
+    gaps = [float(np.abs(line.facing.gap).max(initial=0.0)) for line in lines]
+    extent_of_u = max(_size(trace, displacement), *gaps, 0.0)
     scale = max(stress.largest, FELT * _stiffest(elements) * extent_of_u / cells.diameters.min())
-    left = moments - exerted(elements, balanced.mu) - pushed(mu, lines, balanced.pressure)
+    left = moments - exerted(elements, balanced.coefficients)[0]
+    left -= pushed(mu, lines, balanced.pressure)
+    left = program.resisted(left, left)
     residual = float(residuals(cells, mu, np.where(fixed, 0.0, left), scale).max())
     if residual > SETTLED:
         raise ContactError(
             f"no equilibrated stress was found: the residual relative to the largest stress is "
             f"{residual:.1e}"
         )
-    have = boundary_tractions(cells, given, elements, stress.coefficients)
+    have = boundary_tractions(cells, given, elements, balanced.coefficients)
     wanted = requested(problem, cells, given, lines, balanced.pressure)
     missed = missed_tractions(wanted, cells, have, stress.largest)
     loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(cells, elements))
-    level = Level(cells, elements, stress.coefficients, depth, stress.distance, loads)
+    level = Level(cells, elements, balanced.coefficients, depth, stress.distance, loads)
     distance, loads = once_more(problem, displacement, wanted, level, degree, scale)
     stress = replace(stress, distance=distance)
     lifts = [(line.facing, line.facing.lift) for line in lines]
@@ -202,6 +206,7 @@ def _bound(
         multipliers=mu,
         elements=elements,
         given=given,
+        moments=moments,
         program=program,
         balanced=balanced,
         stress=stress,

@@ -22,7 +22,7 @@ from ...problem import Triangulation
 
 REFERENCE = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])  # NGSolve's corners, in this order
 NEWTON_STEPS = 8
-TURN = 0.01  # twice the sine of the angle between sides up to which they are on one line
+TURN = 0.5  # twice the sine of the angle between sides up to which they are on one line
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ class Cells:
     def own_parameter(self, side: Index, s: Array) -> Array:
         """T (k, j) of places `s` (k, j) of the segments of sides (k,)."""
         a, b = self.span[side, 0, None], self.span[side, 1, None]
-        return np.clip((s - a) / (b - a), 0.0, 1.0)
+        return np.asarray((s - a) / (b - a))
 
     def points(self, side: Index, t: Array) -> tuple[Array, Array]:
         """Points (k, 2) and derivatives by t (k, 2) at `t` (k,) of sides `side` (k,)."""

@@ -18,18 +18,21 @@ import ngsolve as ng
 import numpy as np
 from numpy.polynomial import legendre
 
-from ...arrays import Array, Index
-from ...fem import model_of
+from ...arrays import Array, Index, Mask
+from ...errors import ContactError
+from ...fem import connected_bodies, model_of
 from ...lagrange import gauss
-from ...problem import Problem, varies
+from ...problem import Problem, Triangulation, varies
+from ...qp import vanishing_combinations
 from .cells import Cells, Places, places
 from .parts import projection
 from .polynomials import Frame, balancing, frame_of, in_frame, stresses
 
 ON_CURVES = 3  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+DEFINITE = (1e-15, 1e-14, 1e-13, 1e-12)  # of the diagonal, until it is enough
 WHOLE, PARTED = 10, 4  # degrees above 2 k of rules for forces: on triangles, on their parts
-ROUND_OFF = 1e-13  # of a force, relative to it
+ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
 BLOCK = 4000  # triangles at once: bounds the memory
 
 
@@ -99,10 +102,19 @@ class Element:
         """Of the body force that is balanced."""
         return _force_degree(self.degree, self.strain.shape[2] > 3)
 
-    def coefficients(self, mu: Array) -> Array:
-        """C (b, m) for all multipliers `mu` (k,)."""
-        y = self.g + np.einsum("bmd,bd->bm", self.N, mu[self.dofs])
+    def answer(self, mu: Array) -> Array:
+        """Change of c (b, m) with all multipliers, by `mu` (k,)."""
+        y = np.einsum("bmd,bd->bm", self.N, mu[self.dofs])
         return np.linalg.solve(self.root.transpose(0, 2, 1), y[..., None])[..., 0]
+
+    def alone(self) -> Array:
+        """Coefficients c (b, m) without multipliers."""
+        return np.linalg.solve(self.root.transpose(0, 2, 1), self.g[..., None])[..., 0]
+
+    def tractions(self, c: Array) -> Array:
+        """Moments (b, d) of the tractions of s with coefficients `c` (b, m)."""
+        y = (self.root.transpose(0, 2, 1) @ c[..., None])[..., 0]
+        return np.asarray(self.own + (self.N.transpose(0, 2, 1) @ y[..., None])[..., 0])
 
     def basis(self, x: Array, some: Index | slice = slice(None)) -> Array:
         """T (b, q, v, m) at points `x` (b, q, 2)."""
@@ -126,7 +138,7 @@ class Element:
         )
 
     def whole_stress(self, c: Array) -> Array:
-        """S (b, q, v) at the quadrature points, the radial force's part of the hoop included."""
+        """Stresses (b, q, v) at the quadrature points, the radial force's part of the hoop included."""
         s = self.stress(c, self.places.x)
         if s.shape[2] > 3:
             s[..., 2] += self.radial
@@ -139,7 +151,7 @@ class Element:
         return cells.evaluate(ng.x * self.source[0], at, reference)[:, 0]
 
     def stress(self, c: Array, x: Array, some: Index | slice = slice(None)) -> Array:
-        """S (b, q, v) at points `x` (b, q, 2) for coefficients `c` (b, m), without radial forces."""
+        """Stresses (b, q, v) at points `x` (b, q, 2) for coefficients `c` (b, m), without radial forces."""
         s = np.einsum("bqvm,bm->bqv", self.basis(x, some), c[some])
         if self.force.any():
             axial = self.strain.shape[2] > 3
@@ -173,6 +185,28 @@ def multipliers(cells: Cells, degree: int) -> tuple[Index, Multipliers]:
     np.maximum.at(of_side, cells.sides, own[:, None])
     start = np.concatenate([[0], np.cumsum(2 * (of_side + 1))])
     return own, Multipliers(of_side, start)
+
+
+def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
+    """Multipliers (d, r) of rigid motions, of size 1, that vanish where they are `fixed` (d,)."""
+    trace = cells.trace
+    bodies = connected_bodies(trace)
+    corner = Triangulation(trace.mesh).triangles[cells.parent[cells.owner], 0]
+    body = bodies.of_vertex[corner]
+    values = np.zeros((int(mu.start[-1]), len(bodies.names), 3))
+    for k in np.unique(mu.degree).tolist():
+        side = np.flatnonzero(mu.degree == k)
+        t, w = gauss(k + trace.geometry_order)
+        x, _ = cells.points(np.repeat(side, len(t)), np.tile(t, len(side)))
+        arm = x.reshape(len(side), -1, 2) - bodies.middle[body[side], None]
+        arm = arm / bodies.size[body[side], None, None]
+        chi = w[:, None] * traces(k, t)
+        along_x, at = mu.start[side, None] + np.arange(k + 1), body[side, None]
+        values[along_x, at, 0] = values[along_x + k + 1, at, 1] = chi.sum(axis=0)
+        values[along_x, at, 2] = -arm[..., 1] @ chi
+        values[along_x + k + 1, at, 2] = arm[..., 0] @ chi
+    found = values[:, :, np.array(trace.model.motions)].reshape(len(values), -1)
+    return np.asarray(found @ vanishing_combinations(found[fixed]))
 
 
 def elements_of(
@@ -293,7 +327,7 @@ def _element(
     g = np.einsum("bxm,bx->bm", wT, (root * rest).reshape(b, -1))
     scale = 1 / np.sqrt(np.einsum("bmm->bm", A))
     N, own = _moments(cells, mu, at, degree, frame, on_axis, force, axial, m)
-    L = np.linalg.cholesky(A * scale[:, :, None] * scale[:, None, :])
+    L = _cholesky(A * scale[:, :, None] * scale[:, None, :])
     right = scale[..., None] * np.concatenate([N, g[..., None]], axis=2)
     solved = np.linalg.solve(L, right)
     dofs = np.concatenate(
@@ -322,6 +356,19 @@ def _element(
         own,
         dofs,
     )
+
+
+def _cholesky(A: Array) -> Array:
+    """Of matrices (b, m, m) with unit diagonals that are definite but for round-off.
+
+    What is added to A changes which stress is the nearest, not its equilibrium.
+    """
+    for added in (0.0, *DEFINITE):
+        try:
+            return np.linalg.cholesky(A + added * np.eye(A.shape[-1]))
+        except np.linalg.LinAlgError:
+            continue
+    raise ContactError("triangles are too thin, or too curved, for an equilibrated stress")
 
 
 def _moments(cells, mu, at, degree, frame, on_axis, force, axial, m):

@@ -20,6 +20,7 @@ from .cells import Cells
 
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
+NEAR = 2e-3  # of the shorter segment: vertices that face each other up to that are one
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
 STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
@@ -124,23 +125,38 @@ def reach_of(
 
 
 def cuts_of(trace: BoundaryTrace, reaches: Sequence[Reach]) -> dict[int, Array]:
-    """Places s of vertices to come, by segment: ends of contact, opposite vertices."""
+    """Places s of vertices to come, by segment: ends of contact, opposite vertices.
+
+    Vertices that all but face each other are one.
+    """
     cuts: dict[int, list[float]] = {}
+    length = trace.lengths(np.arange(len(trace.region)))
+    size = np.full(trace.space.ndof, np.inf)  # shortest segment at each vertex
+    np.minimum.at(size, trace.nodes[:, [0, -1]], length[:, None])
+
+    def keep(k: Index, s: Array, other: Index) -> None:
+        """Cut segments `k` (r,) at `s` (r,) but beside a vertex that all but faces `other`'s."""
+        end = trace.nodes[k, np.where(s < 0.5, 0, -1)]
+        near = NEAR * np.minimum(size[end], size[trace.nodes[other][:, [0, -1]]].min(axis=1))
+        apart = np.minimum(s, 1 - s) * length[k] > near
+        for number, place in zip(k[apart].tolist(), s[apart].tolist(), strict=True):
+            cuts.setdefault(number, []).append(place)
+
     for reach in reaches:
         line, contact = reach.pair.line, reach.pair.line.contact
-        own = [np.array(list(reach.ends), dtype=np.intp)]
-        places = [np.array([s for s, _ in reach.ends.values()])]
+        k = np.array(list(reach.ends), dtype=np.intp)
+        s = np.array([place for place, _ in reach.ends.values()])
+        keep(k, s, k)
         if contact.primary is not None and len(reach.segments):
             parts = divided(trace, contact, reach.segments, line.facing)
-            own += [np.tile(reach.segments[parts.local], 2), np.tile(reach.segments, 2)]
-            places += [parts.start, parts.stop, np.repeat([0.0, 1.0], len(reach.segments))]
-        k, s = np.concatenate(own), np.concatenate(places)
-        if contact.primary is not None:
+            own = np.tile(reach.segments[parts.local], 2)
+            places = np.append(parts.start, parts.stop)
+            keep(own, places, np.tile(parts.facing, 2))
+            k, s = np.append(k, own), np.append(s, places)
             d = directions(trace, contact, k, s)
             there, t, *_ = partners(trace, line.facing, k, trace.point(k, s), d)
-            k, s = np.append(k, there[there >= 0]), np.append(s, t[there >= 0])
-        for segment, place in zip(k.tolist(), s.tolist(), strict=True):
-            cuts.setdefault(segment, []).append(place)
+            met = there >= 0
+            keep(there[met], t[met], k[met])
     inside = {k: _inside(np.array(s)) for k, s in cuts.items()}
     return {k: s for k, s in inside.items() if s.size}
 
@@ -198,6 +214,8 @@ class Facing:
         Gap of u_h, lengths.
     after : ndarray (k, degree + 1)
         Bernstein coefficients of the gap of u_h + w, not negative.
+    open : ndarray of bool (k,)
+        Sides on which w adds nothing; `after` only tells that the gap of u_h is not negative.
     closed : ndarray of bool (k,)
         Sides in contact as a whole.
     share : ndarray (k, 2)
@@ -214,19 +232,20 @@ class Facing:
     weight: Array
     gap: Array
     after: Array
+    open: Mask
     closed: Mask
     share: Array
     equality: bool
 
     @cached_property
     def back(self) -> Array:
-        """T (k, j) of the secondary opposite to the Gauss points of the primary's sides."""
+        """Parameters t (k, j) of the secondary opposite to the Gauss points of the primary's sides."""
         nodes = self.there @ THROUGH.T
         t = np.where((nodes[:, -1] < nodes[:, 0])[:, None], 1 - PLACES, PLACES)
         for _ in range(NEWTON_STEPS):
             value = np.einsum("kji,ki->kj", at_places(lagrange, t), nodes)
             slope = np.einsum("kji,ki->kj", at_places(lagrange_derivative, t), nodes)
-            t = np.clip(t - (value - PLACES) / slope, 0.0, 1.0)
+            t = t - (value - PLACES) / slope
         return t
 
     @cached_property
@@ -241,8 +260,9 @@ class Facing:
 
     @property
     def lift(self) -> Array:
-        """R (k, j): what w adds to the gap."""
-        return np.asarray(self.after @ bernstein(self.after.shape[1] - 1, PLACES).T - self.gap)
+        """What w adds to the gap, r (k, j)."""
+        lift = self.after @ bernstein(self.after.shape[1] - 1, PLACES).T - self.gap
+        return np.where(self.open[:, None], 0.0, lift)
 
 
 def facing_of(
@@ -274,9 +294,10 @@ def facing_of(
     other, there = np.full(len(side), -1), np.zeros((len(side), j))
     if contact.primary is not None:
         place = found.s[every].reshape(-1, j)
-        middle = found.segment[every].reshape(-1, j)[:, j // 2]
+        segments = found.segment[every].reshape(-1, j)
+        middle = segments[:, j // 2]
         other = cells.side_at(middle, place[:, j // 2])
-        there = cells.own_parameter(other, place)
+        there = _continued(cells.own_parameter(other, place), segments == middle[:, None])
     rate = np.abs(np.diff(cells.span[side], axis=1))
     weight = WEIGHTS * rate * jacobian(trace, contact, segment, s).reshape(-1, j)
     order = np.argsort(line.segments)
@@ -287,20 +308,30 @@ def facing_of(
         closed[on] = (cells.span[side[on]].mean(axis=1) < at) == (sign > 0)
     closed = closed | contact.bilateral
     shares, stiff = _shares(cells, side, other, there, d, held, share)
-    after = _after(cells.ends[side], gap, closed, stiff, degree)
-    after = np.zeros_like(after) if contact.bilateral else after
-    kept = side, other, there, d, weight, gap, after, closed, shares
+    after, bare = _after(cells.ends[side], gap, closed, stiff, degree)
+    if contact.bilateral:
+        after, bare = np.zeros_like(after), np.zeros_like(bare)
+    kept = side, other, there, d, weight, gap, after, bare, closed, shares
     return Facing(pair, *kept, contact.bilateral)
+
+
+def _continued(there: Array, own: Mask) -> Array:
+    """Parameters (k, j), of which those that are not `own` (k, j) lie beyond the nearer end."""
+    for i in np.flatnonzero(~own.all(axis=1)):
+        at = np.flatnonzero(own[i])
+        rise = np.polyfit(PLACES[at], there[i, at], 1)
+        there[i, ~own[i]] = np.polyval(rise, PLACES[~own[i]])
+    return there
 
 
 def held_motions(cells: Cells, sides: Sequence[Index], directions: Sequence[Array]) -> Array:
     """Projections (nv, 2, 2) of vertices' motions on those that sides (k,) hold.
 
-    They hold motions along `directions` (k, j, 2).
+    They hold motions along `directions` (k, j, 2), from end to end.
     """
     M = np.zeros((len(cells.vertices), 2, 2))
     for side, direction in zip(sides, directions, strict=True):
-        d = _at_ends(direction)
+        d = direction[:, [0, -1]]
         np.add.at(M, cells.ends[side], d[..., :, None] * d[..., None, :])
     size, vectors = np.linalg.eigh(M)
     vectors = np.where(size[:, None] > STIFF**2 * size[:, None, -1:], vectors, 0.0)
@@ -358,27 +389,37 @@ def guides_of(
         weight=WEIGHTS * ds.reshape(k, j),
         gap=gap.reshape(k, j),
         after=np.zeros((k, degree + 1)),
+        open=np.zeros(k, dtype=bool),
         closed=np.ones(k, dtype=bool),
         share=np.ones((k, 2)),
         equality=True,
     )
 
 
-def _after(ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int) -> Array:
+def _after(
+    ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int
+) -> tuple[Array, Mask]:
     """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
 
-    `ends` (k, 2) are the vertices of the sides, at which the gaps of neighbours are one number: 0
-    where all of them are `closed` (k,), but for `stiff` ones (k, 2), where bodies do not move.
+    And whether `gap` itself is not negative, and stays.
+
+    `ends` (k, 2) are the vertices of the sides, at which r is one number of all neighbours: that
+    closes the gap where they are `closed` (k,), but not at `stiff` ones (k, 2), which do not move.
     """
-    B = bernstein(degree, PLACES) * np.sqrt(WEIGHTS)[:, None]
-    c = np.linalg.lstsq(B, (np.sqrt(WEIGHTS) * gap).T, rcond=None)[0].T
+    B, root = bernstein(degree, PLACES), np.sqrt(WEIGHTS)
+    c = np.empty((len(gap), degree + 1))
+    c[:, [0, -1]] = gap @ THROUGH[[0, -1]].T
+    rest = root * (gap - c[:, [0, -1]] @ B[:, [0, -1]].T)
+    c[:, 1:-1] = np.linalg.lstsq(root[:, None] * B[:, 1:-1], rest.T, rcond=None)[0].T
     _, number = np.unique(ends, return_inverse=True)
     number = number.reshape(-1, 2)
-    value, bare = np.zeros(number.size), np.zeros(number.size, dtype=bool)
-    np.maximum.at(value, number, c[:, [0, -1]])
+    lift, bare = np.full(number.size, -np.inf), np.zeros(number.size, dtype=bool)
     np.logical_or.at(bare, number[~closed], True)
     np.logical_or.at(bare, number[stiff], True)
-    value[~bare] = 0.0
+    np.maximum.at(lift, number, -c[:, [0, -1]])
+    lift[bare] = np.maximum(lift[bare], 0.0)
     after = np.where(closed[:, None], 0.0, np.maximum(c, 0.0))
-    after[:, [0, -1]] = value[number]
-    return after
+    after[:, [0, -1]] = c[:, [0, -1]] + lift[number]
+    off = np.abs(c @ B.T - gap).max(axis=1, initial=0.0)
+    bare = ~closed & (c.min(axis=1) > off) & (lift[number] == 0).all(axis=1)
+    return after, bare

@@ -17,7 +17,6 @@ from .facing import PLACES, WEIGHTS, Facing, bernstein
 from .lifting import lifted
 from .missed import data_norms
 from .norms import smallest_moduli, stress_norms
-from .program import exerted
 from .tractions import boundary_tractions, missed_tractions, requested
 
 NOISE = 1e-13  # of a jump, relative to the largest displacement
@@ -74,9 +73,9 @@ def force_bar(
         np.full_like(p, math.inf) if x.facing.equality else kappa * p
         for x, p in zip(lines, proof.balanced.pressure, strict=True)
     ]
-    dual = proof.program.within(-exerted(elements, np.zeros_like(proof.balanced.mu)), limits)
-    norms = stress_norms(elements, dual.mu, n)
-    have = boundary_tractions(cells, proof.given, elements, norms.coefficients)
+    dual = proof.program.within(elements, limits)
+    norms = stress_norms(elements, dual.coefficients, n)
+    have = boundary_tractions(cells, proof.given, elements, dual.coefficients)
     free = replace(problem, force={}, traction={})
     wanted = requested(free, cells, proof.given, lines, dual.pressure)
     missed = missed_tractions(wanted, cells, have, norms.largest)

@@ -118,16 +118,16 @@ def _islands(
         values, held = wanted.values(segment[on], s[on])
         asked[on] = np.where(held[:, None], asked[on], values)
     moments = rule.moments(mu, asked)
-    nothing = np.zeros_like(moments)
-    program = dual_program(mu, elements, np.zeros(len(moments), dtype=bool), [])
-    solved = program.nearest(moments - exerted(elements, nothing)).mu
-    left = residuals(parts, mu, moments - exerted(elements, solved), scale)
-    norms = stress_norms(elements, solved, len(depth))
-    have = tractions_of(elements, norms.coefficients, owner, rule.x, rule.normal)
+    nothing = np.zeros((len(moments), 0))
+    program = dual_program(mu, elements, np.zeros(len(moments), dtype=bool), nothing, [])
+    found = program.nearest(elements, moments).coefficients
+    left = residuals(parts, mu, moments - exerted(elements, found)[0], scale)
+    norms = stress_norms(elements, found, len(depth))
+    have = tractions_of(elements, found, owner, rule.x, rule.normal)
     miss = np.where(np.abs(asked - have) <= ROUND_OFF * scale, 0.0, asked - have)
     forces, moduli = forces_missed(elements, len(depth)), smallest_moduli(parts, elements)
     data = data_norms(parts, forces, rule.norms(parts, miss), moduli)
-    finer = Level(parts, elements, norms.coefficients, depth, norms.distance, data)
+    finer = Level(parts, elements, found, depth, norms.distance, data)
     both = finer.distance, finer.loads
     if depth.any():
         both = once_more(problem, displacement, wanted, finer, degree, scale, allowed)

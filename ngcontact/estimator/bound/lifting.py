@@ -34,7 +34,7 @@ INCONSISTENT = 1e-9  # of what is asked for at a vertex, relative to it
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """d.w on k sides: `direction` (k, j, 2) and `amount` (k, j) at the j Gauss points."""
+    """d.w on k sides: `direction` (k, j, 2) and `amount` (k, j) at j Gauss-Lobatto points."""
 
     side: Index
     direction: Array
@@ -44,11 +44,14 @@ class Asked:
 def asked_on_supports(
     cells: Cells, given: Given, displacement: ng.CoefficientFunction
 ) -> list[Asked]:
-    """u_D - u_h in each prescribed component."""
-    trace, found, j = cells.trace, [], len(PLACES)
+    """u_D - u_h in each prescribed component; no radial motion on the axis."""
+    trace, found, j = cells.trace, [], DATA + 1
+    axis = np.flatnonzero(trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1))
+    along = np.broadcast_to([1.0, 0.0], (len(axis), j, 2))
+    found.append(Asked(axis, along, np.zeros((len(axis), j))))
     for values, side in given.supports:
         k = len(side)
-        segment, s = cells.on_side(np.repeat(side, j), np.tile(PLACES, k))
+        segment, s = cells.on_side(np.repeat(side, j), np.tile(gauss_lobatto(DATA), k))
         u = trace.evaluate(displacement, segment, s)
         for c, value in enumerate(values):
             if value is not None:
@@ -62,10 +65,11 @@ def asked_on_line(facing: Facing, r: Array, alone: bool) -> list[Asked]:
     """-r (k, j) on the secondary and r on the primary, by shares, or on the secondary `alone`."""
     start, stop = np.ones((2, len(facing.side), 1)) if alone else facing.share.T[:, :, None]
     share = start + (stop - start) * PLACES
-    found = [Asked(facing.side, facing.direction, -share * r)]
+    d = np.einsum("ij,kjc->kic", THROUGH, facing.direction)
+    found = [Asked(facing.side, d, -(share * r) @ THROUGH.T)]
     if (share < 1).any():
         both = np.concatenate([facing.direction, ((1 - share) * r)[..., None]], axis=2)
-        there = facing.on_primary(both)
+        there = THROUGH @ facing.on_primary(both)
         found.append(Asked(facing.other, there[..., :2], there[..., 2]))
     return found
 
@@ -95,7 +99,7 @@ def lifted(
 def lifting_of(
     problem: Problem, cells: Cells, asked: Sequence[Asked], degree: int, extent: float
 ) -> Array:
-    """Energy norms (n,) of w, of a degree, for displacements of a size `extent`."""
+    """Energy norms (n,) of w, of a degree, for displacements and gaps of a size `extent`."""
     norms = np.zeros(len(cells.triangles))
     needed = [
         one.side[np.abs(one.amount).max(axis=1, initial=0.0) > NOISE * extent] for one in asked
@@ -180,7 +184,7 @@ def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: floa
     held, value = np.zeros((nodes.count, 2), dtype=bool), np.zeros((nodes.count, 2))
     number, d, amount = [], [], []
     t = gauss_lobatto(nodes.degree)
-    carry = lagrange(DATA, t) @ THROUGH
+    carry = lagrange(DATA, t)
     for one in asked:
         here = np.isin(one.side, nodes.sides)
         number.append(nodes.on_sides(cells, one.side[here]).ravel())
@@ -206,9 +210,7 @@ def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: floa
     missed = np.abs((w[number] * d).sum(axis=1) - amount)
     if missed.max(initial=0.0) > max(INCONSISTENT * np.abs(amount).max(initial=0.0), noise):
         raise ContactError("conditions that meet at a vertex ask for different displacements")
-    rim = _rim(cells, nodes)
-    free = rim & ~held.any(axis=1)
-    held[free] = True
+    held[_rim(cells, nodes)] = True
     return _Conditions(frame, held, value)
 
 
@@ -353,8 +355,7 @@ def _remainders(cells: Cells, nodes: _Nodes, w: Array, asked: Sequence[Asked]) -
         side = one.side[here]
         if not side.size:
             continue
-        d = np.einsum("ij,kjc->kic", THROUGH, one.direction[here])
-        amount = one.amount[here] @ THROUGH.T
+        d, amount = one.direction[here], one.amount[here]
         have = np.einsum("iq,kqc->kic", fine, w[nodes.on_sides(cells, side)])
         miss = (amount - (have * d).sum(axis=2))[..., None] * d
         miss[np.abs(miss) <= NOISE * largest] = 0.0

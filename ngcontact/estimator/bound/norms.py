@@ -20,32 +20,29 @@ class StressNorms:
 
     Attributes
     ----------
-    coefficients : list of ndarray (b, m)
-        Of s on the triangles of each `Element`.
     distance : ndarray (n,)
         |s - C e|, roots of energies.
     largest : float
         Largest component of s, a stress.
     """
 
-    coefficients: list[Array]
     distance: Array
     largest: float
 
 
-def stress_norms(elements: Sequence[Element], mu: Array, n: int) -> StressNorms:
-    """The stress with multipliers `mu` (d,) on the n triangles of `elements`."""
-    coefficients, distance, largest = [], np.zeros(n), 0.0
-    for e in elements:
-        c = e.coefficients(mu)
+def stress_norms(
+    elements: Sequence[Element], coefficients: Sequence[Array], n: int
+) -> StressNorms:
+    """Norms of a stress on the n triangles of `elements`."""
+    distance, largest = np.zeros(n), 0.0
+    for e, c in zip(elements, coefficients, strict=True):
         s = e.whole_stress(c)
         strain = (e.compliance @ s[..., None])[..., 0] - e.strain
         stress = (np.linalg.inv(e.compliance) @ strain[..., None])[..., 0]
         energy = (e.weight * (strain * stress).sum(axis=2)).sum(axis=1)
         distance[e.places.at] = np.sqrt(energy)
-        coefficients.append(c)
         largest = max(largest, float(np.abs(s).max()))
-    return StressNorms(coefficients, distance, largest)
+    return StressNorms(distance, largest)
 
 
 def forces_missed(elements: Sequence[Element], n: int) -> Array:

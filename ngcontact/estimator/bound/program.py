@@ -11,19 +11,34 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.linalg import splu
 
 from ...arrays import Array, Factor, Index, Mask
+from ...errors import ContactError
 from ...linalg import cholesky, lower_half
-from ...qp import LinearSystems, QuadraticProgram, bordered_systems, minimise
+from ...qp import (
+    LinearSystems,
+    NullSpace,
+    QuadraticProgram,
+    bordered_systems,
+    minimise,
+    no_null_space,
+    pinned_null_space,
+    vanishing_combinations,
+)
 from ...triplets import from_triplets
 from .elements import Element, Multipliers, traces
 from .facing import PLACES, Facing, bernstein
 
 FALLING = 0.5  # ratio of two residuals from which more corrections take nothing off
-DEFINITE = 1e-11  # of the diagonal, added to what is factorised: vertices where tractions depend
+ROUND_OFF = 1e-13  # of tractions, relative to the largest: nothing to correct
+QUADRATURE = 1e-4  # of loads on motions that nothing resists, relative to the largest
+DEFINITE = 1e-13  # of the diagonal, added to what is factorised: vertices where tractions depend
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,19 +53,21 @@ class Rows:
     opposite : list of ndarray (j, d)
         On each side that it faces; empty without a primary.
     bound : ndarray (k, j)
+    mass : ndarray (k, j)
+        Integrals of psi_j: the force of a unit coefficient.
     """
 
     facing: Facing
     own: list[Array]
     opposite: list[Array]
     bound: Array
+    mass: Array
 
 
 def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
     """The rows of one line, with a pressure of a degree."""
     psi = bernstein(degree, PLACES)
-    gap = facing.after @ bernstein(facing.after.shape[1] - 1, PLACES).T
-    bound = (gap * facing.weight) @ psi
+    bound = ((facing.gap + facing.lift) * facing.weight) @ psi
     load = facing.weight[..., None] * facing.direction
     own = [_tested(mu, side, PLACES, psi, f) for side, f in zip(facing.side, load, strict=True)]
     opposite = [
@@ -58,7 +75,7 @@ def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
         for side, t, f in zip(facing.other, facing.there, load, strict=True)
         if side >= 0
     ]
-    return Rows(facing, own, opposite, bound)
+    return Rows(facing, own, opposite, bound, facing.weight @ psi)
 
 
 def _tested(mu: Multipliers, side: int, t: Array, psi: Array, load: Array) -> Array:
@@ -69,16 +86,17 @@ def _tested(mu: Multipliers, side: int, t: Array, psi: Array, load: Array) -> Ar
 
 @dataclass(frozen=True, eq=False)
 class Balanced:
-    """A stress in equilibrium: its multipliers, what acts on the lines, how nearly.
+    """A stress in equilibrium, and what acts on the lines.
 
     Attributes
     ----------
-    mu : ndarray (d,)
+    coefficients : list of ndarray (b, m)
+        Of the stress on the triangles of each `Element`.
     pressure : list of ndarray (k, j)
         Bernstein coefficients of p* on the sides of each line, per length (P1) or eta (P2).
     """
 
-    mu: Array
+    coefficients: list[Array]
     pressure: list[Array]
 
 
@@ -93,18 +111,27 @@ class DualProgram:
         mu = T y: each row is an unknown of y.
     program : QuadraticProgram
         Of y, with the bounds of the lines.
-    factor : Factor
-        Of its matrix, made definite.
     """
 
     lines: Sequence[Rows]
     T: sp.csr_array
     program: QuadraticProgram
-    factor: Factor
 
-    def nearest(self, load: Array) -> Balanced:
-        """The stress and the p* >= 0 that minimise B^2; `load` (d,) are the tractions to balance."""
-        program = replace(self.program, b=self.T.T @ load)
+    @cached_property
+    def factor(self) -> Factor:
+        """Of the matrix, made definite."""
+        K = self.program.K
+        return cholesky(lower_half((K + sp.diags_array(DEFINITE * K.diagonal())).tocsr()))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the factor, which is made again."""
+        return {name: value for name, value in vars(self).items() if name != "factor"}
+
+    def nearest(self, elements: Sequence[Element], moments: Array) -> Balanced:
+        """The stress and the p* >= 0 that minimise B^2 for given tractions, `moments` (d,)."""
+        alone, _ = exerted(elements, [e.alone() for e in elements])
+        moments = self.resisted(moments, moments - alone)
+        program = replace(self.program, b=self.T.T @ (moments - alone))
         closed = np.concatenate(
             [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines] or [[]]
         )
@@ -114,19 +141,24 @@ class DualProgram:
             y, force = _refined(systems, active)
             pulling = (force < 0) & ~program.equality
             if not pulling.any():
-                return self._balanced(y, force)
+                signed = ~program.equality
+                return self._balanced(elements, moments, (y, force), active, signed)
             active = active & ~pulling
 
-    def within(self, load: Array, limits: Sequence[Array]) -> Balanced:
-        """The nearest stress to a load whose |q*| are at most `limits` (k, j) of each line.
+    def within(self, elements: Sequence[Element], limits: Sequence[Array]) -> Balanced:
+        """The nearest stress without loads whose |q*| are at most `limits` (k, j) of each line.
 
         Coefficients that would be more stay at their limit.
         """
-        program = replace(self.program, b=self.T.T @ load, g=np.zeros_like(self.program.g))
-        limit = np.concatenate([x.ravel() for x in limits] or [np.zeros(0)])
+        alone, _ = exerted(elements, [e.alone() for e in elements])
+        moments = self.resisted(np.zeros_like(alone), -alone)
+        load = self.T.T @ (moments - alone)
+        program = replace(self.program, g=np.zeros_like(self.program.g))
+        every = zip(limits, self.lines, strict=True)
+        limit = np.concatenate([(x * line.mass).ravel() for x, line in every] or [np.zeros(0)])
         free, force = limit > 0, np.zeros_like(limit)
         while True:
-            b = program.b.copy()
+            b = load.copy()
             b[program.unknown] -= np.where(free, 0.0, force)
             rows = np.flatnonzero(free)
             some = replace(
@@ -141,16 +173,63 @@ class DualProgram:
             y, force[rows] = _refined(bordered_systems(some, self.factor), every)
             over = free & (np.abs(force) > limit)
             if not over.any():
-                return self._balanced(y, force)
+                none = np.zeros_like(free)
+                return self._balanced(elements, moments, (y, force), free, none)
             force[over] = np.sign(force[over]) * limit[over]
             free &= ~over
 
-    def _balanced(self, y: Array, force: Array) -> Balanced:
+    def resisted(self, moments: Array, load: Array) -> Array:
+        """Given tractions, `moments` (d,), without the work of a load (d,) on free motions.
+
+        Nothing resists these motions; what a load does there is the error of quadrature.
+        """
+        lineal = self.T @ self.program.null_space.lineal
+        if lineal.shape[1] == 0:
+            return moments
+        idle = lineal @ np.linalg.solve(lineal.T @ lineal, lineal.T @ load)
+        if np.abs(idle).max() > QUADRATURE * np.abs(load).max():
+            raise ContactError("the loads on a body that moves freely are not in balance")
+        return np.asarray(moments - idle)
+
+    def _balanced(
+        self,
+        elements: Sequence[Element],
+        moments: Array,
+        solution: tuple[Array, Array],
+        held: Mask,
+        signed: Mask,
+    ) -> Balanced:
+        """The stress of a solution y, force, corrected until its tractions balance.
+
+        Stresses of stiff bodies are small differences of multipliers. Rows that are `held` (m,)
+        take what is left as their force, those that are `signed` (m,) none below 0.
+        """
+        p, (y, force) = self.program, solution
+        change, solve, last = self.T @ y, None, np.inf
+        coefficients = [e.alone() for e in elements]
+        while True:
+            coefficients = [
+                c + e.answer(change) for e, c in zip(elements, coefficients, strict=True)
+            ]
+            total, largest = exerted(elements, coefficients)
+            left = self.T.T @ (self.resisted(moments, moments - total) - total)
+            left[p.fixed] = 0.0
+            force = np.where(held, left[p.unknown], force)
+            force = np.where(signed, np.maximum(force, 0.0), force)
+            left[p.unknown] -= force
+            size = float(np.abs(left).max(initial=0.0))
+            if not ROUND_OFF * largest < size < FALLING * last:
+                break
+            last = size
+            if solve is None:
+                free = ~p.fixed
+                free[p.unknown[held]] = False
+                solve = self.factor(free)
+            change = self.T @ solve(np.where(free, left, 0.0))
         shapes = [x.bound.shape for x in self.lines]
         parts = np.split(force, np.cumsum([a * b for a, b in shapes]))[:-1]
-        return Balanced(
-            self.T @ y, [p.reshape(shape) for p, shape in zip(parts, shapes, strict=True)]
-        )
+        pressure = [q.reshape(x.mass.shape) / x.mass for q, x in zip(parts, self.lines, strict=True)]
+        return Balanced(coefficients, pressure)
 
 
 def _refined(systems: LinearSystems, active: Mask) -> tuple[Array, Array]:
@@ -171,11 +250,16 @@ def _refined(systems: LinearSystems, active: Mask) -> tuple[Array, Array]:
 
 
 def dual_program(
-    mu: Multipliers, elements: Sequence[Element], fixed: Mask, lines: Sequence[Rows]
+    mu: Multipliers,
+    elements: Sequence[Element],
+    fixed: Mask,
+    motions: Array,
+    lines: Sequence[Rows],
 ) -> DualProgram:
     """The program of the condensed triangles.
 
-    `fixed` (d,) are multipliers of components on which no traction is given.
+    `fixed` (d,) are multipliers of components on which no traction is given, `motions` (d, r) those
+    of rigid motions that supports leave free.
     """
     size = int(mu.start[-1])
     values, rows, columns = [], [], []
@@ -188,28 +272,39 @@ def dual_program(
     T, unknown, bound, equality = _basis(mu, lines, size)
     if len(unknown):
         K = (T.T @ K @ T).tocsr()
-    diagonal, m = K.diagonal(), len(unknown)
+    m, idle = len(unknown), fixed | (K.diagonal() <= 0)  # on the axis there is no traction
     program = QuadraticProgram(
         K=K,
         b=np.zeros(size),
         R=from_triplets(np.ones(m), np.arange(m), unknown, (m, size)),
         g=bound,
         equality=equality,
-        fixed=fixed | (diagonal <= 0),  # on the axis there is no traction
+        fixed=idle,
         values=np.zeros(size),
         unknown=unknown,
+        null_space=_null_space(motions, T, unknown, idle),
     )
-    definite = (K + sp.diags_array(DEFINITE * diagonal)).tocsr()
-    return DualProgram(lines, T, program, cholesky(lower_half(definite)))
+    return DualProgram(lines, T, program)
 
 
-def exerted(elements: Sequence[Element], mu: Array) -> Array:
-    """Moments (d,) of the tractions of the stress with multipliers `mu` (d,), over all triangles."""
-    total = np.zeros_like(mu)
-    for e in elements:
-        y = e.g + np.einsum("bmd,bd->bm", e.N, mu[e.dofs])
-        np.add.at(total, e.dofs, e.own + np.einsum("bmd,bm->bd", e.N, y))
-    return total
+def _null_space(motions: Array, T: sp.csr_array, unknown: Index, fixed: Mask) -> NullSpace:
+    """Rigid motions, multipliers (d, r), in the unknowns."""
+    if motions.shape[1] == 0:
+        return no_null_space(len(motions))
+    y = splu(T.tocsc()).solve(motions)
+    y[fixed] = 0.0
+    lineal = vanishing_combinations(y[unknown])
+    return pinned_null_space(y, lineal, (y @ lineal).T, unknown, fixed)
+
+
+def exerted(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple[Array, float]:
+    """Moments (d,) of the tractions of a stress over all triangles, and the largest of one."""
+    total, largest = np.zeros(1 + max(int(e.dofs.max()) for e in elements)), 0.0
+    for e, c in zip(elements, coefficients, strict=True):
+        own = e.tractions(c)
+        np.add.at(total, e.dofs, own)
+        largest = max(largest, float(np.abs(own).max(initial=0.0)))
+    return total, largest
 
 
 def pushed(mu: Multipliers, lines: Sequence[Rows], pressure: Sequence[Array]) -> Array:
@@ -226,7 +321,10 @@ def pushed(mu: Multipliers, lines: Sequence[Rows], pressure: Sequence[Array]) ->
 def _basis(
     mu: Multipliers, lines: Sequence[Rows], size: int
 ) -> tuple[sp.csr_array, Index, Array, Mask]:
-    """Mu = T y with a y for each row: its unknown, its bound, and whether it is an equation."""
+    """The change of basis: mu = T y with a y for each row over its `Rows.mass`.
+
+    Its unknown, its bound, and whether it is an equation.
+    """
     values, rows, columns = [], [], []
     unknown, bound, equality = [np.zeros(0, np.intp)], [np.zeros(0)], [np.zeros(0, bool)]
     plain = np.ones(size, dtype=bool)
@@ -242,14 +340,15 @@ def _basis(
         for i, side in enumerate(line.facing.side):
             own = mu.of(int(side))
             plain[own] = False
-            U, S, Vt = np.linalg.svd(line.own[i])
-            inverse = Vt[:j].T @ (U.T / S[:, None])
+            left, size_of, right = np.linalg.svd(line.own[i] / line.mass[i, :, None])
+            inverse = right[:j].T @ (left.T / size_of[:, None])
             put(own, own[:j], inverse)
-            put(own, own[j:], Vt[j:].T)
+            put(own, own[j:], right[j:].T)
             if line.opposite:
-                steps.append((own, mu.of(int(line.facing.other[i])), -inverse @ line.opposite[i]))
+                block = -inverse @ (line.opposite[i] / line.mass[i, :, None])
+                steps.append((own, mu.of(int(line.facing.other[i])), block))
             unknown.append(own[:j])
-        bound.append(line.bound.ravel())
+        bound.append((line.bound / line.mass).ravel())
         equality.append(np.full(line.bound.size, line.facing.equality))
     rest = np.flatnonzero(plain)
     values.append(np.ones(len(rest)))

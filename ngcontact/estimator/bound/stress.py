@@ -12,6 +12,7 @@ import numpy as np
 
 from ...arrays import Array, Index
 from .bound import Proof
+from .certificate import certificate_arrays
 from .facing import bernstein
 
 AT_ONCE = 1000  # places beside all parts
@@ -131,7 +132,7 @@ class EquilibratedStress:
             own[at[better]], best[at[better]] = triangle[better], inside[better]
         found = np.empty((len(element), proof.elements[0].strain.shape[2]))
         number = np.empty(len(cells.triangles), dtype=np.intp)
-        for e, c in zip(proof.elements, proof.stress.coefficients, strict=True):
+        for e, c in zip(proof.elements, proof.balanced.coefficients, strict=True):
             number[:] = -1
             number[e.places.at] = np.arange(len(e.places.at))
             at = np.flatnonzero(number[own] >= 0)
@@ -149,8 +150,6 @@ class EquilibratedStress:
         ValueError
             Another suffix, or a stress on curved triangles, of which there is no certificate.
         """
-        from .certificate import certificate_arrays
-
         path = Path(path)
         if path.suffix != ".npz":
             raise ValueError(f'path="{path}" must end in .npz')

@@ -211,7 +211,9 @@ def requested(
         j = len(PLACES)
         x, dx = cells.points(np.repeat(side, j), np.tile(PLACES, len(side)))
         ds = np.linalg.norm(dx, axis=1) * cells.trace.model.measure(x)
-        for i, value in zip(side.tolist(), force / ds.reshape(-1, j, 1), strict=True):
+        ds = ds.reshape(-1, j, 1)
+        per_area = np.divide(force, ds, out=np.zeros_like(force), where=ds > 0)
+        for i, value in zip(side.tolist(), per_area, strict=True):
             pressed[i] = pressed.get(i, 0.0) + value
 
     for line, p in zip(lines, pressure, strict=True):

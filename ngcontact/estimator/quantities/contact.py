@@ -50,8 +50,16 @@ def peak_of(
     samples = (np.append(pressure, 0.0)[rows] * boundary.shapes(segment, s)).sum(axis=1)
     errors = np.append(off, 0.0)[rows].max(axis=1)
     counts = ~corners.near(boundary.point(segment, s), pressed=True)
+    counts &= np.repeat(_near_contact(pair), len(SAMPLES))
     error = error_of_largest(peak, samples[counts], errors[counts])
     return Quantity("peak pressure", peak, error, "estimated", place, infinite=infinite)
+
+
+def _near_contact(pair: ContactState) -> Mask:
+    """Segments (k,) of the line with a point in contact, or beside such: there the peak is."""
+    rows = pair.line.rows
+    touched = rows[np.append(pair.active, False)[rows].any(axis=1)]
+    return np.asarray(np.isin(rows, touched[touched >= 0]).any(axis=1))
 
 
 def _beside(places: Array, points: Array) -> Mask:
