@@ -273,11 +273,11 @@ def cells_of(
     )
     vertices = np.concatenate([view.vertices, *made.places])
     curved = bent[own[:, 0]]
-    cells = _joined(trace, vertices, triangles, reference, parent, own, spans, curved)
+    cells = joined(trace, vertices, triangles, reference, parent, own, spans, curved)
     return _parted(cells, dependent(cells, loaded, held))
 
 
-def _joined(
+def joined(
     trace: BoundaryTrace,
     vertices: Array,
     triangles: Index,
@@ -331,7 +331,7 @@ def _parted(cells: Cells, at: Index) -> Cells:
             values.append(value)
     vertices = np.concatenate([cells.vertices, cells.corners[at].mean(axis=1)])
     curved = np.concatenate([cells.curved[rest], cells.curved[at], np.zeros(2 * len(at), bool)])
-    return _joined(cells.trace, vertices, *(np.concatenate(x) for x in parts), curved)
+    return joined(cells.trace, vertices, *(np.concatenate(x) for x in parts), curved)
 
 
 def dependent(cells: Cells, loaded: Index, held: Index) -> Index:

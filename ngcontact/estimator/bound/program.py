@@ -178,6 +178,14 @@ class DualProgram:
             force[over] = np.sign(force[over]) * limit[over]
             free &= ~over
 
+    def unbalanced(
+        self, mu: Multipliers, elements: Sequence[Element], moments: Array, found: Balanced
+    ) -> Array:
+        """Forces (d,) that a stress and its pressures leave of given tractions, `moments` (d,)."""
+        left = moments - exerted(elements, found.coefficients)[0]
+        left -= pushed(mu, self.lines, found.pressure)
+        return np.where(self.program.fixed, 0.0, left - self.idle(left))
+
     def idle(self, load: Array) -> Array:
         """The part (d,) of a load (d,) that does work on motions which nothing resists."""
         lineal = self.T @ self.program.null_space.lineal
