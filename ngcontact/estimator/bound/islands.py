@@ -125,7 +125,7 @@ def _islands(
     norms = stress_norms(elements, found, len(depth))
     have = tractions_of(elements, found, owner, rule.x, rule.normal)
     miss = np.where(np.abs(asked - have) <= ROUND_OFF * scale, 0.0, asked - have)
-    forces, moduli = forces_missed(elements, len(depth)), smallest_moduli(parts, elements)
+    forces, moduli = forces_missed(elements, len(depth)), smallest_moduli(elements, len(depth))
     data = data_norms(parts, forces, rule.norms(parts, miss), moduli)
     finer = Level(parts, elements, found, depth, norms.distance, data)
     both = finer.distance, finer.loads
