@@ -5,8 +5,8 @@ misses on Gamma_u and Gamma_K, without a constant
 
     |u - u_h|^2 <= B^2 = |s - sigma_h|^2 + 2 int p* (gap_h + r) + |w|^2,
 
-where gap_h + r >= 0 is the gap of u_h + w; docs/bounds.md has the proof. s and p* minimise B^2: they
-solve the dual contact problem.
+where gap_h + r >= 0 is the gap of u_h + w; docs/bounds.md has the proof. s and p* minimise B^2:
+they solve the dual contact problem.
 """
 
 from __future__ import annotations

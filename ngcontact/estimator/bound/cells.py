@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -155,9 +156,9 @@ class Cells:
         place, jacobian = ng.CF((ng.x, ng.y)), ng.specialcf.JacobianMatrix(2)
         found = guess.copy()
         for _ in range(NEWTON_STEPS):
-            J = self.evaluate(jacobian, at[bent], found[bent]).reshape(-1, 2, 2)
+            slope = self.evaluate(jacobian, at[bent], found[bent]).reshape(-1, 2, 2)
             miss = x[bent] - self.evaluate(place, at[bent], found[bent])
-            found[bent] += np.linalg.solve(J, miss[:, :, None])[:, :, 0]
+            found[bent] += np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
         return found
 
 
@@ -232,15 +233,13 @@ def places(cells: Cells, at: Index, order: int) -> Places:
     return Places(at, x, area, found, spread, local)
 
 
-def cells_of(
-    trace: BoundaryTrace, cuts: Mapping[int, Sequence[float]], loaded: Index, held: Index
-) -> Cells:
+def cells_of(trace: BoundaryTrace, cuts: Mapping[int, Array], loaded: Index, held: Index) -> Cells:
     """Divide the mesh.
 
     Parameters
     ----------
     trace : BoundaryTrace
-    cuts : dict of int to sequence of float
+    cuts : dict of int to ndarray (j,)
         Rising parameters s of new vertices on segments of the boundary.
     loaded, held : ndarray of int (k,)
         Segments that carry something, and those on which the whole displacement is prescribed.
@@ -264,7 +263,7 @@ def cells_of(
     for e in parts.tolist():
         made.divide(e, None if middle[e] else int(special[e].argmax()))
     new = made.arrays()
-    both = (triangles, REFERENCE[roll], whole, own, spans)
+    both: tuple[Any, ...] = (triangles, REFERENCE[roll], whole, own, spans)
     triangles, reference, parent, own, spans = (
         np.concatenate(pair) for pair in zip(both, new, strict=True)
     )
@@ -328,7 +327,8 @@ def _parted(cells: Cells, at: Index) -> Cells:
             values.append(value)
     vertices = np.concatenate([cells.vertices, cells.corners[at].mean(axis=1)])
     curved = np.concatenate([cells.curved[rest], cells.curved[at], np.zeros(2 * len(at), bool)])
-    return _joined(cells.trace, vertices, *(np.concatenate(x) for x in parts), curved)
+    joined: list[Any] = [np.concatenate(x) for x in parts]
+    return _joined(cells.trace, vertices, *joined, curved)
 
 
 def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
@@ -378,7 +378,7 @@ class _Parts:
     trace: BoundaryTrace
     view: Triangulation
     segment: Index
-    cuts: Mapping[int, Sequence[float]]
+    cuts: Mapping[int, Array]
 
     def __post_init__(self) -> None:
         self.count = len(self.view.vertices)

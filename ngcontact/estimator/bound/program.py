@@ -11,13 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from ...arrays import Array, Factor, Index, Mask
-from ...linalg import cholesky, lower_half
-from ...qp import LinearSystems, QuadraticProgram, bordered_systems, minimise
+from ...arrays import Array, Index, Mask
+from ...linalg import change_of_basis, cholesky, handed_over
+from ...qp import BorderedSystems, LinearSystems, QuadraticProgram, bordered_systems, minimise
 from ...triplets import from_triplets
 from .elements import Element, Multipliers, traces
 from .facing import PLACES, Facing, bernstein
@@ -93,25 +95,31 @@ class DualProgram:
         mu = T y: each row is an unknown of y.
     program : QuadraticProgram
         Of y, with the bounds of the lines.
-    factor : Factor
-        Of its matrix, made definite.
     """
 
     lines: Sequence[Rows]
     T: sp.csr_array
     program: QuadraticProgram
-    factor: Factor
+
+    @cached_property
+    def systems(self) -> BorderedSystems:
+        """Its linear systems; what is factorised is the matrix made definite."""
+        lower = sp.tril(self.program.K, format="csr")
+        lower.setdiag((1 + DEFINITE) * self.program.diagonal)
+        return bordered_systems(self.program, cholesky(handed_over(lower)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the factor, which is made again."""
+        return {name: value for name, value in vars(self).items() if name != "systems"}
 
     def nearest(self, load: Array) -> Balanced:
-        """The stress and the p* >= 0 that minimise B^2; `load` (d,) are the tractions to balance."""
+        """The stress and the p* >= 0 that minimise B^2, for tractions `load` (d,) to balance."""
         program = replace(self.program, b=self.T.T @ load)
-        closed = np.concatenate(
-            [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines] or [[]]
-        )
-        systems = bordered_systems(program, self.factor)
-        active = minimise(systems, closed.astype(bool)).active
+        closed = [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines]
+        self.systems.restart(program)
+        active = minimise(self.systems, np.concatenate([np.zeros(0, bool), *closed])).active
         while True:  # any p* >= 0 proves a bound: coefficients below 0 by round-off become 0
-            y, force = _refined(systems, active)
+            y, force = _refined(self.systems, active)
             pulling = (force < 0) & ~program.equality
             if not pulling.any():
                 return self._balanced(y, force)
@@ -127,23 +135,15 @@ class DualProgram:
         free, force = limit > 0, np.zeros_like(limit)
         while True:
             b = program.b.copy()
-            b[program.unknown] -= np.where(free, 0.0, force)
-            rows = np.flatnonzero(free)
-            some = replace(
-                program,
-                b=b,
-                R=program.R[rows],
-                g=program.g[rows],
-                equality=np.ones(len(rows), dtype=bool),
-                unknown=program.unknown[rows],
-            )
-            every = np.ones(len(rows), dtype=bool)
-            y, force[rows] = _refined(bordered_systems(some, self.factor), every)
+            b[program.unknown[~free]] -= force[~free]
+            self.systems.restart(replace(program, b=b))
+            y, found = _refined(self.systems, free)
+            force[free] = found[free]
             over = free & (np.abs(force) > limit)
             if not over.any():
                 return self._balanced(y, force)
             force[over] = np.sign(force[over]) * limit[over]
-            free &= ~over
+            free = free & ~over
 
     def _balanced(self, y: Array, force: Array) -> Balanced:
         shapes = [x.bound.shape for x in self.lines]
@@ -178,37 +178,64 @@ def dual_program(
     `fixed` (d,) are multipliers of components on which no traction is given.
     """
     size = int(mu.start[-1])
-    values, rows, columns = [], [], []
-    for e in elements:
-        d = e.dofs.shape[1]
-        values.append((e.N.transpose(0, 2, 1) @ e.N).ravel())
-        rows.append(np.repeat(e.dofs, d, axis=1).ravel())
-        columns.append(np.tile(e.dofs, (1, d)).ravel())
-    K = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
+    K = _assembled(mu, elements)
     T, unknown, bound, equality = _basis(mu, lines, size)
     if len(unknown):
-        K = (T.T @ K @ T).tocsr()
-    diagonal, m = K.diagonal(), len(unknown)
+        K = K + change_of_basis(K, T)
+    m = len(unknown)
     program = QuadraticProgram(
         K=K,
         b=np.zeros(size),
         R=from_triplets(np.ones(m), np.arange(m), unknown, (m, size)),
         g=bound,
         equality=equality,
-        fixed=fixed | (diagonal <= 0),  # on the axis there is no traction
+        fixed=fixed | (K.diagonal() <= 0),  # on the axis there is no traction
         values=np.zeros(size),
         unknown=unknown,
     )
-    definite = (K + sp.diags_array(DEFINITE * diagonal)).tocsr()
-    return DualProgram(lines, T, program, cholesky(lower_half(definite)))
+    return DualProgram(lines, T, program)
+
+
+def _assembled(mu: Multipliers, elements: Sequence[Element]) -> sp.csr_array:
+    """K (d, d): sums of N'N, written where they stand; each side has one block with each it meets.
+
+    The rows of a side have the same columns, those of the sides of its triangles, rising.
+    """
+    count, wide = len(mu.degree), np.diff(mu.start)
+    sides = np.concatenate([e.sides for e in elements])
+    pairs = sides[:, :, None] * count + sides[:, None, :]
+    blocks, number = np.unique(pairs, return_inverse=True)
+    row, column = np.divmod(blocks, count)
+    stop = np.cumsum(wide[column])
+    last = np.searchsorted(row, np.arange(count), side="right")
+    first = np.append(0, stop)[np.append(0, last[:-1])]  # of each side's columns among all
+    length = stop[last - 1] - first
+    largest = int((wide * length).sum())
+    index = np.int32 if largest <= np.iinfo(np.int32).max else np.int64
+    starts = np.append(0, np.cumsum(np.repeat(length, wide))).astype(index)
+    columns = np.arange(stop[-1]) + np.repeat(mu.start[column] - stop + wide[column], wide[column])
+    at = np.arange(largest, dtype=index)
+    at += np.repeat((np.repeat(first, wide) - starts[:-1]).astype(index), np.diff(starts))
+    indices = columns.astype(index)[at]
+    place = starts[mu.start[row]] + stop - wide[column] - first[row]  # of each block's first entry
+    data, number = np.zeros(largest), number.reshape(-1, 3, 3)
+    groups = np.split(number, np.cumsum([len(e.sides) for e in elements])[:-1])
+    for e, own in zip(elements, groups, strict=True):
+        values, size = e.N.transpose(0, 2, 1) @ e.N, wide[e.sides[0]]
+        ends = np.append(0, np.cumsum(size))
+        for i, j in np.ndindex(3, 3):
+            down = np.arange(size[i])[:, None] * length[e.sides[:, i], None, None]
+            to = place[own[:, i, j], None, None] + down + np.arange(size[j])
+            part = values[:, ends[i] : ends[i + 1], ends[j] : ends[j + 1]]
+            np.add.at(data, to.ravel(), part.ravel())
+    return sp.csr_array((data, indices, starts), shape=(int(mu.start[-1]),) * 2)
 
 
 def exerted(elements: Sequence[Element], mu: Array) -> Array:
-    """Moments (d,) of the tractions of the stress with multipliers `mu` (d,), over all triangles."""
+    """Moments (d,) of the tractions of the stress with multipliers `mu` (d,), of all triangles."""
     total = np.zeros_like(mu)
     for e in elements:
-        y = e.g + np.einsum("bmd,bd->bm", e.N, mu[e.dofs])
-        np.add.at(total, e.dofs, e.own + np.einsum("bmd,bm->bd", e.N, y))
+        np.add.at(total, e.dofs, e.tractions(mu))
     return total
 
 
@@ -224,12 +251,12 @@ def pushed(mu: Multipliers, lines: Sequence[Rows], pressure: Sequence[Array]) ->
 
 
 def _basis(
-    mu: Multipliers, lines: Sequence[Rows], size: int
+    mu: Multipliers, lines: Sequence[Rows], count: int
 ) -> tuple[sp.csr_array, Index, Array, Mask]:
     """Mu = T y with a y for each row: its unknown, its bound, and whether it is an equation."""
     values, rows, columns = [], [], []
     unknown, bound, equality = [np.zeros(0, np.intp)], [np.zeros(0)], [np.zeros(0, bool)]
-    plain = np.ones(size, dtype=bool)
+    plain = np.ones(count, dtype=bool)
     steps = []
 
     def put(i: Index, j: Index, block: Array) -> None:
@@ -242,10 +269,10 @@ def _basis(
         for i, side in enumerate(line.facing.side):
             own = mu.of(int(side))
             plain[own] = False
-            U, S, Vt = np.linalg.svd(line.own[i])
-            inverse = Vt[:j].T @ (U.T / S[:, None])
+            u, size, v = np.linalg.svd(line.own[i])
+            inverse = v[:j].T @ (u.T / size[:, None])
             put(own, own[:j], inverse)
-            put(own, own[j:], Vt[j:].T)
+            put(own, own[j:], v[j:].T)
             if line.opposite:
                 steps.append((own, mu.of(int(line.facing.other[i])), -inverse @ line.opposite[i]))
             unknown.append(own[:j])
@@ -255,14 +282,14 @@ def _basis(
     values.append(np.ones(len(rest)))
     rows.append(rest)
     columns.append(rest)
-    G = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
+    G = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (count, count))
     T = G
     if steps:  # mu = G y + M mu, M from the primary's sides to the secondary's
         M = from_triplets(
             np.concatenate([b.ravel() for _, _, b in steps]),
             np.concatenate([np.repeat(i, len(j)) for i, j, _ in steps]),
             np.concatenate([np.tile(j, len(i)) for i, j, _ in steps]),
-            (size, size),
+            (count, count),
         )
         term = M @ G
         while term.nnz:  # as often as bodies stand in a row
