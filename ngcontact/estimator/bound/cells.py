@@ -8,7 +8,7 @@ common apex, the opposite vertex or, where several sides ask for it, the middle.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -312,7 +312,8 @@ def _parted(cells: Cells, at: Index) -> Cells:
     rest = np.setdiff1d(np.arange(len(cells.triangles)), at)
     middle = len(cells.vertices) + np.arange(len(at))
     place, inside = cells.reference[at].mean(axis=1), np.full(len(at), -1)
-    parts = [[x[rest]] for x in (cells.triangles, cells.reference, cells.parent, own, spans)]
+    whole_ones = cells.triangles, cells.reference, cells.parent, own, spans
+    parts: list[list[Any]] = [[x[rest]] for x in whole_ones]
     whole = np.broadcast_to([0.0, 1.0], (len(at), 2))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         corners, reference = cells.triangles[at], cells.reference[at]
@@ -327,8 +328,8 @@ def _parted(cells: Cells, at: Index) -> Cells:
             values.append(value)
     vertices = np.concatenate([cells.vertices, cells.corners[at].mean(axis=1)])
     curved = np.concatenate([cells.curved[rest], cells.curved[at], np.zeros(2 * len(at), bool)])
-    joined: list[Any] = [np.concatenate(x) for x in parts]
-    return _joined(cells.trace, vertices, *joined, curved)
+    triangles, reference, parent, own, spans = (np.concatenate(x) for x in parts)
+    return _joined(cells.trace, vertices, triangles, reference, parent, own, spans, curved=curved)
 
 
 def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
@@ -386,8 +387,8 @@ class _Parts:
         self.rows: tuple[list, ...] = ([], [], [], [], [])
         self.number = {k: self._added(self._on(k, s)) for k, s in self.cuts.items()}
 
-    def _on(self, k: int, s: Sequence[float]) -> Array:
-        return self.trace.point(np.full(len(s), k), np.asarray(s))
+    def _on(self, k: int, s: Array) -> Array:
+        return self.trace.point(np.full(len(s), k), s)
 
     def _added(self, x: Array) -> list[int]:
         self.places.append(x)

@@ -174,7 +174,7 @@ class Element(Triangles):
     def coefficients(self, mu: Array) -> Array:
         """C (b, m) for all multipliers `mu` (k,)."""
         y = self.g[..., None] + self.N @ mu[self.dofs][..., None]
-        return np.linalg.solve(self.root.transpose(0, 2, 1), y)[..., 0]
+        return np.asarray(np.linalg.solve(self.root.transpose(0, 2, 1), y)[..., 0])
 
     def tractions(self, mu: Array) -> Array:
         """Moments (b, d) of the tractions of the stress with all multipliers `mu` (k,)."""
@@ -183,6 +183,7 @@ class Element(Triangles):
 
     def of_strain(self, strain: Array) -> Element:
         """The same triangles for another displacement, strains (b, q, v), without body forces."""
+        g = np.linalg.solve(self.root, self.tested(strain)[..., None])
         return replace(
             self,
             strain=strain,
@@ -190,7 +191,7 @@ class Element(Triangles):
             radial=np.zeros_like(self.radial),
             source=None,
             missed=np.zeros_like(self.missed),
-            g=np.linalg.solve(self.root, self.tested(strain)[..., None])[..., 0],
+            g=np.asarray(g[..., 0]),
             own=np.zeros_like(self.own),
         )
 
@@ -250,7 +251,8 @@ def elements_of(
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, and their multipliers."""
     own, mu = multipliers(cells, degree)
-    on_axis = cells.trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1)[cells.sides]
+    at_axis = np.asarray(cells.trace.model.on_axis(cells.vertices))
+    on_axis = np.asarray(at_axis[cells.ends].all(axis=1))[cells.sides]
     key = np.column_stack(
         [
             own,
@@ -298,7 +300,7 @@ def compliance_at(problem: Problem, cells: Cells, points: Places) -> Array:
     else:
         C = cells.evaluate(law, at[:1], np.full((1, 2), 1 / 3))[None]
     v = round(C.shape[-1] ** 0.5)
-    return np.linalg.inv(C.reshape(*C.shape[:2], v, v))
+    return np.asarray(np.linalg.inv(C.reshape(*C.shape[:2], v, v)))
 
 
 def _force_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunction | None:

@@ -39,14 +39,14 @@ def products(degree: int) -> tuple[Index, Index]:
 
 def legendre_table(degree: int, X: Array) -> list[Array]:
     """Legendre's polynomials (..., degree + 1) and their first two derivatives."""
-    P = legendre.legvander(X, degree)
-    tables = [P]
+    P: Array = np.asarray(legendre.legvander(X, degree))
+    tables: list[Array] = [P]
     for _ in range(2):
         D = np.zeros((degree + 1, degree + 1))
         for n in range(degree):  # P'_(n+1) = (2 n + 1) P_n + P'_(n-1)
             D[n + 1] = D[n - 1] if n else 0.0
             D[n + 1, n] += 2 * n + 1
-        tables.append(tables[-1] @ D.T)
+        tables.append(np.asarray(tables[-1] @ D.T))
     return tables
 
 

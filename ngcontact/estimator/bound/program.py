@@ -214,8 +214,8 @@ def _assembled(mu: Multipliers, elements: Sequence[Element]) -> sp.csr_array:
     index = np.int32 if largest <= np.iinfo(np.int32).max else np.int64
     starts = np.append(0, np.cumsum(np.repeat(length, wide))).astype(index)
     columns = np.arange(stop[-1]) + np.repeat(mu.start[column] - stop + wide[column], wide[column])
-    at = np.arange(largest, dtype=index)
-    at += np.repeat((np.repeat(first, wide) - starts[:-1]).astype(index), np.diff(starts))
+    shift = (np.repeat(first, wide) - starts[:-1]).astype(index)
+    at = np.arange(largest, dtype=index) + np.repeat(shift, np.diff(starts))
     indices = columns.astype(index)[at]
     place = starts[mu.start[row]] + stop - wide[column] - first[row]  # of each block's first entry
     data, number = np.zeros(largest), number.reshape(-1, 3, 3)
@@ -282,7 +282,8 @@ def _basis(
     values.append(np.ones(len(rest)))
     rows.append(rest)
     columns.append(rest)
-    G = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (count, count))
+    entries, to, of = (np.concatenate(x) for x in (values, rows, columns))
+    G = from_triplets(entries, to, of, (count, count))
     T = G
     if steps:  # mu = G y + M mu, M from the primary's sides to the secondary's
         M = from_triplets(

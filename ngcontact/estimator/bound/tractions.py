@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -37,7 +38,7 @@ class Given:
 
     held: Mask
     loads: list[tuple[str, Index]]
-    supports: list[tuple[tuple, Index]]
+    supports: list[tuple[Sequence[Any], Index]]
     guides: Index
 
 
@@ -52,7 +53,8 @@ def given_on(problem: Problem, cells: Cells) -> Given:
     for values, at in supports:
         held[at] |= [value is not None for value in values]
     loads = [(pattern, sides(pattern)) for pattern in problem.traction]
-    return Given(held, loads, supports, sides(problem.sliding))
+    guided = None if problem.sliding is None else str(problem.sliding)
+    return Given(held, loads, supports, sides(guided))
 
 
 def moments_of(problem: Problem, cells: Cells, mu: Multipliers, given: Given) -> tuple[Array, Mask]:
