@@ -147,7 +147,8 @@ def _bound(
     degree, lift = max(order + 1, 2 + extent), order + LIFTED
     reaches = [reach_of(trace, displacement, pair, everywhere) for pair in pairs]
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
-    loaded = trace.segments(*problem.traction, problem.sliding, *touching)
+    guided = None if problem.sliding is None else str(problem.sliding)
+    loaded = trace.segments(*problem.traction, guided, *touching)
     whole = [name for name, values in problem.displacement.items() if None not in values]
     cells = cells_of(trace, cuts_of(trace, reaches), loaded, trace.segments(*whole))
     given = given_on(problem, cells)

@@ -121,7 +121,7 @@ def reach_of(
         return Reach(pair, line.segments, {})
     nodes = trace.nodes[line.segments][:, [0, -1]]
     active = np.append(pair.active, False)[line.rows].any(axis=1)
-    near = np.isin(nodes, nodes[active]).any(axis=1)
+    near = np.asarray(np.isin(nodes, nodes[active]).any(axis=1))
     rest, j = np.flatnonzero(~near), len(PLACES)
     if rest.size:
         segment = np.repeat(line.segments[rest], j)
@@ -290,7 +290,7 @@ def facing_of(
     segment, s = cells.on_side(np.repeat(side, j), np.tile(PLACES, len(side)))
     found = met(trace, displacement, pair, segment, s)
     faces = found.faces
-    keep = faces.reshape(-1, j).all(axis=1)
+    keep = np.asarray(faces.reshape(-1, j).all(axis=1))
     every = keep.repeat(j)
     if contact.primary is not None and (found.gap[faces & ~every] < 0).any():
         raise ContactError("bodies overlap where a side of the mesh faces the other in part")

@@ -155,7 +155,7 @@ def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Mask)
     With stresses of a `degree`, by rules of an `order`; once at least on curves, and where `least`
     (n,) says so.
     """
-    mesh, n = cells.trace.mesh, len(cells.triangles)
+    mesh = cells.trace.mesh
     found = (least | cells.curved).astype(np.intp)
     if all(numbers(ng.CF(F)) for F in problem.force.values()):
         return found

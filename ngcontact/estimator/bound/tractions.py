@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -43,7 +44,7 @@ class Given:
 
     held: Mask
     loads: list[tuple[str, Index]]
-    supports: list[tuple[tuple, Index]]
+    supports: list[tuple[Sequence[Any], Index]]
     guides: Index
     breaks: Array
 
@@ -65,7 +66,8 @@ def given_on(problem: Problem, cells: Cells) -> Given:
     for values, at in supports:
         held[at] |= [value is not None for value in values]
     loads = [(pattern, sides(pattern)) for pattern in problem.traction]
-    return Given(held, loads, supports, sides(problem.sliding), _breaks(problem, cells, loads))
+    guided = None if problem.sliding is None else str(problem.sliding)
+    return Given(held, loads, supports, sides(guided), _breaks(problem, cells, loads))
 
 
 def _breaks(problem: Problem, cells: Cells, loads: Sequence[tuple[str, Index]]) -> Array:
