@@ -16,6 +16,7 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index, Mask
+from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...lagrange import gauss
 from ...problem import Triangulation
@@ -112,7 +113,7 @@ class Cells:
     def own_parameter(self, side: Index, s: Array) -> Array:
         """T (k, j) of places `s` (k, j) of the segments of sides (k,)."""
         a, b = self.span[side, 0, None], self.span[side, 1, None]
-        return np.clip((s - a) / (b - a), 0.0, 1.0)
+        return np.asarray((s - a) / (b - a))
 
     def points(self, side: Index, t: Array) -> tuple[Array, Array]:
         """Points (k, 2) and derivatives by t (k, 2) at `t` (k,) of sides `side` (k,)."""
@@ -228,8 +229,10 @@ def places(cells: Cells, at: Index, order: int) -> Places:
     guess = np.einsum("qc,bcd->bqd", share, cells.reference[at])
     number = np.repeat(at, len(weight))
     found = cells.located(number, x.reshape(-1, 2), guess.reshape(-1, 2)).reshape(x.shape)
-    area = np.abs(np.linalg.det(spread)) * weight
-    return Places(at, x, area, found, spread, local)
+    area = np.linalg.det(spread)
+    if not (area > 0).all():
+        raise ContactError("a curved side of the mesh goes beyond the middle of its element")
+    return Places(at, x, area * weight, found, spread, local)
 
 
 def cells_of(
@@ -270,11 +273,11 @@ def cells_of(
     )
     vertices = np.concatenate([view.vertices, *made.places])
     curved = bent[own[:, 0]]
-    cells = _joined(trace, vertices, triangles, reference, parent, own, spans, curved)
+    cells = joined(trace, vertices, triangles, reference, parent, own, spans, curved)
     return _parted(cells, dependent(cells, loaded, held))
 
 
-def _joined(
+def joined(
     trace: BoundaryTrace,
     vertices: Array,
     triangles: Index,
@@ -328,7 +331,7 @@ def _parted(cells: Cells, at: Index) -> Cells:
             values.append(value)
     vertices = np.concatenate([cells.vertices, cells.corners[at].mean(axis=1)])
     curved = np.concatenate([cells.curved[rest], cells.curved[at], np.zeros(2 * len(at), bool)])
-    return _joined(cells.trace, vertices, *(np.concatenate(x) for x in parts), curved)
+    return joined(cells.trace, vertices, *(np.concatenate(x) for x in parts), curved)
 
 
 def dependent(cells: Cells, loaded: Index, held: Index) -> Index:

@@ -11,23 +11,27 @@ in the norm of C^-1, and the tractions of s are N'A^-1 N mu + N'A^-1 g + <s_p n,
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import ngsolve as ng
 import numpy as np
 from numpy.polynomial import legendre
 
-from ...arrays import Array, Index
+from ...arrays import Array, Index, Mask
 from ...errors import ContactError
-from ...fem import model_of
+from ...fem import connected_bodies, model_of
 from ...lagrange import gauss
-from ...problem import Problem, varies
+from ...problem import Problem, Triangulation, varies
+from ...qp import vanishing_combinations
 from .cells import Cells, Places, places
-from .polynomials import Frame, balancing, frame_of, in_frame, projected, scalars, stresses
+from .parts import projection
+from .polynomials import Frame, balancing, frame_of, in_frame, stresses
 
 ON_CURVES = 3  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 DEFINITE = (1e-15, 1e-14, 1e-13, 1e-12)  # of the diagonal, until it is enough
+WHOLE, PARTED = 10, 4  # degrees above 2 k of rules for forces: on triangles, on their parts
 ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
 BLOCK = 4000  # triangles at once: bounds the memory
 
@@ -63,7 +67,7 @@ class Element:
     source : CoefficientFunction or None
         The body force.
     missed : ndarray (b,)
-        Norm of what of the body force s_p does not balance.
+        L2 norm of what of the body force s_p does not balance, times the measure.
     root : ndarray (b, m, m)
         L of A = L L'.
     N : ndarray (b, m, d)
@@ -183,15 +187,44 @@ def multipliers(cells: Cells, degree: int) -> tuple[Index, Multipliers]:
     return own, Multipliers(of_side, start)
 
 
+def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
+    """Multipliers (d, r) of rigid motions, of size 1, that vanish where they are `fixed` (d,)."""
+    trace = cells.trace
+    bodies = connected_bodies(trace)
+    corner = Triangulation(trace.mesh).triangles[cells.parent[cells.owner], 0]
+    body = bodies.of_vertex[corner]
+    values = np.zeros((int(mu.start[-1]), len(bodies.names), 3))
+    for k in np.unique(mu.degree).tolist():
+        side = np.flatnonzero(mu.degree == k)
+        t, w = gauss(k + trace.geometry_order)
+        x, _ = cells.points(np.repeat(side, len(t)), np.tile(t, len(side)))
+        arm = x.reshape(len(side), -1, 2) - bodies.middle[body[side], None]
+        arm = arm / bodies.size[body[side], None, None]
+        chi = w[:, None] * traces(k, t)
+        along_x, at = mu.start[side, None] + np.arange(k + 1), body[side, None]
+        values[along_x, at, 0] = values[along_x + k + 1, at, 1] = chi.sum(axis=0)
+        values[along_x, at, 2] = -arm[..., 1] @ chi
+        values[along_x + k + 1, at, 2] = arm[..., 0] @ chi
+    found = values[:, :, np.array(trace.model.motions)].reshape(len(values), -1)
+    return np.asarray(found @ vanishing_combinations(found[fixed]))
+
+
 def elements_of(
-    problem: Problem, cells: Cells, displacement: ng.CoefficientFunction, degree: int
+    problem: Problem,
+    cells: Cells,
+    displacement: ng.CoefficientFunction,
+    degree: int,
+    look: Index,
 ) -> tuple[Multipliers, list[Element]]:
-    """The condensed triangles of a solution, and their multipliers."""
+    """The condensed triangles of a solution, and their multipliers.
+
+    `look` (n, 2) says by what degree above 2 k rules integrate forces, and on parts of what depth.
+    """
     own, mu = multipliers(cells, degree)
     on_axis = cells.trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1)[cells.sides]
     key = np.column_stack([own, mu.degree[cells.sides], on_axis.any(axis=1), cells.curved])
     varying = _varying(problem, cells)
-    key = np.column_stack([key, varying, _body(cells)])
+    key = np.column_stack([key, varying, _body(cells), look])
     kinds, number = np.unique(key, axis=0, return_inverse=True)
     found = []
     for kind in range(len(kinds)):
@@ -200,7 +233,14 @@ def elements_of(
             at = every[start : start + BLOCK]
             found.append(
                 _element(
-                    problem, cells, displacement, mu, at, int(kinds[kind, 0]), bool(kinds[kind, 4])
+                    problem,
+                    cells,
+                    displacement,
+                    mu,
+                    at,
+                    int(kinds[kind, 0]),
+                    bool(kinds[kind, 4]),
+                    kinds[kind, -2:].tolist(),
                 )
             )
     return mu, found
@@ -255,6 +295,7 @@ def _element(
     at: Index,
     degree: int,
     on_axis: bool,
+    look: Sequence[int],
 ) -> Element:
     model = model_of(problem)
     axial = model.extent > 0
@@ -268,7 +309,7 @@ def _element(
     compliance = compliance_at(problem, cells, points)
     strain = points.evaluate(cells, model.strain(displacement))
     source = _force_of(problem, cells, body)
-    force, radial, missed = _forces(source, cells, points, frame, degree, axial)
+    force, radial, missed = _forces(source, cells, points, degree, axial, look)
     local = frame.local(points.x) if curved else in_frame(points.local)[None]
     T = stresses(degree, frame, points.x, local, axial, on_axis)
     root = np.sqrt(weight)[..., None]
@@ -366,25 +407,16 @@ def _tractions(T: Array, normal: Array, chi: Array) -> Array:
     return np.concatenate([tx.transpose(0, 2, 1) @ chi, ty.transpose(0, 2, 1) @ chi], axis=2)
 
 
-def _forces(F, cells, points, frame, degree, axial):
+def _forces(F, cells, points, degree, axial, look):
     """Coefficients of the force that is balanced, r F_r, and the norm of the rest."""
     b, q = points.weight.shape
-    n = _force_degree(degree, axial)
-    j = (n + 1) * (n + 2) // 2
+    n, (bonus, depth) = _force_degree(degree, axial), look
+    radial = np.zeros((b, q))
     if F is None:
-        return np.zeros((b, j, 2)), np.zeros((b, q)), np.zeros(b)
-    fine = places(cells, points.at, 2 * degree + 10)
-    values = fine.evaluate(cells, F)
-    measure = cells.trace.model.measure(fine.x.reshape(-1, 2)).reshape(b, -1)
-    weight = fine.weight * measure
-    force = projected(n, frame, fine.x, weight, values)
-    rest = values - scalars(n, frame, fine.x) @ force
+        return np.zeros((b, (n + 1) * (n + 2) // 2, 2)), radial, np.zeros(b)
+    parts = slice(1, None) if axial else slice(None)
+    force, missed, size = projection(F, cells, points.at, n, 2 * degree + bonus, depth, parts)
     if axial:
-        rest[..., 0] = 0.0
         radial = points.x[..., 0] * points.evaluate(cells, F)[..., 0]
         force[..., 0] = 0.0
-    else:
-        radial = np.zeros((b, q))
-    missed = np.sqrt(np.einsum("bq,bqd->b", weight, rest**2))
-    size = np.sqrt(np.einsum("bq,bqd->b", weight, values**2))
     return force, radial, np.where(missed <= ROUND_OFF * size, 0.0, missed)

@@ -18,8 +18,10 @@ from ...lagrange import gauss, lagrange, lagrange_derivative
 from ...problem import Contact
 from .cells import Cells
 
+NOISE = 1e-14  # of a gap, relative to the displacements on both sides
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
+NEAR = 2e-3  # of the shorter segment: vertices that face each other up to that are one
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
 STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
@@ -75,13 +77,18 @@ def met(
     if contact.gap is not None:
         gap = prescribed_gap(contact, trace, segment, s, x)
     jump = trace.evaluate(displacement, segment, s)
+    noise = np.abs(jump).max(initial=0.0)
     at = np.flatnonzero(other >= 0)
     if at.size:
-        jump[at] -= trace.evaluate(displacement, other[at], place[at])
+        there = trace.evaluate(displacement, other[at], place[at])
+        noise = max(noise, np.abs(there).max())
+        jump[at] -= there
     faces = other >= 0
     if contact.primary is None:
         faces = (trace.normal(segment, s) * d).sum(axis=1) > FACING
-    return Met(gap - (jump * d).sum(axis=1), d, other, place, faces)
+    gap = gap - (jump * d).sum(axis=1)
+    gap[np.abs(gap) <= NOISE * noise] = 0.0
+    return Met(gap, d, other, place, faces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,13 +100,13 @@ class Reach:
     pair : ContactState
     segments : ndarray of int (k,)
         Of the secondary: in contact, beside such, or where u_h goes through the other body.
-    ends : dict of int to (float, int)
-        s where contact ends inside a segment, and 1 where it lies towards s = 0, -1 elsewhere.
+    contact : dict of int to list of (float, float)
+        Intervals of s in contact on segments in which contact ends.
     """
 
     pair: ContactState
     segments: Index
-    ends: dict[int, tuple[float, int]]
+    contact: dict[int, list[tuple[float, float]]]
 
 
 def reach_of(
@@ -120,27 +127,43 @@ def reach_of(
         segment = np.repeat(line.segments[rest], j)
         found = met(trace, displacement, pair, segment, np.tile(PLACES, len(rest)))
         near[rest] = ((found.gap < 0) & found.faces).reshape(-1, j).any(axis=1)
-    return Reach(pair, line.segments[near], _ends(trace, displacement, pair))
+    return Reach(pair, line.segments[near], _contact_on(trace, displacement, pair))
 
 
 def cuts_of(trace: BoundaryTrace, reaches: Sequence[Reach]) -> dict[int, Array]:
-    """Places s of vertices to come, by segment: ends of contact, opposite vertices."""
+    """Places s of vertices to come, by segment: ends of contact, opposite vertices.
+
+    Vertices that all but face each other are one.
+    """
     cuts: dict[int, list[float]] = {}
+    length = trace.lengths(np.arange(len(trace.region)))
+    size = np.full(trace.space.ndof, np.inf)  # shortest segment at each vertex
+    np.minimum.at(size, trace.nodes[:, [0, -1]], length[:, None])
+
+    def keep(k: Index, s: Array, other: Index) -> None:
+        """Cut segments `k` (r,) at `s` (r,) but beside a vertex that all but faces `other`'s."""
+        end = trace.nodes[k, np.where(s < 0.5, 0, -1)]
+        near = NEAR * np.minimum(size[end], size[trace.nodes[other][:, [0, -1]]].min(axis=1))
+        apart = np.minimum(s, 1 - s) * length[k] > near
+        for number, place in zip(k[apart].tolist(), s[apart].tolist(), strict=True):
+            cuts.setdefault(number, []).append(place)
+
     for reach in reaches:
         line, contact = reach.pair.line, reach.pair.line.contact
-        own = [np.array(list(reach.ends), dtype=np.intp)]
-        places = [np.array([s for s, _ in reach.ends.values()])]
+        ends = [(k, s) for k, parts in reach.contact.items() for part in parts for s in part]
+        ends = [(k, s) for k, s in ends if APART < s < 1 - APART]
+        k, s = np.array([k for k, _ in ends], dtype=np.intp), np.array([s for _, s in ends])
+        keep(k, s, k)
         if contact.primary is not None and len(reach.segments):
             parts = divided(trace, contact, reach.segments, line.facing)
-            own += [np.tile(reach.segments[parts.local], 2), np.tile(reach.segments, 2)]
-            places += [parts.start, parts.stop, np.repeat([0.0, 1.0], len(reach.segments))]
-        k, s = np.concatenate(own), np.concatenate(places)
-        if contact.primary is not None:
+            own = np.tile(reach.segments[parts.local], 2)
+            places = np.append(parts.start, parts.stop)
+            keep(own, places, np.tile(parts.facing, 2))
+            k, s = np.append(k, own), np.append(s, places)
             d = directions(trace, contact, k, s)
             there, t, *_ = partners(trace, line.facing, k, trace.point(k, s), d)
-            k, s = np.append(k, there[there >= 0]), np.append(s, t[there >= 0])
-        for segment, place in zip(k.tolist(), s.tolist(), strict=True):
-            cuts.setdefault(segment, []).append(place)
+            met = there >= 0
+            keep(there[met], t[met], k[met])
     inside = {k: _inside(np.array(s)) for k, s in cuts.items()}
     return {k: s for k, s in inside.items() if s.size}
 
@@ -151,28 +174,26 @@ def _inside(s: Array) -> Array:
     return s[np.diff(s, prepend=-1.0) > SAME]
 
 
-def _ends(
+def _contact_on(
     trace: BoundaryTrace, displacement: ng.CoefficientFunction, pair: ContactState
-) -> dict[int, tuple[float, int]]:
-    """Where contact ends inside segments that face the other body, away from their vertices."""
+) -> dict[int, list[tuple[float, float]]]:
+    """Intervals of s in contact on segments in which contact ends, and which face with all nodes."""
     line, found = pair.line, {}
     active = np.append(pair.active, False)[line.rows]
     places = trace.places(line.segments)
     turns = np.diff(active.astype(int), axis=1)
-    for i in np.flatnonzero((np.abs(turns).sum(axis=1) == 1) & line.faces):
-        j = int(np.flatnonzero(turns[i])[0])
-        sign = -int(turns[i, j])
-        s = np.linspace(places[i, j], places[i, j + 1], SAMPLES)
-        gap = met(trace, displacement, pair, np.full(SAMPLES, line.segments[i]), s).gap
-        below = np.flatnonzero(gap < 0)
-        edge = (
-            (s[below[-1]] if below.size else s[0])
-            if sign > 0
-            else (s[below[0]] if below.size else s[-1])
-        )
-        at = float(edge + sign * MARGIN)
-        if APART < at < 1 - APART:
-            found[int(line.segments[i])] = (at, sign)
+    for i in np.flatnonzero((turns != 0).any(axis=1) & line.faces):
+        ends = [0.0] if active[i, 0] else []
+        for j in np.flatnonzero(turns[i]):
+            s = np.linspace(places[i, j], places[i, j + 1], SAMPLES)
+            segment = np.full(SAMPLES, line.segments[i])
+            below = np.flatnonzero(met(trace, displacement, pair, segment, s).gap < 0)
+            if active[i, j]:  # contact up to the last zero of the gap, and a little farther
+                ends.append(float(s[below[-1]] if below.size else s[0]) + MARGIN)
+            else:
+                ends.append(float(s[below[0]] if below.size else s[-1]) - MARGIN)
+        ends += [1.0] if active[i, -1] else []
+        found[int(line.segments[i])] = list(zip(ends[::2], ends[1::2], strict=True))
     return found
 
 
@@ -229,7 +250,7 @@ class Facing:
         for _ in range(NEWTON_STEPS):
             value = np.einsum("kji,ki->kj", at_places(lagrange, t), nodes)
             slope = np.einsum("kji,ki->kj", at_places(lagrange_derivative, t), nodes)
-            t = np.clip(t - (value - PLACES) / slope, 0.0, 1.0)
+            t = t - (value - PLACES) / slope
         return t
 
     @cached_property
@@ -278,17 +299,19 @@ def facing_of(
     other, there = np.full(len(side), -1), np.zeros((len(side), j))
     if contact.primary is not None:
         place = found.s[every].reshape(-1, j)
-        middle = found.segment[every].reshape(-1, j)[:, j // 2]
+        segments = found.segment[every].reshape(-1, j)
+        middle = segments[:, j // 2]
         other = cells.side_at(middle, place[:, j // 2])
-        there = cells.own_parameter(other, place)
+        there = _continued(cells.own_parameter(other, place), segments == middle[:, None])
     rate = np.abs(np.diff(cells.span[side], axis=1))
     weight = WEIGHTS * rate * jacobian(trace, contact, segment, s).reshape(-1, j)
     order = np.argsort(line.segments)
     local = order[np.searchsorted(line.segments[order], cells.segment[side])]
     closed = np.append(pair.active, False)[line.rows[local]].all(axis=1)
-    for k, (at, sign) in reach.ends.items():
-        on = cells.segment[side] == k
-        closed[on] = (cells.span[side[on]].mean(axis=1) < at) == (sign > 0)
+    low, high = np.sort(cells.span[side], axis=1).T
+    for k, parts in reach.contact.items():
+        for a, b in parts:
+            closed |= (cells.segment[side] == k) & (low >= a - SAME) & (high <= b + SAME)
     closed = closed | contact.bilateral
     shares, stiff = _shares(cells, side, other, there, d, held, share)
     after, bare = _after(cells.ends[side], gap, closed, stiff, degree)
@@ -296,6 +319,15 @@ def facing_of(
         after, bare = np.zeros_like(after), np.zeros_like(bare)
     kept = side, other, there, d, weight, gap, after, bare, closed, shares
     return Facing(pair, *kept, contact.bilateral)
+
+
+def _continued(there: Array, own: Mask) -> Array:
+    """Parameters (k, j), of which those that are not `own` (k, j) lie beyond the nearer end."""
+    for i in np.flatnonzero(~own.all(axis=1)):
+        at = np.flatnonzero(own[i])
+        rise = np.polyfit(PLACES[at], there[i, at], 1)
+        there[i, ~own[i]] = np.polyval(rise, PLACES[~own[i]])
+    return there
 
 
 def held_motions(cells: Cells, sides: Sequence[Index], directions: Sequence[Array]) -> Array:
@@ -370,9 +402,7 @@ def guides_of(
     )
 
 
-def _after(
-    ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int
-) -> tuple[Array, Mask]:
+def _after(ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int) -> tuple[Array, Mask]:
     """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
 
     And whether `gap` itself is not negative, and stays.

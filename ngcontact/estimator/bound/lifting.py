@@ -1,9 +1,10 @@
 """A displacement w of little energy that corrects u_h on Gamma_u, Gamma_K and curved guides.
 
 On sides d.w is asked for: u_D - u_h on Gamma_u, r shared by compliance between both bodies on
-Gamma_K, -u_h.d on guides. On the triangles around these sides w is the displacement of least energy
-of a degree with the values asked for at nodes; what is no polynomial of that degree is continued
-from its side to the opposite corner in proportion to the distance.
+Gamma_K, -u_h.d on guides. Other parts of Gamma_K stay where they are. On the triangles around these
+sides w is the displacement of least energy of a degree with the values asked for at nodes; what is
+no polynomial of that degree is continued from its side to the opposite corner in proportion to the
+distance.
 """
 
 from __future__ import annotations
@@ -110,7 +111,11 @@ def lifting_of(
     touched[cells.ends[np.concatenate(needed)]] = True
     layer = np.flatnonzero(touched[cells.triangles].any(axis=1))
     nodes = _Nodes(cells, layer, degree)
-    conditions = _conditions(cells, nodes, asked, 100 * NOISE * extent)
+    lines = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
+    still = np.isin(cells.segment, cells.trace.segments(*lines))
+    for one in asked:
+        still[one.side] = False
+    conditions = _conditions(cells, nodes, asked, still, 100 * NOISE * extent)
     squares = _least(problem, cells, nodes, conditions, asked)
     norms[layer] = np.sqrt(np.maximum(squares, 0.0))
     return norms
@@ -178,8 +183,10 @@ class _Conditions:
     value: Array
 
 
-def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: float) -> _Conditions:
-    """What is asked for at the nodes; 0 on the rim of the layer."""
+def _conditions(
+    cells: Cells, nodes: _Nodes, asked: Sequence[Asked], still: Mask, noise: float
+) -> _Conditions:
+    """What is asked for at the nodes; 0 on the rim of the layer and on sides `still` (e,)."""
     frame = np.tile(np.eye(2), (nodes.count, 1, 1))
     held, value = np.zeros((nodes.count, 2), dtype=bool), np.zeros((nodes.count, 2))
     number, d, amount = [], [], []
@@ -210,16 +217,16 @@ def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: floa
     missed = np.abs((w[number] * d).sum(axis=1) - amount)
     if missed.max(initial=0.0) > max(INCONSISTENT * np.abs(amount).max(initial=0.0), noise):
         raise ContactError("conditions that meet at a vertex ask for different displacements")
-    held[_rim(cells, nodes)] = True
+    held[_rim(cells, nodes, still)] = True
     return _Conditions(frame, held, value)
 
 
-def _rim(cells: Cells, nodes: _Nodes) -> Mask:
-    """Nodes on sides whose other triangle is outside of the layer, and their vertices."""
+def _rim(cells: Cells, nodes: _Nodes, still: Mask) -> Mask:
+    """Nodes on sides whose other triangle is outside of the layer, or that are `still`."""
     inside = np.zeros(len(cells.triangles), dtype=bool)
     inside[nodes.layer] = True
     count = np.bincount(cells.sides[inside].ravel(), minlength=len(cells.ends))
-    side = np.flatnonzero((count == 1) & cells.inner)
+    side = np.flatnonzero((count == 1) & (cells.inner | still))
     rim = np.zeros(nodes.count, dtype=bool)
     rim[nodes.on_sides(cells, side)] = True
     return rim

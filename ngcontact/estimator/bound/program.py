@@ -16,17 +16,29 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.linalg import splu
 
 from ...arrays import Array, Factor, Index, Mask
+from ...errors import ContactError
 from ...linalg import cholesky, lower_half
-from ...qp import LinearSystems, QuadraticProgram, bordered_systems, minimise
+from ...qp import (
+    LinearSystems,
+    NullSpace,
+    QuadraticProgram,
+    bordered_systems,
+    minimise,
+    no_null_space,
+    pinned_null_space,
+    vanishing_combinations,
+)
 from ...triplets import from_triplets
 from .elements import Element, Multipliers, traces
 from .facing import PLACES, Facing, bernstein
 
 FALLING = 0.5  # ratio of two residuals from which more corrections take nothing off
 ROUND_OFF = 1e-13  # of tractions, relative to the largest: nothing to correct
-DEFINITE = 1e-11  # of the diagonal, added to what is factorised: vertices where tractions depend
+QUADRATURE = 1e-4  # of loads on motions that nothing resists, relative to the largest
+DEFINITE = 1e-13  # of the diagonal, added to what is factorised: vertices where tractions depend
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,12 +53,15 @@ class Rows:
     opposite : list of ndarray (j, d)
         On each side that it faces; empty without a primary.
     bound : ndarray (k, j)
+    mass : ndarray (k, j)
+        Integrals of psi_j: the force of a unit coefficient.
     """
 
     facing: Facing
     own: list[Array]
     opposite: list[Array]
     bound: Array
+    mass: Array
 
 
 def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
@@ -60,7 +75,7 @@ def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
         for side, t, f in zip(facing.other, facing.there, load, strict=True)
         if side >= 0
     ]
-    return Rows(facing, own, opposite, bound)
+    return Rows(facing, own, opposite, bound, facing.weight @ psi)
 
 
 def _tested(mu: Multipliers, side: int, t: Array, psi: Array, load: Array) -> Array:
@@ -115,6 +130,7 @@ class DualProgram:
     def nearest(self, elements: Sequence[Element], moments: Array) -> Balanced:
         """The stress and the p* >= 0 that minimise B^2 for given tractions, `moments` (d,)."""
         alone, _ = exerted(elements, [e.alone() for e in elements])
+        moments = self._resisted(moments, moments - alone)
         program = replace(self.program, b=self.T.T @ (moments - alone))
         closed = np.concatenate(
             [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines] or [[]]
@@ -135,9 +151,11 @@ class DualProgram:
         Coefficients that would be more stay at their limit.
         """
         alone, _ = exerted(elements, [e.alone() for e in elements])
-        load = self.T.T @ -alone
+        moments = self._resisted(np.zeros_like(alone), -alone)
+        load = self.T.T @ (moments - alone)
         program = replace(self.program, g=np.zeros_like(self.program.g))
-        limit = np.concatenate([x.ravel() for x in limits] or [np.zeros(0)])
+        every = zip(limits, self.lines, strict=True)
+        limit = np.concatenate([(x * line.mass).ravel() for x, line in every] or [np.zeros(0)])
         free, force = limit > 0, np.zeros_like(limit)
         while True:
             b = load.copy()
@@ -156,9 +174,34 @@ class DualProgram:
             over = free & (np.abs(force) > limit)
             if not over.any():
                 none = np.zeros_like(free)
-                return self._balanced(elements, np.zeros_like(load), (y, force), free, none)
+                return self._balanced(elements, moments, (y, force), free, none)
             force[over] = np.sign(force[over]) * limit[over]
             free &= ~over
+
+    def unbalanced(
+        self, mu: Multipliers, elements: Sequence[Element], moments: Array, found: Balanced
+    ) -> Array:
+        """Forces (d,) that a stress and its pressures leave of given tractions, `moments` (d,)."""
+        left = moments - exerted(elements, found.coefficients)[0]
+        left -= pushed(mu, self.lines, found.pressure)
+        return np.where(self.program.fixed, 0.0, left - self.idle(left))
+
+    def idle(self, load: Array) -> Array:
+        """The part (d,) of a load (d,) that does work on motions which nothing resists."""
+        lineal = self.T @ self.program.null_space.lineal
+        if lineal.shape[1] == 0:
+            return np.zeros_like(load)
+        return np.asarray(lineal @ np.linalg.solve(lineal.T @ lineal, lineal.T @ load))
+
+    def _resisted(self, moments: Array, load: Array) -> Array:
+        """Given tractions, `moments` (d,), without the idle part of the `load` (d,) that they are of.
+
+        That is the error of quadrature, and round-off.
+        """
+        idle = self.idle(load)
+        if np.abs(idle).max() > QUADRATURE * np.abs(load).max():
+            raise ContactError("the loads on a body that moves freely are not in balance")
+        return np.asarray(moments - idle)
 
     def _balanced(
         self,
@@ -181,7 +224,9 @@ class DualProgram:
                 c + e.answer(change) for e, c in zip(elements, coefficients, strict=True)
             ]
             total, largest = exerted(elements, coefficients)
-            left = np.where(p.fixed, 0.0, self.T.T @ (moments - total))
+            left = moments - total
+            left = self.T.T @ (left - self.idle(left))
+            left[p.fixed] = 0.0
             force = np.where(held, left[p.unknown], force)
             force = np.where(signed, np.maximum(force, 0.0), force)
             left[p.unknown] -= force
@@ -196,7 +241,9 @@ class DualProgram:
             change = self.T @ solve(np.where(free, left, 0.0))
         shapes = [x.bound.shape for x in self.lines]
         parts = np.split(force, np.cumsum([a * b for a, b in shapes]))[:-1]
-        pressure = [q.reshape(shape) for q, shape in zip(parts, shapes, strict=True)]
+        pressure = [
+            q.reshape(x.mass.shape) / x.mass for q, x in zip(parts, self.lines, strict=True)
+        ]
         return Balanced(coefficients, pressure)
 
 
@@ -218,11 +265,16 @@ def _refined(systems: LinearSystems, active: Mask) -> tuple[Array, Array]:
 
 
 def dual_program(
-    mu: Multipliers, elements: Sequence[Element], fixed: Mask, lines: Sequence[Rows]
+    mu: Multipliers,
+    elements: Sequence[Element],
+    fixed: Mask,
+    motions: Array,
+    lines: Sequence[Rows],
 ) -> DualProgram:
     """The program of the condensed triangles.
 
-    `fixed` (d,) are multipliers of components on which no traction is given.
+    `fixed` (d,) are multipliers of components on which no traction is given, `motions` (d, r) those
+    of rigid motions that supports leave free.
     """
     size = int(mu.start[-1])
     values, rows, columns = [], [], []
@@ -235,18 +287,29 @@ def dual_program(
     T, unknown, bound, equality = _basis(mu, lines, size)
     if len(unknown):
         K = (T.T @ K @ T).tocsr()
-    m = len(unknown)
+    m, idle = len(unknown), fixed | (K.diagonal() <= 0)  # on the axis there is no traction
     program = QuadraticProgram(
         K=K,
         b=np.zeros(size),
         R=from_triplets(np.ones(m), np.arange(m), unknown, (m, size)),
         g=bound,
         equality=equality,
-        fixed=fixed | (K.diagonal() <= 0),  # on the axis there is no traction
+        fixed=idle,
         values=np.zeros(size),
         unknown=unknown,
+        null_space=_null_space(motions, T, unknown, idle),
     )
     return DualProgram(lines, T, program)
+
+
+def _null_space(motions: Array, T: sp.csr_array, unknown: Index, fixed: Mask) -> NullSpace:
+    """Rigid motions, multipliers (d, r), in the unknowns."""
+    if motions.shape[1] == 0:
+        return no_null_space(len(motions))
+    y = splu(T.tocsc()).solve(motions)
+    y[fixed] = 0.0
+    lineal = vanishing_combinations(y[unknown])
+    return pinned_null_space(y, lineal, (y @ lineal).T, unknown, fixed)
 
 
 def exerted(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple[Array, float]:
@@ -273,7 +336,10 @@ def pushed(mu: Multipliers, lines: Sequence[Rows], pressure: Sequence[Array]) ->
 def _basis(
     mu: Multipliers, lines: Sequence[Rows], size: int
 ) -> tuple[sp.csr_array, Index, Array, Mask]:
-    """Mu = T y with a y for each row: its unknown, its bound, and whether it is an equation."""
+    """The change of basis: mu = T y with a y for each row over its `Rows.mass`.
+
+    Its unknown, its bound, and whether it is an equation.
+    """
     values, rows, columns = [], [], []
     unknown, bound, equality = [np.zeros(0, np.intp)], [np.zeros(0)], [np.zeros(0, bool)]
     plain = np.ones(size, dtype=bool)
@@ -289,14 +355,15 @@ def _basis(
         for i, side in enumerate(line.facing.side):
             own = mu.of(int(side))
             plain[own] = False
-            U, S, Vt = np.linalg.svd(line.own[i])
-            inverse = Vt[:j].T @ (U.T / S[:, None])
+            left, size_of, right = np.linalg.svd(line.own[i] / line.mass[i, :, None])
+            inverse = right[:j].T @ (left.T / size_of[:, None])
             put(own, own[:j], inverse)
-            put(own, own[j:], Vt[j:].T)
+            put(own, own[j:], right[j:].T)
             if line.opposite:
-                steps.append((own, mu.of(int(line.facing.other[i])), -inverse @ line.opposite[i]))
+                block = -inverse @ (line.opposite[i] / line.mass[i, :, None])
+                steps.append((own, mu.of(int(line.facing.other[i])), block))
             unknown.append(own[:j])
-        bound.append(line.bound.ravel())
+        bound.append((line.bound / line.mass).ravel())
         equality.append(np.full(line.bound.size, line.facing.equality))
     rest = np.flatnonzero(plain)
     values.append(np.ones(len(rest)))
