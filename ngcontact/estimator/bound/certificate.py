@@ -30,8 +30,8 @@ def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
     """
     cells = proof.cells
     lines = [line.facing.direction for line in proof.program.lines]
-    turning = sum(np.count_nonzero(np.ptp(d, axis=1).max(axis=1) > STRAIGHT) for d in lines)
-    found = {"cells have a curved side": np.count_nonzero(cells.curved)}
+    turning = sum(int((np.ptp(d, axis=1) > STRAIGHT).any(axis=1).sum()) for d in lines)
+    found = {"cells have a curved side": int(cells.curved.sum())}
     found["sides have a direction of contact or guide that turns along them"] = turning
     if any(found.values()):
         told = " and ".join(f"{n} {what}" for what, n in found.items() if n)
