@@ -37,11 +37,15 @@ from .facing import (
     held_motions,
 )
 from .lifting import NOISE, _carried, asked_on_contact, asked_on_supports, lifting_of
-from .missed import data_norms
+from .missed import data_norms, least_moduli, missed_tractions, tractions_of
 from .program import Rows, Solved, rows_of, solved
+from .rough import on_pieces
 from .tractions import Given, given_on, moments_of
 
 LIFTED = 3  # degrees by which w is above u_h
+# What is missed of forces is looked at in so many pieces of each side, where it is more than this
+# share of the mean error of a triangle, on so many triangles at most.
+PARTS = ((4, 0.05, 4000), (16, 0.3, 200))
 SETTLED = 1e-10  # residual of equilibrium, relative to the largest stress
 
 
@@ -98,34 +102,36 @@ def error_bound(
 
 
 def _summed(problem, cells, displacement, mu, elements, lines, found, given, asked, order) -> Proof:
-    n, extent = len(cells.triangles), cells.trace.model.extent
-    constitutive, forces, least = np.zeros(n), np.zeros(n), np.zeros(n)
+    n = len(cells.triangles)
+    constitutive, forces = np.zeros((2, n))
     coefficients, largest = found.coefficients, 0.0
     for e, c in zip(elements, coefficients, strict=True):
-        s = e.stress(c, e.places.x)
-        if extent:
-            s[..., 2] += e.radial
-        D = e.compliance
+        s, D = e.full_stress(c), e.compliance
         off = (D @ s[..., None])[..., 0] - e.strain
         both = off * (np.linalg.inv(D) @ off[..., None])[..., 0]
-        at = e.places.at
-        constitutive[at] = np.sqrt((e.weight * both.sum(axis=2)).sum(axis=1))
-        forces[at] = e.missed
+        constitutive[e.places.at] = np.sqrt((e.weight * both.sum(axis=2)).sum(axis=1))
+        forces[e.places.at] = e.missed
         largest = max(largest, float(np.abs(s).max()))
-        half = np.ones(D.shape[-1])
-        half[-1] = 0.5**0.5
-        eig = np.linalg.eigvalsh(D * half * half[:, None])[..., -1].max(axis=1)
-        least[at] = 1 / eig
-    if extent:
-        least *= np.maximum(cells.trace.model.measure(cells.corners.reshape(-1, 2)).reshape(n, 3).min(axis=1), 1e-300)
-    residual = _residual(cells, mu, found) 
+    residual = _residual(cells, mu, found)
     if residual > SETTLED * largest:
         raise ContactError(
             "no equilibrated stress was found: residuals relative to the largest stress are "
             f"{residual / largest:.1e}"
         )
     missed, reaction = _missed(problem, cells, displacement, elements, coefficients, lines, found, given, largest)
+    least = least_moduli(cells, elements)
     loads = data_norms(cells, forces, missed, least)
+    mean = float(np.linalg.norm(constitutive)) / n**0.5
+    on_sides = data_norms(cells, 0 * forces, missed, least)
+    for parts, worth, most in PARTS:
+        costly = np.argsort(on_sides - loads)[:most]
+        costly = costly[(loads - on_sides)[costly] > worth * mean]
+        for e in elements:
+            some = np.flatnonzero(np.isin(e.places.at, costly) & (e.missed > 0))
+            if some.size:
+                at = e.places.at[some]
+                looked = on_pieces(problem, cells, e, some, parts) + on_sides[at]
+                loads[at] = np.minimum(loads[at], looked)
     segment = np.arange(len(cells.trace.region))
     size = np.abs(cells.trace.evaluate(displacement, segment, np.zeros(len(segment)))).max()
     gaps = [np.abs(line.facing.gap).max(initial=0.0) for line in lines]
@@ -185,31 +191,12 @@ def _share(problem: Problem, cells: Cells, pair: ContactState) -> float:
 def _missed(problem, cells, displacement, elements, coefficients, lines, found, given, largest):
     """L2 norms (n, 3) of tractions that s misses on the boundary; work of s n on u_D - u_h."""
     trace = cells.trace
-    side = np.flatnonzero(cells.segment >= 0)
+    side, have, ds = tractions_of(cells, elements, coefficients)
     position = np.full(len(cells.ends), -1)
     position[side] = np.arange(len(side))
-    k, j = len(side), len(PLACES)
-    every, t = np.repeat(side, j), np.tile(PLACES, k)
-    x, dx = cells.points(every, t)
-    x, dx = x.reshape(k, j, 2), dx.reshape(k, j, 2)
-    measure = trace.model.measure(x.reshape(-1, 2)).reshape(k, j)
-    length = np.linalg.norm(dx, axis=2)
-    # tractions of s, per ds
-    have = np.zeros((k, j, 2))
-    for e, c in zip(elements, coefficients, strict=True):
-        number = np.full(len(cells.triangles), -1)
-        number[e.places.at] = np.arange(len(e.places.at))
-        mine = np.flatnonzero(number[cells.owner[side]] >= 0)
-        if not mine.size:
-            continue
-        some = number[cells.owner[side[mine]]]
-        at = e.places.at[some]
-        s = e.stress(c, x[mine], some)
-        back = cells.backward[at, cells.local[side[mine]]]
-        slope = np.where(back[:, None, None], -dx[mine], dx[mine])
-        nx, ny = slope[..., 1], -slope[..., 0]
-        have[mine] = np.stack([s[:, :, 0] * nx + s[:, :, -1] * ny, s[:, :, -1] * nx + s[:, :, 1] * ny], axis=-1)
-    have /= length[..., None]
+    j, length = len(PLACES), ds / WEIGHTS
+    x, _ = cells.points(np.repeat(side, j), np.tile(PLACES, len(side)))
+    measure = trace.model.measure(x).reshape(ds.shape)
     asked = np.zeros_like(have)
     for pattern, at in given.loads:
         segment, s = cells.on_side(np.repeat(at, j), np.tile(PLACES, len(at)))
@@ -223,13 +210,8 @@ def _missed(problem, cells, displacement, elements, coefficients, lines, found, 
             at = position[f.other]
             rate = np.abs(_rates(f))
             asked[at] += _carried(f, density) * rate[..., None] / (length[at] * measure[at])[..., None]
-    miss = np.where(given.held[side][:, None], 0.0, asked - have)
-    square = ((WEIGHTS * length * measure**2)[..., None] * miss**2).sum(axis=(1, 2))
-    # Round-off, of which there is more than equilibrium is refused for nowhere.
-    size = length.mean(axis=1) * (measure**2).mean(axis=1)
-    square = np.where(square <= (SETTLED * largest) ** 2 * size, 0.0, square)
-    norms = np.zeros((len(cells.triangles), 3))
-    norms[cells.owner[side], cells.local[side]] = np.sqrt(square)
+    held = given.held[side]
+    norms = missed_tractions(cells, elements, coefficients, largest, asked, held)
     reaction = 0.0
     for pattern, values in problem.displacement.items():
         at = np.flatnonzero(np.isin(cells.segment, trace.segments(pattern)))

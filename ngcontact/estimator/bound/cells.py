@@ -196,14 +196,24 @@ class Places:
         return cells.evaluate(function, np.repeat(self.at, q), flat).reshape(b, q, -1)
 
 
-def places(cells: Cells, at: Index, order: int) -> Places:
+def _lattice(parts: int) -> Array:
+    """Corners (parts^2, 3, 2) of equal parts of the triangle of reference."""
+    m = parts
+    up = [[(i, j), (i + 1, j), (i, j + 1)] for i in range(m) for j in range(m - i)]
+    down = [[(i, j + 1), (i + 1, j), (i + 1, j + 1)] for i in range(m) for j in range(m - 1 - i)]
+    return np.array(up + down, dtype=float) / m
+
+
+def places(cells: Cells, at: Index, order: int, parts: int = 1) -> Places:
     """Quadrature of degree `order` in triangles `at` (b,), all straight or all with a curved base.
 
-    Towards a curved base points lie on straight lines from the apex.
+    Towards a curved base points lie on straight lines from the apex. The rule is that of `parts`^2
+    parts.
     """
     corners = cells.corners[at]
     if len(at) and cells.curved[at[0]]:
         g, w = gauss(order)
+        g, w = ((np.arange(parts)[:, None] + g) / parts).ravel(), np.tile(w / parts, parts)
         sigma, t = (z.ravel() for z in np.meshgrid(g, g, indexing="ij"))
         weight = np.outer(w * g, w).ravel()
         side = np.repeat(cells.sides[at, 0], len(t))
@@ -219,6 +229,8 @@ def places(cells: Cells, at: Index, order: int) -> Places:
     else:
         rule = ng.IntegrationRule(ng.TRIG, order)
         local, weight = np.array([p[:2] for p in rule.points]), np.array(rule.weights)
+        share = np.column_stack([1 - local.sum(axis=1), local])
+        local, weight = (share @ _lattice(parts)).reshape(-1, 2), np.tile(weight, parts**2) / parts**2
         edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)
         x = corners[:, :1] + np.einsum("bij,qj->bqi", edges, local)
         spread = np.broadcast_to(edges[:, None], (len(at), len(weight), 2, 2))
@@ -268,11 +280,11 @@ def cells_of(
     )
     vertices = np.concatenate([view.vertices, *made.places])
     curved = bent[own[:, 0]]
-    cells = _joined(trace, vertices, triangles, reference, parent, own, spans, curved)
+    cells = joined(trace, vertices, triangles, reference, parent, own, spans, curved)
     return _parted(cells, dependent(cells, loaded, held))
 
 
-def _joined(
+def joined(
     trace: BoundaryTrace,
     vertices: Array,
     triangles: Index,
@@ -326,7 +338,7 @@ def _parted(cells: Cells, at: Index) -> Cells:
             values.append(value)
     vertices = np.concatenate([cells.vertices, cells.corners[at].mean(axis=1)])
     curved = np.concatenate([cells.curved[rest], cells.curved[at], np.zeros(2 * len(at), bool)])
-    return _joined(cells.trace, vertices, *(np.concatenate(x) for x in parts), curved)
+    return joined(cells.trace, vertices, *(np.concatenate(x) for x in parts), curved)
 
 
 def dependent(cells: Cells, loaded: Index, held: Index) -> Index:

@@ -11,7 +11,7 @@ in the norm of C^-1, and the tractions of s are N'A^-1 N mu + N'A^-1 g + <s_p n,
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import ngsolve as ng
@@ -29,6 +29,8 @@ from .cells import Cells, Places, places
 from .polynomials import Frame, balancing, frame_of, projected, scalars, stresses
 
 ROUGH = 1e-4  # of a load on a triangle, that stresses of the usual degree may miss
+ROUGH_RULE = (8, 4)  # order and parts of the quadrature of such loads
+BONUS = 10  # orders of that of others
 ON_ROUGH = 3  # degrees by which they are higher where they miss more
 ON_CURVES = 3  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
@@ -114,6 +116,13 @@ class Element:
         """Moments (b, d) of the tractions of s with coefficients `c` (b, m)."""
         return self.own + np.einsum("bmd,bmn,bn->bd", self.N, self.root.transpose(0, 2, 1), c, optimize=True)
 
+    def full_stress(self, c: Array) -> Array:
+        """s (b, q, v) at the quadrature points, with radial forces."""
+        s = self.stress(c, self.places.x)
+        if s.shape[2] > 3:
+            s[..., 2] += self.radial
+        return s
+
     def stress(self, c: Array, x: Array, some: Index | slice = slice(None)) -> Array:
         """s (b, q, v) at points `x` (b, q, 2) for coefficients `c` (b, m), without radial forces."""
         axial = self.strain.shape[2] > 3
@@ -181,28 +190,38 @@ def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
 
 
 def elements(
-    problem: Problem, cells: Cells, displacement: ng.CoefficientFunction, degree: int
+    problem: Problem,
+    cells: Cells,
+    displacement: ng.CoefficientFunction | None,
+    degree: int,
+    rest: Callable[[Places, Array], Array] | None = None,
 ) -> tuple[Multipliers, list[Element]]:
-    """The condensed triangles of a solution, and their multipliers."""
-    own, mu = multipliers(cells, degree, _rough(problem, cells, degree))
+    """The condensed triangles of a solution, and their multipliers.
+
+    Or of the `rest` of body forces, by points and forces there, without a displacement.
+    """
+    rough = _rough(problem, cells, degree, rest is None)
+    own, mu = multipliers(cells, degree, rough)
     on_axis = cells.trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1)[cells.sides]
     key = np.column_stack([own, mu.degree[cells.sides], on_axis.any(axis=1), cells.curved])
     varying = _varying(problem, cells)
-    key = np.column_stack([key, varying, _body(cells) ])
+    key = np.column_stack([key, varying, cells.bodies, rough])
     kinds, number = np.unique(key, axis=0, return_inverse=True)
     found = []
     for kind in range(len(kinds)):
         every = np.flatnonzero(number.ravel() == kind)
         for start in range(0, len(every), BLOCK):
             at = every[start : start + BLOCK]
-            found.append(_element(problem, cells, displacement, mu, at, int(kinds[kind, 0]), bool(kinds[kind, 4])))
+            found.append(_element(problem, cells, displacement, mu, at, int(kinds[kind, 0]), bool(kinds[kind, 4]), rest, bool(kinds[kind, -1])))
     return mu, found
 
 
-def _rough(problem: Problem, cells: Cells, degree: int) -> Mask:
+def _rough(problem: Problem, cells: Cells, degree: int, looked: bool) -> Mask:
     """Triangles (n,) on which loads are no polynomials that stresses of a degree balance."""
     model = cells.trace.model
     axial, rough = model.extent > 0, np.zeros(len(cells.triangles), dtype=bool)
+    if not looked:
+        return rough
     n = _force_degree(degree, axial)
     for pattern, force in problem.force.items():
         mask = np.array(cells.trace.mesh.Materials(pattern).Mask())
@@ -210,7 +229,7 @@ def _rough(problem: Problem, cells: Cells, degree: int) -> Mask:
             at = np.flatnonzero(mask[cells.bodies] & (cells.curved == bent))
             if numbers(force) or not at.size:
                 continue
-            points = places(cells, at, 2 * degree + 10)
+            points = places(cells, at, 2 * degree + BONUS)
             F = points.evaluate(cells, ng.CF(force))[..., int(axial) :]
             weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(len(at), -1)
             frame = frame_of(cells.corners[at])
@@ -228,10 +247,6 @@ def _rough(problem: Problem, cells: Cells, degree: int) -> Mask:
         miss, size = (np.einsum("q,sqc->s", w, f**2) for f in (rest, P))
         rough[cells.owner[side[miss > ROUGH**2 * size]]] = True
     return rough
-
-
-def _body(cells: Cells) -> Index:
-    return cells.bodies
 
 
 def _varying(problem: Problem, cells: Cells) -> Index:
@@ -263,7 +278,7 @@ def compliance_at(problem: Problem, cells: Cells, points: Places) -> Array:
     return np.linalg.inv(C.reshape(*C.shape[:2], v, v))
 
 
-def _force_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunction | None:
+def force_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunction | None:
     mesh = cells.trace.mesh
     for pattern, force in problem.force.items():
         if mesh.Materials(pattern).Mask()[body]:
@@ -274,11 +289,13 @@ def _force_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFuncti
 def _element(
     problem: Problem,
     cells: Cells,
-    displacement: ng.CoefficientFunction,
+    displacement: ng.CoefficientFunction | None,
     mu: Multipliers,
     at: Index,
     degree: int,
     on_axis: bool,
+    rest: Callable[[Places, Array], Array] | None,
+    finer: bool,
 ) -> Element:
     model = model_of(problem)
     axial = model.extent > 0
@@ -290,8 +307,10 @@ def _element(
     weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(b, q)
     frame = frame_of(cells.corners[at])
     compliance = compliance_at(problem, cells, points)
-    strain = points.evaluate(cells, model.strain(displacement))
-    force, radial, missed = _forces(problem, cells, points, frame, degree, body, axial)
+    strain = np.zeros((b, q, 3 + model.extent))
+    if displacement is not None:
+        strain = points.evaluate(cells, model.strain(displacement))
+    force, radial, missed = _forces(problem, cells, points, frame, degree, body, axial, rest, finer)
     local = frame.local(points.x) if curved else points.local[None]
     T = stresses(degree, frame, points.x, local, axial, on_axis)
     root = np.sqrt(weight)[..., None]
@@ -300,13 +319,13 @@ def _element(
     DT = D @ T
     wT = (root[..., None] * T).reshape(b, q * v, m)
     A = wT.transpose(0, 2, 1) @ (root[..., None] * DT).reshape(b, q * v, m)
-    rest = strain
+    wanted = strain
     if force.any() or radial.any():
         s_p = balancing(_force_degree(degree, axial), frame, points.x, force, axial)
         if axial:
             s_p[..., 2] += radial
-        rest = strain - (D @ s_p[..., None])[..., 0]
-    g = np.einsum("bxm,bx->bm", wT, (root * rest).reshape(b, -1))
+        wanted = strain - (D @ s_p[..., None])[..., 0]
+    g = np.einsum("bxm,bx->bm", wT, (root * wanted).reshape(b, -1))
     scale = 1 / np.sqrt(np.einsum("bmm->bm", A))
     N, own = _moments(cells, mu, at, degree, frame, on_axis, force, axial, m)
     L = _cholesky(A * scale[:, :, None] * scale[:, None, :])
@@ -383,26 +402,29 @@ def _tractions(T: Array, normal: Array, chi: Array) -> Array:
     return np.concatenate([tx.transpose(0, 2, 1) @ chi, ty.transpose(0, 2, 1) @ chi], axis=2)
 
 
-def _forces(problem, cells, points, frame, degree, body, axial):
+def _forces(problem, cells, points, frame, degree, body, axial, less, finer):
     """Coefficients of the force that is balanced, r F_r, and the norm of the rest."""
     b, q = points.weight.shape
     n = _force_degree(degree, axial)
     j = (n + 1) * (n + 2) // 2
-    F = _force_of(problem, cells, body)
+    F = force_of(problem, cells, body)
     if F is None:
         return np.zeros((b, j, 2)), np.zeros((b, q)), np.zeros(b)
-    fine = places(cells, points.at, 2 * degree + 10)
+    fine = places(cells, points.at, *(ROUGH_RULE if finer else (2 * degree + BONUS,)))
     values = fine.evaluate(cells, F)
+    size = values
+    if less is not None:
+        values = less(fine, values)
     measure = cells.trace.model.measure(fine.x.reshape(-1, 2)).reshape(b, -1)
     weight = fine.weight * measure
     force = projected(n, frame, fine.x, weight, values)
     rest = values - scalars(n, frame, fine.x) @ force
     if axial:
         rest[..., 0] = 0.0
-        radial = points.x[..., 0] * points.evaluate(cells, F)[..., 0]
+        radial = points.x[..., 0] * points.evaluate(cells, F)[..., 0] if less is None else np.zeros((b, q))
         force[..., 0] = 0.0
     else:
         radial = np.zeros((b, q))
     missed = np.sqrt(np.einsum("bq,bqd->b", weight, rest**2))
-    size = np.sqrt(np.einsum("bq,bqd->b", weight, values**2))
+    size = np.sqrt(np.einsum("bq,bqd->b", weight, size**2))
     return force, radial, np.where(missed <= ROUND_OFF * size, 0.0, missed)

@@ -23,12 +23,16 @@ triangle, of which T is the image under D: |w| <= h / pi max |D| (max det D / mi
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from ...arrays import Array, Index
+from ...arrays import Array, Index, Mask
 from .cells import Cells
+from .elements import Element
+from .facing import PLACES, WEIGHTS
 
+ROUND_OFF = 1e-10  # of tractions, relative to the largest stress: more is refused
 SEEN = 17  # points on each side
 MIDDLES = 8  # degree of the lattice of places at which the middle of both balls is sought
 
@@ -107,3 +111,67 @@ def _distortion(cells: Cells, at: Index, x: Array, slope: Array) -> Array:
         size, det = np.linalg.norm(D, 2, axis=(2, 3)).max(axis=1), np.linalg.det(D)
         found[bent] = size * np.sqrt(det.max(axis=1) / np.maximum(det.min(axis=1), 1e-300))
     return found
+
+
+def least_moduli(cells: Cells, elements: Sequence[Element]) -> Array:
+    """Smallest eigenvalue (n,) of C in Mandel's scaling, times the least measure."""
+    least = np.zeros(len(cells.triangles))
+    for e in elements:
+        half = np.ones(e.compliance.shape[-1])
+        half[-1] = 0.5**0.5
+        size = np.linalg.eigvalsh(e.compliance * half * half[:, None])[..., -1].max(axis=1)
+        least[e.places.at] = 1 / size
+    model = cells.trace.model
+    if model.extent:
+        measure = model.measure(cells.corners.reshape(-1, 2)).reshape(-1, 3).min(axis=1)
+        least *= np.maximum(measure, np.finfo(float).tiny)
+    return least
+
+
+def tractions_of(
+    cells: Cells, elements: Sequence[Element], coefficients: Sequence[Array]
+) -> tuple[Index, Array, Array]:
+    """Sides (k,) on the boundary; tractions of s (k, j, 2) and weights ds (k, j) at `PLACES`."""
+    side = np.flatnonzero(cells.segment >= 0)
+    k, j = len(side), len(PLACES)
+    x, dx = (z.reshape(k, j, 2) for z in cells.points(np.repeat(side, j), np.tile(PLACES, k)))
+    have = np.zeros((k, j, 2))
+    for e, c in zip(elements, coefficients, strict=True):
+        number = np.full(len(cells.triangles), -1)
+        number[e.places.at] = np.arange(len(e.places.at))
+        mine = np.flatnonzero(number[cells.owner[side]] >= 0)
+        if not mine.size:
+            continue
+        some = number[cells.owner[side[mine]]]
+        at = e.places.at[some]
+        s = e.stress(c, x[mine], some)
+        back = cells.backward[at, cells.local[side[mine]]]
+        slope = np.where(back[:, None, None], -dx[mine], dx[mine])
+        nx, ny = slope[..., 1], -slope[..., 0]
+        have[mine, :, 0] = s[:, :, 0] * nx + s[:, :, -1] * ny
+        have[mine, :, 1] = s[:, :, -1] * nx + s[:, :, 1] * ny
+    length = np.linalg.norm(dx, axis=2)
+    return side, have / length[..., None], WEIGHTS * length
+
+
+def missed_tractions(
+    cells: Cells,
+    elements: Sequence[Element],
+    coefficients: Sequence[Array],
+    largest: float,
+    asked: Array | float = 0.0,
+    held: Mask | bool = False,
+) -> Array:
+    """L2 norms (n, 3) of what tractions miss of those `asked` (k, j, 2) on boundary sides.
+
+    Components (k, 2) that are `held` do not count, nor does round-off of the `largest` stress.
+    """
+    side, have, ds = tractions_of(cells, elements, coefficients)
+    x, _ = cells.points(np.repeat(side, len(PLACES)), np.tile(PLACES, len(side)))
+    measure = cells.trace.model.measure(x).reshape(ds.shape)
+    miss = np.where(np.broadcast_to(held, (len(side), 2))[:, None], 0.0, asked - have)
+    square = ((ds * measure**2)[..., None] * miss**2).sum(axis=(1, 2))
+    square = np.where(square <= (ROUND_OFF * largest) ** 2 * (ds * measure**2).sum(axis=1), 0.0, square)
+    norms = np.zeros((len(cells.triangles), 3))
+    norms[cells.owner[side], cells.local[side]] = np.sqrt(square)
+    return norms
