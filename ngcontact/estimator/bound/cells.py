@@ -373,10 +373,10 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
         one[vertex[left]] = line[left]
         left = left[np.abs(line[left] - one[vertex[left]]) > TURN]
     at_two[vertex[left]] = False
-    chosen = np.full(count, -1)
-    order = np.argsort(~cells.curved, kind="stable")  # straight ones if there are any
-    chosen[cells.triangles[order]] = order[:, None]
-    return np.unique(chosen[at_two])
+    eased = np.zeros(count, dtype=bool)  # by straight triangles, if there are any
+    eased[cells.triangles[~cells.curved]] = True
+    asked = at_two[cells.triangles] & (~cells.curved[:, None] | ~eased[cells.triangles])
+    return np.flatnonzero(asked.any(axis=1))
 
 
 @dataclass(eq=False)

@@ -20,7 +20,7 @@ from .cells import Cells
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
 ROUND_OFF = 1e-14  # of gaps, relative to coordinates
-NEAR = 2e-3  # of a segment: vertices that face each other up to that are one; no point of `PLACES` lies between them
+NEAR = 4e-3  # of a segment: vertices that face each other up to that are one; no point of `PLACES` lies between them
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
 STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of them

@@ -33,7 +33,7 @@ from .elements import Element, Multipliers, traces
 from .facing import PLACES, Facing, bernstein
 
 REFINED = 8  # steps of refinement of the stress, at most ...
-ROUND_OFF = 1e-13  # ... until what does not balance is that little
+ROUND_OFF = 1e-12  # ... until what does not balance is that little
 QUADRATURE = 1e-4  # of loads on motions that nothing resists, relative to their terms
 DEFINITE = 1e-13  # of the diagonal, added to what is factorised: vertices where tractions depend
 
@@ -166,7 +166,7 @@ def solved(
     closed = equality | (force > 0)
     free = ~fixed
     free[unknown[closed]] = False
-    solve = factor(free)
+    solve = None
     for step in range(REFINED + 1):
         exerted, largest = np.zeros(size), 0.0
         for e, c in zip(elements, coefficients, strict=True):
@@ -181,6 +181,7 @@ def solved(
         if step == REFINED or np.abs(left[free]).max(initial=0.0) <= ROUND_OFF * largest:
             break
         # Stresses of stiff bodies are small differences of multipliers.
+        solve = solve or factor(free)
         change = T @ solve(np.where(free, left, 0.0))
         coefficients = [c + e.answer(change) for e, c in zip(elements, coefficients, strict=True)]
     sizes = [line.bound.size for line in lines]
