@@ -39,8 +39,8 @@ class Level:
     elements : list of Element
     coefficients : list of ndarray (b, m)
         Of the stress.
-    depth : ndarray of int (n,)
-        How often each is divided for the rules of forces.
+    look : ndarray of int (n, 3)
+        Rules of forces on each, as of `elements_of`.
     distance, loads : ndarray (n,)
         |s - sigma_h|, and norms of what s misses of the data.
     """
@@ -48,7 +48,7 @@ class Level:
     cells: Cells
     elements: list[Element]
     coefficients: list[Array]
-    depth: Index
+    look: Index
     distance: Array
     loads: Array
 
@@ -81,12 +81,15 @@ def once_more(
     limit = COUNTS * float(((c + D) ** 2).sum()) if allowed is None else allowed
     order = np.argsort(lost)
     at = np.sort(order[np.cumsum(lost[order]) > limit])
-    for m in (1, PARTS) if top else (PARTS,):
-        some = at[(level.depth[at] == 0) == (m == 1)]
+    whole, thirds = level.look[:, 1] == 0, level.look[:, 2] > 0
+    for m, third in ((1, False), (PARTS, False), (PARTS, True)):
+        some = at[(whole == (m == 1))[at] & (whole | (thirds == third))[at]]
+        if m == 1 and not top:
+            continue
         for start in range(0, len(some), AT_ONCE):
             here = some[start : start + AT_ONCE]
             share = limit * len(here) / len(some)
-            one, two = _islands(problem, displacement, wanted, level, here, degree, scale, m, share)
+            one, two = _islands(problem, displacement, wanted, level, here, degree, scale, (m, third), share)
             better = one + two < c[here] + D[here]
             c[here[better]], D[here[better]] = one[better], two[better]
     return c, D
@@ -100,14 +103,14 @@ def _islands(
     at: Index,
     degree: int,
     scale: float,
-    m: int,
+    division: tuple[int, bool],
     allowed: float,
 ) -> tuple[Array, Array]:
-    """Norms (b,) on triangles `at` (b,) in m^2 parts; infinite where there is no equilibrium."""
-    parts, k = divided(level.cells, at, m), len(pattern(m)[1])
-    depth = np.repeat(np.maximum(level.depth[at] - 1, 0), k)
-    look = np.column_stack([np.full(len(depth), PARTED), depth])
-    raised = degree + (RAISED if m == 1 else 0)
+    """Norms (b,) on triangles `at` (b,) in parts; infinite where there is no equilibrium."""
+    parts, k = divided(level.cells, at, *division), len(pattern(*division)[1])
+    look = np.repeat(level.look[at], k, axis=0)
+    look[:, 0], look[:, 1] = PARTED, np.maximum(look[:, 1] - 1, 0)
+    n, raised = len(look), degree + (RAISED if division[0] == 1 else 0)
     mu, elements = elements_of(problem, parts, displacement, raised, look)
     rule = along(parts, wanted.given, np.flatnonzero(~parts.inner))
     owner = parts.owner[rule.side]
@@ -122,14 +125,14 @@ def _islands(
     program = dual_program(mu, elements, np.zeros(len(moments), dtype=bool), nothing, [])
     found = program.nearest(elements, moments).coefficients
     left = residuals(parts, mu, moments - exerted(elements, found)[0], scale)
-    norms = stress_norms(elements, found, len(depth))
+    norms = stress_norms(elements, found, n)
     have = tractions_of(elements, found, owner, rule.x, rule.normal)
     miss = np.where(np.abs(asked - have) <= ROUND_OFF * scale, 0.0, asked - have)
-    forces, moduli = forces_missed(elements, len(depth)), smallest_moduli(parts, elements)
+    forces, moduli = forces_missed(elements, n), smallest_moduli(parts, elements)
     data = data_norms(parts, forces, rule.norms(parts, miss), moduli)
-    finer = Level(parts, elements, found, depth, norms.distance, data)
+    finer = Level(parts, elements, found, look, norms.distance, data)
     both = finer.distance, finer.loads
-    if depth.any():
+    if look[:, 1].any():
         both = once_more(problem, displacement, wanted, finer, degree, scale, allowed)
     settled = left.reshape(-1, k).max(axis=1) <= SETTLED
     one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
