@@ -24,7 +24,7 @@ from .parts import PARTS, divided, pattern
 from .program import dual_program, exerted
 from .tractions import ROUND_OFF, Requested, along, on_segments, tractions_of
 
-COUNTS = 0.005  # share of B^2 that may be lost by data where nothing is balanced once more
+COUNTS = 0.02  # of |s - sigma_h|^2, what may be added by data where nothing is balanced again
 RAISED = (WHOLE - PARTED) // 2  # degrees on whole triangles, where the rule stays
 AT_ONCE = 200  # triangles
 
@@ -73,12 +73,12 @@ def once_more(
     scale : float
         The largest stress, beside which equilibrium is measured.
     allowed : float, optional
-        Of B^2 that may be lost; of the whole mesh without.
+        What may be added to B^2; for the whole mesh without.
     """
     c, D = level.distance.copy(), level.loads.copy()
     lost = (c + D) ** 2 - c**2
     top = allowed is None
-    limit = COUNTS * float(((c + D) ** 2).sum()) if allowed is None else allowed
+    limit = COUNTS * float(c @ c) if allowed is None else allowed
     order = np.argsort(lost)
     at = np.sort(order[np.cumsum(lost[order]) > limit])
     whole, thirds = level.look[:, 1] == 0, level.look[:, 2] > 0

@@ -135,6 +135,10 @@ class DualProgram:
         closed = np.concatenate(
             [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines] or [[]]
         )
+        if not closed.size:  # one system, which need not be definite
+            none = np.zeros(0, dtype=bool)
+            start = np.zeros_like(program.b), np.zeros(0)
+            return self._balanced(elements, moments, start, none, none)
         systems = bordered_systems(program, self.factor)
         active = minimise(systems, closed.astype(bool)).active
         while True:  # any p* >= 0 proves a bound: coefficients below 0 by round-off become 0
