@@ -17,7 +17,7 @@ import numpy as np
 from ...arrays import Array, Index
 from ...problem import Problem
 from .cells import Cells
-from .elements import PARTED, WHOLE, Element, elements_of
+from .elements import Element, elements_of
 from .missed import data_norms
 from .norms import SETTLED, forces_missed, residuals, smallest_moduli, stress_norms
 from .parts import PARTS, divided, pattern
@@ -25,7 +25,8 @@ from .program import dual_program, exerted
 from .tractions import ROUND_OFF, Requested, along, on_segments, tractions_of
 
 COUNTS = 0.02  # of |s - sigma_h|^2, what may be added by data where nothing is balanced again
-RAISED = (WHOLE - PARTED) // 2  # degrees on whole triangles, where the rule stays
+RAISED = 3  # degrees on whole triangles
+LEAST = 3  # degree on parts: lower ones do not meet all tractions
 AT_ONCE = 200  # triangles
 
 
@@ -109,8 +110,9 @@ def _islands(
     """Norms (b,) on triangles `at` (b,) in parts; infinite where there is no equilibrium."""
     parts, k = divided(level.cells, at, *division), len(pattern(*division)[1])
     look = np.repeat(level.look[at], k, axis=0)
-    look[:, 0], look[:, 1] = PARTED, np.maximum(look[:, 1] - 1, 0)
-    n, raised = len(look), degree + (RAISED if division[0] == 1 else 0)
+    n, raised = len(look), degree + RAISED if division[0] == 1 else max(degree, LEAST)
+    look[:, 0] -= 2 * (raised - degree)  # the rule stays
+    look[:, 1] = np.maximum(look[:, 1] - 1, 0)
     mu, elements = elements_of(problem, parts, displacement, raised, look)
     rule = along(parts, wanted.given, np.flatnonzero(~parts.inner))
     owner = parts.owner[rule.side]
@@ -133,7 +135,7 @@ def _islands(
     finer = Level(parts, elements, found, look, norms.distance, data)
     both = finer.distance, finer.loads
     if look[:, 1].any():
-        both = once_more(problem, displacement, wanted, finer, degree, scale, allowed)
+        both = once_more(problem, displacement, wanted, finer, raised, scale, allowed)
     settled = left.reshape(-1, k).max(axis=1) <= SETTLED
     one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
     return np.where(settled, one, np.inf), np.where(settled, two, np.inf)
