@@ -135,8 +135,12 @@ class DualProgram:
         moments = self._resisted(moments, moments - alone)
         program = replace(self.program, b=self.T.T @ (moments - alone))
         closed = [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines]
+        if not closed:  # one system, which need not be definite
+            none = np.zeros(0, dtype=bool)
+            start = np.zeros_like(program.b), np.zeros(0)
+            return self._balanced(elements, moments, start, none, none)
         self.systems.restart(program)
-        active = minimise(self.systems, np.concatenate([np.zeros(0, bool), *closed])).active
+        active = minimise(self.systems, np.concatenate(closed)).active
         while True:  # any p* >= 0 proves a bound: coefficients below 0 by round-off become 0
             y, force = _refined(self.systems, active)
             pulling = (force < 0) & ~program.equality
