@@ -24,7 +24,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 # Of equations between polynomials, relative to the largest stress, and of B. The package lets pass
-# 1e-10, from factorisations of matrices of large condition; measured 1e-15 to 1e-12.
+# 1e-10 in moments, which at a vertex may add up to ten times that; measured 1e-16 to 3e-11.
 TOLERANCE = 1e-9
 # Of what must not be negative, relative to the largest: 45 units of round-off, for a zero that is a
 # sum of some ten products, such as a circumference on the axis. It changes a term of B^2 by 1e-14

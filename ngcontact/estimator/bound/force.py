@@ -10,13 +10,15 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
+from ...errors import ContactError
 from ...fem import model_of
 from ...problem import Problem
-from .bound import LIFTED, Proof, smallest_moduli, stress_norms, work_on_gap
-from .facing import PLACES, WEIGHTS, Facing, bernstein
-from .lifting import lifted
+from .bound import LIFTED, Proof, work_on_gap
+from .facing import PLACES, WEIGHTS, Facing, bernstein, met
+from .lifting import asked_on_supports, lifted
 from .missed import data_norms
-from .tractions import boundary_tractions, missed_tractions
+from .norms import SETTLED, residuals, smallest_moduli, stress_norms
+from .tractions import boundary_tractions, missed_tractions, requested
 
 NOISE = 1e-13  # of a jump, relative to the largest displacement
 ROOM = 2.0  # largest |q*| / p* over the ratio of their means, where contact has no open end
@@ -60,6 +62,7 @@ def force_bar(
     kappa = max(
         *(_least_kappa(*x) for x in zip(ends, facing, excess, strict=True)),
         _mean_ratio(proof, tested),
+        _ratio_beside(proof, displacement, tested),
     )
     if not math.isfinite(kappa):
         raise ValueError(
@@ -74,12 +77,21 @@ def force_bar(
     ]
     dual = proof.program.within(elements, limits)
     norms = stress_norms(elements, dual.coefficients, n)
-    have = boundary_tractions(cells, elements, dual.coefficients)
+    none = np.zeros_like(proof.moments)
+    left = proof.program.unbalanced(proof.multipliers, elements, none, dual)
+    if not residuals(cells, proof.multipliers, left, norms.largest).max() <= SETTLED:
+        raise ContactError("no stress of the force's test was found in equilibrium")
+    have = boundary_tractions(cells, proof.given, elements, dual.coefficients)
     free = replace(problem, force={}, traction={})
-    missed = missed_tractions(free, cells, proof.given, lines, dual.pressure, have, norms.largest)
-    data = data_norms(cells, np.zeros(n), missed, smallest_moduli(cells, elements))
-    lifts = [(f, -r) for f, r in zip(facing, lift, strict=True)]
-    lifting = lifted(problem, cells, [], lifts, cells.trace.order + LIFTED, 1.0)
+    wanted = requested(free, cells, proof.given, lines, dual.pressure)
+    missed = missed_tractions(wanted, cells, have, norms.largest)
+    data = data_norms(cells, np.zeros(n), missed, smallest_moduli(elements, n))
+    held = [
+        replace(one, amount=np.zeros_like(one.amount))
+        for one in asked_on_supports(cells, proof.given, G)
+    ]
+    lifts = list(zip(facing, lift, strict=True))
+    lifting = lifted(problem, cells, held, lifts, cells.trace.order + LIFTED, 1.0)
     M = float(np.linalg.norm(norms.distance + data + lifting))
     B = proof.bound
     # The largest M e + kappa (X + Y) with e^2 + 2 X + 2 Y <= B^2.
@@ -140,6 +152,27 @@ def _lift(ends: Index, f: Facing, jump: Array, kappa: float) -> Array:
     room = kappa * f.after
     kept = np.clip(_coefficients(ends, f, jump), -room, room)
     return np.asarray(jump - kept @ bernstein(kept.shape[1] - 1, PLACES).T)
+
+
+def _ratio_beside(proof: Proof, displacement: ng.CoefficientFunction, tested: Tested) -> float:
+    """The largest ratio of [G] - d.e to the gap where p* does not act, at Gauss points."""
+    cells, ratio, j = proof.cells, 0.0, len(PLACES)
+    facing = [line.facing for line in proof.program.lines]
+    for f, e in zip([f for f in facing if f.pair is not None], tested.directions, strict=True):
+        assert f.pair is not None
+        beside = np.isin(cells.segment, f.pair.line.segments)
+        beside[f.side] = False
+        side = np.flatnonzero(beside)
+        segment, s = cells.on_side(np.repeat(side, j), np.tile(PLACES, len(side)))
+        found = met(cells.trace, displacement, f.pair, segment, s)
+        jump = cells.trace.evaluate(tested.displacement, segment, s)
+        at = np.flatnonzero(found.segment >= 0)
+        jump[at] -= cells.trace.evaluate(tested.displacement, found.segment[at], found.s[at])
+        excess = np.abs(((jump - e) * found.direction).sum(axis=1))
+        some = found.faces & (excess > NOISE)
+        room = np.maximum(found.gap[some], np.finfo(float).tiny)
+        ratio = max(ratio, float((excess[some] / room).max(initial=0.0)))
+    return ratio
 
 
 def _mean_ratio(proof: Proof, tested: Tested) -> float:

@@ -1,9 +1,10 @@
 """A displacement w of little energy that corrects u_h on Gamma_u, Gamma_K and curved guides.
 
 On sides d.w is asked for: u_D - u_h on Gamma_u, r shared by compliance between both bodies on
-Gamma_K, -u_h.d on guides. On the triangles around these sides w is the displacement of least energy
-of a degree with the values asked for at nodes; what is no polynomial of that degree is continued
-from its side to the opposite corner in proportion to the distance.
+Gamma_K, -u_h.d on guides. Other parts of Gamma_K stay where they are. On the triangles around these
+sides w is the displacement of least energy of a degree with the values asked for at nodes; what is
+no polynomial of that degree is continued from its side to the opposite corner in proportion to the
+distance.
 """
 
 from __future__ import annotations
@@ -110,7 +111,11 @@ def lifting_of(
     touched[cells.ends[np.concatenate(needed)]] = True
     layer = np.flatnonzero(touched[cells.triangles].any(axis=1))
     nodes = _Nodes(cells, layer, degree)
-    conditions = _conditions(cells, nodes, asked, 100 * NOISE * extent)
+    lines = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
+    still = np.isin(cells.segment, cells.trace.segments(*lines))
+    for one in asked:
+        still[one.side] = False
+    conditions = _conditions(cells, nodes, asked, still, 100 * NOISE * extent)
     squares = _least(problem, cells, nodes, conditions, asked)
     norms[layer] = np.sqrt(np.maximum(squares, 0.0))
     return norms
@@ -178,21 +183,22 @@ class _Conditions:
     value: Array
 
 
-def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: float) -> _Conditions:
-    """What is asked for at the nodes; 0 on the rim of the layer."""
+def _conditions(
+    cells: Cells, nodes: _Nodes, asked: Sequence[Asked], still: Mask, noise: float
+) -> _Conditions:
+    """What is asked for at the nodes; 0 on the rim of the layer and on sides `still` (e,)."""
     frame = np.tile(np.eye(2), (nodes.count, 1, 1))
     held, value = np.zeros((nodes.count, 2), dtype=bool), np.zeros((nodes.count, 2))
-    number, d, amount = [], [], []
+    found = []
     t = gauss_lobatto(nodes.degree)
     carry = lagrange(DATA, t)
     for one in asked:
         here = np.isin(one.side, nodes.sides)
-        number.append(nodes.on_sides(cells, one.side[here]).ravel())
         vectors = np.einsum("ij,kjc->kic", carry, one.direction[here]).reshape(-1, 2)
         length = np.linalg.norm(vectors, axis=1, keepdims=True)
-        d.append(vectors / length)
-        amount.append((one.amount[here] @ carry.T).ravel() / length[:, 0])
-    number, d, amount = np.concatenate(number), np.concatenate(d), np.concatenate(amount)
+        own = (one.amount[here] @ carry.T).ravel() / length[:, 0]
+        found.append((nodes.on_sides(cells, one.side[here]).ravel(), vectors / length, own))
+    number, d, amount = (np.concatenate(x) for x in zip(*found, strict=True))
     # Normal equations at each node: two directions, or one and the one across, which is free.
     M, right = np.zeros((nodes.count, 2, 2)), np.zeros((nodes.count, 2))
     np.add.at(M, number, d[:, :, None] * d[:, None])
@@ -210,16 +216,16 @@ def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: floa
     missed = np.abs((w[number] * d).sum(axis=1) - amount)
     if missed.max(initial=0.0) > max(INCONSISTENT * np.abs(amount).max(initial=0.0), noise):
         raise ContactError("conditions that meet at a vertex ask for different displacements")
-    held[_rim(cells, nodes)] = True
+    held[_rim(cells, nodes, still)] = True
     return _Conditions(frame, held, value)
 
 
-def _rim(cells: Cells, nodes: _Nodes) -> Mask:
-    """Nodes on sides whose other triangle is outside of the layer, and their vertices."""
+def _rim(cells: Cells, nodes: _Nodes, still: Mask) -> Mask:
+    """Nodes on sides whose other triangle is outside of the layer, or that are `still`."""
     inside = np.zeros(len(cells.triangles), dtype=bool)
     inside[nodes.layer] = True
     count = np.bincount(cells.sides[inside].ravel(), minlength=len(cells.ends))
-    side = np.flatnonzero((count == 1) & cells.inner)
+    side = np.flatnonzero((count == 1) & (cells.inner | still))
     rim = np.zeros(nodes.count, dtype=bool)
     rim[nodes.on_sides(cells, side)] = True
     return rim
@@ -253,7 +259,8 @@ def _least(
         rows.append(np.repeat(nodes.components[some], m, axis=1).ravel())
         columns.append(np.tile(nodes.components[some], (1, m)).ravel())
     size = 2 * nodes.count
-    K = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
+    entries, i, j = (np.concatenate(x) for x in (values, rows, columns))
+    K = from_triplets(entries, i, j, (size, size))
     n = 2 * np.arange(nodes.count)[:, None] + [0, 1]
     R = from_triplets(  # w = R (components in the frames)
         conditions.frame.transpose(0, 2, 1).ravel(),
@@ -286,8 +293,8 @@ def _operators(
     """Strains (b, q, v, 2 m) of the nodes' functions, C, weights, and d(a, b) / dx."""
     model, degree = model_of(problem), nodes.degree
     weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
-    law = np.linalg.inv(compliance_at(problem, cells, points))
-    into = np.linalg.inv(points.spread)
+    law = np.asarray(np.linalg.inv(compliance_at(problem, cells, points)))
+    into = np.asarray(np.linalg.inv(points.spread))
     by = np.einsum("qma,mn->qan", _gradients(degree, points.local), nodes.inverse)
     gradient = np.einsum("qan,bqac->bqcn", by, into)
     shape = _values(degree, points.local) @ nodes.inverse
@@ -364,4 +371,4 @@ def _remainders(cells: Cells, nodes: _Nodes, w: Array, asked: Sequence[Asked]) -
         miss = np.where(back[:, None, None], miss[:, ::-1], miss)
         at = position[triangle]
         rho[at, local] += miss
-    return _Remainders(rho, rho.any(axis=(1, 2, 3)))
+    return _Remainders(rho, np.asarray(rho.any(axis=(1, 2, 3))))

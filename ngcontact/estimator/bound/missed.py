@@ -39,23 +39,33 @@ def data_norms(cells: Cells, forces: Array, tractions: Array, least: Array) -> A
     Parameters
     ----------
     forces : ndarray (n,)
-        L2 norms of body forces orthogonal to rigid motions.
+        L2 norms of body forces orthogonal to rigid motions, times the measure.
     tractions : ndarray (n, 3)
         The same of tractions on the sides.
     least : ndarray (n,)
-        Smallest eigenvalue of C in Mandel's scaling, times the least measure.
+        Smallest eigenvalue of C in Mandel's scaling.
+
+    Raises
+    ------
+    ValueError
+        Something is missed at the axis, where the measure is 0.
     """
     found = np.zeros(len(forces))
     at = np.flatnonzero((forces > 0) | (tractions > 0).any(axis=1))
     if at.size:
-        poincare, korn, trace = _constants(cells, at)
+        poincare, korn, trace, measure = _constants(cells, at)
+        if (measure <= 0).any():
+            raise ValueError(
+                "no guaranteed bound is known for loads that are no polynomials at the axis; use "
+                "error_estimate"
+            )
         total = poincare * forces[at] + (np.sqrt(trace) * tractions[at]).sum(axis=1)
-        found[at] = korn * total / np.sqrt(least[at])
+        found[at] = korn * total / np.sqrt(least[at] * measure)
     return found
 
 
-def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array]:
-    """Of Poincare and Korn (b,), and of traces (b, 3), squares for |grad w| = 1."""
+def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array, Array]:
+    """Of Poincare and Korn (b,), of traces (b, 3), squares for |grad w| = 1; least measure (b,)."""
     corners, t = cells.corners[at], np.linspace(0, 1, SEEN)
     x = np.empty((len(at), 3, SEEN, 2))
     normal = np.empty_like(x)
@@ -88,7 +98,8 @@ def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array]:
     least = np.maximum((away * normal).sum(axis=-1).min(axis=-1), np.finfo(float).tiny)
     far = np.linalg.norm(away, axis=-1).max(axis=-1)
     p = poincare[:, None]
-    return poincare, np.sqrt(1 + 2 / beta**2), 2 * (p**2 + far * p) / least
+    measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), -1).min(axis=1)
+    return poincare, np.sqrt(1 + 2 / beta**2), 2 * (p**2 + far * p) / least, measure
 
 
 def _distortion(cells: Cells, at: Index, x: Array, slope: Array) -> Array:
