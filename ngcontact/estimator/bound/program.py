@@ -131,9 +131,11 @@ class DualProgram:
 
     def nearest(self, elements: Sequence[Element], moments: Array) -> Balanced:
         """The stress and the p* >= 0 that minimise B^2 for given tractions, `moments` (d,)."""
-        alone, _ = exerted(elements, [e.alone() for e in elements])
+        alone, largest = exerted(elements, [e.alone() for e in elements])
         moments = self._resisted(moments, moments - alone)
-        program = replace(self.program, b=self.T.T @ (moments - alone))
+        load = moments - alone
+        load[np.abs(load) <= ROUND_OFF * largest] = 0.0  # no load where tractions depend
+        program = replace(self.program, b=self.T.T @ load)
         closed = [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines]
         if not closed:  # one system, which need not be definite
             none = np.zeros(0, dtype=bool)
