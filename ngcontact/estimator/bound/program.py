@@ -39,7 +39,7 @@ from .facing import PLACES, Facing, bernstein
 FALLING = 0.5  # ratio of two residuals from which more corrections take nothing off
 ROUND_OFF = 1e-13  # of tractions, relative to the largest: nothing to correct
 QUADRATURE = 1e-4  # of loads on motions that nothing resists, relative to the largest
-DEFINITE = 1e-13  # of the diagonal, added to what is factorised: vertices where tractions depend
+DEFINITE = 1e-12  # of the diagonal, added to what is factorised: vertices where tractions depend
 
 
 @dataclass(frozen=True, eq=False)
