@@ -137,10 +137,11 @@ class DualProgram:
             b = program.b.copy()
             b[program.unknown[~free]] -= force[~free]
             self.systems.restart(replace(program, b=b))
-            y, found = _refined(self.systems, free)
-            force[free] = found[free]
+            force[free] = self.systems.solve(free)[1][free]
             over = free & (np.abs(force) > limit)
             if not over.any():
+                y, found = _refined(self.systems, free)
+                force[free] = found[free]
                 return self._balanced(y, force)
             force[over] = np.sign(force[over]) * limit[over]
             free = free & ~over
