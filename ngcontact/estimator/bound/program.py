@@ -25,7 +25,7 @@ from .elements import Element, Multipliers, traces
 from .facing import PLACES, Facing, bernstein
 
 FALLING = 0.5  # ratio of two residuals from which more corrections take nothing off
-DEFINITE = 1e-11  # of the diagonal, added to what is factorised: vertices where tractions depend
+DEFINITE = 1e-14  # of the diagonal, added to what is factorised: vertices where tractions depend
 
 
 @dataclass(frozen=True, eq=False)
