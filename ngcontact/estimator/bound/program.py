@@ -167,10 +167,11 @@ class DualProgram:
             b = load.copy()
             b[program.unknown[~free]] -= force[~free]
             self.systems.restart(replace(program, b=b))
-            y, found = _refined(self.systems, free)
-            force[free] = found[free]
+            force[free] = self.systems.solve(free)[1][free]
             over = free & (np.abs(force) > limit)
             if not over.any():
+                y, found = _refined(self.systems, free)
+                force[free] = found[free]
                 none = np.zeros_like(free)
                 return self._balanced(elements, moments, (y, force), free, none)
             force[over] = np.sign(force[over]) * limit[over]
