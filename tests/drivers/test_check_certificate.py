@@ -275,9 +275,11 @@ def test_certificates_of_copies_pass(copied, tmp_path):
     assert check_certificate.check(path)
 
 
-def test_curves_have_no_certificate(tmp_path):
-    solution = solve(cases.ring_in_ring().problem, maxh=0.5, order=2)
-    with pytest.raises(ValueError, match="curved side"):
+@pytest.mark.parametrize(("order", "reason"), [(1, "turns along"), (2, "a curved side")])
+def test_curves_have_no_certificate(order, reason, tmp_path):
+    """Normals are those of the drawing, at order 1 too."""
+    solution = solve(cases.ring_in_ring().problem, maxh=0.5, order=order)
+    with pytest.raises(ValueError, match=reason):
         solution.equilibrated.save(tmp_path / "certificate.npz")
 
 

@@ -12,58 +12,45 @@ they solve the dual contact problem.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Mask
+from ...arrays import Array
 from ...contact import ContactState
 from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
 from .cells import Cells, cells_of, places
-from .elements import Element, Multipliers, compliance_at, elements_of, rigid_motions
+from .elements import PARTED, WHOLE, Element, Multipliers, compliance_at, elements_of, rigid_motions
 from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
+from .islands import Level, once_more
 from .lifting import asked_on_line, asked_on_supports, lifted
 from .missed import data_norms
-from .program import Balanced, DualProgram, dual_program, exerted, pushed, rows_of
+from .norms import (
+    SETTLED,
+    StressNorms,
+    forces_missed,
+    residuals,
+    smallest_moduli,
+    stress_norms,
+)
+from .parts import depths
+from .program import Balanced, DualProgram, dual_program, rows_of
 from .refusals import refuse_bound, refuse_jumps, refuse_narrow
-from .tractions import Given, boundary_tractions, given_on, missed_tractions, moments_of
+from .tractions import (
+    Given,
+    boundary_tractions,
+    given_on,
+    missed_tractions,
+    moments_of,
+    requested,
+)
 
 LIFTED = 3  # degrees by which w is above u_h
 FELT = 1e-4  # of modulus times displacement over an element's size: stresses beside whose round-off
 # equilibrium is measured
-SETTLED = 1e-10  # residual of equilibrium, relative to the largest stress
-
-
-@dataclass(frozen=True, eq=False)
-class StressNorms:
-    """Of a stress s on n triangles, beside that of a displacement.
-
-    Attributes
-    ----------
-    distance : ndarray (n,)
-        |s - C e|, roots of energies.
-    largest : float
-        Largest component of s, a stress.
-    """
-
-    distance: Array
-    largest: float
-
-
-def stress_norms(elements: Sequence[Element], coefficients: Sequence[Array], n: int) -> StressNorms:
-    """Norms of a stress on the n triangles of `elements`."""
-    distance, largest = np.zeros(n), 0.0
-    for e, c in zip(elements, coefficients, strict=True):
-        s = e.whole_stress(c)
-        strain = (e.compliance @ s[..., None])[..., 0] - e.strain
-        stress = (np.linalg.inv(e.compliance) @ strain[..., None])[..., 0]
-        energy = (e.weight * (strain * stress).sum(axis=2)).sum(axis=1)
-        distance[e.places.at] = np.sqrt(energy)
-        largest = max(largest, float(np.abs(s).max()))
-    return StressNorms(distance, largest)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,11 +147,14 @@ def _bound(
     degree, lift = max(order + 1, 2 + extent), order + LIFTED
     reaches = [reach_of(trace, displacement, pair, everywhere) for pair in pairs]
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
-    loaded = trace.segments(*problem.traction, problem.sliding, *touching)
+    guided = None if problem.sliding is None else str(problem.sliding)
+    loaded = trace.segments(*problem.traction, guided, *touching)
     whole = [name for name, values in problem.displacement.items() if None not in values]
     cells = cells_of(trace, cuts_of(trace, reaches), loaded, trace.segments(*whole))
-    mu, elements = elements_of(problem, cells, displacement, degree)
     given = given_on(problem, cells)
+    depth = depths(problem, cells, degree, 2 * degree + PARTED, given.followed(cells))
+    look = np.column_stack([np.where(depth, PARTED, WHOLE), depth])
+    mu, elements = elements_of(problem, cells, displacement, degree, look)
     asked = asked_on_supports(cells, given, displacement)
     of_guides = mu.degree[given.guides]
     guides = [
@@ -187,10 +177,20 @@ def _bound(
     gaps = [float(np.abs(line.facing.gap).max(initial=0.0)) for line in lines]
     extent_of_u = max(_size(trace, displacement), *gaps, 0.0)
     scale = max(stress.largest, FELT * _stiffest(elements) * extent_of_u / cells.diameters.min())
-    residual = settled(cells, mu, elements, program, balanced, moments, fixed, scale)
-    have = boundary_tractions(cells, elements, balanced.coefficients)
-    missed = missed_tractions(problem, cells, given, lines, balanced.pressure, have, stress.largest)
+    left = program.unbalanced(mu, elements, moments, balanced)
+    residual = float(residuals(cells, mu, left, scale).max())
+    if not residual <= SETTLED:
+        raise ContactError(
+            f"no equilibrated stress was found: the residual relative to the largest stress is "
+            f"{residual:.1e}"
+        )
+    have = boundary_tractions(cells, given, elements, balanced.coefficients)
+    wanted = requested(problem, cells, given, lines, balanced.pressure)
+    missed = missed_tractions(wanted, cells, have, stress.largest)
     loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(elements, n))
+    level = Level(cells, elements, balanced.coefficients, depth, stress.distance, loads)
+    distance, loads = once_more(problem, displacement, wanted, level, degree, scale)
+    stress = replace(stress, distance=distance)
     lifts = [(line.facing, line.facing.lift) for line in lines]
     lifting = lifted(problem, cells, asked, lifts, lift, extent_of_u)
     closed, signed = 0.0, 0.0
@@ -250,61 +250,6 @@ def work_on_gap(facing: Facing, pressure: Array, gap: Array) -> float:
     """Integral of a pressure (k, j) in Bernstein polynomials times a gap at Gauss points."""
     density = pressure @ bernstein(pressure.shape[1] - 1, PLACES).T * facing.weight
     return float((density * gap).sum())
-
-
-def forces_missed(elements: Sequence[Element], n: int) -> Array:
-    """Norms (n,) of body forces that stresses do not balance."""
-    missed = np.zeros(n)
-    for e in elements:
-        missed[e.places.at] = e.missed
-    return missed
-
-
-def smallest_moduli(elements: Sequence[Element], n: int) -> Array:
-    """Smallest eigenvalue (n,) of C in Mandel's scaling."""
-    found = np.zeros(n)
-    for e in elements:
-        mandel = np.ones(e.compliance.shape[-1])
-        mandel[-1] = 0.5**0.5
-        scaled = e.compliance * mandel * mandel[:, None]
-        found[e.places.at] = 1 / np.linalg.eigvalsh(scaled)[..., -1].max(axis=1)
-    return found
-
-
-def settled(
-    cells: Cells,
-    mu: Multipliers,
-    elements: Sequence[Element],
-    program: DualProgram,
-    balanced: Balanced,
-    moments: Array,
-    fixed: Mask,
-    largest: float,
-) -> float:
-    """What is left of equilibrium with given tractions, `moments` (d,).
-
-    The largest force over the triangle's diameter, its measure and the `largest` stress; `fixed`
-    (d,) multipliers take any force.
-
-    Raises
-    ------
-    ContactError
-        More than `SETTLED`.
-    """
-    left = moments - exerted(elements, balanced.coefficients)[0]
-    left -= pushed(mu, program.lines, balanced.pressure)
-    left = np.where(fixed, 0.0, program.resisted(left, left))
-    side = np.repeat(np.arange(len(cells.ends)), np.diff(mu.start))
-    middle = cells.vertices[cells.ends].mean(axis=1)
-    size = cells.diameters[cells.owner] * cells.trace.model.measure(middle) * (largest or 1.0)
-    at = np.flatnonzero(size[side] > 0)  # on the axis there is no traction
-    residual = float((np.abs(left[at]) / size[side[at]]).max(initial=0.0))
-    if not residual <= SETTLED:
-        raise ContactError(
-            f"no equilibrated stress was found: the residual relative to the largest stress is "
-            f"{residual:.1e}"
-        )
-    return residual
 
 
 def _stiffest(elements: Sequence[Element]) -> float:

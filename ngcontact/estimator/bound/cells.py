@@ -8,9 +8,10 @@ common apex, the opposite vertex or, where several sides ask for it, the middle.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -156,9 +157,9 @@ class Cells:
         place, jacobian = ng.CF((ng.x, ng.y)), ng.specialcf.JacobianMatrix(2)
         found = guess.copy()
         for _ in range(NEWTON_STEPS):
-            J = self.evaluate(jacobian, at[bent], found[bent]).reshape(-1, 2, 2)
+            slope = self.evaluate(jacobian, at[bent], found[bent]).reshape(-1, 2, 2)
             miss = x[bent] - self.evaluate(place, at[bent], found[bent])
-            found[bent] += np.linalg.solve(J, miss[:, :, None])[:, :, 0]
+            found[bent] += np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
         return found
 
 
@@ -235,15 +236,13 @@ def places(cells: Cells, at: Index, order: int) -> Places:
     return Places(at, x, area * weight, found, spread, local)
 
 
-def cells_of(
-    trace: BoundaryTrace, cuts: Mapping[int, Sequence[float]], loaded: Index, held: Index
-) -> Cells:
+def cells_of(trace: BoundaryTrace, cuts: Mapping[int, Array], loaded: Index, held: Index) -> Cells:
     """Divide the mesh.
 
     Parameters
     ----------
     trace : BoundaryTrace
-    cuts : dict of int to sequence of float
+    cuts : dict of int to ndarray (j,)
         Rising parameters s of new vertices on segments of the boundary.
     loaded, held : ndarray of int (k,)
         Segments that carry something, and those on which the whole displacement is prescribed.
@@ -267,17 +266,17 @@ def cells_of(
     for e in parts.tolist():
         made.divide(e, None if middle[e] else int(special[e].argmax()))
     new = made.arrays()
-    both = (triangles, REFERENCE[roll], whole, own, spans)
+    both: tuple[Any, ...] = (triangles, REFERENCE[roll], whole, own, spans)
     triangles, reference, parent, own, spans = (
         np.concatenate(pair) for pair in zip(both, new, strict=True)
     )
     vertices = np.concatenate([view.vertices, *made.places])
     curved = bent[own[:, 0]]
-    cells = _joined(trace, vertices, triangles, reference, parent, own, spans, curved)
+    cells = joined(trace, vertices, triangles, reference, parent, own, spans, curved)
     return _parted(cells, dependent(cells, loaded, held))
 
 
-def _joined(
+def joined(
     trace: BoundaryTrace,
     vertices: Array,
     triangles: Index,
@@ -316,7 +315,8 @@ def _parted(cells: Cells, at: Index) -> Cells:
     rest = np.setdiff1d(np.arange(len(cells.triangles)), at)
     middle = len(cells.vertices) + np.arange(len(at))
     place, inside = cells.reference[at].mean(axis=1), np.full(len(at), -1)
-    parts = [[x[rest]] for x in (cells.triangles, cells.reference, cells.parent, own, spans)]
+    whole_ones = cells.triangles, cells.reference, cells.parent, own, spans
+    parts: list[list[Any]] = [[x[rest]] for x in whole_ones]
     whole = np.broadcast_to([0.0, 1.0], (len(at), 2))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         corners, reference = cells.triangles[at], cells.reference[at]
@@ -331,7 +331,8 @@ def _parted(cells: Cells, at: Index) -> Cells:
             values.append(value)
     vertices = np.concatenate([cells.vertices, cells.corners[at].mean(axis=1)])
     curved = np.concatenate([cells.curved[rest], cells.curved[at], np.zeros(2 * len(at), bool)])
-    return _joined(cells.trace, vertices, *(np.concatenate(x) for x in parts), curved)
+    triangles, reference, parent, own, spans = (np.concatenate(x) for x in parts)
+    return joined(cells.trace, vertices, triangles, reference, parent, own, spans, curved=curved)
 
 
 def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
@@ -381,7 +382,7 @@ class _Parts:
     trace: BoundaryTrace
     view: Triangulation
     segment: Index
-    cuts: Mapping[int, Sequence[float]]
+    cuts: Mapping[int, Array]
 
     def __post_init__(self) -> None:
         self.count = len(self.view.vertices)
@@ -389,8 +390,8 @@ class _Parts:
         self.rows: tuple[list, ...] = ([], [], [], [], [])
         self.number = {k: self._added(self._on(k, s)) for k, s in self.cuts.items()}
 
-    def _on(self, k: int, s: Sequence[float]) -> Array:
-        return self.trace.point(np.full(len(s), k), np.asarray(s))
+    def _on(self, k: int, s: Array) -> Array:
+        return self.trace.point(np.full(len(s), k), s)
 
     def _added(self, x: Array) -> list[int]:
         self.places.append(x)

@@ -17,6 +17,7 @@ from .facing import PLACES, WEIGHTS
 from .polynomials import scalars
 
 INSET = 0.1  # of a step of the lattice: it keeps off an axis, where stresses are not defined
+STRAIGHT = 1e-12  # difference of unit vectors that are one: round-off
 
 
 def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
@@ -25,14 +26,16 @@ def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
     Raises
     ------
     ValueError
-        Where cells have curved sides.
+        Where cells have curved sides, or normals of drawn curves turn along straight ones.
     """
     cells = proof.cells
-    if cells.curved.any():
-        raise ValueError(
-            f"no certificate: {np.count_nonzero(cells.curved)} cells have a curved side, along"
-            " which tractions and p* are no polynomials; it is written where all are straight"
-        )
+    lines = [line.facing.direction for line in proof.program.lines]
+    turning = sum(int((np.ptp(d, axis=1) > STRAIGHT).any(axis=1).sum()) for d in lines)
+    found = {"cells have a curved side": int(cells.curved.sum())}
+    found["sides have a direction of contact or guide that turns along them"] = turning
+    if any(found.values()):
+        told = " and ".join(f"{n} {what}" for what, n in found.items() if n)
+        raise ValueError(f"no certificate: {told}; tractions and p* are no polynomials there")
     return {
         "axisymmetric": np.array(cells.trace.model.extent > 0),
         "vertices": cells.vertices,

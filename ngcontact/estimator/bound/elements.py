@@ -11,6 +11,7 @@ in the norm of C^-1, and the tractions of s are N'A^-1 N mu + N'A^-1 g + <s_p n,
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import ngsolve as ng
@@ -24,11 +25,22 @@ from ...lagrange import gauss
 from ...problem import Problem, Triangulation, varies
 from ...qp import vanishing_combinations
 from .cells import Cells, Places, places
-from .polynomials import Frame, balancing, frame_of, in_frame, projected, scalars, stresses
+from .parts import projection
+from .polynomials import (
+    Frame,
+    airy_stress,
+    balancing,
+    bending,
+    frame_of,
+    in_frame,
+    stresses,
+)
 
 ON_CURVES = 3  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
 DEFINITE = (1e-15, 1e-14, 1e-13, 1e-12)  # of the diagonal, until it is enough
+WHOLE, PARTED = 10, 4  # degrees above 2 k of rules for forces: on triangles, on their parts
 ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
 BLOCK = 4000  # triangles at once: bounds the memory
 
@@ -40,8 +52,8 @@ def traces(degree: int, t: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Element:
-    """b triangles of one kind: m stresses, d multipliers on each.
+class Triangles:
+    """b triangles of one kind, with stresses of one degree.
 
     Attributes
     ----------
@@ -51,10 +63,83 @@ class Element:
         With the model's measure.
     frame : Frame
     degree : int
+    curved, axial : bool
+        Whether the base of each is curved; whether the model is axisymmetric.
     on_axis : bool
         Whether a side of each lies on the axis.
     compliance : ndarray (b or 1, q or 1, v, v)
         C^-1.
+    """
+
+    places: Places
+    weight: Array
+    frame: Frame
+    degree: int
+    curved: bool
+    axial: bool
+    on_axis: bool
+    compliance: Array
+
+    @property
+    def alike(self) -> bool:
+        """Whether T is one table for all, but for `Frame.airy`, and C a number."""
+        return not self.curved and not self.axial and self.compliance.shape[:2] == (1, 1)
+
+    @property
+    def local(self) -> Array:
+        """The quadrature points in the frame, (q, 2), or (b, q, 2) of curved triangles."""
+        return self.frame.local(self.places.x) if self.curved else in_frame(self.places.local)
+
+    @property
+    def force_degree(self) -> int:
+        """Of the body force that is balanced."""
+        return max(0, self.degree - 1 - self.axial)
+
+    def basis(self, x: Array, local: Array) -> Array:
+        """T (b, q, v, m) at points `x` (b, q, 2), `local` in the frame."""
+        return stresses(self.degree, self.frame, x, local, self.axial, self.on_axis)
+
+    def balancing(self, x: Array, force: Array, some: Index | slice = slice(None)) -> Array:
+        """Stresses s_p (b, q, v) at points `x` (b, q, 2), without radial forces."""
+        frame = self.frame[some]
+        return balancing(self.force_degree, frame, x, force[some], self.axial)
+
+    def tested(self, strain: Array) -> Array:
+        """(T, strain), (b, m), of strains (b, q, v)."""
+        local, b = self.local, len(strain)
+        strain = self.weight[..., None] * strain
+        if self.alike:
+            second = (strain @ self.frame.airy).reshape(b, -1)
+            table = bending(self.degree, local)
+            return np.asarray(second @ table.reshape(-1, table.shape[-1]))
+        T = self.basis(self.places.x, local)
+        T = T.reshape(b, -1, T.shape[-1])
+        return np.asarray((strain.reshape(b, 1, -1) @ T)[:, 0])
+
+    def squared(self) -> Array:
+        """A (b, m, m)."""
+        b, local = len(self.weight), self.local
+        if self.alike:
+            table = bending(self.degree, local)
+            m = table.shape[-1]
+            size = self.weight.sum(axis=1)[:, None, None]
+            share = (self.weight[0] / self.weight[0].sum())[:, None, None]
+            R = np.tensordot(share * table, table, (0, 0)).transpose(0, 2, 1, 3)  # (3, 3, m, m)
+            airy = self.frame.airy
+            M = size * (airy.transpose(0, 2, 1) @ self.compliance[0] @ airy)
+            return np.asarray(M.reshape(b, 9) @ R.reshape(9, m * m)).reshape(b, m, m)
+        T = np.sqrt(self.weight)[..., None, None] * self.basis(self.places.x, local)
+        m = T.shape[-1]
+        strains = (self.compliance @ T).reshape(b, -1, m)
+        return np.asarray(T.reshape(b, -1, m).transpose(0, 2, 1) @ strains)
+
+
+@dataclass(frozen=True, eq=False)
+class Element(Triangles):
+    """Condensed triangles: m stresses, d multipliers on each.
+
+    Attributes
+    ----------
     strain : ndarray (b, q, v)
         e(u_h), Voigt.
     force : ndarray (b, j, 2)
@@ -73,16 +158,12 @@ class Element:
         L^-1 g.
     own : ndarray (b, d)
         Moments of s_p n.
+    sides : ndarray of int (b, 3)
+        Numbers of the sides.
     dofs : ndarray of int (b, d)
-        Numbers of the multipliers.
+        Numbers of their multipliers.
     """
 
-    places: Places
-    weight: Array
-    frame: Frame
-    degree: int
-    on_axis: bool
-    compliance: Array
     strain: Array
     force: Array
     radial: Array
@@ -92,12 +173,8 @@ class Element:
     N: Array
     g: Array
     own: Array
+    sides: Index
     dofs: Index
-
-    @property
-    def force_degree(self) -> int:
-        """Of the body force that is balanced."""
-        return _force_degree(self.degree, self.strain.shape[2] > 3)
 
     def answer(self, mu: Array) -> Array:
         """Change of c (b, m) with all multipliers, by `mu` (k,)."""
@@ -113,16 +190,9 @@ class Element:
         y = (self.root.transpose(0, 2, 1) @ c[..., None])[..., 0]
         return np.asarray(self.own + (self.N.transpose(0, 2, 1) @ y[..., None])[..., 0])
 
-    def basis(self, x: Array, some: Index | slice = slice(None)) -> Array:
-        """T (b, q, v, m) at points `x` (b, q, 2)."""
-        frame, axial = self.frame[some], self.strain.shape[2] > 3
-        return stresses(self.degree, frame, x, frame.local(x), axial, self.on_axis)
-
     def of_strain(self, strain: Array) -> Element:
         """The same triangles for another displacement, strains (b, q, v), without body forces."""
-        b, q, v = strain.shape
-        T = self.basis(self.places.x)
-        g = np.einsum("bqvm,bqv->bm", T, self.weight[..., None] * strain)
+        g = np.linalg.solve(self.root, self.tested(strain)[..., None])
         return replace(
             self,
             strain=strain,
@@ -130,14 +200,14 @@ class Element:
             radial=np.zeros_like(self.radial),
             source=None,
             missed=np.zeros_like(self.missed),
-            g=np.linalg.solve(self.root, g[..., None])[..., 0],
+            g=np.asarray(g[..., 0]),
             own=np.zeros_like(self.own),
         )
 
     def whole_stress(self, c: Array) -> Array:
         """Stresses (b, q, v) at the quadrature points, the radial force's part of the hoop included."""
-        s = self.stress(c, self.places.x)
-        if s.shape[2] > 3:
+        s = self._stress(c, self.places.x, self.local, slice(None))
+        if self.axial:
             s[..., 2] += self.radial
         return s
 
@@ -148,16 +218,17 @@ class Element:
         return cells.evaluate(ng.x * self.source[0], at, reference)[:, 0]
 
     def stress(self, c: Array, x: Array, some: Index | slice = slice(None)) -> Array:
-        """Stresses (b, q, v) at points `x` (b, q, 2) for coefficients `c` (b, m), without radial forces."""
-        s = np.einsum("bqvm,bm->bqv", self.basis(x, some), c[some])
-        if self.force.any():
-            axial = self.strain.shape[2] > 3
-            s = s + balancing(self.force_degree, self.frame[some], x, self.force[some], axial)
-        return s
+        """Stresses (b, q, v) at `x` (b, q, 2) for coefficients `c` (b, m), radial forces apart."""
+        return self._stress(c[some], x, self.frame[some].local(x), some)
 
-
-def _force_degree(degree: int, axial: bool) -> int:
-    return max(0, degree - 1 - axial)
+    def _stress(self, c: Array, x: Array, local: Array, some: Index | slice) -> Array:
+        frame = self.frame[some]
+        if self.axial:
+            T = stresses(self.degree, frame, x, local, self.axial, self.on_axis)
+            s = (T @ c[:, None, :, None])[..., 0]
+        else:
+            s = airy_stress(self.degree, frame, local, c)
+        return s + self.balancing(x, self.force, some) if self.force.any() else s
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,38 +278,48 @@ def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
 
 
 def elements_of(
-    problem: Problem, cells: Cells, displacement: ng.CoefficientFunction, degree: int
+    problem: Problem,
+    cells: Cells,
+    displacement: ng.CoefficientFunction,
+    degree: int,
+    look: Index,
 ) -> tuple[Multipliers, list[Element]]:
-    """The condensed triangles of a solution, and their multipliers."""
+    """The condensed triangles of a solution, and their multipliers.
+
+    `look` (n, 2) says by what degree above 2 k rules integrate forces, and on parts of what depth.
+    """
     own, mu = multipliers(cells, degree)
-    on_axis = cells.trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1)[cells.sides]
-    key = np.column_stack([own, mu.degree[cells.sides], on_axis.any(axis=1), cells.curved])
-    varying = _varying(problem, cells)
-    key = np.column_stack([key, varying, _body(cells)])
+    at_axis = np.asarray(cells.trace.model.on_axis(cells.vertices))
+    on_axis = np.asarray(at_axis[cells.ends].all(axis=1))[cells.sides]
+    key = np.column_stack(
+        [
+            own,
+            on_axis.any(axis=1),
+            mu.degree[cells.sides],
+            cells.curved,
+            _varying(problem, cells),
+            cells.bodies,
+            *look.T,
+        ]
+    )
     kinds, number = np.unique(key, axis=0, return_inverse=True)
     found = []
-    for kind in range(len(kinds)):
+    for kind, (own_degree, axis, *rest) in enumerate(kinds.tolist()):
         every = np.flatnonzero(number.ravel() == kind)
         for start in range(0, len(every), BLOCK):
             at = every[start : start + BLOCK]
-            found.append(
-                _element(
-                    problem, cells, displacement, mu, at, int(kinds[kind, 0]), bool(kinds[kind, 4])
-                )
-            )
+            kept = problem, cells, displacement, mu, at, own_degree, bool(axis), rest[-2:]
+            found.append(_element(*kept))
     return mu, found
 
 
-def _body(cells: Cells) -> Index:
-    return cells.bodies
-
-
-def _varying(problem: Problem, cells: Cells) -> Index:
+def _varying(problem: Problem, cells: Cells) -> Mask:
+    """Triangles (n,) whose law varies in them."""
     mesh = cells.trace.mesh
-    flags = np.zeros(len(mesh.GetMaterials()), dtype=np.intp)
+    flags = np.zeros(len(mesh.GetMaterials()), dtype=bool)
     for pattern, law in problem.materials.items():
         flags[np.array(mesh.Materials(pattern).Mask())] = varies(law)
-    return flags[cells.bodies]
+    return np.asarray(flags[cells.bodies])
 
 
 def law_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunction:
@@ -259,7 +340,7 @@ def compliance_at(problem: Problem, cells: Cells, points: Places) -> Array:
     else:
         C = cells.evaluate(law, at[:1], np.full((1, 2), 1 / 3))[None]
     v = round(C.shape[-1] ** 0.5)
-    return np.linalg.inv(C.reshape(*C.shape[:2], v, v))
+    return np.asarray(np.linalg.inv(C.reshape(*C.shape[:2], v, v)))
 
 
 def _force_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunction | None:
@@ -278,65 +359,58 @@ def _element(
     at: Index,
     degree: int,
     on_axis: bool,
+    look: Sequence[int],
 ) -> Element:
+    """Triangles `at` (b,), condensed."""
     model = model_of(problem)
     axial = model.extent > 0
-    body = int(cells.bodies[at[0]])
     curved, varying = bool(cells.curved[at[0]]), bool(_varying(problem, cells)[at[0]])
-    order = 2 * degree + 4 * (curved or varying or axial)
-    points = places(cells, at, order)
-    b, q = points.weight.shape
-    weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(b, q)
-    frame = frame_of(cells.corners[at])
-    compliance = compliance_at(problem, cells, points)
+    points = places(cells, at, 2 * degree + 4 * (curved or varying or axial))
+    weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
+    kind = Triangles(
+        places=points,
+        weight=weight,
+        frame=frame_of(cells.corners[at]),
+        degree=degree,
+        curved=curved,
+        axial=axial,
+        on_axis=on_axis,
+        compliance=compliance_at(problem, cells, points),
+    )
     strain = points.evaluate(cells, model.strain(displacement))
-    source = _force_of(problem, cells, body)
-    force, radial, missed = _forces(source, cells, points, frame, degree, axial)
-    local = frame.local(points.x) if curved else in_frame(points.local)[None]
-    T = stresses(degree, frame, points.x, local, axial, on_axis)
-    root = np.sqrt(weight)[..., None]
-    D = compliance
-    v, m = T.shape[-2:]
-    DT = D @ T
-    wT = (root[..., None] * T).reshape(b, q * v, m)
-    A = wT.transpose(0, 2, 1) @ (root[..., None] * DT).reshape(b, q * v, m)
+    source = _force_of(problem, cells, int(cells.bodies[at[0]]))
+    force, radial, missed = _forces(source, cells, kind, look)
     rest = strain
     if force.any() or radial.any():
-        s_p = balancing(_force_degree(degree, axial), frame, points.x, force, axial)
+        s_p = kind.balancing(points.x, force)
         if axial:
             s_p[..., 2] += radial
-        rest = strain - (D @ s_p[..., None])[..., 0]
-    g = np.einsum("bxm,bx->bm", wT, (root * rest).reshape(b, -1))
+        rest = strain - (kind.compliance @ s_p[..., None])[..., 0]
+    N, own = _moments(cells, mu, kind, force)
+    A = kind.squared()
     scale = 1 / np.sqrt(np.einsum("bmm->bm", A))
-    N, own = _moments(cells, mu, at, degree, frame, on_axis, force, axial, m)
-    L = _cholesky(A * scale[:, :, None] * scale[:, None, :])
-    right = scale[..., None] * np.concatenate([N, g[..., None]], axis=2)
-    solved = np.linalg.solve(L, right)
-    dofs = np.concatenate(
-        [
-            mu.start[cells.sides[at, i], None]
-            + np.arange(2 * (mu.degree[cells.sides[at[0], i]] + 1))
-            for i in range(3)
-        ],
-        axis=1,
-    )
+    root = _cholesky(A * scale[:, :, None] * scale[:, None, :])
+    right = np.concatenate([N, kind.tested(rest)[..., None]], axis=2)
+    solved = np.linalg.solve(root, scale[..., None] * right)
     return Element(
-        points,
-        weight,
-        frame,
-        degree,
-        on_axis,
-        compliance,
-        strain,
-        force,
-        radial,
-        source,
-        missed,
-        L / scale[:, :, None],
-        solved[..., :-1],
-        solved[..., -1],
-        own,
-        dofs,
+        **vars(kind),
+        strain=strain,
+        force=force,
+        radial=radial,
+        source=source,
+        missed=missed,
+        root=root / scale[:, :, None],
+        N=solved[..., :-1],
+        g=solved[..., -1],
+        own=own,
+        sides=cells.sides[at],
+        dofs=np.concatenate(
+            [
+                mu.start[side, None] + np.arange(2 * (mu.degree[side[0]] + 1))
+                for side in cells.sides[at].T
+            ],
+            axis=1,
+        ),
     )
 
 
@@ -353,32 +427,47 @@ def _cholesky(A: Array) -> Array:
     raise ContactError("triangles are too thin, or too curved, for an equilibrated stress")
 
 
-def _moments(cells, mu, at, degree, frame, on_axis, force, axial, m):
-    """N (b, m, d), and the moments (b, d) of s_p n."""
-    found, given = [], []
+def _moments(cells: Cells, mu: Multipliers, kind: Triangles, force: Array) -> tuple[Array, Array]:
+    """N (b, m, d), and the moments (b, d) of s_p n for coefficients of a body force."""
+    at, loaded, found, given = kind.places.at, force.any(), [], []
     for i in range(3):
-        side = cells.sides[at, i]
-        k = int(mu.degree[side[0]])
-        bent = bool(cells.bent[side[0]])
-        t, w = gauss(degree + k + 2 * axial + (4 * cells.trace.geometry_order if bent else 0))
-        own = np.where(cells.backward[at, i, None], 1 - t, t)
+        side, back = cells.sides[at, i], cells.backward[at, i]
+        k, bent = int(mu.degree[side[0]]), bool(cells.bent[side[0]])
+        t, w = gauss(kind.degree + k + 2 * kind.axial + 4 * cells.trace.geometry_order * bent)
+        start, stop = CORNERS[(i + 1) % 3], CORNERS[(i + 2) % 3]
+        local = in_frame(start + t[:, None] * (stop - start))
+        if kind.alike:
+            N = _tractions_alike(kind, i, local, w[:, None] * traces(k, t))
+            odd = np.arange(2 * (k + 1)) % (k + 1) % 2 == 1
+            found.append(np.where((back[:, None] & odd)[:, None], -N, N))
+        if kind.alike and not loaded:
+            given.append(np.zeros((len(at), 2 * (k + 1))))
+            continue
+        own = np.where(back[:, None], 1 - t, t)
         x, dx = (
             z.reshape(len(at), -1, 2) for z in cells.points(np.repeat(side, len(t)), own.ravel())
         )
-        dx = np.where(cells.backward[at, i, None, None], -dx, dx)
-        normal = np.stack([dx[..., 1], -dx[..., 0]], axis=-1)  # times ds / dt
+        normal = np.where(back[:, None, None], -1, 1) * (dx @ CLOCKWISE)  # times ds / dt
         weight = w * cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), -1)
         chi = weight[..., None] * traces(k, own)
-        start, stop = CORNERS[(i + 1) % 3], CORNERS[(i + 2) % 3]
-        local = frame.local(x) if bent else in_frame(start + t[:, None] * (stop - start))[None]
-        T = stresses(degree, frame, x, local, axial, on_axis)
-        found.append(_tractions(T, normal, chi))
-        if force.any():
-            s = balancing(_force_degree(degree, axial), frame, x, force, axial)[..., None]
-            given.append(_tractions(s, normal, chi)[:, 0])
-        else:
-            given.append(np.zeros((len(at), 2 * (k + 1))))
+        if not kind.alike:
+            T = kind.basis(x, kind.frame.local(x) if bent else local)
+            found.append(_tractions(T, normal, chi))
+        given.append(_tractions(kind.balancing(x, force)[..., None], normal, chi)[:, 0])
     return np.concatenate(found, axis=2), np.concatenate(given, axis=1)
+
+
+def _tractions_alike(kind: Triangles, i: int, local: Array, chi: Array) -> Array:
+    """Moments (b, m, 2 r) of tractions of T on side `i` with chi (q, r), from one table."""
+    base, edge = kind.frame.edges[..., 0], kind.frame.edges[..., 1]
+    nx, ny = ((base, edge - base, -edge)[i] @ CLOCKWISE).T[..., None]
+    xx, yy, xy = kind.frame.airy.transpose(1, 0, 2)
+    rates = np.stack([nx * xx + ny * xy, nx * xy + ny * yy], axis=1)  # (b, 2, 3)
+    table = bending(kind.degree, local)
+    q, _, m = table.shape
+    moments = table.reshape(q, -1).T @ chi
+    parts = rates.reshape(-1, 3) @ moments.reshape(3, -1)
+    return parts.reshape(-1, 2, m, chi.shape[1]).transpose(0, 2, 1, 3).reshape(len(nx), m, -1)
 
 
 def _tractions(T: Array, normal: Array, chi: Array) -> Array:
@@ -389,26 +478,18 @@ def _tractions(T: Array, normal: Array, chi: Array) -> Array:
     return np.concatenate([tx.transpose(0, 2, 1) @ chi, ty.transpose(0, 2, 1) @ chi], axis=2)
 
 
-def _forces(F, cells, points, frame, degree, axial):
+def _forces(
+    source: ng.CoefficientFunction | None, cells: Cells, kind: Triangles, look: Sequence[int]
+) -> tuple[Array, Array, Array]:
     """Coefficients of the force that is balanced, r F_r, and the norm of the rest."""
+    points, n = kind.places, kind.force_degree
     b, q = points.weight.shape
-    n = _force_degree(degree, axial)
-    j = (n + 1) * (n + 2) // 2
-    if F is None:
-        return np.zeros((b, j, 2)), np.zeros((b, q)), np.zeros(b)
-    fine = places(cells, points.at, 2 * degree + 10)
-    values = fine.evaluate(cells, F)
-    measure = cells.trace.model.measure(fine.x.reshape(-1, 2)).reshape(b, -1)
-    weight = fine.weight * measure
-    force = projected(n, frame, fine.x, weight, values)
-    rest = values - scalars(n, frame, fine.x) @ force
-    if axial:
-        rest[..., 0] = 0.0
-        radial = points.x[..., 0] * points.evaluate(cells, F)[..., 0]
+    (bonus, depth), radial = look, np.zeros((b, q))
+    if source is None:
+        return np.zeros((b, (n + 1) * (n + 2) // 2, 2)), radial, np.zeros(b)
+    parts, order = slice(int(kind.axial), None), 2 * kind.degree + bonus
+    force, missed, size = projection(source, cells, points.at, n, order, depth, parts)
+    if kind.axial:
+        radial = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
         force[..., 0] = 0.0
-    else:
-        radial = np.zeros((b, q))
-    weight = weight * measure  # norms of F times the measure
-    missed = np.sqrt(np.einsum("bq,bqd->b", weight, rest**2))
-    size = np.sqrt(np.einsum("bq,bqd->b", weight, values**2))
     return force, radial, np.where(missed <= ROUND_OFF * size, 0.0, missed)

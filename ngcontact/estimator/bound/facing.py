@@ -18,6 +18,7 @@ from ...lagrange import gauss, lagrange, lagrange_derivative
 from ...problem import Contact
 from .cells import Cells
 
+NOISE = 1e-14  # of a gap, relative to the displacements on both sides
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
 NEAR = 2e-3  # of the shorter segment: vertices that face each other up to that are one
@@ -76,13 +77,18 @@ def met(
     if contact.gap is not None:
         gap = prescribed_gap(contact, trace, segment, s, x)
     jump = trace.evaluate(displacement, segment, s)
+    noise = np.abs(jump).max(initial=0.0)
     at = np.flatnonzero(other >= 0)
     if at.size:
-        jump[at] -= trace.evaluate(displacement, other[at], place[at])
+        there = trace.evaluate(displacement, other[at], place[at])
+        noise = max(noise, np.abs(there).max())
+        jump[at] -= there
     faces = other >= 0
     if contact.primary is None:
         faces = (trace.normal(segment, s) * d).sum(axis=1) > FACING
-    return Met(gap - (jump * d).sum(axis=1), d, other, place, faces)
+    gap = gap - (jump * d).sum(axis=1)
+    gap[np.abs(gap) <= NOISE * noise] = 0.0
+    return Met(gap, d, other, place, faces)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,13 +100,13 @@ class Reach:
     pair : ContactState
     segments : ndarray of int (k,)
         Of the secondary: in contact, beside such, or where u_h goes through the other body.
-    ends : dict of int to (float, int)
-        s where contact ends inside a segment, and 1 where it lies towards s = 0, -1 elsewhere.
+    contact : dict of int to list of (float, float)
+        Intervals of s in contact on segments in which contact ends.
     """
 
     pair: ContactState
     segments: Index
-    ends: dict[int, tuple[float, int]]
+    contact: dict[int, list[tuple[float, float]]]
 
 
 def reach_of(
@@ -115,13 +121,13 @@ def reach_of(
         return Reach(pair, line.segments, {})
     nodes = trace.nodes[line.segments][:, [0, -1]]
     active = np.append(pair.active, False)[line.rows].any(axis=1)
-    near = np.isin(nodes, nodes[active]).any(axis=1)
+    near = np.asarray(np.isin(nodes, nodes[active]).any(axis=1))
     rest, j = np.flatnonzero(~near), len(PLACES)
     if rest.size:
         segment = np.repeat(line.segments[rest], j)
         found = met(trace, displacement, pair, segment, np.tile(PLACES, len(rest)))
         near[rest] = ((found.gap < 0) & found.faces).reshape(-1, j).any(axis=1)
-    return Reach(pair, line.segments[near], _ends(trace, displacement, pair))
+    return Reach(pair, line.segments[near], _contact_on(trace, displacement, pair))
 
 
 def cuts_of(trace: BoundaryTrace, reaches: Sequence[Reach]) -> dict[int, Array]:
@@ -144,8 +150,9 @@ def cuts_of(trace: BoundaryTrace, reaches: Sequence[Reach]) -> dict[int, Array]:
 
     for reach in reaches:
         line, contact = reach.pair.line, reach.pair.line.contact
-        k = np.array(list(reach.ends), dtype=np.intp)
-        s = np.array([place for place, _ in reach.ends.values()])
+        ends = [(k, s) for k, parts in reach.contact.items() for part in parts for s in part]
+        ends = [(k, s) for k, s in ends if APART < s < 1 - APART]
+        k, s = np.array([k for k, _ in ends], dtype=np.intp), np.array([s for _, s in ends])
         keep(k, s, k)
         if contact.primary is not None and len(reach.segments):
             parts = divided(trace, contact, reach.segments, line.facing)
@@ -167,28 +174,26 @@ def _inside(s: Array) -> Array:
     return s[np.diff(s, prepend=-1.0) > SAME]
 
 
-def _ends(
+def _contact_on(
     trace: BoundaryTrace, displacement: ng.CoefficientFunction, pair: ContactState
-) -> dict[int, tuple[float, int]]:
-    """Where contact ends inside segments that face the other body, away from their vertices."""
+) -> dict[int, list[tuple[float, float]]]:
+    """Intervals of s in contact on segments in which contact ends, and which face with all nodes."""
     line, found = pair.line, {}
     active = np.append(pair.active, False)[line.rows]
     places = trace.places(line.segments)
     turns = np.diff(active.astype(int), axis=1)
-    for i in np.flatnonzero((np.abs(turns).sum(axis=1) == 1) & line.faces):
-        j = int(np.flatnonzero(turns[i])[0])
-        sign = -int(turns[i, j])
-        s = np.linspace(places[i, j], places[i, j + 1], SAMPLES)
-        gap = met(trace, displacement, pair, np.full(SAMPLES, line.segments[i]), s).gap
-        below = np.flatnonzero(gap < 0)
-        edge = (
-            (s[below[-1]] if below.size else s[0])
-            if sign > 0
-            else (s[below[0]] if below.size else s[-1])
-        )
-        at = float(edge + sign * MARGIN)
-        if APART < at < 1 - APART:
-            found[int(line.segments[i])] = (at, sign)
+    for i in np.flatnonzero((turns != 0).any(axis=1) & line.faces):
+        ends = [0.0] if active[i, 0] else []
+        for j in np.flatnonzero(turns[i]):
+            s = np.linspace(places[i, j], places[i, j + 1], SAMPLES)
+            segment = np.full(SAMPLES, line.segments[i])
+            below = np.flatnonzero(met(trace, displacement, pair, segment, s).gap < 0)
+            if active[i, j]:  # contact up to the last zero of the gap, and a little farther
+                ends.append(float(s[below[-1]] if below.size else s[0]) + MARGIN)
+            else:
+                ends.append(float(s[below[0]] if below.size else s[-1]) - MARGIN)
+        ends += [1.0] if active[i, -1] else []
+        found[int(line.segments[i])] = list(zip(ends[::2], ends[1::2], strict=True))
     return found
 
 
@@ -285,7 +290,7 @@ def facing_of(
     segment, s = cells.on_side(np.repeat(side, j), np.tile(PLACES, len(side)))
     found = met(trace, displacement, pair, segment, s)
     faces = found.faces
-    keep = faces.reshape(-1, j).all(axis=1)
+    keep = np.asarray(faces.reshape(-1, j).all(axis=1))
     every = keep.repeat(j)
     if contact.primary is not None and (found.gap[faces & ~every] < 0).any():
         raise ContactError("bodies overlap where a side of the mesh faces the other in part")
@@ -303,9 +308,10 @@ def facing_of(
     order = np.argsort(line.segments)
     local = order[np.searchsorted(line.segments[order], cells.segment[side])]
     closed = np.append(pair.active, False)[line.rows[local]].all(axis=1)
-    for k, (at, sign) in reach.ends.items():
-        on = cells.segment[side] == k
-        closed[on] = (cells.span[side[on]].mean(axis=1) < at) == (sign > 0)
+    low, high = np.sort(cells.span[side], axis=1).T
+    for k, parts in reach.contact.items():
+        for a, b in parts:
+            closed |= (cells.segment[side] == k) & (low >= a - SAME) & (high <= b + SAME)
     closed = closed | contact.bilateral
     shares, stiff = _shares(cells, side, other, there, d, held, share)
     after, bare = _after(cells.ends[side], gap, closed, stiff, degree)

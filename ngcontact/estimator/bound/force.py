@@ -10,13 +10,15 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
+from ...errors import ContactError
 from ...fem import model_of
 from ...problem import Problem
-from .bound import LIFTED, Proof, settled, smallest_moduli, stress_norms, work_on_gap
+from .bound import LIFTED, Proof, work_on_gap
 from .facing import PLACES, WEIGHTS, Facing, bernstein, met
 from .lifting import asked_on_supports, lifted
 from .missed import data_norms
-from .tractions import boundary_tractions, missed_tractions
+from .norms import SETTLED, residuals, smallest_moduli, stress_norms
+from .tractions import boundary_tractions, missed_tractions, requested
 
 NOISE = 1e-13  # of a jump, relative to the largest displacement
 ROOM = 2.0  # largest |q*| / p* over the ratio of their means, where contact has no open end
@@ -75,12 +77,14 @@ def force_bar(
     ]
     dual = proof.program.within(elements, limits)
     norms = stress_norms(elements, dual.coefficients, n)
-    none = np.zeros(int(proof.multipliers.start[-1]))
-    fixed = proof.program.program.fixed
-    settled(cells, proof.multipliers, elements, proof.program, dual, none, fixed, norms.largest)
-    have = boundary_tractions(cells, elements, dual.coefficients)
+    none = np.zeros_like(proof.moments)
+    left = proof.program.unbalanced(proof.multipliers, elements, none, dual)
+    if not residuals(cells, proof.multipliers, left, norms.largest).max() <= SETTLED:
+        raise ContactError("no stress of the force's test was found in equilibrium")
+    have = boundary_tractions(cells, proof.given, elements, dual.coefficients)
     free = replace(problem, force={}, traction={})
-    missed = missed_tractions(free, cells, proof.given, lines, dual.pressure, have, norms.largest)
+    wanted = requested(free, cells, proof.given, lines, dual.pressure)
+    missed = missed_tractions(wanted, cells, have, norms.largest)
     data = data_norms(cells, np.zeros(n), missed, smallest_moduli(elements, n))
     held = [
         replace(one, amount=np.zeros_like(one.amount))

@@ -189,17 +189,16 @@ def _conditions(
     """What is asked for at the nodes; 0 on the rim of the layer and on sides `still` (e,)."""
     frame = np.tile(np.eye(2), (nodes.count, 1, 1))
     held, value = np.zeros((nodes.count, 2), dtype=bool), np.zeros((nodes.count, 2))
-    number, d, amount = [], [], []
+    found = []
     t = gauss_lobatto(nodes.degree)
     carry = lagrange(DATA, t)
     for one in asked:
         here = np.isin(one.side, nodes.sides)
-        number.append(nodes.on_sides(cells, one.side[here]).ravel())
         vectors = np.einsum("ij,kjc->kic", carry, one.direction[here]).reshape(-1, 2)
         length = np.linalg.norm(vectors, axis=1, keepdims=True)
-        d.append(vectors / length)
-        amount.append((one.amount[here] @ carry.T).ravel() / length[:, 0])
-    number, d, amount = np.concatenate(number), np.concatenate(d), np.concatenate(amount)
+        own = (one.amount[here] @ carry.T).ravel() / length[:, 0]
+        found.append((nodes.on_sides(cells, one.side[here]).ravel(), vectors / length, own))
+    number, d, amount = (np.concatenate(x) for x in zip(*found, strict=True))
     # Normal equations at each node: two directions, or one and the one across, which is free.
     M, right = np.zeros((nodes.count, 2, 2)), np.zeros((nodes.count, 2))
     np.add.at(M, number, d[:, :, None] * d[:, None])
@@ -260,7 +259,8 @@ def _least(
         rows.append(np.repeat(nodes.components[some], m, axis=1).ravel())
         columns.append(np.tile(nodes.components[some], (1, m)).ravel())
     size = 2 * nodes.count
-    K = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
+    entries, i, j = (np.concatenate(x) for x in (values, rows, columns))
+    K = from_triplets(entries, i, j, (size, size))
     n = 2 * np.arange(nodes.count)[:, None] + [0, 1]
     R = from_triplets(  # w = R (components in the frames)
         conditions.frame.transpose(0, 2, 1).ravel(),
@@ -293,8 +293,8 @@ def _operators(
     """Strains (b, q, v, 2 m) of the nodes' functions, C, weights, and d(a, b) / dx."""
     model, degree = model_of(problem), nodes.degree
     weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
-    law = np.linalg.inv(compliance_at(problem, cells, points))
-    into = np.linalg.inv(points.spread)
+    law = np.asarray(np.linalg.inv(compliance_at(problem, cells, points)))
+    into = np.asarray(np.linalg.inv(points.spread))
     by = np.einsum("qma,mn->qan", _gradients(degree, points.local), nodes.inverse)
     gradient = np.einsum("qan,bqac->bqcn", by, into)
     shape = _values(degree, points.local) @ nodes.inverse
@@ -371,4 +371,4 @@ def _remainders(cells: Cells, nodes: _Nodes, w: Array, asked: Sequence[Asked]) -
         miss = np.where(back[:, None, None], miss[:, ::-1], miss)
         at = position[triangle]
         rho[at, local] += miss
-    return _Remainders(rho, rho.any(axis=(1, 2, 3)))
+    return _Remainders(rho, np.asarray(rho.any(axis=(1, 2, 3))))

@@ -12,6 +12,7 @@ Legendre's in the coordinates of each triangle.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import comb
@@ -21,6 +22,8 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from ...arrays import Array, Index
+
+SECOND = (2, 0), (1, 1), (0, 2)  # derivatives by (a, b)
 
 
 @lru_cache
@@ -36,14 +39,14 @@ def products(degree: int) -> tuple[Index, Index]:
 
 def legendre_table(degree: int, X: Array) -> list[Array]:
     """Legendre's polynomials (..., degree + 1) and their first two derivatives."""
-    P = legendre.legvander(X, degree)
-    tables = [P]
+    P: Array = np.asarray(legendre.legvander(X, degree))
+    tables: list[Array] = [P]
     for _ in range(2):
         D = np.zeros((degree + 1, degree + 1))
         for n in range(degree):  # P'_(n+1) = (2 n + 1) P_n + P'_(n-1)
             D[n + 1] = D[n - 1] if n else 0.0
             D[n + 1, n] += 2 * n + 1
-        tables.append(tables[-1] @ D.T)
+        tables.append(np.asarray(tables[-1] @ D.T))
     return tables
 
 
@@ -56,7 +59,7 @@ class Frame:
     corner : ndarray (b, 2)
         Corner 1, lengths.
     edges : ndarray (b, 2, 2)
-        The base from there to corner 2 and the edge to corner 0, columns: x = corner + edges (a, b).
+        Columns: the base from there to corner 2, the edge to corner 0; x = corner + edges (a, b).
     size : ndarray (b,)
         Half the extent along the axes, lengths.
     centre : ndarray (b, 2)
@@ -77,6 +80,18 @@ class Frame:
         away = (x - self.corner[:, None]).transpose(0, 2, 1)
         return np.asarray(np.linalg.solve(self.edges, away).transpose(0, 2, 1))
 
+    @property
+    def rates(self) -> tuple[Array, Array]:
+        """Derivatives (b, 2) of 2 (a, b) along each of the axes, times `size`."""
+        rates = 2 * self.size[:, None, None] * np.linalg.inv(self.edges)
+        return rates[..., 0], rates[..., 1]
+
+    @property
+    def airy(self) -> Array:
+        """Matrices (b, 3, 3) from `bending` of a function psi to its stress (xx, yy, xy)."""
+        x, y = self.rates
+        return np.stack([_second(y, y), _second(x, x), -_second(x, y)], axis=1)
+
     def scaled(self, x: Array) -> Array:
         """Coordinates (b, q, 2) along the axes, up to 1 in size, of points `x` (b, q, 2)."""
         return np.asarray((x - self.centre[:, None]) / self.size[:, None, None])
@@ -94,6 +109,40 @@ def frame_of(corners: Array) -> Frame:
     return Frame(corners[:, 1], edges, np.ptp(corners, axis=1).max(axis=1) / 2, centre)
 
 
+def _second(p: Array, q: Array) -> Array:
+    """Second derivatives along two axes as sums (b, 3) of those by (aa, ab, bb)."""
+    mixed = p[:, 0] * q[:, 1] + p[:, 1] * q[:, 0]
+    return np.stack([p[:, 0] * q[:, 0], mixed, p[:, 1] * q[:, 1]], axis=-1)
+
+
+def derivatives(degree: int, local: Array, *orders: tuple[int, int]) -> list[Array]:
+    """The `products` (..., k) at `local` (..., 2), derived by 2 a and 2 b as `orders` say."""
+    i, j = products(degree)
+    a, b = (legendre_table(degree, 2 * local[..., c] - 1) for c in (0, 1))
+    return [a[n][..., i] * b[m][..., j] for n, m in orders]
+
+
+def bending(degree: int, local: Array) -> Array:
+    """Second derivatives (..., 3, m) by (aa, ab, bb) of stress functions, at `local` (..., 2).
+
+    `Frame.airy` makes of them a basis of the stresses of a degree in the plane, of units of stress.
+    """
+    psi = orthonormal(degree + 2, 2)
+    return np.stack([part @ psi for part in derivatives(degree + 2, local, *SECOND)], axis=-2)
+
+
+def airy_stress(degree: int, frame: Frame, local: Array, c: Array) -> Array:
+    """Stress (b, q, 3) with coefficients `c` (b, m) at `local`, (b, q, 2) or (q, 2) for all."""
+    if local.ndim == 2:
+        H = bending(degree, local)
+        second = (c @ H.reshape(-1, H.shape[-1]).T).reshape(len(c), -1, 3)
+    else:
+        psi = (c @ orthonormal(degree + 2, 2).T)[..., None]
+        parts = derivatives(degree + 2, local, *SECOND)
+        second = np.concatenate([part @ psi for part in parts], axis=-1)
+    return np.asarray(second @ frame.airy.transpose(0, 2, 1))
+
+
 def stresses(
     degree: int, frame: Frame, x: Array, local: Array, axial: bool, on_axis: bool = False
 ) -> Array:
@@ -105,41 +154,42 @@ def stresses(
     Parameters
     ----------
     x, local : ndarray (b, q, 2)
-        Points, and their `Frame.local`, which may be (1, q, 2) where it is the same for all.
+        Points, and their `Frame.local`, which may be (q, 2) where it is the same for all.
     """
-    highest = degree + (2 if not axial else -1 if on_axis else 1)
-    i, j = products(highest)
-    a, b = (legendre_table(highest, 2 * local[..., c] - 1) for c in (0, 1))
-    G = 2 * frame.size[:, None, None] * np.linalg.inv(frame.edges)  # by lengths of `size`
-
-    def derivative(*by: int) -> Array:
-        """Along the axes `by`."""
-        total = np.zeros(())
-        for along in np.ndindex(*(2,) * len(by)):
-            n = sum(along)
-            values = a[len(by) - n][..., i] * b[n][..., j]
-            factor = np.prod([G[:, c, axis] for c, axis in zip(along, by, strict=True)], axis=0)
-            total = total + factor[:, None, None] * values
-        return np.asarray(total)
-
     if not axial:
-        psi = orthonormal(highest, 2)
-        parts = derivative(1, 1), derivative(0, 0), -derivative(0, 1)
-        return np.stack([part @ psi for part in parts], axis=2)
+        return np.asarray(frame.airy[:, None] @ bending(degree, local))
     r = x[..., :1] / frame.size[:, None, None]
-    f = np.broadcast_to(a[0][..., i] * b[0][..., j], (*x.shape[:2], len(i)))
-    f_r, f_z, f_zz, none = derivative(0), derivative(1), derivative(1, 1), np.zeros_like(f)
+    by_r, by_z = frame.rates
+    zz = _second(by_z, by_z)
+
+    def derived(degree: int, order: int) -> tuple[Array, Array, Array, Array]:
+        """Functions `orthonormal` in an order, and what they are derived by r, z, zz."""
+        combined = orthonormal(degree, order)
+        f, *parts = (
+            part @ combined for part in derivatives(degree, local, (0, 0), (1, 0), (0, 1), *SECOND)
+        )
+        f = np.broadcast_to(f, (*x.shape[:2], combined.shape[1]))
+        return f, _along(by_r, parts[:2]), _along(by_z, parts[:2]), _along(zz, parts[2:])
+
+    highest = degree - 1 if on_axis else degree + 1
     if on_axis:  # T_rr = r f, chi = r^2 f
-        lower = chi = orthonormal(highest, 0)
+        f, f_r, f_z, f_zz = derived(highest, 0)
+        none = np.zeros_like(f)
         free = [f, none, f + r * f_r, none]
         bent = [none, -(2 * f + r * f_r), r**2 * f_zz, r * f_z]
     else:
-        lower, chi = orthonormal(degree, 0), orthonormal(highest, 1)
+        f, f_r, *_ = derived(degree, 0)
+        _, chi_r, chi_z, chi_zz = derived(highest, 1)
+        none, still = np.zeros_like(f), np.zeros_like(chi_r)
         free = [f / r, none, f_r, none]
-        bent = [none, -f_r / r, f_zz, f_z / r]
-    kept = i + j <= (degree if len(lower) < len(i) else highest)
-    one = np.stack([part[..., kept] @ lower for part in free], axis=2)
-    return np.concatenate([one, np.stack([part @ chi for part in bent], axis=2)], axis=-1)
+        bent = [still, -chi_r / r, chi_zz, chi_z / r]
+    return np.concatenate([np.stack(free, axis=2), np.stack(bent, axis=2)], axis=-1)
+
+
+def _along(rates: Array, parts: Sequence[Array]) -> Array:
+    """Sum (b, q, m) of n derivatives (..., q, m) times `rates` (b, n)."""
+    terms = [rate[:, None, None] * part for rate, part in zip(rates.T, parts, strict=True)]
+    return np.asarray(sum(terms))
 
 
 @lru_cache
@@ -170,8 +220,8 @@ def projected(degree: int, frame: Frame, x: Array, weight: Array, values: Array)
     """
     P = scalars(degree, frame, x)
     root = np.sqrt(weight)[..., None]
-    Q, R = np.linalg.qr(root * P)
-    return np.asarray(np.linalg.solve(R, Q.transpose(0, 2, 1) @ (root * values)))
+    q, R = np.linalg.qr(root * P)
+    return np.asarray(np.linalg.solve(R, q.transpose(0, 2, 1) @ (root * values)))
 
 
 def scalars(degree: int, frame: Frame, x: Array) -> Array:

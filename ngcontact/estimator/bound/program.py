@@ -18,10 +18,11 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from ...arrays import Array, Factor, Index, Mask
+from ...arrays import Array, Index, Mask
 from ...errors import ContactError
-from ...linalg import cholesky, lower_half
+from ...linalg import change_of_basis, cholesky, handed_over
 from ...qp import (
+    BorderedSystems,
     LinearSystems,
     NullSpace,
     QuadraticProgram,
@@ -118,27 +119,26 @@ class DualProgram:
     program: QuadraticProgram
 
     @cached_property
-    def factor(self) -> Factor:
-        """Of the matrix, made definite."""
-        K = self.program.K
-        return cholesky(lower_half((K + sp.diags_array(DEFINITE * K.diagonal())).tocsr()))
+    def systems(self) -> BorderedSystems:
+        """Its linear systems; what is factorised is the matrix made definite."""
+        lower = sp.tril(self.program.K, format="csr")
+        lower.setdiag((1 + DEFINITE) * self.program.diagonal)
+        return bordered_systems(self.program, cholesky(handed_over(lower)))
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the factor, which is made again."""
-        return {name: value for name, value in vars(self).items() if name != "factor"}
+        return {name: value for name, value in vars(self).items() if name != "systems"}
 
     def nearest(self, elements: Sequence[Element], moments: Array) -> Balanced:
         """The stress and the p* >= 0 that minimise B^2 for given tractions, `moments` (d,)."""
         alone, _ = exerted(elements, [e.alone() for e in elements])
-        moments = self.resisted(moments, moments - alone)
+        moments = self._resisted(moments, moments - alone)
         program = replace(self.program, b=self.T.T @ (moments - alone))
-        closed = np.concatenate(
-            [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines] or [[]]
-        )
-        systems = bordered_systems(program, self.factor)
-        active = minimise(systems, closed.astype(bool)).active
+        closed = [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines]
+        self.systems.restart(program)
+        active = minimise(self.systems, np.concatenate([np.zeros(0, bool), *closed])).active
         while True:  # any p* >= 0 proves a bound: coefficients below 0 by round-off become 0
-            y, force = _refined(systems, active)
+            y, force = _refined(self.systems, active)
             pulling = (force < 0) & ~program.equality
             if not pulling.any():
                 signed = ~program.equality
@@ -151,7 +151,7 @@ class DualProgram:
         Coefficients that would be more stay at their limit.
         """
         alone, _ = exerted(elements, [e.alone() for e in elements])
-        moments = self.resisted(np.zeros_like(alone), -alone)
+        moments = self._resisted(np.zeros_like(alone), -alone)
         load = self.T.T @ (moments - alone)
         program = replace(self.program, g=np.zeros_like(self.program.g))
         every = zip(limits, self.lines, strict=True)
@@ -159,34 +159,38 @@ class DualProgram:
         free, force = limit > 0, np.zeros_like(limit)
         while True:
             b = load.copy()
-            b[program.unknown] -= np.where(free, 0.0, force)
-            rows = np.flatnonzero(free)
-            some = replace(
-                program,
-                b=b,
-                R=program.R[rows],
-                g=program.g[rows],
-                equality=np.ones(len(rows), dtype=bool),
-                unknown=program.unknown[rows],
-            )
-            every = np.ones(len(rows), dtype=bool)
-            y, force[rows] = _refined(bordered_systems(some, self.factor), every)
+            b[program.unknown[~free]] -= force[~free]
+            self.systems.restart(replace(program, b=b))
+            y, found = _refined(self.systems, free)
+            force[free] = found[free]
             over = free & (np.abs(force) > limit)
             if not over.any():
                 none = np.zeros_like(free)
                 return self._balanced(elements, moments, (y, force), free, none)
             force[over] = np.sign(force[over]) * limit[over]
-            free &= ~over
+            free = free & ~over
 
-    def resisted(self, moments: Array, load: Array) -> Array:
-        """Given tractions, `moments` (d,), without the work of a load (d,) on free motions.
+    def unbalanced(
+        self, mu: Multipliers, elements: Sequence[Element], moments: Array, found: Balanced
+    ) -> Array:
+        """Forces (d,) that a stress and its pressures leave of given tractions, `moments` (d,)."""
+        left = moments - exerted(elements, found.coefficients)[0]
+        left -= pushed(mu, self.lines, found.pressure)
+        return np.where(self.program.fixed, 0.0, left - self.idle(left))
 
-        Nothing resists these motions; what a load does there is the error of quadrature.
-        """
+    def idle(self, load: Array) -> Array:
+        """The part (d,) of a load (d,) that does work on motions which nothing resists."""
         lineal = self.T @ self.program.null_space.lineal
         if lineal.shape[1] == 0:
-            return moments
-        idle = lineal @ np.linalg.solve(lineal.T @ lineal, lineal.T @ load)
+            return np.zeros_like(load)
+        return np.asarray(lineal @ np.linalg.solve(lineal.T @ lineal, lineal.T @ load))
+
+    def _resisted(self, moments: Array, load: Array) -> Array:
+        """Given tractions, `moments` (d,), without the idle part of the `load` (d,) that they are of.
+
+        That is the error of quadrature, and round-off.
+        """
+        idle = self.idle(load)
         if np.abs(idle).max() > QUADRATURE * np.abs(load).max():
             raise ContactError("the loads on a body that moves freely are not in balance")
         return np.asarray(moments - idle)
@@ -212,7 +216,8 @@ class DualProgram:
                 c + e.answer(change) for e, c in zip(elements, coefficients, strict=True)
             ]
             total, largest = exerted(elements, coefficients)
-            left = self.T.T @ (self.resisted(moments, moments - total) - total)
+            left = moments - total
+            left = self.T.T @ (left - self.idle(left))
             left[p.fixed] = 0.0
             force = np.where(held, left[p.unknown], force)
             force = np.where(signed, np.maximum(force, 0.0), force)
@@ -224,7 +229,7 @@ class DualProgram:
             if solve is None:
                 free = ~p.fixed
                 free[p.unknown[held]] = False
-                solve = self.factor(free)
+                solve = self.systems.factor(free)
             change = self.T @ solve(np.where(free, left, 0.0))
         shapes = [x.bound.shape for x in self.lines]
         parts = np.split(force, np.cumsum([a * b for a, b in shapes]))[:-1]
@@ -264,16 +269,10 @@ def dual_program(
     of rigid motions that supports leave free.
     """
     size = int(mu.start[-1])
-    values, rows, columns = [], [], []
-    for e in elements:
-        d = e.dofs.shape[1]
-        values.append((e.N.transpose(0, 2, 1) @ e.N).ravel())
-        rows.append(np.repeat(e.dofs, d, axis=1).ravel())
-        columns.append(np.tile(e.dofs, (1, d)).ravel())
-    K = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
+    K = _assembled(mu, elements)
     T, unknown, bound, equality = _basis(mu, lines, size)
     if len(unknown):
-        K = (T.T @ K @ T).tocsr()
+        K = K + change_of_basis(K, T)
     m, idle = len(unknown), fixed | (K.diagonal() <= 0)  # on the axis there is no traction
     program = QuadraticProgram(
         K=K,
@@ -309,6 +308,41 @@ def exerted(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple
     return total, largest
 
 
+def _assembled(mu: Multipliers, elements: Sequence[Element]) -> sp.csr_array:
+    """K (d, d): sums of N'N, written where they stand; each side has one block with each it meets.
+
+    The rows of a side have the same columns, those of the sides of its triangles, rising.
+    """
+    count, wide = len(mu.degree), np.diff(mu.start)
+    sides = np.concatenate([e.sides for e in elements])
+    pairs = sides[:, :, None] * count + sides[:, None, :]
+    blocks, number = np.unique(pairs, return_inverse=True)
+    row, column = np.divmod(blocks, count)
+    stop = np.cumsum(wide[column])
+    last = np.searchsorted(row, np.arange(count), side="right")
+    first = np.append(0, stop)[np.append(0, last[:-1])]  # of each side's columns among all
+    length = stop[last - 1] - first
+    largest = int((wide * length).sum())
+    index = np.int32 if largest <= np.iinfo(np.int32).max else np.int64
+    starts = np.append(0, np.cumsum(np.repeat(length, wide))).astype(index)
+    columns = np.arange(stop[-1]) + np.repeat(mu.start[column] - stop + wide[column], wide[column])
+    shift = (np.repeat(first, wide) - starts[:-1]).astype(index)
+    at = np.arange(largest, dtype=index) + np.repeat(shift, np.diff(starts))
+    indices = columns.astype(index)[at]
+    place = starts[mu.start[row]] + stop - wide[column] - first[row]  # of each block's first entry
+    data, number = np.zeros(largest), number.reshape(-1, 3, 3)
+    groups = np.split(number, np.cumsum([len(e.sides) for e in elements])[:-1])
+    for e, own in zip(elements, groups, strict=True):
+        values, size = e.N.transpose(0, 2, 1) @ e.N, wide[e.sides[0]]
+        ends = np.append(0, np.cumsum(size))
+        for i, j in np.ndindex(3, 3):
+            down = np.arange(size[i])[:, None] * length[e.sides[:, i], None, None]
+            to = place[own[:, i, j], None, None] + down + np.arange(size[j])
+            part = values[:, ends[i] : ends[i + 1], ends[j] : ends[j + 1]]
+            np.add.at(data, to.ravel(), part.ravel())
+    return sp.csr_array((data, indices, starts), shape=(int(mu.start[-1]),) * 2)
+
+
 def pushed(mu: Multipliers, lines: Sequence[Rows], pressure: Sequence[Array]) -> Array:
     """Moments (d,) of the tractions R'p that pressures of lines exert."""
     total = np.zeros(int(mu.start[-1]))
@@ -321,7 +355,7 @@ def pushed(mu: Multipliers, lines: Sequence[Rows], pressure: Sequence[Array]) ->
 
 
 def _basis(
-    mu: Multipliers, lines: Sequence[Rows], size: int
+    mu: Multipliers, lines: Sequence[Rows], count: int
 ) -> tuple[sp.csr_array, Index, Array, Mask]:
     """The change of basis: mu = T y with a y for each row over its `Rows.mass`.
 
@@ -329,7 +363,7 @@ def _basis(
     """
     values, rows, columns = [], [], []
     unknown, bound, equality = [np.zeros(0, np.intp)], [np.zeros(0)], [np.zeros(0, bool)]
-    plain = np.ones(size, dtype=bool)
+    plain = np.ones(count, dtype=bool)
     steps = []
 
     def put(i: Index, j: Index, block: Array) -> None:
@@ -356,14 +390,15 @@ def _basis(
     values.append(np.ones(len(rest)))
     rows.append(rest)
     columns.append(rest)
-    G = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
+    entries, to, of = (np.concatenate(x) for x in (values, rows, columns))
+    G = from_triplets(entries, to, of, (count, count))
     T = G
     if steps:  # mu = G y + M mu, M from the primary's sides to the secondary's
         M = from_triplets(
             np.concatenate([b.ravel() for _, _, b in steps]),
             np.concatenate([np.repeat(i, len(j)) for i, j, _ in steps]),
             np.concatenate([np.tile(j, len(i)) for i, j, _ in steps]),
-            (size, size),
+            (count, count),
         )
         term = M @ G
         while term.nnz:  # as often as bodies stand in a row

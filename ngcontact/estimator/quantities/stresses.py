@@ -57,7 +57,7 @@ def largest_von_mises(
         trace = (values[:, 0] + values[:, 1]).reshape(-1, n)
         square = (trace**2).sum(axis=1)
         ratio = (trace * normal.reshape(-1, n)).sum(axis=1) / np.where(square > 0, square, 1.0)
-        known = np.isfinite(other).all(axis=1)  # it divides by r, 0 on the axis
+        known = np.asarray(np.isfinite(other).all(axis=1))  # it divides by r, 0 on the axis
         other = np.where(known[:, None], other, 0.0)
         change = (other[:, :2] - values[:, :2]).sum(axis=1) * np.repeat(ratio, n)
         out = around if around.size else normal + change[:, None]

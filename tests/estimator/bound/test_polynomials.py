@@ -30,13 +30,19 @@ KINDS = {
 }
 
 
-def derivative(function, x, axis, degree):
+def height(corners):
+    """The least one of a triangle, nearly."""
+    edges = corners[0, 1:] - corners[0, 0]
+    return np.abs(np.linalg.det(edges)) / np.linalg.norm(edges, axis=1).max()
+
+
+def derivative(function, x, axis, degree, size):
     """Of a polynomial of a degree, at points `x` (q, 2): through points on lines; exact."""
-    t = gauss_lobatto(degree) - 0.5
+    t = size * (gauss_lobatto(degree) - 0.5)
     away = np.zeros((len(t), 2))
     away[:, axis] = t
     values = function((x[:, None] + away).reshape(1, -1, 2))[0]
-    rows = lagrange_derivative(degree, np.array([0.5]))[0]
+    rows = lagrange_derivative(degree, np.array([0.5]))[0] / size
     return np.einsum("t,qt...->q...", rows, values.reshape(len(x), len(t), *values.shape[1:]))
 
 
@@ -46,10 +52,13 @@ def inside(corners, count=7):
     return shares @ corners[0]
 
 
-def divergence(function, x, axial, degree):
+def divergence(function, x, axial, degree, size=1.0):
     """Of a stress (1, q, c, ...), at points (q, 2), times r about an axis."""
-    times = (lambda y: y[..., :1, None]) if axial else (lambda y: 1.0)
-    dx, dy = (derivative(lambda y: times(y) * function(y), x, axis, degree) for axis in (0, 1))
+
+    def times(y):
+        return function(y) * (y[..., :1, None] if axial else 1.0)
+
+    dx, dy = (derivative(times, x, axis, degree, size) for axis in (0, 1))
     hoop = function(x[None])[0][:, 2] if axial else 0.0
     return np.stack([dx[:, 0] + dy[:, -1] - hoop, dx[:, -1] + dy[:, 1]])
 
@@ -64,9 +73,9 @@ def test_stresses_without_a_divergence(kind, degree):
         return stresses(degree, frame, y, frame.local(y), axial, on_axis)
 
     values = basis(x[None])[0]
-    # Derivatives by lengths of the triangle's least height.
-    size = np.abs(values).max() * 2 / np.abs(np.linalg.det(frame.edges[0]))
-    assert np.abs(divergence(basis, x, axial, degree + 2)).max() <= ROUND_OFF * size
+    size = height(corners)
+    div = size * divergence(basis, x, axial, degree + 2, size)
+    assert np.abs(div).max() <= ROUND_OFF * np.abs(values).max()
     # As many as there are polynomials less conditions: none depends on others.
     k = degree
     plane = (k + 3) * (k + 4) // 2 - 3
@@ -109,7 +118,8 @@ def test_the_condition_at_a_corner():
     lengths = np.linalg.norm(sides, axis=1)
     n = np.column_stack([sides[:, 1], -sides[:, 0]])  # times lengths, as the moments
     # At corner 0 side 1 ends and side 2 begins.
-    at_end = N[:, 1] @ traces(degree, np.array(1.0)), N[:, 2] @ traces(degree, np.array(0.0))
+    first, last = traces(degree, np.array([0.0, 1.0]))
+    at_end = N[:, 1] @ last, N[:, 2] @ first
     left, right = at_end[0] @ n[2], at_end[1] @ n[1]
     assert np.abs(left - right).max() <= ROUND_OFF * np.abs(N).max() * lengths.max()
     s = stresses(degree, frame, x[None, :1], frame.local(x[None, :1]), False)[0, 0]

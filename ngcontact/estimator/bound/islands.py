@@ -1,0 +1,136 @@
+"""Stresses balanced once more where they miss much of their data.
+
+Where F or P are no polynomials s balances projections of them. On a triangle T where that counts,
+the stress s' nearest to sigma_h with the tractions of s on inner sides and on Gamma_u, with P and
+p* on the others, and -div s' = F, is sought once more: of a higher degree where F is smooth, else
+on parts of T, where again F and P are met in projections. s' may stand for s on T, with what it
+misses itself; both have the same resultants, for the rules on T are those on its parts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+
+from ...arrays import Array, Index
+from ...problem import Problem
+from .cells import Cells
+from .elements import PARTED, WHOLE, Element, elements_of
+from .missed import data_norms
+from .norms import SETTLED, forces_missed, residuals, smallest_moduli, stress_norms
+from .parts import PARTS, divided, pattern
+from .program import dual_program, exerted
+from .tractions import ROUND_OFF, Requested, along, on_segments, tractions_of
+
+COUNTS = 0.005  # share of B^2 that may be lost by data where nothing is balanced once more
+RAISED = (WHOLE - PARTED) // 2  # degrees on whole triangles, where the rule stays
+AT_ONCE = 200  # triangles
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A stress on n triangles.
+
+    Attributes
+    ----------
+    cells : Cells
+    elements : list of Element
+    coefficients : list of ndarray (b, m)
+        Of the stress.
+    depth : ndarray of int (n,)
+        How often each is divided for the rules of forces.
+    distance, loads : ndarray (n,)
+        |s - sigma_h|, and norms of what s misses of the data.
+    """
+
+    cells: Cells
+    elements: list[Element]
+    coefficients: list[Array]
+    depth: Index
+    distance: Array
+    loads: Array
+
+
+def once_more(
+    problem: Problem,
+    displacement: ng.CoefficientFunction,
+    wanted: Requested,
+    level: Level,
+    degree: int,
+    scale: float,
+    allowed: float | None = None,
+) -> tuple[Array, Array]:
+    """`Level.distance` and `.loads` of the better of both stresses on each triangle.
+
+    Parameters
+    ----------
+    wanted : Requested
+        Tractions on the boundary.
+    degree : int
+        Of stresses on straight triangles.
+    scale : float
+        The largest stress, beside which equilibrium is measured.
+    allowed : float, optional
+        Of B^2 that may be lost; of the whole mesh without.
+    """
+    c, D = level.distance.copy(), level.loads.copy()
+    lost = (c + D) ** 2 - c**2
+    top = allowed is None
+    limit = COUNTS * float(((c + D) ** 2).sum()) if allowed is None else allowed
+    order = np.argsort(lost)
+    at = np.sort(order[np.cumsum(lost[order]) > limit])
+    for m in (1, PARTS) if top else (PARTS,):
+        some = at[(level.depth[at] == 0) == (m == 1)]
+        for start in range(0, len(some), AT_ONCE):
+            here = some[start : start + AT_ONCE]
+            share = limit * len(here) / len(some)
+            one, two = _islands(problem, displacement, wanted, level, here, degree, scale, m, share)
+            better = one + two < c[here] + D[here]
+            c[here[better]], D[here[better]] = one[better], two[better]
+    return c, D
+
+
+def _islands(
+    problem: Problem,
+    displacement: ng.CoefficientFunction,
+    wanted: Requested,
+    level: Level,
+    at: Index,
+    degree: int,
+    scale: float,
+    m: int,
+    allowed: float,
+) -> tuple[Array, Array]:
+    """Norms (b,) on triangles `at` (b,) in m^2 parts; infinite where there is no equilibrium."""
+    parts, k = divided(level.cells, at, m), len(pattern(m)[1])
+    depth = np.repeat(np.maximum(level.depth[at] - 1, 0), k)
+    look = np.column_stack([np.full(len(depth), PARTED), depth])
+    raised = degree + (RAISED if m == 1 else 0)
+    mu, elements = elements_of(problem, parts, displacement, raised, look)
+    rule = along(parts, wanted.given, np.flatnonzero(~parts.inner))
+    owner = parts.owner[rule.side]
+    asked = tractions_of(level.elements, level.coefficients, at[owner // k], rule.x, rule.normal)
+    segment, s = on_segments(parts, rule)
+    on = np.flatnonzero(segment >= 0)
+    if on.size:
+        values, held = wanted.values(segment[on], s[on])
+        asked[on] = np.where(held[:, None], asked[on], values)
+    moments = rule.moments(mu, asked)
+    nothing = np.zeros((len(moments), 0))
+    program = dual_program(mu, elements, np.zeros(len(moments), dtype=bool), nothing, [])
+    found = program.nearest(elements, moments).coefficients
+    left = residuals(parts, mu, moments - exerted(elements, found)[0], scale)
+    norms = stress_norms(elements, found, len(depth))
+    have = tractions_of(elements, found, owner, rule.x, rule.normal)
+    miss = np.where(np.abs(asked - have) <= ROUND_OFF * scale, 0.0, asked - have)
+    forces, moduli = forces_missed(elements, len(depth)), smallest_moduli(elements, len(depth))
+    data = data_norms(parts, forces, rule.norms(parts, miss), moduli)
+    finer = Level(parts, elements, found, depth, norms.distance, data)
+    both = finer.distance, finer.loads
+    if depth.any():
+        both = once_more(problem, displacement, wanted, finer, degree, scale, allowed)
+    settled = left.reshape(-1, k).max(axis=1) <= SETTLED
+    one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
+    return np.where(settled, one, np.inf), np.where(settled, two, np.inf)
