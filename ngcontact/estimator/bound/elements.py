@@ -36,7 +36,7 @@ from .polynomials import (
     stresses,
 )
 
-ON_CURVES = 3  # degrees by which stresses on triangles with a curved side are higher
+ON_CURVES = 4  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
 DEFINITE = (1e-15, 1e-14, 1e-13, 1e-12)  # of the diagonal, until it is enough
