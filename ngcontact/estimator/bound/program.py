@@ -193,9 +193,9 @@ class DualProgram:
         return np.asarray(lineal @ np.linalg.solve(lineal.T @ lineal, lineal.T @ load))
 
     def _resisted(self, moments: Array, load: Array) -> Array:
-        """Given tractions, `moments` (d,), without the idle part of the `load` (d,) that they are of.
+        """Given tractions, `moments` (d,), without the idle part of the `load` (d,).
 
-        That is the error of quadrature, and round-off.
+        That part is the error of quadrature, and round-off.
         """
         idle = self.idle(load)
         if np.abs(idle).max() > QUADRATURE * np.abs(load).max():
