@@ -24,6 +24,7 @@ from ...problem import Triangulation
 
 REFERENCE = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])  # NGSolve's corners, in this order
 NEWTON_STEPS = 8
+CLOSE = 1e-9  # of an element: the next step is round-off
 TURN = 0.5  # twice the sine of the angle between sides up to which they are on one line
 
 
@@ -159,7 +160,10 @@ class Cells:
         for _ in range(NEWTON_STEPS):
             slope = self.evaluate(jacobian, at[bent], found[bent]).reshape(-1, 2, 2)
             miss = x[bent] - self.evaluate(place, at[bent], found[bent])
-            found[bent] += np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
+            step = np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
+            found[bent] += step
+            if np.abs(step).max() <= CLOSE:
+                break
         return found
 
 

@@ -36,7 +36,7 @@ from .polynomials import (
     stresses,
 )
 
-ON_CURVES = 3  # degrees by which stresses on triangles with a curved side are higher
+ON_CURVES = 4  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
 DEFINITE = (1e-15, 1e-14, 1e-13, 1e-12)  # of the diagonal, until it is enough
@@ -286,7 +286,8 @@ def elements_of(
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, and their multipliers.
 
-    `look` (n, 2) says by what degree above 2 k rules integrate forces, and on parts of what depth.
+    `look` (n, 3) says by what degree above 2 k rules integrate forces, and on parts of what depth,
+    with thirds at corners or not.
     """
     own, mu = multipliers(cells, degree)
     at_axis = np.asarray(cells.trace.model.on_axis(cells.vertices))
@@ -308,7 +309,7 @@ def elements_of(
         every = np.flatnonzero(number.ravel() == kind)
         for start in range(0, len(every), BLOCK):
             at = every[start : start + BLOCK]
-            kept = problem, cells, displacement, mu, at, own_degree, bool(axis), rest[-2:]
+            kept = problem, cells, displacement, mu, at, own_degree, bool(axis), rest[-3:]
             found.append(_element(*kept))
     return mu, found
 
@@ -484,11 +485,11 @@ def _forces(
     """Coefficients of the force that is balanced, r F_r, and the norm of the rest."""
     points, n = kind.places, kind.force_degree
     b, q = points.weight.shape
-    (bonus, depth), radial = look, np.zeros((b, q))
+    (bonus, *parted), radial = look, np.zeros((b, q))
     if source is None:
         return np.zeros((b, (n + 1) * (n + 2) // 2, 2)), radial, np.zeros(b)
     parts, order = slice(int(kind.axial), None), 2 * kind.degree + bonus
-    force, missed, size = projection(source, cells, points.at, n, order, depth, parts)
+    force, missed, size = projection(source, cells, points.at, n, order, *parted, parts)
     if kind.axial:
         radial = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
         force[..., 0] = 0.0
