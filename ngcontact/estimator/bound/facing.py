@@ -378,7 +378,7 @@ def _shares(
 def guides_of(
     cells: Cells, displacement: ng.CoefficientFunction, side: Index, degree: int
 ) -> Facing:
-    """Sides (k,) of Gamma_0, as bilateral contact with an obstacle without a gap."""
+    """Sides (k,) of Gamma_0 (3.8), as bilateral contact with an obstacle without a gap."""
     k, j = len(side), len(PLACES)
     every, t = np.repeat(side, j), np.tile(PLACES, k)
     segment, s = cells.on_side(every, t)

@@ -233,7 +233,7 @@ def scalars(degree: int, frame: Frame, x: Array) -> Array:
 
 
 def balancing(degree: int, frame: Frame, x: Array, force: Array, axial: bool) -> Array:
-    """Stress (b, q, c) at `x` (b, q, 2) whose divergence is minus a polynomial force.
+    """Stress (b, q, c) at `x` (b, q, 2) whose divergence is minus a polynomial force (3.5).
 
     `force` (b, m, 2) are its coefficients as of `projected`, for a `degree`. About an axis only the
     axial part counts: s_zz = - int F_z dz.

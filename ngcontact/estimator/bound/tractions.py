@@ -229,7 +229,7 @@ def requested(
 
 
 def moments_of(problem: Problem, cells: Cells, mu: Multipliers, given: Given) -> tuple[Array, Mask]:
-    """Moments (d,) of the given tractions with the multipliers, and fixed multipliers (d,)."""
+    """Moments (d,) of the given tractions (3.7) with the multipliers, and fixed multipliers (d,)."""
     moments, fixed = np.zeros((2, int(mu.start[-1])))
     loaded = [side for _, side in given.loads]
     if loaded:
