@@ -378,13 +378,13 @@ def _shares(
 def guides_of(
     cells: Cells, displacement: ng.CoefficientFunction, side: Index, degree: int
 ) -> Facing:
-    """Sides (k,) of Gamma_0 (3.8), as bilateral contact with an obstacle without a gap."""
+    """Sides (k,) of Gamma_0, as bilateral contact with an obstacle without a gap."""
     k, j = len(side), len(PLACES)
     every, t = np.repeat(side, j), np.tile(PLACES, k)
     segment, s = cells.on_side(every, t)
     x, dx = cells.points(every, t)
     d = cells.trace.exact_normal(segment, s)
-    gap = -(cells.trace.evaluate(displacement, segment, s) * d).sum(axis=1)
+    gap = -(cells.trace.evaluate(displacement, segment, s) * d).sum(axis=1)  # (3.8)
     ds = np.linalg.norm(dx, axis=1) * cells.trace.model.measure(x)
     return Facing(
         pair=None,

@@ -45,7 +45,7 @@ class Asked:
 def asked_on_supports(
     cells: Cells, given: Given, displacement: ng.CoefficientFunction
 ) -> list[Asked]:
-    """u_D - u_h (3.6) in each prescribed component; no radial motion on the axis."""
+    """u_D - u_h in each prescribed component; no radial motion on the axis."""
     trace, found, j = cells.trace, [], DATA + 1
     axis = np.flatnonzero(trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1))
     along = np.broadcast_to([1.0, 0.0], (len(axis), j, 2))
@@ -56,7 +56,7 @@ def asked_on_supports(
         u = trace.evaluate(displacement, segment, s)
         for c, value in enumerate(values):
             if value is not None:
-                rest = trace.evaluate(ng.CF(value), segment, s)[:, 0] - u[:, c]
+                rest = trace.evaluate(ng.CF(value), segment, s)[:, 0] - u[:, c]  # (3.6)
                 d = np.broadcast_to(np.eye(2)[c], (k, j, 2))
                 found.append(Asked(side, d, rest.reshape(k, j)))
     return found

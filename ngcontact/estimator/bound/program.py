@@ -66,9 +66,9 @@ class Rows:
 
 
 def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
-    """The rows of one line, with a pressure of a degree: (3.9) to (3.12) for multipliers."""
+    """The rows of one line, with a pressure of a degree."""
     psi = bernstein(degree, PLACES)
-    bound = ((facing.gap + facing.lift) * facing.weight) @ psi
+    bound = ((facing.gap + facing.lift) * facing.weight) @ psi  # (3.9)
     load = facing.weight[..., None] * facing.direction
     own = [_tested(mu, side, PLACES, psi, f) for side, f in zip(facing.side, load, strict=True)]
     opposite = [

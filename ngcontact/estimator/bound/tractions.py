@@ -229,13 +229,13 @@ def requested(
 
 
 def moments_of(problem: Problem, cells: Cells, mu: Multipliers, given: Given) -> tuple[Array, Mask]:
-    """Moments (d,) of the given tractions (3.7) with the multipliers, and fixed multipliers (d,)."""
+    """Moments (d,) of the given tractions with the multipliers, and fixed multipliers (d,)."""
     moments, fixed = np.zeros((2, int(mu.start[-1])))
     loaded = [side for _, side in given.loads]
     if loaded:
         rule = along(cells, given, np.unique(np.concatenate(loaded)))
         values, _ = requested(problem, cells, given).values(*on_segments(cells, rule))
-        moments = rule.moments(mu, values)
+        moments = rule.moments(mu, values)  # (3.7)
     for side, c in zip(*np.nonzero(given.held), strict=True):
         n = mu.degree[side] + 1
         fixed[mu.start[side] + c * n : mu.start[side] + (c + 1) * n] = True
