@@ -384,7 +384,7 @@ def guides_of(
     segment, s = cells.on_side(every, t)
     x, dx = cells.points(every, t)
     d = cells.trace.exact_normal(segment, s)
-    gap = -(cells.trace.evaluate(displacement, segment, s) * d).sum(axis=1)
+    gap = -(cells.trace.evaluate(displacement, segment, s) * d).sum(axis=1)  # (3.8)
     ds = np.linalg.norm(dx, axis=1) * cells.trace.model.measure(x)
     return Facing(
         pair=None,

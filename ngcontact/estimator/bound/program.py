@@ -68,7 +68,7 @@ class Rows:
 def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
     """The rows of one line, with a pressure of a degree."""
     psi = bernstein(degree, PLACES)
-    bound = ((facing.gap + facing.lift) * facing.weight) @ psi
+    bound = ((facing.gap + facing.lift) * facing.weight) @ psi  # (3.9)
     load = facing.weight[..., None] * facing.direction
     own = [_tested(mu, side, PLACES, psi, f) for side, f in zip(facing.side, load, strict=True)]
     opposite = [
@@ -147,8 +147,8 @@ class DualProgram:
             y, force = _refined(self.systems, active)
             pulling = (force < 0) & ~program.equality
             if not pulling.any():
-                signed = ~program.equality
-                return self._balanced(elements, moments, (y, force), active, signed)
+                low, high = np.where(program.equality, -np.inf, 0.0), np.full_like(force, np.inf)
+                return self._balanced(elements, moments, (y, force), active, low, high)
             active = active & ~pulling
 
     def within(self, elements: Sequence[Element], limits: Sequence[Array]) -> Balanced:
@@ -172,8 +172,7 @@ class DualProgram:
             if not over.any():
                 y, found = _refined(self.systems, free)
                 force[free] = found[free]
-                none = np.zeros_like(free)
-                return self._balanced(elements, moments, (y, force), free, none)
+                return self._balanced(elements, moments, (y, force), free, -limit, limit)
             force[over] = np.sign(force[over]) * limit[over]
             free = free & ~over
 
@@ -208,12 +207,13 @@ class DualProgram:
         moments: Array,
         solution: tuple[Array, Array],
         held: Mask,
-        signed: Mask,
+        low: Array,
+        high: Array,
     ) -> Balanced:
         """The stress of a solution y, force, corrected until its tractions balance.
 
         Stresses of stiff bodies are small differences of multipliers. Rows that are `held` (m,)
-        take what is left as their force, those that are `signed` (m,) none below 0.
+        take what is left as their force, from `low` to `high` (m,).
         """
         p, (y, force) = self.program, solution
         change, solve, last = self.T @ y, None, np.inf
@@ -226,8 +226,7 @@ class DualProgram:
             left = moments - total
             left = self.T.T @ (left - self.idle(left))
             left[p.fixed] = 0.0
-            force = np.where(held, left[p.unknown], force)
-            force = np.where(signed, np.maximum(force, 0.0), force)
+            force = np.clip(np.where(held, left[p.unknown], force), low, high)
             left[p.unknown] -= force
             size = float(np.abs(left).max(initial=0.0))
             if not ROUND_OFF * largest < size < FALLING * last:

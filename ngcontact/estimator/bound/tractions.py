@@ -235,7 +235,7 @@ def moments_of(problem: Problem, cells: Cells, mu: Multipliers, given: Given) ->
     if loaded:
         rule = along(cells, given, np.unique(np.concatenate(loaded)))
         values, _ = requested(problem, cells, given).values(*on_segments(cells, rule))
-        moments = rule.moments(mu, values)
+        moments = rule.moments(mu, values)  # (3.7)
     for side, c in zip(*np.nonzero(given.held), strict=True):
         n = mu.degree[side] + 1
         fixed[mu.start[side] + c * n : mu.start[side] + (c + 1) * n] = True
