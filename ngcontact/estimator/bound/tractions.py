@@ -172,7 +172,7 @@ class Requested:
     cells : Cells
     given : Given
     pressed : dict of int to ndarray (j, 2)
-        Of the lines at `PLACES` of sides.
+        Of the lines at `PLACES` of sides: forces per t, with the measure.
     """
 
     problem: Problem
@@ -194,8 +194,12 @@ class Requested:
         at = np.flatnonzero(np.isin(side, list(self.pressed)))
         if at.size:
             t = cells.own_parameter(side[at], s[at])
+            x, dx = cells.points(np.repeat(side[at], t.shape[1]), t.ravel())
+            ds = np.linalg.norm(dx, axis=1) * cells.trace.model.measure(x)
+            ds = ds.reshape(*t.shape, 1)
             nodes = THROUGH @ np.stack([self.pressed[i] for i in side[at].tolist()])
-            total[at] += at_places(lagrange, t) @ nodes
+            force = at_places(lagrange, t) @ nodes
+            total[at] += np.divide(force, ds, out=np.zeros_like(force), where=ds > 0)
         return total, self.given.held[side]
 
 
@@ -210,12 +214,7 @@ def requested(
     pressed: dict[int, Array] = {}
 
     def add(side: Index, force: Array) -> None:
-        j = len(PLACES)
-        x, dx = cells.points(np.repeat(side, j), np.tile(PLACES, len(side)))
-        ds = np.linalg.norm(dx, axis=1) * cells.trace.model.measure(x)
-        ds = ds.reshape(-1, j, 1)
-        per_area = np.divide(force, ds, out=np.zeros_like(force), where=ds > 0)
-        for i, value in zip(side.tolist(), per_area, strict=True):
+        for i, value in zip(side.tolist(), force, strict=True):
             pressed[i] = pressed.get(i, 0.0) + value
 
     for line, p in zip(lines, pressure, strict=True):
@@ -316,5 +315,7 @@ def missed_tractions(
     """L2 norms (n, 3) of what tractions miss, times the model's measure."""
     values, held = wanted.values(*on_segments(cells, have.rule))
     miss = np.where(held[:, None], 0.0, values - have.values)
-    miss[np.abs(miss) <= ROUND_OFF * largest] = 0.0
+    measure = cells.trace.model.measure(have.rule.x.reshape(-1, 2)).reshape(*miss.shape[:2], 1)
+    most = measure.max(axis=1, keepdims=True)  # s is a polynomial over the measure
+    miss[np.abs(miss) * measure <= ROUND_OFF * largest * most] = 0.0
     return have.rule.norms(cells, miss)
