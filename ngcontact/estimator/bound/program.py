@@ -140,7 +140,7 @@ class DualProgram:
         if not closed:  # one system, which need not be definite
             none = np.zeros(0, dtype=bool)
             start = np.zeros_like(program.b), np.zeros(0)
-            return self._balanced(elements, moments, start, none, none)
+            return self._balanced(elements, moments, start, none, start[1], start[1])
         self.systems.restart(program)
         active = minimise(self.systems, np.concatenate(closed)).active
         while True:  # any p* >= 0 proves a bound: coefficients below 0 by round-off become 0

@@ -315,7 +315,8 @@ def missed_tractions(
     """L2 norms (n, 3) of what tractions miss, times the model's measure."""
     values, held = wanted.values(*on_segments(cells, have.rule))
     miss = np.where(held[:, None], 0.0, values - have.values)
-    measure = cells.trace.model.measure(have.rule.x.reshape(-1, 2)).reshape(*miss.shape[:2], 1)
-    most = measure.max(axis=1, keepdims=True)  # s is a polynomial over the measure
-    miss[np.abs(miss) * measure <= ROUND_OFF * largest * most] = 0.0
+    x = have.rule.x
+    measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(*x.shape[:2], 1)
+    force = np.abs(miss) * measure  # near an axis stresses are T / r
+    miss[force <= ROUND_OFF * largest * measure.max(axis=1, keepdims=True)] = 0.0
     return have.rule.norms(cells, miss)
