@@ -23,6 +23,7 @@ from ...problem import Triangulation
 
 REFERENCE = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])  # NGSolve's corners, in this order
 NEWTON_STEPS = 8
+SETTLED = 1e-9  # step in reference coordinates after which there is no other
 TURN = 0.01  # twice the sine of the angle between sides up to which they are on one line
 
 
@@ -158,7 +159,10 @@ class Cells:
         for _ in range(NEWTON_STEPS):
             slope = self.evaluate(jacobian, at[bent], found[bent]).reshape(-1, 2, 2)
             miss = x[bent] - self.evaluate(place, at[bent], found[bent])
-            found[bent] += np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
+            step = np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
+            found[bent] += step
+            if np.abs(step).max() <= SETTLED:  # the error that is left is its square
+                break
         return found
 
 

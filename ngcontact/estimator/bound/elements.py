@@ -38,6 +38,7 @@ ON_CURVES = 3  # degrees by which stresses on triangles with a curved side are h
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
 BLOCK = 4000  # triangles at once: bounds the memory
+SMALL_BLOCK = 500  # ... where each has a table of its own
 
 
 def traces(degree: int, t: Array) -> Array:
@@ -265,10 +266,11 @@ def elements_of(
     )
     kinds, number = np.unique(key, axis=0, return_inverse=True)
     found = []
-    for kind, (own_degree, axis, *_) in enumerate(kinds.tolist()):
+    for kind, (own_degree, axis, *_, curved, varying, _) in enumerate(kinds.tolist()):
         every = np.flatnonzero(number.ravel() == kind)
-        for start in range(0, len(every), BLOCK):
-            at = every[start : start + BLOCK]
+        most = SMALL_BLOCK if curved or varying or model_of(problem).extent else BLOCK
+        for start in range(0, len(every), most):
+            at = every[start : start + most]
             found.append(_element(problem, cells, displacement, mu, at, own_degree, bool(axis)))
     return mu, found
 
