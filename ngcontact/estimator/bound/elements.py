@@ -43,6 +43,7 @@ DEFINITE = (1e-15, 1e-14, 1e-13, 1e-12)  # of the diagonal, until it is enough
 WHOLE, PARTED = 10, 4  # degrees above 2 k of rules for forces: on triangles, on their parts
 ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
 BLOCK = 4000  # triangles at once: bounds the memory
+SMALL_BLOCK = 500  # ... where each has a table of its own
 
 
 def traces(degree: int, t: Array) -> Array:
@@ -307,8 +308,10 @@ def elements_of(
     found = []
     for kind, (own_degree, axis, *rest) in enumerate(kinds.tolist()):
         every = np.flatnonzero(number.ravel() == kind)
-        for start in range(0, len(every), BLOCK):
-            at = every[start : start + BLOCK]
+        curved, varying = rest[3:5]
+        most = SMALL_BLOCK if curved or varying or cells.trace.model.extent else BLOCK
+        for start in range(0, len(every), most):
+            at = every[start : start + most]
             kept = problem, cells, displacement, mu, at, own_degree, bool(axis), rest[-3:]
             found.append(_element(*kept))
     return mu, found
