@@ -151,9 +151,9 @@ def _bound(
     whole = [name for name, values in problem.displacement.items() if None not in values]
     cells = cells_of(trace, cuts_of(trace, reaches), loaded, trace.segments(*whole))
     given = given_on(problem, cells)
-    thirds = cells.curved | given.followed(cells)
-    depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, thirds)
-    look = np.column_stack([np.where(depth, PARTED, WHOLE), depth, thirds])
+    least = np.maximum(given.followed(cells), cells.curved)
+    depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, least)
+    look = np.column_stack([np.where(depth, PARTED, WHOLE), depth, least > 0])
     mu, elements = elements_of(problem, cells, displacement, degree, look)
     asked = asked_on_supports(cells, given, displacement)
     of_guides = mu.degree[given.guides]

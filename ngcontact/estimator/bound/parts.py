@@ -152,16 +152,16 @@ def projection(
     return np.concatenate(force), np.concatenate(rest), np.concatenate(size)
 
 
-def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Mask) -> Index:
+def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Index) -> Index:
     """How often triangles (n,) are divided: where forces are not near to polynomials.
 
-    Those of a `degree`, with rules of an `order`; once where `least` (n,) says so.
+    Those of a `degree`, with rules of an `order`; `least` (n,) times at least.
     """
     mesh, n = cells.trace.mesh, len(cells.triangles)
-    found = least.astype(np.intp)
+    found = least.copy()
     if all(numbers(ng.CF(F)) for F in problem.force.values()):
         return found
-    found |= narrow_forces(problem, mesh, cells.trace.order)[cells.parent]
+    found = np.maximum(found, narrow_forces(problem, mesh, cells.trace.order)[cells.parent])
     found[_with_features(problem, cells)] = LEVELS
     for k, F in problem.force.items():
         at = np.flatnonzero(np.array(mesh.Materials(k).Mask())[cells.bodies])
