@@ -23,7 +23,16 @@ from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
 from .cells import Cells, cells_of, places
-from .elements import PARTED, WHOLE, Element, Multipliers, compliance_at, elements_of, rigid_motions
+from .elements import (
+    ON_CURVES,
+    PARTED,
+    WHOLE,
+    Element,
+    Multipliers,
+    compliance_at,
+    elements_of,
+    rigid_motions,
+)
 from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
 from .islands import Level, once_more
 from .lifting import asked_on_line, asked_on_supports, lifted
@@ -143,8 +152,8 @@ def _bound(
     everywhere: bool,
 ) -> Proof:
     """The bound with a p* that acts `everywhere` on the lines, or near to the contact."""
-    order, extent = trace.order, trace.model.extent
-    degree, lift = max(order + 1, 2 + extent), order + LIFTED
+    p, extent = trace.order, trace.model.extent
+    degree, lift = max(p + 1, 2 + extent), p + LIFTED
     reaches = [reach_of(trace, displacement, pair, everywhere) for pair in pairs]
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
     loaded = trace.segments(*problem.traction, problem.sliding, *touching)
@@ -153,7 +162,8 @@ def _bound(
     given = given_on(problem, cells)
     least = np.maximum(given.followed(cells), cells.curved)
     depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, least)
-    look = np.column_stack([np.where(depth, PARTED, WHOLE), depth, least > 0])
+    order = 2 * (degree + ON_CURVES * cells.curved) + np.where(depth, PARTED, WHOLE)
+    look = np.column_stack([order, depth, least > 0])
     mu, elements = elements_of(problem, cells, displacement, degree, look)
     asked = asked_on_supports(cells, given, displacement)
     of_guides = mu.degree[given.guides]

@@ -218,7 +218,7 @@ def elements_of(
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, and their multipliers.
 
-    `look` (n, 3) says by what degree above 2 k rules integrate forces, and on parts of what depth,
+    `look` (n, 3) says by what order rules integrate forces, and on parts of what depth,
     with thirds at corners or not.
     """
     own, mu = multipliers(cells, degree)
@@ -411,12 +411,12 @@ def _tractions(T: Array, normal: Array, chi: Array) -> Array:
 def _forces(F, cells, points, degree, axial, look):
     """Coefficients of the force that is balanced, r F_r, and the norm of the rest."""
     b, q = points.weight.shape
-    n, (bonus, *look) = _force_degree(degree, axial), look
+    n = _force_degree(degree, axial)
     radial = np.zeros((b, q))
     if F is None:
         return np.zeros((b, (n + 1) * (n + 2) // 2, 2)), radial, np.zeros(b)
     parts = slice(1, None) if axial else slice(None)
-    force, missed, size = projection(F, cells, points.at, n, 2 * degree + bonus, *look, parts)
+    force, missed, size = projection(F, cells, points.at, n, *look, parts)
     if axial:
         radial = points.x[..., 0] * points.evaluate(cells, F)[..., 0]
         force[..., 0] = 0.0

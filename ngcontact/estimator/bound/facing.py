@@ -396,9 +396,7 @@ def guides_of(
     )
 
 
-def _after(
-    ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int
-) -> tuple[Array, Mask]:
+def _after(ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int) -> tuple[Array, Mask]:
     """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
 
     And whether `gap` itself is not negative, and stays.

@@ -78,8 +78,8 @@ def once_more(
     """
     c, D = level.distance.copy(), level.loads.copy()
     limit = COUNTS * float(c @ c) if allowed is None else allowed
-    bonus, depth, thirds = level.look.T
-    fine = (depth > 0) | (bonus == WHOLE)  # rules that see more than higher degrees meet
+    rule, depth, thirds = level.look.T
+    fine = (depth > 0) | (rule >= 2 * degree + WHOLE)  # rules that see what higher degrees miss
     for m, third in ((1, False), (PARTS, False), (PARTS, True)):
         lost = (c + D) ** 2 - c**2
         order = np.argsort(lost)
@@ -88,7 +88,9 @@ def once_more(
         for start in range(0, len(some), AT_ONCE):
             here = some[start : start + AT_ONCE]
             share = limit * len(here) / len(some)
-            one, two = _islands(problem, displacement, wanted, level, here, degree, scale, (m, third), share)
+            one, two = _islands(
+                problem, displacement, wanted, level, here, degree, scale, (m, third), share
+            )
             better = one + two < c[here] + D[here]
             c[here[better]], D[here[better]] = one[better], two[better]
     return c, D
@@ -109,7 +111,6 @@ def _islands(
     parts, k = divided(level.cells, at, *division), len(pattern(*division)[1])
     look = np.repeat(level.look[at], k, axis=0)
     n, raised = len(look), degree + RAISED if division[0] == 1 else max(degree, LEAST)
-    look[:, 0] -= 2 * (raised - degree)  # the rule stays
     look[:, 1] -= division[0] > 1
     mu, elements = elements_of(problem, parts, displacement, raised, look)
     rule = along(parts, wanted.given, np.flatnonzero(~parts.inner))

@@ -30,9 +30,7 @@ class StressNorms:
     largest: float
 
 
-def stress_norms(
-    elements: Sequence[Element], coefficients: Sequence[Array], n: int
-) -> StressNorms:
+def stress_norms(elements: Sequence[Element], coefficients: Sequence[Array], n: int) -> StressNorms:
     """Norms of a stress on the n triangles of `elements`."""
     distance, largest = np.zeros(n), 0.0
     for e, c in zip(elements, coefficients, strict=True):

@@ -232,7 +232,9 @@ class DualProgram:
             change = self.T @ solve(np.where(free, left, 0.0))
         shapes = [x.bound.shape for x in self.lines]
         parts = np.split(force, np.cumsum([a * b for a, b in shapes]))[:-1]
-        pressure = [q.reshape(x.mass.shape) / x.mass for q, x in zip(parts, self.lines, strict=True)]
+        pressure = [
+            q.reshape(x.mass.shape) / x.mass for q, x in zip(parts, self.lines, strict=True)
+        ]
         return Balanced(coefficients, pressure)
 
 
