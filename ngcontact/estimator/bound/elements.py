@@ -287,7 +287,7 @@ def elements_of(
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, and their multipliers.
 
-    `look` (n, 3) says by what degree above 2 k rules integrate forces, and on parts of what depth,
+    `look` (n, 3) says by what order rules integrate forces, and on parts of what depth,
     with thirds at corners or not.
     """
     own, mu = multipliers(cells, degree)
@@ -488,12 +488,12 @@ def _forces(
     """Coefficients of the force that is balanced, r F_r, and the norm of the rest."""
     points, n = kind.places, kind.force_degree
     b, q = points.weight.shape
-    (bonus, depth, thirds), radial = look, np.zeros((b, q))
+    radial = np.zeros((b, q))
     if source is None:
         return np.zeros((b, (n + 1) * (n + 2) // 2, 2)), radial, np.zeros(b)
-    parts, order = slice(int(kind.axial), None), 2 * kind.degree + bonus
-    at, rule = points.at, (order, depth, bool(thirds))
-    force, missed, size = projection(source, cells, at, n, *rule, parts)
+    (order, depth, thirds), parts = look, slice(int(kind.axial), None)
+    rule = order, depth, bool(thirds)
+    force, missed, size = projection(source, cells, points.at, n, *rule, parts)
     if kind.axial:
         radial = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
         force[..., 0] = 0.0
