@@ -10,6 +10,7 @@ from .doubts import warn_of_unresolved as warn_of_unresolved
 from .features import Features as Features
 from .features import features_of as features_of
 from .features import look as look
+from .features import touched as touched
 from .integrals import integral_over as integral_over
 from .jumps import jumping_moduli as jumping_moduli
 from .jumps import warn_of_jumps as warn_of_jumps

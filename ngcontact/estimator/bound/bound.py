@@ -152,8 +152,9 @@ def _bound(
     whole = [name for name, values in problem.displacement.items() if None not in values]
     cells = cells_of(trace, cuts_of(trace, reaches), loaded, trace.segments(*whole))
     given = given_on(problem, cells)
-    depth = depths(problem, cells, degree, 2 * degree + PARTED, given.followed(cells))
-    look = np.column_stack([np.where(depth, PARTED, WHOLE), depth])
+    thirds = cells.curved | given.followed(cells)
+    depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, thirds)
+    look = np.column_stack([np.where(depth, PARTED, WHOLE), depth, thirds])
     mu, elements = elements_of(problem, cells, displacement, degree, look)
     asked = asked_on_supports(cells, given, displacement)
     of_guides = mu.degree[given.guides]
@@ -188,7 +189,7 @@ def _bound(
     wanted = requested(problem, cells, given, lines, balanced.pressure)
     missed = missed_tractions(wanted, cells, have, stress.largest)
     loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(elements, n))
-    level = Level(cells, elements, balanced.coefficients, depth, stress.distance, loads)
+    level = Level(cells, elements, balanced.coefficients, look, stress.distance, loads)
     distance, loads = once_more(problem, displacement, wanted, level, degree, scale)
     stress = replace(stress, distance=distance)
     lifts = [(line.facing, line.facing.lift) for line in lines]

@@ -14,6 +14,7 @@ from ...arrays import Array, Index
 from .bound import Proof
 from .cells import Cells
 from .facing import PLACES, WEIGHTS
+from .norms import stress_norms
 from .polynomials import scalars
 
 INSET = 0.1  # of a step of the lattice: it keeps off an axis, where stresses are not defined
@@ -36,10 +37,14 @@ def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
     if any(found.values()):
         told = " and ".join(f"{n} {what}" for what, n in found.items() if n)
         raise ValueError(f"no certificate: {told}; tractions and p* are no polynomials there")
+    own = stress_norms(proof.elements, proof.balanced.coefficients, len(cells.triangles)).distance
+    replaced = np.flatnonzero(proof.stress.distance != own)
     return {
         "axisymmetric": np.array(cells.trace.model.extent > 0),
         "vertices": cells.vertices,
         "triangles": cells.triangles,
+        "replaced": replaced,
+        "replaced_distance": proof.stress.distance[replaced],
         "loads": proof.loads,
         "lifting": proof.lifting,
         "bound": np.array(proof.bound),

@@ -36,7 +36,7 @@ from .polynomials import (
     stresses,
 )
 
-ON_CURVES = 3  # degrees by which stresses on triangles with a curved side are higher
+ON_CURVES = 4  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
 DEFINITE = (1e-15, 1e-14, 1e-13, 1e-12)  # of the diagonal, until it is enough
@@ -179,11 +179,11 @@ class Element(Triangles):
     def answer(self, mu: Array) -> Array:
         """Change of c (b, m) with all multipliers, by `mu` (k,)."""
         y = np.einsum("bmd,bd->bm", self.N, mu[self.dofs])
-        return np.linalg.solve(self.root.transpose(0, 2, 1), y[..., None])[..., 0]
+        return np.asarray(np.linalg.solve(self.root.transpose(0, 2, 1), y[..., None])[..., 0])
 
     def alone(self) -> Array:
         """Coefficients c (b, m) without multipliers."""
-        return np.linalg.solve(self.root.transpose(0, 2, 1), self.g[..., None])[..., 0]
+        return np.asarray(np.linalg.solve(self.root.transpose(0, 2, 1), self.g[..., None])[..., 0])
 
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with coefficients `c` (b, m)."""
@@ -205,7 +205,7 @@ class Element(Triangles):
         )
 
     def whole_stress(self, c: Array) -> Array:
-        """Stresses (b, q, v) at the quadrature points, the radial force's part of the hoop included."""
+        """Stresses (b, q, v) at the quadrature points, with the hoop's part of radial forces."""
         s = self._stress(c, self.places.x, self.local, slice(None))
         if self.axial:
             s[..., 2] += self.radial
@@ -286,7 +286,8 @@ def elements_of(
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, and their multipliers.
 
-    `look` (n, 2) says by what degree above 2 k rules integrate forces, and on parts of what depth.
+    `look` (n, 3) says by what degree above 2 k rules integrate forces, and on parts of what depth,
+    with thirds at corners or not.
     """
     own, mu = multipliers(cells, degree)
     at_axis = np.asarray(cells.trace.model.on_axis(cells.vertices))
@@ -308,7 +309,7 @@ def elements_of(
         every = np.flatnonzero(number.ravel() == kind)
         for start in range(0, len(every), BLOCK):
             at = every[start : start + BLOCK]
-            kept = problem, cells, displacement, mu, at, own_degree, bool(axis), rest[-2:]
+            kept = problem, cells, displacement, mu, at, own_degree, bool(axis), rest[-3:]
             found.append(_element(*kept))
     return mu, found
 
@@ -421,7 +422,7 @@ def _cholesky(A: Array) -> Array:
     """
     for added in (0.0, *DEFINITE):
         try:
-            return np.linalg.cholesky(A + added * np.eye(A.shape[-1]))
+            return np.asarray(np.linalg.cholesky(A + added * np.eye(A.shape[-1])))
         except np.linalg.LinAlgError:
             continue
     raise ContactError("triangles are too thin, or too curved, for an equilibrated stress")
@@ -484,11 +485,12 @@ def _forces(
     """Coefficients of the force that is balanced, r F_r, and the norm of the rest."""
     points, n = kind.places, kind.force_degree
     b, q = points.weight.shape
-    (bonus, depth), radial = look, np.zeros((b, q))
+    (bonus, depth, thirds), radial = look, np.zeros((b, q))
     if source is None:
         return np.zeros((b, (n + 1) * (n + 2) // 2, 2)), radial, np.zeros(b)
     parts, order = slice(int(kind.axial), None), 2 * kind.degree + bonus
-    force, missed, size = projection(source, cells, points.at, n, order, depth, parts)
+    at, rule = points.at, (order, depth, bool(thirds))
+    force, missed, size = projection(source, cells, at, n, *rule, parts)
     if kind.axial:
         radial = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
         force[..., 0] = 0.0

@@ -17,15 +17,16 @@ import numpy as np
 from ...arrays import Array, Index
 from ...problem import Problem
 from .cells import Cells
-from .elements import PARTED, WHOLE, Element, elements_of
+from .elements import Element, elements_of
 from .missed import data_norms
 from .norms import SETTLED, forces_missed, residuals, smallest_moduli, stress_norms
 from .parts import PARTS, divided, pattern
 from .program import dual_program, exerted
 from .tractions import ROUND_OFF, Requested, along, on_segments, tractions_of
 
-COUNTS = 0.005  # share of B^2 that may be lost by data where nothing is balanced once more
-RAISED = (WHOLE - PARTED) // 2  # degrees on whole triangles, where the rule stays
+COUNTS = 0.02  # of |s - sigma_h|^2, what may be added by data where nothing is balanced again
+RAISED = 3  # degrees on whole triangles
+LEAST = 3  # degree on parts: lower ones do not meet all tractions
 AT_ONCE = 200  # triangles
 
 
@@ -39,8 +40,8 @@ class Level:
     elements : list of Element
     coefficients : list of ndarray (b, m)
         Of the stress.
-    depth : ndarray of int (n,)
-        How often each is divided for the rules of forces.
+    look : ndarray of int (n, 3)
+        Rules of forces on each, as of `elements_of`.
     distance, loads : ndarray (n,)
         |s - sigma_h|, and norms of what s misses of the data.
     """
@@ -48,7 +49,7 @@ class Level:
     cells: Cells
     elements: list[Element]
     coefficients: list[Array]
-    depth: Index
+    look: Index
     distance: Array
     loads: Array
 
@@ -73,20 +74,25 @@ def once_more(
     scale : float
         The largest stress, beside which equilibrium is measured.
     allowed : float, optional
-        Of B^2 that may be lost; of the whole mesh without.
+        What may be added to B^2; for the whole mesh without.
     """
     c, D = level.distance.copy(), level.loads.copy()
     lost = (c + D) ** 2 - c**2
     top = allowed is None
-    limit = COUNTS * float(((c + D) ** 2).sum()) if allowed is None else allowed
+    limit = COUNTS * float(c @ c) if allowed is None else allowed
     order = np.argsort(lost)
     at = np.sort(order[np.cumsum(lost[order]) > limit])
-    for m in (1, PARTS) if top else (PARTS,):
-        some = at[(level.depth[at] == 0) == (m == 1)]
+    whole, thirds = level.look[:, 1] == 0, level.look[:, 2] > 0
+    for m, third in ((1, False), (PARTS, False), (PARTS, True)):
+        some = at[(whole == (m == 1))[at] & (whole | (thirds == third))[at]]
+        if m == 1 and not top:
+            continue
         for start in range(0, len(some), AT_ONCE):
             here = some[start : start + AT_ONCE]
             share = limit * len(here) / len(some)
-            one, two = _islands(problem, displacement, wanted, level, here, degree, scale, m, share)
+            one, two = _islands(
+                problem, displacement, wanted, level, here, degree, scale, (m, third), share
+            )
             better = one + two < c[here] + D[here]
             c[here[better]], D[here[better]] = one[better], two[better]
     return c, D
@@ -100,14 +106,15 @@ def _islands(
     at: Index,
     degree: int,
     scale: float,
-    m: int,
+    division: tuple[int, bool],
     allowed: float,
 ) -> tuple[Array, Array]:
-    """Norms (b,) on triangles `at` (b,) in m^2 parts; infinite where there is no equilibrium."""
-    parts, k = divided(level.cells, at, m), len(pattern(m)[1])
-    depth = np.repeat(np.maximum(level.depth[at] - 1, 0), k)
-    look = np.column_stack([np.full(len(depth), PARTED), depth])
-    raised = degree + (RAISED if m == 1 else 0)
+    """Norms (b,) on triangles `at` (b,) in parts; infinite where there is no equilibrium."""
+    parts, k = divided(level.cells, at, *division), len(pattern(*division)[1])
+    look = np.repeat(level.look[at], k, axis=0)
+    n, raised = len(look), degree + RAISED if division[0] == 1 else max(degree, LEAST)
+    look[:, 0] -= 2 * (raised - degree)  # the rule stays
+    look[:, 1] = np.maximum(look[:, 1] - 1, 0)
     mu, elements = elements_of(problem, parts, displacement, raised, look)
     rule = along(parts, wanted.given, np.flatnonzero(~parts.inner))
     owner = parts.owner[rule.side]
@@ -122,15 +129,15 @@ def _islands(
     program = dual_program(mu, elements, np.zeros(len(moments), dtype=bool), nothing, [])
     found = program.nearest(elements, moments).coefficients
     left = residuals(parts, mu, moments - exerted(elements, found)[0], scale)
-    norms = stress_norms(elements, found, len(depth))
+    norms = stress_norms(elements, found, n)
     have = tractions_of(elements, found, owner, rule.x, rule.normal)
     miss = np.where(np.abs(asked - have) <= ROUND_OFF * scale, 0.0, asked - have)
-    forces, moduli = forces_missed(elements, len(depth)), smallest_moduli(elements, len(depth))
+    forces, moduli = forces_missed(elements, n), smallest_moduli(elements, n)
     data = data_norms(parts, forces, rule.norms(parts, miss), moduli)
-    finer = Level(parts, elements, found, depth, norms.distance, data)
+    finer = Level(parts, elements, found, look, norms.distance, data)
     both = finer.distance, finer.loads
-    if depth.any():
-        both = once_more(problem, displacement, wanted, finer, degree, scale, allowed)
+    if look[:, 1].any():
+        both = once_more(problem, displacement, wanted, finer, raised, scale, allowed)
     settled = left.reshape(-1, k).max(axis=1) <= SETTLED
     one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
     return np.where(settled, one, np.inf), np.where(settled, two, np.inf)

@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays import Array, Index, Mask
 from ...fem import narrow_forces
 from ...problem import Problem
-from ...quadrature import numbers
+from ...quadrature import View, features_of, numbers, touched
 from .cells import Cells, joined, places
 from .polynomials import frame_of, projected, scalars
 
@@ -22,8 +22,8 @@ AT_ONCE = 200_000  # points at which forces are looked at together
 
 
 @lru_cache
-def pattern(m: int) -> tuple[Array, Index, Index, Array]:
-    """The m^2 equal parts of a triangle; those at its corners in three about their middles, m > 1.
+def pattern(m: int, thirds: bool) -> tuple[Array, Index, Index, Array]:
+    """The m^2 equal parts of a triangle; those at its corners in `thirds` about their middles.
 
     There given tractions may be those of no symmetric stress. Side 0 of a part is the one that lies
     on the triangle's, where one does.
@@ -45,7 +45,7 @@ def pattern(m: int) -> tuple[Array, Index, Index, Array]:
     for i, j in at:
         if i + j < m:
             up = [at[i, j], at[i + 1, j], at[i, j + 1]]
-            if m > 1 and any(max(vertices[v]) == m for v in up):
+            if thirds and any(max(vertices[v]) == m for v in up):
                 vertices.append(tuple(np.mean([vertices[v] for v in up], axis=0)))
                 middle = len(vertices) - 1
                 found += [[middle, up[1], up[2]], [middle, up[2], up[0]], [middle, up[0], up[1]]]
@@ -71,9 +71,12 @@ def pattern(m: int) -> tuple[Array, Index, Index, Array]:
     return shares, corners, outer, along
 
 
-def divided(cells: Cells, at: Index, m: int = PARTS) -> Cells:
-    """Triangles `at` (b,) in parts, those of each together; no two share a vertex."""
-    shares, corners, outer, along = pattern(m)
+def divided(cells: Cells, at: Index, m: int, thirds: bool) -> Cells:
+    """Triangles `at` (b,) in parts, those of each together; no two share a vertex.
+
+    See `pattern`.
+    """
+    shares, corners, outer, along = pattern(m, thirds)
     b, p, k = len(at), len(shares), len(corners)
     x = np.einsum("pc,bcd->bpd", shares, cells.corners[at])
     bent = np.flatnonzero(cells.curved[at])
@@ -101,7 +104,7 @@ def divided(cells: Cells, at: Index, m: int = PARTS) -> Cells:
 
 
 def looked_at(
-    F: ng.CoefficientFunction, cells: Cells, at: Index, order: int, depth: int
+    F: ng.CoefficientFunction, cells: Cells, at: Index, order: int, depth: int, thirds: bool
 ) -> tuple[Array, Array, Array]:
     """Points (b, q, 2), weights (b, q) and values (b, q, dim) of F in triangles `at` (b,).
 
@@ -111,13 +114,13 @@ def looked_at(
         points = places(cells, at, order)
         measure = cells.trace.model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
         return points.x, points.weight * measure, points.evaluate(cells, F)
-    parts = divided(cells, at)
+    parts = divided(cells, at, PARTS, thirds)
     found = []
     for curved in (False, True):
         some = np.flatnonzero(parts.curved == curved)
         if some.size:
-            values = looked_at(F, parts, some, order, depth - 1)
-            found.append([z.reshape(len(at), -1, *z.shape[2:]) for z in values])
+            own = looked_at(F, parts, some, order, depth - 1, thirds)
+            found.append([z.reshape(len(at), -1, *z.shape[2:]) for z in own])
     x, weight, values = (np.concatenate(z, axis=1) for z in zip(*found, strict=True))
     return x, weight, values
 
@@ -129,17 +132,20 @@ def projection(
     degree: int,
     order: int,
     depth: int,
-    components: slice = slice(None),
+    thirds: bool,
+    components: slice,
 ) -> tuple[Array, Array, Array]:
-    """Coefficients (b, m, 2) of polynomials of a degree near to F, norms (b,) of the rest, and of F.
+    """Coefficients (b, m, 2) of polynomials near to F, norms (b,) of the rest, and of F.
 
     In triangles `at` (b,) as of `looked_at`; norms of some `components`, times the measure.
     """
-    force, rest, size = [], [], []
-    step = max(1, AT_ONCE // (len(pattern(PARTS)[1]) ** depth * (order // 2 + 1) ** 2))
+    force: list[Array] = []
+    rest: list[Array] = []
+    size: list[Array] = []
+    step = max(1, AT_ONCE // (len(pattern(PARTS, thirds)[1]) ** depth * (order // 2 + 1) ** 2))
     for start in range(0, len(at), step):
         some = at[start : start + step]
-        x, weight, values = looked_at(F, cells, some, order, depth)
+        x, weight, values = looked_at(F, cells, some, order, depth, thirds)
         frame = frame_of(cells.corners[some])
         force.append(projected(degree, frame, x, weight, values))
         left = (values - scalars(degree, frame, x) @ force[-1])[..., components]
@@ -152,49 +158,63 @@ def projection(
 def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Mask) -> Index:
     """How often triangles (n,) are divided: where forces are not near to polynomials.
 
-    With stresses of a `degree`, by rules of an `order`; once at least on curves, and where `least`
-    (n,) says so.
+    Those of a `degree`, with rules of an `order`; once where `least` (n,) says so.
     """
     mesh = cells.trace.mesh
-    found = (least | cells.curved).astype(np.intp)
+    found = least.astype(np.intp)
     if all(numbers(ng.CF(F)) for F in problem.force.values()):
         return found
-    degree -= 1 + cells.trace.model.extent
-    narrow = narrow_forces(problem, mesh, cells.trace.order)[cells.parent]
-    bodies = [
-        (ng.CF(F), np.flatnonzero(np.array(mesh.Materials(k).Mask())[cells.bodies]))
-        for k, F in problem.force.items()
-    ]
-
-    def of(cells: Cells, at: Index, F: ng.CoefficientFunction, least: float, level: int) -> Index:
-        depth, rest, size = np.zeros((3, len(at)))
-        axial = slice(cells.trace.model.extent, None)
-        for curved in (False, True):
-            some = np.flatnonzero(cells.curved[at] == curved)
-            if some.size:
-                _, rest[some], size[some] = projection(F, cells, at[some], degree, order, 0, axial)
-        area = np.abs(np.linalg.det(cells.corners[at][:, 1:] - cells.corners[at][:, :1])) / 2
-        rest, size = rest / np.sqrt(area), size / np.sqrt(area)
-        least = max(least, SMOOTH * size.max(initial=0.0))
-        rough = rest > least
-        if level == LEVELS:
-            rough |= narrow[at]
-        else:
-            largest = np.sort(area * rest**2)[::-1]
-            enough = np.searchsorted(np.cumsum(largest), (1 - LEFT) * largest.sum())
-            rough &= area * rest**2 >= largest[min(enough, len(largest) - 1)]
-        if not rough.any():
-            return depth.astype(np.intp)
-        depth[rough] = 1
-        if level > 1:
-            parts = divided(cells, at[rough])
-            inner = of(parts, np.arange(len(parts.triangles)), F, least, level - 1)
-            depth[rough] += inner.reshape(rough.sum(), -1).max(axis=1)
-            if level == LEVELS:
-                depth[narrow[at]] = LEVELS
-        return depth.astype(np.intp)
-
-    for F, at in bodies:
-        if not numbers(F):
-            found[at] = np.maximum(found[at], of(cells, at, F, 0.0, LEVELS))
+    found |= narrow_forces(problem, mesh, cells.trace.order)[cells.parent]
+    found[_with_features(problem, cells)] = LEVELS
+    for k, F in problem.force.items():
+        at = np.flatnonzero(np.array(mesh.Materials(k).Mask())[cells.bodies])
+        if not numbers(F) and at.size:
+            asked = found[at]
+            found[at] = _depths(ng.CF(F), cells, at, asked, (degree, order), LEVELS, 0.0)
     return found
+
+
+def _with_features(problem: Problem, cells: Cells) -> Mask:
+    """Triangles (n,) in elements with features of forces that points of their parts may not see."""
+    mesh = cells.trace.mesh
+    view, found = View(mesh, 2), np.zeros(mesh.ne, dtype=bool)
+    for one in features_of(problem, mesh):
+        if one.kind == "force" and len(one.places):
+            spots = np.column_stack([one.places, one.widths])
+            at, feature = touched(spots, view, np.arange(mesh.ne))
+            found[at[view.sizes[at] > PARTS * one.widths[feature]]] = True
+    return found[cells.parent]
+
+
+def _depths(
+    F: ng.CoefficientFunction,
+    cells: Cells,
+    at: Index,
+    asked: Index,
+    rule: tuple[int, int],
+    levels: int,
+    least: float,
+) -> Index:
+    """Depths (b,) of triangles `at` (b,) for one force, `asked` (b,) ones at least."""
+    rest, size = np.zeros((2, len(at)))
+    axial = slice(cells.trace.model.extent, None)
+    for curved in (False, True):
+        some = np.flatnonzero(cells.curved[at] == curved)
+        if some.size:
+            _, rest[some], size[some] = projection(F, cells, at[some], *rule, 0, False, axial)
+    corners = cells.corners[at]
+    area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
+    least = max(least, SMOOTH * float((size / np.sqrt(area)).max(initial=0.0)))
+    rough = rest > least * np.sqrt(area)
+    if levels < LEVELS:  # what is left counts
+        order = np.argsort(rest)
+        enough = np.cumsum(rest[order] ** 2) > LEFT * (rest @ rest)
+        rough[order[~enough]] = False
+    depth = np.maximum(asked, rough)
+    some = np.flatnonzero((depth > 0) & (asked < levels))
+    if levels > 1 and some.size:
+        parts = divided(cells, at[some], PARTS, False)
+        every = np.arange(len(parts.triangles))
+        inner = _depths(F, parts, every, 0 * every, rule, levels - 1, least)
+        depth[some] = 1 + inner.reshape(len(some), -1).max(axis=1)
+    return depth

@@ -219,9 +219,10 @@ def projected(degree: int, frame: Frame, x: Array, weight: Array, values: Array)
     At quadrature points `x` (b, q, 2) with `weight` (b, q).
     """
     P = scalars(degree, frame, x)
-    root = np.sqrt(weight)[..., None]
-    q, R = np.linalg.qr(root * P)
-    return np.asarray(np.linalg.solve(R, q.transpose(0, 2, 1) @ (root * values)))
+    weighted = P.transpose(0, 2, 1) * weight[:, None]
+    mass = weighted @ P
+    found = np.linalg.solve(mass, weighted @ values)
+    return np.asarray(found + np.linalg.solve(mass, weighted @ (values - P @ found)))
 
 
 def scalars(degree: int, frame: Frame, x: Array) -> Array:

@@ -39,7 +39,7 @@ from .facing import PLACES, Facing, bernstein
 FALLING = 0.5  # ratio of two residuals from which more corrections take nothing off
 ROUND_OFF = 1e-13  # of tractions, relative to the largest: nothing to correct
 QUADRATURE = 1e-4  # of loads on motions that nothing resists, relative to the largest
-DEFINITE = 1e-13  # of the diagonal, added to what is factorised: vertices where tractions depend
+DEFINITE = 1e-12  # of the diagonal, added to what is factorised: vertices where tractions depend
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,12 +131,18 @@ class DualProgram:
 
     def nearest(self, elements: Sequence[Element], moments: Array) -> Balanced:
         """The stress and the p* >= 0 that minimise B^2 for given tractions, `moments` (d,)."""
-        alone, _ = exerted(elements, [e.alone() for e in elements])
+        alone, largest = exerted(elements, [e.alone() for e in elements])
         moments = self._resisted(moments, moments - alone)
-        program = replace(self.program, b=self.T.T @ (moments - alone))
+        load = moments - alone
+        load[np.abs(load) <= ROUND_OFF * largest] = 0.0  # no load where tractions depend
+        program = replace(self.program, b=self.T.T @ load)
         closed = [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines]
+        if not closed:  # one system, which need not be definite
+            none = np.zeros(0, dtype=bool)
+            start = np.zeros_like(program.b), np.zeros(0)
+            return self._balanced(elements, moments, start, none, none)
         self.systems.restart(program)
-        active = minimise(self.systems, np.concatenate([np.zeros(0, bool), *closed])).active
+        active = minimise(self.systems, np.concatenate(closed)).active
         while True:  # any p* >= 0 proves a bound: coefficients below 0 by round-off become 0
             y, force = _refined(self.systems, active)
             pulling = (force < 0) & ~program.equality
@@ -161,10 +167,11 @@ class DualProgram:
             b = load.copy()
             b[program.unknown[~free]] -= force[~free]
             self.systems.restart(replace(program, b=b))
-            y, found = _refined(self.systems, free)
-            force[free] = found[free]
+            force[free] = self.systems.solve(free)[1][free]
             over = free & (np.abs(force) > limit)
             if not over.any():
+                y, found = _refined(self.systems, free)
+                force[free] = found[free]
                 return self._balanced(elements, moments, (y, force), free, -limit, limit)
             force[over] = np.sign(force[over]) * limit[over]
             free = free & ~over
@@ -185,9 +192,9 @@ class DualProgram:
         return np.asarray(lineal @ np.linalg.solve(lineal.T @ lineal, lineal.T @ load))
 
     def _resisted(self, moments: Array, load: Array) -> Array:
-        """Given tractions, `moments` (d,), without the idle part of the `load` (d,) that they are of.
+        """Given tractions, `moments` (d,), without the idle part of the `load` (d,).
 
-        That is the error of quadrature, and round-off.
+        That part is the error of quadrature, and round-off.
         """
         idle = self.idle(load)
         if np.abs(idle).max() > QUADRATURE * np.abs(load).max():

@@ -181,7 +181,7 @@ class Requested:
     pressed: dict[int, Array]
 
     def values(self, segment: Index, s: Array) -> tuple[Array, Mask]:
-        """Tractions (m, j, 2) at `s` (m, j) of segments (m,), and components (m, 2) that are held."""
+        """Tractions (m, j, 2) at `s` (m, j) of segments (m,), and held components (m, 2)."""
         cells, total = self.cells, np.zeros((*s.shape, 2))
         side = cells.side_at(segment, s[:, s.shape[1] // 2])
         every = np.repeat(segment, s.shape[1])

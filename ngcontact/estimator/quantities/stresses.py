@@ -75,9 +75,9 @@ def _jumps(mesh: ng.Mesh, points: Array, mises: Array) -> Array:
     least = SAME * float(np.ptp(view.corners, axis=1).max(axis=1).min())
     key = np.round(points / least).astype(np.int64)
     key = np.column_stack([key, np.repeat(body, len(LATTICE))])
-    _, number = np.unique(key, axis=0, return_inverse=True)
-    number = number.ravel()
-    low, high = (np.full(number.max() + 1, x) for x in (np.inf, -np.inf))
-    np.minimum.at(low, number, mises)
-    np.maximum.at(high, number, mises)
-    return np.asarray((high - low)[number])
+    order = np.lexsort(key.T)
+    first = np.append(True, (np.diff(key[order], axis=0) != 0).any(axis=1))
+    start, found = np.flatnonzero(first), np.empty(len(mises))
+    low, high = (f.reduceat(mises[order], start) for f in (np.minimum, np.maximum))
+    found[order] = (high - low)[np.cumsum(first) - 1]
+    return found
