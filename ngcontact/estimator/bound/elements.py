@@ -428,7 +428,10 @@ def _cholesky(A: Array) -> Array:
             return np.asarray(np.linalg.cholesky(A + added * np.eye(A.shape[-1])))
         except np.linalg.LinAlgError:
             continue
-    raise ContactError("triangles are too thin, or too curved, for an equilibrated stress")
+    raise ContactError(
+        "no equilibrated stress: triangles are too thin or too curved, or a law is too stiff in one "
+        "direction; use error_estimate"
+    )
 
 
 def _moments(cells: Cells, mu: Multipliers, kind: Triangles, force: Array) -> tuple[Array, Array]:
