@@ -429,8 +429,8 @@ def _cholesky(A: Array) -> Array:
         except np.linalg.LinAlgError:
             continue
     raise ContactError(
-        "no equilibrated stress: triangles are too thin or too curved, or a law is too stiff in one "
-        "direction; use error_estimate"
+        "no equilibrated stress: triangles are too thin or too curved, or a law is too stiff in "
+        "one direction; use error_estimate"
     )
 
 
