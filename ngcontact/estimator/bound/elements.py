@@ -32,7 +32,7 @@ ROUGH = 1e-4  # of a load on a triangle, that stresses of the usual degree may m
 ROUGH_RULE = (8, 4)  # order and parts of the quadrature of such loads
 BONUS = 10  # orders of that of others
 ON_ROUGH = 3  # degrees by which they are higher where they miss more
-ON_CURVES = 3  # degrees by which stresses on triangles with a curved side are higher
+ON_CURVES = 4  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 DEFINITE = (1e-15, 1e-14, 1e-13, 1e-12)  # of the diagonal, until it is enough
 ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
@@ -246,6 +246,13 @@ def _rough(problem: Problem, cells: Cells, degree: int, looked: bool) -> Mask:
         rest = P - chi @ (chi.T @ (w[:, None] * P))
         miss, size = (np.einsum("q,sqc->s", w, f**2) for f in (rest, P))
         rough[cells.owner[side[miss > ROUGH**2 * size]]] = True
+    # Directions of contact and of guides that are not the normals of the mesh.
+    sides = [name for c in problem.contact if c.direction is None for name in (c.secondary, c.primary)]
+    side = np.flatnonzero(np.isin(cells.segment, cells.trace.segments(*sides, problem.sliding)))
+    segment, s = cells.on_side(np.tile(side, 2), np.repeat([0.0, 1.0], len(side)))
+    turn = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
+    turned = np.linalg.norm(turn, axis=1).reshape(2, -1).max(axis=0) > ROUGH
+    rough[cells.owner[side[turned & ~cells.bent[side]]]] = True
     return rough
 
 
