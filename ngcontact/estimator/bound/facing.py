@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import ngsolve as ng
 import numpy as np
@@ -27,6 +28,8 @@ STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of 
 PLACES, WEIGHTS = gauss(2 * DATA)
 THROUGH = np.linalg.inv(lagrange(DATA, PLACES))  # from values there to Gauss-Lobatto points
 SAMPLES = 200  # places on a segment among which the last zero of the gap is sought
+
+End: TypeAlias = tuple[int, float, int]  # segment, s, 1 where contact lies towards s = 0 or -1
 
 
 def bernstein(degree: int, t: Array) -> Array:
@@ -74,11 +77,8 @@ def met(
 
 def cuts_of(
     trace: BoundaryTrace, displacement: ng.CoefficientFunction, pairs: Sequence[ContactState]
-) -> tuple[dict[int, Array], list[dict[int, tuple[float, int]]]]:
-    """Places s of vertices to come, by segment; where contact ends.
-
-    The latter pair by pair as (s, sign): contact lies towards s = 0 for the sign 1.
-    """
+) -> tuple[dict[int, Array], list[list[End]]]:
+    """Places s of vertices to come, by segment; where contact ends, pair by pair."""
     cuts: dict[int, list[float]] = {}
     every = []
     length = trace.lengths(np.arange(len(trace.region)))
@@ -97,8 +97,8 @@ def cuts_of(
         line, contact = pair.line, pair.line.contact
         ends = _ends(trace, displacement, pair)
         every.append(ends)
-        k = np.array(list(ends), dtype=np.intp)
-        s = np.array([s for s, _ in ends.values()])
+        k = np.array([segment for segment, _, _ in ends], dtype=np.intp)
+        s = np.array([place for _, place, _ in ends])
         keep(k, s, k)
         if contact.primary is not None:
             parts = divided(trace, contact, line.segments, line.facing)
@@ -122,24 +122,20 @@ def _inside(s: Array) -> Array:
 
 def _ends(
     trace: BoundaryTrace, displacement: ng.CoefficientFunction, pair: ContactState
-) -> dict[int, tuple[float, int]]:
+) -> list[End]:
     """Where contact ends inside segments that face the other body, away from their vertices."""
-    line, found = pair.line, {}
-    if line.contact.bilateral:
-        return {}
+    line, found = pair.line, []
     active = np.append(pair.active, False)[line.rows]
     places = trace.places(line.segments)
-    turns = np.diff(active.astype(int), axis=1)
-    for i in np.flatnonzero((np.abs(turns).sum(axis=1) == 1) & line.faces):
-        j = int(np.flatnonzero(turns[i])[0])
-        sign = -int(turns[i, j])
+    turns = np.diff(active.astype(int), axis=1) * line.faces[:, None]
+    for i, j in zip(*np.nonzero(turns * (not line.contact.bilateral)), strict=True):
         s = np.linspace(places[i, j], places[i, j + 1], SAMPLES)
         gap = met(trace, displacement, pair, np.full(SAMPLES, line.segments[i]), s).gap
-        below = np.flatnonzero(gap < 0)
-        edge = (s[below[-1]] if below.size else s[0]) if sign > 0 else (s[below[0]] if below.size else s[-1])
-        at = float(edge + sign * MARGIN)
+        sign = -int(turns[i, j])
+        inside = np.append(s[gap < 0], s[0 if sign > 0 else -1])
+        at = float(sign * (sign * inside).max() + sign * MARGIN)
         if APART < at < 1 - APART:
-            found[int(line.segments[i])] = (at, sign)
+            found.append((int(line.segments[i]), at, sign))
     return found
 
 
@@ -199,7 +195,7 @@ def facing_of(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     pair: ContactState,
-    ends: dict[int, tuple[float, int]],
+    ends: Sequence[End],
     degree: int,
     held: Array,
     share: float,
@@ -236,9 +232,11 @@ def facing_of(
     order = np.argsort(line.segments)
     local = order[np.searchsorted(line.segments[order], cells.segment[side])]
     closed = np.append(pair.active, False)[line.rows[local]].all(axis=1)
-    for k, (at, sign) in ends.items():
-        on = cells.segment[side] == k
-        closed[on] = (cells.span[side[on]].mean(axis=1) < at) == (sign > 0)
+    middle, nearest = cells.span[side].mean(axis=1), np.full(len(side), np.inf)
+    for k, at, sign in ends:
+        away = middle - at
+        on = (cells.segment[side] == k) & (np.abs(away) < nearest)
+        closed[on], nearest[on] = away[on] * sign < 0, np.abs(away[on])
     closed = closed | contact.bilateral
     shares, stiff = _shares(cells, side, other, there, d, held, share)
     noise = ROUND_OFF * np.abs(cells.vertices).max()
