@@ -76,9 +76,15 @@ def met(
 
 
 def cuts_of(
-    trace: BoundaryTrace, displacement: ng.CoefficientFunction, pairs: Sequence[ContactState]
+    trace: BoundaryTrace,
+    displacement: ng.CoefficientFunction,
+    pairs: Sequence[ContactState],
+    more: Sequence[float] = (),
 ) -> tuple[dict[int, Array], list[list[End]]]:
-    """Places s of vertices to come, by segment; where contact ends, pair by pair."""
+    """Places s of vertices to come, by segment; where contact ends, pair by pair.
+
+    There are `more` of them on each segment of a secondary.
+    """
     cuts: dict[int, list[float]] = {}
     every = []
     length = trace.lengths(np.arange(len(trace.region)))
@@ -98,7 +104,8 @@ def cuts_of(
         ends = _ends(trace, displacement, pair)
         every.append(ends)
         k = np.array([segment for segment, _, _ in ends], dtype=np.intp)
-        s = np.array([place for _, place, _ in ends])
+        k = np.append(k, np.repeat(line.segments, len(more)))
+        s = np.array([*(place for _, place, _ in ends), *(len(line.segments) * list(more))])
         keep(k, s, k)
         if contact.primary is not None:
             parts = divided(trace, contact, line.segments, line.facing)
