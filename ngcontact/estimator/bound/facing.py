@@ -21,7 +21,7 @@ from .cells import Cells
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
 ROUND_OFF = 1e-14  # of gaps, relative to coordinates
-NEAR = 4e-3  # of a segment: vertices that face each other up to that are one; no point of `PLACES` lies between them
+NEAR = 1e-3  # of a segment: vertices that face each other up to that are one; no point of `PLACES` lies between them
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
 STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
@@ -91,13 +91,9 @@ def cuts_of(
     size = np.full(trace.space.ndof, np.inf)  # shortest segment at each vertex
     np.minimum.at(size, trace.nodes[:, [0, -1]], length[:, None])
 
-    def keep(k: Index, s: Array, other: Index) -> None:
-        """Cut segments `k` (r,) at `s` (r,) but beside a vertex that all but faces one of `other`."""
-        end = trace.nodes[k, np.where(s < 0.5, 0, -1)]
-        near = NEAR * np.minimum(size[end], size[trace.nodes[other][:, [0, -1]]].min(axis=1))
-        apart = np.minimum(s, 1 - s) * length[k] > near
-        for number, place in zip(k[apart].tolist(), s[apart].tolist(), strict=True):
-            cuts.setdefault(number, []).append(place)
+    def nearest(k: Index, s: Array) -> tuple[Index, Array]:
+        """The vertices (r,) that are the nearer ends of segments (r,), and how far they are."""
+        return trace.nodes[k, np.where(s < 0.5, 0, -1)], np.minimum(s, 1 - s) * length[k]
 
     for pair in pairs:
         line, contact = pair.line, pair.line.contact
@@ -106,17 +102,31 @@ def cuts_of(
         k = np.array([segment for segment, _, _ in ends], dtype=np.intp)
         k = np.append(k, np.repeat(line.segments, len(more)))
         s = np.array([*(place for _, place, _ in ends), *(len(line.segments) * list(more))])
-        keep(k, s, k)
+        kept = np.ones(len(k), dtype=bool)
         if contact.primary is not None:
             parts = divided(trace, contact, line.segments, line.facing)
-            own = np.tile(line.segments[parts.local], 2)
-            places = np.append(parts.start, parts.stop)
-            keep(own, places, np.tile(parts.facing, 2))
-            k, s = np.append(k, own), np.append(s, places)
+            k = np.append(k, np.tile(line.segments[parts.local], 2))
+            s = np.concatenate([s, parts.start, parts.stop])
             d = directions(trace, contact, k, s)
             there, t, *_ = partners(trace, line.facing, k, trace.point(k, s), d)
-            met = there >= 0
-            keep(there[met], t[met], k[met])
+            own, away = nearest(k, s)
+            other, beyond = nearest(there, t)
+            size_of_both = np.minimum(size[own], size[other])
+            near = np.maximum(away, beyond) <= NEAR * size_of_both
+            # Whether two vertices are one, the place decides that the secondary's faces.
+            corner = (s <= SAME) | (s >= 1 - SAME)
+            same = set(zip(own[near & corner].tolist(), other[near & corner].tolist(), strict=True))
+            apart = set(own[~near & corner & (there >= 0)].tolist())
+            about = np.maximum(away, beyond) <= 2 * NEAR * size_of_both
+            one = [
+                (a, b) in same or (n and a not in apart)
+                for a, b, n in zip(own.tolist(), other.tolist(), near.tolist(), strict=True)
+            ]
+            kept = ~(about & np.array(one, dtype=bool)) | (there < 0)
+            for number, place in zip(there[kept & (there >= 0)].tolist(), t[kept & (there >= 0)].tolist(), strict=True):
+                cuts.setdefault(number, []).append(place)
+        for number, place in zip(k[kept].tolist(), s[kept].tolist(), strict=True):
+            cuts.setdefault(number, []).append(place)
     inside = {k: _inside(np.array(s)) for k, s in cuts.items()}
     return {k: s for k, s in inside.items() if s.size}, every
 
