@@ -24,6 +24,7 @@ ROUND_OFF = 1e-14  # of gaps, relative to coordinates
 NEAR = 1e-3  # of a segment: vertices that face each other up to that are one; no point of `PLACES` lies between them
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
+NARROW = 0.1  # of the sides beside it, a side between them on which r does not change
 STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
 PLACES, WEIGHTS = gauss(2 * DATA)
 THROUGH = np.linalg.inv(lagrange(DATA, PLACES))  # from values there to Gauss-Lobatto points
@@ -235,6 +236,7 @@ def facing_of(
     every = keep.repeat(j)
     if contact.primary is not None and (found.gap[faces & ~every] < 0).any():
         raise ContactError("bodies overlap where a side of the mesh faces the other in part")
+    slots = side[~keep]
     side, segment, s = side[keep], segment[every], s[every]
     gap, d = found.gap[every].reshape(-1, j), found.direction[every].reshape(-1, j, 2)
     other, there = np.full(len(side), -1), np.zeros((len(side), j))
@@ -257,7 +259,8 @@ def facing_of(
     closed = closed | contact.bilateral
     shares, stiff = _shares(cells, side, other, there, d, held, share)
     noise = ROUND_OFF * np.abs(cells.vertices).max()
-    after, bare = _after(cells.ends[side], gap, closed, stiff, degree, noise)
+    ends_of = _across(cells, slots, side)[cells.ends[side]]
+    after, bare = _after(ends_of, gap, closed, stiff, degree, noise)
     if contact.bilateral:
         after, bare = np.zeros_like(after), np.zeros_like(bare)
     kept = side, other, there, d, weight, gap, after, bare, closed, shares
@@ -291,6 +294,17 @@ def held_motions(cells: Cells, sides: Sequence[Index], directions: Sequence[Arra
 def _at_ends(values: Array) -> Array:
     """Functions (k, j, c) at the Gauss points of sides: at their ends, (k, 2, c)."""
     return np.einsum("ej,kjc->kec", THROUGH[[0, -1]], values)
+
+
+def _across(cells: Cells, slots: Index, side: Index) -> Index:
+    """A vertex for each (nv,): one for both ends of `slots` (r,) that are far shorter than sides."""
+    number = np.arange(len(cells.vertices))
+    length = np.linalg.norm(np.diff(cells.vertices[cells.ends], axis=1)[:, 0], axis=1)
+    beside = np.zeros(len(number))
+    np.maximum.at(beside, cells.ends[side], length[side, None])
+    for a, b in cells.ends[slots[length[slots] < NARROW * beside[cells.ends[slots]].min(axis=1)]]:
+        number[number == number[b]] = number[a]
+    return number
 
 
 def _shares(
