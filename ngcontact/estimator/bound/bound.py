@@ -21,13 +21,16 @@ from ...arrays import Array
 from ...contact import ContactState
 from ...errors import ContactError, ConvergenceError
 from ...fem import BoundaryTrace
+from ...lagrange import lagrange_derivative
 from ...problem import Problem
 from .cells import Cells, cells_of, places
 from .elements import Element, Multipliers, compliance_at, rigid_motions
 from .elements import elements as elements_of
 from .facing import (
+    DATA,
     PLACES,
     ROUND_OFF,
+    THROUGH,
     WEIGHTS,
     Facing,
     bernstein,
@@ -36,11 +39,11 @@ from .facing import (
     guides_of,
     held_motions,
 )
-from .lifting import NOISE, _carried, asked_on_contact, asked_on_supports, lifting_of
+from .lifting import NOISE, _carried, _inverse, asked_on_contact, asked_on_supports, lifting_of
 from .missed import data_norms, least_moduli, missed_tractions, tractions_of
 from .program import Rows, Solved, rows_of, solved
 from .rough import on_pieces
-from .tractions import Given, given_on, moments_of
+from .tractions import given_on, moments_of
 
 LIFTED = 3  # degrees by which w is above u_h
 # What is missed of forces is looked at in so many pieces of each side, where it is more than this
@@ -82,9 +85,9 @@ def error_bound(
         No pressures balance the loads, or no stress was found.
     """
     data = problem, trace, displacement, pairs, order, degree
-    for places in ((), BESIDE):
+    for beside in ((), BESIDE):
         try:
-            return _bound(*data, places)
+            return _bound(*data, beside)
         except ConvergenceError:
             continue
     raise ContactError(
@@ -100,12 +103,12 @@ def _bound(
     pairs: Sequence[ContactState],
     order: int,
     degree: int | None,
-    places: Sequence[float],
+    beside: Sequence[float],
 ) -> Proof:
-    """The same with more vertices at `places` of the segments of Gamma_K."""
+    """The same with more vertices `beside` those of the segments of Gamma_K."""
     extent = trace.model.extent
     degree = max(order + 1, 2 + extent) if degree is None else degree
-    cuts, ends = cuts_of(trace, displacement, pairs, places)
+    cuts, ends = cuts_of(trace, displacement, pairs, beside)
     sides = [(pair.secondary, pair.primary) for pair in problem.contact]
     loaded = trace.segments(*problem.traction, problem.sliding, *sum(sides, ()))
     whole = [name for name, u in problem.displacement.items() if None not in u]
@@ -147,7 +150,9 @@ def _summed(problem, cells, displacement, mu, elements, lines, found, given, ask
             "no equilibrated stress was found: residuals relative to the largest stress are "
             f"{residual / largest:.1e}"
         )
-    missed, reaction = _missed(problem, cells, displacement, elements, coefficients, lines, found, given, largest)
+    missed, reaction = _missed(
+        problem, cells, displacement, elements, coefficients, lines, found, given, largest
+    )
     least = least_moduli(cells, elements)
     loads = data_norms(cells, forces, missed, least)
     mean = float(np.linalg.norm(constitutive)) / n**0.5
@@ -229,16 +234,22 @@ def _missed(problem, cells, displacement, elements, coefficients, lines, found, 
     asked = np.zeros_like(have)
     for pattern, at in given.loads:
         segment, s = cells.on_side(np.repeat(at, j), np.tile(PLACES, len(at)))
-        asked[position[at]] += trace.evaluate(problem.traction_vector(pattern), segment, s).reshape(-1, j, 2)
+        asked[position[at]] += trace.evaluate(problem.traction_vector(pattern), segment, s).reshape(
+            -1, j, 2
+        )
     for line, p in zip(lines, found.pressure, strict=True):
         f = line.facing
-        density = (p @ bernstein(p.shape[1] - 1, PLACES).T * f.weight / WEIGHTS)[..., None] * f.direction
+        density = (p @ bernstein(p.shape[1] - 1, PLACES).T * f.weight / WEIGHTS)[
+            ..., None
+        ] * f.direction
         at = position[f.side]
         asked[at] -= density / (length[at] * measure[at])[..., None]
         if (f.other >= 0).all() and len(f.other):
             at = position[f.other]
             rate = np.abs(_rates(f))
-            asked[at] += _carried(f, density) * rate[..., None] / (length[at] * measure[at])[..., None]
+            asked[at] += (
+                _carried(f, density) * rate[..., None] / (length[at] * measure[at])[..., None]
+            )
     held = given.held[side]
     norms = missed_tractions(cells, elements, coefficients, largest, asked, held)
     reaction = 0.0
@@ -256,12 +267,7 @@ def _missed(problem, cells, displacement, elements, coefficients, lines, found, 
 
 
 def _rates(facing: Facing) -> Array:
-    """dt / dt' (k, j) at the Gauss points of the primary's sides."""
-    from ...lagrange import lagrange_derivative
-    from .facing import DATA
-    from .facing import THROUGH
-    from .lifting import _inverse
-
+    """How fast t changes with t' (k, j) at the Gauss points of the primary's sides."""
     at = _inverse(facing.there)
     slopes = lagrange_derivative(DATA, at.ravel()).reshape(*at.shape, -1)
     return 1 / np.einsum("kji,il,kl->kj", slopes, THROUGH, facing.there)

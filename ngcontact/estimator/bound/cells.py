@@ -110,7 +110,7 @@ class Cells:
         return order[np.searchsorted(key, 4.0 * segment + s, side="right") - 1]
 
     def own_parameter(self, side: Index, s: Array) -> Array:
-        """t (k, j) of places `s` (k, j) of the segments of sides (k,)."""
+        """T (k, j) of places `s` (k, j) of the segments of sides (k,)."""
         a, b = self.span[side, 0, None], self.span[side, 1, None]
         return np.asarray((s - a) / (b - a))
 
@@ -155,9 +155,9 @@ class Cells:
         place, jacobian = ng.CF((ng.x, ng.y)), ng.specialcf.JacobianMatrix(2)
         found = guess.copy()
         for _ in range(NEWTON_STEPS):
-            J = self.evaluate(jacobian, at[bent], found[bent]).reshape(-1, 2, 2)
+            slope = self.evaluate(jacobian, at[bent], found[bent]).reshape(-1, 2, 2)
             miss = x[bent] - self.evaluate(place, at[bent], found[bent])
-            found[bent] += np.linalg.solve(J, miss[:, :, None])[:, :, 0]
+            found[bent] += np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
         return found
 
 
@@ -217,7 +217,9 @@ def places(cells: Cells, at: Index, order: int, parts: int = 1) -> Places:
         sigma, t = (z.ravel() for z in np.meshgrid(g, g, indexing="ij"))
         weight = np.outer(w * g, w).ravel()
         side = np.repeat(cells.sides[at, 0], len(t))
-        own = np.where(np.repeat(cells.backward[at, 0], len(t)), 1 - np.tile(t, len(at)), np.tile(t, len(at)))
+        own = np.where(
+            np.repeat(cells.backward[at, 0], len(t)), 1 - np.tile(t, len(at)), np.tile(t, len(at))
+        )
         base, slope = (z.reshape(len(at), -1, 2) for z in cells.points(side, own))
         slope = np.where(cells.backward[at, 0][:, None, None], -slope, slope)
         away = base - corners[:, :1]
@@ -230,7 +232,10 @@ def places(cells: Cells, at: Index, order: int, parts: int = 1) -> Places:
         rule = ng.IntegrationRule(ng.TRIG, order)
         local, weight = np.array([p[:2] for p in rule.points]), np.array(rule.weights)
         share = np.column_stack([1 - local.sum(axis=1), local])
-        local, weight = (share @ _lattice(parts)).reshape(-1, 2), np.tile(weight, parts**2) / parts**2
+        local, weight = (
+            (share @ _lattice(parts)).reshape(-1, 2),
+            np.tile(weight, parts**2) / parts**2,
+        )
         edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)
         x = corners[:, :1] + np.einsum("bij,qj->bqi", edges, local)
         spread = np.broadcast_to(edges[:, None], (len(at), len(weight), 2, 2))

@@ -108,23 +108,25 @@ class Element:
         return np.linalg.solve(self.root.transpose(0, 2, 1), y[..., None])[..., 0]
 
     def coefficients(self, mu: Array) -> Array:
-        """c (b, m) for all multipliers `mu` (k,)."""
+        """C (b, m) for all multipliers `mu` (k,)."""
         g = np.linalg.solve(self.root.transpose(0, 2, 1), self.g[..., None])[..., 0]
         return g + self.answer(mu)
 
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with coefficients `c` (b, m)."""
-        return self.own + np.einsum("bmd,bmn,bn->bd", self.N, self.root.transpose(0, 2, 1), c, optimize=True)
+        return self.own + np.einsum(
+            "bmd,bmn,bn->bd", self.N, self.root.transpose(0, 2, 1), c, optimize=True
+        )
 
     def full_stress(self, c: Array) -> Array:
-        """s (b, q, v) at the quadrature points, with radial forces."""
+        """Stress s (b, q, v) at the quadrature points, with radial forces."""
         s = self.stress(c, self.places.x)
         if s.shape[2] > 3:
             s[..., 2] += self.radial
         return s
 
     def stress(self, c: Array, x: Array, some: Index | slice = slice(None)) -> Array:
-        """s (b, q, v) at points `x` (b, q, 2) for coefficients `c` (b, m), without radial forces."""
+        """Stress s (b, q, v) at `x` (b, q, 2) for coefficients `c` (b, m), no radial forces."""
         axial = self.strain.shape[2] > 3
         frame = self.frame[some]
         T = stresses(self.degree, frame, x, frame.local(x), axial, self.on_axis)
@@ -212,7 +214,19 @@ def elements(
         every = np.flatnonzero(number.ravel() == kind)
         for start in range(0, len(every), BLOCK):
             at = every[start : start + BLOCK]
-            found.append(_element(problem, cells, displacement, mu, at, int(kinds[kind, 0]), bool(kinds[kind, 4]), rest, bool(kinds[kind, -1])))
+            found.append(
+                _element(
+                    problem,
+                    cells,
+                    displacement,
+                    mu,
+                    at,
+                    int(kinds[kind, 0]),
+                    bool(kinds[kind, 4]),
+                    rest,
+                    bool(kinds[kind, -1]),
+                )
+            )
     return mu, found
 
 
@@ -247,7 +261,9 @@ def _rough(problem: Problem, cells: Cells, degree: int, looked: bool) -> Mask:
         miss, size = (np.einsum("q,sqc->s", w, f**2) for f in (rest, P))
         rough[cells.owner[side[miss > ROUGH**2 * size]]] = True
     # Directions of contact and of guides that are not the normals of the mesh.
-    sides = [name for c in problem.contact if c.direction is None for name in (c.secondary, c.primary)]
+    sides = [
+        name for c in problem.contact if c.direction is None for name in (c.secondary, c.primary)
+    ]
     side = np.flatnonzero(np.isin(cells.segment, cells.trace.segments(*sides, problem.sliding)))
     segment, s = cells.on_side(np.tile(side, 2), np.repeat([0.0, 1.0], len(side)))
     turn = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
@@ -286,6 +302,7 @@ def compliance_at(problem: Problem, cells: Cells, points: Places) -> Array:
 
 
 def force_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunction | None:
+    """The force on a body, if there is one."""
     mesh = cells.trace.mesh
     for pattern, force in problem.force.items():
         if mesh.Materials(pattern).Mask()[body]:
@@ -323,16 +340,15 @@ def _element(
     root = np.sqrt(weight)[..., None]
     D = compliance
     v, m = T.shape[-2:]
-    DT = D @ T
-    wT = (root[..., None] * T).reshape(b, q * v, m)
-    A = wT.transpose(0, 2, 1) @ (root[..., None] * DT).reshape(b, q * v, m)
+    weighted = (root[..., None] * T).reshape(b, q * v, m)
+    A = weighted.transpose(0, 2, 1) @ (root[..., None] * (D @ T)).reshape(b, q * v, m)
     wanted = strain
     if force.any() or radial.any():
         s_p = balancing(_force_degree(degree, axial), frame, points.x, force, axial)
         if axial:
             s_p[..., 2] += radial
         wanted = strain - (D @ s_p[..., None])[..., 0]
-    g = np.einsum("bxm,bx->bm", wT, (root * wanted).reshape(b, -1))
+    g = np.einsum("bxm,bx->bm", weighted, (root * wanted).reshape(b, -1))
     scale = 1 / np.sqrt(np.einsum("bmm->bm", A))
     N, own = _moments(cells, mu, at, degree, frame, on_axis, force, axial, m)
     L = _cholesky(A * scale[:, :, None] * scale[:, None, :])
@@ -340,27 +356,47 @@ def _element(
     solved = np.linalg.solve(L, right)
     of_side = mu.degree[cells.sides[at[0]]]
     dofs = np.concatenate(
-        [start[:, None] + np.arange(2 * (k + 1)) for start, k in zip(mu.start[cells.sides[at]].T, of_side, strict=True)],
+        [
+            start[:, None] + np.arange(2 * (k + 1))
+            for start, k in zip(mu.start[cells.sides[at]].T, of_side, strict=True)
+        ],
         axis=1,
     )
     highest = np.maximum(of_side, degree)
-    shared = np.concatenate([np.tile(np.arange(j + 1) <= k, 2) for j, k in zip(highest, of_side, strict=True)])
+    shared = np.concatenate(
+        [np.tile(np.arange(j + 1) <= k, 2) for j, k in zip(highest, of_side, strict=True)]
+    )
     N, g = solved[..., :-1], solved[..., -1]
     if not shared.all():
         N, g, own = _without(N, g, own, shared)
-    return Element(points, weight, frame, degree, on_axis, compliance, strain, force, radial, missed,
-                   L / scale[:, :, None], N, g, own, dofs)
+    return Element(
+        points,
+        weight,
+        frame,
+        degree,
+        on_axis,
+        compliance,
+        strain,
+        force,
+        radial,
+        missed,
+        L / scale[:, :, None],
+        N,
+        g,
+        own,
+        dofs,
+    )
 
 
 def _without(N: Array, g: Array, own: Array, shared: Mask) -> tuple[Array, Array, Array]:
     """N, g, moments of s_p n of the `shared` multipliers (d,), where all other moments vanish."""
-    Q, R = np.linalg.qr(N[:, :, ~shared])
+    basis, R = np.linalg.qr(N[:, :, ~shared])
     fixed = -np.linalg.solve(R.transpose(0, 2, 1), own[:, ~shared, None])
     N, g = N[:, :, shared], g[..., None]
-    along = Q.transpose(0, 2, 1) @ N
+    along = basis.transpose(0, 2, 1) @ N
     own = own[:, shared] + (along.transpose(0, 2, 1) @ fixed)[..., 0]
-    g = g - Q @ (Q.transpose(0, 2, 1) @ g - fixed)
-    return N - Q @ along, g[..., 0], own
+    g = g - basis @ (basis.transpose(0, 2, 1) @ g - fixed)
+    return N - basis @ along, g[..., 0], own
 
 
 def _cholesky(A: Array) -> Array:
@@ -385,12 +421,20 @@ def _moments(cells, mu, at, degree, frame, on_axis, force, axial, m):
         bent = bool(cells.bent[side[0]])
         t, w = gauss(degree + k + 2 * axial + (4 * cells.trace.geometry_order if bent else 0))
         own = np.where(cells.backward[at, i, None], 1 - t, t)
-        x, dx = (z.reshape(len(at), -1, 2) for z in cells.points(np.repeat(side, len(t)), own.ravel()))
+        x, dx = (
+            z.reshape(len(at), -1, 2) for z in cells.points(np.repeat(side, len(t)), own.ravel())
+        )
         dx = np.where(cells.backward[at, i, None, None], -dx, dx)
         normal = np.stack([dx[..., 1], -dx[..., 0]], axis=-1)  # times ds / dt
         weight = w * cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), -1)
         chi = weight[..., None] * traces(k, own)
-        local = frame.local(x) if bent else (CORNERS[(i + 1) % 3] + t[:, None] * (CORNERS[(i + 2) % 3] - CORNERS[(i + 1) % 3]))[None]
+        local = (
+            frame.local(x)
+            if bent
+            else (
+                CORNERS[(i + 1) % 3] + t[:, None] * (CORNERS[(i + 2) % 3] - CORNERS[(i + 1) % 3])
+            )[None]
+        )
         T = stresses(degree, frame, x, local, axial, on_axis)
         found.append(_tractions(T, normal, chi))
         if force.any():
@@ -428,7 +472,11 @@ def _forces(problem, cells, points, frame, degree, body, axial, less, finer):
     rest = values - scalars(n, frame, fine.x) @ force
     if axial:
         rest[..., 0] = 0.0
-        radial = points.x[..., 0] * points.evaluate(cells, F)[..., 0] if less is None else np.zeros((b, q))
+        radial = (
+            points.x[..., 0] * points.evaluate(cells, F)[..., 0]
+            if less is None
+            else np.zeros((b, q))
+        )
         force[..., 0] = 0.0
     else:
         radial = np.zeros((b, q))

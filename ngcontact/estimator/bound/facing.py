@@ -21,7 +21,7 @@ from .cells import Cells
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
 ROUND_OFF = 1e-14  # of gaps, relative to coordinates
-NEAR = 1e-3  # of a segment: vertices that face each other up to that are one; no point of `PLACES` lies between them
+NEAR = 1e-3  # of a segment: vertices that face each other up to that are one
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
 NARROW = 0.1  # of the sides beside it, a side between them on which r does not change
@@ -40,7 +40,7 @@ def bernstein(degree: int, t: Array) -> Array:
 
 
 def directions(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
-    """d (k, 2) at `s` (k,) of segments `segment` (k,) of the secondary."""
+    """D (k, 2) at `s` (k,) of segments `segment` (k,) of the secondary."""
     if contact.direction is None:
         return trace.exact_normal(segment, s)
     return np.tile(contact.direction, (len(segment), 1))
@@ -124,7 +124,9 @@ def cuts_of(
                 for a, b, n in zip(own.tolist(), other.tolist(), near.tolist(), strict=True)
             ]
             kept = ~(about & np.array(one, dtype=bool)) | (there < 0)
-            for number, place in zip(there[kept & (there >= 0)].tolist(), t[kept & (there >= 0)].tolist(), strict=True):
+            for number, place in zip(
+                there[kept & (there >= 0)].tolist(), t[kept & (there >= 0)].tolist(), strict=True
+            ):
                 cuts.setdefault(number, []).append(place)
         for number, place in zip(k[kept].tolist(), s[kept].tolist(), strict=True):
             cuts.setdefault(number, []).append(place)
@@ -204,7 +206,7 @@ class Facing:
 
     @property
     def lift(self) -> Array:
-        """r (k, j): what w adds to the gap."""
+        """R (k, j): what w adds to the gap."""
         lift = self.after @ bernstein(self.after.shape[1] - 1, PLACES).T - self.gap
         return np.where(self.open[:, None], 0.0, lift)
 
@@ -297,7 +299,7 @@ def _at_ends(values: Array) -> Array:
 
 
 def _across(cells: Cells, slots: Index, side: Index) -> Index:
-    """A vertex for each (nv,): one for both ends of `slots` (r,) that are far shorter than sides."""
+    """A vertex for each (nv,): one for both ends of `slots` (r,) far shorter than sides."""
     number = np.arange(len(cells.vertices))
     length = np.linalg.norm(np.diff(cells.vertices[cells.ends], axis=1)[:, 0], axis=1)
     beside = np.zeros(len(number))
@@ -332,7 +334,9 @@ def _shares(
     return shares, ~own & ~opposite
 
 
-def guides_of(cells: Cells, displacement: ng.CoefficientFunction, side: Index, degree: int) -> Facing:
+def guides_of(
+    cells: Cells, displacement: ng.CoefficientFunction, side: Index, degree: int
+) -> Facing:
     """Sides (k,) of Gamma_0, as bilateral contact with an obstacle without a gap."""
     k, j = len(side), len(PLACES)
     every, t = np.repeat(side, j), np.tile(PLACES, k)

@@ -87,7 +87,9 @@ def _inverse(there: Array) -> Array:
     for _ in range(20):
         flat = t.ravel()
         value = np.einsum("kji,ki->kj", lagrange(DATA, flat).reshape(*t.shape, -1), nodes)
-        slope = np.einsum("kji,ki->kj", lagrange_derivative(DATA, flat).reshape(*t.shape, -1), nodes)
+        slope = np.einsum(
+            "kji,ki->kj", lagrange_derivative(DATA, flat).reshape(*t.shape, -1), nodes
+        )
         step = (value - PLACES) / slope
         t = t - step
         if np.abs(step).max(initial=0.0) < 1e-14:
@@ -100,7 +102,9 @@ def lifting_of(
 ) -> Array:
     """Energy norms (n,) of w, of a degree, for displacements and gaps of a size `extent`."""
     norms = np.zeros(len(cells.triangles))
-    needed = [one.side[np.abs(one.amount).max(axis=1, initial=0.0) > NOISE * extent] for one in asked]
+    needed = [
+        one.side[np.abs(one.amount).max(axis=1, initial=0.0) > NOISE * extent] for one in asked
+    ]
     if not sum(map(len, needed)):
         return norms
     touched = np.zeros(len(cells.vertices), dtype=bool)
@@ -175,9 +179,7 @@ class _Conditions:
     value: Array
 
 
-def _conditions(
-    cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: float
-) -> _Conditions:
+def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: float) -> _Conditions:
     """What is asked for at the nodes; 0 on the rim of the layer."""
     frame = np.tile(np.eye(2), (nodes.count, 1, 1))
     held, value = np.zeros((nodes.count, 2), dtype=bool), np.zeros((nodes.count, 2))
@@ -202,7 +204,9 @@ def _conditions(
     size = size[:, ::-1]
     both = size > PARALLEL * size[:, :1]
     frame[at], held[at] = vectors, both
-    value[at] = np.where(both, np.einsum("kij,kj->ki", vectors, right[at]) / np.where(both, size, 1.0), 0.0)
+    value[at] = np.where(
+        both, np.einsum("kij,kj->ki", vectors, right[at]) / np.where(both, size, 1.0), 0.0
+    )
     w = np.einsum("kij,ki->kj", frame, value)
     missed = np.abs((w[number] * d).sum(axis=1) - amount)
     if missed.max(initial=0.0) > max(INCONSISTENT * np.abs(amount).max(initial=0.0), noise):
@@ -341,9 +345,7 @@ class _Remainders:
         return np.stack(e, axis=-1)
 
 
-def _remainders(
-    cells: Cells, nodes: _Nodes, w: Array, asked: Sequence[Asked]
-) -> _Remainders:
+def _remainders(cells: Cells, nodes: _Nodes, w: Array, asked: Sequence[Asked]) -> _Remainders:
     """d.w as asked for less that of the polynomial with values `w` (c, 2) at the nodes."""
     layer = nodes.layer
     position = np.full(len(cells.triangles), -1)

@@ -48,9 +48,19 @@ def data_norms(cells: Cells, forces: Array, tractions: Array, least: Array) -> A
         The same of tractions on the sides.
     least : ndarray (n,)
         Smallest eigenvalue of C in Mandel's scaling, times the least measure.
+
+    Raises
+    ------
+    ValueError
+        Something is missed at the axis.
     """
     found = np.zeros(len(forces))
     at = np.flatnonzero((forces > 0) | (tractions > 0).any(axis=1))
+    if (least[at] == 0).any():
+        raise ValueError(
+            "no guaranteed bound is known where loads at the axis are no polynomials; "
+            "use error_estimate"
+        )
     if at.size:
         poincare, korn, trace = _constants(cells, at)
         total = poincare * forces[at] + (np.sqrt(trace) * tractions[at]).sum(axis=1)
@@ -96,7 +106,7 @@ def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array]:
 
 
 def _distortion(cells: Cells, at: Index, x: Array, slope: Array) -> Array:
-    """max |D| (max det D / min det D)^(1/2) (b,) of the map of straight triangles; 1 on those."""
+    """Max |D| (max det D / min det D)^(1/2) (b,) of the map of straight triangles; 1 on those."""
     found, bent = np.ones(len(at)), np.flatnonzero(cells.curved[at])
     if bent.size:
         corners = cells.corners[at[bent]]
@@ -124,7 +134,7 @@ def least_moduli(cells: Cells, elements: Sequence[Element]) -> Array:
     model = cells.trace.model
     if model.extent:
         measure = model.measure(cells.corners.reshape(-1, 2)).reshape(-1, 3).min(axis=1)
-        least *= np.maximum(measure, np.finfo(float).tiny)
+        least *= measure
     return least
 
 
@@ -171,7 +181,9 @@ def missed_tractions(
     measure = cells.trace.model.measure(x).reshape(ds.shape)
     miss = np.where(np.broadcast_to(held, (len(side), 2))[:, None], 0.0, asked - have)
     square = ((ds * measure**2)[..., None] * miss**2).sum(axis=(1, 2))
-    square = np.where(square <= (ROUND_OFF * largest) ** 2 * (ds * measure**2).sum(axis=1), 0.0, square)
+    square = np.where(
+        square <= (ROUND_OFF * largest) ** 2 * (ds * measure**2).sum(axis=1), 0.0, square
+    )
     norms = np.zeros((len(cells.triangles), 3))
     norms[cells.owner[side], cells.local[side]] = np.sqrt(square)
     return norms

@@ -134,8 +134,8 @@ def projected(degree: int, frame: Frame, x: Array, weight: Array, values: Array)
     """
     P = scalars(degree, frame, x)
     root = np.sqrt(weight)[..., None]
-    Q, R = np.linalg.qr(root * P)
-    return np.asarray(np.linalg.solve(R, Q.transpose(0, 2, 1) @ (root * values)))
+    basis, R = np.linalg.qr(root * P)
+    return np.asarray(np.linalg.solve(R, basis.transpose(0, 2, 1) @ (root * values)))
 
 
 def scalars(degree: int, frame: Frame, x: Array) -> Array:

@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.linalg
 
 from ...arrays import Array, Index, Mask
 from ...errors import ContactError
@@ -151,7 +150,9 @@ def solved(
     program = QuadraticProgram(
         K=K,
         b=b,
-        R=from_triplets(np.ones(len(unknown)), np.arange(len(unknown)), unknown, (len(unknown), size)),
+        R=from_triplets(
+            np.ones(len(unknown)), np.arange(len(unknown)), unknown, (len(unknown), size)
+        ),
         g=bound,
         equality=equality,
         fixed=fixed,
@@ -193,7 +194,7 @@ def solved(
 def _null_space(
     motions: Array, T: sp.csr_array, unknown: Index, fixed: Mask, idle: Mask
 ) -> NullSpace:
-    """Rigid motions (d, r) in the unknowns; where multipliers are `idle` (d,) they are of no use."""
+    """Rigid motions (d, r) in the unknowns, where multipliers are not `idle` (d,)."""
     if motions.shape[1] == 0:
         return no_null_space(len(motions))
     y = sp.linalg.splu(T.tocsc()).solve(motions)
@@ -212,7 +213,7 @@ def _left_over(lineal: Array, b: Array) -> Array:
 def _basis(
     mu: Multipliers, lines: Sequence[Rows], size: int
 ) -> tuple[sp.csr_array, Index, Array, Mask, Mask, Array]:
-    """mu = T y with a y for each row over the integral of psi_j.
+    """Mu = T y with a y for each row over the integral of psi_j.
 
     Its unknown, bound, whether it is an equation, and closed; that integral.
     """
@@ -233,10 +234,10 @@ def _basis(
         for i, side in enumerate(line.facing.side):
             own = mu.of(int(side))
             plain[own] = False
-            U, S, Vt = np.linalg.svd(line.own[i] / mass[i, :, None])
-            inverse = Vt[:j].T @ (U.T / S[:, None])
+            left, sizes, right = np.linalg.svd(line.own[i] / mass[i, :, None])
+            inverse = right[:j].T @ (left.T / sizes[:, None])
             put(own, own[:j], inverse)
-            put(own, own[j:], Vt[j:].T)
+            put(own, own[j:], right[j:].T)
             if line.opposite:
                 opposite = line.opposite[i] / mass[i, :, None]
                 steps.append((own, mu.of(int(line.facing.other[i])), -inverse @ opposite))

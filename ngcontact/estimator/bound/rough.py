@@ -35,7 +35,9 @@ def on_pieces(problem: Problem, cells: Cells, e: Element, some: Index, parts: in
         found = load - scalars(e.force_degree, frame[of], points.x) @ force[of]
         if extent:
             found[..., 0] = 0.0
-        return np.asarray(found - np.einsum("bqcr,br->bqc", _rigid(frame[of], points, extent), work[of]))
+        return np.asarray(
+            found - np.einsum("bqcr,br->bqc", _rigid(frame[of], points, extent), work[of])
+        )
 
     # The rule of whole triangles is another one: what it leaves does no work on rigid motions.
     work = np.zeros((len(at), 3 - 2 * extent))
@@ -48,10 +50,15 @@ def on_pieces(problem: Problem, cells: Cells, e: Element, some: Index, parts: in
     along = np.diff(pieces.vertices[pieces.ends[side]], axis=1)[:, 0]
     upright = np.abs(along[:, 1]) > np.abs(along[:, 0])
     fixed = np.zeros(size, dtype=bool)
-    fixed[np.concatenate([start, start + k + 1, np.where(upright, start, start + k + 1) + 1])] = True
+    fixed[np.concatenate([start, start + k + 1, np.where(upright, start, start + k + 1) + 1])] = (
+        True
+    )
     none = np.zeros(size)
     found = solved(mu, groups, none, fixed, none[:, None][:, :0], [])
-    largest = max(float(np.abs(g.stress(c, g.places.x)).max()) for g, c in zip(groups, found.coefficients, strict=True))
+    largest = max(
+        float(np.abs(g.stress(c, g.places.x)).max())
+        for g, c in zip(groups, found.coefficients, strict=True)
+    )
     tractions = missed_tractions(pieces, groups, found.coefficients, largest)
     forces, norms = np.zeros((2, len(pieces.triangles)))
     for g, c in zip(groups, found.coefficients, strict=True):
@@ -95,7 +102,9 @@ def _work(
             measure = model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
             wz = (points.weight * measure)[..., None, None] * z
             np.add.at(M, of, np.einsum("bqcr,bqcs->brs", wz, z))
-            np.add.at(b, of, np.einsum("bqcr,bqc->br", wz, rest(points, points.evaluate(pieces, load))))
+            np.add.at(
+                b, of, np.einsum("bqcr,bqc->br", wz, rest(points, points.evaluate(pieces, load)))
+            )
     return np.asarray(np.linalg.solve(M, b[..., None])[..., 0])
 
 

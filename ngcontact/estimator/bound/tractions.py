@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...arrays import Array, Index, Mask
-from ...contact import ContactState
 from ...lagrange import gauss
 from ...problem import Problem
 from .cells import Cells
