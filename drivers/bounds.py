@@ -20,7 +20,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from drivers.adaptive_study.studies import STUDIES, Name, error_measure
+from drivers.adaptive_study.studies import STUDIES, Name, energy_errors
 from drivers.command_line import Count, Order, run
 from ngcontact import adapt
 
@@ -47,25 +47,25 @@ class Row:
 def rows_of(name: Name, order: int, max_dofs: int, reference: int) -> Iterator[Row]:
     """The levels of an adaptive run."""
     study = STUDIES[name]()
-    measure = error_measure(study, reference)
+    measure = energy_errors(study, reference)
     spent, started = 0.0, time.process_time()
     for level in adapt(study.problem, order=order, max_dofs=max_dofs):
-        estimate = level.relative_error_estimate
+        estimate = level.error_estimate
         spent += time.process_time() - started
         begun = time.process_time()
-        bound, (low, high) = level.relative_error_bound, level.energy_bounds
+        bound, (low, high) = level.error_bound, level.energy_bounds
         proved = time.process_time()
         level.quantities()
         told = time.process_time()
-        error = measure(level)
+        error, norm = measure(level)
         yield Row(
             case=name,
             order=order,
             unknowns=level.displacement.space.ndof,
-            error=error,
+            error=error / norm,
             estimate=estimate / error,
             bound=bound / error,
-            width=(high - low) / level.error_bound**2,
+            width=(high - low) / bound**2,
             run=spent,
             bounding=proved - begun,
             quantities=told - proved,

@@ -29,9 +29,9 @@ from .estimator import Estimator, estimate, refuse_bound
 from .fem import boundary_trace, unknowns
 from .mesh import curve, first_mesh
 from .one_mesh import check_continuation, solve_on, with_warnings
-from .plausibility import EXACT, at_round_off, contradictions, look_at_data, warn_of_implausible
+from .plausibility import EXACT, at_round_off, contradictions, warn_of_implausible
 from .problem import Problem
-from .quadrature import unresolved
+from .quadrature import look, unresolved
 from .results import with_progress
 from .solution import Solution
 
@@ -104,7 +104,7 @@ def adapt(
     refinement = _with_order(plain, order, start)
     truth("progress", progress)
     mesh = first_level(problem, maxh, refinement, start)
-    look_at_data(problem, mesh)
+    look(problem, mesh)
     if guaranteed:
         _refuse_infinite_energy(problem, mesh)
     warn_of_implausible(problem, mesh, refinement.order)

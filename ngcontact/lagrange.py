@@ -52,9 +52,9 @@ def gauss(order: int) -> tuple[Array, Array]:
 
 @lru_cache
 def _coefficients(order: int, axis: int = 0) -> Array:
-    """Monomial coefficients (lowest first) in 2s - 1 of the Lagrange polynomials, as columns."""
-    vandermonde = np.vander(2 * gauss_lobatto(order, axis) - 1, increasing=True)
-    return np.asarray(np.linalg.inv(vandermonde), dtype=np.float64)
+    """Coefficients of the Lagrange polynomials in Legendre's of 2s - 1, as columns."""
+    values = legendre.legvander(2 * gauss_lobatto(order, axis) - 1, order)
+    return np.asarray(np.linalg.inv(values))
 
 
 def lagrange(order: int, s: Array, axis: int = 0) -> Array:
@@ -76,7 +76,7 @@ def lagrange(order: int, s: Array, axis: int = 0) -> Array:
         the rows are unit vectors exactly.
     """
     s = np.atleast_1d(s)
-    values: Array = np.vander(2 * s - 1, order + 1, increasing=True) @ _coefficients(order, axis)
+    values: Array = legendre.legvander(2 * s - 1, order) @ _coefficients(order, axis)
     at, node = np.nonzero(s[:, None] == gauss_lobatto(order, axis))
     values[at] = 0.0
     values[at, node] = 1.0
@@ -85,9 +85,8 @@ def lagrange(order: int, s: Array, axis: int = 0) -> Array:
 
 def lagrange_derivative(order: int, s: Array) -> Array:
     """Derivatives (k, order + 1) of the polynomials of `lagrange` at parameters `s` (k,)."""
-    powers = np.vander(2 * np.atleast_1d(s) - 1, order, increasing=True)
-    factors = 2.0 * np.arange(1, order + 1)
-    return (powers * factors) @ _coefficients(order)[1:]
+    slopes = 2 * legendre.legder(_coefficients(order))
+    return np.asarray(legendre.legvander(2 * np.atleast_1d(s) - 1, order - 1) @ slopes)
 
 
 def zeros(order: int, values: Array) -> tuple[Index, Array]:
@@ -108,7 +107,8 @@ def zeros(order: int, values: Array) -> tuple[Index, Array]:
     number, s : ndarray (r,), (r,)
         Polynomial and parameter of each.
     """
-    coefficients = values @ _coefficients(order).T
+    powers = np.vander(2 * gauss_lobatto(order) - 1, increasing=True)
+    coefficients = np.linalg.solve(powers, values.T).T
     ends = np.tile([-1.0, 1.0], (len(values), 1))
     edges = ends
     for degree in range(1, order + 1):

@@ -9,19 +9,24 @@ import ngsolve as ng
 import numpy as np
 
 from .arrays import Mask
+from .contact import with_roles
 from .discrete import (
     DiscreteProblem,
     carried_active_set,
     discretise,
     first_active_set,
+    hardly_held,
     minimise_energy,
 )
-from .errors import ContactError, ConvergenceError, warn
+from .errors import ContactError, ConvergenceError, NoEquilibriumError, warn
+from .fem import boundary_trace, model_of
 from .mesh import check_curves, curve, same_geometry
 from .plausibility import doubt_of_refinement, doubts, estimates_rise
 from .problem import Contact, Problem
 from .quadrature import evaluations, unresolved, warn_of_unresolved
 from .solution import Solution
+
+ALIKE = 0.1  # relative difference of energies up to which two coarse solutions are one
 
 
 def check_start(problem: Problem, start: object) -> None:
@@ -44,7 +49,7 @@ def check_continuation(problem: Problem, start: Solution, order: int, element: s
             f"element={element!r}: give the same, its indicators tell nothing of others"
         )
     here, there = ([(c.secondary, c.primary) for c in p.contact] for p in (problem, start.problem))
-    if here != there:
+    if [set(pair) for pair in here] != [set(pair) for pair in there]:  # roles may be exchanged
         raise ValueError(f"the contact pairs of start are {there}, not {here}: keep them")
     if not same_geometry(problem.geometry, start.problem.geometry):
         raise ValueError(
@@ -58,8 +63,8 @@ def solve_on(
 ) -> Solution:
     """Solution on one mesh, of which names and values are known to be right.
 
-    Roles of pairs that fail are tried the other way round, once; `Solution.problem` has the pairs
-    as they were solved.
+    Roles of pairs that fail, or that leave a body all but free, are tried the other way round,
+    once; `Solution.problem` has the pairs as they were solved.
     """
     before = evaluations()
     mesh, curved = curve(mesh, order, element)
@@ -67,42 +72,57 @@ def solve_on(
         check_curves(mesh)
     here = (mesh, order, element)
     same = start is not None and (start.mesh, start.order, start.element) == here
-    discrete = discretise(problem, *here, start.discrete if start is not None and same else None)
-    tried = [discrete]
-    try:
-        minimiser = minimise_energy(discrete, _first_active_set(discrete, start))
-    except ConvergenceError as error:
-        exchanged = _exchanged(discrete)
-        if not exchanged:
-            raise
-        pairs = [exchanged.get(i, contact) for i, contact in enumerate(problem.contact)]
-        problem = replace(problem, contact=pairs)
-        try:
-            discrete = discretise(problem, *here, discrete)
-            minimiser = minimise_energy(discrete, _first_active_set(discrete, start))
-        except (ContactError, ValueError):
-            raise error from None
+    tried: list[DiscreteProblem] = []
+
+    def attempt(problem: Problem, known: DiscreteProblem | None) -> Solution:
+        discrete = discretise(problem, *here, known)
         tried.append(discrete)
+        minimiser = minimise_energy(discrete, _first_active_set(discrete, start))
+        return Solution(
+            problem=problem,
+            mesh=mesh,
+            order=order,
+            element=element,
+            displacement=discrete.displacement(minimiser.u),
+            discrete=discrete,
+            minimiser=minimiser,
+            work={
+                "assemblies": sum(one.assembled for one in tried),
+                "factorizations": minimiser.factorizations,
+                "back_solves": minimiser.back_solves,
+                "gap_searches": sum(line.searches for one in tried for line in one.lines),
+                "curved_elements": curved,
+                "estimates": 0,
+                "equilibrations": 0,
+                "evaluations": evaluations() - before,
+            },
+        )
+
+    first = None
+    try:
+        first = attempt(problem, start.discrete if start is not None and same else None)
+        doubt: ContactError | None = hardly_held(first.discrete, first.minimiser)
+        if doubt is None:
+            return first
+    except (ConvergenceError, NoEquilibriumError) as error:
+        doubt = error
+    doubted = _doubted(problem, mesh, order, doubt, tried)
+    if first is not None and not doubted:
+        return first
+    exchanged = {i: pair.swapped() for i, pair in doubted.items() if pair.gap is None}
+    if not exchanged:
+        raise doubt
+    pairs = [exchanged.get(i, contact) for i, contact in enumerate(problem.contact)]
+    try:
+        second = attempt(replace(problem, contact=pairs), tried[0] if tried else None)
+    except (ContactError, ValueError):
+        raise doubt from None
+    if hardly_held(second.discrete, second.minimiser) is None:
         warn(_told(list(exchanged.values())))
-    return Solution(
-        problem=problem,
-        mesh=mesh,
-        order=order,
-        element=element,
-        displacement=discrete.displacement(minimiser.u),
-        discrete=discrete,
-        minimiser=minimiser,
-        work={
-            "assemblies": sum(one.assembled for one in tried),
-            "factorizations": minimiser.factorizations,
-            "back_solves": minimiser.back_solves,
-            "gap_searches": sum(line.searches for one in tried for line in one.lines),
-            "curved_elements": curved,
-            "estimates": 0,
-            "equilibrations": 0,
-            "evaluations": evaluations() - before,
-        },
-    )
+        return second
+    if first is None or abs(first.energy - second.energy) > ALIKE * abs(second.energy):
+        raise doubt
+    return first  # so are the bodies made, not the rows
 
 
 def _first_active_set(discrete: DiscreteProblem, start: Solution | None) -> Mask:
@@ -112,24 +132,25 @@ def _first_active_set(discrete: DiscreteProblem, start: Solution | None) -> Mask
     return carried_active_set(discrete.lines, start.pairs)
 
 
-def _exchanged(discrete: DiscreteProblem) -> dict[int, Contact]:
-    """Pairs by number, with roles exchanged, whose primary belongs to a body without support.
+def _doubted(
+    problem: Problem, mesh: ng.Mesh, order: int, error: ContactError, tried: list[DiscreteProblem]
+) -> dict[int, Contact]:
+    """Pairs by number, with roles decided, whose primary is of a body that supports leave free.
 
     Normals of a hole, at points of a pin that lies elsewhere in it, all but resist the turning of
-    the pin; its own normals leave it free.
+    the pin, with forces that are not there; its own normals leave it free.
     """
-    if discrete.rigid is None:
-        return {}
-    free = discrete.rigid.free
-    moves = np.abs(free.combinations).sum(axis=1).reshape(-1, 3).sum(axis=1) > 0
-    primaries = [moves[np.unique(free.bodies.of_segment[line.facing])] for line in discrete.lines]
+    if isinstance(error, NoEquilibriumError):
+        bodies = error.motion.bodies
+    else:
+        bodies = [name for one in tried if one.rigid for name in one.rigid.free.names]
+    trace, names = boundary_trace(mesh, order, model_of(problem)), mesh.GetMaterials()
+    decided = [with_roles(trace, contact) for contact in problem.contact]
+    primaries = [trace.body[trace.segments(pair.primary)] for pair in decided]
     return {
-        number: contact.swapped()
-        for number, contact in enumerate(discrete.problem.contact)
-        if primaries[number].any()
-        and contact.roles == "given"
-        and contact.gap is None
-        and not contact.bilateral
+        number: pair
+        for number, (pair, body) in enumerate(zip(decided, primaries, strict=True))
+        if pair.primary is not None and any(names[i] in bodies for i in np.unique(body))
     }
 
 

@@ -13,16 +13,17 @@ from .errors import ContactError
 from .fem import check_element, unknowns
 from .mesh import first_mesh
 from .one_mesh import check_start, solve_on, warn_of_doubts
-from .plausibility import look_at_data, warn_of_implausible
+from .plausibility import warn_of_implausible
 from .problem import Problem, Triangulation
-from .quadrature import evaluations
+from .quadrature import evaluations, look
 from .solution import Solution
 
 # A cold start of more unknowns costs more than a coarse adaptive run that saves its Newton steps.
 COARSE_RUN_FROM = 20_000
 COARSE_ELEMENTS = 4  # of that run along the largest extent
 COARSE_ORDER = 3
-COARSE_DOFS = 1500
+COARSE_DOFS = 1500  # its unknowns, which resolve the ends of a zone or two
+COARSE_SHARE = 1 / 40  # ... or, where that is more, their share: waves in contact have many ends
 
 
 def solve(
@@ -65,6 +66,8 @@ def solve(
         Bad input, before any assembly.
     ConvergenceError
         The active set did not settle, or a body can still move rigidly; carries the last iterate.
+    NoEquilibriumError
+        The load drives a rigid motion that supports and contact do not resist, or hardly.
     """
     order = check_element(order, element)
     if mesh is not None and maxh is not None:
@@ -74,10 +77,10 @@ def solve(
     mesh = first_mesh(problem, maxh) if mesh is None else mesh
     problem.check(mesh)
     before = evaluations()
-    look_at_data(problem, mesh)
+    look(problem, mesh)
     if start is None:
         warn_of_implausible(problem, mesh, order)
-    coarse = _coarse_run(problem, mesh, order, element) if start is None else []
+    coarse = coarse_run(problem, mesh, order, element) if start is None else []
     if coarse:  # with roles that can be solved
         problem, start = coarse[-1].problem, coarse[-1]
     solution = solve_on(problem, mesh, order, element, start)
@@ -88,19 +91,21 @@ def solve(
     return solution
 
 
-def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> list[Solution]:
+def coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> list[Solution]:
     """A short adaptive run, to start a large mesh near its active set.
 
     Empty where it would not pay: on small meshes, and without a CAD geometry to mesh coarsely.
     """
     given = isinstance(problem.geometry, ng.Mesh)
     searched = any(not contact.bilateral for contact in problem.contact)
-    if given or not searched or unknowns(mesh, order, element) < COARSE_RUN_FROM:
+    size = unknowns(mesh, order, element)
+    if given or not searched or size < COARSE_RUN_FROM:
         return []
-    size = float(np.ptp(Triangulation(mesh).vertices, axis=0).max()) / COARSE_ELEMENTS
-    refinement = Refinement(COARSE_ORDER, "isoparametric", 0.5, None, COARSE_DOFS)
+    maxh = float(np.ptp(Triangulation(mesh).vertices, axis=0).max()) / COARSE_ELEMENTS
+    most = max(COARSE_DOFS, round(COARSE_SHARE * size))
+    refinement = Refinement(COARSE_ORDER, "isoparametric", 0.5, None, most)
     try:
-        return list(levels(problem, first_level(problem, size, refinement), refinement))
+        return list(levels(problem, first_level(problem, maxh, refinement), refinement))
     except (ContactError, ValueError) as error:  # it decides nothing but the start
         log.debug("no coarse run: %s", error)
         return []

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Compound, OCCGeometry, WorkPlane, X, Y
+from netgen.occ import Compound, Glue, OCCGeometry, WorkPlane, X, Y
 
 from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.mesh import first_mesh
@@ -109,6 +111,31 @@ def test_pressure_in_a_bore_is_the_one_of_lame(part, order):
 
 
 @pytest.mark.parametrize("order", ORDERS)
+def test_a_whole_tube_held_along_its_axes_of_symmetry(order):
+    """Four quarters glued: components of the displacement vanish on lines inside of the body."""
+    quarters = []
+    for x, y in ((0, 0), (-6, 0), (-6, -6), (0, -6)):
+        part = tube("whole").shape * rectangle(x, y, 6, 6, "tube", "cut")
+        for edge in part.edges:
+            if abs(edge.center.x) < 1e-9 or abs(edge.center.y) < 1e-9:
+                edge.name = "upright" if abs(edge.center.x) < 1e-9 else "level"
+        quarters.append(part)
+    geometry = OCCGeometry(Glue(quarters), dim=2)
+    problem = replace(
+        pressed_tube("whole", geometry=geometry),
+        displacement={"upright": (0, None), "level": (None, 0)},
+    )
+    solution = solve(problem, maxh=0.5, order=order)
+    trace = solution.discrete.space.trace
+    segment, s = trace.at_nodes(trace.segments("bore"))
+    u, x = trace.evaluate(solution.displacement, segment, s), trace.point(segment, s)
+    radial = (u * x).sum(axis=1) / np.linalg.norm(x, axis=1)
+    assert np.abs(radial / lame()[0] - 1).max() < MISSED[order]
+    resultant = sum(solution.reactions.values())
+    assert resultant == pytest.approx([0, 0], abs=1e-12 * PRESSURE * BORE)
+
+
+@pytest.mark.parametrize("order", ORDERS)
 def test_radial_displacement_of_the_bore_converges_at_full_rate(order):
     errors = [radial_error(solve(pressed_tube("quarter"), maxh=h, order=order)) for h in (1, 0.25)]
     assert errors[0] / errors[1] > 0.8 * 4 ** (order + 1)  # measured: 0.95 of that and more
@@ -203,10 +230,31 @@ def test_reactions_balance_loads_on_cuts(make, order):
         assert load == pytest.approx(expected, abs=1e-12 * scale)
 
 
+def test_a_cut_that_takes_nothing_away_is_told():
+    """OCC subtracts no face that was drawn clockwise; its outline stays as a line in the body."""
+    corners = [(1, 4), (2, 1), (3, 4)]
+    for outline in (corners, corners[::-1]):
+        pen = WorkPlane().MoveTo(*outline[-1])
+        for corner in outline:
+            pen.LineTo(*corner)
+        notch = pen.Face()
+        notch.edges.name = "flank"
+        shape = rectangle(0, 0, 4, 3, "body", "side") - notch
+        shape.edges.Min(Y).name = "below"
+        problem = Problem(
+            OCCGeometry(shape, dim=2), {"body": STEEL}, {"below": (0, 0)}, traction={"flank": 1.0}
+        )
+        if outline is corners:
+            solution = solve(problem, maxh=0.5)
+            width = 4 / 3  # of the notch at the top
+            assert solution.reactions["below"] == pytest.approx([0, width], abs=1e-12)
+        else:
+            with pytest.raises(ValueError, match="draw what is cut off anticlockwise"):
+                solve(problem, maxh=0.5)
+
+
 def test_a_pressure_between_bodies_has_no_outward_normal():
     """A line inside a body takes a pair; a number is refused with that advice."""
-    from netgen.occ import Glue
-
     left = rectangle(0, 0, 1, 1, "left", "side")
     left.edges.Max(X).name = "between"
     right = rectangle(1, 0, 1, 1, "right", "side")

@@ -20,8 +20,10 @@ from ngcontact import (
     ConvergenceError,
     Elastic,
     Problem,
+    adapt,
     one_mesh,
     solve,
+    solving,
 )
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import rings
@@ -306,8 +308,7 @@ def test_roles_that_fail_are_exchanged_with_a_warning(monkeypatch):
     np.testing.assert_allclose(solution.contact_force(), -load, atol=1e-9 * abs(load).max())
 
 
-@pytest.mark.parametrize("options", [{"gap": 0.01}, {"roles": "auto"}, {"bilateral": True}])
-def test_other_roles_are_not_tried_for_what_depends_on_them(monkeypatch, options):
+def test_other_roles_are_not_tried_where_the_gap_is_given(monkeypatch):
     """The error of the roles that were given is raised, as where the others fail, too."""
     problem = pin_at_the_bottom(("hole", "pin"))
     calls = []
@@ -322,10 +323,111 @@ def test_other_roles_are_not_tried_for_what_depends_on_them(monkeypatch, options
         solve(problem, mesh, order=2)
     assert [pairs[0].secondary for pairs in calls] == ["hole", "pin"]
     calls.clear()
-    problem = replace(problem, contact=[replace(problem.contact[0], **options)])
+    problem = replace(problem, contact=[replace(problem.contact[0], gap=0.01)])
     with pytest.raises(ContactError):
         solve(problem, mesh, order=2)
     assert len(calls) <= 1
+
+
+def test_roles_that_all_but_leave_a_pin_free_are_exchanged():
+    """They turn it far, with large forces: energies -2.0 and -2.0e-4."""
+    given = pin_at_the_bottom(("hole", "pin"))
+    mesh = first_mesh(given, 0.35)
+    with pytest.warns(ContactWarning, match="exchanged"):
+        solution = solve(given, mesh, order=1)
+    right = solve(replace(given, contact=[given.contact[0].swapped()]), mesh, order=1)
+    assert solution.problem.contact[0].secondary == "pin"
+    np.testing.assert_allclose(solution.energy, right.energy, rtol=1e-9)  # round-off, amplified
+
+
+@pytest.mark.parametrize("swap", [False, True])
+def test_a_pin_that_lies_askew_in_a_loose_bush_is_refused(swap):
+    """Normals of either side of a pair turn one of the two bodies, which nothing holds."""
+    clearance = 0.03
+    hole = WorkPlane().Circle(1.0).Face()
+    plate = WorkPlane().MoveTo(-2, -2).Rectangle(4, 4).Face() - hole
+    at = -clearance
+    bush = WorkPlane().Circle(0, at, 1.0 - clearance).Face()
+    bush.edges.name = "outside"
+    bush -= WorkPlane().Circle(0, at, 0.6).Face()
+    pin = WorkPlane().Circle(0, 2 * at, 0.6 - clearance).Face()
+    for name, face in (("plate", plate), ("bush", bush), ("pin", pin)):
+        face.faces.name = name
+    pin.edges.name = "pin"
+    for edge in plate.edges:
+        edge.name = "rim" if max(abs(edge.center.x), abs(edge.center.y)) > 1.5 else "hole"
+    for edge in bush.edges:
+        if edge.name != "outside":
+            edge.name = "inside"
+    pairs = [("hole", "outside"), ("inside", "pin")]
+    problem = Problem(
+        geometry=OCCGeometry(Compound([plate, bush, pin]), dim=2),
+        materials={"pin|bush|plate": Elastic(E=210e3, nu=0.3)},
+        displacement={"rim": (0, 0)},
+        force={"pin": (3.0, -10.0)},
+        contact=[Contact(*(pair[::-1] if swap else pair)) for pair in pairs],
+    )
+    for order in (1, 2):
+        with pytest.raises(ContactError):
+            solve(problem, maxh=0.35, order=order)
+
+
+@pytest.mark.parametrize("swap", [False, True])
+def test_a_slender_wedge_keeps_its_roles(swap):
+    """It moves far for a small gap whichever roles: forces are its load over the slope, 1/200."""
+    slope = 0.005
+    outlines = {
+        "wedge": ([(0, 0), (2, 0), (2, 1 - 2 * slope), (0, 1)], ["down", "", "up", ""]),
+        "lower": ([(-1, -1), (3, -1), (3, 0), (-1, 0)], ["fixed", "", "floor", ""]),
+        "upper": (
+            [(-1, 1 + slope), (3, 1 - 3 * slope), (3, 2), (-1, 2)],
+            ["roof", "", "fixed", ""],
+        ),
+    }
+    bodies = [body(name, polygon(*outline)) for name, outline in outlines.items()]
+    pairs = [("down", "floor"), ("up", "roof")]
+    problem = Problem(
+        geometry=compound(*bodies),
+        materials={"wedge|lower|upper": Elastic(E=1e5, nu=0.3)},
+        displacement={"fixed": (0, 0)},
+        force={"wedge": (1.0, 0)},
+        contact=[Contact(*(pair[::-1] if swap else pair)) for pair in pairs],
+    )
+    solution = solve(problem, maxh=0.5, order=2)
+    assert solution.problem is problem
+    load = 2 - 2 * slope
+    expected = (-1 if swap else 1) * np.array((-load, -load / slope))
+    np.testing.assert_allclose(solution.contact_force(1), expected, rtol=1e-6)  # round-off / slope
+
+
+def test_roles_are_exchanged_in_adapt_and_from_its_solutions():
+    """In `adapt` once, in the coarse run of `solve`, and from a start with exchanged roles."""
+    given = pin_at_the_bottom(("hole", "pin"))
+    with pytest.warns(ContactWarning, match="exchanged") as said:
+        *_, solution = adapt(given, maxh=0.5, order=2, max_dofs=3000)
+    assert sum("exchanged" in str(one.message) for one in said) == 1
+    assert solution.problem.contact[0].secondary == "pin"
+    heavier = replace(given, force={"pin": (0.6, -2.0)})
+    with pytest.warns(ContactWarning, match="exchanged"):
+        *_, continued = adapt(heavier, order=2, max_dofs=3000, start=solution)
+    right = replace(heavier, contact=[given.contact[0].swapped()])
+    *_, fresh = adapt(right, maxh=0.5, order=2, max_dofs=3000)
+    # Either is wrong by the square of its relative error.
+    wrong = continued.relative_error_estimate**2 + fresh.relative_error_estimate**2
+    np.testing.assert_allclose(continued.energy, fresh.energy, rtol=wrong)
+
+
+def test_roles_are_exchanged_in_the_coarse_run(monkeypatch):
+    """That starts a large mesh, which takes its roles over."""
+    monkeypatch.setattr(solving, "COARSE_RUN_FROM", 500)
+    given = pin_at_the_bottom(("hole", "pin"))
+    with pytest.warns(ContactWarning, match="exchanged"):
+        solution = solve(given, maxh=0.35, order=2)
+    assert solution.coarse_levels > 0
+    assert solution.problem.contact[0].secondary == "pin"
+    right = replace(given, contact=[given.contact[0].swapped()])
+    other = solve(right, solution.mesh, order=2)
+    np.testing.assert_allclose(solution.energy, other.energy, rtol=1e-9)  # round-off, amplified
 
 
 def disc_in_vee(contact, settle):

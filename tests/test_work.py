@@ -10,6 +10,8 @@ from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.benchmark.studies.skip import two_blocks
 from drivers.reference import cases
 from ngcontact import adapt, solve
+from ngcontact.fem import unknowns
+from ngcontact.solving import COARSE_DOFS, COARSE_SHARE, coarse_run
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])
@@ -68,6 +70,14 @@ def test_a_large_cold_start_follows_a_coarse_run():
     u, v = (s.displacement.vec.FV().NumPy() for s in (given, solution))
     # Two factorisations of other active sets: round-off times the condition, about 1e5.
     np.testing.assert_allclose(u, v, rtol=0, atol=1e-10 * np.abs(v).max())
+
+
+def test_coarse_runs_of_larger_meshes_are_larger():
+    problem = cases.disc_on_rigid_plane()
+    mesh = uniform_mesh(problem, 1, 30_000)
+    most = unknowns(mesh, 2, "isoparametric") * COARSE_SHARE
+    *_, last = coarse_run(problem, mesh, 2, "isoparametric")
+    assert COARSE_DOFS < last.displacement.space.ndof <= most
 
 
 @pytest.mark.study

@@ -13,6 +13,7 @@ import tokenize
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from io import StringIO
 from pathlib import Path
 
@@ -103,6 +104,7 @@ def comments(source: str) -> Iterator[tuple[int, str]]:
             waiting = []
 
 
+@cache
 def places() -> dict[str, list[Place]]:
     """Lines of the package with a comment that names an equation, by equation."""
     found = defaultdict(list)

@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias
 
 from drivers.reference import cases
 from drivers.reference.overkill import Overkill
-from drivers.reference.straight import Exact, relative_energy_error
+from drivers.reference.straight import Exact, energy_error
 from ngcontact import Problem, Solution, adapt
 
 Name: TypeAlias = Literal[
@@ -56,13 +56,26 @@ STUDIES: dict[Name, Callable[[], Study]] = {
 
 
 def error_measure(study: Study, reference: int = REFERENCE) -> Callable[[Solution], float]:
-    """Relative error of stresses in the energy norm, as a function of a solution.
+    """Relative error of stresses in the energy norm, as a function of a solution."""
+    errors = energy_errors(study, reference)
+
+    def relative(solution: Solution) -> float:
+        error, norm = errors(solution)
+        return error / norm
+
+    return relative
+
+
+def energy_errors(
+    study: Study, reference: int = REFERENCE
+) -> Callable[[Solution], tuple[float, float]]:
+    """Error of stresses in the energy norm, and the norm itself, as a function of a solution.
 
     Against the exact stress, or against that of an adaptive solution of order 4 with up to
     `reference` unknowns.
     """
     exact = study.exact
     if exact is not None:
-        return lambda solution: relative_energy_error(solution, exact)
+        return lambda solution: energy_error(solution, exact)
     *_, finest = adapt(study.problem, order=4, max_dofs=study.reference(reference))
-    return Overkill(finest).relative_error
+    return Overkill(finest).energy_error

@@ -71,10 +71,15 @@ class Overkill:
 
     def relative_error(self, solution: Solution) -> float:
         """Relative error of the stress of another solution of the problem, in the energy norm."""
+        error, norm = self.energy_error(solution)
+        return error / norm
+
+    def energy_error(self, solution: Solution) -> tuple[float, float]:
+        """Error of the stress of another solution in the energy norm, and the norm of this one."""
         place, weight, body, exact = self._sample
         difference = _stress_at(solution, place, body) - exact
         error, norm = (weight @ self._energy(s) for s in (difference, exact))
-        return math.sqrt(error / norm)
+        return math.sqrt(error), math.sqrt(norm)
 
     def _energy(self, stress: Array) -> Array:
         """Twice the complementary energy (n,) of stresses (n, 4), s : C^-1 : s."""

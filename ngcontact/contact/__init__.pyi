@@ -2,6 +2,7 @@ from .assembly import contact_line as contact_line
 from .assembly import joined as joined
 from .assembly import kept_lines as kept_lines
 from .assembly import merged as merged
+from .assembly import with_roles as with_roles
 from .corners import in_contact as in_contact
 from .corners import pressure_across_corners as pressure_across_corners
 from .corners import twins as twins

@@ -19,7 +19,8 @@ ALIKE = np.sqrt(0.5)  # cosine of the turn up to which both sides of a corner ha
 def twins(line: ContactLine) -> Index:
     """Pairs (t, 2) of contact points that share a node."""
     order = np.argsort(line.node, kind="stable")
-    same = np.flatnonzero(np.diff(line.node[order]) == 0)
+    node = line.node[order]
+    same = np.flatnonzero(node[1:] == node[:-1])
     return np.column_stack([order[same], order[same + 1]])
 
 

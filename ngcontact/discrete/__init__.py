@@ -2,6 +2,7 @@
 
 from .discrete_problem import DiscreteProblem as DiscreteProblem
 from .discrete_problem import discretise as discretise
+from .discrete_problem import hardly_held as hardly_held
 from .discrete_problem import minimise_energy as minimise_energy
 from .discrete_problem import reassembled as reassembled
 from .initial_active_set import carried_active_set as carried_active_set

@@ -12,7 +12,7 @@ import scipy.sparse as sp
 from ..arrays import Array, Index, Mask
 from ..constraints import BasisTransformation, Conditions
 from ..contact import ContactLine
-from ..errors import ConvergenceError
+from ..errors import ConvergenceError, NoEquilibriumError
 from ..fem import (
     LOAD_BONUS,
     BoundaryTrace,
@@ -245,6 +245,13 @@ def minimise_energy(discrete: DiscreteProblem, active: Mask) -> Iterate:
     result = _placed(p, rigid, result)
     result.u[p.unknown[result.active]] = p.g[result.active]
     return result
+
+
+def hardly_held(discrete: DiscreteProblem, found: Iterate) -> NoEquilibriumError | None:
+    """What is to be said of a body that contact hardly holds, None without one; see `Rigid`."""
+    if discrete.rigid is None:
+        return None
+    return discrete.rigid.hardly_held(discrete.basis.T @ found.u)
 
 
 def _placed(p: QuadraticProgram, rigid: Rigid, iterate: Iterate) -> Iterate:

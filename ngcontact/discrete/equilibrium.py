@@ -26,6 +26,7 @@ CURVED = 2  # degrees added to see the error of the mesh's curved sides
 QUADRATURE = 3.0  # times the error that is measured of the load's work is none; measured: up to .21
 WORK_NOISE = 1e-10  # ... and this, relative to the sum of its terms, round-off
 BALANCED = 1e-13  # of all contact forces: what their least squares leave, measured 2e-14
+HARDLY = 1e-2  # of a motion, that closes or opens no gap more: contact hardly resists it
 NO_WORK = 1e-14  # work, relative to the sum of its terms, that is none
 
 
@@ -62,6 +63,33 @@ class Rigid:
     def left_free(self, active: Mask) -> list[RigidMotion]:
         """Motions that the rows `active` (m,) do not resist either, Remark 3.7."""
         return [self._motion(x) for x in vanishing_combinations(self.rows[active]).T]
+
+    def hardly_held(self, values: Array) -> NoEquilibriumError | None:
+        """What is to be said of a large motion that contact rows hardly see, None without one.
+
+        Of one body or all, in the displacement of node `values` (2n,). A wrong moment, as of a
+        hole's normals at points of a pin that lies elsewhere in it, drives it as far as round-off
+        and the mesh allow.
+        """
+        free, extent = self.free, np.abs(values).max(initial=0.0)
+        amounts = np.linalg.solve(free.nodal.T @ free.nodal, free.nodal.T @ values)
+        lineal = vanishing_combinations(self.rows)
+        amounts -= lineal @ np.linalg.lstsq(lineal, amounts)[0]
+        for part in (free.combinations, *free.of_bodies):
+            mine = np.where(part.any(axis=0), amounts, 0.0)
+            size, seen = (np.abs(x @ mine).max(initial=0.0) for x in (part, self.rows))
+            if size > HARDLY * extent and seen < HARDLY * size:
+                motion, work = free.motion(mine / size), float(mine @ self.work)
+                return NoEquilibriumError(
+                    f"contact hardly holds a rigid {motion}: by {size:.3g} it opens or closes gaps "
+                    f"by {seen:.3g} only, and the load does the work {work:.6g}; give that body as "
+                    "secondary, hold it by `displacement` or `sliding`, or draw it where the load "
+                    "presses it",
+                    body=motion.bodies[0],
+                    motion=motion,
+                    work=work,
+                )
+        return None
 
     def on(self, space: Space | None) -> Rigid:
         """The same as functions of an equal space; of None, to be kept without one."""
@@ -199,7 +227,7 @@ def _allowed(residue: Array, error: Array, carried: float) -> float:
     return float(np.abs(residue / unit) @ error) + BALANCED * carried
 
 
-def _work_of_load(problem: Problem, mesh: ng.Mesh, motion: RigidMotion) -> float:
+def work_of_load(problem: Problem, mesh: ng.Mesh, motion: RigidMotion) -> float:
     """Work of the load on a rigid motion of bodies with names of their own, by the mesh's shape."""
     z = {}
     parts = zip(motion.bodies, motion.translation, motion.rotation, motion.middle, strict=True)
@@ -220,7 +248,7 @@ def _work_by_shape(problem: Problem, mesh: ng.Mesh, motion: RigidMotion) -> floa
         return 0.0
     copy = ng.Mesh(mesh.ngmesh.Copy())
     copy.Curve(mesh.GetCurveOrder() + CURVED)
-    return _work_of_load(problem, copy, motion) - _work_of_load(problem, mesh, motion)
+    return work_of_load(problem, copy, motion) - work_of_load(problem, mesh, motion)
 
 
 def _check_work(

@@ -183,6 +183,17 @@ class FreeMotions:
     nodal: Array
     values: Array
 
+    @property
+    def of_bodies(self) -> Array:
+        """The combinations of each body, (b, 3, r)."""
+        return self.combinations.reshape(len(self.bodies.names), 3, -1)
+
+    @property
+    def names(self) -> list[str]:
+        """Of the bodies that can move."""
+        both = zip(self.bodies.names, self.of_bodies, strict=True)
+        return [name for name, part in both if part.any()]
+
     @cached_property
     def means(self) -> Array:
         """Integrals (2N, r) of v.z over the boundaries for the motions z, made when asked for."""

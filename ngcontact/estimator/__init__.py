@@ -1,6 +1,6 @@
 """Error indicators of a solution, functions of one signature, `Estimator`; bounds of its error."""
 
-from .equilibrated import refuse_bound as refuse_bound
+from .bound import refuse_bound as refuse_bound
 from .indicators import Estimate as Estimate
 from .indicators import Estimator as Estimator
 from .quantities import Measured as Measured

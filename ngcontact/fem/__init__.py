@@ -29,8 +29,6 @@ from .moduli import stiffer_than as stiffer_than
 from .moduli import stiffnesses as stiffnesses
 from .moduli import warn_of_locking as warn_of_locking
 from .nodal_basis import edge_bubbles as edge_bubbles
-from .prescribed_jumps import look_at_prescribed as look_at_prescribed
-from .prescribed_jumps import prescribed as prescribed
 from .space import LOAD_BONUS as LOAD_BONUS
 from .space import Space as Space
 from .space import assemble as assemble

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -82,6 +83,10 @@ class BoundaryTrace:
     model: Model
     axis: Index
     on_axis: Mask
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Made again from the mesh: lines of a drawing cannot be pickled."""
+        return boundary_trace, (self.mesh, self.order, self.model)
 
     def point(self, segment: Index, s: Array) -> Array:
         """Points (k, 2) of the mesh's curves at parameters `s` (k,) of segments `segment` (k,)."""

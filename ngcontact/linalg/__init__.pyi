@@ -6,8 +6,10 @@ from .iterative import Limits as Limits
 from .iterative import iterative_systems as iterative_systems
 from .multigrid import Multigrid as Multigrid
 from .multigrid import truncated_multigrid as truncated_multigrid
+from .sparse import change_of_basis as change_of_basis
 from .sparse import cholesky as cholesky
 from .sparse import congruent as congruent
+from .sparse import handed_over as handed_over
 from .sparse import inverse_of as inverse_of
 from .sparse import lower_half as lower_half
 from .sparse import shared as shared

@@ -65,14 +65,9 @@ def congruent(
     if T.shape[0] != T.shape[1]:  # fewer node values than edge unknowns: element="physical"
         K = (T.T @ A @ T).tocsr()
         return K, lower_half(K)
-    changed = _unlike_identity(T)
-    if changed.size == 0:
+    change = change_of_basis(A, T)
+    if change.nnz == 0:
         return A, matrix
-    each = np.arange(changed.size)
-    ones = from_triplets(np.ones(changed.size), each, changed, (changed.size, T.shape[0]))
-    D = T[changed] - ones  # T = I + D, its rows
-    rows = D.T @ A[changed]  # D'A: as A is symmetric, AD is its transpose
-    change = (rows + rows.T + rows[:, changed] @ D).tocsr()
     places = _places(A, change)
     if places is None:
         total = (matrix + handed_over(change)).CreateSparseMatrix()
@@ -82,6 +77,16 @@ def congruent(
     K = shared(total)
     K.data[places] += change.data
     return K, total
+
+
+def change_of_basis(A: sp.csr_array, T: sp.csr_array) -> sp.csr_array:
+    """T'AT - A of a symmetric `A` (n, n), where `T` (n, n) is the identity but for a few rows."""
+    changed = _unlike_identity(T)
+    each = np.arange(changed.size)
+    ones = from_triplets(np.ones(changed.size), each, changed, (changed.size, T.shape[0]))
+    D = T[changed] - ones  # T = I + D, its rows
+    rows = D.T @ A[changed]  # D'A: as A is symmetric, AD is its transpose
+    return (rows + rows.T + rows[:, changed] @ D).tocsr()
 
 
 def _unlike_identity(T: sp.csr_array) -> Index:

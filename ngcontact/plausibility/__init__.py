@@ -6,5 +6,4 @@ from .estimates import EXACT as EXACT
 from .estimates import at_round_off as at_round_off
 from .estimates import doubt_of_refinement as doubt_of_refinement
 from .estimates import estimates_rise as estimates_rise
-from .implausible import look_at_data as look_at_data
 from .implausible import warn_of_implausible as warn_of_implausible

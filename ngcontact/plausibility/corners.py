@@ -9,9 +9,9 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from ..errors import warn
-from ..fem import BoundaryTrace, boundary_trace, prescribed
+from ..fem import BoundaryTrace, boundary_trace
 from ..problem import Problem
-from ..quadrature import View, looked, numbers
+from ..quadrature import Features, View, features_of, looked, numbers
 
 APART = 1e-6  # values of two supports at one corner, relative to the largest, that are two values
 NOISE = 64 * np.finfo(float).eps  # ... and to the largest of all values: below it is round-off
@@ -46,16 +46,17 @@ def contradictions(problem: Problem, trace: BoundaryTrace) -> list[Contradiction
     """
     if not problem.displacement:
         return []
-    seen, shared = prescribed(problem, trace.mesh), _shared(problem, trace.mesh)
+    seen, shared = _prescribed(problem, trace.mesh), _shared(problem, trace.mesh)
     known: dict[tuple[int, int], tuple[str, float]] = {}
     found = [
         Contradiction(
             (one.name, one.name),
-            one.place,
-            f'displacement "{one.name}" jumps by {one.amount:.6g} along {"xy"[one.axis]}',
-            one.amount,
+            np.array(place),
+            f'displacement "{one.name}" jumps by {amount:.6g} along {"xy"[one.axis]}',
+            amount,
         )
-        for one in seen.steps
+        for one in seen
+        for *place, amount in one.jumps.tolist()
     ]
     for pattern, components in problem.displacement.items():
         segment, s = trace.at_nodes(trace.segments(pattern))
@@ -81,14 +82,20 @@ def contradictions(problem: Problem, trace: BoundaryTrace) -> list[Contradiction
                         )
                     )
     found += _across_guides(problem, trace, known)
-    return [one for one in found if one.amount > NOISE * seen.largest]
+    largest = max((one.largest for one in seen), default=0.0)
+    return [one for one in found if one.amount > NOISE * largest]
+
+
+def _prescribed(problem: Problem, mesh: ng.Mesh) -> list[Features]:
+    """What was seen of displacements given as functions."""
+    return [one for one in features_of(problem, mesh) if one.kind == "displacement"]
 
 
 def _shared(problem: Problem, mesh: ng.Mesh) -> Mask:
     """Vertices at which segments of several prescribed regions, or of guides, meet."""
     guides = [str(problem.sliding)] if problem.sliding is not None else []
-    view, patterns = View(mesh, 1), (*problem.displacement, *guides)
-    at = np.concatenate([view.inside(mesh.Boundaries(pattern)) for pattern in patterns])
+    view, pattern = View(mesh, 1), "|".join([*problem.displacement, *guides])
+    at = view.inside(mesh.Boundaries(pattern))
     vertex, region = view.arrays.segments[at], view.arrays.boundaries[at]
     low, high = np.full(mesh.nv, len(mesh.GetBoundaries())), np.full(mesh.nv, -1)
     np.minimum.at(low, vertex, region[:, None])
@@ -123,7 +130,7 @@ def warn_of_contradictions(problem: Problem, mesh: ng.Mesh) -> None:
     """Warn of the first corner of each two supports."""
     told: set[tuple[str, str]] = set()
     possible = bool(problem.displacement) and (
-        prescribed(problem, mesh).steps or _shared(problem, mesh).any()
+        any(len(one.jumps) for one in _prescribed(problem, mesh)) or _shared(problem, mesh).any()
     )
     for one in contradictions(problem, boundary_trace(mesh, 1)) if possible else ():
         if one.supports not in told:

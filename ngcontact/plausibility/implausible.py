@@ -4,16 +4,10 @@ from __future__ import annotations
 
 import ngsolve as ng
 
-from ..fem import look_at_prescribed, warn_of_locking
+from ..fem import warn_of_locking
 from ..problem import Problem
-from ..quadrature import look, warn_of_data, warn_of_jumps
+from ..quadrature import warn_of_data, warn_of_jumps
 from .corners import warn_of_contradictions
-
-
-def look_at_data(problem: Problem, mesh: ng.Mesh) -> None:
-    """Look at all functions among the data anew, once per run: parameters may have changed."""
-    look(problem, mesh)
-    look_at_prescribed(problem, mesh)
 
 
 def warn_of_implausible(problem: Problem, mesh: ng.Mesh, order: int) -> None:

@@ -35,21 +35,23 @@ class Zones:
 
 def links(line: ContactLine) -> tuple[Index, Index]:
     """Pairs of neighbouring points: (l, 2) on one segment, (t, 2) on both sides of a corner."""
-    pairs = np.stack([line.rows[:, :-1].ravel(), line.rows[:, 1:].ravel()], axis=1)
-    return pairs[(pairs >= 0).all(axis=1)], twins(line)
+    one, other = line.rows[:, :-1].ravel(), line.rows[:, 1:].ravel()
+    both = np.flatnonzero((one >= 0) & (other >= 0))
+    return np.array([one[both], other[both]]).T, twins(line)
 
 
 def connected(count: int, pairs: Index) -> Index:
     """Least number (n,), of a `count` n, to which each is joined by `pairs` (k, 2)."""
     number = np.arange(count)
     while True:
-        ends = number[pairs]
-        low = ends.min(axis=1)
-        if np.array_equal(low, ends.max(axis=1)):
+        one, other = number[pairs.T]
+        if (one == other).all():
             return number
-        np.minimum.at(number, ends, low[:, None])
-        while (number[number] != number).any():
-            number = number[number]
+        low = np.minimum(one, other)
+        np.minimum.at(number, one, low)
+        np.minimum.at(number, other, low)
+        while ((further := number[number]) != number).any():
+            number = further
 
 
 def zones_of(state: ContactState) -> Zones:
@@ -58,7 +60,7 @@ def zones_of(state: ContactState) -> Zones:
     along, across = links(line)
     closed = in_contact(line, state.active) if len(across) else state.active
     both = np.concatenate([along, across])
-    touching = np.count_nonzero(closed[both], axis=1)
+    touching = closed[both].sum(axis=1)
     number = connected(len(closed), both[touching == 2])
     first = closed & (number == np.arange(len(closed)))
     k = np.count_nonzero(first)

@@ -187,7 +187,8 @@ def check_pressures(
             name = names[int(np.argmax(mask & inner))]
             raise ValueError(
                 f'{label} is a pressure, and "{name}" lies inside a body or between two that are '
-                "glued, where no normal is the outward one: give the traction as a pair"
+                "glued, where no normal is the outward one: give the traction as a pair; if it "
+                "should bound a cut, draw what is cut off anticlockwise, as OCC needs it"
             )
 
 

@@ -7,10 +7,12 @@ from .doubts import Unresolved as Unresolved
 from .doubts import unresolved as unresolved
 from .doubts import warn_of_data as warn_of_data
 from .doubts import warn_of_unresolved as warn_of_unresolved
+from .features import Features as Features
+from .features import features_of as features_of
 from .features import look as look
+from .features import touched as touched
 from .integrals import integral_over as integral_over
 from .jumps import jumping_moduli as jumping_moduli
-from .jumps import steps_on as steps_on
 from .jumps import warn_of_jumps as warn_of_jumps
 from .lattice import composite as composite
 from .lattice import extent as extent

@@ -23,4 +23,4 @@ def evaluations() -> int:
 def looked(function: ng.CoefficientFunction, points: NDArray) -> Array:
     """Values (..., c) of a function among the data at mesh `points` (j, n) or (n,), counted."""
     _Count.points += points.size
-    return np.asarray(function(points.ravel())).reshape(*points.shape, -1)
+    return np.asarray(function(points.ravel())).reshape(*points.shape, function.dim)

@@ -26,7 +26,7 @@ BENT = 1e-9  # of a segment, its distance from a chord
 def warn_of_data(problem: Problem, mesh: ng.Mesh, order: int) -> None:
     """Warn of loads that vanish wherever they are looked at or are finer than any quadrature."""
     for one in features_of(problem, mesh):
-        if one.kind in ("force", "traction") and one.samples and one.vanishes:
+        if one.kind in ("force", "traction") and one.samples and not one.largest:
             warn(
                 f'{one.kind} "{one.name}" is zero at all {one.samples} points at which it was '
                 "looked at: if it acts on a smaller part, make that a boundary or a body of its own"

@@ -12,27 +12,23 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeGuard
 from weakref import WeakKeyDictionary
 
 import ngsolve as ng
 import numpy as np
-from scipy.ndimage import (
-    distance_transform_edt,
-    label,
-    maximum,
-    maximum_filter1d,
-    minimum_filter1d,
-    uniform_filter,
-)
+from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask
 from ..problem import Problem, varies
 from .cells import Cells, joined
 from .constant_data import numbers
-from .lattice import GOLDEN
+from .counted import looked
+from .jumps import steps_along
+from .lattice import lattice
 from .view import View
 
 ON_LINE = 2048  # samples of a boundary: none are further apart than 1 / 1365 of it
@@ -41,7 +37,7 @@ TURN = 0.3  # angle of their lattice, out of step with edges
 WINDOWS = (3, 7, 15, 31, 63, 127, 255)  # samples, each of twice the last and one
 STEEP = 0.5  # of the change in a window, what is lost there of a feature
 AT_ENDS = 31  # of these, for features at ends of lines, where the end of a wave looks like one ...
-HIGH = 0.05  # ... of less than this share of the range
+BESIDE_ENDS = 4  # ... but changes far more within so many windows
 # The same in bodies; laws are not integrated on parts of elements that follow them.
 IN_PLANE = {"force": (5, 11), "materials": (5, 11, 23, 47)}
 BESIDE = 4  # samples, half of them on each side
@@ -52,7 +48,9 @@ SHARE = {"traction": 0.1, "force": 0.1, "materials": 0.1, "displacement": 1e-5, 
 ROUND_OFF = 1e-10  # of values, relative to the largest
 FEW = 6  # samples in a feature up to which what is between them is looked at
 MEASURED = 65  # points across a feature, to tell its width
-FEATURES = 200  # of one function on a line, or that are measured in a body
+FEATURES = 200  # of one function on a line
+ACROSS = 16  # features of a body of which widths are measured ...
+WIDE = 8.0  # ... up to so many samples on either side
 NARROWEST = 0.1  # samples: no feature is taken for narrower
 
 Function: TypeAlias = ng.CoefficientFunction | Callable[[Array, Array], Array]
@@ -60,74 +58,92 @@ Function: TypeAlias = ng.CoefficientFunction | Callable[[Array, Array], Array]
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """Narrow features of a function on a boundary, or in a body.
+    """Narrow features of a function on a boundary, or in a body, and its jumps.
 
     Attributes
     ----------
     kind, name : str
         What the function is, as "gap", and where.
+    axis : int
+        Of displacements, their component.
     dim : int
         1 on boundaries, 2 in bodies.
     places : ndarray (k, 2)
         Lengths.
     widths : ndarray (k,)
         Lengths.
+    jumps : ndarray (j, 3)
+        Of displacements: a place, and by how much; lengths.
     samples : int
         At which it was looked at.
-    vanishes : bool
-        Whether it is 0 at all of them.
+    largest : float
+        Largest size of a value there.
     """
 
     kind: str
     name: str
+    axis: int
     dim: int
     places: Array
     widths: Array
+    jumps: Array
     samples: int
-    vanishes: bool
+    largest: float
 
 
-# By the object that holds a function, which lives as long as the problem; by kind and name.
-FOUND: WeakKeyDictionary[Any, dict[tuple[str, str], Features]] = WeakKeyDictionary()
+# Places, widths, jumps, number of samples and largest size of a value, as above.
+Seen: TypeAlias = tuple[Array, Array, Array, int, float]
+NOTHING: Seen = np.empty((0, 2)), np.empty(0), np.empty((0, 3)), 0, 0.0
+
+# By the object that holds a function, which lives as long as the problem; by kind, name and axis.
+FOUND: WeakKeyDictionary[Any, dict[tuple[str, str, int], Features]] = WeakKeyDictionary()
 
 
-def _functions(
+def _data(
     problem: Problem, mesh: ng.Mesh
-) -> Iterator[tuple[str, str, object, Function, ng.Region]]:
-    """Kind, name, owner, function and region of all data that are no numbers."""
+) -> Iterator[tuple[tuple[str, str, int], object, Function | float | None, ng.Region]]:
+    """Kind, name and axis, owner and region of all data, functions or numbers."""
     for name, F in problem.force.items():
-        if not numbers(F):
-            yield "force", name, F, F, mesh.Materials(name)
+        yield ("force", name, 0), F, F, mesh.Materials(name)
     for name, p in problem.traction.items():
-        if not numbers(p):
-            yield "traction", name, p, p, mesh.Boundaries(name)
+        yield ("traction", name, 0), p, p, mesh.Boundaries(name)
     for name, components in problem.displacement.items():
-        for value in components:
-            if value is not None and not numbers(value):
-                yield "displacement", name, value, value, mesh.Boundaries(name)
+        for axis, value in enumerate(components):
+            yield ("displacement", name, axis), value, value, mesh.Boundaries(name)
     for pair in problem.contact:
-        if pair.gap is not None and not isinstance(pair.gap, float):
-            yield "gap", pair.secondary, pair, pair.gap, mesh.Boundaries(pair.secondary)
+        yield ("gap", pair.secondary, 0), pair, pair.gap, mesh.Boundaries(pair.secondary)
     for name, law in problem.materials.items():
-        if varies(law):
-            C = law.voigt(problem.model)
-            yield "materials", name, law, C, mesh.Materials(name)
+        C = law.voigt(problem.model) if varies(law) else None
+        diagonal = None if C is None else ng.CF(tuple(C[k, k] for k in range(C.dims[0])))
+        yield ("materials", name, 0), law, diagonal, mesh.Materials(name)
+
+
+def _is_function(data: object) -> TypeGuard[Function]:
+    """Whether data are no numbers, and given at all."""
+    if isinstance(data, ng.CoefficientFunction):
+        return not numbers(data)
+    return callable(data)
 
 
 def look(problem: Problem, mesh: ng.Mesh) -> None:
-    """Look at all functions of a problem anew: `features_of` knows them from now on."""
-    for kind, name, owner, function, region in _functions(problem, mesh):
-        FOUND.setdefault(owner, {})[kind, name] = _looked_at(kind, name, function, region)
+    """Look at all functions of a problem anew, as each run does: parameters may have changed.
+
+    `features_of` knows them from now on.
+    """
+    for key, owner, data, region in _data(problem, mesh):
+        if _is_function(data):
+            FOUND.setdefault(owner, {})[key] = _looked_at(key, data, region)
 
 
 def features_of(problem: Problem, mesh: ng.Mesh) -> list[Features]:
     """What `look` found of the functions of a problem last; a look where there was none."""
     found = []
-    for kind, name, owner, function, region in _functions(problem, mesh):
-        known = FOUND.setdefault(owner, {})
-        if (kind, name) not in known:
-            known[kind, name] = _looked_at(kind, name, function, region)
-        found.append(known[kind, name])
+    for key, owner, data, region in _data(problem, mesh):
+        if _is_function(data):
+            known = FOUND.setdefault(owner, {})
+            if key not in known:
+                known[key] = _looked_at(key, data, region)
+            found.append(known[key])
     return found
 
 
@@ -138,20 +154,13 @@ def features_in(load: object) -> Array:
     return np.concatenate([np.empty((0, 3)), *rows])
 
 
-def _looked_at(kind: str, name: str, function: Function, region: ng.Region) -> Features:
-    dim = 2 if region.VB() == ng.VOL else 1
-    places, widths, count, any_value = [np.empty((0, 2))], [np.empty(0)], 0, False
-    if isinstance(function, ng.CoefficientFunction) and numbers(function):
-        return Features(kind, name, dim, places[0], widths[0], 0, vanishes=False)
-    view = View(region.mesh, dim)
-    look = _in_body if dim == 2 else _on_line
-    for elements in _parts(view, region):
-        x, w, n, vanishes = look(kind, function, view, elements)
-        places.append(x)
-        widths.append(w)
-        count, any_value = count + n, any_value or not vanishes
-    x, w = np.concatenate(places), np.concatenate(widths)
-    return Features(kind, name, dim, x, w, count, vanishes=not any_value)
+def _looked_at(key: tuple[str, str, int], function: Function, region: ng.Region) -> Features:
+    view = View(region.mesh, 2 if region.VB() == ng.VOL else 1)
+    look = _in_body if view.dim == 2 else _on_boundary
+    parts = [look(key[0], function, view, elements) for elements in _parts(view, region)]
+    places, widths, jumps, samples, largest = zip(NOTHING, *parts, strict=True)
+    x, w, steps = (np.concatenate(some) for some in (places, widths, jumps))
+    return Features(*key, view.dim, x, w, steps, sum(samples), max(largest))
 
 
 def _parts(view: View, region: ng.Region) -> list[Index]:
@@ -183,8 +192,7 @@ def _positions(view: View, elements: Index, reference: Array) -> Array:
 def _told(kind: str, values: Array) -> tuple[Array, float]:
     """What is looked at of `values` (n, c), (n, c'), and what counts as a departure."""
     if kind == "materials":
-        diagonal = values[:, :: round(values.shape[1] ** 0.5) + 1]
-        stiffness = np.log(np.maximum(np.abs(diagonal), np.finfo(float).tiny))
+        stiffness = np.log(np.maximum(np.abs(values), np.finfo(float).tiny))
         return stiffness.mean(axis=1, keepdims=True), SHARE[kind]
     size = float(np.abs(values).max(initial=0.0))
     unit = float(np.abs(values).max(axis=1).mean()) if kind in ("traction", "force") else 0.0
@@ -213,49 +221,94 @@ def _lost(values: Array, window: int, inside: Mask | None = None) -> Array:
     return np.asarray(values - least)
 
 
-def _on_line(
-    kind: str, function: Function, view: View, segments: Index
-) -> tuple[Array, Array, int, bool]:
-    """Places (k, 2) and widths (k,) of features; the number of samples, and whether all are 0."""
-    chains = _chains(view, segments)
+@dataclass(frozen=True, eq=False)
+class _Line:
+    """A function along a chain of segments, some of which are run backwards."""
+
+    function: Function
+    view: View
+    segments: Index
+    turned: Mask
+
+    @cached_property
+    def ends(self) -> Array:
+        """Lengths from the start to all ends of segments."""
+        return np.append(0.0, np.cumsum(self.view.sizes[self.segments]))
+
+    def _at(self, t: Array) -> tuple[Index, Array]:
+        """Segments and points on them at the lengths `t` (n,)."""
+        k = np.searchsorted(self.ends, t, side="right") - 1
+        k = np.clip(k, 0, len(self.segments) - 1)
+        s = np.clip((t - self.ends[k]) / np.diff(self.ends)[k], 0.0, 1.0)
+        return self.segments[k], np.where(self.turned[k], 1 - s, s)[:, None]
+
+    def values(self, t: Array) -> Array:
+        """Of the function (n, c) at the lengths `t` (n,)."""
+        return _values(self.function, self.view, *self._at(t))
+
+    def places(self, t: Array) -> Array:
+        """Points (n, 2) at the lengths `t` (n,)."""
+        return _positions(self.view, *self._at(t))
+
+    def jumps(self, t: Array, known: Array) -> Array:
+        """Places and sizes (j, 3) of jumps of a scalar, `known` (n,) at `t` (n,), at ends, too."""
+        t = np.concatenate([[0.0], t, self.ends[-1:]])
+        first, last = self.values(t[[0, -1]])
+        at, size = steps_along(
+            lambda t: self.values(t)[:, 0], t, np.concatenate([first, known, last])
+        )
+        return np.column_stack([self.places(at), size])
+
+
+def _on_boundary(kind: str, function: Function, view: View, segments: Index) -> Seen:
+    lines = [_Line(function, view, at, turned) for at, turned in _chains(view, segments)]
     whole = view.sizes[segments].sum()
-    places, widths, count, vanishes = [np.empty((0, 2))], [np.empty(0)], 0, True
     looked = []
-    for at, turned in chains:
-        ends = np.append(0.0, np.cumsum(view.sizes[at]))
-        n = max(round(ON_LINE * ends[-1] / whole), len(at), WINDOWS[0])
-        t = (np.arange(n) + 0.25 + 0.5 * (GOLDEN * np.arange(n) % 1)) / n * ends[-1]
-        looked.append((at, turned, ends, t, _values(function, view, *_on(at, turned, ends, t))))
-    _, limit = _told(kind, np.concatenate([one[-1] for one in looked]))
-    for at, turned, ends, t, values in looked:
-        count, vanishes = count + len(t), vanishes and not values.any()
+    for line in lines:
+        n = round(ON_LINE * line.ends[-1] / whole)
+        t = line.ends[-1] * lattice(1, max(n, len(line.segments), WINDOWS[0]))[:, 0]
+        looked.append((line, t, line.values(t)))
+    sampled = np.concatenate([values for *_, values in looked])
+    largest, (_, limit) = float(np.abs(sampled).max()), _told(kind, sampled)
+    found = [NOTHING[:3]]
+    for line, t, values in looked:
         for component in np.hstack([values, -values]).T:
-            departure = _departures(component, limit)
-            runs = _runs(departure > 0)
-            if len(runs) > FEATURES:  # no features but roughness, which the estimate tells
-                continue
-            for first, last in runs:
-                low = t[first - 1] if first else 0.0
-                high = t[last] if last < len(t) else ends[-1]
-                if last - first < FEW:  # what is between samples counts
-                    fine = low + (high - low) * (np.arange(MEASURED) + 0.5) / MEASURED
-                    found = _values(function, view, *_on(at, turned, ends, fine))
-                    # Both ends are beside the feature, unless the line ends there.
-                    base = found[[0 if first else -1, -1 if last < len(t) else 0]].mean(axis=0)
-                    away = np.abs(found - base).max(axis=1)
-                else:
-                    fine, away = t[first:last], departure[first:last]
-                most = away > away.max() / 2
-                width = np.count_nonzero(most) / len(most) * (high - low)
-                widths.append(np.array([max(width, NARROWEST * whole / ON_LINE)]))
-                middle = np.median(fine[most]) if most.any() else (low + high) / 2
-                places.append(_positions(view, *_on(at, turned, ends, np.array([middle]))))
-    return np.concatenate(places), np.concatenate(widths), count, vanishes
+            runs = _runs(departure := _departures(component, limit))
+            if len(runs) <= FEATURES:  # else no features but roughness, which the estimate tells
+                seen = [_feature(line, t, departure, a, b, whole / ON_LINE) for a, b in runs]
+                at, widths = np.reshape(seen, (-1, 2)).T
+                found.append((line.places(at), widths, NOTHING[2]))
+        if kind == "displacement":
+            found.append((*NOTHING[:2], line.jumps(t, values[:, 0])))
+    places, widths, jumps = map(np.concatenate, zip(*found, strict=True))
+    return places, widths, jumps, len(sampled), largest
 
 
-def _runs(some: Mask) -> list[list[int]]:
-    """Where each run of `some` (n,) begins, and where the rest begins again."""
-    changes = np.diff(np.concatenate([[0], some.astype(int), [0]]))
+def _feature(
+    line: _Line, t: Array, departure: Array, first: int, last: int, spacing: float
+) -> tuple[float, float]:
+    """Length along a line to the middle of a feature, and its width.
+
+    From `first` to before `last` the samples at `t` (n,) depart from what is around them.
+    """
+    low = t[first - 1] if first else 0.0
+    high = t[last] if last < len(t) else line.ends[-1]
+    fine, away = t[first:last], departure[first:last]
+    if last - first < FEW:  # what is between samples counts
+        fine = low + (high - low) * (np.arange(MEASURED) + 0.5) / MEASURED
+        found = line.values(fine)
+        # Both ends are beside the feature, unless the line ends there.
+        base = found[[0 if first else -1, -1 if last < len(t) else 0]].mean(axis=0)
+        away = np.abs(found - base).max(axis=1)
+    most = away > away.max() / 2
+    width = np.count_nonzero(most) / len(most) * (high - low)
+    middle = np.median(fine[most]) if most.any() else (low + high) / 2
+    return float(middle), max(width, NARROWEST * spacing)
+
+
+def _runs(departure: Array) -> list[list[int]]:
+    """Where each run of departures (n,) begins, and where the rest begins again."""
+    changes = np.diff(np.concatenate([[0], (departure > 0).astype(int), [0]]))
     return np.flatnonzero(changes).reshape(-1, 2).tolist()
 
 
@@ -268,17 +321,13 @@ def _departures(values: Array, limit: float) -> Array:
         some = (now > limit) & (then < SATURATED * now)
         around = maximum_filter1d(values, window) - minimum_filter1d(values, window)
         some &= now > STEEP * around
-        for end in (slice(window // 2), slice(-(window // 2), None)):
-            some[end] &= window <= AT_ENDS and now[end] > HIGH * np.ptp(values)
+        for back in (1, -1):  # runs that reach an end
+            n = int(np.argmin(np.append(some[::back], False)))
+            beside = np.ptp(values[::back][: BESIDE_ENDS * window])
+            if window > AT_ENDS or now[::back][:n].max(initial=0.0) <= STEEP * beside:
+                some[::back][:n] = False
         found = np.maximum(found, np.where(some, now, 0.0))
     return found
-
-
-def _on(at: Index, turned: Mask, ends: Array, t: Array) -> tuple[Index, Array]:
-    """Segments and points on them at the lengths `t` (n,) of a chain of segments `at`."""
-    k = np.clip(np.searchsorted(ends, t, side="right") - 1, 0, len(at) - 1)
-    s = np.clip((t - ends[k]) / (ends[k + 1] - ends[k]), 0.0, 1.0)
-    return at[k], np.where(turned[k], 1 - s, s)[:, None]
 
 
 def _chains(view: View, segments: Index) -> list[tuple[Index, Mask]]:
@@ -302,10 +351,7 @@ def _chains(view: View, segments: Index) -> list[tuple[Index, Mask]]:
     return chains
 
 
-def _in_body(
-    kind: str, function: Function, view: View, elements: Index
-) -> tuple[Array, Array, int, bool]:
-    """The same of triangles, as of `_on_line`."""
+def _in_body(kind: str, function: Function, view: View, elements: Index) -> Seen:
     corners = view.arrays.corners[elements]
     spacing = IN_BODY * float(np.ptp(corners.reshape(-1, 2), axis=0).max())
     c, s = np.cos([TURN, TURN + np.pi / 3]), np.sin([TURN, TURN + np.pi / 3])
@@ -317,9 +363,9 @@ def _in_body(
     element, i, j = _nodes_in(corners)
     inverse = np.linalg.inv(corners[:, :2] - corners[:, 2:])
     reference = np.column_stack([i, j]) - corners[element, 2]
-    reference = (reference[:, None] @ inverse[element])[:, 0]
+    reference = np.einsum("ki,kij->kj", reference, inverse[element])
     values = _values(function, view, elements[element], reference)
-    vanishes, (told, limit) = not values.any(), _told(kind, values)
+    told, limit = _told(kind, values)
     inside = np.zeros(shape, dtype=bool)
     inside[i, j] = True
     flagged, windows = np.zeros(shape, dtype=bool), IN_PLANE[kind]
@@ -344,13 +390,8 @@ def _in_body(
             around = [uniform_filter(x, 2 * window + 1, mode="constant") for x in (now, then)]
             flagged[part] |= (now > limit) & (around[1] < SATURATED * around[0])
     x = (np.argwhere(flagged) + origin) @ sides
-    parts, _ = label(flagged, np.ones((3, 3)))
-    depth = distance_transform_edt(np.pad(flagged, 1))[1:-1, 1:-1]  # samples, 1 at the rim
-    depth = np.append(0.0, maximum(depth, parts, np.arange(1, parts.max() + 1)))[parts[flagged]]
-    widths = spacing * (2 * depth - 1)
-    if kind == "materials" and len(x):
-        widths = _widths(function, view.mesh, x, spacing)
-    return x, widths, len(values), vanishes
+    widths = _widths(kind, function, view.mesh, x, spacing)
+    return x, widths, NOTHING[2], len(values), float(np.abs(values).max(initial=0.0))
 
 
 def _nodes_in(corners: Array) -> tuple[Index, Index, Index]:
@@ -375,28 +416,37 @@ def _nodes_in(corners: Array) -> tuple[Index, Index, Index]:
     return of[k], i, row[k]
 
 
-def _widths(law: ng.CoefficientFunction, mesh: ng.Mesh, places: Array, spacing: float) -> Array:
-    """Widths (k,) of features at `places` (k, 2): the least in four directions."""
-    some = np.linspace(0, len(places) - 1, min(len(places), FEATURES // 2)).astype(int)
-    t = np.linspace(-2 * spacing, 2 * spacing, MEASURED)
+def _widths(
+    kind: str, function: ng.CoefficientFunction, mesh: ng.Mesh, places: Array, spacing: float
+) -> Array:
+    """Widths (k,) of features at `places` (k, 2): the least chord at the nearest of some of them.
+
+    Or at a wider place within whose width that lies.
+    """
+    if not len(places):
+        return np.empty(0)
+    some = places[np.linspace(0, len(places) - 1, min(len(places), ACROSS)).astype(int)]
+    t = spacing * np.geomspace(NARROWEST, WIDE, MEASURED // 2)
+    t = np.concatenate([-t[::-1], [0.0], t])
     angle = TURN / 2 + np.pi / 4 * np.arange(4)
     steps = t[:, None, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    x = (places[some][:, None, None] + steps).reshape(-1, 2)
+    x = (some[:, None, None] + steps).reshape(-1, 2)
     points = mesh(x[:, 0].copy(), x[:, 1].copy())
-    known = points["nr"] >= 0
-    told = np.zeros(len(x))
-    told[known] = _told("materials", np.asarray(law(points[known])))[0][:, 0]
-    shape, middle = (len(some), MEASURED, 4), MEASURED // 2
-    table = told.reshape(shape)
-    away = np.abs(table - table[:, middle : middle + 1])
-    away[~known.reshape(shape)] = 0.0
+    known, middle = points["nr"] >= 0, len(t) // 2
+    found = _told(kind, looked(function, points[known]))[0]
+    told = np.zeros((len(some), len(t), 4, found.shape[1]))
+    told.reshape(len(x), -1)[known] = found
+    away = np.abs(told - told[:, middle, None]).max(axis=3)
+    away[~known.reshape(away.shape)] = 0.0
     same = away <= away.max(axis=1, keepdims=True) / 2
     up = np.cumprod(same[:, middle:], axis=1).sum(axis=1)
     down = np.cumprod(same[:, middle::-1], axis=1).sum(axis=1)
-    width = ((up + down - 1) * (t[1] - t[0])).min(axis=1)
-    result = np.full(len(places), width.min())
-    result[some] = width
-    return np.maximum(result, NARROWEST * spacing)
+    width = (t[middle + up - 1] - t[middle - down + 1]).min(axis=1)
+    width = np.maximum(width, NARROWEST * spacing)
+    apart = np.linalg.norm(some[:, None] - some, axis=2)
+    width = np.where(apart <= width, width, 0.0).max(axis=1)  # chords near corners are shorter
+    nearest = ((some**2).sum(axis=1) - 2 * places @ some.T).argmin(axis=1)
+    return np.asarray(width[nearest])
 
 
 def towards(features: Array, cells: Cells, view: View) -> Cells:

@@ -1,4 +1,4 @@
-"""Jumps of moduli inside elements, of functions along segments, told from smooth variation."""
+"""Jumps of moduli inside elements, of functions along lines, told from smooth variation."""
 
 from __future__ import annotations
 
@@ -16,10 +16,8 @@ from .counted import looked
 from .lattice import mesh_points, on_lattice
 
 JUMP = 0.5  # change of a law over its least value from which it is told
-PLACES = 2048  # of a boundary, at which a function is looked at: of narrower bumps it sees none
-FEWEST = 5  # ... of a segment: the changes between them show a bend
 QUARTERS = np.linspace(0, 1, 5)
-STEPS = 18  # in which a part is quartered: what still changes across 1e-12 of a segment jumps
+STEPS = 18  # in which a part is quartered: what still changes across 1e-11 of it jumps
 KEPT = 0.9  # share of a change that the last half of the steps leave of a jump; of x^(1/10), 0.3
 STEADY = 1e-9  # change across a part, relative to the largest value, that is not looked into
 HALVINGS = 24  # of the distance between two points: what still changes across 1e-7 of it jumps
@@ -131,53 +129,46 @@ def warn_of_jumps(problem: Problem, mesh: ng.Mesh) -> None:
             )
 
 
-def steps_on(
-    values: Callable[[Index, Array], Array], segments: Index
-) -> tuple[Index, Array, float]:
-    """Segments (j,) on which a function jumps, parameters (j,) there; its largest size seen.
+def steps_along(values: Callable[[Array], Array], t: Array, known: Array) -> tuple[Array, Array]:
+    """Where a function jumps along a line (j,), and by how much (j,).
 
-    At ends, too. Looked into are parts whose change is not between those of their neighbours, as
-    where a smooth function does not bend from one side to the other. Of their quarters the one is
-    kept whose change differs most from that of the others, again and again: a smooth change
-    shrinks by that, that of a jump does not.
+    Looked into are parts whose slope is not between those of their neighbours, as where a smooth
+    function does not bend from one side to the other. Of their quarters the one is kept whose
+    change differs most from that of the others, again and again: a smooth change shrinks by that,
+    that of a jump does not.
 
     Parameters
     ----------
     values : callable
-        The function (k,) at parameters (k,) of segments (k,).
-    segments : ndarray of int (n,)
-        Which.
+        The function (k,) at any lengths (k,).
+    t : ndarray (n,)
+        Lengths, at least four, ascending.
+    known : ndarray (n,)
+        The function there.
     """
-    if not len(segments):
-        return segments, np.empty(0), 0.0
-    count = max(PLACES // len(segments), FEWEST)
-    s = np.linspace(0, 1, count)
-    found = values(np.repeat(segments, count), np.tile(s, len(segments))).reshape(-1, count)
-    largest = float(np.abs(found).max())
-    row, part = np.nonzero(_odd(np.diff(found, axis=1), STEADY * largest))
-    at, low, size = segments[row], s[part], s[1]
-    change = before = np.abs(found[row, part + 1] - found[row, part])
-    every = np.arange(len(at))
-    for number in range(STEPS if at.size else 0):
-        places = low[:, None] + size * QUARTERS
-        steps = np.diff(values(np.repeat(at, 5), places.ravel()).reshape(-1, 5), axis=1)
+    size, change, noise = np.diff(t), np.diff(known), STEADY * float(np.abs(known).max())
+    part = np.flatnonzero(_odd(change / size, noise / float(np.median(size))))
+    low, high, every = t[part], t[part + 1], np.arange(len(part))
+    change = before = np.abs(change[part])
+    for number in range(STEPS if len(part) else 0):
+        places = low[:, None] * (1 - QUARTERS) + high[:, None] * QUARTERS  # exact at both ends
+        steps = np.diff(values(places.ravel()).reshape(places.shape), axis=1)
         odd = np.abs(steps - np.median(steps, axis=1, keepdims=True)).argmax(axis=1)
-        low, size, change = places[every, odd], size / 4, np.abs(steps[every, odd])
+        low, high = places[every, odd], places[every, odd + 1]
+        change = np.abs(steps[every, odd])
         if number == STEPS // 2:
             before = change
-    jumps = (change >= KEPT * before) & (change > STEADY * largest)
-    at, first_of = np.unique(at[jumps], return_index=True)
-    return at, low[jumps][first_of], largest
+    jumps = (change >= KEPT * before) & (change > noise)
+    return low[jumps], change[jumps]
 
 
-def _odd(change: Array, noise: float) -> Mask:
-    """Which changes (n, k) are not between those of their neighbours, by more than `noise`.
+def _odd(slope: Array, noise: float) -> Mask:
+    """Which slopes (n,) are not between those of their neighbours, by more than `noise`.
 
     At ends not between that of the neighbour and one that goes on as the next two do, twice as far.
     """
-    first = 3 * change[:, 1] - 2 * change[:, 2]
-    last = 3 * change[:, -2] - 2 * change[:, -3]
-    left = np.column_stack([change[:, 1], change[:, :-1]])
-    right = np.column_stack([first, change[:, 2:], last])
+    left = np.append(slope[1], slope[:-1])
+    right = np.append(slope[1:], 3 * slope[-2] - 2 * slope[-3])
+    right[0], left[0] = slope[1], 3 * slope[1] - 2 * slope[2]
     low, high = np.minimum(left, right), np.maximum(left, right)
-    return np.asarray((change < low - noise) | (change > high + noise))
+    return np.asarray((slope < low - noise) | (slope > high + noise))

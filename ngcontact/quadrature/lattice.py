@@ -113,7 +113,7 @@ def mesh_points(mesh: ng.Mesh, elements: Index, reference: Array) -> NDArray:
     dim = reference.shape[-1]
     middle = ng.IntegrationRule([(1 / 3, 1 / 3 if dim == 2 else 0.0, 0.0)], [1])
     template = mesh.MapToAllElements(middle, ng.VOL if dim == 2 else ng.BND)
-    points = np.repeat(template[elements][:, None], reference.shape[1], axis=1)
+    points = template[np.repeat(elements, reference.shape[1])].reshape(reference.shape[:2])
     for axis, name in zip(range(dim), "xy", strict=False):
         points[name] = reference[..., axis]
     return points

@@ -72,7 +72,7 @@ class View:
     ) -> Array:
         """Values (j, n, c) at `reference` (j, n, dim), or (n, dim), of `elements` (j,)."""
         points = self._points(elements, reference)
-        return np.asarray(function(points.ravel())).reshape(*points.shape, -1)
+        return np.asarray(function(points.ravel())).reshape(*points.shape, function.dim)
 
     def look(self, data: ng.CoefficientFunction, elements: Index, reference: Array) -> Array:
         """Values (j, n, c) of `data` at `reference` (j, n, dim) of `elements` (j,), counted."""

@@ -43,7 +43,7 @@ def test_oblique_rays_on_a_line():
 def test_overlap_is_a_negative_distance():
     curve = graph(lambda x: 0 * x, [0, 1])
     found = cast(*rays([[0.5, -0.25], [0.25, 0.125]], DOWN), curve, upward(curve))
-    assert found.distance.tolist() == [-0.25, 0.125]
+    assert found.distance == pytest.approx([-0.25, 0.125], rel=1e-15)
 
 
 def test_rays_that_meet_nothing():
@@ -227,15 +227,16 @@ def test_blocks_of_points_give_the_same():
     whole = cast(points, directions, curve, upward(curve))
     parts = cast(points, directions, curve, upward(curve), pairs_at_once=40)
     assert (whole.segment == parts.segment).all()
-    assert (whole.s == parts.s).all()
-    assert (whole.distance == parts.distance).all()
+    # Products of other sizes take other kernels: round-off of a few products.
+    np.testing.assert_allclose(parts.s, whole.s, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(parts.distance, whole.distance, rtol=0, atol=1e-14)
 
 
 def test_scale_does_not_matter():
     curve = graph(lambda x: x**2 / 2, [-1, 0.25, 1], 2)
     points, directions = rays(RNG.uniform(-1, 1, (20, 2)), DOWN)
     one = cast(points, directions, curve, upward(curve))
-    for scale in (2.0**-40, 2.0**40):
+    for scale in (2.0**-40, 2.0**40):  # powers of two: every product is exact
         other = cast(scale * points, directions, scale * curve, upward(curve))
         assert (other.segment == one.segment).all()
         assert (other.distance == scale * one.distance).all()

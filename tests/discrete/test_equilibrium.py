@@ -23,7 +23,8 @@ from ngcontact import (
     solve,
 )
 from ngcontact.discrete.discrete_problem import discretise, minimise_energy
-from ngcontact.discrete.rigid_motions import free_motions
+from ngcontact.discrete.equilibrium import work_of_load
+from ngcontact.discrete.rigid_motions import RigidMotion, free_motions
 from ngcontact.geometries import blocks, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh import first_mesh
@@ -434,3 +435,14 @@ def test_the_shape_of_a_mesh_does_no_work(order):
     assert np.abs(solution.contact_force() - [0, weight]).max() < 1e-9 * weight
     with pytest.raises(NoEquilibriumError, match="rotation"):
         solve(shaft((0, -1 - 1e-4 * ng.x)), maxh=0.2, order=order)
+
+
+def test_work_of_a_load_on_a_motion_by_hand():
+    """A disc of radius 1 about the origin moves by (0, 2) and turns by 3 about (-1, 0)."""
+    face = occ.WorkPlane().Circle(1).Face()
+    face.faces.name = "disc"
+    problem = Problem(OCCGeometry(face, dim=2), {"disc": STEEL}, force={"disc": (5.0, 7.0)})
+    mesh = ng.Mesh(problem.geometry.GenerateMesh(maxh=0.5)).Curve(4)
+    motion = RigidMotion(("disc",), np.array([[0.0, 2.0]]), np.array([3.0]), np.array([[-1.0, 0]]))
+    area = ng.Integrate(ng.CF(1.0), mesh)
+    assert work_of_load(problem, mesh, motion) == pytest.approx(7 * (2 + 3) * area, rel=1e-6)

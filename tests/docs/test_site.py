@@ -6,6 +6,7 @@ needs more than the package; everything else is executed here, the cells of note
 
 from __future__ import annotations
 
+import gc
 import re
 import warnings
 from collections.abc import Callable
@@ -84,13 +85,16 @@ def test_the_site_executes(block):
 def run(tmp_path_factory) -> Callable[[Block], None]:
     """Execute a block after those before it in its page, each once, in a folder of the page.
 
-    What a page shows to do is not warned of.
+    What a page shows to do is not warned of. Solutions of one page alone are in memory.
     """
     spaces: dict[str, dict[str, object]] = {}
     done: set[Block] = set()
 
     def upto(block: Block) -> None:
         if block.page not in spaces:
+            spaces.clear()
+            done.clear()
+            gc.collect()  # few objects of much memory lie in circles: Python would wait
             spaces[block.page] = {"__name__": "__main__"}
             exec(GIVEN.get(block.page, ""), spaces[block.page])
         for other in BLOCKS:

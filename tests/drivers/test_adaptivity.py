@@ -16,7 +16,7 @@ from drivers.reference import cases
 from ngcontact import adapt
 
 
-@lru_cache
+@lru_cache(maxsize=4)  # of some 50 MB each
 def levels(name, strategy, order, unknowns):
     """Solutions and rows of one run up to a number of unknowns."""
     study = STUDIES[name]()

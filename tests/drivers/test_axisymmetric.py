@@ -88,7 +88,7 @@ def test_shrink_fit(order, limit):
     solution = solve(problem, maxh=0.02 * order, order=order)
     assert solution.active.all()
     assert np.abs(solution.pressure / exact.p - 1).max() < limit
-    assert solution.contact_force() == pytest.approx((0, 0), abs=0)
+    assert solution.contact_force() == pytest.approx((0, 0), abs=EXACT * exact.p)
 
 
 # Relative energy error at 4000 unknowns that `adapt` stays below: 1.5 times what was measured.
@@ -140,11 +140,14 @@ def test_huber_contact(huber):
 
 @pytest.mark.parametrize(
     ("make", "order"),
-    [(cases.indented_by_punch, p) for p in (2, 3, 4)] + [(cases.indented_by_cone, 2)],
+    [(make, p) for make in (cases.indented_by_punch, cases.indented_by_cone) for p in (2, 3, 4)],
 )
-@pytest.mark.study(witness=["indented_by_punch-3"])
+@pytest.mark.study(witness=["indented_by_punch-3", "indented_by_cone-4"])
 def test_indentation(make, order):
-    """Boussinesq and Sneddon: singular at the edge and at the tip. Measured 2e-4 at 4000."""
+    """Boussinesq and Sneddon: singular at the edge and at the tip. Measured 2e-4 at 4000.
+
+    The cone: forces 6e-7 to 1.4e-5, ends 2e-5 to 9e-5.
+    """
     problem, exact = make()
     *_, solution = adapt(problem, order=order, max_dofs=4000)
     assert solution.contact_force()[1] == pytest.approx(-exact.P, rel=1e-3)

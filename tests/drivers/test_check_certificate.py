@@ -1,4 +1,4 @@
-"""Certificates pass a check that shares no code with the package; tampered ones fail."""
+"""Certificates of bounds are checked with NumPy alone; tampered ones fail."""
 
 from __future__ import annotations
 
@@ -16,42 +16,30 @@ import pytest
 
 from drivers import check_certificate
 from drivers.reference import axisymmetric_cases, cases, laws
-from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.geometries import ring_in_groove
+from ngcontact import Contact, Problem, solve
 from tests.scenes import unmatched_blocks
 
 DRIVER = Path(check_certificate.__file__)
 
 
-def dual_transition():
-    case = cases.one_transition()
-    return replace(case.problem, geometry=unmatched_blocks())
+def opening(**changes):
+    return replace(cases.partly_opening_block(), **changes)
 
 
-SCENES = {
-    "transition": lambda: cases.one_transition().problem,
-    "hertz": lambda: cases.hertz_contact().problem,
-    "body forces": lambda: cases.clamped_transition().problem,
-    "corners": lambda: cases.polygonal_patch().problem,
-    "lifting off": cases.partly_opening_block,
-    "punch": cases.flat_punch,
-    "dual rows": dual_transition,
-}
+def glued():
+    """Contact that may pull, under a load that lifts."""
+    pair = Contact("upper_contact", "lower_contact", bilateral=True)
+    return opening(contact=[pair], traction={"pressed": -1.0})
 
 
-def dual_rings():
-    problem = cases.ring_in_ring().problem
-    return replace(problem, contact=[replace(c, rows="dual") for c in problem.contact])
+def on_obstacle():
+    """No support but guides: a rigid plane holds the lower block."""
+    contact = [*opening().contact, Contact("bottom", gap=0.0)]
+    return opening(displacement={}, contact=contact, traction={"pressed|top": 1.0})
 
 
-BENT = {
-    "rings": lambda: cases.ring_in_ring().problem,
-    "dual rings": dual_rings,
-    "disc on a block": cases.pressed_disc,
-    "disc on a plane": cases.disc_on_rigid_plane,
-    "graded": lambda: laws.graded(1e3).problem,
-    "bent fibres": lambda: laws.bent_fibres(100.0, 0.3).problem,
-}
+def unmatched():
+    return replace(cases.one_transition().problem, geometry=unmatched_blocks())
 
 
 def with_forces():
@@ -67,65 +55,34 @@ def with_forces():
     )
 
 
-def o_ring():
-    """Curves that do not match."""
-    return Problem(
-        geometry=ring_in_groove(),
-        materials={"ring": Elastic(1.0, 0.3), "housing|plate": Elastic(5.0, 0.3)},
-        displacement={"housing_bottom": (0, 0), "plate_top": (0, -0.01)},
-        contact=[
-            Contact("ring_lower", "groove", direction=(0, -1)),
-            Contact("ring_upper", "plate_face", direction=(0, 1)),
-        ],
-        model="axisymmetric",
-    )
-
-
-REVOLVED = {
-    "cylinders": axisymmetric_cases.pressed_cylinders,
-    "dual cylinders": lambda: axisymmetric_cases.pressed_cylinders(rows="dual"),
-    "Huber": lambda: axisymmetric_cases.hertz_contact()[0],
-    "shrink fit": lambda: axisymmetric_cases.fitted_rings()[0],
-    "cone": lambda: axisymmetric_cases.indented_by_cone()[0],
-    "forces": with_forces,
-    "O-ring": o_ring,
+SCENES = {
+    "transition": (lambda: cases.one_transition().problem, [1, 2, 3, 4]),
+    "hertz": (lambda: cases.hertz_contact().problem, [1, 2, 3, 4]),
+    "body forces": (lambda: cases.clamped_transition().problem, [2, 3]),
+    "guided": (lambda: cases.guided_transition().problem, [1, 2]),
+    "corners": (lambda: cases.polygonal_patch().problem, [1, 3]),
+    "lifting off": (opening, [1, 2, 3, 4]),
+    "bilateral": (glued, [1, 2, 3]),
+    "obstacle": (on_obstacle, [1, 2, 3]),
+    "punch": (cases.flat_punch, [1, 2, 4]),
+    "dual rows": (unmatched, [1, 2, 3]),
+    "layers": (lambda: laws.stiff_and_soft(1e8).problem, [1, 2]),
+    "graded": (lambda: laws.graded(1e3).problem, [2]),
+    "bent fibres": (lambda: laws.bent_fibres(100.0, 0.3).problem, [2, 3]),
+    "cylinders": (axisymmetric_cases.pressed_cylinders, [1, 2, 3]),
+    "dual cylinders": (lambda: axisymmetric_cases.pressed_cylinders(rows="dual"), [2]),
+    "Huber": (lambda: axisymmetric_cases.hertz_contact()[0], [1, 2]),
+    "shrink fit": (lambda: axisymmetric_cases.fitted_rings()[0], [1, 2]),
+    "cone": (lambda: axisymmetric_cases.indented_by_cone()[0], [2]),
+    "forces": (with_forces, [1, 2]),
 }
 
 
-@pytest.fixture(scope="module")
-def saved(tmp_path_factory):
-    """Arrays of a certificate, and where they are."""
-    path = tmp_path_factory.mktemp("certificate") / "certificate.npz"
-    solution = solve(cases.hertz_contact(half_width=0.5).problem, maxh=0.25, order=2)
-    solution.equilibrated.save(path)
-    with np.load(path) as file:
-        return path, dict(file), solution
-
-
-def cases_of(scenes, orders):
-    return [
-        pytest.param(scenes[name], order, id=f"{name}-{order}")
-        for name in scenes
-        for order in orders
-    ]
-
-
-@pytest.mark.study(
-    witness=[
-        "transition-1",
-        "hertz-2",
-        "dual rows-1",
-        "dual rings-2",
-        "cylinders-2",
-        "shrink fit-2",
-    ]
-)
 @pytest.mark.parametrize(
-    ("scene", "order"),
-    cases_of(SCENES, [1, 2, 3]) + cases_of(BENT, [2, 3]) + cases_of(REVOLVED, [1, 2]),
+    ("name", "order"), [(name, order) for name, (_, orders) in SCENES.items() for order in orders]
 )
-def test_certificates_pass(scene, order, tmp_path, capsys):
-    solution = solve(scene(), maxh=0.5, order=order)
+def test_certificates_pass(name, order, tmp_path, capsys):
+    solution = solve(SCENES[name][0](), maxh=0.5, order=order)
     path = solution.equilibrated.save(tmp_path / "certificate.npz")
     passed = check_certificate.check(path)
     said = capsys.readouterr().out
@@ -140,216 +97,169 @@ def changed(array, factor=1 + 1e-6):
     return array
 
 
+def without_last(a, *beginnings):
+    """Arrays with one entry less."""
+    return {name: v[:-1] for name, v in a.items() if name.startswith(beginnings)}
+
+
+def size(a):
+    return np.abs(a["stress"]).max()
+
+
+def alike(name, change):
+    """A change of one array."""
+    return lambda a: {name: change(a[name])}
+
+
 TAMPERED = {
-    "a smaller bound": lambda a: {"bound": a["bound"] * (1 - 1e-6)},
-    "a stress": lambda a: {"stress": changed(a["stress"])},
-    "all stresses": lambda a: {"stress": a["stress"] * (1 + 1e-6)},
-    "a discrete stress": lambda a: {"discrete_stress": changed(a["discrete_stress"], 1.01)},
-    "a force": lambda a: {"force": a["force"] + np.abs(a["stress"]).max() * 1e-3},
-    "a vertex": lambda a: {"vertices": changed(a["vertices"])},
-    "an inverted triangle": lambda a: {"triangles": a["triangles"][:, ::-1]},
-    "a missing triangle": lambda a: {
-        name: a[name][:-1]
-        for name in (
-            *("triangles", "stress", "discrete_stress", "force"),
-            *("law", "loads", "curves", "lifting"),
-        )
-    },
-    "a law": lambda a: {"law": changed(a["law"], 1.01)},
-    "an indefinite law": lambda a: {"law": -a["law"]},
-    "a load on the zone": lambda a: {
-        "strip_load": a["strip_load"] + np.abs(a["stress"]).max() * 1e-6
-    },
-    "supports that are none": lambda a: {"edge_constrained": np.ones_like(a["edge_constrained"])},
-    "a missing edge": lambda a: {
-        name: a[name][:-1]
-        for name in (
-            "edge_triangle",
-            "edge_side",
-            "edge_frame",
-            "edge_constrained",
-            "edge_traction",
-        )
-    },
-    "a pulling pressure": lambda a: {"contact_pressure": -a["contact_pressure"]},
-    "a pressure": lambda a: {"contact_pressure": changed(a["contact_pressure"])},
-    "a turned direction": lambda a: {"strip_action": a["strip_action"][:, :, ::-1]},
-    "a long direction": lambda a: {"strip_action": a["strip_action"] * (1 + 1e-6)},
-    "an action without reaction": lambda a: {"strip_action": changed(a["strip_action"])},
-    "an overlap": lambda a: {"gap_open": a["gap_open"] - a["gap_open"].max() * 1e-6},
-    "a wider gap": lambda a: {"gap_open": a["gap_open"] + a["gap_open"].max() * 1e-3},
-    "a smaller weight": lambda a: {"gap_weight": a["gap_weight"] * (1 - 1e-6)},
-    "no lifting": lambda a: {"lifting": a["lifting"] * 0},
-    "a negative norm": lambda a: {"lifting": -a["lifting"]},
-    "not a number": lambda a: {"stress": changed(a["stress"], np.nan)},
+    "a smaller bound": alike("bound", lambda v: v * (1 - 1e-6)),
+    "a stress": alike("stress", changed),
+    "all stresses": alike("stress", lambda v: v * (1 + 1e-6)),
+    "a rotated stress": alike("stress", lambda v: v[..., [1, 0, 2]]),
+    "another degree": alike("degree", lambda v: v - 1),
+    "a place of the lattice": alike("lattice", changed),
+    "a strain": alike("rule0_strain", lambda v: changed(v, 1.01)),
+    "a force": lambda a: {"force": a["force"] + 1e-6 * size(a)},
+    "a vertex": alike("vertices", changed),
+    "an inverted triangle": alike("triangles", lambda v: v[:, ::-1]),
+    "a flat triangle": alike("triangles", lambda v: v[:, [0, 1, 1]]),
+    "triangles at each other's places": alike("triangles", lambda v: np.roll(v, 1, axis=0)),
+    "a missing triangle": lambda a: without_last(a, "triangles", "stress", "force", "rule0"),
+    "a triangle in no quadrature": lambda a: without_last(a, "rule0_triangle", "rule0_strain"),
+    "a law": alike("rule0_compliance", lambda v: changed(v, 1.01)),
+    "an indefinite law": alike("rule0_compliance", lambda v: -v),
+    "weights": alike("rule0_weights", lambda v: v * (1 - 1e-6)),
+    "a place of a quadrature": alike("rule0_points", lambda v: changed(v, 1 + 1e-4)),
+    "a missing side": lambda a: without_last(a, "side"),
+    "another side": alike("side_vertices", lambda v: v[::-1]),
+    "supports that are none": alike("side_held", np.zeros_like),
+    "a load": lambda a: {"side_traction": a["side_traction"] + 1e-6 * size(a)},
+    "a pulling pressure": alike("contact_pressure", lambda v: -v),
+    "a pressure": alike("contact_pressure", changed),
+    "no pressure": alike("contact_pressure", np.zeros_like),
+    "pressures at other ends": alike("contact_pressure", lambda v: v[:, ::-1]),
+    "a turned direction": alike("contact_direction", lambda v: v[:, ::-1]),
+    "a long direction": alike("contact_direction", lambda v: v * (1 + 1e-6)),
+    "wider sides": alike("contact_weight", lambda v: v * (1 + 1e-6)),
+    "another side in contact": alike("contact_side", lambda v: np.roll(v, 1)),
+    "an action without reaction": alike("contact_other", lambda v: v * 0 - 1),
+    "a reaction elsewhere": alike("contact_other", lambda v: np.roll(v, 1)),
+    "a reaction the other way round": alike("contact_turned", np.logical_not),
+    "contact that may pull": alike("contact_equality", np.ones_like),
+    "an overlap": alike("contact_gap", lambda v: v - 1e-6 * v.max()),
+    "a wider gap": alike("contact_gap", lambda v: v + 1e-3 * v.max()),
+    "no gap": alike("contact_gap", np.zeros_like),
+    "no lifting": alike("lifting", np.zeros_like),
+    "a negative norm": alike("lifting", np.negative),
+    "loads that take off": alike("loads", lambda v: v - 1.0),
+    "not a number": alike("stress", lambda v: changed(v, np.nan)),
 }
 
-
-@pytest.mark.parametrize("name", TAMPERED)
-@pytest.mark.study(witness=["an inverted triangle", "a pressure", "not a number"])
-def test_tampered_certificates_fail(name, saved, tmp_path, capsys):
-    path, arrays, _ = saved
-    assert check_certificate.check(path)
-    np.savez(tmp_path / "tampered.npz", **(arrays | TAMPERED[name](arrays)))
-    assert not check_certificate.check(tmp_path / "tampered.npz")
-    assert "FAIL" in capsys.readouterr().out
-
-
-TAMPERED_CURVES = {
-    "a smaller bound": lambda a: {"bound": a["bound"] * (1 - 1e-6)},
-    "a stress": lambda a: {"stress": changed(a["stress"])},
-    "a discrete stress": lambda a: {"sampled_stress": changed(a["sampled_stress"], 1.01)},
-    "a law": lambda a: {"sampled_law": changed(a["sampled_law"], 1.01)},
-    "an indefinite law": lambda a: {"sampled_law": -a["sampled_law"]},
-    "smaller weights": lambda a: {"sampled_weights": a["sampled_weights"] * (1 - 1e-6)},
-    "a moved point": lambda a: {"sampled_points": changed(a["sampled_points"], 1 + 1e-4)},
-    "a quadrature of lower order": lambda a: {"sampled_exact": a["sampled_exact"] - 10},
-    "a map": lambda a: {"sampled_map": changed(a["sampled_map"])},
-    "a missing map": lambda a: {
-        name: a[name][1:]
-        for name in ("sampled_triangle", "sampled_map", "sampled_stress", "sampled_law")
-    },
-    "maps of others": lambda a: {"sampled_map": a["sampled_map"][::-1]},
-    "all constants": lambda a: {"curves": a["curves"] * (1 - 1e-6)},
-    "no constants, a smaller bound": lambda a: {"curves": 0 * a["curves"], "bound": less(a)},
-    "a missing strip": lambda a: {
-        name: v[:-1] for name, v in a.items() if name.startswith("strip_")
-    },
-    "narrow strips": lambda a: {"strip_weight": a["strip_weight"] * (1 - 1e-4)},
-    "a load": lambda a: {"strip_load": a["strip_load"] + np.abs(a["stress"]).max() * 1e-6},
-    "free components": lambda a: {"strip_counts": ~a["strip_counts"], "bound": less(a)},
-    "an action": lambda a: {"strip_action": changed(a["strip_action"])},
-    "a pulling pressure": lambda a: {"contact_pressure": -a["contact_pressure"]},
-    "other places of p*": lambda a: {"strip_s": 1 - a["strip_s"]},
+TAMPERED_LOADS = {
+    "no norms": alike("loads", np.zeros_like),
+    "smaller norms": alike("loads", lambda v: v * (1 - 1e-6)),
+    "negative norms": alike("loads", np.negative),
+    "a smaller distance": alike("replaced_distance", lambda v: changed(v, 1 - 1e-3)),
+    "distances replaced elsewhere": alike("replaced", lambda v: (v + 1) % (v.max() + 2)),
+    "a force": alike("force", changed),
+    "no force": alike("force", np.zeros_like),
+    "a load": alike("side_traction", changed),
+    "loads at other ends": alike("side_traction", lambda v: v * (-1.0) ** np.arange(v.shape[2])),
 }
 
-
-def less(a):
-    return a["bound"] * (1 - 1e-6)
-
-
-@pytest.fixture(scope="module")
-def curved(tmp_path_factory):
-    """The same of curved triangles."""
-    path = tmp_path_factory.mktemp("certificate") / "certificate.npz"
-    solve(BENT["rings"](), maxh=0.5, order=2).equilibrated.save(path)
-    with np.load(path) as file:
-        return path, dict(file)
-
-
-@pytest.mark.parametrize("name", TAMPERED_CURVES)
-def test_tampered_curves_fail(name, curved, tmp_path, capsys):
-    path, arrays = curved
-    assert check_certificate.check(path)
-    np.savez(tmp_path / "tampered.npz", **(arrays | TAMPERED_CURVES[name](arrays)))
-    assert not check_certificate.check(tmp_path / "tampered.npz")
-    assert "FAIL" in capsys.readouterr().out
-
-
-def at_points(name, change):
-    """Of all rules."""
-    return lambda a: {k: change(v) for k, v in a.items() if k.endswith(name) and k[:4] == "rule"}
-
+TAMPERED_GUIDES = {
+    "a guide's force": alike("contact_pressure", lambda v: changed(v, 1 + 1e-6)),
+    "guides of another direction": alike("contact_direction", lambda v: v[:, ::-1]),
+    "open gaps": alike("contact_gap", lambda v: v + 1.0),
+    "contact that does not pull": alike("contact_equality", np.zeros_like),
+}
 
 TAMPERED_REVOLVED = {
-    "a smaller bound": lambda a: {"bound": less(a)},
-    "a stress": lambda a: {"stress": changed(a["stress"])},
-    "all stresses": lambda a: {"stress": a["stress"] * (1 + 1e-6)},
-    "radial forces": at_points("_radial", lambda v: v + 1e-3),
-    "hoop stresses": at_points("_stress", lambda v: v * [1, 1, 1 + 1e-4, 1]),
-    "a law": at_points("_law", lambda v: changed(v, 1.01)),
-    "smaller weights": at_points("_weights", lambda v: v * (1 - 1e-6)),
-    "a missing triangle in a rule": lambda a: {
-        k: v[1:]
-        for k, v in a.items()
-        if k in {f"rule0_{name}" for name in ("triangle", "stress", "law", "radial")}
-    },
-    "axial forces": lambda a: {"force": a["force"] + np.abs(a["stress"]).max() * 1e-3},
-    "a moved axis": lambda a: {"vertices": a["vertices"] + [1e-3, 0]},
-    "a body beyond the axis": lambda a: {"vertices": a["vertices"] - [1e-3, 0]},
-    "a load on the zone": lambda a: {
-        "strip_load": a["strip_load"] + np.abs(a["stress"]).max() * 1e-6
-    },
-    "a pulling pressure": lambda a: {"contact_pressure": -a["contact_pressure"]},
-    "a pressure": lambda a: {"contact_pressure": changed(a["contact_pressure"])},
-    "an action without circumference": lambda a: {"strip_action": changed(a["strip_action"])},
-    "an overlap": lambda a: {"gap_open": a["gap_open"] - a["gap_open"].max() * 1e-6},
-    "a wider gap": lambda a: {"gap_open": a["gap_open"] + a["gap_open"].max() * 1e-3},
-    "a smaller weight": lambda a: {"gap_weight": a["gap_weight"] * (1 - 1e-6)},
-    "no lifting": lambda a: {"lifting": a["lifting"] * 0},
+    "a smaller bound": alike("bound", lambda v: v * (1 - 1e-6)),
+    "a stress": alike("stress", changed),
+    "all stresses": alike("stress", lambda v: v * (1 + 1e-6)),
+    "a plane body": alike("axisymmetric", np.logical_not),
+    "radial forces": lambda a: {"rule0_radial": a["rule0_radial"] + size(a)},
+    "hoop strains": alike("rule0_strain", lambda v: v * np.array([1, 1, 1 + 1e-4, 1])),
+    "axial forces": lambda a: {"force": a["force"] + 1e-6 * size(a)},
+    "a moved axis": alike("vertices", lambda v: v + np.array([1e-3, 0])),
+    "a body beyond the axis": alike("vertices", lambda v: v - np.array([1e-3, 0])),
+    "a law": alike("rule0_compliance", lambda v: changed(v, 1.01)),
+    "a load": lambda a: {"side_traction": a["side_traction"] + 1e-6 * size(a)},
+    "a pulling pressure": alike("contact_pressure", np.negative),
+    "a pressure": alike("contact_pressure", changed),
+    "a side without circumference": alike("contact_weight", lambda v: v * 0 + v.mean()),
+    "an overlap": alike("contact_gap", lambda v: v - 1e-6 * v.max()),
+    "a wider gap": alike("contact_gap", lambda v: v + 1e-3 * v.max()),
+    "no lifting": alike("lifting", np.zeros_like),
 }
+
+KINDS = {"hertz": TAMPERED, "body forces": TAMPERED_LOADS}
+KINDS |= {"bilateral": TAMPERED_GUIDES, "Huber": TAMPERED_REVOLVED}
 
 
 @pytest.fixture(scope="module")
-def revolved(tmp_path_factory):
-    """The same about an axis that the body meets."""
-    path = tmp_path_factory.mktemp("certificate") / "certificate.npz"
-    problem, _ = axisymmetric_cases.hertz_contact(a=0.5)
-    solve(problem, maxh=0.25, order=2).equilibrated.save(path)
-    with np.load(path) as file:
-        return path, dict(file)
+def saved(tmp_path_factory):
+    """Paths, arrays and solutions of one certificate of each kind."""
+    found = {}
+    for name in KINDS:
+        solution = solve(SCENES[name][0](), maxh=0.5, order=2)
+        path = tmp_path_factory.mktemp("certificate") / "certificate.npz"
+        solution.equilibrated.save(path)
+        assert check_certificate.check(path)
+        with np.load(path) as file:
+            found[name] = path, dict(file), solution
+    return found
 
 
-@pytest.mark.parametrize("name", TAMPERED_REVOLVED)
-def test_tampered_bodies_of_revolution_fail(name, revolved, tmp_path, capsys):
-    path, arrays = revolved
-    assert check_certificate.check(path)
-    np.savez(tmp_path / "tampered.npz", **(arrays | TAMPERED_REVOLVED[name](arrays)))
+@pytest.mark.parametrize(
+    ("kind", "name"), [(kind, name) for kind, changes in KINDS.items() for name in changes]
+)
+def test_tampered_certificates_fail(kind, name, saved, tmp_path, capsys):
+    _, arrays, _ = saved[kind]
+    np.savez(tmp_path / "tampered.npz", **(arrays | KINDS[kind][name](arrays)))
     assert not check_certificate.check(tmp_path / "tampered.npz")
     assert "FAIL" in capsys.readouterr().out
 
 
-def negative_at_its_least(array, share):
-    """The entry of least size replaced by a negative share of the largest."""
-    array = array.copy()
-    array.flat[np.abs(array).argmin()] = -share * np.abs(array).max()
-    return array
+@pytest.mark.parametrize("missing", ["stress", "contact_gap", "rule0_strain"])
+def test_files_with_an_array_less_fail(missing, saved, tmp_path):
+    _, arrays, _ = saved["hertz"]
+    rest = {name: v for name, v in arrays.items() if name != missing}
+    np.savez(tmp_path / "tampered.npz", **rest)
+    assert not check_certificate.check(tmp_path / "tampered.npz")
 
 
-def with_another_point(a, share):
-    """One more point of the gap, of which the weight is a negative share of the largest."""
-    more = {"gap_piece": 0, "gap_s": 0.5, "gap_open": 0.0}
-    more["gap_weight"] = -share * a["gap_weight"].max()
-    return {name: np.append(a[name], value) for name, value in more.items()}
-
-
-SIGNED = {
-    "gap_weight": with_another_point,
-    "gap_open": lambda a, share: {"gap_open": negative_at_its_least(a["gap_open"], share)},
-    "pressure": lambda a, share: {
-        "contact_pressure": negative_at_its_least(a["contact_pressure"], share)
-    },
-    "lifting": lambda a, share: {"lifting": negative_at_its_least(a["lifting"], share)},
-}
-
-
-@pytest.mark.parametrize("name", SIGNED)
-@pytest.mark.parametrize(("share", "passes"), [(1e-20, True), (1e-8, False)])
-def test_zero_may_be_round_off_of_either_sign(name, share, passes, revolved, tmp_path, capsys):
+@pytest.mark.parametrize("name", ["contact_weight", "contact_gap", "contact_pressure"])
+@pytest.mark.parametrize(("share", "passes"), [(5e-15, True), (1e-12, False)])
+def test_zero_may_be_round_off_of_either_sign(name, share, passes, saved, tmp_path, capsys):
     """A circumference on the axis is -1e-20 with some kernels of BLAS and NumPy."""
-    _, arrays = revolved
-    np.savez(tmp_path / "other.npz", **(arrays | SIGNED[name](arrays, share)))
+    _, arrays, _ = saved["Huber"]
+    array = arrays[name].copy()
+    assert np.abs(array).min() <= 1e-15 * np.abs(array).max()
+    array.flat[np.abs(array).argmin()] = -share * np.abs(array).max()
+    np.savez(tmp_path / "other.npz", **(arrays | {name: array}))
     assert check_certificate.check(tmp_path / "other.npz") == passes, capsys.readouterr().out
 
 
-def test_round_off_of_weights_does_not_lower_the_bound(revolved, tmp_path, capsys):
+def test_round_off_of_weights_does_not_lower_the_bound(saved, tmp_path, capsys):
     """A huge gap where a weight is round-off below 0 would, if that weight counted."""
-    _, arrays = revolved
-    weight, gap = arrays["gap_weight"].copy(), arrays["gap_open"].copy()
-    p = arrays["contact_pressure"][arrays["gap_piece"]].min(axis=1)
-    at = np.argmax(p)
+    _, arrays, _ = saved["hertz"]
+    weight, gap = arrays["contact_weight"].copy(), arrays["contact_gap"].copy()
+    p = arrays["contact_pressure"].max(axis=1)
+    at = np.argmin(np.where(p > 0, p, np.inf))
     weight[at] = -1e-15 * weight.max()
     wanted = 0.1 * arrays["bound"] ** 2
-    gap[at] = wanted / (2e-15 * weight.max() * p[at])
+    gap[at] = wanted / (-2 * weight[at, 0] * arrays["contact_pressure"][at].mean())
     lower = np.sqrt(arrays["bound"] ** 2 - wanted)
-    changes = {"gap_weight": weight, "gap_open": gap, "bound": lower}
+    changes = {"contact_weight": weight, "contact_gap": gap, "bound": lower}
     np.savez(tmp_path / "other.npz", **(arrays | changes))
     assert not check_certificate.check(tmp_path / "other.npz")
     assert "FAIL  B follows" in capsys.readouterr().out
 
 
 def test_the_driver_needs_nothing_but_numpy(saved):
-    path, arrays, solution = saved
+    path, arrays, solution = saved["hertz"]
     tree = ast.parse(DRIVER.read_text())
     names = {a.name for x in ast.walk(tree) if isinstance(x, ast.Import) for a in x.names}
     names |= {x.module for x in ast.walk(tree) if isinstance(x, ast.ImportFrom)}
@@ -361,12 +271,20 @@ def test_the_driver_needs_nothing_but_numpy(saved):
 
 @pytest.mark.parametrize("copied", [copy.deepcopy, lambda s: pickle.loads(pickle.dumps(s))])
 def test_certificates_of_copies_pass(copied, tmp_path):
-    solution = solve(BENT["graded"](), maxh=0.5, order=2)
+    solution = solve(SCENES["bent fibres"][0](), maxh=0.5, order=2)
     assert solution.error_bound > 0
     path = copied(solution).equilibrated.save(tmp_path / "certificate.npz")
     assert check_certificate.check(path)
 
 
+@pytest.mark.parametrize(("order", "reason"), [(1, "turns along"), (2, "a curved side")])
+def test_curves_have_no_certificate(order, reason, tmp_path):
+    """Normals are those of the drawing, at order 1 too."""
+    solution = solve(cases.ring_in_bearing().problem, maxh=0.5, order=order)
+    with pytest.raises(ValueError, match=reason):
+        solution.equilibrated.save(tmp_path / "certificate.npz")
+
+
 def test_the_name_of_the_file(saved, tmp_path):
     with pytest.raises(ValueError, match=r"must end in \.npz"):
-        saved[2].equilibrated.save(tmp_path / "certificate.txt")
+        saved["hertz"][2].equilibrated.save(tmp_path / "certificate.txt")

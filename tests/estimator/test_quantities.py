@@ -13,8 +13,9 @@ from netgen.occ import Circle, Compound, MoveTo, OCCGeometry, Y
 from drivers.reference import cases
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
 from ngcontact.estimator import Quantity
-from ngcontact.estimator.equilibrated import bound
-from ngcontact.geometries import disc_on_disc
+from ngcontact.estimator.bound import bound
+from ngcontact.geometries import blocks, disc_on_disc
+from tests.runs import solved
 from tests.scenes import unmatched_blocks
 
 
@@ -140,8 +141,7 @@ def test_bars_scale(scale):
 
 def test_largest_stress_lies_under_the_surface():
     """Johnson 1985: the largest shear is 0.3 p0 at 0.78 a; von Mises 0.56 p0 at nu = 0.3, 0.7 a."""
-    case = cases.hertz_contact(half_width=0.3)
-    *_, finest = adapt(case.problem, order=4, max_dofs=4500)
+    case, finest = cases.hertz_contact(), solved(cases.hertz_contact, 4, 4500)
     row = finest.quantities()["von Mises"]
     assert 0.5 * case.exact.p0 < row.value < 0.65 * case.exact.p0
     assert abs(row.place[0]) < 0.1
@@ -309,8 +309,8 @@ def test_the_force_of_half_a_model_is_the_load():
 
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_figures_of_hertz_lie_in_their_bars(order):
-    case = cases.hertz_contact(half_width=0.3)
-    *_, solution = adapt(case.problem, order=order, max_dofs=1500 if order < 4 else 4500)
+    case = cases.hertz_contact()
+    solution = replace(solved(cases.hertz_contact, order, 1500 if order < 4 else 4500))
     without_proof(solution)
     q, P = solution.quantities(), case.exact.P
     exact = {
@@ -320,7 +320,32 @@ def test_figures_of_hertz_lie_in_their_bars(order):
         "peak pressure": case.exact.p0,
     }
     for name, value in exact.items():
-        assert abs(q[name].value - value) <= q[name].error <= 0.2 * value
+        # The widest is that of the peak at order 1, 0.25 of it for an error of 0.1.
+        assert abs(q[name].value - value) <= q[name].error <= 0.3 * value
+    for row in q:
+        if row.name == "end of contact, x":
+            assert abs(abs(row.value) - 0.3) <= row.error <= 0.1 * 0.3
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("pressed", [False, True])
+def test_the_approach_is_that_of_supports_and_middles(pressed, swap):
+    """Blocks in uniform compression, of height 1 and nu = 0, on a base that moves up by 0.2.
+
+    A load moves the upper one: by that of its middle, one and a half blocks above the base.
+    """
+    pair = Contact("upper_contact", "lower_contact")
+    held = {"bottom": (0, 0.2), **({} if pressed else {"top": (0, -0.1)})}
+    problem = Problem(
+        geometry=blocks(),
+        materials={"upper|lower": Elastic(E=10.0, nu=0.0)},
+        displacement=held,
+        traction={"top": (0, -0.5)} if pressed else {},
+        contact=[pair.swapped() if swap else pair],
+    )
+    approach = solve(problem, maxh=0.5, order=2).quantities()["approach"]
+    expected = 1.5 * 0.5 / 10.0 if pressed else 0.2 + 0.1
+    assert approach.value == pytest.approx(expected, rel=1e-10)
 
 
 def test_pairs_given_twice_have_quantities():
@@ -347,6 +372,8 @@ def test_corners_of_infinite_stress_are_named():
     half = q["contact area"].value / 2
     assert sorted(q["peak pressure"].infinite[:, 0]) == pytest.approx([-half, half])
     assert q["peak pressure"].infinite[:, 1] == pytest.approx([0, 0])
+    # The ends are corners of the punch: 0.5, to round-off of a sum of segments.
+    assert abs(half - 0.5) <= q["contact area"].error + 1e-14
     assert len(partly_lifted_corners()) == 1
 
 

@@ -305,7 +305,8 @@ def test_element_part(patch):
     h = diameters(patch.mesh)
     expected = (h**2 / (2 * MU["upper"]) * areas)[upper].sum()
     assert value == pytest.approx(expected, rel=1e-12)
-    assert solution.estimate_parts["element"][~upper].max() == 0
+    part = solution.estimate_parts["element"]  # squares: of round-off they are 1e-32
+    assert part[~upper].max() < 1e-28 * part.max()
 
 
 @pytest.mark.parametrize("order", [2, 3, 4])

@@ -41,19 +41,24 @@ ROUGH = {
 }
 
 
-@pytest.mark.parametrize("order", [1, 2, 4])
+# Effectivity on the last level. Measured 3.1 to 3.7, 4.2 to 4.9 and 2.9 to 9.3; 9.3 of the waves,
+# where the mesh has just resolved them: the estimate still sees their second derivatives (87 % of
+# its square), the error has fallen. 7.9 and 6.6 follow on the next two levels, and smooth data have
+# 4.5 to 6.1.
+LARGEST = {1: 5, 2: 7, 4: 10}
+
+
+@pytest.mark.parametrize("order", LARGEST)
 @pytest.mark.parametrize("name", ROUGH)
 @pytest.mark.study(witness=["a dent of a support-1"])
 def test_effectivity_of_rough_data(name, order):
-    # Waves at order 2: .15 without a slope and without points that follow. Measured 1.3 to 6.6,
-    # 8.4 on the second mesh of the dent; 9.3 of the waves at order 4, where `adapt` refines towards
-    # every crest first.
+    # Waves at order 2: .15 without a slope and without points that follow.
     problem = replace(loaded(), **ROUGH[name])
     *_, reference = adapt(problem, order=4, max_dofs=15_000)
     levels = list(adapt(problem, order=order, max_dofs=1500 * order))
     found = [s.error_estimate / miss(s, reference) for s in levels[:: max(1, len(levels) // 3)]]
     assert min(found) >= 1
-    assert found[-1] <= 10
+    assert found[-1] <= LARGEST[order]
 
 
 def test_waves_between_the_vertices_of_a_support():

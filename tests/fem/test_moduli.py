@@ -106,5 +106,6 @@ def test_moduli_of_chosen_elements_are_those_of_all(mesh):
     chosen = (np.arange(mesh.ne) % 3 == 0) & (region == region[0])
     for modulus in (shear_moduli, bulk_moduli):
         found = modulus(made_of(somewhere), mesh, chosen)
-        assert (found[chosen] == modulus(made_of(somewhere), mesh)[chosen]).all()
+        every = modulus(made_of(somewhere), mesh)
+        assert found[chosen] == pytest.approx(every[chosen], rel=1e-14)
         assert (found[~chosen] == 0).all()

@@ -12,6 +12,17 @@ from ngcontact.output import slope_triangle
 from tests.output.stubs import stub
 
 
+def test_the_last_frame_is_seen_three_times_as_long(tmp_path, monkeypatch):
+    images = [Image.new("L", (8, 8), grey) for grey in (0, 100, 200)]
+    monkeypatch.setattr("ngcontact.output.film._images", lambda *_: images)
+    path, times = write_film(tmp_path / "a.gif", [stub(1)] * 3, seconds=0.25), []
+    with Image.open(path) as film:
+        for k in range(film.n_frames):
+            film.seek(k)
+            times.append(film.info["duration"])
+    assert times == [250, 250, 750]
+
+
 @pytest.mark.study
 def test_a_film_has_a_frame_for_each_solution(tmp_path):
     path = write_film(tmp_path / "a.gif", [stub(1), stub(2), stub(1)], seconds=0.25)

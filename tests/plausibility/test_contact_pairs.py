@@ -103,6 +103,14 @@ def test_inclined_rigid_obstacles_are_told():
     assert quiet(lambda: solve(disc, maxh=0.015, order=2))
 
 
+def test_a_flat_obstacle_under_an_inclined_surface_is_silent():
+    """A disc pressed by 0.2 of its radius, with normals 25 degrees off where contact ends."""
+    disc = cases.disc_on_rigid_plane()
+    assert quiet(
+        lambda: solve(replace(disc, displacement={"top": (None, -0.2)}), maxh=0.1, order=2)
+    )
+
+
 def edge_of(name: str, left: float):
     corners = [(left, -1), (left + 1, -1), (left + 1, 0), (left, 0)]
     return body(name, polygon(corners, ["base", "side", "top", "side"]))
@@ -156,7 +164,9 @@ def test_the_last_level_resolves_the_zone_of_a_load_however_small(press):
     supports = {"block_bottom": (0, 0), "disc_top": (0, -press)}
     problem = replace(cases.pressed_disc(), displacement=supports)
     assert quiet(finest(problem, unknowns=11_000))
-    assert only(finest(problem, unknowns=1000), ZONE)  # the first levels do not
+    # One point in contact at 934 unknowns: the peak is 45 % off, 95 % of the lighter load. At 1438
+    # the heavier one has three, its peak is 5 % off, and no warning comes.
+    assert only(finest(problem, unknowns=1000), ZONE)
 
 
 @pytest.mark.parametrize(("order", "maxh"), [(1, 0.058), (2, 0.06), (3, 0.06), (4, 0.06)])

@@ -88,6 +88,8 @@ SMOOTH = [
     ng.sqrt((ng.x - 0.3) ** 2),
     (ng.x - 0.4) ** 2,
     ng.IfPos(ng.x - 0.4, 1.0, 2.0),
+    ng.cos(27 * ng.x + 2.52),  # turns shortly before an end ...
+    ng.cos(29.9 * ng.x + 1.02),  # ... or shortly after
 ]
 
 
@@ -95,6 +97,14 @@ SMOOTH = [
 @pytest.mark.parametrize("number", range(len(SMOOTH)))
 def test_slopes_waves_kinks_and_steps_are_no_features(kind, number):
     assert not len(found(given(kind, SMOOTH[number]), kind).places)
+
+
+@pytest.mark.parametrize("waves", [12.0, 14.0, 18.6])
+def test_no_part_of_a_crest_is_told_at_an_end(waves):
+    """Of waves that turn at their ends and are features themselves; splinters of 1e-3 were told."""
+    one = found(given("displacement", ng.cos(2 * math.pi * waves * ng.x)), "displacement")
+    assert len(one.places) >= 2 * waves - 3
+    assert one.widths.min() > 0.3 / waves  # measured: 0.40 to 0.52
 
 
 def test_corners_and_arcs_of_wide_parts_are_no_features():

@@ -20,6 +20,8 @@ def test_a_record_holds_plain_numbers():
     assert row["unknowns"] == solution.displacement.space.ndof
     assert row["contact_0_force_y"] == solution.contact_force()[1]
     assert row["contact_0_peak_pressure"] == solution.pressure.max()
+    energies = [row["energy"], row["energy_norm"]]
+    assert energies == pytest.approx([solution.energy, solution.energy_norm], rel=1e-12)
     # Equilibrium of the disc, from the record alone.
     assert row["reaction_disc_top_y"] == pytest.approx(-row["contact_0_force_y"], rel=1e-9)
 

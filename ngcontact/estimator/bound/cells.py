@@ -8,21 +8,24 @@ common apex, the opposite vertex or, where several sides ask for it, the middle.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index, Mask
+from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...lagrange import gauss
 from ...problem import Triangulation
 
 REFERENCE = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])  # NGSolve's corners, in this order
 NEWTON_STEPS = 8
-TURN = 0.01  # twice the sine of the angle between sides up to which they are on one line
+CLOSE = 1e-9  # of an element: the next step is round-off
+TURN = 0.5  # twice the sine of the angle between sides up to which they are on one line
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,7 +160,10 @@ class Cells:
         for _ in range(NEWTON_STEPS):
             slope = self.evaluate(jacobian, at[bent], found[bent]).reshape(-1, 2, 2)
             miss = x[bent] - self.evaluate(place, at[bent], found[bent])
-            found[bent] += np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
+            step = np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
+            found[bent] += step
+            if np.abs(step).max() <= CLOSE:
+                break
         return found
 
 
@@ -196,24 +202,14 @@ class Places:
         return cells.evaluate(function, np.repeat(self.at, q), flat).reshape(b, q, -1)
 
 
-def _lattice(parts: int) -> Array:
-    """Corners (parts^2, 3, 2) of equal parts of the triangle of reference."""
-    m = parts
-    up = [[(i, j), (i + 1, j), (i, j + 1)] for i in range(m) for j in range(m - i)]
-    down = [[(i, j + 1), (i + 1, j), (i + 1, j + 1)] for i in range(m) for j in range(m - 1 - i)]
-    return np.array(up + down, dtype=float) / m
-
-
-def places(cells: Cells, at: Index, order: int, parts: int = 1) -> Places:
+def places(cells: Cells, at: Index, order: int) -> Places:
     """Quadrature of degree `order` in triangles `at` (b,), all straight or all with a curved base.
 
-    Towards a curved base points lie on straight lines from the apex. The rule is that of `parts`^2
-    parts.
+    Towards a curved base points lie on straight lines from the apex.
     """
     corners = cells.corners[at]
     if len(at) and cells.curved[at[0]]:
         g, w = gauss(order)
-        g, w = ((np.arange(parts)[:, None] + g) / parts).ravel(), np.tile(w / parts, parts)
         sigma, t = (z.ravel() for z in np.meshgrid(g, g, indexing="ij"))
         weight = np.outer(w * g, w).ravel()
         side = np.repeat(cells.sides[at, 0], len(t))
@@ -231,11 +227,6 @@ def places(cells: Cells, at: Index, order: int, parts: int = 1) -> Places:
     else:
         rule = ng.IntegrationRule(ng.TRIG, order)
         local, weight = np.array([p[:2] for p in rule.points]), np.array(rule.weights)
-        share = np.column_stack([1 - local.sum(axis=1), local])
-        local, weight = (
-            (share @ _lattice(parts)).reshape(-1, 2),
-            np.tile(weight, parts**2) / parts**2,
-        )
         edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)
         x = corners[:, :1] + np.einsum("bij,qj->bqi", edges, local)
         spread = np.broadcast_to(edges[:, None], (len(at), len(weight), 2, 2))
@@ -243,19 +234,19 @@ def places(cells: Cells, at: Index, order: int, parts: int = 1) -> Places:
     guess = np.einsum("qc,bcd->bqd", share, cells.reference[at])
     number = np.repeat(at, len(weight))
     found = cells.located(number, x.reshape(-1, 2), guess.reshape(-1, 2)).reshape(x.shape)
-    area = np.abs(np.linalg.det(spread)) * weight
-    return Places(at, x, area, found, spread, local)
+    area = np.linalg.det(spread)
+    if not (area > 0).all():
+        raise ContactError("a curved side of the mesh goes beyond the middle of its element")
+    return Places(at, x, area * weight, found, spread, local)
 
 
-def cells_of(
-    trace: BoundaryTrace, cuts: Mapping[int, Sequence[float]], loaded: Index, held: Index
-) -> Cells:
+def cells_of(trace: BoundaryTrace, cuts: Mapping[int, Array], loaded: Index, held: Index) -> Cells:
     """Divide the mesh.
 
     Parameters
     ----------
     trace : BoundaryTrace
-    cuts : dict of int to sequence of float
+    cuts : dict of int to ndarray (j,)
         Rising parameters s of new vertices on segments of the boundary.
     loaded, held : ndarray of int (k,)
         Segments that carry something, and those on which the whole displacement is prescribed.
@@ -279,7 +270,7 @@ def cells_of(
     for e in parts.tolist():
         made.divide(e, None if middle[e] else int(special[e].argmax()))
     new = made.arrays()
-    both = (triangles, REFERENCE[roll], whole, own, spans)
+    both: tuple[Any, ...] = (triangles, REFERENCE[roll], whole, own, spans)
     triangles, reference, parent, own, spans = (
         np.concatenate(pair) for pair in zip(both, new, strict=True)
     )
@@ -328,7 +319,8 @@ def _parted(cells: Cells, at: Index) -> Cells:
     rest = np.setdiff1d(np.arange(len(cells.triangles)), at)
     middle = len(cells.vertices) + np.arange(len(at))
     place, inside = cells.reference[at].mean(axis=1), np.full(len(at), -1)
-    parts = [[x[rest]] for x in (cells.triangles, cells.reference, cells.parent, own, spans)]
+    whole_ones = cells.triangles, cells.reference, cells.parent, own, spans
+    parts: list[list[Any]] = [[x[rest]] for x in whole_ones]
     whole = np.broadcast_to([0.0, 1.0], (len(at), 2))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         corners, reference = cells.triangles[at], cells.reference[at]
@@ -343,7 +335,8 @@ def _parted(cells: Cells, at: Index) -> Cells:
             values.append(value)
     vertices = np.concatenate([cells.vertices, cells.corners[at].mean(axis=1)])
     curved = np.concatenate([cells.curved[rest], cells.curved[at], np.zeros(2 * len(at), bool)])
-    return joined(cells.trace, vertices, *(np.concatenate(x) for x in parts), curved)
+    triangles, reference, parent, own, spans = (np.concatenate(x) for x in parts)
+    return joined(cells.trace, vertices, triangles, reference, parent, own, spans, curved=curved)
 
 
 def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
@@ -378,10 +371,12 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
         one[vertex[left]] = line[left]
         left = left[np.abs(line[left] - one[vertex[left]]) > TURN]
     at_two[vertex[left]] = False
-    eased = np.zeros(count, dtype=bool)  # by straight triangles, if there are any
-    eased[cells.triangles[~cells.curved]] = True
-    asked = at_two[cells.triangles] & (~cells.curved[:, None] | ~eased[cells.triangles])
-    return np.flatnonzero(asked.any(axis=1))
+    chosen = np.full(count, -1)
+    x = cells.corners  # straight ones, and wide ones, if there are any
+    wide = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / cells.diameters**2
+    order = np.lexsort((wide, ~cells.curved))
+    chosen[cells.triangles[order]] = order[:, None]
+    return np.unique(chosen[at_two])
 
 
 @dataclass(eq=False)
@@ -391,7 +386,7 @@ class _Parts:
     trace: BoundaryTrace
     view: Triangulation
     segment: Index
-    cuts: Mapping[int, Sequence[float]]
+    cuts: Mapping[int, Array]
 
     def __post_init__(self) -> None:
         self.count = len(self.view.vertices)
@@ -399,8 +394,8 @@ class _Parts:
         self.rows: tuple[list, ...] = ([], [], [], [], [])
         self.number = {k: self._added(self._on(k, s)) for k, s in self.cuts.items()}
 
-    def _on(self, k: int, s: Sequence[float]) -> Array:
-        return self.trace.point(np.full(len(s), k), np.asarray(s))
+    def _on(self, k: int, s: Array) -> Array:
+        return self.trace.point(np.full(len(s), k), s)
 
     def _added(self, x: Array) -> list[int]:
         self.places.append(x)

@@ -11,8 +11,8 @@ in the norm of C^-1, and the tractions of s are N'A^-1 N mu + N'A^-1 g + <s_p n,
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import ngsolve as ng
 import numpy as np
@@ -24,17 +24,23 @@ from ...fem import connected_bodies, model_of
 from ...lagrange import gauss
 from ...problem import Problem, Triangulation, varies
 from ...qp import vanishing_combinations
-from ...quadrature import numbers
 from .cells import Cells, Places, places
-from .polynomials import Frame, balancing, frame_of, projected, scalars, stresses
+from .parts import projection
+from .polynomials import (
+    Frame,
+    airy_stress,
+    balancing,
+    bending,
+    frame_of,
+    in_frame,
+    stresses,
+)
 
-ROUGH = 1e-4  # of a load on a triangle, that stresses of the usual degree may miss
-ROUGH_RULE = (8, 4)  # order and parts of the quadrature of such loads
-BONUS = 10  # orders of that of others
-ON_ROUGH = 3  # degrees by which they are higher where they miss more
 ON_CURVES = 4  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
 DEFINITE = (1e-15, 1e-14, 1e-13, 1e-12)  # of the diagonal, until it is enough
+WHOLE, PARTED = 10, 4  # degrees above 2 k of rules for forces: on triangles, on their parts
 ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
 BLOCK = 4000  # triangles at once: bounds the memory
 
@@ -46,8 +52,8 @@ def traces(degree: int, t: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class Element:
-    """b triangles of one kind: m stresses, d multipliers on each.
+class Triangles:
+    """b triangles of one kind, with stresses of one degree.
 
     Attributes
     ----------
@@ -57,18 +63,93 @@ class Element:
         With the model's measure.
     frame : Frame
     degree : int
+    curved, axial : bool
+        Whether the base of each is curved; whether the model is axisymmetric.
     on_axis : bool
         Whether a side of each lies on the axis.
     compliance : ndarray (b or 1, q or 1, v, v)
         C^-1.
+    """
+
+    places: Places
+    weight: Array
+    frame: Frame
+    degree: int
+    curved: bool
+    axial: bool
+    on_axis: bool
+    compliance: Array
+
+    @property
+    def alike(self) -> bool:
+        """Whether T is one table for all, but for `Frame.airy`, and C a number."""
+        return not self.curved and not self.axial and self.compliance.shape[:2] == (1, 1)
+
+    @property
+    def local(self) -> Array:
+        """The quadrature points in the frame, (q, 2), or (b, q, 2) of curved triangles."""
+        return self.frame.local(self.places.x) if self.curved else in_frame(self.places.local)
+
+    @property
+    def force_degree(self) -> int:
+        """Of the body force that is balanced."""
+        return max(0, self.degree - 1 - self.axial)
+
+    def basis(self, x: Array, local: Array) -> Array:
+        """T (b, q, v, m) at points `x` (b, q, 2), `local` in the frame."""
+        return stresses(self.degree, self.frame, x, local, self.axial, self.on_axis)
+
+    def balancing(self, x: Array, force: Array, some: Index | slice = slice(None)) -> Array:
+        """Stresses s_p (b, q, v) at points `x` (b, q, 2), without radial forces."""
+        frame = self.frame[some]
+        return balancing(self.force_degree, frame, x, force[some], self.axial)
+
+    def tested(self, strain: Array) -> Array:
+        """(T, strain), (b, m), of strains (b, q, v)."""
+        local, b = self.local, len(strain)
+        strain = self.weight[..., None] * strain
+        if self.alike:
+            second = (strain @ self.frame.airy).reshape(b, -1)
+            table = bending(self.degree, local)
+            return np.asarray(second @ table.reshape(-1, table.shape[-1]))
+        T = self.basis(self.places.x, local)
+        T = T.reshape(b, -1, T.shape[-1])
+        return np.asarray((strain.reshape(b, 1, -1) @ T)[:, 0])
+
+    def squared(self) -> Array:
+        """A (b, m, m)."""
+        b, local = len(self.weight), self.local
+        if self.alike:
+            table = bending(self.degree, local)
+            m = table.shape[-1]
+            size = self.weight.sum(axis=1)[:, None, None]
+            share = (self.weight[0] / self.weight[0].sum())[:, None, None]
+            R = np.tensordot(share * table, table, (0, 0)).transpose(0, 2, 1, 3)  # (3, 3, m, m)
+            airy = self.frame.airy
+            M = size * (airy.transpose(0, 2, 1) @ self.compliance[0] @ airy)
+            return np.asarray(M.reshape(b, 9) @ R.reshape(9, m * m)).reshape(b, m, m)
+        T = np.sqrt(self.weight)[..., None, None] * self.basis(self.places.x, local)
+        m = T.shape[-1]
+        strains = (self.compliance @ T).reshape(b, -1, m)
+        return np.asarray(T.reshape(b, -1, m).transpose(0, 2, 1) @ strains)
+
+
+@dataclass(frozen=True, eq=False)
+class Element(Triangles):
+    """Condensed triangles: m stresses, d multipliers on each.
+
+    Attributes
+    ----------
     strain : ndarray (b, q, v)
         e(u_h), Voigt.
     force : ndarray (b, j, 2)
         Coefficients of the body force that s_p balances, of degree `force_degree`.
     radial : ndarray (b, q)
         Radial force times r about an axis: a part of the hoop stress.
+    source : CoefficientFunction or None
+        The body force.
     missed : ndarray (b,)
-        Norm of what of the body force s_p does not balance.
+        L2 norm of what of the body force s_p does not balance, times the measure.
     root : ndarray (b, m, m)
         L of A = L L'.
     N : ndarray (b, m, d)
@@ -77,67 +158,77 @@ class Element:
         L^-1 g.
     own : ndarray (b, d)
         Moments of s_p n.
+    sides : ndarray of int (b, 3)
+        Numbers of the sides.
     dofs : ndarray of int (b, d)
-        Numbers of the multipliers.
+        Numbers of their multipliers.
     """
 
-    places: Places
-    weight: Array
-    frame: Frame
-    degree: int
-    on_axis: bool
-    compliance: Array
     strain: Array
     force: Array
     radial: Array
+    source: ng.CoefficientFunction | None
     missed: Array
     root: Array
     N: Array
     g: Array
     own: Array
+    sides: Index
     dofs: Index
-
-    @property
-    def force_degree(self) -> int:
-        """Of the body force that is balanced."""
-        return _force_degree(self.degree, self.strain.shape[2] > 3)
 
     def answer(self, mu: Array) -> Array:
         """Change of c (b, m) with all multipliers, by `mu` (k,)."""
         y = np.einsum("bmd,bd->bm", self.N, mu[self.dofs])
         return np.linalg.solve(self.root.transpose(0, 2, 1), y[..., None])[..., 0]
 
-    def coefficients(self, mu: Array) -> Array:
-        """C (b, m) for all multipliers `mu` (k,)."""
-        g = np.linalg.solve(self.root.transpose(0, 2, 1), self.g[..., None])[..., 0]
-        return g + self.answer(mu)
+    def alone(self) -> Array:
+        """Coefficients c (b, m) without multipliers."""
+        return np.linalg.solve(self.root.transpose(0, 2, 1), self.g[..., None])[..., 0]
 
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with coefficients `c` (b, m)."""
-        return self.own + np.einsum(
-            "bmd,bmn,bn->bd", self.N, self.root.transpose(0, 2, 1), c, optimize=True
+        y = (self.root.transpose(0, 2, 1) @ c[..., None])[..., 0]
+        return np.asarray(self.own + (self.N.transpose(0, 2, 1) @ y[..., None])[..., 0])
+
+    def of_strain(self, strain: Array) -> Element:
+        """The same triangles for another displacement, strains (b, q, v), without body forces."""
+        g = np.linalg.solve(self.root, self.tested(strain)[..., None])
+        return replace(
+            self,
+            strain=strain,
+            force=np.zeros_like(self.force),
+            radial=np.zeros_like(self.radial),
+            source=None,
+            missed=np.zeros_like(self.missed),
+            g=np.asarray(g[..., 0]),
+            own=np.zeros_like(self.own),
         )
 
-    def full_stress(self, c: Array) -> Array:
-        """Stress s (b, q, v) at the quadrature points, with radial forces."""
-        s = self.stress(c, self.places.x)
-        if s.shape[2] > 3:
+    def whole_stress(self, c: Array) -> Array:
+        """Stresses (b, q, v) at the quadrature points, the radial force's part of the hoop included."""
+        s = self._stress(c, self.places.x, self.local, slice(None))
+        if self.axial:
             s[..., 2] += self.radial
         return s
 
+    def radial_at(self, cells: Cells, at: Index, reference: Array) -> Array:
+        """Radial force times r, (k,), in triangles (k,) at reference places (k, 2)."""
+        if self.source is None:
+            return np.zeros(len(at))
+        return cells.evaluate(ng.x * self.source[0], at, reference)[:, 0]
+
     def stress(self, c: Array, x: Array, some: Index | slice = slice(None)) -> Array:
-        """Stress s (b, q, v) at `x` (b, q, 2) for coefficients `c` (b, m), no radial forces."""
-        axial = self.strain.shape[2] > 3
+        """Stresses (b, q, v) at `x` (b, q, 2) for coefficients `c` (b, m), radial forces apart."""
+        return self._stress(c[some], x, self.frame[some].local(x), some)
+
+    def _stress(self, c: Array, x: Array, local: Array, some: Index | slice) -> Array:
         frame = self.frame[some]
-        T = stresses(self.degree, frame, x, frame.local(x), axial, self.on_axis)
-        s = np.einsum("bqvm,bm->bqv", T, c[some])
-        if self.force.any():
-            s = s + balancing(self.force_degree, frame, x, self.force[some], axial)
-        return s
-
-
-def _force_degree(degree: int, axial: bool) -> int:
-    return max(0, degree - 1 - axial)
+        if self.axial:
+            T = stresses(self.degree, frame, x, local, self.axial, self.on_axis)
+            s = (T @ c[:, None, :, None])[..., 0]
+        else:
+            s = airy_stress(self.degree, frame, local, c)
+        return s + self.balancing(x, self.force, some) if self.force.any() else s
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,16 +246,11 @@ class Multipliers:
         return np.arange(self.start[side], self.start[side + 1])
 
 
-def multipliers(cells: Cells, degree: int, rough: Mask) -> tuple[Index, Multipliers]:
-    """Degree (n,) of the stress in each triangle, and the multipliers that it asks for.
-
-    In `rough` triangles (n,) it is higher, but tractions on inner sides are not.
-    """
+def multipliers(cells: Cells, degree: int) -> tuple[Index, Multipliers]:
+    """Degree (n,) of the stress in each triangle, and the multipliers that it asks for."""
     own = np.where(cells.curved, degree + ON_CURVES, degree)
     of_side = np.zeros(len(cells.ends), dtype=np.intp)
     np.maximum.at(of_side, cells.sides, own[:, None])
-    own = own + ON_ROUGH * rough
-    of_side = np.where(cells.inner, of_side, own[cells.owner])
     start = np.concatenate([[0], np.cumsum(2 * (of_side + 1))])
     return own, Multipliers(of_side, start)
 
@@ -191,93 +277,50 @@ def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
     return np.asarray(found @ vanishing_combinations(found[fixed]))
 
 
-def elements(
+def elements_of(
     problem: Problem,
     cells: Cells,
-    displacement: ng.CoefficientFunction | None,
+    displacement: ng.CoefficientFunction,
     degree: int,
-    rest: Callable[[Places, Array], Array] | None = None,
+    look: Index,
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, and their multipliers.
 
-    Or of the `rest` of body forces, by points and forces there, without a displacement.
+    `look` (n, 3) says by what degree above 2 k rules integrate forces, and on parts of what depth,
+    with thirds at corners or not.
     """
-    rough = _rough(problem, cells, degree, rest is None)
-    own, mu = multipliers(cells, degree, rough)
-    on_axis = cells.trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1)[cells.sides]
-    key = np.column_stack([own, mu.degree[cells.sides], on_axis.any(axis=1), cells.curved])
-    varying = _varying(problem, cells)
-    key = np.column_stack([key, varying, cells.bodies, rough])
+    own, mu = multipliers(cells, degree)
+    at_axis = np.asarray(cells.trace.model.on_axis(cells.vertices))
+    on_axis = np.asarray(at_axis[cells.ends].all(axis=1))[cells.sides]
+    key = np.column_stack(
+        [
+            own,
+            on_axis.any(axis=1),
+            mu.degree[cells.sides],
+            cells.curved,
+            _varying(problem, cells),
+            cells.bodies,
+            *look.T,
+        ]
+    )
     kinds, number = np.unique(key, axis=0, return_inverse=True)
     found = []
-    for kind in range(len(kinds)):
+    for kind, (own_degree, axis, *rest) in enumerate(kinds.tolist()):
         every = np.flatnonzero(number.ravel() == kind)
         for start in range(0, len(every), BLOCK):
             at = every[start : start + BLOCK]
-            found.append(
-                _element(
-                    problem,
-                    cells,
-                    displacement,
-                    mu,
-                    at,
-                    int(kinds[kind, 0]),
-                    bool(kinds[kind, 4]),
-                    rest,
-                    bool(kinds[kind, -1]),
-                )
-            )
+            kept = problem, cells, displacement, mu, at, own_degree, bool(axis), rest[-3:]
+            found.append(_element(*kept))
     return mu, found
 
 
-def _rough(problem: Problem, cells: Cells, degree: int, looked: bool) -> Mask:
-    """Triangles (n,) on which loads are no polynomials that stresses of a degree balance."""
-    model = cells.trace.model
-    axial, rough = model.extent > 0, np.zeros(len(cells.triangles), dtype=bool)
-    if not looked:
-        return rough
-    n = _force_degree(degree, axial)
-    for pattern, force in problem.force.items():
-        mask = np.array(cells.trace.mesh.Materials(pattern).Mask())
-        for bent in (False, True):
-            at = np.flatnonzero(mask[cells.bodies] & (cells.curved == bent))
-            if numbers(force) or not at.size:
-                continue
-            points = places(cells, at, 2 * degree + BONUS)
-            F = points.evaluate(cells, ng.CF(force))[..., int(axial) :]
-            weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(len(at), -1)
-            frame = frame_of(cells.corners[at])
-            rest = F - scalars(n, frame, points.x) @ projected(n, frame, points.x, weight, F)
-            miss, size = (np.einsum("bq,bqd->b", weight, f**2) for f in (rest, F))
-            rough[at] = miss > ROUGH**2 * np.maximum(size, 1e-4 * size.mean())
-    for pattern in problem.traction:
-        side = np.flatnonzero(np.isin(cells.segment, cells.trace.segments(pattern)))
-        t, w = gauss(2 * degree + 10)
-        segment, s = cells.on_side(np.repeat(side, len(t)), np.tile(t, len(side)))
-        P = cells.trace.evaluate(problem.traction_vector(pattern), segment, s)
-        P = P.reshape(len(side), len(t), 2)
-        chi = traces(degree - model.extent, t)
-        rest = P - chi @ (chi.T @ (w[:, None] * P))
-        miss, size = (np.einsum("q,sqc->s", w, f**2) for f in (rest, P))
-        rough[cells.owner[side[miss > ROUGH**2 * size]]] = True
-    # Directions of contact and of guides that are not the normals of the mesh.
-    sides = [
-        name for c in problem.contact if c.direction is None for name in (c.secondary, c.primary)
-    ]
-    side = np.flatnonzero(np.isin(cells.segment, cells.trace.segments(*sides, problem.sliding)))
-    segment, s = cells.on_side(np.tile(side, 2), np.repeat([0.0, 1.0], len(side)))
-    turn = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
-    turned = np.linalg.norm(turn, axis=1).reshape(2, -1).max(axis=0) > ROUGH
-    rough[cells.owner[side[turned & ~cells.bent[side]]]] = True
-    return rough
-
-
-def _varying(problem: Problem, cells: Cells) -> Index:
+def _varying(problem: Problem, cells: Cells) -> Mask:
+    """Triangles (n,) whose law varies in them."""
     mesh = cells.trace.mesh
-    flags = np.zeros(len(mesh.GetMaterials()), dtype=np.intp)
+    flags = np.zeros(len(mesh.GetMaterials()), dtype=bool)
     for pattern, law in problem.materials.items():
         flags[np.array(mesh.Materials(pattern).Mask())] = varies(law)
-    return flags[cells.bodies]
+    return np.asarray(flags[cells.bodies])
 
 
 def law_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunction:
@@ -298,11 +341,10 @@ def compliance_at(problem: Problem, cells: Cells, points: Places) -> Array:
     else:
         C = cells.evaluate(law, at[:1], np.full((1, 2), 1 / 3))[None]
     v = round(C.shape[-1] ** 0.5)
-    return np.linalg.inv(C.reshape(*C.shape[:2], v, v))
+    return np.asarray(np.linalg.inv(C.reshape(*C.shape[:2], v, v)))
 
 
-def force_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunction | None:
-    """The force on a body, if there is one."""
+def _force_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunction | None:
     mesh = cells.trace.mesh
     for pattern, force in problem.force.items():
         if mesh.Materials(pattern).Mask()[body]:
@@ -313,90 +355,64 @@ def force_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunctio
 def _element(
     problem: Problem,
     cells: Cells,
-    displacement: ng.CoefficientFunction | None,
+    displacement: ng.CoefficientFunction,
     mu: Multipliers,
     at: Index,
     degree: int,
     on_axis: bool,
-    rest: Callable[[Places, Array], Array] | None,
-    finer: bool,
+    look: Sequence[int],
 ) -> Element:
+    """Triangles `at` (b,), condensed."""
     model = model_of(problem)
     axial = model.extent > 0
-    body = int(cells.bodies[at[0]])
     curved, varying = bool(cells.curved[at[0]]), bool(_varying(problem, cells)[at[0]])
-    order = 2 * degree + 4 * (curved or varying or axial)
-    points = places(cells, at, order)
-    b, q = points.weight.shape
-    weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(b, q)
-    frame = frame_of(cells.corners[at])
-    compliance = compliance_at(problem, cells, points)
-    strain = np.zeros((b, q, 3 + model.extent))
-    if displacement is not None:
-        strain = points.evaluate(cells, model.strain(displacement))
-    force, radial, missed = _forces(problem, cells, points, frame, degree, body, axial, rest, finer)
-    local = frame.local(points.x) if curved else points.local[None]
-    T = stresses(degree, frame, points.x, local, axial, on_axis)
-    root = np.sqrt(weight)[..., None]
-    D = compliance
-    v, m = T.shape[-2:]
-    weighted = (root[..., None] * T).reshape(b, q * v, m)
-    A = weighted.transpose(0, 2, 1) @ (root[..., None] * (D @ T)).reshape(b, q * v, m)
-    wanted = strain
+    points = places(cells, at, 2 * degree + 4 * (curved or varying or axial))
+    weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
+    kind = Triangles(
+        places=points,
+        weight=weight,
+        frame=frame_of(cells.corners[at]),
+        degree=degree,
+        curved=curved,
+        axial=axial,
+        on_axis=on_axis,
+        compliance=compliance_at(problem, cells, points),
+    )
+    strain = points.evaluate(cells, model.strain(displacement))
+    source = _force_of(problem, cells, int(cells.bodies[at[0]]))
+    force, radial, missed = _forces(source, cells, kind, look)
+    rest = strain
     if force.any() or radial.any():
-        s_p = balancing(_force_degree(degree, axial), frame, points.x, force, axial)
+        s_p = kind.balancing(points.x, force)
         if axial:
             s_p[..., 2] += radial
-        wanted = strain - (D @ s_p[..., None])[..., 0]
-    g = np.einsum("bxm,bx->bm", weighted, (root * wanted).reshape(b, -1))
+        rest = strain - (kind.compliance @ s_p[..., None])[..., 0]
+    N, own = _moments(cells, mu, kind, force)
+    A = kind.squared()
     scale = 1 / np.sqrt(np.einsum("bmm->bm", A))
-    N, own = _moments(cells, mu, at, degree, frame, on_axis, force, axial, m)
-    L = _cholesky(A * scale[:, :, None] * scale[:, None, :])
-    right = scale[..., None] * np.concatenate([N, g[..., None]], axis=2)
-    solved = np.linalg.solve(L, right)
-    of_side = mu.degree[cells.sides[at[0]]]
-    dofs = np.concatenate(
-        [
-            start[:, None] + np.arange(2 * (k + 1))
-            for start, k in zip(mu.start[cells.sides[at]].T, of_side, strict=True)
-        ],
-        axis=1,
-    )
-    highest = np.maximum(of_side, degree)
-    shared = np.concatenate(
-        [np.tile(np.arange(j + 1) <= k, 2) for j, k in zip(highest, of_side, strict=True)]
-    )
-    N, g = solved[..., :-1], solved[..., -1]
-    if not shared.all():
-        N, g, own = _without(N, g, own, shared)
+    root = _cholesky(A * scale[:, :, None] * scale[:, None, :])
+    right = np.concatenate([N, kind.tested(rest)[..., None]], axis=2)
+    solved = np.linalg.solve(root, scale[..., None] * right)
     return Element(
-        points,
-        weight,
-        frame,
-        degree,
-        on_axis,
-        compliance,
-        strain,
-        force,
-        radial,
-        missed,
-        L / scale[:, :, None],
-        N,
-        g,
-        own,
-        dofs,
+        **vars(kind),
+        strain=strain,
+        force=force,
+        radial=radial,
+        source=source,
+        missed=missed,
+        root=root / scale[:, :, None],
+        N=solved[..., :-1],
+        g=solved[..., -1],
+        own=own,
+        sides=cells.sides[at],
+        dofs=np.concatenate(
+            [
+                mu.start[side, None] + np.arange(2 * (mu.degree[side[0]] + 1))
+                for side in cells.sides[at].T
+            ],
+            axis=1,
+        ),
     )
-
-
-def _without(N: Array, g: Array, own: Array, shared: Mask) -> tuple[Array, Array, Array]:
-    """N, g, moments of s_p n of the `shared` multipliers (d,), where all other moments vanish."""
-    basis, R = np.linalg.qr(N[:, :, ~shared])
-    fixed = -np.linalg.solve(R.transpose(0, 2, 1), own[:, ~shared, None])
-    N, g = N[:, :, shared], g[..., None]
-    along = basis.transpose(0, 2, 1) @ N
-    own = own[:, shared] + (along.transpose(0, 2, 1) @ fixed)[..., 0]
-    g = g - basis @ (basis.transpose(0, 2, 1) @ g - fixed)
-    return N - basis @ along, g[..., 0], own
 
 
 def _cholesky(A: Array) -> Array:
@@ -412,37 +428,47 @@ def _cholesky(A: Array) -> Array:
     raise ContactError("triangles are too thin, or too curved, for an equilibrated stress")
 
 
-def _moments(cells, mu, at, degree, frame, on_axis, force, axial, m):
-    """N (b, m, d), and the moments (b, d) of s_p n."""
-    found, given = [], []
+def _moments(cells: Cells, mu: Multipliers, kind: Triangles, force: Array) -> tuple[Array, Array]:
+    """N (b, m, d), and the moments (b, d) of s_p n for coefficients of a body force."""
+    at, loaded, found, given = kind.places.at, force.any(), [], []
     for i in range(3):
-        side = cells.sides[at, i]
-        k = max(int(mu.degree[side[0]]), degree)
-        bent = bool(cells.bent[side[0]])
-        t, w = gauss(degree + k + 2 * axial + (4 * cells.trace.geometry_order if bent else 0))
-        own = np.where(cells.backward[at, i, None], 1 - t, t)
+        side, back = cells.sides[at, i], cells.backward[at, i]
+        k, bent = int(mu.degree[side[0]]), bool(cells.bent[side[0]])
+        t, w = gauss(kind.degree + k + 2 * kind.axial + 4 * cells.trace.geometry_order * bent)
+        start, stop = CORNERS[(i + 1) % 3], CORNERS[(i + 2) % 3]
+        local = in_frame(start + t[:, None] * (stop - start))
+        if kind.alike:
+            N = _tractions_alike(kind, i, local, w[:, None] * traces(k, t))
+            odd = np.arange(2 * (k + 1)) % (k + 1) % 2 == 1
+            found.append(np.where((back[:, None] & odd)[:, None], -N, N))
+        if kind.alike and not loaded:
+            given.append(np.zeros((len(at), 2 * (k + 1))))
+            continue
+        own = np.where(back[:, None], 1 - t, t)
         x, dx = (
             z.reshape(len(at), -1, 2) for z in cells.points(np.repeat(side, len(t)), own.ravel())
         )
-        dx = np.where(cells.backward[at, i, None, None], -dx, dx)
-        normal = np.stack([dx[..., 1], -dx[..., 0]], axis=-1)  # times ds / dt
+        normal = np.where(back[:, None, None], -1, 1) * (dx @ CLOCKWISE)  # times ds / dt
         weight = w * cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), -1)
         chi = weight[..., None] * traces(k, own)
-        local = (
-            frame.local(x)
-            if bent
-            else (
-                CORNERS[(i + 1) % 3] + t[:, None] * (CORNERS[(i + 2) % 3] - CORNERS[(i + 1) % 3])
-            )[None]
-        )
-        T = stresses(degree, frame, x, local, axial, on_axis)
-        found.append(_tractions(T, normal, chi))
-        if force.any():
-            s = balancing(_force_degree(degree, axial), frame, x, force, axial)[..., None]
-            given.append(_tractions(s, normal, chi)[:, 0])
-        else:
-            given.append(np.zeros((len(at), 2 * (k + 1))))
+        if not kind.alike:
+            T = kind.basis(x, kind.frame.local(x) if bent else local)
+            found.append(_tractions(T, normal, chi))
+        given.append(_tractions(kind.balancing(x, force)[..., None], normal, chi)[:, 0])
     return np.concatenate(found, axis=2), np.concatenate(given, axis=1)
+
+
+def _tractions_alike(kind: Triangles, i: int, local: Array, chi: Array) -> Array:
+    """Moments (b, m, 2 r) of tractions of T on side `i` with chi (q, r), from one table."""
+    base, edge = kind.frame.edges[..., 0], kind.frame.edges[..., 1]
+    nx, ny = ((base, edge - base, -edge)[i] @ CLOCKWISE).T[..., None]
+    xx, yy, xy = kind.frame.airy.transpose(1, 0, 2)
+    rates = np.stack([nx * xx + ny * xy, nx * xy + ny * yy], axis=1)  # (b, 2, 3)
+    table = bending(kind.degree, local)
+    q, _, m = table.shape
+    moments = table.reshape(q, -1).T @ chi
+    parts = rates.reshape(-1, 3) @ moments.reshape(3, -1)
+    return parts.reshape(-1, 2, m, chi.shape[1]).transpose(0, 2, 1, 3).reshape(len(nx), m, -1)
 
 
 def _tractions(T: Array, normal: Array, chi: Array) -> Array:
@@ -453,33 +479,18 @@ def _tractions(T: Array, normal: Array, chi: Array) -> Array:
     return np.concatenate([tx.transpose(0, 2, 1) @ chi, ty.transpose(0, 2, 1) @ chi], axis=2)
 
 
-def _forces(problem, cells, points, frame, degree, body, axial, less, finer):
+def _forces(
+    source: ng.CoefficientFunction | None, cells: Cells, kind: Triangles, look: Sequence[int]
+) -> tuple[Array, Array, Array]:
     """Coefficients of the force that is balanced, r F_r, and the norm of the rest."""
+    points, n = kind.places, kind.force_degree
     b, q = points.weight.shape
-    n = _force_degree(degree, axial)
-    j = (n + 1) * (n + 2) // 2
-    F = force_of(problem, cells, body)
-    if F is None:
-        return np.zeros((b, j, 2)), np.zeros((b, q)), np.zeros(b)
-    fine = places(cells, points.at, *(ROUGH_RULE if finer else (2 * degree + BONUS,)))
-    values = fine.evaluate(cells, F)
-    size = values
-    if less is not None:
-        values = less(fine, values)
-    measure = cells.trace.model.measure(fine.x.reshape(-1, 2)).reshape(b, -1)
-    weight = fine.weight * measure
-    force = projected(n, frame, fine.x, weight, values)
-    rest = values - scalars(n, frame, fine.x) @ force
-    if axial:
-        rest[..., 0] = 0.0
-        radial = (
-            points.x[..., 0] * points.evaluate(cells, F)[..., 0]
-            if less is None
-            else np.zeros((b, q))
-        )
+    (bonus, *parted), radial = look, np.zeros((b, q))
+    if source is None:
+        return np.zeros((b, (n + 1) * (n + 2) // 2, 2)), radial, np.zeros(b)
+    parts, order = slice(int(kind.axial), None), 2 * kind.degree + bonus
+    force, missed, size = projection(source, cells, points.at, n, order, *parted, parts)
+    if kind.axial:
+        radial = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
         force[..., 0] = 0.0
-    else:
-        radial = np.zeros((b, q))
-    missed = np.sqrt(np.einsum("bq,bqd->b", weight, rest**2))
-    size = np.sqrt(np.einsum("bq,bqd->b", weight, size**2))
     return force, radial, np.where(missed <= ROUND_OFF * size, 0.0, missed)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TypeAlias
+from functools import cached_property
 
 import ngsolve as ng
 import numpy as np
@@ -14,23 +14,26 @@ from ...arrays import Array, Index, Mask
 from ...contact import FACING, ContactState, divided, jacobian, partners, prescribed_gap
 from ...errors import ContactError
 from ...fem import BoundaryTrace
-from ...lagrange import gauss, lagrange
+from ...lagrange import gauss, lagrange, lagrange_derivative
 from ...problem import Contact
 from .cells import Cells
 
+NOISE = 1e-14  # of a gap, relative to the displacements on both sides
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
-ROUND_OFF = 1e-14  # of gaps, relative to coordinates
-NEAR = 1e-3  # of a segment: vertices that face each other up to that are one
+NEAR = 2e-3  # of the shorter segment: vertices that face each other up to that are one
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
-NARROW = 0.1  # of the sides beside it, a side between them on which r does not change
 STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
 PLACES, WEIGHTS = gauss(2 * DATA)
-THROUGH = np.linalg.inv(lagrange(DATA, PLACES))  # from values there to Gauss-Lobatto points
+THROUGH = np.linalg.inv(lagrange(DATA, PLACES))  # from values at `PLACES` to Gauss-Lobatto points
+NEWTON_STEPS = 12
 SAMPLES = 200  # places on a segment among which the last zero of the gap is sought
 
-End: TypeAlias = tuple[int, float, int]  # segment, s, 1 where contact lies towards s = 0 or -1
+
+def at_places(shapes: Callable[[int, Array], Array], t: Array) -> Array:
+    """Polynomials (k, j, DATA + 1) of Gauss-Lobatto points, or their derivatives, at t (k, j)."""
+    return shapes(DATA, t.ravel()).reshape(*t.shape, -1)
 
 
 def bernstein(degree: int, t: Array) -> Array:
@@ -48,12 +51,16 @@ def directions(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array)
 
 @dataclass(frozen=True, eq=False)
 class Met:
-    """k places of a secondary and what they meet: lengths, and the primary's place (-1: none)."""
+    """k places of a secondary and what they meet: lengths, and the primary's place (-1: none).
+
+    `faces` (k,) says whether they face the other body or the obstacle.
+    """
 
     gap: Array
     direction: Array
     segment: Index
     s: Array
+    faces: Mask
 
 
 def met(
@@ -70,68 +77,95 @@ def met(
     if contact.gap is not None:
         gap = prescribed_gap(contact, trace, segment, s, x)
     jump = trace.evaluate(displacement, segment, s)
+    noise = np.abs(jump).max(initial=0.0)
     at = np.flatnonzero(other >= 0)
     if at.size:
-        jump[at] -= trace.evaluate(displacement, other[at], place[at])
-    return Met(gap - (jump * d).sum(axis=1), d, other, place)
+        there = trace.evaluate(displacement, other[at], place[at])
+        noise = max(noise, np.abs(there).max())
+        jump[at] -= there
+    faces = other >= 0
+    if contact.primary is None:
+        faces = (trace.normal(segment, s) * d).sum(axis=1) > FACING
+    gap = gap - (jump * d).sum(axis=1)
+    gap[np.abs(gap) <= NOISE * noise] = 0.0
+    return Met(gap, d, other, place, faces)
 
 
-def cuts_of(
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """Where p* of a pair may act.
+
+    Attributes
+    ----------
+    pair : ContactState
+    segments : ndarray of int (k,)
+        Of the secondary: in contact, beside such, or where u_h goes through the other body.
+    contact : dict of int to list of (float, float)
+        Intervals of s in contact on segments in which contact ends.
+    """
+
+    pair: ContactState
+    segments: Index
+    contact: dict[int, list[tuple[float, float]]]
+
+
+def reach_of(
     trace: BoundaryTrace,
     displacement: ng.CoefficientFunction,
-    pairs: Sequence[ContactState],
-    more: Sequence[float] = (),
-) -> tuple[dict[int, Array], list[list[End]]]:
-    """Places s of vertices to come, by segment; where contact ends, pair by pair.
+    pair: ContactState,
+    everywhere: bool,
+) -> Reach:
+    """The reach of a pair; `everywhere` on its line if that is asked for."""
+    line = pair.line
+    if everywhere or line.contact.bilateral or not len(line.segments):
+        return Reach(pair, line.segments, {})
+    nodes = trace.nodes[line.segments][:, [0, -1]]
+    active = np.append(pair.active, False)[line.rows].any(axis=1)
+    near = np.asarray(np.isin(nodes, nodes[active]).any(axis=1))
+    rest, j = np.flatnonzero(~near), len(PLACES)
+    if rest.size:
+        segment = np.repeat(line.segments[rest], j)
+        found = met(trace, displacement, pair, segment, np.tile(PLACES, len(rest)))
+        near[rest] = ((found.gap < 0) & found.faces).reshape(-1, j).any(axis=1)
+    return Reach(pair, line.segments[near], _contact_on(trace, displacement, pair))
 
-    There are `more` of them on each segment of a secondary.
+
+def cuts_of(trace: BoundaryTrace, reaches: Sequence[Reach]) -> dict[int, Array]:
+    """Places s of vertices to come, by segment: ends of contact, opposite vertices.
+
+    Vertices that all but face each other are one.
     """
     cuts: dict[int, list[float]] = {}
-    every = []
     length = trace.lengths(np.arange(len(trace.region)))
     size = np.full(trace.space.ndof, np.inf)  # shortest segment at each vertex
     np.minimum.at(size, trace.nodes[:, [0, -1]], length[:, None])
 
-    def nearest(k: Index, s: Array) -> tuple[Index, Array]:
-        """The vertices (r,) that are the nearer ends of segments (r,), and how far they are."""
-        return trace.nodes[k, np.where(s < 0.5, 0, -1)], np.minimum(s, 1 - s) * length[k]
+    def keep(k: Index, s: Array, other: Index) -> None:
+        """Cut segments `k` (r,) at `s` (r,) but beside a vertex that all but faces `other`'s."""
+        end = trace.nodes[k, np.where(s < 0.5, 0, -1)]
+        near = NEAR * np.minimum(size[end], size[trace.nodes[other][:, [0, -1]]].min(axis=1))
+        apart = np.minimum(s, 1 - s) * length[k] > near
+        for number, place in zip(k[apart].tolist(), s[apart].tolist(), strict=True):
+            cuts.setdefault(number, []).append(place)
 
-    for pair in pairs:
-        line, contact = pair.line, pair.line.contact
-        ends = _ends(trace, displacement, pair)
-        every.append(ends)
-        k = np.array([segment for segment, _, _ in ends], dtype=np.intp)
-        k = np.append(k, np.repeat(line.segments, len(more)))
-        s = np.array([*(place for _, place, _ in ends), *(len(line.segments) * list(more))])
-        kept = np.ones(len(k), dtype=bool)
-        if contact.primary is not None:
-            parts = divided(trace, contact, line.segments, line.facing)
-            k = np.append(k, np.tile(line.segments[parts.local], 2))
-            s = np.concatenate([s, parts.start, parts.stop])
+    for reach in reaches:
+        line, contact = reach.pair.line, reach.pair.line.contact
+        ends = [(k, s) for k, parts in reach.contact.items() for part in parts for s in part]
+        ends = [(k, s) for k, s in ends if APART < s < 1 - APART]
+        k, s = np.array([k for k, _ in ends], dtype=np.intp), np.array([s for _, s in ends])
+        keep(k, s, k)
+        if contact.primary is not None and len(reach.segments):
+            parts = divided(trace, contact, reach.segments, line.facing)
+            own = np.tile(reach.segments[parts.local], 2)
+            places = np.append(parts.start, parts.stop)
+            keep(own, places, np.tile(parts.facing, 2))
+            k, s = np.append(k, own), np.append(s, places)
             d = directions(trace, contact, k, s)
             there, t, *_ = partners(trace, line.facing, k, trace.point(k, s), d)
-            own, away = nearest(k, s)
-            other, beyond = nearest(there, t)
-            size_of_both = np.minimum(size[own], size[other])
-            near = np.maximum(away, beyond) <= NEAR * size_of_both
-            # Whether two vertices are one, the place decides that the secondary's faces.
-            corner = (s <= SAME) | (s >= 1 - SAME)
-            same = set(zip(own[near & corner].tolist(), other[near & corner].tolist(), strict=True))
-            apart = set(own[~near & corner & (there >= 0)].tolist())
-            about = np.maximum(away, beyond) <= 2 * NEAR * size_of_both
-            one = [
-                (a, b) in same or (n and a not in apart)
-                for a, b, n in zip(own.tolist(), other.tolist(), near.tolist(), strict=True)
-            ]
-            kept = ~(about & np.array(one, dtype=bool)) | (there < 0)
-            for number, place in zip(
-                there[kept & (there >= 0)].tolist(), t[kept & (there >= 0)].tolist(), strict=True
-            ):
-                cuts.setdefault(number, []).append(place)
-        for number, place in zip(k[kept].tolist(), s[kept].tolist(), strict=True):
-            cuts.setdefault(number, []).append(place)
+            met = there >= 0
+            keep(there[met], t[met], k[met])
     inside = {k: _inside(np.array(s)) for k, s in cuts.items()}
-    return {k: s for k, s in inside.items() if s.size}, every
+    return {k: s for k, s in inside.items() if s.size}
 
 
 def _inside(s: Array) -> Array:
@@ -140,22 +174,26 @@ def _inside(s: Array) -> Array:
     return s[np.diff(s, prepend=-1.0) > SAME]
 
 
-def _ends(
+def _contact_on(
     trace: BoundaryTrace, displacement: ng.CoefficientFunction, pair: ContactState
-) -> list[End]:
-    """Where contact ends inside segments that face the other body, away from their vertices."""
-    line, found = pair.line, []
+) -> dict[int, list[tuple[float, float]]]:
+    """Intervals of s in contact on segments in which contact ends, and which face with all nodes."""
+    line, found = pair.line, {}
     active = np.append(pair.active, False)[line.rows]
     places = trace.places(line.segments)
-    turns = np.diff(active.astype(int), axis=1) * line.faces[:, None]
-    for i, j in zip(*np.nonzero(turns * (not line.contact.bilateral)), strict=True):
-        s = np.linspace(places[i, j], places[i, j + 1], SAMPLES)
-        gap = met(trace, displacement, pair, np.full(SAMPLES, line.segments[i]), s).gap
-        sign = -int(turns[i, j])
-        inside = np.append(s[gap < 0], s[0 if sign > 0 else -1])
-        at = float(sign * (sign * inside).max() + sign * MARGIN)
-        if APART < at < 1 - APART:
-            found.append((int(line.segments[i]), at, sign))
+    turns = np.diff(active.astype(int), axis=1)
+    for i in np.flatnonzero((turns != 0).any(axis=1) & line.faces):
+        ends = [0.0] if active[i, 0] else []
+        for j in np.flatnonzero(turns[i]):
+            s = np.linspace(places[i, j], places[i, j + 1], SAMPLES)
+            segment = np.full(SAMPLES, line.segments[i])
+            below = np.flatnonzero(met(trace, displacement, pair, segment, s).gap < 0)
+            if active[i, j]:  # contact up to the last zero of the gap, and a little farther
+                ends.append(float(s[below[-1]] if below.size else s[0]) + MARGIN)
+            else:
+                ends.append(float(s[below[0]] if below.size else s[-1]) - MARGIN)
+        ends += [1.0] if active[i, -1] else []
+        found[int(line.segments[i])] = list(zip(ends[::2], ends[1::2], strict=True))
     return found
 
 
@@ -204,9 +242,30 @@ class Facing:
     share: Array
     equality: bool
 
+    @cached_property
+    def back(self) -> Array:
+        """Parameters t (k, j) of the secondary opposite to the Gauss points of the primary's sides."""
+        nodes = self.there @ THROUGH.T
+        t = np.where((nodes[:, -1] < nodes[:, 0])[:, None], 1 - PLACES, PLACES)
+        for _ in range(NEWTON_STEPS):
+            value = np.einsum("kji,ki->kj", at_places(lagrange, t), nodes)
+            slope = np.einsum("kji,ki->kj", at_places(lagrange_derivative, t), nodes)
+            t = t - (value - PLACES) / slope
+        return t
+
+    @cached_property
+    def rates(self) -> Array:
+        """|dt| of the secondary per dt of the primary, (k, j), at the latter's Gauss points."""
+        slopes = at_places(lagrange_derivative, self.back)
+        return np.abs(1 / np.einsum("kji,il,kl->kj", slopes, THROUGH, self.there))
+
+    def on_primary(self, values: Array) -> Array:
+        """Functions (k, j, c) of the secondary's t at the Gauss points of the primary's sides."""
+        return np.einsum("kji,il,klc->kjc", at_places(lagrange, self.back), THROUGH, values)
+
     @property
     def lift(self) -> Array:
-        """R (k, j): what w adds to the gap."""
+        """What w adds to the gap, r (k, j)."""
         lift = self.after @ bernstein(self.after.shape[1] - 1, PLACES).T - self.gap
         return np.where(self.open[:, None], 0.0, lift)
 
@@ -214,55 +273,48 @@ class Facing:
 def facing_of(
     cells: Cells,
     displacement: ng.CoefficientFunction,
-    pair: ContactState,
-    ends: Sequence[End],
+    reach: Reach,
     degree: int,
     held: Array,
     share: float,
 ) -> Facing:
-    """What of a pair faces, and the gap after a lifting of `degree`.
+    """What of a pair's reach faces, and the gap after a lifting of `degree`.
 
     The secondary takes a `share` of that, but for vertices that cannot move along d; `held` (nv, 2,
     2) are the projections of motions of all vertices on those that are prescribed.
     """
-    trace, line, contact = cells.trace, pair.line, pair.line.contact
-    side = np.flatnonzero(np.isin(cells.segment, line.segments))
+    pair, trace = reach.pair, cells.trace
+    line, contact = pair.line, pair.line.contact
+    side = np.flatnonzero(np.isin(cells.segment, reach.segments))
     j = len(PLACES)
     segment, s = cells.on_side(np.repeat(side, j), np.tile(PLACES, len(side)))
     found = met(trace, displacement, pair, segment, s)
-    if contact.primary is None:
-        faces = (trace.normal(segment, s) * found.direction).sum(axis=1) > FACING
-    else:
-        faces = found.segment >= 0
-    keep = faces.reshape(-1, j).all(axis=1)
+    faces = found.faces
+    keep = np.asarray(faces.reshape(-1, j).all(axis=1))
     every = keep.repeat(j)
     if contact.primary is not None and (found.gap[faces & ~every] < 0).any():
         raise ContactError("bodies overlap where a side of the mesh faces the other in part")
-    slots = side[~keep]
     side, segment, s = side[keep], segment[every], s[every]
     gap, d = found.gap[every].reshape(-1, j), found.direction[every].reshape(-1, j, 2)
     other, there = np.full(len(side), -1), np.zeros((len(side), j))
     if contact.primary is not None:
         place = found.s[every].reshape(-1, j)
-        met_segment = found.segment[every].reshape(-1, j)
-        middle = met_segment[:, j // 2]
+        segments = found.segment[every].reshape(-1, j)
+        middle = segments[:, j // 2]
         other = cells.side_at(middle, place[:, j // 2])
-        there = _continued(cells.own_parameter(other, place), met_segment == middle[:, None])
+        there = _continued(cells.own_parameter(other, place), segments == middle[:, None])
     rate = np.abs(np.diff(cells.span[side], axis=1))
     weight = WEIGHTS * rate * jacobian(trace, contact, segment, s).reshape(-1, j)
     order = np.argsort(line.segments)
     local = order[np.searchsorted(line.segments[order], cells.segment[side])]
     closed = np.append(pair.active, False)[line.rows[local]].all(axis=1)
-    middle, nearest = cells.span[side].mean(axis=1), np.full(len(side), np.inf)
-    for k, at, sign in ends:
-        away = middle - at
-        on = (cells.segment[side] == k) & (np.abs(away) < nearest)
-        closed[on], nearest[on] = away[on] * sign < 0, np.abs(away[on])
+    low, high = np.sort(cells.span[side], axis=1).T
+    for k, parts in reach.contact.items():
+        for a, b in parts:
+            closed |= (cells.segment[side] == k) & (low >= a - SAME) & (high <= b + SAME)
     closed = closed | contact.bilateral
     shares, stiff = _shares(cells, side, other, there, d, held, share)
-    noise = ROUND_OFF * np.abs(cells.vertices).max()
-    ends_of = _across(cells, slots, side)[cells.ends[side]]
-    after, bare = _after(ends_of, gap, closed, stiff, degree, noise)
+    after, bare = _after(cells.ends[side], gap, closed, stiff, degree)
     if contact.bilateral:
         after, bare = np.zeros_like(after), np.zeros_like(bare)
     kept = side, other, there, d, weight, gap, after, bare, closed, shares
@@ -274,7 +326,7 @@ def _continued(there: Array, own: Mask) -> Array:
     for i in np.flatnonzero(~own.all(axis=1)):
         at = np.flatnonzero(own[i])
         rise = np.polyfit(PLACES[at], there[i, at], 1)
-        there[i, ~own[i]] = np.clip(np.polyval(rise, PLACES[~own[i]]), 0.0, 1.0)
+        there[i, ~own[i]] = np.polyval(rise, PLACES[~own[i]])
     return there
 
 
@@ -296,17 +348,6 @@ def held_motions(cells: Cells, sides: Sequence[Index], directions: Sequence[Arra
 def _at_ends(values: Array) -> Array:
     """Functions (k, j, c) at the Gauss points of sides: at their ends, (k, 2, c)."""
     return np.einsum("ej,kjc->kec", THROUGH[[0, -1]], values)
-
-
-def _across(cells: Cells, slots: Index, side: Index) -> Index:
-    """A vertex for each (nv,): one for both ends of `slots` (r,) far shorter than sides."""
-    number = np.arange(len(cells.vertices))
-    length = np.linalg.norm(np.diff(cells.vertices[cells.ends], axis=1)[:, 0], axis=1)
-    beside = np.zeros(len(number))
-    np.maximum.at(beside, cells.ends[side], length[side, None])
-    for a, b in cells.ends[slots[length[slots] < NARROW * beside[cells.ends[slots]].min(axis=1)]]:
-        number[number == number[b]] = number[a]
-    return number
 
 
 def _shares(
@@ -361,12 +402,10 @@ def guides_of(
     )
 
 
-def _after(
-    ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int, noise: float
-) -> tuple[Array, Mask]:
+def _after(ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int) -> tuple[Array, Mask]:
     """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
 
-    And whether `gap` itself is not negative, and stays. What is below `noise` is 0.
+    And whether `gap` itself is not negative, and stays.
 
     `ends` (k, 2) are the vertices of the sides, at which r is one number of all neighbours: that
     closes the gap where they are `closed` (k,), but not at `stiff` ones (k, 2), which do not move.
@@ -385,7 +424,6 @@ def _after(
     lift[bare] = np.maximum(lift[bare], 0.0)
     after = np.where(closed[:, None], 0.0, np.maximum(c, 0.0))
     after[:, [0, -1]] = c[:, [0, -1]] + lift[number]
-    after[np.abs(after) <= noise] = 0.0
     off = np.abs(c @ B.T - gap).max(axis=1, initial=0.0)
     bare = ~closed & (c.min(axis=1) > off) & (lift[number] == 0).all(axis=1)
     return after, bare

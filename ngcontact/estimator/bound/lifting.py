@@ -1,9 +1,10 @@
 """A displacement w of little energy that corrects u_h on Gamma_u, Gamma_K and curved guides.
 
 On sides d.w is asked for: u_D - u_h on Gamma_u, r shared by compliance between both bodies on
-Gamma_K, -u_h.d on guides. On the triangles around these sides w is the displacement of least energy
-of a degree with the values asked for at nodes; what is no polynomial of that degree is continued
-from its side to the opposite corner in proportion to the distance.
+Gamma_K, -u_h.d on guides. Other parts of Gamma_K stay where they are. On the triangles around these
+sides w is the displacement of least energy of a degree with the values asked for at nodes; what is
+no polynomial of that degree is continued from its side to the opposite corner in proportion to the
+distance.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from .cells import Cells, Places, places
 from .elements import CORNERS, compliance_at
 from .facing import DATA, PLACES, THROUGH, Facing
 from .polynomials import legendre_table, products
+from .tractions import Given
 
 NOISE = 1e-13  # of what is asked for, relative to the displacement: round-off
 PARALLEL = 1e-8  # sine of the angle between directions at a vertex that are one
@@ -41,60 +43,58 @@ class Asked:
 
 
 def asked_on_supports(
-    problem: Problem, cells: Cells, displacement: ng.CoefficientFunction
+    cells: Cells, given: Given, displacement: ng.CoefficientFunction
 ) -> list[Asked]:
-    """u_D - u_h in each prescribed component."""
-    trace, found = cells.trace, []
-    for pattern, values in problem.displacement.items():
-        side = np.flatnonzero(np.isin(cells.segment, trace.segments(pattern)))
-        k, j = len(side), DATA + 1
+    """u_D - u_h in each prescribed component; no radial motion on the axis."""
+    trace, found, j = cells.trace, [], DATA + 1
+    axis = np.flatnonzero(trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1))
+    along = np.broadcast_to([1.0, 0.0], (len(axis), j, 2))
+    found.append(Asked(axis, along, np.zeros((len(axis), j))))
+    for values, side in given.supports:
+        k = len(side)
         segment, s = cells.on_side(np.repeat(side, j), np.tile(gauss_lobatto(DATA), k))
         u = trace.evaluate(displacement, segment, s)
         for c, value in enumerate(values):
             if value is not None:
-                wanted = trace.evaluate(ng.CF(value), segment, s)[:, 0] - u[:, c]
+                rest = trace.evaluate(ng.CF(value), segment, s)[:, 0] - u[:, c]
                 d = np.broadcast_to(np.eye(2)[c], (k, j, 2))
-                found.append(Asked(side, d, wanted.reshape(k, j)))
+                found.append(Asked(side, d, rest.reshape(k, j)))
     return found
 
 
-def asked_on_contact(facing: Facing, alone: bool) -> list[Asked]:
-    """-r on the secondary and r on the primary, by shares or on the secondary `alone`."""
+def asked_on_line(facing: Facing, r: Array, alone: bool) -> list[Asked]:
+    """-r (k, j) on the secondary and r on the primary, by shares, or on the secondary `alone`."""
     start, stop = np.ones((2, len(facing.side), 1)) if alone else facing.share.T[:, :, None]
     share = start + (stop - start) * PLACES
     d = np.einsum("ij,kjc->kic", THROUGH, facing.direction)
-    found = [Asked(facing.side, d, -(share * facing.lift) @ THROUGH.T)]
-    if (share < 1).any():  # at the places of the secondary; the primary's own are other ones
-        r = (1 - share) * facing.lift
-        d, values = (THROUGH @ _carried(facing, x) for x in (facing.direction, r[..., None]))
-        found.append(Asked(facing.other, d, values[..., 0]))
+    found = [Asked(facing.side, d, -(share * r) @ THROUGH.T)]
+    if (share < 1).any():
+        both = np.concatenate([facing.direction, ((1 - share) * r)[..., None]], axis=2)
+        there = THROUGH @ facing.on_primary(both)
+        found.append(Asked(facing.other, there[..., :2], there[..., 2]))
     return found
 
 
-def _carried(facing: Facing, values: Array) -> Array:
-    """Functions (k, j, c) of the secondary's t at the Gauss points of the primary's sides."""
-    k, j = facing.there.shape
-    at = _inverse(facing.there)
-    shapes = lagrange(DATA, at.ravel()).reshape(k, j, -1)
-    return np.einsum("kji,il,klc->kjc", shapes, THROUGH, values)
+def lifted(
+    problem: Problem,
+    cells: Cells,
+    asked: Sequence[Asked],
+    lines: Sequence[tuple[Facing, Array]],
+    degree: int,
+    extent: float,
+) -> Array:
+    """Norms (n,) of w, with r (k, j) on each line; on secondaries alone where vertices disagree.
 
-
-def _inverse(there: Array) -> Array:
-    """Secondary's t (k, j) of the primary's Gauss points, for monotone maps `there` (k, j)."""
-    nodes = there @ THROUGH.T
-    back = nodes[:, -1] < nodes[:, 0]
-    t = np.where(back[:, None], 1 - PLACES, PLACES)
-    for _ in range(20):
-        flat = t.ravel()
-        value = np.einsum("kji,ki->kj", lagrange(DATA, flat).reshape(*t.shape, -1), nodes)
-        slope = np.einsum(
-            "kji,ki->kj", lagrange_derivative(DATA, flat).reshape(*t.shape, -1), nodes
-        )
-        step = (value - PLACES) / slope
-        t = t - step
-        if np.abs(step).max(initial=0.0) < 1e-14:
-            break
-    return t
+    See `lifting_of`.
+    """
+    for alone in (False, True):
+        every = [*asked, *(one for line in lines for one in asked_on_line(*line, alone))]
+        try:
+            return lifting_of(problem, cells, every, degree, extent)
+        except ContactError:
+            if alone:
+                raise
+    raise AssertionError
 
 
 def lifting_of(
@@ -111,7 +111,11 @@ def lifting_of(
     touched[cells.ends[np.concatenate(needed)]] = True
     layer = np.flatnonzero(touched[cells.triangles].any(axis=1))
     nodes = _Nodes(cells, layer, degree)
-    conditions = _conditions(cells, nodes, asked, 100 * NOISE * extent)
+    lines = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
+    still = np.isin(cells.segment, cells.trace.segments(*lines))
+    for one in asked:
+        still[one.side] = False
+    conditions = _conditions(cells, nodes, asked, still, 100 * NOISE * extent)
     squares = _least(problem, cells, nodes, conditions, asked)
     norms[layer] = np.sqrt(np.maximum(squares, 0.0))
     return norms
@@ -179,21 +183,22 @@ class _Conditions:
     value: Array
 
 
-def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: float) -> _Conditions:
-    """What is asked for at the nodes; 0 on the rim of the layer."""
+def _conditions(
+    cells: Cells, nodes: _Nodes, asked: Sequence[Asked], still: Mask, noise: float
+) -> _Conditions:
+    """What is asked for at the nodes; 0 on the rim of the layer and on sides `still` (e,)."""
     frame = np.tile(np.eye(2), (nodes.count, 1, 1))
     held, value = np.zeros((nodes.count, 2), dtype=bool), np.zeros((nodes.count, 2))
-    number, d, amount = [], [], []
+    found = []
     t = gauss_lobatto(nodes.degree)
     carry = lagrange(DATA, t)
     for one in asked:
         here = np.isin(one.side, nodes.sides)
-        number.append(nodes.on_sides(cells, one.side[here]).ravel())
         vectors = np.einsum("ij,kjc->kic", carry, one.direction[here]).reshape(-1, 2)
         length = np.linalg.norm(vectors, axis=1, keepdims=True)
-        d.append(vectors / length)
-        amount.append((one.amount[here] @ carry.T).ravel() / length[:, 0])
-    number, d, amount = np.concatenate(number), np.concatenate(d), np.concatenate(amount)
+        own = (one.amount[here] @ carry.T).ravel() / length[:, 0]
+        found.append((nodes.on_sides(cells, one.side[here]).ravel(), vectors / length, own))
+    number, d, amount = (np.concatenate(x) for x in zip(*found, strict=True))
     # Normal equations at each node: two directions, or one and the one across, which is free.
     M, right = np.zeros((nodes.count, 2, 2)), np.zeros((nodes.count, 2))
     np.add.at(M, number, d[:, :, None] * d[:, None])
@@ -211,18 +216,16 @@ def _conditions(cells: Cells, nodes: _Nodes, asked: Sequence[Asked], noise: floa
     missed = np.abs((w[number] * d).sum(axis=1) - amount)
     if missed.max(initial=0.0) > max(INCONSISTENT * np.abs(amount).max(initial=0.0), noise):
         raise ContactError("conditions that meet at a vertex ask for different displacements")
-    rim = _rim(cells, nodes)
-    free = rim & ~held.any(axis=1)
-    held[free] = True
+    held[_rim(cells, nodes, still)] = True
     return _Conditions(frame, held, value)
 
 
-def _rim(cells: Cells, nodes: _Nodes) -> Mask:
-    """Nodes on sides whose other triangle is outside of the layer, and their vertices."""
+def _rim(cells: Cells, nodes: _Nodes, still: Mask) -> Mask:
+    """Nodes on sides whose other triangle is outside of the layer, or that are `still`."""
     inside = np.zeros(len(cells.triangles), dtype=bool)
     inside[nodes.layer] = True
     count = np.bincount(cells.sides[inside].ravel(), minlength=len(cells.ends))
-    side = np.flatnonzero((count == 1) & cells.inner)
+    side = np.flatnonzero((count == 1) & (cells.inner | still))
     rim = np.zeros(nodes.count, dtype=bool)
     rim[nodes.on_sides(cells, side)] = True
     return rim
@@ -256,7 +259,8 @@ def _least(
         rows.append(np.repeat(nodes.components[some], m, axis=1).ravel())
         columns.append(np.tile(nodes.components[some], (1, m)).ravel())
     size = 2 * nodes.count
-    K = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
+    entries, i, j = (np.concatenate(x) for x in (values, rows, columns))
+    K = from_triplets(entries, i, j, (size, size))
     n = 2 * np.arange(nodes.count)[:, None] + [0, 1]
     R = from_triplets(  # w = R (components in the frames)
         conditions.frame.transpose(0, 2, 1).ravel(),
@@ -289,8 +293,8 @@ def _operators(
     """Strains (b, q, v, 2 m) of the nodes' functions, C, weights, and d(a, b) / dx."""
     model, degree = model_of(problem), nodes.degree
     weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
-    law = np.linalg.inv(compliance_at(problem, cells, points))
-    into = np.linalg.inv(points.spread)
+    law = np.asarray(np.linalg.inv(compliance_at(problem, cells, points)))
+    into = np.asarray(np.linalg.inv(points.spread))
     by = np.einsum("qma,mn->qan", _gradients(degree, points.local), nodes.inverse)
     gradient = np.einsum("qan,bqac->bqcn", by, into)
     shape = _values(degree, points.local) @ nodes.inverse
@@ -367,4 +371,4 @@ def _remainders(cells: Cells, nodes: _Nodes, w: Array, asked: Sequence[Asked]) -
         miss = np.where(back[:, None, None], miss[:, ::-1], miss)
         at = position[triangle]
         rho[at, local] += miss
-    return _Remainders(rho, rho.any(axis=(1, 2, 3)))
+    return _Remainders(rho, np.asarray(rho.any(axis=(1, 2, 3))))

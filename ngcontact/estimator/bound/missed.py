@@ -23,16 +23,12 @@ triangle, of which T is the image under D: |w| <= h / pi max |D| (max det D / mi
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 
-from ...arrays import Array, Index, Mask
+from ...arrays import Array, Index
 from .cells import Cells
-from .elements import Element
-from .facing import PLACES, WEIGHTS
 
-ROUND_OFF = 1e-10  # of tractions, relative to the largest stress: more is refused
 SEEN = 17  # points on each side
 MIDDLES = 8  # degree of the lattice of places at which the middle of both balls is sought
 
@@ -43,33 +39,33 @@ def data_norms(cells: Cells, forces: Array, tractions: Array, least: Array) -> A
     Parameters
     ----------
     forces : ndarray (n,)
-        L2 norms of body forces orthogonal to rigid motions.
+        L2 norms of body forces orthogonal to rigid motions, times the measure.
     tractions : ndarray (n, 3)
         The same of tractions on the sides.
     least : ndarray (n,)
-        Smallest eigenvalue of C in Mandel's scaling, times the least measure.
+        Smallest eigenvalue of C in Mandel's scaling.
 
     Raises
     ------
     ValueError
-        Something is missed at the axis.
+        Something is missed at the axis, where the measure is 0.
     """
     found = np.zeros(len(forces))
     at = np.flatnonzero((forces > 0) | (tractions > 0).any(axis=1))
-    if (least[at] == 0).any():
-        raise ValueError(
-            "no guaranteed bound is known where loads at the axis are no polynomials; "
-            "use error_estimate"
-        )
     if at.size:
-        poincare, korn, trace = _constants(cells, at)
+        poincare, korn, trace, measure = _constants(cells, at)
+        if (measure <= 0).any():
+            raise ValueError(
+                "no guaranteed bound is known for loads that are no polynomials at the axis; use "
+                "error_estimate"
+            )
         total = poincare * forces[at] + (np.sqrt(trace) * tractions[at]).sum(axis=1)
-        found[at] = korn * total / np.sqrt(least[at])
+        found[at] = korn * total / np.sqrt(least[at] * measure)
     return found
 
 
-def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array]:
-    """Of Poincare and Korn (b,), and of traces (b, 3), squares for |grad w| = 1."""
+def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array, Array]:
+    """Of Poincare and Korn (b,), of traces (b, 3), squares for |grad w| = 1; least measure (b,)."""
     corners, t = cells.corners[at], np.linspace(0, 1, SEEN)
     x = np.empty((len(at), 3, SEEN, 2))
     normal = np.empty_like(x)
@@ -102,7 +98,8 @@ def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array]:
     least = np.maximum((away * normal).sum(axis=-1).min(axis=-1), np.finfo(float).tiny)
     far = np.linalg.norm(away, axis=-1).max(axis=-1)
     p = poincare[:, None]
-    return poincare, np.sqrt(1 + 2 / beta**2), 2 * (p**2 + far * p) / least
+    measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), -1).min(axis=1)
+    return poincare, np.sqrt(1 + 2 / beta**2), 2 * (p**2 + far * p) / least, measure
 
 
 def _distortion(cells: Cells, at: Index, x: Array, slope: Array) -> Array:
@@ -121,69 +118,3 @@ def _distortion(cells: Cells, at: Index, x: Array, slope: Array) -> Array:
         size, det = np.linalg.norm(D, 2, axis=(2, 3)).max(axis=1), np.linalg.det(D)
         found[bent] = size * np.sqrt(det.max(axis=1) / np.maximum(det.min(axis=1), 1e-300))
     return found
-
-
-def least_moduli(cells: Cells, elements: Sequence[Element]) -> Array:
-    """Smallest eigenvalue (n,) of C in Mandel's scaling, times the least measure."""
-    least = np.zeros(len(cells.triangles))
-    for e in elements:
-        half = np.ones(e.compliance.shape[-1])
-        half[-1] = 0.5**0.5
-        size = np.linalg.eigvalsh(e.compliance * half * half[:, None])[..., -1].max(axis=1)
-        least[e.places.at] = 1 / size
-    model = cells.trace.model
-    if model.extent:
-        measure = model.measure(cells.corners.reshape(-1, 2)).reshape(-1, 3).min(axis=1)
-        least *= measure
-    return least
-
-
-def tractions_of(
-    cells: Cells, elements: Sequence[Element], coefficients: Sequence[Array]
-) -> tuple[Index, Array, Array]:
-    """Sides (k,) on the boundary; tractions of s (k, j, 2) and weights ds (k, j) at `PLACES`."""
-    side = np.flatnonzero(cells.segment >= 0)
-    k, j = len(side), len(PLACES)
-    x, dx = (z.reshape(k, j, 2) for z in cells.points(np.repeat(side, j), np.tile(PLACES, k)))
-    have = np.zeros((k, j, 2))
-    for e, c in zip(elements, coefficients, strict=True):
-        number = np.full(len(cells.triangles), -1)
-        number[e.places.at] = np.arange(len(e.places.at))
-        mine = np.flatnonzero(number[cells.owner[side]] >= 0)
-        if not mine.size:
-            continue
-        some = number[cells.owner[side[mine]]]
-        at = e.places.at[some]
-        s = e.stress(c, x[mine], some)
-        back = cells.backward[at, cells.local[side[mine]]]
-        slope = np.where(back[:, None, None], -dx[mine], dx[mine])
-        nx, ny = slope[..., 1], -slope[..., 0]
-        have[mine, :, 0] = s[:, :, 0] * nx + s[:, :, -1] * ny
-        have[mine, :, 1] = s[:, :, -1] * nx + s[:, :, 1] * ny
-    length = np.linalg.norm(dx, axis=2)
-    return side, have / length[..., None], WEIGHTS * length
-
-
-def missed_tractions(
-    cells: Cells,
-    elements: Sequence[Element],
-    coefficients: Sequence[Array],
-    largest: float,
-    asked: Array | float = 0.0,
-    held: Mask | bool = False,
-) -> Array:
-    """L2 norms (n, 3) of what tractions miss of those `asked` (k, j, 2) on boundary sides.
-
-    Components (k, 2) that are `held` do not count, nor does round-off of the `largest` stress.
-    """
-    side, have, ds = tractions_of(cells, elements, coefficients)
-    x, _ = cells.points(np.repeat(side, len(PLACES)), np.tile(PLACES, len(side)))
-    measure = cells.trace.model.measure(x).reshape(ds.shape)
-    miss = np.where(np.broadcast_to(held, (len(side), 2))[:, None], 0.0, asked - have)
-    square = ((ds * measure**2)[..., None] * miss**2).sum(axis=(1, 2))
-    square = np.where(
-        square <= (ROUND_OFF * largest) ** 2 * (ds * measure**2).sum(axis=1), 0.0, square
-    )
-    norms = np.zeros((len(cells.triangles), 3))
-    norms[cells.owner[side], cells.local[side]] = np.sqrt(square)
-    return norms

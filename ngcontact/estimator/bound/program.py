@@ -10,15 +10,20 @@ psi_j Bernstein polynomials: a quadratic program whose forces are the coefficien
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.sparse.linalg import splu
 
 from ...arrays import Array, Index, Mask
 from ...errors import ContactError
-from ...linalg import cholesky, lower_half
+from ...linalg import change_of_basis, cholesky, handed_over
 from ...qp import (
+    BorderedSystems,
+    LinearSystems,
     NullSpace,
     QuadraticProgram,
     bordered_systems,
@@ -31,10 +36,10 @@ from ...triplets import from_triplets
 from .elements import Element, Multipliers, traces
 from .facing import PLACES, Facing, bernstein
 
-REFINED = 8  # steps of refinement of the stress, at most ...
-ROUND_OFF = 1e-12  # ... until what does not balance is that little
-QUADRATURE = 1e-4  # of loads on motions that nothing resists, relative to their terms
-DEFINITE = 1e-13  # of the diagonal, added to what is factorised: vertices where tractions depend
+FALLING = 0.5  # ratio of two residuals from which more corrections take nothing off
+ROUND_OFF = 1e-13  # of tractions, relative to the largest: nothing to correct
+QUADRATURE = 1e-4  # of loads on motions that nothing resists, relative to the largest
+DEFINITE = 1e-12  # of the diagonal, added to what is factorised: vertices where tractions depend
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +54,15 @@ class Rows:
     opposite : list of ndarray (j, d)
         On each side that it faces; empty without a primary.
     bound : ndarray (k, j)
+    mass : ndarray (k, j)
+        Integrals of psi_j: the force of a unit coefficient.
     """
 
     facing: Facing
     own: list[Array]
     opposite: list[Array]
     bound: Array
+    mass: Array
 
 
 def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
@@ -68,7 +76,7 @@ def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
         for side, t, f in zip(facing.other, facing.there, load, strict=True)
         if side >= 0
     ]
-    return Rows(facing, own, opposite, bound)
+    return Rows(facing, own, opposite, bound, facing.weight @ psi)
 
 
 def _tested(mu: Multipliers, side: int, t: Array, psi: Array, load: Array) -> Array:
@@ -78,148 +86,291 @@ def _tested(mu: Multipliers, side: int, t: Array, psi: Array, load: Array) -> Ar
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
-    """The solution.
+class Balanced:
+    """A stress in equilibrium, and what acts on the lines.
 
     Attributes
     ----------
-    mu : ndarray (d,)
-        All multipliers.
     coefficients : list of ndarray (b, m)
-        Those of the stress in each group of triangles.
+        Of the stress on the triangles of each `Element`.
     pressure : list of ndarray (k, j)
-        Coefficients of p* on each line.
-    residual : ndarray (d,)
-        Moments of tractions that do not balance.
-    steps : int
+        Bernstein coefficients of p* on the sides of each line, per length (P1) or eta (P2).
     """
 
-    mu: Array
     coefficients: list[Array]
     pressure: list[Array]
-    residual: Array
-    steps: int
 
 
-def assembled(elements: Sequence[Element], size: int) -> tuple[sp.csr_array, Array]:
-    """K, and what s without multipliers exerts on the sides (size,)."""
-    values, rows, columns = [], [], []
-    load = np.zeros(size)
-    for e in elements:
-        G = e.N.transpose(0, 2, 1) @ e.N
-        d = e.dofs.shape[1]
-        values.append(G.ravel())
-        rows.append(np.repeat(e.dofs, d, axis=1).ravel())
-        columns.append(np.tile(e.dofs, (1, d)).ravel())
-        np.add.at(load, e.dofs, e.own + np.einsum("bmd,bm->bd", e.N, e.g))
-    K = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
-    return K, load
+@dataclass(frozen=True, eq=False)
+class DualProgram:
+    """The matrix of the multipliers, factorised once, for several loads.
+
+    Attributes
+    ----------
+    lines : sequence of Rows
+    T : sparse (d, d)
+        mu = T y: each row is an unknown of y.
+    program : QuadraticProgram
+        Of y, with the bounds of the lines.
+    """
+
+    lines: Sequence[Rows]
+    T: sp.csr_array
+    program: QuadraticProgram
+
+    @cached_property
+    def systems(self) -> BorderedSystems:
+        """Its linear systems; what is factorised is the matrix made definite."""
+        lower = sp.tril(self.program.K, format="csr")
+        lower.setdiag((1 + DEFINITE) * self.program.diagonal)
+        return bordered_systems(self.program, cholesky(handed_over(lower)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the factor, which is made again."""
+        return {name: value for name, value in vars(self).items() if name != "systems"}
+
+    def nearest(self, elements: Sequence[Element], moments: Array) -> Balanced:
+        """The stress and the p* >= 0 that minimise B^2 for given tractions, `moments` (d,)."""
+        alone, largest = exerted(elements, [e.alone() for e in elements])
+        moments = self._resisted(moments, moments - alone)
+        load = moments - alone
+        load[np.abs(load) <= ROUND_OFF * largest] = 0.0  # no load where tractions depend
+        program = replace(self.program, b=self.T.T @ load)
+        closed = [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines]
+        if not closed:  # one system, which need not be definite
+            none = np.zeros(0, dtype=bool)
+            start = np.zeros_like(program.b), np.zeros(0)
+            return self._balanced(elements, moments, start, none, none)
+        self.systems.restart(program)
+        active = minimise(self.systems, np.concatenate(closed)).active
+        while True:  # any p* >= 0 proves a bound: coefficients below 0 by round-off become 0
+            y, force = _refined(self.systems, active)
+            pulling = (force < 0) & ~program.equality
+            if not pulling.any():
+                signed = ~program.equality
+                return self._balanced(elements, moments, (y, force), active, signed)
+            active = active & ~pulling
+
+    def within(self, elements: Sequence[Element], limits: Sequence[Array]) -> Balanced:
+        """The nearest stress without loads whose |q*| are at most `limits` (k, j) of each line.
+
+        Coefficients that would be more stay at their limit.
+        """
+        alone, _ = exerted(elements, [e.alone() for e in elements])
+        moments = self._resisted(np.zeros_like(alone), -alone)
+        load = self.T.T @ (moments - alone)
+        program = replace(self.program, g=np.zeros_like(self.program.g))
+        every = zip(limits, self.lines, strict=True)
+        limit = np.concatenate([(x * line.mass).ravel() for x, line in every] or [np.zeros(0)])
+        free, force = limit > 0, np.zeros_like(limit)
+        while True:
+            b = load.copy()
+            b[program.unknown[~free]] -= force[~free]
+            self.systems.restart(replace(program, b=b))
+            force[free] = self.systems.solve(free)[1][free]
+            over = free & (np.abs(force) > limit)
+            if not over.any():
+                y, found = _refined(self.systems, free)
+                force[free] = found[free]
+                none = np.zeros_like(free)
+                return self._balanced(elements, moments, (y, force), free, none)
+            force[over] = np.sign(force[over]) * limit[over]
+            free = free & ~over
+
+    def unbalanced(
+        self, mu: Multipliers, elements: Sequence[Element], moments: Array, found: Balanced
+    ) -> Array:
+        """Forces (d,) that a stress and its pressures leave of given tractions, `moments` (d,)."""
+        left = moments - exerted(elements, found.coefficients)[0]
+        left -= pushed(mu, self.lines, found.pressure)
+        return np.where(self.program.fixed, 0.0, left - self.idle(left))
+
+    def idle(self, load: Array) -> Array:
+        """The part (d,) of a load (d,) that does work on motions which nothing resists."""
+        lineal = self.T @ self.program.null_space.lineal
+        if lineal.shape[1] == 0:
+            return np.zeros_like(load)
+        return np.asarray(lineal @ np.linalg.solve(lineal.T @ lineal, lineal.T @ load))
+
+    def _resisted(self, moments: Array, load: Array) -> Array:
+        """Given tractions, `moments` (d,), without the idle part of the `load` (d,) that they are of.
+
+        That is the error of quadrature, and round-off.
+        """
+        idle = self.idle(load)
+        if np.abs(idle).max() > QUADRATURE * np.abs(load).max():
+            raise ContactError("the loads on a body that moves freely are not in balance")
+        return np.asarray(moments - idle)
+
+    def _balanced(
+        self,
+        elements: Sequence[Element],
+        moments: Array,
+        solution: tuple[Array, Array],
+        held: Mask,
+        signed: Mask,
+    ) -> Balanced:
+        """The stress of a solution y, force, corrected until its tractions balance.
+
+        Stresses of stiff bodies are small differences of multipliers. Rows that are `held` (m,)
+        take what is left as their force, those that are `signed` (m,) none below 0.
+        """
+        p, (y, force) = self.program, solution
+        change, solve, last = self.T @ y, None, np.inf
+        coefficients = [e.alone() for e in elements]
+        while True:
+            coefficients = [
+                c + e.answer(change) for e, c in zip(elements, coefficients, strict=True)
+            ]
+            total, largest = exerted(elements, coefficients)
+            left = moments - total
+            left = self.T.T @ (left - self.idle(left))
+            left[p.fixed] = 0.0
+            force = np.where(held, left[p.unknown], force)
+            force = np.where(signed, np.maximum(force, 0.0), force)
+            left[p.unknown] -= force
+            size = float(np.abs(left).max(initial=0.0))
+            if not ROUND_OFF * largest < size < FALLING * last:
+                break
+            last = size
+            if solve is None:
+                free = ~p.fixed
+                free[p.unknown[held]] = False
+                solve = self.systems.factor(free)
+            change = self.T @ solve(np.where(free, left, 0.0))
+        shapes = [x.bound.shape for x in self.lines]
+        parts = np.split(force, np.cumsum([a * b for a, b in shapes]))[:-1]
+        pressure = [
+            q.reshape(x.mass.shape) / x.mass for q, x in zip(parts, self.lines, strict=True)
+        ]
+        return Balanced(coefficients, pressure)
 
 
-def solved(
+def _refined(systems: LinearSystems, active: Mask) -> tuple[Array, Array]:
+    """The solution for the rows `active` (m,), corrected as long as that takes the residual down.
+
+    What is factorised is definite, which the matrix need not be.
+    """
+    p, last = systems.program, np.inf
+    while True:
+        y, force = systems.refine(active)
+        left = p.b - p.K @ y
+        left[p.unknown] -= force
+        left[p.fixed] = 0.0
+        size = float(np.abs(left).max(initial=0.0))
+        if not 0 < size < FALLING * last:
+            return y, force
+        last = size
+
+
+def dual_program(
     mu: Multipliers,
     elements: Sequence[Element],
-    given: Array,
     fixed: Mask,
     motions: Array,
     lines: Sequence[Rows],
-) -> Solved:
-    """Minimise over the multipliers.
+) -> DualProgram:
+    """The program of the condensed triangles.
 
-    Parameters
-    ----------
-    given : ndarray (d,)
-        Moments of the given tractions.
-    fixed : ndarray of bool (d,)
-        Multipliers of components on which no traction is given.
-    motions : ndarray (d, r)
-        Those of rigid motions that supports leave free.
+    `fixed` (d,) are multipliers of components on which no traction is given, `motions` (d, r) those
+    of rigid motions that supports leave free.
     """
     size = int(mu.start[-1])
-    K, load = assembled(elements, size)
-    T, unknown, bound, equality, start, mass = _basis(mu, lines, size)
-    K, b = (T.T @ K @ T).tocsr(), T.T @ (given - load)
-    diagonal = K.diagonal()
-    null_space = _null_space(motions, T, unknown, fixed, diagonal <= 0)
-    fixed = fixed | (diagonal <= 0)
-    # Work on motions that nothing resists: quadrature leaves it, and the mesh of a curved body.
-    idle = _left_over(null_space.lineal, b)
-    if np.abs(idle).max(initial=0.0) > QUADRATURE * np.abs(b).max(initial=0.0):
-        raise ContactError("the loads on a body that moves freely are not in balance")
-    b = b - idle
+    K = _assembled(mu, elements)
+    T, unknown, bound, equality = _basis(mu, lines, size)
+    if len(unknown):
+        K = K + change_of_basis(K, T)
+    m, idle = len(unknown), fixed | (K.diagonal() <= 0)  # on the axis there is no traction
     program = QuadraticProgram(
         K=K,
-        b=b,
-        R=from_triplets(
-            np.ones(len(unknown)), np.arange(len(unknown)), unknown, (len(unknown), size)
-        ),
+        b=np.zeros(size),
+        R=from_triplets(np.ones(m), np.arange(m), unknown, (m, size)),
         g=bound,
         equality=equality,
-        fixed=fixed,
+        fixed=idle,
         values=np.zeros(size),
         unknown=unknown,
-        null_space=null_space,
+        null_space=_null_space(motions, T, unknown, idle),
     )
-    factor = cholesky(lower_half((K + sp.diags_array(DEFINITE * diagonal)).tocsr()))
-    found = minimise(bordered_systems(program, factor), start)
-    y, force = found.u, np.where(equality, found.force, np.maximum(found.force, 0.0))
-    coefficients = [e.coefficients(T @ y) for e in elements]
-    closed = equality | (force > 0)
-    free = ~fixed
-    free[unknown[closed]] = False
-    solve = None
-    for step in range(REFINED + 1):
-        exerted, largest = np.zeros(size), 0.0
-        for e, c in zip(elements, coefficients, strict=True):
-            each = e.tractions(c)
-            largest = max(largest, float(np.abs(each).max()))
-            np.add.at(exerted, e.dofs, each)
-        left = np.where(fixed, 0.0, T.T @ (given - exerted))
-        force[closed] = left[unknown[closed]]
-        force = np.where(equality, force, np.maximum(force, 0.0))
-        left[unknown] -= force
-        left -= _left_over(null_space.lineal, left)
-        if step == REFINED or np.abs(left[free]).max(initial=0.0) <= ROUND_OFF * largest:
-            break
-        # Stresses of stiff bodies are small differences of multipliers.
-        solve = solve or factor(free)
-        change = T @ solve(np.where(free, left, 0.0))
-        coefficients = [c + e.answer(change) for e, c in zip(elements, coefficients, strict=True)]
-    sizes = [line.bound.size for line in lines]
-    parts = np.split(force / mass, np.cumsum(sizes)[:-1]) if lines else []
-    pressure = [p.reshape(line.bound.shape) for p, line in zip(parts, lines, strict=True)]
-    return Solved(T @ y, coefficients, pressure, left, len(found.steps))
+    return DualProgram(lines, T, program)
 
 
-def _null_space(
-    motions: Array, T: sp.csr_array, unknown: Index, fixed: Mask, idle: Mask
-) -> NullSpace:
-    """Rigid motions (d, r) in the unknowns, where multipliers are not `idle` (d,)."""
+def _null_space(motions: Array, T: sp.csr_array, unknown: Index, fixed: Mask) -> NullSpace:
+    """Rigid motions, multipliers (d, r), in the unknowns."""
     if motions.shape[1] == 0:
         return no_null_space(len(motions))
-    y = sp.linalg.splu(T.tocsc()).solve(motions)
-    y[fixed | idle] = 0.0
+    y = splu(T.tocsc()).solve(motions)
+    y[fixed] = 0.0
     lineal = vanishing_combinations(y[unknown])
-    return pinned_null_space(y, lineal, (y @ lineal).T, unknown, fixed | idle)
+    return pinned_null_space(y, lineal, (y @ lineal).T, unknown, fixed)
 
 
-def _left_over(lineal: Array, b: Array) -> Array:
-    """The part (n,) of a load `b` (n,) that does work on motions `lineal` (n, l)."""
-    if lineal.shape[1] == 0:
-        return np.zeros(len(b))
-    return np.asarray(lineal @ np.linalg.solve(lineal.T @ lineal, lineal.T @ b))
+def exerted(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple[Array, float]:
+    """Moments (d,) of the tractions of a stress over all triangles, and the largest of one."""
+    total, largest = np.zeros(1 + max(int(e.dofs.max()) for e in elements)), 0.0
+    for e, c in zip(elements, coefficients, strict=True):
+        own = e.tractions(c)
+        np.add.at(total, e.dofs, own)
+        largest = max(largest, float(np.abs(own).max(initial=0.0)))
+    return total, largest
+
+
+def _assembled(mu: Multipliers, elements: Sequence[Element]) -> sp.csr_array:
+    """K (d, d): sums of N'N, written where they stand; each side has one block with each it meets.
+
+    The rows of a side have the same columns, those of the sides of its triangles, rising.
+    """
+    count, wide = len(mu.degree), np.diff(mu.start)
+    sides = np.concatenate([e.sides for e in elements])
+    pairs = sides[:, :, None] * count + sides[:, None, :]
+    blocks, number = np.unique(pairs, return_inverse=True)
+    row, column = np.divmod(blocks, count)
+    stop = np.cumsum(wide[column])
+    last = np.searchsorted(row, np.arange(count), side="right")
+    first = np.append(0, stop)[np.append(0, last[:-1])]  # of each side's columns among all
+    length = stop[last - 1] - first
+    largest = int((wide * length).sum())
+    index = np.int32 if largest <= np.iinfo(np.int32).max else np.int64
+    starts = np.append(0, np.cumsum(np.repeat(length, wide))).astype(index)
+    columns = np.arange(stop[-1]) + np.repeat(mu.start[column] - stop + wide[column], wide[column])
+    shift = (np.repeat(first, wide) - starts[:-1]).astype(index)
+    at = np.arange(largest, dtype=index) + np.repeat(shift, np.diff(starts))
+    indices = columns.astype(index)[at]
+    place = starts[mu.start[row]] + stop - wide[column] - first[row]  # of each block's first entry
+    data, number = np.zeros(largest), number.reshape(-1, 3, 3)
+    groups = np.split(number, np.cumsum([len(e.sides) for e in elements])[:-1])
+    for e, own in zip(elements, groups, strict=True):
+        values, size = e.N.transpose(0, 2, 1) @ e.N, wide[e.sides[0]]
+        ends = np.append(0, np.cumsum(size))
+        for i, j in np.ndindex(3, 3):
+            down = np.arange(size[i])[:, None] * length[e.sides[:, i], None, None]
+            to = place[own[:, i, j], None, None] + down + np.arange(size[j])
+            part = values[:, ends[i] : ends[i + 1], ends[j] : ends[j + 1]]
+            np.add.at(data, to.ravel(), part.ravel())
+    return sp.csr_array((data, indices, starts), shape=(int(mu.start[-1]),) * 2)
+
+
+def pushed(mu: Multipliers, lines: Sequence[Rows], pressure: Sequence[Array]) -> Array:
+    """Moments (d,) of the tractions R'p that pressures of lines exert."""
+    total = np.zeros(int(mu.start[-1]))
+    for line, p in zip(lines, pressure, strict=True):
+        for i, side in enumerate(line.facing.side):
+            total[mu.of(int(side))] += p[i] @ line.own[i]
+            if line.opposite:
+                total[mu.of(int(line.facing.other[i]))] += p[i] @ line.opposite[i]
+    return total
 
 
 def _basis(
-    mu: Multipliers, lines: Sequence[Rows], size: int
-) -> tuple[sp.csr_array, Index, Array, Mask, Mask, Array]:
-    """Mu = T y with a y for each row over the integral of psi_j.
+    mu: Multipliers, lines: Sequence[Rows], count: int
+) -> tuple[sp.csr_array, Index, Array, Mask]:
+    """The change of basis: mu = T y with a y for each row over its `Rows.mass`.
 
-    Its unknown, bound, whether it is an equation, and closed; that integral.
+    Its unknown, its bound, and whether it is an equation.
     """
-    values, rows, columns, unknown, bound, equality, start = [], [], [], [], [], [], []
-    masses = [np.zeros(0)]
-    plain = np.ones(size, dtype=bool)
+    values, rows, columns = [], [], []
+    unknown, bound, equality = [np.zeros(0, np.intp)], [np.zeros(0)], [np.zeros(0, bool)]
+    plain = np.ones(count, dtype=bool)
     steps = []
 
     def put(i: Index, j: Index, block: Array) -> None:
@@ -229,40 +380,35 @@ def _basis(
 
     for line in lines:
         j = line.bound.shape[1]
-        mass = line.facing.weight @ bernstein(j - 1, PLACES)
-        masses.append(mass.ravel())
         for i, side in enumerate(line.facing.side):
             own = mu.of(int(side))
             plain[own] = False
-            left, sizes, right = np.linalg.svd(line.own[i] / mass[i, :, None])
-            inverse = right[:j].T @ (left.T / sizes[:, None])
+            left, size_of, right = np.linalg.svd(line.own[i] / line.mass[i, :, None])
+            inverse = right[:j].T @ (left.T / size_of[:, None])
             put(own, own[:j], inverse)
             put(own, own[j:], right[j:].T)
             if line.opposite:
-                opposite = line.opposite[i] / mass[i, :, None]
-                steps.append((own, mu.of(int(line.facing.other[i])), -inverse @ opposite))
+                block = -inverse @ (line.opposite[i] / line.mass[i, :, None])
+                steps.append((own, mu.of(int(line.facing.other[i])), block))
             unknown.append(own[:j])
-        bound.append((line.bound / mass).ravel())
+        bound.append((line.bound / line.mass).ravel())
         equality.append(np.full(line.bound.size, line.facing.equality))
-        start.append(np.repeat(line.facing.closed, j))
     rest = np.flatnonzero(plain)
     values.append(np.ones(len(rest)))
     rows.append(rest)
     columns.append(rest)
-    G = from_triplets(*(np.concatenate(x) for x in (values, rows, columns)), (size, size))
+    entries, to, of = (np.concatenate(x) for x in (values, rows, columns))
+    G = from_triplets(entries, to, of, (count, count))
     T = G
     if steps:  # mu = G y + M mu, M from the primary's sides to the secondary's
         M = from_triplets(
             np.concatenate([b.ravel() for _, _, b in steps]),
             np.concatenate([np.repeat(i, len(j)) for i, j, _ in steps]),
             np.concatenate([np.tile(j, len(i)) for i, j, _ in steps]),
-            (size, size),
+            (count, count),
         )
         term = M @ G
         while term.nnz:  # as often as bodies stand in a row
             T = T + term
             term = M @ term
-    if not lines:
-        none = np.zeros(0)
-        return T, none.astype(np.intp), none, none.astype(bool), none.astype(bool), none
-    return T, *(np.concatenate(x) for x in (unknown, bound, equality, start, masses))
+    return T, np.concatenate(unknown), np.concatenate(bound), np.concatenate(equality)

@@ -3,21 +3,19 @@
 The bar of the energy is proved, and beside its estimate that of the force, by a dual problem. The
 others are estimated, by measurement (docs/bounds.md):
 
-* force: of second order, 0.2 times the square of the relative estimate, 1.5 times at order 4;
-* peak pressure: twice the largest difference to p*, or 0.75 times that to the discrete stress,
-  where the pressure is within a tenth of its peak, or twice of what p* is larger anywhere;
-* end of contact: 0.6 times the sum of h^2 over half of the zone's length, h that of the segment
-  there, and of the largest distance to where fits of gap^(2/3) outside and of p^2 inside vanish,
-  of degrees 1 and 2; contact area: the sum of those of its ends;
-* approach: of second order, the square of the relative estimate, where it is not prescribed;
-* von Mises stress: 1.2 times the largest difference to that of the equilibrated stress, or the
-  largest jump between elements, where it is within a tenth of the largest, or of how much larger
-  the other one is anywhere.
+* force: of second order, 0.3 times the square of the relative estimate, 1.5 times at order 4;
+* peak pressure and von Mises stress: the largest lies between those of the discrete field less and
+  plus an error, which is one number on each segment or element: of pressures twice the largest
+  difference to p* there, or once that to the discrete stress; of von Mises 1.1 times the largest
+  difference to that of the equilibrated stress, or half of the jump between elements;
+* end of contact: how far from it the lines through the first two values of gap^(2/3) outside and
+  of p^2 inside vanish, and 0.3 of the distance of the points between which it lies; contact
+  area: the sum of those of its ends;
+* approach: of second order, the square of the relative estimate, where it is not prescribed.
 
-Where no bound is known, all are estimated, without the equilibrated stress and p*, in place of
-which the difference to the discrete stress counts 1.5 times. Peak and von Mises have no bar where
-the relative estimate is more than 1, nor within twice the reach of a corner of infinite stress,
-and the peak has none where less than one segment is in contact.
+Where no bound is known, all are estimated, without the equilibrated stress and p*: the difference
+to the discrete stress and the jump count twice as much. Peak and von Mises have no bar where the
+relative estimate is more than 1.
 """
 
 from __future__ import annotations
@@ -33,7 +31,7 @@ from ...arrays import Array
 from ...contact import ContactState, state_of
 from ...errors import ContactError, warn
 from ...fem import BoundaryTrace
-from ..equilibrated import EquilibratedStress, Guaranteed
+from ..bound import EquilibratedStress, Guaranteed
 from .contact import area_in_contact, ends_of, peak_of
 from .force import Forced, proved_force_errors
 from .motion import approach_of, direction_of
@@ -42,7 +40,7 @@ from .stresses import largest_von_mises
 from .table import Quantities, Quantity, unknown
 
 # Relative errors over the square of the relative estimate, measured on random scenes of all orders.
-FORCE = {1: 0.2, 2: 0.2, 3: 0.2, 4: 1.5}  # by order: at most 0.13; 1.2 at order 4
+FORCE = {1: 0.3, 2: 0.3, 3: 0.3, 4: 1.5}  # by order: 96 % of 118 are at most that, most of Hertz
 APPROACH = 1.0  # at most 0.9
 ROUND_OFF = 64 * np.finfo(float).eps  # of what is prescribed
 
@@ -111,7 +109,7 @@ class Measured(Guaranteed):
         star, relative = None, self.relative_error_estimate
         if proof is not None:
             found = proof.pressure[pair]
-            star = found.segments, np.asarray(found.coefficients)
+            star = found
         boundary: BoundaryTrace = self.discrete.space.trace
         corners = singular_corners(self.problem, boundary, self.pairs)
         e, along = direction_of(self, pair, state)
@@ -127,7 +125,7 @@ class Measured(Guaranteed):
             *forces,
             *_means(state, boundary, sum_error),
             peak_of(state, boundary, self.stress, star, corners, relative),
-            *ends_of(state, boundary),
+            *ends_of(state),
             _approach(self, state, e, relative),
             _energy(self, proof is not None),
             largest_von_mises(boundary.mesh, stresses, proof, corners, relative),
@@ -179,7 +177,7 @@ def _approach(solution: _Solved, state: ContactState, e: Array, relative: float)
 
 def _domain(proof: EquilibratedStress, boundary: BoundaryTrace) -> str:
     """What is to be said of curved boundaries: what is proved is proved on the mesh's domain."""
-    if not (proof.proof.discrete.curves.number >= 0).any():
+    if not (proof.proof.cells.curved).any():
         return ""
     return f"guaranteed on the domain of the mesh, of curves of degree {boundary.geometry_order}"
 

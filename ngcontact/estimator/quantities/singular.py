@@ -4,7 +4,7 @@ At the tip of a wedge it is infinite where the angle is larger than a critical o
 conditions on both sides tell (Williams 1952): 180 degrees where both are free or both are held, 90
 where one is guided and the other is free, held or guided, arcsin ((kappa + 1) / 4)^(1/2) where one
 is held and the other is free. In contact without friction both bodies count: a corner that presses
-on a line is one of 270 degrees in all.
+on a line is one of 270 degrees in all. Of other moduli it is infinite at smaller angles, too.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Singular:
     places : ndarray (k, 2)
         Lengths.
     reach : ndarray (k,)
-        How far from each of them the stress is its own, lengths.
+        How far from each of them the stress is its own, or not resolved by an element, lengths.
     pressed : ndarray of bool (k,)
         Corners at which bodies press on each other.
     """
@@ -48,12 +48,12 @@ class Singular:
         """Places (j, 2), each once where several bodies meet."""
         return np.unique(self.places, axis=0)
 
-    def near(self, points: Array, pressed: bool = False, reach: float = 1.0) -> Mask:
-        """Which of the `points` (m, 2) lie within `reach` times the reach of a corner, (m,)."""
+    def near(self, points: Array, pressed: bool = False) -> Mask:
+        """Which of the `points` (m, 2) lie within the reach of a corner, (m,)."""
         result = np.zeros(len(points), dtype=bool)
         for place, r, of_contact in zip(self.places, self.reach, self.pressed, strict=True):
             if of_contact or not pressed:
-                result |= np.linalg.norm(points - place, axis=1) <= reach * r
+                result |= np.linalg.norm(points - place, axis=1) <= r
         return result
 
 
@@ -75,14 +75,16 @@ def singular_corners(
     critical[(high == GUIDED) | ((low == GUIDED) & (high == HELD))] = np.pi / 2
     clamped = (low == FREE) & (high == HELD)
     critical[clamped] = _critical(problem, trace)[trace.body[first[clamped]]]
-    edge = (low == FREE) & (high == PRESSED)
-    critical[edge] = np.pi - _facing(place, angle, h, trace.body[first], rigid)[edge]
+    facing = _facing(place, angle, h, trace.body[first], rigid)
+    edge = (high == PRESSED) & ((low == FREE) | ((low == PRESSED) & (facing == np.pi)))
+    critical[edge] = (np.pi - facing)[edge]
+    uneven = edge & ~rigid & _turned_apart(problem, trace, place, angle, facing, trace.body[first])
     straight = (low == high) & (np.abs(angle - np.pi) <= SMOOTH)  # nothing changes
-    found = ~straight & (angle > critical + SMOOTH)
+    found = ~straight & ((angle > critical + SMOOTH) | uneven)
     size, reach = float(np.ptp(trace.curve, axis=(0, 1)).max()), []
-    for x in place[found]:
+    for x, least in zip(place[found], h[found].tolist(), strict=True):
         away = np.linalg.norm(place - x, axis=1)
-        reach.append(NEAR * float(away[away > SAME * size].min(initial=size)))
+        reach.append(max(NEAR * float(away[away > SAME * size].min(initial=size)), least))
     return Singular(place[found] + 0.0, np.array(reach), (high == PRESSED)[found])
 
 
@@ -150,6 +152,39 @@ def _facing(place: Array, angle: Array, h: Array, body: Index, rigid: Mask) -> A
         if met.any():
             facing[i] = angle[met][0]
     return facing
+
+
+def _turned_apart(
+    problem: Problem, trace: BoundaryTrace, place: Array, angle: Array, facing: Array, body: Index
+) -> Mask:
+    """Where a uniform pressure would turn both wedges (v,) at an end of contact apart.
+
+    It turns a wedge of angle a with one free side by log r / (E (tan a - a)), E that of the model;
+    where the sum of both is negative the pressure is infinite (Dundurs and Lee 1972).
+    """
+    outer = np.flatnonzero(~trace.inner)
+    middle = trace.point(outer, np.full(len(outer), 0.5))
+    compliance = _compliances(problem, trace)
+    result = np.zeros(len(place), dtype=bool)
+    for i, (x, a, b) in enumerate(zip(place, angle, facing, strict=True)):
+        others = outer[trace.body[outer] != body[i]]
+        if len(others) and a < np.pi and b <= np.pi:
+            away = np.linalg.norm(middle[trace.body[outer] != body[i]] - x, axis=1)
+            one, two = compliance[body[i]], compliance[trace.body[others[away.argmin()]]]
+            turn = one / (np.tan(a) - a) + two / (np.tan(b) - b)
+            result[i] = turn < -SMOOTH / 2 * (one + two)
+    return result
+
+
+def _compliances(problem: Problem, trace: BoundaryTrace) -> Array:
+    """1 / E of each body, (1 - nu^2) / E in plane strain; 1 of all where one is no such number."""
+    found = np.full(len(trace.mesh.GetMaterials()), np.nan)
+    for name, law in problem.materials.items():
+        if isinstance(law, Elastic) and isinstance(law.E, float | int):
+            nu = law.nu if isinstance(law.nu, float | int) else np.nan
+            square = 0.0 if problem.model == "plane stress" else nu**2
+            found[body_mask(trace.mesh, name)] = (1 - square) / law.E
+    return found if np.isfinite(found).all() else np.ones(len(found))
 
 
 def _critical(problem: Problem, trace: BoundaryTrace) -> Array:

@@ -71,6 +71,15 @@ def unknown(
     return Quantity(name, value, math.nan, "none", place, infinite=infinite)
 
 
+def error_of_largest(value: float, samples: Array, errors: Array) -> float:
+    """How far a `value` is from the largest of what is within `errors` (k,) of `samples` (k,).
+
+    At most: the largest lies between those of samples - errors and of samples + errors.
+    """
+    above, below = (samples + errors).max() - value, value - (samples - errors).max()
+    return float(max(above, below))
+
+
 def _point(x: Array) -> str:
     """A point `x` (2,) in brackets."""
     return f"({x[0]:.6g}, {x[1]:.6g})"

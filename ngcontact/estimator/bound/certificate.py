@@ -1,0 +1,139 @@
+"""Arrays from which a bound can be checked without the package, for cells with straight sides.
+
+On these all that the proof needs is a polynomial in x: the stress times the model's measure
+(1, or 2 pi r), the force that it balances, tractions and p* on sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...arrays import Array, Index
+from .bound import Proof
+from .cells import Cells
+from .facing import PLACES, WEIGHTS
+from .norms import stress_norms
+from .polynomials import scalars
+
+INSET = 0.1  # of a step of the lattice: it keeps off an axis, where stresses are not defined
+STRAIGHT = 1e-12  # difference of unit vectors that are one: round-off
+
+
+def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
+    """All arrays by name; docs/bounds.md says what they are.
+
+    Raises
+    ------
+    ValueError
+        Where cells have curved sides, or normals of drawn curves turn along straight ones.
+    """
+    cells = proof.cells
+    lines = [line.facing.direction for line in proof.program.lines]
+    turning = sum(int((np.ptp(d, axis=1) > STRAIGHT).any(axis=1).sum()) for d in lines)
+    found = {"cells have a curved side": int(cells.curved.sum())}
+    found["sides have a direction of contact or guide that turns along them"] = turning
+    if any(found.values()):
+        told = " and ".join(f"{n} {what}" for what, n in found.items() if n)
+        raise ValueError(f"no certificate: {told}; tractions and p* are no polynomials there")
+    own = stress_norms(proof.elements, proof.balanced.coefficients, len(cells.triangles)).distance
+    replaced = np.flatnonzero(proof.stress.distance != own)
+    return {
+        "axisymmetric": np.array(cells.trace.model.extent > 0),
+        "vertices": cells.vertices,
+        "triangles": cells.triangles,
+        "replaced": replaced,
+        "replaced_distance": proof.stress.distance[replaced],
+        "loads": proof.loads,
+        "lifting": proof.lifting,
+        "bound": np.array(proof.bound),
+        **_stresses(proof),
+        **_sides(proof),
+        **_contact(proof),
+    }
+
+
+def _stresses(proof: Proof) -> dict[str, np.ndarray]:
+    """T = measure s and measure F at a lattice; by rules of quadrature e(u_h) and C^-1."""
+    cells = proof.cells
+    model, corners = cells.trace.model, cells.corners
+    k = proof.elements[0].degree
+    i, j = np.array([(i, j) for i in range(k + 1) for j in range(k + 1 - i)]).T
+    lattice = (np.column_stack([i, j]) + INSET) / (k + 3 * INSET)
+    share = np.column_stack([1 - lattice.sum(axis=1), lattice])
+    x = np.einsum("qc,ncd->nqd", share, corners)
+    measure = model.measure(x.reshape(-1, 2)).reshape(*x.shape[:2], 1)
+    stress, force = np.zeros((*x.shape[:2], 3)), np.zeros(x.shape)
+    rules: dict[str, np.ndarray] = {}
+    for number, (e, c) in enumerate(zip(proof.elements, proof.balanced.coefficients, strict=True)):
+        at = e.places.at
+        stress[at] = e.stress(c, x[at])[..., [0, 1, -1]]
+        force[at] = scalars(e.force_degree, e.frame, x[at]) @ e.force
+        area = np.abs(np.linalg.det(e.places.spread[0, 0]))
+        rules |= {
+            f"rule{number}_triangle": at,
+            f"rule{number}_points": e.places.local,
+            f"rule{number}_weights": e.places.weight[0] / area,
+            f"rule{number}_strain": e.strain,
+            f"rule{number}_compliance": e.compliance,
+            f"rule{number}_radial": e.radial,
+        }
+    found = {"lattice": lattice, "stress": measure * stress, "force": measure * force}
+    return {"degree": np.array(k)} | found | rules
+
+
+def _sides(proof: Proof) -> dict[str, np.ndarray]:
+    """The boundary: vertices, the lower number first, and in Legendre polynomials what is given.
+
+    Tractions are per parameter t of the side and times the measure.
+    """
+    cells, mu, given = proof.cells, proof.multipliers, proof.given
+    side = _boundary(cells)
+    k = int(mu.degree[side[0]])
+    dofs = mu.start[side, None] + np.arange(2 * (k + 1))
+    traction = proof.moments[dofs].reshape(len(side), 2, k + 1) * np.sqrt(2 * np.arange(k + 1) + 1)
+    return {
+        "side_vertices": cells.ends[side],
+        "side_held": given.held[side],
+        "side_traction": traction,
+    }
+
+
+def _boundary(cells: Cells) -> Index:
+    return np.flatnonzero(~cells.inner)
+
+
+def _contact(proof: Proof) -> dict[str, np.ndarray]:
+    """p* and the gap after lifting as Bernstein coefficients, in t of the secondary's sides.
+
+    Sides are numbers among those of the boundary. The primary's parameter is t, or 1 - t where it
+    is turned; the weight is linear and given at both ends.
+    """
+    position = np.full(len(proof.cells.ends), -1)
+    boundary = _boundary(proof.cells)
+    position[boundary] = np.arange(len(boundary))
+    faced = [line.facing for line in proof.program.lines]
+
+    def joined(parts: Sequence[np.ndarray]) -> np.ndarray:
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    return {
+        "contact_side": joined([position[f.side] for f in faced]).astype(np.intp),
+        "contact_other": joined(
+            [np.where(f.other < 0, -1, position[f.other]) for f in faced]
+        ).astype(np.intp),
+        "contact_turned": joined([f.there[:, -1] < f.there[:, 0] for f in faced]).astype(bool),
+        "contact_direction": joined([f.direction[:, 0] for f in faced]),
+        "contact_weight": joined([_at_ends(f.weight / WEIGHTS) for f in faced]),
+        "contact_equality": joined([np.full(len(f.side), f.equality) for f in faced]).astype(bool),
+        "contact_gap": joined([f.after for f in faced]),
+        "contact_pressure": joined(proof.balanced.pressure),
+    }
+
+
+def _at_ends(values: Array) -> Array:
+    """Values (k, 2) at t = 0 and 1 of linear functions (k, j) at the Gauss points."""
+    slope = (values[:, -1] - values[:, 0]) / (PLACES[-1] - PLACES[0])
+    first = values[:, 0] - PLACES[0] * slope
+    return np.column_stack([first, first + slope])

@@ -1,0 +1,158 @@
+"""The equilibrated stress of a bound as a user reads it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import ngsolve as ng
+import numpy as np
+
+from ...arrays import Array, Index
+from .bound import Proof
+from .certificate import certificate_arrays
+from .facing import bernstein
+
+AT_ONCE = 1000  # places beside all parts
+INSIDE = 1e-9  # parameters nearer to an end are inside of the part that begins there
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPressure:
+    """p* of one pair on k parts of segments.
+
+    Attributes
+    ----------
+    segments : ndarray of int (k,)
+        Segments of the boundary of the mesh, the secondary's.
+    span : ndarray (k, 2)
+        Parameters s on them at which each part begins and ends.
+    coefficients : ndarray (k, d + 1)
+        Of Bernstein polynomials from the beginning to the end, units of stress; per unit length
+        (P1), per unit eta (P2).
+    """
+
+    segments: Index
+    span: Array
+    coefficients: Array
+
+    def values(self, segment: Index, s: Array) -> Array:
+        """p* (k,) at `s` (k,) of segments `segment` (k,), 0 where it does not act.
+
+        At the end of two parts the one towards the middle of the segment.
+        """
+        inside = np.clip(s, INSIDE, 1 - INSIDE)[:, None]
+        low, high = np.sort(self.span, axis=1).T
+        found = np.zeros(len(segment))
+        for start in range(0, len(segment), AT_ONCE):
+            at = slice(start, start + AT_ONCE)
+            on = (segment[at, None] == self.segments) & (inside[at] >= low) & (inside[at] <= high)
+            point, part = np.nonzero(on)
+            a, b = self.span[part].T
+            t = (s[at][point] - a) / (b - a)
+            basis = bernstein(self.coefficients.shape[1] - 1, t)
+            found[start + point] = (basis * self.coefficients[part]).sum(axis=1)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class EquilibratedStress:
+    """A stress in equilibrium with the loads on n triangles.
+
+    Attributes
+    ----------
+    proof : Proof
+        What it was made of.
+    """
+
+    proof: Proof
+
+    @property
+    def degree(self) -> int:
+        """Of its polynomials on triangles with straight sides; about an axis of r times it."""
+        return min(e.degree for e in self.proof.elements)
+
+    @property
+    def triangles(self) -> Array:
+        """Corners (n, 3, 2) of the triangles, lengths."""
+        return self.proof.cells.corners
+
+    @property
+    def element(self) -> Index:
+        """Elements (n,) of the mesh that they are, or parts of."""
+        return self.proof.cells.parent
+
+    @property
+    def pressure(self) -> list[ContactPressure]:
+        """p* of each pair."""
+        cells, found = self.proof.cells, []
+        for line, p in zip(self.proof.program.lines, self.proof.balanced.pressure, strict=True):
+            if line.facing.pair is not None:
+                side = line.facing.side
+                found.append(ContactPressure(cells.segment[side], cells.span[side], p))
+        return found
+
+    @property
+    def certificate(self) -> dict[str, float]:
+        """Largest residual of equilibrium, relative to the largest stress; the least p*, a stress.
+
+        The divergence holds by construction; what is left are jumps of tractions between triangles
+        and from the given ones.
+        """
+        lines = zip(self.proof.program.lines, self.proof.balanced.pressure, strict=True)
+        least = [p.min(initial=0.0) for line, p in lines if not line.facing.equality]
+        return {"tractions": self.proof.residual, "least pressure": float(min(least, default=0.0))}
+
+    def values(self, element: Index, reference: Array) -> Array:
+        """Stress (k, 3) as (xx, yy, xy), or (k, 4) as (rr, zz, hoop, rz), units of stress.
+
+        Parameters
+        ----------
+        element : ndarray of int (k,)
+            Elements of the mesh.
+        reference : ndarray (k, 2)
+            Places in them, NGSolve's reference coordinates.
+        """
+        proof, cells = self.proof, self.proof.cells
+        first = np.argsort(cells.parent, kind="stable")
+        count = np.bincount(cells.parent, minlength=int(element.max(initial=0)) + 1)
+        start = np.cumsum(count) - count
+        x = cells.evaluate(ng.CF((ng.x, ng.y)), first[start[element]], reference)
+        own, best = np.empty(len(element), dtype=np.intp), np.full(len(element), -np.inf)
+        for i in range(int(count.max(initial=0))):
+            at = np.flatnonzero(count[element] > i)
+            triangle = first[start[element[at]] + i]
+            corners = cells.corners[triangle]
+            edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+            share = np.linalg.solve(edges, (x[at] - corners[:, 0])[..., None])[..., 0]
+            inside = np.minimum(share.min(axis=1), 1 - share.sum(axis=1))
+            better = inside > best[at]
+            own[at[better]], best[at[better]] = triangle[better], inside[better]
+        found = np.empty((len(element), proof.elements[0].strain.shape[2]))
+        number = np.empty(len(cells.triangles), dtype=np.intp)
+        for e, c in zip(proof.elements, proof.balanced.coefficients, strict=True):
+            number[:] = -1
+            number[e.places.at] = np.arange(len(e.places.at))
+            at = np.flatnonzero(number[own] >= 0)
+            if at.size:
+                found[at] = e.stress(c, x[at, None], number[own[at]])[:, 0]
+                if found.shape[1] > 3:
+                    found[at, 2] += e.radial_at(cells, own[at], reference[at])
+        return found
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write `path` (.npz): arrays that drivers/check_certificate.py checks with NumPy alone.
+
+        Raises
+        ------
+        ValueError
+            Another suffix, or a stress on curved triangles, of which there is no certificate.
+        """
+        path = Path(path)
+        if path.suffix != ".npz":
+            raise ValueError(f'path="{path}" must end in .npz')
+        arrays: dict[str, Any] = dict(certificate_arrays(self.proof))
+        np.savez_compressed(path, **arrays)
+        return path

@@ -1,0 +1,163 @@
+"""Displacements that correct what u_h misses on the boundary: their energies by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import ngsolve as ng
+import numpy as np
+import pytest
+
+from drivers.reference import cases
+from drivers.reference.westergaard import moduli
+from ngcontact import Contact, ContactError, Elastic, Problem, solve
+from ngcontact.estimator.bound.cells import cells_of
+from ngcontact.estimator.bound.facing import DATA
+from ngcontact.estimator.bound.lifting import Asked, lifting_of
+from ngcontact.fem import boundary_trace
+from ngcontact.lagrange import gauss_lobatto
+from tests.estimator.bound.test_cells import square
+
+NONE = np.zeros(0, dtype=np.intp)
+LAW = Elastic(E=2.5, nu=0.3)
+SIDES = ("bottom", "right", "top", "left")
+T = gauss_lobatto(DATA)  # where amounts are given
+
+
+def on_the_square(n=2):
+    """Cells of the unit square, and its problem."""
+    mesh = square(n)
+    names = "|".join(SIDES)
+    problem = Problem(geometry=mesh, materials={"body": LAW}, displacement={names: (0, 0)})
+    return problem, cells_of(boundary_trace(mesh, 1), {}, NONE, NONE)
+
+
+def asked_of(cells, name, direction, amount):
+    """A component of a displacement of (x, y) on a boundary."""
+    side = np.flatnonzero(np.isin(cells.segment, cells.trace.segments(name)))
+    x, _ = cells.points(np.repeat(side, len(T)), np.tile(T, len(side)))
+    d = np.broadcast_to(np.asarray(direction, dtype=float), (len(side), len(T), 2))
+    return Asked(side, d, amount(*x.T).reshape(len(side), len(T)))
+
+
+def whole(cells, u, v):
+    """Both components on all sides."""
+    return [asked_of(cells, name, d, f) for name in SIDES for d, f in (((1, 0), u), ((0, 1), v))]
+
+
+def energy(cells, problem, asked, degree):
+    """|w|^2."""
+    return float((lifting_of(problem, cells, asked, degree, 1.0) ** 2).sum())
+
+
+@pytest.mark.parametrize("degree", [4, 5])
+def test_a_linear_displacement_is_continued_as_it_is(degree):
+    """On all of the boundary of one layer: C e : e in plane strain."""
+    problem, cells = on_the_square(n=1)
+    law = moduli(LAW)
+    found = energy(cells, problem, whole(cells, lambda x, y: 0.2 * x, lambda x, y: 0 * y), degree)
+    assert found == pytest.approx((2 * law.mu + law.lam) * 0.2**2, rel=1e-11)
+    shear = energy(cells, problem, whole(cells, lambda x, y: 0.1 * y, lambda x, y: 0 * x), degree)
+    assert shear == pytest.approx(law.mu * 0.1**2, rel=1e-11)
+
+
+@pytest.mark.parametrize(("n", "degree"), [(3, 4), (4, 5), (6, 4)])
+def test_the_field_of_least_energy(n, degree):
+    """Conjugates of (x + i y)^n are gradients of harmonic polynomials: they need no forces."""
+    problem, cells = on_the_square(n=1)
+    u, v = lambda x, y: ((x + 1j * y) ** n).real, lambda x, y: -((x + 1j * y) ** n).imag
+    # e = n ((x + i y)^(n-1)): 2 mu e : e = 4 mu n^2 |z|^(2 n - 2).
+    t, w = np.polynomial.legendre.leggauss(2 * n)
+    X, Y = np.meshgrid((1 + t) / 2, (1 + t) / 2)
+    r = np.outer(w, w) / 4 * (X**2 + Y**2) ** (n - 1)
+    exact = 4 * moduli(LAW).mu * n**2 * r.sum()
+    found = energy(cells, problem, whole(cells, u, v), degree)
+    if degree >= n:
+        assert found == pytest.approx(exact, rel=1e-10)
+    else:  # what is no polynomial of the degree is continued, not minimised
+        assert 1 - 1e-10 <= found / exact <= 1.01  # measured 1.0006
+
+
+def test_an_amount_of_round_off_costs_nothing():
+    problem, cells = on_the_square()
+    noise = asked_of(cells, "top", (0, 1), lambda x, y: 1e-15 * np.sin(40 * x))
+    assert energy(cells, problem, [noise], 4) == 0
+
+
+def test_a_layer_is_left_in_peace_beyond_its_rim():
+    """What is asked for on one side moves no triangle that has no vertex there."""
+    problem, cells = on_the_square(n=4)
+    top = asked_of(cells, "top", (0, 1), lambda x, y: x * (1 - x))
+    norms = lifting_of(problem, cells, [top], 4, 1.0)
+    far = (cells.corners[..., 1] < 1 - 1e-9).all(axis=1)
+    assert (norms[far] == 0).all()
+    assert (norms[~far] > 0).any()
+
+
+def test_directions_in_a_vertex():
+    """Two of them decide it; two amounts along one are refused."""
+    problem, cells = on_the_square(n=1)
+    flat, zero = (lambda x, y: 0.1 + 0 * x), (lambda x, y: 0 * x)
+    both = [asked_of(cells, name, d, flat) for name in SIDES for d in ((1, 0), (0, 1))]
+    assert energy(cells, problem, both, 4) <= 1e-20  # a translation
+    slanted = [asked_of(cells, name, d, flat) for name in SIDES for d in ((1, 1), (1, -1))]
+    assert energy(cells, problem, slanted, 4) <= 1e-20
+    with pytest.raises(ContactError, match="at a vertex ask for different displacements"):
+        energy(
+            cells,
+            problem,
+            [asked_of(cells, "top", (0, 1), flat), asked_of(cells, "right", (0, 1), zero)],
+            4,
+        )
+
+
+def opposite(gap, **changes):
+    """Two blocks with a gap given as data, the upper one pressed down."""
+    pair = Contact("lower_contact", "upper_contact", direction=(0, 1), gap=gap, **changes)
+    problem = cases.hertz_contact().problem
+    return replace(problem, contact=[pair], displacement={"bottom": (0, 0), "top": (0, -0.02)})
+
+
+def facing_of(solution):
+    (line,) = (x for x in solution.equilibrated.proof.program.lines if x.facing.pair is not None)
+    return line.facing
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_the_gap_of_the_lifted_displacement(order):
+    """Nowhere negative by its coefficients, the same number at vertices, 0 inside of contact."""
+    solution = solve(opposite(0.05 * ng.x**2), maxh=0.3, order=order)
+    facing, cells = facing_of(solution), solution.equilibrated.proof.cells
+    assert 0 < facing.closed.sum() < len(facing.side)
+    size = 0.02  # of displacements
+    assert facing.after.min() >= -1e-16 * size
+    assert np.abs(facing.after[facing.closed, 1:-1]).max(initial=0.0) <= 1e-12 * size
+    lifted = facing.gap + facing.lift
+    assert lifted.min() >= -1e-12 * size
+    ends = cells.ends[facing.side]
+    lowest, highest = np.full(len(cells.vertices), np.inf), np.full(len(cells.vertices), -np.inf)
+    np.minimum.at(lowest, ends, facing.after[:, [0, -1]])
+    np.maximum.at(highest, ends, facing.after[:, [0, -1]])
+    at = np.unique(ends)
+    np.testing.assert_allclose(lowest[at], highest[at], atol=1e-12 * size)
+
+
+def test_a_polynomial_gap_in_contact_needs_no_lifting():
+    """Where rows hold it at all nodes; of one that is none they leave something between nodes."""
+    quadratic = solve(opposite(-0.001 * (1 - ng.x**2)), maxh=0.4, order=2)
+    assert quadratic.active.all()
+    other = solve(opposite(-0.001 * ng.cos(3 * ng.x)), maxh=0.4, order=2)
+    facing = facing_of(quadratic)
+    assert np.abs(facing.gap).max() <= 1e-12 * 0.02
+    assert quadratic.bound_parts["lifting"] <= 1e-20 * quadratic.error_bound**2
+    assert other.bound_parts["lifting"] > 1e-8 * other.error_bound**2
+
+
+def test_supports_that_elements_do_not_meet():
+    """u_D - u_h is lifted: none of polynomials of the order, some of others."""
+    base = cases.one_transition().problem
+    parts = []
+    for f in (ng.x**2, ng.sin(3 * ng.x)):
+        problem = replace(base, displacement={"bottom": (0, 0), "top": (0, -0.01 * (2 + f))})
+        parts.append(solve(problem, maxh=0.5, order=2).bound_parts["lifting"])
+    assert parts[0] <= 1e-15 * parts[1]
