@@ -235,6 +235,8 @@ class Facing:
         Sides in contact as a whole.
     share : ndarray (k, 2)
         Of what w adds to the gap, that the secondary takes at t = 0 and t = 1.
+    away : ndarray of int (r,)
+        Sides of the secondary of which nothing faces, as over a slot.
     equality : bool
         Whether the gap is 0 and forces have any sign.
     """
@@ -250,6 +252,7 @@ class Facing:
     open: Mask
     closed: Mask
     share: Array
+    away: Index
     equality: bool
 
     @cached_property
@@ -305,6 +308,7 @@ def facing_of(
     if contact.primary is not None and (found.gap[faces & ~every] < 0).any():
         raise ContactError("bodies overlap where a side of the mesh faces the other in part")
     slots = side[~keep]
+    away = side[~faces.reshape(-1, j).any(axis=1)]
     side, segment, s = side[keep], segment[every], s[every]
     gap, d = found.gap[every].reshape(-1, j), found.direction[every].reshape(-1, j, 2)
     other, there = np.full(len(side), -1), np.zeros((len(side), j))
@@ -332,7 +336,7 @@ def facing_of(
     after, bare = _after(vertices, gap, closed, stiff, degree)
     if contact.bilateral:
         after, bare = np.zeros_like(after), np.zeros_like(bare)
-    kept = side, other, there, d, weight, gap, after, bare, closed, shares
+    kept = side, other, there, d, weight, gap, after, bare, closed, shares, away
     return Facing(pair, *kept, contact.bilateral)
 
 
@@ -424,6 +428,7 @@ def guides_of(
         open=np.zeros(k, dtype=bool),
         closed=np.ones(k, dtype=bool),
         share=np.ones((k, 2)),
+        away=side[:0],
         equality=True,
     )
 
