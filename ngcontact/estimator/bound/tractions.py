@@ -316,5 +316,8 @@ def missed_tractions(
     """L2 norms (n, 3) of what tractions miss, times the model's measure."""
     values, held = wanted.values(*on_segments(cells, have.rule))
     miss = np.where(held[:, None], 0.0, values - have.values)
-    miss[np.abs(miss) <= ROUND_OFF * largest] = 0.0
+    x = have.rule.x  # about an axis round-off is that of stresses times radii
+    measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(*x.shape[:-1], 1)
+    noise = ROUND_OFF * largest * measure.max(initial=0.0)
+    miss[np.abs(miss) * measure <= noise] = 0.0
     return have.rule.norms(cells, miss)
