@@ -159,7 +159,7 @@ def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Index
 
     Those of a `degree`, with rules of an `order`; `least` (n,) times at least.
     """
-    mesh, n = cells.trace.mesh, len(cells.triangles)
+    mesh = cells.trace.mesh
     found = least.copy()
     if all(numbers(ng.CF(F)) for F in problem.force.values()):
         return found

@@ -48,7 +48,7 @@ class Given:
     breaks: Array
 
     def followed(self, cells: Cells) -> Index:
-        """How often triangles (n,) are divided for their tractions: `LEVELS` where these are rough."""
+        """How often triangles (n,) are divided for tractions: `LEVELS` where these are rough."""
         found = np.zeros(len(cells.triangles), dtype=np.intp)
         side = np.flatnonzero(cells.segment >= 0)
         breaks = np.bincount(self.breaks[:, 0].astype(np.intp), minlength=len(cells.trace.region))
@@ -182,7 +182,7 @@ class Requested:
     pressed: dict[int, Array]
 
     def values(self, segment: Index, s: Array) -> tuple[Array, Mask]:
-        """Tractions (m, j, 2) at `s` (m, j) of segments (m,), and components (m, 2) that are held."""
+        """Tractions (m, j, 2) at `s` (m, j) of segments (m,), and which (m, 2) are held."""
         cells, total = self.cells, np.zeros((*s.shape, 2))
         side = cells.side_at(segment, s[:, s.shape[1] // 2])
         every = np.repeat(segment, s.shape[1])
