@@ -137,7 +137,7 @@ def projection(
     thirds: bool,
     components: slice,
 ) -> tuple[Array, Array, Array]:
-    """Coefficients (b, m, 2) of polynomials of a degree near to F, norms (b,) of the rest, and of F.
+    """Coefficients (b, m, 2) of polynomials near to F, norms (b,) of the rest, and of F.
 
     In triangles `at` (b,) as of `looked_at`; only some `components` count.
     """
