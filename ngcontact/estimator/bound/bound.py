@@ -210,6 +210,11 @@ def _bound(
     level = Level(cells, elements, balanced.coefficients, look, stress.distance, loads)
     distance, loads = once_more(problem, displacement, wanted, level, degree, scale)
     stress = replace(stress, distance=distance)
+    if not np.isfinite(loads).all():
+        raise ValueError(
+            "no guaranteed bound is known for loads that are no polynomials beside the axis; use "
+            "error_estimate"
+        )
     lifts = [(line.facing, line.facing.lift) for line in lines]
     lifting = lifted(problem, cells, asked, lifts, lift, extent_of_u)
     closed, signed = 0.0, 0.0
