@@ -25,7 +25,7 @@ from drivers.command_line import Count, Order, run
 from ngcontact import adapt
 
 SHOWN: tuple[Name, ...] = ("one transition", "hertz a=0.3", "flat punch", "disc on rigid plane")
-ROUND = (1.0, 1.5, 2.0, 3.0, 5.0, 10.0)  # effectivities with a tick
+ROUND = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)  # effectivities with a tick
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def draw(path: Path, rows: Sequence[Row]) -> None:
             n = [row.unknowns for row in mine]
             axes.loglog(n, [row.bound for row in mine], "o-", ms=3, color=f"C{order - 1}")
             axes.loglog(n, [row.estimate for row in mine], "s--", ms=3, color=f"C{order - 1}")
-        axes.axhline(1, color="k", lw=0.8)
+        axes.axhline(1, color="k", lw=0.8, zorder=0)
         axes.set(title=name, xlabel="unknowns")
         axes.set_yticks(ROUND, [f"{tick:g}" for tick in ROUND])
         axes.minorticks_off()

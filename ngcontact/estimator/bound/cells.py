@@ -42,7 +42,7 @@ class Cells:
     vertices : ndarray (nv, 2)
         Their corners, lengths.
     triangles : ndarray of int (n, 3)
-        Anticlockwise; the base, side 0, is the one that may be curved.
+        Anticlockwise; the base, side 0, is the one that may be curved, else the shortest.
     parent : ndarray of int (n,)
         Element of the mesh that each is a part of.
     reference : ndarray (n, 3, 2)
@@ -291,6 +291,10 @@ def joined(
     curved: Mask,
 ) -> Cells:
     """Cells of which segments `own` (n, 3) and `spans` (n, 3, 2) at sides are known."""
+    shortest = np.where(curved, 0, _lengths(vertices[triangles]).argmin(axis=1))
+    roll = (shortest[:, None] + np.arange(3)) % 3
+    triangles, own = (np.take_along_axis(x, roll, axis=1) for x in (triangles, own))
+    reference, spans = (np.take_along_axis(x, roll[..., None], axis=1) for x in (reference, spans))
     start = np.roll(triangles, -1, axis=1).ravel()
     stop = np.roll(triangles, -2, axis=1).ravel()
     low, high = np.minimum(start, stop), np.maximum(start, stop)
@@ -312,13 +316,24 @@ def joined(
     )
 
 
+def _lengths(corners: Array) -> Array:
+    """Lengths (n, 3) of the straight sides opposite to `corners` (n, 3, 2)."""
+    return np.linalg.norm(np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1), axis=2)
+
+
 def _parted(cells: Cells, at: Index) -> Cells:
-    """Triangles `at` (k,) in three about their middles."""
+    """Triangles `at` (k,) in three about the middles of their inscribed circles.
+
+    Parts of thin triangles are thin with one short side, not flat.
+    """
     own, spans = cells.segment[cells.sides], cells.span[cells.sides]
     spans = np.where(cells.backward[..., None], spans[..., ::-1], spans)
     rest = np.setdiff1d(np.arange(len(cells.triangles)), at)
     middle = len(cells.vertices) + np.arange(len(at))
-    place, inside = cells.reference[at].mean(axis=1), np.full(len(at), -1)
+    share = _lengths(cells.corners[at])
+    share /= share.sum(axis=1, keepdims=True)
+    place, x = (np.einsum("kc,kcd->kd", share, y[at]) for y in (cells.reference, cells.corners))
+    inside = np.full(len(at), -1)
     whole_ones = cells.triangles, cells.reference, cells.parent, own, spans
     parts: list[list[Any]] = [[x[rest]] for x in whole_ones]
     whole = np.broadcast_to([0.0, 1.0], (len(at), 2))
@@ -333,7 +348,7 @@ def _parted(cells: Cells, at: Index) -> Cells:
         )
         for values, value in zip(parts, new, strict=True):
             values.append(value)
-    vertices = np.concatenate([cells.vertices, cells.corners[at].mean(axis=1)])
+    vertices = np.concatenate([cells.vertices, x])
     curved = np.concatenate([cells.curved[rest], cells.curved[at], np.zeros(2 * len(at), bool)])
     triangles, reference, parent, own, spans = (np.concatenate(x) for x in parts)
     return joined(cells.trace, vertices, triangles, reference, parent, own, spans, curved=curved)

@@ -179,11 +179,11 @@ class Element(Triangles):
     def answer(self, mu: Array) -> Array:
         """Change of c (b, m) with all multipliers, by `mu` (k,)."""
         y = np.einsum("bmd,bd->bm", self.N, mu[self.dofs])
-        return np.linalg.solve(self.root.transpose(0, 2, 1), y[..., None])[..., 0]
+        return np.asarray(np.linalg.solve(self.root.transpose(0, 2, 1), y[..., None])[..., 0])
 
     def alone(self) -> Array:
         """Coefficients c (b, m) without multipliers."""
-        return np.linalg.solve(self.root.transpose(0, 2, 1), self.g[..., None])[..., 0]
+        return np.asarray(np.linalg.solve(self.root.transpose(0, 2, 1), self.g[..., None])[..., 0])
 
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with coefficients `c` (b, m)."""
@@ -205,7 +205,7 @@ class Element(Triangles):
         )
 
     def whole_stress(self, c: Array) -> Array:
-        """Stresses (b, q, v) at the quadrature points, the radial force's part of the hoop included."""
+        """Stresses (b, q, v) at the quadrature points, with the hoop's part of radial forces."""
         s = self._stress(c, self.places.x, self.local, slice(None))
         if self.axial:
             s[..., 2] += self.radial
@@ -422,7 +422,7 @@ def _cholesky(A: Array) -> Array:
     """
     for added in (0.0, *DEFINITE):
         try:
-            return np.linalg.cholesky(A + added * np.eye(A.shape[-1]))
+            return np.asarray(np.linalg.cholesky(A + added * np.eye(A.shape[-1])))
         except np.linalg.LinAlgError:
             continue
     raise ContactError("triangles are too thin, or too curved, for an equilibrated stress")
@@ -485,11 +485,12 @@ def _forces(
     """Coefficients of the force that is balanced, r F_r, and the norm of the rest."""
     points, n = kind.places, kind.force_degree
     b, q = points.weight.shape
-    (bonus, *parted), radial = look, np.zeros((b, q))
+    (bonus, depth, thirds), radial = look, np.zeros((b, q))
     if source is None:
         return np.zeros((b, (n + 1) * (n + 2) // 2, 2)), radial, np.zeros(b)
     parts, order = slice(int(kind.axial), None), 2 * kind.degree + bonus
-    force, missed, size = projection(source, cells, points.at, n, order, *parted, parts)
+    at, rule = points.at, (order, depth, bool(thirds))
+    force, missed, size = projection(source, cells, at, n, *rule, parts)
     if kind.axial:
         radial = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
         force[..., 0] = 0.0

@@ -177,7 +177,7 @@ def _inside(s: Array) -> Array:
 def _contact_on(
     trace: BoundaryTrace, displacement: ng.CoefficientFunction, pair: ContactState
 ) -> dict[int, list[tuple[float, float]]]:
-    """Intervals of s in contact on segments in which contact ends, and which face with all nodes."""
+    """Intervals of s in contact on segments in which contact ends, which face with all nodes."""
     line, found = pair.line, {}
     active = np.append(pair.active, False)[line.rows]
     places = trace.places(line.segments)
@@ -244,7 +244,7 @@ class Facing:
 
     @cached_property
     def back(self) -> Array:
-        """Parameters t (k, j) of the secondary opposite to the Gauss points of the primary's sides."""
+        """Parameters t (k, j) of the secondary, opposite to the primary's Gauss points."""
         nodes = self.there @ THROUGH.T
         t = np.where((nodes[:, -1] < nodes[:, 0])[:, None], 1 - PLACES, PLACES)
         for _ in range(NEWTON_STEPS):
@@ -384,7 +384,7 @@ def guides_of(
     segment, s = cells.on_side(every, t)
     x, dx = cells.points(every, t)
     d = cells.trace.exact_normal(segment, s)
-    gap = -(cells.trace.evaluate(displacement, segment, s) * d).sum(axis=1)
+    gap = -(cells.trace.evaluate(displacement, segment, s) * d).sum(axis=1)  # (3.8)
     ds = np.linalg.norm(dx, axis=1) * cells.trace.model.measure(x)
     return Facing(
         pair=None,

@@ -90,7 +90,9 @@ def once_more(
         for start in range(0, len(some), AT_ONCE):
             here = some[start : start + AT_ONCE]
             share = limit * len(here) / len(some)
-            one, two = _islands(problem, displacement, wanted, level, here, degree, scale, (m, third), share)
+            one, two = _islands(
+                problem, displacement, wanted, level, here, degree, scale, (m, third), share
+            )
             better = one + two < c[here] + D[here]
             c[here[better]], D[here[better]] = one[better], two[better]
     return c, D

@@ -56,7 +56,7 @@ def asked_on_supports(
         u = trace.evaluate(displacement, segment, s)
         for c, value in enumerate(values):
             if value is not None:
-                rest = trace.evaluate(ng.CF(value), segment, s)[:, 0] - u[:, c]
+                rest = trace.evaluate(ng.CF(value), segment, s)[:, 0] - u[:, c]  # (3.6)
                 d = np.broadcast_to(np.eye(2)[c], (k, j, 2))
                 found.append(Asked(side, d, rest.reshape(k, j)))
     return found

@@ -119,8 +119,8 @@ def looked_at(
     for curved in (False, True):
         some = np.flatnonzero(parts.curved == curved)
         if some.size:
-            values = looked_at(F, parts, some, order, depth - 1, thirds)
-            found.append([z.reshape(len(at), -1, *z.shape[2:]) for z in values])
+            own = looked_at(F, parts, some, order, depth - 1, thirds)
+            found.append([z.reshape(len(at), -1, *z.shape[2:]) for z in own])
     x, weight, values = (np.concatenate(z, axis=1) for z in zip(*found, strict=True))
     return x, weight, values
 
@@ -135,11 +135,13 @@ def projection(
     thirds: bool,
     components: slice,
 ) -> tuple[Array, Array, Array]:
-    """Coefficients (b, m, 2) of polynomials of a degree near to F, norms (b,) of the rest, and of F.
+    """Coefficients (b, m, 2) of polynomials near to F, norms (b,) of the rest, and of F.
 
     In triangles `at` (b,) as of `looked_at`; norms of some `components`, times the measure.
     """
-    force, rest, size = [], [], []
+    force: list[Array] = []
+    rest: list[Array] = []
+    size: list[Array] = []
     step = max(1, AT_ONCE // (len(pattern(PARTS, thirds)[1]) ** depth * (order // 2 + 1) ** 2))
     for start in range(0, len(at), step):
         some = at[start : start + step]

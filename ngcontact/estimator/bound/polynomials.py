@@ -250,5 +250,5 @@ def balancing(degree: int, frame: Frame, x: Array, force: Array, axial: bool) ->
     along_x = np.einsum("bqm,bm->bq", ia[..., i] * b[..., j], force[..., 0])
     along_y = np.einsum("bqm,bm->bq", a[..., i] * ib[..., j], force[..., 1])
     none = np.zeros_like(along_x)
-    parts = [none, along_y, none, none] if axial else [along_x, along_y, none]
+    parts = [none, along_y, none, none] if axial else [along_x, along_y, none]  # (3.5)
     return -np.stack(parts, axis=2) * frame.size[:, None, None]

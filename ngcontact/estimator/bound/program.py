@@ -68,7 +68,7 @@ class Rows:
 def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
     """The rows of one line, with a pressure of a degree."""
     psi = bernstein(degree, PLACES)
-    bound = ((facing.gap + facing.lift) * facing.weight) @ psi
+    bound = ((facing.gap + facing.lift) * facing.weight) @ psi  # (3.9)
     load = facing.weight[..., None] * facing.direction
     own = [_tested(mu, side, PLACES, psi, f) for side, f in zip(facing.side, load, strict=True)]
     opposite = [
@@ -140,15 +140,15 @@ class DualProgram:
         if not closed:  # one system, which need not be definite
             none = np.zeros(0, dtype=bool)
             start = np.zeros_like(program.b), np.zeros(0)
-            return self._balanced(elements, moments, start, none, none)
+            return self._balanced(elements, moments, start, none, start[1], start[1])
         self.systems.restart(program)
         active = minimise(self.systems, np.concatenate(closed)).active
         while True:  # any p* >= 0 proves a bound: coefficients below 0 by round-off become 0
             y, force = _refined(self.systems, active)
             pulling = (force < 0) & ~program.equality
             if not pulling.any():
-                signed = ~program.equality
-                return self._balanced(elements, moments, (y, force), active, signed)
+                low, high = np.where(program.equality, -np.inf, 0.0), np.full_like(force, np.inf)
+                return self._balanced(elements, moments, (y, force), active, low, high)
             active = active & ~pulling
 
     def within(self, elements: Sequence[Element], limits: Sequence[Array]) -> Balanced:
@@ -172,8 +172,7 @@ class DualProgram:
             if not over.any():
                 y, found = _refined(self.systems, free)
                 force[free] = found[free]
-                none = np.zeros_like(free)
-                return self._balanced(elements, moments, (y, force), free, none)
+                return self._balanced(elements, moments, (y, force), free, -limit, limit)
             force[over] = np.sign(force[over]) * limit[over]
             free = free & ~over
 
@@ -193,9 +192,9 @@ class DualProgram:
         return np.asarray(lineal @ np.linalg.solve(lineal.T @ lineal, lineal.T @ load))
 
     def _resisted(self, moments: Array, load: Array) -> Array:
-        """Given tractions, `moments` (d,), without the idle part of the `load` (d,) that they are of.
+        """Given tractions, `moments` (d,), without the idle part of the `load` (d,).
 
-        That is the error of quadrature, and round-off.
+        That part is the error of quadrature, and round-off.
         """
         idle = self.idle(load)
         if np.abs(idle).max() > QUADRATURE * np.abs(load).max():
@@ -208,12 +207,13 @@ class DualProgram:
         moments: Array,
         solution: tuple[Array, Array],
         held: Mask,
-        signed: Mask,
+        low: Array,
+        high: Array,
     ) -> Balanced:
         """The stress of a solution y, force, corrected until its tractions balance.
 
         Stresses of stiff bodies are small differences of multipliers. Rows that are `held` (m,)
-        take what is left as their force, those that are `signed` (m,) none below 0.
+        take what is left as their force, from `low` to `high` (m,).
         """
         p, (y, force) = self.program, solution
         change, solve, last = self.T @ y, None, np.inf
@@ -226,8 +226,7 @@ class DualProgram:
             left = moments - total
             left = self.T.T @ (left - self.idle(left))
             left[p.fixed] = 0.0
-            force = np.where(held, left[p.unknown], force)
-            force = np.where(signed, np.maximum(force, 0.0), force)
+            force = np.clip(np.where(held, left[p.unknown], force), low, high)
             left[p.unknown] -= force
             size = float(np.abs(left).max(initial=0.0))
             if not ROUND_OFF * largest < size < FALLING * last:

@@ -172,7 +172,7 @@ class Requested:
     cells : Cells
     given : Given
     pressed : dict of int to ndarray (j, 2)
-        Of the lines at `PLACES` of sides.
+        Of the lines at `PLACES` of sides: forces per t, with the measure.
     """
 
     problem: Problem
@@ -181,7 +181,7 @@ class Requested:
     pressed: dict[int, Array]
 
     def values(self, segment: Index, s: Array) -> tuple[Array, Mask]:
-        """Tractions (m, j, 2) at `s` (m, j) of segments (m,), and components (m, 2) that are held."""
+        """Tractions (m, j, 2) at `s` (m, j) of segments (m,), and held components (m, 2)."""
         cells, total = self.cells, np.zeros((*s.shape, 2))
         side = cells.side_at(segment, s[:, s.shape[1] // 2])
         every = np.repeat(segment, s.shape[1])
@@ -194,8 +194,12 @@ class Requested:
         at = np.flatnonzero(np.isin(side, list(self.pressed)))
         if at.size:
             t = cells.own_parameter(side[at], s[at])
+            x, dx = cells.points(np.repeat(side[at], t.shape[1]), t.ravel())
+            ds = np.linalg.norm(dx, axis=1) * cells.trace.model.measure(x)
+            ds = ds.reshape(*t.shape, 1)
             nodes = THROUGH @ np.stack([self.pressed[i] for i in side[at].tolist()])
-            total[at] += at_places(lagrange, t) @ nodes
+            force = at_places(lagrange, t) @ nodes
+            total[at] += np.divide(force, ds, out=np.zeros_like(force), where=ds > 0)
         return total, self.given.held[side]
 
 
@@ -210,12 +214,7 @@ def requested(
     pressed: dict[int, Array] = {}
 
     def add(side: Index, force: Array) -> None:
-        j = len(PLACES)
-        x, dx = cells.points(np.repeat(side, j), np.tile(PLACES, len(side)))
-        ds = np.linalg.norm(dx, axis=1) * cells.trace.model.measure(x)
-        ds = ds.reshape(-1, j, 1)
-        per_area = np.divide(force, ds, out=np.zeros_like(force), where=ds > 0)
-        for i, value in zip(side.tolist(), per_area, strict=True):
+        for i, value in zip(side.tolist(), force, strict=True):
             pressed[i] = pressed.get(i, 0.0) + value
 
     for line, p in zip(lines, pressure, strict=True):
@@ -235,7 +234,7 @@ def moments_of(problem: Problem, cells: Cells, mu: Multipliers, given: Given) ->
     if loaded:
         rule = along(cells, given, np.unique(np.concatenate(loaded)))
         values, _ = requested(problem, cells, given).values(*on_segments(cells, rule))
-        moments = rule.moments(mu, values)
+        moments = rule.moments(mu, values)  # (3.7)
     for side, c in zip(*np.nonzero(given.held), strict=True):
         n = mu.degree[side] + 1
         fixed[mu.start[side] + c * n : mu.start[side] + (c + 1) * n] = True
