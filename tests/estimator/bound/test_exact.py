@@ -127,16 +127,7 @@ CASES = {
     "rings-2": (cases.ring_in_ring, 2, 2000, 1.1, 1.03),  # 1.04, 1.005
     "rings-4": (cases.ring_in_ring, 4, 2700, 1.1, 1.1),  # 1.04, 1.04
 }
-WITNESSES = [
-    "S1-2",
-    "S3-1",
-    "S3-2",
-    "S3 of .05-4",
-    "nu = .4999-2",
-    "2:3-2",
-    "S3, 5:37-4",
-    "rings-2",
-]
+WITNESSES = ["S1-2", "S3-1", "S3 of .05-4", "nu = .4999-2", "2:3-2", "rings-2"]
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -162,7 +153,7 @@ def test_straight_segments_for_circles(make):
 
 
 @pytest.mark.parametrize(("order", "size"), [(1, 400), (2, 1300), (4, 4000)])
-@pytest.mark.study(witness=["2-1300"])
+@pytest.mark.study(witness=["1-400"])
 def test_body_forces_and_tractions(order, size):
     """No polynomials: what they miss is added."""
     for solution in levels(cases.clamped_transition, order, size):
@@ -171,7 +162,7 @@ def test_body_forces_and_tractions(order, size):
 
 
 @pytest.mark.parametrize(("order", "size"), [(2, 1800), (4, 2500)])
-@pytest.mark.study(witness=["2-1800"])
+@pytest.mark.study
 def test_body_forces_with_kinks_inside_triangles(order, size):
     for solution in levels(cases.curved_lines, order, size):
         assert 1 <= effectivity(solution, cases.curved_lines().exact)
@@ -189,7 +180,7 @@ LAWS = {
 
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("law", LAWS)
-@pytest.mark.study(witness=["fibres, 1e4-2", "layers, 1e6-2"])
+@pytest.mark.study(witness=["fibres, 1e4-2"])
 def test_stiff_laws(law, order):
     make, maxh = LAWS[law]
     case = make()

@@ -61,7 +61,7 @@ def test_a_ring_that_turns_freely():
 
 
 @pytest.mark.parametrize(("guided", "row"), [("rim", "auto"), ("hole", "auto"), ("rim", "dual")])
-@pytest.mark.study(witness=["rim-dual"])
+@pytest.mark.study
 def test_rings_in_contact_and_guided(guided, row):
     """Curved contact beside a curved guide, which a stiffer bearing approaches."""
     problem = cases.ring_in_ring().problem
