@@ -40,7 +40,7 @@ def shared(matrix: ng.BaseMatrix) -> sp.csr_array:
 
 def handed_over(K: sp.sparray) -> ng.BaseMatrix:
     """A copy for NGSolve of the SciPy matrix `K` (m, n)."""
-    K = K.tocoo()
+    K = K.tocoo(copy=False)
     entries = []
     # NumPy arrays as arguments would be converted entry by entry, at ten times the price.
     for kind, values in ((Array_I_S, K.row), (Array_I_S, K.col), (Array_D_S, K.data)):

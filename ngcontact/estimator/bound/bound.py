@@ -23,7 +23,16 @@ from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
 from .cells import Cells, cells_of, places
-from .elements import PARTED, WHOLE, Element, Multipliers, compliance_at, elements_of, rigid_motions
+from .elements import (
+    ON_CURVES,
+    PARTED,
+    WHOLE,
+    Element,
+    Multipliers,
+    compliance_at,
+    elements_of,
+    rigid_motions,
+)
 from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
 from .islands import Level, once_more
 from .lifting import asked_on_line, asked_on_supports, lifted
@@ -48,6 +57,7 @@ from .tractions import (
     requested,
 )
 
+BESIDE = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
 LIFTED = 3  # degrees by which w is above u_h
 FELT = 1e-4  # of modulus times displacement over an element's size: stresses beside whose round-off
 # equilibrium is measured
@@ -129,10 +139,13 @@ def error_bound(
     refuse_bound(problem, trace, pairs)
     refuse_narrow(problem, trace)
     refuse_jumps(problem, trace)
-    try:
-        return _bound(problem, trace, displacement, pairs, everywhere=False)
-    except ContactError:  # resultants that no pressure near to the contact has
-        return _bound(problem, trace, displacement, pairs, everywhere=True)
+    data = problem, trace, displacement, pairs
+    for everywhere, beside in ((False, ()), (True, ())):
+        try:
+            return _bound(*data, everywhere, beside)
+        except ContactError:  # resultants that no pressure near to the contact has
+            continue
+    return _bound(*data, True, BESIDE)
 
 
 def _bound(
@@ -141,20 +154,25 @@ def _bound(
     displacement: ng.GridFunction,
     pairs: Sequence[ContactState],
     everywhere: bool,
+    beside: Sequence[float],
 ) -> Proof:
-    """The bound with a p* that acts `everywhere` on the lines, or near to the contact."""
-    order, extent = trace.order, trace.model.extent
-    degree, lift = max(order + 1, 2 + extent), order + LIFTED
+    """The bound with a p* that acts `everywhere` on the lines, or near to the contact.
+
+    On segments there it is one polynomial between places `beside` their ends.
+    """
+    p, extent = trace.order, trace.model.extent
+    degree, lift = max(p + 1, 2 + extent), p + LIFTED
     reaches = [reach_of(trace, displacement, pair, everywhere) for pair in pairs]
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
     guided = None if problem.sliding is None else str(problem.sliding)
     loaded = trace.segments(*problem.traction, guided, *touching)
     whole = [name for name, values in problem.displacement.items() if None not in values]
-    cells = cells_of(trace, cuts_of(trace, reaches), loaded, trace.segments(*whole))
+    cells = cells_of(trace, cuts_of(trace, reaches, beside), loaded, trace.segments(*whole))
     given = given_on(problem, cells)
-    thirds = cells.curved | given.followed(cells)
-    depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, thirds)
-    look = np.column_stack([np.where(depth, PARTED, WHOLE), depth, thirds])
+    least = np.maximum(given.followed(cells), cells.curved)
+    depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, least)
+    order = 2 * (degree + ON_CURVES * cells.curved) + np.where(depth, PARTED, WHOLE)
+    look = np.column_stack([order, depth, least > 0])
     mu, elements = elements_of(problem, cells, displacement, degree, look)
     asked = asked_on_supports(cells, given, displacement)
     of_guides = mu.degree[given.guides]

@@ -25,6 +25,7 @@ from ...problem import Triangulation
 REFERENCE = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])  # NGSolve's corners, in this order
 NEWTON_STEPS = 8
 CLOSE = 1e-9  # of an element: the next step is round-off
+WIDE = 0.1  # twice the area over the square of the diameter, from which triangles are divided
 TURN = 0.5  # twice the sine of the angle between sides up to which they are on one line
 
 
@@ -391,7 +392,8 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
     wide = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / cells.diameters**2
     order = np.lexsort((wide, ~cells.curved))
     chosen[cells.triangles[order]] = order[:, None]
-    return np.unique(chosen[at_two])
+    every = at_two[cells.triangles].any(axis=1) & ~cells.curved & (wide > WIDE)
+    return np.union1d(chosen[at_two], np.flatnonzero(every))
 
 
 class _Parts:

@@ -36,6 +36,7 @@ from .polynomials import (
     stresses,
 )
 
+TURNED = 1e-4  # sine of the angle between normals that are not one
 ON_CURVES = 4  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
@@ -43,6 +44,7 @@ DEFINITE = (1e-15, 1e-14, 1e-13, 1e-12)  # of the diagonal, until it is enough
 WHOLE, PARTED = 10, 4  # degrees above 2 k of rules for forces: on triangles, on their parts
 ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
 BLOCK = 4000  # triangles at once: bounds the memory
+SMALL_BLOCK = 500  # ... where each has a table of its own
 
 
 def traces(degree: int, t: Array) -> Array:
@@ -246,9 +248,26 @@ class Multipliers:
         return np.arange(self.start[side], self.start[side + 1])
 
 
-def multipliers(cells: Cells, degree: int) -> tuple[Index, Multipliers]:
-    """Degree (n,) of the stress in each triangle, and the multipliers that it asks for."""
-    own = np.where(cells.curved, degree + ON_CURVES, degree)
+def turning(problem: Problem, cells: Cells) -> Mask:
+    """Triangles (n,) beside contact along normals of a curve that are not those of the mesh."""
+    pairs = [pair for pair in problem.contact if pair.direction is None]
+    names = [name for pair in pairs for name in (pair.secondary, pair.primary)]
+    side = np.flatnonzero(np.isin(cells.segment, cells.trace.segments(*names)))
+    segment, s = cells.on_side(np.tile(side, 2), np.repeat([0.0, 1.0], len(side)))
+    off = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
+    found = np.zeros(len(cells.triangles), dtype=bool)
+    found[cells.owner[np.tile(side, 2)[np.linalg.norm(off, axis=1) > TURNED]]] = True
+    return found
+
+
+def multipliers(
+    cells: Cells, degree: int, turned: Mask | bool = False
+) -> tuple[Index, Multipliers]:
+    """Degree (n,) of the stress in each triangle, and the multipliers that it asks for.
+
+    It is higher beside curves, and where directions are `turned` (n,).
+    """
+    own = np.where(cells.curved | turned, degree + ON_CURVES, degree)
     of_side = np.zeros(len(cells.ends), dtype=np.intp)
     np.maximum.at(of_side, cells.sides, own[:, None])
     start = np.concatenate([[0], np.cumsum(2 * (of_side + 1))])
@@ -286,10 +305,10 @@ def elements_of(
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, and their multipliers.
 
-    `look` (n, 3) says by what degree above 2 k rules integrate forces, and on parts of what depth,
+    `look` (n, 3) says by what order rules integrate forces, and on parts of what depth,
     with thirds at corners or not.
     """
-    own, mu = multipliers(cells, degree)
+    own, mu = multipliers(cells, degree, turning(problem, cells))
     at_axis = np.asarray(cells.trace.model.on_axis(cells.vertices))
     on_axis = np.asarray(at_axis[cells.ends].all(axis=1))[cells.sides]
     key = np.column_stack(
@@ -307,8 +326,10 @@ def elements_of(
     found = []
     for kind, (own_degree, axis, *rest) in enumerate(kinds.tolist()):
         every = np.flatnonzero(number.ravel() == kind)
-        for start in range(0, len(every), BLOCK):
-            at = every[start : start + BLOCK]
+        curved, varying = rest[3:5]
+        most = SMALL_BLOCK if curved or varying or cells.trace.model.extent else BLOCK
+        for start in range(0, len(every), most):
+            at = every[start : start + most]
             kept = problem, cells, displacement, mu, at, own_degree, bool(axis), rest[-3:]
             found.append(_element(*kept))
     return mu, found
@@ -485,12 +506,12 @@ def _forces(
     """Coefficients of the force that is balanced, r F_r, and the norm of the rest."""
     points, n = kind.places, kind.force_degree
     b, q = points.weight.shape
-    (bonus, depth, thirds), radial = look, np.zeros((b, q))
+    radial = np.zeros((b, q))
     if source is None:
         return np.zeros((b, (n + 1) * (n + 2) // 2, 2)), radial, np.zeros(b)
-    parts, order = slice(int(kind.axial), None), 2 * kind.degree + bonus
-    at, rule = points.at, (order, depth, bool(thirds))
-    force, missed, size = projection(source, cells, at, n, *rule, parts)
+    (order, depth, thirds), parts = look, slice(int(kind.axial), None)
+    rule = order, depth, bool(thirds)
+    force, missed, size = projection(source, cells, points.at, n, *rule, parts)
     if kind.axial:
         radial = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
         force[..., 0] = 0.0

@@ -17,14 +17,14 @@ import numpy as np
 from ...arrays import Array, Index
 from ...problem import Problem
 from .cells import Cells
-from .elements import Element, elements_of
+from .elements import WHOLE, Element, elements_of
 from .missed import data_norms
 from .norms import SETTLED, forces_missed, residuals, smallest_moduli, stress_norms
 from .parts import PARTS, divided, pattern
 from .program import dual_program, exerted
 from .tractions import ROUND_OFF, Requested, along, on_segments, tractions_of
 
-COUNTS = 0.02  # of |s - sigma_h|^2, what may be added by data where nothing is balanced again
+COUNTS = 0.04  # of |s - sigma_h|^2, what may be added by data where nothing is balanced again
 RAISED = 3  # degrees on whole triangles
 LEAST = 3  # degree on parts: lower ones do not meet all tractions
 AT_ONCE = 200  # triangles
@@ -77,16 +77,14 @@ def once_more(
         What may be added to B^2; for the whole mesh without.
     """
     c, D = level.distance.copy(), level.loads.copy()
-    lost = (c + D) ** 2 - c**2
-    top = allowed is None
     limit = COUNTS * float(c @ c) if allowed is None else allowed
-    order = np.argsort(lost)
-    at = np.sort(order[np.cumsum(lost[order]) > limit])
-    whole, thirds = level.look[:, 1] == 0, level.look[:, 2] > 0
+    rule, depth, thirds = level.look.T
+    fine = (depth > 0) | (rule >= 2 * degree + WHOLE)  # rules that see what higher degrees miss
     for m, third in ((1, False), (PARTS, False), (PARTS, True)):
-        some = at[(whole == (m == 1))[at] & (whole | (thirds == third))[at]]
-        if m == 1 and not top:
-            continue
+        lost = (c + D) ** 2 - c**2
+        order = np.argsort(lost)
+        at = np.sort(order[np.cumsum(lost[order]) > limit])
+        some = at[(fine if m == 1 else depth > 0)[at] & (thirds[at] == third)]
         for start in range(0, len(some), AT_ONCE):
             here = some[start : start + AT_ONCE]
             share = limit * len(here) / len(some)
@@ -113,8 +111,7 @@ def _islands(
     parts, k = divided(level.cells, at, *division), len(pattern(*division)[1])
     look = np.repeat(level.look[at], k, axis=0)
     n, raised = len(look), degree + RAISED if division[0] == 1 else max(degree, LEAST)
-    look[:, 0] -= 2 * (raised - degree)  # the rule stays
-    look[:, 1] = np.maximum(look[:, 1] - 1, 0)
+    look[:, 1] -= division[0] > 1
     mu, elements = elements_of(problem, parts, displacement, raised, look)
     rule = along(parts, wanted.given, np.flatnonzero(~parts.inner))
     owner = parts.owner[rule.side]
@@ -136,7 +133,7 @@ def _islands(
     data = data_norms(parts, forces, rule.norms(parts, miss), moduli)
     finer = Level(parts, elements, found, look, norms.distance, data)
     both = finer.distance, finer.loads
-    if look[:, 1].any():
+    if division[0] > 1 and look[:, 1].any():
         both = once_more(problem, displacement, wanted, finer, raised, scale, allowed)
     settled = left.reshape(-1, k).max(axis=1) <= SETTLED
     one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)

@@ -18,6 +18,7 @@ PARTS = 4  # of each side
 LEVELS = 2  # how often triangles are divided
 SMOOTH = 1e-3  # of the largest force: what polynomials miss where none is divided
 LEFT = 0.005  # share of the squares of what is missed, that may be on parts not divided again
+BENT = 2  # times the order of rules on curved triangles, for polynomials in x
 AT_ONCE = 200_000  # points at which forces are looked at together
 
 
@@ -111,7 +112,8 @@ def looked_at(
     All are straight or have a curved base; a rule of an `order` on them, divided `depth` times.
     """
     if depth == 0:
-        points = places(cells, at, order)
+        bent = len(at) > 0 and cells.curved[at[0]]
+        points = places(cells, at, BENT * order if bent else order)
         measure = cells.trace.model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
         return points.x, points.weight * measure, points.evaluate(cells, F)
     parts = divided(cells, at, PARTS, thirds)
@@ -155,16 +157,16 @@ def projection(
     return np.concatenate(force), np.concatenate(rest), np.concatenate(size)
 
 
-def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Mask) -> Index:
+def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Index) -> Index:
     """How often triangles (n,) are divided: where forces are not near to polynomials.
 
-    Those of a `degree`, with rules of an `order`; once where `least` (n,) says so.
+    Those of a `degree`, with rules of an `order`; `least` (n,) times at least.
     """
     mesh = cells.trace.mesh
-    found = least.astype(np.intp)
+    found = least.copy()
     if all(numbers(ng.CF(F)) for F in problem.force.values()):
         return found
-    found |= narrow_forces(problem, mesh, cells.trace.order)[cells.parent]
+    found = np.maximum(found, narrow_forces(problem, mesh, cells.trace.order)[cells.parent])
     found[_with_features(problem, cells)] = LEVELS
     for k, F in problem.force.items():
         at = np.flatnonzero(np.array(mesh.Materials(k).Mask())[cells.bodies])

@@ -138,9 +138,9 @@ class DualProgram:
         program = replace(self.program, b=self.T.T @ load)
         closed = [np.repeat(x.facing.closed, x.bound.shape[1]) for x in self.lines]
         if not closed:  # one system, which need not be definite
-            none = np.zeros(0, dtype=bool)
-            start = np.zeros_like(program.b), np.zeros(0)
-            return self._balanced(elements, moments, start, none, start[1], start[1])
+            none = np.zeros(0)
+            start = np.zeros_like(program.b), none
+            return self._balanced(elements, moments, start, none.astype(bool), none, none)
         self.systems.restart(program)
         active = minimise(self.systems, np.concatenate(closed)).active
         while True:  # any p* >= 0 proves a bound: coefficients below 0 by round-off become 0

@@ -48,10 +48,13 @@ class Given:
     guides: Index
     breaks: Array
 
-    def followed(self, cells: Cells) -> Mask:
-        """Triangles (n,) with a side along which tractions are followed."""
-        found = np.zeros(len(cells.triangles), dtype=bool)
-        found[cells.owner[np.isin(cells.segment, self.breaks[:, 0])]] = True
+    def followed(self, cells: Cells) -> Index:
+        """How often triangles (n,) are divided for tractions: `LEVELS` where these are rough."""
+        found = np.zeros(len(cells.triangles), dtype=np.intp)
+        side = np.flatnonzero(cells.segment >= 0)
+        breaks = np.bincount(self.breaks[:, 0].astype(np.intp), minlength=len(cells.trace.region))
+        count = breaks[cells.segment[side]]
+        np.maximum.at(found, cells.owner[side], np.where(count >= FINEST, LEVELS, count > 0))
         return found
 
 
