@@ -611,3 +611,37 @@ def test_refinement_ends_where_no_curve_can_be_divided(monkeypatch):
     with pytest.warns(ContactWarning, match="refinement ends here"):
         [solution] = adapt(small_disc(1.0), order=2, max_dofs=3000)
     assert solution.relative_error_estimate > 1e-3
+
+
+def test_adapt_stops_at_the_bound():
+    case, tolerance = cases.hertz_contact(), 1e-2
+    levels = list(adapt(case.problem, order=3, tolerance=tolerance, guaranteed=True))
+    assert levels[-1].relative_error_bound <= tolerance
+    assert levels[-1].bounded
+    assert not levels[0].bounded  # its estimate said that it is too coarse
+    assert "bound" not in str(levels[0])
+    assert f"bound {levels[-1].relative_error_bound:.2e}" in str(levels[-1])
+    assert relative_energy_error(levels[-1], case.exact) <= tolerance
+    assert sum(level.work["equilibrations"] for level in levels[:-1]) <= 2
+    # The bound that is forecast ends the plan: hardly more unknowns than the estimate's own first
+    # level that meets the tolerance needs.
+    plain = adapt(case.problem, order=3, max_dofs=8000)
+    fine = next(level for level in plain if level.relative_error_bound <= tolerance)
+    assert unknowns(levels[-1]) <= 1.2 * unknowns(fine)
+
+
+def test_a_tolerance_out_of_reach_is_told_by_the_bound():
+    """The bound of the last level is made, whatever the estimate suggests."""
+    problem = cases.hertz_contact().problem
+    with pytest.warns(
+        ContactWarning, match=r"the bound is \d\.\d\de-0\d, more than tolerance=1e-06"
+    ):
+        *_, last = adapt(problem, order=2, max_dofs=800, tolerance=1e-6, guaranteed=True)
+    assert last.bounded
+
+
+def test_guaranteed_needs_a_tolerance():
+    with pytest.raises(ValueError, match="tolerance=None"):
+        adapt(cases.one_transition().problem, guaranteed=True)
+    with pytest.raises(TypeError, match="guaranteed=1"):
+        adapt(cases.one_transition().problem, guaranteed=1, tolerance=1e-2)

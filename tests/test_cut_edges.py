@@ -101,7 +101,8 @@ def test_pressure_in_a_bore_is_the_one_of_lame(part, order):
     solution = solve(pressed_tube(part), maxh=0.5, order=order)
     assert radial_error(solution) < MISSED[order]
     error = energy_error(solution)
-    assert error <= solution.error_bound < 1.5 * error  # measured: 1.00 to 1.32
+    # Measured: 1.00 to 1.32; the exact domain is another one than the mesh's, by 4e-5 at order 4.
+    assert 0.999 * error <= solution.error_bound < 1.5 * error
     assert 1 < solution.error_estimate / error < 8  # measured: 4.2 to 6.3
     resultant = {"left": (-1, 0), "below": (0, -1)}
     size = PRESSURE * BORE * (1 if part == "quarter" else 2)

@@ -57,6 +57,7 @@ from .tractions import (
     requested,
 )
 
+BESIDE = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
 LIFTED = 3  # degrees by which w is above u_h
 FELT = 1e-4  # of modulus times displacement over an element's size: stresses beside whose round-off
 # equilibrium is measured
@@ -138,10 +139,13 @@ def error_bound(
     refuse_bound(problem, trace, pairs)
     refuse_narrow(problem, trace)
     refuse_jumps(problem, trace)
-    try:
-        return _bound(problem, trace, displacement, pairs, everywhere=False)
-    except ContactError:  # resultants that no pressure near to the contact has
-        return _bound(problem, trace, displacement, pairs, everywhere=True)
+    data = problem, trace, displacement, pairs
+    for everywhere, beside in ((False, ()), (True, ())):
+        try:
+            return _bound(*data, everywhere, beside)
+        except ContactError:  # resultants that no pressure near to the contact has
+            continue
+    return _bound(*data, True, BESIDE)
 
 
 def _bound(
@@ -150,8 +154,12 @@ def _bound(
     displacement: ng.GridFunction,
     pairs: Sequence[ContactState],
     everywhere: bool,
+    beside: Sequence[float],
 ) -> Proof:
-    """The bound with a p* that acts `everywhere` on the lines, or near to the contact."""
+    """The bound with a p* that acts `everywhere` on the lines, or near to the contact.
+
+    On segments there it is one polynomial between places `beside` their ends.
+    """
     p, extent = trace.order, trace.model.extent
     degree, lift = max(p + 1, 2 + extent), p + LIFTED
     reaches = [reach_of(trace, displacement, pair, everywhere) for pair in pairs]
@@ -159,7 +167,7 @@ def _bound(
     guided = None if problem.sliding is None else str(problem.sliding)
     loaded = trace.segments(*problem.traction, guided, *touching)
     whole = [name for name, values in problem.displacement.items() if None not in values]
-    cells = cells_of(trace, cuts_of(trace, reaches), loaded, trace.segments(*whole))
+    cells = cells_of(trace, cuts_of(trace, reaches, beside), loaded, trace.segments(*whole))
     given = given_on(problem, cells)
     least = np.maximum(given.followed(cells), cells.curved)
     depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, least)
@@ -202,6 +210,11 @@ def _bound(
     level = Level(cells, elements, balanced.coefficients, look, stress.distance, loads)
     distance, loads = once_more(problem, displacement, wanted, level, degree, scale)
     stress = replace(stress, distance=distance)
+    if not np.isfinite(loads).all():
+        raise ValueError(
+            "no guaranteed bound is known for loads that are no polynomials beside the axis; use "
+            "error_estimate"
+        )
     lifts = [(line.facing, line.facing.lift) for line in lines]
     lifting = lifted(problem, cells, asked, lifts, lift, extent_of_u)
     closed, signed = 0.0, 0.0

@@ -25,6 +25,7 @@ from ...problem import Triangulation
 REFERENCE = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])  # NGSolve's corners, in this order
 NEWTON_STEPS = 8
 CLOSE = 1e-9  # of an element: the next step is round-off
+WIDE = 0.1  # twice the area over the square of the diameter, from which triangles are divided
 TURN = 0.5  # twice the sine of the angle between sides up to which they are on one line
 
 
@@ -391,31 +392,28 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
     wide = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / cells.diameters**2
     order = np.lexsort((wide, ~cells.curved))
     chosen[cells.triangles[order]] = order[:, None]
-    return np.unique(chosen[at_two])
+    every = at_two[cells.triangles].any(axis=1) & ~cells.curved & (wide > WIDE)
+    return np.union1d(chosen[at_two], np.flatnonzero(every))
 
 
-@dataclass(eq=False)
 class _Parts:
     """Triangles that take the place of elements, with the vertices that they add."""
 
-    trace: BoundaryTrace
-    view: Triangulation
-    segment: Index
-    cuts: Mapping[int, Array]
-
-    def __post_init__(self) -> None:
-        self.count = len(self.view.vertices)
+    def __init__(
+        self, trace: BoundaryTrace, view: Triangulation, segment: Index, cuts: Mapping[int, Array]
+    ) -> None:
+        self.trace, self.view, self.segment, self.cuts = trace, view, segment, cuts
         self.places: list[Array] = []
         self.rows: tuple[list, ...] = ([], [], [], [], [])
-        self.number = {k: self._added(self._on(k, s)) for k, s in self.cuts.items()}
+        self.number = {k: self._added(self._on(k, s)) for k, s in cuts.items()}
 
     def _on(self, k: int, s: Array) -> Array:
         return self.trace.point(np.full(len(s), k), s)
 
     def _added(self, x: Array) -> list[int]:
+        first = len(self.view.vertices) + sum(map(len, self.places))
         self.places.append(x)
-        self.count += len(x)
-        return list(range(self.count - len(x), self.count))
+        return list(range(first, first + len(x)))
 
     def divide(self, e: int, base: int | None) -> None:
         """Triangles between side `base` of element `e` and its apex; of all, and the middle."""

@@ -36,6 +36,7 @@ from .polynomials import (
     stresses,
 )
 
+TURNED = 1e-4  # sine of the angle between normals that are not one
 ON_CURVES = 4  # degrees by which stresses on triangles with a curved side are higher
 CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
 CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
@@ -247,9 +248,26 @@ class Multipliers:
         return np.arange(self.start[side], self.start[side + 1])
 
 
-def multipliers(cells: Cells, degree: int) -> tuple[Index, Multipliers]:
-    """Degree (n,) of the stress in each triangle, and the multipliers that it asks for."""
-    own = np.where(cells.curved, degree + ON_CURVES, degree)
+def turning(problem: Problem, cells: Cells) -> Mask:
+    """Triangles (n,) beside contact along normals of a curve that are not those of the mesh."""
+    pairs = [pair for pair in problem.contact if pair.direction is None]
+    names = [name for pair in pairs for name in (pair.secondary, pair.primary)]
+    side = np.flatnonzero(np.isin(cells.segment, cells.trace.segments(*names)))
+    segment, s = cells.on_side(np.tile(side, 2), np.repeat([0.0, 1.0], len(side)))
+    off = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
+    found = np.zeros(len(cells.triangles), dtype=bool)
+    found[cells.owner[np.tile(side, 2)[np.linalg.norm(off, axis=1) > TURNED]]] = True
+    return found
+
+
+def multipliers(
+    cells: Cells, degree: int, turned: Mask | bool = False
+) -> tuple[Index, Multipliers]:
+    """Degree (n,) of the stress in each triangle, and the multipliers that it asks for.
+
+    It is higher beside curves, and where directions are `turned` (n,).
+    """
+    own = np.where(cells.curved | turned, degree + ON_CURVES, degree)
     of_side = np.zeros(len(cells.ends), dtype=np.intp)
     np.maximum.at(of_side, cells.sides, own[:, None])
     start = np.concatenate([[0], np.cumsum(2 * (of_side + 1))])
@@ -290,7 +308,7 @@ def elements_of(
     `look` (n, 3) says by what order rules integrate forces, and on parts of what depth,
     with thirds at corners or not.
     """
-    own, mu = multipliers(cells, degree)
+    own, mu = multipliers(cells, degree, turning(problem, cells))
     at_axis = np.asarray(cells.trace.model.on_axis(cells.vertices))
     on_axis = np.asarray(at_axis[cells.ends].all(axis=1))[cells.sides]
     key = np.column_stack(

@@ -21,9 +21,10 @@ from .cells import Cells
 NOISE = 1e-14  # of a gap, relative to the displacements on both sides
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
-NEAR = 2e-3  # of the shorter segment: vertices that face each other up to that are one
+NEAR = 1e-3  # of the shorter segment: vertices that face each other up to that are one
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
+NARROW = 0.1  # of the sides beside it, a side between them on which r does not change
 STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
 PLACES, WEIGHTS = gauss(2 * DATA)
 THROUGH = np.linalg.inv(lagrange(DATA, PLACES))  # from values at `PLACES` to Gauss-Lobatto points
@@ -130,40 +131,49 @@ def reach_of(
     return Reach(pair, line.segments[near], _contact_on(trace, displacement, pair))
 
 
-def cuts_of(trace: BoundaryTrace, reaches: Sequence[Reach]) -> dict[int, Array]:
+def cuts_of(
+    trace: BoundaryTrace, reaches: Sequence[Reach], more: Sequence[float] = ()
+) -> dict[int, Array]:
     """Places s of vertices to come, by segment: ends of contact, opposite vertices.
 
-    Vertices that all but face each other are one.
+    And `more` on each segment of a reach. Vertices that all but face each other are one.
     """
     cuts: dict[int, list[float]] = {}
     length = trace.lengths(np.arange(len(trace.region)))
     size = np.full(trace.space.ndof, np.inf)  # shortest segment at each vertex
     np.minimum.at(size, trace.nodes[:, [0, -1]], length[:, None])
 
-    def keep(k: Index, s: Array, other: Index) -> None:
-        """Cut segments `k` (r,) at `s` (r,) but beside a vertex that all but faces `other`'s."""
-        end = trace.nodes[k, np.where(s < 0.5, 0, -1)]
-        near = NEAR * np.minimum(size[end], size[trace.nodes[other][:, [0, -1]]].min(axis=1))
-        apart = np.minimum(s, 1 - s) * length[k] > near
-        for number, place in zip(k[apart].tolist(), s[apart].tolist(), strict=True):
+    def nearest(k: Index, s: Array) -> tuple[Index, Array]:
+        """The vertices (r,) that are the nearer ends of segments (r,), and how far they are."""
+        return trace.nodes[k, np.where(s < 0.5, 0, -1)], np.minimum(s, 1 - s) * length[k]
+
+    def put(k: Index, s: Array) -> None:
+        for number, place in zip(k.tolist(), s.tolist(), strict=True):
             cuts.setdefault(number, []).append(place)
 
     for reach in reaches:
         line, contact = reach.pair.line, reach.pair.line.contact
         ends = [(k, s) for k, parts in reach.contact.items() for part in parts for s in part]
         ends = [(k, s) for k, s in ends if APART < s < 1 - APART]
+        ends += [(k, s) for k in reach.segments.tolist() for s in more]
         k, s = np.array([k for k, _ in ends], dtype=np.intp), np.array([s for _, s in ends])
-        keep(k, s, k)
+        kept = np.ones(len(k), dtype=bool)
         if contact.primary is not None and len(reach.segments):
             parts = divided(trace, contact, reach.segments, line.facing)
-            own = np.tile(reach.segments[parts.local], 2)
-            places = np.append(parts.start, parts.stop)
-            keep(own, places, np.tile(parts.facing, 2))
-            k, s = np.append(k, own), np.append(s, places)
+            k = np.append(k, np.tile(reach.segments[parts.local], 2))
+            s = np.concatenate([s, parts.start, parts.stop])
             d = directions(trace, contact, k, s)
             there, t, *_ = partners(trace, line.facing, k, trace.point(k, s), d)
-            met = there >= 0
-            keep(there[met], t[met], k[met])
+            (own, away), (other, beyond) = nearest(k, s), nearest(there, t)
+            far = np.maximum(away, beyond) / np.minimum(size[own], size[other])
+            # Whether two vertices are one, the place decides that the secondary's faces.
+            corner = ((s <= SAME) | (s >= 1 - SAME)) & (there >= 0)
+            pairs = own * len(size) + other
+            same = np.isin(pairs, pairs[corner & (far <= NEAR)])
+            same |= (far <= NEAR) & ~np.isin(own, own[corner & (far > NEAR)])
+            kept = ~(same & (far <= 2 * NEAR)) | (there < 0)
+            put(there[kept & (there >= 0)], t[kept & (there >= 0)])
+        put(k[kept], s[kept])
     inside = {k: _inside(np.array(s)) for k, s in cuts.items()}
     return {k: s for k, s in inside.items() if s.size}
 
@@ -225,6 +235,8 @@ class Facing:
         Sides in contact as a whole.
     share : ndarray (k, 2)
         Of what w adds to the gap, that the secondary takes at t = 0 and t = 1.
+    away : ndarray of int (r,)
+        Sides of the secondary of which nothing faces, as over a slot.
     equality : bool
         Whether the gap is 0 and forces have any sign.
     """
@@ -240,6 +252,7 @@ class Facing:
     open: Mask
     closed: Mask
     share: Array
+    away: Index
     equality: bool
 
     @cached_property
@@ -294,6 +307,8 @@ def facing_of(
     every = keep.repeat(j)
     if contact.primary is not None and (found.gap[faces & ~every] < 0).any():
         raise ContactError("bodies overlap where a side of the mesh faces the other in part")
+    slots = side[~keep]
+    away = side[~faces.reshape(-1, j).any(axis=1)]
     side, segment, s = side[keep], segment[every], s[every]
     gap, d = found.gap[every].reshape(-1, j), found.direction[every].reshape(-1, j, 2)
     other, there = np.full(len(side), -1), np.zeros((len(side), j))
@@ -314,10 +329,14 @@ def facing_of(
             closed |= (cells.segment[side] == k) & (low >= a - SAME) & (high <= b + SAME)
     closed = closed | contact.bilateral
     shares, stiff = _shares(cells, side, other, there, d, held, share)
-    after, bare = _after(cells.ends[side], gap, closed, stiff, degree)
+    vertices = _across(cells, slots, side)[cells.ends[side]]
+    most = np.zeros(len(cells.vertices))  # one share at a vertex that faces two bodies
+    np.maximum.at(most, vertices, shares)
+    shares = most[vertices]
+    after, bare = _after(vertices, gap, closed, stiff, degree)
     if contact.bilateral:
         after, bare = np.zeros_like(after), np.zeros_like(bare)
-    kept = side, other, there, d, weight, gap, after, bare, closed, shares
+    kept = side, other, there, d, weight, gap, after, bare, closed, shares, away
     return Facing(pair, *kept, contact.bilateral)
 
 
@@ -348,6 +367,17 @@ def held_motions(cells: Cells, sides: Sequence[Index], directions: Sequence[Arra
 def _at_ends(values: Array) -> Array:
     """Functions (k, j, c) at the Gauss points of sides: at their ends, (k, 2, c)."""
     return np.einsum("ej,kjc->kec", THROUGH[[0, -1]], values)
+
+
+def _across(cells: Cells, slots: Index, side: Index) -> Index:
+    """A vertex for each (nv,): one for both ends of `slots` (r,) far shorter than sides."""
+    number = np.arange(len(cells.vertices))
+    length = np.linalg.norm(np.diff(cells.vertices[cells.ends], axis=1)[:, 0], axis=1)
+    beside = np.zeros(len(number))
+    np.maximum.at(beside, cells.ends[side], length[side, None])
+    for a, b in cells.ends[slots[length[slots] < NARROW * beside[cells.ends[slots]].min(axis=1)]]:
+        number[number == number[b]] = number[a]
+    return number
 
 
 def _shares(
@@ -398,6 +428,7 @@ def guides_of(
         open=np.zeros(k, dtype=bool),
         closed=np.ones(k, dtype=bool),
         share=np.ones((k, 2)),
+        away=side[:0],
         equality=True,
     )
 

@@ -87,10 +87,11 @@ def lifted(
 
     See `lifting_of`.
     """
+    away = np.concatenate([np.zeros(0, dtype=np.intp), *(facing.away for facing, _ in lines)])
     for alone in (False, True):
         every = [*asked, *(one for line in lines for one in asked_on_line(*line, alone))]
         try:
-            return lifting_of(problem, cells, every, degree, extent)
+            return lifting_of(problem, cells, every, degree, extent, away)
         except ContactError:
             if alone:
                 raise
@@ -98,9 +99,17 @@ def lifted(
 
 
 def lifting_of(
-    problem: Problem, cells: Cells, asked: Sequence[Asked], degree: int, extent: float
+    problem: Problem,
+    cells: Cells,
+    asked: Sequence[Asked],
+    degree: int,
+    extent: float,
+    away: Sequence[int] | Index = (),
 ) -> Array:
-    """Energy norms (n,) of w, of a degree, for displacements and gaps of a size `extent`."""
+    """Energy norms (n,) of w, of a degree, for displacements and gaps of a size `extent`.
+
+    Sides `away` (r,) of Gamma_K face nothing, and may move.
+    """
     norms = np.zeros(len(cells.triangles))
     needed = [
         one.side[np.abs(one.amount).max(axis=1, initial=0.0) > NOISE * extent] for one in asked
@@ -113,6 +122,7 @@ def lifting_of(
     nodes = _Nodes(cells, layer, degree)
     lines = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
     still = np.isin(cells.segment, cells.trace.segments(*lines))
+    still[np.asarray(away, dtype=np.intp)] = False
     for one in asked:
         still[one.side] = False
     conditions = _conditions(cells, nodes, asked, still, 100 * NOISE * extent)

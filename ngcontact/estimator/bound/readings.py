@@ -54,9 +54,10 @@ class Guaranteed:
 
     @cached_property
     def _bound(self: _Solved) -> Proof:
+        space = self.discrete.space
+        space.require_mesh()
         self.work["equilibrations"] += 1
-        boundary = self.discrete.space.trace
-        return error_bound(self.problem, boundary, self.displacement, self.pairs)
+        return error_bound(self.problem, space.trace, self.displacement, self.pairs)
 
     @property
     def bounded(self) -> bool:

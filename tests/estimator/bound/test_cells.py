@@ -93,16 +93,6 @@ def test_cuts_are_vertices(cuts):
     np.testing.assert_allclose(cells.on_side(own, t[:, 0])[1], s, rtol=ROUND_OFF)
 
 
-def test_a_triangle_with_two_cut_sides_has_a_middle():
-    trace = boundary_trace(square(1), 1)
-    both = [int(trace.segments(name)[0]) for name in ("bottom", "right")]
-    cells = cells_of(trace, {k: np.array([0.5]) for k in both}, NONE, NONE)
-    consistent(cells)
-    # Three sides, two of them in halves, and the other triangle.
-    assert len(cells.triangles) == 5 + 1
-    assert moment(cells, lambda x: x[:, 0]) == pytest.approx(1 / 2, rel=ROUND_OFF)
-
-
 def test_triangles_are_parted_where_tractions_depend_on_each_other():
     """A corner of one triangle with tractions on both sides, unless the vertex is held."""
     trace = boundary_trace(square(1), 1)
@@ -136,19 +126,6 @@ def test_curved_triangles(order):
     ):
         expected = abs((weight * primitive(x) * dx[:, 1]).sum())
         assert moment(cells, function, 16) == pytest.approx(expected, rel=1e-11)
-
-
-def test_places_lie_in_their_parents():
-    """X of reference places is where the quadrature says, on curved triangles, too."""
-    import ngsolve as ng
-
-    trace = ring(3)
-    cells = cells_of(trace, {}, NONE, NONE)
-    for at in (np.flatnonzero(cells.curved), np.flatnonzero(~cells.curved)):
-        points = places(cells, at, 4)
-        np.testing.assert_allclose(
-            points.evaluate(cells, ng.CF((ng.x, ng.y))), points.x, atol=ROUND_OFF
-        )
 
 
 @cache

@@ -229,22 +229,6 @@ def test_a_body_that_contact_alone_holds(rows, order):
     assert solution.equilibrated.pressure[0].coefficients.min() >= 0
 
 
-def test_pressures_are_read_on_segments():
-    """At places s of segments; 0 where p* does not act; in all their resultant."""
-    solution = solved("Hertz-4")
-    p, trace = solution.equilibrated.pressure[0], solution.discrete.space.trace
-    t, w = np.polynomial.legendre.leggauss(40)
-    total = 0.0
-    for name in ("lower_contact", "upper_contact"):
-        at = trace.segments(name)
-        length = np.linalg.norm(np.diff(trace.curve[at][:, [0, -1]], axis=1)[:, 0], axis=1)
-        values = p.values(np.repeat(at, len(t)), np.tile((1 + t) / 2, len(at)))
-        assert values.min() >= 0
-        total += ((values.reshape(len(at), -1) @ w) / 2) @ length
-    assert total == pytest.approx(resultant(solution), rel=1e-2)  # jumps inside of segments
-    assert (p.values(trace.segments("top"), np.full(len(trace.segments("top")), 0.5)) == 0).all()
-
-
 @pytest.mark.parametrize(("order", "maxh"), [(1, 0.5), (2, 0.5), (3, 0.5), (2, 0.3)])
 @pytest.mark.study(witness=["2-0.5"])
 def test_a_pin_that_may_turn(order, maxh):

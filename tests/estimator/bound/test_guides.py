@@ -12,7 +12,7 @@ from netgen.occ import Axis, OCCGeometry, WorkPlane, Z
 from drivers.reference import cases
 from drivers.reference.overkill import Overkill
 from drivers.reference.straight import energy_error
-from ngcontact import Elastic, Problem, adapt, solve
+from ngcontact import ContactError, Elastic, Problem, adapt, solve
 from ngcontact.geometries import blocks, rings
 from ngcontact.geometries.region import DOWN, LEFT, RIGHT, UP, body, quarter_arc
 from tests.estimator.bound.test_exact import settled
@@ -39,36 +39,6 @@ def test_a_straight_guide(order, angle):
     assert solution.relative_error_bound <= 1e-7
 
 
-def test_the_exact_bearing_does_not_yield():
-    """The reference: u.n = 0 and no shear on the rim; the load on the hole."""
-    case = cases.ring_in_bearing()
-    solution = solve(case.problem, maxh=0.3, order=4)
-    u, s = case.exact.displacement["ring"], case.exact.stress["ring"]
-    n = ng.CF((ng.x, ng.y)) / ng.sqrt(ng.x**2 + ng.y**2)
-    t = ng.CF((-n[1], n[0]))
-    rim, hole = (solution.mesh.Boundaries(name) for name in ("rim", "hole"))
-    squares = ng.CF(((u * n) ** 2, ((s * n) * t) ** 2))
-    off = np.sqrt(ng.Integrate(squares, rim, order=12))
-    assert off.max() <= 1e-5  # the mesh's rim is off by a part in 1e6
-    load = case.problem.traction["hole"]
-    off = ng.Integrate((s * n * n + load) ** 2 + (s * n * t) ** 2, hole, order=12)
-    assert np.sqrt(off) <= 1e-4
-
-
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.study(witness=["1"])
-def test_energies_of_the_bearing(order):
-    """The distance between both domains is in the energy, not in the bound."""
-    case = cases.ring_in_bearing()
-    *_, reference = adapt(case.problem, order=4, max_dofs=6000)
-    for solution in adapt(case.problem, order=order, max_dofs=900):
-        areas = [ng.Integrate(ng.CF(1.0), one.mesh) for one in (solution, reference)]
-        slack = 4 * abs(areas[0] / areas[1] - 1) * abs(reference.energy)
-        low, high = solution.energy_bounds
-        assert low - slack <= reference.energy <= high + slack
-        assert solution.bound_parts["lifting"] > 0  # u_h.n between the nodes
-
-
 @pytest.mark.study
 def test_a_ring_that_turns_freely():
     """Pressed all around in its bearing: the rotation that nothing resists needs no reaction."""
@@ -91,7 +61,7 @@ def test_a_ring_that_turns_freely():
 
 
 @pytest.mark.parametrize(("guided", "row"), [("rim", "auto"), ("hole", "auto"), ("rim", "dual")])
-@pytest.mark.study(witness=["rim-dual"])
+@pytest.mark.study
 def test_rings_in_contact_and_guided(guided, row):
     """Curved contact beside a curved guide, which a stiffer bearing approaches."""
     problem = cases.ring_in_ring().problem
@@ -106,7 +76,7 @@ def test_rings_in_contact_and_guided(guided, row):
     for solution in adapt(problem, order=2, max_dofs=1800):
         settled(solution)
         error = overkill.relative_error(solution) * fine.energy_norm
-        assert 1 <= solution.error_bound / error <= 1.5
+        assert error - fine.error_bound <= solution.error_bound <= 1.5 * error
 
 
 def half_ellipse(angle=0.0):
@@ -140,7 +110,7 @@ def test_guides_that_are_crossed_are_refused():
     problem = replace(half_ellipse(), displacement={"cut": (0.01, 0.01)})
     with pytest.warns(match="leads"):
         solution = solve(problem, maxh=0.5, order=2)
-    with pytest.raises(ValueError, match=r'leads across the guide "rim" at a vertex'):
+    with pytest.raises(ContactError, match="at a vertex ask for different displacements"):
         _ = solution.error_bound
 
 
@@ -159,19 +129,3 @@ def test_the_bar_of_a_force_beside_a_curved_guide():
         row = q[f"force, {axis}"]
         # Both are on the domains of their meshes.
         assert abs(value - row.value) <= row.proved + 1e-4 * size
-
-
-def test_curved_guides_of_bodies_of_revolution():
-    """Of a ring whose rim bears on a guide: energies of two meshes overlap."""
-    problem = cases.ring_in_bearing().problem
-    away = OCCGeometry(problem.geometry.shape.Move((2, 0, 0)), dim=2)
-    load = {"hole": 1.0}
-    problem = replace(
-        problem, geometry=away, model="axisymmetric", sliding="cut_y|rim", traction=load
-    )
-    coarse, fine = (solve(problem, maxh=h, order=2) for h in (0.4, 0.15))
-    settled(coarse)
-    apart = 1e-3 * abs(fine.energy)  # domains of both meshes
-    (low, high), (lower, upper) = coarse.energy_bounds, fine.energy_bounds
-    assert max(low, lower) <= min(high, upper) + apart
-    assert fine.relative_error_bound < coarse.relative_error_bound / 3

@@ -55,21 +55,6 @@ def test_the_equilateral_triangle():
     assert both == pytest.approx(2 * korn / math.pi + 3 * korn * math.sqrt(trace), rel=1e-6)
 
 
-def test_moduli_and_lengths():
-    """Norms of stresses: forces by a length, tractions by its root, over the root of a modulus."""
-    corners = np.array([(0, 0), (2, 0.3), (0.7, 1.1)])
-    (one, at), (large, there) = triangles(corners), triangles(1e6 * corners)
-    assert one_of(large, there, 1, 0) == pytest.approx(1e6 * one_of(one, at, 1, 0), rel=1e-9)
-    sides = [1.0, 2.0, 0.5]
-    assert one_of(large, there, 0, sides) == pytest.approx(
-        1e3 * one_of(one, at, 0, sides), rel=1e-9
-    )
-    n = len(one.triangles)
-    forces = np.ones(n)
-    soft, stiff = (data_norms(one, forces, np.zeros((n, 3)), np.full(n, c)) for c in (1e-8, 1e8))
-    np.testing.assert_allclose(soft, 1e8 * stiff, rtol=1e-12)
-
-
 def worst(cells, at):
     """Suprema of |v| / |e(v)| for forces and on each side, v less the nearest rigid motion.
 

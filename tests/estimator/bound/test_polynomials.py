@@ -9,9 +9,6 @@ from ngcontact.estimator.bound.elements import traces
 from ngcontact.estimator.bound.polynomials import (
     balancing,
     frame_of,
-    legendre_table,
-    orthonormal,
-    products,
     projected,
     scalars,
     stresses,
@@ -151,23 +148,3 @@ def test_what_balances_a_force(axial):
     div = divergence(stress, at, axial, degree + 3)[..., 0]
     expected = -force(at).T * (at[:, 0] if axial else 1.0)
     np.testing.assert_allclose(div[axial:], expected[axial:], rtol=1e-10)
-
-
-@pytest.mark.parametrize("order", [0, 1, 2])
-def test_derivatives_are_orthonormal(order):
-    """By a quadrature of their own: sums over all mixed derivatives with multiplicities."""
-    degree = 5
-    found = orthonormal(degree, order)
-    lost = order * (order + 1) // 2  # polynomials of lower degree
-    assert found.shape[1] == (degree + 1) * (degree + 2) // 2 - lost
-    t, w = gauss(2 * degree + 2)
-    u, v = (z.ravel() for z in np.meshgrid(t, t))
-    a, b, weight = u * (1 - v), u * v, np.outer(w, w).ravel() * u
-    i, j = products(degree)
-    A, B = (legendre_table(degree, 2 * z - 1) for z in (a, b))
-    gram = 0.0
-    for along in np.ndindex(*(2,) * order):
-        n = sum(along)
-        values = A[order - n][:, i] * B[n][:, j] @ found
-        gram = gram + values.T @ (weight[:, None] * values)
-    np.testing.assert_allclose(gram, np.eye(found.shape[1]), atol=1e-10)
