@@ -218,9 +218,9 @@ def _bound(
     lifts = [(line.facing, line.facing.lift) for line in lines]
     lifting = lifted(problem, cells, asked, lifts, lift, extent_of_u)
     closed, signed = 0.0, 0.0
-    for line, p in zip(lines, balanced.pressure, strict=True):
-        closed += float((p * line.bound).sum())
-        signed += work_on_gap(line.facing, p, line.facing.gap)
+    for line, pressure in zip(lines, balanced.pressure, strict=True):
+        closed += float((pressure * line.bound).sum())
+        signed += work_on_gap(line.facing, pressure, line.facing.gap)
     parts, below, above = _summed(
         stress.distance, loads, lifting, closed, signed, have.work(cells, given, displacement)
     )

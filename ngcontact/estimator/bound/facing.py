@@ -327,7 +327,7 @@ def facing_of(
     for k, parts in reach.contact.items():
         for a, b in parts:
             closed |= (cells.segment[side] == k) & (low >= a - SAME) & (high <= b + SAME)
-    closed = closed | contact.bilateral
+    closed = np.asarray(closed | contact.bilateral)
     shares, stiff = _shares(cells, side, other, there, d, held, share)
     vertices = _across(cells, slots, side)[cells.ends[side]]
     most = np.zeros(len(cells.vertices))  # one share at a vertex that faces two bodies

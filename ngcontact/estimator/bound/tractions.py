@@ -21,7 +21,7 @@ from .program import Rows
 
 FINEST = PARTS**LEVELS  # parts of a side
 SAME = 1e-10  # of a segment: breaks nearer to ends of sides are these
-ROUND_OFF = 1e-12  # of tractions, relative to the largest stress
+ROUND_OFF = 1e-10  # of tractions, relative to the largest stress: as equilibrium is accepted
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,14 +155,14 @@ def along(cells: Cells, given: Given, side: Index) -> Along:
     stop = np.where(last, 1.0, (s[np.minimum(low[piece] + place, len(s) - 1)] - base) / size)
     back = ((cells.span[side, 0] > cells.span[side, 1]) & ~inside)[piece]
     start, stop = np.where(back, 1 - stop, start), np.where(back, 1 - start, stop)
-    own = side[piece]
+    every = side[piece]
     t = start[:, None] + (stop - start)[:, None] * PLACES
-    x, dx = (z.reshape(*t.shape, 2) for z in cells.points(np.repeat(own, len(PLACES)), t.ravel()))
+    x, dx = (z.reshape(*t.shape, 2) for z in cells.points(np.repeat(every, len(PLACES)), t.ravel()))
     length = np.linalg.norm(dx, axis=2)
     normal = np.stack([dx[..., 1], -dx[..., 0]], axis=-1) / length[..., None]
-    normal[cells.backward[cells.owner[own], cells.local[own]]] *= -1
+    normal[cells.backward[cells.owner[every], cells.local[every]]] *= -1
     ds = length * cells.trace.model.measure(x.reshape(-1, 2)).reshape(t.shape)
-    return Along(own, t, (stop - start)[:, None] * WEIGHTS, x, normal, ds, length)
+    return Along(every, t, (stop - start)[:, None] * WEIGHTS, x, normal, ds, length)
 
 
 @dataclass(frozen=True, eq=False)
