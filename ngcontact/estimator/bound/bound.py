@@ -205,7 +205,7 @@ def _bound(
         )
     have = boundary_tractions(cells, given, elements, balanced.coefficients)
     wanted = requested(problem, cells, given, lines, balanced.pressure)
-    missed = missed_tractions(wanted, cells, have, stress.largest)
+    missed = missed_tractions(wanted, cells, have, scale)
     loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(elements, n))
     level = Level(cells, elements, balanced.coefficients, look, stress.distance, loads)
     distance, loads = once_more(problem, displacement, wanted, level, degree, scale)
