@@ -19,6 +19,7 @@ from ...problem import Contact
 from .cells import Cells
 
 NOISE = 1e-14  # of a gap, relative to the displacements on both sides
+INSIDE = 1e-12  # parameters of vertices, as seen from a side
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
 NEAR = 1e-3  # of the shorter segment: vertices that face each other up to that are one
@@ -310,7 +311,8 @@ def facing_of(
     slots = side[~keep]
     away = side[~faces.reshape(-1, j).any(axis=1)]
     side, segment, s = side[keep], segment[every], s[every]
-    gap, d = found.gap[every].reshape(-1, j), found.direction[every].reshape(-1, j, 2)
+    gap = _with_ends(cells, displacement, pair, side, found.gap[every].reshape(-1, j))
+    d = found.direction[every].reshape(-1, j, 2)
     other, there = np.full(len(side), -1), np.zeros((len(side), j))
     if contact.primary is not None:
         place = found.s[every].reshape(-1, j)
@@ -338,6 +340,25 @@ def facing_of(
         after, bare = np.zeros_like(after), np.zeros_like(bare)
     kept = side, other, there, d, weight, gap, after, bare, closed, shares, away
     return Facing(pair, *kept, contact.bilateral)
+
+
+def _with_ends(
+    cells: Cells,
+    displacement: ng.CoefficientFunction,
+    pair: ContactState,
+    side: Index,
+    gap: Array,
+) -> Array:
+    """The `gap` (k, j) of sides (k,) as polynomials with its own values at their vertices.
+
+    Those that Gauss points continue to there are not the same on two sides of a narrow gap.
+    """
+    t = np.tile([INSIDE, 1 - INSIDE], len(side))
+    ends = met(cells.trace, displacement, pair, *cells.on_side(np.repeat(side, 2), t))
+    nodes = gap @ THROUGH.T
+    own = ends.faces.reshape(-1, 2)
+    nodes[:, [0, -1]] = np.where(own, ends.gap.reshape(-1, 2), nodes[:, [0, -1]])
+    return np.asarray(nodes @ lagrange(DATA, PLACES).T)
 
 
 def _continued(there: Array, own: Mask) -> Array:
