@@ -197,7 +197,7 @@ class Element(Triangles):
         return np.asarray(np.linalg.solve(self.root.transpose(0, 2, 1), self.g[..., None])[..., 0])
 
     def tractions(self, c: Array) -> Array:
-        """Moments (b, d) of the tractions of s with the multipliers, for coefficients `c` (b, m)."""
+        """Moments (b, d) of the tractions of s with the multipliers, by coefficients `c` (b, m)."""
         y = (self.root.transpose(0, 2, 1) @ c[..., None])[..., 0]
         return np.asarray(self.own + (self.N.transpose(0, 2, 1) @ y[..., None])[..., 0])
 

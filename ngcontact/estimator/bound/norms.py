@@ -69,9 +69,9 @@ def smallest_moduli(elements: Sequence[Element], n: int) -> Array:
 
 
 def residuals(cells: Cells, mu: Multipliers, left: Array, largest: float) -> Array:
-    """Largest moment `left` (d,) without balance on the sides of each triangle, (n,), dimensionless.
+    """Largest moment `left` (d,) without balance on the sides of each triangle, (n,).
 
-    It is divided by the diameter of the side's owner, the measure and the `largest` stress.
+    Dimensionless: over the diameter of the side's owner, the measure and the `largest` stress.
     """
     middle = cells.vertices[cells.ends].mean(axis=1)
     size = cells.diameters[cells.owner] * cells.trace.model.measure(middle) * (largest or 1.0)

@@ -30,17 +30,17 @@ SECOND = (2, 0), (1, 1), (0, 2)  # derivatives by (a, b)
 def products(degree: int) -> tuple[Index, Index]:
     """Degrees, (m,) each, in both coordinates of the products up to a total degree.
 
-    They rise in the first. Across a thin triangle, along its short base, those of degree 0 and 1 have no stress of the
-    large kind: combined with earlier ones alone they keep it so.
+    They rise in the first, along the base. Where that is short, second derivatives along it are
+    large: products of degree 0 and 1 have none, nor have their combinations with earlier ones.
     """
     i, j = np.array([(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]).T
     return i, j
 
 
 def legendre_table(degree: int, X: Array) -> list[Array]:
-    """Legendre's polynomials and their first two derivatives, (..., degree + 1) each, at `X` (...,).
+    """Legendre's polynomials and two derivatives, (..., degree + 1) each, at `X` (...,).
 
-    `X` is in [-1, 1].
+    `X` is from -1 to 1.
     """
     P: Array = np.asarray(legendre.legvander(X, degree))
     tables: list[Array] = [P]
@@ -119,7 +119,10 @@ def _second(p: Array, q: Array) -> Array:
 
 
 def derivatives(degree: int, local: Array, *orders: tuple[int, int]) -> list[Array]:
-    """The k `products` at `local` (..., 2), (..., k) each, derived by 2 a and 2 b as `orders` say."""
+    """Derivatives of the k `products` at `local` (..., 2), (..., k) each.
+
+    By 2 a and by 2 b as often as `orders` say.
+    """
     i, j = products(degree)
     a, b = (legendre_table(degree, 2 * local[..., c] - 1) for c in (0, 1))
     return [a[n][..., i] * b[m][..., j] for n, m in orders]
@@ -242,8 +245,8 @@ def scalars(degree: int, frame: Frame, x: Array) -> Array:
 def balancing(degree: int, frame: Frame, x: Array, force: Array, axial: bool) -> Array:
     """Stress (b, q, c) at `x` (b, q, 2) whose divergence is minus a polynomial force.
 
-    `force` (b, m, 2) are the coefficients of the force as of `projected`, for a `degree`. About an axis only the
-    axial part counts: s_zz = - int F_z dz.
+    `force` (b, m, 2) are the coefficients of the force as of `projected`, for a `degree`. About an
+    axis only the axial part counts: s_zz = - int F_z dz.
     """
     X = frame.scaled(x)
     i, j = products(degree)
