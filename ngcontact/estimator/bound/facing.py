@@ -47,7 +47,7 @@ def bernstein(degree: int, t: Array) -> Array:
 
 
 def directions(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
-    """Directions d (k, 2), unit vectors, at `s` (k,) of segments `segment` (k,) of the secondary."""
+    """Unit vectors d (k, 2) at `s` (k,) of segments `segment` (k,) of the secondary."""
     if contact.direction is None:
         return trace.exact_normal(segment, s)
     return np.tile(contact.direction, (len(segment), 1))
