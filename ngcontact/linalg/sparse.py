@@ -80,7 +80,10 @@ def congruent(
 
 
 def change_of_basis(A: sp.csr_array, T: sp.csr_array) -> sp.csr_array:
-    """T'AT - A of a symmetric `A` (n, n), where `T` (n, n) is the identity but for a few rows."""
+    """Change T'AT - A, (n, n), of a symmetric `A` (n, n).
+
+    `T` (n, n) is the identity but for a few rows.
+    """
     changed = _unlike_identity(T)
     each = np.arange(changed.size)
     ones = from_triplets(np.ones(changed.size), each, changed, (changed.size, T.shape[0]))

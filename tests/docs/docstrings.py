@@ -16,7 +16,7 @@ FUNCTION = ast.FunctionDef | ast.AsyncFunctionDef
 ARRAYS = {"NDArray", "ndarray", "ArrayLike", "sparray", "spmatrix", "csr_array", "csc_array"}
 
 # "(m, 2)", "(n,)", "(3 b, r)", "(k, order + 1)", but not "(x, y)" nor "(Judice, Pires 1994)".
-_TERM = r"(?:\d+|\d*\s?(?:[a-wA-Z]|ne|nv|dim|(?:geometry_)?order)(?!\w))"
+_TERM = r"(?:\d+|\d*\s?(?:[a-wA-Z]|ne|nv|dim|(?:geometry_)?order|degree)(?!\w))"
 _DIMENSION = rf"(?:\.\.\.|{_TERM}(?:\s?[-+*]\s?{_TERM})*)"
 SHAPE = re.compile(rf"\({_DIMENSION},(?:\s{_DIMENSION},)*(?:\s{_DIMENSION})?\)")
 _SECTION = re.compile(r"^(\w[\w ]*)\n-+$", re.MULTILINE)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from importlib import import_module
 from importlib.util import find_spec
+from typing import get_type_hints
 
 
 def resolved(name: str) -> object:
     """Module, function, class or attribute of `ngcontact` by its dotted name below it.
+
+    What follows a property is a name of the class that the property gives.
 
     Raises
     ------
@@ -16,6 +19,8 @@ def resolved(name: str) -> object:
     """
     found: object = import_module("ngcontact")
     for part in name.split("."):
+        if isinstance(found, property):
+            found = get_type_hints(found.fget)["return"]
         module = f"{getattr(found, '__name__', '')}.{part}"
         if hasattr(found, "__path__") and find_spec(module):
             found = import_module(module)

@@ -223,7 +223,9 @@ def test_sections_and_entries():
     ]
 
 
-@pytest.mark.parametrize("text", ["(m,)", "(m, 2)", "(3 b, r)", "(k, order + 1)", "(2N, 2n)"])
+@pytest.mark.parametrize(
+    "text", ["(m,)", "(m, 2)", "(3 b, r)", "(k, order + 1)", "(..., degree + 1)", "(2N, 2n)"]
+)
 def test_shapes(text):
     assert SHAPE.fullmatch(text)
 

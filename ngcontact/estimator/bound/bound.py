@@ -126,8 +126,13 @@ def error_bound(
 
     Parameters
     ----------
-    problem, trace, displacement, pairs
-        See `Estimator`.
+    problem : Problem
+    trace : BoundaryTrace
+        The boundary of its mesh.
+    displacement : ng.GridFunction
+        u_h, lengths.
+    pairs : sequence of ContactState
+        Contact of u_h, one for each pair of the problem.
 
     Raises
     ------
@@ -271,18 +276,21 @@ def _summed(
 
 
 def work_on_gap(facing: Facing, pressure: Array, gap: Array) -> float:
-    """Integral of a pressure (k, j) in Bernstein polynomials times a gap at Gauss points."""
+    """Integral of a pressure on a line times a gap, an energy per thickness.
+
+    `pressure` (k, n) has Bernstein coefficients on its k sides, `gap` (k, j) lengths at `PLACES`.
+    """
     density = pressure @ bernstein(pressure.shape[1] - 1, PLACES).T * facing.weight
     return float((density * gap).sum())
 
 
 def _stiffest(elements: Sequence[Element]) -> float:
-    """The largest modulus, of stresses in place of its inverse, C^-1."""
+    """The largest modulus, a stress: one over the least diagonal entry of C^-1."""
     return max(1 / float(np.diagonal(e.compliance, axis1=-2, axis2=-1).min()) for e in elements)
 
 
 def _share(problem: Problem, cells: Cells, pair: ContactState) -> float:
-    """Of the lifting, that the secondary takes: by compliance."""
+    """The share of r that the secondary takes: by compliance."""
     sizes = []
     for segments in (pair.line.segments, pair.line.facing):
         at = cells.owner[np.isin(cells.segment, segments)][:1]
@@ -293,6 +301,6 @@ def _share(problem: Problem, cells: Cells, pair: ContactState) -> float:
 
 
 def _size(trace: BoundaryTrace, displacement: ng.GridFunction) -> float:
-    """The largest displacement at a vertex of the boundary."""
+    """The largest displacement at a vertex of the boundary, a length."""
     every = np.arange(len(trace.region))
     return float(np.abs(trace.evaluate(displacement, every, np.zeros(len(every)))).max())

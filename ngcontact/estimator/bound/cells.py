@@ -99,27 +99,27 @@ class Cells:
 
     @property
     def bodies(self) -> Index:
-        """Material region number (n,)."""
+        """Numbers (n,) of the material regions."""
         return Triangulation(self.trace.mesh).bodies[self.parent]
 
     def on_side(self, side: Index, t: Array) -> tuple[Index, Array]:
-        """Segment (k,) and parameter s (k,) of places `t` (k,) on boundary sides (k,)."""
+        """Segment (k,) and parameter s (k,) of places `t` (k,) on boundary sides `side` (k,)."""
         a, b = self.span[side].T
         return self.segment[side], a + (b - a) * t
 
     def side_at(self, segment: Index, s: Array) -> Index:
-        """Sides (k,) that hold the places `s` (k,) of boundary segments (k,)."""
+        """Sides (k,) that hold the places `s` (k,) of boundary segments `segment` (k,)."""
         order = np.lexsort((self.span.min(axis=1), self.segment))
         key = 4.0 * self.segment[order] + self.span[order].min(axis=1)
         return order[np.searchsorted(key, 4.0 * segment + s, side="right") - 1]
 
     def own_parameter(self, side: Index, s: Array) -> Array:
-        """T (k, j) of places `s` (k, j) of the segments of sides (k,)."""
+        """Parameters t (k, j) on sides `side` (k,) of places `s` (k, j) of their segments."""
         a, b = self.span[side, 0, None], self.span[side, 1, None]
         return np.asarray((s - a) / (b - a))
 
     def points(self, side: Index, t: Array) -> tuple[Array, Array]:
-        """Points (k, 2) and derivatives by t (k, 2) at `t` (k,) of sides `side` (k,)."""
+        """Points (k, 2) and derivatives by t (k, 2) at `t` (k,) of sides `side` (k,), lengths."""
         a, b = self.vertices[self.ends[side, 0]], self.vertices[self.ends[side, 1]]
         x, dx = a + t[:, None] * (b - a), b - a
         bent = np.flatnonzero(self.bent[side])
@@ -138,7 +138,7 @@ class Cells:
         return bent
 
     def evaluate(self, function: ng.CoefficientFunction, at: Index, reference: Array) -> Array:
-        """Values (k, dim) in triangles `at` (k,) at the parents' `reference` places (k, 2)."""
+        """Values (k, dim) in triangles `at` (k,) at places `reference` (k, 2) of their parents."""
         points = self._middles[self.parent[at]]
         points["x"], points["y"] = reference.T
         return np.asarray(function(points)).reshape(len(at), function.dim)
@@ -197,7 +197,7 @@ class Places:
     local: Array
 
     def evaluate(self, cells: Cells, function: ng.CoefficientFunction) -> Array:
-        """Values (b, q, dim)."""
+        """Values (b, q, dim) of a function at the points."""
         b, q = self.weight.shape
         flat = self.reference.reshape(-1, 2)
         return cells.evaluate(function, np.repeat(self.at, q), flat).reshape(b, q, -1)
@@ -207,6 +207,11 @@ def places(cells: Cells, at: Index, order: int) -> Places:
     """Quadrature of degree `order` in triangles `at` (b,), all straight or all with a curved base.
 
     Towards a curved base points lie on straight lines from the apex.
+
+    Raises
+    ------
+    ContactError
+        A curved side goes beyond the middle of its element.
     """
     corners = cells.corners[at]
     if len(at) and cells.curved[at[0]]:
@@ -291,7 +296,21 @@ def joined(
     spans: Array,
     curved: Mask,
 ) -> Cells:
-    """Cells of which segments `own` (n, 3) and `spans` (n, 3, 2) at sides are known."""
+    """Cells of triangles whose sides are known to lie on segments, or inside.
+
+    Parameters
+    ----------
+    vertices : ndarray (nv, 2)
+    triangles : ndarray of int (n, 3)
+        Side 0 is the curved one where there is one; else the shortest becomes side 0.
+    reference : ndarray (n, 3, 2)
+    parent : ndarray of int (n,)
+    own : ndarray of int (n, 3)
+        Segment that each side is part of, -1 inside of elements.
+    spans : ndarray (n, 3, 2)
+        Parameters s on it where the side begins and ends, anticlockwise.
+    curved : ndarray of bool (n,)
+    """
     shortest = np.where(curved, 0, _lengths(vertices[triangles]).argmin(axis=1))
     roll = (shortest[:, None] + np.arange(3)) % 3
     triangles, own = (np.take_along_axis(x, roll, axis=1) for x in (triangles, own))
@@ -416,7 +435,10 @@ class _Parts:
         return list(range(first, first + len(x)))
 
     def divide(self, e: int, base: int | None) -> None:
-        """Triangles between side `base` of element `e` and its apex; of all, and the middle."""
+        """Add the triangles between side `base` of element `e` and its apex.
+
+        Without a base those between all sides and the middle.
+        """
         old, segment = self.view.triangles[e], self.segment[e]
         if base is None:
             (apex,), at = self._added(self.view.vertices[old].mean(axis=0)[None]), np.full(2, 1 / 3)

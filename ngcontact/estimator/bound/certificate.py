@@ -22,7 +22,7 @@ STRAIGHT = 1e-12  # difference of unit vectors that are one: round-off
 
 
 def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
-    """All arrays by name; docs/bounds.md says what they are.
+    """All arrays by name; docs/bounds.md says what each is, with its shape, as (n, 3).
 
     Raises
     ------
@@ -101,6 +101,7 @@ def _sides(proof: Proof) -> dict[str, np.ndarray]:
 
 
 def _boundary(cells: Cells) -> Index:
+    """Sides (k,) of one triangle only."""
     return np.flatnonzero(~cells.inner)
 
 

@@ -11,8 +11,9 @@ in the norm of C^-1, and the tractions of s are N'A^-1 N mu + N'A^-1 g + <s_p n,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import ngsolve as ng
 import numpy as np
@@ -46,16 +47,18 @@ ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
 BLOCK = 4000  # triangles at once: bounds the memory
 SMALL_BLOCK = 500  # ... where each has a table of its own
 
+Value = TypeVar("Value")
+
 
 def traces(degree: int, t: Array) -> Array:
-    """Orthonormal polynomials (..., degree + 1) on sides, at t (...) in [0, 1]."""
+    """Orthonormal polynomials (..., degree + 1) on sides at `t` (...,), from 0 to 1."""
     values = legendre.legvander(2 * t - 1, degree)
     return np.asarray(values * np.sqrt(2 * np.arange(degree + 1) + 1))
 
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """b triangles of one kind, with stresses of one degree.
+    """b triangles of one kind, with stresses of one degree and v Voigt components.
 
     Attributes
     ----------
@@ -69,8 +72,8 @@ class Triangles:
         Whether the base of each is curved; whether the model is axisymmetric.
     on_axis : bool
         Whether a side of each lies on the axis.
-    compliance : ndarray (b or 1, q or 1, v, v)
-        C^-1.
+    compliance : ndarray (b, q, v, v)
+        C^-1, one over a stress; (1, 1, v, v) where it is one matrix for all.
     """
 
     places: Places
@@ -89,7 +92,7 @@ class Triangles:
 
     @property
     def local(self) -> Array:
-        """The quadrature points in the frame, (q, 2), or (b, q, 2) of curved triangles."""
+        """The quadrature points in `frame`, (q, 2), or (b, q, 2) of curved triangles."""
         return self.frame.local(self.places.x) if self.curved else in_frame(self.places.local)
 
     @property
@@ -98,16 +101,22 @@ class Triangles:
         return max(0, self.degree - 1 - self.axial)
 
     def basis(self, x: Array, local: Array) -> Array:
-        """T (b, q, v, m) at points `x` (b, q, 2), `local` in the frame."""
+        """T (b, q, v, m) at points `x` (b, q, 2), which are `local` (b, q, 2) in `frame`.
+
+        Or (q, 2), where that is the same for all.
+        """
         return stresses(self.degree, self.frame, x, local, self.axial, self.on_axis)
 
     def balancing(self, x: Array, force: Array, some: Index | slice = slice(None)) -> Array:
-        """Stresses s_p (b, q, v) at points `x` (b, q, 2), without radial forces."""
+        """Stresses s_p (b, q, v) at `x` (b, q, 2) in `some` (b,) of n triangles, or in all.
+
+        `force` (n, j, 2) is as of `Element`; radial forces are left out.
+        """
         frame = self.frame[some]
         return balancing(self.force_degree, frame, x, force[some], self.axial)
 
     def tested(self, strain: Array) -> Array:
-        """(T, strain), (b, m), of strains (b, q, v)."""
+        """Products (T, e), shape (b, m), with strains e, `strain` (b, q, v)."""
         local, b = self.local, len(strain)
         strain = self.weight[..., None] * strain
         if self.alike:
@@ -119,7 +128,7 @@ class Triangles:
         return np.asarray((strain.reshape(b, 1, -1) @ T)[:, 0])
 
     def squared(self) -> Array:
-        """A (b, m, m)."""
+        """Products A = (T, T), shape (b, m, m)."""
         b, local = len(self.weight), self.local
         if self.alike:
             table = bending(self.degree, local)
@@ -179,21 +188,21 @@ class Element(Triangles):
     dofs: Index
 
     def answer(self, mu: Array) -> Array:
-        """Change of c (b, m) with all multipliers, by `mu` (k,)."""
+        """A^-1 N mu (b, m): what all multipliers of the mesh, `mu` (k,), add to c."""
         y = np.einsum("bmd,bd->bm", self.N, mu[self.dofs])
         return np.asarray(np.linalg.solve(self.root.transpose(0, 2, 1), y[..., None])[..., 0])
 
     def alone(self) -> Array:
-        """Coefficients c (b, m) without multipliers."""
+        """A^-1 g (b, m): the coefficients c without multipliers."""
         return np.asarray(np.linalg.solve(self.root.transpose(0, 2, 1), self.g[..., None])[..., 0])
 
     def tractions(self, c: Array) -> Array:
-        """Moments (b, d) of the tractions of s with coefficients `c` (b, m)."""
+        """Moments (b, d) of the tractions of s with the multipliers, by coefficients `c` (b, m)."""
         y = (self.root.transpose(0, 2, 1) @ c[..., None])[..., 0]
         return np.asarray(self.own + (self.N.transpose(0, 2, 1) @ y[..., None])[..., 0])
 
     def of_strain(self, strain: Array) -> Element:
-        """The same triangles for another displacement, strains (b, q, v), without body forces."""
+        """The same triangles for a displacement of `strain` (b, q, v), without body forces."""
         g = np.linalg.solve(self.root, self.tested(strain)[..., None])
         return replace(
             self,
@@ -207,20 +216,29 @@ class Element(Triangles):
         )
 
     def whole_stress(self, c: Array) -> Array:
-        """Stresses (b, q, v) at the quadrature points, with the hoop's part of radial forces."""
+        """Stresses (b, q, v) at the quadrature points for coefficients `c` (b, m).
+
+        With the hoop's part of radial forces.
+        """
         s = self._stress(c, self.places.x, self.local, slice(None))
         if self.axial:
             s[..., 2] += self.radial
         return s
 
     def radial_at(self, cells: Cells, at: Index, reference: Array) -> Array:
-        """Radial force times r, (k,), in triangles (k,) at reference places (k, 2)."""
+        """Radial force times r, (k,), in triangles `at` (k,) of `cells`, about an axis.
+
+        `reference` (k, 2) are the places in the parents; units of stress.
+        """
         if self.source is None:
             return np.zeros(len(at))
         return cells.evaluate(ng.x * self.source[0], at, reference)[:, 0]
 
     def stress(self, c: Array, x: Array, some: Index | slice = slice(None)) -> Array:
-        """Stresses (b, q, v) at `x` (b, q, 2) for coefficients `c` (b, m), radial forces apart."""
+        """Stresses (b, q, v) at `x` (b, q, 2) in `some` (b,) of the n triangles, or in all.
+
+        `c` (n, m) are the coefficients in all; the hoop's part of radial forces is left out.
+        """
         return self._stress(c[some], x, self.frame[some].local(x), some)
 
     def _stress(self, c: Array, x: Array, local: Array, some: Index | slice) -> Array:
@@ -235,21 +253,26 @@ class Element(Triangles):
 
 @dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Numbers of the multipliers: on each of e sides (x, y) by polynomials of its degree.
+    """Numbers of the multipliers: on each of e sides those of mu_x, then those of mu_y.
 
-    `degree` (e,), `start` (e + 1,): those of side i are start[i], ..., start[i + 1] - 1.
+    Attributes
+    ----------
+    degree : ndarray of int (e,)
+        Of their polynomials, `traces`.
+    start : ndarray of int (e + 1,)
+        Those of side i are start[i], ..., start[i + 1] - 1.
     """
 
     degree: Index
     start: Index
 
     def of(self, side: int) -> Index:
-        """All of one side."""
+        """The k multipliers of one side, (k,)."""
         return np.arange(self.start[side], self.start[side + 1])
 
 
 def turning(problem: Problem, cells: Cells) -> Mask:
-    """Triangles (n,) beside contact along normals of a curve that are not those of the mesh."""
+    """Whether triangles (n,) lie beside contact along normals that are not those of the mesh."""
     pairs = [pair for pair in problem.contact if pair.direction is None]
     names = [name for pair in pairs for name in (pair.secondary, pair.primary)]
     side = np.flatnonzero(np.isin(cells.segment, cells.trace.segments(*names)))
@@ -265,7 +288,7 @@ def multipliers(
 ) -> tuple[Index, Multipliers]:
     """Degree (n,) of the stress in each triangle, and the multipliers that it asks for.
 
-    It is higher beside curves, and where directions are `turned` (n,).
+    It is `degree`, and higher at curved sides and where directions are `turned` (n,).
     """
     own = np.where(cells.curved | turned, degree + ON_CURVES, degree)
     of_side = np.zeros(len(cells.ends), dtype=np.intp)
@@ -275,7 +298,10 @@ def multipliers(
 
 
 def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
-    """Multipliers (d, r) of rigid motions, of size 1, that vanish where they are `fixed` (d,)."""
+    """Multipliers (d, r) of the r rigid motions that vanish where they are `fixed` (d,).
+
+    Motions are those of bodies, translations of size 1 and turns about their middles.
+    """
     trace = cells.trace
     bodies = connected_bodies(trace)
     corner = Triangulation(trace.mesh).triangles[cells.parent[cells.owner], 0]
@@ -303,10 +329,20 @@ def elements_of(
     degree: int,
     look: Index,
 ) -> tuple[Multipliers, list[Element]]:
-    """The condensed triangles of a solution, and their multipliers.
+    """The condensed triangles of a solution, in groups of one kind, and their multipliers.
 
-    `look` (n, 3) says by what order rules integrate forces, and on parts of what depth,
-    with thirds at corners or not.
+    Parameters
+    ----------
+    degree : int
+        Of stresses on triangles with straight sides.
+    look : ndarray of int (n, 3)
+        How forces are integrated: order of the rules, depth of the parts that these are on, and
+        whether parts at corners are in thirds; see `looked_at`.
+
+    Raises
+    ------
+    ContactError
+        No equilibrated stress.
     """
     own, mu = multipliers(cells, degree, turning(problem, cells))
     at_axis = np.asarray(cells.trace.model.on_axis(cells.vertices))
@@ -336,7 +372,7 @@ def elements_of(
 
 
 def _varying(problem: Problem, cells: Cells) -> Mask:
-    """Triangles (n,) whose law varies in them."""
+    """Whether the law varies in triangles (n,)."""
     mesh = cells.trace.mesh
     flags = np.zeros(len(mesh.GetMaterials()), dtype=bool)
     for pattern, law in problem.materials.items():
@@ -344,33 +380,25 @@ def _varying(problem: Problem, cells: Cells) -> Mask:
     return np.asarray(flags[cells.bodies])
 
 
-def law_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunction:
-    """The law of a body, (v, v)."""
+def _of_body(values: Mapping[str, Value], cells: Cells, body: int) -> Value | None:
+    """What is given for a body by a pattern of its name; None if nothing is."""
     mesh = cells.trace.mesh
-    for pattern, law in problem.materials.items():
-        if mesh.Materials(pattern).Mask()[body]:
-            return law.voigt(problem.model)
-    raise AssertionError
+    masks = ((mesh.Materials(pattern).Mask(), value) for pattern, value in values.items())
+    return next((value for mask, value in masks if mask[body]), None)
 
 
 def compliance_at(problem: Problem, cells: Cells, points: Places) -> Array:
     """C^-1 at places of one body, (b, q, v, v) or, of a law of numbers, (1, 1, v, v)."""
     at = points.at
-    law = law_of(problem, cells, int(cells.bodies[at[0]]))
+    law = _of_body(problem.materials, cells, int(cells.bodies[at[0]]))
+    assert law is not None
+    C = law.voigt(problem.model)
     if _varying(problem, cells)[at[0]]:
-        C = points.evaluate(cells, law)
+        C = points.evaluate(cells, C)
     else:
-        C = cells.evaluate(law, at[:1], np.full((1, 2), 1 / 3))[None]
+        C = cells.evaluate(C, at[:1], np.full((1, 2), 1 / 3))[None]
     v = round(C.shape[-1] ** 0.5)
     return np.asarray(np.linalg.inv(C.reshape(*C.shape[:2], v, v)))
-
-
-def _force_of(problem: Problem, cells: Cells, body: int) -> ng.CoefficientFunction | None:
-    mesh = cells.trace.mesh
-    for pattern, force in problem.force.items():
-        if mesh.Materials(pattern).Mask()[body]:
-            return ng.CF(force)
-    return None
 
 
 def _element(
@@ -383,7 +411,7 @@ def _element(
     on_axis: bool,
     look: Sequence[int],
 ) -> Element:
-    """Triangles `at` (b,), condensed."""
+    """Triangles `at` (b,) of one kind, condensed; `look` as of `elements_of`."""
     model = model_of(problem)
     axial = model.extent > 0
     curved, varying = bool(cells.curved[at[0]]), bool(_varying(problem, cells)[at[0]])
@@ -400,7 +428,8 @@ def _element(
         compliance=compliance_at(problem, cells, points),
     )
     strain = points.evaluate(cells, model.strain(displacement))
-    source = _force_of(problem, cells, int(cells.bodies[at[0]]))
+    given = _of_body(problem.force, cells, int(cells.bodies[at[0]]))
+    source = None if given is None else ng.CF(given)
     force, radial, missed = _forces(source, cells, kind, look)
     rest = strain
     if force.any() or radial.any():
@@ -437,7 +466,7 @@ def _element(
 
 
 def _cholesky(A: Array) -> Array:
-    """Of matrices (b, m, m) with unit diagonals that are definite but for round-off.
+    """Factors L of matrices `A` (b, m, m) of unit diagonal that are definite but for round-off.
 
     What is added to A changes which stress is the nearest, not its equilibrium.
     """
@@ -453,7 +482,7 @@ def _cholesky(A: Array) -> Array:
 
 
 def _moments(cells: Cells, mu: Multipliers, kind: Triangles, force: Array) -> tuple[Array, Array]:
-    """N (b, m, d), and the moments (b, d) of s_p n for coefficients of a body force."""
+    """N (b, m, d), and the moments (b, d) of s_p n for the coefficients `force` (b, j, 2)."""
     at, loaded, found, given = kind.places.at, force.any(), [], []
     for i in range(3):
         side, back = cells.sides[at, i], cells.backward[at, i]
@@ -506,7 +535,7 @@ def _tractions(T: Array, normal: Array, chi: Array) -> Array:
 def _forces(
     source: ng.CoefficientFunction | None, cells: Cells, kind: Triangles, look: Sequence[int]
 ) -> tuple[Array, Array, Array]:
-    """Coefficients of the force that is balanced, r F_r, and the norm of the rest."""
+    """`Element.force`, `.radial` and `.missed`."""
     points, n = kind.places, kind.force_degree
     b, q = points.weight.shape
     radial = np.zeros((b, q))

@@ -34,18 +34,21 @@ SAMPLES = 200  # places on a segment among which the last zero of the gap is sou
 
 
 def at_places(shapes: Callable[[int, Array], Array], t: Array) -> Array:
-    """Polynomials (k, j, DATA + 1) of Gauss-Lobatto points, or their derivatives, at t (k, j)."""
+    """Lagrange's polynomials of Gauss-Lobatto points, or their derivatives, at `t` (k, j).
+
+    There are DATA + 1 = m of them, (k, j, m); `shapes` is `lagrange` or `lagrange_derivative`.
+    """
     return shapes(DATA, t.ravel()).reshape(*t.shape, -1)
 
 
 def bernstein(degree: int, t: Array) -> Array:
-    """Bernstein polynomials (..., degree + 1) at `t` (...)."""
+    """Bernstein polynomials (..., degree + 1) at `t` (...,), from 0 to 1."""
     i = np.arange(degree + 1)
     return np.asarray(comb(degree, i) * t[..., None] ** i * (1 - t[..., None]) ** (degree - i))
 
 
 def directions(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
-    """D (k, 2) at `s` (k,) of segments `segment` (k,) of the secondary."""
+    """Unit vectors d (k, 2) at `s` (k,) of segments `segment` (k,) of the secondary."""
     if contact.direction is None:
         return trace.exact_normal(segment, s)
     return np.tile(contact.direction, (len(segment), 1))
@@ -53,9 +56,20 @@ def directions(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array)
 
 @dataclass(frozen=True, eq=False)
 class Met:
-    """k places of a secondary and what they meet: lengths, and the primary's place (-1: none).
+    """What k places of a secondary meet.
 
-    `faces` (k,) says whether they face the other body or the obstacle.
+    Attributes
+    ----------
+    gap : ndarray (k,)
+        Of u_h, lengths.
+    direction : ndarray (k, 2)
+        d, unit vectors.
+    segment : ndarray of int (k,)
+        Of the primary, -1 where none is met.
+    s : ndarray (k,)
+        Parameters on these.
+    faces : ndarray of bool (k,)
+        Whether the places face the other body or the obstacle.
     """
 
     gap: Array
@@ -72,7 +86,7 @@ def met(
     segment: Index,
     s: Array,
 ) -> Met:
-    """The gap of u_h, d and the partner at `s` (k,) of segments `segment` (k,)."""
+    """What `s` (k,) of the secondary's segments `segment` (k,) meet, with the gap of u_h."""
     line, contact = pair.line, pair.line.contact
     x, d = trace.point(segment, s), directions(trace, contact, segment, s)
     other, place, gap, _ = partners(trace, line.facing, segment, x, d)
@@ -135,7 +149,7 @@ def reach_of(
 def cuts_of(
     trace: BoundaryTrace, reaches: Sequence[Reach], more: Sequence[float] = ()
 ) -> dict[int, Array]:
-    """Places s of vertices to come, by segment: ends of contact, opposite vertices.
+    """Rising places s, (j,), of vertices to come, by segment: ends of contact, opposite vertices.
 
     And `more` on each segment of a reach. Vertices that all but face each other are one.
     """
@@ -274,7 +288,10 @@ class Facing:
         return np.abs(1 / np.einsum("kji,il,kl->kj", slopes, THROUGH, self.there))
 
     def on_primary(self, values: Array) -> Array:
-        """Functions (k, j, c) of the secondary's t at the Gauss points of the primary's sides."""
+        """Functions (k, j, c) at the Gauss points of the primary's sides.
+
+        `values` (k, j, c) are those at the secondary's.
+        """
         return np.einsum("kji,il,klc->kjc", at_places(lagrange, self.back), THROUGH, values)
 
     @property
@@ -294,8 +311,13 @@ def facing_of(
 ) -> Facing:
     """What of a pair's reach faces, and the gap after a lifting of `degree`.
 
-    The secondary takes a `share` of that, but for vertices that cannot move along d; `held` (nv, 2,
-    2) are the projections of motions of all vertices on those that are prescribed.
+    The secondary takes a `share` of that, but for vertices that cannot move along d; `held`
+    (nv, 2, 2) are the projections of `held_motions`.
+
+    Raises
+    ------
+    ContactError
+        Bodies overlap where a side faces the other body in part.
     """
     pair, trace = reach.pair, cells.trace
     line, contact = pair.line, pair.line.contact
@@ -371,9 +393,14 @@ def _continued(there: Array, own: Mask) -> Array:
 
 
 def held_motions(cells: Cells, sides: Sequence[Index], directions: Sequence[Array]) -> Array:
-    """Projections (nv, 2, 2) of vertices' motions on those that sides (k,) hold.
+    """Projections (nv, 2, 2) of motions of all vertices on those that conditions prescribe.
 
-    They hold motions along `directions` (k, j, 2), from end to end.
+    Parameters
+    ----------
+    sides : sequence of ndarray of int (k,)
+        Of each condition.
+    directions : sequence of ndarray (k, j, 2)
+        Along which it prescribes motions, at j points from t = 0 to t = 1.
     """
     M = np.zeros((len(cells.vertices), 2, 2))
     for side, direction in zip(sides, directions, strict=True):
@@ -429,7 +456,10 @@ def _shares(
 def guides_of(
     cells: Cells, displacement: ng.CoefficientFunction, side: Index, degree: int
 ) -> Facing:
-    """Sides (k,) of Gamma_0, as bilateral contact with an obstacle without a gap."""
+    """Sides `side` (k,) of Gamma_0, as bilateral contact with an obstacle without a gap.
+
+    `degree` is that of w.
+    """
     k, j = len(side), len(PLACES)
     every, t = np.repeat(side, j), np.tile(PLACES, k)
     segment, s = cells.on_side(every, t)

@@ -63,12 +63,17 @@ def once_more(
     scale: float,
     allowed: float | None = None,
 ) -> tuple[Array, Array]:
-    """`Level.distance` and `.loads` of the better of both stresses on each triangle.
+    """`Level.distance` and `.loads`, (n,) each, of the better of both stresses on each triangle.
 
     Parameters
     ----------
+    problem : Problem
+    displacement : CoefficientFunction
+        u_h.
     wanted : Requested
         Tractions on the boundary.
+    level : Level
+        The stress in equilibrium so far.
     degree : int
         Of stresses on straight triangles.
     scale : float

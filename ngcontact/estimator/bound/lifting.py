@@ -35,7 +35,16 @@ INCONSISTENT = 1e-9  # of what is asked for at a vertex, relative to it
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """d.w on k sides: `direction` (k, j, 2) and `amount` (k, j) at j Gauss-Lobatto points."""
+    """d.w on k sides, at j Gauss-Lobatto points.
+
+    Attributes
+    ----------
+    side : ndarray of int (k,)
+    direction : ndarray (k, j, 2)
+        d.
+    amount : ndarray (k, j)
+        d.w, lengths.
+    """
 
     side: Index
     direction: Array
@@ -63,7 +72,10 @@ def asked_on_supports(
 
 
 def asked_on_line(facing: Facing, r: Array, alone: bool) -> list[Asked]:
-    """-r (k, j) on the secondary and r on the primary, by shares, or on the secondary `alone`."""
+    """What opens the gap of a line by `r` (k, j), lengths at Gauss points.
+
+    d.w = -r on the secondary and r on the primary by shares, or all on the secondary `alone`.
+    """
     start, stop = np.ones((2, len(facing.side), 1)) if alone else facing.share.T[:, :, None]
     share = start + (stop - start) * PLACES
     d = np.einsum("ij,kjc->kic", THROUGH, facing.direction)
@@ -83,9 +95,25 @@ def lifted(
     degree: int,
     extent: float,
 ) -> Array:
-    """Norms (n,) of w, with r (k, j) on each line; on secondaries alone where vertices disagree.
+    """Norms (n,) of w, roots of energies per thickness, shared by both bodies of each line.
 
-    See `lifting_of`.
+    On secondaries alone where conditions at a vertex disagree.
+
+    Parameters
+    ----------
+    asked : sequence of Asked
+        On supports.
+    lines : sequence of (Facing, ndarray (k, j))
+        Each line and its r, lengths at Gauss points.
+    degree : int
+        Of w.
+    extent : float
+        Size of displacements and gaps, a length, beside which round-off is told.
+
+    Raises
+    ------
+    ContactError
+        Conditions disagree on secondaries alone, too.
     """
     away = np.concatenate([np.zeros(0, dtype=np.intp), *(facing.away for facing, _ in lines)])
     for alone in (False, True):
@@ -106,9 +134,14 @@ def lifting_of(
     extent: float,
     away: Sequence[int] | Index = (),
 ) -> Array:
-    """Energy norms (n,) of w, of a degree, for displacements and gaps of a size `extent`.
+    """Norms (n,) of w, of a `degree`, with all that is asked for; see `lifted`.
 
     Sides `away` (r,) of Gamma_K face nothing, and may move.
+
+    Raises
+    ------
+    ContactError
+        Conditions at a vertex ask for different displacements.
     """
     norms = np.zeros(len(cells.triangles))
     needed = [
@@ -172,13 +205,14 @@ class _Nodes:
 
 
 def _values(degree: int, local: Array) -> Array:
+    """The m products of Legendre's polynomials at `local` (..., 2): (..., m)."""
     a, b = (legendre_table(degree, 2 * local[..., c] - 1)[0] for c in (0, 1))
     i, j = products(degree)
     return np.asarray(a[..., i] * b[..., j])
 
 
 def _gradients(degree: int, local: Array) -> Array:
-    """By (a, b): (..., m, 2)."""
+    """Their derivatives by (a, b): (..., m, 2)."""
     a, b = (legendre_table(degree, 2 * local[..., c] - 1) for c in (0, 1))
     i, j = products(degree)
     return 2 * np.stack([a[1][..., i] * b[0][..., j], a[0][..., i] * b[1][..., j]], axis=-1)
@@ -325,15 +359,17 @@ def _strains(gradient: Array, shape: Array, x: Array, extent: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _Remainders:
-    """What of d.w is no polynomial: vectors rho (b, 3, DATA + 1, 2) on sides of b triangles.
+    """What of d.w is no polynomial of the nodes, on sides of b triangles.
 
-    At Gauss-Lobatto points of the triangle's own sense; `reached` (b,) says where.
+    `rho` (b, 3, DATA + 1, 2) are vectors at Gauss-Lobatto points, anticlockwise; `reached` (b,)
+    says where they are not 0.
     """
 
     rho: Array
     reached: Mask
 
     def strains(self, some: Index, points: Places, into: Array, extent: int) -> Array:
+        """Voigt strains (k, q, v) at points of triangles `some` (k,), `into` as of `_operators`."""
         b, q = points.weight.shape
         share = np.column_stack([1 - points.local.sum(axis=1), points.local])
         slope = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])  # of the shares by (a, b)

@@ -1,4 +1,4 @@
-"""Norms of stresses and residuals over triangles."""
+"""Norms of stresses, forces and residuals by triangles."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ SETTLED = 1e-10  # residual of equilibrium, relative to the largest stress
 
 @dataclass(frozen=True, eq=False)
 class StressNorms:
-    """Of a stress s on n triangles, beside that of a displacement.
+    """A stress s on n triangles, beside that of a displacement of strain e.
 
     Attributes
     ----------
     distance : ndarray (n,)
-        |s - C e|, roots of energies.
+        |s - C e|, roots of energies per thickness.
     largest : float
         Largest component of s, a stress.
     """
@@ -31,7 +31,13 @@ class StressNorms:
 
 
 def stress_norms(elements: Sequence[Element], coefficients: Sequence[Array], n: int) -> StressNorms:
-    """Norms of a stress on the n triangles of `elements`."""
+    """Norms of a stress on the n triangles of `elements`.
+
+    Parameters
+    ----------
+    coefficients : sequence of ndarray (b, m)
+        Of the stress on the triangles of each element.
+    """
     distance, largest = np.zeros(n), 0.0
     for e, c in zip(elements, coefficients, strict=True):
         s = e.whole_stress(c)
@@ -44,7 +50,7 @@ def stress_norms(elements: Sequence[Element], coefficients: Sequence[Array], n: 
 
 
 def forces_missed(elements: Sequence[Element], n: int) -> Array:
-    """Norms (n,) of body forces that stresses do not balance."""
+    """`Element.missed` (n,) of all triangles: L2 norms of forces that stresses do not balance."""
     missed = np.zeros(n)
     for e in elements:
         missed[e.places.at] = e.missed
@@ -52,7 +58,7 @@ def forces_missed(elements: Sequence[Element], n: int) -> Array:
 
 
 def smallest_moduli(elements: Sequence[Element], n: int) -> Array:
-    """Smallest eigenvalue (n,) of C in Mandel's scaling."""
+    """Smallest eigenvalue (n,) of C in Mandel's scaling, a stress."""
     found = np.zeros(n)
     for e in elements:
         mandel = np.ones(e.compliance.shape[-1])
@@ -63,9 +69,9 @@ def smallest_moduli(elements: Sequence[Element], n: int) -> Array:
 
 
 def residuals(cells: Cells, mu: Multipliers, left: Array, largest: float) -> Array:
-    """Largest force `left` (d,) on the sides of each triangle, (n,).
+    """Largest moment `left` (d,) without balance on the sides of each triangle, (n,).
 
-    Over the diameter of a side's owner, its measure and the largest stress.
+    Dimensionless: over the diameter of the side's owner, the measure and the `largest` stress.
     """
     middle = cells.vertices[cells.ends].mean(axis=1)
     size = cells.diameters[cells.owner] * cells.trace.model.measure(middle) * (largest or 1.0)

@@ -109,7 +109,8 @@ def looked_at(
 ) -> tuple[Array, Array, Array]:
     """Points (b, q, 2), weights (b, q) and values (b, q, dim) of F in triangles `at` (b,).
 
-    All are straight or have a curved base; a rule of an `order` on them, divided `depth` times.
+    All are straight, or all have a curved base. The rule is of an `order` on each of their parts:
+    they are divided `depth` times by `pattern`, with `thirds` at corners or not.
     """
     if depth == 0:
         bent = len(at) > 0 and cells.curved[at[0]]
@@ -137,9 +138,14 @@ def projection(
     thirds: bool,
     components: slice,
 ) -> tuple[Array, Array, Array]:
-    """Coefficients (b, m, 2) of polynomials near to F, norms (b,) of the rest, and of F.
+    """Polynomials near to a force F in triangles `at` (b,), by the rules of `looked_at`.
 
-    In triangles `at` (b,) as of `looked_at`; norms of some `components`, times the measure.
+    Returns
+    -------
+    coefficients : ndarray (b, m, 2)
+        Of the polynomials of a `degree`, as of `projected`.
+    rest, size : ndarray (b,)
+        L2 norms of some `components` of what they miss of F, and of F, times the measure.
     """
     force: list[Array] = []
     rest: list[Array] = []
@@ -158,9 +164,9 @@ def projection(
 
 
 def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Index) -> Index:
-    """How often triangles (n,) are divided: where forces are not near to polynomials.
+    """How often triangles (n,) are divided, because forces are not near to polynomials.
 
-    Those of a `degree`, with rules of an `order`; `least` (n,) times at least.
+    The polynomials are of a `degree`, the rules of an `order`; `least` (n,) times at least.
     """
     mesh = cells.trace.mesh
     found = least.copy()
@@ -177,7 +183,7 @@ def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Index
 
 
 def _with_features(problem: Problem, cells: Cells) -> Mask:
-    """Triangles (n,) in elements with features of forces that points of their parts may not see."""
+    """Whether triangles (n,) lie in elements with features of forces too narrow for parts."""
     mesh = cells.trace.mesh
     view, found = View(mesh, 2), np.zeros(mesh.ne, dtype=bool)
     for one in features_of(problem, mesh):

@@ -28,17 +28,20 @@ SECOND = (2, 0), (1, 1), (0, 2)  # derivatives by (a, b)
 
 @lru_cache
 def products(degree: int) -> tuple[Index, Index]:
-    """Degrees (m,) in both coordinates of the products up to a total degree, rising in the first.
+    """Degrees, (m,) each, in both coordinates of the products up to a total degree.
 
-    Across a thin triangle, along its short base, those of degree 0 and 1 have no stress of the
-    large kind: combined with earlier ones alone they keep it so.
+    They rise in the first, along the base. Where that is short, second derivatives along it are
+    large: products of degree 0 and 1 have none, nor have their combinations with earlier ones.
     """
     i, j = np.array([(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]).T
     return i, j
 
 
 def legendre_table(degree: int, X: Array) -> list[Array]:
-    """Legendre's polynomials (..., degree + 1) and their first two derivatives."""
+    """Legendre's polynomials and two derivatives, (..., degree + 1) each, at `X` (...,).
+
+    `X` is from -1 to 1.
+    """
     P: Array = np.asarray(legendre.legvander(X, degree))
     tables: list[Array] = [P]
     for _ in range(2):
@@ -76,7 +79,7 @@ class Frame:
         return Frame(self.corner[at], self.edges[at], self.size[at], self.centre[at])
 
     def local(self, x: Array) -> Array:
-        """(a, b), (b, q, 2), of points `x` (b, q, 2)."""
+        """Coordinates (a, b), shape (b, q, 2), of points `x` (b, q, 2)."""
         away = (x - self.corner[:, None]).transpose(0, 2, 1)
         return np.asarray(np.linalg.solve(self.edges, away).transpose(0, 2, 1))
 
@@ -98,12 +101,12 @@ class Frame:
 
 
 def in_frame(local: Array) -> Array:
-    """`Frame.local` (q, 2) of places (q, 2) given by their shares of corners 1 and 2."""
+    """`Frame.local`, (q, 2), of places `local` (q, 2): their shares of corners 1 and 2."""
     return np.column_stack([local[:, 1], 1 - local.sum(axis=1)])
 
 
 def frame_of(corners: Array) -> Frame:
-    """The frame of triangles `corners` (b, 3, 2)."""
+    """The frame of triangles with `corners` (b, 3, 2), lengths."""
     edges = np.stack([corners[:, 2] - corners[:, 1], corners[:, 0] - corners[:, 1]], axis=-1)
     centre = (corners.max(axis=1) + corners.min(axis=1)) / 2
     return Frame(corners[:, 1], edges, np.ptp(corners, axis=1).max(axis=1) / 2, centre)
@@ -116,7 +119,10 @@ def _second(p: Array, q: Array) -> Array:
 
 
 def derivatives(degree: int, local: Array, *orders: tuple[int, int]) -> list[Array]:
-    """The `products` (..., k) at `local` (..., 2), derived by 2 a and 2 b as `orders` say."""
+    """Derivatives of the k `products` at `local` (..., 2), (..., k) each.
+
+    By 2 a and by 2 b as often as `orders` say.
+    """
     i, j = products(degree)
     a, b = (legendre_table(degree, 2 * local[..., c] - 1) for c in (0, 1))
     return [a[n][..., i] * b[m][..., j] for n, m in orders]
@@ -132,7 +138,10 @@ def bending(degree: int, local: Array) -> Array:
 
 
 def airy_stress(degree: int, frame: Frame, local: Array, c: Array) -> Array:
-    """Stress (b, q, 3) with coefficients `c` (b, m) at `local`, (b, q, 2) or (q, 2) for all."""
+    """Stress (b, q, 3) in the plane with coefficients `c` (b, m), units of stress.
+
+    `local` (b, q, 2) are `Frame.local` of its places, or (q, 2) where these are the same for all.
+    """
     if local.ndim == 2:
         H = bending(degree, local)
         second = (c @ H.reshape(-1, H.shape[-1]).T).reshape(len(c), -1, 3)
@@ -216,7 +225,7 @@ def orthonormal(degree: int, order: int) -> Array:
 def projected(degree: int, frame: Frame, x: Array, weight: Array, values: Array) -> Array:
     """Coefficients (b, m, d) of the nearest polynomials of a degree to `values` (b, q, d).
 
-    At quadrature points `x` (b, q, 2) with `weight` (b, q).
+    In the mean square at quadrature points `x` (b, q, 2) with `weight` (b, q).
     """
     P = scalars(degree, frame, x)
     weighted = P.transpose(0, 2, 1) * weight[:, None]
@@ -226,7 +235,7 @@ def projected(degree: int, frame: Frame, x: Array, weight: Array, values: Array)
 
 
 def scalars(degree: int, frame: Frame, x: Array) -> Array:
-    """The polynomials (b, q, m) themselves."""
+    """The polynomials (b, q, m) of `projected` at points `x` (b, q, 2)."""
     X = frame.scaled(x)
     a, b = (legendre.legvander(X[..., c], degree) for c in (0, 1))
     i, j = products(degree)
@@ -236,8 +245,8 @@ def scalars(degree: int, frame: Frame, x: Array) -> Array:
 def balancing(degree: int, frame: Frame, x: Array, force: Array, axial: bool) -> Array:
     """Stress (b, q, c) at `x` (b, q, 2) whose divergence is minus a polynomial force.
 
-    `force` (b, m, 2) are its coefficients as of `projected`, for a `degree`. About an axis only the
-    axial part counts: s_zz = - int F_z dz.
+    `force` (b, m, 2) are the coefficients of the force as of `projected`, for a `degree`. About an
+    axis only the axial part counts: s_zz = - int F_z dz.
     """
     X = frame.scaled(x)
     i, j = products(degree)

@@ -44,7 +44,7 @@ DEFINITE = 1e-12  # of the diagonal, added to what is factorised: vertices where
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """R on the multipliers of k sides and of those that they face, for pressures of j functions.
+    """R on the multipliers of k sides and of those that they face, for j Bernstein polynomials.
 
     Attributes
     ----------
@@ -54,6 +54,7 @@ class Rows:
     opposite : list of ndarray (j, d)
         On each side that it faces; empty without a primary.
     bound : ndarray (k, j)
+        Integrals of psi_j (gap_h + r).
     mass : ndarray (k, j)
         Integrals of psi_j: the force of a unit coefficient.
     """
@@ -66,7 +67,7 @@ class Rows:
 
 
 def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
-    """The rows of one line, with a pressure of a degree."""
+    """The rows of one line, with a pressure of a `degree`."""
     psi = bernstein(degree, PLACES)
     bound = ((facing.gap + facing.lift) * facing.weight) @ psi  # (3.9)
     load = facing.weight[..., None] * facing.direction
@@ -130,7 +131,13 @@ class DualProgram:
         return {name: value for name, value in vars(self).items() if name != "systems"}
 
     def nearest(self, elements: Sequence[Element], moments: Array) -> Balanced:
-        """The stress and the p* >= 0 that minimise B^2 for given tractions, `moments` (d,)."""
+        """The stress and the p* >= 0 that minimise B^2 for given tractions, `moments` (d,).
+
+        Raises
+        ------
+        ContactError
+            Loads on a body that moves freely are not in balance.
+        """
         alone, largest = exerted(elements, [e.alone() for e in elements])
         moments = self._resisted(moments, moments - alone)
         load = moments - alone
@@ -185,7 +192,7 @@ class DualProgram:
         return np.where(self.program.fixed, 0.0, left - self.idle(left))
 
     def idle(self, load: Array) -> Array:
-        """The part (d,) of a load (d,) that does work on motions which nothing resists."""
+        """The part (d,) of a `load` (d,) that does work on motions which nothing resists."""
         lineal = self.T @ self.program.null_space.lineal
         if lineal.shape[1] == 0:
             return np.zeros_like(load)
@@ -271,8 +278,14 @@ def dual_program(
 ) -> DualProgram:
     """The program of the condensed triangles.
 
-    `fixed` (d,) are multipliers of components on which no traction is given, `motions` (d, r) those
-    of rigid motions that supports leave free.
+    Parameters
+    ----------
+    fixed : ndarray of bool (d,)
+        Multipliers of components on which no traction is given.
+    motions : ndarray (d, r)
+        Multipliers of rigid motions that supports leave free.
+    lines : sequence of Rows
+        Contact and guides.
     """
     size = int(mu.start[-1])
     K = _assembled(mu, elements)
@@ -305,7 +318,13 @@ def _null_space(motions: Array, T: sp.csr_array, unknown: Index, fixed: Mask) ->
 
 
 def exerted(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple[Array, float]:
-    """Moments (d,) of the tractions of a stress over all triangles, and the largest of one."""
+    """Moments (d,) of the tractions of a stress over all triangles, and the largest of one.
+
+    Parameters
+    ----------
+    coefficients : sequence of ndarray (b, m)
+        Of the stress on the triangles of each element.
+    """
     total, largest = np.zeros(1 + max(int(e.dofs.max()) for e in elements)), 0.0
     for e, c in zip(elements, coefficients, strict=True):
         own = e.tractions(c)
@@ -350,7 +369,13 @@ def _assembled(mu: Multipliers, elements: Sequence[Element]) -> sp.csr_array:
 
 
 def pushed(mu: Multipliers, lines: Sequence[Rows], pressure: Sequence[Array]) -> Array:
-    """Moments (d,) of the tractions R'p that pressures of lines exert."""
+    """Moments (d,) of the tractions R'p* that pressures of lines exert.
+
+    Parameters
+    ----------
+    pressure : sequence of ndarray (k, j)
+        Bernstein coefficients on the sides of each line.
+    """
     total = np.zeros(int(mu.start[-1]))
     for line, p in zip(lines, pressure, strict=True):
         for i, side in enumerate(line.facing.side):

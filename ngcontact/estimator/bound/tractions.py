@@ -32,9 +32,9 @@ class Given:
     ----------
     held : ndarray of bool (e, 2)
         Components with prescribed displacements: no traction is given.
-    loads : list of (str, ndarray of int)
+    loads : list of (str, ndarray of int (k,))
         Keys of `Problem.traction` with their sides.
-    supports : list of (values, ndarray of int)
+    supports : list of (values, ndarray of int (k,))
         u_D of `Problem.displacement` with their sides.
     guides : ndarray of int (k,)
         Sides of Gamma_0.
@@ -123,7 +123,7 @@ class Along:
     length: Array
 
     def moments(self, mu: Multipliers, values: Array) -> Array:
-        """Integrals (d,) of tractions (m, j, 2) times the multipliers."""
+        """Integrals (d,) of tractions `values` (m, j, 2) times the multipliers."""
         total, load = np.zeros(int(mu.start[-1])), (self.weight * self.ds)[..., None] * values
         for k in np.unique(mu.degree[self.side]).tolist():
             at = np.flatnonzero(mu.degree[self.side] == k)
@@ -132,7 +132,7 @@ class Along:
         return total
 
     def norms(self, cells: Cells, missed: Array) -> Array:
-        """L2 norms (n, 3) of tractions (m, j, 2), times the model's measure."""
+        """L2 norms (n, 3) of tractions `missed` (m, j, 2), times the model's measure."""
         squares = np.zeros((len(cells.triangles), 3))
         square = ((self.weight * self.ds**2 / self.length)[..., None] * missed**2).sum(axis=(1, 2))
         np.add.at(squares, (cells.owner[self.side], cells.local[self.side]), square)
@@ -140,7 +140,7 @@ class Along:
 
 
 def along(cells: Cells, given: Given, side: Index) -> Along:
-    """The rule on sides (k,), which begins anew at `Given.breaks`."""
+    """The rule on sides `side` (k,), which begins anew at `Given.breaks`."""
     inside = cells.segment[side] < 0
     ends = np.where(inside[:, None], [0.0, 1.0], np.sort(cells.span[side], axis=1))
     key, own = given.breaks @ [4.0, 1.0], 4.0 * cells.segment[side]
@@ -184,7 +184,7 @@ class Requested:
     pressed: dict[int, Array]
 
     def values(self, segment: Index, s: Array) -> tuple[Array, Mask]:
-        """Tractions (m, j, 2) at `s` (m, j) of segments (m,), and held components (m, 2)."""
+        """Tractions (m, j, 2) at `s` (m, j) of `segment` (m,), and held components (m, 2)."""
         cells, total = self.cells, np.zeros((*s.shape, 2))
         side = cells.side_at(segment, s[:, s.shape[1] // 2])
         every = np.repeat(segment, s.shape[1])
@@ -213,7 +213,13 @@ def requested(
     lines: Sequence[Rows] = (),
     pressure: Sequence[Array] = (),
 ) -> Requested:
-    """The loads of a problem, and what pressures (k, j) on lines exert."""
+    """The loads of a problem, and what pressures on lines exert.
+
+    Parameters
+    ----------
+    pressure : sequence of ndarray (k, j)
+        Bernstein coefficients of p* on the sides of each line.
+    """
     pressed: dict[int, Array] = {}
 
     def add(side: Index, force: Array) -> None:
@@ -231,7 +237,10 @@ def requested(
 
 
 def moments_of(problem: Problem, cells: Cells, mu: Multipliers, given: Given) -> tuple[Array, Mask]:
-    """Moments (d,) of the given tractions with the multipliers, and fixed multipliers (d,)."""
+    """Moments (d,) of the given tractions with the multipliers, and which of these are fixed, (d,).
+
+    Fixed are those of components with prescribed displacements.
+    """
     moments, fixed = np.zeros((2, int(mu.start[-1])))
     loaded = [side for _, side in given.loads]
     if loaded:
@@ -266,7 +275,16 @@ def tractions_of(
     x: Array,
     normal: Array,
 ) -> Array:
-    """S n (m, j, 2) of a stress at points `x` (m, j, 2) of triangles `at` (m,)."""
+    """Tractions s n (m, j, 2) of a stress at points `x` (m, j, 2) of triangles `at` (m,).
+
+    Parameters
+    ----------
+    coefficients : sequence of ndarray (b, m)
+        Of the stress on the triangles of each element.
+    at : ndarray of int (m,)
+    x, normal : ndarray (m, j, 2)
+        Points, lengths, and unit normals there.
+    """
     values = np.empty_like(x)
     number = np.empty(max(int(e.places.at.max()) for e in elements) + 1, dtype=np.intp)
     for e, c in zip(elements, coefficients, strict=True):
@@ -283,13 +301,13 @@ def tractions_of(
 
 @dataclass(frozen=True, eq=False)
 class BoundaryTractions:
-    """S n (m, j, 2) along the boundary."""
+    """Tractions s n of a stress along the boundary: `values` (m, j, 2) at the points of `rule`."""
 
     rule: Along
     values: Array
 
     def work(self, cells: Cells, given: Given, displacement: ng.CoefficientFunction) -> float:
-        """Of s n on u_D - u_h."""
+        """Work of s n on u_D - u_h, an energy per thickness."""
         total, rule = 0.0, self.rule
         density = (rule.weight * rule.ds)[..., None] * self.values
         for wanted, side in given.supports:
@@ -306,7 +324,13 @@ class BoundaryTractions:
 def boundary_tractions(
     cells: Cells, given: Given, elements: Sequence[Element], coefficients: Sequence[Array]
 ) -> BoundaryTractions:
-    """Those of a stress."""
+    """Tractions of a stress along the boundary.
+
+    Parameters
+    ----------
+    coefficients : sequence of ndarray (b, m)
+        Of the stress on the triangles of each element.
+    """
     rule = along(cells, given, np.flatnonzero(cells.segment >= 0))
     at = cells.owner[rule.side]
     return BoundaryTractions(rule, tractions_of(elements, coefficients, at, rule.x, rule.normal))
@@ -315,7 +339,10 @@ def boundary_tractions(
 def missed_tractions(
     wanted: Requested, cells: Cells, have: BoundaryTractions, largest: float
 ) -> Array:
-    """L2 norms (n, 3) of what tractions miss, times the model's measure."""
+    """L2 norms (n, 3) of what tractions miss on sides, times the model's measure.
+
+    What is round-off beside the `largest` stress counts as 0.
+    """
     values, held = wanted.values(*on_segments(cells, have.rule))
     miss = np.where(held[:, None], 0.0, values - have.values)
     rule, size = have.rule, np.zeros(len(cells.ends))
