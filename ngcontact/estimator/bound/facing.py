@@ -19,7 +19,7 @@ from ...problem import Contact
 from .cells import Cells
 
 NOISE = 1e-14  # of a gap, relative to the displacements on both sides
-INSIDE = 1e-12  # parameters of vertices, as seen from a side
+INSIDE = 1e-14  # parameters of vertices, as seen from a side
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
 NEAR = 1e-3  # of the shorter segment: vertices that face each other up to that are one
