@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...arrays import Array, Index
+from ...arrays import Index
 from .bound import Proof
 from .cells import Cells
-from .facing import PLACES, WEIGHTS
+from .facing import THROUGH, WEIGHTS
 from .norms import stress_norms
 from .polynomials import scalars
 
@@ -22,7 +22,7 @@ STRAIGHT = 1e-12  # difference of unit vectors that are one: round-off
 
 
 def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
-    """All arrays by name; docs/bounds.md says what each is, with its shape, as (n, 3).
+    """All arrays by name: vertices (nv, 2), triangles (n, 3), ...; docs/bounds.md has the list.
 
     Raises
     ------
@@ -116,25 +116,19 @@ def _contact(proof: Proof) -> dict[str, np.ndarray]:
     position[boundary] = np.arange(len(boundary))
     faced = [line.facing for line in proof.program.lines]
 
-    def joined(parts: Sequence[np.ndarray]) -> np.ndarray:
+    def stacked(parts: Sequence[np.ndarray]) -> np.ndarray:
+        """Of all lines; nothing without any."""
         return np.concatenate(parts) if parts else np.zeros(0)
 
     return {
-        "contact_side": joined([position[f.side] for f in faced]).astype(np.intp),
-        "contact_other": joined(
+        "contact_side": stacked([position[f.side] for f in faced]).astype(np.intp),
+        "contact_other": stacked(
             [np.where(f.other < 0, -1, position[f.other]) for f in faced]
         ).astype(np.intp),
-        "contact_turned": joined([f.there[:, -1] < f.there[:, 0] for f in faced]).astype(bool),
-        "contact_direction": joined([f.direction[:, 0] for f in faced]),
-        "contact_weight": joined([_at_ends(f.weight / WEIGHTS) for f in faced]),
-        "contact_equality": joined([np.full(len(f.side), f.equality) for f in faced]).astype(bool),
-        "contact_gap": joined([f.after for f in faced]),
-        "contact_pressure": joined(proof.balanced.pressure),
+        "contact_turned": stacked([f.there[:, -1] < f.there[:, 0] for f in faced]).astype(bool),
+        "contact_direction": stacked([f.direction[:, 0] for f in faced]),
+        "contact_weight": stacked([f.weight / WEIGHTS @ THROUGH[[0, -1]].T for f in faced]),
+        "contact_equality": stacked([np.full(len(f.side), f.equality) for f in faced]).astype(bool),
+        "contact_gap": stacked([f.after for f in faced]),
+        "contact_pressure": stacked(proof.balanced.pressure),
     }
-
-
-def _at_ends(values: Array) -> Array:
-    """Values (k, 2) at t = 0 and 1 of linear functions (k, j) at the Gauss points."""
-    slope = (values[:, -1] - values[:, 0]) / (PLACES[-1] - PLACES[0])
-    first = values[:, 0] - PLACES[0] * slope
-    return np.column_stack([first, first + slope])

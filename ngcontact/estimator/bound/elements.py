@@ -11,7 +11,7 @@ in the norm of C^-1, and the tractions of s are N'A^-1 N mu + N'A^-1 g + <s_p n,
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeVar
 
@@ -269,6 +269,33 @@ class Multipliers:
     def of(self, side: int) -> Index:
         """The k multipliers of one side, (k,)."""
         return np.arange(self.start[side], self.start[side + 1])
+
+
+def among(
+    elements: Sequence[Element], coefficients: Sequence[Array], at: Index
+) -> Iterator[tuple[Element, Array, Index, Index]]:
+    """The elements that have some of the triangles `at` (m,).
+
+    Parameters
+    ----------
+    coefficients : sequence of ndarray (b, m)
+        Of a stress on the triangles of each element.
+
+    Yields
+    ------
+    element : Element
+    c : ndarray (b, m)
+        Its coefficients.
+    mine, some : ndarray of int (k,)
+        Which of the triangles it has, and their places among its own.
+    """
+    number = np.empty(1 + max(int(e.places.at.max()) for e in elements), dtype=np.intp)
+    for e, c in zip(elements, coefficients, strict=True):
+        number[:] = -1
+        number[e.places.at] = np.arange(len(e.places.at))
+        mine = np.flatnonzero(number[at] >= 0)
+        if mine.size:
+            yield e, c, mine, number[at[mine]]
 
 
 def turning(problem: Problem, cells: Cells) -> Mask:

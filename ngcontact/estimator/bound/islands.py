@@ -112,7 +112,10 @@ def _islands(
     division: tuple[int, bool],
     allowed: float,
 ) -> tuple[Array, Array]:
-    """Norms (b,) on triangles `at` (b,) in parts; infinite where there is no equilibrium."""
+    """`Level.distance` and `.loads` of s' on triangles `at` (b,); infinite without equilibrium.
+
+    `division` is that of `divided`; `allowed` may be added to B^2 on these triangles.
+    """
     parts, k = divided(level.cells, at, *division), len(pattern(*division)[1])
     look = np.repeat(level.look[at], k, axis=0)
     n, raised = len(look), degree + RAISED if division[0] == 1 else max(degree, LEAST)

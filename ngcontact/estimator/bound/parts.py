@@ -203,7 +203,11 @@ def _depths(
     levels: int,
     least: float,
 ) -> Index:
-    """Depths (b,) of triangles `at` (b,) for one force, `asked` (b,) ones at least."""
+    """Depths (b,) of triangles `at` (b,) for one force, from `asked` (b,) up to `levels`.
+
+    `rule` is the degree of the polynomials and the order of the rules. Polynomials are near to the
+    force if they miss less, in the root of the mean square, than `least`.
+    """
     rest, size = np.zeros((2, len(at)))
     axial = slice(cells.trace.model.extent, None)
     for curved in (False, True):

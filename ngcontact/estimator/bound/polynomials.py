@@ -64,9 +64,9 @@ class Frame:
     edges : ndarray (b, 2, 2)
         Columns: the base from there to corner 2, the edge to corner 0; x = corner + edges (a, b).
     size : ndarray (b,)
-        Half the extent along the axes, lengths.
+        Half the larger extent along the axes x and y, lengths.
     centre : ndarray (b, 2)
-        Its middle.
+        Middle of both extents, lengths.
     """
 
     corner: Array

@@ -13,6 +13,7 @@ import numpy as np
 from ...arrays import Array, Index
 from .bound import Proof
 from .certificate import certificate_arrays
+from .elements import among
 from .facing import bernstein
 
 AT_ONCE = 1000  # places beside all parts
@@ -131,15 +132,10 @@ class EquilibratedStress:
             better = inside > best[at]
             own[at[better]], best[at[better]] = triangle[better], inside[better]
         found = np.empty((len(element), proof.elements[0].strain.shape[2]))
-        number = np.empty(len(cells.triangles), dtype=np.intp)
-        for e, c in zip(proof.elements, proof.balanced.coefficients, strict=True):
-            number[:] = -1
-            number[e.places.at] = np.arange(len(e.places.at))
-            at = np.flatnonzero(number[own] >= 0)
-            if at.size:
-                found[at] = e.stress(c, x[at, None], number[own[at]])[:, 0]
-                if found.shape[1] > 3:
-                    found[at, 2] += e.radial_at(cells, own[at], reference[at])
+        for e, c, at, some in among(proof.elements, proof.balanced.coefficients, own):
+            found[at] = e.stress(c, x[at, None], some)[:, 0]
+            if found.shape[1] > 3:
+                found[at, 2] += e.radial_at(cells, own[at], reference[at])
         return found
 
     def save(self, path: str | os.PathLike[str]) -> Path:

@@ -14,7 +14,7 @@ from ...lagrange import lagrange
 from ...problem import Problem
 from ...quadrature import known_rough_load, moment_degree, numbers
 from .cells import Cells
-from .elements import Element, Multipliers, traces
+from .elements import Element, Multipliers, among, traces
 from .facing import PLACES, THROUGH, WEIGHTS, at_places, bernstein
 from .parts import LEVELS, PARTS
 from .program import Rows
@@ -286,16 +286,11 @@ def tractions_of(
         Points, lengths, and unit normals there.
     """
     values = np.empty_like(x)
-    number = np.empty(max(int(e.places.at.max()) for e in elements) + 1, dtype=np.intp)
-    for e, c in zip(elements, coefficients, strict=True):
-        number[:] = -1
-        number[e.places.at] = np.arange(len(e.places.at))
-        mine = np.flatnonzero(number[at] >= 0)
-        if mine.size:
-            s = e.stress(c, x[mine], number[at[mine]])
-            nx, ny = normal[mine, :, 0], normal[mine, :, 1]
-            values[mine, :, 0] = s[:, :, 0] * nx + s[:, :, -1] * ny
-            values[mine, :, 1] = s[:, :, -1] * nx + s[:, :, 1] * ny
+    for e, c, mine, some in among(elements, coefficients, at):
+        s = e.stress(c, x[mine], some)
+        nx, ny = normal[mine, :, 0], normal[mine, :, 1]
+        values[mine, :, 0] = s[:, :, 0] * nx + s[:, :, -1] * ny
+        values[mine, :, 1] = s[:, :, -1] * nx + s[:, :, 1] * ny
     return values
 
 
