@@ -83,7 +83,7 @@ def test_energies_are_enclosed(scene):
     energies of both may differ.
     """
     problem = SCENES[scene]()
-    *_, finest = adapt(problem, order=4, max_dofs=4000)
+    *_, finest = adapt(problem, order=4, max_dofs=5000)
     lower, upper = finest.energy_bounds
     area = ng.Integrate(1, finest.mesh)
     for level in adapt(problem, order=2, max_dofs=1300):
