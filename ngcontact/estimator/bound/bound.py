@@ -167,7 +167,7 @@ def _bound(
     """
     p, extent = trace.order, trace.model.extent
     degree, lift = max(p + 1, 2 + extent), p + LIFTED
-    reaches = [reach_of(trace, displacement, pair, everywhere) for pair in pairs]
+    reaches = [reach_of(trace, displacement, pair, lift, everywhere) for pair in pairs]
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
     guided = None if problem.sliding is None else str(problem.sliding)
     loaded = trace.segments(*problem.traction, guided, *touching)

@@ -8,6 +8,7 @@ from functools import cached_property
 
 import ngsolve as ng
 import numpy as np
+from numpy.polynomial import legendre
 from scipy.special import comb
 
 from ...arrays import Array, Index, Mask
@@ -22,12 +23,15 @@ NOISE = 1e-14  # of a gap, relative to the displacements on both sides
 INSIDE = 1e-14  # parameters of vertices, as seen from a side
 SAME = 1e-7  # parameters of a segment that are one place
 DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
-NEAR = 1e-3  # of the shorter segment: vertices that face each other up to that are one
+NEAR = 1e-6  # of the shorter segment: vertices that face each other up to that are one; at
+# 1.5e-7 stresses of orders 3 and 4 lose all digits, at 6e-7 B is as at 1e-2 (1 % at order 1)
+OPPOSITE = 1e-9  # of a side, by which it may go beyond the one it faces; 1e-14 in 320 scenes
 MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
 NARROW = 0.1  # of the sides beside it, a side between them on which r does not change
 STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
 PLACES, WEIGHTS = gauss(2 * DATA)
+LEGENDRE = np.linalg.inv(legendre.legvander(2 * PLACES - 1, DATA))  # to their coefficients
 THROUGH = np.linalg.inv(lagrange(DATA, PLACES))  # from values at `PLACES` to Gauss-Lobatto points
 NEWTON_STEPS = 12
 SAMPLES = 200  # places on a segment among which the last zero of the gap is sought
@@ -129,21 +133,52 @@ def reach_of(
     trace: BoundaryTrace,
     displacement: ng.CoefficientFunction,
     pair: ContactState,
+    degree: int,
     everywhere: bool,
 ) -> Reach:
-    """The reach of a pair; `everywhere` on its line if that is asked for."""
+    """The reach of a pair; `everywhere` on its line if that is asked for.
+
+    Beyond it the gap is not negative, as Bernstein polynomials of a `degree` show.
+    """
     line = pair.line
     if everywhere or line.contact.bilateral or not len(line.segments):
         return Reach(pair, line.segments, {})
     nodes = trace.nodes[line.segments][:, [0, -1]]
     active = np.append(pair.active, False)[line.rows].any(axis=1)
     near = np.asarray(np.isin(nodes, nodes[active]).any(axis=1))
-    rest, j = np.flatnonzero(~near), len(PLACES)
+    rest = np.flatnonzero(~near)
     if rest.size:
-        segment = np.repeat(line.segments[rest], j)
-        found = met(trace, displacement, pair, segment, np.tile(PLACES, len(rest)))
-        near[rest] = ((found.gap < 0) & found.faces).reshape(-1, j).any(axis=1)
+        near[rest] = ~_open(trace, displacement, pair, line.segments[rest], degree)
     return Reach(pair, line.segments[near], _contact_on(trace, displacement, pair))
+
+
+def _open(
+    trace: BoundaryTrace,
+    displacement: ng.CoefficientFunction,
+    pair: ContactState,
+    segments: Index,
+    degree: int,
+) -> Mask:
+    """Whether the gap is nowhere negative on segments (k,), on each part between vertices.
+
+    Of parts that face in part, as beside the end of a body, points are looked at.
+    """
+    contact, j = pair.line.contact, len(PLACES)
+    local, start, stop = np.arange(len(segments)), np.zeros(len(segments)), np.ones(len(segments))
+    if contact.primary is not None:
+        parts = divided(trace, contact, segments, pair.line.facing)
+        local = np.append(parts.local, local)
+        start, stop = np.append(parts.start, start), np.append(parts.stop, stop)
+    s = start[:, None] + (stop - start)[:, None] * PLACES
+    found = met(trace, displacement, pair, np.repeat(segments[local], j), s.ravel())
+    gap, faces = found.gap.reshape(-1, j), found.faces.reshape(-1, j)
+    open_ = np.asarray(~((gap < 0) & faces).any(axis=1))
+    known = np.asarray(faces.all(axis=1))
+    if contact.primary is not None:
+        known[len(parts.local) :] = False  # segments as a whole: gaps have kinks
+    c, off = _fitted(gap[known], degree)
+    open_[known] = c.min(axis=1, initial=np.inf) >= off
+    return np.bincount(local[~open_], minlength=len(segments)) == 0
 
 
 def cuts_of(
@@ -177,8 +212,7 @@ def cuts_of(
             parts = divided(trace, contact, reach.segments, line.facing)
             k = np.append(k, np.tile(reach.segments[parts.local], 2))
             s = np.concatenate([s, parts.start, parts.stop])
-            d = directions(trace, contact, k, s)
-            there, t, *_ = partners(trace, line.facing, k, trace.point(k, s), d)
+            s, there, t = _opposite(trace, reach.pair, k, s)
             (own, away), (other, beyond) = nearest(k, s), nearest(there, t)
             far = np.maximum(away, beyond) / np.minimum(size[own], size[other])
             # Whether two vertices are one, the place decides that the secondary's faces.
@@ -191,6 +225,28 @@ def cuts_of(
         put(k[kept], s[kept])
     inside = {k: _inside(np.array(s)) for k, s in cuts.items()}
     return {k: s for k, s in inside.items() if s.size}
+
+
+def _opposite(
+    trace: BoundaryTrace, pair: ContactState, k: Index, s: Array
+) -> tuple[Array, Index, Array]:
+    """Places (r,) of segments `k` (r,), and segments (r,) and places (r,) opposite along d.
+
+    Places `s` (r,) inside of segments are moved until a vertex lies opposite.
+    """
+    contact, facing, s = pair.line.contact, pair.line.facing, s.copy()
+    inner = (s > SAME) & (s < 1 - SAME)
+    for _ in range(NEWTON_STEPS):
+        d = directions(trace, contact, k, s)
+        there, t, *_ = partners(trace, facing, k, trace.point(k, s), d)
+        near = np.flatnonzero(inner & (there >= 0) & (np.minimum(t, 1 - t) < APART))
+        vertex, along = np.round(t[near]), trace.derivative(k[near], s[near])
+        away = trace.point(there[near], vertex) - trace.point(there[near], t[near])
+        s[near] += (away * along).sum(axis=1) / (along**2).sum(axis=1)
+        s[near] = s[near].clip(0, 1)
+    exact = near[np.abs(t[near] - vertex) <= NEAR]
+    t[exact] = np.round(t[exact])
+    return s, there, t
 
 
 def _inside(s: Array) -> Array:
@@ -328,7 +384,7 @@ def facing_of(
     faces = found.faces
     keep = np.asarray(faces.reshape(-1, j).all(axis=1))
     every = keep.repeat(j)
-    if contact.primary is not None and (found.gap[faces & ~every] < 0).any():
+    if (found.gap[faces & ~every] < 0).any():
         raise ContactError("bodies overlap where a side of the mesh faces the other in part")
     slots = side[~keep]
     away = side[~faces.reshape(-1, j).any(axis=1)]
@@ -342,6 +398,15 @@ def facing_of(
         middle = segments[:, j // 2]
         other = cells.side_at(middle, place[:, j // 2])
         there = _continued(cells.own_parameter(other, place), segments == middle[:, None])
+        ends = there @ THROUGH[[0, -1]].T
+        beyond = np.abs(ends - (ends > 0.5)).max(axis=1)
+        if (beyond > OPPOSITE).any():
+            x, y = cells.vertices[cells.ends[side[beyond.argmax()]]].mean(axis=0)
+            raise ValueError(
+                f'no guaranteed bound is known where vertices on "{contact.secondary}" and '
+                f'"{contact.primary}" face each other to within {beyond.max():.0e} of a side, as '
+                f"near ({x:.6g}, {y:.6g}): move them together or farther apart, or refine"
+            )
     rate = np.abs(np.diff(cells.span[side], axis=1))
     weight = WEIGHTS * rate * jacobian(trace, contact, segment, s).reshape(-1, j)
     order = np.argsort(line.segments)
@@ -353,11 +418,12 @@ def facing_of(
             closed |= (cells.segment[side] == k) & (low >= a - SAME) & (high <= b + SAME)
     closed = np.asarray(closed | contact.bilateral)
     shares, stiff = _shares(cells, side, other, there, d, held, share)
-    vertices = _across(cells, slots, side)[cells.ends[side]]
+    number, narrow = _across(cells, slots, side)
+    vertices = number[cells.ends[side]]
     most = np.zeros(len(cells.vertices))  # one share at a vertex that faces two bodies
     np.maximum.at(most, vertices, shares)
     shares = most[vertices]
-    after, bare = _after(vertices, gap, closed, stiff, degree)
+    after, bare = _after(vertices, gap, closed, stiff, narrow, degree)
     if contact.bilateral:
         after, bare = np.zeros_like(after), np.zeros_like(bare)
     kept = side, other, there, d, weight, gap, after, bare, closed, shares, away
@@ -417,15 +483,19 @@ def _at_ends(values: Array) -> Array:
     return np.einsum("ej,kjc->kec", THROUGH[[0, -1]], values)
 
 
-def _across(cells: Cells, slots: Index, side: Index) -> Index:
-    """A vertex for each (nv,): one for both ends of `slots` (r,) far shorter than sides."""
-    number = np.arange(len(cells.vertices))
+def _across(cells: Cells, slots: Index, side: Index) -> tuple[Index, Mask]:
+    """A vertex for each (nv,): one for both ends of a `side` (k,) or slot far shorter than others.
+
+    And whether sides are that short. `slots` (r,) are sides of which nothing faces.
+    """
+    number, every = np.arange(len(cells.vertices)), np.append(side, slots)
     length = np.linalg.norm(np.diff(cells.vertices[cells.ends], axis=1)[:, 0], axis=1)
     beside = np.zeros(len(number))
     np.maximum.at(beside, cells.ends[side], length[side, None])
-    for a, b in cells.ends[slots[length[slots] < NARROW * beside[cells.ends[slots]].min(axis=1)]]:
+    narrow = length[every] < NARROW * beside[cells.ends[every]].min(axis=1)
+    for a, b in cells.ends[every[narrow]]:
         number[number == number[b]] = number[a]
-    return number
+    return number, narrow[: len(side)]
 
 
 def _shares(
@@ -484,28 +554,42 @@ def guides_of(
     )
 
 
-def _after(ends: Index, gap: Array, closed: Mask, stiff: Mask, degree: int) -> tuple[Array, Mask]:
-    """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
+def _fitted(gap: Array, degree: int) -> tuple[Array, Array]:
+    """Bernstein coefficients (k, degree + 1) near to gaps (k, j), the same at the ends.
 
-    And whether `gap` itself is not negative, and stays.
-
-    `ends` (k, 2) are the vertices of the sides, at which r is one number of all neighbours: that
-    closes the gap where they are `closed` (k,), but not at `stiff` ones (k, 2), which do not move.
+    And what the gaps, polynomials of degree `DATA`, differ from these at most (k,): no Legendre
+    polynomial is more than 1.
     """
     B, root = bernstein(degree, PLACES), np.sqrt(WEIGHTS)
     c = np.empty((len(gap), degree + 1))
     c[:, [0, -1]] = gap @ THROUGH[[0, -1]].T
     rest = root * (gap - c[:, [0, -1]] @ B[:, [0, -1]].T)
     c[:, 1:-1] = np.linalg.lstsq(root[:, None] * B[:, 1:-1], rest.T, rcond=None)[0].T
+    return c, np.abs((gap - c @ B.T) @ LEGENDRE.T).sum(axis=1)
+
+
+def _after(
+    ends: Index, gap: Array, closed: Mask, stiff: Mask, narrow: Mask, degree: int
+) -> tuple[Array, Mask]:
+    """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
+
+    And whether `gap` itself is not negative, and stays.
+
+    `ends` (k, 2) are the vertices of the sides, at which r is one number of all neighbours: that
+    closes the gap where they are `closed` (k,), but not at `stiff` ones (k, 2), which do not move.
+    On `narrow` sides (k,) r is that number, too.
+    """
+    c, off = _fitted(gap, degree)
     _, number = np.unique(ends, return_inverse=True)
     number = number.reshape(-1, 2)
     lift, bare = np.full(number.size, -np.inf), np.zeros(number.size, dtype=bool)
     np.logical_or.at(bare, number[~closed], True)
     np.logical_or.at(bare, number[stiff], True)
     np.maximum.at(lift, number, -c[:, [0, -1]])
+    np.maximum.at(lift, number[narrow, 0], -c[narrow].min(axis=1))
     lift[bare] = np.maximum(lift[bare], 0.0)
     after = np.where(closed[:, None], 0.0, np.maximum(c, 0.0))
     after[:, [0, -1]] = c[:, [0, -1]] + lift[number]
-    off = np.abs(c @ B.T - gap).max(axis=1, initial=0.0)
+    after[narrow] = c[narrow] + lift[number[narrow, :1]]
     bare = ~closed & (c.min(axis=1) > off) & (lift[number] == 0).all(axis=1)
     return after, bare
