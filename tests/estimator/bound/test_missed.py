@@ -90,7 +90,8 @@ def worst(cells, at):
     rigid[powers.index((0, 0)), 0] = rigid[k + powers.index((0, 0)), 1] = 1
     rigid[powers.index((0, 1)), 2], rigid[k + powers.index((1, 0)), 2] = -1, 1
     size, basis = np.linalg.eigh(energy)
-    basis = basis[:, 3:] / np.sqrt(size[3:])  # |e| = 1, rigid motions left out
+    strained = size > 1e-12 * size[-1]  # not rigid motions, nor what round-off makes of others
+    basis = basis[:, strained] / np.sqrt(size[strained])  # |e| = 1
     found = []
     for M in masses:  # of v less the rigid motion that is nearest in M
         R = np.linalg.solve(rigid.T @ M @ rigid, rigid.T @ M @ basis)
