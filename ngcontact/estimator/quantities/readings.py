@@ -4,6 +4,7 @@ The bar of the energy is proved, and beside its estimate that of the force, by a
 others are estimated, by measurement (docs/bounds.md):
 
 * force: of second order, 0.3 times the square of the relative estimate, 1.5 times at order 4;
+  where Gamma_K ends on Gamma_u, more by what acts at the held point;
 * peak pressure and von Mises stress: the largest lies between those of the discrete field less and
   plus an error, which is one number on each segment or element: of pressures twice the largest
   difference to p* there, or once that to the discrete stress; of von Mises 1.1 times the largest
@@ -32,7 +33,7 @@ from ...contact import ContactState, state_of
 from ...errors import ContactError, warn
 from ...fem import BoundaryTrace
 from ..bound import EquilibratedStress, Guaranteed
-from .contact import area_in_contact, ends_of, peak_of
+from .contact import area_in_contact, ends_of, left_out, peak_of
 from .force import Forced, proved_force_errors
 from .motion import approach_of, direction_of
 from .singular import singular_corners
@@ -115,7 +116,7 @@ class Measured(Guaranteed):
         e, along = direction_of(self, pair, state)
         e = e + 0.0  # no -0
         largest = max(abs(float(one.force.sum())) for one in self.pairs)
-        sum_error = FORCE[self.order] * relative**2 * largest
+        sum_error = FORCE[self.order] * relative**2 * largest + left_out(state, boundary)
         forces = _forces(self.contact_force(pair), e, sum_error)
         if proof is not None:
             *errors, reason = _force_error(self, pair, e)
