@@ -25,7 +25,7 @@ from .adaptivity import (
 )
 from .arrays import root_of_squares
 from .errors import ConvergenceError, warn
-from .estimator import Estimator, estimate, refuse_bound
+from .estimator import refuse_bound
 from .fem import boundary_trace, unknowns
 from .mesh import curve, first_mesh
 from .one_mesh import check_continuation, solve_on, with_warnings
@@ -225,16 +225,15 @@ def levels(
     problem: Problem,
     mesh: ng.Mesh,
     refinement: Refinement,
-    estimator: Estimator = estimate,
     start: Solution | None = None,
 ) -> Generator[Solution]:
     """Levels from a first mesh on, of which names and values are known to be right.
 
     Parameters
     ----------
-    problem, mesh, refinement, estimator
+    problem, mesh, refinement
         The continuous problem; the first mesh, curved as the element asks; what is refined, and
-        when to stop; what tells the indicators.
+        when to stop.
     start
         A solution for another load, of whose sequence `mesh` is the first.
     """
@@ -246,7 +245,7 @@ def levels(
             solution.discrete.systems.forget()
         solution = solve_on(problem, plan.mesh, plan.order, element, solution or start)
         problem = solution.problem  # roles that fail are exchanged once
-        solution = replace(solution, adaptive=True, estimator=estimator, descent=plan.descent)
+        solution = replace(solution, adaptive=True, descent=plan.descent)
         narrow = unresolved(problem, solution.mesh, in_bounds=refinement.guaranteed)
         if refinement.guaranteed:
             refuse_bound(problem, solution.discrete.space.trace, solution.pairs)

@@ -1,29 +1,37 @@
-"""What a user reads: displacement, pressure, gap, forces, certificates."""
+"""What a user reads: displacement, pressure, gap, forces, errors, tables, files and pictures."""
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
-from functools import cached_property
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
 
 from . import __version__
 from .adaptivity import Descent
-from .arrays import Array, Index, Mask, root_of_squares
-from .contact import ContactState, contact_states, state_of
-from .discrete import DiscreteProblem, RigidMotion, resultants
-from .estimator import Estimate, Estimator, Measured, estimate
-from .fem import energy_norm, model_of, normal_stress_of, potential_energy, stress_of
-from .output import Shown
-from .problem import Problem
-from .qp import Iterate, kkt_residuals
-from .results import Readable, read
+from .estimator import Measured
+from .output import Profile, Unit, plot_solution, write_revolved, write_solution
+from .results import (
+    Number,
+    Values,
+    html_of,
+    line_of,
+    read,
+    record_of,
+    restored,
+    save,
+    state_of,
+    values_at,
+)
 
 
 @dataclass(frozen=True, eq=False)
-class Solution(Measured, Readable, Shown):
+class Solution(Measured):
     """Exact minimiser u_h of L over K_h on one mesh: HH81 (P_1h), (P_2h).
 
     Contact quantities are arrays over the m contact points, all pairs in order.
@@ -55,191 +63,184 @@ class Solution(Measured, Readable, Shown):
         Levels of the coarse adaptive run that told `solve` the first active set of a large mesh.
     adaptive : bool
         Whether it is a level of `adapt`, whose estimate is needed anyway.
-    estimator : Estimator
-        What tells `indicators`.
     descent : Descent or None
         Of a level of `adapt`: the first mesh, and which of its elements those of `mesh` are parts
         of.
     """
 
-    problem: Problem
-    mesh: ng.Mesh
-    order: int
-    element: str
-    displacement: ng.GridFunction
-    discrete: DiscreteProblem
-    minimiser: Iterate
-    work: dict[str, int] = field(default_factory=dict)
     coarse_levels: int = 0
-    adaptive: bool = False
-    estimator: Estimator = estimate
     descent: Descent | None = None
 
-    @property
-    def stress(self) -> ng.CoefficientFunction:
-        """In-plane stress, a (2, 2) CoefficientFunction, in units of stress.
+    def at(self, points: Any, *, body: str | None = None, outside: str = "error") -> Values:
+        """Displacement, stress, von Mises and principal stresses at points, any consistent units.
 
-        What is computed on first use and looks at the mesh asks for it: estimate, bound, values at
-        points, files and pictures.
+        Parameters
+        ----------
+        points : array_like (..., 2)
+            Where, before deformation: one point, a list of points, a grid.
+        body : str, optional
+            Name or pattern of the body: of two bodies that share the point, as on a contact line.
+        outside : str
+            "error", or "nan" for NaN at points that lie in no body, or not in `body`.
+
+        Returns
+        -------
+        Values
+            Arrays of the shape of `points`: `.displacement`, `.stress`, `.out_of_plane_stress`,
+            `.von_mises`, `.principal_stresses`, and the name of the `.body`.
 
         Raises
         ------
-        RuntimeError
-            The mesh was refined or moved in place since.
+        ValueError, TypeError
+            Points in no body or in several, with the first of them; a name that is none.
+        """
+        return values_at(self, points, body, outside)
+
+    def along(
+        self,
+        start: Sequence[float],
+        end: Sequence[float],
+        count: int = 101,
+        *,
+        body: str | None = None,
+        outside: str = "error",
+    ) -> Values:
+        """Values at `count` points of the line from `start` to `end`, any consistent units.
+
+        `.distance` is the length of the way from `start`. `body`, `outside` and what is refused as
+        in `at`.
+        """
+        if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 2:
+            raise ValueError(f"count={count!r}: give a number of points, at least 2")
+        share = np.linspace(0, 1, int(count))[:, None]
+        a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
+        return values_at(self, (1 - share) * a + share * b, body, outside)
+
+    def record(self) -> dict[str, Number]:
+        """One row of a table: a flat dict of plain numbers, in any consistent units.
+
+        Sizes and counts, energy, forces and peak pressure by number of the pair, reactions by name
+        of the boundary, residuals, work. The columns of a problem are always the same: estimate
+        and bound are NaN unless they have been made, or the solution is a level of `adapt`.
+        """
+        return record_of(self)
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write everything to `path` (.ngcontact), for `ngcontact.load` in another process.
+
+        Raises
+        ------
+        TypeError
+            Data that cannot be pickled, like a gap given by a lambda, with the name.
+        ValueError, OSError
+            A name that does not end in .ngcontact, a folder that cannot be written to.
+        """
+        return save(self, path, __version__)
+
+    def draw(self) -> object:
+        """Draw the displacement in a notebook with NGSolve's webgui.
+
+        Raises
+        ------
+        ImportError
+            What the extra `notebook` installs is not there.
         """
         self.discrete.space.require_mesh()
-        return stress_of(self.problem, self.displacement)
+        for package in ("anywidget", "IPython"):
+            if find_spec(package) is None:
+                raise ImportError(
+                    f"draw() needs {package}, which is not installed: pip install "
+                    "'ngcontact[notebook]', or use plot(), which needs nothing"
+                )
+        with np.errstate():  # NGSolve's module changes how NumPy warns, for the whole process
+            from ngsolve.webgui import Draw
 
-    @cached_property
-    def out_of_plane_stress(self) -> ng.CoefficientFunction:
-        """Stress normal to the plane, a scalar CoefficientFunction, in units of stress.
+        return Draw(self.displacement, self.mesh, deformation=True)
 
-        nu (xx + yy) in plane strain, 0 where a general `Hooke` law does not tell it and in plane
-        stress, the hoop stress about an axis.
+    def __getstate__(self) -> dict[str, Any]:
+        """What is pickled and copied: factorisations stay behind."""
+        return state_of(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Make the rest again."""
+        vars(self).update(restored(state))
+
+    def __str__(self) -> str:
+        """One line: unknowns, active points, steps, pairs' forces; estimate, bound if known."""
+        return line_of(self)
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows."""
+        return html_of(self)
+
+    def write(self, path: str | os.PathLike[str]) -> Path:
+        """Write `path` (.vtu) and, beside it, ``<stem>_contact.vtp``."""
+        return write_solution(path, self)
+
+    def revolved(self, path: str | os.PathLike[str], angle: float = 270.0) -> Path:
+        """Write the body of revolution, turned by `angle` degrees, to `path` (.vtu)."""
+        return write_revolved(path, self, angle)
+
+    def plot(
+        self,
+        path: str | os.PathLike[str] | None = None,
+        scale: float | None = None,
+        *,
+        field: str | ng.CoefficientFunction = "von_mises",
+        limits: tuple[float, float] | None = None,
+        units: Mapping[str, Unit] | None = None,
+        profile: Mapping[str, Profile] | None = None,
+        mesh: bool = True,
+        mirror: str | None = None,
+    ) -> None:
+        """Picture of the deformed bodies, close-ups of zones in contact, and the pressure.
+
+        Parameters
+        ----------
+        path : path, optional
+            File (.png); without one the picture is shown on the screen.
+        scale : float, optional
+            Factor of the displacement; chosen to be seen when left out.
+        field : str or ng.CoefficientFunction
+            What colours show: "von_mises", "displacement", "displacement_x", "displacement_y",
+            "stress_xx", "stress_yy", "stress_xy", "stress_zz", "largest_principal",
+            "smallest_principal", "mean_pressure", or a real function. Of bodies of revolution
+            the coordinates are r and z, and "stress_hoop" takes the place of "stress_zz".
+        limits : tuple of float, optional
+            Ends of the colour scale in the unit of the data. Default: the range of the bodies and
+            of the zones in contact without single peaks, as at corners; an arrow and a number on
+            the scale say what lies beyond.
+        units : mapping, optional
+            Of "length" and "stress": a name, or a name and its size in the unit of the data, as
+            ``{"length": ("mm", 1e-3), "stress": ("MPa", 1e6)}``.
+        profile : mapping, optional
+            What is drawn over the pressure, by label: functions of the coordinate (k,) along the
+            contact line, or pairs of arrays, coordinates and pressures in the unit of the data.
+        mesh : bool
+            Whether edges of elements are drawn.
+        mirror : str, optional
+            A straight boundary, a line of symmetry, at which the bodies are mirrored. Bodies of
+            revolution always are at their axis.
+
+        Raises
+        ------
+        ValueError, TypeError, OSError
+            An option that is none, a path that cannot be written: before any work. A boundary
+            `mirror` that is no line of symmetry.
         """
-        return normal_stress_of(self.problem, self.displacement)
+        plot_solution(
+            self,
+            path,
+            scale,
+            field=field,
+            limits=limits,
+            units=units or {},
+            profile=profile or {},
+            mesh=mesh,
+            mirror=mirror,
+        )
 
-    @property
-    def hoop_stress(self) -> ng.CoefficientFunction:
-        """Hoop stress of a body of revolution, a scalar, in units of stress; refused in planes."""
-        return model_of(self.problem).hoop(self.out_of_plane_stress)
-
-    @cached_property
-    def pairs(self) -> list[ContactState]:
-        """Gap, force, pressure and state of the points of each pair, in arrays of their own."""
-        program = self.discrete.program
-        gap = program.g - self.minimiser.u[program.unknown]  # (3.9), (3.9')
-        return contact_states(self.discrete.lines, gap, self.force, self.active)
-
-    @cached_property
-    def points(self) -> Array:
-        """Contact points C_j on the secondary before deformation, (m, 2), a length."""
-        return np.concatenate([np.zeros((0, 2)), *(pair.line.position for pair in self.pairs)])
-
-    @cached_property
-    def pair(self) -> Index:
-        """Number of the pair in ``problem.contact`` of each point, (m,)."""
-        return np.repeat(np.arange(len(self.pairs)), [pair.gap.size for pair in self.pairs])
-
-    @cached_property
-    def gap(self) -> Array:
-        """Gap (m,) after deformation along each point's direction, a length; >= 0 to round-off."""
-        return np.concatenate([np.zeros(0), *(pair.gap for pair in self.pairs)])
-
-    @property
-    def force(self) -> Array:
-        """Nodal contact forces lambda_j, (m,), a force per unit thickness."""
-        return self.minimiser.force
-
-    @cached_property
-    def pressure(self) -> Array:
-        """-T_n per unit length (P1), -T_xi per unit eta (P2), (m,), in units of stress."""
-        return np.concatenate([np.zeros(0), *(pair.pressure for pair in self.pairs)])
-
-    @property
-    def active(self) -> Mask:
-        """Points in contact, (m,)."""
-        return self.minimiser.active
-
-    @property
-    def steps(self) -> list[int]:
-        """Changes of the active set after each linear system; the last one is 0."""
-        return self.minimiser.steps
-
-    def contact_force(self, pair: int = 0) -> Array:
-        """Resultant (2,) of a pair's contact forces on its secondary, force per thickness."""
-        state = state_of(self.pairs, pair)
-        forces = -(state.force[:, None] * state.line.direction).sum(axis=0)
-        return model_of(self.problem).resultant(forces)
-
-    @cached_property
-    def nodal_reaction(self) -> Array:
-        """Forces (n, 2) of the supports on the nodes, force per thickness, A u - f + B' force."""
-        d = self.discrete
-        residual = d.space.A @ self.displacement.vec.FV().NumPy() - d.space.f
-        return (d.space.basis.T @ residual + d.B.T @ self.force).reshape(2, -1).T
-
-    @cached_property
-    def reactions(self) -> dict[str, Array]:
-        """Resultant (2,) of every boundary of Gamma_u, Gamma_0 on its body, force per thickness.
-
-        A node shared by several of them counts for the last entry of `displacement`, then for
-        `sliding`; a name that several bodies share gives the sum over them.
-        """
-        return resultants(self.problem, self.discrete.space.trace, self.nodal_reaction)
-
-    @cached_property
-    def free_motions(self) -> list[RigidMotion]:
-        """Rigid motions that neither supports nor active contact resist (HH81 Remark 3.7).
-
-        The displacement is determined but for these; of those that no contact point resists, it
-        is the one whose component along them vanishes in the mean over the body's boundary.
-        """
-        rigid = self.discrete.rigid
-        return [] if rigid is None else rigid.left_free(self.active)
-
-    def transitions(self, pair: int = 0) -> Array:
-        """Points (k, 2) where a pair's contact turns from binding to non-binding, each a length.
-
-        None, k = 0, where all of the pair is in contact, or nothing.
-        """
-        return state_of(self.pairs, pair).transitions.position
-
-    @cached_property
-    def energy(self) -> float:
-        """Total potential energy L(u_h) of HH81 (2.6), per unit thickness."""
-        return potential_energy(self.problem, self.discrete.space, self.displacement)
-
-    @cached_property
-    def energy_norm(self) -> float:
-        """A(u_h, u_h)^(1/2), root of an energy per unit thickness."""
-        return energy_norm(self.problem, self.discrete.space, self.displacement)
-
-    @cached_property
-    def _estimate(self) -> Estimate:
-        self.work["estimates"] += 1
-        boundary = self.discrete.space.trace
-        return self.estimator(self.problem, boundary, self.displacement, self.stress, self.pairs)
-
-    @property
-    def estimated(self) -> bool:
-        """Whether the error estimate has been computed already."""
-        return "_estimate" in self.__dict__
-
-    @property
-    def indicators(self) -> Array:
-        """Local error indicators eta_T, (ne,), root of an energy per unit thickness."""
-        return self._estimate.indicators
-
-    @property
-    def estimate_parts(self) -> dict[str, Array]:
-        """Squared contributions (ne,) to the indicators by origin, energy per thickness."""
-        return self._estimate.parts
-
-    @property
-    def error_estimate(self) -> float:
-        """Estimated A(u - u_h, u - u_h)^(1/2), root of an energy per unit thickness."""
-        return root_of_squares(self.indicators)
-
-    @property
-    def relative_error_estimate(self) -> float:
-        """Estimated error over the energy norm of u_h, dimensionless; 0 where both vanish."""
-        if self.error_estimate == 0:
-            return 0.0
-        return self.error_estimate / self.energy_norm if self.energy_norm > 0 else float("inf")
-
-    @cached_property
-    def residuals(self) -> dict[str, float]:
-        """Residuals of the Karush-Kuhn-Tucker conditions, dimensionless.
-
-        `equilibrium`: unbalanced force over the largest force or term of a force; `penetration`:
-        negative gap over the largest displacement or closed gap; `tension`: negative over largest
-        contact force;
-        `complementarity`: sum of force times gap over force times length.
-        """
-        return kkt_residuals(self.discrete.program, self.minimiser)
-
-    __repr__ = Readable.__str__  # instead of all arrays
+    __repr__ = __str__  # instead of all arrays
 
 
 def load(path: str | os.PathLike[str]) -> Solution:

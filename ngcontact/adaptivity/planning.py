@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol
 
 import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Mask, root_of_squares
-from ..contact import ContactState
+from ..estimator import Estimated
 from ..fem import BoundaryTrace, unknowns
 from ..mesh import curve, diameters, unresolved
 from ..problem import Problem, Triangulation
@@ -56,30 +54,6 @@ class Plan:
     descent: Descent
     stuck: bool = False
     ends: bool = False
-
-
-class Estimated(Protocol):
-    """What of a solution is asked for."""
-
-    @property
-    def problem(self) -> Problem:
-        """The data."""
-
-    @property
-    def mesh(self) -> ng.Mesh:
-        """The mesh."""
-
-    @property
-    def pairs(self) -> Sequence[ContactState]:
-        """The contact pairs."""
-
-    @property
-    def indicators(self) -> Array:
-        """eta_T (ne,), root of an energy per unit thickness."""
-
-    @property
-    def relative_error_estimate(self) -> float:
-        """Dimensionless."""
 
 
 def next_plan(

@@ -35,21 +35,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array
-from ..contact import ContactState
 from ..fem import (
     NEARLY_INCOMPRESSIBLE,
-    BoundaryTrace,
     nearly_incompressible,
 )
-from ..problem import Problem, varies
+from ..problem import varies
 from ..quadrature import known_rough_load, moment_degree
+from ..solved import Solved
 from .contact import on_contact, remaining
-from .indicators import Estimate
 from .interior import divergence_and_jump, edge_integral, element_integral
 from .oscillation import oscillation
 from .pressure_correction import PressureCorrection, correcting_pressure
@@ -57,25 +56,33 @@ from .supports import on_supports_and_loads
 from .terms import DATA_BONUS, BoundaryTerms, ScaledSolution, Squares, scaled
 
 
-def estimate(
-    problem: Problem,
-    boundary: BoundaryTrace,
-    displacement: ng.GridFunction,
-    stress: ng.CoefficientFunction,
-    pairs: Sequence[ContactState],
-    *,
-    corrected_from: float = NEARLY_INCOMPRESSIBLE,
-) -> Estimate:
-    """Residual error estimate of a displacement, an `Estimator`.
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Error indicators of the ne elements.
+
+    Attributes
+    ----------
+    indicators : ndarray (ne,)
+        eta_T, an energy norm: the root of an energy per unit thickness.
+    parts : dict of ndarray (ne,)
+        Squared contributions by name: energies, 0 or inf where these are out of a float's range.
+    """
+
+    indicators: Array
+    parts: dict[str, Array]
+
+
+def estimate(solved: Solved, corrected_from: float = NEARLY_INCOMPRESSIBLE) -> Estimate:
+    """Residual error estimate of a displacement in the energy norm.
 
     Parameters
     ----------
-    problem, boundary, displacement, stress, pairs
-        See `Estimator`.
+    solved : Solved
     corrected_from : float
         kappa / mu from which the pressure of a body is corrected.
     """
-    solution = scaled(problem, boundary, displacement, stress)
+    pairs, boundary = solved.pairs, solved.discrete.space.trace
+    solution = scaled(solved.problem, boundary, solved.displacement, solved.stress)
     terms = [on_contact(solution, pair, pairs) for pair in pairs]
     rest = remaining(boundary.inner | boundary.on_axis, [term.covered for term in terms])
     terms.append(on_supports_and_loads(solution, rest))

@@ -15,6 +15,7 @@ from .energy import normal_stress_of as normal_stress_of
 from .energy import potential_energy as potential_energy
 from .energy import stress_of as stress_of
 from .energy import voigt_stress as voigt_stress
+from .energy import von_mises as von_mises
 from .model import MODELS as MODELS
 from .model import Model as Model
 from .model import model_of as model_of

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 import ngsolve as ng
+import numpy as np
 
-from ..arrays import power_of_two
+from ..arrays import Array, power_of_two
 from ..problem import Problem
 from .model import model_of
 from .space import Space
@@ -68,3 +69,10 @@ def normal_stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.Coef
     """Stress normal to the plane of a displacement, a scalar, in the units of the moduli."""
     voigt, mesh = voigt_stress(problem, displacement), displacement.space.mesh
     return model_of(problem).out_of_plane(problem.materials, mesh, voigt)
+
+
+def von_mises(stress: Array) -> Array:
+    """Von Mises stress (k,) of the components xx, yy, xy, zz in `stress` (k, 4), same units."""
+    size = float(np.abs(stress).max(initial=0.0)) or 1.0  # squares must stay in range
+    xx, yy, xy, zz = stress.T / size
+    return size * np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * xy**2)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..solved import Solved
 from .files import check_path, replacing
 from .pictures.fields import check_field
 from .pictures.lines import contact_lines
@@ -18,7 +19,6 @@ from .pictures.picture import draw_scene
 from .pictures.scene import Scene, names_of, picture
 from .pictures.style import Style
 from .pictures.windows import close_ups, colour_range
-from .solution_data import SolutionData
 
 if TYPE_CHECKING:
     from PIL.Image import Image
@@ -29,7 +29,7 @@ HEADROOM = 1.05  # of the largest pressure
 
 def write_film(
     path: str | os.PathLike[str],
-    solutions: Sequence[SolutionData],
+    solutions: Sequence[Solved],
     *,
     seconds: float = 0.6,
     titles: Sequence[str] | None = None,
@@ -85,7 +85,7 @@ def write_film(
     return target
 
 
-def _check(frames: Sequence[SolutionData], seconds: float, titles: Sequence[str] | None) -> None:
+def _check(frames: Sequence[Solved], seconds: float, titles: Sequence[str] | None) -> None:
     """Raise ``ValueError`` where nothing can be shown."""
     if not frames:
         raise ValueError("solutions: give one at least")
@@ -96,7 +96,7 @@ def _check(frames: Sequence[SolutionData], seconds: float, titles: Sequence[str]
 
 
 def _images(
-    frames: Sequence[SolutionData],
+    frames: Sequence[Solved],
     scenes: Sequence[Scene],
     style: Style,
     names: Sequence[str],

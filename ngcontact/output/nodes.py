@@ -14,8 +14,8 @@ from scipy.spatial import KDTree
 
 from ..arrays import Array, Index
 from ..problem import Triangulation
+from ..solved import Solved
 from ..triplets import from_triplets
-from .solution_data import SolutionData
 
 VTK_CELL = {1: 5, 2: 22}  # VTK_TRIANGLE, VTK_QUADRATIC_TRIANGLE
 VTK_LAGRANGE_TRIANGLE = 69  # every higher order
@@ -102,17 +102,10 @@ def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
     return Nodes(cells.reshape(-1, len(weights)), body, names, at)
 
 
-def full_stress(solution: SolutionData) -> ng.CoefficientFunction:
+def full_stress(solution: Solved) -> ng.CoefficientFunction:
     """Stress components xx, yy, xy and zz, the one normal to the plane, (4,)."""
     stress = solution.stress
     return ng.CF((stress[0, 0], stress[1, 1], stress[0, 1], solution.out_of_plane_stress))
-
-
-def von_mises(stress: Array) -> Array:
-    """Von Mises stress (k,) of the components xx, yy, xy, zz in `stress` (k, 4), same units."""
-    size = float(np.abs(stress).max(initial=0.0)) or 1.0  # squares must stay in range
-    xx, yy, xy, zz = stress.T / size
-    return size * np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * xy**2)
 
 
 def neighbour_tree(points: Array) -> csr_array:

@@ -11,10 +11,11 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index
+from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS
+from ..solved import Solved
 from .files import check_path, replacing
-from .nodes import full_stress, neighbour_tree, nodes_of, subdivision, von_mises
-from .solution_data import SolutionData
+from .nodes import full_stress, neighbour_tree, nodes_of, subdivision
 from .vtk import name_pairs, write_data
 
 if TYPE_CHECKING:
@@ -24,9 +25,7 @@ STEP = 6.0  # degrees between two sections, at most
 VTK_WEDGE = 13
 
 
-def write_revolved(
-    path: str | os.PathLike[str], solution: SolutionData, angle: float = 270.0
-) -> Path:
+def write_revolved(path: str | os.PathLike[str], solution: Solved, angle: float = 270.0) -> Path:
     """Bodies of revolution as ``.vtu``, the surface of contact beside it: ``<stem>_contact.vtp``.
 
     The meridian section is turned by `angle` degrees about z.
@@ -64,7 +63,7 @@ def _sections(angle: float) -> tuple[Array, Index, Index]:
     return turns, np.arange(steps), (np.arange(steps) + 1) % count
 
 
-def _grid(solution: SolutionData, angle: float) -> pyvista.UnstructuredGrid:
+def _grid(solution: Solved, angle: float) -> pyvista.UnstructuredGrid:
     """The wedges with their fields."""
     import pyvista
 
@@ -92,7 +91,7 @@ def _grid(solution: SolutionData, angle: float) -> pyvista.UnstructuredGrid:
     return grid
 
 
-def _surface(solution: SolutionData, angle: float) -> pyvista.PolyData:
+def _surface(solution: Solved, angle: float) -> pyvista.PolyData:
     """Quadrilaterals between neighbouring contact points of each pair, turned."""
     import pyvista
 

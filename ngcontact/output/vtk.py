@@ -11,10 +11,12 @@ from typing import TYPE_CHECKING, Any
 import ngsolve as ng
 import numpy as np
 
+from ..estimator import Estimated
+from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS
+from ..solved import Solved
 from .files import check_path, replacing
-from .nodes import VTK_CELL, VTK_LAGRANGE_TRIANGLE, full_stress, neighbour_tree, nodes_of, von_mises
-from .solution_data import SolutionData
+from .nodes import VTK_CELL, VTK_LAGRANGE_TRIANGLE, full_stress, neighbour_tree, nodes_of
 
 if TYPE_CHECKING:
     import pyvista
@@ -23,7 +25,7 @@ PLANE = ("xx", "yy", "xy", "zz")  # components of a stress, as `full_stress` ord
 MERIDIAN = ("rr", "zz", "rz", "hoop")
 
 
-def write_solution(path: str | os.PathLike[str], solution: SolutionData) -> Path:
+def write_solution(path: str | os.PathLike[str], solution: Estimated) -> Path:
     """Bodies of a solution as ``.vtu``, contact points beside it as ``<stem>_contact.vtp``.
 
     The cells are Lagrange triangles of the order of the geometry or of the displacement,
@@ -50,7 +52,7 @@ def write_solution(path: str | os.PathLike[str], solution: SolutionData) -> Path
 
 def write_series(
     path: str | os.PathLike[str],
-    solutions: Iterable[SolutionData],
+    solutions: Iterable[Estimated],
     times: Iterable[float] | None = None,
 ) -> Path:
     """Solutions, one per level or load, as a ``.pvd`` for ParaView.
@@ -96,7 +98,7 @@ def _increasing(times: Iterable[float]) -> list[float]:
     return [float(time) for time in values]
 
 
-def _bodies(solution: SolutionData) -> pyvista.UnstructuredGrid:
+def _bodies(solution: Estimated) -> pyvista.UnstructuredGrid:
     """Both bodies with their fields as a VTK grid."""
     import pyvista
 
@@ -125,7 +127,7 @@ def _bodies(solution: SolutionData) -> pyvista.UnstructuredGrid:
     return grid
 
 
-def _contact_points(solution: SolutionData) -> pyvista.PolyData:
+def _contact_points(solution: Estimated) -> pyvista.PolyData:
     """Contact points as VTK vertices, neighbours of a pair joined by lines."""
     import pyvista
 
@@ -154,7 +156,7 @@ def _contact_points(solution: SolutionData) -> pyvista.PolyData:
     return data
 
 
-def name_pairs(data: pyvista.DataSet, solution: SolutionData) -> None:
+def name_pairs(data: pyvista.DataSet, solution: Solved) -> None:
     """Names of the pairs as field data, in the order of their numbers."""
     contact = solution.problem.contact
     if contact:  # VTK has no empty list of strings

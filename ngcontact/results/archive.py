@@ -12,46 +12,23 @@ import pickle
 from collections.abc import Iterator
 from dataclasses import fields, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import ngsolve as ng
 
-from ..discrete import DiscreteProblem, reassembled
+from ..discrete import reassembled
 from ..fem import assemble, boundary_trace, model_of
 from ..mesh import keep_parents, vertex_parents
 from ..output import check_path, replacing
 from ..problem import Problem
+from ..solved import Solved
 
 SUFFIX = ".ngcontact"
 FORMAT = 1  # of the files
 MADE = ("_estimate", "_bound")  # members that cost much, kept where they have been made
 
 
-class Kept(Protocol):
-    """What of a solution is kept."""
-
-    @property
-    def problem(self) -> Problem:
-        """The data."""
-
-    @property
-    def mesh(self) -> ng.Mesh:
-        """The mesh."""
-
-    @property
-    def element(self) -> str:
-        """Name of the element."""
-
-    @property
-    def discrete(self) -> DiscreteProblem:
-        """The discrete problem."""
-
-    @property
-    def displacement(self) -> ng.GridFunction:
-        """u_h, lengths."""
-
-
-def state_of(solution: Kept) -> dict[str, Any]:
+def state_of(solution: Solved) -> dict[str, Any]:
     """What a solution is made of again by `restored`, all of it fit to be pickled."""
     discrete, plain = solution.discrete, {"discrete", "displacement"}
     discrete.space.require_mesh()
@@ -93,8 +70,8 @@ def _names(data: Any) -> list[str]:
     return [field.name for field in fields(data)]
 
 
-def save(solution: Kept, path: str | os.PathLike[str], version: str) -> Path:
-    """Write a solution to `path`; see `Readable.save`."""
+def save(solution: Solved, path: str | os.PathLike[str], version: str) -> Path:
+    """Write a solution to `path`; see `Solution.save`."""
     target = check_path(path, SUFFIX)
     solution.discrete.space.require_mesh()
     try:

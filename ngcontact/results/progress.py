@@ -6,30 +6,16 @@ import math
 import sys
 import time
 from collections.abc import Generator, Iterator
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
-import ngsolve as ng
-
+from ..estimator import Measured
 from ..problem import table
 
 HEAD = ("level", "unknowns", "estimate", "seconds")
 WIDTH = 20  # characters of a bar
 
 
-class _Level(Protocol):
-    """What of a level is told."""
-
-    @property
-    def displacement(self) -> ng.GridFunction: ...
-    @property
-    def relative_error_estimate(self) -> float: ...
-    @property
-    def bounded(self) -> bool: ...
-    @property
-    def relative_error_bound(self) -> float: ...
-
-
-Level = TypeVar("Level", bound=_Level)
+Level = TypeVar("Level", bound=Measured)
 
 
 def with_progress(

@@ -3,53 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 
-from ..arrays import Array
-from ..contact import ContactState
-from .values import Solved
-
-
-class _Recorded(Solved, Protocol):
-    """What of a solution stands in its record."""
-
-    @property
-    def pairs(self) -> Sequence[ContactState]: ...
-    @property
-    def steps(self) -> list[int]: ...
-    @property
-    def energy(self) -> float: ...
-    @property
-    def energy_norm(self) -> float: ...
-    @property
-    def adaptive(self) -> bool: ...
-    @property
-    def bounded(self) -> bool: ...
-    @property
-    def error_estimate(self) -> float: ...
-    @property
-    def relative_error_estimate(self) -> float: ...
-    @property
-    def error_bound(self) -> float: ...
-    @property
-    def relative_error_bound(self) -> float: ...
-    @property
-    def reactions(self) -> dict[str, Array]: ...
-    @property
-    def residuals(self) -> dict[str, float]: ...
-    @property
-    def work(self) -> dict[str, int]: ...
-    def contact_force(self, pair: int = 0) -> Array: ...
-
+from ..estimator import Measured
 
 Number = int | float
 
 
-def record_of(solution: _Recorded) -> dict[str, Number]:
-    """A flat dict of numbers; see `Readable.record`."""
+def record_of(solution: Measured) -> dict[str, Number]:
+    """A flat dict of numbers; see `Solution.record`."""
     solution.discrete.space.require_mesh()
     estimated = solution.estimated or solution.adaptive
     row: dict[str, Number] = {

@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 import numpy as np
 
-from ..discrete import RigidMotion
+from ..estimator import Measured
 from ..problem import table
-from .record import _Recorded
 
 
-class _Told(_Recorded, Protocol):
-    """What of a solution is told."""
-
-    @property
-    def free_motions(self) -> list[RigidMotion]: ...
-
-
-def line_of(solution: _Told) -> str:
+def line_of(solution: Measured) -> str:
     """Unknowns, active points, steps, forces of all pairs; estimate and bound where known."""
     return ", ".join(f"{name} {value}" if name else value for name, value in facts(solution))
 
 
-def forces(solution: _Told) -> str:
+def forces(solution: Measured) -> str:
     """Sizes of the forces of all pairs, with the names of the secondaries if there are several."""
     contact = solution.problem.contact
     sizes = [_six_digits(np.hypot(*solution.contact_force(k))) for k in range(len(contact))]
@@ -37,7 +27,7 @@ def _six_digits(size: float) -> str:
     return f"{size:#.6g}".rstrip(".")
 
 
-def facts(solution: _Told) -> list[tuple[str, str]]:
+def facts(solution: Measured) -> list[tuple[str, str]]:
     """What is worth a word, by name; of one width in all lines of a run but for the last ones."""
     active = f"{np.count_nonzero(solution.active)}/{solution.active.size}"
     told = [
@@ -57,7 +47,7 @@ def facts(solution: _Told) -> list[tuple[str, str]]:
     return told
 
 
-def html_of(solution: _Told) -> str:
+def html_of(solution: Measured) -> str:
     """What a notebook shows: facts, then a line for each pair."""
     rows = [(name, value.strip()) for name, value in _named(solution)]
     about = table(("", ""), rows)
@@ -75,7 +65,7 @@ def html_of(solution: _Told) -> str:
     return about + table(("contact", "of", "force", "peak pressure", "active"), lines)
 
 
-def _named(solution: _Told) -> list[tuple[str, str]]:
+def _named(solution: Measured) -> list[tuple[str, str]]:
     """Facts with a name each, without those of pairs."""
     words = (
         (name, value) if name else tuple(reversed(value.strip().split(" ", 1)))

@@ -3,36 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask
-from ..fem import BoundaryTrace
-from ..output import SolutionData, full_stress, von_mises
+from ..fem import BoundaryTrace, von_mises
+from ..output import full_stress
 from ..problem import Triangulation, body_mask, body_of_vertex, regions_of
 from ..quadrature import mesh_points
+from ..solved import Solved
 from .location import Location, locate
 
 OUTSIDE = ("error", "nan")
-
-
-class Assembled(Protocol):
-    """A discrete problem, of which the space is asked."""
-
-    @property
-    def space(self) -> Any:
-        """V_h, whose `trace` is the boundary."""
-
-
-class Solved(SolutionData, Protocol):
-    """What of a solution is asked."""
-
-    @property
-    def discrete(self) -> Assembled:
-        """The discrete problem."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +91,7 @@ def _nowhere_nan(function: Any, stress: Array) -> Array:
 def values_at(
     solution: Solved, points: Any, body: str | None = None, outside: str = "error"
 ) -> Values:
-    """Values at `points`, (..., 2) lengths; see `Readable.at`."""
+    """Values at `points`, (..., 2) lengths; see `Solution.at`."""
     if outside not in OUTSIDE:
         raise ValueError(f"outside={outside!r}: choose one of {OUTSIDE}")
     where, stress = _points(points), full_stress(solution)

@@ -103,7 +103,7 @@ PLAIN = {
     *("problem", "mesh", "order", "element", "discrete", "minimiser", "work", "coarse_levels"),
     "descent",
     *("adaptive", "pair", "active", "steps", "free_motions", "estimated", "bounded"),
-    *("pairs", "estimator", "write", "revolved", "plot", "draw", "save"),
+    *("pairs", "write", "revolved", "plot", "draw", "save"),
 }
 
 

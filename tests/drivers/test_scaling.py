@@ -13,8 +13,8 @@ from drivers.stress.trials import scaling, symmetry
 from drivers.stress.trials.interruption import while_writing
 from drivers.stress.trials.symmetry import cornered, disc_scene, graph_scene, hertz_scene, parting
 from ngcontact import ConvergenceError, Elastic, Solution, adapt, solve
+from ngcontact.fem import von_mises
 from ngcontact.fem.boundary import boundary_trace
-from ngcontact.output.nodes import von_mises
 
 TURN = np.array([[0.6, -0.8], [0.8, 0.6]])
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from vtkmodules.vtkCommonDataModel import vtkHigherOrderTriangle
 
-from ngcontact.output.nodes import lattice, neighbour_tree, von_mises
+from ngcontact.fem import von_mises
+from ngcontact.output.nodes import lattice, neighbour_tree
 
 
 @pytest.mark.parametrize("order", range(1, 7))

@@ -74,7 +74,7 @@ def test_without_the_extra_draw_says_what_to_install(monkeypatch):
     solution = solve(two_blocks(), maxh=1.0)
     find = importlib.util.find_spec
     monkeypatch.setattr(
-        sys.modules["ngcontact.results.members"],
+        sys.modules["ngcontact.solution"],
         "find_spec",
         lambda name: None if name == "anywidget" else find(name),
     )

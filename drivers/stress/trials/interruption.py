@@ -11,7 +11,7 @@ import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pyvista
@@ -176,9 +176,9 @@ def while_writing() -> Iterator[Outcome]:
             target = Path(folder) / "hertz.vtu"
             first.write(target)
             before = {path.name: path.read_bytes() for path in Path(folder).iterdir()}
-            raised = False
+            raised, failing = False, cast(Solution, _Failing(second, name))
             try:
-                Solution.write(_Failing(second, name), target)
+                Solution.write(failing, target)
             except KeyboardInterrupt:
                 raised = True
             after = {path.name: path.read_bytes() for path in Path(folder).iterdir()}

@@ -6,7 +6,7 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array
-from ...output import von_mises
+from ...fem import von_mises
 from ...problem import Triangulation, body_of_vertex
 from ..bound import EquilibratedStress
 from .singular import Singular

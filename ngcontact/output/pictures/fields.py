@@ -9,8 +9,9 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array
-from ..nodes import Nodes, full_stress, von_mises
-from ..solution_data import SolutionData
+from ...fem import von_mises
+from ...solved import Solved
+from ..nodes import Nodes, full_stress
 
 Evaluated = Callable[[Array, Array], Array]
 
@@ -111,7 +112,7 @@ def check_field(field: str | ng.CoefficientFunction, axes: tuple[str, str], acro
 
 
 def evaluated(
-    solution: SolutionData,
+    solution: Solved,
     nodes: Nodes,
     field: str | ng.CoefficientFunction,
     axes: tuple[str, str],

@@ -6,11 +6,11 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from ...arrays import Array, Index
+from ...solved import Solved
 from ..nodes import neighbour_tree
-from ..solution_data import SolutionData
 
 
-def contact_lines(solution: SolutionData) -> list[tuple[int, Index, Array]]:
+def contact_lines(solution: Solved) -> list[tuple[int, Index, Array]]:
     """Contact points in order along their lines: (pair, rows, coordinate) for every line.
 
     Of the k points of each line `rows` (k,) index ``solution.points``, and the coordinate (k,) is a
@@ -58,7 +58,7 @@ def _arcs(points: Array) -> list[tuple[Index, Array]]:
     return arcs
 
 
-def zones_of(solution: SolutionData) -> list[Index]:
+def zones_of(solution: Solved) -> list[Index]:
     """Contact points (c,) of each zone in contact, the zone of the largest force first.
 
     A zone is a run of neighbouring points in contact on one line.

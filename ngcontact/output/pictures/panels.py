@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...arrays import Array, Index
-from ..solution_data import SolutionData
+from ...solved import Solved
 from .lines import contact_lines
 from .scene import Scene
 from .style import COLOURS, MARKS, RISING, SIGNED, Style
@@ -94,7 +94,7 @@ def draw_windows(
             )
 
 
-def shown_part(solution: SolutionData, lines: list[tuple[int, Index, Array]]) -> Array | None:
+def shown_part(solution: Solved, lines: list[tuple[int, Index, Array]]) -> Array | None:
     """Ends (2,) of what is shown of long boundaries: the zones in contact and what is beside.
 
     Of each of the `lines` (l,) its pair, numbers (k,) of contact points, their coordinates (k,).
@@ -109,7 +109,7 @@ def shown_part(solution: SolutionData, lines: list[tuple[int, Index, Array]]) ->
     return np.array([low - 0.03 * margin, high + 0.03 * margin])
 
 
-def shown_parts(solution: SolutionData) -> list[Array]:
+def shown_parts(solution: Solved) -> list[Array]:
     """Ends (2,) of each interval of the coordinate in which pressures are shown.
 
     One for each zone, where zones are small and far from each other, or one for all.
@@ -132,9 +132,7 @@ def shown_parts(solution: SolutionData) -> list[Array]:
     return parts if far else [whole]
 
 
-def _zones(
-    solution: SolutionData, lines: list[tuple[int, Index, Array]]
-) -> list[tuple[Array, Array]]:
+def _zones(solution: Solved, lines: list[tuple[int, Index, Array]]) -> list[tuple[Array, Array]]:
     """Coordinates (c,) and pressures (c,) of each zone in contact."""
     zones = []
     for _, rows, s in lines:
@@ -144,7 +142,7 @@ def _zones(
     return zones
 
 
-def cut_pressure(solution: SolutionData) -> float | None:
+def cut_pressure(solution: Solved) -> float | None:
     """End of the scale of pressures where single points, as at corners, lie far above the others.
 
     In each zone all but `SINGLE` of its length lie below.
@@ -160,7 +158,7 @@ def cut_pressure(solution: SolutionData) -> float | None:
 
 
 def draw_pressures(
-    several: Sequence[Axes], solution: SolutionData, style: Style, parts: Sequence[Array]
+    several: Sequence[Axes], solution: Solved, style: Style, parts: Sequence[Array]
 ) -> None:
     """Pressure along the contact lines: one panel for each of the `parts` (2,), with one scale."""
     (_, stress), top = style.unit("stress"), cut_pressure(solution)
@@ -188,7 +186,7 @@ def draw_pressures(
             others[-1].legend(fontsize="small", ncols=2, **above)
 
 
-def draw_pressure(axes: Axes, solution: SolutionData, style: Style, part: Array) -> None:
+def draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> None:
     """Pressure along one `part` (2,) of the lines, full where in contact and hollow where open."""
     (_, length), (_, stress) = style.unit("length"), style.unit("stress")
     lines, contact = contact_lines(solution), solution.problem.contact

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...arrays import Array
+from ...solved import Solved
 from ..files import check_path, replacing
-from ..solution_data import SolutionData
 from .fields import check_field
 from .panels import draw_bodies, draw_pressures, draw_windows, powers, shown_parts
 from .scene import Scene, names_of, picture
@@ -25,7 +25,7 @@ HEIGHT = 5.0  # of a picture, inches
 
 
 def plot_solution(
-    solution: SolutionData,
+    solution: Solved,
     path: str | os.PathLike[str] | None = None,
     scale: float | None = None,
     **options: Any,
@@ -64,7 +64,7 @@ def plot_solution(
     return figure
 
 
-def draw(figure: Figure, solution: SolutionData, style: Style) -> None:
+def draw(figure: Figure, solution: Solved, style: Style) -> None:
     """Bodies on the left, close-ups of the contact if needed, the pressure on the right."""
     scene = picture(solution, style)
     windows = close_ups([scene])
@@ -103,7 +103,7 @@ def _panels(
 
 def draw_scene(
     figure: Figure,
-    solution: SolutionData,
+    solution: Solved,
     scene: Scene,
     style: Style,
     windows: Sequence[Window],

@@ -10,8 +10,8 @@ from scipy.spatial import KDTree
 
 from ...arrays import Array, Index, Mask
 from ...problem import ABOUT_AN_AXIS
+from ...solved import Solved
 from ..nodes import nodes_of, subdivision
-from ..solution_data import SolutionData
 from .fields import Field, evaluated
 from .lines import zones_of
 from .style import Style
@@ -61,13 +61,13 @@ class Scene:
         return np.asarray(np.abs(ux * vy - uy * vx) / 2)
 
 
-def names_of(solution: SolutionData) -> tuple[tuple[str, str], str]:
+def names_of(solution: Solved) -> tuple[tuple[str, str], str]:
     """Names of both coordinates and of the stress normal to the plane."""
     revolved = solution.problem.model in ABOUT_AN_AXIS
     return (("r", "z"), "hoop") if revolved else (("x", "y"), "zz")
 
 
-def picture(solution: SolutionData, style: Style) -> Scene:
+def picture(solution: Solved, style: Style) -> Scene:
     """Evaluate a solution for the picture."""
     _ = solution.stress  # refuses a mesh that was changed, whatever field is shown
     mesh, u, scale = solution.mesh, solution.displacement, style.scale
@@ -124,7 +124,7 @@ def mirrored(scene: Scene, line: SymmetryLine, place: Array) -> Scene:
     )
 
 
-def _chosen_scale(solution: SolutionData, place: Array, move: Array, body: Index) -> float:
+def _chosen_scale(solution: Solved, place: Array, move: Array, body: Index) -> float:
     """Factor 1, 2, 5, 10, ... on the displacement: seen, yet no false overlap of the bodies.
 
     Contact turns a gap e into `gap`; a factor s draws it as e - s (e - gap). For e, the distance

@@ -1,0 +1,196 @@
+"""One solved mesh: displacement, contact and forces, which all that comes after reads."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import ngsolve as ng
+import numpy as np
+
+from .arrays import Array, Index, Mask
+from .contact import ContactState, contact_states, state_of
+from .discrete import DiscreteProblem, RigidMotion, resultants
+from .fem import energy_norm, model_of, normal_stress_of, potential_energy, stress_of
+from .problem import Problem
+from .qp import Iterate, kkt_residuals
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """Exact minimiser u_h of L over K_h on one mesh: HH81 (P_1h), (P_2h).
+
+    Contact quantities are arrays over the m contact points, all pairs in order.
+
+    Attributes
+    ----------
+    problem : Problem
+        What was solved.
+    mesh : ng.Mesh
+        The (curved) mesh.
+    order : int
+        Polynomial degree of the displacement.
+    element : str
+        "isoparametric", "superparametric" or "physical".
+    displacement : ng.GridFunction
+        u_h, a length, on a VectorH1 space; "unknowns" means ``displacement.space.ndof``.
+    discrete : DiscreteProblem
+        The algebraic problem.
+    minimiser : Iterate
+        Its solution.
+    work : dict
+        Counts of assemblies, factorizations, back_solves, gap_searches, curved_elements, estimates
+        and equilibrations spent on this solution, on its mesh. Without factorisation V-cycles of
+        multigrid count as back_solves. And evaluations: points at which functions among the data
+        were looked at for warnings, jumps and roughness, in `adapt` by the level itself; beside
+        those are checks that data are finite, interpolation and quadrature. 0 where all data are
+        numbers.
+    """
+
+    problem: Problem
+    mesh: ng.Mesh
+    order: int
+    element: str
+    displacement: ng.GridFunction
+    discrete: DiscreteProblem
+    minimiser: Iterate
+    work: dict[str, int] = field(default_factory=dict)
+
+    @property
+    def stress(self) -> ng.CoefficientFunction:
+        """In-plane stress, a (2, 2) CoefficientFunction, in units of stress.
+
+        What is computed on first use and looks at the mesh asks for it: estimate, bound, values at
+        points, files and pictures.
+
+        Raises
+        ------
+        RuntimeError
+            The mesh was refined or moved in place since.
+        """
+        self.discrete.space.require_mesh()
+        return stress_of(self.problem, self.displacement)
+
+    @cached_property
+    def out_of_plane_stress(self) -> ng.CoefficientFunction:
+        """Stress normal to the plane, a scalar CoefficientFunction, in units of stress.
+
+        nu (xx + yy) in plane strain, 0 where a general `Hooke` law does not tell it and in plane
+        stress, the hoop stress about an axis.
+        """
+        return normal_stress_of(self.problem, self.displacement)
+
+    @property
+    def hoop_stress(self) -> ng.CoefficientFunction:
+        """Hoop stress of a body of revolution, a scalar, in units of stress; refused in planes."""
+        return model_of(self.problem).hoop(self.out_of_plane_stress)
+
+    @cached_property
+    def pairs(self) -> list[ContactState]:
+        """Gap, force, pressure and state of the points of each pair, in arrays of their own."""
+        program = self.discrete.program
+        gap = program.g - self.minimiser.u[program.unknown]  # (3.9), (3.9')
+        return contact_states(self.discrete.lines, gap, self.force, self.active)
+
+    @cached_property
+    def points(self) -> Array:
+        """Contact points C_j on the secondary before deformation, (m, 2), a length."""
+        return np.concatenate([np.zeros((0, 2)), *(pair.line.position for pair in self.pairs)])
+
+    @cached_property
+    def pair(self) -> Index:
+        """Number of the pair in ``problem.contact`` of each point, (m,)."""
+        return np.repeat(np.arange(len(self.pairs)), [pair.gap.size for pair in self.pairs])
+
+    @property
+    def direction(self) -> Array:
+        """Unit direction d (m, 2) of each point, from the secondary to the primary, dimensionless.
+
+        The traction on the secondary is -pressure d, the force of a point on it -force d.
+        """
+        return np.concatenate([np.zeros((0, 2)), *(pair.line.direction for pair in self.pairs)])
+
+    @cached_property
+    def gap(self) -> Array:
+        """Gap (m,) after deformation along each point's direction, a length; >= 0 to round-off."""
+        return np.concatenate([np.zeros(0), *(pair.gap for pair in self.pairs)])
+
+    @property
+    def force(self) -> Array:
+        """Nodal contact forces lambda_j, (m,), a force per unit thickness."""
+        return self.minimiser.force
+
+    @cached_property
+    def pressure(self) -> Array:
+        """-T_n per unit length (P1), -T_xi per unit eta (P2), (m,), in units of stress."""
+        return np.concatenate([np.zeros(0), *(pair.pressure for pair in self.pairs)])
+
+    @property
+    def active(self) -> Mask:
+        """Points in contact, (m,)."""
+        return self.minimiser.active
+
+    @property
+    def steps(self) -> list[int]:
+        """Changes of the active set after each linear system; the last one is 0."""
+        return self.minimiser.steps
+
+    def contact_force(self, pair: int = 0) -> Array:
+        """Resultant (2,) of a pair's contact forces on its secondary, force per thickness."""
+        state = state_of(self.pairs, pair)
+        forces = -(state.force[:, None] * state.line.direction).sum(axis=0)
+        return model_of(self.problem).resultant(forces)
+
+    @cached_property
+    def nodal_reaction(self) -> Array:
+        """Forces (n, 2) of the supports on the nodes, force per thickness, A u - f + B' force."""
+        d = self.discrete
+        residual = d.space.A @ self.displacement.vec.FV().NumPy() - d.space.f
+        return (d.space.basis.T @ residual + d.B.T @ self.force).reshape(2, -1).T
+
+    @cached_property
+    def reactions(self) -> dict[str, Array]:
+        """Resultant (2,) of every boundary of Gamma_u, Gamma_0 on its body, force per thickness.
+
+        A node shared by several of them counts for the last entry of `displacement`, then for
+        `sliding`; a name that several bodies share gives the sum over them.
+        """
+        return resultants(self.problem, self.discrete.space.trace, self.nodal_reaction)
+
+    @cached_property
+    def free_motions(self) -> list[RigidMotion]:
+        """Rigid motions that neither supports nor active contact resist (HH81 Remark 3.7).
+
+        The displacement is determined but for these; of those that no contact point resists, it
+        is the one whose component along them vanishes in the mean over the body's boundary.
+        """
+        rigid = self.discrete.rigid
+        return [] if rigid is None else rigid.left_free(self.active)
+
+    def transitions(self, pair: int = 0) -> Array:
+        """Points (k, 2) where a pair's contact turns from binding to non-binding, each a length.
+
+        None, k = 0, where all of the pair is in contact, or nothing.
+        """
+        return state_of(self.pairs, pair).transitions.position
+
+    @cached_property
+    def energy(self) -> float:
+        """Total potential energy L(u_h) of HH81 (2.6), per unit thickness."""
+        return potential_energy(self.problem, self.discrete.space, self.displacement)
+
+    @cached_property
+    def energy_norm(self) -> float:
+        """A(u_h, u_h)^(1/2), root of an energy per unit thickness."""
+        return energy_norm(self.problem, self.discrete.space, self.displacement)
+
+    @cached_property
+    def residuals(self) -> dict[str, float]:
+        """Residuals of the Karush-Kuhn-Tucker conditions, dimensionless.
+
+        `equilibrium`: unbalanced force over the largest force or term of a force; `penetration`:
+        negative gap over the largest displacement or closed gap; `tension`: negative over largest
+        contact force;
+        `complementarity`: sum of force times gap over force times length.
+        """
+        return kkt_residuals(self.discrete.program, self.minimiser)
