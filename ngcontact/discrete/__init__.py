@@ -5,6 +5,7 @@ from .discrete_problem import discretise as discretise
 from .discrete_problem import hardly_held as hardly_held
 from .discrete_problem import minimise_energy as minimise_energy
 from .discrete_problem import reassembled as reassembled
+from .equilibrium import load_by_shape as load_by_shape
 from .initial_active_set import carried_active_set as carried_active_set
 from .initial_active_set import first_active_set as first_active_set
 from .linear_systems import MULTIGRID as MULTIGRID

@@ -46,10 +46,10 @@ def direction_of(solution: Solved, pair: int, state: ContactState) -> tuple[Arra
     return (force / size if size > 0 else np.array([1.0, 0.0])), "itself"
 
 
-def approach_of(solution: Solved, state: ContactState, e: Array) -> tuple[float, float]:
-    """How far the bodies of a pair approach along `e` (2,), and the part of it that is not given.
+def approach_of(solution: Solved, state: ContactState) -> tuple[Array, Array]:
+    """By what vector (2,) the bodies of a pair approach, and sizes (2,) of what is not given of it.
 
-    Each body moves by the mean of what its supports prescribe along e, or, where none does, by the
+    Each body moves by the mean of what its supports prescribe, or, where none does, by the
     mean of its displacement; a rigid obstacle stays.
     """
     bodies = connected_bodies(solution.discrete.space.trace)
@@ -59,7 +59,7 @@ def approach_of(solution: Solved, state: ContactState, e: Array) -> tuple[float,
         mean = _mean(solution, bodies, body)
         total += sign * np.where(np.isnan(held), mean, held)
         free += np.where(np.isnan(held), np.abs(mean), 0.0)
-    return abs(float(total @ e)), float(free @ np.abs(e))
+    return total, free
 
 
 def _sides(state: ContactState, bodies: Bodies) -> list[int]:
