@@ -7,6 +7,7 @@ from .boundary import BoundaryTrace as BoundaryTrace
 from .boundary import boundary_trace as boundary_trace
 from .element import ORDERS as ORDERS
 from .element import check_element as check_element
+from .element import edge_bubbles as edge_bubbles
 from .element import node_basis as node_basis
 from .element import unknowns as unknowns
 from .element import unknowns_of as unknowns_of
@@ -29,7 +30,6 @@ from .moduli import shear_moduli as shear_moduli
 from .moduli import stiffer_than as stiffer_than
 from .moduli import stiffnesses as stiffnesses
 from .moduli import warn_of_locking as warn_of_locking
-from .nodal_basis import edge_bubbles as edge_bubbles
 from .space import LOAD_BONUS as LOAD_BONUS
 from .space import Space as Space
 from .space import assemble as assemble

@@ -8,8 +8,8 @@ from .location import Location as Location
 from .location import locate as locate
 from .progress import with_progress as with_progress
 from .record import Number as Number
+from .record import html_of as html_of
+from .record import line_of as line_of
 from .record import record_of as record_of
-from .text import html_of as html_of
-from .text import line_of as line_of
 from .values import Values as Values
 from .values import values_at as values_at

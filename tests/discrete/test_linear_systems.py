@@ -12,8 +12,7 @@ from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
 from ngcontact import ConvergenceError, Elastic, Solution, adapt, solve
 from ngcontact.adaptivity.refinement import refined
-from ngcontact.discrete.discrete_problem import minimise_energy
-from ngcontact.discrete.linear_systems import MULTIGRID
+from ngcontact.discrete.discrete_problem import MULTIGRID, minimise_energy
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.qp import BorderedSystems
 from tests.scenes import REFINED

@@ -13,7 +13,7 @@ from netgen.occ import Glue, OCCGeometry, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.fem.boundary import boundary_trace
-from ngcontact.fem.nodal_basis import nodal_basis
+from ngcontact.fem.element import nodal_basis
 from ngcontact.geometries import blocks, disc_on_block, graphs, rings
 from ngcontact.lagrange import gauss, gauss_lobatto
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ngcontact.mesh.spacing import TURN, narrowest, spaced
+from ngcontact.mesh.matching import TURN, narrowest, spaced
 
 EXACT = 1e-12  # round-off of places; a parabola's vertex on the finer step is good to 1e-9
 T = np.linspace(0.0, 1.0, 513)
