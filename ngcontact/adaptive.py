@@ -143,7 +143,7 @@ class Run(Iterator[Solution]):
 
 def _refuse_infinite_energy(problem: Problem, mesh: ng.Mesh) -> None:
     """Raise where supports contradict each other: no refinement makes a bound there."""
-    if found := contradictions(problem, boundary_trace(mesh, 1)):
+    if found := contradictions(problem, mesh):
         x, y = found[0].place
         raise ValueError(
             f"no guaranteed bound is known for supports that contradict each other: "
@@ -192,7 +192,7 @@ def _first_plan(
     """The first level, of which nothing is forecast but by `start`."""
     trace = boundary_trace(mesh, 1)
     found = corners(problem, trace)
-    found = found.joined(unresolvable([one.place for one in contradictions(problem, trace)]))
+    found = found.joined(unresolvable([one.place for one in contradictions(problem, mesh)]))
     plan = Plan(mesh, refinement.order, found, math.inf, refinement.growth, Descent.first(mesh))
     if start is None or at_round_off(
         start.problem, start.discrete.space, start.displacement, start.error_estimate

@@ -50,11 +50,25 @@ def gauss(order: int) -> tuple[Array, Array]:
     return (1 + points) / 2, weights / 2
 
 
+def _legendre(x: Array, degree: int) -> Array:
+    """Values (k, degree + 1) of Legendre's polynomials at `x` (k,), without checks of input."""
+    values = np.ones((degree + 1, len(x)))
+    values[1:2] = x
+    for n in range(2, degree + 1):
+        values[n] = (values[n - 1] * x * (2 * n - 1) - values[n - 2] * (n - 1)) / n
+    return values.T
+
+
 @lru_cache
 def _coefficients(order: int, axis: int = 0) -> Array:
     """Coefficients of the Lagrange polynomials in Legendre's of 2s - 1, as columns."""
-    values = legendre.legvander(2 * gauss_lobatto(order, axis) - 1, order)
-    return np.asarray(np.linalg.inv(values))
+    return np.asarray(np.linalg.inv(_legendre(2 * gauss_lobatto(order, axis) - 1, order)))
+
+
+@lru_cache
+def _slopes(order: int) -> Array:
+    """The same of their derivatives with respect to s."""
+    return np.asarray(2 * legendre.legder(_coefficients(order)))
 
 
 def lagrange(order: int, s: Array, axis: int = 0) -> Array:
@@ -76,7 +90,7 @@ def lagrange(order: int, s: Array, axis: int = 0) -> Array:
         the rows are unit vectors exactly.
     """
     s = np.atleast_1d(s)
-    values: Array = legendre.legvander(2 * s - 1, order) @ _coefficients(order, axis)
+    values: Array = _legendre(2 * s - 1, order) @ _coefficients(order, axis)
     at, node = np.nonzero(s[:, None] == gauss_lobatto(order, axis))
     values[at] = 0.0
     values[at, node] = 1.0
@@ -85,8 +99,7 @@ def lagrange(order: int, s: Array, axis: int = 0) -> Array:
 
 def lagrange_derivative(order: int, s: Array) -> Array:
     """Derivatives (k, order + 1) of the polynomials of `lagrange` at parameters `s` (k,)."""
-    slopes = 2 * legendre.legder(_coefficients(order))
-    return np.asarray(legendre.legvander(2 * np.atleast_1d(s) - 1, order - 1) @ slopes)
+    return np.asarray(_legendre(2 * np.atleast_1d(s) - 1, order - 1) @ _slopes(order))
 
 
 def zeros(order: int, values: Array) -> tuple[Index, Array]:

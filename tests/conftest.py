@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import ctypes
+import gc
+
 import pytest
 
 ORDERS = {"constant pressure": (1, 3), "linear pressure": (2, 4), "polygonal line": (1, 2)}
@@ -20,6 +23,15 @@ def reproduced(request):
 
     name, order = request.param
     return REPRODUCED[name](), order
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _memory():
+    """What a file leaves is given back to the system: a process runs many of them."""
+    yield
+    gc.collect()
+    if trim := getattr(ctypes.CDLL(None), "malloc_trim", None):  # of glibc
+        trim(0)
 
 
 @pytest.fixture
@@ -43,6 +55,12 @@ def two_threads():
     ng.SetNumThreads(2)
     yield
     ng.SetNumThreads(before)
+
+
+def pytest_collection_finish():
+    """Modules stay: collecting what tests leave does not look at them again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -11,7 +11,7 @@ from functools import lru_cache
 from drivers.reference.cases import Case
 from ngcontact import Problem, Solution, adapt
 
-KEPT = 6  # runs in memory at a time: some 20 MB each at 5000 unknowns
+KEPT = 2  # runs in memory at a time: some 20 to 50 MB each at 5000 unknowns, with bounds
 
 
 @lru_cache(maxsize=KEPT)

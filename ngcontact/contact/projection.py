@@ -17,7 +17,9 @@ from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative, zeros
 MATCHED = 1e-9  # distance, relative to a segment's length, below which two points are one
 GRAZING = 1e-9  # cosine between ray and normal up to which the ray does not meet the curve
 NEWTON_STEPS = 20
-SETTLED = 1e-15  # change of a parameter in [0, 1] at which Newton's method has arrived
+# Change of a parameter in [0, 1] at which Newton's method has arrived: the next one would be of
+# its square. Below 1e-15, the round-off of places, no change falls, and all steps were taken.
+SETTLED = 1e-12
 LEBESGUE = 2.0  # bounds interpolation at Gauss-Lobatto points: 1.98 at degree 7
 PAIRS_AT_ONCE = 4_000_000  # of points and segments: bounds the memory of a search
 
@@ -103,13 +105,14 @@ def _candidates(
         passes = np.minimum(a, b) <= slack[segment]
         passes &= np.maximum(a, b) >= -slack[segment]
         # Markov: what is no larger than the bend on [0, 1] has a slope up to 2 p^2 times that.
-        turns = np.flatnonzero(np.abs(a - b) <= 2 * degree**2 * bend[segment])
-        turns = turns[_turning(curve[segment[turns]], t[point[turns]])]
-        height = np.einsum("kid,kd->ki", curve[segment[turns]], t[point[turns]])
-        which, zero = zeros(degree, height - here[point[turns], None])
-        passes[turns[which]] = False  # all their crossings are known
-        point, segment = (np.append(x[passes], x[turns[which]]) for x in (point, segment))
-        pairs.append((point + first, segment, np.append(s[passes], zero)))
+        turns, bent = np.flatnonzero(np.abs(a - b) <= 2 * degree**2 * bend[segment]), []
+        if len(turns):
+            turns = turns[_turning(curve[segment[turns]], t[point[turns]])]
+            height = np.einsum("kid,kd->ki", curve[segment[turns]], t[point[turns]])
+            which, zero = zeros(degree, height - here[point[turns], None])
+            passes[turns[which]] = False  # all their crossings are known
+            bent = [(point[turns[which]] + first, segment[turns[which]], zero)]
+        pairs += [(point[passes] + first, segment[passes], s[passes]), *bent]
     point, segment, s = (np.concatenate(part) for part in zip(*pairs, strict=True))
     return point, segment, s
 

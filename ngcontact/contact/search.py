@@ -75,7 +75,13 @@ def _beyond_own_body(
 
 
 def partners(
-    trace: BoundaryTrace, facing: Index, own: Index, points: Array, directions: Array
+    trace: BoundaryTrace,
+    facing: Index,
+    own: Index,
+    points: Array,
+    directions: Array,
+    *,
+    nodes: bool = True,
 ) -> tuple[Index, Array, Array, int]:
     """Points of the segments `facing` opposite to `points`: A_j and B_j of HH81 (2.10).
 
@@ -88,6 +94,8 @@ def partners(
         Segments on which the points lie.
     points, directions : ndarray (k, 2)
         The points, and unit vectors towards the facing body.
+    nodes : bool
+        Whether they are nodes, some of which may lie at others.
 
     Returns
     -------
@@ -99,7 +107,9 @@ def partners(
         0 if there is nothing to search, as where all of them are nodes at the same place.
     """
     curve, side = trace.curve[facing], trace.side[facing]
-    found = coincident(points, directions, curve, side, trace.places(facing))
+    found = none_met(len(points))
+    if nodes:
+        found = coincident(points, directions, curve, side, trace.places(facing))
     rest = np.flatnonzero(found.segment < 0) if facing.size else facing
     if rest.size:
         other: Partners = cast(points[rest], directions[rest], curve, side)

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Mask
+from ..arrays import Array, Index, Mask
 from ..errors import warn
-from ..fem import BoundaryTrace, boundary_trace
+from ..mesh import cad_edges
 from ..problem import Problem
-from ..quadrature import Features, View, features_of, looked, numbers
+from ..quadrature import View, features_of, numbers
 
 APART = 1e-6  # values of two supports at one corner, relative to the largest, that are two values
 NOISE = 64 * np.finfo(float).eps  # ... and to the largest of all values: below it is round-off
@@ -39,15 +39,11 @@ class Contradiction:
     amount: float
 
 
-def contradictions(problem: Problem, trace: BoundaryTrace) -> list[Contradiction]:
-    """All of Gamma_u with itself, within a boundary, too, and with guides, by component.
-
-    `trace` is that of order 1.
-    """
+def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
+    """All of Gamma_u with itself, within a boundary, too, and with guides, by component."""
     if not problem.displacement:
         return []
-    seen, shared = _prescribed(problem, trace.mesh), _shared(problem, trace.mesh)
-    known: dict[tuple[int, int], tuple[str, float]] = {}
+    seen = [one for one in features_of(problem, mesh) if one.kind == "displacement"]
     found = [
         Contradiction(
             (one.name, one.name),
@@ -58,81 +54,84 @@ def contradictions(problem: Problem, trace: BoundaryTrace) -> list[Contradiction
         for one in seen
         for *place, amount in one.jumps.tolist()
     ]
-    for pattern, components in problem.displacement.items():
-        segment, s = trace.at_nodes(trace.segments(pattern))
-        node = trace.nodes[segment, np.round(s).astype(int)]
-        segment, s, node = segment[shared[node]], s[shared[node]], node[shared[node]].tolist()
+    view = View(mesh, 1)
+    shared = _shared(problem, view)
+    known: dict[tuple[int, int], tuple[str, float]] = {}
+    for pattern, components in problem.displacement.items() if shared.any() else ():
+        vertices, segments, s = _ends(view, pattern, shared)
         for axis, value in enumerate(components):
-            if value is None or not len(segment):
+            if value is None or not len(vertices):
                 continue
-            points = trace.mesh_points(segment, s)
-            values = (
-                value(points).ravel() if numbers(value) else looked(value, points).ravel()
-            ).tolist()
-            for k, (vertex, u) in enumerate(zip(node, values, strict=True)):
+            look = view.evaluate if numbers(value) else view.look
+            values = look(value, segments, s).ravel().tolist()
+            for vertex, u in zip(vertices.tolist(), values, strict=True):
                 name, other = known.setdefault((vertex, axis), (pattern, u))
                 if abs(u - other) > APART * max(abs(other), abs(u)):
                     found.append(
                         Contradiction(
                             (name, pattern),
-                            trace.point(segment[k : k + 1], s[k : k + 1])[0],
+                            view.arrays.vertices[vertex],
                             f'displacement "{name}" and "{pattern}" prescribe {other:.6g} and '
                             f"{u:.6g} along {'xy'[axis]}",
                             abs(u - other),
                         )
                     )
-    found += _across_guides(problem, trace, known)
+    if problem.sliding is not None and known:
+        found += _across_guides(str(problem.sliding), view, shared, known)
     largest = max((one.largest for one in seen), default=0.0)
     return [one for one in found if one.amount > NOISE * largest]
 
 
-def _prescribed(problem: Problem, mesh: ng.Mesh) -> list[Features]:
-    """What was seen of displacements given as functions."""
-    return [one for one in features_of(problem, mesh) if one.kind == "displacement"]
-
-
-def _shared(problem: Problem, mesh: ng.Mesh) -> Mask:
+def _shared(problem: Problem, view: View) -> Mask:
     """Vertices at which segments of several prescribed regions, or of guides, meet."""
     guides = [str(problem.sliding)] if problem.sliding is not None else []
-    view, pattern = View(mesh, 1), "|".join([*problem.displacement, *guides])
-    at = view.inside(mesh.Boundaries(pattern))
+    at = view.inside(view.mesh.Boundaries("|".join([*problem.displacement, *guides])))
     vertex, region = view.arrays.segments[at], view.arrays.boundaries[at]
-    low, high = np.full(mesh.nv, len(mesh.GetBoundaries())), np.full(mesh.nv, -1)
+    low, high = np.full(view.mesh.nv, len(view.mesh.GetBoundaries())), np.full(view.mesh.nv, -1)
     np.minimum.at(low, vertex, region[:, None])
     np.maximum.at(high, vertex, region[:, None])
     return np.asarray(low < high)
 
 
+def _ends(view: View, pattern: str, shared: Mask) -> tuple[Index, Index, Array]:
+    """The `shared` vertices (k,) of boundaries, once for each segment (k,) there.
+
+    And the places (k, 1, 1) on these, as NGSolve's parameter runs.
+    """
+    segments = view.inside(view.mesh.Boundaries(pattern))
+    vertices = view.arrays.segments[segments]
+    k, end = np.nonzero(shared[vertices])
+    return vertices[k, end], segments[k], np.asarray(1.0 - end[:, None, None])
+
+
 def _across_guides(
-    problem: Problem, trace: BoundaryTrace, known: dict[tuple[int, int], tuple[str, float]]
+    guides: str, view: View, shared: Mask, known: dict[tuple[int, int], tuple[str, float]]
 ) -> list[Contradiction]:
-    """Ends of guides at which `known` values, by vertex and axis, lead across them."""
-    if problem.sliding is None:
-        return []
+    """Ends of `guides` at which `known` values, by vertex and axis, lead across them."""
     found = []
-    segment, s = trace.at_nodes(trace.segments(str(problem.sliding)))
-    node = trace.nodes[segment, np.round(s).astype(int)].tolist()
-    place, normals = trace.point(segment, s), trace.exact_normal(segment, s)
-    for vertex, x, normal in zip(node, place, normals, strict=True):
+    vertices, segments, s = _ends(view, guides, shared)
+    places, edges = view.arrays.vertices[vertices], cad_edges(view.mesh)
+    normals = view.evaluate(ng.specialcf.normal(2), segments, s)[:, 0]
+    for k, vertex in enumerate(vertices.tolist()):
+        normal = normals[k]
+        if edges is not None:
+            [exact] = edges[view.arrays.boundaries[segments[k]]].normal(places[k : k + 1])
+            normal = exact if exact @ normal > 0 else -exact
         needed = [axis for axis in (0, 1) if abs(normal[axis]) > APART]
         if all((vertex, axis) in known for axis in needed):
             name = known[vertex, needed[0]][0]
             u = [known.get((vertex, axis), ("", 0.0))[1] for axis in (0, 1)]
             across = float(normal @ u)
             if abs(across) > APART * max(map(abs, u)):
-                message = f'displacement "{name}" leads {across:.6g} across the guide'
-                message += f' "{problem.sliding}"'
-                found.append(Contradiction((name, "guide"), x, message, abs(across)))
+                message = f'displacement "{name}" leads {across:.6g} across the guide "{guides}"'
+                found.append(Contradiction((name, "guide"), places[k], message, abs(across)))
     return found
 
 
 def warn_of_contradictions(problem: Problem, mesh: ng.Mesh) -> None:
     """Warn of the first corner of each two supports."""
     told: set[tuple[str, str]] = set()
-    possible = bool(problem.displacement) and (
-        any(len(one.jumps) for one in _prescribed(problem, mesh)) or _shared(problem, mesh).any()
-    )
-    for one in contradictions(problem, boundary_trace(mesh, 1)) if possible else ():
+    for one in contradictions(problem, mesh):
         if one.supports not in told:
             told.add(one.supports)
             x, y = one.place

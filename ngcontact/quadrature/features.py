@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, TypeAlias, TypeGuard
+from typing import Any, TypeAlias
 from weakref import WeakKeyDictionary
 
 import ngsolve as ng
@@ -99,30 +99,19 @@ NOTHING: Seen = np.empty((0, 2)), np.empty(0), np.empty((0, 3)), 0, 0.0
 FOUND: WeakKeyDictionary[Any, dict[tuple[str, str, int], Features]] = WeakKeyDictionary()
 
 
-def _data(
-    problem: Problem, mesh: ng.Mesh
-) -> Iterator[tuple[tuple[str, str, int], object, Function | float | None, ng.Region]]:
-    """Kind, name and axis, owner and region of all data, functions or numbers."""
-    for name, F in problem.force.items():
-        yield ("force", name, 0), F, F, mesh.Materials(name)
-    for name, p in problem.traction.items():
-        yield ("traction", name, 0), p, p, mesh.Boundaries(name)
+def _functions(problem: Problem) -> Iterator[tuple[tuple[str, str, int], Any, Any]]:
+    """Kind, name and axis, owner and function, or law, of all data that are no numbers."""
+    data = [("force", name, 0, F, F) for name, F in problem.force.items()]
+    data += [("traction", name, 0, p, p) for name, p in problem.traction.items()]
     for name, components in problem.displacement.items():
-        for axis, value in enumerate(components):
-            yield ("displacement", name, axis), value, value, mesh.Boundaries(name)
-    for pair in problem.contact:
-        yield ("gap", pair.secondary, 0), pair, pair.gap, mesh.Boundaries(pair.secondary)
+        data += [("displacement", name, axis, u, u) for axis, u in enumerate(components)]
+    data += [("gap", pair.secondary, 0, pair, pair.gap) for pair in problem.contact]
+    for kind, name, axis, owner, f in data:
+        if callable(f) and not (isinstance(f, ng.CoefficientFunction) and numbers(f)):
+            yield (kind, name, axis), owner, f
     for name, law in problem.materials.items():
-        C = law.voigt(problem.model) if varies(law) else None
-        diagonal = None if C is None else ng.CF(tuple(C[k, k] for k in range(C.dims[0])))
-        yield ("materials", name, 0), law, diagonal, mesh.Materials(name)
-
-
-def _is_function(data: object) -> TypeGuard[Function]:
-    """Whether data are no numbers, and given at all."""
-    if isinstance(data, ng.CoefficientFunction):
-        return not numbers(data)
-    return callable(data)
+        if varies(law):
+            yield ("materials", name, 0), law, law
 
 
 def look(problem: Problem, mesh: ng.Mesh) -> None:
@@ -130,20 +119,18 @@ def look(problem: Problem, mesh: ng.Mesh) -> None:
 
     `features_of` knows them from now on.
     """
-    for key, owner, data, region in _data(problem, mesh):
-        if _is_function(data):
-            FOUND.setdefault(owner, {})[key] = _looked_at(key, data, region)
+    for key, owner, function in _functions(problem):
+        FOUND.setdefault(owner, {})[key] = _looked_at(problem, mesh, key, function)
 
 
 def features_of(problem: Problem, mesh: ng.Mesh) -> list[Features]:
     """What `look` found of the functions of a problem last; a look where there was none."""
     found = []
-    for key, owner, data, region in _data(problem, mesh):
-        if _is_function(data):
-            known = FOUND.setdefault(owner, {})
-            if key not in known:
-                known[key] = _looked_at(key, data, region)
-            found.append(known[key])
+    for key, owner, function in _functions(problem):
+        known = FOUND.setdefault(owner, {})
+        if key not in known:
+            known[key] = _looked_at(problem, mesh, key, function)
+        found.append(known[key])
     return found
 
 
@@ -154,10 +141,17 @@ def features_in(load: object) -> Array:
     return np.concatenate([np.empty((0, 3)), *rows])
 
 
-def _looked_at(key: tuple[str, str, int], function: Function, region: ng.Region) -> Features:
-    view = View(region.mesh, 2 if region.VB() == ng.VOL else 1)
-    look = _in_body if view.dim == 2 else _on_boundary
-    parts = [look(key[0], function, view, elements) for elements in _parts(view, region)]
+def _looked_at(
+    problem: Problem, mesh: ng.Mesh, key: tuple[str, str, int], function: Any
+) -> Features:
+    kind, name, _ = key
+    in_body = kind in IN_PLANE
+    view, look = View(mesh, 2 if in_body else 1), _in_body if in_body else _on_boundary
+    region = mesh.Materials(name) if in_body else mesh.Boundaries(name)
+    if kind == "materials":  # the diagonal of the law; compiled, as a modulus stands in each entry
+        C = function.voigt(problem.model)
+        function = ng.CF(tuple(C[k, k] for k in range(C.dims[0]))).Compile()
+    parts = [look(kind, function, view, elements) for elements in _parts(view, region)]
     places, widths, jumps, samples, largest = zip(NOTHING, *parts, strict=True)
     x, w, steps = (np.concatenate(some) for some in (places, widths, jumps))
     return Features(*key, view.dim, x, w, steps, sum(samples), max(largest))
@@ -445,7 +439,8 @@ def _widths(
     width = np.maximum(width, NARROWEST * spacing)
     apart = np.linalg.norm(some[:, None] - some, axis=2)
     width = np.where(apart <= width, width, 0.0).max(axis=1)  # chords near corners are shorter
-    nearest = ((some**2).sum(axis=1) - 2 * places @ some.T).argmin(axis=1)
+    squares = np.vstack([-2 * some.T, (some**2).sum(axis=1)])  # of distances, but for |place|^2
+    nearest = (np.column_stack([places, np.ones(len(places))]) @ squares).argmin(axis=1)
     return np.asarray(width[nearest])
 
 
