@@ -48,14 +48,7 @@ from .norms import (
 from .parts import depths
 from .program import Balanced, DualProgram, dual_program, rows_of
 from .refusals import refuse_bound, refuse_jumps, refuse_narrow
-from .tractions import (
-    Given,
-    boundary_tractions,
-    given_on,
-    missed_tractions,
-    moments_of,
-    requested,
-)
+from .tractions import Given, boundary_tractions, given_on
 
 BESIDE = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
 LIFTED = 3  # degrees by which w is above u_h
@@ -144,13 +137,10 @@ def error_bound(
     refuse_bound(problem, trace, pairs)
     refuse_narrow(problem, trace)
     refuse_jumps(problem, trace)
-    data = problem, trace, displacement, pairs
-    for everywhere, beside in ((False, ()), (True, ())):
-        try:
-            return _bound(*data, everywhere, beside)
-        except ContactError:  # resultants that no pressure near to the contact has
-            continue
-    return _bound(*data, True, BESIDE)
+    try:
+        return _bound(problem, trace, displacement, pairs, ())
+    except ContactError:  # resultants that no polynomial pressure has, as of a body about to tilt
+        return _bound(problem, trace, displacement, pairs, BESIDE)
 
 
 def _bound(
@@ -158,23 +148,19 @@ def _bound(
     trace: BoundaryTrace,
     displacement: ng.GridFunction,
     pairs: Sequence[ContactState],
-    everywhere: bool,
     beside: Sequence[float],
 ) -> Proof:
-    """The bound with a p* that acts `everywhere` on the lines, or near to the contact.
-
-    On segments there it is one polynomial between places `beside` their ends.
-    """
+    """The bound with a p* that is one polynomial between places `beside` ends of segments."""
     p, extent = trace.order, trace.model.extent
     degree, lift = max(p + 1, 2 + extent), p + LIFTED
-    reaches = [reach_of(trace, displacement, pair, lift, everywhere) for pair in pairs]
+    reaches = [reach_of(trace, displacement, pair, lift) for pair in pairs]
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
     guided = None if problem.sliding is None else str(problem.sliding)
     loaded = trace.segments(*problem.traction, guided, *touching)
     whole = [name for name, values in problem.displacement.items() if None not in values]
     cells = cells_of(trace, cuts_of(trace, reaches, beside), loaded, trace.segments(*whole))
     given = given_on(problem, cells)
-    least = np.maximum(given.followed(cells), cells.curved)
+    least = np.maximum(given.followed(), cells.curved)
     depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, least)
     order = 2 * (degree + ON_CURVES * cells.curved) + np.where(depth, PARTED, WHOLE)
     look = np.column_stack([order, depth, least > 0])
@@ -192,7 +178,7 @@ def _bound(
         share = _share(problem, cells, reach.pair)
         facing = facing_of(cells, displacement, reach, lift, held, share)
         lines.append(rows_of(mu, facing, degree - extent))
-    moments, fixed = moments_of(problem, cells, mu, given)
+    moments, fixed = given.moments(mu)
     motions = rigid_motions(cells, mu, fixed)
     program = dual_program(mu, elements, fixed, motions, lines)
     balanced = program.nearest(elements, moments)
@@ -208,12 +194,12 @@ def _bound(
             f"no equilibrated stress was found: the residual relative to the largest stress is "
             f"{residual:.1e}"
         )
-    have = boundary_tractions(cells, given, elements, balanced.coefficients)
-    wanted = requested(problem, cells, given, lines, balanced.pressure)
-    missed = missed_tractions(wanted, cells, have, scale)
+    given = given.under(lines, balanced.pressure)
+    have = boundary_tractions(given, elements, balanced.coefficients)
+    missed = have.missed(given, scale)
     loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(elements, n))
     level = Level(cells, elements, balanced.coefficients, look, stress.distance, loads)
-    distance, loads = once_more(problem, displacement, wanted, level, degree, scale)
+    distance, loads = once_more(problem, displacement, given, level, degree, scale)
     stress = replace(stress, distance=distance)
     if not np.isfinite(loads).all():
         raise ValueError(
@@ -227,7 +213,7 @@ def _bound(
         closed += float((pressure * line.bound).sum())
         signed += work_on_gap(line.facing, pressure, line.facing.gap)
     parts, below, above = _summed(
-        stress.distance, loads, lifting, closed, signed, have.work(cells, given, displacement)
+        stress.distance, loads, lifting, closed, signed, have.work(given, displacement)
     )
     return Proof(
         cells=cells,

@@ -22,7 +22,7 @@ from .missed import data_norms
 from .norms import SETTLED, forces_missed, residuals, smallest_moduli, stress_norms
 from .parts import PARTS, divided, pattern
 from .program import dual_program, exerted
-from .tractions import ROUND_OFF, Requested, along, on_segments, tractions_of
+from .tractions import Given, side_rule, tractions_of
 
 COUNTS = 0.04  # of |s - sigma_h|^2, what may be added by data where nothing is balanced again
 RAISED = 3  # degrees on whole triangles
@@ -57,7 +57,7 @@ class Level:
 def once_more(
     problem: Problem,
     displacement: ng.CoefficientFunction,
-    wanted: Requested,
+    given: Given,
     level: Level,
     degree: int,
     scale: float,
@@ -70,8 +70,7 @@ def once_more(
     problem : Problem
     displacement : CoefficientFunction
         u_h.
-    wanted : Requested
-        Tractions on the boundary.
+    given : Given
     level : Level
         The stress in equilibrium so far.
     degree : int
@@ -94,7 +93,7 @@ def once_more(
             here = some[start : start + AT_ONCE]
             share = limit * len(here) / len(some)
             one, two = _islands(
-                problem, displacement, wanted, level, here, degree, scale, (m, third), share
+                problem, displacement, given, level, here, degree, scale, (m, third), share
             )
             better = one + two < c[here] + D[here]
             c[here[better]], D[here[better]] = one[better], two[better]
@@ -104,7 +103,7 @@ def once_more(
 def _islands(
     problem: Problem,
     displacement: ng.CoefficientFunction,
-    wanted: Requested,
+    given: Given,
     level: Level,
     at: Index,
     degree: int,
@@ -121,14 +120,10 @@ def _islands(
     n, raised = len(look), degree + RAISED if division[0] == 1 else max(degree, LEAST)
     look[:, 1] -= division[0] > 1
     mu, elements = elements_of(problem, parts, displacement, raised, look)
-    rule = along(parts, wanted.given, np.flatnonzero(~parts.inner))
+    rule = side_rule(parts, given.breaks, np.flatnonzero(~parts.inner))
     owner = parts.owner[rule.side]
-    asked = tractions_of(level.elements, level.coefficients, at[owner // k], rule.x, rule.normal)
-    segment, s = on_segments(parts, rule)
-    on = np.flatnonzero(segment >= 0)
-    if on.size:
-        values, held = wanted.values(segment[on], s[on])
-        asked[on] = np.where(held[:, None], asked[on], values)
+    own = tractions_of(level.elements, level.coefficients, at[owner // k], rule.x, rule.normal)
+    asked = given.asked(parts, rule, own)
     moments = rule.moments(mu, asked)
     nothing = np.zeros((len(moments), 0))
     program = dual_program(mu, elements, np.zeros(len(moments), dtype=bool), nothing, [])
@@ -136,13 +131,12 @@ def _islands(
     left = residuals(parts, mu, moments - exerted(elements, found)[0], scale)
     norms = stress_norms(elements, found, n)
     have = tractions_of(elements, found, owner, rule.x, rule.normal)
-    miss = np.where(np.abs(asked - have) <= ROUND_OFF * scale, 0.0, asked - have)
     forces, moduli = forces_missed(elements, n), smallest_moduli(elements, n)
-    data = data_norms(parts, forces, rule.norms(parts, miss), moduli)
+    data = data_norms(parts, forces, rule.missed(parts, asked - have, scale), moduli)
     finer = Level(parts, elements, found, look, norms.distance, data)
     both = finer.distance, finer.loads
     if division[0] > 1 and look[:, 1].any():
-        both = once_more(problem, displacement, wanted, finer, raised, scale, allowed)
+        both = once_more(problem, displacement, given, finer, raised, scale, allowed)
     settled = left.reshape(-1, k).max(axis=1) <= SETTLED
     one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
     return np.where(settled, one, np.inf), np.where(settled, two, np.inf)
