@@ -34,9 +34,8 @@ from .elements import (
     rigid_motions,
 )
 from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
-from .islands import Level, once_more
 from .lifting import asked_on_line, asked_on_supports, lifted
-from .missed import data_norms
+from .missed import Level, data_norms, once_more
 from .norms import (
     SETTLED,
     StressNorms,
