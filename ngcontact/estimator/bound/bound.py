@@ -20,7 +20,7 @@ import numpy as np
 from ...arrays import Array
 from ...contact import ContactState
 from ...errors import ContactError
-from ...fem import BoundaryTrace
+from ...fem import BoundaryTrace, narrow_forces
 from ...problem import Problem
 from .cells import Cells, cells_of, places
 from .elements import (
@@ -44,9 +44,9 @@ from .norms import (
     smallest_moduli,
     stress_norms,
 )
-from .parts import depths
+from .parts import LEVELS
 from .program import Balanced, DualProgram, dual_program, rows_of
-from .refusals import refuse_bound, refuse_jumps, refuse_narrow
+from .refusals import refuse_bound, refuse_narrow
 from .tractions import Given, boundary_tractions, given_on
 
 BESIDE = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
@@ -135,7 +135,6 @@ def error_bound(
     """
     refuse_bound(problem, trace, pairs)
     refuse_narrow(problem, trace)
-    refuse_jumps(problem, trace)
     try:
         return _bound(problem, trace, displacement, pairs, ())
     except ContactError:  # resultants that no polynomial pressure has, as of a body about to tilt
@@ -160,7 +159,8 @@ def _bound(
     cells = cells_of(trace, cuts_of(trace, reaches, beside), loaded, trace.segments(*whole))
     given = given_on(problem, cells)
     least = np.maximum(given.followed(), cells.curved)
-    depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, least)
+    narrow = narrow_forces(problem, trace.mesh, p)[cells.parent]
+    depth = np.maximum(least, LEVELS * narrow)
     order = 2 * (degree + ON_CURVES * cells.curved) + np.where(depth, PARTED, WHOLE)
     look = np.column_stack([order, depth, least > 0])
     mu, elements = elements_of(problem, cells, displacement, degree, look)

@@ -1,27 +1,12 @@
 """What an equilibrated stress misses of its data, and how much of the energy that can be.
 
-For every displacement v there is a rigid motion r with |v - r| <= h / pi |grad(v - r)| (Payne,
-Weinberger 1960, Arch. Rational Mech. Anal. 5:286; Bebendorf 2003) on a convex T of diameter h, and
-
-    |grad(v - r)|^2 <= (1 + 2 / beta^2) |e(v)|^2,
-
-since the rotation omega of v - r, of mean 0, is the divergence of a z that vanishes on the boundary
-with |grad z| <= |omega| / beta, and the gradient of omega consists of derivatives of e. With a ball
-of radius rho, with respect to which T is star-shaped, and one of R about the same place around T,
-
-    beta >= rho / (sqrt 2 R) (1 + sqrt(1 - rho^2 / R^2))^(-1/2)
-
-(Costabel, Dauge 2015, Arch. Rational Mech. Anal. 217:873, theorem 2.3). On an edge E opposite to P,
-
-    min_E (x - P).n |w|_E^2 <= int_T div((x - P) w^2) <= 2 |w|^2 + 2 d |w| |grad w|
-
-with the largest distance d from P. On a curved T the first inequality is that of the straight
-triangle, of which T is the image under D: |w| <= h / pi max |D| (max det D / min det D)^(1/2)
-|grad w|. Extrema on curves are taken over points.
+Constants of Poincare (Payne, Weinberger 1960, Arch. Rational Mech. Anal. 5:286; Bebendorf 2003), of
+Korn (Costabel, Dauge 2015, Arch. Rational Mech. Anal. 217:873, theorem 2.3) and of traces are known
+for each triangle; docs/bounds.md has the proof. Extrema on curves are taken over points.
 
 Where F or P are no polynomials s balances projections of them. On a triangle T where that counts,
 the stress s' nearest to sigma_h with the tractions of s on inner sides and on Gamma_u, with P and
-p* on the others, and -div s' = F, is sought once more on parts of T, where again F and P are met in
+p* on the others, and -div s' = F, is sought on parts of T, where again F and P are met in
 projections. s' may stand for s on T, with what it misses itself; both have the same resultants, for
 the rules on T are those on its parts.
 """
@@ -168,7 +153,7 @@ def once_more(
     scale : float
         The largest stress, beside which equilibrium is measured.
     allowed : float, optional
-        What may be added to B^2; for the whole mesh without.
+        What may be added to B^2; without it a share of |s - sigma_h|^2.
     """
     c, D = level.distance.copy(), level.loads.copy()
     limit = COUNTS * float(c @ c) if allowed is None else allowed

@@ -7,17 +7,12 @@ from functools import lru_cache
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Index, Mask
-from ...fem import narrow_forces
-from ...problem import Problem
-from ...quadrature import View, features_of, numbers, touched
+from ...arrays import Array, Index
 from .cells import Cells, joined, places
 from .polynomials import frame_of, projected, scalars
 
 PARTS = 4  # of each side
 LEVELS = 2  # how often triangles are divided
-SMOOTH = 1e-3  # of the largest force: what polynomials miss where none is divided
-LEFT = 0.005  # share of the squares of what is missed, that may be on parts not divided again
 BENT = 2  # times the order of rules on curved triangles, for polynomials in x
 AT_ONCE = 200_000  # points at which forces are looked at together
 
@@ -145,67 +140,3 @@ def projection(
         norms.append(np.sqrt(np.einsum("bq,nbqd->nb", weight, both**2)))
     rest, size = np.concatenate(norms, axis=1)
     return np.concatenate(force), rest, size
-
-
-def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Index) -> Index:
-    """How often triangles (n,) are divided, because forces are not near to polynomials.
-
-    The polynomials are of a `degree`, the rules of an `order`; `least` (n,) times at least. They
-    are near if they miss less of a force, in the root of the mean square, than `SMOOTH`.
-    """
-    mesh, found = cells.trace.mesh, least.copy()
-    if all(numbers(ng.CF(F)) for F in problem.force.values()):
-        return found
-    found = np.maximum(found, narrow_forces(problem, mesh, cells.trace.order)[cells.parent])
-    found[_with_features(problem, cells)] = LEVELS
-    for k, F in problem.force.items():
-        at = np.flatnonzero(np.array(mesh.Materials(k).Mask())[cells.bodies])
-        if numbers(F) or not at.size:
-            continue
-        missed, size = _mean_squares(ng.CF(F), cells, at, degree, order)
-        found[at] = np.maximum(found[at], missed > SMOOTH * size.max())
-        some = at[found[at] == 1]
-        if some.size:
-            parts, every = (
-                divided(cells, some, False),
-                np.arange(len(some) * len(pattern(False)[1])),
-            )
-            rest, of_parts = _mean_squares(ng.CF(F), parts, every, degree, order)
-            rough = rest > SMOOTH * max(size.max(), of_parts.max())
-            squares = rest**2 * _areas(parts)
-            rank = np.argsort(squares)
-            rough[rank[np.cumsum(squares[rank]) <= LEFT * squares.sum()]] = False
-            found[some] += rough.reshape(len(some), -1).any(axis=1)
-    return found
-
-
-def _with_features(problem: Problem, cells: Cells) -> Mask:
-    """Whether triangles (n,) lie in elements with features of forces too narrow for parts."""
-    mesh = cells.trace.mesh
-    view, found = View(mesh, 2), np.zeros(mesh.ne, dtype=bool)
-    for one in features_of(problem, mesh):
-        if one.kind == "force" and len(one.places):
-            spots = np.column_stack([one.places, one.widths])
-            at, feature = touched(spots, view, np.arange(mesh.ne))
-            found[at[view.sizes[at] > PARTS * one.widths[feature]]] = True
-    return found[cells.parent]
-
-
-def _areas(cells: Cells) -> Array:
-    """Areas (n,) of straight triangles with the same corners."""
-    corners = cells.corners
-    return np.asarray(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2)
-
-
-def _mean_squares(
-    F: ng.CoefficientFunction, cells: Cells, at: Index, degree: int, order: int
-) -> tuple[Array, Array]:
-    """Roots (b,) of mean squares of what polynomials miss of a force on triangles, and of it."""
-    found = np.zeros((2, len(at)))
-    axial = slice(cells.trace.model.extent, None)
-    for curved in (False, True):
-        some = np.flatnonzero(cells.curved[at] == curved)
-        if some.size:
-            found[:, some] = projection(F, cells, at[some], degree, order, 0, False, axial)[1:]
-    missed, size = found / np.sqrt(_areas(cells)[at])
-    return missed, size
