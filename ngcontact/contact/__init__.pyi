@@ -9,6 +9,7 @@ from .corners import twins as twins
 from .dual import Pieces as Pieces
 from .dual import divided as divided
 from .dual import end_to_end as end_to_end
+from .dual import rays as rays
 from .line import FACING as FACING
 from .line import ContactLine as ContactLine
 from .line import at_quadrature as at_quadrature

@@ -79,7 +79,7 @@ class DualIntegrals:
     coupling: sp.csr_array
 
 
-def _rays(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
+def rays(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
     """Unit vectors (k, 2) from points of the secondary to the primary."""
     if contact.direction is None:
         return trace.exact_normal(segment, s)
@@ -100,7 +100,7 @@ def divided(trace: BoundaryTrace, contact: Contact, segments: Index, facing: Ind
     one = (local[1:] == local[:-1]) & (np.diff(cut) > SLIVER)
     local, start, stop = local[:-1][one], cut[:-1][one], cut[1:][one]
     segment, middle = segments[local], (start + stop) / 2
-    d = _rays(trace, contact, segment, middle)
+    d = rays(trace, contact, segment, middle)
     met, there, *_ = partners(trace, facing, segment, trace.point(segment, middle), d)
     on = met >= 0
     return Pieces(local[on], start[on], stop[on], met[on], there[on])
@@ -155,7 +155,7 @@ def _integrals(
     local, facing = (np.repeat(x, q) for x in (pieces.local, pieces.facing))
     segment, x = segments[local], trace.point(segments[local], s)
     w = (length[:, None] * weights).ravel() * jacobian(trace, contact, segment, s)
-    d = _rays(trace, contact, segment, s)
+    d = rays(trace, contact, segment, s)
     across = np.column_stack([-d[:, 1], d[:, 0]])
     s_there = crossings(x, across, trace.curve, facing, np.repeat(pieces.opposite, q))
     eps = ((at(trace.curve, facing, s_there) - x) * d).sum(axis=1)
@@ -172,7 +172,7 @@ def _integrals(
     weight, change, hats = _dual_basis(whole, weight, mass, trace.places(segments))
     facing_part = change[pieces.local] @ np.einsum("rg,rgi,rgj->rij", w, phi, phi_there)
     own_part = change @ mass - weight[:, :, None] * np.eye(p + 1)
-    first, last = (_rays(trace, contact, segments, np.full(k, s)) for s in (0.0, 1.0))
+    first, last = (rays(trace, contact, segments, np.full(k, s)) for s in (0.0, 1.0))
     hats &= np.abs(last - first).max(axis=1) <= SLIVER  # no turn
     own_part[~hats] = 0.0  # int psi_i phi_j = 0 but for i = j
     blocks = np.concatenate([facing_part, -own_part])

@@ -20,7 +20,7 @@ import numpy as np
 from ...arrays import Array
 from ...contact import ContactState
 from ...errors import ContactError
-from ...fem import BoundaryTrace
+from ...fem import BoundaryTrace, narrow_forces
 from ...problem import Problem
 from .cells import Cells, cells_of, places
 from .elements import (
@@ -34,9 +34,8 @@ from .elements import (
     rigid_motions,
 )
 from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
-from .islands import Level, once_more
 from .lifting import asked_on_line, asked_on_supports, lifted
-from .missed import data_norms
+from .missed import Level, data_norms, once_more
 from .norms import (
     SETTLED,
     StressNorms,
@@ -45,17 +44,10 @@ from .norms import (
     smallest_moduli,
     stress_norms,
 )
-from .parts import depths
+from .parts import LEVELS
 from .program import Balanced, DualProgram, dual_program, rows_of
-from .refusals import refuse_bound, refuse_jumps, refuse_narrow
-from .tractions import (
-    Given,
-    boundary_tractions,
-    given_on,
-    missed_tractions,
-    moments_of,
-    requested,
-)
+from .refusals import refuse_bound, refuse_narrow
+from .tractions import Given, boundary_tractions, given_on
 
 BESIDE = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
 LIFTED = 3  # degrees by which w is above u_h
@@ -143,14 +135,10 @@ def error_bound(
     """
     refuse_bound(problem, trace, pairs)
     refuse_narrow(problem, trace)
-    refuse_jumps(problem, trace)
-    data = problem, trace, displacement, pairs
-    for everywhere, beside in ((False, ()), (True, ())):
-        try:
-            return _bound(*data, everywhere, beside)
-        except ContactError:  # resultants that no pressure near to the contact has
-            continue
-    return _bound(*data, True, BESIDE)
+    try:
+        return _bound(problem, trace, displacement, pairs, ())
+    except ContactError:  # resultants that no polynomial pressure has, as of a body about to tilt
+        return _bound(problem, trace, displacement, pairs, BESIDE)
 
 
 def _bound(
@@ -158,24 +146,21 @@ def _bound(
     trace: BoundaryTrace,
     displacement: ng.GridFunction,
     pairs: Sequence[ContactState],
-    everywhere: bool,
     beside: Sequence[float],
 ) -> Proof:
-    """The bound with a p* that acts `everywhere` on the lines, or near to the contact.
-
-    On segments there it is one polynomial between places `beside` their ends.
-    """
+    """The bound with a p* that is one polynomial between places `beside` ends of segments."""
     p, extent = trace.order, trace.model.extent
     degree, lift = max(p + 1, 2 + extent), p + LIFTED
-    reaches = [reach_of(trace, displacement, pair, lift, everywhere) for pair in pairs]
+    reaches = [reach_of(trace, displacement, pair, lift) for pair in pairs]
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
     guided = None if problem.sliding is None else str(problem.sliding)
     loaded = trace.segments(*problem.traction, guided, *touching)
     whole = [name for name, values in problem.displacement.items() if None not in values]
     cells = cells_of(trace, cuts_of(trace, reaches, beside), loaded, trace.segments(*whole))
     given = given_on(problem, cells)
-    least = np.maximum(given.followed(cells), cells.curved)
-    depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, least)
+    least = np.maximum(given.followed(), cells.curved)
+    narrow = narrow_forces(problem, trace.mesh, p)[cells.parent]
+    depth = np.maximum(least, LEVELS * narrow)
     order = 2 * (degree + ON_CURVES * cells.curved) + np.where(depth, PARTED, WHOLE)
     look = np.column_stack([order, depth, least > 0])
     mu, elements = elements_of(problem, cells, displacement, degree, look)
@@ -192,7 +177,7 @@ def _bound(
         share = _share(problem, cells, reach.pair)
         facing = facing_of(cells, displacement, reach, lift, held, share)
         lines.append(rows_of(mu, facing, degree - extent))
-    moments, fixed = moments_of(problem, cells, mu, given)
+    moments, fixed = given.moments(mu)
     motions = rigid_motions(cells, mu, fixed)
     program = dual_program(mu, elements, fixed, motions, lines)
     balanced = program.nearest(elements, moments)
@@ -208,12 +193,12 @@ def _bound(
             f"no equilibrated stress was found: the residual relative to the largest stress is "
             f"{residual:.1e}"
         )
-    have = boundary_tractions(cells, given, elements, balanced.coefficients)
-    wanted = requested(problem, cells, given, lines, balanced.pressure)
-    missed = missed_tractions(wanted, cells, have, scale)
+    given = given.under(lines, balanced.pressure)
+    have = boundary_tractions(given, elements, balanced.coefficients)
+    missed = have.missed(given, scale)
     loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(elements, n))
     level = Level(cells, elements, balanced.coefficients, look, stress.distance, loads)
-    distance, loads = once_more(problem, displacement, wanted, level, degree, scale)
+    distance, loads = once_more(problem, displacement, given, level, degree, scale)
     stress = replace(stress, distance=distance)
     if not np.isfinite(loads).all():
         raise ValueError(
@@ -227,7 +212,7 @@ def _bound(
         closed += float((pressure * line.bound).sum())
         signed += work_on_gap(line.facing, pressure, line.facing.gap)
     parts, below, above = _summed(
-        stress.distance, loads, lifting, closed, signed, have.work(cells, given, displacement)
+        stress.distance, loads, lifting, closed, signed, have.work(given, displacement)
     )
     return Proof(
         cells=cells,

@@ -14,11 +14,11 @@ from ...errors import ContactError
 from ...fem import model_of
 from ...problem import Problem
 from .bound import LIFTED, Proof, work_on_gap
-from .facing import PLACES, WEIGHTS, Facing, bernstein, met
+from .facing import PLACES, WEIGHTS, Facing, bernstein, met, on_segments
 from .lifting import asked_on_supports, lifted
 from .missed import data_norms
 from .norms import SETTLED, residuals, smallest_moduli, stress_norms
-from .tractions import boundary_tractions, missed_tractions, requested
+from .tractions import boundary_tractions
 
 NOISE = 1e-13  # of a jump, relative to the largest displacement
 ROOM = 2.0  # largest |q*| / p* over the ratio of their means, where contact has no open end
@@ -81,14 +81,12 @@ def force_bar(
     left = proof.program.unbalanced(proof.multipliers, elements, none, dual)
     if not residuals(cells, proof.multipliers, left, norms.largest).max() <= SETTLED:
         raise ContactError("no stress of the force's test was found in equilibrium")
-    have = boundary_tractions(cells, proof.given, elements, dual.coefficients)
-    free = replace(problem, force={}, traction={})
-    wanted = requested(free, cells, proof.given, lines, dual.pressure)
-    missed = missed_tractions(wanted, cells, have, norms.largest)
+    given = replace(proof.given, loads=[]).under(lines, dual.pressure)
+    have = boundary_tractions(given, elements, dual.coefficients)
+    missed = have.missed(given, norms.largest)
     data = data_norms(cells, np.zeros(n), missed, smallest_moduli(elements, n))
     held = [
-        replace(one, amount=np.zeros_like(one.amount))
-        for one in asked_on_supports(cells, proof.given, G)
+        replace(one, amount=np.zeros_like(one.amount)) for one in asked_on_supports(cells, given, G)
     ]
     lifts = list(zip(facing, lift, strict=True))
     lifting = lifted(problem, cells, held, lifts, cells.trace.order + LIFTED, 1.0)
@@ -96,7 +94,7 @@ def force_bar(
     B = proof.bound
     # The largest M e + kappa (X + Y) with e^2 + 2 X + 2 Y <= B^2.
     error = M * B if M >= kappa * B else (M**2 / kappa + kappa * B**2) / 2
-    work = have.work(cells, proof.given, displacement)
+    work = have.work(given, displacement)
     opened = 0.0
     for line, q, p, r in zip(lines, dual.pressure, proof.balanced.pressure, lift, strict=True):
         work -= work_on_gap(line.facing, q, line.facing.gap)
@@ -163,12 +161,12 @@ def _ratio_beside(proof: Proof, displacement: ng.CoefficientFunction, tested: Te
         beside = np.isin(cells.segment, f.pair.line.segments)
         beside[f.side] = False
         side = np.flatnonzero(beside)
-        segment, s = cells.on_side(np.repeat(side, j), np.tile(PLACES, len(side)))
+        segment, s = on_segments(cells, side, PLACES)
         found = met(cells.trace, displacement, f.pair, segment, s)
-        jump = cells.trace.evaluate(tested.displacement, segment, s)
-        at = np.flatnonzero(found.segment >= 0)
+        jump = cells.trace.evaluate(tested.displacement, np.repeat(segment, j), s.ravel())
+        jump, at = jump.reshape(*s.shape, 2), found.segment >= 0
         jump[at] -= cells.trace.evaluate(tested.displacement, found.segment[at], found.s[at])
-        excess = np.abs(((jump - e) * found.direction).sum(axis=1))
+        excess = np.abs(((jump - e) * found.direction).sum(axis=2))
         some = found.faces & (excess > NOISE)
         room = np.maximum(found.gap[some], np.finfo(float).tiny)
         ratio = max(ratio, float((excess[some] / room).max(initial=0.0)))

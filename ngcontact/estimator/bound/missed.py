@@ -1,36 +1,37 @@
 """What an equilibrated stress misses of its data, and how much of the energy that can be.
 
-For every displacement v there is a rigid motion r with |v - r| <= h / pi |grad(v - r)| (Payne,
-Weinberger 1960, Arch. Rational Mech. Anal. 5:286; Bebendorf 2003) on a convex T of diameter h, and
+Constants of Poincare (Payne, Weinberger 1960, Arch. Rational Mech. Anal. 5:286; Bebendorf 2003), of
+Korn (Costabel, Dauge 2015, Arch. Rational Mech. Anal. 217:873, theorem 2.3) and of traces are known
+for each triangle; docs/bounds.md has the proof. Extrema on curves are taken over points.
 
-    |grad(v - r)|^2 <= (1 + 2 / beta^2) |e(v)|^2,
-
-since the rotation omega of v - r, of mean 0, is the divergence of a z that vanishes on the boundary
-with |grad z| <= |omega| / beta, and the gradient of omega consists of derivatives of e. With a ball
-of radius rho, with respect to which T is star-shaped, and one of R about the same place around T,
-
-    beta >= rho / (sqrt 2 R) (1 + sqrt(1 - rho^2 / R^2))^(-1/2)
-
-(Costabel, Dauge 2015, Arch. Rational Mech. Anal. 217:873, theorem 2.3). On an edge E opposite to P,
-
-    min_E (x - P).n |w|_E^2 <= int_T div((x - P) w^2) <= 2 |w|^2 + 2 d |w| |grad w|
-
-with the largest distance d from P. On a curved T the first inequality is that of the straight
-triangle, of which T is the image under D: |w| <= h / pi max |D| (max det D / min det D)^(1/2)
-|grad w|. Extrema on curves are taken over points.
+Where F or P are no polynomials s balances projections of them. On a triangle T where that counts,
+the stress s' nearest to sigma_h with the tractions of s on inner sides and on Gamma_u, with P and
+p* on the others, and -div s' = F, is sought on parts of T, where again F and P are met in
+projections. s' may stand for s on T, with what it misses itself; both have the same resultants, for
+the rules on T are those on its parts.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
+import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
+from ...problem import Problem
 from .cells import Cells
+from .elements import Element, elements_of
+from .norms import SETTLED, forces_missed, residuals, smallest_moduli, stress_norms
+from .parts import divided, pattern
+from .program import dual_program, exerted
+from .tractions import Given, side_rule, tractions_of
 
 SEEN = 17  # points on each side
-MIDDLES = 8  # degree of the lattice of places at which the middle of both balls is sought
+COUNTS = 0.02  # of |s - sigma_h|^2, what may be added by data where nothing is balanced again
+LEAST = 3  # degree on parts: lower ones do not meet all tractions
+AT_ONCE = 200  # triangles
 
 
 def data_norms(cells: Cells, forces: Array, tractions: Array, least: Array) -> Array:
@@ -66,55 +67,151 @@ def data_norms(cells: Cells, forces: Array, tractions: Array, least: Array) -> A
 
 def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array, Array]:
     """Of Poincare and Korn (b,), of traces (b, 3), squares for |grad w| = 1; least measure (b,)."""
-    corners, t = cells.corners[at], np.linspace(0, 1, SEEN)
-    x = np.empty((len(at), 3, SEEN, 2))
-    normal = np.empty_like(x)
-    for i in range(3):
-        own = np.where(cells.backward[at, i, None], 1 - t, t)
-        side = np.repeat(cells.sides[at, i], SEEN)
-        place, slope = (z.reshape(len(at), SEEN, 2) for z in cells.points(side, own.ravel()))
-        slope = np.where(cells.backward[at, i, None, None], -slope, slope)
-        x[:, i] = place
-        normal[:, i] = np.stack([slope[..., 1], -slope[..., 0]], axis=-1)
-    slope = np.stack([-normal[..., 1], normal[..., 0]], axis=-1)
+    corners, back = cells.corners[at], cells.backward[at, :, None]
+    t = np.linspace(0, 1, SEEN)
+    own = np.where(back, 1 - t, t).ravel()
+    x, slope = (
+        z.reshape(len(at), 3, SEEN, 2)
+        for z in cells.points(np.repeat(cells.sides[at].ravel(), SEEN), own)
+    )
+    slope = np.where(back[..., None], -slope, slope)
+    normal = np.stack([slope[..., 1], -slope[..., 0]], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    best = np.zeros(len(at))
-    opposite = np.linalg.norm(np.roll(corners, -1, 1) - np.roll(corners, -2, 1), axis=2)
-    shares = [opposite / opposite.sum(axis=1, keepdims=True)]
-    m = MIDDLES
-    shares += [
-        np.broadcast_to(np.array([i, j, m - i - j]) / m, (len(at), 3))
-        for i in range(1, m)
-        for j in range(1, m - i)
-    ]
-    for share in shares:
-        away = x - np.einsum("bi,bic->bc", share, corners)[:, None, None]
-        rho = (away * normal).sum(axis=-1).min(axis=(1, 2))
-        best = np.maximum(best, rho / np.linalg.norm(away, axis=-1).max(axis=(1, 2)))
-    best = np.maximum(best, np.finfo(float).tiny)
-    beta = best / math.sqrt(2) / np.sqrt(1 + np.sqrt(1 - best**2))
-    poincare = cells.diameters[at] / math.pi * _distortion(cells, at, x, slope)
+    share = np.linalg.norm(np.roll(corners, -1, 1) - np.roll(corners, -2, 1), axis=2)
+    middle = np.einsum("bi,bic->bc", share / share.sum(axis=1, keepdims=True), corners)
+    away, tiny = x - middle[:, None, None], np.finfo(float).tiny
+    rho = np.maximum((away * normal).sum(axis=-1).min(axis=(1, 2)), tiny)
+    ratio = rho / np.linalg.norm(away, axis=-1).max(axis=(1, 2))
+    beta = ratio / math.sqrt(2) / np.sqrt(1 + np.sqrt(1 - ratio**2))
+    poincare = cells.diameters[at] / math.pi * _distortion(cells, at, x[:, 0], slope[:, 0])
     away = x - corners[:, :, None]
-    least = np.maximum((away * normal).sum(axis=-1).min(axis=-1), np.finfo(float).tiny)
-    far = np.linalg.norm(away, axis=-1).max(axis=-1)
-    p = poincare[:, None]
+    least = np.maximum((away * normal).sum(axis=-1).min(axis=-1), tiny)
+    far, p = np.linalg.norm(away, axis=-1).max(axis=-1), poincare[:, None]
     measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), -1).min(axis=1)
     return poincare, np.sqrt(1 + 2 / beta**2), 2 * (p**2 + far * p) / least, measure
 
 
-def _distortion(cells: Cells, at: Index, x: Array, slope: Array) -> Array:
+def _distortion(cells: Cells, at: Index, base: Array, slope: Array) -> Array:
     """Max |D| (max det D / min det D)^(1/2) (b,) of the map of straight triangles; 1 on those."""
     found, bent = np.ones(len(at)), np.flatnonzero(cells.curved[at])
     if bent.size:
-        corners = cells.corners[at[bent]]
-        away, along = x[bent, 0] - corners[:, None, 0], slope[bent, 0]
-        chord = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 1]], axis=-1)
-        t = np.linspace(0, 1, SEEN)
-        # away = D (straight away), along = D chord: D depends on t alone.
-        straight = np.empty((len(bent), SEEN, 2, 2))
-        straight[..., 0] = chord[:, None, :, 0] + t[:, None] * chord[:, None, :, 1]
-        straight[..., 1] = chord[:, None, :, 1]
-        D = np.stack([away, along], axis=-1) @ np.linalg.inv(straight)
+        apex, a, b = np.moveaxis(cells.corners[at[bent], :, None], 1, 0)
+        t = np.linspace(0, 1, SEEN)[:, None]
+        # base - apex = D (straight base - apex), slope = D (b - a): D depends on t alone.
+        straight = np.stack(np.broadcast_arrays(a + t * (b - a) - apex, b - a), axis=-1)
+        D = np.stack([base[bent] - apex, slope[bent]], axis=-1) @ np.linalg.inv(straight)
         size, det = np.linalg.norm(D, 2, axis=(2, 3)).max(axis=1), np.linalg.det(D)
         found[bent] = size * np.sqrt(det.max(axis=1) / np.maximum(det.min(axis=1), 1e-300))
     return found
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """A stress on n triangles.
+
+    Attributes
+    ----------
+    cells : Cells
+    elements : list of Element
+    coefficients : list of ndarray (b, m)
+        Of the stress.
+    look : ndarray of int (n, 3)
+        Rules of forces on each, as of `elements_of`.
+    distance, loads : ndarray (n,)
+        |s - sigma_h|, and norms of what s misses of the data.
+    """
+
+    cells: Cells
+    elements: list[Element]
+    coefficients: list[Array]
+    look: Index
+    distance: Array
+    loads: Array
+
+
+def once_more(
+    problem: Problem,
+    displacement: ng.CoefficientFunction,
+    given: Given,
+    level: Level,
+    degree: int,
+    scale: float,
+    allowed: float | None = None,
+) -> tuple[Array, Array]:
+    """`Level.distance` and `.loads`, (n,) each, of the better of both stresses on each triangle.
+
+    Parameters
+    ----------
+    displacement : CoefficientFunction
+        u_h.
+    given : Given
+        Tractions on the boundary.
+    level : Level
+        The stress in equilibrium so far.
+    degree : int
+        Of stresses on straight triangles.
+    scale : float
+        The largest stress, beside which equilibrium is measured.
+    allowed : float, optional
+        What may be added to B^2; without it a share of |s - sigma_h|^2.
+    """
+    c, D = level.distance.copy(), level.loads.copy()
+    limit = COUNTS * float(c @ c) if allowed is None else allowed
+    _, depth, thirds = level.look.T
+    lost = (c + D) ** 2 - c**2
+    order = np.argsort(lost)
+    counts = np.cumsum(lost[order]) > limit
+    at = np.sort(order[counts & (depth[order] > 0)])
+    for third in (False, True):
+        some = at[thirds[at] == third]
+        for start in range(0, len(some), AT_ONCE):
+            here = some[start : start + AT_ONCE]
+            share = limit * len(here) / len(at)
+            one, two = _on_parts(
+                problem, displacement, given, level, here, degree, scale, third, share
+            )
+            better = one + two < c[here] + D[here]
+            c[here[better]], D[here[better]] = one[better], two[better]
+    return c, D
+
+
+def _on_parts(
+    problem: Problem,
+    displacement: ng.CoefficientFunction,
+    given: Given,
+    level: Level,
+    at: Index,
+    degree: int,
+    scale: float,
+    thirds: bool,
+    allowed: float,
+) -> tuple[Array, Array]:
+    """`Level.distance` and `.loads` of s' on triangles `at` (b,); infinite without equilibrium.
+
+    `allowed` may be added to B^2 on these triangles.
+    """
+    parts, k, degree = divided(level.cells, at, thirds), len(pattern(thirds)[1]), max(degree, LEAST)
+    look = np.repeat(level.look[at], k, axis=0)
+    look[:, 1] -= 1
+    mu, elements = elements_of(problem, parts, displacement, degree, look)
+    rule = side_rule(parts, given.breaks, np.flatnonzero(~parts.inner))
+    owner = parts.owner[rule.side]
+    own = tractions_of(level.elements, level.coefficients, at[owner // k], rule.x, rule.normal)
+    asked = given.asked(parts, rule, own)
+    moments = rule.moments(mu, asked)
+    free = np.zeros(len(moments), dtype=bool)
+    program = dual_program(mu, elements, free, np.zeros((len(moments), 0)), [])
+    found = program.nearest(elements, moments).coefficients
+    left = residuals(parts, mu, moments - exerted(elements, found)[0], scale)
+    distance = stress_norms(elements, found, len(look)).distance
+    have = tractions_of(elements, found, owner, rule.x, rule.normal)
+    missed = rule.missed(parts, asked - have, scale)
+    moduli = smallest_moduli(elements, len(look))
+    loads = data_norms(parts, forces_missed(elements, len(look)), missed, moduli)
+    both = distance, loads
+    if look[:, 1].any():
+        finer = Level(parts, elements, found, look, *both)
+        both = once_more(problem, displacement, given, finer, degree, scale, allowed)
+    settled = left.reshape(-1, k).max(axis=1) <= SETTLED
+    one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
+    return np.where(settled, one, np.inf), np.where(settled, two, np.inf)

@@ -7,27 +7,22 @@ from functools import lru_cache
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Index, Mask
-from ...fem import narrow_forces
-from ...problem import Problem
-from ...quadrature import View, features_of, numbers, touched
+from ...arrays import Array, Index
 from .cells import Cells, joined, places
 from .polynomials import frame_of, projected, scalars
 
 PARTS = 4  # of each side
 LEVELS = 2  # how often triangles are divided
-SMOOTH = 1e-3  # of the largest force: what polynomials miss where none is divided
-LEFT = 0.005  # share of the squares of what is missed, that may be on parts not divided again
 BENT = 2  # times the order of rules on curved triangles, for polynomials in x
 AT_ONCE = 200_000  # points at which forces are looked at together
 
 
 @lru_cache
-def pattern(m: int, thirds: bool) -> tuple[Array, Index, Index, Array]:
-    """The m^2 equal parts of a triangle; those at its corners in `thirds` about their middles.
+def pattern(thirds: bool) -> tuple[Array, Index, Index, Array]:
+    """The equal parts of a triangle; those at its corners in `thirds` about their middles.
 
-    There given tractions may be those of no symmetric stress. Side 0 of a part is the one that lies
-    on the triangle's, where one does.
+    There given tractions may be those of no symmetric stress. What lies on the triangle's side 0 is
+    side 0 of its part.
 
     Returns
     -------
@@ -40,44 +35,31 @@ def pattern(m: int, thirds: bool) -> tuple[Array, Index, Index, Array]:
     span : ndarray (k, 3, 2)
         Where it starts and ends on that, from 0 to 1 in the triangle's sense.
     """
-    at = {ij: n for n, ij in enumerate((i, j) for i in range(m + 1) for j in range(m + 1 - i))}
-    vertices = [(m - i - j, i, j) for i, j in at]
-    found = []
-    for i, j in at:
-        if i + j < m:
-            up = [at[i, j], at[i + 1, j], at[i, j + 1]]
-            if thirds and any(max(vertices[v]) == m for v in up):
+    lattice = [(i, j) for i in range(PARTS + 1) for j in range(PARTS + 1 - i)]
+    at = {ij: n for n, ij in enumerate(lattice)}
+    vertices, found = [(PARTS - i - j, i, j) for i, j in lattice], []
+    for i, j in lattice:
+        if i + j < PARTS:
+            a, b, c = up = [at[i, j], at[i + 1, j], at[i, j + 1]]
+            if thirds and any(max(vertices[v]) == PARTS for v in up):
+                middle = len(vertices)
                 vertices.append(tuple(np.mean([vertices[v] for v in up], axis=0)))
-                middle = len(vertices) - 1
-                found += [[middle, up[1], up[2]], [middle, up[2], up[0]], [middle, up[0], up[1]]]
+                found += [[middle, b, c], [middle, c, a], [middle, a, b]]
             else:
                 found.append(up)
-        if i + j < m - 1:
+        if i + j < PARTS - 1:
             found.append([at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]])
-    shares, corners = np.array(vertices) / m, np.array(found)
-    for turn in (0, 1, 2):  # the outer side first, of all the triangle's side 0
-        ends = shares[np.roll(corners, -1, axis=1)], shares[np.roll(corners, -2, axis=1)]
-        on = (ends[0] == 0) & (ends[1] == 0)  # (k, 3 own sides, 3 sides of the triangle)
-        outer = np.where(on.any(axis=2), on.argmax(axis=2), -1)
-        if turn < 2:
-            rank = np.where(outer < 0, 3, outer)
-            roll = (rank.argmin(axis=1)[:, None] + np.arange(3)) % 3
-            corners = np.take_along_axis(corners, roll, axis=1)
-    along = np.stack(ends, axis=2)[
-        np.arange(len(corners))[:, None, None],
-        np.arange(3)[:, None],
-        np.arange(2),
-        (outer[:, :, None] + 2) % 3,
-    ]
-    return shares, corners, outer, along
+    shares, corners = np.array(vertices) / PARTS, np.array(found)
+    ends = shares[np.stack([np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1)], axis=2)]
+    on = (ends == 0).all(axis=2)  # (k, 3 own sides, 3 sides of the triangle)
+    outer = np.where(on.any(axis=2), on.argmax(axis=2), -1)
+    span = np.take_along_axis(ends, (outer[..., None, None] + 2) % 3, axis=3)[..., 0]
+    return shares, corners, outer, span
 
 
-def divided(cells: Cells, at: Index, m: int, thirds: bool) -> Cells:
-    """Triangles `at` (b,) in parts, those of each together; no two share a vertex.
-
-    See `pattern`.
-    """
-    shares, corners, outer, along = pattern(m, thirds)
+def divided(cells: Cells, at: Index, thirds: bool) -> Cells:
+    """Triangles `at` (b,) in the parts of `pattern`, each with vertices of its own."""
+    shares, corners, outer, along = pattern(thirds)
     b, p, k = len(at), len(shares), len(corners)
     x = np.einsum("pc,bcd->bpd", shares, cells.corners[at])
     bent = np.flatnonzero(cells.curved[at])
@@ -91,7 +73,7 @@ def divided(cells: Cells, at: Index, m: int, thirds: bool) -> Cells:
     reference = np.einsum("pc,bcd->bpd", shares, cells.reference[at])
     sides = cells.sides[at]
     span = np.where(cells.backward[at][..., None], cells.span[sides][..., ::-1], cells.span[sides])
-    start, stop = span[:, outer, 0], span[:, outer, 1]  # (b, k, 3)
+    start, stop = np.moveaxis(span[:, outer], -1, 0)[..., None]  # (b, k, 3, 1)
     return joined(
         cells.trace,
         x.reshape(-1, 2),
@@ -99,7 +81,7 @@ def divided(cells: Cells, at: Index, m: int, thirds: bool) -> Cells:
         reference[:, corners].reshape(-1, 3, 2),
         np.repeat(cells.parent[at], k),
         np.where(outer < 0, -1, cells.segment[sides][:, outer]).reshape(-1, 3),
-        (start[..., None] + (stop - start)[..., None] * along).reshape(-1, 3, 2),
+        (start + (stop - start) * along).reshape(-1, 3, 2),
         (cells.curved[at][:, None] & (outer[:, 0] == 0)).ravel(),
     )
 
@@ -117,8 +99,7 @@ def looked_at(
         points = places(cells, at, BENT * order if bent else order)
         measure = cells.trace.model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
         return points.x, points.weight * measure, points.evaluate(cells, F)
-    parts = divided(cells, at, PARTS, thirds)
-    found = []
+    parts, found = divided(cells, at, thirds), []
     for curved in (False, True):
         some = np.flatnonzero(parts.curved == curved)
         if some.size:
@@ -147,86 +128,15 @@ def projection(
     rest, size : ndarray (b,)
         L2 norms of some `components` of what they miss of F, and of F, times the measure.
     """
-    force: list[Array] = []
-    rest: list[Array] = []
-    size: list[Array] = []
-    step = max(1, AT_ONCE // (len(pattern(PARTS, thirds)[1]) ** depth * (order // 2 + 1) ** 2))
+    force, norms = [], []
+    step = max(1, AT_ONCE // (len(pattern(thirds)[1]) ** depth * (order // 2 + 1) ** 2))
     for start in range(0, len(at), step):
         some = at[start : start + step]
         x, weight, values = looked_at(F, cells, some, order, depth, thirds)
         frame = frame_of(cells.corners[some])
         force.append(projected(degree, frame, x, weight, values))
-        left = (values - scalars(degree, frame, x) @ force[-1])[..., components]
-        measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(weight.shape)
-        for found, function in ((rest, left), (size, values[..., components])):
-            found.append(np.sqrt(np.einsum("bq,bqd->b", weight * measure, function**2)))
-    return np.concatenate(force), np.concatenate(rest), np.concatenate(size)
-
-
-def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Index) -> Index:
-    """How often triangles (n,) are divided, because forces are not near to polynomials.
-
-    The polynomials are of a `degree`, the rules of an `order`; `least` (n,) times at least.
-    """
-    mesh = cells.trace.mesh
-    found = least.copy()
-    if all(numbers(ng.CF(F)) for F in problem.force.values()):
-        return found
-    found = np.maximum(found, narrow_forces(problem, mesh, cells.trace.order)[cells.parent])
-    found[_with_features(problem, cells)] = LEVELS
-    for k, F in problem.force.items():
-        at = np.flatnonzero(np.array(mesh.Materials(k).Mask())[cells.bodies])
-        if not numbers(F) and at.size:
-            asked = found[at]
-            found[at] = _depths(ng.CF(F), cells, at, asked, (degree, order), LEVELS, 0.0)
-    return found
-
-
-def _with_features(problem: Problem, cells: Cells) -> Mask:
-    """Whether triangles (n,) lie in elements with features of forces too narrow for parts."""
-    mesh = cells.trace.mesh
-    view, found = View(mesh, 2), np.zeros(mesh.ne, dtype=bool)
-    for one in features_of(problem, mesh):
-        if one.kind == "force" and len(one.places):
-            spots = np.column_stack([one.places, one.widths])
-            at, feature = touched(spots, view, np.arange(mesh.ne))
-            found[at[view.sizes[at] > PARTS * one.widths[feature]]] = True
-    return found[cells.parent]
-
-
-def _depths(
-    F: ng.CoefficientFunction,
-    cells: Cells,
-    at: Index,
-    asked: Index,
-    rule: tuple[int, int],
-    levels: int,
-    least: float,
-) -> Index:
-    """Depths (b,) of triangles `at` (b,) for one force, from `asked` (b,) up to `levels`.
-
-    `rule` is the degree of the polynomials and the order of the rules. Polynomials are near to the
-    force if they miss less, in the root of the mean square, than `least`.
-    """
-    rest, size = np.zeros((2, len(at)))
-    axial = slice(cells.trace.model.extent, None)
-    for curved in (False, True):
-        some = np.flatnonzero(cells.curved[at] == curved)
-        if some.size:
-            _, rest[some], size[some] = projection(F, cells, at[some], *rule, 0, False, axial)
-    corners = cells.corners[at]
-    area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2
-    least = max(least, SMOOTH * float((size / np.sqrt(area)).max(initial=0.0)))
-    rough = rest > least * np.sqrt(area)
-    if levels < LEVELS:  # what is left counts
-        order = np.argsort(rest)
-        enough = np.cumsum(rest[order] ** 2) > LEFT * (rest @ rest)
-        rough[order[~enough]] = False
-    depth = np.maximum(asked, rough)
-    some = np.flatnonzero((depth > 0) & (asked < levels))
-    if levels > 1 and some.size:
-        parts = divided(cells, at[some], PARTS, False)
-        every = np.arange(len(parts.triangles))
-        inner = _depths(F, parts, every, 0 * every, rule, levels - 1, least)
-        depth[some] = 1 + inner.reshape(len(some), -1).max(axis=1)
-    return depth
+        both = np.stack([values - scalars(degree, frame, x) @ force[-1], values])[..., components]
+        weight = weight * cells.trace.model.measure(x.reshape(-1, 2)).reshape(weight.shape)
+        norms.append(np.sqrt(np.einsum("bq,nbqd->nb", weight, both**2)))
+    rest, size = np.concatenate(norms, axis=1)
+    return np.concatenate(force), rest, size

@@ -11,6 +11,8 @@ from ...fem import BoundaryTrace
 from ...problem import Problem
 from ...quadrature import features_of, unresolved
 
+NO_BOUND = "no guaranteed bound is known"
+
 
 def refuse_bound(problem: Problem, boundary: BoundaryTrace, pairs: Sequence[ContactState]) -> None:
     """Raise unless the error of a problem's solutions can be bounded.
@@ -20,43 +22,29 @@ def refuse_bound(problem: Problem, boundary: BoundaryTrace, pairs: Sequence[Cont
     ValueError
         What stands in the way.
     """
-    no_bound = "no guaranteed bound is known for"
-    names = boundary.mesh.GetBoundaries()
-    bent = np.flatnonzero(boundary.curved_segments)
-    if boundary.inner[bent].any():
-        name = names[boundary.region[bent[boundary.inner[bent]][0]]]
-        raise ValueError(f'{no_bound} curved lines inside a body, as "{name}"; use error_estimate')
-    axis = boundary.model.on_axis(boundary.curve[:, [0, -1]].reshape(-1, 2))
-    at_axis = bent[axis.reshape(-1, 2)[bent].any(axis=1)]
-    if at_axis.size:
-        name = names[boundary.region[at_axis[0]]]
-        raise ValueError(f'{no_bound} curves that meet the axis, as "{name}"; use error_estimate')
+    bent = boundary.curved_segments
+    axis = boundary.model.on_axis(boundary.curve[:, [0, -1]].reshape(-1, 2)).reshape(-1, 2)
+    for refused, what in (
+        (bent & boundary.inner, "curved lines inside a body"),
+        (bent & axis.any(axis=1), "curves that meet the axis"),
+    ):
+        if refused.any():
+            name = boundary.mesh.GetBoundaries()[boundary.region[refused.argmax()]]
+            raise ValueError(f'{NO_BOUND} for {what}, as "{name}"; use error_estimate')
     guides = () if problem.sliding is None else (str(problem.sliding),)
     for pattern in (*problem.displacement, *problem.traction, *guides):
-        at = boundary.segments(pattern)
-        if boundary.inner[at].any():
-            raise ValueError(f'{no_bound} conditions on a line inside a body, as on "{pattern}"')
-    for pair in pairs:
-        line = pair.line
-        if line.contact.primary is not None:
-            continue
-        loaded = (np.append(pair.force, 0.0)[line.rows] != 0).any(axis=1)
-        ends = np.isin(line.rows, [-1, *line.rows[line.faces].ravel()]).all(axis=1)
-        if (loaded & ~line.faces & ~ends).any():
+        if boundary.inner[boundary.segments(pattern)].any():
             raise ValueError(
-                f"{no_bound} segments that face an obstacle in part, as on "
-                f'"{line.contact.secondary}"'
+                f'{NO_BOUND} for conditions on a line inside a body, as on "{pattern}"'
             )
-
-
-def refuse_jumps(problem: Problem, boundary: BoundaryTrace) -> None:
-    """Raise where a prescribed displacement jumps inside a boundary.
-
-    Raises
-    ------
-    ValueError
-        The first one, with its place.
-    """
+    for line, force in ((pair.line, pair.force) for pair in pairs):
+        loaded = (np.append(force, 0.0)[line.rows] != 0).any(axis=1)
+        ends = np.isin(line.rows, [-1, *line.rows[line.faces].ravel()]).all(axis=1)
+        if line.contact.primary is None and (loaded & ~line.faces & ~ends).any():
+            name = line.contact.secondary
+            raise ValueError(
+                f'{NO_BOUND} for segments that face an obstacle in part, as on "{name}"'
+            )
     for one in features_of(problem, boundary.mesh):
         for x, y, _ in one.jumps.tolist():
             raise ValueError(
@@ -75,4 +63,4 @@ def refuse_narrow(problem: Problem, boundary: BoundaryTrace) -> None:
         The first function, with place and width.
     """
     for one in unresolved(problem, boundary.mesh, in_bounds=True):
-        raise ValueError(f"no guaranteed bound is known where {one}; refine the mesh there")
+        raise ValueError(f"{NO_BOUND} where {one}; refine the mesh there")

@@ -8,20 +8,108 @@ from typing import Any
 
 import ngsolve as ng
 import numpy as np
+from numpy.polynomial import legendre
 
 from ...arrays import Array, Index, Mask
-from ...lagrange import lagrange
+from ...fem import BoundaryTrace
 from ...problem import Problem
 from ...quadrature import known_rough_load, moment_degree, numbers
 from .cells import Cells
 from .elements import Element, Multipliers, among, traces
-from .facing import PLACES, THROUGH, WEIGHTS, at_places, bernstein
+from .facing import DATA, LEGENDRE, PLACES, WEIGHTS, bernstein
 from .parts import LEVELS, PARTS
 from .program import Rows
 
 FINEST = PARTS**LEVELS  # parts of a side
-SAME = 1e-10  # of a segment: breaks nearer to ends of sides are these
+SAME = 1e-10  # of a side: breaks nearer to its ends are these
 ROUND_OFF = 1e-10  # of tractions, relative to the largest stress: as equilibrium is accepted
+
+
+@dataclass(frozen=True, eq=False)
+class SideRule:
+    """Quadrature along sides of cells, j points on each of m pieces.
+
+    Attributes
+    ----------
+    side : ndarray of int (m,)
+        Of each piece.
+    t, weight : ndarray (m, j)
+        Parameters of the sides, and weights in arc length.
+    x, normal : ndarray (m, j, 2)
+        Points, lengths; unit normals, out of the owners of the sides.
+    measure : ndarray (m, j)
+        The model's.
+    """
+
+    side: Index
+    t: Array
+    weight: Array
+    x: Array
+    normal: Array
+    measure: Array
+
+    def moments(self, mu: Multipliers, values: Array) -> Array:
+        """Integrals (d,) of tractions `values` (m, j, 2) times the multipliers."""
+        total, load = np.zeros(int(mu.start[-1])), (self.weight * self.measure)[..., None] * values
+        for k in np.unique(mu.degree[self.side]).tolist():
+            at = np.flatnonzero(mu.degree[self.side] == k)
+            parts = np.einsum("mjc,mji->mci", load[at], traces(k, self.t[at])).reshape(len(at), -1)
+            np.add.at(total, mu.start[self.side[at], None] + np.arange(2 * (k + 1)), parts)
+        return total
+
+    def missed(self, cells: Cells, values: Array, largest: float) -> Array:
+        """L2 norms (n, 3) of tractions `values` (m, j, 2) on sides, times the model's measure.
+
+        What is round-off beside the `largest` stress counts as 0.
+        """
+        size = np.zeros(len(cells.ends))
+        np.maximum.at(size, self.side, self.measure.max(axis=1))  # stresses lose it at an axis
+        lost = values * self.measure[..., None]
+        lost[np.abs(lost) <= ROUND_OFF * largest * size[self.side, None, None]] = 0.0
+        squares = np.zeros((len(cells.triangles), 3))
+        at = cells.owner[self.side], cells.local[self.side]
+        np.add.at(squares, at, (self.weight[..., None] * lost**2).sum(axis=(1, 2)))
+        return np.sqrt(squares)
+
+    def on_segments(self, cells: Cells) -> tuple[Index, Array]:
+        """Segments (m,) and parameters s (m, j) of a rule along sides of the boundary."""
+        a, b = cells.span[self.side].T[..., None]
+        return cells.segment[self.side], a + (b - a) * self.t
+
+
+def side_rule(cells: Cells, breaks: Array, side: Index) -> SideRule:
+    """The rule on sides `side` (k,), which begins anew at `Given.breaks` (r, 2)."""
+    segment, s = breaks[:, 0].astype(np.intp), breaks[:, 1]
+    at = cells.side_at(segment, s)
+    some = (cells.segment[at] == segment) & np.isin(at, side)
+    t = cells.own_parameter(at[some], s[some, None])[:, 0]
+    inside = (t > SAME) & (t < 1 - SAME)
+    every = np.concatenate([side, side, at[some][inside]])
+    t = np.concatenate([np.zeros(len(side)), np.ones(len(side)), t[inside]])
+    order = np.lexsort((t, every))
+    one = np.diff(every[order]) == 0
+    piece, start, stop = every[order][:-1][one], t[order][:-1][one], t[order][1:][one]
+    t = start[:, None] + (stop - start)[:, None] * PLACES
+    x, dx = _points(cells, piece, t)
+    length = np.linalg.norm(dx, axis=2)
+    normal = np.stack([dx[..., 1], -dx[..., 0]], axis=-1) / length[..., None]
+    normal[cells.backward[cells.owner[piece], cells.local[piece]]] *= -1
+    measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(t.shape)
+    return SideRule(piece, t, (stop - start)[:, None] * WEIGHTS * length, x, normal, measure)
+
+
+def _points(cells: Cells, side: Index, t: Array) -> tuple[Array, Array]:
+    """`Cells.points`, (m, j, 2) each, at `t` (m, j) of sides `side` (m,)."""
+    x, dx = cells.points(np.repeat(side, t.shape[1]), t.ravel())
+    return x.reshape(*t.shape, 2), dx.reshape(*t.shape, 2)
+
+
+def _evaluated(
+    trace: BoundaryTrace, function: ng.CoefficientFunction, segment: Index, s: Array
+) -> Array:
+    """Values (m, j, dim) at `s` (m, j) of segments `segment` (m,)."""
+    values = trace.evaluate(function, np.repeat(segment, s.shape[1]), s.ravel())
+    return values.reshape(*s.shape, -1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,242 +118,131 @@ class Given:
 
     Attributes
     ----------
+    cells : Cells
     held : ndarray of bool (e, 2)
         Components with prescribed displacements: no traction is given.
-    loads : list of (str, ndarray of int (k,))
-        Keys of `Problem.traction` with their sides.
+    loads : list of (CoefficientFunction, ndarray of int (k,))
+        P with its sides.
     supports : list of (values, ndarray of int (k,))
         u_D of `Problem.displacement` with their sides.
     guides : ndarray of int (k,)
         Sides of Gamma_0.
-    breaks : ndarray (k, 2)
+    breaks : ndarray (r, 2)
         Segments and s, rising: where rules on the boundary begin anew to follow tractions.
+    pressed : ndarray (e, j, 2)
+        What pressures of lines exert: forces per t, with the measure, at `PLACES`.
     """
 
+    cells: Cells
     held: Mask
-    loads: list[tuple[str, Index]]
+    loads: list[tuple[ng.CoefficientFunction, Index]]
     supports: list[tuple[Sequence[Any], Index]]
     guides: Index
     breaks: Array
+    pressed: Array
 
-    def followed(self, cells: Cells) -> Index:
-        """How often triangles (n,) are divided for tractions: `LEVELS` where these are rough."""
-        found = np.zeros(len(cells.triangles), dtype=np.intp)
-        side = np.flatnonzero(cells.segment >= 0)
-        breaks = np.bincount(self.breaks[:, 0].astype(np.intp), minlength=len(cells.trace.region))
-        count = breaks[cells.segment[side]]
-        np.maximum.at(found, cells.owner[side], np.where(count >= FINEST, LEVELS, count > 0))
+    def followed(self) -> Index:
+        """How often triangles (n,) are divided: `LEVELS` times beside tractions that vary."""
+        found = np.zeros(len(self.cells.triangles), dtype=np.intp)
+        found[self.cells.owner[np.isin(self.cells.segment, self.breaks[:, 0])]] = LEVELS
         return found
+
+    def under(self, lines: Sequence[Rows], pressure: Sequence[Array]) -> Given:
+        """The same with pressures on lines: Bernstein coefficients (k, n) on the sides of each."""
+        pressed = np.zeros_like(self.pressed)
+        for line, p in zip(lines, pressure, strict=True):
+            f = line.facing
+            density = p @ bernstein(p.shape[1] - 1, PLACES).T * f.weight / WEIGHTS
+            force = density[..., None] * f.direction
+            np.add.at(pressed, f.side, -force)
+            if line.opposite:
+                np.add.at(pressed, f.other, f.on_primary(force / f.rate[..., None]))
+        return replace(self, pressed=pressed)
+
+    def tractions(self, segment: Index, s: Array) -> tuple[Array, Mask]:
+        """Tractions (m, j, 2) at `s` (m, j) of `segment` (m,), and held components (m, 2)."""
+        cells, total = self.cells, np.zeros((*s.shape, 2))
+        side = cells.side_at(segment, s[:, s.shape[1] // 2])
+        for load, loaded in self.loads:
+            at = np.flatnonzero(np.isin(side, loaded))
+            if at.size:
+                total[at] += _evaluated(cells.trace, load, segment[at], s[at])
+        at = np.flatnonzero(self.pressed[side].any(axis=(1, 2)))
+        if at.size:
+            t = cells.own_parameter(side[at], s[at])
+            x, dx = _points(cells, side[at], t)
+            measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(*t.shape, 1)
+            ds = np.linalg.norm(dx, axis=2, keepdims=True) * measure
+            force = legendre.legvander(2 * t - 1, DATA) @ (LEGENDRE @ self.pressed[side[at]])
+            total[at] += np.divide(force, ds, out=np.zeros_like(force), where=ds > 0)
+        return total, self.held[side]
+
+    def asked(self, cells: Cells, rule: SideRule, own: Array) -> Array:
+        """Tractions (m, j, 2) on sides of `cells`, parts of these; `own` where none are given."""
+        segment, s = rule.on_segments(cells)
+        on, asked = np.flatnonzero(segment >= 0), own.copy()
+        if on.size:
+            values, held = self.tractions(segment[on], s[on])
+            asked[on] = np.where(held[:, None], own[on], values)
+        return asked
+
+    def moments(self, mu: Multipliers) -> tuple[Array, Mask]:
+        """Moments (d,) of the loads with the multipliers, and which of these are fixed, (d,).
+
+        Fixed are those of components with prescribed displacements.
+        """
+        moments, fixed = np.zeros(int(mu.start[-1])), np.zeros(int(mu.start[-1]), dtype=bool)
+        if self.loads:
+            side = np.unique(np.concatenate([loaded for _, loaded in self.loads]))
+            rule = side_rule(self.cells, self.breaks, side)
+            values, _ = self.tractions(*rule.on_segments(self.cells))
+            moments = rule.moments(mu, values)  # (3.7)
+        for side, c in zip(*np.nonzero(self.held), strict=True):
+            n = mu.degree[side] + 1
+            fixed[mu.start[side] + c * n : mu.start[side] + (c + 1) * n] = True
+        return np.where(fixed, 0.0, moments), fixed
 
 
 def given_on(problem: Problem, cells: Cells) -> Given:
     """The conditions of a problem."""
 
-    def sides(*patterns: str | None) -> Index:
-        return np.flatnonzero(np.isin(cells.segment, cells.trace.segments(*patterns)))
+    def sides(pattern: str | None) -> Index:
+        return np.flatnonzero(np.isin(cells.segment, cells.trace.segments(pattern)))
 
     held = np.zeros((len(cells.ends), 2), dtype=bool)
     supports = [(values, sides(pattern)) for pattern, values in problem.displacement.items()]
     for values, at in supports:
         held[at] |= [value is not None for value in values]
-    loads = [(pattern, sides(pattern)) for pattern in problem.traction]
+    loads = {name: sides(name) for name in problem.traction}
     guided = None if problem.sliding is None else str(problem.sliding)
-    return Given(held, loads, supports, sides(guided), _breaks(problem, cells, loads))
+    return Given(
+        cells,
+        held,
+        [(problem.traction_vector(name), side) for name, side in loads.items()],
+        supports,
+        sides(guided),
+        _breaks(problem, cells, loads),
+        np.zeros((len(cells.ends), len(PLACES), 2)),
+    )
 
 
-def _breaks(problem: Problem, cells: Cells, loads: Sequence[tuple[str, Index]]) -> Array:
+def _breaks(problem: Problem, cells: Cells, loads: dict[str, Index]) -> Array:
     """`Given.breaks`: ends of parts, and of those that `quadrature` integrates rough loads on."""
-    segments, places = [np.zeros(0)], [np.zeros(0)]
-    for name, side in loads:
+    found = [np.zeros((0, 2))]
+    for name, side in loads.items():
         data, load = problem.traction[name], problem.traction_vector(name)
         if numbers(data):
             continue
         a, b = cells.span[side].T[..., None]
-        inner = np.arange(1, FINEST) / FINEST
-        segments.append(np.repeat(cells.segment[side], len(inner)))
-        places.append((a + (b - a) * inner).ravel())
+        s = a + (b - a) * np.arange(1, FINEST) / FINEST
+        found.append(np.column_stack([np.repeat(cells.segment[side], FINEST - 1), s.ravel()]))
         region = cells.trace.mesh.Boundaries(name)
         rough = known_rough_load(data, load, region, moment_degree(cells.trace.order))
         if rough is not None:  # NGSolve's segments run from s = 1 to s = 0
             start = rough.cells.origin[:, 0]
-            segments.append(np.tile(rough.cells.element, 2))
-            places += [1 - start, 1 - start - rough.cells.side[:, 0, 0]]
-    found = np.column_stack([np.concatenate(segments), np.concatenate(places)])
-    return np.unique(found, axis=0)
-
-
-@dataclass(frozen=True, eq=False)
-class Along:
-    """Quadrature along sides of cells, j points on each of m pieces.
-
-    Attributes
-    ----------
-    side : ndarray of int (m,)
-        Of each piece.
-    t, weight : ndarray (m, j)
-        Parameters of the sides, and weights in these.
-    x : ndarray (m, j, 2)
-        Points, lengths.
-    normal : ndarray (m, j, 2)
-        Unit normals, out of the owners of the sides.
-    ds : ndarray (m, j)
-        Length per t, with the model's measure.
-    length : ndarray (m, j)
-        Length per t.
-    """
-
-    side: Index
-    t: Array
-    weight: Array
-    x: Array
-    normal: Array
-    ds: Array
-    length: Array
-
-    def moments(self, mu: Multipliers, values: Array) -> Array:
-        """Integrals (d,) of tractions `values` (m, j, 2) times the multipliers."""
-        total, load = np.zeros(int(mu.start[-1])), (self.weight * self.ds)[..., None] * values
-        for k in np.unique(mu.degree[self.side]).tolist():
-            at = np.flatnonzero(mu.degree[self.side] == k)
-            parts = np.einsum("mjc,mji->mci", load[at], traces(k, self.t[at])).reshape(len(at), -1)
-            np.add.at(total, mu.start[self.side[at], None] + np.arange(2 * (k + 1)), parts)
-        return total
-
-    def norms(self, cells: Cells, missed: Array) -> Array:
-        """L2 norms (n, 3) of tractions `missed` (m, j, 2), times the model's measure."""
-        squares = np.zeros((len(cells.triangles), 3))
-        square = ((self.weight * self.ds**2 / self.length)[..., None] * missed**2).sum(axis=(1, 2))
-        np.add.at(squares, (cells.owner[self.side], cells.local[self.side]), square)
-        return np.sqrt(squares)
-
-
-def along(cells: Cells, given: Given, side: Index) -> Along:
-    """The rule on sides `side` (k,), which begins anew at `Given.breaks`."""
-    inside = cells.segment[side] < 0
-    ends = np.where(inside[:, None], [0.0, 1.0], np.sort(cells.span[side], axis=1))
-    key, own = given.breaks @ [4.0, 1.0], 4.0 * cells.segment[side]
-    low = np.searchsorted(key, own + ends[:, 0] + SAME)
-    count = np.maximum(np.searchsorted(key, own + ends[:, 1] - SAME) - low, 0) + 1
-    piece = np.repeat(np.arange(len(side)), count)
-    place = np.arange(len(piece)) - np.repeat(np.cumsum(count) - count, count)
-    first, last = place == 0, place == count[piece] - 1
-    s = np.append(given.breaks[:, 1], 0.0)
-    base, size = ends[piece, 0], (ends[:, 1] - ends[:, 0])[piece]
-    start = np.where(first, 0.0, (s[low[piece] + place - 1] - base) / size)
-    stop = np.where(last, 1.0, (s[np.minimum(low[piece] + place, len(s) - 1)] - base) / size)
-    back = ((cells.span[side, 0] > cells.span[side, 1]) & ~inside)[piece]
-    start, stop = np.where(back, 1 - stop, start), np.where(back, 1 - start, stop)
-    every = side[piece]
-    t = start[:, None] + (stop - start)[:, None] * PLACES
-    x, dx = (z.reshape(*t.shape, 2) for z in cells.points(np.repeat(every, len(PLACES)), t.ravel()))
-    length = np.linalg.norm(dx, axis=2)
-    normal = np.stack([dx[..., 1], -dx[..., 0]], axis=-1) / length[..., None]
-    normal[cells.backward[cells.owner[every], cells.local[every]]] *= -1
-    ds = length * cells.trace.model.measure(x.reshape(-1, 2)).reshape(t.shape)
-    return Along(every, t, (stop - start)[:, None] * WEIGHTS, x, normal, ds, length)
-
-
-@dataclass(frozen=True, eq=False)
-class Requested:
-    """Tractions on the boundary that are given, and those of pressures on lines.
-
-    Attributes
-    ----------
-    problem : Problem
-    cells : Cells
-    given : Given
-    pressed : dict of int to ndarray (j, 2)
-        Of the lines at `PLACES` of sides: forces per t, with the measure.
-    """
-
-    problem: Problem
-    cells: Cells
-    given: Given
-    pressed: dict[int, Array]
-
-    def values(self, segment: Index, s: Array) -> tuple[Array, Mask]:
-        """Tractions (m, j, 2) at `s` (m, j) of `segment` (m,), and held components (m, 2)."""
-        cells, total = self.cells, np.zeros((*s.shape, 2))
-        side = cells.side_at(segment, s[:, s.shape[1] // 2])
-        every = np.repeat(segment, s.shape[1])
-        for pattern, loaded in self.given.loads:
-            at = np.flatnonzero(np.isin(side, loaded))
-            if at.size and pattern in self.problem.traction:
-                load = self.problem.traction_vector(pattern)
-                where = every.reshape(s.shape)[at].ravel(), s[at].ravel()
-                total[at] += cells.trace.evaluate(load, *where).reshape(len(at), -1, 2)
-        at = np.flatnonzero(np.isin(side, list(self.pressed)))
-        if at.size:
-            t = cells.own_parameter(side[at], s[at])
-            x, dx = cells.points(np.repeat(side[at], t.shape[1]), t.ravel())
-            ds = np.linalg.norm(dx, axis=1) * cells.trace.model.measure(x)
-            ds = ds.reshape(*t.shape, 1)
-            nodes = THROUGH @ np.stack([self.pressed[i] for i in side[at].tolist()])
-            force = at_places(lagrange, t) @ nodes
-            total[at] += np.divide(force, ds, out=np.zeros_like(force), where=ds > 0)
-        return total, self.given.held[side]
-
-
-def requested(
-    problem: Problem,
-    cells: Cells,
-    given: Given,
-    lines: Sequence[Rows] = (),
-    pressure: Sequence[Array] = (),
-) -> Requested:
-    """The loads of a problem, and what pressures on lines exert.
-
-    Parameters
-    ----------
-    pressure : sequence of ndarray (k, j)
-        Bernstein coefficients of p* on the sides of each line.
-    """
-    pressed: dict[int, Array] = {}
-
-    def add(side: Index, force: Array) -> None:
-        for i, value in zip(side.tolist(), force, strict=True):
-            pressed[i] = pressed.get(i, 0.0) + value
-
-    for line, p in zip(lines, pressure, strict=True):
-        f = line.facing
-        density = p @ bernstein(p.shape[1] - 1, PLACES).T * f.weight / WEIGHTS
-        force = density[..., None] * f.direction
-        add(f.side, -force)
-        if line.opposite:
-            add(f.other, f.on_primary(force) * f.rates[..., None])
-    return Requested(problem, cells, given, pressed)
-
-
-def moments_of(problem: Problem, cells: Cells, mu: Multipliers, given: Given) -> tuple[Array, Mask]:
-    """Moments (d,) of the given tractions with the multipliers, and which of these are fixed, (d,).
-
-    Fixed are those of components with prescribed displacements.
-    """
-    moments, fixed = np.zeros((2, int(mu.start[-1])))
-    loaded = [side for _, side in given.loads]
-    if loaded:
-        rule = along(cells, given, np.unique(np.concatenate(loaded)))
-        values, _ = requested(problem, cells, given).values(*on_segments(cells, rule))
-        moments = rule.moments(mu, values)  # (3.7)
-    for side, c in zip(*np.nonzero(given.held), strict=True):
-        n = mu.degree[side] + 1
-        fixed[mu.start[side] + c * n : mu.start[side] + (c + 1) * n] = True
-    held = fixed.astype(bool)
-    moments[held] = 0.0
-    return moments, held
-
-
-def on_segments(cells: Cells, rule: Along) -> tuple[Index, Array]:
-    """Segments (m,) and parameters s (m, j) of a rule along sides of the boundary."""
-    a, b = cells.span[rule.side].T[..., None]
-    return cells.segment[rule.side], a + (b - a) * rule.t
-
-
-def _at(cells: Cells, function: ng.CoefficientFunction, rule: Along) -> Array:
-    """Values (m, j, dim) on sides of the boundary."""
-    segment, s = on_segments(cells, rule)
-    every = np.repeat(segment, s.shape[1])
-    return cells.trace.evaluate(function, every, s.ravel()).reshape(*s.shape, -1)
+            for stop in (start, start + rough.cells.side[:, 0, 0]):
+                found.append(np.column_stack([rough.cells.element, 1 - stop]))
+    return np.unique(np.concatenate(found), axis=0)
 
 
 def tractions_of(
@@ -281,7 +258,6 @@ def tractions_of(
     ----------
     coefficients : sequence of ndarray (b, m)
         Of the stress on the triangles of each element.
-    at : ndarray of int (m,)
     x, normal : ndarray (m, j, 2)
         Points, lengths, and unit normals there.
     """
@@ -298,50 +274,34 @@ def tractions_of(
 class BoundaryTractions:
     """Tractions s n of a stress along the boundary: `values` (m, j, 2) at the points of `rule`."""
 
-    rule: Along
+    rule: SideRule
     values: Array
 
-    def work(self, cells: Cells, given: Given, displacement: ng.CoefficientFunction) -> float:
+    def work(self, given: Given, displacement: ng.CoefficientFunction) -> float:
         """Work of s n on u_D - u_h, an energy per thickness."""
-        total, rule = 0.0, self.rule
-        density = (rule.weight * rule.ds)[..., None] * self.values
+        total, trace, rule = 0.0, given.cells.trace, self.rule
+        segment, s = rule.on_segments(given.cells)
+        density = (rule.weight * rule.measure)[..., None] * self.values
         for wanted, side in given.supports:
             at = np.flatnonzero(np.isin(rule.side, side))
-            here = replace(rule, side=rule.side[at], t=rule.t[at])
-            u = _at(cells, displacement, here)
+            u = _evaluated(trace, displacement, segment[at], s[at])
             for c, value in enumerate(wanted):
                 if value is not None:
-                    rest = _at(cells, ng.CF(value), here)[..., 0] - u[..., c]
+                    rest = _evaluated(trace, ng.CF(value), segment[at], s[at])[..., 0] - u[..., c]
                     total += float((density[at, :, c] * rest).sum())
         return total
 
+    def missed(self, given: Given, largest: float) -> Array:
+        """`SideRule.missed`, (n, 3), of what is asked for."""
+        lost = given.asked(given.cells, self.rule, self.values) - self.values
+        return self.rule.missed(given.cells, lost, largest)
+
 
 def boundary_tractions(
-    cells: Cells, given: Given, elements: Sequence[Element], coefficients: Sequence[Array]
+    given: Given, elements: Sequence[Element], coefficients: Sequence[Array]
 ) -> BoundaryTractions:
-    """Tractions of a stress along the boundary.
-
-    Parameters
-    ----------
-    coefficients : sequence of ndarray (b, m)
-        Of the stress on the triangles of each element.
-    """
-    rule = along(cells, given, np.flatnonzero(cells.segment >= 0))
+    """Tractions along the boundary of a stress of coefficients (b, m) on each of the elements."""
+    cells = given.cells
+    rule = side_rule(cells, given.breaks, np.flatnonzero(cells.segment >= 0))
     at = cells.owner[rule.side]
     return BoundaryTractions(rule, tractions_of(elements, coefficients, at, rule.x, rule.normal))
-
-
-def missed_tractions(
-    wanted: Requested, cells: Cells, have: BoundaryTractions, largest: float
-) -> Array:
-    """L2 norms (n, 3) of what tractions miss on sides, times the model's measure.
-
-    What is round-off beside the `largest` stress counts as 0.
-    """
-    values, held = wanted.values(*on_segments(cells, have.rule))
-    miss = np.where(held[:, None], 0.0, values - have.values)
-    rule, size = have.rule, np.zeros(len(cells.ends))
-    np.maximum.at(size, rule.side, rule.ds.max(axis=1))  # at an axis stresses lose digits by it
-    noise = ROUND_OFF * largest * size[rule.side, None, None]
-    miss[np.abs(miss) * rule.ds[..., None] <= noise] = 0.0
-    return have.rule.norms(cells, miss)
