@@ -23,9 +23,9 @@ from ...linalg import cholesky, lower_half
 from ...problem import Problem
 from ...triplets import from_triplets
 from .cells import Cells, Places, places
-from .elements import CORNERS, compliance_at
+from .elements import compliance_at
 from .facing import DATA, PLACES, THROUGH, Facing
-from .polynomials import legendre_table, products
+from .polynomials import CORNERS, derivatives
 from .tractions import Given
 
 NOISE = 1e-13  # of what is asked for, relative to the displacement: round-off
@@ -193,7 +193,7 @@ class _Nodes:
         self.number = np.concatenate([triangle, own.reshape(len(layer), -1), rest], axis=1)
         self.count = count + rest.size
         self.components = np.concatenate([2 * self.number, 2 * self.number + 1], axis=1)
-        self.inverse = np.linalg.inv(_values(degree, self.local))
+        self.inverse = np.linalg.inv(derivatives(degree, self.local, (0, 0))[..., 0, :])
 
     def on_sides(self, cells: Cells, side: Index) -> Index:
         """Nodes (k, degree + 1) from t = 0 to t = 1; of sides of the layer."""
@@ -202,20 +202,6 @@ class _Nodes:
         ends = np.searchsorted(self.vertices, cells.ends[side])
         inner = len(self.vertices) + at[:, None] * q + np.arange(q)
         return np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1)
-
-
-def _values(degree: int, local: Array) -> Array:
-    """The m products of Legendre's polynomials at `local` (..., 2): (..., m)."""
-    a, b = (legendre_table(degree, 2 * local[..., c] - 1)[0] for c in (0, 1))
-    i, j = products(degree)
-    return np.asarray(a[..., i] * b[..., j])
-
-
-def _gradients(degree: int, local: Array) -> Array:
-    """Their derivatives by (a, b): (..., m, 2)."""
-    a, b = (legendre_table(degree, 2 * local[..., c] - 1) for c in (0, 1))
-    i, j = products(degree)
-    return 2 * np.stack([a[1][..., i] * b[0][..., j], a[0][..., i] * b[1][..., j]], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,13 +322,12 @@ def _operators(
 ) -> tuple[Array, Array, Array, Array]:
     """Strains (b, q, v, 2 m) of the nodes' functions, C, weights, and d(a, b) / dx."""
     model, degree = model_of(problem), nodes.degree
-    weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
+    weight = points.weight * cells.measure(points.x)
     law = np.asarray(np.linalg.inv(compliance_at(problem, cells, points)))
-    into = np.asarray(np.linalg.inv(points.spread))
-    by = np.einsum("qma,mn->qan", _gradients(degree, points.local), nodes.inverse)
-    gradient = np.einsum("qan,bqac->bqcn", by, into)
-    shape = _values(degree, points.local) @ nodes.inverse
-    return _strains(gradient, shape, points.x, model.extent), law, weight, into
+    into = np.asarray(np.linalg.inv(cells.image(points.at, points.local)[1]))
+    table = derivatives(degree, points.local, (0, 0), (1, 0), (0, 1)) @ nodes.inverse
+    gradient = into.swapaxes(2, 3) @ (2 * table[:, 1:])
+    return _strains(gradient, table[:, 0], points.x, model.extent), law, weight, into
 
 
 def _strains(gradient: Array, shape: Array, x: Array, extent: int) -> Array:
@@ -371,8 +356,8 @@ class _Remainders:
     def strains(self, some: Index, points: Places, into: Array, extent: int) -> Array:
         """Voigt strains (k, q, v) at points of triangles `some` (k,), `into` as of `_operators`."""
         b, q = points.weight.shape
-        share = np.column_stack([1 - points.local.sum(axis=1), points.local])
-        slope = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])  # of the shares by (a, b)
+        share = points.local @ CORNERS.T + [0, 1, 0] * (1 - points.local.sum(axis=1))[:, None]
+        slope = CORNERS - [[0, 0], [1, 1], [0, 0]]  # of the shares by (a, b)
         grad = np.einsum("sa,bqac->bqsc", slope, into)
         total = np.zeros((b, q, 2, 2))
         value = np.zeros((b, q, 2))

@@ -12,7 +12,7 @@ from ...fem import narrow_forces
 from ...problem import Problem
 from ...quadrature import View, features_of, numbers, touched
 from .cells import Cells, joined, places
-from .polynomials import frame_of, projected, scalars
+from .polynomials import projected, scalars
 
 PARTS = 4  # of each side
 LEVELS = 2  # how often triangles are divided
@@ -23,11 +23,10 @@ AT_ONCE = 200_000  # points at which forces are looked at together
 
 
 @lru_cache
-def pattern(m: int, thirds: bool) -> tuple[Array, Index, Index, Array]:
+def pattern(m: int, thirds: bool) -> tuple[Array, Index]:
     """The m^2 equal parts of a triangle; those at its corners in `thirds` about their middles.
 
-    There given tractions may be those of no symmetric stress. Side 0 of a part is the one that lies
-    on the triangle's, where one does.
+    There given tractions may be those of no symmetric stress.
 
     Returns
     -------
@@ -35,10 +34,6 @@ def pattern(m: int, thirds: bool) -> tuple[Array, Index, Index, Array]:
         Of the triangle's corners in the vertices.
     corners : ndarray of int (k, 3)
         Vertices of each part, anticlockwise.
-    outer : ndarray of int (k, 3)
-        The triangle's side on which each side lies, or -1.
-    span : ndarray (k, 3, 2)
-        Where it starts and ends on that, from 0 to 1 in the triangle's sense.
     """
     at = {ij: n for n, ij in enumerate((i, j) for i in range(m + 1) for j in range(m + 1 - i))}
     vertices = [(m - i - j, i, j) for i, j in at]
@@ -54,22 +49,7 @@ def pattern(m: int, thirds: bool) -> tuple[Array, Index, Index, Array]:
                 found.append(up)
         if i + j < m - 1:
             found.append([at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]])
-    shares, corners = np.array(vertices) / m, np.array(found)
-    for turn in (0, 1, 2):  # the outer side first, of all the triangle's side 0
-        ends = shares[np.roll(corners, -1, axis=1)], shares[np.roll(corners, -2, axis=1)]
-        on = (ends[0] == 0) & (ends[1] == 0)  # (k, 3 own sides, 3 sides of the triangle)
-        outer = np.where(on.any(axis=2), on.argmax(axis=2), -1)
-        if turn < 2:
-            rank = np.where(outer < 0, 3, outer)
-            roll = (rank.argmin(axis=1)[:, None] + np.arange(3)) % 3
-            corners = np.take_along_axis(corners, roll, axis=1)
-    along = np.stack(ends, axis=2)[
-        np.arange(len(corners))[:, None, None],
-        np.arange(3)[:, None],
-        np.arange(2),
-        (outer[:, :, None] + 2) % 3,
-    ]
-    return shares, corners, outer, along
+    return np.array(vertices) / m, np.array(found)
 
 
 def divided(cells: Cells, at: Index, m: int, thirds: bool) -> Cells:
@@ -77,30 +57,14 @@ def divided(cells: Cells, at: Index, m: int, thirds: bool) -> Cells:
 
     See `pattern`.
     """
-    shares, corners, outer, along = pattern(m, thirds)
-    b, p, k = len(at), len(shares), len(corners)
-    x = np.einsum("pc,bcd->bpd", shares, cells.corners[at])
-    bent = np.flatnonzero(cells.curved[at])
-    if bent.size:
-        sigma = 1 - shares[:, 0]
-        t = np.divide(shares[:, 2], sigma, out=np.zeros(p), where=sigma > 0)
-        own = np.where(cells.backward[at[bent], 0, None], 1 - t, t)
-        base, _ = cells.points(np.repeat(cells.sides[at[bent], 0], p), own.ravel())
-        apex = cells.corners[at[bent], :1]
-        x[bent] = apex + sigma[:, None] * (base.reshape(-1, p, 2) - apex)
-    reference = np.einsum("pc,bcd->bpd", shares, cells.reference[at])
-    sides = cells.sides[at]
-    span = np.where(cells.backward[at][..., None], cells.span[sides][..., ::-1], cells.span[sides])
-    start, stop = span[:, outer, 0], span[:, outer, 1]  # (b, k, 3)
+    shares, corners = pattern(m, thirds)
+    p, k = len(shares), len(corners)
     return joined(
         cells.trace,
-        x.reshape(-1, 2),
-        (corners + p * np.arange(b)[:, None, None]).reshape(-1, 3),
-        reference[:, corners].reshape(-1, 3, 2),
+        cells.image(at, shares[:, [2, 0]])[0].reshape(-1, 2),
+        (corners + p * np.arange(len(at))[:, None, None]).reshape(-1, 3),
+        (shares @ cells.barycentric[at])[:, corners].reshape(-1, 3, 3),
         np.repeat(cells.parent[at], k),
-        np.where(outer < 0, -1, cells.segment[sides][:, outer]).reshape(-1, 3),
-        (start[..., None] + (stop - start)[..., None] * along).reshape(-1, 3, 2),
-        (cells.curved[at][:, None] & (outer[:, 0] == 0)).ravel(),
     )
 
 
@@ -115,8 +79,7 @@ def looked_at(
     if depth == 0:
         bent = len(at) > 0 and cells.curved[at[0]]
         points = places(cells, at, BENT * order if bent else order)
-        measure = cells.trace.model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
-        return points.x, points.weight * measure, points.evaluate(cells, F)
+        return points.x, points.weight * cells.measure(points.x), points.evaluate(cells, F)
     parts = divided(cells, at, PARTS, thirds)
     found = []
     for curved in (False, True):
@@ -154,10 +117,10 @@ def projection(
     for start in range(0, len(at), step):
         some = at[start : start + step]
         x, weight, values = looked_at(F, cells, some, order, depth, thirds)
-        frame = frame_of(cells.corners[some])
-        force.append(projected(degree, frame, x, weight, values))
-        left = (values - scalars(degree, frame, x) @ force[-1])[..., components]
-        measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(weight.shape)
+        P = scalars(degree, cells.corners[some], x)
+        force.append(projected(P, weight, values))
+        left = (values - P @ force[-1])[..., components]
+        measure = cells.measure(x)
         for found, function in ((rest, left), (size, values[..., components])):
             found.append(np.sqrt(np.einsum("bq,bqd->b", weight * measure, function**2)))
     return np.concatenate(force), np.concatenate(rest), np.concatenate(size)
