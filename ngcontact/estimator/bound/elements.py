@@ -124,16 +124,10 @@ class Element:
     def of_strain(self, strain: Array) -> Element:
         """The same triangles for a displacement of `strain` (b, q, v), without body forces."""
         T = stresses(self.degree, self.corners, self.local, self.axial, self.on_axis)
-        return replace(
-            self,
-            strain=strain,
-            force=np.zeros_like(self.force),
-            radial=np.zeros_like(self.radial),
-            source=None,
-            missed=np.zeros_like(self.missed),
-            g=(_products(T, self.weight, strain) @ self.combined)[:, 0],
-            own=np.zeros_like(self.own),
-        )
+        g = (_products(T, self.weight, strain) @ self.combined)[:, 0]
+        forces = "force", "radial", "missed", "own"
+        none = {name: np.zeros_like(getattr(self, name)) for name in forces}
+        return replace(self, strain=strain, source=None, g=g, **none)
 
     def whole_stress(self, c: Array) -> Array:
         """Stresses (b, q, v) at the quadrature points for coefficients `c` (b, m).
@@ -210,13 +204,12 @@ def among(
     mine, some : ndarray of int (k,)
         Which of the triangles it has, and their places among its own.
     """
-    number = np.empty(1 + max(int(e.places.at.max()) for e in elements), dtype=np.intp)
     for e, c in zip(elements, coefficients, strict=True):
-        number[:] = -1
-        number[e.places.at] = np.arange(len(e.places.at))
-        mine = np.flatnonzero(number[at] >= 0)
+        own = e.places.at
+        some = np.minimum(np.searchsorted(own, at), len(own) - 1)
+        mine = np.flatnonzero(own[some] == at)
         if mine.size:
-            yield e, c, mine, number[at[mine]]
+            yield e, c, mine, some[mine]
 
 
 def turning(problem: Problem, cells: Cells) -> Mask:
