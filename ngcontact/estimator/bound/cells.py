@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -22,7 +21,6 @@ from ...fem import BoundaryTrace
 from ...lagrange import gauss
 from ...problem import Triangulation
 
-REFERENCE = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])  # NGSolve's corners, in this order
 NEWTON_STEPS = 8
 CLOSE = 1e-9  # of an element: the next step is round-off
 WIDE = 0.1  # twice the area over the square of the diameter, from which triangles are divided
@@ -46,8 +44,8 @@ class Cells:
         Anticlockwise; the base, side 0, is the one that may be curved, else the shortest.
     parent : ndarray of int (n,)
         Element of the mesh that each is a part of.
-    reference : ndarray (n, 3, 2)
-        Corners in the reference coordinates of the parent.
+    barycentric : ndarray (n, 3, 3)
+        Barycentric coordinates of the corners in the parent.
     ends : ndarray of int (e, 2)
         Vertices of the sides, the lower number first.
     sides : ndarray of int (n, 3)
@@ -57,7 +55,7 @@ class Cells:
     segment : ndarray of int (e,)
         Segment of the boundary that a side is part of, -1 inside of bodies.
     span : ndarray (e, 2)
-        Parameters s on that segment at t = 0 and t = 1.
+        Parameters s on that segment at t = 0 and t = 1; of no meaning inside.
     curved : ndarray of bool (n,)
         Triangles with a curved base.
     """
@@ -66,7 +64,7 @@ class Cells:
     vertices: Array
     triangles: Index
     parent: Index
-    reference: Array
+    barycentric: Array
     ends: Index
     sides: Index
     owner: Index
@@ -137,6 +135,27 @@ class Cells:
         bent[self.sides[self.curved, 0]] = True
         return bent
 
+    def image(self, at: Index, local: Array) -> tuple[Array, Array]:
+        """Points (b, q, 2) of triangles `at` (b,), and derivatives (b, q, 2, 2) by `local` (q, 2).
+
+        `local` are shares (a, b) of corners 2 and 0 where the base is straight. Where it is curved
+        points lie on straight lines from the apex, x = x_0 + (1 - b) (base(a / (1 - b)) - x_0).
+        """
+        a, b = local.T
+        t = np.divide(a, 1 - b, out=np.zeros(len(a)), where=b < 1)
+        back = self.backward[at, :1]
+        base, slope = self.points(
+            np.repeat(self.sides[at, 0], len(t)), np.where(back, 1 - t, t).ravel()
+        )
+        away = base.reshape(len(at), -1, 2) - self.corners[at, :1]
+        slope = np.where(back[..., None], -1, 1) * slope.reshape(away.shape)
+        x = self.corners[at, :1] + (1 - b)[:, None] * away
+        return x, np.stack([slope, t[:, None] * slope - away], axis=-1)
+
+    def measure(self, x: Array) -> Array:
+        """The model's measure (...,) at points `x` (..., 2)."""
+        return np.asarray(self.trace.model.measure(x.reshape(-1, 2))).reshape(x.shape[:-1])
+
     def evaluate(self, function: ng.CoefficientFunction, at: Index, reference: Array) -> Array:
         """Values (k, dim) in triangles `at` (k,) at places `reference` (k, 2) of their parents."""
         points = self._middles[self.parent[at]]
@@ -176,25 +195,21 @@ class Places:
     ----------
     at : ndarray of int (b,)
         The triangles.
+    local : ndarray (q, 2)
+        Their places (a, b) in each, as of `Cells.image`.
     x : ndarray (b, q, 2)
         Points, lengths.
     weight : ndarray (b, q)
         Weights in the plane, areas.
     reference : ndarray (b, q, 2)
         Reference coordinates in the parents.
-    spread : ndarray (b, q, 2, 2)
-        Derivatives of x by (a, b), where x = corner 0 + a (corner 1 - corner 0) + b (corner 2 -
-        corner 0) if the base is straight.
-    local : ndarray (q, 2)
-        These (a, b).
     """
 
     at: Index
+    local: Array
     x: Array
     weight: Array
     reference: Array
-    spread: Array
-    local: Array
 
     def evaluate(self, cells: Cells, function: ng.CoefficientFunction) -> Array:
         """Values (b, q, dim) of a function at the points."""
@@ -206,44 +221,28 @@ class Places:
 def places(cells: Cells, at: Index, order: int) -> Places:
     """Quadrature of degree `order` in triangles `at` (b,), all straight or all with a curved base.
 
-    Towards a curved base points lie on straight lines from the apex.
+    On curved ones in the distance from the apex and the parameter of the base.
 
     Raises
     ------
     ContactError
         A curved side goes beyond the middle of its element.
     """
-    corners = cells.corners[at]
     if len(at) and cells.curved[at[0]]:
         g, w = gauss(order)
         sigma, t = (z.ravel() for z in np.meshgrid(g, g, indexing="ij"))
-        weight = np.outer(w * g, w).ravel()
-        side = np.repeat(cells.sides[at, 0], len(t))
-        own = np.where(
-            np.repeat(cells.backward[at, 0], len(t)), 1 - np.tile(t, len(at)), np.tile(t, len(at))
-        )
-        base, slope = (z.reshape(len(at), -1, 2) for z in cells.points(side, own))
-        slope = np.where(cells.backward[at, 0][:, None, None], -slope, slope)
-        away = base - corners[:, :1]
-        x = corners[:, :1] + sigma[:, None] * away
-        # x = apex + sigma (base(t) - apex), a = sigma (1 - t), b = sigma t
-        by_a, by_b = away - t[:, None] * slope, away + (1 - t)[:, None] * slope
-        spread = np.stack([by_a, by_b], axis=-1)
-        local = np.column_stack([sigma * (1 - t), sigma * t])
+        local, weight = np.column_stack([sigma * t, 1 - sigma]), np.outer(w * g, w).ravel()
     else:
         rule = ng.IntegrationRule(ng.TRIG, order)
-        local, weight = np.array([p[:2] for p in rule.points]), np.array(rule.weights)
-        edges = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)
-        x = corners[:, :1] + np.einsum("bij,qj->bqi", edges, local)
-        spread = np.broadcast_to(edges[:, None], (len(at), len(weight), 2, 2))
-    share = np.column_stack([1 - local.sum(axis=1), local])
-    guess = np.einsum("qc,bcd->bqd", share, cells.reference[at])
-    number = np.repeat(at, len(weight))
-    found = cells.located(number, x.reshape(-1, 2), guess.reshape(-1, 2)).reshape(x.shape)
-    area = np.linalg.det(spread)
+        local, weight = np.array(rule.points)[:, :2], np.array(rule.weights)
+    x, slopes = cells.image(at, local)
+    area = slopes[..., 0, 0] * slopes[..., 1, 1] - slopes[..., 0, 1] * slopes[..., 1, 0]
     if not (area > 0).all():
         raise ContactError("a curved side of the mesh goes beyond the middle of its element")
-    return Places(at, x, area * weight, found, spread, local)
+    shares = np.column_stack([local[:, 1], 1 - local.sum(axis=1), local[:, 0]])
+    guess = (shares @ cells.barycentric[at, :, :2]).reshape(-1, 2)
+    found = cells.located(np.repeat(at, len(weight)), x.reshape(-1, 2), guess)
+    return Places(at, local, x, area * weight, found.reshape(x.shape))
 
 
 def cells_of(trace: BoundaryTrace, cuts: Mapping[int, Array], loaded: Index, held: Index) -> Cells:
@@ -258,79 +257,87 @@ def cells_of(trace: BoundaryTrace, cuts: Mapping[int, Array], loaded: Index, hel
         Segments that carry something, and those on which the whole displacement is prescribed.
     """
     view = Triangulation(trace.mesh)
-    old, ends = view.triangles, view.segments
-    segment = _segments_of_elements(trace, old, ends)
-    bent, cut = np.zeros((2, len(ends) + 1), dtype=bool)
+    old, (segment, last) = view.triangles, _segments_of_elements(trace)
+    bent, cut = np.zeros((2, len(trace.region) + 1), dtype=bool)
     bent[:-1], cut[list(cuts)] = trace.curved_segments, True
     special = (bent | cut)[segment]
     beside = bent[segment].any(axis=1) & ((segment >= 0).sum(axis=1) > 1)
     middle = (special.sum(axis=1) > 1) | beside
     parts = np.flatnonzero(middle | cut[segment].any(axis=1))
     whole = np.setdiff1d(np.arange(len(old)), parts)
-    roll = (special[whole].argmax(axis=1)[:, None] + np.arange(3)) % 3  # the base first
-    own = np.take_along_axis(segment[whole], roll, axis=1)
-    triangles = np.take_along_axis(old[whole], roll, axis=1)
-    ahead = ends[own, 0] == np.roll(triangles, -1, axis=1)
-    spans = np.where(ahead[:, :, None], [0.0, 1.0], [1.0, 0.0])
-    made = _Parts(trace, view, segment, cuts)
-    for e in parts.tolist():
-        made.divide(e, None if middle[e] else int(special[e].argmax()))
-    new = made.arrays()
-    both: tuple[Any, ...] = (triangles, REFERENCE[roll], whole, own, spans)
-    triangles, reference, parent, own, spans = (
-        np.concatenate(pair) for pair in zip(both, new, strict=True)
+    vertices, count, number = [view.vertices], len(view.vertices), {}
+    for k, s in cuts.items():
+        vertices.append(trace.point(np.full(len(s), k), s))
+        number[k] = list(range(count, count + len(s)))
+        count += len(s)
+    unit, triangles, barycentric, parent = np.eye(3), [], [], []
+    for e in parts.tolist():  # fans of the places around the element
+        around: list[tuple[int, Array]] = []
+        for i in range(3):
+            j, k, own = (i + 1) % 3, (i + 2) % 3, int(segment[e, i])
+            s, end = np.asarray(cuts.get(own, ()))[:, None], last[own] if own in cuts else k
+            on = [
+                *zip(number.get(own, ()), s * unit[end] + (1 - s) * unit[j + k - end], strict=True)
+            ]
+            around += [(int(old[e, j]), unit[j]), *(on if end == k else on[::-1])]
+        if middle[e]:
+            apex, count = (count, np.full(3, 1 / 3)), count + 1
+            vertices.append(view.vertices[old[e]].mean(axis=0)[None])
+        else:
+            base = int(special[e].argmax())
+            apex = int(old[e, base]), unit[base]
+        for one, two in zip(around, [*around[1:], around[0]], strict=True):
+            if apex[0] not in (one[0], two[0]):
+                corners = apex, one, two
+                triangles.append([v for v, _ in corners])
+                barycentric.append([b for _, b in corners])
+                parent.append(e)
+    cells = joined(
+        trace,
+        np.concatenate(vertices),
+        np.concatenate([old[whole], np.reshape(triangles, (-1, 3)).astype(np.intp)]),
+        np.reshape([*[unit] * len(whole), *barycentric], (-1, 3, 3)),
+        np.concatenate([whole, np.array(parent, dtype=np.intp)]),
     )
-    vertices = np.concatenate([view.vertices, *made.places])
-    curved = bent[own[:, 0]]
-    cells = joined(trace, vertices, triangles, reference, parent, own, spans, curved)
     return _parted(cells, dependent(cells, loaded, held))
 
 
 def joined(
-    trace: BoundaryTrace,
-    vertices: Array,
-    triangles: Index,
-    reference: Array,
-    parent: Index,
-    own: Index,
-    spans: Array,
-    curved: Mask,
+    trace: BoundaryTrace, vertices: Array, triangles: Index, barycentric: Array, parent: Index
 ) -> Cells:
-    """Cells of triangles whose sides are known to lie on segments, or inside.
+    """Cells of triangles by their `vertices` (nv, 2); the others as of `Cells`, not yet in order.
 
-    Parameters
-    ----------
-    vertices : ndarray (nv, 2)
-    triangles : ndarray of int (n, 3)
-        Side 0 is the curved one where there is one; else the shortest becomes side 0.
-    reference : ndarray (n, 3, 2)
-    parent : ndarray of int (n,)
-    own : ndarray of int (n, 3)
-        Segment that each side is part of, -1 inside of elements.
-    spans : ndarray (n, 3, 2)
-        Parameters s on it where the side begins and ends, anticlockwise.
-    curved : ndarray of bool (n,)
+    Sides on one side of a parent lie on its segment of the boundary.
     """
-    shortest = np.where(curved, 0, _lengths(vertices[triangles]).argmin(axis=1))
-    roll = (shortest[:, None] + np.arange(3)) % 3
+    segment, last = _segments_of_elements(trace)
+    zero = barycentric == 0
+    on = np.roll(zero, -1, axis=1) & np.roll(zero, -2, axis=1)  # (n, 3 sides, 3 of the parent)
+    own = np.where(on, segment[parent][:, None], -1).max(axis=2)
+    bent = np.append(trace.curved_segments, False)[own]
+    curved = bent.any(axis=1)
+    base = np.where(curved, bent.argmax(axis=1), _lengths(vertices[triangles]).argmin(axis=1))
+    roll = (base[:, None] + np.arange(3)) % 3
     triangles, own = (np.take_along_axis(x, roll, axis=1) for x in (triangles, own))
-    reference, spans = (np.take_along_axis(x, roll[..., None], axis=1) for x in (reference, spans))
+    barycentric = np.take_along_axis(barycentric, roll[..., None], axis=1)
     start = np.roll(triangles, -1, axis=1).ravel()
     stop = np.roll(triangles, -2, axis=1).ravel()
     low, high = np.minimum(start, stop), np.maximum(start, stop)
     _, first, sides = np.unique(low * len(vertices) + high, return_index=True, return_inverse=True)
-    span = spans.reshape(-1, 2)[first]
+    owner, local = np.divmod(first, 3)
+    segment = own[owner, local]
+    ends = (local[:, None] + [1, 2]) % 3
+    span = barycentric[owner[:, None], ends, last[segment][:, None]]
     return Cells(
         trace=trace,
         vertices=vertices,
         triangles=triangles,
         parent=parent,
-        reference=reference,
+        barycentric=barycentric,
         ends=np.column_stack([low, high])[first],
         sides=sides.reshape(-1, 3),
-        owner=first // 3,
-        local=first % 3,
-        segment=np.where(trace.inner[own.ravel()[first]], -1, own.ravel()[first]),
+        owner=owner,
+        local=local,
+        segment=segment,
         span=np.where((start > stop)[first, None], span[:, ::-1], span),
         curved=curved,
     )
@@ -346,32 +353,20 @@ def _parted(cells: Cells, at: Index) -> Cells:
 
     Parts of thin triangles are thin with one short side, not flat.
     """
-    own, spans = cells.segment[cells.sides], cells.span[cells.sides]
-    spans = np.where(cells.backward[..., None], spans[..., ::-1], spans)
-    rest = np.setdiff1d(np.arange(len(cells.triangles)), at)
-    middle = len(cells.vertices) + np.arange(len(at))
+    rest, corner = np.setdiff1d(np.arange(len(cells.triangles)), at), np.arange(3)
     share = _lengths(cells.corners[at])
-    share /= share.sum(axis=1, keepdims=True)
-    place, x = (np.einsum("kc,kcd->kd", share, y[at]) for y in (cells.reference, cells.corners))
-    inside = np.full(len(at), -1)
-    whole_ones = cells.triangles, cells.reference, cells.parent, own, spans
-    parts: list[list[Any]] = [[x[rest]] for x in whole_ones]
-    whole = np.broadcast_to([0.0, 1.0], (len(at), 2))
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        corners, reference = cells.triangles[at], cells.reference[at]
-        new = (
-            np.stack([middle, corners[:, j], corners[:, k]], axis=1),
-            np.stack([place, reference[:, j], reference[:, k]], axis=1),
-            cells.parent[at],
-            np.stack([own[at, i], inside, inside], axis=1),
-            np.stack([spans[at, i], whole, whole], axis=1),
-        )
-        for values, value in zip(parts, new, strict=True):
-            values.append(value)
-    vertices = np.concatenate([cells.vertices, x])
-    curved = np.concatenate([cells.curved[rest], cells.curved[at], np.zeros(2 * len(at), bool)])
-    triangles, reference, parent, own, spans = (np.concatenate(x) for x in parts)
-    return joined(cells.trace, vertices, triangles, reference, parent, own, spans, curved=curved)
+    share = (share / share.sum(axis=1, keepdims=True))[:, None]
+    triangles = np.repeat(cells.triangles[at, None], 3, axis=1)
+    triangles[:, corner, corner] = len(cells.vertices) + np.arange(len(at))[:, None]
+    places = np.repeat(cells.barycentric[at, None], 3, axis=1)
+    places[:, corner, corner] = share @ cells.barycentric[at]
+    return joined(
+        cells.trace,
+        np.concatenate([cells.vertices, (share @ cells.corners[at])[:, 0]]),
+        np.concatenate([cells.triangles[rest], triangles.reshape(-1, 3)]),
+        np.concatenate([cells.barycentric[rest], places.reshape(-1, 3, 3)]),
+        np.concatenate([cells.parent[rest], np.repeat(cells.parent[at], 3)]),
+    )
 
 
 def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
@@ -415,75 +410,14 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
     return np.union1d(chosen[at_two], np.flatnonzero(every))
 
 
-class _Parts:
-    """Triangles that take the place of elements, with the vertices that they add."""
+def _segments_of_elements(trace: BoundaryTrace) -> tuple[Index, Index]:
+    """Segment (ne, 3) of the boundary opposite to each corner, -1 where there is none.
 
-    def __init__(
-        self, trace: BoundaryTrace, view: Triangulation, segment: Index, cuts: Mapping[int, Array]
-    ) -> None:
-        self.trace, self.view, self.segment, self.cuts = trace, view, segment, cuts
-        self.places: list[Array] = []
-        self.rows: tuple[list, ...] = ([], [], [], [], [])
-        self.number = {k: self._added(self._on(k, s)) for k, s in cuts.items()}
-
-    def _on(self, k: int, s: Array) -> Array:
-        return self.trace.point(np.full(len(s), k), s)
-
-    def _added(self, x: Array) -> list[int]:
-        first = len(self.view.vertices) + sum(map(len, self.places))
-        self.places.append(x)
-        return list(range(first, first + len(x)))
-
-    def divide(self, e: int, base: int | None) -> None:
-        """Add the triangles between side `base` of element `e` and its apex.
-
-        Without a base those between all sides and the middle.
-        """
-        old, segment = self.view.triangles[e], self.segment[e]
-        if base is None:
-            (apex,), at = self._added(self.view.vertices[old].mean(axis=0)[None]), np.full(2, 1 / 3)
-        else:
-            apex, at = int(old[base]), REFERENCE[base]
-        for i in (0, 1, 2) if base is None else (base,):
-            j, k, number = (i + 1) % 3, (i + 2) % 3, int(segment[i])
-            s = np.array([0.0, *self.cuts.get(number, ()), 1.0])
-            chain = [*self.number.get(number, ())]
-            if number >= 0 and self.view.segments[number, 0] != old[j]:
-                s, chain = s[::-1], chain[::-1]
-            chain = [int(old[j]), *chain, int(old[k])]
-            place = REFERENCE[j] + np.abs(s - s[0])[:, None] * (REFERENCE[k] - REFERENCE[j])
-            for m in range(len(s) - 1):
-                own = [number, -1, -1]
-                if base is not None:  # the element's own other sides
-                    own[1] = int(segment[j]) if m == len(s) - 2 else -1
-                    own[2] = int(segment[k]) if m == 0 else -1
-                spans = [(s[m], s[m + 1]), *(self._whole(own[c], (j, k)[c - 1], e) for c in (1, 2))]
-                corners = [at, place[m], place[m + 1]]
-                made = ([apex, chain[m], chain[m + 1]], corners, e, own, spans)
-                for values, value in zip(self.rows, made, strict=True):
-                    values.append(value)
-
-    def _whole(self, segment: int, side: int, e: int) -> tuple[float, float]:
-        """Parameters of a whole segment along a side of an element."""
-        start = self.view.triangles[e, (side + 1) % 3]
-        return (0.0, 1.0) if self.view.segments[segment, 0] == start else (1.0, 0.0)
-
-    def arrays(self) -> tuple[Array, ...]:
-        """Triangles, corners in the parents, parents, segments and their spans at the sides."""
-        shapes = ((3,), (3, 2), (), (3,), (3, 2))
-        kinds = (np.intp, float, np.intp, np.intp, float)
-        return tuple(
-            np.array(rows, dtype=kind).reshape(-1, *shape)
-            for rows, kind, shape in zip(self.rows, kinds, shapes, strict=True)
-        )
-
-
-def _segments_of_elements(trace: BoundaryTrace, triangles: Index, ends: Index) -> Index:
-    """Segment (ne, 3) at the side opposite to each corner, -1 where there is none."""
-    nv = int(triangles.max()) + 1
-    start, stop = np.roll(triangles, -1, axis=1), np.roll(triangles, -2, axis=1)
-    keys = np.minimum(start, stop) * nv + np.maximum(start, stop)
-    own = ends.min(axis=1) * nv + ends.max(axis=1)
-    order = np.argsort(own)
-    at = np.minimum(np.searchsorted(own[order], keys), len(own) - 1)
-    return np.where(own[order][at] == keys, order[at], -1)
+    And which corner (k,) of its element each segment ends at, s = 1.
+    """
+    view = Triangulation(trace.mesh)
+    corners = view.triangles[trace.element][:, :, None] == view.segments[:, None]
+    found = np.full(view.triangles.shape, -1)
+    outer = np.flatnonzero(~trace.inner)
+    found[trace.element[outer], (~corners.any(axis=2))[outer].argmax(axis=1)] = outer
+    return found, corners[..., 1].argmax(axis=1)

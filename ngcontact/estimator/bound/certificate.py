@@ -69,12 +69,12 @@ def _stresses(proof: Proof) -> dict[str, np.ndarray]:
     for number, (e, c) in enumerate(zip(proof.elements, proof.balanced.coefficients, strict=True)):
         at = e.places.at
         stress[at] = e.stress(c, x[at])[..., [0, 1, -1]]
-        force[at] = scalars(e.force_degree, e.frame, x[at]) @ e.force
-        area = np.abs(np.linalg.det(e.places.spread[0, 0]))
+        force[at] = scalars(e.force_degree, e.corners, x[at]) @ e.force
+        a, b = e.places.local.T
         rules |= {
             f"rule{number}_triangle": at,
-            f"rule{number}_points": e.places.local,
-            f"rule{number}_weights": e.places.weight[0] / area,
+            f"rule{number}_points": np.column_stack([1 - a - b, a]),
+            f"rule{number}_weights": e.places.weight[0] / (2 * e.places.weight[0].sum()),
             f"rule{number}_strain": e.strain,
             f"rule{number}_compliance": e.compliance,
             f"rule{number}_radial": e.radial,

@@ -9,23 +9,23 @@ distance.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
+import scipy.sparse as sp
 
 from ...arrays import Array, Index, Mask
 from ...errors import ContactError
-from ...fem import model_of
 from ...lagrange import gauss_lobatto, lagrange, lagrange_derivative
 from ...linalg import cholesky, lower_half
 from ...problem import Problem
 from ...triplets import from_triplets
 from .cells import Cells, Places, places
-from .elements import CORNERS, compliance_at
+from .elements import ENTRIES, compliance_at
 from .facing import DATA, PLACES, THROUGH, Facing
-from .polynomials import legendre_table, products
+from .polynomials import CORNERS, derivatives
 from .tractions import Given
 
 NOISE = 1e-13  # of what is asked for, relative to the displacement: round-off
@@ -152,269 +152,201 @@ def lifting_of(
     touched = np.zeros(len(cells.vertices), dtype=bool)
     touched[cells.ends[np.concatenate(needed)]] = True
     layer = np.flatnonzero(touched[cells.triangles].any(axis=1))
-    nodes = _Nodes(cells, layer, degree)
+    nodes = _Nodes(problem, cells, layer, degree)
     lines = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
     still = np.isin(cells.segment, cells.trace.segments(*lines))
     still[np.asarray(away, dtype=np.intp)] = False
     for one in asked:
         still[one.side] = False
-    conditions = _conditions(cells, nodes, asked, still, 100 * NOISE * extent)
-    squares = _least(problem, cells, nodes, conditions, asked)
-    norms[layer] = np.sqrt(np.maximum(squares, 0.0))
+    w = _least(nodes, asked, nodes.rim(still), 100 * NOISE * extent)
+    rest = _rest(nodes, w, asked)
+    rough = np.asarray(rest.any(axis=(1, 2, 3)))
+    for block in nodes.blocks(rough):
+        some = block.some
+        own = block.table @ w[nodes.number[some]][:, None]
+        value, slope = own[:, :, 0], own[:, :, 1:]
+        if rough[some[0]]:
+            more = _continued(block.points.local, rest[some])
+            value, slope = value + more[0], slope + more[1]
+        e = block.strains(slope, value)
+        energy = (e * (block.law @ e[..., None])[..., 0]).sum(axis=2)
+        norms[layer[some]] = np.sqrt((block.weight * energy).sum(axis=1))
     return norms
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Triangles `some` (b,) of a layer, all of one kind, with quadrature.
+
+    `weight` (b, q) has the model's measure, `law` is C, `into` (b, q, 2, 2) are the derivatives of
+    (a, b) by x, `table` (q, 3, m) the nodes' functions and their derivatives by (a, b).
+    """
+
+    some: Index
+    points: Places
+    weight: Array
+    law: Array
+    into: Array
+    table: Array
+
+    def strains(self, slope: Array, value: Array) -> Array:
+        """Voigt strains (b, q, ..., v) by derivatives (b, q, 2, ..., 2) and values (b, q, ..., 2).
+
+        Of displacements (..., 2); derivatives are by (a, b).
+        """
+        gradient = np.einsum("bqax,bqa...->bq...x", self.into, slope)
+        xx, yy = gradient[..., 0, 0], gradient[..., 1, 1]
+        found = [xx, yy, gradient[..., 0, 1] + gradient[..., 1, 0]]
+        if self.law.shape[-1] > 3:
+            r = self.points.x[..., 0].reshape(self.weight.shape + (1,) * (value.ndim - 3))
+            found.insert(2, value[..., 0] / r)
+        return np.stack(found, axis=-1)
 
 
 class _Nodes:
     """Nodes of continuous polynomials on a layer of b triangles.
 
-    `number` (b, m): of vertices, sides and inside in turn; `local` (m, 2) their coordinates.
+    `number` (b, m): of vertices, sides and inside in turn; `local` (m, 2) their places (a, b).
     """
 
-    def __init__(self, cells: Cells, layer: Index, degree: int) -> None:
-        self.layer, self.degree = layer, degree
-        inner = gauss_lobatto(degree)[1:-1]
-        q = degree - 1
-        local = [CORNERS]
-        for i in range(3):
-            a, b = CORNERS[(i + 1) % 3], CORNERS[(i + 2) % 3]
-            local.append(a + inner[:, None] * (b - a))
+    def __init__(self, problem: Problem, cells: Cells, layer: Index, degree: int) -> None:
+        self.problem, self.cells, self.layer, self.degree = problem, cells, layer, degree
+        t = gauss_lobatto(degree)[1:-1, None]
+        along = [(1 - t) * CORNERS[(i + 1) % 3] + t * CORNERS[(i + 2) % 3] for i in range(3)]
         inside = [(i / degree, j / degree) for i in range(1, degree) for j in range(1, degree - i)]
-        self.local = np.concatenate([*local, np.array(inside).reshape(-1, 2)])
-        vertices, triangle = np.unique(cells.triangles[layer], return_inverse=True)
-        sides, side = np.unique(cells.sides[layer], return_inverse=True)
-        triangle, side = triangle.reshape(-1, 3), side.reshape(-1, 3)
-        self.vertices, self.sides = vertices, sides
-        along = np.arange(q)
-        start = len(vertices) + side[..., None] * q
-        back = cells.backward[layer][..., None]
-        own = start + np.where(back, q - 1 - along, along)
-        count = len(vertices) + len(sides) * q
-        rest = count + np.arange(len(layer) * len(inside)).reshape(len(layer), -1)
-        self.number = np.concatenate([triangle, own.reshape(len(layer), -1), rest], axis=1)
-        self.count = count + rest.size
-        self.components = np.concatenate([2 * self.number, 2 * self.number + 1], axis=1)
-        self.inverse = np.linalg.inv(_values(degree, self.local))
+        self.local = np.concatenate([CORNERS, *along, np.reshape(inside, (-1, 2))])
+        on = self._on(cells.sides[layer])[..., 1:-1]
+        on = np.where(cells.backward[layer][..., None], on[..., ::-1], on)
+        first = len(cells.vertices) + len(cells.ends) * (degree - 1)
+        rest = first + np.arange(len(layer) * len(inside)).reshape(len(layer), -1)
+        every = np.concatenate([cells.triangles[layer], on.reshape(len(layer), -1), rest], axis=1)
+        self.every, number = np.unique(every, return_inverse=True)
+        self.number = number.reshape(every.shape)
+        self.inverse = np.linalg.inv(derivatives(degree, self.local, (0, 0))[:, 0])
 
-    def on_sides(self, cells: Cells, side: Index) -> Index:
-        """Nodes (k, degree + 1) from t = 0 to t = 1; of sides of the layer."""
-        at = np.searchsorted(self.sides, side)
-        q = self.degree - 1
-        ends = np.searchsorted(self.vertices, cells.ends[side])
-        inner = len(self.vertices) + at[:, None] * q + np.arange(q)
-        return np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1)
+    def _on(self, side: Index) -> Index:
+        """Nodes (..., degree + 1) of sides (...,) from t = 0 to t = 1, among those of all cells."""
+        inner = len(self.cells.vertices) + side[..., None] * (self.degree - 1)
+        inner = inner + np.arange(self.degree - 1)
+        ends = self.cells.ends[side]
+        return np.concatenate([ends[..., :1], inner, ends[..., 1:]], axis=-1)
+
+    def on_sides(self, side: Index) -> Index:
+        """Nodes (k, degree + 1) of sides (k,) of the layer, from t = 0 to t = 1."""
+        return np.searchsorted(self.every, self._on(side))
+
+    def rim(self, still: Mask) -> Index:
+        """Nodes (k,) on sides whose other triangle is outside of the layer, or that are `still`."""
+        cells = self.cells
+        count = np.bincount(cells.sides[self.layer].ravel(), minlength=len(cells.ends))
+        return self.on_sides(np.flatnonzero((count == 1) & (cells.inner | still))).ravel()
+
+    def blocks(self, rough: Mask) -> Iterator[_Block]:
+        """The layer in groups of one kind; rules see what is continued where it is `rough` (b,)."""
+        cells, degree = self.cells, self.degree
+        key = np.column_stack([cells.bodies[self.layer], cells.curved[self.layer], rough])
+        kinds, number = np.unique(key, axis=0, return_inverse=True)
+        for kind, (_, bent, fine) in enumerate(kinds.tolist()):
+            order = max(2 * degree + 4 * bent, (2 * DATA + 4) * fine)
+            every = np.flatnonzero(number.ravel() == kind)
+            for some in np.array_split(every, 1 + len(every) * order**2 * degree**2 // ENTRIES):
+                points = places(cells, self.layer[some], order)
+                table = derivatives(degree, points.local, (0, 0), (1, 0), (0, 1))
+                yield _Block(
+                    some=some,
+                    points=points,
+                    weight=points.weight * cells.measure(points.x),
+                    law=np.asarray(np.linalg.inv(compliance_at(self.problem, cells, points))),
+                    into=np.asarray(np.linalg.inv(cells.image(points.at, points.local)[1])),
+                    table=np.array([1, 2, 2])[:, None] * table @ self.inverse,
+                )
 
 
-def _values(degree: int, local: Array) -> Array:
-    """The m products of Legendre's polynomials at `local` (..., 2): (..., m)."""
-    a, b = (legendre_table(degree, 2 * local[..., c] - 1)[0] for c in (0, 1))
-    i, j = products(degree)
-    return np.asarray(a[..., i] * b[..., j])
-
-
-def _gradients(degree: int, local: Array) -> Array:
-    """Their derivatives by (a, b): (..., m, 2)."""
-    a, b = (legendre_table(degree, 2 * local[..., c] - 1) for c in (0, 1))
-    i, j = products(degree)
-    return 2 * np.stack([a[1][..., i] * b[0][..., j], a[0][..., i] * b[1][..., j]], axis=-1)
-
-
-@dataclass(frozen=True, eq=False)
-class _Conditions:
-    """Frames (c, 2, 2) by rows at c nodes, which of their components are held, and their values."""
-
-    frame: Array
-    held: Mask
-    value: Array
-
-
-def _conditions(
-    cells: Cells, nodes: _Nodes, asked: Sequence[Asked], still: Mask, noise: float
-) -> _Conditions:
-    """What is asked for at the nodes; 0 on the rim of the layer and on sides `still` (e,)."""
-    frame = np.tile(np.eye(2), (nodes.count, 1, 1))
-    held, value = np.zeros((nodes.count, 2), dtype=bool), np.zeros((nodes.count, 2))
-    found = []
-    t = gauss_lobatto(nodes.degree)
-    carry = lagrange(DATA, t)
+def _least(nodes: _Nodes, asked: Sequence[Asked], rim: Index, noise: float) -> Array:
+    """Values (c, 2) at the nodes of the w of least energy that is as asked for, 0 on the rim."""
+    count, found = len(nodes.every), []
+    carry = lagrange(DATA, gauss_lobatto(nodes.degree))
     for one in asked:
-        here = np.isin(one.side, nodes.sides)
-        vectors = np.einsum("ij,kjc->kic", carry, one.direction[here]).reshape(-1, 2)
+        here = np.isin(one.side, nodes.cells.sides[nodes.layer])
+        vectors = (carry @ one.direction[here]).reshape(-1, 2)
         length = np.linalg.norm(vectors, axis=1, keepdims=True)
         own = (one.amount[here] @ carry.T).ravel() / length[:, 0]
-        found.append((nodes.on_sides(cells, one.side[here]).ravel(), vectors / length, own))
+        found.append((nodes.on_sides(one.side[here]).ravel(), vectors / length, own))
     number, d, amount = (np.concatenate(x) for x in zip(*found, strict=True))
     # Normal equations at each node: two directions, or one and the one across, which is free.
-    M, right = np.zeros((nodes.count, 2, 2)), np.zeros((nodes.count, 2))
+    M, right = np.zeros((count, 2, 2)), np.zeros((count, 2, 1))
     np.add.at(M, number, d[:, :, None] * d[:, None])
-    np.add.at(right, number, d * amount[:, None])
-    at = np.unique(number)
-    size, vectors = np.linalg.eigh(M[at])
-    vectors = vectors[:, :, ::-1].transpose(0, 2, 1)
-    size = size[:, ::-1]
-    both = size > PARALLEL * size[:, :1]
-    frame[at], held[at] = vectors, both
-    value[at] = np.where(
-        both, np.einsum("kij,kj->ki", vectors, right[at]) / np.where(both, size, 1.0), 0.0
-    )
-    w = np.einsum("kij,ki->kj", frame, value)
+    np.add.at(right, number, (d * amount[:, None])[..., None])
+    size, V = np.linalg.eigh(M)
+    held = size > PARALLEL * size[:, 1:]
+    parts = np.divide((V.transpose(0, 2, 1) @ right)[..., 0], size, out=0 * size, where=held)
+    w = (V @ parts[..., None])[..., 0]
     missed = np.abs((w[number] * d).sum(axis=1) - amount)
     if missed.max(initial=0.0) > max(INCONSISTENT * np.abs(amount).max(initial=0.0), noise):
         raise ContactError("conditions that meet at a vertex ask for different displacements")
-    held[_rim(cells, nodes, still)] = True
-    return _Conditions(frame, held, value)
-
-
-def _rim(cells: Cells, nodes: _Nodes, still: Mask) -> Mask:
-    """Nodes on sides whose other triangle is outside of the layer, or that are `still`."""
-    inside = np.zeros(len(cells.triangles), dtype=bool)
-    inside[nodes.layer] = True
-    count = np.bincount(cells.sides[inside].ravel(), minlength=len(cells.ends))
-    side = np.flatnonzero((count == 1) & (cells.inner | still))
-    rim = np.zeros(nodes.count, dtype=bool)
-    rim[nodes.on_sides(cells, side)] = True
-    return rim
-
-
-def _groups(cells: Cells, at: Index, others: Mask) -> list[Index]:
-    """Positions in `at` (b,) of triangles of one kind and body; `others` (b,) tell two kinds."""
-    key = np.column_stack([cells.bodies[at], cells.curved[at], others])
-    kinds, number = np.unique(key, axis=0, return_inverse=True)
-    return [np.flatnonzero(number.ravel() == kind) for kind in range(len(kinds))]
-
-
-def _least(
-    problem: Problem,
-    cells: Cells,
-    nodes: _Nodes,
-    conditions: _Conditions,
-    asked: Sequence[Asked],
-) -> Array:
-    """Squares (b,) of the norms of the w of least energy."""
-    model, degree, layer = model_of(problem), nodes.degree, nodes.layer
+    held[rim] = True
+    if held.all():
+        return w
     values, rows, columns = [], [], []
-    for some in _groups(cells, layer, np.zeros(len(layer), dtype=bool)):
-        bent = bool(cells.curved[layer[some[0]]])
-        points = places(cells, layer[some], 2 * degree + 4 * bent)
-        B, law, weight, _ = _operators(problem, cells, nodes, points)
-        b, q, v, m = B.shape
-        root = (weight[..., None, None] * B).reshape(b, q * v, m)
-        K = root.transpose(0, 2, 1) @ (law @ B).reshape(b, q * v, m)
+    for block in nodes.blocks(np.zeros(len(nodes.layer), dtype=bool)):
+        units = block.table[None, :, :, :, None, None] * np.eye(2)  # (1, q, 3, m, 2, 2)
+        B = block.strains(units[:, :, 1:], units[:, :, 0])
+        B = B.reshape(*B.shape[:2], -1, B.shape[-1])
+        b, q, m, v = B.shape
+        B = B.swapaxes(2, 3)
+        root = (block.weight[..., None, None] * B).reshape(b, q * v, m)
+        K = root.transpose(0, 2, 1) @ (block.law @ B).reshape(b, q * v, m)
+        n = (2 * nodes.number[block.some][..., None] + [0, 1]).reshape(b, m)
         values.append(K.ravel())
-        rows.append(np.repeat(nodes.components[some], m, axis=1).ravel())
-        columns.append(np.tile(nodes.components[some], (1, m)).ravel())
-    size = 2 * nodes.count
+        rows.append(np.repeat(n, m, axis=1).ravel())
+        columns.append(np.tile(n, (1, m)).ravel())
     entries, i, j = (np.concatenate(x) for x in (values, rows, columns))
-    K = from_triplets(entries, i, j, (size, size))
-    n = 2 * np.arange(nodes.count)[:, None] + [0, 1]
-    R = from_triplets(  # w = R (components in the frames)
-        conditions.frame.transpose(0, 2, 1).ravel(),
-        np.repeat(n, 2, axis=1).ravel(),
-        np.tile(n, (1, 2)).ravel(),
-        (size, size),
-    )
-    K = (R.T @ K @ R).tocsr()
-    held, y = conditions.held.ravel(), conditions.value.ravel()
-    if not held.all():
-        y = y + cholesky(lower_half(K))(~held)(np.where(held, 0.0, -(K @ y)))
-    w = R @ y
-    rest = _remainders(cells, nodes, w.reshape(-1, 2), asked)
-    squares = np.zeros(len(layer))
-    for some in _groups(cells, layer, rest.reached):
-        bent, rough = bool(cells.curved[layer[some[0]]]), bool(rest.reached[some[0]])
-        order = max(2 * degree + 4 * bent, 2 * DATA + 4 if rough else 0)
-        points = places(cells, layer[some], order)
-        B, law, weight, into = _operators(problem, cells, nodes, points)
-        e = np.einsum("bqvm,bm->bqv", B, w[nodes.components[some]])
-        if rough:
-            e = e + rest.strains(some, points, into, model.extent)
-        squares[some] = (weight * (e * (law @ e[..., None])[..., 0]).sum(axis=2)).sum(axis=1)
-    return squares
+    K = from_triplets(entries, i, j, (2 * count, 2 * count))
+    R = sp.bsr_array((V, np.arange(count), np.arange(count + 1)))
+    Z = sp.csr_array(R.tocsc()[:, np.flatnonzero(~held)])
+    A = (Z.T @ K @ Z).tocsr()
+    y = cholesky(lower_half(A))(np.ones(A.shape[0], dtype=bool))(-(Z.T @ (K @ w.ravel())))
+    return np.asarray(w + (Z @ y).reshape(-1, 2))
 
 
-def _operators(
-    problem: Problem, cells: Cells, nodes: _Nodes, points: Places
-) -> tuple[Array, Array, Array, Array]:
-    """Strains (b, q, v, 2 m) of the nodes' functions, C, weights, and d(a, b) / dx."""
-    model, degree = model_of(problem), nodes.degree
-    weight = points.weight * model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
-    law = np.asarray(np.linalg.inv(compliance_at(problem, cells, points)))
-    into = np.asarray(np.linalg.inv(points.spread))
-    by = np.einsum("qma,mn->qan", _gradients(degree, points.local), nodes.inverse)
-    gradient = np.einsum("qan,bqac->bqcn", by, into)
-    shape = _values(degree, points.local) @ nodes.inverse
-    return _strains(gradient, shape, points.x, model.extent), law, weight, into
+def _rest(nodes: _Nodes, w: Array, asked: Sequence[Asked]) -> Array:
+    """What of d.w is no polynomial with the values `w` (c, 2) at the nodes: (b, 3, DATA + 1, 2).
 
-
-def _strains(gradient: Array, shape: Array, x: Array, extent: int) -> Array:
-    """Voigt strains (b, q, v, 2 m) of both components; with the hoop's about an axis."""
-    b, q, _, m = gradient.shape
-    v = 3 + extent
-    B = np.zeros((b, q, v, 2 * m))
-    B[:, :, 0, :m], B[:, :, 1, m:] = gradient[:, :, 0], gradient[:, :, 1]
-    B[:, :, -1, :m], B[:, :, -1, m:] = gradient[:, :, 1], gradient[:, :, 0]
-    if extent:
-        B[:, :, 2, :m] = shape / x[..., :1]
-    return B
-
-
-@dataclass(frozen=True, eq=False)
-class _Remainders:
-    """What of d.w is no polynomial of the nodes, on sides of b triangles.
-
-    `rho` (b, 3, DATA + 1, 2) are vectors at Gauss-Lobatto points, anticlockwise; `reached` (b,)
-    says where they are not 0.
+    Vectors at Gauss-Lobatto points of the triangles' sides, anticlockwise.
     """
-
-    rho: Array
-    reached: Mask
-
-    def strains(self, some: Index, points: Places, into: Array, extent: int) -> Array:
-        """Voigt strains (k, q, v) at points of triangles `some` (k,), `into` as of `_operators`."""
-        b, q = points.weight.shape
-        share = np.column_stack([1 - points.local.sum(axis=1), points.local])
-        slope = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])  # of the shares by (a, b)
-        grad = np.einsum("sa,bqac->bqsc", slope, into)
-        total = np.zeros((b, q, 2, 2))
-        value = np.zeros((b, q, 2))
-        for i in range(3):
-            rho = self.rho[some, i]
-            if not rho.any():
-                continue
-            j, k = (i + 1) % 3, (i + 2) % 3
-            sigma = share[:, j] + share[:, k]
-            t = share[:, k] / sigma
-            f = np.einsum("qi,bic->bqc", lagrange(DATA, t), rho)
-            df = np.einsum("qi,bic->bqc", lagrange_derivative(DATA, t), rho)
-            by_sigma = grad[:, :, j] + grad[:, :, k]
-            by_t = grad[:, :, k] - t[:, None] * by_sigma
-            total += f[..., None] * by_sigma[:, :, None] + df[..., None] * by_t[:, :, None]
-            value += sigma[:, None] * f
-        e = [total[..., 0, 0], total[..., 1, 1], total[..., 0, 1] + total[..., 1, 0]]
-        if extent:
-            e.insert(2, value[..., 0] / points.x[..., 0])
-        return np.stack(e, axis=-1)
-
-
-def _remainders(cells: Cells, nodes: _Nodes, w: Array, asked: Sequence[Asked]) -> _Remainders:
-    """d.w as asked for less that of the polynomial with values `w` (c, 2) at the nodes."""
-    layer = nodes.layer
-    position = np.full(len(cells.triangles), -1)
-    position[layer] = np.arange(len(layer))
-    rho = np.zeros((len(layer), 3, DATA + 1, 2))
+    cells, layer = nodes.cells, nodes.layer
+    found = np.zeros((len(layer), 3, DATA + 1, 2))
     largest = max(float(np.abs(one.amount).max(initial=0.0)) for one in asked)
     fine = lagrange(nodes.degree, gauss_lobatto(DATA))
     for one in asked:
-        here = np.isin(one.side, nodes.sides)
-        side = one.side[here]
-        if not side.size:
-            continue
-        d, amount = one.direction[here], one.amount[here]
-        have = np.einsum("iq,kqc->kic", fine, w[nodes.on_sides(cells, side)])
-        miss = (amount - (have * d).sum(axis=2))[..., None] * d
+        here = np.isin(one.side, cells.sides[layer])
+        side, d = one.side[here], one.direction[here]
+        have = ((fine @ w[nodes.on_sides(side)]) * d).sum(axis=2)
+        miss = (one.amount[here] - have)[..., None] * d
         miss[np.abs(miss) <= NOISE * largest] = 0.0
-        triangle, local = cells.owner[side], cells.local[side]
-        back = cells.backward[triangle, local]
+        owner, local = cells.owner[side], cells.local[side]
+        back = cells.backward[owner, local]
         miss = np.where(back[:, None, None], miss[:, ::-1], miss)
-        at = position[triangle]
-        rho[at, local] += miss
-    return _Remainders(rho, np.asarray(rho.any(axis=(1, 2, 3))))
+        found[np.searchsorted(layer, owner), local] += miss
+    return found
+
+
+def _continued(local: Array, rest: Array) -> tuple[Array, Array]:
+    """Values (b, q, 2) and derivatives (b, q, 2, 2) by (a, b) of what is no polynomial.
+
+    At `local` (q, 2) in triangles, from their sides `rest` (b, 3, DATA + 1, 2): f(t) on a side is
+    continued as sigma f(t), sigma being 0 in the opposite corner.
+    """
+    share = np.column_stack([local[:, 1], 1 - local.sum(axis=1), local[:, 0]])
+    grad = np.array([[0.0, 1.0], [-1.0, -1.0], [1.0, 0.0]])  # of the shares by (a, b)
+    value, slope = np.zeros((len(rest), len(local), 2)), np.zeros((len(rest), len(local), 2, 2))
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        sigma = share[:, j] + share[:, k]
+        t = share[:, k] / sigma
+        f, df = (g(DATA, t) @ rest[:, i] for g in (lagrange, lagrange_derivative))
+        by_sigma = grad[j] + grad[k]
+        by_t = grad[k] - t[:, None] * by_sigma  # times sigma
+        value += sigma[:, None] * f
+        slope += by_sigma[:, None] * f[:, :, None] + by_t[..., None] * df[:, :, None]
+    return value, slope

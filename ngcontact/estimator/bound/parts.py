@@ -9,7 +9,7 @@ import numpy as np
 
 from ...arrays import Array, Index
 from .cells import Cells, joined, places
-from .polynomials import frame_of, projected, scalars
+from .polynomials import projected, scalars
 
 PARTS = 4  # of each side
 LEVELS = 2  # how often triangles are divided
@@ -18,11 +18,10 @@ AT_ONCE = 200_000  # points at which forces are looked at together
 
 
 @lru_cache
-def pattern(thirds: bool) -> tuple[Array, Index, Index, Array]:
+def pattern(thirds: bool) -> tuple[Array, Index]:
     """The equal parts of a triangle; those at its corners in `thirds` about their middles.
 
-    There given tractions may be those of no symmetric stress. What lies on the triangle's side 0 is
-    side 0 of its part.
+    There given tractions may be those of no symmetric stress.
 
     Returns
     -------
@@ -30,10 +29,6 @@ def pattern(thirds: bool) -> tuple[Array, Index, Index, Array]:
         Of the triangle's corners in the vertices.
     corners : ndarray of int (k, 3)
         Vertices of each part, anticlockwise.
-    outer : ndarray of int (k, 3)
-        The triangle's side on which each side lies, or -1.
-    span : ndarray (k, 3, 2)
-        Where it starts and ends on that, from 0 to 1 in the triangle's sense.
     """
     lattice = [(i, j) for i in range(PARTS + 1) for j in range(PARTS + 1 - i)]
     at = {ij: n for n, ij in enumerate(lattice)}
@@ -49,40 +44,19 @@ def pattern(thirds: bool) -> tuple[Array, Index, Index, Array]:
                 found.append(up)
         if i + j < PARTS - 1:
             found.append([at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]])
-    shares, corners = np.array(vertices) / PARTS, np.array(found)
-    ends = shares[np.stack([np.roll(corners, -1, axis=1), np.roll(corners, -2, axis=1)], axis=2)]
-    on = (ends == 0).all(axis=2)  # (k, 3 own sides, 3 sides of the triangle)
-    outer = np.where(on.any(axis=2), on.argmax(axis=2), -1)
-    span = np.take_along_axis(ends, (outer[..., None, None] + 2) % 3, axis=3)[..., 0]
-    return shares, corners, outer, span
+    return np.array(vertices) / PARTS, np.array(found)
 
 
 def divided(cells: Cells, at: Index, thirds: bool) -> Cells:
     """Triangles `at` (b,) in the parts of `pattern`, each with vertices of its own."""
-    shares, corners, outer, along = pattern(thirds)
-    b, p, k = len(at), len(shares), len(corners)
-    x = np.einsum("pc,bcd->bpd", shares, cells.corners[at])
-    bent = np.flatnonzero(cells.curved[at])
-    if bent.size:
-        sigma = 1 - shares[:, 0]
-        t = np.divide(shares[:, 2], sigma, out=np.zeros(p), where=sigma > 0)
-        own = np.where(cells.backward[at[bent], 0, None], 1 - t, t)
-        base, _ = cells.points(np.repeat(cells.sides[at[bent], 0], p), own.ravel())
-        apex = cells.corners[at[bent], :1]
-        x[bent] = apex + sigma[:, None] * (base.reshape(-1, p, 2) - apex)
-    reference = np.einsum("pc,bcd->bpd", shares, cells.reference[at])
-    sides = cells.sides[at]
-    span = np.where(cells.backward[at][..., None], cells.span[sides][..., ::-1], cells.span[sides])
-    start, stop = np.moveaxis(span[:, outer], -1, 0)[..., None]  # (b, k, 3, 1)
+    shares, corners = pattern(thirds)
+    p, k = len(shares), len(corners)
     return joined(
         cells.trace,
-        x.reshape(-1, 2),
-        (corners + p * np.arange(b)[:, None, None]).reshape(-1, 3),
-        reference[:, corners].reshape(-1, 3, 2),
+        cells.image(at, shares[:, [2, 0]])[0].reshape(-1, 2),
+        (corners + p * np.arange(len(at))[:, None, None]).reshape(-1, 3),
+        (shares @ cells.barycentric[at])[:, corners].reshape(-1, 3, 3),
         np.repeat(cells.parent[at], k),
-        np.where(outer < 0, -1, cells.segment[sides][:, outer]).reshape(-1, 3),
-        (start + (stop - start) * along).reshape(-1, 3, 2),
-        (cells.curved[at][:, None] & (outer[:, 0] == 0)).ravel(),
     )
 
 
@@ -97,8 +71,7 @@ def looked_at(
     if depth == 0:
         bent = len(at) > 0 and cells.curved[at[0]]
         points = places(cells, at, BENT * order if bent else order)
-        measure = cells.trace.model.measure(points.x.reshape(-1, 2)).reshape(points.weight.shape)
-        return points.x, points.weight * measure, points.evaluate(cells, F)
+        return points.x, points.weight * cells.measure(points.x), points.evaluate(cells, F)
     parts, found = divided(cells, at, thirds), []
     for curved in (False, True):
         some = np.flatnonzero(parts.curved == curved)
@@ -133,10 +106,9 @@ def projection(
     for start in range(0, len(at), step):
         some = at[start : start + step]
         x, weight, values = looked_at(F, cells, some, order, depth, thirds)
-        frame = frame_of(cells.corners[some])
-        force.append(projected(degree, frame, x, weight, values))
-        both = np.stack([values - scalars(degree, frame, x) @ force[-1], values])[..., components]
-        weight = weight * cells.trace.model.measure(x.reshape(-1, 2)).reshape(weight.shape)
-        norms.append(np.sqrt(np.einsum("bq,nbqd->nb", weight, both**2)))
+        P = scalars(degree, cells.corners[some], x)
+        force.append(projected(P, weight, values))
+        both = np.stack([values - P @ force[-1], values])[..., components]
+        norms.append(np.sqrt(np.einsum("bq,nbqd->nb", weight * cells.measure(x), both**2)))
     rest, size = np.concatenate(norms, axis=1)
     return np.concatenate(force), rest, size

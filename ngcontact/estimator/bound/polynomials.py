@@ -6,14 +6,13 @@ About an axis T = r s is a polynomial: with T_rr and a stress function chi
     T_rz = chi_z,  T_zz = -chi_r,  hoop = (T_rr)_r + (T_rz)_z,
 
 so that the axial equation holds, and the radial one says what the hoop stress is. On a triangle
-with a side on the axis T vanishes there, T_rr = r f and chi = r^2 eta. Polynomials are products of
-Legendre's in the coordinates of each triangle.
+with a side on the axis T vanishes there, T_rr = r f and chi = r^2 f. Polynomials are products of
+Legendre's in the coordinates (a, b) of each triangle, x = corner 1 + a base + b (corner 0 - corner
+1): the shares of corners 2 and 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from math import comb
 
@@ -23,7 +22,9 @@ from numpy.polynomial import legendre
 
 from ...arrays import Array, Index
 
-SECOND = (2, 0), (1, 1), (0, 2)  # derivatives by (a, b)
+CORNERS = np.array([[0.0, 1.0], [0.0, 0.0], [1.0, 0.0]])  # their (a, b)
+DERIVATIVES = (0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)  # orders by (a, b)
+AIRY = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # of psi_xx, psi_xy, psi_yy
 
 
 @lru_cache
@@ -37,168 +38,32 @@ def products(degree: int) -> tuple[Index, Index]:
     return i, j
 
 
-def legendre_table(degree: int, X: Array) -> list[Array]:
-    """Legendre's polynomials and two derivatives, (..., degree + 1) each, at `X` (...,).
-
-    `X` is from -1 to 1.
-    """
-    P: Array = np.asarray(legendre.legvander(X, degree))
-    tables: list[Array] = [P]
-    for _ in range(2):
-        D = np.zeros((degree + 1, degree + 1))
-        for n in range(degree):  # P'_(n+1) = (2 n + 1) P_n + P'_(n-1)
-            D[n + 1] = D[n - 1] if n else 0.0
-            D[n + 1, n] += 2 * n + 1
-        tables.append(np.asarray(tables[-1] @ D.T))
-    return tables
+def edges(corners: Array) -> Array:
+    """Columns (b, 2, 2), lengths: x = corner 1 + edges (a, b), of triangles `corners` (b, 3, 2)."""
+    return np.stack([corners[:, 2] - corners[:, 1], corners[:, 0] - corners[:, 1]], axis=-1)
 
 
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """Coordinates of b triangles.
-
-    Attributes
-    ----------
-    corner : ndarray (b, 2)
-        Corner 1, lengths.
-    edges : ndarray (b, 2, 2)
-        Columns: the base from there to corner 2, the edge to corner 0; x = corner + edges (a, b).
-    size : ndarray (b,)
-        Half the larger extent along the axes x and y, lengths.
-    centre : ndarray (b, 2)
-        Middle of both extents, lengths.
-    """
-
-    corner: Array
-    edges: Array
-    size: Array
-    centre: Array
-
-    def __getitem__(self, at: Index | slice) -> Frame:
-        """Those of some of the triangles."""
-        return Frame(self.corner[at], self.edges[at], self.size[at], self.centre[at])
-
-    def local(self, x: Array) -> Array:
-        """Coordinates (a, b), shape (b, q, 2), of points `x` (b, q, 2)."""
-        away = (x - self.corner[:, None]).transpose(0, 2, 1)
-        return np.asarray(np.linalg.solve(self.edges, away).transpose(0, 2, 1))
-
-    @property
-    def rates(self) -> tuple[Array, Array]:
-        """Derivatives (b, 2) of 2 (a, b) along each of the axes, times `size`."""
-        rates = 2 * self.size[:, None, None] * np.linalg.inv(self.edges)
-        return rates[..., 0], rates[..., 1]
-
-    @property
-    def airy(self) -> Array:
-        """Matrices (b, 3, 3) from `bending` of a function psi to its stress (xx, yy, xy)."""
-        x, y = self.rates
-        return np.stack([_second(y, y), _second(x, x), -_second(x, y)], axis=1)
-
-    def scaled(self, x: Array) -> Array:
-        """Coordinates (b, q, 2) along the axes, up to 1 in size, of points `x` (b, q, 2)."""
-        return np.asarray((x - self.centre[:, None]) / self.size[:, None, None])
+def coordinates(corners: Array, x: Array) -> Array:
+    """(a, b), shape (b, q, 2), of points `x` (b, q, 2) in triangles `corners` (b, 3, 2)."""
+    away = (x - corners[:, 1:2]).transpose(0, 2, 1)
+    return np.asarray(np.linalg.solve(edges(corners), away).transpose(0, 2, 1))
 
 
-def in_frame(local: Array) -> Array:
-    """`Frame.local`, (q, 2), of places `local` (q, 2): their shares of corners 1 and 2."""
-    return np.column_stack([local[:, 1], 1 - local.sum(axis=1)])
+def derivatives(degree: int, local: Array, *orders: tuple[int, int]) -> Array:
+    """Derivatives (..., n, m) of the m `products` at `local` (..., 2), by 2 a and 2 b.
 
-
-def frame_of(corners: Array) -> Frame:
-    """The frame of triangles with `corners` (b, 3, 2), lengths."""
-    edges = np.stack([corners[:, 2] - corners[:, 1], corners[:, 0] - corners[:, 1]], axis=-1)
-    centre = (corners.max(axis=1) + corners.min(axis=1)) / 2
-    return Frame(corners[:, 1], edges, np.ptp(corners, axis=1).max(axis=1) / 2, centre)
-
-
-def _second(p: Array, q: Array) -> Array:
-    """Second derivatives along two axes as sums (b, 3) of those by (aa, ab, bb)."""
-    mixed = p[:, 0] * q[:, 1] + p[:, 1] * q[:, 0]
-    return np.stack([p[:, 0] * q[:, 0], mixed, p[:, 1] * q[:, 1]], axis=-1)
-
-
-def derivatives(degree: int, local: Array, *orders: tuple[int, int]) -> list[Array]:
-    """Derivatives of the k `products` at `local` (..., 2), (..., k) each.
-
-    By 2 a and by 2 b as often as `orders` say.
+    As often as each of the n `orders` says.
     """
     i, j = products(degree)
-    a, b = (legendre_table(degree, 2 * local[..., c] - 1) for c in (0, 1))
-    return [a[n][..., i] * b[m][..., j] for n, m in orders]
-
-
-def bending(degree: int, local: Array) -> Array:
-    """Second derivatives (..., 3, m) by (aa, ab, bb) of stress functions, at `local` (..., 2).
-
-    `Frame.airy` makes of them a basis of the stresses of a degree in the plane, of units of stress.
-    """
-    psi = orthonormal(degree + 2, 2)
-    return np.stack([part @ psi for part in derivatives(degree + 2, local, *SECOND)], axis=-2)
-
-
-def airy_stress(degree: int, frame: Frame, local: Array, c: Array) -> Array:
-    """Stress (b, q, 3) in the plane with coefficients `c` (b, m), units of stress.
-
-    `local` (b, q, 2) are `Frame.local` of its places, or (q, 2) where these are the same for all.
-    """
-    if local.ndim == 2:
-        H = bending(degree, local)
-        second = (c @ H.reshape(-1, H.shape[-1]).T).reshape(len(c), -1, 3)
-    else:
-        psi = (c @ orthonormal(degree + 2, 2).T)[..., None]
-        parts = derivatives(degree + 2, local, *SECOND)
-        second = np.concatenate([part @ psi for part in parts], axis=-1)
-    return np.asarray(second @ frame.airy.transpose(0, 2, 1))
-
-
-def stresses(
-    degree: int, frame: Frame, x: Array, local: Array, axial: bool, on_axis: bool = False
-) -> Array:
-    """Basis (b, q, c, m) of the stresses of a degree.
-
-    Their c components are xx, yy, xy or rr, zz, hoop, rz; coefficients have units of stress. About
-    an axis (`axial`) the degree is that of T, and it vanishes `on_axis` if a side lies there.
-
-    Parameters
-    ----------
-    x, local : ndarray (b, q, 2)
-        Points, and their `Frame.local`, which may be (q, 2) where it is the same for all.
-    """
-    if not axial:
-        return np.asarray(frame.airy[:, None] @ bending(degree, local))
-    r = x[..., :1] / frame.size[:, None, None]
-    by_r, by_z = frame.rates
-    zz = _second(by_z, by_z)
-
-    def derived(degree: int, order: int) -> tuple[Array, Array, Array, Array]:
-        """Functions `orthonormal` in an order, and what they are derived by r, z, zz."""
-        combined = orthonormal(degree, order)
-        f, *parts = (
-            part @ combined for part in derivatives(degree, local, (0, 0), (1, 0), (0, 1), *SECOND)
-        )
-        f = np.broadcast_to(f, (*x.shape[:2], combined.shape[1]))
-        return f, _along(by_r, parts[:2]), _along(by_z, parts[:2]), _along(zz, parts[2:])
-
-    highest = degree - 1 if on_axis else degree + 1
-    if on_axis:  # T_rr = r f, chi = r^2 f
-        f, f_r, f_z, f_zz = derived(highest, 0)
-        none = np.zeros_like(f)
-        free = [f, none, f + r * f_r, none]
-        bent = [none, -(2 * f + r * f_r), r**2 * f_zz, r * f_z]
-    else:
-        f, f_r, *_ = derived(degree, 0)
-        _, chi_r, chi_z, chi_zz = derived(highest, 1)
-        none, still = np.zeros_like(f), np.zeros_like(chi_r)
-        free = [f / r, none, f_r, none]
-        bent = [still, -chi_r / r, chi_zz, chi_z / r]
-    return np.concatenate([np.stack(free, axis=2), np.stack(bent, axis=2)], axis=-1)
-
-
-def _along(rates: Array, parts: Sequence[Array]) -> Array:
-    """Sum (b, q, m) of n derivatives (..., q, m) times `rates` (b, n)."""
-    terms = [rate[:, None, None] * part for rate, part in zip(rates.T, parts, strict=True)]
-    return np.asarray(sum(terms))
+    found = []
+    for order in orders:
+        values = [
+            legendre.legvander(2 * local[..., c] - 1, max(degree - n, 0))
+            @ legendre.legder(np.eye(degree + 1), n)
+            for c, n in enumerate(order)
+        ]
+        found.append(values[0][..., i] * values[1][..., j])
+    return np.stack(found, axis=-2)
 
 
 @lru_cache
@@ -208,56 +73,111 @@ def orthonormal(degree: int, order: int) -> Array:
     On the triangle of reference; those without such derivatives are left out.
     """
     rule = ng.IntegrationRule(ng.TRIG, 2 * degree)
-    X, w = 2 * np.array(rule.points)[:, :2] - 1, np.array(rule.weights)
-    a, b = (legendre_table(degree, X[:, c]) for c in (0, 1))
+    every = [(order - n, n) for n in range(order + 1)]
+    rows = derivatives(degree, np.array(rule.points)[:, :2], *every)
+    scale = np.sqrt(np.outer(rule.weights, [comb(order, n) for n in range(order + 1)]))
     i, j = products(degree)
-    rows = [
-        np.sqrt(w * comb(order, n))[:, None] * a[order - n][:, i] * b[n][:, j]
-        for n in range(order + 1)
-    ]
     some = i + j >= order
-    R = np.linalg.qr(np.concatenate(rows)[:, some], mode="r")
+    R = np.linalg.qr((scale[..., None] * rows).reshape(-1, len(i))[:, some], mode="r")
     found = np.zeros((len(i), len(R)))
     found[some] = np.linalg.inv(R)
     return found
 
 
-def projected(degree: int, frame: Frame, x: Array, weight: Array, values: Array) -> Array:
-    """Coefficients (b, m, d) of the nearest polynomials of a degree to `values` (b, q, d).
+def scales(corners: Array) -> tuple[Array, Array]:
+    """Middle (b, 1, 2) of the extents along the axes, and half the larger one, (b, 1, 1)."""
+    low, high = corners.min(axis=1, keepdims=True), corners.max(axis=1, keepdims=True)
+    return (low + high) / 2, (high - low).max(axis=2, keepdims=True) / 2
 
-    In the mean square at quadrature points `x` (b, q, 2) with `weight` (b, q).
+
+def _rates(corners: Array) -> Array:
+    """Matrices (b, 6, 6) from `DERIVATIVES` by (2 a, 2 b) to those by x and y, times `scales`."""
+    _, size = scales(corners)
+    by = 2 * size * np.linalg.inv(edges(corners))  # (b, 2, 2): a, b by x, y
+    found = np.zeros((len(corners), 6, 6))
+    found[:, 0, 0] = 1.0
+    found[:, 1:3, 1:3] = by.transpose(0, 2, 1)
+    for row, (p, q) in zip((3, 4, 5), ((0, 0), (0, 1), (1, 1)), strict=True):
+        found[:, row, 3] = by[:, 0, p] * by[:, 0, q]
+        found[:, row, 4] = by[:, 0, p] * by[:, 1, q] + by[:, 1, p] * by[:, 0, q]
+        found[:, row, 5] = by[:, 1, p] * by[:, 1, q]
+    return found
+
+
+def stresses(
+    degree: int, corners: Array, local: Array, axial: bool, on_axis: bool = False
+) -> Array:
+    """Basis (b, q, c, m) of the stresses of a degree.
+
+    Their c components are xx, yy, xy or rr, zz, hoop, rz; coefficients have units of stress. About
+    an axis (`axial`) the degree is that of T, and it vanishes `on_axis` if a side lies there.
+
+    Parameters
+    ----------
+    corners : ndarray (b, 3, 2)
+    local : ndarray (b, q, 2)
+        Points by (a, b), or (q, 2) where these are the same for all.
     """
-    P = scalars(degree, frame, x)
+    rates = _rates(corners)
+    if not axial:
+        psi = derivatives(degree + 2, local, *DERIVATIVES[3:]) @ orthonormal(degree + 2, 2)
+        return np.asarray((AIRY @ rates[:, 3:, 3:])[:, None] @ psi)
+
+    def derived(degree: int, order: int) -> Array:
+        """Functions `orthonormal` in an order, by r, z, rr, rz, zz: (6, b, q, m)."""
+        table = derivatives(degree, local, *DERIVATIVES) @ orthonormal(degree, order)
+        return np.moveaxis(rates[:, None] @ table, 2, 0)
+
+    _, size = scales(corners)
+    r = (corners[:, 1:2, :1] + local @ edges(corners)[:, 0, :, None]) / size
+    if on_axis:  # T_rr = r f, chi = r^2 f
+        f, f_r, f_z, _, _, f_zz = derived(degree - 1, 0)
+        none = np.zeros_like(f)
+        free = [f, none, f + r * f_r, none]
+        bent = [none, -(2 * f + r * f_r), r**2 * f_zz, r * f_z]
+    else:
+        f, f_r, *_ = derived(degree, 0)
+        chi, chi_r, chi_z, _, _, chi_zz = derived(degree + 1, 1)
+        none, still = np.zeros_like(f), np.zeros_like(chi)
+        free = [f / r, none, f_r, none]
+        bent = [still, -chi_r / r, chi_zz, chi_z / r]
+    return np.concatenate([np.stack(free, axis=2), np.stack(bent, axis=2)], axis=-1)
+
+
+def scalars(degree: int, corners: Array, x: Array) -> Array:
+    """Polynomials (b, q, m) of a degree in x and y, at points `x` (b, q, 2)."""
+    middle, size = scales(corners)
+    X = (x - middle) / size
+    i, j = products(degree)
+    a, b = (legendre.legvander(X[..., c], degree) for c in (0, 1))
+    return np.asarray(a[..., i] * b[..., j])
+
+
+def projected(P: Array, weight: Array, values: Array) -> Array:
+    """Coefficients (b, m, d) of the polynomials `P` (b, q, m) that are nearest to `values`.
+
+    In the mean square at q points with `weight` (b, q); `values` are (b, q, d).
+    """
     weighted = P.transpose(0, 2, 1) * weight[:, None]
     mass = weighted @ P
     found = np.linalg.solve(mass, weighted @ values)
     return np.asarray(found + np.linalg.solve(mass, weighted @ (values - P @ found)))
 
 
-def scalars(degree: int, frame: Frame, x: Array) -> Array:
-    """The polynomials (b, q, m) of `projected` at points `x` (b, q, 2)."""
-    X = frame.scaled(x)
-    a, b = (legendre.legvander(X[..., c], degree) for c in (0, 1))
-    i, j = products(degree)
-    return np.asarray(a[..., i] * b[..., j])
-
-
-def balancing(degree: int, frame: Frame, x: Array, force: Array, axial: bool) -> Array:
+def balancing(degree: int, corners: Array, x: Array, force: Array, axial: bool) -> Array:
     """Stress (b, q, c) at `x` (b, q, 2) whose divergence is minus a polynomial force.
 
-    `force` (b, m, 2) are the coefficients of the force as of `projected`, for a `degree`. About an
+    `force` (b, m, 2) are the coefficients of the force as of `scalars`, for a `degree`. About an
     axis only the axial part counts: s_zz = - int F_z dz.
     """
-    X = frame.scaled(x)
+    middle, size = scales(corners)
+    X = (x - middle) / size
     i, j = products(degree)
     a, b = (legendre.legvander(X[..., c], degree) for c in (0, 1))
-    up = np.zeros((degree + 1, degree + 2))  # integrals of Legendre's polynomials
-    up[0, 1] = 1.0
-    for n in range(1, degree + 1):
-        up[n, n + 1], up[n, n - 1] = 1 / (2 * n + 1), -1 / (2 * n + 1)
-    ia, ib = (legendre.legvander(X[..., c], degree + 1) @ up.T for c in (0, 1))
-    along_x = np.einsum("bqm,bm->bq", ia[..., i] * b[..., j], force[..., 0])
-    along_y = np.einsum("bqm,bm->bq", a[..., i] * ib[..., j], force[..., 1])
+    up = legendre.legint(np.eye(degree + 1))
+    ia, ib = (legendre.legvander(X[..., c], degree + 1) @ up for c in (0, 1))
+    along_x = (ia[..., i] * b[..., j]) @ force[..., :1]
+    along_y = (a[..., i] * ib[..., j]) @ force[..., 1:]
     none = np.zeros_like(along_x)
     parts = [none, along_y, none, none] if axial else [along_x, along_y, none]  # (3.5)
-    return -np.stack(parts, axis=2) * frame.size[:, None, None]
+    return np.asarray(-size * np.concatenate(parts, axis=2))

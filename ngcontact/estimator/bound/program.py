@@ -141,7 +141,7 @@ class DualProgram:
         ContactError
             Loads on a body that moves freely are not in balance.
         """
-        alone, largest = exerted(elements, [e.alone() for e in elements])
+        alone, largest = exerted(elements, [e.g for e in elements])
         moments = self._resisted(moments, moments - alone)
         load = moments - alone
         load[np.abs(load) <= ROUND_OFF * largest] = 0.0  # no load where tractions depend
@@ -166,7 +166,7 @@ class DualProgram:
 
         Coefficients that would be more stay at their limit.
         """
-        alone, _ = exerted(elements, [e.alone() for e in elements])
+        alone, _ = exerted(elements, [e.g for e in elements])
         moments = self._resisted(np.zeros_like(alone), -alone)
         load = self.T.T @ (moments - alone)
         program = replace(self.program, g=np.zeros_like(self.program.g))
@@ -231,7 +231,7 @@ class DualProgram:
         """
         p, (y, force) = self.program, solution
         change, solve, last = self.T @ y, None, np.inf
-        coefficients = [e.alone() for e in elements]
+        coefficients = [e.g for e in elements]
         while True:
             coefficients = [
                 c + e.answer(change) for e, c in zip(elements, coefficients, strict=True)

@@ -94,7 +94,7 @@ def side_rule(cells: Cells, breaks: Array, side: Index) -> SideRule:
     length = np.linalg.norm(dx, axis=2)
     normal = np.stack([dx[..., 1], -dx[..., 0]], axis=-1) / length[..., None]
     normal[cells.backward[cells.owner[piece], cells.local[piece]]] *= -1
-    measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(t.shape)
+    measure = cells.measure(x)
     return SideRule(piece, t, (stop - start)[:, None] * WEIGHTS * length, x, normal, measure)
 
 
@@ -171,7 +171,7 @@ class Given:
         if at.size:
             t = cells.own_parameter(side[at], s[at])
             x, dx = _points(cells, side[at], t)
-            measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(*t.shape, 1)
+            measure = cells.measure(x)[..., None]
             ds = np.linalg.norm(dx, axis=2, keepdims=True) * measure
             force = legendre.legvander(2 * t - 1, DATA) @ (LEGENDRE @ self.pressed[side[at]])
             total[at] += np.divide(force, ds, out=np.zeros_like(force), where=ds > 0)

@@ -8,7 +8,7 @@ import pytest
 from ngcontact.estimator.bound.elements import traces
 from ngcontact.estimator.bound.polynomials import (
     balancing,
-    frame_of,
+    coordinates,
     projected,
     scalars,
     stresses,
@@ -64,10 +64,10 @@ def divergence(function, x, axial, degree, size=1.0):
 @pytest.mark.parametrize("kind", KINDS)
 def test_stresses_without_a_divergence(kind, degree):
     corners, axial, on_axis = KINDS[kind]
-    frame, x = frame_of(corners), inside(corners)
+    x = inside(corners)
 
     def basis(y):
-        return stresses(degree, frame, y, frame.local(y), axial, on_axis)
+        return stresses(degree, corners, coordinates(corners, y), axial, on_axis)
 
     values = basis(x[None])[0]
     size = height(corners)
@@ -85,12 +85,12 @@ def test_stresses_without_a_divergence(kind, degree):
 
 def tractions_of(degree, corners, axial):
     """Moments (m, 6 (degree + 1)) of tractions on the sides: x, y on each in turn."""
-    frame, (t, w) = frame_of(corners), gauss(2 * degree + 4)
+    t, w = gauss(2 * degree + 4)
     found = []
     for i in range(3):
         a, b = corners[0, (i + 1) % 3], corners[0, (i + 2) % 3]
         x = (a + t[:, None] * (b - a))[None]
-        T = stresses(degree, frame, x, frame.local(x), axial)[0]
+        T = stresses(degree, corners, coordinates(corners, x), axial)[0]
         nx, ny = b[1] - a[1], a[0] - b[0]
         chi = (w * (x[0, :, 0] if axial else 1.0))[:, None] * traces(degree, t)
         found.append(np.einsum("qm,qc->mc", T[:, 0] * nx + T[:, -1] * ny, chi))
@@ -108,7 +108,7 @@ def test_tractions_but_for_rigid_motions_and_corners(axial, less, degree):
 
 def test_the_condition_at_a_corner():
     """Tractions of each stress at a corner fulfil n.(s m) = m.(s n)."""
-    degree, frame = 3, frame_of(TRIANGLE)
+    degree = 3
     N = tractions_of(degree, TRIANGLE, False).reshape(-1, 3, 2, degree + 1)
     x = TRIANGLE[0]
     sides = np.roll(x, -2, axis=0) - np.roll(x, -1, axis=0)
@@ -119,7 +119,7 @@ def test_the_condition_at_a_corner():
     at_end = N[:, 1] @ last, N[:, 2] @ first
     left, right = at_end[0] @ n[2], at_end[1] @ n[1]
     assert np.abs(left - right).max() <= ROUND_OFF * np.abs(N).max() * lengths.max()
-    s = stresses(degree, frame, x[None, :1], frame.local(x[None, :1]), False)[0, 0]
+    s = stresses(degree, TRIANGLE, coordinates(TRIANGLE, x[None, :1]), False)[0, 0]
     sn = s[0] * n[1, 0] + s[2] * n[1, 1]
     np.testing.assert_allclose(at_end[0][:, 0], sn, atol=ROUND_OFF * np.abs(s).max())
 
@@ -127,7 +127,7 @@ def test_the_condition_at_a_corner():
 @pytest.mark.parametrize("axial", [False, True])
 def test_what_balances_a_force(axial):
     """Minus its divergence is a polynomial force of that degree; about an axis the axial one."""
-    degree, frame = 3, frame_of(TRIANGLE)
+    degree = 3
     t, w = gauss(10)
     a, b = (z.ravel() for z in np.meshgrid(t, t))
     shares = np.column_stack([(1 - a), a * (1 - b), a * b])  # Duffy's
@@ -137,13 +137,13 @@ def test_what_balances_a_force(axial):
         r, z = x[..., 0], x[..., 1]
         return np.stack([r**3 - 2 * r * z, 1 + z**3 - r**2], axis=-1)
 
-    c = projected(degree, frame, x, weight, force(x))
+    c = projected(scalars(degree, TRIANGLE, x), weight, force(x))
     at = inside(TRIANGLE)
-    found = (scalars(degree, frame, at[None]) @ c)[0]
+    found = (scalars(degree, TRIANGLE, at[None]) @ c)[0]
     np.testing.assert_allclose(found, force(at), rtol=1e-11)
 
     def stress(y):
-        return balancing(degree, frame, y, c, axial)[..., None]
+        return balancing(degree, TRIANGLE, y, c, axial)[..., None]
 
     div = divergence(stress, at, axial, degree + 3)[..., 0]
     expected = -force(at).T * (at[:, 0] if axial else 1.0)
