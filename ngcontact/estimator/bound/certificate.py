@@ -37,7 +37,7 @@ def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
     if any(found.values()):
         told = " and ".join(f"{n} {what}" for what, n in found.items() if n)
         raise ValueError(f"no certificate: {told}; tractions and p* are no polynomials there")
-    own = stress_norms(proof.elements, proof.balanced.coefficients, len(cells.triangles)).distance
+    own = stress_norms(proof.elements, proof.stress.coefficients, len(cells.triangles)).distance
     replaced = np.flatnonzero(proof.stress.distance != own)
     return {
         "axisymmetric": np.array(cells.trace.model.extent > 0),
@@ -45,7 +45,7 @@ def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
         "triangles": cells.triangles,
         "replaced": replaced,
         "replaced_distance": proof.stress.distance[replaced],
-        "loads": proof.loads,
+        "loads": proof.stress.loads,
         "lifting": proof.lifting,
         "bound": np.array(proof.bound),
         **_stresses(proof),
@@ -66,7 +66,7 @@ def _stresses(proof: Proof) -> dict[str, np.ndarray]:
     measure = model.measure(x.reshape(-1, 2)).reshape(*x.shape[:2], 1)
     stress, force = np.zeros((*x.shape[:2], 3)), np.zeros(x.shape)
     rules: dict[str, np.ndarray] = {}
-    for number, (e, c) in enumerate(zip(proof.elements, proof.balanced.coefficients, strict=True)):
+    for number, (e, c) in enumerate(zip(proof.elements, proof.stress.coefficients, strict=True)):
         at = e.places.at
         stress[at] = e.stress(c, x[at])[..., [0, 1, -1]]
         force[at] = scalars(e.force_degree, e.frame, x[at]) @ e.force
@@ -88,7 +88,7 @@ def _sides(proof: Proof) -> dict[str, np.ndarray]:
 
     Tractions are per parameter t of the side and times the measure.
     """
-    cells, mu, given = proof.cells, proof.multipliers, proof.given
+    cells, mu, given = proof.cells, proof.program.multipliers, proof.given
     side = _boundary(cells)
     k = int(mu.degree[side[0]])
     dofs = mu.start[side, None] + np.arange(2 * (k + 1))
@@ -130,5 +130,5 @@ def _contact(proof: Proof) -> dict[str, np.ndarray]:
         "contact_weight": stacked([f.weight / WEIGHTS @ THROUGH[[0, -1]].T for f in faced]),
         "contact_equality": stacked([np.full(len(f.side), f.equality) for f in faced]).astype(bool),
         "contact_gap": stacked([f.after for f in faced]),
-        "contact_pressure": stacked(proof.balanced.pressure),
+        "contact_pressure": stacked(proof.stress.pressure),
     }

@@ -89,7 +89,7 @@ class EquilibratedStress:
     def pressure(self) -> list[ContactPressure]:
         """p* of each pair."""
         cells, found = self.proof.cells, []
-        for line, p in zip(self.proof.program.lines, self.proof.balanced.pressure, strict=True):
+        for line, p in zip(self.proof.program.lines, self.proof.stress.pressure, strict=True):
             if line.facing.pair is not None:
                 side = line.facing.side
                 found.append(ContactPressure(cells.segment[side], cells.span[side], p))
@@ -102,9 +102,12 @@ class EquilibratedStress:
         The divergence holds by construction; what is left are jumps of tractions between triangles
         and from the given ones.
         """
-        lines = zip(self.proof.program.lines, self.proof.balanced.pressure, strict=True)
+        lines = zip(self.proof.program.lines, self.proof.stress.pressure, strict=True)
         least = [p.min(initial=0.0) for line, p in lines if not line.facing.equality]
-        return {"tractions": self.proof.residual, "least pressure": float(min(least, default=0.0))}
+        return {
+            "tractions": self.proof.stress.residual,
+            "least pressure": float(min(least, default=0.0)),
+        }
 
     def values(self, element: Index, reference: Array) -> Array:
         """Stress (k, 3) as (xx, yy, xy), or (k, 4) as (rr, zz, hoop, rz), units of stress.
@@ -132,7 +135,7 @@ class EquilibratedStress:
             better = inside > best[at]
             own[at[better]], best[at[better]] = triangle[better], inside[better]
         found = np.empty((len(element), proof.elements[0].strain.shape[2]))
-        for e, c, at, some in among(proof.elements, proof.balanced.coefficients, own):
+        for e, c, at, some in among(proof.elements, proof.stress.coefficients, own):
             found[at] = e.stress(c, x[at, None], some)[:, 0]
             if found.shape[1] > 3:
                 found[at, 2] += e.radial_at(cells, own[at], reference[at])

@@ -129,7 +129,7 @@ class Measured(Guaranteed):
             *ends_of(state),
             _approach(self, state, e, relative),
             _energy(self, proof is not None),
-            largest_von_mises(boundary.mesh, stresses, proof, corners, relative),
+            largest_von_mises(boundary.mesh, self.order, stresses, proof, corners, relative),
         ]
         size = float(np.abs(boundary.curve).max())
         told = f"force along {along}, ({e[0]:.4g}, {e[1]:.4g})" if along != "itself" else ""
