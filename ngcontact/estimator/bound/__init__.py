@@ -6,6 +6,7 @@ from .force import Tested as Tested
 from .force import force_bar as force_bar
 from .readings import FINE as FINE
 from .readings import Guaranteed as Guaranteed
+from .readings import Solved as Solved
 from .refusals import refuse_bound as refuse_bound
 from .stress import ContactPressure as ContactPressure
 from .stress import EquilibratedStress as EquilibratedStress

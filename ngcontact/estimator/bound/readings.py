@@ -6,13 +6,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import ngsolve as ng
 import numpy as np
 
+from ...arrays import Array, Mask
 from ...contact import ContactState
-from ...fem import LOAD_BONUS, Space, load_vector, potential_energy
+from ...fem import LOAD_BONUS, load_vector, potential_energy
 from ...problem import Problem
 from .bound import Proof, error_bound
 from .stress import EquilibratedStress
@@ -21,39 +22,55 @@ ROUND_OFF = 64 * np.finfo(float).eps  # of an energy, relative to its terms
 FINE = 3 * LOAD_BONUS  # quadrature orders above the default for the work of loads
 
 
-class _Assembled(Protocol):
-    """A discrete problem, of which the space is asked."""
+class Solved(Protocol):
+    """What of `Solution`, which stands above this room, is asked."""
+
+    def contact_force(self, pair: int = 0) -> Array:
+        """Resultant (2,) of a pair."""
 
     @property
-    def space(self) -> Space: ...
-
-
-class _Solved(Protocol):
-    """What of a solution is asked."""
-
+    def work(self) -> dict[str, int]: ...  # noqa: D102
     @property
-    def work(self) -> dict[str, int]: ...
+    def problem(self) -> Problem: ...  # noqa: D102
     @property
-    def problem(self) -> Problem: ...
+    def order(self) -> int: ...  # noqa: D102
     @property
-    def displacement(self) -> ng.GridFunction: ...
+    def displacement(self) -> ng.GridFunction: ...  # noqa: D102
     @property
-    def discrete(self) -> _Assembled: ...
+    def discrete(self) -> Any: ...  # noqa: D102
     @property
-    def stress(self) -> ng.CoefficientFunction: ...
+    def stress(self) -> ng.CoefficientFunction: ...  # noqa: D102
     @property
-    def pairs(self) -> Sequence[ContactState]: ...
+    def out_of_plane_stress(self) -> ng.CoefficientFunction: ...  # noqa: D102
     @property
-    def energy_norm(self) -> float: ...
+    def pairs(self) -> Sequence[ContactState]: ...  # noqa: D102
+    @property
+    def active(self) -> Mask: ...  # noqa: D102
+    @property
+    def energy(self) -> float: ...  # noqa: D102
+    @property
+    def energy_norm(self) -> float: ...  # noqa: D102
+    @property
+    def energy_bounds(self) -> tuple[float, float]: ...  # noqa: D102
+    @property
+    def error_estimate(self) -> float: ...  # noqa: D102
+    @property
+    def relative_error_estimate(self) -> float: ...  # noqa: D102
+    @property
+    def equilibrated(self) -> EquilibratedStress: ...  # noqa: D102
     @property
     def _bound(self) -> Proof: ...
+    @property
+    def _proved(self) -> tuple[EquilibratedStress | None, str]: ...
+    @property
+    def _force_errors(self) -> dict[int, tuple[float, float, str]]: ...
 
 
 class Guaranteed:
     """Members of `Solution` that bound its error, made when the first of them is asked for."""
 
     @cached_property
-    def _bound(self: _Solved) -> Proof:
+    def _bound(self: Solved) -> Proof:
         space = self.discrete.space
         space.require_mesh()
         self.work["equilibrations"] += 1
@@ -65,7 +82,7 @@ class Guaranteed:
         return "_bound" in self.__dict__
 
     @property
-    def error_bound(self: _Solved) -> float:
+    def error_bound(self: Solved) -> float:
         """At least A(u - u_h, u - u_h)^(1/2), root of an energy per unit thickness.
 
         u is the solution on the domain of the mesh. Proved by an equilibrated stress, but for
@@ -79,7 +96,7 @@ class Guaranteed:
         return self._bound.bound
 
     @property
-    def relative_error_bound(self: _Solved) -> float:
+    def relative_error_bound(self: Solved) -> float:
         """`error_bound` over the energy norm of u_h, dimensionless; 0 where both vanish."""
         bound = self._bound.bound
         if bound == 0:
@@ -87,7 +104,7 @@ class Guaranteed:
         return bound / self.energy_norm if self.energy_norm > 0 else math.inf
 
     @property
-    def bound_parts(self: _Solved) -> dict[str, float]:
+    def bound_parts(self: Solved) -> dict[str, float]:
         """What the square of the bound is the sum of, each an energy per thickness.
 
         `constitutive`: |s - sigma_h|^2 of the equilibrated stress s; `complementarity`: twice the
@@ -97,7 +114,7 @@ class Guaranteed:
         return self._bound.parts
 
     @property
-    def energy_bounds(self: _Solved) -> tuple[float, float]:
+    def energy_bounds(self: Solved) -> tuple[float, float]:
         """Energies per unit thickness between which L(u) of HH81 (2.6) lies."""
         space, u = self.discrete.space, self.displacement
         if self.problem.force or self.problem.traction:
@@ -108,6 +125,6 @@ class Guaranteed:
         return energy - self._bound.below - noise, energy + self._bound.above + noise
 
     @property
-    def equilibrated(self: _Solved) -> EquilibratedStress:
+    def equilibrated(self: Solved) -> EquilibratedStress:
         """The stress that proves the bound, in equilibrium with the loads; units of stress."""
         return EquilibratedStress(self._bound)

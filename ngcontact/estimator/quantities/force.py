@@ -2,81 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Protocol
-
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Mask
-from ...contact import ContactState
-from ...fem import Space, has_rough_loads, load_vector, stress_of
-from ...problem import Problem, varies
-from ..bound import FINE, EquilibratedStress, Tested, force_bar
+from ...arrays import Array
+from ...fem import has_rough_loads, load_vector, stress_of
+from ...problem import varies
+from ..bound import FINE, Solved, Tested, force_bar
 
 INTEGRATED = 5  # degree of NGSolve's quadrature with dx, without a bonus
 STRAIGHT = 1e-12  # difference of directions that are one: round-off
 ROUND_OFF = 64 * np.finfo(float).eps  # of a force, relative to the terms that it is the sum of
 
 
-class _Influence(Protocol):
-    """Forces and work of a displacement that moves contact points."""
-
-    @property
-    def force(self) -> Array: ...
-    @property
-    def factorizations(self) -> int: ...
-    @property
-    def back_solves(self) -> int: ...
-
-
-class Movable(Protocol):
-    """A discrete problem whose contact points can be moved."""
-
-    @property
-    def space(self) -> Space:
-        """V_h."""
-
-    def influence(self, active: Mask, jumps: Array) -> tuple[ng.GridFunction, _Influence]:
-        """What moves the `active` (m,) points by `jumps` (m,)."""
-
-
-class Forced(Protocol):
-    """What of a solution is asked."""
-
-    @property
-    def work(self) -> dict[str, int]:
-        """Counts of what was done."""
-
-    @property
-    def problem(self) -> Problem:
-        """What was solved."""
-
-    @property
-    def displacement(self) -> ng.GridFunction:
-        """u_h."""
-
-    @property
-    def discrete(self) -> Movable:
-        """The discrete problem."""
-
-    @property
-    def pairs(self) -> Sequence[ContactState]:
-        """The state of each pair."""
-
-    @property
-    def active(self) -> Mask:
-        """Points in contact (m,)."""
-
-    @property
-    def equilibrated(self) -> EquilibratedStress:
-        """The stress that proves the bound."""
-
-    def contact_force(self, pair: int = 0) -> Array:
-        """Resultant (2,) of a pair."""
-
-
-def proved_force_errors(solution: Forced, pair: int, e: Array) -> tuple[float, float]:
+def proved_force_errors(solution: Solved, pair: int, e: Array) -> tuple[float, float]:
     """How far a pair's contact force is from the true one at most, along `e` (2,) and across it.
 
     Raises
@@ -103,7 +42,7 @@ def proved_force_errors(solution: Forced, pair: int, e: Array) -> tuple[float, f
     return along, other
 
 
-def _component(solution: Forced, pair: int, e: Array) -> float:
+def _component(solution: Solved, pair: int, e: Array) -> float:
     """How far the force's component along `e` (2,) is from the true one, at most."""
     states, space, u = solution.pairs, solution.discrete.space, solution.displacement
     directions = [e if number == pair else 0 * e for number in range(len(states))]
@@ -120,7 +59,7 @@ def _component(solution: Forced, pair: int, e: Array) -> float:
     return error + noise + _integrated(solution, G, proof.sampled)
 
 
-def _integrated(solution: Forced, G: ng.GridFunction, rough: bool) -> float:
+def _integrated(solution: Solved, G: ng.GridFunction, rough: bool) -> float:
     """Size of what quadrature of stiffness and loads misses of A(u_h, G) - l(G)."""
     space, problem, u = solution.discrete.space, solution.problem, solution.displacement
     a, b = (x.vec.FV().NumPy() for x in (u, G))

@@ -2,40 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
-import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
 from ...contact import ContactState
-from ...fem import Bodies, Space, connected_bodies
+from ...fem import Bodies, connected_bodies
 from ...lagrange import gauss
-from ...problem import Problem
+from ..bound import Solved
 
 NONE = 1e-9  # part of the largest load that is none
 
 
-class _Loaded(Protocol):
-    """A discrete problem, of which the space is asked."""
-
-    @property
-    def space(self) -> Space: ...
-
-
-class _Moved(Protocol):
-    """What of a solution is asked."""
-
-    @property
-    def problem(self) -> Problem: ...
-    @property
-    def displacement(self) -> ng.GridFunction: ...
-    @property
-    def discrete(self) -> _Loaded: ...
-    def contact_force(self, pair: int = 0) -> Array: ...
-
-
-def direction_of(solution: _Moved, pair: int, state: ContactState) -> tuple[Array, str]:
+def direction_of(solution: Solved, pair: int, state: ContactState) -> tuple[Array, str]:
     """Unit vector (2,) along which the force of a pair is told, and what it is.
 
     The axis of revolution; the pair's direction; that of the loads on the secondary's body, or of
@@ -68,7 +46,7 @@ def direction_of(solution: _Moved, pair: int, state: ContactState) -> tuple[Arra
     return (force / size if size > 0 else np.array([1.0, 0.0])), "itself"
 
 
-def approach_of(solution: _Moved, state: ContactState, e: Array) -> tuple[float, float]:
+def approach_of(solution: Solved, state: ContactState, e: Array) -> tuple[float, float]:
     """How far the bodies of a pair approach along `e` (2,), and the part of it that is not given.
 
     Each body moves by the mean of what its supports prescribe along e, or, where none does, by the
@@ -90,7 +68,7 @@ def _sides(state: ContactState, bodies: Bodies) -> list[int]:
     return [int(bodies.of_segment[s[0]]) for s in chosen if len(s)]
 
 
-def _held(solution: _Moved, bodies: Bodies, body: int) -> Array:
+def _held(solution: Solved, bodies: Bodies, body: int) -> Array:
     """Mean (2,) over a body's supports of what they prescribe, NaN where nothing is."""
     problem, trace = solution.problem, solution.discrete.space.trace
     own = np.flatnonzero(bodies.of_segment == body)
@@ -103,13 +81,13 @@ def _held(solution: _Moved, bodies: Bodies, body: int) -> Array:
     return result
 
 
-def _mean(solution: _Moved, bodies: Bodies, body: int) -> Array:
+def _mean(solution: Solved, bodies: Bodies, body: int) -> Array:
     """Mean displacement (2,) of a body's boundary."""
     inner = solution.discrete.space.trace.inner
     return _boundary_mean(solution, np.flatnonzero((bodies.of_segment == body) & ~inner))
 
 
-def _boundary_mean(solution: _Moved, segments: Index) -> Array:
+def _boundary_mean(solution: Solved, segments: Index) -> Array:
     """Mean displacement (2,) on `segments` (k,), weighted as the model weighs lengths."""
     trace = solution.discrete.space.trace
     t, w = gauss(trace.order + 2 * trace.geometry_order)

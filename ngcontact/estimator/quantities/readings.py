@@ -23,18 +23,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import Protocol
 
-import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array
 from ...contact import ContactState, state_of
 from ...errors import ContactError, warn
 from ...fem import BoundaryTrace
-from ..bound import EquilibratedStress, Guaranteed
+from ..bound import EquilibratedStress, Guaranteed, Solved
 from .contact import area_in_contact, ends_of, left_out, peak_of
-from .force import Forced, proved_force_errors
+from .force import proved_force_errors
 from .motion import approach_of, direction_of
 from .singular import singular_corners
 from .stresses import largest_von_mises
@@ -46,36 +44,11 @@ APPROACH = 1.0  # at most 0.9
 ROUND_OFF = 64 * np.finfo(float).eps  # of what is prescribed
 
 
-class _Solved(Forced, Protocol):
-    """What of a solution is asked."""
-
-    @property
-    def order(self) -> int: ...
-    @property
-    def stress(self) -> ng.CoefficientFunction: ...
-    @property
-    def out_of_plane_stress(self) -> ng.CoefficientFunction: ...
-    @property
-    def energy(self) -> float: ...
-    @property
-    def energy_bounds(self) -> tuple[float, float]: ...
-    @property
-    def error_estimate(self) -> float: ...
-    @property
-    def relative_error_bound(self) -> float: ...
-    @property
-    def relative_error_estimate(self) -> float: ...
-    @property
-    def _proved(self) -> tuple[EquilibratedStress | None, str]: ...
-    @property
-    def _force_errors(self) -> dict[int, tuple[float, float, str]]: ...
-
-
 class Measured(Guaranteed):
     """Members of `Solution` that tell figures with their errors."""
 
     @cached_property
-    def _proved(self: _Solved) -> tuple[EquilibratedStress | None, str]:
+    def _proved(self: Solved) -> tuple[EquilibratedStress | None, str]:
         """The stress that proves the bound, or why there is none."""
         try:
             return self.equilibrated, ""
@@ -87,11 +60,11 @@ class Measured(Guaranteed):
         """By pair what is proved of the force, infinite where nothing is, and why."""
         return {}
 
-    def contact_area(self: _Solved, pair: int = 0) -> float:
+    def contact_area(self: Solved, pair: int = 0) -> float:
         """Length of a pair's line in contact, an area about an axis; any consistent units."""
         return area_in_contact(state_of(self.pairs, pair), self.discrete.space.trace)[0]
 
-    def quantities(self: _Solved, pair: int = 0) -> Quantities:
+    def quantities(self: Solved, pair: int = 0) -> Quantities:
         """Force, contact area, pressures, ends, approach, energy, von Mises stress, with errors.
 
         Each in units of the data, any consistent units; printed as a table, found by name:
@@ -107,10 +80,8 @@ class Measured(Guaranteed):
         proof, reason = self._proved
         if proof is None and not known:
             warn(f"{reason}; all errors of quantities() are estimates")
-        star, relative = None, self.relative_error_estimate
-        if proof is not None:
-            found = proof.pressure[pair]
-            star = found
+        relative = self.relative_error_estimate
+        star = None if proof is None else proof.pressure[pair]
         boundary: BoundaryTrace = self.discrete.space.trace
         corners = singular_corners(self.problem, boundary, self.pairs)
         e, along = direction_of(self, pair, state)
@@ -169,7 +140,7 @@ def _means(state: ContactState, boundary: BoundaryTrace, error: float) -> list[Q
     ]
 
 
-def _approach(solution: _Solved, state: ContactState, e: Array, relative: float) -> Quantity:
+def _approach(solution: Solved, state: ContactState, e: Array, relative: float) -> Quantity:
     """The approach along `e` (2,); what is prescribed has an error of round-off alone."""
     value, free = approach_of(solution, state, e)
     error = APPROACH * relative**2 * free + ROUND_OFF * value
@@ -190,7 +161,7 @@ def _without_round_off(row: Quantity, size: float) -> Quantity:
     return replace(row, place=np.where(np.abs(row.place) < 1e-14 * size, 0.0, row.place))
 
 
-def _force_error(solution: _Solved, pair: int, e: Array) -> tuple[float, float, str]:
+def _force_error(solution: Solved, pair: int, e: Array) -> tuple[float, float, str]:
     """What is proved of a pair's force along `e` (2,) and across it, infinite where nothing is."""
     known = solution._force_errors
     if pair not in known:
@@ -201,7 +172,7 @@ def _force_error(solution: _Solved, pair: int, e: Array) -> tuple[float, float, 
     return known[pair]
 
 
-def _energy(solution: _Solved, proved: bool) -> Quantity:
+def _energy(solution: Solved, proved: bool) -> Quantity:
     """L(u_h); it exceeds L(u) by half the square of the error, but for gaps and supports."""
     value = solution.energy
     if not proved:

@@ -54,13 +54,13 @@ def largest_von_mises(
     value, place = float(mises[at]), xy[at]
     if relative > 1 or (equilibrated is None and mesh.ne == 1):  # nothing to compare with
         return unknown("von Mises", value, place, corners.distinct)
-    high = np.where(away, mises, 0.0).reshape(-1, n).max(axis=1) >= HALF * value
+    high = np.asarray(np.where(away, mises, 0.0).reshape(-1, n).max(axis=1) >= HALF * value)
     some = np.repeat(high, n)
     off = _jumps(mesh, xy, mises, n)[some]
     if equilibrated is not None:
         element = np.flatnonzero(high)
         whole = equilibrated.values(np.repeat(element, n), np.tile(places, (len(element), 1)))
-        known = np.isfinite(whole).all(axis=1)  # it divides by r, 0 on the axis
+        known = np.asarray(np.isfinite(whole).all(axis=1))  # it divides by r, 0 on the axis
         whole = np.where(known[:, None], whole, 0.0)
         other, own = whole[:, [0, 1, -1, 2]], stress[some]
         if whole.shape[1] == 3:  # out of the plane: nu times the trace, or 0
