@@ -57,20 +57,17 @@ from .tractions import (
 
 BESIDE = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
 LIFTED = 3  # degrees by which w is above u_h
-FELT = 1e-4  # of modulus times displacement over an element's size: stresses beside whose round-off
-# equilibrium is measured
+# Part of modulus times displacement over size of an element: equilibrium is measured beside the
+# round-off of such stresses.
+FELT = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class AdmissibleStress:
-    """A stress s in equilibrium on n triangles, beside C e of a displacement.
+class AdmissibleStress(Balanced):
+    """A stress s in equilibrium on n triangles, beside C e of a displacement u_h.
 
     Attributes
     ----------
-    coefficients : list of ndarray (b, m)
-        On the triangles of each element.
-    pressure : list of ndarray (k, j)
-        Bernstein coefficients of p* on the sides of each line.
     distance : ndarray (n,)
         |s - C e|, roots of energies per thickness.
     loads : ndarray (n,)
@@ -81,8 +78,6 @@ class AdmissibleStress:
         Of equilibrium, relative to the largest stress.
     """
 
-    coefficients: list[Array]
-    pressure: list[Array]
     distance: Array
     loads: Array
     work: float
@@ -91,17 +86,15 @@ class AdmissibleStress:
 
 @dataclass(frozen=True, eq=False)
 class DualProblem:
-    """Which stress in equilibrium is the nearest to that of a displacement.
+    """Conditions on n cells, and their program for the strain of a displacement.
 
     Attributes
     ----------
     cells : Cells
-        The mesh of the stress, n triangles.
     given : Given
     elements : list of Element
-        With the strain of the displacement.
     look : ndarray of int (n, 3)
-        Rules of forces on each triangle, as of `elements_of`.
+        Rules of forces, as of `elements_of`.
     moments : ndarray (d,)
         Of the given tractions with the multipliers.
     program : DualProgram
@@ -158,7 +151,8 @@ class DualProblem:
         work = have.work(cells, given, displacement)
         for line, p in zip(lines, found.pressure, strict=True):
             work -= work_on_gap(line.facing, p, line.facing.gap)
-        return AdmissibleStress(found.coefficients, found.pressure, distance, loads, work, residual)
+        balanced = found.coefficients, found.pressure, found.left
+        return AdmissibleStress(*balanced, distance, loads, work, residual)
 
 
 @dataclass(frozen=True, eq=False)
@@ -274,14 +268,15 @@ def _bound(
     motions = rigid_motions(cells, mu, fixed)
     program = dual_program(mu, elements, fixed, motions, lines)
     dual = DualProblem(cells, given, elements, look, moments, program)
-    gaps = [float(np.abs(line.facing.gap).max(initial=0.0)) for line in lines]
-    extent_of_u = max(_size(trace, displacement), *gaps, 0.0)
-    least = FELT * _stiffest(elements) * extent_of_u / cells.diameters.min()
-    stress = dual.admissible(
-        problem, displacement, program.nearest(elements, moments), least, degree
-    )
+    every = np.arange(len(trace.region))
+    sizes = [trace.evaluate(displacement, every, np.zeros(len(every)))]
+    size = max(float(np.abs(x).max(initial=0.0)) for x in sizes + [x.facing.gap for x in lines])
+    stiffest = min(np.diagonal(e.compliance, axis1=-2, axis2=-1).min() for e in elements)
+    felt = FELT * size / float(stiffest * cells.diameters.min())
+    found = program.nearest(elements, moments)
+    stress = dual.admissible(problem, displacement, found, felt, degree)
     lifts = [(line.facing, line.facing.lift) for line in lines]
-    lifting = lifted(problem, cells, asked, lifts, lift, extent_of_u)
+    lifting = lifted(problem, cells, asked, lifts, lift, size)
     c, D = stress.distance, stress.loads
     closed = float(sum((p * x.bound).sum() for p, x in zip(stress.pressure, lines, strict=True)))
     parts = {
@@ -306,11 +301,6 @@ def work_on_gap(facing: Facing, pressure: Array, gap: Array) -> float:
     return float((density * gap).sum())
 
 
-def _stiffest(elements: Sequence[Element]) -> float:
-    """The largest modulus, a stress: one over the least diagonal entry of C^-1."""
-    return max(1 / float(np.diagonal(e.compliance, axis1=-2, axis2=-1).min()) for e in elements)
-
-
 def _share(problem: Problem, cells: Cells, pair: ContactState) -> float:
     """The share of r that the secondary takes: by compliance."""
     sizes = []
@@ -320,9 +310,3 @@ def _share(problem: Problem, cells: Cells, pair: ContactState) -> float:
             return 1.0
         sizes.append(np.trace(compliance_at(problem, cells, places(cells, at, 0))[0, 0]))
     return float(sizes[0] / sum(sizes))
-
-
-def _size(trace: BoundaryTrace, displacement: ng.GridFunction) -> float:
-    """The largest displacement at a vertex of the boundary, a length."""
-    every = np.arange(len(trace.region))
-    return float(np.abs(trace.evaluate(displacement, every, np.zeros(len(every)))).max())

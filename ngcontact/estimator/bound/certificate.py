@@ -10,9 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...arrays import Index
 from .bound import Proof
-from .cells import Cells
 from .facing import THROUGH, WEIGHTS
 from .norms import stress_norms
 from .polynomials import scalars
@@ -89,7 +87,7 @@ def _sides(proof: Proof) -> dict[str, np.ndarray]:
     Tractions are per parameter t of the side and times the measure.
     """
     cells, mu, given = proof.cells, proof.program.multipliers, proof.given
-    side = _boundary(cells)
+    side = np.flatnonzero(~cells.inner)
     k = int(mu.degree[side[0]])
     dofs = mu.start[side, None] + np.arange(2 * (k + 1))
     traction = proof.moments[dofs].reshape(len(side), 2, k + 1) * np.sqrt(2 * np.arange(k + 1) + 1)
@@ -100,35 +98,27 @@ def _sides(proof: Proof) -> dict[str, np.ndarray]:
     }
 
 
-def _boundary(cells: Cells) -> Index:
-    """Sides (k,) of one triangle only."""
-    return np.flatnonzero(~cells.inner)
-
-
 def _contact(proof: Proof) -> dict[str, np.ndarray]:
     """p* and the gap after lifting as Bernstein coefficients, in t of the secondary's sides.
 
     Sides are numbers among those of the boundary. The primary's parameter is t, or 1 - t where it
     is turned; the weight is linear and given at both ends.
     """
-    position = np.full(len(proof.cells.ends), -1)
-    boundary = _boundary(proof.cells)
+    position = np.full(len(proof.cells.ends) + 1, -1)  # the last one where no side is faced
+    boundary = np.flatnonzero(~proof.cells.inner)
     position[boundary] = np.arange(len(boundary))
     faced = [line.facing for line in proof.program.lines]
 
-    def stacked(parts: Sequence[np.ndarray]) -> np.ndarray:
-        """Of all lines; nothing without any."""
-        return np.concatenate(parts) if parts else np.zeros(0)
+    def joined(parts: Sequence[np.ndarray], kind: type = float) -> np.ndarray:
+        return np.concatenate(parts).astype(kind) if parts else np.zeros(0, kind)
 
     return {
-        "contact_side": stacked([position[f.side] for f in faced]).astype(np.intp),
-        "contact_other": stacked(
-            [np.where(f.other < 0, -1, position[f.other]) for f in faced]
-        ).astype(np.intp),
-        "contact_turned": stacked([f.there[:, -1] < f.there[:, 0] for f in faced]).astype(bool),
-        "contact_direction": stacked([f.direction[:, 0] for f in faced]),
-        "contact_weight": stacked([f.weight / WEIGHTS @ THROUGH[[0, -1]].T for f in faced]),
-        "contact_equality": stacked([np.full(len(f.side), f.equality) for f in faced]).astype(bool),
-        "contact_gap": stacked([f.after for f in faced]),
-        "contact_pressure": stacked(proof.stress.pressure),
+        "contact_side": joined([position[f.side] for f in faced], int),
+        "contact_other": joined([position[f.other] for f in faced], int),
+        "contact_turned": joined([f.there[:, -1] < f.there[:, 0] for f in faced], bool),
+        "contact_direction": joined([f.direction[:, 0] for f in faced]),
+        "contact_weight": joined([f.weight / WEIGHTS @ THROUGH[[0, -1]].T for f in faced]),
+        "contact_equality": joined([np.full(len(f.side), f.equality) for f in faced], bool),
+        "contact_gap": joined([f.after for f in faced]),
+        "contact_pressure": joined(proof.stress.pressure),
     }

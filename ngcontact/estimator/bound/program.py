@@ -38,8 +38,8 @@ from .facing import PLACES, Facing, bernstein
 
 FALLING = 0.5  # ratio of two residuals from which more corrections take nothing off
 ROUND_OFF = 1e-13  # of tractions, relative to the largest: nothing to correct
-# Work of loads on motions that nothing resists, relative to the largest load: 2e-6 at most in 346
-# scenes, less than 1e-8 in all but 8 of them.
+# Force that holds a motion which nothing resists, relative to the largest load, for loads that are
+# in balance but for quadrature: 2e-6 at most in 346 scenes, less than 1e-8 in all but 8 of them.
 QUADRATURE = 1e-5
 ROOM = 1.1  # ratio of a force to its limit up to which it stays as it is
 DEFINITE = 1e-12  # of the diagonal, added to what is factorised: vertices where tractions depend
@@ -215,7 +215,11 @@ class DualProgram:
             return self.systems.approximation.y
 
     def _idle(self, load: Array) -> Array:
-        """The part (d,) of a `load` (d,) that does work on motions which nothing resists."""
+        """The part (d,) of a `load` (d,) that does work on motions which nothing resists.
+
+        A condition holds their mean, and takes it: s and sigma have it in common, and it does no
+        work on u - u_h - w.
+        """
         lineal = self.T @ self.program.null_space.lineal
         if lineal.shape[1] == 0:
             return np.zeros_like(load)
