@@ -12,15 +12,15 @@ they solve the dual contact problem.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Index
 from ...contact import ContactState
 from ...errors import ContactError
-from ...fem import BoundaryTrace, narrow_forces
+from ...fem import BoundaryTrace
 from ...problem import Problem
 from .cells import Cells, cells_of, places
 from .elements import (
@@ -28,7 +28,6 @@ from .elements import (
     PARTED,
     WHOLE,
     Element,
-    Multipliers,
     compliance_at,
     elements_of,
     rigid_motions,
@@ -38,69 +37,141 @@ from .lifting import asked_on_line, asked_on_supports, lifted
 from .missed import Level, data_norms, once_more
 from .norms import (
     SETTLED,
-    StressNorms,
     forces_missed,
     residuals,
     smallest_moduli,
     stress_norms,
 )
-from .parts import LEVELS
+from .parts import depths
 from .program import Balanced, DualProgram, dual_program, rows_of
 from .refusals import refuse_bound, refuse_narrow
 from .tractions import Given, boundary_tractions, given_on
 
 BESIDE = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
 LIFTED = 3  # degrees by which w is above u_h
-FELT = 1e-4  # of modulus times displacement over an element's size: stresses beside whose round-off
-# equilibrium is measured
+# Part of modulus times displacement over size of an element: equilibrium is measured beside the
+# round-off of such stresses.
+FELT = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Proof:
-    """What a bound was made of.
+class AdmissibleStress(Balanced):
+    """A stress s in equilibrium on n triangles, beside C e of a displacement u_h.
 
     Attributes
     ----------
-    cells : Cells
-        The mesh of the stress, n triangles.
-    multipliers : Multipliers
-    elements : list of Element
-    given : Given
-    moments : ndarray (d,)
-        Of the given tractions with the multipliers.
-    program : DualProgram
-    balanced : Balanced
-        The stress in equilibrium, and p*.
-    stress : StressNorms
+    distance : ndarray (n,)
+        |s - C e|, roots of energies per thickness.
     loads : ndarray (n,)
         Norms of what s misses of the data.
-    lifting : ndarray (n,)
-        Norms of w.
-    bound : float
-        B, root of an energy per thickness.
-    parts : dict of float
-        What B^2 is the sum of.
-    below, above : float
-        L(u_h) - below <= L(u) <= L(u_h) + above, energies per thickness.
+    work : float
+        <s n, u_D - u_h> - int p* gap_h, an energy per thickness.
     residual : float
         Of equilibrium, relative to the largest stress.
     """
 
+    distance: Array
+    loads: Array
+    work: float
+    residual: float
+
+
+@dataclass(frozen=True, eq=False)
+class DualProblem:
+    """Conditions on n cells, and their program for the strain of a displacement.
+
+    Attributes
+    ----------
+    cells : Cells
+    given : Given
+    elements : list of Element
+    look : ndarray of int (n, 3)
+        Rules of forces, as of `elements_of`.
+    moments : ndarray (d,)
+        Of the given tractions with the multipliers.
+    program : DualProgram
+    """
+
     cells: Cells
-    multipliers: Multipliers
-    elements: list[Element]
     given: Given
+    elements: list[Element]
+    look: Index
     moments: Array
     program: DualProgram
-    balanced: Balanced
-    stress: StressNorms
-    loads: Array
+
+    def admissible(
+        self,
+        problem: Problem,
+        displacement: ng.GridFunction,
+        found: Balanced,
+        least: float = 0.0,
+        degree: int | None = None,
+    ) -> AdmissibleStress:
+        """What a stress `found` proves of a displacement u_h, under the loads of a problem.
+
+        Equilibrium is measured beside the largest stress, `least` or more. Where s misses much of
+        the data, stresses above a `degree` are sought once more.
+
+        Raises
+        ------
+        ContactError
+            It is not in equilibrium.
+        """
+        cells, elements, lines = self.cells, self.elements, self.program.lines
+        given, n = self.given.under(lines, found.pressure), len(cells.triangles)
+        norms = stress_norms(elements, found.coefficients, n)
+        scale = max(norms.largest, least)
+        residual = float(residuals(cells, self.program.multipliers, found.left, scale).max())
+        if not residual <= SETTLED:
+            raise ContactError(
+                f"no equilibrated stress was found: the residual relative to the largest stress is "
+                f"{residual:.1e}"
+            )
+        have = boundary_tractions(given, elements, found.coefficients)
+        missed = have.missed(given, scale)
+        loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(elements, n))
+        distance = norms.distance
+        if degree is not None:
+            level = Level(cells, elements, found.coefficients, self.look, distance, loads)
+            distance, loads = once_more(problem, displacement, given, level, degree, scale)
+        if not np.isfinite(loads).all():
+            raise ValueError(
+                "no guaranteed bound is known for loads that are no polynomials beside the axis; "
+                "use error_estimate"
+            )
+        work = have.work(given, displacement)
+        for line, p in zip(lines, found.pressure, strict=True):
+            work -= work_on_gap(line.facing, p, line.facing.gap)
+        balanced = found.coefficients, found.pressure, found.left
+        return AdmissibleStress(*balanced, distance, loads, work, residual)
+
+
+@dataclass(frozen=True, eq=False)
+class Proof(DualProblem):
+    """What a bound was made of.
+
+    Attributes
+    ----------
+    stress : AdmissibleStress
+        The nearest one, and p* >= 0.
+    lifting : ndarray (n,)
+        Norms of w.
+    parts : dict of float
+        What B^2 is the sum of.
+    below, above : float
+        L(u_h) - below <= L(u) <= L(u_h) + above, energies per thickness.
+    """
+
+    stress: AdmissibleStress
     lifting: Array
-    bound: float
     parts: dict[str, float]
     below: float
     above: float
-    residual: float
+
+    @property
+    def bound(self) -> float:
+        """B, root of an energy per thickness."""
+        return float(sum(self.parts.values()) ** 0.5)
 
     @property
     def sampled(self) -> bool:
@@ -159,8 +230,7 @@ def _bound(
     cells = cells_of(trace, cuts_of(trace, reaches, beside), loaded, trace.segments(*whole))
     given = given_on(problem, cells)
     least = np.maximum(given.followed(), cells.curved)
-    narrow = narrow_forces(problem, trace.mesh, p)[cells.parent]
-    depth = np.maximum(least, LEVELS * narrow)
+    depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, least)
     order = 2 * (degree + ON_CURVES * cells.curved) + np.where(depth, PARTED, WHOLE)
     look = np.column_stack([order, depth, least > 0])
     mu, elements = elements_of(problem, cells, displacement, degree, look)
@@ -180,84 +250,29 @@ def _bound(
     moments, fixed = given.moments(mu)
     motions = rigid_motions(cells, mu, fixed)
     program = dual_program(mu, elements, fixed, motions, lines)
-    balanced = program.nearest(elements, moments)
-    n = len(cells.triangles)
-    stress = stress_norms(elements, balanced.coefficients, n)
-    gaps = [float(np.abs(line.facing.gap).max(initial=0.0)) for line in lines]
-    extent_of_u = max(_size(trace, displacement), *gaps, 0.0)
-    scale = max(stress.largest, FELT * _stiffest(elements) * extent_of_u / cells.diameters.min())
-    left = program.unbalanced(mu, elements, moments, balanced)
-    residual = float(residuals(cells, mu, left, scale).max())
-    if not residual <= SETTLED:
-        raise ContactError(
-            f"no equilibrated stress was found: the residual relative to the largest stress is "
-            f"{residual:.1e}"
-        )
-    given = given.under(lines, balanced.pressure)
-    have = boundary_tractions(given, elements, balanced.coefficients)
-    missed = have.missed(given, scale)
-    loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(elements, n))
-    level = Level(cells, elements, balanced.coefficients, look, stress.distance, loads)
-    distance, loads = once_more(problem, displacement, given, level, degree, scale)
-    stress = replace(stress, distance=distance)
-    if not np.isfinite(loads).all():
-        raise ValueError(
-            "no guaranteed bound is known for loads that are no polynomials beside the axis; use "
-            "error_estimate"
-        )
+    dual = DualProblem(cells, given, elements, look, moments, program)
+    every = np.arange(len(trace.region))
+    sizes = [trace.evaluate(displacement, every, np.zeros(len(every)))]
+    size = max(float(np.abs(x).max(initial=0.0)) for x in sizes + [x.facing.gap for x in lines])
+    stiffest = min(np.diagonal(e.compliance, axis1=-2, axis2=-1).min() for e in elements)
+    felt = FELT * size / float(stiffest * cells.diameters.min())
+    found = program.nearest(elements, moments)
+    stress = dual.admissible(problem, displacement, found, felt, degree)
     lifts = [(line.facing, line.facing.lift) for line in lines]
-    lifting = lifted(problem, cells, asked, lifts, lift, extent_of_u)
-    closed, signed = 0.0, 0.0
-    for line, pressure in zip(lines, balanced.pressure, strict=True):
-        closed += float((pressure * line.bound).sum())
-        signed += work_on_gap(line.facing, pressure, line.facing.gap)
-    parts, below, above = _summed(
-        stress.distance, loads, lifting, closed, signed, have.work(given, displacement)
-    )
-    return Proof(
-        cells=cells,
-        multipliers=mu,
-        elements=elements,
-        given=given,
-        moments=moments,
-        program=program,
-        balanced=balanced,
-        stress=stress,
-        loads=loads,
-        lifting=lifting,
-        bound=sum(parts.values()) ** 0.5,
-        parts=parts,
-        below=below,
-        above=above,
-        residual=residual,
-    )
-
-
-def _summed(
-    constitutive: Array,
-    loads: Array,
-    lifting: Array,
-    closed: float,
-    signed: float,
-    reaction: float,
-) -> tuple[dict[str, float], float, float]:
-    """The parts of B^2, and how far the energy is below and above that of u_h.
-
-    `closed` is the integral of p* (gap_h + r), `signed` that of p* gap_h, `reaction` the work of
-    s n on u_D - u_h.
-    """
-    both, own = constitutive + loads, float(constitutive @ constitutive)
+    lifting = lifted(problem, cells, asked, lifts, lift, size)
+    c, D = stress.distance, stress.loads
+    closed = float(sum((p * x.bound).sum() for p, x in zip(stress.pressure, lines, strict=True)))
     parts = {
-        "constitutive": own,
+        "constitutive": float(c @ c),
         "complementarity": 2 * closed,
         "lifting": float(lifting @ lifting),
-        "loads": float(both @ both) - own,
+        "loads": float(D @ (2 * c + D)),
     }
-    worked = float(loads @ lifting)
-    data = float(loads @ constitutive + loads @ loads / 2) + 2 * worked
-    below = own / 2 + signed - reaction + data
-    above = float(constitutive @ lifting) + reaction + closed - signed
-    return parts, below, above + parts["lifting"] / 2 + worked
+    below = float(c @ c / 2 + D @ (c + D / 2 + 2 * lifting)) - stress.work
+    above = float((c + D + lifting / 2) @ lifting) + stress.work + closed
+    return Proof(
+        **vars(dual), stress=stress, lifting=lifting, parts=parts, below=below, above=above
+    )
 
 
 def work_on_gap(facing: Facing, pressure: Array, gap: Array) -> float:
@@ -269,11 +284,6 @@ def work_on_gap(facing: Facing, pressure: Array, gap: Array) -> float:
     return float((density * gap).sum())
 
 
-def _stiffest(elements: Sequence[Element]) -> float:
-    """The largest modulus, a stress: one over the least diagonal entry of C^-1."""
-    return max(1 / float(np.diagonal(e.compliance, axis1=-2, axis2=-1).min()) for e in elements)
-
-
 def _share(problem: Problem, cells: Cells, pair: ContactState) -> float:
     """The share of r that the secondary takes: by compliance."""
     sizes = []
@@ -283,9 +293,3 @@ def _share(problem: Problem, cells: Cells, pair: ContactState) -> float:
             return 1.0
         sizes.append(np.trace(compliance_at(problem, cells, places(cells, at, 0))[0, 0]))
     return float(sizes[0] / sum(sizes))
-
-
-def _size(trace: BoundaryTrace, displacement: ng.GridFunction) -> float:
-    """The largest displacement at a vertex of the boundary, a length."""
-    every = np.arange(len(trace.region))
-    return float(np.abs(trace.evaluate(displacement, every, np.zeros(len(every)))).max())

@@ -10,9 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...arrays import Index
 from .bound import Proof
-from .cells import Cells
 from .facing import THROUGH, WEIGHTS
 from .norms import stress_norms
 from .polynomials import scalars
@@ -37,7 +35,7 @@ def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
     if any(found.values()):
         told = " and ".join(f"{n} {what}" for what, n in found.items() if n)
         raise ValueError(f"no certificate: {told}; tractions and p* are no polynomials there")
-    own = stress_norms(proof.elements, proof.balanced.coefficients, len(cells.triangles)).distance
+    own = stress_norms(proof.elements, proof.stress.coefficients, len(cells.triangles)).distance
     replaced = np.flatnonzero(proof.stress.distance != own)
     return {
         "axisymmetric": np.array(cells.trace.model.extent > 0),
@@ -45,7 +43,7 @@ def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
         "triangles": cells.triangles,
         "replaced": replaced,
         "replaced_distance": proof.stress.distance[replaced],
-        "loads": proof.loads,
+        "loads": proof.stress.loads,
         "lifting": proof.lifting,
         "bound": np.array(proof.bound),
         **_stresses(proof),
@@ -66,7 +64,7 @@ def _stresses(proof: Proof) -> dict[str, np.ndarray]:
     measure = model.measure(x.reshape(-1, 2)).reshape(*x.shape[:2], 1)
     stress, force = np.zeros((*x.shape[:2], 3)), np.zeros(x.shape)
     rules: dict[str, np.ndarray] = {}
-    for number, (e, c) in enumerate(zip(proof.elements, proof.balanced.coefficients, strict=True)):
+    for number, (e, c) in enumerate(zip(proof.elements, proof.stress.coefficients, strict=True)):
         at = e.places.at
         stress[at] = e.stress(c, x[at])[..., [0, 1, -1]]
         force[at] = scalars(e.force_degree, e.corners, x[at]) @ e.force
@@ -88,8 +86,8 @@ def _sides(proof: Proof) -> dict[str, np.ndarray]:
 
     Tractions are per parameter t of the side and times the measure.
     """
-    cells, mu, given = proof.cells, proof.multipliers, proof.given
-    side = _boundary(cells)
+    cells, mu, given = proof.cells, proof.program.multipliers, proof.given
+    side = np.flatnonzero(~cells.inner)
     k = int(mu.degree[side[0]])
     dofs = mu.start[side, None] + np.arange(2 * (k + 1))
     traction = proof.moments[dofs].reshape(len(side), 2, k + 1) * np.sqrt(2 * np.arange(k + 1) + 1)
@@ -100,35 +98,27 @@ def _sides(proof: Proof) -> dict[str, np.ndarray]:
     }
 
 
-def _boundary(cells: Cells) -> Index:
-    """Sides (k,) of one triangle only."""
-    return np.flatnonzero(~cells.inner)
-
-
 def _contact(proof: Proof) -> dict[str, np.ndarray]:
     """p* and the gap after lifting as Bernstein coefficients, in t of the secondary's sides.
 
     Sides are numbers among those of the boundary. The primary's parameter is t, or 1 - t where it
     is turned; the weight is linear and given at both ends.
     """
-    position = np.full(len(proof.cells.ends), -1)
-    boundary = _boundary(proof.cells)
+    position = np.full(len(proof.cells.ends) + 1, -1)  # the last one where no side is faced
+    boundary = np.flatnonzero(~proof.cells.inner)
     position[boundary] = np.arange(len(boundary))
     faced = [line.facing for line in proof.program.lines]
 
-    def stacked(parts: Sequence[np.ndarray]) -> np.ndarray:
-        """Of all lines; nothing without any."""
-        return np.concatenate(parts) if parts else np.zeros(0)
+    def joined(parts: Sequence[np.ndarray], kind: type = float) -> np.ndarray:
+        return np.concatenate(parts).astype(kind) if parts else np.zeros(0, kind)
 
     return {
-        "contact_side": stacked([position[f.side] for f in faced]).astype(np.intp),
-        "contact_other": stacked(
-            [np.where(f.other < 0, -1, position[f.other]) for f in faced]
-        ).astype(np.intp),
-        "contact_turned": stacked([f.there[:, -1] < f.there[:, 0] for f in faced]).astype(bool),
-        "contact_direction": stacked([f.direction[:, 0] for f in faced]),
-        "contact_weight": stacked([f.weight / WEIGHTS @ THROUGH[[0, -1]].T for f in faced]),
-        "contact_equality": stacked([np.full(len(f.side), f.equality) for f in faced]).astype(bool),
-        "contact_gap": stacked([f.after for f in faced]),
-        "contact_pressure": stacked(proof.balanced.pressure),
+        "contact_side": joined([position[f.side] for f in faced], int),
+        "contact_other": joined([position[f.other] for f in faced], int),
+        "contact_turned": joined([f.there[:, -1] < f.there[:, 0] for f in faced], bool),
+        "contact_direction": joined([f.direction[:, 0] for f in faced]),
+        "contact_weight": joined([f.weight / WEIGHTS @ THROUGH[[0, -1]].T for f in faced]),
+        "contact_equality": joined([np.full(len(f.side), f.equality) for f in faced], bool),
+        "contact_gap": joined([f.after for f in faced]),
+        "contact_pressure": joined(proof.stress.pressure),
     }

@@ -8,11 +8,16 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
+from ...fem import narrow_forces
+from ...problem import Problem
+from ...quadrature import View, features_of, numbers, touched
 from .cells import Cells, joined, places
 from .polynomials import projected, scalars
 
 PARTS = 4  # of each side
 LEVELS = 2  # how often triangles are divided
+SMOOTH = 1e-3  # of the largest force: what polynomials miss where none is divided
+LEFT = 0.005  # share of the squares of what is missed, that may be on parts not divided again
 BENT = 2  # times the order of rules on curved triangles, for polynomials in x
 AT_ONCE = 200_000  # points at which forces are looked at together
 
@@ -112,3 +117,63 @@ def projection(
         norms.append(np.sqrt(np.einsum("bq,nbqd->nb", weight * cells.measure(x), both**2)))
     rest, size = np.concatenate(norms, axis=1)
     return np.concatenate(force), rest, size
+
+
+def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Index) -> Index:
+    """How often triangles (n,) are divided, because forces are not near to polynomials.
+
+    The polynomials are of a `degree`, the rules of an `order`; `least` (n,) times at least.
+    """
+    found, mesh = least.copy(), cells.trace.mesh
+    if all(numbers(ng.CF(F)) for F in problem.force.values()):
+        return found
+    narrow = narrow_forces(problem, mesh, cells.trace.order)
+    for one in features_of(problem, mesh):
+        if one.kind == "force" and len(one.places):
+            view, spots = View(mesh, 2), np.column_stack([one.places, one.widths])
+            at, feature = touched(spots, view, np.arange(mesh.ne))
+            narrow[at[view.sizes[at] > PARTS * one.widths[feature]]] = True
+    found[narrow[cells.parent]] = LEVELS
+    for k, F in problem.force.items():
+        at = np.flatnonzero(np.array(mesh.Materials(k).Mask())[cells.bodies])
+        if not numbers(F) and at.size:
+            found[at] = _depths(ng.CF(F), cells, at, found[at], (degree, order))
+    return found
+
+
+def _depths(
+    F: ng.CoefficientFunction,
+    cells: Cells,
+    at: Index,
+    asked: Index,
+    rule: tuple[int, int],
+    least: float = 0.0,
+) -> Index:
+    """Depths (b,) of triangles `at` (b,) for one force, from `asked` (b,) up to `LEVELS`.
+
+    `rule` is the degree of the polynomials and the order of the rules. Polynomials are near to the
+    force if they miss less, in the root of the mean square, than `least`; on parts, what they miss
+    of it must count as well.
+    """
+    rest, size = np.zeros((2, len(at)))
+    axial = slice(cells.trace.model.extent, None)
+    for curved in (False, True):
+        some = np.flatnonzero(cells.curved[at] == curved)
+        if some.size:
+            _, rest[some], size[some] = projection(F, cells, at[some], *rule, 0, False, axial)
+    corners = cells.corners[at]
+    root = np.sqrt(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2)
+    threshold = max(least, SMOOTH * float((size / root).max(initial=0.0)))
+    rough = rest > threshold * root
+    if least:
+        order = np.argsort(rest)
+        rough[order[np.cumsum(rest[order] ** 2) <= LEFT * (rest @ rest)]] = False
+        return asked + rough
+    depth = np.maximum(asked, rough)
+    some = np.flatnonzero((depth > 0) & (asked < LEVELS))
+    if some.size:
+        parts = divided(cells, at[some], False)
+        every = np.arange(len(parts.triangles))
+        inner = _depths(F, parts, every, 0 * every, rule, threshold)
+        depth[some] = 1 + inner.reshape(len(some), -1).max(axis=1)
+    return depth

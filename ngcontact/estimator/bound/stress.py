@@ -16,7 +16,6 @@ from .certificate import certificate_arrays
 from .elements import among
 from .facing import bernstein
 
-AT_ONCE = 1000  # places beside all parts
 INSIDE = 1e-9  # parameters nearer to an end are inside of the part that begins there
 
 
@@ -44,17 +43,17 @@ class ContactPressure:
 
         At the end of two parts the one towards the middle of the segment.
         """
-        inside = np.clip(s, INSIDE, 1 - INSIDE)[:, None]
         low, high = np.sort(self.span, axis=1).T
+        order = np.argsort(self.segments + low)
+        inside = np.clip(s, INSIDE, 1 - INSIDE)
+        at = np.searchsorted((self.segments + low)[order], segment + inside, side="right") - 1
+        part = order[np.maximum(at, 0)] if len(order) else np.zeros(len(segment), dtype=np.intp)
+        on = np.flatnonzero((at >= 0) & (segment == np.append(self.segments, -1)[part]))
+        on = on[inside[on] <= high[part[on]]]
+        a, b = self.span[part[on]].T
+        basis = bernstein(self.coefficients.shape[1] - 1, (s[on] - a) / (b - a))
         found = np.zeros(len(segment))
-        for start in range(0, len(segment), AT_ONCE):
-            at = slice(start, start + AT_ONCE)
-            on = (segment[at, None] == self.segments) & (inside[at] >= low) & (inside[at] <= high)
-            point, part = np.nonzero(on)
-            a, b = self.span[part].T
-            t = (s[at][point] - a) / (b - a)
-            basis = bernstein(self.coefficients.shape[1] - 1, t)
-            found[start + point] = (basis * self.coefficients[part]).sum(axis=1)
+        found[on] = (basis * self.coefficients[part[on]]).sum(axis=1)
         return found
 
 
@@ -89,7 +88,7 @@ class EquilibratedStress:
     def pressure(self) -> list[ContactPressure]:
         """p* of each pair."""
         cells, found = self.proof.cells, []
-        for line, p in zip(self.proof.program.lines, self.proof.balanced.pressure, strict=True):
+        for line, p in zip(self.proof.program.lines, self.proof.stress.pressure, strict=True):
             if line.facing.pair is not None:
                 side = line.facing.side
                 found.append(ContactPressure(cells.segment[side], cells.span[side], p))
@@ -102,9 +101,12 @@ class EquilibratedStress:
         The divergence holds by construction; what is left are jumps of tractions between triangles
         and from the given ones.
         """
-        lines = zip(self.proof.program.lines, self.proof.balanced.pressure, strict=True)
+        lines = zip(self.proof.program.lines, self.proof.stress.pressure, strict=True)
         least = [p.min(initial=0.0) for line, p in lines if not line.facing.equality]
-        return {"tractions": self.proof.residual, "least pressure": float(min(least, default=0.0))}
+        return {
+            "tractions": self.proof.stress.residual,
+            "least pressure": float(min(least, default=0.0)),
+        }
 
     def values(self, element: Index, reference: Array) -> Array:
         """Stress (k, 3) as (xx, yy, xy), or (k, 4) as (rr, zz, hoop, rz), units of stress.
@@ -119,20 +121,18 @@ class EquilibratedStress:
         proof, cells = self.proof, self.proof.cells
         first = np.argsort(cells.parent, kind="stable")
         count = np.bincount(cells.parent, minlength=int(element.max(initial=0)) + 1)
-        start = np.cumsum(count) - count
-        x = cells.evaluate(ng.CF((ng.x, ng.y)), first[start[element]], reference)
-        own, best = np.empty(len(element), dtype=np.intp), np.full(len(element), -np.inf)
-        for i in range(int(count.max(initial=0))):
-            at = np.flatnonzero(count[element] > i)
-            triangle = first[start[element[at]] + i]
-            corners = cells.corners[triangle]
-            edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
-            share = np.linalg.solve(edges, (x[at] - corners[:, 0])[..., None])[..., 0]
-            inside = np.minimum(share.min(axis=1), 1 - share.sum(axis=1))
-            better = inside > best[at]
-            own[at[better]], best[at[better]] = triangle[better], inside[better]
+        start, many = (np.cumsum(count) - count)[element], count[element]
+        x = cells.evaluate(ng.CF((ng.x, ng.y)), first[start], reference)
+        # Of the parts of an element the one that a place lies in, or is the nearest to.
+        last, at = np.cumsum(many), np.repeat(np.arange(len(element)), many)
+        part = first[np.arange(len(at)) + np.repeat(start - last + many, many)]
+        corners = cells.corners[part]
+        edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+        share = np.linalg.solve(edges, (x[at] - corners[:, 0])[..., None])[..., 0]
+        inside = np.minimum(share.min(axis=1), 1 - share.sum(axis=1))
+        own = part[np.lexsort((-np.arange(len(at)), inside, at))[last - 1]]
         found = np.empty((len(element), proof.elements[0].strain.shape[2]))
-        for e, c, at, some in among(proof.elements, proof.balanced.coefficients, own):
+        for e, c, at, some in among(proof.elements, proof.stress.coefficients, own):
             found[at] = e.stress(c, x[at, None], some)[:, 0]
             if found.shape[1] > 3:
                 found[at, 2] += e.radial_at(cells, own[at], reference[at])

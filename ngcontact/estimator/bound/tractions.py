@@ -142,9 +142,12 @@ class Given:
     pressed: Array
 
     def followed(self) -> Index:
-        """How often triangles (n,) are divided: `LEVELS` times beside tractions that vary."""
-        found = np.zeros(len(self.cells.triangles), dtype=np.intp)
-        found[self.cells.owner[np.isin(self.cells.segment, self.breaks[:, 0])]] = LEVELS
+        """How often triangles (n,) are divided for tractions: `LEVELS` where these are rough."""
+        cells, found = self.cells, np.zeros(len(self.cells.triangles), dtype=np.intp)
+        side = np.flatnonzero(cells.segment >= 0)
+        breaks = np.bincount(self.breaks[:, 0].astype(np.intp), minlength=len(cells.trace.region))
+        count = breaks[cells.segment[side]]
+        np.maximum.at(found, cells.owner[side], np.where(count >= FINEST, LEVELS, count > 0))
         return found
 
     def under(self, lines: Sequence[Rows], pressure: Sequence[Array]) -> Given:

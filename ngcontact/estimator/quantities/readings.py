@@ -82,10 +82,8 @@ class Measured(Guaranteed):
         proof, reason = self._proved
         if proof is None and not known:
             warn(f"{reason}; all errors of quantities() are estimates")
-        star, relative = None, self.relative_error_estimate
-        if proof is not None:
-            found = proof.pressure[pair]
-            star = found
+        relative = self.relative_error_estimate
+        star = None if proof is None else proof.pressure[pair]
         boundary = self.discrete.space.trace
         corners = singular_corners(self.problem, boundary, self.pairs)
         e, along = direction_of(self, pair, state)
@@ -107,7 +105,7 @@ class Measured(Guaranteed):
             *ends_of(state),
             _approach(self, state, e, relative, forces[0].error if along == "itself" else 0.0),
             _energy(self, proof is not None),
-            largest_von_mises(boundary.mesh, stresses, proof, corners, relative),
+            largest_von_mises(boundary.mesh, self.order, stresses, proof, corners, relative),
         ]
         size = float(np.abs(boundary.curve).max())
         told = f"force along {along}, ({e[0]:.4g}, {e[1]:.4g})" if along != "itself" else ""
