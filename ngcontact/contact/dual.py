@@ -80,7 +80,7 @@ class DualIntegrals:
 
 
 def rays(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
-    """Unit vectors (k, 2) from points of the secondary to the primary."""
+    """Unit vectors (k, 2) to the primary from points at `s` (k,) of segments `segment` (k,)."""
     if contact.direction is None:
         return trace.exact_normal(segment, s)
     return np.tile(contact.direction, (len(s), 1))

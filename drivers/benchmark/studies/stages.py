@@ -27,7 +27,7 @@ STAGES = {  # cumulative seconds of these functions; none calls another
     "matrix": [("sparse", "congruent")],
     "factorisation": [("sparse", "factor")],
     "back-solves": [("sparse", "solve")],
-    "multigrid": [("linear_systems", "prepare"), ("multigrid", "solve")],
+    "multigrid": [("discrete_problem", "prepare"), ("multigrid", "solve")],
     "estimate": [("residual", "estimate")],
     "refinement": [("refinement", "refined")],
 }

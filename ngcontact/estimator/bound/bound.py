@@ -101,13 +101,12 @@ class DualProblem:
 
     def admissible(
         self,
-        problem: Problem,
         displacement: ng.GridFunction,
         found: Balanced,
         least: float = 0.0,
         degree: int | None = None,
     ) -> AdmissibleStress:
-        """What a stress `found` proves of a displacement u_h, under the loads of a problem.
+        """What a stress `found` proves of a displacement u_h, under the given loads.
 
         Equilibrium is measured beside the largest stress, `least` or more. Where s misses much of
         the data, stresses above a `degree` are sought once more.
@@ -133,7 +132,7 @@ class DualProblem:
         distance = norms.distance
         if degree is not None:
             level = Level(cells, elements, found.coefficients, self.look, distance, loads)
-            distance, loads = once_more(problem, displacement, given, level, degree, scale)
+            distance, loads = once_more(displacement, given, level, degree, scale)
         if not np.isfinite(loads).all():
             raise ValueError(
                 "no guaranteed bound is known for loads that are no polynomials beside the axis; "
@@ -257,7 +256,7 @@ def _bound(
     stiffest = min(np.diagonal(e.compliance, axis1=-2, axis2=-1).min() for e in elements)
     felt = FELT * size / float(stiffest * cells.diameters.min())
     found = program.nearest(elements, moments)
-    stress = dual.admissible(problem, displacement, found, felt, degree)
+    stress = dual.admissible(displacement, found, felt, degree)
     lifts = [(line.facing, line.facing.lift) for line in lines]
     lifting = lifted(problem, cells, asked, lifts, lift, size)
     c, D = stress.distance, stress.loads

@@ -305,8 +305,9 @@ def cells_of(trace: BoundaryTrace, cuts: Mapping[int, Array], loaded: Index, hel
 def joined(
     trace: BoundaryTrace, vertices: Array, triangles: Index, barycentric: Array, parent: Index
 ) -> Cells:
-    """Cells of triangles by their `vertices` (nv, 2); the others as of `Cells`, not yet in order.
+    """Cells of `triangles` (n, 3) by their `vertices` (nv, 2).
 
+    `parent` (n,) and `barycentric` (n, 3, 3) are those of `Cells`, in the order of the triangles.
     Sides on one side of a parent lie on its segment of the boundary.
     """
     segment, last = _segments_of_elements(trace)

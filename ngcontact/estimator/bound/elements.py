@@ -181,7 +181,7 @@ class Multipliers:
     start: Index
 
     def of(self, side: int | Index) -> Index:
-        """The k multipliers (..., k) of sides (...,) of one degree."""
+        """The k multipliers (..., k) of sides `side` (...,) of one degree."""
         k = 2 * (int(np.max(self.degree[side])) + 1)
         return np.add.outer(self.start[side], np.arange(k))
 

@@ -43,7 +43,7 @@ def bernstein(degree: int, t: Array) -> Array:
 
 
 def on_segments(cells: Cells, side: Index, t: Array) -> tuple[Index, Array]:
-    """Segments (k,) and parameters s (k, j) of places `t`, (k, j) or (j,), on sides `side` (k,)."""
+    """Segments (k,) and parameters s (k, j) of places `t` (k, j) or (j,) on sides `side` (k,)."""
     a, b = cells.span[side].T[..., None]
     return cells.segment[side], a + (b - a) * t
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from ...arrays import Array, Index
 from ...fem import model_of
-from ...problem import Problem
 from .bound import Proof, work_on_gap
 from .facing import PLACES, WEIGHTS, Facing, bernstein, met, on_segments
 from .lifting import asked_on_supports, lifted
@@ -38,9 +37,7 @@ class Tested:
     directions: Sequence[Array]
 
 
-def force_bar(
-    problem: Problem, displacement: ng.GridFunction, tested: Tested, proof: Proof
-) -> float:
+def force_bar(displacement: ng.GridFunction, tested: Tested, proof: Proof) -> float:
     """How far the tested component of a contact force is from the true one, at most.
 
     Loads and stiffness count as they are integrated. A force per unit thickness.
@@ -50,7 +47,8 @@ def force_bar(
     ValueError, ContactError
         No bar is proved.
     """
-    cells, G, B, p = proof.cells, tested.displacement, proof.bound, proof.stress.pressure
+    problem, G = proof.given.problem, tested.displacement
+    cells, B, p = proof.cells, proof.bound, proof.stress.pressure
     facing = [line.facing for line in proof.program.lines]
     ends, excess = [cells.ends[f.side] for f in facing], _jumps(proof, tested)
     bare = [_least_kappa(*x) for x in zip(ends, facing, excess, strict=True)]
@@ -61,7 +59,7 @@ def force_bar(
         )
     strain = model_of(problem).strain(G)
     elements = [e.of_strain(e.places.evaluate(cells, strain)) for e in proof.elements]
-    given = replace(proof.given, loads=[])
+    given = replace(proof.given, loads={})
     moments = np.zeros_like(proof.moments)
     test = replace(proof, given=given, elements=elements, moments=moments)
     found = _within(test, np.inf)
@@ -71,7 +69,7 @@ def force_bar(
     if _largest(test, found) > limit:
         found = _within(test, limit, found)
     kappa = max(kappa, costless, _largest(test, found))
-    t = test.admissible(problem, displacement, found)
+    t = test.admissible(displacement, found)
     r = [_lift(*x, kappa) for x in zip(ends, facing, excess, strict=True)]
     held = [
         replace(one, amount=np.zeros_like(one.amount)) for one in asked_on_supports(cells, given, G)

@@ -20,7 +20,6 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
-from ...problem import Problem
 from .cells import Cells
 from .elements import Element, elements_of
 from .norms import SETTLED, forces_missed, residuals, smallest_moduli, stress_norms
@@ -29,6 +28,8 @@ from .program import dual_program, exerted
 from .tractions import Given, side_rule, tractions_of
 
 SEEN = 17  # points on each side
+# Shares of corners in places at which the middle of both balls is sought, beside the incentre.
+INNER = np.array([(i, j, 8 - i - j) for i in range(1, 8) for j in range(1, 8 - i)]) / 8
 COUNTS = 0.02  # of |s - sigma_h|^2, what may be added by data where nothing is balanced again
 LEAST = 3  # degree on parts: lower ones do not meet all tractions
 AT_ONCE = 200  # triangles
@@ -77,11 +78,13 @@ def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array, Array]:
     slope = np.where(back[..., None], -slope, slope)
     normal = np.stack([slope[..., 1], -slope[..., 0]], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    share = np.linalg.norm(np.roll(corners, -1, 1) - np.roll(corners, -2, 1), axis=2)
-    middle = np.einsum("bi,bic->bc", share / share.sum(axis=1, keepdims=True), corners)
-    away, tiny = x - middle[:, None, None], np.finfo(float).tiny
-    rho = np.maximum((away * normal).sum(axis=-1).min(axis=(1, 2)), tiny)
-    ratio = rho / np.linalg.norm(away, axis=-1).max(axis=(1, 2))
+    opposite = np.linalg.norm(np.roll(corners, -1, 1) - np.roll(corners, -2, 1), axis=2)
+    ratio, tiny = np.zeros(len(at)), np.finfo(float).tiny
+    for share in [opposite / opposite.sum(axis=1, keepdims=True), *INNER]:
+        away = x - (share[..., None] * corners).sum(axis=1)[:, None, None]
+        rho = (away * normal).sum(axis=-1).min(axis=(1, 2))
+        ratio = np.maximum(ratio, rho / np.linalg.norm(away, axis=-1).max(axis=(1, 2)))
+    ratio = np.maximum(ratio, tiny)
     beta = ratio / math.sqrt(2) / np.sqrt(1 + np.sqrt(1 - ratio**2))
     poincare = cells.diameters[at] / math.pi * _distortion(cells, at, x[:, 0], slope[:, 0])
     away = x - corners[:, :, None]
@@ -130,7 +133,6 @@ class Level:
 
 
 def once_more(
-    problem: Problem,
     displacement: ng.CoefficientFunction,
     given: Given,
     level: Level,
@@ -167,16 +169,13 @@ def once_more(
         for start in range(0, len(some), AT_ONCE):
             here = some[start : start + AT_ONCE]
             share = limit * len(here) / len(at)
-            one, two = _on_parts(
-                problem, displacement, given, level, here, degree, scale, third, share
-            )
+            one, two = _on_parts(displacement, given, level, here, degree, scale, third, share)
             better = one + two < c[here] + D[here]
             c[here[better]], D[here[better]] = one[better], two[better]
     return c, D
 
 
 def _on_parts(
-    problem: Problem,
     displacement: ng.CoefficientFunction,
     given: Given,
     level: Level,
@@ -193,7 +192,7 @@ def _on_parts(
     parts, k, degree = divided(level.cells, at, thirds), len(pattern(thirds)[1]), max(degree, LEAST)
     look = np.repeat(level.look[at], k, axis=0)
     look[:, 1] -= 1
-    mu, elements = elements_of(problem, parts, displacement, degree, look)
+    mu, elements = elements_of(given.problem, parts, displacement, degree, look)
     rule = side_rule(parts, given.breaks, np.flatnonzero(~parts.inner))
     owner = parts.owner[rule.side]
     own = tractions_of(level.elements, level.coefficients, at[owner // k], rule.x, rule.normal)
@@ -211,7 +210,7 @@ def _on_parts(
     both = distance, loads
     if look[:, 1].any():
         finer = Level(parts, elements, found, look, *both)
-        both = once_more(problem, displacement, given, finer, degree, scale, allowed)
+        both = once_more(displacement, given, finer, degree, scale, allowed)
     settled = left.reshape(-1, k).max(axis=1) <= SETTLED
     one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
     return np.where(settled, one, np.inf), np.where(settled, two, np.inf)

@@ -85,7 +85,7 @@ def orthonormal(degree: int, order: int) -> Array:
 
 
 def scales(corners: Array) -> tuple[Array, Array]:
-    """Middle (b, 1, 2) of the extents along the axes, and half the larger one, (b, 1, 1)."""
+    """Middle (b, 1, 2) of the extents of `corners` (b, 3, 2), and half the larger (b, 1, 1)."""
     low, high = corners.min(axis=1, keepdims=True), corners.max(axis=1, keepdims=True)
     return (low + high) / 2, (high - low).max(axis=2, keepdims=True) / 2
 
@@ -145,7 +145,7 @@ def stresses(
 
 
 def scalars(degree: int, corners: Array, x: Array) -> Array:
-    """Polynomials (b, q, m) of a degree in x and y, at points `x` (b, q, 2)."""
+    """Polynomials (b, q, m) of a degree on triangles of `corners` (b, 3, 2), at `x` (b, q, 2)."""
     middle, size = scales(corners)
     X = (x - middle) / size
     i, j = products(degree)
@@ -156,7 +156,7 @@ def scalars(degree: int, corners: Array, x: Array) -> Array:
 def projected(P: Array, weight: Array, values: Array) -> Array:
     """Coefficients (b, m, d) of the polynomials `P` (b, q, m) that are nearest to `values`.
 
-    In the mean square at q points with `weight` (b, q); `values` are (b, q, d).
+    In the mean square at q points with `weight` (b, q), where F has `values` (b, q, d).
     """
     weighted = P.transpose(0, 2, 1) * weight[:, None]
     mass = weighted @ P
@@ -167,8 +167,8 @@ def projected(P: Array, weight: Array, values: Array) -> Array:
 def balancing(degree: int, corners: Array, x: Array, force: Array, axial: bool) -> Array:
     """Stress (b, q, c) at `x` (b, q, 2) whose divergence is minus a polynomial force.
 
-    `force` (b, m, 2) are the coefficients of the force as of `scalars`, for a `degree`. About an
-    axis only the axial part counts: s_zz = - int F_z dz.
+    `force` (b, m, 2) are the coefficients of the force as of `scalars`, for a `degree` and
+    `corners` (b, 3, 2). About an axis only the axial part counts: s_zz = - int F_z dz.
     """
     middle, size = scales(corners)
     X = (x - middle) / size

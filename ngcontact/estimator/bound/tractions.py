@@ -62,13 +62,12 @@ class SideRule:
 
         What is round-off beside the `largest` stress counts as 0.
         """
-        size = np.zeros(len(cells.ends))
-        np.maximum.at(size, self.side, self.measure.max(axis=1))  # stresses lose it at an axis
-        lost = values * self.measure[..., None]
-        lost[np.abs(lost) <= ROUND_OFF * largest * size[self.side, None, None]] = 0.0
+        owner, lost = cells.owner[self.side], values * self.measure[..., None]
+        size = cells.measure(cells.corners[owner]).max(axis=1)  # stresses lose it at an axis
+        lost[np.abs(lost) <= ROUND_OFF * largest * size[:, None, None]] = 0.0
         squares = np.zeros((len(cells.triangles), 3))
-        at = cells.owner[self.side], cells.local[self.side]
-        np.add.at(squares, at, (self.weight[..., None] * lost**2).sum(axis=(1, 2)))
+        square = (self.weight[..., None] * lost**2).sum(axis=(1, 2))
+        np.add.at(squares, (owner, cells.local[self.side]), square)
         return np.sqrt(squares)
 
     def on_segments(self, cells: Cells) -> tuple[Index, Array]:
@@ -78,7 +77,7 @@ class SideRule:
 
 
 def side_rule(cells: Cells, breaks: Array, side: Index) -> SideRule:
-    """The rule on sides `side` (k,), which begins anew at `Given.breaks` (r, 2)."""
+    """The rule on sides `side` (k,), which begins anew at `breaks` (r, 2) of `Given`."""
     segment, s = breaks[:, 0].astype(np.intp), breaks[:, 1]
     at = cells.side_at(segment, s)
     some = (cells.segment[at] == segment) & np.isin(at, side)
@@ -118,11 +117,12 @@ class Given:
 
     Attributes
     ----------
+    problem : Problem
     cells : Cells
     held : ndarray of bool (e, 2)
         Components with prescribed displacements: no traction is given.
-    loads : list of (CoefficientFunction, ndarray of int (k,))
-        P with its sides.
+    loads : dict of ndarray of int (k,)
+        Sides of each P of `Problem.traction`.
     supports : list of (values, ndarray of int (k,))
         u_D of `Problem.displacement` with their sides.
     guides : ndarray of int (k,)
@@ -133,9 +133,10 @@ class Given:
         What pressures of lines exert: forces per t, with the measure, at `PLACES`.
     """
 
+    problem: Problem
     cells: Cells
     held: Mask
-    loads: list[tuple[ng.CoefficientFunction, Index]]
+    loads: dict[str, Index]
     supports: list[tuple[Sequence[Any], Index]]
     guides: Index
     breaks: Array
@@ -151,7 +152,13 @@ class Given:
         return found
 
     def under(self, lines: Sequence[Rows], pressure: Sequence[Array]) -> Given:
-        """The same with pressures on lines: Bernstein coefficients (k, n) on the sides of each."""
+        """The same with pressures on lines.
+
+        Parameters
+        ----------
+        pressure : sequence of ndarray (k, n)
+            Bernstein coefficients on the k sides of each line.
+        """
         pressed = np.zeros_like(self.pressed)
         for line, p in zip(lines, pressure, strict=True):
             f = line.facing
@@ -166,9 +173,10 @@ class Given:
         """Tractions (m, j, 2) at `s` (m, j) of `segment` (m,), and held components (m, 2)."""
         cells, total = self.cells, np.zeros((*s.shape, 2))
         side = cells.side_at(segment, s[:, s.shape[1] // 2])
-        for load, loaded in self.loads:
+        for name, loaded in self.loads.items():
             at = np.flatnonzero(np.isin(side, loaded))
             if at.size:
+                load = self.problem.traction_vector(name)
                 total[at] += _evaluated(cells.trace, load, segment[at], s[at])
         at = np.flatnonzero(self.pressed[side].any(axis=(1, 2)))
         if at.size:
@@ -181,7 +189,7 @@ class Given:
         return total, self.held[side]
 
     def asked(self, cells: Cells, rule: SideRule, own: Array) -> Array:
-        """Tractions (m, j, 2) on sides of `cells`, parts of these; `own` where none are given."""
+        """Tractions (m, j, 2) on sides of `cells`, parts of these; `own` (m, j, 2) without any."""
         segment, s = rule.on_segments(cells)
         on, asked = np.flatnonzero(segment >= 0), own.copy()
         if on.size:
@@ -196,7 +204,7 @@ class Given:
         """
         moments, fixed = np.zeros(int(mu.start[-1])), np.zeros(int(mu.start[-1]), dtype=bool)
         if self.loads:
-            side = np.unique(np.concatenate([loaded for _, loaded in self.loads]))
+            side = np.unique(np.concatenate(list(self.loads.values())))
             rule = side_rule(self.cells, self.breaks, side)
             values, _ = self.tractions(*rule.on_segments(self.cells))
             moments = rule.moments(mu, values)  # (3.7)
@@ -219,9 +227,10 @@ def given_on(problem: Problem, cells: Cells) -> Given:
     loads = {name: sides(name) for name in problem.traction}
     guided = None if problem.sliding is None else str(problem.sliding)
     return Given(
+        problem,
         cells,
         held,
-        [(problem.traction_vector(name), side) for name, side in loads.items()],
+        loads,
         supports,
         sides(guided),
         _breaks(problem, cells, loads),
@@ -303,7 +312,7 @@ class BoundaryTractions:
 def boundary_tractions(
     given: Given, elements: Sequence[Element], coefficients: Sequence[Array]
 ) -> BoundaryTractions:
-    """Tractions along the boundary of a stress of coefficients (b, m) on each of the elements."""
+    """Tractions along the boundary of a stress, with `coefficients` (b, m) on each element."""
     cells = given.cells
     rule = side_rule(cells, given.breaks, np.flatnonzero(cells.segment >= 0))
     at = cells.owner[rule.side]

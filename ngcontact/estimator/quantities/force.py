@@ -53,7 +53,7 @@ def _component(solution: Guaranteed, pair: int, e: Array) -> float:
     solution.work["back_solves"] += found.back_solves
     solution.work["equilibrations"] += 1
     proof = solution.equilibrated.proof
-    error = force_bar(solution.problem, u, Tested(G, directions), proof)
+    error = force_bar(u, Tested(G, directions), proof)
     a, b = (x.vec.FV().NumPy() for x in (u, G))
     noise = ROUND_OFF * float(np.sqrt((space.diagonal @ a**2) * (space.diagonal @ b**2)))
     return error + noise + _integrated(solution, G, proof.sampled)
