@@ -13,6 +13,7 @@ from ..fem import BoundaryTrace, normal_stress_of, rough_moduli, stiffnesses
 from ..lagrange import gauss
 from ..mesh import diameters
 from ..problem import Problem, Triangulation
+from ..quadrature import features_of
 from .interior import projected_stress
 from .oscillation import project_by_compliance
 
@@ -128,6 +129,11 @@ def scaled(
         project_by_compliance(problem, projected, stress, modulus, rough, boundary.model)
     coefficients = projected.vec.FV().NumPy()
     unit = power_of_two(coefficients)
+    # Displacements that nodes hardly know of, as narrow ones, may be the largest by far.
+    seen = [x.largest for x in features_of(problem, boundary.mesh) if x.kind == "displacement"]
+    if seen:
+        strain = power_of_two(np.array(seen)) / power_of_two(np.ptp(boundary.curve, axis=(0, 1)))
+        unit = max(unit, modulus * strain)
     coefficients /= unit
     return ScaledSolution(
         problem=problem,

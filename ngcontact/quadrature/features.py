@@ -50,7 +50,8 @@ FEW = 6  # samples in a feature up to which what is between them is looked at
 MEASURED = 65  # points across a feature, to tell its width
 FEATURES = 200  # of one function on a line
 ACROSS = 16  # features of a body of which widths are measured ...
-WIDE = 8.0  # ... up to so many samples on either side
+WIDE = 8.0  # ... up to so many samples on either side ...
+CHORD = 20  # ... by so many points: to a quarter
 NARROWEST = 0.1  # samples: no feature is taken for narrower
 
 Function: TypeAlias = ng.CoefficientFunction | Callable[[Array, Array], Array]
@@ -420,15 +421,15 @@ def _widths(
     if not len(places):
         return np.empty(0)
     some = places[np.linspace(0, len(places) - 1, min(len(places), ACROSS)).astype(int)]
-    t = spacing * np.geomspace(NARROWEST, WIDE, MEASURED // 2)
+    t = spacing * np.geomspace(NARROWEST, WIDE, CHORD)
     t = np.concatenate([-t[::-1], [0.0], t])
-    angle = TURN / 2 + np.pi / 4 * np.arange(4)
+    angle = TURN / 2 + np.pi / 3 * np.arange(3)
     steps = t[:, None, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     x = (some[:, None, None] + steps).reshape(-1, 2)
     points = mesh(x[:, 0].copy(), x[:, 1].copy())
     known, middle = points["nr"] >= 0, len(t) // 2
     found = _told(kind, looked(function, points[known]))[0]
-    told = np.zeros((len(some), len(t), 4, found.shape[1]))
+    told = np.zeros((len(some), len(t), len(angle), found.shape[1]))
     told.reshape(len(x), -1)[known] = found
     away = np.abs(told - told[:, middle, None]).max(axis=3)
     away[~known.reshape(away.shape)] = 0.0

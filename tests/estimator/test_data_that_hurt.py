@@ -240,3 +240,20 @@ def test_slips_along_a_curved_zone(name):
     assert 1 <= (found / errors).min() <= (found / errors).max() <= 8
     # Meshes made anew. By the mesh's normals it fell like the root of h.
     assert np.log2(found[0] / found[-1]) / 2 > 0.85
+
+
+def test_a_displacement_that_no_node_knows_of():
+    """At nodes it is 1e-200, which is no unit of squares; the error is the solution's norm."""
+    problem = Problem(
+        geometry=square(),
+        materials={"body": Elastic(1.0, 0.3)},
+        displacement={
+            "bottom": (0, 0),
+            "top": (None, -0.01 * ng.exp(-(((ng.x - 0.87) / 2e-3) ** 2))),
+        },
+    )
+    with pytest.warns(ContactWarning, match="has a feature"):
+        solution = solve(problem, maxh=0.34)
+    *_, fine = adapt(problem, order=2, max_dofs=4000)
+    assert solution.energy_norm < 1e-6 * fine.energy_norm
+    assert 1 <= solution.error_estimate / fine.energy_norm <= 8  # measured 1.3
