@@ -6,9 +6,9 @@ for each triangle; docs/bounds.md has the proof. Extrema on curves are taken ove
 
 Where F or P are no polynomials s balances projections of them. On a triangle T where that counts,
 the stress s' nearest to sigma_h with the tractions of s on inner sides and on Gamma_u, with P and
-p* on the others, and -div s' = F, is sought on parts of T, where again F and P are met in
-projections. s' may stand for s on T, with what it misses itself; both have the same resultants, for
-the rules on T are those on its parts.
+p* on the others, and -div s' = F, is sought of a higher degree, or on parts of T, where again F and
+P are met in projections. s' may stand for s on T, with what it misses itself; both have the same
+resultants, for the rules on T are those on its parts.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from ...arrays import Array, Index
 from .cells import Cells
 from .elements import Element, elements_of
 from .norms import SETTLED, forces_missed, residuals, smallest_moduli, stress_norms
-from .parts import divided, pattern
+from .parts import LEVELS, PARTS, divided, pattern
 from .program import dual_program, exerted
 from .tractions import Given, side_rule, tractions_of
 
@@ -31,6 +31,7 @@ SEEN = 17  # points on each side
 # Shares of corners in places at which the middle of both balls is sought, beside the incentre.
 INNER = np.array([(i, j, 8 - i - j) for i in range(1, 8) for j in range(1, 8 - i)]) / 8
 COUNTS = 0.02  # of |s - sigma_h|^2, what may be added by data where nothing is balanced again
+RAISED = 3  # degrees on whole triangles
 LEAST = 3  # degree on parts: lower ones do not meet all tractions
 AT_ONCE = 200  # triangles
 
@@ -160,38 +161,40 @@ def once_more(
     c, D = level.distance.copy(), level.loads.copy()
     limit = COUNTS * float(c @ c) if allowed is None else allowed
     _, depth, thirds = level.look.T
-    lost = (c + D) ** 2 - c**2
-    order = np.argsort(lost)
-    counts = np.cumsum(lost[order]) > limit
-    at = np.sort(order[counts & (depth[order] > 0)])
-    for third in (False, True):
-        some = at[thirds[at] == third]
+    for m, third in ((1, False), (PARTS, False), (PARTS, True)):
+        lost = (c + D) ** 2 - c**2
+        order = np.argsort(lost)
+        at = np.sort(order[np.cumsum(lost[order]) > limit])
+        fits = depth < LEVELS if m == 1 else (depth > 0) & (thirds == third)
+        some = at[fits[at]]
         for start in range(0, len(some), AT_ONCE):
             here = some[start : start + AT_ONCE]
-            share = limit * len(here) / len(at)
-            one, two = _on_parts(displacement, given, level, here, degree, scale, third, share)
+            share, division = limit * len(here) / len(some), (m, third)
+            one, two = _anew(displacement, given, level, here, degree, scale, division, share)
             better = one + two < c[here] + D[here]
             c[here[better]], D[here[better]] = one[better], two[better]
     return c, D
 
 
-def _on_parts(
+def _anew(
     displacement: ng.CoefficientFunction,
     given: Given,
     level: Level,
     at: Index,
     degree: int,
     scale: float,
-    thirds: bool,
+    division: tuple[int, bool],
     allowed: float,
 ) -> tuple[Array, Array]:
     """`Level.distance` and `.loads` of s' on triangles `at` (b,); infinite without equilibrium.
 
-    `allowed` may be added to B^2 on these triangles.
+    `division` is that of `pattern`, one part of a higher degree or more; `allowed` may be added to
+    B^2 on these triangles.
     """
-    parts, k, degree = divided(level.cells, at, thirds), len(pattern(thirds)[1]), max(degree, LEAST)
-    look = np.repeat(level.look[at], k, axis=0)
-    look[:, 1] -= 1
+    parts, k = divided(level.cells, at, *division), len(pattern(*division)[1])
+    look, whole = np.repeat(level.look[at], k, axis=0), k == 1
+    look[:, 1] -= not whole
+    degree = degree + RAISED if whole else max(degree, LEAST)
     mu, elements = elements_of(given.problem, parts, displacement, degree, look)
     rule = side_rule(parts, given.breaks, np.flatnonzero(~parts.inner))
     owner = parts.owner[rule.side]
@@ -208,7 +211,7 @@ def _on_parts(
     moduli = smallest_moduli(elements, len(look))
     loads = data_norms(parts, forces_missed(elements, len(look)), missed, moduli)
     both = distance, loads
-    if look[:, 1].any():
+    if look[:, 1].any() and not whole:
         finer = Level(parts, elements, found, look, *both)
         both = once_more(displacement, given, finer, degree, scale, allowed)
     settled = left.reshape(-1, k).max(axis=1) <= SETTLED

@@ -23,8 +23,8 @@ AT_ONCE = 200_000  # points at which forces are looked at together
 
 
 @lru_cache
-def pattern(thirds: bool) -> tuple[Array, Index]:
-    """The equal parts of a triangle; those at its corners in `thirds` about their middles.
+def pattern(m: int, thirds: bool) -> tuple[Array, Index]:
+    """The m^2 equal parts of a triangle; those at its corners in `thirds` about their middles.
 
     There given tractions may be those of no symmetric stress.
 
@@ -35,26 +35,26 @@ def pattern(thirds: bool) -> tuple[Array, Index]:
     corners : ndarray of int (k, 3)
         Vertices of each part, anticlockwise.
     """
-    lattice = [(i, j) for i in range(PARTS + 1) for j in range(PARTS + 1 - i)]
+    lattice = [(i, j) for i in range(m + 1) for j in range(m + 1 - i)]
     at = {ij: n for n, ij in enumerate(lattice)}
-    vertices, found = [(PARTS - i - j, i, j) for i, j in lattice], []
+    vertices, found = [(m - i - j, i, j) for i, j in lattice], []
     for i, j in lattice:
-        if i + j < PARTS:
+        if i + j < m:
             a, b, c = up = [at[i, j], at[i + 1, j], at[i, j + 1]]
-            if thirds and any(max(vertices[v]) == PARTS for v in up):
+            if thirds and any(max(vertices[v]) == m for v in up):
                 middle = len(vertices)
                 vertices.append(tuple(np.mean([vertices[v] for v in up], axis=0)))
                 found += [[middle, b, c], [middle, c, a], [middle, a, b]]
             else:
                 found.append(up)
-        if i + j < PARTS - 1:
+        if i + j < m - 1:
             found.append([at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]])
-    return np.array(vertices) / PARTS, np.array(found)
+    return np.array(vertices) / m, np.array(found)
 
 
-def divided(cells: Cells, at: Index, thirds: bool) -> Cells:
+def divided(cells: Cells, at: Index, m: int, thirds: bool) -> Cells:
     """Triangles `at` (b,) in the parts of `pattern`, each with vertices of its own."""
-    shares, corners = pattern(thirds)
+    shares, corners = pattern(m, thirds)
     p, k = len(shares), len(corners)
     return joined(
         cells.trace,
@@ -77,7 +77,7 @@ def looked_at(
         bent = len(at) > 0 and cells.curved[at[0]]
         points = places(cells, at, BENT * order if bent else order)
         return points.x, points.weight * cells.measure(points.x), points.evaluate(cells, F)
-    parts, found = divided(cells, at, thirds), []
+    parts, found = divided(cells, at, PARTS, thirds), []
     for curved in (False, True):
         some = np.flatnonzero(parts.curved == curved)
         if some.size:
@@ -107,7 +107,7 @@ def projection(
         L2 norms of some `components` of what they miss of F, and of F, times the measure.
     """
     force, norms = [], []
-    step = max(1, AT_ONCE // (len(pattern(thirds)[1]) ** depth * (order // 2 + 1) ** 2))
+    step = max(1, AT_ONCE // (len(pattern(PARTS, thirds)[1]) ** depth * (order // 2 + 1) ** 2))
     for start in range(0, len(at), step):
         some = at[start : start + step]
         x, weight, values = looked_at(F, cells, some, order, depth, thirds)
@@ -172,7 +172,7 @@ def _depths(
     depth = np.maximum(asked, rough)
     some = np.flatnonzero((depth > 0) & (asked < LEVELS))
     if some.size:
-        parts = divided(cells, at[some], False)
+        parts = divided(cells, at[some], PARTS, False)
         every = np.arange(len(parts.triangles))
         inner = _depths(F, parts, every, 0 * every, rule, threshold)
         depth[some] = 1 + inner.reshape(len(some), -1).max(axis=1)
