@@ -65,7 +65,7 @@ python_maximum_signature_line_length = 88
 nitpick_ignore_regex = [("py:obj", ".*"), ("py:.*", r"(?!ngcontact\.).*")]
 nitpick_ignore = [  # in signatures, but of the inside
     ("py:class", "ngcontact.fem.boundary.BoundaryTrace"),
-    ("py:class", "ngcontact.contact.transitions.Transitions"),
+    ("py:class", "ngcontact.contact.state.Transitions"),
 ]
 
 # Look.

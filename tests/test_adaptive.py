@@ -164,7 +164,7 @@ def test_the_estimator_decides_where_to_refine(monkeypatch):
         x = np.array(ng.Integrate(ng.x, solved.mesh, element_wise=True))
         return Estimate(indicators=np.maximum(-x, 0.0), parts={})
 
-    monkeypatch.setattr("ngcontact.estimator.estimated.estimate", left)
+    monkeypatch.setattr("ngcontact.estimator.residual.estimate", left)
     chosen = refinement(order=2, max_dofs=2000)
     mesh = first_mesh(problem, 0.5)
     solutions = list(adaptive.levels(problem, mesh, chosen))

@@ -19,7 +19,7 @@ from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
 from ngcontact.geometries import blocks, disc, disc_on_block, disc_on_disc, rings
 from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.mesh.generation import first_mesh
-from ngcontact.problem.regions import boundary_mask
+from ngcontact.problem.values import boundary_mask
 
 SOFT = Elastic(E=1.0, nu=0.3)
 STIFF = Elastic(E=3.0, nu=0.2)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from ngcontact.triplets import from_triplets
+from ngcontact.arrays import from_triplets
 
 
 @pytest.mark.parametrize("index", [np.int32, np.int64, np.uint64])

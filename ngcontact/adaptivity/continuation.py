@@ -10,9 +10,9 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask
 from ..problem import Problem, Triangulation
-from .exceptions import at_limit
-from .forecast import Aim, Forecast, areas, depths, planned, touching
 from .marking import doerfler
+from .refinement import Aim, Forecast, areas, depths, planned, touching
+from .singularities import at_limit
 
 
 @dataclass(frozen=True, eq=False)

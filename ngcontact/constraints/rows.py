@@ -10,8 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Array, Index, Mask
-from ..triplets import from_triplets
+from ..arrays import Array, Index, Mask, from_triplets
 
 REPEATED = 1e-9  # difference of coefficients, each at most 1, below which two rows are one
 

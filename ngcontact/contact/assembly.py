@@ -7,11 +7,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, from_triplets
 from ..constraints import Rows, concatenated, no_rows
 from ..fem import BoundaryTrace
 from ..problem import Contact
-from ..triplets import from_triplets
 from .dual import with_dual_rows
 from .line import ContactLine, nodal_line, without
 from .state import by_line

@@ -23,11 +23,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, from_triplets
 from ..fem import BoundaryTrace
 from ..lagrange import gauss, lagrange
 from ..problem import Contact
-from ..triplets import from_triplets
 from .line import ContactLine, jacobian, prescribed_gap, segment_weights
 from .projection import at, crossings, feet
 from .search import partners

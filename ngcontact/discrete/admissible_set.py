@@ -8,12 +8,95 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Array, Mask
-from ..constraints import BasisTransformation, Conditions, change_of_basis
+from ..arrays import Array, Index, Mask
+from ..constraints import (
+    BasisTransformation,
+    Conditions,
+    change_of_basis,
+    concatenated,
+    no_conditions,
+)
 from ..contact import ContactLine, joined, kept_lines, merged
-from ..fem import Space
-from ..problem import Problem
-from .supports import support_conditions
+from ..fem import BoundaryTrace, Space
+from ..problem import Problem, boundary_mask
+
+
+def _prescribed(problem: Problem, trace: BoundaryTrace) -> Conditions:
+    """Gamma_u, (3.6): interpolated displacement components at the nodes."""
+    n = trace.space.ndof
+    given = np.zeros((2, n), dtype=bool)
+    value = np.zeros((2, n))
+    for pattern, components in problem.displacement.items():
+        segment, s = trace.at_nodes(trace.segments(pattern))
+        node = trace.nodes[segment[:: trace.order + 1]].ravel()
+        for axis, function in enumerate(components):
+            if function is not None:
+                given[axis, node] = True
+                value[axis, node] = trace.evaluate(function, segment, s)[:, 0]  # (3.6)
+    axes, nodes = np.nonzero(given)
+    return Conditions(node=nodes, direction=np.eye(2)[axes], value=value[axes, nodes])
+
+
+def _guided(problem: Problem, trace: BoundaryTrace) -> Conditions:
+    """Gamma_0, (3.8): zero normal displacement at the nodes, with the exact normals."""
+    if problem.sliding is None:
+        return no_conditions()
+    segment, s = trace.at_nodes(trace.segments(str(problem.sliding)))
+    node = trace.nodes[segment[:: trace.order + 1]].ravel()
+    number, normal = trace.number_points(segment, node, trace.exact_normal(segment, s))
+    _, first = np.unique(number, return_index=True)
+    return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))  # (3.8)
+
+
+def _on_axis(trace: BoundaryTrace) -> Conditions:
+    """No radial displacement on the axis of a body of revolution."""
+    ends = [trace.nodes[trace.axis == end, place] for end, place in ((-1, 0), (1, -1))]
+    node = np.unique(np.concatenate([trace.nodes[trace.on_axis].ravel(), *ends]))
+    return Conditions(node, np.tile([1.0, 0.0], (len(node), 1)), np.zeros(len(node)))
+
+
+def support_conditions(problem: Problem, trace: BoundaryTrace) -> Conditions:
+    """Gamma_u and Gamma_0, to which the axis of a body of revolution belongs."""
+    return concatenated([_prescribed(problem, trace), _guided(problem, trace), _on_axis(trace)])
+
+
+def conditioned_segments(problem: Problem, trace: BoundaryTrace) -> Index:
+    """Segments (k,) on which conditions are posed: Gamma_u, Gamma_0, Gamma_K, the axis."""
+    sides = [side for pair in problem.contact for side in (pair.secondary, pair.primary)]
+    guides = [] if problem.sliding is None else [str(problem.sliding)]
+    chosen = trace.lies_on(np.arange(len(trace.region)), *problem.displacement, *guides, *sides)
+    return np.flatnonzero(chosen | trace.on_axis)
+
+
+def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[str, Array]:
+    """Sums (2,) of forces on nodes, by boundary of Gamma_u and Gamma_0.
+
+    Parameters
+    ----------
+    problem : Problem
+        What names these boundaries.
+    trace : BoundaryTrace
+        The boundary.
+    reaction : ndarray (n, 2)
+        Forces of the supports on its nodes and all others, per unit thickness.
+    """
+    mesh = trace.mesh
+    names = np.array(mesh.GetBoundaries())
+    patterns = [
+        *reversed(list(problem.displacement)),  # at a common node the last one is in force
+        *([] if problem.sliding is None else [str(problem.sliding)]),
+    ]
+    counted = np.zeros(len(reaction), dtype=bool)
+    result: dict[str, Array] = {}
+    for pattern in patterns:
+        segments = trace.segments(pattern)
+        named = names[trace.region[segments]]
+        for name in dict.fromkeys(names[boundary_mask(mesh, pattern)]):
+            nodes = np.unique(trace.nodes[segments[named == name]])
+            nodes = nodes[~counted[nodes]]
+            counted[nodes] = True
+            result[str(name)] = trace.model.resultant(reaction[nodes].sum(axis=0))
+    return result
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,9 +1,9 @@
 """Error indicators of a solution, and bounds of its error."""
 
 from .bound import refuse_bound as refuse_bound
-from .estimated import Estimated as Estimated
 from .quantities import Measured as Measured
 from .quantities import Quantities as Quantities
 from .quantities import Quantity as Quantity
 from .residual import Estimate as Estimate
+from .residual import Estimated as Estimated
 from .residual import estimate as estimate

@@ -22,11 +22,10 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Array
+from ..arrays import Array, from_triplets
 from ..fem import BoundaryTrace, bulk_moduli
 from ..linalg import cholesky, lower_half, shared
 from ..problem import Problem, Triangulation
-from ..triplets import from_triplets
 from .terms import BoundaryResidual, PressureShare, ScaledSolution
 
 HELD = 1e6  # stiffness of supports in the last term, relative to the elements beside them

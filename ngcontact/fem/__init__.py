@@ -1,22 +1,13 @@
 """The finite element spaces V_h: elements, boundary nodes, forms, energies."""
 
-from .bodies import Bodies as Bodies
-from .bodies import body_of_unknown as body_of_unknown
-from .bodies import connected_bodies as connected_bodies
+from .boundary import ORDERS as ORDERS
 from .boundary import BoundaryTrace as BoundaryTrace
 from .boundary import boundary_trace as boundary_trace
-from .element import ORDERS as ORDERS
-from .element import check_element as check_element
-from .element import edge_bubbles as edge_bubbles
-from .element import node_basis as node_basis
-from .element import unknowns as unknowns
-from .element import unknowns_of as unknowns_of
-from .energy import energy_norm as energy_norm
-from .energy import normal_stress_of as normal_stress_of
-from .energy import potential_energy as potential_energy
-from .energy import stress_of as stress_of
-from .energy import voigt_stress as voigt_stress
-from .energy import von_mises as von_mises
+from .boundary import check_element as check_element
+from .boundary import edge_bubbles as edge_bubbles
+from .boundary import node_basis as node_basis
+from .boundary import unknowns as unknowns
+from .boundary import unknowns_of as unknowns_of
 from .model import MODELS as MODELS
 from .model import Model as Model
 from .model import model_of as model_of
@@ -31,9 +22,18 @@ from .moduli import stiffer_than as stiffer_than
 from .moduli import stiffnesses as stiffnesses
 from .moduli import warn_of_locking as warn_of_locking
 from .space import LOAD_BONUS as LOAD_BONUS
+from .space import Bodies as Bodies
 from .space import Space as Space
 from .space import assemble as assemble
+from .space import body_of_unknown as body_of_unknown
+from .space import connected_bodies as connected_bodies
+from .space import energy_norm as energy_norm
 from .space import has_rough_loads as has_rough_loads
 from .space import load_vector as load_vector
 from .space import loads_of as loads_of
 from .space import narrow_forces as narrow_forces
+from .space import normal_stress_of as normal_stress_of
+from .space import potential_energy as potential_energy
+from .space import stress_of as stress_of
+from .space import voigt_stress as voigt_stress
+from .space import von_mises as von_mises

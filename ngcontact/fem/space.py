@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,18 +12,18 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, power_of_two
 from ..linalg import shared
-from ..problem import Problem, Triangulation, varies
+from ..problem import Problem, Triangulation, body_of_vertex, varies
 from ..quadrature import keep_rough_load, known_rough_load, moment_degree
-from .boundary import BoundaryTrace
-from .element import node_basis, vector_space
+from .boundary import BoundaryTrace, node_basis, vector_space
 from .model import model_of
 from .moduli import constant_measures, law_measures, rough_moduli
 
 Load: TypeAlias = tuple[ng.CoefficientFunction, ng.CoefficientFunction, ng.Region]
 
 LOAD_BONUS = 6  # quadrature orders above the default: loads may be as rough as r^(-1/2)
+CANCELLED = 1e-6  # energy relative to its terms below which fewer than ten digits are left
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,3 +174,111 @@ def assemble(
         f=load_vector(problem, V, LOAD_BONUS),
         vertices=Triangulation(mesh).vertices,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """The connected bodies, b of them.
+
+    Attributes
+    ----------
+    names : list of str
+        The material region of each.
+    middle : ndarray (b, 2)
+        Of its boundary.
+    size : ndarray (b,)
+        Half its extent, a length.
+    of_segment, of_vertex : ndarray of int (q,), (nv,)
+        The body of each segment of the boundary and of each vertex of the mesh.
+    """
+
+    names: list[str]
+    middle: Array
+    size: Array
+    of_segment: Index
+    of_vertex: Index
+
+
+def connected_bodies(trace: BoundaryTrace) -> Bodies:
+    """The connected pieces of the mesh of `trace`."""
+    piece = body_of_vertex(trace.mesh)
+    pieces, number = np.unique(piece[trace.nodes[:, 0]], return_inverse=True)
+    materials = trace.mesh.GetMaterials()
+    names = {int(b): materials[m] for b, m in zip(number, trace.body, strict=True)}
+    ends = [trace.curve[number == b].reshape(-1, 2) for b in range(len(names))]
+    return Bodies(
+        names=[names[b] for b in range(len(names))],
+        middle=np.array([(x.min(axis=0) + x.max(axis=0)) / 2 for x in ends]),
+        size=np.array([np.ptp(x, axis=0).max() / 2 for x in ends]),
+        of_segment=number,
+        of_vertex=np.searchsorted(pieces, piece),
+    )
+
+
+def body_of_unknown(space: Space, bodies: Bodies) -> Index:
+    """Number of the body that each unknown (2N,) of V_h belongs to."""
+    # Vertices come first, so that the first entry of a row is one of an element of its body.
+    return bodies.of_vertex[space.A.indices[space.A.indptr[:-1]]]
+
+
+def potential_energy(problem: Problem, space: Space, displacement: ng.GridFunction) -> float:
+    """L(u_h) of HH81 (2.6), per unit thickness."""
+    size, energy = _scaled_energy(problem, space, displacement)
+    work = float(space.f / size @ (displacement.vec.FV().NumPy() / size))
+    return (energy / 2 - work) * size * size  # (2.6)
+
+
+def energy_norm(problem: Problem, space: Space, displacement: ng.GridFunction) -> float:
+    """A(u_h, u_h)^(1/2), root of an energy per unit thickness."""
+    size, energy = _scaled_energy(problem, space, displacement)
+    return math.sqrt(energy) * size
+
+
+def _scaled_energy(
+    problem: Problem, space: Space, displacement: ng.GridFunction
+) -> tuple[float, float]:
+    """A size s of the displacement, whose squares may leave the range, and A(u_h / s, u_h / s).
+
+    From the strains where large rigid motions would cancel.
+    """
+    u, mesh, order = displacement.vec.FV().NumPy(), space.trace.mesh, space.trace.order
+    size = power_of_two(u)
+    u = u / size
+    energy = float(u @ (space.A @ u))
+    if energy <= CANCELLED * float(space.diagonal @ u**2):
+        space.require_mesh()
+        model = model_of(problem)
+        e, energy = model.strain(displacement) / size, 0.0
+        for body, law in problem.materials.items():
+            stress = model.stress(law.voigt(problem.model), e)
+            density = model.weighted(ng.InnerProduct(stress, e)).Compile()
+            energy += ng.Integrate(density, mesh.Materials(body), order=2 * order + 2)
+    return size, energy
+
+
+def voigt_stress(problem: Problem, displacement: ng.GridFunction) -> list[ng.CoefficientFunction]:
+    """The q Voigt components of the stress of a displacement, in the units of the moduli."""
+    model, mesh = model_of(problem), displacement.space.mesh
+    e = model.strain(displacement)
+    by_body = {
+        body: model.stress(law.voigt(problem.model), e) for body, law in problem.materials.items()
+    }
+    return [mesh.MaterialCF({body: s[i] for body, s in by_body.items()}) for i in range(e.dim)]
+
+
+def stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.CoefficientFunction:
+    """Stress (2, 2) in the plane of a displacement, sigma_h, in the units of the moduli."""
+    return model_of(problem).in_plane(voigt_stress(problem, displacement))
+
+
+def normal_stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.CoefficientFunction:
+    """Stress normal to the plane of a displacement, a scalar, in the units of the moduli."""
+    voigt, mesh = voigt_stress(problem, displacement), displacement.space.mesh
+    return model_of(problem).out_of_plane(problem.materials, mesh, voigt)
+
+
+def von_mises(stress: Array) -> Array:
+    """Von Mises stress (k,) of the components xx, yy, xy, zz in `stress` (k, 4), same units."""
+    size = float(np.abs(stress).max(initial=0.0)) or 1.0  # squares must stay in range
+    xx, yy, xy, zz = stress.T / size
+    return size * np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * xy**2)

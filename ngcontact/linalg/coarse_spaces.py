@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Integers
+from ..arrays import Integers, from_triplets
 from ..lagrange import gauss_lobatto
-from ..triplets import from_triplets
 
 COARSEST = 10_000  # unknowns below which a factor costs less than what coarser spaces save
 SHARE = 0.5  # of the vertices that the next coarser space has at most

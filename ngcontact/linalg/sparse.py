@@ -12,8 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from pyngcore import Array_D_S, Array_I_S
 
-from ..arrays import Array, Factor, Index, Mask, Solve
-from ..triplets import from_triplets
+from ..arrays import Array, Factor, Index, Mask, Solve, from_triplets
 
 # Unknowns up to which one thread factorises sooner than NGSolve has started others and they have
 # found their work: that takes 25 ms of processor time, 10 000 unknowns of order 3 on one thread 33.

@@ -9,7 +9,9 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 
+from ..arrays import Array, Index, Integers, Mask
 from ..problem import Problem, Triangulation, triangle_sides
+from .cad import cad_edges
 from .matching import Edge, divided
 
 COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given ...
@@ -22,6 +24,74 @@ FARTHEST = 5e8  # from the origin
 SMALLEST = 1e-6  # extent
 
 SHARED = threading.Lock()
+KEPT = "_ngcontact_parents"  # attribute of a mesh: it lives as long as the mesh
+# OCC's projections know absolute lengths: points within 1e-7 of the end of an arc go to that end,
+# on other curves 1e-10 over the speed counts as met. On edges of extent SHORTEST that changes no
+# more than 1e-8 of it as long as elements keep their shape.
+SHORTEST = 1e-2  # extent of an edge; measured: all but arcs of circles are wrong from 2e-3
+SHORTEST = 1e-6  # a segment of a curved edge; measured: elements of order 4 turn over at 5e-7
+SHORTEST_ON_SMALL = 1e-5  # ... of a smaller arc; measured: middles displaced from 5e-6, order 4
+ON_CURVE = 1e-12  # distance, relative to the geometry's size, at which an element misses its curve
+
+
+def vertex_parents(mesh: ng.Mesh) -> Integers:
+    """Ends of the edges that refinement halved, (nv, 2); -1 for vertices of the first mesh.
+
+    Both have lower numbers than the vertex itself.
+    """
+    kept: Integers = getattr(mesh, KEPT, np.zeros((0, 2), dtype=np.int32))
+    known = len(kept)
+    if known > mesh.nv:  # another mesh has been loaded into this one
+        known, kept = 0, kept[:0]
+    if known < mesh.nv and mesh.GetParentVertices(mesh.nv - 1)[0] < 0:  # nothing was refined here
+        new = np.full((mesh.nv - known, 2), -1, dtype=np.int32)
+    else:
+        pairs = [mesh.GetParentVertices(v) for v in range(known, mesh.nv)]
+        new = np.array(pairs, dtype=np.int32).reshape(-1, 2)
+    return np.concatenate([kept, new])
+
+
+def copied(mesh: ng.Mesh) -> ng.Mesh:
+    """Copy that keeps the names, the geometry and the parents; not curved."""
+    copy = ng.Mesh(mesh.ngmesh.Copy())
+    keep_parents(copy, vertex_parents(mesh))
+    return copy
+
+
+def keep_parents(mesh: ng.Mesh, parents: Integers) -> None:
+    """Let `vertex_parents` of a mesh that forgot them be `parents` (nv, 2)."""
+    setattr(mesh, KEPT, parents)
+
+
+def diameters(mesh: ng.Mesh) -> Array:
+    """Longest side of each triangle, (ne,), lengths."""
+    corners = Triangulation(mesh).corners
+    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+
+
+def neighbours(segments: Index, triangles: Index, vertices: int) -> tuple[Index, Mask]:
+    """Number (k,) of a triangle at each segment, and whether there is another one, (k,).
+
+    `segments` (k, 2) and `triangles` (ne, 3) are those of a mesh of so many `vertices`.
+    """
+    marked = np.zeros(vertices, dtype=bool)
+    marked[segments] = True
+    sides = triangle_sides(triangles)
+    some = np.flatnonzero(marked[sides].all(axis=1))  # few, which are sorted in no time
+    sides = np.sort(sides[some], axis=1)
+    keys = sides[:, 0] * vertices + sides[:, 1]
+    order = np.argsort(keys)
+    low, high = np.sort(segments, axis=1).T
+    wanted = low * vertices + high
+    first = np.searchsorted(keys[order], wanted)
+    last = np.searchsorted(keys[order], wanted, side="right")
+    return some[order[first]] // 3, last - first > 1
+
+
+def rightward(vectors: Array) -> Array:
+    """Unit vectors (k, 2) to the right of `vectors` (k, 2)."""
+    right = np.column_stack([vectors[:, 1], -vectors[:, 0]])
+    return right / np.linalg.norm(right, axis=1)[:, None]
 
 
 def _require_complete(mesh: ng.Mesh, problem: Problem) -> None:
@@ -104,3 +174,78 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
         mesh = _generated(shape, edges, maxh)
     _require_complete(mesh, problem)
     return mesh
+
+
+def resolved_lengths(mesh: ng.Mesh) -> Array:
+    """Length (k,) of each boundary segment over the least on its curve; inf on straight edges."""
+    view = Triangulation(mesh)
+    ends = view.vertices[view.segments]
+    least = [
+        0.0 if edge.straight else SHORTEST_ON_SMALL if edge.size < SHORTEST else SHORTEST
+        for edge in cad_edges(mesh) or []
+    ]
+    if not least:
+        return np.full(len(ends), np.inf)
+    with np.errstate(divide="ignore"):
+        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / np.array(least)[view.boundaries]
+
+
+def unresolved(mesh: ng.Mesh) -> bool:
+    """Whether segments of curved elements are too short for OCC."""
+    return mesh.GetCurveOrder() > 1 and bool((resolved_lengths(mesh) < 1).any())
+
+
+def check_curves(mesh: ng.Mesh) -> None:
+    """Raise if curved edges are too small for OCC to curve the elements beside them.
+
+    Raises
+    ------
+    ValueError
+        Names the edge and its length; another unit of length mends it.
+    """
+    boundaries, length = Triangulation(mesh).boundaries, resolved_lengths(mesh)
+    for number, edge in enumerate(cad_edges(mesh) or []):
+        if edge.straight:
+            continue
+        small = edge.size < SHORTEST
+        limit = SHORTEST_ON_SMALL if small else SHORTEST
+        shortest = float(length[boundaries == number].min(initial=np.inf))
+        if shortest < 1 or (small and not edge.uniform):
+            raise ValueError(
+                f'the curved edge "{edge.name}" has the extent {edge.size:g} and segments of '
+                f"{shortest * limit:g}, on which the geometry kernel loses digits; choose a "
+                f"smaller unit of length: curved edges of {SHORTEST:g} and more may have segments "
+                f"down to {SHORTEST:g}"
+            )
+
+
+def geometry_order(order: int, element: str) -> int:
+    """Degree of the curved elements: Zlamal's (2.8) maps P_order by geometry one degree up."""
+    return order if element == "isoparametric" else order + 1  # (2.8)
+
+
+def _straightened(mesh: ng.Mesh) -> bool:
+    """Whether elements miss their own curved boundary, as after NGSolve's `Refine`."""
+    position = ng.CF((ng.x, ng.y))
+    off = ng.BoundaryFromVolumeCF(position) - position
+    missed, size = (ng.Integrate(ng.InnerProduct(x, x), mesh, ng.BND) for x in (off, position))
+    return bool(missed > ON_CURVE**2 * size)
+
+
+def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
+    """Mesh curved to the element's degree, and the number of elements at curved edges.
+
+    A mesh without an OCC geometry, without curved edges, or curved to that degree already is
+    used as it is; otherwise, also after `Refine` has straightened it, the result is a copy.
+    """
+    degree = geometry_order(order, element)
+    edges = cad_edges(mesh)
+    if edges is None:
+        return mesh, 0
+    curved = np.array([not edge.straight for edge in edges])[Triangulation(mesh).boundaries]
+    count = int(np.count_nonzero(curved))
+    if count == 0 or (mesh.GetCurveOrder() == degree and not _straightened(mesh)):
+        return mesh, count
+    copy = copied(mesh)
+    copy.Curve(degree)
+    return copy, count

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array
 from .files import check_path, replacing
-from .pictures.style import COLOURS, MARKS
+from .pictures.scene import COLOURS, MARKS
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

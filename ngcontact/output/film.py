@@ -13,12 +13,9 @@ import numpy as np
 from ..solved import Solved
 from .files import check_path, replacing
 from .pictures.fields import check_field
-from .pictures.lines import contact_lines
-from .pictures.panels import cut_pressure, shown_part
+from .pictures.panels import close_ups, colour_range, cut_pressure, shown_part
 from .pictures.picture import draw_scene
-from .pictures.scene import Scene, names_of, picture
-from .pictures.style import Style
-from .pictures.windows import close_ups, colour_range
+from .pictures.scene import Scene, Style, contact_lines, names_of, picture
 
 if TYPE_CHECKING:
     from PIL.Image import Image

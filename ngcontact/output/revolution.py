@@ -15,8 +15,7 @@ from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS
 from ..solved import Solved
 from .files import check_path, replacing
-from .nodes import full_stress, neighbour_tree, nodes_of, subdivision
-from .vtk import name_pairs, write_data
+from .vtk import full_stress, name_pairs, neighbour_tree, nodes_of, subdivision, write_data
 
 if TYPE_CHECKING:
     import pyvista

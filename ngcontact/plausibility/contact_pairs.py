@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Mask
-from ..contact import ContactState
+from ..arrays import Array, Index, Mask
+from ..contact import ContactState, partners, prescribed_gap
 from ..fem import BoundaryTrace, Space, bulk_moduli, shear_moduli, stiffer_than
+from ..lagrange import gauss_lobatto, lagrange_derivative
 from ..problem import Problem
-from .drawn import apart, contradicted
+from .drawn import Zones, apart, contradicted, zones_of
 from .estimates import moves_rigidly
-from .inclinations import INCLINED, inclinations, lies_across
-from .penetration import penetration
-from .zones import Zones, zones_of
 
 # Share of a pair's force below which a part of its zone does not matter.
 SHARE = 0.01
@@ -37,6 +36,173 @@ MISSING = 0.25
 # mean of a zone stays finite at the corners of a punch, where the peak does not; confined bodies
 # that are nearly incompressible bear pressures far above E at small strains.
 LARGE = 1.0
+PLACES = (np.arange(4) + 0.5) / 4  # on a segment; what lies between them is 1 / 16 of its sagitta
+MOST = 32  # segments of a pair that are looked at
+ROUND_OFF = 100 * np.finfo(float).eps  # of lengths and displacements
+INCLINED = np.deg2rad(15)  # from which forces along the direction are wrong by 1 - cos = 3.4 %
+TURN = np.cos(INCLINED / 2)  # mean of two unit normals at a vertex below which it is a corner
+
+
+def _at_vertices(
+    point: Index, at_end: Mask, normal: Array, xi: Array, count: int
+) -> tuple[Array, Mask]:
+    """Cosine (count,) of the normal nearest to `xi` at each point, and where the curve is smooth.
+
+    `point` (k,) numbers those of the unit normals `normal` (k, 2), `at_end` (k,) tells which are
+    one-sided at an end of a segment: at ends of the line and at corners no mean is a unit vector.
+    """
+    cosine, mean = np.full(count, -1.0), np.zeros((count, 2))
+    np.maximum.at(cosine, point, normal @ xi)
+    np.add.at(mean, point, np.where(at_end, 0.5, 1.0)[:, None] * normal)
+    return cosine, np.linalg.norm(mean, axis=1) > TURN
+
+
+def _of_secondary(trace: BoundaryTrace, state: ContactState, xi: Array) -> tuple[Array, Mask]:
+    """Cosine (m,) of the secondary's normal at the points in contact, and where it is smooth."""
+    line, m = state.line, len(state.active)
+    touching = np.flatnonzero(np.append(state.active, False)[line.rows].any(axis=1))
+    point = line.rows[touching].ravel()
+    segment, s = trace.at_nodes(line.segments[touching])
+    normal = trace.exact_normal(segment, s)
+    has = point >= 0
+    return _at_vertices(point[has], np.isin(s[has], (0.0, 1.0)), normal[has], xi, m)
+
+
+def _of_primary(
+    trace: BoundaryTrace, state: ContactState, points: Index, xi: Array
+) -> tuple[Array, Mask]:
+    """The same of the primary, where it is met from the `points` (k,) of the secondary."""
+    line = state.line
+    segment, s = line.partner[points], line.partner_s[points]
+    point, end = np.arange(len(points)), np.isin(s, (0.0, 1.0))
+    vertex = trace.nodes[segment, np.where(s < 0.5, 0, -1)]
+    # Both segments at a vertex: all that end there.
+    ends = trace.nodes[line.facing][:, [0, -1]]
+    which, local, side = np.nonzero(vertex[end, None, None] == ends)
+    point = np.concatenate([point[~end], point[end][which]])
+    at_end = np.concatenate([np.zeros(np.count_nonzero(~end), bool), np.ones(len(which), bool)])
+    segment = np.concatenate([segment[~end], line.facing[local]])
+    s = np.concatenate([s[~end], side.astype(float)])
+    return _at_vertices(point, at_end, -trace.exact_normal(segment, s), xi, len(points))
+
+
+def _of_obstacle(state: ContactState, points: Index, xi: Array) -> tuple[Array, Mask]:
+    """The same of a rigid obstacle, whose curve is that of the secondary moved by the gap."""
+    line = state.line
+    order = line.rows.shape[1] - 1
+    whole = line.rows[(line.rows >= 0).all(axis=1)]
+    curve = (line.position + line.gap[:, None] * xi)[whole]
+    slope = np.einsum("ni,kid->knd", lagrange_derivative(order, gauss_lobatto(order)), curve)
+    tangent = slope / np.linalg.norm(slope, axis=2)[:, :, None]
+    cosine = np.full(len(line.node), -1.0)
+    np.maximum.at(cosine, whole, np.abs(tangent[:, :, 0] * xi[1] - tangent[:, :, 1] * xi[0]))
+    return cosine[points], np.ones(len(points), dtype=bool)
+
+
+def lies_across(trace: BoundaryTrace, state: ContactState) -> bool:
+    """Whether the secondary has straight edges alone in contact, none inclined to the direction."""
+    line = state.line
+    if line.contact.direction is None or trace.edges is None:
+        return False
+    touching = np.append(state.active, False)[line.rows].any(axis=1)
+    segments = line.segments[touching]
+    chord = trace.curve[segments, -1] - trace.curve[segments, 0]
+    along = np.abs(chord @ np.array(line.contact.direction))
+    straight = all(trace.edges[k].straight for k in set(trace.region[segments].tolist()))
+    return straight and bool((along <= np.sin(INCLINED) * trace.lengths(segments)).all())
+
+
+def inclinations(trace: BoundaryTrace, state: ContactState) -> Array:
+    """Angles (m,) in radians between a pair's fixed direction and the surfaces; 0 where open.
+
+    The smaller one of both surfaces; ends of their lines and corners have no normal of their own
+    and count only where neither surface has.
+    """
+    line = state.line
+    if line.contact.direction is None or not state.active.any():
+        return np.zeros(len(state.active))
+    xi = np.array(line.contact.direction)
+    cosine, smooth = _of_secondary(trace, state, xi)
+    cosine[~state.active] = 1.0
+    steep = np.flatnonzero(cosine < np.cos(INCLINED))
+    if len(steep):
+        rigid = line.contact.primary is None
+        other, plain = (
+            _of_obstacle(state, steep, xi) if rigid else _of_primary(trace, state, steep, xi)
+        )
+        mine = np.where(smooth[steep] | ~plain, cosine[steep], -1.0)
+        cosine[steep] = np.maximum(mine, np.where(plain | ~smooth[steep], other, -1.0))
+    return np.arccos(np.clip(cosine, -1.0, 1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Penetration:
+    """Where bodies of one pair pass through each other most.
+
+    Attributes
+    ----------
+    depth : float
+        How deep, a length; 0 where they do not.
+    slope : float
+        Depth over the length of the segment: times a modulus a pressure that is not there.
+    place : ndarray (2,)
+        Where, on the secondary.
+    """
+
+    depth: float
+    slope: float
+    place: Array
+
+
+def _suspected(state: ContactState) -> Index:
+    """Numbers (j,) in `line.segments` between whose nodes the gap may be negative.
+
+    Not where all nodes are in contact, and not where the gap is wide beside its change on the
+    segment and its neighbours.
+    """
+    line, gap = state.line, np.maximum(state.gap, 0.0)
+    if state.active.all():
+        return line.segments[:0]
+    whole = np.flatnonzero((line.rows >= 0).all(axis=1))
+    rows = line.rows[whole]
+    high = np.zeros(len(gap))
+    np.maximum.at(high, rows, np.broadcast_to(gap[rows].max(axis=1)[:, None], rows.shape))
+    least, most = gap[rows].min(axis=1), high[rows].max(axis=1)
+    near = np.flatnonzero((2 * least < most) & ~state.active[rows].all(axis=1))
+    return whole[near[np.argsort(least[near], kind="stable")[:MOST]]]
+
+
+def penetration(
+    trace: BoundaryTrace, displacement: ng.GridFunction, state: ContactState
+) -> Penetration:
+    """Largest penetration between the contact points of one pair, on the curves of the mesh."""
+    line, local = state.line, _suspected(state)
+    none = Penetration(0.0, 0.0, np.full(2, np.nan))
+    if line.contact.bilateral or not len(local):
+        return none
+    segment, s = np.repeat(line.segments[local], len(PLACES)), np.tile(PLACES, len(local))
+    x, d = trace.point(segment, s), trace.normal(segment, s)
+    if line.contact.direction is not None:
+        d = np.tile(line.contact.direction, (len(s), 1))
+    there, s_there, distance, _ = partners(trace, line.facing, segment, x, d, nodes=False)
+    if line.contact.gap is not None:
+        distance = prescribed_gap(line.contact, trace, segment, s, x)
+    met = np.isfinite(distance) & ((there >= 0) | (line.contact.primary is None))
+    if not met.any():
+        return none
+    segment, there, x, d = segment[met], there[met], x[met], d[met]
+    s, s_there, distance = s[met], s_there[met], distance[met]
+    u = trace.evaluate(displacement, segment, s)
+    noise = ROUND_OFF * (np.abs(u).max() + np.abs(x).max())
+    if line.contact.primary is not None:
+        u = u - trace.evaluate(displacement, there, s_there)
+    gap = distance - (u * d).sum(axis=1)  # (2.10)
+    deepest = int(np.argmin(gap))
+    if gap[deepest] >= -noise:
+        return none
+    depth, [length] = -float(gap[deepest]), trace.lengths(segment[[deepest]])
+    return Penetration(depth, depth / float(length), x[deepest])
+
 
 Doubts = dict[tuple[str, int], str]  # messages by what is doubted and the number of the pair
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask
 from ..errors import warn
+from ..fem import warn_of_locking
 from ..mesh import cad_edges
 from ..problem import Problem
-from ..quadrature import View, features_of, numbers
+from ..quadrature import View, features_of, numbers, warn_of_data, warn_of_jumps
 
 APART = 1e-6  # values of two supports at one corner, relative to the largest, that are two values
 NOISE = 64 * np.finfo(float).eps  # ... and to the largest of all values: below it is round-off
@@ -144,3 +145,14 @@ def warn_of_contradictions(problem: Problem, mesh: ng.Mesh) -> None:
 def _place(one: Contradiction) -> str:
     """What is at the place of a contradiction."""
     return "a point" if one.supports[0] == one.supports[1] else "their corner"
+
+
+def warn_of_implausible(problem: Problem, mesh: ng.Mesh, order: int) -> None:
+    """Warn of elements that lock, loads that are nowhere, supports that contradict, laws that jump.
+
+    Once, of the first mesh.
+    """
+    warn_of_locking(problem, mesh, order)
+    warn_of_data(problem, mesh, order)
+    warn_of_contradictions(problem, mesh)
+    warn_of_jumps(problem, mesh)

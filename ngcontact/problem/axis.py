@@ -10,8 +10,8 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from .contact import Contact
-from .regions import body_mask, boundary_mask
 from .triangulation import Triangulation
+from .values import body_mask, boundary_mask
 
 ON_AXIS = 1e-9  # radius, relative to the largest, up to which a point lies on the axis
 NO_RADIAL = 1e-9  # radial part there, relative to the largest value, that is round-off

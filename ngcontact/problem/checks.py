@@ -16,9 +16,8 @@ import numpy as np
 
 from .contact import Contact
 from .material import Elastic, Hooke
-from .regions import body_mask, body_of_vertex, boundary_mask
 from .triangulation import Triangulation, triangle_sides
-from .values import refuse_where
+from .values import body_mask, body_of_vertex, boundary_mask, refuse_where
 
 # By 'argument "pattern"': which of the r boundaries or bodies of a mesh it selects, bool (r,).
 Masks = dict[str, np.ndarray]

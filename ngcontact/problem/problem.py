@@ -29,10 +29,11 @@ from .checks import (
 )
 from .contact import Contact
 from .material import ABOUT_AN_AXIS, Elastic, Hooke, require_model
-from .regions import body_mask, boundary_mask
 from .values import (
     Scalar,
     Vector,
+    body_mask,
+    boundary_mask,
     by_region,
     displacement_components,
     region_pattern,

@@ -4,12 +4,125 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg import qr
 
 from ..arrays import Array, Index, Mask
-from .null_space import NullSpace, no_null_space
+
+FREE = 1e-8  # singular value, relative to motions of size 1, below which nothing resists
+IN_CACHE = 1 << 14  # rows that are copied at a time: the copy stays in the cache
+ROUGH = 1e-11  # residual, relative to the largest met, of a system that tells the next active set
+REFINED = 1e-14  # ... and of the last system
+
+
+def vanishing_combinations(resisted: Array) -> Array:
+    """Combinations (r, l) of the r columns of `resisted` (k, r) that vanish, in echelon form."""
+    r = resisted.shape[1]
+    if len(resisted) < r:
+        resisted = np.pad(resisted, ((0, r - len(resisted)), (0, 0)))
+    if r == 0:
+        return np.zeros((0, 0))
+    _, singular, directions = np.linalg.svd(resisted, full_matrices=False)
+    return echelon(directions[singular <= FREE * np.sqrt(len(resisted))].T)
+
+
+def echelon(vectors: Array) -> Array:
+    """Columns (n, l) of the same span as `vectors` (n, l), of which l rows form the identity."""
+    if vectors.shape[1] == 0:
+        return vectors
+    pivots = qr(vectors.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
+    pivots.sort()
+    result = vectors @ np.linalg.inv(vectors[pivots])
+    result[pivots] = np.eye(len(pivots))
+    result[np.abs(result) <= FREE] = 0.0
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class NullSpace:
+    """Rigid motions in the unknowns of a quadratic program.
+
+    Attributes
+    ----------
+    lineal : ndarray (n, l)
+        Motions that no row resists.
+    others : ndarray (n, q)
+        The rest of the null space, zero at `held`.
+    held : ndarray of int (l,)
+        Unknowns that fix the first.
+    pins : ndarray of int (q,)
+        Unknowns that fix the others.
+    conditions : ndarray (l, n)
+        Functionals that vanish at the result, the identity on `lineal`.
+    """
+
+    lineal: Array
+    others: Array
+    held: Index
+    pins: Index
+    conditions: Array
+
+    def resisted(self, rows: Index) -> bool:
+        """Whether rows with the unknowns `rows` (k,) resist all motions that are not lineal."""
+        if self.pins.size == 0:
+            return True
+        return vanishing_combinations(self.others[rows]).shape[1] == 0
+
+
+def no_null_space(n: int) -> NullSpace:
+    """The null space of a definite matrix of size n."""
+    none, index = np.zeros((n, 0)), np.zeros(0, dtype=np.intp)
+    return NullSpace(lineal=none, others=none, held=index, pins=index, conditions=none.T)
+
+
+def pinned_null_space(
+    motions: Array, combinations: Array, functionals: Array, rows: Index, fixed: Mask
+) -> NullSpace:
+    """Null space with well separated pins.
+
+    Parameters
+    ----------
+    motions : ndarray (n, r)
+        Basis of the null space, of size 1, zero at `fixed`.
+    combinations : ndarray (r, l)
+        Of them that no row resists.
+    functionals : ndarray (l, n)
+        Conditions that determine those.
+    rows : ndarray of int (m,)
+        Unknowns that are the values of contact rows.
+    fixed : ndarray of bool (n,)
+        Unknowns with given values.
+
+    """
+    free = ~fixed
+    free[rows] = False
+    places = np.flatnonzero(free)
+    lineal = motions @ combinations
+    lineal[rows] = 0.0
+    held = _separated(lineal, places)
+    # What completes the lineal motions, less what these contribute at the held unknowns.
+    rest = motions @ np.linalg.svd(combinations, full_matrices=True)[0][:, lineal.shape[1] :]
+    rest -= lineal @ np.linalg.solve(lineal[held], rest[held]) if held.size else 0.0
+    rest[held] = 0.0
+    pins = _separated(rest, places)
+    return NullSpace(
+        lineal=lineal,
+        others=rest,
+        held=held,
+        pins=pins,
+        conditions=np.asarray(np.linalg.solve(functionals @ lineal, functionals), dtype=float),
+    )
+
+
+def _separated(vectors: Array, places: Index) -> Index:
+    """As many of the `places` as there are vectors, at which they are most independent."""
+    count = vectors.shape[1]
+    if count == 0:
+        return np.zeros(0, dtype=np.intp)
+    return places[qr(vectors[places].T, mode="r", pivoting=True)[1][:count]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,3 +202,160 @@ class Iterate:
     multiplier: Array = field(default_factory=lambda: np.zeros(0))
     factorizations: int = 0
     back_solves: int = 0
+
+
+def terms(A: sp.csr_array, x: Array, rows: int = IN_CACHE) -> Array:
+    """|A| |x| (m,), the size of the terms of A x, without a second matrix of that size.
+
+    Parameters
+    ----------
+    A : sparse (m, n)
+    x : ndarray (n,) or (n, k)
+        With k columns the result is (m, k).
+    rows : int
+        Rows that are copied at a time.
+    """
+    x = np.abs(x)
+    parts = [abs(A[start : start + rows]) @ x for start in range(0, A.shape[0], rows)]
+    return np.concatenate([np.zeros((0, *x.shape[1:])), *parts])
+
+
+def kkt_residuals(program: QuadraticProgram, minimiser: Iterate) -> dict[str, float]:
+    """Dimensionless residuals of the Karush-Kuhn-Tucker conditions, see `Solution.residuals`.
+
+    Parameters
+    ----------
+    program : QuadraticProgram
+        With unit rows.
+    minimiser : Iterate
+        As computed.
+    """
+    p, y, force, active = program, minimiser.u, minimiser.force, minimiser.active
+    gap = p.g - y[p.unknown]
+    residual = p.b - p.K @ y - p.R.T @ force
+    sizes = (p.b, terms(p.K, y), force)
+    load = max(np.abs(x).max(initial=0.0) for x in sizes)
+    length = max(np.abs(y).max(initial=0.0), np.abs(p.g[active]).max(initial=0.0))
+    largest = np.abs(force).max(initial=0.0)
+    one_sided = force[~p.equality]
+
+    def over(value: float, scale: float) -> float:
+        return float(value / scale) if value > 0 else 0.0
+
+    return {
+        "equilibrium": over(np.abs(residual[~p.fixed]).max(initial=0.0), load),
+        "penetration": over(-gap.min(initial=0.0), length),
+        "tension": over(-one_sided.min(initial=0.0), largest),
+        "complementarity": float(np.abs(force / (largest or 1.0) * (gap / (length or 1.0))).sum()),
+    }
+
+
+class SingularError(ArithmeticError):
+    """A factorised matrix does not solve its system: some motion meets no resistance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Anchor:
+    """Proximal terms stiffness / 2 (y - at)^2 on the q pins, which make every system definite.
+
+    Attributes
+    ----------
+    stiffness : ndarray (q,)
+        Force per displacement.
+    at : ndarray (q,)
+        Values of the pins from which they pull.
+    """
+
+    stiffness: Array
+    at: Array
+
+
+class LinearSystems(Protocol):
+    """The systems K y + R' force = b, R y = g on the active rows, force = 0 on the others.
+
+    Every solution starts from the one before. `solve` and `refine` may be called in any order.
+    """
+
+    @property
+    def program(self) -> QuadraticProgram:
+        """The program, n unknowns and m rows, of the last `restart`."""
+
+    @property
+    def factorizations(self) -> int:
+        """Factorisations since then."""
+
+    @property
+    def back_solves(self) -> int:
+        """Back-solves since then; V-cycles count as such."""
+
+    def restart(self, program: QuadraticProgram) -> None:
+        """Begin with another load, other values or bounds; what the matrix cost stays."""
+
+    def solve(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
+        """Solution (n,) and multipliers (m,) for the rows `active` (m,), to tell the next set.
+
+        Raises
+        ------
+        SingularError
+            The matrix is singular to working precision.
+        """
+
+    def refine(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
+        """Solution (n,), multipliers (m,) for `active` (m,) to round-off: little after `solve`."""
+
+    def stiffness(self) -> Array:
+        """Force per displacement at each row, (m,): an upper bound, infinite where unknown."""
+
+    def forget(self) -> None:
+        """Give memory back; what it held is made again when asked for."""
+
+
+@dataclass(eq=False)
+class Approximation:
+    """The last solution of a system, where the next one starts.
+
+    Attributes
+    ----------
+    program : QuadraticProgram
+        With n unknowns and m rows.
+    y : ndarray (n,)
+        Solution.
+    force : ndarray (m,)
+        Multipliers.
+    scale : float
+        Largest force that a system was to balance.
+    """
+
+    program: QuadraticProgram
+    y: Array
+    force: Array
+    scale: float = 0.0
+
+    def unbalanced(self, active: Mask, anchor: Anchor | None) -> Array:
+        """Unbalanced force b - K y - R' force, (n,), less that of the proximal terms.
+
+        The unit rows `active` (m,) first take as their force what is left at their unknowns.
+        """
+        p = self.program
+        residual = p.b - p.K @ self.y
+        if anchor is not None:
+            pins = p.null_space.pins
+            residual[pins] -= anchor.stiffness * (self.y[pins] - anchor.at)
+        if p.unit_rows:
+            self.force[:] = 0.0
+            self.force[active] = residual[p.unknown[active]]
+            residual[p.unknown[active]] = 0.0
+            return residual
+        return residual - p.R.T @ self.force
+
+    def copies(self) -> tuple[Array, Array]:
+        """Solution (n,) and multipliers (m,), that no later system changes."""
+        return self.y.copy(), self.force.copy()
+
+
+def first_approximation(program: QuadraticProgram, closed: Mask | None = None) -> Approximation:
+    """Prescribed values, and the bounds of the unit rows that are `closed` (m,)."""
+    y = np.where(program.fixed, program.values, 0.0)
+    if closed is not None and program.unit_rows:
+        y[program.unknown[closed]] = program.g[closed]
+    return Approximation(program=program, y=y, force=np.zeros(program.g.size))

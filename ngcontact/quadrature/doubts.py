@@ -10,10 +10,9 @@ import numpy as np
 from ..arrays import Array, Index, Mask
 from ..errors import warn
 from ..problem import Problem
-from .constant_data import numbers
 from .features import Features, features_of, touched
 from .loads import known_rough_load, moment_degree
-from .view import View
+from .view import View, numbers
 
 LOST = 1e-3  # of a load that quadrature may miss without a word
 # Size of an element over the width of a feature in it, up to which it is resolved. Loads are

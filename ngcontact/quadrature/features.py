@@ -24,12 +24,9 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask
 from ..problem import Problem, varies
-from .cells import Cells, joined
-from .constant_data import numbers
-from .counted import looked
+from .cells import Cells, joined, lattice
 from .jumps import steps_along
-from .lattice import lattice
-from .view import View
+from .view import View, looked, numbers
 
 ON_LINE = 2048  # samples of a boundary: none are further apart than 1 / 1365 of it
 IN_BODY = 5.2e-3  # between samples of a body, over its extent: discs of radius 3e-3 hold one

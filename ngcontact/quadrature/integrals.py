@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from functools import lru_cache
 
 import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask
-from .cells import Cells, Integrand, joined, whole, with_corners, with_those_beside
-from .view import View
+from .cells import (
+    Cells,
+    Integrand,
+    divisions,
+    extent,
+    following,
+    joined,
+    whole,
+    with_corners,
+    with_those_beside,
+)
+from .view import View, looked_at, numbers
 
 EXACT = {1: 15, 2: 10}  # degree of polynomials that the rule on a part integrates
 SEEN = {1: 6, 2: 5}  # degree of those that tell its corners from its points
@@ -18,6 +29,10 @@ ENOUGH = 2e-7  # error relative to the integral of the size, at which nothing is
 AT_ONCE = 16.0  # parts are halved whose error is that of the worst one over this, or more
 MOST = 10_000  # parts that are looked at: jumps along curves leave an error
 SMALLEST = 2.0**-38  # of an element: points beside corners of smaller parts are these corners
+FEWEST = 8  # points on a segment at least, which show any interpolation error
+RESOLVED = 0.1  # what polynomials miss of values, relative to what the mesh does: they are rough
+NOISE = 1e-10  # ... and relative to the values
+FOLLOWED = 1e-3  # error of the squares on a part, relative to all of them
 
 
 @lru_cache
@@ -108,3 +123,48 @@ def integral_over(
     if fine.any():
         cells = joined([cells, view.in_parts(elements[fine])])
     return integral(values, cells, view.arrays.corners if view.dim == 2 else None)
+
+
+def rough_segments(
+    values: Sequence[ng.CoefficientFunction], mesh: ng.Mesh, segments: Index, missed: float
+) -> Mask:
+    """Which `segments` (k,) have values, scalars, that are not seen at a few points, (k,).
+
+    `missed` is how far a displacement is from them there. Numbers are nowhere rough.
+    """
+    if all(map(numbers, values)):
+        return np.zeros(len(segments), dtype=bool)
+    left, largest = np.zeros(mesh.GetNE(ng.BND)), 0.0
+    for here, found, beyond in looked_at(ng.CF(tuple(values)), View(mesh, 1), segments, FEWEST):
+        left[here] = beyond
+        largest = max(largest, float(np.abs(found).max()))
+    return np.asarray(left[segments] > max(RESOLVED * missed, NOISE * largest))
+
+
+def pieces(
+    miss: Callable[[Index, Array], Array], mesh: ng.Mesh, sizes: Array, at: Index
+) -> tuple[Index, Array, Array]:
+    """Pieces on which Gauss points tell a function's squares.
+
+    Segment (n,), start (n,) and length (n,) of each, the latter in [0, 1].
+
+    Parameters
+    ----------
+    miss : function
+        Its values (k, m, c) at parameters (k, m) of segments (k,).
+    mesh : ng.Mesh
+        The mesh.
+    sizes : ndarray (q,)
+        Lengths of the segments.
+    at : ndarray of int (k,)
+        The segments to be taken to pieces.
+    """
+
+    def squares(segment: Index, s: Array) -> Array:
+        return np.asarray(sizes[segment, None, None] * miss(segment, s[..., 0]) ** 2)
+
+    n = max(FEWEST, int(divisions(1, sizes[at], extent(mesh)).max()))
+    cells = whole(1, at).divided(n)
+    total = float((cells.weights * squares(cells.element, cells.points).sum(axis=2)).sum())
+    cells, *_ = following(squares, cells, FOLLOWED * total)
+    return cells.element, cells.origin[:, 0], cells.side[:, 0, 0]

@@ -12,8 +12,8 @@ from ..arrays import Array, Index, Mask
 from ..errors import warn
 from ..mesh import diameters
 from ..problem import Problem, Triangulation, varies
-from .counted import looked
-from .lattice import mesh_points, on_lattice
+from .cells import mesh_points, on_lattice
+from .view import looked
 
 JUMP = 0.5  # change of a law over its least value from which it is told
 QUARTERS = np.linspace(0, 1, 5)

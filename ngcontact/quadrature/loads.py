@@ -8,11 +8,9 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two
-from .cells import Cells, following
-from .constant_data import numbers
+from .cells import Cells, beside_edges, following, monomials
 from .features import features_in, touched, towards
-from .lattice import beside_edges, monomials
-from .view import View, looked_at
+from .view import View, looked_at, numbers
 
 SHAPE = 0.05  # what they miss of a load at a point, relative to its largest value ...
 SHARE = {

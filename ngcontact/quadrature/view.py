@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from weakref import WeakKeyDictionary
 
 import ngsolve as ng
 import numpy as np
@@ -14,12 +16,45 @@ from numpy.typing import NDArray
 from ..arrays import Array, Index, Mask
 from ..mesh import diameters
 from ..problem import Triangulation
-from .cells import Cells, joined, whole
-from .counted import looked
-from .lattice import divisions, lattice, mesh_points, monomials
+from .cells import Cells, divisions, joined, lattice, mesh_points, monomials, whole
 
 POINTS = {1: 3, 2: 3}  # parts of a lattice that one of the rule is as good as
 DEGREE = 6  # of polynomials that the usual rules integrate against displacements
+LONG = 4000  # of what is printed; numbers are short
+KNOWN: WeakKeyDictionary[ng.CoefficientFunction, bool] = WeakKeyDictionary()  # numbers or not
+# What NGSolve prints of numbers, also times others and times the normal.
+NUMBER = r"[-+.\de]+"
+NUMBERS = re.compile(
+    rf"ZeroCoefficientFunction|\s*({NUMBER}\*\()?"
+    rf"(coef (unary operation ' '|VectorialCoefficientFunction|ZeroCF|{NUMBER}|"
+    rf"scale {NUMBER}|scalar-vector multiply|normal vector), real(, dim=\d+)?)?\s*\)?\s*"
+)
+
+
+def numbers(data: ng.CoefficientFunction) -> bool:
+    """Whether data are made of numbers alone: these are nowhere rough. Looked at once."""
+    if data not in KNOWN:  # printing a long expression costs as much as evaluating it
+        text = str(data)
+        lines = text.splitlines() if len(text) < LONG else [text]
+        KNOWN[data] = len(text) < LONG and all(map(NUMBERS.fullmatch, lines))
+    return KNOWN[data]
+
+
+class _Count:
+    """Points since the start of the process."""
+
+    points = 0
+
+
+def evaluations() -> int:
+    """Points at which data were looked at since the start of the process."""
+    return _Count.points
+
+
+def looked(function: ng.CoefficientFunction, points: NDArray) -> Array:
+    """Values (..., c) of a function among the data at mesh `points` (j, n) or (n,), counted."""
+    _Count.points += points.size
+    return np.asarray(function(points.ravel())).reshape(*points.shape, function.dim)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import pytest
 from drivers.reference import cases
 from ngcontact import Elastic, Problem, adapt, adaptive
 from ngcontact.adaptivity import Aim, Forecast, Refinement, Refining, planned, unresolvable
-from ngcontact.adaptivity.forecast import touching
+from ngcontact.adaptivity.refinement import touching
 from ngcontact.estimator import Estimate
 from ngcontact.fem import unknowns
 from ngcontact.geometries import blocks
@@ -142,7 +142,7 @@ def test_forecasts_that_prove_wrong_shorten_the_plan(monkeypatch):
             indicators=np.where((corners[..., 0] > 0.9).any(axis=1), 1.0, 1e-3), parts={}
         )
 
-    monkeypatch.setattr("ngcontact.estimator.estimated.estimate", stubborn)
+    monkeypatch.setattr("ngcontact.estimator.residual.estimate", stubborn)
     problem, sizes = cases.one_transition().problem, []
     refinement = Refinement(4, "isoparametric", 0.1, None, 6000)
     for solution in adaptive.levels(problem, first_mesh(problem, 0.5), refinement):

@@ -15,7 +15,7 @@ from netgen.occ import OCCGeometry
 
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.adaptivity import Refining, refined
-from ngcontact.adaptivity.forecast import touching
+from ngcontact.adaptivity.refinement import touching
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, rings
 from ngcontact.mesh import curve, first_mesh

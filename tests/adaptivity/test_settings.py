@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from ngcontact.adaptivity import Refinement
-from ngcontact.adaptivity.settings import best_order
+from ngcontact.adaptivity.planning import best_order
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

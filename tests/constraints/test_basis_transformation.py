@@ -7,10 +7,10 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
+from ngcontact.arrays import from_triplets
 from ngcontact.constraints.basis_transformation import change_of_basis
 from ngcontact.constraints.rows import Rows, concatenated
 from ngcontact.lagrange import lagrange
-from ngcontact.triplets import from_triplets
 from tests.constraints.given import X, Y, clamped, conditions, rows, unit
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from ngcontact.constraints.basis_transformation import change_of_basis
-from ngcontact.constraints.pivots import CONTRAST, coefficients_at
+from ngcontact.constraints.basis_transformation import CONTRAST, change_of_basis, coefficients_at
 from tests.constraints.given import X, Y, clamped, conditions, rows
 
 

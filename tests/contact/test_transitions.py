@@ -11,8 +11,8 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import Contact, Problem, adapt, solve
-from ngcontact.contact.corners import in_contact, pressure_across_corners, twins
-from ngcontact.contact.transitions import ending_segments, transitions_on
+from ngcontact.contact.line import in_contact, pressure_across_corners, twins
+from ngcontact.contact.state import ending_segments, transitions_on
 from ngcontact.geometries import blocks
 
 

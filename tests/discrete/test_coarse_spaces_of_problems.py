@@ -13,8 +13,7 @@ from ngcontact.adaptivity.refinement import refined
 from ngcontact.discrete.discrete_problem import DiscreteProblem, discretise
 from ngcontact.lagrange import gauss_lobatto
 from ngcontact.linalg import refined_share
-from ngcontact.mesh.generation import first_mesh
-from ngcontact.mesh.parents import vertex_parents
+from ngcontact.mesh.generation import first_mesh, vertex_parents
 from tests.scenes import REFINED, coordinates, discrete, near_origin, steps_of
 
 

@@ -250,7 +250,7 @@ def test_matched_lines_that_end_on_supports_are_not_divided(case, monkeypatch):
     def refuse(*_):
         raise AssertionError("a search where nodes face nodes")
 
-    monkeypatch.setattr("ngcontact.estimator.contact.pieces.divided", refuse)
+    monkeypatch.setattr("ngcontact.estimator.contact.facing.divided", refuse)
     assert replace(solution).error_estimate == expected
     with pytest.raises(AssertionError, match="a search"):
         _ = solve(replace(case().problem, geometry=unmatched_blocks())).error_estimate

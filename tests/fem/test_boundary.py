@@ -12,8 +12,7 @@ from netgen.geom2d import SplineGeometry
 from netgen.occ import Glue, OCCGeometry, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
-from ngcontact.fem.boundary import boundary_trace
-from ngcontact.fem.element import nodal_basis
+from ngcontact.fem.boundary import boundary_trace, nodal_basis
 from ngcontact.geometries import blocks, disc_on_block, graphs, rings
 from ngcontact.lagrange import gauss, gauss_lobatto
 

@@ -14,8 +14,7 @@ from drivers.reference import cases, paper
 from drivers.reference.straight import relative_energy_error
 from ngcontact import Elastic, Hooke, Problem, solve
 from ngcontact.fem import moduli
-from ngcontact.fem.boundary import boundary_trace
-from ngcontact.fem.element import check_element
+from ngcontact.fem.boundary import boundary_trace, check_element
 from ngcontact.fem.space import assemble
 from ngcontact.geometries import blocks, disc, graphs, rings
 from ngcontact.lagrange import gauss

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from ngcontact.arrays import from_triplets
 from ngcontact.constraints import Conditions, Rows, change_of_basis
 from ngcontact.lagrange import gauss_lobatto
 from ngcontact.linalg.coarse_spaces import COARSEST, RingError, coarsenings, refined_share
-from ngcontact.triplets import from_triplets
 
 FIRST = 4  # vertices of each line at first
 

@@ -10,7 +10,7 @@ import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.geometries import blocks, disc
-from ngcontact.mesh.curving import curve, geometry_order
+from ngcontact.mesh.generation import curve, geometry_order
 from ngcontact.problem import Triangulation
 
 ORDERS = [1, 2, 3, 4]

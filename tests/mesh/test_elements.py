@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact.mesh.elements import diameters
+from ngcontact.mesh.generation import diameters
 
 
 def test_diameters_are_longest_sides():

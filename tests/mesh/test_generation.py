@@ -20,8 +20,7 @@ from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh import generation
-from ngcontact.mesh.curving import check_curves
-from ngcontact.mesh.generation import first_mesh
+from ngcontact.mesh.generation import check_curves, first_mesh
 from tests.scenes import coordinates, vertices
 
 SOFT = Elastic(E=1.0, nu=0.3)

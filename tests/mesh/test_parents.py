@@ -8,9 +8,7 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact.adaptivity import refined
-from ngcontact.mesh.curving import curve
-from ngcontact.mesh.generation import first_mesh
-from ngcontact.mesh.parents import copied, vertex_parents
+from ngcontact.mesh.generation import copied, curve, first_mesh, vertex_parents
 from tests.scenes import coordinates, near_origin
 
 BLOCK = cases.partly_opening_block()  # straight, nodes matched

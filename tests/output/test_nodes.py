@@ -7,7 +7,7 @@ import pytest
 from vtkmodules.vtkCommonDataModel import vtkHigherOrderTriangle
 
 from ngcontact.fem import von_mises
-from ngcontact.output.nodes import lattice, neighbour_tree
+from ngcontact.output.vtk import lattice, neighbour_tree
 
 
 @pytest.mark.parametrize("order", range(1, 7))

@@ -18,8 +18,7 @@ from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
 from ngcontact import Elastic, Hooke
 from ngcontact.output import plot_solution, write_series, write_solution
-from ngcontact.output.nodes import lattice
-from ngcontact.output.vtk import write_data
+from ngcontact.output.vtk import lattice, write_data
 from ngcontact.quadrature import mesh_points
 from tests.output.stubs import MAXH, stub, two_bodies
 

@@ -82,7 +82,7 @@ def test_meshes_are_read_as_arrays_in_one_module():
 def test_boundaries_are_selected_by_name_in_one_module():
     """Where a problem is checked, reactions are named, and a boundary selects its segments."""
     outside = {path for path in with_lines(r"boundary_mask\(") if "/problem/" not in path}
-    assert outside == {"ngcontact/fem/boundary.py", "ngcontact/discrete/supports.py"}
+    assert outside == {"ngcontact/fem/boundary.py", "ngcontact/discrete/admissible_set.py"}
 
 
 def test_arrays_are_cut_into_pairs_in_one_module():

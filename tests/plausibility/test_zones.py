@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from ngcontact.plausibility.zones import connected
+from ngcontact.plausibility.drawn import connected
 
 
 @pytest.mark.parametrize("kept", [1.0, 0.9, 0.5, 0.0])

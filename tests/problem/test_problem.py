@@ -18,7 +18,7 @@ from ngcontact.geometries import blocks
 from ngcontact.problem.contact import Contact
 from ngcontact.problem.material import Elastic, Hooke
 from ngcontact.problem.problem import Problem
-from ngcontact.problem.regions import body_mask, body_of_vertex, boundary_mask
+from ngcontact.problem.values import body_mask, body_of_vertex, boundary_mask
 
 STEEL = Elastic(E=210e9, nu=0.3)
 NAN = ng.sqrt(-1 - ng.x * ng.x)  # not a number at every point

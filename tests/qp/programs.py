@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from ngcontact.qp.null_space import no_null_space
-from ngcontact.qp.quadratic_program import QuadraticProgram
+from ngcontact.qp.quadratic_program import QuadraticProgram, no_null_space
 
 
 def membrane(n=60, load=-1.0, height=-0.02):

@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from ngcontact.qp.active_set import minimise
-from ngcontact.qp.null_space import (
+from ngcontact.qp.quadratic_program import (
     echelon,
     no_null_space,
     pinned_null_space,

@@ -9,7 +9,7 @@ import pytest
 import scipy.sparse as sp
 
 from ngcontact.qp.active_set import minimise
-from ngcontact.qp.optimality import kkt_residuals, terms
+from ngcontact.qp.quadratic_program import kkt_residuals, terms
 from ngcontact.qp.schur_complement import bordered_systems
 from tests.qp.programs import counting_factor, first_unknowns_bounded, membrane
 

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from ngcontact.qp.active_set import minimise
+from ngcontact.qp.active_set import minimise, solve_qp
 from ngcontact.qp.schur_complement import bordered_systems
-from ngcontact.qp.solving import solve_qp
 from tests.qp.programs import counting_factor, first_unknowns_bounded, inequalities, membrane
 
 

@@ -20,7 +20,7 @@ from drivers.stress.trials.algebra import (
     random_program,
     tied_program,
 )
-from ngcontact.qp.solving import solve_qp
+from ngcontact.qp.active_set import solve_qp
 from tests.qp.programs import membrane
 
 SIZES_AND_SEEDS = st.integers(1, 40), st.integers(0, 2**32 - 1)

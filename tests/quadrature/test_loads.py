@@ -15,7 +15,7 @@ from ngcontact import Elastic, Problem, solve
 from ngcontact.fem.space import LOAD_BONUS, load_vector
 from ngcontact.mesh import first_mesh
 from ngcontact.quadrature import keep_rough_load, known_rough_load, rough_load, rough_segments
-from ngcontact.quadrature.lattice import monomials
+from ngcontact.quadrature.cells import monomials
 from ngcontact.quadrature.loads import numbers
 from ngcontact.quadrature.view import View
 
@@ -179,7 +179,7 @@ def test_numbers_are_not_looked_at(data, monkeypatch):
     mesh, data = first_mesh(loaded()), ng.CF(data)
     assert numbers(data)
     assert not numbers(ng.CF((ng.x, 0)))
-    monkeypatch.delattr("ngcontact.quadrature.values.looked_at")
+    monkeypatch.delattr("ngcontact.quadrature.integrals.looked_at")
     assert not rough_segments([data], mesh, np.arange(mesh.GetNE(ng.BND)), 1.0).any()
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from ngcontact.quadrature.cells import lattice
 from ngcontact.quadrature.jumps import steps_along
-from ngcontact.quadrature.lattice import lattice
 
 START, END = 3.0, 6.0
 

@@ -8,9 +8,9 @@ import scipy.sparse as sp
 
 from drivers.benchmark.scenes.plane import Numbering, moduli
 from drivers.benchmark.scenes.problems import Common
+from ngcontact.arrays import from_triplets
 from ngcontact.linalg import shared
 from ngcontact.problem import Triangulation
-from ngcontact.triplets import from_triplets
 
 BUBBLE = -1 / 8  # value of NGSolve's edge function of order 2 at the middle of the edge
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from drivers.benchmark.scenes.problems import Common
 from ngcontact import Elastic
-from ngcontact.triplets import from_triplets
+from ngcontact.arrays import from_triplets
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -16,12 +16,11 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from ...arrays import Array, Index, Mask
+from ...arrays import Array, Index, Mask, from_triplets
 from ...errors import ContactError
 from ...lagrange import gauss_lobatto, lagrange, lagrange_derivative
 from ...linalg import cholesky, lower_half
 from ...problem import Problem
-from ...triplets import from_triplets
 from .cells import Cells, Places, places
 from .elements import ENTRIES, compliance_at
 from .facing import DATA, PLACES, THROUGH, Facing

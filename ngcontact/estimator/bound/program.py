@@ -18,7 +18,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from ...arrays import Array, Index, Mask
+from ...arrays import Array, Index, Mask, from_triplets
 from ...errors import ContactError
 from ...linalg import change_of_basis, cholesky, handed_over
 from ...qp import (
@@ -32,7 +32,6 @@ from ...qp import (
     pinned_null_space,
     vanishing_combinations,
 )
-from ...triplets import from_triplets
 from .elements import Element, Multipliers, traces
 from .facing import PLACES, Facing, bernstein
 

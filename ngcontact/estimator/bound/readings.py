@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ...fem import LOAD_BONUS, load_vector, potential_energy
-from ..estimated import Estimated
+from ..residual import Estimated
 from .bound import Proof, error_bound
 from .stress import EquilibratedStress
 

@@ -1,6 +1,6 @@
 """Residuals on Gamma_K, and which parts of the boundary face no body."""
 
-from .closing import closing_energy as closing_energy
 from .facing import between_nodes as between_nodes
-from .pieces import remaining as remaining
+from .facing import remaining as remaining
+from .tractions import closing_energy as closing_energy
 from .tractions import on_contact as on_contact

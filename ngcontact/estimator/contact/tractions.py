@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from functools import partial
 
 import numpy as np
+from numpy.polynomial.legendre import legvander
 
 from ...arrays import Array, Index, Mask
-from ...contact import ContactLine, ContactState
+from ...contact import ContactLine, ContactState, Pieces, prescribed_gap
 from ...fem import BoundaryTrace
+from ...lagrange import gauss
 from ..terms import (
     DATA_BONUS,
     BoundaryResidual,
@@ -19,13 +21,119 @@ from ..terms import (
     ScaledSolution,
     Squares,
 )
-from .closing import closing_energy
-from .facing import FacingPoints, facing_points
-from .following import following_gap
-from .pieces import covered_parts, pieces_of
+from .facing import FacingPoints, covered_parts, facing_points, pieces_of
 
 ALIKE = 1 - 1e-6  # cosine of directions from which points of two pairs at a node are one
 GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
+BUMP = 2.0  # |w| |d_s w| over the largest w^2; 1 at least, 1.2 to 1.7 of hats, Gauss's, parabolas
+UNRESOLVED = 0.1  # distance of a gap from polynomials over its range, from which it is followed
+NO_GAP = 1e-12  # ... relative to the gap, below which there is none
+DIVIDED = 4  # parts of a piece whose gap is followed
+PARTS = 100_000  # pieces looked at, from which no more are divided
+
+
+def following_gap(boundary: BoundaryTrace, line: ContactLine, pieces: Pieces, order: int) -> Pieces:
+    """Pieces divided until `gap` data are polynomials on each, by its Gauss points of `order`.
+
+    Or until `PARTS` are reached. Gaps between measured curves are resolved by those.
+    """
+    gap, rule = line.contact.gap, gauss(order)[0]
+    if gap is None or isinstance(gap, float) or len(pieces.local) == 0:
+        return pieces
+    ends = np.concatenate([[0.0], rule, [1.0]])
+    between = (ends[1:] + ends[:-1]) / 2
+    basis = [legvander(2 * s - 1, len(rule) - 1) for s in (rule, between)]
+    follow = basis[1] @ np.linalg.inv(basis[0])
+    done, number = [], 0
+
+    while len(pieces.local):
+        length = pieces.stop - pieces.start
+        segment = line.segments[pieces.local]
+        at_rule, at_between = (
+            _gap_at(boundary, line, segment, pieces.start[:, None] + length[:, None] * s)
+            for s in (rule, between)
+        )
+        number += len(pieces.local)
+        low, high = (f(at_rule, axis=1) for f in (np.min, np.max))
+        allowed = UNRESOLVED * (high - low) + NO_GAP * np.abs(at_rule).max()
+        rough = np.abs(at_between - at_rule @ follow.T).max(axis=1) > allowed
+        rough &= number < PARTS
+        done.append(_select(pieces, np.flatnonzero(~rough)))
+        pieces = _select(pieces, np.repeat(np.flatnonzero(rough), DIVIDED))
+        step = (pieces.stop - pieces.start) / DIVIDED
+        start = pieces.start + step * np.tile(np.arange(DIVIDED), rough.sum())
+        pieces = replace(pieces, start=start, stop=start + step)
+    if len(done) == 1:
+        return done[0]
+    parts = {name.name: [getattr(x, name.name) for x in done] for name in fields(Pieces)}
+    found = Pieces(**{name: np.concatenate(values) for name, values in parts.items()})
+    return _select(found, np.lexsort((found.start, found.local)))
+
+
+def _select(pieces: Pieces, at: Index) -> Pieces:
+    """Pieces of the numbers `at` (n,)."""
+    return Pieces(**{name.name: getattr(pieces, name.name)[at] for name in fields(Pieces)})
+
+
+def _gap_at(boundary: BoundaryTrace, line: ContactLine, segment: Index, s: Array) -> Array:
+    """Data of the gap (r, n) at `s` (r, n) of segments (r,), lengths."""
+    every, where = np.repeat(segment, s.shape[1]), s.ravel()
+    x = boundary.point(every, where)
+    return prescribed_gap(line.contact, boundary, every, where, x).reshape(s.shape)
+
+
+def closing_energy(
+    solution: ScaledSolution,
+    where: tuple[Index, Array, Array],
+    stiffness: Array,
+    w: Array,
+    *,
+    or_more: bool = False,
+) -> Array:
+    """Energy (k,) of a displacement `w` (k,) of the boundary, without a unit: c |w|^2 h / l.
+
+    l is the element's diameter h, or where it is shorter the length |w| / |d_s w| in which w
+    changes on the segment: |w| |d_s w| bounds the square of w in H^(1/2). Of a w that jumps it is
+    infinite; where more than w does as well it is at most that of a bump as high as w.
+
+    Parameters
+    ----------
+    solution : ScaledSolution
+        In units of its own.
+    where : tuple of ndarray (k,), (k,), (k, 2)
+        Segments, weights of the quadrature and positions of the points, in order along segments.
+    stiffness : ndarray (k,)
+        c, a modulus over h.
+    w : ndarray (k,)
+        The displacement.
+    or_more : bool
+        Whether a larger displacement closes the gap as well.
+    """
+    segment, weight, position = where
+    change = np.diff(w) ** 2 * (segment[1:] == segment[:-1])
+    if not change.any():
+        return stiffness * w**2
+    size = len(solution.boundary.region)
+    apart = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    # Points coincide to round-off at a jump.
+    steep = np.divide(change, apart, out=np.zeros_like(change), where=apart > 0)
+    steep *= solution.boundary.model.measure(position[1:])
+    square, rise = (
+        np.bincount(at, x, size) for at, x in ((segment, weight * w**2), (segment[1:], steep))
+    )
+    seen = np.bincount(segment[1:], apart * (segment[1:] == segment[:-1]), size)
+    whole = solution.boundary.lengths(np.arange(size))
+    sloping = rise * whole / np.where(seen > 0, seen, np.inf)
+    h = solution.diameter[solution.boundary.element]
+    ratio = np.divide(sloping, square, out=np.zeros(size), where=square > 0)
+    times = h * np.sqrt(ratio)
+    if or_more:
+        most = np.zeros(size)
+        np.maximum.at(most, segment, solution.boundary.model.measure(position) * w**2)
+        times = np.minimum(
+            times, BUMP * h * np.divide(most, square, out=np.zeros(size), where=square > 0)
+        )
+    return stiffness * w**2 * np.maximum(times, 1)[segment]
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,11 +33,9 @@ from ...discrete import load_by_shape
 from ...errors import ContactError, warn
 from ...fem import BoundaryTrace
 from ..bound import EquilibratedStress, Guaranteed
-from .contact import area_in_contact, ends_of, left_out, peak_of
+from .contact import approach_of, area_in_contact, direction_of, ends_of, left_out, peak_of
 from .force import proved_force_errors
-from .motion import approach_of, direction_of
-from .singular import singular_corners
-from .stresses import largest_von_mises
+from .stresses import largest_von_mises, singular_corners
 from .table import Quantities, Quantity, unknown
 
 # Relative errors over the square of the relative estimate, measured on random scenes of all orders.

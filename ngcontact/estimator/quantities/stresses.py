@@ -2,17 +2,201 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array
-from ...fem import von_mises
-from ...problem import Triangulation, body_of_vertex
+from ...arrays import Array, Index, Mask
+from ...contact import ContactState, in_contact
+from ...fem import BoundaryTrace, von_mises
+from ...problem import Elastic, Problem, Triangulation, body_mask, body_of_vertex
 from ..bound import EquilibratedStress
-from .singular import Singular
 from .table import Quantity, error_of_largest, unknown
 
 SAME = 1e-9  # distance, relative to an element, at which points of two elements are one
+
+
+FREE, GUIDED, HELD, PRESSED = range(4)  # what is on a side of a corner
+SMOOTH = 0.05  # turn, radians, below which an angle is one of 180 degrees
+NEAR = 0.1  # of the way to the next corner, how far from a corner its stress counts
+MEETING = 1e-6  # of a segment, distance at which two corners meet
+
+
+@dataclass(frozen=True, eq=False)
+class Singular:
+    """Corners of infinite stress.
+
+    Attributes
+    ----------
+    places : ndarray (k, 2)
+        Lengths.
+    reach : ndarray (k,)
+        How far from each of them the stress is its own, or not resolved by an element, lengths.
+    pressed : ndarray of bool (k,)
+        Corners at which bodies press on each other.
+    """
+
+    places: Array
+    reach: Array
+    pressed: Mask
+
+    @property
+    def distinct(self) -> Array:
+        """Places (j, 2), each once where several bodies meet."""
+        return np.unique(self.places, axis=0)
+
+    def near(self, points: Array, pressed: bool = False) -> Mask:
+        """Which of the `points` (m, 2) lie within the reach of a corner, (m,)."""
+        result = np.zeros(len(points), dtype=bool)
+        for place, r, of_contact in zip(self.places, self.reach, self.pressed, strict=True):
+            if of_contact or not pressed:
+                result |= np.linalg.norm(points - place, axis=1) <= r
+        return result
+
+
+def singular_corners(
+    problem: Problem, trace: BoundaryTrace, pairs: Sequence[ContactState]
+) -> Singular:
+    """Corners of all bodies at which the stress is infinite, by angles and conditions."""
+    vertex, first, second = _vertices(trace)
+    angle, kind = _angles(trace, vertex, first, second), _conditions(problem, trace)
+    drawn = (np.abs(angle - np.pi) > SMOOTH) | (kind[first] != kind[second])
+    vertex, first, second, angle = vertex[drawn], first[drawn], second[drawn], angle[drawn]
+    place = Triangulation(trace.mesh).vertices[vertex]
+    h = np.maximum(trace.lengths(first), trace.lengths(second))
+    closed, rigid = _closed(pairs, place, h)
+    sides = np.sort([kind[first], kind[second]], axis=0)
+    sides[(sides == PRESSED) & ~closed] = FREE
+    low, high = np.sort(sides, axis=0)
+    critical = np.full(len(vertex), np.pi)
+    critical[(high == GUIDED) | ((low == GUIDED) & (high == HELD))] = np.pi / 2
+    clamped = (low == FREE) & (high == HELD)
+    critical[clamped] = _critical(problem, trace)[trace.body[first[clamped]]]
+    facing = _facing(place, angle, h, trace.body[first], rigid)
+    edge = (high == PRESSED) & ((low == FREE) | ((low == PRESSED) & (facing == np.pi)))
+    critical[edge] = (np.pi - facing)[edge]
+    uneven = edge & ~rigid & _turned_apart(problem, trace, place, angle, facing, trace.body[first])
+    straight = (low == high) & (np.abs(angle - np.pi) <= SMOOTH)  # nothing changes
+    found = ~straight & ((angle > critical + SMOOTH) | uneven)
+    size, reach = float(np.ptp(trace.curve, axis=(0, 1)).max()), []
+    for x, least in zip(place[found], h[found].tolist(), strict=True):
+        away = np.linalg.norm(place - x, axis=1)
+        reach.append(max(NEAR * float(away[away > MEETING * size].min(initial=size)), least))
+    return Singular(place[found] + 0.0, np.array(reach), (high == PRESSED)[found])
+
+
+def _vertices(trace: BoundaryTrace) -> tuple[Index, Index, Index]:
+    """Vertices (v,) of the boundary, and the two segments (v,) that meet at each."""
+    outer = np.flatnonzero(~trace.inner)
+    ends = Triangulation(trace.mesh).segments[outer].ravel()
+    order = np.argsort(ends, kind="stable")
+    vertex, start, count = np.unique(ends[order], return_index=True, return_counts=True)
+    start, vertex = start[count == 2], vertex[count == 2]
+    segment = np.repeat(outer, 2)[order]
+    return vertex, segment[start], segment[start + 1]
+
+
+def _angles(trace: BoundaryTrace, vertex: Index, first: Index, second: Index) -> Array:
+    """Angle (v,) of the body at each vertex, by the normals of the geometry."""
+    normals = []
+    for segment in (first, second):
+        s = (Triangulation(trace.mesh).segments[segment, 1] == vertex).astype(float)
+        normals.append(trace.exact_normal(segment, s))
+    turn = np.arccos(np.clip((normals[0] * normals[1]).sum(axis=1), -1, 1))
+    inwards = Triangulation(trace.mesh).angles[vertex] > np.pi
+    return np.asarray(np.pi + np.where(inwards, turn, -turn))
+
+
+def _conditions(problem: Problem, trace: BoundaryTrace) -> Index:
+    """What is on each segment (k,): `FREE`, `GUIDED`, `HELD` or `PRESSED`."""
+    segments = np.arange(len(trace.region))
+    kind = np.full(len(segments), FREE)
+    for pair in problem.contact:
+        kind[trace.lies_on(segments, pair.secondary, pair.primary)] = PRESSED
+    guided = trace.lies_on(segments, None if problem.sliding is None else str(problem.sliding))
+    components = [
+        trace.lies_on(segments, *(b for b, u in problem.displacement.items() if u[i] is not None))
+        for i in (0, 1)
+    ]
+    kind[guided | components[0] | components[1] | trace.on_axis] = GUIDED
+    kind[components[0] & components[1]] = HELD
+    return kind
+
+
+def _closed(pairs: Sequence[ContactState], place: Array, h: Array) -> tuple[Mask, Mask]:
+    """Which of the vertices at `place` (v, 2) are in contact, and with a rigid obstacle."""
+    closed, rigid = np.zeros(len(place), dtype=bool), np.zeros(len(place), dtype=bool)
+    for pair in pairs:
+        line, active = pair.line, in_contact(pair.line, pair.active)
+        if not len(active):
+            continue
+        facing = line.position + line.gap[:, None] * line.direction
+        for points in (line.position, facing):
+            away = np.linalg.norm(place[:, None] - points, axis=2)
+            at = away.argmin(axis=1)
+            met = active[at] & (away.min(axis=1) <= h)
+            closed |= met
+            rigid |= met & (line.contact.primary is None)
+    return closed, rigid
+
+
+def _facing(place: Array, angle: Array, h: Array, body: Index, rigid: Mask) -> Array:
+    """Angle (v,) of what faces each corner: 180 degrees of a line, 90 stand for a rigid one."""
+    facing = np.where(rigid, np.pi / 2, np.pi)
+    for i in range(len(place)):
+        away = np.linalg.norm(place - place[i], axis=1)
+        met = (body != body[i]) & (away <= MEETING * h[i])
+        if met.any():
+            facing[i] = angle[met][0]
+    return facing
+
+
+def _turned_apart(
+    problem: Problem, trace: BoundaryTrace, place: Array, angle: Array, facing: Array, body: Index
+) -> Mask:
+    """Where a uniform pressure would turn both wedges (v,) at an end of contact apart.
+
+    It turns a wedge of angle a with one free side by log r / (E (tan a - a)), E that of the model;
+    where the sum of both is negative the pressure is infinite (Dundurs and Lee 1972).
+    """
+    outer = np.flatnonzero(~trace.inner)
+    middle = trace.point(outer, np.full(len(outer), 0.5))
+    compliance = _compliances(problem, trace)
+    result = np.zeros(len(place), dtype=bool)
+    for i, (x, a, b) in enumerate(zip(place, angle, facing, strict=True)):
+        others = outer[trace.body[outer] != body[i]]
+        if len(others) and a < np.pi and b <= np.pi:
+            away = np.linalg.norm(middle[trace.body[outer] != body[i]] - x, axis=1)
+            one, two = compliance[body[i]], compliance[trace.body[others[away.argmin()]]]
+            turn = one / (np.tan(a) - a) + two / (np.tan(b) - b)
+            result[i] = turn < -SMOOTH / 2 * (one + two)
+    return result
+
+
+def _compliances(problem: Problem, trace: BoundaryTrace) -> Array:
+    """1 / E of each body, (1 - nu^2) / E in plane strain; 1 of all where one is no such number."""
+    found = np.full(len(trace.mesh.GetMaterials()), np.nan)
+    for name, law in problem.materials.items():
+        if isinstance(law, Elastic) and isinstance(law.E, float | int):
+            nu = law.nu if isinstance(law.nu, float | int) else np.nan
+            square = 0.0 if problem.model == "plane stress" else nu**2
+            found[body_mask(trace.mesh, name)] = (1 - square) / law.E
+    return found if np.isfinite(found).all() else np.ones(len(found))
+
+
+def _critical(problem: Problem, trace: BoundaryTrace) -> Array:
+    """Angle by body beyond which one held and one free side make the stress infinite."""
+    critical = np.full(len(trace.mesh.GetMaterials()), np.pi / 4)  # the least, of nu = 1 / 2
+    for name, law in problem.materials.items():
+        if isinstance(law, Elastic) and isinstance(law.nu, float | int):
+            nu = law.nu
+            kappa = (3 - nu) / (1 + nu) if problem.model == "plane stress" else 3 - 4 * nu
+            critical[body_mask(trace.mesh, name)] = np.arcsin(np.sqrt(min((kappa + 1) / 4, 1.0)))
+    return critical
+
+
 # Error over the largest difference in an element to the equilibrated stress, and over that between
 # elements, a part of which counts: chosen on 113 random scenes, orders 1 to 4.
 MISES, OF_JUMP = 1.1, 0.5

@@ -11,7 +11,7 @@ import numpy as np
 from ...arrays import Array
 from ...fem import von_mises
 from ...solved import Solved
-from ..nodes import Nodes, full_stress
+from ..vtk import Nodes, full_stress
 
 Evaluated = Callable[[Array, Array], Array]
 

@@ -12,10 +12,17 @@ from ...arrays import Array
 from ...solved import Solved
 from ..files import check_path, replacing
 from .fields import check_field
-from .panels import draw_bodies, draw_pressures, draw_windows, powers, shown_parts
-from .scene import Scene, names_of, picture
-from .style import Style
-from .windows import Window, close_ups, colour_range
+from .panels import (
+    Window,
+    close_ups,
+    colour_range,
+    draw_bodies,
+    draw_pressures,
+    draw_windows,
+    powers,
+    shown_parts,
+)
+from .scene import Scene, Style, names_of, picture
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

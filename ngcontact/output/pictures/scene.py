@@ -2,24 +2,176 @@
 
 from __future__ import annotations
 
+import dataclasses
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
+from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
 from ...arrays import Array, Index, Mask
 from ...problem import ABOUT_AN_AXIS
 from ...solved import Solved
-from ..nodes import nodes_of, subdivision
+from ..vtk import neighbour_tree, nodes_of, subdivision
 from .fields import Field, evaluated
-from .lines import zones_of
-from .style import Style
 
 MOST_TRIANGLES = 200_000  # of a picture: more cannot be seen
 NEAR = 0.25  # of a zone's size: distance to a line of symmetry up to which both halves are one zone
 STRAIGHT = 1e-6  # distance from the line, relative to its length, of a straight boundary
 ACROSS = 1e-6  # displacement across a line, relative to the largest on it, that is round-off
+# Colours of Okabe and Ito, told apart with any colour vision, and marks for those who print grey.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKS = ("o", "s", "^", "D", "v", "P", "X")
+
+
+RISING, SIGNED = "viridis", "RdBu_r"  # colour maps, told apart with any colour vision
+KINDS = ("length", "stress")  # what has a unit
+
+Unit = str | tuple[str, float]
+Profile = Callable[[Array], Any] | tuple[Any, Any]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Style:
+    """What a picture shows, and how.
+
+    Attributes
+    ----------
+    scale : float, optional
+        Factor of the displacement; None chooses one.
+    field : str or ng.CoefficientFunction
+        What colours show.
+    limits : tuple of float, optional
+        Ends of the colour scale, in the unit of the data; None chooses them.
+    units : mapping
+        Of "length" and "stress": a name, or a name and its size in the unit of the data.
+    profile : mapping
+        What is drawn over the pressure, by label: functions of the coordinate (k,) with pressures
+        (k,) as values, or two arrays, coordinates and pressures, in the unit of the data.
+    mesh : bool
+        Whether edges of elements are drawn.
+    mirror : str, optional
+        Boundary at which bodies are mirrored, a line of symmetry.
+    """
+
+    scale: float | None = None
+    field: str | ng.CoefficientFunction = "von_mises"
+    limits: tuple[float, float] | None = None
+    units: Mapping[str, Unit] = dataclasses.field(default_factory=dict)
+    profile: Mapping[str, Profile] = dataclasses.field(default_factory=dict)
+    mesh: bool = True
+    mirror: str | None = None
+
+    def __post_init__(self) -> None:
+        """Raise ``ValueError`` or ``TypeError`` where a choice is none."""
+        if self.scale is not None and not np.isfinite(self.scale):
+            raise ValueError(
+                f"scale = {self.scale}: give a finite factor, or None to have one chosen"
+            )
+        if self.limits is not None and not (
+            len(self.limits) == 2
+            and np.isfinite(self.limits).all()
+            and self.limits[0] < self.limits[1]
+        ):
+            raise ValueError(f"limits = {self.limits}: give two finite numbers, the smaller first")
+        for kind in self.units:
+            if kind not in KINDS:
+                raise ValueError(f'units: "{kind}" is none of {", ".join(KINDS)}')
+            name, size = self.unit(kind)
+            if not isinstance(name, str) or not (np.isfinite(size) and size > 0):
+                raise ValueError(
+                    f'units["{kind}"] = {self.units[kind]}: give a name, or a name and its size in '
+                    'the unit of the data, as ("MPa", 1e6)'
+                )
+        for label, profile in self.profile.items():
+            if not callable(profile) and not _two_arrays(profile):
+                raise TypeError(
+                    f'profile["{label}"]: give a function of the coordinate, or two arrays of one '
+                    "length, coordinates and pressures"
+                )
+
+    def unit(self, kind: str) -> tuple[str, float]:
+        """Name and size of the unit of a `kind`, "" and 1 where none is given."""
+        chosen = self.units.get(kind, "")
+        return (chosen, 1.0) if isinstance(chosen, str) else (chosen[0], float(chosen[1]))
+
+    def title(self, text: str, kind: str) -> str:
+        """`text` with the unit of its `kind` in brackets."""
+        name, _ = self.unit(kind)
+        return f"{text} [{name}]" if name else text
+
+
+def _two_arrays(profile: Any) -> bool:
+    """Whether it is a pair of arrays (k,)."""
+    try:
+        one, other = (np.asarray(values, dtype=float) for values in profile)
+    except (TypeError, ValueError):
+        return False
+    return one.ndim == 1 and one.shape == other.shape
+
+
+def contact_lines(solution: Solved) -> list[tuple[int, Index, Array]]:
+    """Contact points in order along their lines: (pair, rows, coordinate) for every line.
+
+    Of the k points of each line `rows` (k,) index ``solution.points``, and the coordinate (k,) is a
+    length: eta, across the fixed direction xi (P2), or without one (P1) the arc position, a sum of
+    chords. Both rise with the coordinate of which more changes along the line, whichever body is
+    the secondary. A pair whose points lie on separate pieces of boundary gives several lines, one
+    behind the other.
+    """
+    lines = []
+    for pair in np.unique(solution.pair).tolist():
+        rows = np.flatnonzero(solution.pair == pair)
+        points = solution.points[rows]
+        direction = solution.problem.contact[pair].direction
+        if direction is None:
+            lines += [(pair, rows[order], s) for order, s in _arcs(points)]
+        else:
+            dx, dy = np.asarray(direction, dtype=float) / np.hypot(*direction)
+            across = np.array([-dy, dx])
+            eta = points @ (_rising(across) * across)
+            order = np.argsort(eta, kind="stable")
+            lines.append((pair, rows[order], eta[order]))
+    return lines
+
+
+def _rising(along: Array) -> float:
+    """Sign that makes the larger component of `along` (2,) positive."""
+    return -1.0 if along[np.argmax(np.abs(along))] < 0 else 1.0
+
+
+def _arcs(points: Array) -> list[tuple[Index, Array]]:
+    """Order and arc position of points on curves: walks along the tree of neighbours."""
+    tree = neighbour_tree(points)
+    count, piece = connected_components(tree, directed=False)
+    arcs: list[tuple[Index, Array]] = []
+    start = 0.0
+    for k in range(count):
+        members = np.flatnonzero(piece == k)
+        s = dijkstra(tree, directed=False, indices=members[0])[members]
+        s = dijkstra(tree, directed=False, indices=members[np.argmax(s)])[members]
+        first, last = points[members[np.argmin(s)]], points[members[np.argmax(s)]]
+        s = start + (s.max() - s if _rising(last - first) < 0 else s)
+        order = np.argsort(s, kind="stable")
+        arcs.append((members[order], s[order]))
+        start = s.max()
+    return arcs
+
+
+def zones_of(solution: Solved) -> list[Index]:
+    """Contact points (c,) of each zone in contact, the zone of the largest force first.
+
+    A zone is a run of neighbouring points in contact on one line.
+    """
+    zones = []
+    for _, rows, _ in contact_lines(solution):
+        active = solution.active[rows]
+        run = np.cumsum(np.diff(active, prepend=False))  # odd in contact, even where open
+        zones += [rows[run == k] for k in range(1, run[-1] + 1, 2)]
+    return sorted(zones, key=lambda zone: -float(np.abs(solution.force[zone]).sum()))
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from ngcontact.output.pictures.lines import contact_lines
+from ngcontact.output.pictures.scene import contact_lines
 
 
 def lines_of(points, direction=None, pair=None):

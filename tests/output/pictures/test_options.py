@@ -10,8 +10,8 @@ from drivers.reference import cases
 from ngcontact import solve
 from ngcontact.output import plot_solution
 from ngcontact.output.pictures import Style
+from ngcontact.output.pictures.panels import close_ups, colour_range
 from ngcontact.output.pictures.scene import picture
-from ngcontact.output.pictures.windows import close_ups, colour_range
 from tests.output.stubs import MAXH, stub
 
 UNIFORM = ((3.0, 1.0), (1.0, -2.0))  # in-plane stress
