@@ -1,4 +1,4 @@
-"""Types of arrays, factorisations as functions, and squares that stay in the range of numbers."""
+"""Types of arrays, squares that stay in the range of numbers, sparse arrays from entries."""
 
 from __future__ import annotations
 

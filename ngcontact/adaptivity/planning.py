@@ -1,4 +1,4 @@
-"""The next level, planned on what the last one estimates."""
+"""How a run is refined, and the next level, planned on what the last one estimates."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Local refinement that keeps facing contact lines matched, HH81 (2.10)."""
+"""Local refinement that keeps facing contact lines matched, HH81 (2.10), and what it would give."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Points at which displacements are less smooth than elsewhere: ends of contact, corners."""
+"""Where elements are refined whatever their indicators, or are not: singular points, limits."""
 
 from __future__ import annotations
 

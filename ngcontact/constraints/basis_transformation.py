@@ -4,6 +4,11 @@ All conditions hold at nodes. A change of basis, local to the nodes concerned, m
 side of every contact row - the normal value of a rigid pair, the jump between two bodies - an
 unknown of its own: an active row is a fixed unknown, and every Newton step has a symmetric
 positive definite sparse matrix. NumPy and SciPy only.
+
+A row replaces an unknown of the secondary's node, unless its displacement is prescribed there or
+other rows took its directions; then of a node of the facing segment. Between a stiff and a soft
+body it is the soft one's node: the row's force is the unbalanced force there, which round-off of
+the stiff one would drown.
 """
 
 from __future__ import annotations

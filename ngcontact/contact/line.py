@@ -3,6 +3,11 @@
 HH81 (2.3), (2.5): on a bounded zone the direction is the outward normal of the secondary body
 and a corner of the contact line carries two points, one per side. HH81 (2.10): on an enlarging
 zone the direction is the fixed xi.
+
+A corner of Gamma_K carries two contact points, one for each side: HH81 (2.3). Both rows hold at one
+node. When it touches the corner, its force splits between the two normals, and where these are
+nearly parallel the split is no measure of the pressure: a part of the force across the corner
+weighs 1 / turn in it, and one of the two rows may even be open.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a solution says of each contact pair: gap, force, pressure and state of its points."""
+"""What a solution says of each pair: gap, force, pressure, and where contact ends."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""K_h = {v in V_h : B v <= g}: supports and contact rows, and one unknown for each of them."""
+"""K_h = {v in V_h : B v <= g}: supports and contact rows, one unknown for each, and forces."""
 
 from __future__ import annotations
 

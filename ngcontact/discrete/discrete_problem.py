@@ -1,4 +1,4 @@
-"""The discrete problems (P_1h), (P_2h) of HH81 on one mesh, and their solution."""
+"""The discrete problems (P_1h), (P_2h) of HH81 on one mesh: first active sets, solution."""
 
 from __future__ import annotations
 

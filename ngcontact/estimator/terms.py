@@ -1,4 +1,4 @@
-"""What the residual estimate is made of: a solution in units of its own, residuals, squares."""
+"""What the residual estimate is made of: units, stresses inside bodies, residuals, squares."""
 
 from __future__ import annotations
 

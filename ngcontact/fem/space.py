@@ -1,4 +1,4 @@
-"""The finite element spaces V_h of HH81 (2.2), (2.4), (2.9): space, stiffness A, load f."""
+"""The space V_h of HH81 (2.2), (2.4), (2.9): stiffness A, load f, stresses, energies, bodies."""
 
 from __future__ import annotations
 

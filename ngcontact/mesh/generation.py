@@ -1,4 +1,4 @@
-"""First meshes whose nodes on facing contact lines match, HH81 (2.3), (2.10)."""
+"""First meshes whose nodes on facing lines match, HH81 (2.3), (2.10); their curves and parents."""
 
 from __future__ import annotations
 

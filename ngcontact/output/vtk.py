@@ -1,4 +1,4 @@
-"""Files for ParaView: curved bodies with their fields, contact points, series of levels."""
+"""Files for ParaView: curved bodies with fields at nodes, contact points, series of levels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""What may be wrong with a solution: directions, gaps, unresolved zones, large strains."""
+"""What may be wrong with a solution: directions, gaps, penetration, large strains.
+
+Along a fixed direction xi the tangential part of the jump does not enter (2.10), and forces act
+along xi. That is right to first order where one of the two surfaces lies across xi: points of the
+other one, wherever they slide, meet the same line. Where both are inclined by an angle, as the two
+sides of a groove are, forces that should act along the normals are wrong by its cosine.
+"""
 
 from __future__ import annotations
 

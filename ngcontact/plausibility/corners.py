@@ -1,4 +1,4 @@
-"""Corners at which supports contradict each other: no displacement of finite energy has both."""
+"""What is looked at before the first solve: corners at which supports contradict each other."""
 
 from __future__ import annotations
 

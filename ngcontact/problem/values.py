@@ -1,4 +1,4 @@
-"""Values of data: what is accepted, what is refused and what would be right, how all is shown."""
+"""Values of data and names of regions: what is accepted, and what would be right."""
 
 from __future__ import annotations
 

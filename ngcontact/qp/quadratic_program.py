@@ -1,4 +1,10 @@
-"""The quadratic program of a discrete contact problem: arrays only. NumPy and SciPy only."""
+"""The quadratic program of a discrete contact problem, its null space, systems and optimality.
+
+HH81 Remark 3.7. Directions that no contact row resists (lineality) are fixed by one held unknown
+each, whose force vanishes under a load in equilibrium; the others are left to contact. A few
+unknowns, the pins, make the factorised matrix definite for every active set and are released in
+its border, so that singularity sits in a small Schur complement alone. NumPy and SciPy only.
+"""
 
 from __future__ import annotations
 

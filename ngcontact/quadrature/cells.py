@@ -1,4 +1,4 @@
-"""Parts of elements, halved where a function asks for it."""
+"""Elements in equal parts, and parts that are halved where a function asks for it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Integrals of any functions, with the error that is left."""
+"""Integrals of any functions, with the error that is left; prescribed values finer than meshes."""
 
 from __future__ import annotations
 

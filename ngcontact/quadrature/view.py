@@ -1,4 +1,4 @@
-"""Triangles of bodies, or segments of boundaries: their sizes, functions there, polynomials."""
+"""Triangles or segments: their sizes, functions there; looks at data, which are counted."""
 
 from __future__ import annotations
 

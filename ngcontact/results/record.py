@@ -1,4 +1,8 @@
-"""A solution as one row of a table, in one line, and as a table in a notebook."""
+"""A solution as a row of a table, in one line, in a notebook, and in a file that survives.
+
+Kept are the data, the mesh, the displacement and all arrays of contact; the stiffness is assembled
+again, and factorised when it is next needed.
+"""
 
 from __future__ import annotations
 

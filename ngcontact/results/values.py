@@ -1,4 +1,4 @@
-"""Displacement and stress at given points."""
+"""Displacement and stress at given points, and the elements that these lie in."""
 
 from __future__ import annotations
 

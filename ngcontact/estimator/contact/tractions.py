@@ -1,4 +1,4 @@
-"""Residuals on Gamma_K: tractions of both sides, complementarity, penetration."""
+"""Residuals on Gamma_K: tractions of both sides, complementarity, penetration, data followed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pressure, ends and size of one contact, with estimated bars."""
+"""Pressure, ends, size and approach of one contact, with estimated bars."""
 
 from __future__ import annotations
 

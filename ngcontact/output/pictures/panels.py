@@ -1,4 +1,4 @@
-"""Panels of a picture: bodies with a field, pressures along the contact lines."""
+"""Panels of a picture: bodies with a field, pressures along contact lines, close-ups of zones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a picture shows of a solution: curved elements as triangles, and zones in contact."""
+"""What a picture shows: style, curved elements as triangles, contact lines and their zones."""
 
 from __future__ import annotations
 
