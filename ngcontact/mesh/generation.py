@@ -26,9 +26,9 @@ SMALLEST = 1e-6  # extent
 SHARED = threading.Lock()
 KEPT = "_ngcontact_parents"  # attribute of a mesh: it lives as long as the mesh
 # OCC's projections know absolute lengths: points within 1e-7 of the end of an arc go to that end,
-# on other curves 1e-10 over the speed counts as met. On edges of extent SHORTEST that changes no
+# on other curves 1e-10 over the speed counts as met. On edges of extent SMALL_EDGE that changes no
 # more than 1e-8 of it as long as elements keep their shape.
-SHORTEST = 1e-2  # extent of an edge; measured: all but arcs of circles are wrong from 2e-3
+SMALL_EDGE = 1e-2  # extent of an edge; measured: all but arcs of circles are wrong from 2e-3
 SHORTEST = 1e-6  # a segment of a curved edge; measured: elements of order 4 turn over at 5e-7
 SHORTEST_ON_SMALL = 1e-5  # ... of a smaller arc; measured: middles displaced from 5e-6, order 4
 ON_CURVE = 1e-12  # distance, relative to the geometry's size, at which an element misses its curve
@@ -181,7 +181,7 @@ def resolved_lengths(mesh: ng.Mesh) -> Array:
     view = Triangulation(mesh)
     ends = view.vertices[view.segments]
     least = [
-        0.0 if edge.straight else SHORTEST_ON_SMALL if edge.size < SHORTEST else SHORTEST
+        0.0 if edge.straight else SHORTEST_ON_SMALL if edge.size < SMALL_EDGE else SHORTEST
         for edge in cad_edges(mesh) or []
     ]
     if not least:
@@ -207,14 +207,14 @@ def check_curves(mesh: ng.Mesh) -> None:
     for number, edge in enumerate(cad_edges(mesh) or []):
         if edge.straight:
             continue
-        small = edge.size < SHORTEST
+        small = edge.size < SMALL_EDGE
         limit = SHORTEST_ON_SMALL if small else SHORTEST
         shortest = float(length[boundaries == number].min(initial=np.inf))
         if shortest < 1 or (small and not edge.uniform):
             raise ValueError(
                 f'the curved edge "{edge.name}" has the extent {edge.size:g} and segments of '
                 f"{shortest * limit:g}, on which the geometry kernel loses digits; choose a "
-                f"smaller unit of length: curved edges of {SHORTEST:g} and more may have segments "
+                f"smaller unit of length: curved edges of {SMALL_EDGE:g} and more may have segments "
                 f"down to {SHORTEST:g}"
             )
 

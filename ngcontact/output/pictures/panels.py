@@ -21,7 +21,7 @@ SMALL = 0.2  # half of a close-up's size over that of the picture, from which th
 MARGIN = 0.9  # half of a close-up's size over that of its zone
 HALF_SIZES = 0.02, 0.002  # half-sizes, relative to the picture, of single points and of any zone
 SHARE = 0.005  # of an area, beyond whose value colours may saturate
-MARGIN = 1.25  # largest value over that one up to which they do not
+CUT_OFF = 1.25  # largest value over that one up to which they do not
 
 
 Window = tuple[Array, Array]  # lower left and upper right corner, each (2,)
@@ -89,7 +89,7 @@ def colour_range(scene: Scene, windows: Sequence[Window]) -> tuple[float, float]
         if seen.any():
             top = max(top, _typical(mean[seen], areas[seen]))
     largest = float(values.max(initial=0.0))
-    top = largest if largest <= MARGIN * top else top
+    top = largest if largest <= CUT_OFF * top else top
     top = top or 1.0
     return (-top, top) if scene.shown.signed else (0.0, top)
 
