@@ -203,6 +203,8 @@ class Places:
         Weights in the plane, areas.
     reference : ndarray (b, q, 2)
         Reference coordinates in the parents.
+    slopes : ndarray (b, q, 2, 2)
+        Derivatives of x by (a, b).
     """
 
     at: Index
@@ -210,6 +212,7 @@ class Places:
     x: Array
     weight: Array
     reference: Array
+    slopes: Array
 
     def evaluate(self, cells: Cells, function: ng.CoefficientFunction) -> Array:
         """Values (b, q, dim) of a function at the points."""
@@ -242,7 +245,7 @@ def places(cells: Cells, at: Index, order: int) -> Places:
     shares = np.column_stack([local[:, 1], 1 - local.sum(axis=1), local[:, 0]])
     guess = (shares @ cells.barycentric[at, :, :2]).reshape(-1, 2)
     found = cells.located(np.repeat(at, len(weight)), x.reshape(-1, 2), guess)
-    return Places(at, local, x, area * weight, found.reshape(x.shape))
+    return Places(at, local, x, area * weight, found.reshape(x.shape), slopes)
 
 
 def cells_of(trace: BoundaryTrace, cuts: Mapping[int, Array], loaded: Index, held: Index) -> Cells:
