@@ -259,49 +259,13 @@ def cells_of(trace: BoundaryTrace, cuts: Mapping[int, Array], loaded: Index, hel
     loaded, held : ndarray of int (k,)
         Segments that carry something, and those on which the whole displacement is prescribed.
     """
-    view = Triangulation(trace.mesh)
-    old, (segment, last) = view.triangles, _segments_of_elements(trace)
-    bent, cut = np.zeros((2, len(trace.region) + 1), dtype=bool)
-    bent[:-1], cut[list(cuts)] = trace.curved_segments, True
-    special = (bent | cut)[segment]
-    beside = bent[segment].any(axis=1) & ((segment >= 0).sum(axis=1) > 1)
-    middle = (special.sum(axis=1) > 1) | beside
-    parts = np.flatnonzero(middle | cut[segment].any(axis=1))
-    whole = np.setdiff1d(np.arange(len(old)), parts)
-    vertices, count, number = [view.vertices], len(view.vertices), {}
-    for k, s in cuts.items():
-        vertices.append(trace.point(np.full(len(s), k), s))
-        number[k] = list(range(count, count + len(s)))
-        count += len(s)
-    unit, triangles, barycentric, parent = np.eye(3), [], [], []
-    for e in parts.tolist():  # fans of the places around the element
-        around: list[tuple[int, Array]] = []
-        for i in range(3):
-            j, k, own = (i + 1) % 3, (i + 2) % 3, int(segment[e, i])
-            s, end = np.asarray(cuts.get(own, ()))[:, None], last[own] if own in cuts else k
-            on = [
-                *zip(number.get(own, ()), s * unit[end] + (1 - s) * unit[j + k - end], strict=True)
-            ]
-            around += [(int(old[e, j]), unit[j]), *(on if end == k else on[::-1])]
-        if middle[e]:
-            apex, count = (count, np.full(3, 1 / 3)), count + 1
-            vertices.append(view.vertices[old[e]].mean(axis=0)[None])
-        else:
-            base = int(special[e].argmax())
-            apex = int(old[e, base]), unit[base]
-        for one, two in zip(around, [*around[1:], around[0]], strict=True):
-            if apex[0] not in (one[0], two[0]):
-                corners = apex, one, two
-                triangles.append([v for v, _ in corners])
-                barycentric.append([b for _, b in corners])
-                parent.append(e)
-    cells = joined(
-        trace,
-        np.concatenate(vertices),
-        np.concatenate([old[whole], np.reshape(triangles, (-1, 3)).astype(np.intp)]),
-        np.reshape([*[unit] * len(whole), *barycentric], (-1, 3, 3)),
-        np.concatenate([whole, np.array(parent, dtype=np.intp)]),
-    )
+    view, unit = Triangulation(trace.mesh), np.eye(3)
+    old, ne = view.triangles, trace.mesh.ne
+    cells = joined(trace, view.vertices, old, np.broadcast_to(unit, (ne, 3, 3)), np.arange(ne))
+    cut = np.isin(cells.segment, list(cuts))
+    several = (cells.bent | cut)[cells.sides].sum(axis=1) > 1
+    beside = cells.curved & ((cells.segment >= 0)[cells.sides].sum(axis=1) > 1)
+    cells = _fanned(_parted(cells, np.flatnonzero(several | beside)), cuts)
     return _parted(cells, dependent(cells, loaded, held))
 
 
@@ -352,24 +316,67 @@ def _lengths(corners: Array) -> Array:
     return np.linalg.norm(np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1), axis=2)
 
 
+def _with_parts(cells: Cells, new: Array, of: Index, triangles: Index, places: Array) -> Cells:
+    """Triangles in parts: `triangles` (k, 3) of those that they are part `of` (k,).
+
+    `new` (r, 2) are more vertices, `places` (k, 3, 3) the barycentric coordinates of the corners.
+    """
+    rest = np.setdiff1d(np.arange(len(cells.triangles)), of)
+    return joined(
+        cells.trace,
+        np.concatenate([cells.vertices, new]),
+        np.concatenate([cells.triangles[rest], triangles]),
+        np.concatenate([cells.barycentric[rest], places]),
+        np.concatenate([cells.parent[rest], cells.parent[of]]),
+    )
+
+
+def _fanned(cells: Cells, cuts: Mapping[int, Array]) -> Cells:
+    """Triangles with vertices to come on one side, as of `cells_of`, in fans about its opposite."""
+    if not cuts:
+        return cells
+    segment = np.repeat(list(cuts), [len(s) for s in cuts.values()])
+    s = np.concatenate(list(cuts.values()))
+    at = cells.side_at(segment, s)
+    side, t = np.unique(at), cells.own_parameter(at, s[:, None])[:, 0]
+    every, t = np.append(np.repeat(side, 2), at), np.append(np.tile([0.0, 1.0], len(side)), t)
+    vertex = np.append(cells.ends[side], len(cells.vertices) + np.arange(len(s)))
+    order = np.lexsort((t, every))
+    one = np.diff(every[order]) == 0
+    pieces = np.stack([order[:-1][one], order[1:][one]])
+    owner, local = (x[every[pieces[0]]] for x in (cells.owner, cells.local))
+    pair = np.where(cells.backward[owner, local], pieces[::-1], pieces)  # start and stop of parts
+    low, high = np.where(cells.backward[owner, local], [[2], [1]], [[1], [2]])
+    low, high = (cells.barycentric[owner, (local + k) % 3] for k in (low, high))
+    places = [(1 - t[k, None]) * low + t[k, None] * high for k in pair]
+    return _with_parts(
+        cells,
+        cells.trace.point(segment, s),
+        owner,
+        np.column_stack([cells.triangles[owner, local], *vertex[pair]]),
+        np.stack([cells.barycentric[owner, local], *places], axis=1),
+    )
+
+
 def _parted(cells: Cells, at: Index) -> Cells:
     """Triangles `at` (k,) in three about the middles of their inscribed circles.
 
-    Parts of thin triangles are thin with one short side, not flat.
+    Parts of thin triangles are thin with one short side, not flat. Behind a curved side about the
+    centre of gravity, which is farther from the longest side.
     """
-    rest, corner = np.setdiff1d(np.arange(len(cells.triangles)), at), np.arange(3)
-    share = _lengths(cells.corners[at])
+    share = np.where(cells.curved[at, None], 1.0, _lengths(cells.corners[at]))
     share = (share / share.sum(axis=1, keepdims=True))[:, None]
     triangles = np.repeat(cells.triangles[at, None], 3, axis=1)
-    triangles[:, corner, corner] = len(cells.vertices) + np.arange(len(at))[:, None]
     places = np.repeat(cells.barycentric[at, None], 3, axis=1)
+    corner = np.arange(3)
+    triangles[:, corner, corner] = len(cells.vertices) + np.arange(len(at))[:, None]
     places[:, corner, corner] = share @ cells.barycentric[at]
-    return joined(
-        cells.trace,
-        np.concatenate([cells.vertices, (share @ cells.corners[at])[:, 0]]),
-        np.concatenate([cells.triangles[rest], triangles.reshape(-1, 3)]),
-        np.concatenate([cells.barycentric[rest], places.reshape(-1, 3, 3)]),
-        np.concatenate([cells.parent[rest], np.repeat(cells.parent[at], 3)]),
+    return _with_parts(
+        cells,
+        (share @ cells.corners[at])[:, 0],
+        np.repeat(at, 3),
+        triangles.reshape(-1, 3),
+        places.reshape(-1, 3, 3),
     )
 
 

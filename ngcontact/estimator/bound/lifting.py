@@ -242,14 +242,18 @@ def _stiffness(
             if B.shape[2] > 3:
                 B[:, :, 2, :m] = f / points.x[..., :1]
             weight = (points.weight * cells.measure(points.x))[..., None, None]
-            CB, B = (x.reshape(len(at), -1, 2 * m) for x in (weight * (C @ B), B))
+            stress, strain = (x.reshape(len(at), -1, 2 * m) for x in (weight * (C @ B), B))
             on = [_on_sides(cells, cells.sides[at, i], n)[:, 1:-1] for i, n in enumerate(own)]
             back = cells.backward[at]
             on = [np.where(back[:, i, None], x[:, ::-1], x) for i, x in enumerate(on)]
             inside = m - sum(own)
             first = len(cells.vertices) + (DATA - 1) * len(cells.ends)
             rest = first + inside * at[:, None] + np.arange(inside)
-            yield at, np.hstack([cells.triangles[at], *on, rest]), B.transpose(0, 2, 1) @ CB
+            yield (
+                at,
+                np.hstack([cells.triangles[at], *on, rest]),
+                strain.transpose(0, 2, 1) @ stress,
+            )
 
 
 @lru_cache
@@ -262,7 +266,7 @@ def _nodes(degree: int, *own: int) -> tuple[Array, Array]:
     on = [(1 - t[i]) * CORNERS[i - 2] + t[i] * CORNERS[i - 1] for i in range(3)]
     inside = [(i / degree, j / degree) for i in range(1, degree) for j in range(1, degree - i)]
     found = np.concatenate([CORNERS, *on, np.reshape(inside, (-1, 2))])
-    return found, np.linalg.inv(_functions(degree, own, found)[:, 0])
+    return found, np.asarray(np.linalg.inv(_functions(degree, own, found)[:, 0]))
 
 
 def _functions(degree: int, own: Sequence[int], local: Array) -> Array:

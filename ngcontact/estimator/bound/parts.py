@@ -125,7 +125,7 @@ def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Index
     The polynomials are of a `degree`, the rules of an `order`; `least` (n,) times at least.
     """
     found, mesh = least.copy(), cells.trace.mesh
-    if all(numbers(ng.CF(F)) for F in problem.force.values()):
+    if all(numbers(F) for F in problem.force.values()):
         return found
     narrow = narrow_forces(problem, mesh, cells.trace.order)
     for one in features_of(problem, mesh):
