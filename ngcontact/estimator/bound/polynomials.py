@@ -24,7 +24,6 @@ from ...arrays import Array, Index
 
 CORNERS = np.array([[0.0, 1.0], [0.0, 0.0], [1.0, 0.0]])  # their (a, b)
 DERIVATIVES = (0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)  # orders by (a, b)
-AIRY = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # of psi_xx, psi_xy, psi_yy
 
 
 @lru_cache
@@ -90,20 +89,6 @@ def scales(corners: Array) -> tuple[Array, Array]:
     return (low + high) / 2, (high - low).max(axis=2, keepdims=True) / 2
 
 
-def _rates(corners: Array) -> Array:
-    """Matrices (b, 6, 6) from `DERIVATIVES` by (2 a, 2 b) to those by x and y, times `scales`."""
-    _, size = scales(corners)
-    by = 2 * size * np.linalg.inv(edges(corners))  # (b, 2, 2): a, b by x, y
-    found = np.zeros((len(corners), 6, 6))
-    found[:, 0, 0] = 1.0
-    found[:, 1:3, 1:3] = by.transpose(0, 2, 1)
-    for row, (p, q) in zip((3, 4, 5), ((0, 0), (0, 1), (1, 1)), strict=True):
-        found[:, row, 3] = by[:, 0, p] * by[:, 0, q]
-        found[:, row, 4] = by[:, 0, p] * by[:, 1, q] + by[:, 1, p] * by[:, 0, q]
-        found[:, row, 5] = by[:, 1, p] * by[:, 1, q]
-    return found
-
-
 def stresses(
     degree: int, corners: Array, local: Array, axial: bool, on_axis: bool = False
 ) -> Array:
@@ -118,29 +103,32 @@ def stresses(
     local : ndarray (b, q, 2)
         Points by (a, b), or (q, 2) where these are the same for all.
     """
-    rates = _rates(corners)
-    if not axial:
-        psi = derivatives(degree + 2, local, *DERIVATIVES[3:]) @ orthonormal(degree + 2, 2)
-        return np.asarray((AIRY @ rates[:, 3:, 3:])[:, None] @ psi)
-
-    def derived(degree: int, order: int) -> Array:
-        """Functions `orthonormal` in an order, by r, z, rr, rz, zz: (6, b, q, m)."""
-        table = derivatives(degree, local, *DERIVATIVES) @ orthonormal(degree, order)
-        return np.moveaxis(rates[:, None] @ table, 2, 0)
-
     _, size = scales(corners)
+    E = edges(corners) / (2 * size)
+    if not axial:  # psi_bb p p' - psi_ab (p q' + q p') + psi_aa q q', p and q the columns of E
+        (px, qx), (py, qy) = E.transpose(1, 2, 0)
+        rows = [px * px, -2 * px * qx, qx * qx], [py * py, -2 * py * qy, qy * qy]
+        airy = np.array([*rows, [px * py, -(px * qy + py * qx), qx * qy]]).transpose(2, 0, 1)
+        airy /= np.linalg.det(E)[:, None, None] ** 2
+        psi = derivatives(degree + 2, local, *DERIVATIVES[:2:-1]) @ orthonormal(degree + 2, 2)
+        return np.asarray(airy[:, None] @ psi)
+    (a_r, a_z), (b_r, b_z) = np.linalg.inv(E).transpose(1, 2, 0)[..., None, None]
+
+    def derived(degree: int, order: int) -> tuple[Array, Array, Array, Array]:
+        """Functions `orthonormal` in an order, and these by r, z, and zz: (b, q, m) each."""
+        table = derivatives(degree, local, *DERIVATIVES) @ orthonormal(degree, order)
+        f, f_a, f_b, f_aa, f_ab, f_bb = np.moveaxis(table, -2, 0)
+        by_r, by_z = a_r * f_a + b_r * f_b, a_z * f_a + b_z * f_b
+        return f + 0 * by_r, by_r, by_z, a_z**2 * f_aa + 2 * a_z * b_z * f_ab + b_z**2 * f_bb
+
     r = (corners[:, 1:2, :1] + local @ edges(corners)[:, 0, :, None]) / size
-    if on_axis:  # T_rr = r f, chi = r^2 f
-        f, f_r, f_z, _, _, f_zz = derived(degree - 1, 0)
-        none = np.zeros_like(f)
-        free = [f, none, f + r * f_r, none]
-        bent = [none, -(2 * f + r * f_r), r**2 * f_zz, r * f_z]
-    else:
-        f, f_r, *_ = derived(degree, 0)
-        chi, chi_r, chi_z, _, _, chi_zz = derived(degree + 1, 1)
-        none, still = np.zeros_like(f), np.zeros_like(chi)
-        free = [f / r, none, f_r, none]
-        bent = [still, -chi_r / r, chi_zz, chi_z / r]
+    k = int(on_axis)  # T_rr = r^k f, chi = r^(2 k) g
+    f, f_r, *_ = derived(degree - k, 0)
+    g, g_r, g_z, g_zz = derived(degree + 1 - 2 * k, 1 - k)
+    none, still = np.zeros_like(f), np.zeros_like(g)
+    free = [r ** (k - 1) * f, none, k * f + r**k * f_r, none]
+    bent = [still, -(r ** (2 * k - 2)) * (2 * k * g + r * g_r), r ** (2 * k) * g_zz]
+    bent.append(r ** (2 * k - 1) * g_z)
     return np.concatenate([np.stack(free, axis=2), np.stack(bent, axis=2)], axis=-1)
 
 
@@ -170,14 +158,16 @@ def balancing(degree: int, corners: Array, x: Array, force: Array, axial: bool) 
     `force` (b, m, 2) are the coefficients of the force as of `scalars`, for a `degree` and
     `corners` (b, 3, 2). About an axis only the axial part counts: s_zz = - int F_z dz.
     """
-    middle, size = scales(corners)
-    X = (x - middle) / size
-    i, j = products(degree)
-    a, b = (legendre.legvander(X[..., c], degree) for c in (0, 1))
-    up = legendre.legint(np.eye(degree + 1))
-    ia, ib = (legendre.legvander(X[..., c], degree + 1) @ up for c in (0, 1))
-    along_x = (ia[..., i] * b[..., j]) @ force[..., :1]
-    along_y = (a[..., i] * ib[..., j]) @ force[..., 1:]
-    none = np.zeros_like(along_x)
-    parts = [none, along_y, none, none] if axial else [along_x, along_y, none]  # (3.5)
-    return np.asarray(-size * np.concatenate(parts, axis=2))
+    _, size = scales(corners)
+    c = np.einsum("cnm,bmc->bnc", _antiderivatives(degree), force)
+    found = np.zeros((*x.shape[:2], 3 + axial))
+    found[..., axial:2] = -size * (scalars(degree + 1, corners, x) @ c)[..., axial:]  # (3.5)
+    return found
+
+
+@lru_cache
+def _antiderivatives(degree: int) -> Array:
+    """Of the m `products` by both coordinates in those k of a degree more, (2, k, m)."""
+    (i, j), (p, q) = products(degree), products(degree + 1)
+    up, p, q = legendre.legint(np.eye(degree + 1)), p[:, None], q[:, None]
+    return np.stack([up[p, i] * (q == j), up[q, j] * (p == i)])
