@@ -31,17 +31,11 @@ from .elements import (
     compliance_at,
     elements_of,
     rigid_motions,
+    stress_norms,
 )
 from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
 from .lifting import asked_on_line, asked_on_supports, lifted
-from .missed import Level, data_norms, once_more
-from .norms import (
-    SETTLED,
-    forces_missed,
-    residuals,
-    smallest_moduli,
-    stress_norms,
-)
+from .missed import SETTLED, Level, data_norms, once_more, residuals
 from .parts import depths
 from .program import Balanced, DualProgram, dual_program, rows_of
 from .refusals import refuse_bound, refuse_narrow
@@ -117,9 +111,9 @@ class DualProblem:
             It is not in equilibrium.
         """
         cells, elements, lines = self.cells, self.elements, self.program.lines
-        given, n = self.given.under(lines, found.pressure), len(cells.triangles)
-        norms = stress_norms(elements, found.coefficients, n)
-        scale = max(norms.largest, least)
+        given = self.given.under(lines, found.pressure)
+        distance, largest = stress_norms(elements, found.coefficients)
+        scale = max(largest, least)
         residual = float(residuals(cells, self.program.multipliers, found.left, scale).max())
         if not residual <= SETTLED:
             raise ContactError(
@@ -128,8 +122,7 @@ class DualProblem:
             )
         have = boundary_tractions(given, elements, found.coefficients)
         missed = have.missed(given, scale)
-        loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(elements, n))
-        distance = norms.distance
+        loads = data_norms(cells, elements, missed)
         if degree is not None:
             level = Level(cells, elements, found.coefficients, self.look, distance, loads)
             distance, loads = once_more(displacement, given, level, degree, scale)

@@ -66,26 +66,28 @@ class Element:
         C^-1, one over a stress; (1, 1, v, v) where it is one matrix for all.
     strain : ndarray (b, q, v)
         e(u_h), Voigt.
+    source : CoefficientFunction or None
+        The body force.
     force : ndarray (b, j, 2)
         Coefficients of the body force that s_p balances, of degree `force_degree`.
     radial : ndarray (b, q)
         Radial force times r about an axis: a part of the hoop stress.
-    source : CoefficientFunction or None
-        The body force.
     missed : ndarray (b,)
         L2 norm of what of the body force s_p does not balance, times the measure.
+    modulus : ndarray (b,)
+        Smallest eigenvalue of C in Mandel's scaling, a stress.
     combined : ndarray (b, n, m)
-        T from the n polynomials of `stresses`.
+        T from the n polynomials of `stresses`, orthonormal: (T, T) = 1.
     N : ndarray (b, m, d)
         Moments <T n, .> of the tractions with the multipliers.
-    g : ndarray (b, m)
-        (T, e(u_h) - C^-1 s_p): the coefficients without multipliers.
     own : ndarray (b, d)
         Moments of s_p n.
-    sides : ndarray of int (b, 3)
-        Numbers of the sides.
+    g : ndarray (b, m)
+        (T, e(u_h) - C^-1 s_p): the coefficients without multipliers.
+    beyond : ndarray (b,)
+        Squares of |C e(u_h) - s_p - T g|, which no coefficients reach.
     dofs : ndarray of int (b, d)
-        Numbers of their multipliers.
+        Numbers of the multipliers.
     """
 
     places: Places
@@ -97,15 +99,16 @@ class Element:
     on_axis: bool
     compliance: Array
     strain: Array
+    source: ng.CoefficientFunction | None
     force: Array
     radial: Array
-    source: ng.CoefficientFunction | None
     missed: Array
+    modulus: Array
     combined: Array
     N: Array
-    g: Array
     own: Array
-    sides: Index
+    g: Array
+    beyond: Array
     dofs: Index
 
     @property
@@ -124,20 +127,10 @@ class Element:
     def of_strain(self, strain: Array) -> Element:
         """The same triangles for a displacement of `strain` (b, q, v), without body forces."""
         T = stresses(self.degree, self.corners, self.local, self.axial, self.on_axis)
-        g = (_products(T, self.weight, strain) @ self.combined)[:, 0]
+        _, g, beyond = _condensed(T, self.weight, self.compliance, strain)
         forces = "force", "radial", "missed", "own"
         none = {name: np.zeros_like(getattr(self, name)) for name in forces}
-        return replace(self, strain=strain, source=None, g=g, **none)
-
-    def whole_stress(self, c: Array) -> Array:
-        """Stresses (b, q, v) at the quadrature points for coefficients `c` (b, m).
-
-        With the hoop's part of radial forces.
-        """
-        s = self._stress(c, self.places.x, self.local)
-        if self.axial:
-            s[..., 2] += self.radial
-        return s
+        return replace(self, strain=strain, source=None, g=g, beyond=beyond, **none)
 
     def radial_at(self, cells: Cells, at: Index, reference: Array) -> Array:
         """Radial force times r, (k,), in triangles `at` (k,) of `cells`, about an axis.
@@ -153,11 +146,8 @@ class Element:
 
         `c` (n, m) are the coefficients in all; the hoop's part of radial forces is left out.
         """
-        return self._stress(c, x, coordinates(self.corners[some], x), some)
-
-    def _stress(self, c: Array, x: Array, local: Array, some: Index | slice = slice(None)) -> Array:
         corners = self.corners[some]
-        T = stresses(self.degree, corners, local, self.axial, self.on_axis)
+        T = stresses(self.degree, corners, coordinates(corners, x), self.axial, self.on_axis)
         c = self.combined[some] @ c[some][..., None]
         s = (T.reshape(len(c), -1, T.shape[-1]) @ c).reshape(T.shape[:-1])
         if self.force.any():
@@ -212,30 +202,47 @@ def among(
             yield e, c, mine, some[mine]
 
 
-def turning(problem: Problem, cells: Cells) -> Mask:
-    """Whether triangles (n,) lie beside contact along normals that are not those of the mesh."""
-    pairs = [pair for pair in problem.contact if pair.direction is None]
-    names = [name for pair in pairs for name in (pair.secondary, pair.primary)]
-    side = np.flatnonzero(np.isin(cells.segment, cells.trace.segments(*names)))
-    segment, s = cells.on_side(np.tile(side, 2), np.repeat([0.0, 1.0], len(side)))
-    off = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
-    found = np.zeros(len(cells.triangles), dtype=bool)
-    found[cells.owner[np.tile(side, 2)[np.linalg.norm(off, axis=1) > TURNED]]] = True
+def by_triangle(elements: Sequence[Element], values: Sequence[Array]) -> Array:
+    """One array (n,) of `values` (b,) on each element's triangles, n in all."""
+    found = np.zeros(sum(map(len, values)))
+    for e, own in zip(elements, values, strict=True):
+        found[e.places.at] = own
     return found
 
 
-def multipliers(
-    cells: Cells, degree: int, turned: Mask | bool = False
-) -> tuple[Index, Multipliers]:
+def stress_norms(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple[Array, float]:
+    """|s - C e| (n,), roots of energies per thickness, and the largest component of s.
+
+    That is looked at in the middles of straight sides.
+
+    Parameters
+    ----------
+    coefficients : sequence of ndarray (b, m)
+        Of the stress on the triangles of each element.
+    """
+    pairs = list(zip(elements, coefficients, strict=True))
+    square = by_triangle(elements, [((c - e.g) ** 2).sum(axis=1) + e.beyond for e, c in pairs])
+    middles = ((e.corners + np.roll(e.corners, 1, axis=1)) / 2 for e in elements)
+    sizes = [np.abs(e.stress(c, x)).max() for (e, c), x in zip(pairs, middles, strict=True)]
+    return np.sqrt(square), float(max(sizes, default=0.0))
+
+
+def multipliers(problem: Problem, cells: Cells, degree: int) -> tuple[Index, Multipliers]:
     """Degree (n,) of the stress in each triangle, and the multipliers that it asks for.
 
-    It is `degree`, and higher at curved sides and where directions are `turned` (n,).
+    It is `degree`, and higher at curved sides and beside contact along normals that are not those
+    of the mesh.
     """
-    own = np.where(cells.curved | turned, degree + ON_CURVES, degree)
-    of_side = np.zeros(len(cells.ends), dtype=np.intp)
+    pairs = [pair for pair in problem.contact if pair.direction is None]
+    names = [name for pair in pairs for name in (pair.secondary, pair.primary)]
+    side = np.tile(np.flatnonzero(np.isin(cells.segment, cells.trace.segments(*names))), 2)
+    segment, s = cells.on_side(side, np.repeat([0.0, 1.0], len(side) // 2))
+    off = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
+    higher = cells.curved.copy()
+    higher[cells.owner[side[np.linalg.norm(off, axis=1) > TURNED]]] = True
+    own, of_side = degree + ON_CURVES * higher, np.zeros(len(cells.ends), dtype=np.intp)
     np.maximum.at(of_side, cells.sides, own[:, None])
-    start = np.concatenate([[0], np.cumsum(2 * (of_side + 1))])
-    return own, Multipliers(of_side, start)
+    return own, Multipliers(of_side, np.concatenate([[0], np.cumsum(2 * (of_side + 1))]))
 
 
 def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
@@ -243,23 +250,21 @@ def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
 
     Motions are those of bodies, translations of size 1 and turns about their middles.
     """
-    trace = cells.trace
+    trace, e, highest = cells.trace, len(cells.ends), int(mu.degree.max())
     bodies = connected_bodies(trace)
-    corner = Triangulation(trace.mesh).triangles[cells.parent[cells.owner], 0]
-    body = bodies.of_vertex[corner]
-    values = np.zeros((int(mu.start[-1]), len(bodies.names), 3))
-    for k in np.unique(mu.degree).tolist():
-        side = np.flatnonzero(mu.degree == k)
-        t, w = gauss(k + trace.geometry_order)
-        x, _ = cells.points(np.repeat(side, len(t)), np.tile(t, len(side)))
-        arm = x.reshape(len(side), -1, 2) - bodies.middle[body[side], None]
-        arm = arm / bodies.size[body[side], None, None]
-        chi = w[:, None] * traces(k, t)
-        along_x, at = mu.start[side, None] + np.arange(k + 1), body[side, None]
-        values[along_x, at, 0] = values[along_x + k + 1, at, 1] = chi.sum(axis=0)
-        values[along_x, at, 2] = -arm[..., 1] @ chi
-        values[along_x + k + 1, at, 2] = arm[..., 0] @ chi
-    found = values[:, :, np.array(trace.model.motions)].reshape(len(values), -1)
+    body = bodies.of_vertex[Triangulation(trace.mesh).triangles[cells.parent[cells.owner], 0]]
+    t, w = gauss(highest + trace.geometry_order)
+    x, _ = cells.points(np.repeat(np.arange(e), len(t)), np.tile(t, e))
+    arm = (x.reshape(e, -1, 2) - bodies.middle[body, None]) / bodies.size[body, None, None]
+    motions = np.zeros((*arm.shape, 3))
+    motions[:, :, [0, 1], [0, 1]] = 1.0
+    motions[..., 2] = np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
+    motions = motions[..., np.array(trace.model.motions)]
+    moments = np.einsum("q,qn,eqcr->ecnr", w, traces(highest, t), motions, optimize=True)
+    own = (np.arange(highest + 1) <= mu.degree[:, None])[:, None] & np.ones((2, 1), dtype=bool)
+    values = np.zeros((int(mu.start[-1]), len(bodies.names), motions.shape[-1]))
+    values[np.arange(len(values)), np.repeat(body, 2 * (mu.degree + 1))] = moments[own]
+    found = values.reshape(len(values), -1)
     return np.asarray(found @ vanishing_combinations(found[fixed]))
 
 
@@ -285,7 +290,7 @@ def elements_of(
     ContactError
         No equilibrated stress.
     """
-    own, mu = multipliers(cells, degree, turning(problem, cells))
+    own, mu = multipliers(problem, cells, degree)
     at_axis = np.asarray(cells.trace.model.on_axis(cells.vertices))
     on_axis = np.asarray(at_axis[cells.ends].all(axis=1))[cells.sides]
     key = np.column_stack(
@@ -357,11 +362,10 @@ def _element(
             force[..., 0] = 0.0
             s_p[..., 2] += radial
         rest = strain - (compliance @ s_p[..., None])[..., 0]
-    # T = stresses @ combined is orthonormal: (T, T) = 1
     T = stresses(degree, corners, local, axial, on_axis)
-    roots = np.sqrt(weight)[..., None, None] * np.linalg.cholesky(compliance).swapaxes(2, 3)
-    rows = (roots @ T).reshape(len(at), -1, T.shape[-1])
-    combined = np.linalg.inv(np.linalg.qr(rows, mode="r"))
+    combined, g, beyond = _condensed(T, weight, compliance, rest)
+    mandel = np.append(np.ones(compliance.shape[-1] - 1), 0.5**0.5)
+    largest = np.linalg.eigvalsh(compliance * mandel * mandel[:, None])[..., -1].max(axis=1)
     N, own = _moments(cells, mu, at, degree, on_axis, force)
     return Element(
         places=points,
@@ -373,15 +377,16 @@ def _element(
         on_axis=on_axis,
         compliance=compliance,
         strain=strain,
+        source=source,
         force=force,
         radial=radial,
-        source=source,
         missed=missed,
+        modulus=np.broadcast_to(1 / largest, len(at)),
         combined=combined,
         N=combined.transpose(0, 2, 1) @ N,
-        g=(_products(T, weight, rest) @ combined)[:, 0],
         own=own,
-        sides=cells.sides[at],
+        g=g,
+        beyond=beyond,
         dofs=np.concatenate([mu.of(side) for side in cells.sides[at].T], axis=1),
     )
 
@@ -391,11 +396,23 @@ def _force_degree(degree: int, axial: bool) -> int:
     return max(0, degree - 1 - axial)
 
 
-def _products(T: Array, weight: Array, strain: Array) -> Array:
-    """(T, e), shape (b, 1, m), of stresses T (b, q, v, m) and strains e, `strain` (b, q, v)."""
-    b = len(weight)
-    weighted = (weight[..., None] * strain).reshape(b, 1, -1)
-    return np.asarray(weighted @ T.reshape(b, -1, T.shape[-1]))
+def _condensed(
+    T: Array, weight: Array, compliance: Array, strain: Array
+) -> tuple[Array, Array, Array]:
+    """`Element.combined`, `.g` and `.beyond` of stresses T (b, q, v, n) for a `strain` (b, q, v).
+
+    `weight` is (b, q), `compliance` C^-1 = L L' (b, q, v, v) or (1, 1, v, v).
+    """
+    L, root = np.linalg.cholesky(compliance), np.sqrt(weight)[..., None, None]
+    rows = (root * L.swapaxes(2, 3) @ T).reshape(len(T), -1, T.shape[-1])
+    combined = np.linalg.inv(np.linalg.qr(rows, mode="r"))
+    rows = rows @ combined
+    rest = (root * (np.linalg.inv(L) @ strain[..., None])).reshape(len(T), -1, 1)
+    g = np.zeros((*rows.shape[::2], 1))
+    for _ in range(2):  # once more, as the rows are orthonormal but for round-off
+        more = rows.swapaxes(1, 2) @ rest
+        g, rest = g + more, rest - rows @ more
+    return combined, g[..., 0], (rest**2).sum(axis=(1, 2))
 
 
 def _moments(

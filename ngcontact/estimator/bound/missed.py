@@ -14,6 +14,7 @@ the rules on T are those on its parts.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import ngsolve as ng
@@ -21,12 +22,12 @@ import numpy as np
 
 from ...arrays import Array, Index
 from .cells import Cells
-from .elements import Element, elements_of
-from .norms import SETTLED, forces_missed, residuals, smallest_moduli, stress_norms
+from .elements import Element, Multipliers, by_triangle, elements_of, stress_norms
 from .parts import divided, pattern
 from .program import dual_program, exerted
 from .tractions import Given, side_rule, tractions_of
 
+SETTLED = 1e-10  # residual of equilibrium, relative to the largest stress
 SEEN = 17  # points on each side
 # Shares of corners in places at which the middle of both balls is sought, beside the incentre.
 INNER = np.array([(i, j, 8 - i - j) for i in range(1, 8) for j in range(1, 8 - i)]) / 8
@@ -35,23 +36,18 @@ LEAST = 3  # degree on parts: lower ones do not meet all tractions
 AT_ONCE = 200  # triangles
 
 
-def data_norms(cells: Cells, forces: Array, tractions: Array, least: Array) -> Array:
-    """Norm (n,) of a stress that does the work of what is missed.
+def data_norms(cells: Cells, elements: Sequence[Element], tractions: Array) -> Array:
+    """Norm (n,) of a stress that does the work of what is missed of body forces and tractions.
 
-    Parameters
-    ----------
-    forces : ndarray (n,)
-        L2 norms of body forces orthogonal to rigid motions, times the measure.
-    tractions : ndarray (n, 3)
-        The same of tractions on the sides.
-    least : ndarray (n,)
-        Smallest eigenvalue of C in Mandel's scaling.
+    `tractions` (n, 3) are L2 norms on the sides, orthogonal to rigid motions, times the measure.
 
     Raises
     ------
     ValueError
         Something is missed at the axis, where the measure is 0.
     """
+    forces = by_triangle(elements, [e.missed for e in elements])
+    least = by_triangle(elements, [e.modulus for e in elements])
     found = np.zeros(len(forces))
     at = np.flatnonzero((forces > 0) | (tractions > 0).any(axis=1))
     if at.size:
@@ -202,15 +198,24 @@ def _on_parts(
     program = dual_program(mu, elements, free, np.zeros((len(moments), 0)), [])
     found = program.nearest(elements, moments).coefficients
     left = residuals(parts, mu, moments - exerted(elements, found)[0], scale)
-    distance = stress_norms(elements, found, len(look)).distance
+    distance, _ = stress_norms(elements, found)
     have = tractions_of(elements, found, owner, rule.x, rule.normal)
     missed = rule.missed(parts, asked - have, scale)
-    moduli = smallest_moduli(elements, len(look))
-    loads = data_norms(parts, forces_missed(elements, len(look)), missed, moduli)
-    both = distance, loads
+    both = distance, data_norms(parts, elements, missed)
     if look[:, 1].any():
         finer = Level(parts, elements, found, look, *both)
         both = once_more(displacement, given, finer, degree, scale, allowed)
     settled = left.reshape(-1, k).max(axis=1) <= SETTLED
     one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
     return np.where(settled, one, np.inf), np.where(settled, two, np.inf)
+
+
+def residuals(cells: Cells, mu: Multipliers, left: Array, largest: float) -> Array:
+    """Largest moment `left` (d,) without balance on the sides of each triangle, (n,).
+
+    Dimensionless: over the diameter of the side's owner, the measure and the `largest` stress.
+    """
+    middle = cells.vertices[cells.ends].mean(axis=1)
+    size = cells.diameters[cells.owner] * cells.trace.model.measure(middle) * (largest or 1.0)
+    force = np.maximum.reduceat(np.abs(left), mu.start[:-1])
+    return np.divide(force, size, out=np.zeros_like(size), where=size > 0)[cells.sides].max(axis=1)
