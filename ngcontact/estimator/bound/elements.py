@@ -25,13 +25,12 @@ from ...lagrange import gauss
 from ...problem import Problem, Triangulation, varies
 from ...qp import vanishing_combinations
 from .cells import Cells, Places, places
-from .parts import projection
+from .parts import ForceRules, projection
 from .polynomials import CORNERS, balancing, coordinates, stresses
 
 TURNED = 1e-4  # sine of the angle between normals that are not one
 ON_CURVES = 4  # degrees by which stresses on triangles with a curved side are higher
 CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
-WHOLE, PARTED = 10, 4  # degrees above 2 k of rules for forces: on triangles, on their parts
 ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
 ENTRIES = 2**20  # of triangles at once, (degree + 2)^4 each: bounds the memory
 
@@ -68,10 +67,14 @@ class Element:
         e(u_h), Voigt.
     source : CoefficientFunction or None
         The body force.
+    force_degree : int
+        Of the body force that s_p balances.
     force : ndarray (b, j, 2)
-        Coefficients of the body force that s_p balances, of degree `force_degree`.
+        Its coefficients, as of `scalars`.
     radial : ndarray (b, q)
         Radial force times r about an axis: a part of the hoop stress.
+    parted : ndarray of bool (b,)
+        Triangles on the parts of which forces are integrated, or tractions are.
     missed : ndarray (b,)
         L2 norm of what of the body force s_p does not balance, times the measure.
     modulus : ndarray (b,)
@@ -100,8 +103,10 @@ class Element:
     compliance: Array
     strain: Array
     source: ng.CoefficientFunction | None
+    force_degree: int
     force: Array
     radial: Array
+    parted: Mask
     missed: Array
     modulus: Array
     combined: Array
@@ -110,11 +115,6 @@ class Element:
     g: Array
     beyond: Array
     dofs: Index
-
-    @property
-    def force_degree(self) -> int:
-        """Of the body force that is balanced."""
-        return _force_degree(self.degree, self.axial)
 
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with the multipliers, by coefficients `c` (b, m)."""
@@ -202,7 +202,7 @@ def among(
             yield e, c, mine, some[mine]
 
 
-def by_triangle(elements: Sequence[Element], values: Sequence[Array]) -> Array:
+def by_triangle(elements: Sequence[Element], values: Sequence[Array | Mask]) -> Array:
     """One array (n,) of `values` (b,) on each element's triangles, n in all."""
     found = np.zeros(sum(map(len, values)))
     for e, own in zip(elements, values, strict=True):
@@ -273,7 +273,7 @@ def elements_of(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     degree: int,
-    look: Index,
+    rules: ForceRules,
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, in groups of one kind, and their multipliers.
 
@@ -281,9 +281,7 @@ def elements_of(
     ----------
     degree : int
         Of stresses on triangles with straight sides.
-    look : ndarray of int (n, 3)
-        How forces are integrated: order of the rules, depth of the parts that these are on, and
-        whether parts at corners are in thirds; see `looked_at`.
+    rules : ForceRules
 
     Raises
     ------
@@ -294,14 +292,14 @@ def elements_of(
     at_axis = np.asarray(cells.trace.model.on_axis(cells.vertices))
     on_axis = np.asarray(at_axis[cells.ends].all(axis=1))[cells.sides]
     key = np.column_stack(
-        [own, on_axis.any(axis=1), mu.degree[cells.sides], cells.curved, cells.bodies, look]
+        [own, on_axis.any(axis=1), mu.degree[cells.sides], cells.curved, cells.bodies]
     )
     kinds, number = np.unique(key, axis=0, return_inverse=True)
     found = []
-    for kind, (own_degree, axis, *rest) in enumerate(kinds.tolist()):
+    for kind, (own_degree, axis, *_) in enumerate(kinds.tolist()):
         every = np.flatnonzero(number.ravel() == kind)
         for at in np.array_split(every, 1 + len(every) * (own_degree + 2) ** 4 // ENTRIES):
-            kept = problem, cells, displacement, mu, at, own_degree, bool(axis), rest[-3:]
+            kept = problem, cells, displacement, mu, at, own_degree, bool(axis), rules
             found.append(_element(*kept))
     return mu, found
 
@@ -334,9 +332,9 @@ def _element(
     at: Index,
     degree: int,
     on_axis: bool,
-    look: Sequence[int],
+    rules: ForceRules,
 ) -> Element:
-    """Triangles `at` (b,) of one kind, condensed; `look` as of `elements_of`."""
+    """Triangles `at` (b,) of one kind, condensed."""
     model = model_of(problem)
     axial, curved = model.extent > 0, bool(cells.curved[at[0]])
     law = _of_body(problem.materials, cells, at)
@@ -347,14 +345,12 @@ def _element(
     compliance = compliance_at(problem, cells, points)
     strain = points.evaluate(cells, model.strain(displacement))
     source = _of_body(problem.force, cells, at)
-    source = None if source is None else ng.CF(source)
-    n = _force_degree(degree, axial)
+    n = min(max(0, degree - 1 - axial), rules.order // 2)
     force, missed = np.zeros((len(at), (n + 1) * (n + 2) // 2, 2)), np.zeros(len(at))
-    radial, rest = np.zeros(weight.shape), strain
+    radial, rest, parted = np.zeros(weight.shape), strain, rules.least[at] > 0
     if source is not None:
-        (order, depth, thirds), parts = look, slice(int(axial), None)
-        rule = order, depth, bool(thirds)
-        force, missed, size = projection(source, cells, at, n, *rule, parts)
+        threshold = dict(zip(problem.force.values(), rules.thresholds, strict=True))[source]
+        force, missed, size, parted = projection(source, cells, at, n, rules, threshold)
         missed[missed <= ROUND_OFF * size] = 0.0
         s_p = balancing(n, corners, points.x, force, axial)
         if axial:
@@ -366,7 +362,7 @@ def _element(
     combined, g, beyond = _condensed(T, weight, compliance, rest)
     mandel = np.append(np.ones(compliance.shape[-1] - 1), 0.5**0.5)
     largest = np.linalg.eigvalsh(compliance * mandel * mandel[:, None])[..., -1].max(axis=1)
-    N, own = _moments(cells, mu, at, degree, on_axis, force)
+    N, own = _moments(cells, mu, at, degree, on_axis, n, force)
     return Element(
         places=points,
         weight=weight,
@@ -378,8 +374,10 @@ def _element(
         compliance=compliance,
         strain=strain,
         source=source,
+        force_degree=n,
         force=force,
         radial=radial,
+        parted=parted,
         missed=missed,
         modulus=np.broadcast_to(1 / largest, len(at)),
         combined=combined,
@@ -389,11 +387,6 @@ def _element(
         beyond=beyond,
         dofs=np.concatenate([mu.of(side) for side in cells.sides[at].T], axis=1),
     )
-
-
-def _force_degree(degree: int, axial: bool) -> int:
-    """Of the body forces that stresses of a `degree` balance."""
-    return max(0, degree - 1 - axial)
 
 
 def _condensed(
@@ -416,11 +409,18 @@ def _condensed(
 
 
 def _moments(
-    cells: Cells, mu: Multipliers, at: Index, degree: int, on_axis: bool, force: Array
+    cells: Cells,
+    mu: Multipliers,
+    at: Index,
+    degree: int,
+    on_axis: bool,
+    force_degree: int,
+    force: Array,
 ) -> tuple[Array, Array]:
     """Moments of tractions with the multipliers of triangles `at` (b,).
 
-    Those (b, n, d) of `stresses`, and those (b, d) of s_p for the coefficients `force` (b, j, 2).
+    Those (b, n, d) of `stresses`, and those (b, d) of s_p for the coefficients `force` (b, j, 2)
+    of a `force_degree`.
     """
     axial, corners, found = cells.trace.model.extent > 0, cells.corners[at], []
     for i in range(3):
@@ -435,7 +435,7 @@ def _moments(
         local = coordinates(corners, x) if bent else start + t[:, None] * (stop - start)
         T = stresses(degree, corners, local, axial, on_axis)
         if force.any():
-            s_p = balancing(_force_degree(degree, axial), corners, x, force, axial)
+            s_p = balancing(force_degree, corners, x, force, axial)
             T = np.concatenate([T, s_p[..., None]], axis=3)
         n = np.where(back[:, None, None], -1, 1) * (dx @ CLOCKWISE)  # times ds / dt
         chi = (w * cells.measure(x))[..., None] * traces(k, own)

@@ -23,7 +23,7 @@ import numpy as np
 from ...arrays import Array, Index
 from .cells import Cells
 from .elements import Element, Multipliers, by_triangle, elements_of, stress_norms
-from .parts import divided, pattern
+from .parts import LEAST, ForceRules, divided, pattern
 from .program import dual_program, exerted
 from .tractions import Given, side_rule, tractions_of
 
@@ -32,7 +32,6 @@ SEEN = 17  # points on each side
 # Shares of corners in places at which the middle of both balls is sought, beside the incentre.
 INNER = np.array([(i, j, 8 - i - j) for i in range(1, 8) for j in range(1, 8 - i)]) / 8
 COUNTS = 0.02  # of |s - sigma_h|^2, what may be added by data where nothing is balanced again
-LEAST = 3  # degree on parts: lower ones do not meet all tractions
 AT_ONCE = 200  # triangles
 
 
@@ -49,9 +48,10 @@ def data_norms(cells: Cells, elements: Sequence[Element], tractions: Array) -> A
     forces = by_triangle(elements, [e.missed for e in elements])
     least = by_triangle(elements, [e.modulus for e in elements])
     found = np.zeros(len(forces))
-    at = np.flatnonzero((forces > 0) | (tractions > 0).any(axis=1))
-    if at.size:
-        poincare, korn, trace, measure = _constants(cells, at)
+    some = (forces > 0) | (tractions > 0).any(axis=1)
+    for points in (2, SEEN):  # on straight sides extrema are at ends
+        at = np.flatnonzero(some & (cells.curved == (points > 2)))
+        poincare, korn, trace, measure = _constants(cells, at, points)
         if (measure <= 0).any():
             raise ValueError(
                 "no guaranteed bound is known for loads that are no polynomials at the axis; use "
@@ -62,14 +62,17 @@ def data_norms(cells: Cells, elements: Sequence[Element], tractions: Array) -> A
     return found
 
 
-def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array, Array]:
-    """Of Poincare and Korn (b,), of traces (b, 3), squares for |grad w| = 1; least measure (b,)."""
+def _constants(cells: Cells, at: Index, points: int) -> tuple[Array, Array, Array, Array]:
+    """Of Poincare and Korn (b,), of traces (b, 3), squares for |grad w| = 1; least measure (b,).
+
+    Sides are looked at in that many `points`.
+    """
     corners, back = cells.corners[at], cells.backward[at, :, None]
-    t = np.linspace(0, 1, SEEN)
+    t = np.linspace(0, 1, points)
     own = np.where(back, 1 - t, t).ravel()
     x, slope = (
-        z.reshape(len(at), 3, SEEN, 2)
-        for z in cells.points(np.repeat(cells.sides[at].ravel(), SEEN), own)
+        z.reshape(len(at), 3, points, 2)
+        for z in cells.points(np.repeat(cells.sides[at].ravel(), points), own)
     )
     slope = np.where(back[..., None], -slope, slope)
     normal = np.stack([slope[..., 1], -slope[..., 0]], axis=-1)
@@ -86,7 +89,7 @@ def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array, Array]:
     away = x - corners[:, :, None]
     least = np.maximum((away * normal).sum(axis=-1).min(axis=-1), tiny)
     far, p = np.linalg.norm(away, axis=-1).max(axis=-1), poincare[:, None]
-    measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), -1).min(axis=1)
+    measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), 3 * points).min(axis=1)
     return poincare, np.sqrt(1 + 2 / beta**2), 2 * (p**2 + far * p) / least, measure
 
 
@@ -114,8 +117,7 @@ class Level:
     elements : list of Element
     coefficients : list of ndarray (b, m)
         Of the stress.
-    look : ndarray of int (n, 3)
-        Rules of forces on each, as of `elements_of`.
+    rules : ForceRules
     distance, loads : ndarray (n,)
         |s - sigma_h|, and norms of what s misses of the data.
     """
@@ -123,7 +125,7 @@ class Level:
     cells: Cells
     elements: list[Element]
     coefficients: list[Array]
-    look: Index
+    rules: ForceRules
     distance: Array
     loads: Array
 
@@ -153,61 +155,38 @@ def once_more(
     allowed : float, optional
         What may be added to B^2; without it a share of |s - sigma_h|^2.
     """
-    c, D = level.distance.copy(), level.loads.copy()
+    c, D, rules = level.distance.copy(), level.loads.copy(), level.rules
     limit = COUNTS * float(c @ c) if allowed is None else allowed
-    _, depth, thirds = level.look.T
     lost = (c + D) ** 2 - c**2
     order = np.argsort(lost)
-    counts = np.cumsum(lost[order]) > limit
-    at = np.sort(order[counts & (depth[order] > 0)])
+    parted = by_triangle(level.elements, [e.parted for e in level.elements])[order] > 0
+    counts = np.sort(order[(np.cumsum(lost[order]) > limit) & parted])
     for third in (False, True):
-        some = at[thirds[at] == third]
-        for start in range(0, len(some), AT_ONCE):
-            here = some[start : start + AT_ONCE]
-            share = limit * len(here) / len(at)
-            one, two = _on_parts(displacement, given, level, here, degree, scale, third, share)
-            better = one + two < c[here] + D[here]
-            c[here[better]], D[here[better]] = one[better], two[better]
+        some, k = counts[rules.thirds[counts] == third], len(pattern(third)[1])
+        for at in np.array_split(some, -(-len(some) // AT_ONCE)) if len(some) else ():
+            parts, finer = divided(level.cells, at, third), rules.on_parts(at, k)
+            own = max(degree, LEAST)
+            mu, elements = elements_of(given.problem, parts, displacement, own, finer)
+            rule = side_rule(parts, given.breaks, np.flatnonzero(~parts.inner))
+            owner = parts.owner[rule.side]
+            on = level.elements, level.coefficients, at[owner // k], rule.x, rule.normal
+            asked = given.asked(parts, rule, tractions_of(*on))
+            moments = rule.moments(mu, asked)
+            free = np.zeros(len(moments), dtype=bool)
+            program = dual_program(mu, elements, free, np.zeros((len(moments), 0)), [])
+            found = program.nearest(elements, moments).coefficients
+            left = residuals(parts, mu, moments - exerted(elements, found)[0], scale)
+            have = tractions_of(elements, found, owner, rule.x, rule.normal)
+            loads = data_norms(parts, elements, rule.missed(parts, asked - have, scale))
+            both = stress_norms(elements, found)[0], loads
+            if finer.levels:
+                inner, share = Level(parts, elements, found, finer, *both), len(at) / len(counts)
+                both = once_more(displacement, given, inner, own, scale, limit * share)
+            one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
+            settled = left.reshape(-1, k).max(axis=1) <= SETTLED
+            better = settled & (one + two < c[at] + D[at])
+            c[at[better]], D[at[better]] = one[better], two[better]
     return c, D
-
-
-def _on_parts(
-    displacement: ng.CoefficientFunction,
-    given: Given,
-    level: Level,
-    at: Index,
-    degree: int,
-    scale: float,
-    thirds: bool,
-    allowed: float,
-) -> tuple[Array, Array]:
-    """`Level.distance` and `.loads` of s' on triangles `at` (b,); infinite without equilibrium.
-
-    `allowed` may be added to B^2 on these triangles.
-    """
-    parts, k, degree = divided(level.cells, at, thirds), len(pattern(thirds)[1]), max(degree, LEAST)
-    look = np.repeat(level.look[at], k, axis=0)
-    look[:, 1] -= 1
-    mu, elements = elements_of(given.problem, parts, displacement, degree, look)
-    rule = side_rule(parts, given.breaks, np.flatnonzero(~parts.inner))
-    owner = parts.owner[rule.side]
-    own = tractions_of(level.elements, level.coefficients, at[owner // k], rule.x, rule.normal)
-    asked = given.asked(parts, rule, own)
-    moments = rule.moments(mu, asked)
-    free = np.zeros(len(moments), dtype=bool)
-    program = dual_program(mu, elements, free, np.zeros((len(moments), 0)), [])
-    found = program.nearest(elements, moments).coefficients
-    left = residuals(parts, mu, moments - exerted(elements, found)[0], scale)
-    distance, _ = stress_norms(elements, found)
-    have = tractions_of(elements, found, owner, rule.x, rule.normal)
-    missed = rule.missed(parts, asked - have, scale)
-    both = distance, data_norms(parts, elements, missed)
-    if look[:, 1].any():
-        finer = Level(parts, elements, found, look, *both)
-        both = once_more(displacement, given, finer, degree, scale, allowed)
-    settled = left.reshape(-1, k).max(axis=1) <= SETTLED
-    one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
-    return np.where(settled, one, np.inf), np.where(settled, two, np.inf)
 
 
 def residuals(cells: Cells, mu: Multipliers, left: Array, largest: float) -> Array:
