@@ -29,35 +29,29 @@ TURN = 0.5  # twice the sine of the angle between sides up to which they are on 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Triangles, n of them, with e sides; b sides lie on the boundary.
+    """Triangles, n of them, with e sides.
 
     Side i of a triangle is opposite to corner i and runs from corner i + 1 to corner i + 2; a
-    side's own parameter t in [0, 1] runs from its vertex of the lower number to the other.
+    side's own parameter t in [0, 1] runs from its vertex of the lower number to the other. The
+    base, side 0, is the one that may be curved, else the shortest.
 
     Attributes
     ----------
     trace : BoundaryTrace
         Boundary of the mesh that they divide.
-    vertices : ndarray (nv, 2)
-        Their corners, lengths.
-    triangles : ndarray of int (n, 3)
-        Anticlockwise; the base, side 0, is the one that may be curved, else the shortest.
-    parent : ndarray of int (n,)
-        Element of the mesh that each is a part of.
-    barycentric : ndarray (n, 3, 3)
-        Barycentric coordinates of the corners in the parent.
-    ends : ndarray of int (e, 2)
-        Vertices of the sides, the lower number first.
-    sides : ndarray of int (n, 3)
-        Side numbers.
+    vertices, triangles : ndarray (nv, 2), of int (n, 3)
+        Places, lengths, and their numbers at the corners, anticlockwise.
+    parent, barycentric : ndarray of int (n,), (n, 3, 3)
+        Element of the mesh that each is a part of, and coordinates of the corners in it.
+    ends, sides : ndarray of int (e, 2), (n, 3)
+        Vertices of the sides, the lower number first, and the sides of triangles.
     owner, local : ndarray of int (e,)
         A triangle of each side, and which of its sides it is.
-    segment : ndarray of int (e,)
-        Segment of the boundary that a side is part of, -1 inside of bodies.
-    span : ndarray (e, 2)
-        Parameters s on that segment at t = 0 and t = 1; of no meaning inside.
-    curved : ndarray of bool (n,)
-        Triangles with a curved base.
+    segment, span : ndarray of int (e,), (e, 2)
+        Segment of the boundary that a side is part of, -1 inside of bodies, and parameters s on it
+        at t = 0 and t = 1.
+    curved, bent : ndarray of bool (n,), (e,)
+        Triangles with a curved base, and curved sides.
     """
 
     trace: BoundaryTrace
@@ -72,6 +66,7 @@ class Cells:
     segment: Index
     span: Array
     curved: Mask
+    bent: Mask
 
     @property
     def corners(self) -> Array:
@@ -128,13 +123,6 @@ class Cells:
             dx[bent] = self.trace.derivative(segment, s) * rate
         return x, dx
 
-    @cached_property
-    def bent(self) -> Mask:
-        """Curved sides (e,)."""
-        bent = np.zeros(len(self.ends), dtype=bool)
-        bent[self.sides[self.curved, 0]] = True
-        return bent
-
     def image(self, at: Index, local: Array) -> tuple[Array, Array]:
         """Points (b, q, 2) of triangles `at` (b,), and derivatives (b, q, 2, 2) by `local` (q, 2).
 
@@ -167,25 +155,6 @@ class Cells:
         rule = ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1.0])
         return np.asarray(self.trace.mesh.MapToAllElements(rule, ng.VOL))
 
-    def located(self, at: Index, x: Array, guess: Array) -> Array:
-        """Reference places (k, 2) of `x` (k, 2) in the parents of triangles `at` (k,).
-
-        By Newton's method from a `guess` (k, 2), exact where elements are straight.
-        """
-        bent = np.flatnonzero(self.trace.curved_elements[self.parent[at]])
-        if bent.size == 0:
-            return guess
-        place, jacobian = ng.CF((ng.x, ng.y)), ng.specialcf.JacobianMatrix(2)
-        found = guess.copy()
-        for _ in range(NEWTON_STEPS):
-            slope = self.evaluate(jacobian, at[bent], found[bent]).reshape(-1, 2, 2)
-            miss = x[bent] - self.evaluate(place, at[bent], found[bent])
-            step = np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
-            found[bent] += step
-            if np.abs(step).max() <= CLOSE:
-                break
-        return found
-
 
 @dataclass(frozen=True, eq=False)
 class Places:
@@ -197,22 +166,20 @@ class Places:
         The triangles.
     local : ndarray (q, 2)
         Their places (a, b) in each, as of `Cells.image`.
-    x : ndarray (b, q, 2)
-        Points, lengths.
+    x, slopes : ndarray (b, q, 2), (b, q, 2, 2)
+        Points, lengths, and derivatives by (a, b).
     weight : ndarray (b, q)
-        Weights in the plane, areas.
+        Weights in the plane times the model's measure.
     reference : ndarray (b, q, 2)
         Reference coordinates in the parents.
-    slopes : ndarray (b, q, 2, 2)
-        Derivatives of x by (a, b).
     """
 
     at: Index
     local: Array
     x: Array
+    slopes: Array
     weight: Array
     reference: Array
-    slopes: Array
 
     def evaluate(self, cells: Cells, function: ng.CoefficientFunction) -> Array:
         """Values (b, q, dim) of a function at the points."""
@@ -243,9 +210,18 @@ def places(cells: Cells, at: Index, order: int) -> Places:
     if not (area > 0).all():
         raise ContactError("a curved side of the mesh goes beyond the middle of its element")
     shares = np.column_stack([local[:, 1], 1 - local.sum(axis=1), local[:, 0]])
-    guess = (shares @ cells.barycentric[at, :, :2]).reshape(-1, 2)
-    found = cells.located(np.repeat(at, len(weight)), x.reshape(-1, 2), guess)
-    return Places(at, local, x, area * weight, found.reshape(x.shape), slopes)
+    found = shares @ cells.barycentric[at, :, :2]
+    bent = np.flatnonzero(cells.trace.curved_elements[cells.parent[at]])
+    owner, flat = np.repeat(at[bent], len(weight)), found[bent].reshape(-1, 2)
+    for _ in range(NEWTON_STEPS if bent.size else 0):
+        slope = cells.evaluate(ng.specialcf.JacobianMatrix(2), owner, flat).reshape(-1, 2, 2)
+        miss = x[bent].reshape(-1, 2) - cells.evaluate(ng.CF((ng.x, ng.y)), owner, flat)
+        step = np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
+        flat += step
+        if np.abs(step).max() <= CLOSE:
+            break
+    found[bent] = flat.reshape(-1, *x.shape[1:])
+    return Places(at, local, x, slopes, area * weight * cells.measure(x), found)
 
 
 def cells_of(trace: BoundaryTrace, cuts: Mapping[int, Array], loaded: Index, held: Index) -> Cells:
@@ -277,20 +253,23 @@ def joined(
     `parent` (n,) and `barycentric` (n, 3, 3) are those of `Cells`, in the order of the triangles.
     Sides on one side of a parent lie on its segment of the boundary.
     """
-    segment, last = _segments_of_elements(trace)
+    view = Triangulation(trace.mesh)
+    at = view.triangles[trace.element][:, :, None] == view.segments[:, None]  # (k, corners, ends)
+    last, outer = at[..., 1].argmax(axis=1), np.flatnonzero(~trace.inner)
+    segments = np.full(view.triangles.shape, -1)  # opposite to each corner of the elements
+    segments[trace.element[outer], (~at.any(axis=2))[outer].argmax(axis=1)] = outer
     zero = barycentric == 0
     on = np.roll(zero, -1, axis=1) & np.roll(zero, -2, axis=1)  # (n, 3 sides, 3 of the parent)
-    own = np.where(on, segment[parent][:, None], -1).max(axis=2)
-    bent = np.append(trace.curved_segments, False)[own]
-    curved = bent.any(axis=1)
-    base = np.where(curved, bent.argmax(axis=1), _lengths(vertices[triangles]).argmin(axis=1))
+    own = np.where(on, segments[parent][:, None], -1).max(axis=2)
+    bent = np.append(trace.curved_segments, False)
+    base = _lengths(vertices[triangles]).argmin(axis=1)
+    base = np.where(bent[own].any(axis=1), bent[own].argmax(axis=1), base)
     roll = (base[:, None] + np.arange(3)) % 3
     triangles, own = (np.take_along_axis(x, roll, axis=1) for x in (triangles, own))
     barycentric = np.take_along_axis(barycentric, roll[..., None], axis=1)
-    start = np.roll(triangles, -1, axis=1).ravel()
-    stop = np.roll(triangles, -2, axis=1).ravel()
-    low, high = np.minimum(start, stop), np.maximum(start, stop)
-    _, first, sides = np.unique(low * len(vertices) + high, return_index=True, return_inverse=True)
+    start, stop = (np.roll(triangles, -k, axis=1).ravel() for k in (1, 2))
+    both = np.sort(np.column_stack([start, stop]), axis=1)
+    _, first, sides = np.unique(both @ [len(vertices), 1], return_index=True, return_inverse=True)
     owner, local = np.divmod(first, 3)
     segment = own[owner, local]
     ends = (local[:, None] + [1, 2]) % 3
@@ -301,13 +280,14 @@ def joined(
         triangles=triangles,
         parent=parent,
         barycentric=barycentric,
-        ends=np.column_stack([low, high])[first],
+        ends=both[first],
         sides=sides.reshape(-1, 3),
         owner=owner,
         local=local,
         segment=segment,
         span=np.where((start > stop)[first, None], span[:, ::-1], span),
-        curved=curved,
+        curved=bent[own[:, 0]],
+        bent=bent[segment],
     )
 
 
@@ -387,48 +367,25 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
     Around a vertex of the boundary all sides of which lie on two lines, as at a corner of one
     triangle or between two on a straight boundary, these equations have a sum without tractions of
     inner sides: a condition on those that are given. Another triangle there takes it away.
-
-    Parameters
-    ----------
-    cells : Cells
-    loaded, held : ndarray of int (k,)
-        As of `cells_of`.
+    `loaded` and `held` (k,) are as of `cells_of`.
     """
-    count = len(cells.vertices)
-    border = ~cells.inner
-    carries, free = np.zeros((2, count), dtype=bool)
-    carries[cells.ends[border & np.isin(cells.segment, loaded)]] = True
-    free[cells.ends[border & np.isin(cells.segment, held)]] = True
-    side, end = np.nonzero((carries & ~free)[cells.ends])
+    loads, supports = np.zeros((2, len(cells.vertices)), dtype=bool)
+    loads[cells.ends[~cells.inner & np.isin(cells.segment, loaded)]] = True
+    supports[cells.ends[~cells.inner & np.isin(cells.segment, held)]] = True
+    side, end = np.nonzero((loads & ~supports)[cells.ends])
     vertex = cells.ends[side, end]
-    _, along = cells.points(side, end.astype(float))
-    line = along @ np.array([1.0, 1j])
+    line = cells.points(side, end.astype(float))[1] @ np.array([1.0, 1j])
     line = line**2 / np.abs(line) ** 2  # one number for both senses
-    at_two = np.zeros(count, dtype=bool)
-    at_two[vertex] = True
-    left = np.arange(len(vertex))
+    at_two, left = loads & ~supports, np.arange(len(vertex))
     for _ in range(2):  # take away the sides of one line
-        one = np.zeros(count, dtype=complex)
+        one = np.zeros(len(at_two), dtype=complex)
         one[vertex[left]] = line[left]
         left = left[np.abs(line[left] - one[vertex[left]]) > TURN]
     at_two[vertex[left]] = False
-    chosen = np.full(count, -1)
+    chosen = np.full(len(at_two), -1)
     x = cells.corners  # straight ones, and wide ones, if there are any
     wide = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / cells.diameters**2
     order = np.lexsort((wide, ~cells.curved))
     chosen[cells.triangles[order]] = order[:, None]
     every = at_two[cells.triangles].any(axis=1) & ~cells.curved & (wide > WIDE)
     return np.union1d(chosen[at_two], np.flatnonzero(every))
-
-
-def _segments_of_elements(trace: BoundaryTrace) -> tuple[Index, Index]:
-    """Segment (ne, 3) of the boundary opposite to each corner, -1 where there is none.
-
-    And which corner (k,) of its element each segment ends at, s = 1.
-    """
-    view = Triangulation(trace.mesh)
-    corners = view.triangles[trace.element][:, :, None] == view.segments[:, None]
-    found = np.full(view.triangles.shape, -1)
-    outer = np.flatnonzero(~trace.inner)
-    found[trace.element[outer], (~corners.any(axis=2))[outer].argmax(axis=1)] = outer
-    return found, corners[..., 1].argmax(axis=1)

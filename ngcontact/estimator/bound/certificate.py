@@ -69,13 +69,15 @@ def _stresses(proof: Proof) -> dict[str, np.ndarray]:
         stress[at] = e.stress(c, x[at])[..., [0, 1, -1]]
         force[at] = scalars(e.force_degree, e.corners, x[at]) @ e.force
         a, b = e.places.local.T
+        weight = e.places.weight[0] / cells.measure(e.places.x[0])
+        every, places = np.repeat(at, len(a)), e.places.reference.reshape(-1, 2)
         rules |= {
             f"rule{number}_triangle": at,
             f"rule{number}_points": np.column_stack([1 - a - b, a]),
-            f"rule{number}_weights": e.places.weight[0] / (2 * e.places.weight[0].sum()),
+            f"rule{number}_weights": weight / (2 * weight.sum()),
             f"rule{number}_strain": e.strain,
             f"rule{number}_compliance": e.compliance,
-            f"rule{number}_radial": e.radial,
+            f"rule{number}_radial": e.radial_at(cells, every, places).reshape(e.strain.shape[:2]),
         }
     found = {"lattice": lattice, "stress": measure * stress, "force": measure * force}
     return {"degree": np.array(k)} | found | rules

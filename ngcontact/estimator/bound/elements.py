@@ -51,14 +51,10 @@ class Element:
     ----------
     places : Places
         Quadrature points, q in each.
-    weight : ndarray (b, q)
-        With the model's measure.
     corners : ndarray (b, 3, 2)
         Lengths.
-    local : ndarray (b, q, 2)
-        `coordinates` of the quadrature points, or (q, 2) where they are the same for all.
-    degree : int
-        Of the stresses.
+    degree, force_degree : int
+        Of the stresses, and of the body force that s_p balances.
     axial, on_axis : bool
         Whether the model is axisymmetric; whether a side of each lies on the axis.
     compliance : ndarray (b, q, v, v)
@@ -67,45 +63,34 @@ class Element:
         e(u_h), Voigt.
     source : CoefficientFunction or None
         The body force.
-    force_degree : int
-        Of the body force that s_p balances.
     force : ndarray (b, j, 2)
-        Its coefficients, as of `scalars`.
-    radial : ndarray (b, q)
-        Radial force times r about an axis: a part of the hoop stress.
+        Coefficients, as of `scalars`, of the body force that s_p balances.
     parted : ndarray of bool (b,)
         Triangles on the parts of which forces are integrated, or tractions are.
-    missed : ndarray (b,)
-        L2 norm of what of the body force s_p does not balance, times the measure.
-    modulus : ndarray (b,)
-        Smallest eigenvalue of C in Mandel's scaling, a stress.
+    missed, modulus : ndarray (b,)
+        L2 norm of what of the body force s_p does not balance, times the measure; smallest
+        eigenvalue of C in Mandel's scaling, a stress.
     combined : ndarray (b, n, m)
         T from the n polynomials of `stresses`, orthonormal: (T, T) = 1.
-    N : ndarray (b, m, d)
-        Moments <T n, .> of the tractions with the multipliers.
-    own : ndarray (b, d)
-        Moments of s_p n.
-    g : ndarray (b, m)
-        (T, e(u_h) - C^-1 s_p): the coefficients without multipliers.
-    beyond : ndarray (b,)
-        Squares of |C e(u_h) - s_p - T g|, which no coefficients reach.
+    N, own : ndarray (b, m, d), (b, d)
+        Moments <T n, .> of the tractions with the multipliers, and those of s_p n.
+    g, beyond : ndarray (b, m), (b,)
+        (T, e(u_h) - C^-1 s_p), the coefficients without multipliers; squares of
+        |C e(u_h) - s_p - T g|, which no coefficients reach.
     dofs : ndarray of int (b, d)
         Numbers of the multipliers.
     """
 
     places: Places
-    weight: Array
     corners: Array
-    local: Array
     degree: int
+    force_degree: int
     axial: bool
     on_axis: bool
     compliance: Array
     strain: Array
     source: ng.CoefficientFunction | None
-    force_degree: int
     force: Array
-    radial: Array
     parted: Mask
     missed: Array
     modulus: Array
@@ -126,10 +111,10 @@ class Element:
 
     def of_strain(self, strain: Array) -> Element:
         """The same triangles for a displacement of `strain` (b, q, v), without body forces."""
-        T = stresses(self.degree, self.corners, self.local, self.axial, self.on_axis)
-        _, g, beyond = _condensed(T, self.weight, self.compliance, strain)
-        forces = "force", "radial", "missed", "own"
-        none = {name: np.zeros_like(getattr(self, name)) for name in forces}
+        local = coordinates(self.corners, self.places.x)
+        T = stresses(self.degree, self.corners, local, self.axial, self.on_axis)
+        _, g, beyond = _condensed(T, self.places.weight, self.compliance, strain)
+        none = {name: np.zeros_like(getattr(self, name)) for name in ("force", "missed", "own")}
         return replace(self, strain=strain, source=None, g=g, beyond=beyond, **none)
 
     def radial_at(self, cells: Cells, at: Index, reference: Array) -> Array:
@@ -181,18 +166,8 @@ def among(
 ) -> Iterator[tuple[Element, Array, Index, Index]]:
     """The elements that have some of the triangles `at` (m,).
 
-    Parameters
-    ----------
-    coefficients : sequence of ndarray (b, m)
-        Of a stress on the triangles of each element.
-
-    Yields
-    ------
-    element : Element
-    c : ndarray (b, m)
-        Its coefficients.
-    mine, some : ndarray of int (k,)
-        Which of the triangles it has, and their places among its own.
+    Each with its coefficients, one of `coefficients` (b, m), and numbers (k,): which of `at` it
+    has, and their places among its own.
     """
     for e, c in zip(elements, coefficients, strict=True):
         own = e.places.at
@@ -213,12 +188,8 @@ def by_triangle(elements: Sequence[Element], values: Sequence[Array | Mask]) -> 
 def stress_norms(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple[Array, float]:
     """|s - C e| (n,), roots of energies per thickness, and the largest component of s.
 
-    That is looked at in the middles of straight sides.
-
-    Parameters
-    ----------
-    coefficients : sequence of ndarray (b, m)
-        Of the stress on the triangles of each element.
+    That is looked at in the middles of straight sides; `coefficients` (b, m) are those on the
+    triangles of each element.
     """
     pairs = list(zip(elements, coefficients, strict=True))
     square = by_triangle(elements, [((c - e.g) ** 2).sum(axis=1) + e.beyond for e, c in pairs])
@@ -277,16 +248,7 @@ def elements_of(
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, in groups of one kind, and their multipliers.
 
-    Parameters
-    ----------
-    degree : int
-        Of stresses on triangles with straight sides.
-    rules : ForceRules
-
-    Raises
-    ------
-    ContactError
-        No equilibrated stress.
+    Stresses are of a `degree` on triangles with straight sides.
     """
     own, mu = multipliers(problem, cells, degree)
     at_axis = np.asarray(cells.trace.model.on_axis(cells.vertices))
@@ -299,8 +261,8 @@ def elements_of(
     for kind, (own_degree, axis, *_) in enumerate(kinds.tolist()):
         every = np.flatnonzero(number.ravel() == kind)
         for at in np.array_split(every, 1 + len(every) * (own_degree + 2) ** 4 // ENTRIES):
-            kept = problem, cells, displacement, mu, at, own_degree, bool(axis), rules
-            found.append(_element(*kept))
+            kind_ = at, own_degree, bool(axis)
+            found.append(_element(problem, cells, displacement, mu, rules, *kind_))
     return mu, found
 
 
@@ -329,10 +291,10 @@ def _element(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     mu: Multipliers,
+    rules: ForceRules,
     at: Index,
     degree: int,
     on_axis: bool,
-    rules: ForceRules,
 ) -> Element:
     """Triangles `at` (b,) of one kind, condensed."""
     model = model_of(problem)
@@ -340,43 +302,39 @@ def _element(
     law = _of_body(problem.materials, cells, at)
     varying = law is not None and varies(law)
     points = places(cells, at, 2 * degree + 4 * (curved or varying or axial))
-    weight, corners = points.weight * cells.measure(points.x), cells.corners[at]
+    corners = cells.corners[at]
     local = coordinates(corners, points.x) if curved else points.local
     compliance = compliance_at(problem, cells, points)
     strain = points.evaluate(cells, model.strain(displacement))
     source = _of_body(problem.force, cells, at)
     n = min(max(0, degree - 1 - axial), rules.order // 2)
     force, missed = np.zeros((len(at), (n + 1) * (n + 2) // 2, 2)), np.zeros(len(at))
-    radial, rest, parted = np.zeros(weight.shape), strain, rules.least[at] > 0
+    rest, parted = strain, rules.least[at] > 0
     if source is not None:
         threshold = dict(zip(problem.force.values(), rules.thresholds, strict=True))[source]
         force, missed, size, parted = projection(source, cells, at, n, rules, threshold)
         missed[missed <= ROUND_OFF * size] = 0.0
         s_p = balancing(n, corners, points.x, force, axial)
         if axial:
-            radial = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
             force[..., 0] = 0.0
-            s_p[..., 2] += radial
+            s_p[..., 2] += points.x[..., 0] * points.evaluate(cells, source)[..., 0]
         rest = strain - (compliance @ s_p[..., None])[..., 0]
     T = stresses(degree, corners, local, axial, on_axis)
-    combined, g, beyond = _condensed(T, weight, compliance, rest)
+    combined, g, beyond = _condensed(T, points.weight, compliance, rest)
     mandel = np.append(np.ones(compliance.shape[-1] - 1), 0.5**0.5)
     largest = np.linalg.eigvalsh(compliance * mandel * mandel[:, None])[..., -1].max(axis=1)
     N, own = _moments(cells, mu, at, degree, on_axis, n, force)
     return Element(
         places=points,
-        weight=weight,
         corners=corners,
-        local=local,
         degree=degree,
+        force_degree=n,
         axial=axial,
         on_axis=on_axis,
         compliance=compliance,
         strain=strain,
         source=source,
-        force_degree=n,
         force=force,
-        radial=radial,
         parted=parted,
         missed=missed,
         modulus=np.broadcast_to(1 / largest, len(at)),

@@ -241,7 +241,7 @@ def _stiffness(
             B[:, :, 1, m:] = B[:, :, -1, :m] = gradient[:, :, 1]
             if B.shape[2] > 3:
                 B[:, :, 2, :m] = f / points.x[..., :1]
-            weight = (points.weight * cells.measure(points.x))[..., None, None]
+            weight = points.weight[..., None, None]
             stress, strain = (x.reshape(len(at), -1, 2 * m) for x in (weight * (C @ B), B))
             on = [_on_sides(cells, cells.sides[at, i], n)[:, 1:-1] for i, n in enumerate(own)]
             back = cells.backward[at]

@@ -147,7 +147,7 @@ def _samples(
         if own.size == 0:
             continue
         points = places(cells, at[own], rules.order * (BENT if bent else 1))
-        weight, values = points.weight * cells.measure(points.x), points.evaluate(cells, F)
+        weight, values = points.weight, points.evaluate(cells, F)
         rough = np.zeros(len(own), dtype=bool)
         if rules.levels and np.isfinite(threshold):
             P = scalars(rules.degree, cells.corners[at[own]], points.x)
