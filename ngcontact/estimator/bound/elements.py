@@ -11,9 +11,9 @@ and the tractions of s are N'N mu + N'g + <s_p n, .>.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -33,8 +33,6 @@ ON_CURVES = 4  # degrees by which stresses on triangles with a curved side are h
 CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
 ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
 ENTRIES = 2**20  # of triangles at once, (degree + 2)^4 each: bounds the memory
-
-Value = TypeVar("Value")
 
 
 def traces(degree: int, t: Array) -> Array:
@@ -166,8 +164,8 @@ def among(
 ) -> Iterator[tuple[Element, Array, Index, Index]]:
     """The elements that have some of the triangles `at` (m,).
 
-    Each with its coefficients, one of `coefficients` (b, m), and numbers (k,): which of `at` it
-    has, and their places among its own.
+    Each with its coefficients, one of `coefficients` (b, m), which of `at` it has, and their places
+    among its own, (k,) each.
     """
     for e, c in zip(elements, coefficients, strict=True):
         own = e.places.at
@@ -266,22 +264,18 @@ def elements_of(
     return mu, found
 
 
-def _of_body(values: Mapping[str, Value], cells: Cells, at: Index) -> Value | None:
+def _of_body(values: Mapping[str, Any], cells: Cells, at: Index) -> Any:
     """What is given, by patterns of names, for the body of triangles `at` (b,); None if nothing."""
     mesh, body = cells.trace.mesh, int(cells.bodies[at[0]])
-    masks = ((mesh.Materials(pattern).Mask(), value) for pattern, value in values.items())
-    return next((value for mask, value in masks if mask[body]), None)
+    return next((value for k, value in values.items() if mesh.Materials(k).Mask()[body]), None)
 
 
 def compliance_at(problem: Problem, cells: Cells, points: Places) -> Array:
     """C^-1 at places of one body, (b, q, v, v) or, of a law of numbers, (1, 1, v, v)."""
     law = _of_body(problem.materials, cells, points.at)
-    assert law is not None
     C = law.voigt(problem.model)
-    if varies(law):
-        C = points.evaluate(cells, C)
-    else:
-        C = cells.evaluate(C, points.at[:1], np.full((1, 2), 1 / 3))[None]
+    middle = points.at[:1], np.full((1, 2), 1 / 3)
+    C = points.evaluate(cells, C) if varies(law) else cells.evaluate(C, *middle)[None]
     v = round(C.shape[-1] ** 0.5)
     return np.asarray(np.linalg.inv(C.reshape(*C.shape[:2], v, v)))
 
@@ -300,8 +294,7 @@ def _element(
     model = model_of(problem)
     axial, curved = model.extent > 0, bool(cells.curved[at[0]])
     law = _of_body(problem.materials, cells, at)
-    varying = law is not None and varies(law)
-    points = places(cells, at, 2 * degree + 4 * (curved or varying or axial))
+    points = places(cells, at, 2 * degree + 4 * (curved or varies(law) or axial))
     corners = cells.corners[at]
     local = coordinates(corners, points.x) if curved else points.local
     compliance = compliance_at(problem, cells, points)
@@ -309,21 +302,28 @@ def _element(
     source = _of_body(problem.force, cells, at)
     n = min(max(0, degree - 1 - axial), rules.order // 2)
     force, missed = np.zeros((len(at), (n + 1) * (n + 2) // 2, 2)), np.zeros(len(at))
-    rest, parted = strain, rules.least[at] > 0
+    parted, hoop = rules.least[at] > 0, np.zeros(points.weight.shape)
     if source is not None:
         threshold = dict(zip(problem.force.values(), rules.thresholds, strict=True))[source]
         force, missed, size, parted = projection(source, cells, at, n, rules, threshold)
         missed[missed <= ROUND_OFF * size] = 0.0
-        s_p = balancing(n, corners, points.x, force, axial)
         if axial:
             force[..., 0] = 0.0
-            s_p[..., 2] += points.x[..., 0] * points.evaluate(cells, source)[..., 0]
-        rest = strain - (compliance @ s_p[..., None])[..., 0]
-    T = stresses(degree, corners, local, axial, on_axis)
+            hoop = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
+
+    def columns(x: Array, local: Array) -> tuple[Array, Array]:
+        """T (b, q, v, n) and s_p (b, q, v) at `x` (b, q, 2), by (a, b) `local` (b, q, 2)."""
+        T = stresses(degree, corners, local, axial, on_axis)
+        return T, balancing(n, corners, x, force, axial) if force.any() else 0 * T[..., 0]
+
+    T, s_p = columns(points.x, local)
+    if axial:
+        s_p[..., 2] += hoop
+    rest = strain - (compliance @ s_p[..., None])[..., 0]
     combined, g, beyond = _condensed(T, points.weight, compliance, rest)
     mandel = np.append(np.ones(compliance.shape[-1] - 1), 0.5**0.5)
     largest = np.linalg.eigvalsh(compliance * mandel * mandel[:, None])[..., -1].max(axis=1)
-    N, own = _moments(cells, mu, at, degree, on_axis, n, force)
+    N, own = _moments(cells, mu, at, degree, columns)
     return Element(
         places=points,
         corners=corners,
@@ -371,34 +371,28 @@ def _moments(
     mu: Multipliers,
     at: Index,
     degree: int,
-    on_axis: bool,
-    force_degree: int,
-    force: Array,
+    columns: Callable[[Array, Array], tuple[Array, Array]],
 ) -> tuple[Array, Array]:
     """Moments of tractions with the multipliers of triangles `at` (b,).
 
-    Those (b, n, d) of `stresses`, and those (b, d) of s_p for the coefficients `force` (b, j, 2)
-    of a `force_degree`.
+    Those (b, n, d) of the first `columns` of stresses of a `degree`, and those (b, d) of the other.
     """
-    axial, corners, found = cells.trace.model.extent > 0, cells.corners[at], []
+    found: list[Array] = []
+    axial, corners, shape = cells.trace.model.extent > 0, cells.corners[at], (len(at), -1, 2)
     for i in range(3):
         side, back = cells.sides[at, i], cells.backward[at, i]
         k, bent = int(mu.degree[side[0]]), bool(cells.bent[side[0]])
         t, w = gauss(degree + k + 2 * axial + 4 * cells.trace.geometry_order * bent)
-        start, stop = CORNERS[(i + 1) % 3], CORNERS[(i + 2) % 3]
         own = np.where(back[:, None], 1 - t, t)
-        x, dx = (
-            z.reshape(len(at), -1, 2) for z in cells.points(np.repeat(side, len(t)), own.ravel())
-        )
-        local = coordinates(corners, x) if bent else start + t[:, None] * (stop - start)
-        T = stresses(degree, corners, local, axial, on_axis)
-        if force.any():
-            s_p = balancing(force_degree, corners, x, force, axial)
-            T = np.concatenate([T, s_p[..., None]], axis=3)
+        both = cells.points(np.repeat(side, len(t)), own.ravel())
+        x, dx = (z.reshape(shape) for z in both)
+        local = CORNERS[i - 2] + t[:, None] * (CORNERS[i - 1] - CORNERS[i - 2])
+        T, s_p = columns(x, coordinates(corners, x) if bent else local)
+        T = np.concatenate([T, s_p[..., None]], axis=3)
         n = np.where(back[:, None, None], -1, 1) * (dx @ CLOCKWISE)  # times ds / dt
         chi = (w * cells.measure(x))[..., None] * traces(k, own)
         for p, q in ((0, -1), (-1, 1)):
             traction = T[:, :, p] * n[..., :1] + T[:, :, q] * n[..., 1:]
             found.append(traction.transpose(0, 2, 1) @ chi)
     N = np.concatenate(found, axis=2)
-    return (N[:, :-1], N[:, -1]) if force.any() else (N, np.zeros((len(at), N.shape[2])))
+    return N[:, :-1], N[:, -1]

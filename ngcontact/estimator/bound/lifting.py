@@ -2,9 +2,8 @@
 
 On sides d.w is asked for: u_D - u_h on Gamma_u, r shared by compliance between both bodies on
 Gamma_K, -u_h.d on guides. Other parts of Gamma_K stay where they are. On the triangles around these
-sides w is the displacement of least energy of a degree with the values asked for at nodes; what is
-no polynomial of that degree is continued from its side to the opposite corner in proportion to the
-distance.
+sides w is the displacement of least energy with the values asked for at nodes. It is of one degree,
+and of `DATA` on sides where what is asked for is no such polynomial.
 """
 
 from __future__ import annotations
@@ -99,18 +98,8 @@ def lifted(
 ) -> Array:
     """Norms (n,) of w, roots of energies per thickness, shared by both bodies of each line.
 
-    On secondaries alone where conditions at a vertex disagree.
-
-    Parameters
-    ----------
-    asked : sequence of Asked
-        On supports.
-    lines : sequence of (Facing, ndarray (k, j))
-        Each line and its r, lengths at Gauss points.
-    degree : int
-        Of w.
-    extent : float
-        Size of displacements and gaps, a length, beside which round-off is told.
+    On secondaries alone where conditions at a vertex disagree. `asked` are those on supports, with
+    each line comes its r (k, j), lengths at Gauss points; degree and extent are as of `lifting_of`.
 
     Raises
     ------
@@ -122,10 +111,9 @@ def lifted(
         every = [*asked, *(one for line in lines for one in asked_on_line(*line, alone))]
         try:
             return lifting_of(problem, cells, every, degree, extent, away)
-        except ContactError:
-            if alone:
-                raise
-    raise AssertionError
+        except ContactError as found:
+            error = found
+    raise error
 
 
 def lifting_of(
@@ -136,9 +124,10 @@ def lifting_of(
     extent: float,
     away: Sequence[int] | Index = (),
 ) -> Array:
-    """Norms (n,) of w, of a `degree`, with all that is asked for; see `lifted`.
+    """Norms (n,) of w with all that is asked for, of a `degree`, of `DATA` where that has to be.
 
-    Sides `away` (r,) of Gamma_K face nothing, and may move.
+    What is less than round-off beside the `extent` of displacements and gaps, a length, is not
+    lifted. Sides `away` (r,) of Gamma_K face nothing, and may move.
 
     Raises
     ------
@@ -155,12 +144,12 @@ def lifting_of(
     layer = np.flatnonzero(touched[cells.triangles].any(axis=1))
     count = np.bincount(cells.sides[layer].ravel(), minlength=len(cells.ends))
     lines = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
-    still = cells.inner | np.isin(cells.segment, cells.trace.segments(*lines))
-    still[np.asarray(away, dtype=np.intp)] = False
+    fixed = cells.inner | np.isin(cells.segment, cells.trace.segments(*lines))
+    fixed[np.asarray(away, dtype=np.intp)] = False
     lower = lagrange(degree, gauss_lobatto(DATA)) @ lagrange(DATA, gauss_lobatto(degree))
     unit = np.concatenate(largest).max()
     for one in asked:
-        still[one.side] = False
+        fixed[one.side] = False
         both = np.concatenate([one.direction, one.amount[..., None] / unit], axis=2)
         degrees[one.side[(np.abs(both - lower @ both) > NOISE).any(axis=(1, 2))]] = DATA
     stiffness = list(_stiffness(problem, cells, layer, degrees, degree))
@@ -187,7 +176,7 @@ def lifting_of(
     missed = np.abs((w[number] * d).sum(axis=1) - amount).max()
     if missed > max(INCONSISTENT * unit, 100 * NOISE * extent):
         raise ContactError("conditions that meet at a vertex ask for different displacements")
-    rim = _on_sides(cells, np.flatnonzero((count == 1) & still), degree)
+    rim = _on_sides(cells, np.flatnonzero((count == 1) & fixed), degree)
     held[np.searchsorted(nodes, rim)] = True
     dofs = [2 * np.searchsorted(nodes, number) for _, number, _ in stiffness]
     dofs = [np.concatenate([x, x + 1], axis=1) for x in dofs]
@@ -203,11 +192,11 @@ def lifting_of(
         A = (Z.T @ K @ Z).tocsr()
         y = cholesky(lower_half(A))(np.ones(A.shape[0], dtype=bool))(-(Z.T @ (K @ w.ravel())))
         w += (Z @ y).reshape(-1, 2)
+    still = int(cells.trace.model.extent)  # translations from here on have no energy, but round-off
     for (at, _, K), x in zip(stiffness, dofs, strict=True):
-        m = x.shape[1] // 2
-        own = w.ravel()[x]
-        for c in range(int(cells.trace.model.extent), 2):  # translations: round-off of no energy
-            own[:, c * m : (c + 1) * m] -= own[:, c * m, None]
+        own = w.ravel()[x].reshape(len(at), 2, -1)
+        own[:, still:] -= own[:, still:, :1]
+        own = own.reshape(x.shape)
         norms[at] = np.sqrt(np.maximum(((K @ own[..., None])[..., 0] * own).sum(axis=1), 0.0))
     return norms
 

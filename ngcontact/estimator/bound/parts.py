@@ -38,21 +38,18 @@ def pattern(thirds: bool) -> tuple[Array, Index]:
     corners : ndarray of int (k, 3)
         Vertices of each part, anticlockwise.
     """
-    lattice = [(i, j) for i in range(PARTS + 1) for j in range(PARTS + 1 - i)]
-    at = {ij: n for n, ij in enumerate(lattice)}
-    vertices, found = [(PARTS - i - j, i, j) for i, j in lattice], []
-    for i, j in lattice:
-        if i + j < PARTS:
-            a, b, c = up = [at[i, j], at[i + 1, j], at[i, j + 1]]
-            if thirds and any(max(vertices[v]) == PARTS for v in up):
-                middle = len(vertices)
-                vertices.append(tuple(np.mean([vertices[v] for v in up], axis=0)))
-                found += [[middle, b, c], [middle, c, a], [middle, a, b]]
-            else:
-                found.append(up)
-        if i + j < PARTS - 1:
-            found.append([at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]])
-    return np.array(vertices) / PARTS, np.array(found)
+    at = [(i, j) for i in range(PARTS + 1) for j in range(PARTS + 1 - i)]
+    shares = np.array([(PARTS - i - j, i, j) for i, j in at]) / PARTS
+    up = [[(i, j), (i + 1, j), (i, j + 1)] for i, j in at if i + j < PARTS]
+    down = [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i, j in at if i + j < PARTS - 1]
+    corners = np.array([[at.index(v) for v in part] for part in up + down])
+    if thirds:
+        three, each = (shares[corners] == 1).any(axis=(1, 2)), np.arange(3)
+        parts = np.repeat(corners[three, None], 3, axis=1)
+        parts[:, each, each] = len(shares) + each[:, None]
+        shares = np.concatenate([shares, shares[corners[three]].mean(axis=1)])
+        corners = np.concatenate([corners[~three], parts.reshape(-1, 3)])
+    return shares, corners
 
 
 def divided(cells: Cells, at: Index, thirds: bool) -> Cells:
@@ -72,23 +69,17 @@ def divided(cells: Cells, at: Index, thirds: bool) -> Cells:
 class ForceRules:
     """How body forces are integrated on n triangles: where they are rough, on parts.
 
-    They are rough where they are far from polynomials on a triangle, so that the rule on it is
-    that on its parts: resultants are the same.
+    They are rough where they are far from polynomials on a triangle. The rule on it is that on its
+    parts: resultants are the same.
 
     Attributes
     ----------
     thresholds : list of float
         For each of `Problem.force` the root mean square that polynomials may miss.
-    degree : int
-        Of these polynomials.
-    levels : int
-        How often triangles may be divided.
-    lowest : int
-        Order of the rules on parts that may not be divided.
-    least : ndarray of int (n,)
-        How often they are at least.
-    thirds : ndarray of bool (n,)
-        Whether parts at corners are in thirds, as of `pattern`.
+    degree, levels, lowest : int
+        Of these polynomials; how often triangles may be divided; order of rules where they may not.
+    least, thirds : ndarray of int (n,), of bool (n,)
+        How often they are at least, and whether parts at corners are in thirds, as of `pattern`.
     """
 
     thresholds: list[float]
@@ -172,17 +163,10 @@ def projection(
     rules: ForceRules,
     threshold: float,
 ) -> tuple[Array, Array, Array, Mask]:
-    """Polynomials near to a force F in triangles `at` (b,).
+    """Polynomials near to a force F in triangles `at` (b,), of a `degree`.
 
-    Returns
-    -------
-    coefficients : ndarray (b, m, 2)
-        Of the polynomials of a `degree`, as of `scalars`.
-    rest, size : ndarray (b,)
-        L2 norms of what they miss of F, about an axis of its axial part, and of F, times the
-        measure.
-    parted : ndarray of bool (b,)
-        Triangles that the rules divide.
+    Coefficients (b, m, 2) as of `scalars`; L2 norms, (b,) each, of what they miss of F, about an
+    axis of its axial part, and of F, times the measure; whether the rules divide triangles, (b,).
     """
     if len(at) > AT_ONCE and np.isfinite(threshold):
         some = np.array_split(at, 1 + len(at) // AT_ONCE)
