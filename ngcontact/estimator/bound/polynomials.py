@@ -112,24 +112,21 @@ def stresses(
         airy /= np.linalg.det(E)[:, None, None] ** 2
         psi = derivatives(degree + 2, local, *DERIVATIVES[:2:-1]) @ orthonormal(degree + 2, 2)
         return np.asarray(airy[:, None] @ psi)
-    (a_r, a_z), (b_r, b_z) = np.linalg.inv(E).transpose(1, 2, 0)[..., None, None]
-
-    def derived(degree: int, order: int) -> tuple[Array, Array, Array, Array]:
-        """Functions `orthonormal` in an order, and these by r, z, and zz: (b, q, m) each."""
-        table = derivatives(degree, local, *DERIVATIVES) @ orthonormal(degree, order)
-        f, f_a, f_b, f_aa, f_ab, f_bb = np.moveaxis(table, -2, 0)
-        by_r, by_z = a_r * f_a + b_r * f_b, a_z * f_a + b_z * f_b
-        return f + 0 * by_r, by_r, by_z, a_z**2 * f_aa + 2 * a_z * b_z * f_ab + b_z**2 * f_bb
-
-    r = (corners[:, 1:2, :1] + local @ edges(corners)[:, 0, :, None]) / size
+    (a_r, a_z), (b_r, b_z) = np.linalg.inv(E).transpose(1, 2, 0)
+    rates = np.zeros((len(corners), 1, 4, 6))  # from `DERIVATIVES` to values, by r, z, and zz
+    rates[..., 0, 0] = 1.0
+    rates[:, 0, 1:3, 1:3] = np.array([[a_r, b_r], [a_z, b_z]]).transpose(2, 0, 1)
+    rates[:, 0, 3, 3:] = np.stack([a_z**2, 2 * a_z * b_z, b_z**2], axis=1)
+    r = (corners[:, 1:2, 0] + (local @ edges(corners)[:, 0, :, None])[..., 0]) / size[:, 0]
     k = int(on_axis)  # T_rr = r^k f, chi = r^(2 k) g
-    f, f_r, *_ = derived(degree - k, 0)
-    g, g_r, g_z, g_zz = derived(degree + 1 - 2 * k, 1 - k)
-    none, still = np.zeros_like(f), np.zeros_like(g)
-    free = [r ** (k - 1) * f, none, k * f + r**k * f_r, none]
-    bent = [still, -(r ** (2 * k - 2)) * (2 * k * g + r * g_r), r ** (2 * k) * g_zz]
-    bent.append(r ** (2 * k - 1) * g_z)
-    return np.concatenate([np.stack(free, axis=2), np.stack(bent, axis=2)], axis=-1)
+    f, g = np.zeros((2, *r.shape, 4, 4))
+    f[..., 0, 0], f[..., 2, 0], f[..., 2, 1] = r ** (k - 1), k, r**k
+    g[..., 1, 0], g[..., 1, 1] = -2 * k * r ** (2 * k - 2), -(r ** (2 * k - 1))
+    g[..., 2, 3], g[..., 3, 2] = r ** (2 * k), r ** (2 * k - 1)
+    parts = (f, degree - k, 0), (g, degree + 1 - 2 * k, 1 - k)
+    tables = (derivatives(n, local, *DERIVATIVES) @ orthonormal(n, o) for _, n, o in parts)
+    both = zip(parts, tables, strict=True)
+    return np.concatenate([(c @ rates) @ table for (c, *_), table in both], axis=-1)
 
 
 def scalars(degree: int, corners: Array, x: Array) -> Array:
