@@ -23,7 +23,7 @@ import numpy as np
 from ...arrays import Array, Index
 from .cells import Cells
 from .elements import Element, Multipliers, by_triangle, elements_of, stress_norms
-from .parts import LEAST, ForceRules, divided, pattern
+from .parts import LEAST, ForceRules, pattern
 from .program import dual_program, exerted
 from .tractions import Given, side_rule, tractions_of
 
@@ -109,17 +109,9 @@ def _distortion(cells: Cells, at: Index, base: Array, slope: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A stress on n triangles.
+    """A stress on n triangles of cells, in equilibrium with what `rules` see of forces.
 
-    Attributes
-    ----------
-    cells : Cells
-    elements : list of Element
-    coefficients : list of ndarray (b, m)
-        Of the stress.
-    rules : ForceRules
-    distance, loads : ndarray (n,)
-        |s - sigma_h|, and norms of what s misses of the data.
+    `distance` and `loads` (n,) are |s - sigma_h| and norms of what s misses of the data.
     """
 
     cells: Cells
@@ -140,20 +132,8 @@ def once_more(
 ) -> tuple[Array, Array]:
     """`Level.distance` and `.loads`, (n,) each, of the better of both stresses on each triangle.
 
-    Parameters
-    ----------
-    displacement : CoefficientFunction
-        u_h.
-    given : Given
-        Tractions on the boundary.
-    level : Level
-        The stress in equilibrium so far.
-    degree : int
-        Of stresses on straight triangles.
-    scale : float
-        The largest stress, beside which equilibrium is measured.
-    allowed : float, optional
-        What may be added to B^2; without it a share of |s - sigma_h|^2.
+    Stresses are of a `degree` on straight triangles, equilibrium is measured beside the largest
+    one, `scale`. What is `allowed` may be added to B^2; without it a share of |s - sigma_h|^2.
     """
     c, D, rules = level.distance.copy(), level.loads.copy(), level.rules
     limit = COUNTS * float(c @ c) if allowed is None else allowed
@@ -164,16 +144,15 @@ def once_more(
     for third in (False, True):
         some, k = counts[rules.thirds[counts] == third], len(pattern(third)[1])
         for at in np.array_split(some, -(-len(some) // AT_ONCE)) if len(some) else ():
-            parts, finer = divided(level.cells, at, third), rules.on_parts(at, k)
-            own = max(degree, LEAST)
+            (parts, finer), own = rules.divided(level.cells, at, third), max(degree, LEAST)
             mu, elements = elements_of(given.problem, parts, displacement, own, finer)
             rule = side_rule(parts, given.breaks, np.flatnonzero(~parts.inner))
             owner = parts.owner[rule.side]
             on = level.elements, level.coefficients, at[owner // k], rule.x, rule.normal
             asked = given.asked(parts, rule, tractions_of(*on))
             moments = rule.moments(mu, asked)
-            free = np.zeros(len(moments), dtype=bool)
-            program = dual_program(mu, elements, free, np.zeros((len(moments), 0)), [])
+            free, motions = np.zeros(len(moments), dtype=bool), np.zeros((len(moments), 0))
+            program = dual_program(mu, elements, free, motions, [])
             found = program.nearest(elements, moments).coefficients
             left = residuals(parts, mu, moments - exerted(elements, found)[0], scale)
             have = tractions_of(elements, found, owner, rule.x, rule.normal)

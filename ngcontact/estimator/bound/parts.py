@@ -52,19 +52,6 @@ def pattern(thirds: bool) -> tuple[Array, Index]:
     return shares, corners
 
 
-def divided(cells: Cells, at: Index, thirds: bool) -> Cells:
-    """Triangles `at` (b,) in the parts of `pattern`, each with vertices of its own."""
-    shares, corners = pattern(thirds)
-    p, k = len(shares), len(corners)
-    return joined(
-        cells.trace,
-        cells.image(at, shares[:, [2, 0]])[0].reshape(-1, 2),
-        (corners + p * np.arange(len(at))[:, None, None]).reshape(-1, 3),
-        (shares @ cells.barycentric[at])[:, corners].reshape(-1, 3, 3),
-        np.repeat(cells.parent[at], k),
-    )
-
-
 @dataclass(frozen=True, eq=False)
 class ForceRules:
     """How body forces are integrated on n triangles: where they are rough, on parts.
@@ -94,13 +81,25 @@ class ForceRules:
         """Of the rules on triangles that are not divided."""
         return self.lowest + FINER * self.levels
 
-    def on_parts(self, at: Index, k: int) -> ForceRules:
-        """The rules on the k parts of each of the triangles `at` (b,)."""
-        least, thirds = (
+    def divided(self, cells: Cells, at: Index, thirds: bool) -> tuple[Cells, ForceRules]:
+        """Triangles `at` (b,) of cells in the parts of `pattern`, each with vertices of its own.
+
+        And the rules on the parts.
+        """
+        shares, corners = pattern(thirds)
+        p, k = len(shares), len(corners)
+        parts = joined(
+            cells.trace,
+            cells.image(at, shares[:, [2, 0]])[0].reshape(-1, 2),
+            (corners + p * np.arange(len(at))[:, None, None]).reshape(-1, 3),
+            (shares @ cells.barycentric[at])[:, corners].reshape(-1, 3, 3),
+            np.repeat(cells.parent[at], k),
+        )
+        least, third = (
             np.repeat(np.maximum(self.least[at] - 1, 0), k),
             np.repeat(self.thirds[at], k),
         )
-        return replace(self, levels=self.levels - 1, least=least, thirds=thirds)
+        return parts, replace(self, levels=self.levels - 1, least=least, thirds=third)
 
 
 def force_rules(problem: Problem, cells: Cells, degree: int, least: Index) -> ForceRules:
@@ -132,7 +131,7 @@ def _samples(
     The first are numbers (k,) among these triangles. A force with an infinite `threshold` is one of
     numbers.
     """
-    components = slice(int(cells.trace.model.extent), None)
+    axial = int(cells.trace.model.extent)
     for bent, third in np.ndindex(2, 2):
         own = np.flatnonzero((cells.curved[at] == bent) & (rules.thirds[at] == third))
         if own.size == 0:
@@ -142,17 +141,17 @@ def _samples(
         rough = np.zeros(len(own), dtype=bool)
         if rules.levels and np.isfinite(threshold):
             P = scalars(rules.degree, cells.corners[at[own]], points.x)
-            rest = (values - P @ projected(P, weight, values))[..., components]
+            rest = (values - P @ projected(P, weight, values))[..., axial:]
             square = (weight * (rest**2).sum(axis=2)).sum(axis=1)
             rough = (square > threshold**2 * weight.sum(axis=1)) | (rules.least[at[own]] > 0)
         if not rough.all():
             yield own[~rough], points.x[~rough], weight[~rough], values[~rough]
         if rough.any():
-            divide, k = at[own[rough]], len(pattern(bool(third))[1])
-            parts, finer = divided(cells, divide, bool(third)), rules.on_parts(divide, k)
+            parts, finer = rules.divided(cells, at[own[rough]], bool(third))
             every = np.arange(len(parts.triangles))
+            whole = np.repeat(own[rough], len(every) // rough.sum())
             for n, x, w, inner in _samples(F, parts, every, finer, threshold):
-                yield own[rough][n // k], x, w, inner
+                yield whole[n], x, w, inner
 
 
 def projection(
@@ -175,21 +174,20 @@ def projection(
         return coefficients, rest, size, parted
     corners, b, m = cells.corners[at], len(at), (degree + 1) * (degree + 2) // 2
     pieces = [
-        (n, scalars(degree, corners[n], x), w, values, cells.measure(x))
+        (n, scalars(degree, corners[n], x), w, values, w * cells.measure(x))
         for n, x, w, values in _samples(F, cells, at, rules, threshold)
     ]
-    mass, found, norms = np.zeros((b, m, m)), np.zeros((b, m, 2)), []
+    mass, found, norms = np.zeros((b, m, m)), np.zeros((b, m, 2)), np.zeros((3, b))
     for n, P, w, _, _ in pieces:
         np.add.at(mass, n, (P.swapaxes(1, 2) * w[:, None]) @ P)
-    for turn in range(3):  # the second time a correction of round-off
-        right, square = np.zeros_like(found), np.zeros(b)
-        for n, P, w, values, measure in pieces:
+    for turn in range(3):  # without a projection, with one, with that corrected for round-off
+        right = np.zeros_like(found)
+        for n, P, w, values, squares in pieces:
             rest = values - P @ found[n]
             np.add.at(right, n, P.swapaxes(1, 2) @ (w[..., None] * rest))
-            part = rest[..., int(cells.trace.model.extent) :]
-            np.add.at(square, n, (w * measure * (part**2).sum(axis=2)).sum(axis=1))
-        norms.append(np.sqrt(square))
-        if turn < 2:
-            found += np.linalg.solve(mass, right)
+            axial = rest[..., int(cells.trace.model.extent) :]
+            np.add.at(norms[turn], n, (squares * (axial**2).sum(axis=2)).sum(axis=1))
+        found = found + np.linalg.solve(mass, right) if turn < 2 else found
     count = np.bincount(np.concatenate([n for n, *_ in pieces]), minlength=b)
-    return found, norms[2], norms[0], (count > 1) | (rules.least[at] > 0)
+    size, _, rest = np.sqrt(norms)
+    return found, rest, size, (count > 1) | (rules.least[at] > 0)
