@@ -26,7 +26,7 @@ from ...triplets import from_triplets
 from .cells import Cells, places
 from .elements import ENTRIES, compliance_at
 from .facing import DATA, PLACES, THROUGH, Facing
-from .polynomials import CORNERS, derivatives
+from .polynomials import CORNERS, DERIVATIVES, derivatives
 from .tractions import Given
 
 NOISE = 1e-13  # of what is asked for, relative to the displacement: round-off
@@ -98,8 +98,8 @@ def lifted(
 ) -> Array:
     """Norms (n,) of w, roots of energies per thickness, shared by both bodies of each line.
 
-    On secondaries alone where conditions at a vertex disagree. `asked` are those on supports, with
-    each line comes its r (k, j), lengths at Gauss points; degree and extent are as of `lifting_of`.
+    On secondaries alone where conditions at a vertex disagree. `asked` are those on supports,
+    `lines` (k, j) the facing sides with r, lengths at Gauss points; the rest is as of `lifting_of`.
 
     Raises
     ------
@@ -264,7 +264,7 @@ def _functions(degree: int, own: Sequence[int], local: Array) -> Array:
     Polynomials of a `degree`, and of higher ones n on sides of degree `own`: with the shares s and
     t s of its ends, (P_n - P_(n-2))(2 t - 1) s^n, which vanish on the others.
     """
-    found = [derivatives(degree, local, (0, 0), (1, 0), (0, 1)) * np.array([[1], [2], [2]])]
+    found = [derivatives(degree, local, DERIVATIVES[:3]) * np.array([[1], [2], [2]])]
     share = np.column_stack([local[:, 1], 1 - local.sum(axis=1), local[:, 0]])
     by = np.array([[0.0, 1.0], [-1.0, -1.0], [1.0, 0.0]])  # of the shares
     for i, highest in enumerate(own):

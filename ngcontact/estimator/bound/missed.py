@@ -111,7 +111,8 @@ def _distortion(cells: Cells, at: Index, base: Array, slope: Array) -> Array:
 class Level:
     """A stress on n triangles of cells, in equilibrium with what `rules` see of forces.
 
-    `distance` and `loads` (n,) are |s - sigma_h| and norms of what s misses of the data.
+    `distance` and `loads` (n,) are |s - sigma_h| and norms of what s misses of the data,
+    `coefficients` (b, m) those on the triangles of each element.
     """
 
     cells: Cells

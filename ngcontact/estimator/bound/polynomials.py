@@ -13,10 +13,9 @@ Legendre's in the coordinates (a, b) of each triangle, x = corner 1 + a base + b
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
-from math import comb
 
-import ngsolve as ng
 import numpy as np
 from numpy.polynomial import legendre
 
@@ -48,12 +47,14 @@ def coordinates(corners: Array, x: Array) -> Array:
     return np.asarray(np.linalg.solve(edges(corners), away).transpose(0, 2, 1))
 
 
-def derivatives(degree: int, local: Array, *orders: tuple[int, int]) -> Array:
-    """Derivatives (..., n, m) of the m `products` at `local` (..., 2), by 2 a and 2 b.
+def derivatives(
+    degree: int, local: Array, orders: Sequence[tuple[int, int]], least: int = 0
+) -> Array:
+    """Derivatives (..., n, m) at `local` (..., 2), by 2 a and 2 b, as often as n `orders` say.
 
-    As often as each of the n `orders` says.
+    Of the m `products` of a total degree of `least` or more.
     """
-    i, j = products(degree)
+    i, j = (x[np.add(*products(degree)) >= least] for x in products(degree))
     found = []
     for order in orders:
         values = [
@@ -63,24 +64,6 @@ def derivatives(degree: int, local: Array, *orders: tuple[int, int]) -> Array:
         ]
         found.append(values[0][..., i] * values[1][..., j])
     return np.stack(found, axis=-2)
-
-
-@lru_cache
-def orthonormal(degree: int, order: int) -> Array:
-    """Combinations (k, m) of the k `products` whose derivatives of an `order` are orthonormal.
-
-    On the triangle of reference; those without such derivatives are left out.
-    """
-    rule = ng.IntegrationRule(ng.TRIG, 2 * degree)
-    every = [(order - n, n) for n in range(order + 1)]
-    rows = derivatives(degree, np.array(rule.points)[:, :2], *every)
-    scale = np.sqrt(np.outer(rule.weights, [comb(order, n) for n in range(order + 1)]))
-    i, j = products(degree)
-    some = i + j >= order
-    R = np.linalg.qr((scale[..., None] * rows).reshape(-1, len(i))[:, some], mode="r")
-    found = np.zeros((len(i), len(R)))
-    found[some] = np.linalg.inv(R)
-    return found
 
 
 def scales(corners: Array) -> tuple[Array, Array]:
@@ -110,7 +93,7 @@ def stresses(
         rows = [px * px, -2 * px * qx, qx * qx], [py * py, -2 * py * qy, qy * qy]
         airy = np.array([*rows, [px * py, -(px * qy + py * qx), qx * qy]]).transpose(2, 0, 1)
         airy /= np.linalg.det(E)[:, None, None] ** 2
-        psi = derivatives(degree + 2, local, *DERIVATIVES[:2:-1]) @ orthonormal(degree + 2, 2)
+        psi = derivatives(degree + 2, local, DERIVATIVES[:2:-1], 2)
         return np.asarray(airy[:, None] @ psi)
     (a_r, a_z), (b_r, b_z) = np.linalg.inv(E).transpose(1, 2, 0)
     rates = np.zeros((len(corners), 1, 4, 6))  # from `DERIVATIVES` to values, by r, z, and zz
@@ -124,7 +107,7 @@ def stresses(
     g[..., 1, 0], g[..., 1, 1] = -2 * k * r ** (2 * k - 2), -(r ** (2 * k - 1))
     g[..., 2, 3], g[..., 3, 2] = r ** (2 * k), r ** (2 * k - 1)
     parts = (f, degree - k, 0), (g, degree + 1 - 2 * k, 1 - k)
-    tables = (derivatives(n, local, *DERIVATIVES) @ orthonormal(n, o) for _, n, o in parts)
+    tables = (derivatives(n, local, DERIVATIVES, least) for _, n, least in parts)
     both = zip(parts, tables, strict=True)
     return np.concatenate([(c @ rates) @ table for (c, *_), table in both], axis=-1)
 
