@@ -366,7 +366,7 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
     Where n and m are the normals of two sides of a triangle, n.(s m) = m.(s n) at their vertex.
     Around a vertex of the boundary all sides of which lie on two lines, as at a corner of one
     triangle or between two on a straight boundary, these equations have a sum without tractions of
-    inner sides: a condition on those that are given. Another triangle there takes it away.
+    inner sides: a condition on those that are given. More triangles there take it away.
     `loaded` and `held` (k,) are as of `cells_of`.
     """
     loads, supports = np.zeros((2, len(cells.vertices)), dtype=bool)
@@ -382,10 +382,8 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
         one[vertex[left]] = line[left]
         left = left[np.abs(line[left] - one[vertex[left]]) > TURN]
     at_two[vertex[left]] = False
-    chosen = np.full(len(at_two), -1)
-    x = cells.corners  # straight ones, and wide ones, if there are any
+    x, widest = cells.corners, np.zeros(len(at_two))
     wide = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / cells.diameters**2
-    order = np.lexsort((wide, ~cells.curved))
-    chosen[cells.triangles[order]] = order[:, None]
-    every = at_two[cells.triangles].any(axis=1) & ~cells.curved & (wide > WIDE)
-    return np.union1d(chosen[at_two], np.flatnonzero(every))
+    np.maximum.at(widest, cells.triangles, wide[:, None])
+    enough = wide[:, None] >= np.minimum(WIDE, widest)[cells.triangles]
+    return np.flatnonzero((at_two[cells.triangles] & enough).any(axis=1))
