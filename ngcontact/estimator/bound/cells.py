@@ -112,16 +112,27 @@ class Cells:
         return np.asarray((s - a) / (b - a))
 
     def points(self, side: Index, t: Array) -> tuple[Array, Array]:
-        """Points (k, 2) and derivatives by t (k, 2) at `t` (k,) of sides `side` (k,), lengths."""
+        """Points (k, 2) and derivatives by t (k, 2) at `t` (k,) of sides `side` (k,), lengths.
+
+        Or (k, j, 2) at `t` (k, j).
+        """
+        side = np.broadcast_to(side if side.ndim == t.ndim else side[..., None], t.shape)
         a, b = self.vertices[self.ends[side, 0]], self.vertices[self.ends[side, 1]]
-        x, dx = a + t[:, None] * (b - a), b - a
-        bent = np.flatnonzero(self.bent[side])
-        if bent.size:
+        x, dx, bent = a + t[..., None] * (b - a), b - a, self.bent[side]
+        if bent.any():
             segment, s = self.on_side(side[bent], t[bent])
             x[bent] = self.trace.point(segment, s)
-            rate = np.diff(self.span[side[bent]], axis=1)
-            dx[bent] = self.trace.derivative(segment, s) * rate
+            dx[bent] = self.trace.derivative(segment, s) * np.diff(self.span[side[bent]], axis=1)
         return x, dx
+
+    def around(self, at: Index, i: int | Index, t: Array) -> tuple[Array, Array]:
+        """The same, (b, j, 2) each, at `t` (j,) on sides `i` (b,) of triangles `at` (b,).
+
+        Anticlockwise.
+        """
+        back = self.backward[at, i][..., None]
+        x, dx = self.points(self.sides[at, i], np.where(back, 1 - t, t))
+        return x, np.where(back[..., None], -dx, dx)
 
     def image(self, at: Index, local: Array) -> tuple[Array, Array]:
         """Points (b, q, 2) of triangles `at` (b,), and derivatives (b, q, 2, 2) by `local` (q, 2).
@@ -131,14 +142,9 @@ class Cells:
         """
         a, b = local.T
         t = np.divide(a, 1 - b, out=np.zeros(len(a)), where=b < 1)
-        back = self.backward[at, :1]
-        base, slope = self.points(
-            np.repeat(self.sides[at, 0], len(t)), np.where(back, 1 - t, t).ravel()
-        )
-        away = base.reshape(len(at), -1, 2) - self.corners[at, :1]
-        slope = np.where(back[..., None], -1, 1) * slope.reshape(away.shape)
-        x = self.corners[at, :1] + (1 - b)[:, None] * away
-        return x, np.stack([slope, t[:, None] * slope - away], axis=-1)
+        apex, (base, slope) = self.corners[at, :1], self.around(at, 0, t)
+        x = apex + (1 - b)[:, None] * (base - apex)
+        return x, np.stack([slope, t[:, None] * slope - (base - apex)], axis=-1)
 
     def measure(self, x: Array) -> Array:
         """The model's measure (...,) at points `x` (..., 2)."""

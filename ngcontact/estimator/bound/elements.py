@@ -223,8 +223,8 @@ def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
     bodies = connected_bodies(trace)
     body = bodies.of_vertex[Triangulation(trace.mesh).triangles[cells.parent[cells.owner], 0]]
     t, w = gauss(highest + trace.geometry_order)
-    x, _ = cells.points(np.repeat(np.arange(e), len(t)), np.tile(t, e))
-    arm = (x.reshape(e, -1, 2) - bodies.middle[body, None]) / bodies.size[body, None, None]
+    x, _ = cells.points(np.arange(e), np.tile(t, (e, 1)))
+    arm = (x - bodies.middle[body, None]) / bodies.size[body, None, None]
     motions = np.zeros((*arm.shape, 3))
     motions[:, :, [0, 1], [0, 1]] = 1.0
     motions[..., 2] = np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
@@ -378,18 +378,17 @@ def _moments(
     Those (b, n, d) of the first `columns` of stresses of a `degree`, and those (b, d) of the other.
     """
     found: list[Array] = []
-    axial, corners, shape = cells.trace.model.extent > 0, cells.corners[at], (len(at), -1, 2)
+    axial, corners = cells.trace.model.extent > 0, cells.corners[at]
     for i in range(3):
         side, back = cells.sides[at, i], cells.backward[at, i]
         k, bent = int(mu.degree[side[0]]), bool(cells.bent[side[0]])
         t, w = gauss(degree + k + 2 * axial + 4 * cells.trace.geometry_order * bent)
         own = np.where(back[:, None], 1 - t, t)
-        both = cells.points(np.repeat(side, len(t)), own.ravel())
-        x, dx = (z.reshape(shape) for z in both)
+        x, dx = cells.around(at, i, t)
         local = CORNERS[i - 2] + t[:, None] * (CORNERS[i - 1] - CORNERS[i - 2])
         T, s_p = columns(x, coordinates(corners, x) if bent else local)
         T = np.concatenate([T, s_p[..., None]], axis=3)
-        n = np.where(back[:, None, None], -1, 1) * (dx @ CLOCKWISE)  # times ds / dt
+        n = dx @ CLOCKWISE  # times ds / dt
         chi = (w * cells.measure(x))[..., None] * traces(k, own)
         for p, q in ((0, -1), (-1, 1)):
             traction = T[:, :, p] * n[..., :1] + T[:, :, q] * n[..., 1:]

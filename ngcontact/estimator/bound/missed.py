@@ -24,6 +24,7 @@ from ...arrays import Array, Index
 from .cells import Cells
 from .elements import Element, Multipliers, by_triangle, elements_of, stress_norms
 from .parts import LEAST, ForceRules, pattern
+from .polynomials import edges
 from .program import dual_program, exerted
 from .tractions import Given, side_rule, tractions_of
 
@@ -67,14 +68,8 @@ def _constants(cells: Cells, at: Index, points: int) -> tuple[Array, Array, Arra
 
     Sides are looked at in that many `points`.
     """
-    corners, back = cells.corners[at], cells.backward[at, :, None]
-    t = np.linspace(0, 1, points)
-    own = np.where(back, 1 - t, t).ravel()
-    x, slope = (
-        z.reshape(len(at), 3, points, 2)
-        for z in cells.points(np.repeat(cells.sides[at].ravel(), points), own)
-    )
-    slope = np.where(back[..., None], -slope, slope)
+    corners, t = cells.corners[at], np.linspace(0, 1, points)
+    x, slope = cells.around(at[:, None], np.arange(3), t)
     normal = np.stack([slope[..., 1], -slope[..., 0]], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     opposite = np.linalg.norm(np.roll(corners, -1, 1) - np.roll(corners, -2, 1), axis=2)
@@ -85,26 +80,16 @@ def _constants(cells: Cells, at: Index, points: int) -> tuple[Array, Array, Arra
         ratio = np.maximum(ratio, rho / np.linalg.norm(away, axis=-1).max(axis=(1, 2)))
     ratio = np.maximum(ratio, tiny)
     beta = ratio / math.sqrt(2) / np.sqrt(1 + np.sqrt(1 - ratio**2))
-    poincare = cells.diameters[at] / math.pi * _distortion(cells, at, x[:, 0], slope[:, 0])
+    # The map of the straight triangle: its derivatives D depend on t alone.
+    D = cells.image(at, np.column_stack([t, 0 * t]))[1] @ np.linalg.inv(edges(corners))[:, None]
+    size, det = np.linalg.norm(D, 2, axis=(2, 3)).max(axis=1), np.linalg.det(D)
+    distortion = size * np.sqrt(det.max(axis=1) / np.maximum(det.min(axis=1), tiny))
+    poincare = cells.diameters[at] / math.pi * distortion
     away = x - corners[:, :, None]
     least = np.maximum((away * normal).sum(axis=-1).min(axis=-1), tiny)
     far, p = np.linalg.norm(away, axis=-1).max(axis=-1), poincare[:, None]
     measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), 3 * points).min(axis=1)
     return poincare, np.sqrt(1 + 2 / beta**2), 2 * (p**2 + far * p) / least, measure
-
-
-def _distortion(cells: Cells, at: Index, base: Array, slope: Array) -> Array:
-    """Max |D| (max det D / min det D)^(1/2) (b,) of the map of straight triangles; 1 on those."""
-    found, bent = np.ones(len(at)), np.flatnonzero(cells.curved[at])
-    if bent.size:
-        apex, a, b = np.moveaxis(cells.corners[at[bent], :, None], 1, 0)
-        t = np.linspace(0, 1, SEEN)[:, None]
-        # base - apex = D (straight base - apex), slope = D (b - a): D depends on t alone.
-        straight = np.stack(np.broadcast_arrays(a + t * (b - a) - apex, b - a), axis=-1)
-        D = np.stack([base[bent] - apex, slope[bent]], axis=-1) @ np.linalg.inv(straight)
-        size, det = np.linalg.norm(D, 2, axis=(2, 3)).max(axis=1), np.linalg.det(D)
-        found[bent] = size * np.sqrt(det.max(axis=1) / np.maximum(det.min(axis=1), 1e-300))
-    return found
 
 
 @dataclass(frozen=True, eq=False)
