@@ -358,12 +358,12 @@ def _condensed(
     rows = (root * L.swapaxes(2, 3) @ T).reshape(len(T), -1, T.shape[-1])
     combined = np.linalg.inv(np.linalg.qr(rows, mode="r"))
     rows = rows @ combined
-    rest = (root * (np.linalg.inv(L) @ strain[..., None])).reshape(len(T), -1, 1)
-    g = np.zeros((*rows.shape[::2], 1))
+    rest = (root * (np.linalg.inv(L) @ strain[..., None])).reshape(len(T), 1, -1)
+    g = np.zeros((len(T), 1, rows.shape[2]))
     for _ in range(2):  # once more, as the rows are orthonormal but for round-off
-        more = rows.swapaxes(1, 2) @ rest
-        g, rest = g + more, rest - rows @ more
-    return combined, g[..., 0], (rest**2).sum(axis=(1, 2))
+        more = rest @ rows
+        g, rest = g + more, rest - more @ rows.swapaxes(1, 2)
+    return combined, g[:, 0], (rest**2).sum(axis=(1, 2))
 
 
 def _moments(
