@@ -280,21 +280,10 @@ def joined(
     segment = own[owner, local]
     ends = (local[:, None] + [1, 2]) % 3
     span = barycentric[owner[:, None], ends, last[segment][:, None]]
-    return Cells(
-        trace=trace,
-        vertices=vertices,
-        triangles=triangles,
-        parent=parent,
-        barycentric=barycentric,
-        ends=both[first],
-        sides=sides.reshape(-1, 3),
-        owner=owner,
-        local=local,
-        segment=segment,
-        span=np.where((start > stop)[first, None], span[:, ::-1], span),
-        curved=bent[own[:, 0]],
-        bent=bent[segment],
-    )
+    span = np.where((start > stop)[first, None], span[:, ::-1], span)
+    topology = both[first], sides.reshape(-1, 3), owner, local, segment, span
+    curved = bent[own[:, 0]], bent[segment]
+    return Cells(trace, vertices, triangles, parent, barycentric, *topology, *curved)
 
 
 def _lengths(corners: Array) -> Array:

@@ -142,12 +142,8 @@ class Element:
 class Multipliers:
     """Numbers of the multipliers: on each of e sides those of mu_x, then those of mu_y.
 
-    Attributes
-    ----------
-    degree : ndarray of int (e,)
-        Of their polynomials, `traces`.
-    start : ndarray of int (e + 1,)
-        Those of side i are start[i], ..., start[i + 1] - 1.
+    `degree` (e,) is that of their polynomials, `traces`, and `start` (e + 1,) has the first of each
+    side, and their number.
     """
 
     degree: Index
@@ -324,27 +320,11 @@ def _element(
     mandel = np.append(np.ones(compliance.shape[-1] - 1), 0.5**0.5)
     largest = np.linalg.eigvalsh(compliance * mandel * mandel[:, None])[..., -1].max(axis=1)
     N, own = _moments(cells, mu, at, degree, columns)
-    return Element(
-        places=points,
-        corners=corners,
-        degree=degree,
-        force_degree=n,
-        axial=axial,
-        on_axis=on_axis,
-        compliance=compliance,
-        strain=strain,
-        source=source,
-        force=force,
-        parted=parted,
-        missed=missed,
-        modulus=np.broadcast_to(1 / largest, len(at)),
-        combined=combined,
-        N=combined.transpose(0, 2, 1) @ N,
-        own=own,
-        g=g,
-        beyond=beyond,
-        dofs=np.concatenate([mu.of(side) for side in cells.sides[at].T], axis=1),
-    )
+    dofs = np.concatenate([mu.of(side) for side in cells.sides[at].T], axis=1)
+    modulus = np.broadcast_to(1 / largest, len(at))
+    data = compliance, strain, source, force, parted, missed, modulus
+    condensed = combined, combined.transpose(0, 2, 1) @ N, own, g, beyond, dofs
+    return Element(points, corners, degree, n, axial, on_axis, *data, *condensed)
 
 
 def _condensed(

@@ -36,15 +36,9 @@ INCONSISTENT = 1e-9  # of what is asked for at a vertex, relative to it
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """d.w on k sides, at j Gauss-Lobatto points.
+    """Of d.w on k sides, `side` (k,), the `amount` (k, j), lengths, along d, `direction` (k, j, 2).
 
-    Attributes
-    ----------
-    side : ndarray of int (k,)
-    direction : ndarray (k, j, 2)
-        d.
-    amount : ndarray (k, j)
-        d.w, lengths.
+    At j Gauss-Lobatto points.
     """
 
     side: Index
