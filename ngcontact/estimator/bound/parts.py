@@ -29,14 +29,8 @@ AT_ONCE = 100  # triangles with forces that are no numbers
 def pattern(thirds: bool) -> tuple[Array, Index]:
     """The equal parts of a triangle; those at its corners in `thirds` about their middles.
 
-    There given tractions may be those of no symmetric stress.
-
-    Returns
-    -------
-    shares : ndarray (p, 3)
-        Of the triangle's corners in the vertices.
-    corners : ndarray of int (k, 3)
-        Vertices of each part, anticlockwise.
+    There given tractions may be those of no symmetric stress. Shares (p, 3) of the triangle's
+    corners in the vertices, and vertices (k, 3) of each part, anticlockwise.
     """
     at = [(i, j) for i in range(PARTS + 1) for j in range(PARTS + 1 - i)]
     shares = np.array([(PARTS - i - j, i, j) for i, j in at]) / PARTS

@@ -79,12 +79,8 @@ def stresses(
 
     Their c components are xx, yy, xy or rr, zz, hoop, rz; coefficients have units of stress. About
     an axis (`axial`) the degree is that of T, and it vanishes `on_axis` if a side lies there.
-
-    Parameters
-    ----------
-    corners : ndarray (b, 3, 2)
-    local : ndarray (b, q, 2)
-        Points by (a, b), or (q, 2) where these are the same for all.
+    Points of triangles `corners` (b, 3, 2) are given by (a, b), `local` (b, q, 2), or (q, 2) where
+    these are the same for all.
     """
     _, size = scales(corners)
     E = edges(corners) / (2 * size)
