@@ -214,8 +214,8 @@ def check_curves(mesh: ng.Mesh) -> None:
             raise ValueError(
                 f'the curved edge "{edge.name}" has the extent {edge.size:g} and segments of '
                 f"{shortest * limit:g}, on which the geometry kernel loses digits; choose a "
-                f"smaller unit of length: curved edges of {SMALL_EDGE:g} and more may have segments "
-                f"down to {SHORTEST:g}"
+                f"smaller unit of length: curved edges of {SMALL_EDGE:g} and more may have "
+                f"segments down to {SHORTEST:g}"
             )
 
 

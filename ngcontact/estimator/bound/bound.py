@@ -17,32 +17,23 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Index
+from ...arrays import Array
 from ...contact import ContactState
 from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
 from .cells import Cells, cells_of, places
 from .elements import (
-    ON_CURVES,
-    PARTED,
-    WHOLE,
     Element,
     compliance_at,
     elements_of,
     rigid_motions,
+    stress_norms,
 )
 from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
 from .lifting import asked_on_line, asked_on_supports, lifted
-from .missed import Level, data_norms, once_more
-from .norms import (
-    SETTLED,
-    forces_missed,
-    residuals,
-    smallest_moduli,
-    stress_norms,
-)
-from .parts import depths
+from .missed import SETTLED, Level, data_norms, once_more, residuals
+from .parts import ForceRules, force_rules
 from .program import Balanced, DualProgram, dual_program, rows_of
 from .refusals import refuse_bound, refuse_narrow
 from .tractions import Given, boundary_tractions, given_on
@@ -85,8 +76,8 @@ class DualProblem:
     cells : Cells
     given : Given
     elements : list of Element
-    look : ndarray of int (n, 3)
-        Rules of forces, as of `elements_of`.
+    rules : ForceRules
+        How forces are integrated.
     moments : ndarray (d,)
         Of the given tractions with the multipliers.
     program : DualProgram
@@ -95,7 +86,7 @@ class DualProblem:
     cells: Cells
     given: Given
     elements: list[Element]
-    look: Index
+    rules: ForceRules
     moments: Array
     program: DualProgram
 
@@ -117,9 +108,9 @@ class DualProblem:
             It is not in equilibrium.
         """
         cells, elements, lines = self.cells, self.elements, self.program.lines
-        given, n = self.given.under(lines, found.pressure), len(cells.triangles)
-        norms = stress_norms(elements, found.coefficients, n)
-        scale = max(norms.largest, least)
+        given = self.given.under(lines, found.pressure)
+        distance, largest = stress_norms(elements, found.coefficients)
+        scale = max(largest, least)
         residual = float(residuals(cells, self.program.multipliers, found.left, scale).max())
         if not residual <= SETTLED:
             raise ContactError(
@@ -128,10 +119,9 @@ class DualProblem:
             )
         have = boundary_tractions(given, elements, found.coefficients)
         missed = have.missed(given, scale)
-        loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(elements, n))
-        distance = norms.distance
+        loads = data_norms(cells, elements, missed)
         if degree is not None:
-            level = Level(cells, elements, found.coefficients, self.look, distance, loads)
+            level = Level(cells, elements, found.coefficients, self.rules, distance, loads)
             distance, loads = once_more(displacement, given, level, degree, scale)
         if not np.isfinite(loads).all():
             raise ValueError(
@@ -229,10 +219,8 @@ def _bound(
     cells = cells_of(trace, cuts_of(trace, reaches, beside), loaded, trace.segments(*whole))
     given = given_on(problem, cells)
     least = np.maximum(given.followed(), cells.curved)
-    depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, least)
-    order = 2 * (degree + ON_CURVES * cells.curved) + np.where(depth, PARTED, WHOLE)
-    look = np.column_stack([order, depth, least > 0])
-    mu, elements = elements_of(problem, cells, displacement, degree, look)
+    rules = force_rules(problem, cells, degree, least)
+    mu, elements = elements_of(problem, cells, displacement, degree, rules)
     asked = asked_on_supports(cells, given, displacement)
     of_guides = mu.degree[given.guides]
     guides = [
@@ -249,7 +237,7 @@ def _bound(
     moments, fixed = given.moments(mu)
     motions = rigid_motions(cells, mu, fixed)
     program = dual_program(mu, elements, fixed, motions, lines)
-    dual = DualProblem(cells, given, elements, look, moments, program)
+    dual = DualProblem(cells, given, elements, rules, moments, program)
     every = np.arange(len(trace.region))
     sizes = [trace.evaluate(displacement, every, np.zeros(len(every)))]
     size = max(float(np.abs(x).max(initial=0.0)) for x in sizes + [x.facing.gap for x in lines])

@@ -29,35 +29,29 @@ TURN = 0.5  # twice the sine of the angle between sides up to which they are on 
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Triangles, n of them, with e sides; b sides lie on the boundary.
+    """Triangles, n of them, with e sides.
 
     Side i of a triangle is opposite to corner i and runs from corner i + 1 to corner i + 2; a
-    side's own parameter t in [0, 1] runs from its vertex of the lower number to the other.
+    side's own parameter t in [0, 1] runs from its vertex of the lower number to the other. The
+    base, side 0, is the one that may be curved, else the shortest.
 
     Attributes
     ----------
     trace : BoundaryTrace
         Boundary of the mesh that they divide.
-    vertices : ndarray (nv, 2)
-        Their corners, lengths.
-    triangles : ndarray of int (n, 3)
-        Anticlockwise; the base, side 0, is the one that may be curved, else the shortest.
-    parent : ndarray of int (n,)
-        Element of the mesh that each is a part of.
-    barycentric : ndarray (n, 3, 3)
-        Barycentric coordinates of the corners in the parent.
-    ends : ndarray of int (e, 2)
-        Vertices of the sides, the lower number first.
-    sides : ndarray of int (n, 3)
-        Side numbers.
+    vertices, triangles : ndarray (nv, 2), of int (n, 3)
+        Places, lengths, and their numbers at the corners, anticlockwise.
+    parent, barycentric : ndarray of int (n,), (n, 3, 3)
+        Element of the mesh that each is a part of, and coordinates of the corners in it.
+    ends, sides : ndarray of int (e, 2), (n, 3)
+        Vertices of the sides, the lower number first, and the sides of triangles.
     owner, local : ndarray of int (e,)
         A triangle of each side, and which of its sides it is.
-    segment : ndarray of int (e,)
-        Segment of the boundary that a side is part of, -1 inside of bodies.
-    span : ndarray (e, 2)
-        Parameters s on that segment at t = 0 and t = 1; of no meaning inside.
-    curved : ndarray of bool (n,)
-        Triangles with a curved base.
+    segment, span : ndarray of int (e,), (e, 2)
+        Segment of the boundary that a side is part of, -1 inside of bodies, and parameters s on it
+        at t = 0 and t = 1.
+    curved, bent : ndarray of bool (n,), (e,)
+        Triangles with a curved base, and curved sides.
     """
 
     trace: BoundaryTrace
@@ -72,6 +66,7 @@ class Cells:
     segment: Index
     span: Array
     curved: Mask
+    bent: Mask
 
     @property
     def corners(self) -> Array:
@@ -117,23 +112,27 @@ class Cells:
         return np.asarray((s - a) / (b - a))
 
     def points(self, side: Index, t: Array) -> tuple[Array, Array]:
-        """Points (k, 2) and derivatives by t (k, 2) at `t` (k,) of sides `side` (k,), lengths."""
+        """Points (k, 2) and derivatives by t (k, 2) at `t` (k,) of sides `side` (k,), lengths.
+
+        Or (k, j, 2) at `t` (k, j).
+        """
+        side = np.broadcast_to(side if side.ndim == t.ndim else side[..., None], t.shape)
         a, b = self.vertices[self.ends[side, 0]], self.vertices[self.ends[side, 1]]
-        x, dx = a + t[:, None] * (b - a), b - a
-        bent = np.flatnonzero(self.bent[side])
-        if bent.size:
+        x, dx, bent = a + t[..., None] * (b - a), b - a, self.bent[side]
+        if bent.any():
             segment, s = self.on_side(side[bent], t[bent])
             x[bent] = self.trace.point(segment, s)
-            rate = np.diff(self.span[side[bent]], axis=1)
-            dx[bent] = self.trace.derivative(segment, s) * rate
+            dx[bent] = self.trace.derivative(segment, s) * np.diff(self.span[side[bent]], axis=1)
         return x, dx
 
-    @cached_property
-    def bent(self) -> Mask:
-        """Curved sides (e,)."""
-        bent = np.zeros(len(self.ends), dtype=bool)
-        bent[self.sides[self.curved, 0]] = True
-        return bent
+    def around(self, at: Index, i: int | Index, t: Array) -> tuple[Array, Array]:
+        """The same, (b, j, 2) each, at `t` (j,) on sides `i` (b,) of triangles `at` (b,).
+
+        Anticlockwise.
+        """
+        back = self.backward[at, i][..., None]
+        x, dx = self.points(self.sides[at, i], np.where(back, 1 - t, t))
+        return x, np.where(back[..., None], -dx, dx)
 
     def image(self, at: Index, local: Array) -> tuple[Array, Array]:
         """Points (b, q, 2) of triangles `at` (b,), and derivatives (b, q, 2, 2) by `local` (q, 2).
@@ -143,14 +142,9 @@ class Cells:
         """
         a, b = local.T
         t = np.divide(a, 1 - b, out=np.zeros(len(a)), where=b < 1)
-        back = self.backward[at, :1]
-        base, slope = self.points(
-            np.repeat(self.sides[at, 0], len(t)), np.where(back, 1 - t, t).ravel()
-        )
-        away = base.reshape(len(at), -1, 2) - self.corners[at, :1]
-        slope = np.where(back[..., None], -1, 1) * slope.reshape(away.shape)
-        x = self.corners[at, :1] + (1 - b)[:, None] * away
-        return x, np.stack([slope, t[:, None] * slope - away], axis=-1)
+        apex, (base, slope) = self.corners[at, :1], self.around(at, 0, t)
+        x = apex + (1 - b)[:, None] * (base - apex)
+        return x, np.stack([slope, t[:, None] * slope - (base - apex)], axis=-1)
 
     def measure(self, x: Array) -> Array:
         """The model's measure (...,) at points `x` (..., 2)."""
@@ -167,25 +161,6 @@ class Cells:
         rule = ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1.0])
         return np.asarray(self.trace.mesh.MapToAllElements(rule, ng.VOL))
 
-    def located(self, at: Index, x: Array, guess: Array) -> Array:
-        """Reference places (k, 2) of `x` (k, 2) in the parents of triangles `at` (k,).
-
-        By Newton's method from a `guess` (k, 2), exact where elements are straight.
-        """
-        bent = np.flatnonzero(self.trace.curved_elements[self.parent[at]])
-        if bent.size == 0:
-            return guess
-        place, jacobian = ng.CF((ng.x, ng.y)), ng.specialcf.JacobianMatrix(2)
-        found = guess.copy()
-        for _ in range(NEWTON_STEPS):
-            slope = self.evaluate(jacobian, at[bent], found[bent]).reshape(-1, 2, 2)
-            miss = x[bent] - self.evaluate(place, at[bent], found[bent])
-            step = np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
-            found[bent] += step
-            if np.abs(step).max() <= CLOSE:
-                break
-        return found
-
 
 @dataclass(frozen=True, eq=False)
 class Places:
@@ -197,10 +172,10 @@ class Places:
         The triangles.
     local : ndarray (q, 2)
         Their places (a, b) in each, as of `Cells.image`.
-    x : ndarray (b, q, 2)
-        Points, lengths.
+    x, slopes : ndarray (b, q, 2), (b, q, 2, 2)
+        Points, lengths, and derivatives by (a, b).
     weight : ndarray (b, q)
-        Weights in the plane, areas.
+        Weights in the plane times the model's measure.
     reference : ndarray (b, q, 2)
         Reference coordinates in the parents.
     """
@@ -208,6 +183,7 @@ class Places:
     at: Index
     local: Array
     x: Array
+    slopes: Array
     weight: Array
     reference: Array
 
@@ -240,9 +216,18 @@ def places(cells: Cells, at: Index, order: int) -> Places:
     if not (area > 0).all():
         raise ContactError("a curved side of the mesh goes beyond the middle of its element")
     shares = np.column_stack([local[:, 1], 1 - local.sum(axis=1), local[:, 0]])
-    guess = (shares @ cells.barycentric[at, :, :2]).reshape(-1, 2)
-    found = cells.located(np.repeat(at, len(weight)), x.reshape(-1, 2), guess)
-    return Places(at, local, x, area * weight, found.reshape(x.shape))
+    found = shares @ cells.barycentric[at, :, :2]
+    bent = np.flatnonzero(cells.trace.curved_elements[cells.parent[at]])
+    owner, flat = np.repeat(at[bent], len(weight)), found[bent].reshape(-1, 2)
+    for _ in range(NEWTON_STEPS if bent.size else 0):
+        slope = cells.evaluate(ng.specialcf.JacobianMatrix(2), owner, flat).reshape(-1, 2, 2)
+        miss = x[bent].reshape(-1, 2) - cells.evaluate(ng.CF((ng.x, ng.y)), owner, flat)
+        step = np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
+        flat += step
+        if np.abs(step).max() <= CLOSE:
+            break
+    found[bent] = flat.reshape(-1, *x.shape[1:])
+    return Places(at, local, x, slopes, area * weight * cells.measure(x), found)
 
 
 def cells_of(trace: BoundaryTrace, cuts: Mapping[int, Array], loaded: Index, held: Index) -> Cells:
@@ -256,49 +241,13 @@ def cells_of(trace: BoundaryTrace, cuts: Mapping[int, Array], loaded: Index, hel
     loaded, held : ndarray of int (k,)
         Segments that carry something, and those on which the whole displacement is prescribed.
     """
-    view = Triangulation(trace.mesh)
-    old, (segment, last) = view.triangles, _segments_of_elements(trace)
-    bent, cut = np.zeros((2, len(trace.region) + 1), dtype=bool)
-    bent[:-1], cut[list(cuts)] = trace.curved_segments, True
-    special = (bent | cut)[segment]
-    beside = bent[segment].any(axis=1) & ((segment >= 0).sum(axis=1) > 1)
-    middle = (special.sum(axis=1) > 1) | beside
-    parts = np.flatnonzero(middle | cut[segment].any(axis=1))
-    whole = np.setdiff1d(np.arange(len(old)), parts)
-    vertices, count, number = [view.vertices], len(view.vertices), {}
-    for k, s in cuts.items():
-        vertices.append(trace.point(np.full(len(s), k), s))
-        number[k] = list(range(count, count + len(s)))
-        count += len(s)
-    unit, triangles, barycentric, parent = np.eye(3), [], [], []
-    for e in parts.tolist():  # fans of the places around the element
-        around: list[tuple[int, Array]] = []
-        for i in range(3):
-            j, k, own = (i + 1) % 3, (i + 2) % 3, int(segment[e, i])
-            s, end = np.asarray(cuts.get(own, ()))[:, None], last[own] if own in cuts else k
-            on = [
-                *zip(number.get(own, ()), s * unit[end] + (1 - s) * unit[j + k - end], strict=True)
-            ]
-            around += [(int(old[e, j]), unit[j]), *(on if end == k else on[::-1])]
-        if middle[e]:
-            apex, count = (count, np.full(3, 1 / 3)), count + 1
-            vertices.append(view.vertices[old[e]].mean(axis=0)[None])
-        else:
-            base = int(special[e].argmax())
-            apex = int(old[e, base]), unit[base]
-        for one, two in zip(around, [*around[1:], around[0]], strict=True):
-            if apex[0] not in (one[0], two[0]):
-                corners = apex, one, two
-                triangles.append([v for v, _ in corners])
-                barycentric.append([b for _, b in corners])
-                parent.append(e)
-    cells = joined(
-        trace,
-        np.concatenate(vertices),
-        np.concatenate([old[whole], np.reshape(triangles, (-1, 3)).astype(np.intp)]),
-        np.reshape([*[unit] * len(whole), *barycentric], (-1, 3, 3)),
-        np.concatenate([whole, np.array(parent, dtype=np.intp)]),
-    )
+    view, unit = Triangulation(trace.mesh), np.eye(3)
+    old, ne = view.triangles, trace.mesh.ne
+    cells = joined(trace, view.vertices, old, np.broadcast_to(unit, (ne, 3, 3)), np.arange(ne))
+    cut = np.isin(cells.segment, list(cuts))
+    several = (cells.bent | cut)[cells.sides].sum(axis=1) > 1
+    beside = cells.curved & ((cells.segment >= 0)[cells.sides].sum(axis=1) > 1)
+    cells = _fanned(_parted(cells, np.flatnonzero(several | beside)), cuts)
     return _parted(cells, dependent(cells, loaded, held))
 
 
@@ -310,38 +259,31 @@ def joined(
     `parent` (n,) and `barycentric` (n, 3, 3) are those of `Cells`, in the order of the triangles.
     Sides on one side of a parent lie on its segment of the boundary.
     """
-    segment, last = _segments_of_elements(trace)
+    view = Triangulation(trace.mesh)
+    at = view.triangles[trace.element][:, :, None] == view.segments[:, None]  # (k, corners, ends)
+    last, outer = at[..., 1].argmax(axis=1), np.flatnonzero(~trace.inner)
+    segments = np.full(view.triangles.shape, -1)  # opposite to each corner of the elements
+    segments[trace.element[outer], (~at.any(axis=2))[outer].argmax(axis=1)] = outer
     zero = barycentric == 0
     on = np.roll(zero, -1, axis=1) & np.roll(zero, -2, axis=1)  # (n, 3 sides, 3 of the parent)
-    own = np.where(on, segment[parent][:, None], -1).max(axis=2)
-    bent = np.append(trace.curved_segments, False)[own]
-    curved = bent.any(axis=1)
-    base = np.where(curved, bent.argmax(axis=1), _lengths(vertices[triangles]).argmin(axis=1))
+    own = np.where(on, segments[parent][:, None], -1).max(axis=2)
+    bent = np.append(trace.curved_segments, False)
+    base = _lengths(vertices[triangles]).argmin(axis=1)
+    base = np.where(bent[own].any(axis=1), bent[own].argmax(axis=1), base)
     roll = (base[:, None] + np.arange(3)) % 3
     triangles, own = (np.take_along_axis(x, roll, axis=1) for x in (triangles, own))
     barycentric = np.take_along_axis(barycentric, roll[..., None], axis=1)
-    start = np.roll(triangles, -1, axis=1).ravel()
-    stop = np.roll(triangles, -2, axis=1).ravel()
-    low, high = np.minimum(start, stop), np.maximum(start, stop)
-    _, first, sides = np.unique(low * len(vertices) + high, return_index=True, return_inverse=True)
+    start, stop = (np.roll(triangles, -k, axis=1).ravel() for k in (1, 2))
+    both = np.sort(np.column_stack([start, stop]), axis=1)
+    _, first, sides = np.unique(both @ [len(vertices), 1], return_index=True, return_inverse=True)
     owner, local = np.divmod(first, 3)
     segment = own[owner, local]
     ends = (local[:, None] + [1, 2]) % 3
     span = barycentric[owner[:, None], ends, last[segment][:, None]]
-    return Cells(
-        trace=trace,
-        vertices=vertices,
-        triangles=triangles,
-        parent=parent,
-        barycentric=barycentric,
-        ends=np.column_stack([low, high])[first],
-        sides=sides.reshape(-1, 3),
-        owner=owner,
-        local=local,
-        segment=segment,
-        span=np.where((start > stop)[first, None], span[:, ::-1], span),
-        curved=curved,
-    )
+    span = np.where((start > stop)[first, None], span[:, ::-1], span)
+    topology = both[first], sides.reshape(-1, 3), owner, local, segment, span
+    curved = bent[own[:, 0]], bent[segment]
+    return Cells(trace, vertices, triangles, parent, barycentric, *topology, *curved)
 
 
 def _lengths(corners: Array) -> Array:
@@ -349,24 +291,67 @@ def _lengths(corners: Array) -> Array:
     return np.linalg.norm(np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1), axis=2)
 
 
+def _with_parts(cells: Cells, new: Array, of: Index, triangles: Index, places: Array) -> Cells:
+    """Triangles in parts: `triangles` (k, 3) of those that they are part `of` (k,).
+
+    `new` (r, 2) are more vertices, `places` (k, 3, 3) the barycentric coordinates of the corners.
+    """
+    rest = np.setdiff1d(np.arange(len(cells.triangles)), of)
+    return joined(
+        cells.trace,
+        np.concatenate([cells.vertices, new]),
+        np.concatenate([cells.triangles[rest], triangles]),
+        np.concatenate([cells.barycentric[rest], places]),
+        np.concatenate([cells.parent[rest], cells.parent[of]]),
+    )
+
+
+def _fanned(cells: Cells, cuts: Mapping[int, Array]) -> Cells:
+    """Triangles with vertices to come on one side, as of `cells_of`, in fans about its opposite."""
+    if not cuts:
+        return cells
+    segment = np.repeat(list(cuts), [len(s) for s in cuts.values()])
+    s = np.concatenate(list(cuts.values()))
+    at = cells.side_at(segment, s)
+    side, t = np.unique(at), cells.own_parameter(at, s[:, None])[:, 0]
+    every, t = np.append(np.repeat(side, 2), at), np.append(np.tile([0.0, 1.0], len(side)), t)
+    vertex = np.append(cells.ends[side], len(cells.vertices) + np.arange(len(s)))
+    order = np.lexsort((t, every))
+    one = np.diff(every[order]) == 0
+    pieces = np.stack([order[:-1][one], order[1:][one]])
+    owner, local = (x[every[pieces[0]]] for x in (cells.owner, cells.local))
+    pair = np.where(cells.backward[owner, local], pieces[::-1], pieces)  # start and stop of parts
+    low, high = np.where(cells.backward[owner, local], [[2], [1]], [[1], [2]])
+    low, high = (cells.barycentric[owner, (local + k) % 3] for k in (low, high))
+    places = [(1 - t[k, None]) * low + t[k, None] * high for k in pair]
+    return _with_parts(
+        cells,
+        cells.trace.point(segment, s),
+        owner,
+        np.column_stack([cells.triangles[owner, local], *vertex[pair]]),
+        np.stack([cells.barycentric[owner, local], *places], axis=1),
+    )
+
+
 def _parted(cells: Cells, at: Index) -> Cells:
     """Triangles `at` (k,) in three about the middles of their inscribed circles.
 
-    Parts of thin triangles are thin with one short side, not flat.
+    Parts of thin triangles are thin with one short side, not flat. Behind a curved side about the
+    centre of gravity, which is farther from the longest side.
     """
-    rest, corner = np.setdiff1d(np.arange(len(cells.triangles)), at), np.arange(3)
-    share = _lengths(cells.corners[at])
+    share = np.where(cells.curved[at, None], 1.0, _lengths(cells.corners[at]))
     share = (share / share.sum(axis=1, keepdims=True))[:, None]
     triangles = np.repeat(cells.triangles[at, None], 3, axis=1)
-    triangles[:, corner, corner] = len(cells.vertices) + np.arange(len(at))[:, None]
     places = np.repeat(cells.barycentric[at, None], 3, axis=1)
+    corner = np.arange(3)
+    triangles[:, corner, corner] = len(cells.vertices) + np.arange(len(at))[:, None]
     places[:, corner, corner] = share @ cells.barycentric[at]
-    return joined(
-        cells.trace,
-        np.concatenate([cells.vertices, (share @ cells.corners[at])[:, 0]]),
-        np.concatenate([cells.triangles[rest], triangles.reshape(-1, 3)]),
-        np.concatenate([cells.barycentric[rest], places.reshape(-1, 3, 3)]),
-        np.concatenate([cells.parent[rest], np.repeat(cells.parent[at], 3)]),
+    return _with_parts(
+        cells,
+        (share @ cells.corners[at])[:, 0],
+        np.repeat(at, 3),
+        triangles.reshape(-1, 3),
+        places.reshape(-1, 3, 3),
     )
 
 
@@ -376,49 +361,24 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
     Where n and m are the normals of two sides of a triangle, n.(s m) = m.(s n) at their vertex.
     Around a vertex of the boundary all sides of which lie on two lines, as at a corner of one
     triangle or between two on a straight boundary, these equations have a sum without tractions of
-    inner sides: a condition on those that are given. Another triangle there takes it away.
-
-    Parameters
-    ----------
-    cells : Cells
-    loaded, held : ndarray of int (k,)
-        As of `cells_of`.
+    inner sides: a condition on those that are given. More triangles there take it away.
+    `loaded` and `held` (k,) are as of `cells_of`.
     """
-    count = len(cells.vertices)
-    border = ~cells.inner
-    carries, free = np.zeros((2, count), dtype=bool)
-    carries[cells.ends[border & np.isin(cells.segment, loaded)]] = True
-    free[cells.ends[border & np.isin(cells.segment, held)]] = True
-    side, end = np.nonzero((carries & ~free)[cells.ends])
+    loads, supports = np.zeros((2, len(cells.vertices)), dtype=bool)
+    loads[cells.ends[~cells.inner & np.isin(cells.segment, loaded)]] = True
+    supports[cells.ends[~cells.inner & np.isin(cells.segment, held)]] = True
+    side, end = np.nonzero((loads & ~supports)[cells.ends])
     vertex = cells.ends[side, end]
-    _, along = cells.points(side, end.astype(float))
-    line = along @ np.array([1.0, 1j])
+    line = cells.points(side, end.astype(float))[1] @ np.array([1.0, 1j])
     line = line**2 / np.abs(line) ** 2  # one number for both senses
-    at_two = np.zeros(count, dtype=bool)
-    at_two[vertex] = True
-    left = np.arange(len(vertex))
+    at_two, left = loads & ~supports, np.arange(len(vertex))
     for _ in range(2):  # take away the sides of one line
-        one = np.zeros(count, dtype=complex)
+        one = np.zeros(len(at_two), dtype=complex)
         one[vertex[left]] = line[left]
         left = left[np.abs(line[left] - one[vertex[left]]) > TURN]
     at_two[vertex[left]] = False
-    chosen = np.full(count, -1)
-    x = cells.corners  # straight ones, and wide ones, if there are any
+    x, widest = cells.corners, np.zeros(len(at_two))
     wide = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / cells.diameters**2
-    order = np.lexsort((wide, ~cells.curved))
-    chosen[cells.triangles[order]] = order[:, None]
-    every = at_two[cells.triangles].any(axis=1) & ~cells.curved & (wide > WIDE)
-    return np.union1d(chosen[at_two], np.flatnonzero(every))
-
-
-def _segments_of_elements(trace: BoundaryTrace) -> tuple[Index, Index]:
-    """Segment (ne, 3) of the boundary opposite to each corner, -1 where there is none.
-
-    And which corner (k,) of its element each segment ends at, s = 1.
-    """
-    view = Triangulation(trace.mesh)
-    corners = view.triangles[trace.element][:, :, None] == view.segments[:, None]
-    found = np.full(view.triangles.shape, -1)
-    outer = np.flatnonzero(~trace.inner)
-    found[trace.element[outer], (~corners.any(axis=2))[outer].argmax(axis=1)] = outer
-    return found, corners[..., 1].argmax(axis=1)
+    np.maximum.at(widest, cells.triangles, wide[:, None])
+    enough = wide[:, None] >= np.minimum(WIDE, widest)[cells.triangles]
+    return np.flatnonzero((at_two[cells.triangles] & enough).any(axis=1))

@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from .bound import Proof
+from .elements import stress_norms
 from .facing import THROUGH, WEIGHTS
-from .norms import stress_norms
 from .polynomials import scalars
 
 INSET = 0.1  # of a step of the lattice: it keeps off an axis, where stresses are not defined
@@ -35,7 +35,7 @@ def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
     if any(found.values()):
         told = " and ".join(f"{n} {what}" for what, n in found.items() if n)
         raise ValueError(f"no certificate: {told}; tractions and p* are no polynomials there")
-    own = stress_norms(proof.elements, proof.stress.coefficients, len(cells.triangles)).distance
+    own, _ = stress_norms(proof.elements, proof.stress.coefficients)
     replaced = np.flatnonzero(proof.stress.distance != own)
     return {
         "axisymmetric": np.array(cells.trace.model.extent > 0),
@@ -69,13 +69,15 @@ def _stresses(proof: Proof) -> dict[str, np.ndarray]:
         stress[at] = e.stress(c, x[at])[..., [0, 1, -1]]
         force[at] = scalars(e.force_degree, e.corners, x[at]) @ e.force
         a, b = e.places.local.T
+        weight = e.places.weight[0] / cells.measure(e.places.x[0])
+        every, places = np.repeat(at, len(a)), e.places.reference.reshape(-1, 2)
         rules |= {
             f"rule{number}_triangle": at,
             f"rule{number}_points": np.column_stack([1 - a - b, a]),
-            f"rule{number}_weights": e.places.weight[0] / (2 * e.places.weight[0].sum()),
+            f"rule{number}_weights": weight / (2 * weight.sum()),
             f"rule{number}_strain": e.strain,
             f"rule{number}_compliance": e.compliance,
-            f"rule{number}_radial": e.radial,
+            f"rule{number}_radial": e.radial_at(cells, every, places).reshape(e.strain.shape[:2]),
         }
     found = {"lattice": lattice, "stress": measure * stress, "force": measure * force}
     return {"degree": np.array(k)} | found | rules

@@ -11,9 +11,9 @@ and the tractions of s are N'N mu + N'g + <s_p n, .>.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeVar
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -25,17 +25,14 @@ from ...lagrange import gauss
 from ...problem import Problem, Triangulation, varies
 from ...qp import vanishing_combinations
 from .cells import Cells, Places, places
-from .parts import projection
+from .parts import ForceRules, projection
 from .polynomials import CORNERS, balancing, coordinates, stresses
 
 TURNED = 1e-4  # sine of the angle between normals that are not one
 ON_CURVES = 4  # degrees by which stresses on triangles with a curved side are higher
 CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
-WHOLE, PARTED = 10, 4  # degrees above 2 k of rules for forces: on triangles, on their parts
 ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
 ENTRIES = 2**20  # of triangles at once, (degree + 2)^4 each: bounds the memory
-
-Value = TypeVar("Value")
 
 
 def traces(degree: int, t: Array) -> Array:
@@ -52,66 +49,55 @@ class Element:
     ----------
     places : Places
         Quadrature points, q in each.
-    weight : ndarray (b, q)
-        With the model's measure.
     corners : ndarray (b, 3, 2)
         Lengths.
-    local : ndarray (b, q, 2)
-        `coordinates` of the quadrature points, or (q, 2) where they are the same for all.
-    degree : int
-        Of the stresses.
+    degree, force_degree : int
+        Of the stresses, and of the body force that s_p balances.
     axial, on_axis : bool
         Whether the model is axisymmetric; whether a side of each lies on the axis.
     compliance : ndarray (b, q, v, v)
         C^-1, one over a stress; (1, 1, v, v) where it is one matrix for all.
     strain : ndarray (b, q, v)
         e(u_h), Voigt.
-    force : ndarray (b, j, 2)
-        Coefficients of the body force that s_p balances, of degree `force_degree`.
-    radial : ndarray (b, q)
-        Radial force times r about an axis: a part of the hoop stress.
     source : CoefficientFunction or None
         The body force.
-    missed : ndarray (b,)
-        L2 norm of what of the body force s_p does not balance, times the measure.
+    force : ndarray (b, j, 2)
+        Coefficients, as of `scalars`, of the body force that s_p balances.
+    pieces : ndarray of int (b,)
+        Parts of each triangle on which forces are integrated, two at least where tractions are.
+    missed, modulus : ndarray (b,)
+        L2 norm of what of the body force s_p does not balance, times the measure; smallest
+        eigenvalue of C in Mandel's scaling, a stress.
     combined : ndarray (b, n, m)
-        T from the n polynomials of `stresses`.
-    N : ndarray (b, m, d)
-        Moments <T n, .> of the tractions with the multipliers.
-    g : ndarray (b, m)
-        (T, e(u_h) - C^-1 s_p): the coefficients without multipliers.
-    own : ndarray (b, d)
-        Moments of s_p n.
-    sides : ndarray of int (b, 3)
-        Numbers of the sides.
+        T from the n polynomials of `stresses`, orthonormal: (T, T) = 1.
+    N, own : ndarray (b, m, d), (b, d)
+        Moments <T n, .> of the tractions with the multipliers, and those of s_p n.
+    g, beyond : ndarray (b, m), (b,)
+        (T, e(u_h) - C^-1 s_p), the coefficients without multipliers; squares of
+        |C e(u_h) - s_p - T g|, which no coefficients reach.
     dofs : ndarray of int (b, d)
-        Numbers of their multipliers.
+        Numbers of the multipliers.
     """
 
     places: Places
-    weight: Array
     corners: Array
-    local: Array
     degree: int
+    force_degree: int
     axial: bool
     on_axis: bool
     compliance: Array
     strain: Array
-    force: Array
-    radial: Array
     source: ng.CoefficientFunction | None
+    force: Array
+    pieces: Index
     missed: Array
+    modulus: Array
     combined: Array
     N: Array
-    g: Array
     own: Array
-    sides: Index
+    g: Array
+    beyond: Array
     dofs: Index
-
-    @property
-    def force_degree(self) -> int:
-        """Of the body force that is balanced."""
-        return _force_degree(self.degree, self.axial)
 
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with the multipliers, by coefficients `c` (b, m)."""
@@ -123,21 +109,11 @@ class Element:
 
     def of_strain(self, strain: Array) -> Element:
         """The same triangles for a displacement of `strain` (b, q, v), without body forces."""
-        T = stresses(self.degree, self.corners, self.local, self.axial, self.on_axis)
-        g = (_products(T, self.weight, strain) @ self.combined)[:, 0]
-        forces = "force", "radial", "missed", "own"
-        none = {name: np.zeros_like(getattr(self, name)) for name in forces}
-        return replace(self, strain=strain, source=None, g=g, **none)
-
-    def whole_stress(self, c: Array) -> Array:
-        """Stresses (b, q, v) at the quadrature points for coefficients `c` (b, m).
-
-        With the hoop's part of radial forces.
-        """
-        s = self._stress(c, self.places.x, self.local)
-        if self.axial:
-            s[..., 2] += self.radial
-        return s
+        local = coordinates(self.corners, self.places.x)
+        T = stresses(self.degree, self.corners, local, self.axial, self.on_axis)
+        _, g, beyond = _condensed(T, self.places.weight, self.compliance, strain)
+        none = {name: np.zeros_like(getattr(self, name)) for name in ("force", "missed", "own")}
+        return replace(self, strain=strain, source=None, g=g, beyond=beyond, **none)
 
     def radial_at(self, cells: Cells, at: Index, reference: Array) -> Array:
         """Radial force times r, (k,), in triangles `at` (k,) of `cells`, about an axis.
@@ -153,11 +129,8 @@ class Element:
 
         `c` (n, m) are the coefficients in all; the hoop's part of radial forces is left out.
         """
-        return self._stress(c, x, coordinates(self.corners[some], x), some)
-
-    def _stress(self, c: Array, x: Array, local: Array, some: Index | slice = slice(None)) -> Array:
         corners = self.corners[some]
-        T = stresses(self.degree, corners, local, self.axial, self.on_axis)
+        T = stresses(self.degree, corners, coordinates(corners, x), self.axial, self.on_axis)
         c = self.combined[some] @ c[some][..., None]
         s = (T.reshape(len(c), -1, T.shape[-1]) @ c).reshape(T.shape[:-1])
         if self.force.any():
@@ -169,12 +142,8 @@ class Element:
 class Multipliers:
     """Numbers of the multipliers: on each of e sides those of mu_x, then those of mu_y.
 
-    Attributes
-    ----------
-    degree : ndarray of int (e,)
-        Of their polynomials, `traces`.
-    start : ndarray of int (e + 1,)
-        Those of side i are start[i], ..., start[i + 1] - 1.
+    `degree` (e,) is that of their polynomials, `traces`, and `start` (e + 1,) has the first of each
+    side, and their number.
     """
 
     degree: Index
@@ -191,18 +160,8 @@ def among(
 ) -> Iterator[tuple[Element, Array, Index, Index]]:
     """The elements that have some of the triangles `at` (m,).
 
-    Parameters
-    ----------
-    coefficients : sequence of ndarray (b, m)
-        Of a stress on the triangles of each element.
-
-    Yields
-    ------
-    element : Element
-    c : ndarray (b, m)
-        Its coefficients.
-    mine, some : ndarray of int (k,)
-        Which of the triangles it has, and their places among its own.
+    Each with its coefficients, one of `coefficients` (b, m), which of `at` it has, and their places
+    among its own, (k,) each.
     """
     for e, c in zip(elements, coefficients, strict=True):
         own = e.places.at
@@ -212,30 +171,43 @@ def among(
             yield e, c, mine, some[mine]
 
 
-def turning(problem: Problem, cells: Cells) -> Mask:
-    """Whether triangles (n,) lie beside contact along normals that are not those of the mesh."""
-    pairs = [pair for pair in problem.contact if pair.direction is None]
-    names = [name for pair in pairs for name in (pair.secondary, pair.primary)]
-    side = np.flatnonzero(np.isin(cells.segment, cells.trace.segments(*names)))
-    segment, s = cells.on_side(np.tile(side, 2), np.repeat([0.0, 1.0], len(side)))
-    off = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
-    found = np.zeros(len(cells.triangles), dtype=bool)
-    found[cells.owner[np.tile(side, 2)[np.linalg.norm(off, axis=1) > TURNED]]] = True
+def by_triangle(elements: Sequence[Element], values: Sequence[Array | Index]) -> Array:
+    """One array (n,) of `values` (b,) on each element's triangles, n in all."""
+    found = np.zeros(sum(map(len, values)))
+    for e, own in zip(elements, values, strict=True):
+        found[e.places.at] = own
     return found
 
 
-def multipliers(
-    cells: Cells, degree: int, turned: Mask | bool = False
-) -> tuple[Index, Multipliers]:
+def stress_norms(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple[Array, float]:
+    """|s - C e| (n,), roots of energies per thickness, and the largest component of s.
+
+    That is looked at in the middles of straight sides; `coefficients` (b, m) are those on the
+    triangles of each element.
+    """
+    pairs = list(zip(elements, coefficients, strict=True))
+    square = by_triangle(elements, [((c - e.g) ** 2).sum(axis=1) + e.beyond for e, c in pairs])
+    middles = ((e.corners + np.roll(e.corners, 1, axis=1)) / 2 for e in elements)
+    sizes = [np.abs(e.stress(c, x)).max() for (e, c), x in zip(pairs, middles, strict=True)]
+    return np.sqrt(square), float(max(sizes, default=0.0))
+
+
+def multipliers(problem: Problem, cells: Cells, degree: int) -> tuple[Index, Multipliers]:
     """Degree (n,) of the stress in each triangle, and the multipliers that it asks for.
 
-    It is `degree`, and higher at curved sides and where directions are `turned` (n,).
+    It is `degree`, and higher at curved sides and beside contact along normals that are not those
+    of the mesh.
     """
-    own = np.where(cells.curved | turned, degree + ON_CURVES, degree)
-    of_side = np.zeros(len(cells.ends), dtype=np.intp)
+    pairs = [pair for pair in problem.contact if pair.direction is None]
+    names = [name for pair in pairs for name in (pair.secondary, pair.primary)]
+    side = np.tile(np.flatnonzero(np.isin(cells.segment, cells.trace.segments(*names))), 2)
+    segment, s = cells.on_side(side, np.repeat([0.0, 1.0], len(side) // 2))
+    off = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
+    higher = cells.curved.copy()
+    higher[cells.owner[side[np.linalg.norm(off, axis=1) > TURNED]]] = True
+    own, of_side = degree + ON_CURVES * higher, np.zeros(len(cells.ends), dtype=np.intp)
     np.maximum.at(of_side, cells.sides, own[:, None])
-    start = np.concatenate([[0], np.cumsum(2 * (of_side + 1))])
-    return own, Multipliers(of_side, start)
+    return own, Multipliers(of_side, np.concatenate([[0], np.cumsum(2 * (of_side + 1))]))
 
 
 def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
@@ -243,23 +215,21 @@ def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
 
     Motions are those of bodies, translations of size 1 and turns about their middles.
     """
-    trace = cells.trace
+    trace, e, highest = cells.trace, len(cells.ends), int(mu.degree.max())
     bodies = connected_bodies(trace)
-    corner = Triangulation(trace.mesh).triangles[cells.parent[cells.owner], 0]
-    body = bodies.of_vertex[corner]
-    values = np.zeros((int(mu.start[-1]), len(bodies.names), 3))
-    for k in np.unique(mu.degree).tolist():
-        side = np.flatnonzero(mu.degree == k)
-        t, w = gauss(k + trace.geometry_order)
-        x, _ = cells.points(np.repeat(side, len(t)), np.tile(t, len(side)))
-        arm = x.reshape(len(side), -1, 2) - bodies.middle[body[side], None]
-        arm = arm / bodies.size[body[side], None, None]
-        chi = w[:, None] * traces(k, t)
-        along_x, at = mu.start[side, None] + np.arange(k + 1), body[side, None]
-        values[along_x, at, 0] = values[along_x + k + 1, at, 1] = chi.sum(axis=0)
-        values[along_x, at, 2] = -arm[..., 1] @ chi
-        values[along_x + k + 1, at, 2] = arm[..., 0] @ chi
-    found = values[:, :, np.array(trace.model.motions)].reshape(len(values), -1)
+    body = bodies.of_vertex[Triangulation(trace.mesh).triangles[cells.parent[cells.owner], 0]]
+    t, w = gauss(highest + trace.geometry_order)
+    x, _ = cells.points(np.arange(e), np.tile(t, (e, 1)))
+    arm = (x - bodies.middle[body, None]) / bodies.size[body, None, None]
+    motions = np.zeros((*arm.shape, 3))
+    motions[:, :, [0, 1], [0, 1]] = 1.0
+    motions[..., 2] = np.stack([-arm[..., 1], arm[..., 0]], axis=-1)
+    motions = motions[..., np.array(trace.model.motions)]
+    moments = np.einsum("q,qn,eqcr->ecnr", w, traces(highest, t), motions, optimize=True)
+    own = (np.arange(highest + 1) <= mu.degree[:, None])[:, None] & np.ones((2, 1), dtype=bool)
+    values = np.zeros((int(mu.start[-1]), len(bodies.names), motions.shape[-1]))
+    values[np.arange(len(values)), np.repeat(body, 2 * (mu.degree + 1))] = moments[own]
+    found = values.reshape(len(values), -1)
     return np.asarray(found @ vanishing_combinations(found[fixed]))
 
 
@@ -268,55 +238,40 @@ def elements_of(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     degree: int,
-    look: Index,
+    rules: ForceRules,
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, in groups of one kind, and their multipliers.
 
-    Parameters
-    ----------
-    degree : int
-        Of stresses on triangles with straight sides.
-    look : ndarray of int (n, 3)
-        How forces are integrated: order of the rules, depth of the parts that these are on, and
-        whether parts at corners are in thirds; see `looked_at`.
-
-    Raises
-    ------
-    ContactError
-        No equilibrated stress.
+    Stresses are of a `degree` on triangles with straight sides.
     """
-    own, mu = multipliers(cells, degree, turning(problem, cells))
+    own, mu = multipliers(problem, cells, degree)
     at_axis = np.asarray(cells.trace.model.on_axis(cells.vertices))
     on_axis = np.asarray(at_axis[cells.ends].all(axis=1))[cells.sides]
     key = np.column_stack(
-        [own, on_axis.any(axis=1), mu.degree[cells.sides], cells.curved, cells.bodies, look]
+        [own, on_axis.any(axis=1), mu.degree[cells.sides], cells.curved, cells.bodies]
     )
     kinds, number = np.unique(key, axis=0, return_inverse=True)
     found = []
-    for kind, (own_degree, axis, *rest) in enumerate(kinds.tolist()):
+    for kind, (own_degree, axis, *_) in enumerate(kinds.tolist()):
         every = np.flatnonzero(number.ravel() == kind)
         for at in np.array_split(every, 1 + len(every) * (own_degree + 2) ** 4 // ENTRIES):
-            kept = problem, cells, displacement, mu, at, own_degree, bool(axis), rest[-3:]
-            found.append(_element(*kept))
+            kind_ = at, own_degree, bool(axis)
+            found.append(_element(problem, cells, displacement, mu, rules, *kind_))
     return mu, found
 
 
-def _of_body(values: Mapping[str, Value], cells: Cells, at: Index) -> Value | None:
+def _of_body(values: Mapping[str, Any], cells: Cells, at: Index) -> Any:
     """What is given, by patterns of names, for the body of triangles `at` (b,); None if nothing."""
     mesh, body = cells.trace.mesh, int(cells.bodies[at[0]])
-    masks = ((mesh.Materials(pattern).Mask(), value) for pattern, value in values.items())
-    return next((value for mask, value in masks if mask[body]), None)
+    return next((value for k, value in values.items() if mesh.Materials(k).Mask()[body]), None)
 
 
 def compliance_at(problem: Problem, cells: Cells, points: Places) -> Array:
     """C^-1 at places of one body, (b, q, v, v) or, of a law of numbers, (1, 1, v, v)."""
     law = _of_body(problem.materials, cells, points.at)
-    assert law is not None
     C = law.voigt(problem.model)
-    if varies(law):
-        C = points.evaluate(cells, C)
-    else:
-        C = cells.evaluate(C, points.at[:1], np.full((1, 2), 1 / 3))[None]
+    middle = points.at[:1], np.full((1, 2), 1 / 3)
+    C = points.evaluate(cells, C) if varies(law) else cells.evaluate(C, *middle)[None]
     v = round(C.shape[-1] ** 0.5)
     return np.asarray(np.linalg.inv(C.reshape(*C.shape[:2], v, v)))
 
@@ -326,104 +281,97 @@ def _element(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     mu: Multipliers,
+    rules: ForceRules,
     at: Index,
     degree: int,
     on_axis: bool,
-    look: Sequence[int],
 ) -> Element:
-    """Triangles `at` (b,) of one kind, condensed; `look` as of `elements_of`."""
+    """Triangles `at` (b,) of one kind, condensed."""
     model = model_of(problem)
     axial, curved = model.extent > 0, bool(cells.curved[at[0]])
     law = _of_body(problem.materials, cells, at)
-    varying = law is not None and varies(law)
-    points = places(cells, at, 2 * degree + 4 * (curved or varying or axial))
-    weight, corners = points.weight * cells.measure(points.x), cells.corners[at]
+    points = places(cells, at, 2 * degree + 4 * (curved or varies(law) or axial))
+    corners = cells.corners[at]
     local = coordinates(corners, points.x) if curved else points.local
     compliance = compliance_at(problem, cells, points)
     strain = points.evaluate(cells, model.strain(displacement))
     source = _of_body(problem.force, cells, at)
-    source = None if source is None else ng.CF(source)
-    n = _force_degree(degree, axial)
+    n = min(max(0, degree - 1 - axial), rules.order // 2)
     force, missed = np.zeros((len(at), (n + 1) * (n + 2) // 2, 2)), np.zeros(len(at))
-    radial, rest = np.zeros(weight.shape), strain
+    pieces, hoop = 1 + rules.least[at], np.zeros(points.weight.shape)
     if source is not None:
-        (order, depth, thirds), parts = look, slice(int(axial), None)
-        rule = order, depth, bool(thirds)
-        force, missed, size = projection(source, cells, at, n, *rule, parts)
+        threshold = dict(zip(problem.force.values(), rules.thresholds, strict=True))[source]
+        force, missed, size, pieces = projection(source, cells, at, n, rules, threshold)
         missed[missed <= ROUND_OFF * size] = 0.0
-        s_p = balancing(n, corners, points.x, force, axial)
         if axial:
-            radial = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
             force[..., 0] = 0.0
-            s_p[..., 2] += radial
-        rest = strain - (compliance @ s_p[..., None])[..., 0]
-    # T = stresses @ combined is orthonormal: (T, T) = 1
-    T = stresses(degree, corners, local, axial, on_axis)
-    roots = np.sqrt(weight)[..., None, None] * np.linalg.cholesky(compliance).swapaxes(2, 3)
-    rows = (roots @ T).reshape(len(at), -1, T.shape[-1])
+            hoop = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
+
+    def columns(x: Array, local: Array) -> tuple[Array, Array]:
+        """T (b, q, v, n) and s_p (b, q, v) at `x` (b, q, 2), by (a, b) `local` (b, q, 2)."""
+        T = stresses(degree, corners, local, axial, on_axis)
+        return T, balancing(n, corners, x, force, axial) if force.any() else 0 * T[..., 0]
+
+    T, s_p = columns(points.x, local)
+    if axial:
+        s_p[..., 2] += hoop
+    rest = strain - (compliance @ s_p[..., None])[..., 0]
+    combined, g, beyond = _condensed(T, points.weight, compliance, rest)
+    mandel = np.append(np.ones(compliance.shape[-1] - 1), 0.5**0.5)
+    largest = np.linalg.eigvalsh(compliance * mandel * mandel[:, None])[..., -1].max(axis=1)
+    N, own = _moments(cells, mu, at, degree, columns)
+    dofs = np.concatenate([mu.of(side) for side in cells.sides[at].T], axis=1)
+    modulus = np.broadcast_to(1 / largest, len(at))
+    data = compliance, strain, source, force, pieces, missed, modulus
+    condensed = combined, combined.transpose(0, 2, 1) @ N, own, g, beyond, dofs
+    return Element(points, corners, degree, n, axial, on_axis, *data, *condensed)
+
+
+def _condensed(
+    T: Array, weight: Array, compliance: Array, strain: Array
+) -> tuple[Array, Array, Array]:
+    """`Element.combined`, `.g` and `.beyond` of stresses T (b, q, v, n) for a `strain` (b, q, v).
+
+    `weight` is (b, q), `compliance` C^-1 = L L' (b, q, v, v) or (1, 1, v, v).
+    """
+    L, root = np.linalg.cholesky(compliance), np.sqrt(weight)[..., None, None]
+    rows = (root * L.swapaxes(2, 3) @ T).reshape(len(T), -1, T.shape[-1])
     combined = np.linalg.inv(np.linalg.qr(rows, mode="r"))
-    N, own = _moments(cells, mu, at, degree, on_axis, force)
-    return Element(
-        places=points,
-        weight=weight,
-        corners=corners,
-        local=local,
-        degree=degree,
-        axial=axial,
-        on_axis=on_axis,
-        compliance=compliance,
-        strain=strain,
-        force=force,
-        radial=radial,
-        source=source,
-        missed=missed,
-        combined=combined,
-        N=combined.transpose(0, 2, 1) @ N,
-        g=(_products(T, weight, rest) @ combined)[:, 0],
-        own=own,
-        sides=cells.sides[at],
-        dofs=np.concatenate([mu.of(side) for side in cells.sides[at].T], axis=1),
-    )
-
-
-def _force_degree(degree: int, axial: bool) -> int:
-    """Of the body forces that stresses of a `degree` balance."""
-    return max(0, degree - 1 - axial)
-
-
-def _products(T: Array, weight: Array, strain: Array) -> Array:
-    """(T, e), shape (b, 1, m), of stresses T (b, q, v, m) and strains e, `strain` (b, q, v)."""
-    b = len(weight)
-    weighted = (weight[..., None] * strain).reshape(b, 1, -1)
-    return np.asarray(weighted @ T.reshape(b, -1, T.shape[-1]))
+    rows = rows @ combined
+    rest = (root * (np.linalg.inv(L) @ strain[..., None])).reshape(len(T), 1, -1)
+    g = np.zeros((len(T), 1, rows.shape[2]))
+    for _ in range(2):  # once more, as the rows are orthonormal but for round-off
+        more = rest @ rows
+        g, rest = g + more, rest - more @ rows.swapaxes(1, 2)
+    return combined, g[:, 0], (rest**2).sum(axis=(1, 2))
 
 
 def _moments(
-    cells: Cells, mu: Multipliers, at: Index, degree: int, on_axis: bool, force: Array
+    cells: Cells,
+    mu: Multipliers,
+    at: Index,
+    degree: int,
+    columns: Callable[[Array, Array], tuple[Array, Array]],
 ) -> tuple[Array, Array]:
     """Moments of tractions with the multipliers of triangles `at` (b,).
 
-    Those (b, n, d) of `stresses`, and those (b, d) of s_p for the coefficients `force` (b, j, 2).
+    Those (b, n, d) of the first `columns` of stresses of a `degree`, and those (b, d) of the other.
     """
-    axial, corners, found = cells.trace.model.extent > 0, cells.corners[at], []
+    found: list[Array] = []
+    axial, corners = cells.trace.model.extent > 0, cells.corners[at]
     for i in range(3):
         side, back = cells.sides[at, i], cells.backward[at, i]
         k, bent = int(mu.degree[side[0]]), bool(cells.bent[side[0]])
         t, w = gauss(degree + k + 2 * axial + 4 * cells.trace.geometry_order * bent)
-        start, stop = CORNERS[(i + 1) % 3], CORNERS[(i + 2) % 3]
         own = np.where(back[:, None], 1 - t, t)
-        x, dx = (
-            z.reshape(len(at), -1, 2) for z in cells.points(np.repeat(side, len(t)), own.ravel())
-        )
-        local = coordinates(corners, x) if bent else start + t[:, None] * (stop - start)
-        T = stresses(degree, corners, local, axial, on_axis)
-        if force.any():
-            s_p = balancing(_force_degree(degree, axial), corners, x, force, axial)
-            T = np.concatenate([T, s_p[..., None]], axis=3)
-        n = np.where(back[:, None, None], -1, 1) * (dx @ CLOCKWISE)  # times ds / dt
+        x, dx = cells.around(at, i, t)
+        local = CORNERS[i - 2] + t[:, None] * (CORNERS[i - 1] - CORNERS[i - 2])
+        T, s_p = columns(x, coordinates(corners, x) if bent else local)
+        T = np.concatenate([T, s_p[..., None]], axis=3)
+        n = dx @ CLOCKWISE  # times ds / dt
         chi = (w * cells.measure(x))[..., None] * traces(k, own)
         for p, q in ((0, -1), (-1, 1)):
             traction = T[:, :, p] * n[..., :1] + T[:, :, q] * n[..., 1:]
             found.append(traction.transpose(0, 2, 1) @ chi)
     N = np.concatenate(found, axis=2)
-    return (N[:, :-1], N[:, -1]) if force.any() else (N, np.zeros((len(at), N.shape[2])))
+    return N[:, :-1], N[:, -1]

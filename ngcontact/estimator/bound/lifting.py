@@ -2,29 +2,30 @@
 
 On sides d.w is asked for: u_D - u_h on Gamma_u, r shared by compliance between both bodies on
 Gamma_K, -u_h.d on guides. Other parts of Gamma_K stay where they are. On the triangles around these
-sides w is the displacement of least energy of a degree with the values asked for at nodes; what is
-no polynomial of that degree is continued from its side to the opposite corner in proportion to the
-distance.
+sides w is the displacement of least energy with the values asked for at nodes. It is of one degree,
+and of `DATA` on sides where what is asked for is no such polynomial.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
+from numpy.polynomial import legendre
 
-from ...arrays import Array, Index, Mask, from_triplets
+from ...arrays import Array, Index, from_triplets
 from ...errors import ContactError
-from ...lagrange import gauss_lobatto, lagrange, lagrange_derivative
+from ...lagrange import gauss_lobatto, lagrange
 from ...linalg import cholesky, lower_half
 from ...problem import Problem
-from .cells import Cells, Places, places
+from .cells import Cells, places
 from .elements import ENTRIES, compliance_at
 from .facing import DATA, PLACES, THROUGH, Facing
-from .polynomials import CORNERS, derivatives
+from .polynomials import CORNERS, DERIVATIVES, derivatives
 from .tractions import Given
 
 NOISE = 1e-13  # of what is asked for, relative to the displacement: round-off
@@ -34,15 +35,9 @@ INCONSISTENT = 1e-9  # of what is asked for at a vertex, relative to it
 
 @dataclass(frozen=True, eq=False)
 class Asked:
-    """d.w on k sides, at j Gauss-Lobatto points.
+    """Of d.w on k sides, `side` (k,), the `amount` (k, j), lengths, along d, `direction` (k, j, 2).
 
-    Attributes
-    ----------
-    side : ndarray of int (k,)
-    direction : ndarray (k, j, 2)
-        d.
-    amount : ndarray (k, j)
-        d.w, lengths.
+    At j Gauss-Lobatto points.
     """
 
     side: Index
@@ -96,18 +91,8 @@ def lifted(
 ) -> Array:
     """Norms (n,) of w, roots of energies per thickness, shared by both bodies of each line.
 
-    On secondaries alone where conditions at a vertex disagree.
-
-    Parameters
-    ----------
-    asked : sequence of Asked
-        On supports.
-    lines : sequence of (Facing, ndarray (k, j))
-        Each line and its r, lengths at Gauss points.
-    degree : int
-        Of w.
-    extent : float
-        Size of displacements and gaps, a length, beside which round-off is told.
+    On secondaries alone where conditions at a vertex disagree. `asked` are those on supports,
+    `lines` (k, j) the facing sides with r, lengths at Gauss points; the rest is as of `lifting_of`.
 
     Raises
     ------
@@ -119,10 +104,9 @@ def lifted(
         every = [*asked, *(one for line in lines for one in asked_on_line(*line, alone))]
         try:
             return lifting_of(problem, cells, every, degree, extent, away)
-        except ContactError:
-            if alone:
-                raise
-    raise AssertionError
+        except ContactError as found:
+            error = found
+    raise error
 
 
 def lifting_of(
@@ -133,219 +117,157 @@ def lifting_of(
     extent: float,
     away: Sequence[int] | Index = (),
 ) -> Array:
-    """Norms (n,) of w, of a `degree`, with all that is asked for; see `lifted`.
+    """Norms (n,) of w with all that is asked for, of a `degree`, of `DATA` where that has to be.
 
-    Sides `away` (r,) of Gamma_K face nothing, and may move.
+    What is less than round-off beside the `extent` of displacements and gaps, a length, is not
+    lifted. Sides `away` (r,) of Gamma_K face nothing, and may move.
 
     Raises
     ------
     ContactError
         Conditions at a vertex ask for different displacements.
     """
-    norms = np.zeros(len(cells.triangles))
-    needed = [
-        one.side[np.abs(one.amount).max(axis=1, initial=0.0) > NOISE * extent] for one in asked
-    ]
+    norms, degrees = np.zeros(len(cells.triangles)), np.full(len(cells.ends), degree)
+    largest = [np.abs(one.amount).max(axis=1, initial=0.0) for one in asked]
+    needed = [one.side[size > NOISE * extent] for one, size in zip(asked, largest, strict=True)]
     if not sum(map(len, needed)):
         return norms
     touched = np.zeros(len(cells.vertices), dtype=bool)
     touched[cells.ends[np.concatenate(needed)]] = True
     layer = np.flatnonzero(touched[cells.triangles].any(axis=1))
-    nodes = _Nodes(problem, cells, layer, degree)
+    count = np.bincount(cells.sides[layer].ravel(), minlength=len(cells.ends))
     lines = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
-    still = np.isin(cells.segment, cells.trace.segments(*lines))
-    still[np.asarray(away, dtype=np.intp)] = False
+    fixed = cells.inner | np.isin(cells.segment, cells.trace.segments(*lines))
+    fixed[np.asarray(away, dtype=np.intp)] = False
+    lower = lagrange(degree, gauss_lobatto(DATA)) @ lagrange(DATA, gauss_lobatto(degree))
+    unit = np.concatenate(largest).max()
     for one in asked:
-        still[one.side] = False
-    w = _least(nodes, asked, nodes.rim(still), 100 * NOISE * extent)
-    rest = _rest(nodes, w, asked)
-    rough = np.asarray(rest.any(axis=(1, 2, 3)))
-    for block in nodes.blocks(rough):
-        some = block.some
-        own = block.table @ w[nodes.number[some]][:, None]
-        value, slope = own[:, :, 0], own[:, :, 1:]
-        if rough[some[0]]:
-            more = _continued(block.points.local, rest[some])
-            value, slope = value + more[0], slope + more[1]
-        e = block.strains(slope, value)
-        energy = (e * (block.law @ e[..., None])[..., 0]).sum(axis=2)
-        norms[layer[some]] = np.sqrt((block.weight * energy).sum(axis=1))
-    return norms
-
-
-@dataclass(frozen=True, eq=False)
-class _Block:
-    """Triangles `some` (b,) of a layer, all of one kind, with quadrature.
-
-    `weight` (b, q) has the model's measure, `law` is C, `into` (b, q, 2, 2) are the derivatives of
-    (a, b) by x, `table` (q, 3, m) the nodes' functions and their derivatives by (a, b).
-    """
-
-    some: Index
-    points: Places
-    weight: Array
-    law: Array
-    into: Array
-    table: Array
-
-    def strains(self, slope: Array, value: Array) -> Array:
-        """Voigt strains (b, q, ..., v) by derivatives (b, q, 2, ..., 2) and values (b, q, ..., 2).
-
-        Of displacements (..., 2); derivatives are by (a, b).
-        """
-        gradient = np.einsum("bqax,bqa...->bq...x", self.into, slope)
-        xx, yy = gradient[..., 0, 0], gradient[..., 1, 1]
-        found = [xx, yy, gradient[..., 0, 1] + gradient[..., 1, 0]]
-        if self.law.shape[-1] > 3:
-            r = self.points.x[..., 0].reshape(self.weight.shape + (1,) * (value.ndim - 3))
-            found.insert(2, value[..., 0] / r)
-        return np.stack(found, axis=-1)
-
-
-class _Nodes:
-    """Nodes of continuous polynomials on a layer of b triangles.
-
-    `number` (b, m): of vertices, sides and inside in turn; `local` (m, 2) their places (a, b).
-    """
-
-    def __init__(self, problem: Problem, cells: Cells, layer: Index, degree: int) -> None:
-        self.problem, self.cells, self.layer, self.degree = problem, cells, layer, degree
-        t = gauss_lobatto(degree)[1:-1, None]
-        along = [(1 - t) * CORNERS[(i + 1) % 3] + t * CORNERS[(i + 2) % 3] for i in range(3)]
-        inside = [(i / degree, j / degree) for i in range(1, degree) for j in range(1, degree - i)]
-        self.local = np.concatenate([CORNERS, *along, np.reshape(inside, (-1, 2))])
-        on = self._on(cells.sides[layer])[..., 1:-1]
-        on = np.where(cells.backward[layer][..., None], on[..., ::-1], on)
-        first = len(cells.vertices) + len(cells.ends) * (degree - 1)
-        rest = first + np.arange(len(layer) * len(inside)).reshape(len(layer), -1)
-        every = np.concatenate([cells.triangles[layer], on.reshape(len(layer), -1), rest], axis=1)
-        self.every, number = np.unique(every, return_inverse=True)
-        self.number = number.reshape(every.shape)
-        self.inverse = np.linalg.inv(derivatives(degree, self.local, (0, 0))[:, 0])
-
-    def _on(self, side: Index) -> Index:
-        """Nodes (..., degree + 1) of sides (...,) from t = 0 to t = 1, among those of all cells."""
-        inner = len(self.cells.vertices) + side[..., None] * (self.degree - 1)
-        inner = inner + np.arange(self.degree - 1)
-        ends = self.cells.ends[side]
-        return np.concatenate([ends[..., :1], inner, ends[..., 1:]], axis=-1)
-
-    def on_sides(self, side: Index) -> Index:
-        """Nodes (k, degree + 1) of sides (k,) of the layer, from t = 0 to t = 1."""
-        return np.searchsorted(self.every, self._on(side))
-
-    def rim(self, still: Mask) -> Index:
-        """Nodes (k,) on sides whose other triangle is outside of the layer, or that are `still`."""
-        cells = self.cells
-        count = np.bincount(cells.sides[self.layer].ravel(), minlength=len(cells.ends))
-        return self.on_sides(np.flatnonzero((count == 1) & (cells.inner | still))).ravel()
-
-    def blocks(self, rough: Mask) -> Iterator[_Block]:
-        """The layer in groups of one kind; rules see what is continued where it is `rough` (b,)."""
-        cells, degree = self.cells, self.degree
-        key = np.column_stack([cells.bodies[self.layer], cells.curved[self.layer], rough])
-        kinds, number = np.unique(key, axis=0, return_inverse=True)
-        for kind, (_, bent, fine) in enumerate(kinds.tolist()):
-            order = max(2 * degree + 4 * bent, (2 * DATA + 4) * fine)
-            every = np.flatnonzero(number.ravel() == kind)
-            for some in np.array_split(every, 1 + len(every) * order**2 * degree**2 // ENTRIES):
-                points = places(cells, self.layer[some], order)
-                table = derivatives(degree, points.local, (0, 0), (1, 0), (0, 1))
-                yield _Block(
-                    some=some,
-                    points=points,
-                    weight=points.weight * cells.measure(points.x),
-                    law=np.asarray(np.linalg.inv(compliance_at(self.problem, cells, points))),
-                    into=np.asarray(np.linalg.inv(cells.image(points.at, points.local)[1])),
-                    table=np.array([1, 2, 2])[:, None] * table @ self.inverse,
-                )
-
-
-def _least(nodes: _Nodes, asked: Sequence[Asked], rim: Index, noise: float) -> Array:
-    """Values (c, 2) at the nodes of the w of least energy that is as asked for, 0 on the rim."""
-    count, found = len(nodes.every), []
-    carry = lagrange(DATA, gauss_lobatto(nodes.degree))
-    for one in asked:
-        here = np.isin(one.side, nodes.cells.sides[nodes.layer])
-        vectors = (carry @ one.direction[here]).reshape(-1, 2)
-        length = np.linalg.norm(vectors, axis=1, keepdims=True)
-        own = (one.amount[here] @ carry.T).ravel() / length[:, 0]
-        found.append((nodes.on_sides(one.side[here]).ravel(), vectors / length, own))
-    number, d, amount = (np.concatenate(x) for x in zip(*found, strict=True))
+        fixed[one.side] = False
+        both = np.concatenate([one.direction, one.amount[..., None] / unit], axis=2)
+        degrees[one.side[(np.abs(both - lower @ both) > NOISE).any(axis=(1, 2))]] = DATA
+    stiffness = list(_stiffness(problem, cells, layer, degrees, degree))
+    nodes = np.unique(np.concatenate([number.ravel() for _, number, _ in stiffness]))
     # Normal equations at each node: two directions, or one and the one across, which is free.
-    M, right = np.zeros((count, 2, 2)), np.zeros((count, 2, 1))
+    conditions = []
+    for one in asked:
+        for n in (degree, DATA):
+            some = (count[one.side] > 0) & (degrees[one.side] == n)
+            carry = lagrange(DATA, gauss_lobatto(n))
+            d = (carry @ one.direction[some]).reshape(-1, 2)
+            length = np.linalg.norm(d, axis=1, keepdims=True)
+            number = np.searchsorted(nodes, _on_sides(cells, one.side[some], n)).ravel()
+            amount = (one.amount[some] @ carry.T).ravel() / length[:, 0]
+            conditions.append((number, d / length, amount))
+    number, d, amount = (np.concatenate(x) for x in zip(*conditions, strict=True))
+    M, right = np.zeros((len(nodes), 2, 2)), np.zeros((len(nodes), 2, 1))
     np.add.at(M, number, d[:, :, None] * d[:, None])
     np.add.at(right, number, (d * amount[:, None])[..., None])
     size, V = np.linalg.eigh(M)
     held = size > PARALLEL * size[:, 1:]
     parts = np.divide((V.transpose(0, 2, 1) @ right)[..., 0], size, out=0 * size, where=held)
     w = (V @ parts[..., None])[..., 0]
-    missed = np.abs((w[number] * d).sum(axis=1) - amount)
-    if missed.max(initial=0.0) > max(INCONSISTENT * np.abs(amount).max(initial=0.0), noise):
+    missed = np.abs((w[number] * d).sum(axis=1) - amount).max()
+    if missed > max(INCONSISTENT * unit, 100 * NOISE * extent):
         raise ContactError("conditions that meet at a vertex ask for different displacements")
-    held[rim] = True
-    if held.all():
-        return w
-    values, rows, columns = [], [], []
-    for block in nodes.blocks(np.zeros(len(nodes.layer), dtype=bool)):
-        units = block.table[None, :, :, :, None, None] * np.eye(2)  # (1, q, 3, m, 2, 2)
-        B = block.strains(units[:, :, 1:], units[:, :, 0])
-        B = B.reshape(*B.shape[:2], -1, B.shape[-1])
-        b, q, m, v = B.shape
-        B = B.swapaxes(2, 3)
-        root = (block.weight[..., None, None] * B).reshape(b, q * v, m)
-        K = root.transpose(0, 2, 1) @ (block.law @ B).reshape(b, q * v, m)
-        n = (2 * nodes.number[block.some][..., None] + [0, 1]).reshape(b, m)
-        values.append(K.ravel())
-        rows.append(np.repeat(n, m, axis=1).ravel())
-        columns.append(np.tile(n, (1, m)).ravel())
-    entries, i, j = (np.concatenate(x) for x in (values, rows, columns))
-    K = from_triplets(entries, i, j, (2 * count, 2 * count))
-    R = sp.bsr_array((V, np.arange(count), np.arange(count + 1)))
-    Z = sp.csr_array(R.tocsc()[:, np.flatnonzero(~held)])
-    A = (Z.T @ K @ Z).tocsr()
-    y = cholesky(lower_half(A))(np.ones(A.shape[0], dtype=bool))(-(Z.T @ (K @ w.ravel())))
-    return np.asarray(w + (Z @ y).reshape(-1, 2))
+    rim = _on_sides(cells, np.flatnonzero((count == 1) & fixed), degree)
+    held[np.searchsorted(nodes, rim)] = True
+    dofs = [2 * np.searchsorted(nodes, number) for _, number, _ in stiffness]
+    dofs = [np.concatenate([x, x + 1], axis=1) for x in dofs]
+    if not held.all():
+        K = from_triplets(
+            np.concatenate([K.ravel() for _, _, K in stiffness]),
+            np.concatenate([np.repeat(x, x.shape[1], axis=1).ravel() for x in dofs]),
+            np.concatenate([np.tile(x, (1, x.shape[1])).ravel() for x in dofs]),
+            (w.size, w.size),
+        )
+        R = sp.bsr_array((V, np.arange(len(nodes)), np.arange(len(nodes) + 1)))
+        Z = sp.csr_array(R.tocsc()[:, np.flatnonzero(~held)])
+        A = (Z.T @ K @ Z).tocsr()
+        y = cholesky(lower_half(A))(np.ones(A.shape[0], dtype=bool))(-(Z.T @ (K @ w.ravel())))
+        w += (Z @ y).reshape(-1, 2)
+    still = int(cells.trace.model.extent)  # translations from here on have no energy, but round-off
+    for (at, _, K), x in zip(stiffness, dofs, strict=True):
+        own = w.ravel()[x].reshape(len(at), 2, -1)
+        own[:, still:] -= own[:, still:, :1]
+        own = own.reshape(x.shape)
+        norms[at] = np.sqrt(np.maximum(((K @ own[..., None])[..., 0] * own).sum(axis=1), 0.0))
+    return norms
 
 
-def _rest(nodes: _Nodes, w: Array, asked: Sequence[Asked]) -> Array:
-    """What of d.w is no polynomial with the values `w` (c, 2) at the nodes: (b, 3, DATA + 1, 2).
+def _on_sides(cells: Cells, side: Index, n: int) -> Index:
+    """Nodes (k, n + 1) of degree n on sides (k,), from t = 0 to t = 1."""
+    inner = len(cells.vertices) + (DATA - 1) * side[:, None] + np.arange(n - 1)
+    return np.concatenate([cells.ends[side, :1], inner, cells.ends[side, 1:]], axis=1)
 
-    Vectors at Gauss-Lobatto points of the triangles' sides, anticlockwise.
+
+def _stiffness(
+    problem: Problem, cells: Cells, layer: Index, degrees: Index, degree: int
+) -> Iterator[tuple[Index, Index, Array]]:
+    """Triangles `at` (b,) of a `layer` (k,), their m nodes (b, m), and stiffness (b, 2 m, 2 m).
+
+    Polynomials are of a `degree`, on the sides of `degrees` (e,); x components come first.
     """
-    cells, layer = nodes.cells, nodes.layer
-    found = np.zeros((len(layer), 3, DATA + 1, 2))
-    largest = max(float(np.abs(one.amount).max(initial=0.0)) for one in asked)
-    fine = lagrange(nodes.degree, gauss_lobatto(DATA))
-    for one in asked:
-        here = np.isin(one.side, cells.sides[layer])
-        side, d = one.side[here], one.direction[here]
-        have = ((fine @ w[nodes.on_sides(side)]) * d).sum(axis=2)
-        miss = (one.amount[here] - have)[..., None] * d
-        miss[np.abs(miss) <= NOISE * largest] = 0.0
-        owner, local = cells.owner[side], cells.local[side]
-        back = cells.backward[owner, local]
-        miss = np.where(back[:, None, None], miss[:, ::-1], miss)
-        found[np.searchsorted(layer, owner), local] += miss
-    return found
+    key = np.column_stack([degrees[cells.sides], cells.curved, cells.bodies])[layer]
+    kinds, kind = np.unique(key, axis=0, return_inverse=True)
+    for k, (*own, bent, _) in enumerate(kinds.tolist()):
+        every, (places_, inverse) = layer[kind.ravel() == k], _nodes(degree, *own)
+        order, m = 2 * max(own) + 4 * bent, len(places_)
+        for at in np.array_split(every, 1 + len(every) * order**2 * m // ENTRIES):
+            points = places(cells, at, order)
+            f, *by = np.moveaxis(_functions(degree, own, points.local) @ inverse, 1, 0)
+            into = np.linalg.inv(points.slopes)
+            gradient = into.swapaxes(2, 3) @ np.stack(by, axis=1)
+            C = np.linalg.inv(compliance_at(problem, cells, points))
+            B = np.zeros((*points.weight.shape, C.shape[-1], 2 * m))  # Voigt
+            B[:, :, 0, :m] = B[:, :, -1, m:] = gradient[:, :, 0]
+            B[:, :, 1, m:] = B[:, :, -1, :m] = gradient[:, :, 1]
+            if B.shape[2] > 3:
+                B[:, :, 2, :m] = f / points.x[..., :1]
+            weight = points.weight[..., None, None]
+            stress, strain = (x.reshape(len(at), -1, 2 * m) for x in (weight * (C @ B), B))
+            on = [_on_sides(cells, cells.sides[at, i], n)[:, 1:-1] for i, n in enumerate(own)]
+            back = cells.backward[at]
+            on = [np.where(back[:, i, None], x[:, ::-1], x) for i, x in enumerate(on)]
+            inside = m - sum(own)
+            first = len(cells.vertices) + (DATA - 1) * len(cells.ends)
+            rest = first + inside * at[:, None] + np.arange(inside)
+            yield (
+                at,
+                np.hstack([cells.triangles[at], *on, rest]),
+                strain.transpose(0, 2, 1) @ stress,
+            )
 
 
-def _continued(local: Array, rest: Array) -> tuple[Array, Array]:
-    """Values (b, q, 2) and derivatives (b, q, 2, 2) by (a, b) of what is no polynomial.
+@lru_cache
+def _nodes(degree: int, *own: int) -> tuple[Array, Array]:
+    """Nodes (m, 2) by (a, b) of the functions of `_functions`, and what makes these nodal (m, m).
 
-    At `local` (q, 2) in triangles, from their sides `rest` (b, 3, DATA + 1, 2): f(t) on a side is
-    continued as sigma f(t), sigma being 0 in the opposite corner.
+    At corners, on the sides in turn, inside.
     """
+    t = [gauss_lobatto(n)[1:-1, None] for n in own]
+    on = [(1 - t[i]) * CORNERS[i - 2] + t[i] * CORNERS[i - 1] for i in range(3)]
+    inside = [(i / degree, j / degree) for i in range(1, degree) for j in range(1, degree - i)]
+    found = np.concatenate([CORNERS, *on, np.reshape(inside, (-1, 2))])
+    return found, np.asarray(np.linalg.inv(_functions(degree, own, found)[:, 0]))
+
+
+def _functions(degree: int, own: Sequence[int], local: Array) -> Array:
+    """Values and derivatives by (a, b), (q, 3, m), at `local` (q, 2) of the m functions.
+
+    Polynomials of a `degree`, and of higher ones n on sides of degree `own`: with the shares s and
+    t s of its ends, (P_n - P_(n-2))(2 t - 1) s^n, which vanish on the others.
+    """
+    found = [derivatives(degree, local, DERIVATIVES[:3]) * np.array([[1], [2], [2]])]
     share = np.column_stack([local[:, 1], 1 - local.sum(axis=1), local[:, 0]])
-    grad = np.array([[0.0, 1.0], [-1.0, -1.0], [1.0, 0.0]])  # of the shares by (a, b)
-    value, slope = np.zeros((len(rest), len(local), 2)), np.zeros((len(rest), len(local), 2, 2))
-    for i in range(3):
-        j, k = (i + 1) % 3, (i + 2) % 3
-        sigma = share[:, j] + share[:, k]
-        t = share[:, k] / sigma
-        f, df = (g(DATA, t) @ rest[:, i] for g in (lagrange, lagrange_derivative))
-        by_sigma = grad[j] + grad[k]
-        by_t = grad[k] - t[:, None] * by_sigma  # times sigma
-        value += sigma[:, None] * f
-        slope += by_sigma[:, None] * f[:, :, None] + by_t[..., None] * df[:, :, None]
-    return value, slope
+    by = np.array([[0.0, 1.0], [-1.0, -1.0], [1.0, 0.0]])  # of the shares
+    for i, highest in enumerate(own):
+        n = np.arange(degree + 1, highest + 1)
+        s = share[:, i - 2] + share[:, i - 1]
+        t = np.divide(share[:, i - 1], s, out=np.zeros_like(s), where=s > 0)
+        P = legendre.legvander(2 * t - 1, highest)
+        f, df = P[:, n] - P[:, n - 2], 2 * (2 * n - 1) * P[:, n - 1]
+        ds, power = by[i - 2] + by[i - 1], s[:, None] ** (n - 1)
+        dt = by[i - 1] - t[:, None] * ds  # times s
+        slope = power[:, None] * (n * f[:, None] * ds[:, None] + df[:, None] * dt[..., None])
+        found.append(np.concatenate([(s[:, None] * power * f)[:, None], slope], axis=1))
+    return np.concatenate(found, axis=2)

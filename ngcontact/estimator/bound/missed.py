@@ -14,6 +14,7 @@ resultants, for the rules on T are those on its parts.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import ngsolve as ng
@@ -21,42 +22,39 @@ import numpy as np
 
 from ...arrays import Array, Index
 from .cells import Cells
-from .elements import Element, elements_of
-from .norms import SETTLED, forces_missed, residuals, smallest_moduli, stress_norms
-from .parts import LEVELS, PARTS, divided, pattern
+from .elements import Element, Multipliers, by_triangle, elements_of, stress_norms
+from .parts import LEAST, ForceRules
+from .polynomials import edges
 from .program import dual_program, exerted
 from .tractions import Given, side_rule, tractions_of
 
+SETTLED = 1e-10  # residual of equilibrium, relative to the largest stress
 SEEN = 17  # points on each side
 # Shares of corners in places at which the middle of both balls is sought, beside the incentre.
 INNER = np.array([(i, j, 8 - i - j) for i in range(1, 8) for j in range(1, 8 - i)]) / 8
+RAISED = 3  # degrees of stresses on whole triangles ...
+FEW = 24  # ... with so many parts, of which none is divided again
 COUNTS = 0.02  # of |s - sigma_h|^2, what may be added by data where nothing is balanced again
-RAISED = 3  # degrees on whole triangles
-LEAST = 3  # degree on parts: lower ones do not meet all tractions
 AT_ONCE = 200  # triangles
 
 
-def data_norms(cells: Cells, forces: Array, tractions: Array, least: Array) -> Array:
-    """Norm (n,) of a stress that does the work of what is missed.
+def data_norms(cells: Cells, elements: Sequence[Element], tractions: Array) -> Array:
+    """Norm (n,) of a stress that does the work of what is missed of body forces and tractions.
 
-    Parameters
-    ----------
-    forces : ndarray (n,)
-        L2 norms of body forces orthogonal to rigid motions, times the measure.
-    tractions : ndarray (n, 3)
-        The same of tractions on the sides.
-    least : ndarray (n,)
-        Smallest eigenvalue of C in Mandel's scaling.
+    `tractions` (n, 3) are L2 norms on the sides, orthogonal to rigid motions, times the measure.
 
     Raises
     ------
     ValueError
         Something is missed at the axis, where the measure is 0.
     """
+    forces = by_triangle(elements, [e.missed for e in elements])
+    least = by_triangle(elements, [e.modulus for e in elements])
     found = np.zeros(len(forces))
-    at = np.flatnonzero((forces > 0) | (tractions > 0).any(axis=1))
-    if at.size:
-        poincare, korn, trace, measure = _constants(cells, at)
+    some = (forces > 0) | (tractions > 0).any(axis=1)
+    for points in (2, SEEN):  # on straight sides extrema are at ends
+        at = np.flatnonzero(some & (cells.curved == (points > 2)))
+        poincare, korn, trace, measure = _constants(cells, at, points)
         if (measure <= 0).any():
             raise ValueError(
                 "no guaranteed bound is known for loads that are no polynomials at the axis; use "
@@ -67,16 +65,13 @@ def data_norms(cells: Cells, forces: Array, tractions: Array, least: Array) -> A
     return found
 
 
-def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array, Array]:
-    """Of Poincare and Korn (b,), of traces (b, 3), squares for |grad w| = 1; least measure (b,)."""
-    corners, back = cells.corners[at], cells.backward[at, :, None]
-    t = np.linspace(0, 1, SEEN)
-    own = np.where(back, 1 - t, t).ravel()
-    x, slope = (
-        z.reshape(len(at), 3, SEEN, 2)
-        for z in cells.points(np.repeat(cells.sides[at].ravel(), SEEN), own)
-    )
-    slope = np.where(back[..., None], -slope, slope)
+def _constants(cells: Cells, at: Index, points: int) -> tuple[Array, Array, Array, Array]:
+    """Of Poincare and Korn (b,), of traces (b, 3), squares for |grad w| = 1; least measure (b,).
+
+    Sides are looked at in that many `points`.
+    """
+    corners, t = cells.corners[at], np.linspace(0, 1, points)
+    x, slope = cells.around(at[:, None], np.arange(3), t)
     normal = np.stack([slope[..., 1], -slope[..., 0]], axis=-1)
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     opposite = np.linalg.norm(np.roll(corners, -1, 1) - np.roll(corners, -2, 1), axis=2)
@@ -87,48 +82,30 @@ def _constants(cells: Cells, at: Index) -> tuple[Array, Array, Array, Array]:
         ratio = np.maximum(ratio, rho / np.linalg.norm(away, axis=-1).max(axis=(1, 2)))
     ratio = np.maximum(ratio, tiny)
     beta = ratio / math.sqrt(2) / np.sqrt(1 + np.sqrt(1 - ratio**2))
-    poincare = cells.diameters[at] / math.pi * _distortion(cells, at, x[:, 0], slope[:, 0])
+    # The map of the straight triangle: its derivatives D depend on t alone.
+    D = cells.image(at, np.column_stack([t, 0 * t]))[1] @ np.linalg.inv(edges(corners))[:, None]
+    size, det = np.linalg.norm(D, 2, axis=(2, 3)).max(axis=1), np.linalg.det(D)
+    distortion = size * np.sqrt(det.max(axis=1) / np.maximum(det.min(axis=1), tiny))
+    poincare = cells.diameters[at] / math.pi * distortion
     away = x - corners[:, :, None]
     least = np.maximum((away * normal).sum(axis=-1).min(axis=-1), tiny)
     far, p = np.linalg.norm(away, axis=-1).max(axis=-1), poincare[:, None]
-    measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), -1).min(axis=1)
+    measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), 3 * points).min(axis=1)
     return poincare, np.sqrt(1 + 2 / beta**2), 2 * (p**2 + far * p) / least, measure
-
-
-def _distortion(cells: Cells, at: Index, base: Array, slope: Array) -> Array:
-    """Max |D| (max det D / min det D)^(1/2) (b,) of the map of straight triangles; 1 on those."""
-    found, bent = np.ones(len(at)), np.flatnonzero(cells.curved[at])
-    if bent.size:
-        apex, a, b = np.moveaxis(cells.corners[at[bent], :, None], 1, 0)
-        t = np.linspace(0, 1, SEEN)[:, None]
-        # base - apex = D (straight base - apex), slope = D (b - a): D depends on t alone.
-        straight = np.stack(np.broadcast_arrays(a + t * (b - a) - apex, b - a), axis=-1)
-        D = np.stack([base[bent] - apex, slope[bent]], axis=-1) @ np.linalg.inv(straight)
-        size, det = np.linalg.norm(D, 2, axis=(2, 3)).max(axis=1), np.linalg.det(D)
-        found[bent] = size * np.sqrt(det.max(axis=1) / np.maximum(det.min(axis=1), 1e-300))
-    return found
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A stress on n triangles.
+    """A stress on n triangles of cells, in equilibrium with what `rules` see of forces.
 
-    Attributes
-    ----------
-    cells : Cells
-    elements : list of Element
-    coefficients : list of ndarray (b, m)
-        Of the stress.
-    look : ndarray of int (n, 3)
-        Rules of forces on each, as of `elements_of`.
-    distance, loads : ndarray (n,)
-        |s - sigma_h|, and norms of what s misses of the data.
+    `distance` and `loads` (n,) are |s - sigma_h| and norms of what s misses of the data,
+    `coefficients` (b, m) those on the triangles of each element.
     """
 
     cells: Cells
     elements: list[Element]
     coefficients: list[Array]
-    look: Index
+    rules: ForceRules
     distance: Array
     loads: Array
 
@@ -143,77 +120,51 @@ def once_more(
 ) -> tuple[Array, Array]:
     """`Level.distance` and `.loads`, (n,) each, of the better of both stresses on each triangle.
 
-    Parameters
-    ----------
-    displacement : CoefficientFunction
-        u_h.
-    given : Given
-        Tractions on the boundary.
-    level : Level
-        The stress in equilibrium so far.
-    degree : int
-        Of stresses on straight triangles.
-    scale : float
-        The largest stress, beside which equilibrium is measured.
-    allowed : float, optional
-        What may be added to B^2; without it a share of |s - sigma_h|^2.
+    Stresses are of a `degree` on straight triangles, equilibrium is measured beside the largest
+    one, `scale`. What is `allowed` may be added to B^2; without it a share of |s - sigma_h|^2.
     """
-    c, D = level.distance.copy(), level.loads.copy()
+    c, D, rules = level.distance.copy(), level.loads.copy(), level.rules
     limit = COUNTS * float(c @ c) if allowed is None else allowed
-    _, depth, thirds = level.look.T
-    for m, third in ((1, False), (PARTS, False), (PARTS, True)):
+    pieces = by_triangle(level.elements, [e.pieces for e in level.elements])
+    for third in (None, False, True):  # whole triangles, their parts
         lost = (c + D) ** 2 - c**2
         order = np.argsort(lost)
-        at = np.sort(order[np.cumsum(lost[order]) > limit])
-        fits = depth < LEVELS if m == 1 else (depth > 0) & (thirds == third)
-        some = at[fits[at]]
-        for start in range(0, len(some), AT_ONCE):
-            here = some[start : start + AT_ONCE]
-            share, division = limit * len(here) / len(some), (m, third)
-            one, two = _anew(displacement, given, level, here, degree, scale, division, share)
-            better = one + two < c[here] + D[here]
-            c[here[better]], D[here[better]] = one[better], two[better]
+        counts = np.sort(order[np.cumsum(lost[order]) > limit])
+        fits = pieces <= FEW if third is None else (pieces > 1) & (rules.thirds == third)
+        some = counts[fits[counts]]
+        for at in np.array_split(some, -(-len(some) // AT_ONCE)) if len(some) else ():
+            parts, finer = rules.divided(level.cells, at, third)
+            own = degree + RAISED if third is None else max(degree, LEAST)
+            k = len(parts.triangles) // len(at)
+            mu, elements = elements_of(given.problem, parts, displacement, own, finer)
+            rule = side_rule(parts, given.breaks, np.flatnonzero(~parts.inner))
+            owner = parts.owner[rule.side]
+            on = level.elements, level.coefficients, at[owner // k], rule.x, rule.normal
+            asked = given.asked(parts, rule, tractions_of(*on))
+            moments = rule.moments(mu, asked)
+            free, motions = np.zeros(len(moments), dtype=bool), np.zeros((len(moments), 0))
+            program = dual_program(mu, elements, free, motions, [])
+            found = program.nearest(elements, moments).coefficients
+            left = residuals(parts, mu, moments - exerted(elements, found)[0], scale)
+            have = tractions_of(elements, found, owner, rule.x, rule.normal)
+            loads = data_norms(parts, elements, rule.missed(parts, asked - have, scale))
+            both = stress_norms(elements, found)[0], loads
+            if finer.levels and third is not None:
+                inner, share = Level(parts, elements, found, finer, *both), len(at) / len(counts)
+                both = once_more(displacement, given, inner, own, scale, limit * share)
+            one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
+            settled = left.reshape(-1, k).max(axis=1) <= SETTLED
+            better = settled & (one + two < c[at] + D[at])
+            c[at[better]], D[at[better]] = one[better], two[better]
     return c, D
 
 
-def _anew(
-    displacement: ng.CoefficientFunction,
-    given: Given,
-    level: Level,
-    at: Index,
-    degree: int,
-    scale: float,
-    division: tuple[int, bool],
-    allowed: float,
-) -> tuple[Array, Array]:
-    """`Level.distance` and `.loads` of s' on triangles `at` (b,); infinite without equilibrium.
+def residuals(cells: Cells, mu: Multipliers, left: Array, largest: float) -> Array:
+    """Largest moment `left` (d,) without balance on the sides of each triangle, (n,).
 
-    `division` is that of `pattern`, one part of a higher degree or more; `allowed` may be added to
-    B^2 on these triangles.
+    Dimensionless: over the diameter of the side's owner, the measure and the `largest` stress.
     """
-    parts, k = divided(level.cells, at, *division), len(pattern(*division)[1])
-    look, whole = np.repeat(level.look[at], k, axis=0), k == 1
-    look[:, 1] -= not whole
-    degree = degree + RAISED if whole else max(degree, LEAST)
-    mu, elements = elements_of(given.problem, parts, displacement, degree, look)
-    rule = side_rule(parts, given.breaks, np.flatnonzero(~parts.inner))
-    owner = parts.owner[rule.side]
-    own = tractions_of(level.elements, level.coefficients, at[owner // k], rule.x, rule.normal)
-    asked = given.asked(parts, rule, own)
-    moments = rule.moments(mu, asked)
-    free = np.zeros(len(moments), dtype=bool)
-    program = dual_program(mu, elements, free, np.zeros((len(moments), 0)), [])
-    found = program.nearest(elements, moments).coefficients
-    left = residuals(parts, mu, moments - exerted(elements, found)[0], scale)
-    distance = stress_norms(elements, found, len(look)).distance
-    have = tractions_of(elements, found, owner, rule.x, rule.normal)
-    missed = rule.missed(parts, asked - have, scale)
-    moduli = smallest_moduli(elements, len(look))
-    loads = data_norms(parts, forces_missed(elements, len(look)), missed, moduli)
-    both = distance, loads
-    if look[:, 1].any() and not whole:
-        finer = Level(parts, elements, found, look, *both)
-        both = once_more(displacement, given, finer, degree, scale, allowed)
-    settled = left.reshape(-1, k).max(axis=1) <= SETTLED
-    one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
-    return np.where(settled, one, np.inf), np.where(settled, two, np.inf)
+    middle = cells.vertices[cells.ends].mean(axis=1)
+    size = cells.diameters[cells.owner] * cells.trace.model.measure(middle) * (largest or 1.0)
+    force = np.maximum.reduceat(np.abs(left), mu.start[:-1])
+    return np.divide(force, size, out=np.zeros_like(size), where=size > 0)[cells.sides].max(axis=1)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Index
+from ...arrays import Array, Index, Mask
 from ...fem import narrow_forces
 from ...problem import Problem
 from ...quadrature import View, features_of, numbers, touched
@@ -16,75 +18,133 @@ from .polynomials import projected, scalars
 
 PARTS = 4  # of each side
 LEVELS = 2  # how often triangles are divided
-SMOOTH = 1e-3  # of the largest force: what polynomials miss where none is divided
-LEFT = 0.005  # share of the squares of what is missed, that may be on parts not divided again
+SMOOTH = 1e-3  # of the largest force: what polynomials miss where triangles are not divided
 BENT = 2  # times the order of rules on curved triangles, for polynomials in x
-AT_ONCE = 200_000  # points at which forces are looked at together
+FINER = 4  # degrees by which rules on triangles are above those on their parts
+LEAST = 3  # degree of stresses on parts: lower ones do not meet all tractions
+AT_ONCE = 100  # triangles with forces that are no numbers
 
 
 @lru_cache
-def pattern(m: int, thirds: bool) -> tuple[Array, Index]:
-    """The m^2 equal parts of a triangle; those at its corners in `thirds` about their middles.
+def pattern(thirds: bool) -> tuple[Array, Index]:
+    """The equal parts of a triangle; those at its corners in `thirds` about their middles.
 
-    There given tractions may be those of no symmetric stress.
-
-    Returns
-    -------
-    shares : ndarray (p, 3)
-        Of the triangle's corners in the vertices.
-    corners : ndarray of int (k, 3)
-        Vertices of each part, anticlockwise.
+    There given tractions may be those of no symmetric stress. Shares (p, 3) of the triangle's
+    corners in the vertices, and vertices (k, 3) of each part, anticlockwise.
     """
-    lattice = [(i, j) for i in range(m + 1) for j in range(m + 1 - i)]
-    at = {ij: n for n, ij in enumerate(lattice)}
-    vertices, found = [(m - i - j, i, j) for i, j in lattice], []
-    for i, j in lattice:
-        if i + j < m:
-            a, b, c = up = [at[i, j], at[i + 1, j], at[i, j + 1]]
-            if thirds and any(max(vertices[v]) == m for v in up):
-                middle = len(vertices)
-                vertices.append(tuple(np.mean([vertices[v] for v in up], axis=0)))
-                found += [[middle, b, c], [middle, c, a], [middle, a, b]]
-            else:
-                found.append(up)
-        if i + j < m - 1:
-            found.append([at[i + 1, j], at[i + 1, j + 1], at[i, j + 1]])
-    return np.array(vertices) / m, np.array(found)
+    at = [(i, j) for i in range(PARTS + 1) for j in range(PARTS + 1 - i)]
+    shares = np.array([(PARTS - i - j, i, j) for i, j in at]) / PARTS
+    up = [[(i, j), (i + 1, j), (i, j + 1)] for i, j in at if i + j < PARTS]
+    down = [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i, j in at if i + j < PARTS - 1]
+    corners = np.array([[at.index(v) for v in part] for part in up + down])
+    if thirds:
+        three, each = (shares[corners] == 1).any(axis=(1, 2)), np.arange(3)
+        parts = np.repeat(corners[three, None], 3, axis=1)
+        parts[:, each, each] = len(shares) + each[:, None]
+        shares = np.concatenate([shares, shares[corners[three]].mean(axis=1)])
+        corners = np.concatenate([corners[~three], parts.reshape(-1, 3)])
+    return shares, corners
 
 
-def divided(cells: Cells, at: Index, m: int, thirds: bool) -> Cells:
-    """Triangles `at` (b,) in the parts of `pattern`, each with vertices of its own."""
-    shares, corners = pattern(m, thirds)
-    p, k = len(shares), len(corners)
-    return joined(
-        cells.trace,
-        cells.image(at, shares[:, [2, 0]])[0].reshape(-1, 2),
-        (corners + p * np.arange(len(at))[:, None, None]).reshape(-1, 3),
-        (shares @ cells.barycentric[at])[:, corners].reshape(-1, 3, 3),
-        np.repeat(cells.parent[at], k),
-    )
+@dataclass(frozen=True, eq=False)
+class ForceRules:
+    """How body forces are integrated on n triangles: where they are rough, on parts.
 
+    They are rough where they are far from polynomials on a triangle. The rule on it is that on its
+    parts: resultants are the same.
 
-def looked_at(
-    F: ng.CoefficientFunction, cells: Cells, at: Index, order: int, depth: int, thirds: bool
-) -> tuple[Array, Array, Array]:
-    """Points (b, q, 2), weights (b, q) and values (b, q, dim) of F in triangles `at` (b,).
-
-    All are straight, or all have a curved base. The rule is of an `order` on each of their parts:
-    they are divided `depth` times by `pattern`, with `thirds` at corners or not.
+    Attributes
+    ----------
+    thresholds : list of float
+        For each of `Problem.force` the root mean square that polynomials may miss.
+    degree, levels, lowest : int
+        Of these polynomials; how often triangles may be divided; order of rules where they may not.
+    least, thirds : ndarray of int (n,), of bool (n,)
+        How often they are at least, and whether parts at corners are in thirds, as of `pattern`.
     """
-    if depth == 0:
-        bent = len(at) > 0 and cells.curved[at[0]]
-        points = places(cells, at, BENT * order if bent else order)
-        return points.x, points.weight * cells.measure(points.x), points.evaluate(cells, F)
-    parts, found = divided(cells, at, PARTS, thirds), []
-    for curved in (False, True):
-        some = np.flatnonzero(parts.curved == curved)
-        if some.size:
-            own = looked_at(F, parts, some, order, depth - 1, thirds)
-            found.append([z.reshape(len(at), -1, *z.shape[2:]) for z in own])
-    x, weight, values = (np.concatenate(z, axis=1) for z in zip(*found, strict=True))
-    return x, weight, values
+
+    thresholds: list[float]
+    degree: int
+    levels: int
+    lowest: int
+    least: Index
+    thirds: Mask
+
+    @property
+    def order(self) -> int:
+        """Of the rules on triangles that are not divided."""
+        return self.lowest + FINER * self.levels
+
+    def divided(self, cells: Cells, at: Index, thirds: bool | None) -> tuple[Cells, ForceRules]:
+        """Triangles `at` (b,) of cells in the parts of `pattern`, each with vertices of its own.
+
+        And the rules on the parts. Where `thirds` is None each triangle is its only part.
+        """
+        whole = thirds is None
+        shares, corners = (np.eye(3), np.arange(3)[None]) if whole else pattern(bool(thirds))
+        p, k = len(shares), len(corners)
+        parts = joined(
+            cells.trace,
+            cells.image(at, shares[:, [2, 0]])[0].reshape(-1, 2),
+            (corners + p * np.arange(len(at))[:, None, None]).reshape(-1, 3),
+            (shares @ cells.barycentric[at])[:, corners].reshape(-1, 3, 3),
+            np.repeat(cells.parent[at], k),
+        )
+        least = np.repeat(np.maximum(self.least[at] - (not whole), 0), k)
+        third, levels = np.repeat(self.thirds[at], k), self.levels - (not whole)
+        return parts, replace(self, levels=levels, least=least, thirds=third)
+
+
+def force_rules(problem: Problem, cells: Cells, degree: int, least: Index) -> ForceRules:
+    """The rules for stresses of a `degree`; triangles are divided `least` (n,) times at least."""
+    mesh, thresholds, most = cells.trace.mesh, [], least.copy()
+    for pattern, F in problem.force.items():
+        at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[cells.bodies])
+        thresholds.append(np.inf)
+        if not numbers(F):
+            middles = cells.evaluate(F, at, np.full((len(at), 2), 1 / 3))
+            thresholds[-1] = SMOOTH * float(np.linalg.norm(middles, axis=1).max(initial=0.0))
+    if not all(np.isinf(thresholds)):
+        narrow = narrow_forces(problem, mesh, cells.trace.order)
+        for one in features_of(problem, mesh):
+            if one.kind == "force" and len(one.places):
+                view, spots = View(mesh, 2), np.column_stack([one.places, one.widths])
+                at, feature = touched(spots, view, np.arange(mesh.ne))
+                narrow[at[view.sizes[at] > PARTS * one.widths[feature]]] = True
+        most[narrow[cells.parent]] = LEVELS
+    n = max(0, degree - 1 - cells.trace.model.extent)
+    return ForceRules(thresholds, n, LEVELS, 2 * max(degree, LEAST) + 2, most, least > 0)
+
+
+def _samples(
+    F: ng.CoefficientFunction, cells: Cells, at: Index, rules: ForceRules, threshold: float
+) -> Iterator[tuple[Index, Array, Array, Array]]:
+    """Points (k, q, 2), weights (k, q) and values (k, q, 2) of F in triangles `at` (b,) or parts.
+
+    The first are numbers (k,) among these triangles. A force with an infinite `threshold` is one of
+    numbers.
+    """
+    axial = int(cells.trace.model.extent)
+    for bent, third in np.ndindex(2, 2):
+        own = np.flatnonzero((cells.curved[at] == bent) & (rules.thirds[at] == third))
+        if own.size == 0:
+            continue
+        points = places(cells, at[own], rules.order * (BENT if bent else 1))
+        weight, values = points.weight, points.evaluate(cells, F)
+        rough = np.zeros(len(own), dtype=bool)
+        if rules.levels and np.isfinite(threshold):
+            P = scalars(rules.degree, cells.corners[at[own]], points.x)
+            rest = (values - P @ projected(P, weight, values))[..., axial:]
+            square = (weight * (rest**2).sum(axis=2)).sum(axis=1)
+            rough = (square > threshold**2 * weight.sum(axis=1)) | (rules.least[at[own]] > 0)
+        if not rough.all():
+            yield own[~rough], points.x[~rough], weight[~rough], values[~rough]
+        if rough.any():
+            parts, finer = rules.divided(cells, at[own[rough]], bool(third))
+            every = np.arange(len(parts.triangles))
+            whole = np.repeat(own[rough], len(every) // rough.sum())
+            for n, x, w, inner in _samples(F, parts, every, finer, threshold):
+                yield whole[n], x, w, inner
 
 
 def projection(
@@ -92,88 +152,35 @@ def projection(
     cells: Cells,
     at: Index,
     degree: int,
-    order: int,
-    depth: int,
-    thirds: bool,
-    components: slice,
-) -> tuple[Array, Array, Array]:
-    """Polynomials near to a force F in triangles `at` (b,), by the rules of `looked_at`.
+    rules: ForceRules,
+    threshold: float,
+) -> tuple[Array, Array, Array, Index]:
+    """Polynomials near to a force F in triangles `at` (b,), of a `degree`.
 
-    Returns
-    -------
-    coefficients : ndarray (b, m, 2)
-        Of the polynomials of a `degree`, as of `projected`.
-    rest, size : ndarray (b,)
-        L2 norms of some `components` of what they miss of F, and of F, times the measure.
+    Coefficients (b, m, 2) as of `scalars`; L2 norms, (b,) each, of what they miss of F, about an
+    axis of its axial part, and of F, times the measure; on how many parts it is integrated, (b,).
     """
-    force, norms = [], []
-    step = max(1, AT_ONCE // (len(pattern(PARTS, thirds)[1]) ** depth * (order // 2 + 1) ** 2))
-    for start in range(0, len(at), step):
-        some = at[start : start + step]
-        x, weight, values = looked_at(F, cells, some, order, depth, thirds)
-        P = scalars(degree, cells.corners[some], x)
-        force.append(projected(P, weight, values))
-        both = np.stack([values - P @ force[-1], values])[..., components]
-        norms.append(np.sqrt(np.einsum("bq,nbqd->nb", weight * cells.measure(x), both**2)))
-    rest, size = np.concatenate(norms, axis=1)
-    return np.concatenate(force), rest, size
-
-
-def depths(problem: Problem, cells: Cells, degree: int, order: int, least: Index) -> Index:
-    """How often triangles (n,) are divided, because forces are not near to polynomials.
-
-    The polynomials are of a `degree`, the rules of an `order`; `least` (n,) times at least.
-    """
-    found, mesh = least.copy(), cells.trace.mesh
-    if all(numbers(ng.CF(F)) for F in problem.force.values()):
-        return found
-    narrow = narrow_forces(problem, mesh, cells.trace.order)
-    for one in features_of(problem, mesh):
-        if one.kind == "force" and len(one.places):
-            view, spots = View(mesh, 2), np.column_stack([one.places, one.widths])
-            at, feature = touched(spots, view, np.arange(mesh.ne))
-            narrow[at[view.sizes[at] > PARTS * one.widths[feature]]] = True
-    found[narrow[cells.parent]] = LEVELS
-    for k, F in problem.force.items():
-        at = np.flatnonzero(np.array(mesh.Materials(k).Mask())[cells.bodies])
-        if not numbers(F) and at.size:
-            found[at] = _depths(ng.CF(F), cells, at, found[at], (degree, order))
-    return found
-
-
-def _depths(
-    F: ng.CoefficientFunction,
-    cells: Cells,
-    at: Index,
-    asked: Index,
-    rule: tuple[int, int],
-    least: float = 0.0,
-) -> Index:
-    """Depths (b,) of triangles `at` (b,) for one force, from `asked` (b,) up to `LEVELS`.
-
-    `rule` is the degree of the polynomials and the order of the rules. Polynomials are near to the
-    force if they miss less, in the root of the mean square, than `least`; on parts, what they miss
-    of it must count as well.
-    """
-    rest, size = np.zeros((2, len(at)))
-    axial = slice(cells.trace.model.extent, None)
-    for curved in (False, True):
-        some = np.flatnonzero(cells.curved[at] == curved)
-        if some.size:
-            _, rest[some], size[some] = projection(F, cells, at[some], *rule, 0, False, axial)
-    corners = cells.corners[at]
-    root = np.sqrt(np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 2)
-    threshold = max(least, SMOOTH * float((size / root).max(initial=0.0)))
-    rough = rest > threshold * root
-    if least:
-        order = np.argsort(rest)
-        rough[order[np.cumsum(rest[order] ** 2) <= LEFT * (rest @ rest)]] = False
-        return asked + rough
-    depth = np.maximum(asked, rough)
-    some = np.flatnonzero((depth > 0) & (asked < LEVELS))
-    if some.size:
-        parts = divided(cells, at[some], PARTS, False)
-        every = np.arange(len(parts.triangles))
-        inner = _depths(F, parts, every, 0 * every, rule, threshold)
-        depth[some] = 1 + inner.reshape(len(some), -1).max(axis=1)
-    return depth
+    if len(at) > AT_ONCE and np.isfinite(threshold):
+        some = np.array_split(at, 1 + len(at) // AT_ONCE)
+        parts = [projection(F, cells, x, degree, rules, threshold) for x in some]
+        coefficients, rest, size, parted = (np.concatenate(x) for x in zip(*parts, strict=True))
+        return coefficients, rest, size, parted
+    corners, b, m = cells.corners[at], len(at), (degree + 1) * (degree + 2) // 2
+    pieces = [
+        (n, scalars(degree, corners[n], x), w, values, w * cells.measure(x))
+        for n, x, w, values in _samples(F, cells, at, rules, threshold)
+    ]
+    mass, found, norms = np.zeros((b, m, m)), np.zeros((b, m, 2)), np.zeros((3, b))
+    for n, P, w, _, _ in pieces:
+        np.add.at(mass, n, (P.swapaxes(1, 2) * w[:, None]) @ P)
+    for turn in range(3):  # without a projection, with one, with that corrected for round-off
+        right = np.zeros_like(found)
+        for n, P, w, values, squares in pieces:
+            rest = values - P @ found[n]
+            np.add.at(right, n, P.swapaxes(1, 2) @ (w[..., None] * rest))
+            axial = rest[..., int(cells.trace.model.extent) :]
+            np.add.at(norms[turn], n, (squares * (axial**2).sum(axis=2)).sum(axis=1))
+        found = found + np.linalg.solve(mass, right) if turn < 2 else found
+    count = np.bincount(np.concatenate([n for n, *_ in pieces]), minlength=b)
+    size, _, rest = np.sqrt(norms)
+    return found, rest, size, np.maximum(count, 1 + rules.least[at])

@@ -13,10 +13,9 @@ Legendre's in the coordinates (a, b) of each triangle, x = corner 1 + a base + b
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
-from math import comb
 
-import ngsolve as ng
 import numpy as np
 from numpy.polynomial import legendre
 
@@ -24,7 +23,6 @@ from ...arrays import Array, Index
 
 CORNERS = np.array([[0.0, 1.0], [0.0, 0.0], [1.0, 0.0]])  # their (a, b)
 DERIVATIVES = (0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)  # orders by (a, b)
-AIRY = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])  # of psi_xx, psi_xy, psi_yy
 
 
 @lru_cache
@@ -49,12 +47,14 @@ def coordinates(corners: Array, x: Array) -> Array:
     return np.asarray(np.linalg.solve(edges(corners), away).transpose(0, 2, 1))
 
 
-def derivatives(degree: int, local: Array, *orders: tuple[int, int]) -> Array:
-    """Derivatives (..., n, m) of the m `products` at `local` (..., 2), by 2 a and 2 b.
+def derivatives(
+    degree: int, local: Array, orders: Sequence[tuple[int, int]], least: int = 0
+) -> Array:
+    """Derivatives (..., n, m) at `local` (..., 2), by 2 a and 2 b, as often as n `orders` say.
 
-    As often as each of the n `orders` says.
+    Of the m `products` of a total degree of `least` or more.
     """
-    i, j = products(degree)
+    i, j = (x[np.add(*products(degree)) >= least] for x in products(degree))
     found = []
     for order in orders:
         values = [
@@ -66,42 +66,10 @@ def derivatives(degree: int, local: Array, *orders: tuple[int, int]) -> Array:
     return np.stack(found, axis=-2)
 
 
-@lru_cache
-def orthonormal(degree: int, order: int) -> Array:
-    """Combinations (k, m) of the k `products` whose derivatives of an `order` are orthonormal.
-
-    On the triangle of reference; those without such derivatives are left out.
-    """
-    rule = ng.IntegrationRule(ng.TRIG, 2 * degree)
-    every = [(order - n, n) for n in range(order + 1)]
-    rows = derivatives(degree, np.array(rule.points)[:, :2], *every)
-    scale = np.sqrt(np.outer(rule.weights, [comb(order, n) for n in range(order + 1)]))
-    i, j = products(degree)
-    some = i + j >= order
-    R = np.linalg.qr((scale[..., None] * rows).reshape(-1, len(i))[:, some], mode="r")
-    found = np.zeros((len(i), len(R)))
-    found[some] = np.linalg.inv(R)
-    return found
-
-
 def scales(corners: Array) -> tuple[Array, Array]:
     """Middle (b, 1, 2) of the extents of `corners` (b, 3, 2), and half the larger (b, 1, 1)."""
     low, high = corners.min(axis=1, keepdims=True), corners.max(axis=1, keepdims=True)
     return (low + high) / 2, (high - low).max(axis=2, keepdims=True) / 2
-
-
-def _rates(corners: Array) -> Array:
-    """Matrices (b, 6, 6) from `DERIVATIVES` by (2 a, 2 b) to those by x and y, times `scales`."""
-    _, size = scales(corners)
-    by = 2 * size * np.linalg.inv(edges(corners))  # (b, 2, 2): a, b by x, y
-    found = np.zeros((len(corners), 6, 6))
-    found[:, 0, 0] = 1.0
-    found[:, 1:3, 1:3] = by.transpose(0, 2, 1)
-    for row, (p, q) in zip((3, 4, 5), ((0, 0), (0, 1), (1, 1)), strict=True):
-        found[:, row, 3] = by[:, 0, p] * by[:, 0, q]
-        found[:, row, 4] = by[:, 0, p] * by[:, 1, q] + by[:, 1, p] * by[:, 0, q]
-        found[:, row, 5] = by[:, 1, p] * by[:, 1, q]
-    return found
 
 
 def stresses(
@@ -111,37 +79,33 @@ def stresses(
 
     Their c components are xx, yy, xy or rr, zz, hoop, rz; coefficients have units of stress. About
     an axis (`axial`) the degree is that of T, and it vanishes `on_axis` if a side lies there.
-
-    Parameters
-    ----------
-    corners : ndarray (b, 3, 2)
-    local : ndarray (b, q, 2)
-        Points by (a, b), or (q, 2) where these are the same for all.
+    Points of triangles `corners` (b, 3, 2) are given by (a, b), `local` (b, q, 2), or (q, 2) where
+    these are the same for all.
     """
-    rates = _rates(corners)
-    if not axial:
-        psi = derivatives(degree + 2, local, *DERIVATIVES[3:]) @ orthonormal(degree + 2, 2)
-        return np.asarray((AIRY @ rates[:, 3:, 3:])[:, None] @ psi)
-
-    def derived(degree: int, order: int) -> Array:
-        """Functions `orthonormal` in an order, by r, z, rr, rz, zz: (6, b, q, m)."""
-        table = derivatives(degree, local, *DERIVATIVES) @ orthonormal(degree, order)
-        return np.moveaxis(rates[:, None] @ table, 2, 0)
-
     _, size = scales(corners)
-    r = (corners[:, 1:2, :1] + local @ edges(corners)[:, 0, :, None]) / size
-    if on_axis:  # T_rr = r f, chi = r^2 f
-        f, f_r, f_z, _, _, f_zz = derived(degree - 1, 0)
-        none = np.zeros_like(f)
-        free = [f, none, f + r * f_r, none]
-        bent = [none, -(2 * f + r * f_r), r**2 * f_zz, r * f_z]
-    else:
-        f, f_r, *_ = derived(degree, 0)
-        chi, chi_r, chi_z, _, _, chi_zz = derived(degree + 1, 1)
-        none, still = np.zeros_like(f), np.zeros_like(chi)
-        free = [f / r, none, f_r, none]
-        bent = [still, -chi_r / r, chi_zz, chi_z / r]
-    return np.concatenate([np.stack(free, axis=2), np.stack(bent, axis=2)], axis=-1)
+    E = edges(corners) / (2 * size)
+    if not axial:  # psi_bb p p' - psi_ab (p q' + q p') + psi_aa q q', p and q the columns of E
+        (px, qx), (py, qy) = E.transpose(1, 2, 0)
+        rows = [px * px, -2 * px * qx, qx * qx], [py * py, -2 * py * qy, qy * qy]
+        airy = np.array([*rows, [px * py, -(px * qy + py * qx), qx * qy]]).transpose(2, 0, 1)
+        airy /= np.linalg.det(E)[:, None, None] ** 2
+        psi = derivatives(degree + 2, local, DERIVATIVES[:2:-1], 2)
+        return np.asarray(airy[:, None] @ psi)
+    (a_r, a_z), (b_r, b_z) = np.linalg.inv(E).transpose(1, 2, 0)
+    rates = np.zeros((len(corners), 1, 4, 6))  # from `DERIVATIVES` to values, by r, z, and zz
+    rates[..., 0, 0] = 1.0
+    rates[:, 0, 1:3, 1:3] = np.array([[a_r, b_r], [a_z, b_z]]).transpose(2, 0, 1)
+    rates[:, 0, 3, 3:] = np.stack([a_z**2, 2 * a_z * b_z, b_z**2], axis=1)
+    r = (corners[:, 1:2, 0] + (local @ edges(corners)[:, 0, :, None])[..., 0]) / size[:, 0]
+    k = int(on_axis)  # T_rr = r^k f, chi = r^(2 k) g
+    f, g = np.zeros((2, *r.shape, 4, 4))
+    f[..., 0, 0], f[..., 2, 0], f[..., 2, 1] = r ** (k - 1), k, r**k
+    g[..., 1, 0], g[..., 1, 1] = -2 * k * r ** (2 * k - 2), -(r ** (2 * k - 1))
+    g[..., 2, 3], g[..., 3, 2] = r ** (2 * k), r ** (2 * k - 1)
+    parts = (f, degree - k, 0), (g, degree + 1 - 2 * k, 1 - k)
+    tables = (derivatives(n, local, DERIVATIVES, least) for _, n, least in parts)
+    both = zip(parts, tables, strict=True)
+    return np.concatenate([(c @ rates) @ table for (c, *_), table in both], axis=-1)
 
 
 def scalars(degree: int, corners: Array, x: Array) -> Array:
@@ -170,14 +134,16 @@ def balancing(degree: int, corners: Array, x: Array, force: Array, axial: bool) 
     `force` (b, m, 2) are the coefficients of the force as of `scalars`, for a `degree` and
     `corners` (b, 3, 2). About an axis only the axial part counts: s_zz = - int F_z dz.
     """
-    middle, size = scales(corners)
-    X = (x - middle) / size
-    i, j = products(degree)
-    a, b = (legendre.legvander(X[..., c], degree) for c in (0, 1))
-    up = legendre.legint(np.eye(degree + 1))
-    ia, ib = (legendre.legvander(X[..., c], degree + 1) @ up for c in (0, 1))
-    along_x = (ia[..., i] * b[..., j]) @ force[..., :1]
-    along_y = (a[..., i] * ib[..., j]) @ force[..., 1:]
-    none = np.zeros_like(along_x)
-    parts = [none, along_y, none, none] if axial else [along_x, along_y, none]  # (3.5)
-    return np.asarray(-size * np.concatenate(parts, axis=2))
+    _, size = scales(corners)
+    c = np.einsum("cnm,bmc->bnc", _antiderivatives(degree), force)
+    found = np.zeros((*x.shape[:2], 3 + axial))
+    found[..., axial:2] = -size * (scalars(degree + 1, corners, x) @ c)[..., axial:]  # (3.5)
+    return found
+
+
+@lru_cache
+def _antiderivatives(degree: int) -> Array:
+    """Of the m `products` by both coordinates in those k of a degree more, (2, k, m)."""
+    (i, j), (p, q) = products(degree), products(degree + 1)
+    up, p, q = legendre.legint(np.eye(degree + 1)), p[:, None], q[:, None]
+    return np.stack([up[p, i] * (q == j), up[q, j] * (p == i)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,7 +25,9 @@ def one_of(cells, at, force, sides):
     n = len(cells.triangles)
     forces, tractions = np.zeros(n), np.zeros((n, 3))
     forces[at], tractions[at] = force, sides
-    found = data_norms(cells, forces, tractions, np.ones(n))
+    points = SimpleNamespace(at=np.arange(n))
+    element = SimpleNamespace(places=points, missed=forces, modulus=np.ones(n))
+    found = data_norms(cells, [element], tractions)
     assert (np.delete(found, at) == 0).all()
     return found[at]
 
