@@ -32,8 +32,8 @@ from .elements import (
     elements_of,
     rigid_motions,
 )
-from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
-from .lifting import asked_on_line, asked_on_supports, lifted
+from .facing import ENDS, cuts_of, facing_of, guides_of, held_motions, reach_of
+from .lifting import Asked, asked_on_supports, lifted
 from .missed import Level, data_norms, once_more
 from .norms import (
     SETTLED,
@@ -43,9 +43,9 @@ from .norms import (
     stress_norms,
 )
 from .parts import depths
-from .program import Balanced, DualProgram, dual_program, rows_of
+from .program import Balanced, DualProgram, dual_program
 from .refusals import refuse_bound, refuse_narrow
-from .tractions import Given, boundary_tractions, given_on
+from .tractions import Given, given_on, side_rule, tractions_of
 
 BESIDE = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
 LIFTED = 3  # degrees by which w is above u_h
@@ -84,6 +84,8 @@ class DualProblem:
     ----------
     cells : Cells
     given : Given
+    asked : list of Asked
+        u_D - u_h.
     elements : list of Element
     look : ndarray of int (n, 3)
         Rules of forces, as of `elements_of`.
@@ -94,6 +96,7 @@ class DualProblem:
 
     cells: Cells
     given: Given
+    asked: list[Asked]
     elements: list[Element]
     look: Index
     moments: Array
@@ -126,8 +129,10 @@ class DualProblem:
                 f"no equilibrated stress was found: the residual relative to the largest stress is "
                 f"{residual:.1e}"
             )
-        have = boundary_tractions(given, elements, found.coefficients)
-        missed = have.missed(given, scale)
+        rule = side_rule(cells, given.breaks, np.flatnonzero(~cells.inner))
+        at = cells.owner[rule.side]
+        have = tractions_of(elements, found.coefficients, at, rule.x, rule.normal)
+        missed = rule.missed(cells, given.asked(cells, rule, have) - have, scale)
         loads = data_norms(cells, forces_missed(elements, n), missed, smallest_moduli(elements, n))
         distance = norms.distance
         if degree is not None:
@@ -138,11 +143,12 @@ class DualProblem:
                 "no guaranteed bound is known for loads that are no polynomials beside the axis; "
                 "use error_estimate"
             )
-        work = have.work(given, displacement)
+        work = sum(rule.work(have, one.side, one.direction, one.amount) for one in self.asked)
         for line, p in zip(lines, found.pressure, strict=True):
-            work -= work_on_gap(line.facing, p, line.facing.gap)
-        balanced = found.coefficients, found.pressure, found.left
-        return AdmissibleStress(*balanced, distance, loads, work, residual)
+            work -= float((line.force(p) * line.gap).sum())
+        return AdmissibleStress(
+            **vars(found), distance=distance, loads=loads, work=work, residual=residual
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,66 +227,56 @@ def _bound(
     """The bound with a p* that is one polynomial between places `beside` ends of segments."""
     p, extent = trace.order, trace.model.extent
     degree, lift = max(p + 1, 2 + extent), p + LIFTED
-    reaches = [reach_of(trace, displacement, pair, lift) for pair in pairs]
+    # Cells
+    guided = trace.segments(None if problem.sliding is None else str(problem.sliding))
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
-    guided = None if problem.sliding is None else str(problem.sliding)
-    loaded = trace.segments(*problem.traction, guided, *touching)
+    loaded = np.append(trace.segments(*problem.traction, *touching), guided)
     whole = [name for name, values in problem.displacement.items() if None not in values]
+    reaches = [reach_of(trace, displacement, pair, lift) for pair in pairs]
     cells = cells_of(trace, cuts_of(trace, reaches, beside), loaded, trace.segments(*whole))
+    # Stresses
     given = given_on(problem, cells)
     least = np.maximum(given.followed(), cells.curved)
     depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, least)
     order = 2 * (degree + ON_CURVES * cells.curved) + np.where(depth, PARTED, WHOLE)
     look = np.column_stack([order, depth, least > 0])
     mu, elements = elements_of(problem, cells, displacement, degree, look)
+    # The gap
     asked = asked_on_supports(cells, given, displacement)
-    of_guides = mu.degree[given.guides]
-    guides = [
-        (k, guides_of(cells, displacement, given.guides[of_guides == k], lift))
-        for k in np.unique(of_guides).tolist()
-    ]
-    holding = [*asked, *(x for _, g in guides for x in asked_on_line(g, g.gap, alone=True))]
-    held = held_motions(cells, [x.side for x in holding], [x.direction for x in holding])
-    lines = [rows_of(mu, guide, k - extent) for k, guide in guides]
+    lines, side = [], np.flatnonzero(np.isin(cells.segment, guided))
+    for k in np.unique(mu.degree[side]).tolist():
+        own = side[mu.degree[side] == k]
+        lines.append(guides_of(cells, displacement, own, (k - extent, lift)))
+    holding = [(x.side, x.direction[:, [0, -1]]) for x in asked]
+    held = held_motions(cells, holding + [(x.side, ENDS @ x.direction) for x in lines])
     for reach in reaches:
         share = _share(problem, cells, reach.pair)
-        facing = facing_of(cells, displacement, reach, lift, held, share)
-        lines.append(rows_of(mu, facing, degree - extent))
+        degrees = degree - extent, lift
+        lines.append(facing_of(cells, displacement, reach, degrees, held, share))
+    # s and p*
     moments, fixed = given.moments(mu)
-    motions = rigid_motions(cells, mu, fixed)
-    program = dual_program(mu, elements, fixed, motions, lines)
-    dual = DualProblem(cells, given, elements, look, moments, program)
+    program = dual_program(mu, elements, fixed, rigid_motions(cells, mu, fixed), lines)
+    dual = DualProblem(cells, given, asked, elements, look, moments, program)
     every = np.arange(len(trace.region))
     sizes = [trace.evaluate(displacement, every, np.zeros(len(every)))]
-    size = max(float(np.abs(x).max(initial=0.0)) for x in sizes + [x.facing.gap for x in lines])
+    size = max(float(np.abs(x).max(initial=0.0)) for x in sizes + [x.gap for x in lines])
     stiffest = min(np.diagonal(e.compliance, axis1=-2, axis2=-1).min() for e in elements)
     felt = FELT * size / float(stiffest * cells.diameters.min())
-    found = program.nearest(elements, moments)
-    stress = dual.admissible(displacement, found, felt, degree)
-    lifts = [(line.facing, line.facing.lift) for line in lines]
-    lifting = lifted(problem, cells, asked, lifts, lift, size)
+    stress = dual.admissible(displacement, program.nearest(elements, moments), felt, degree)
+    # w
+    w = lifted(problem, cells, asked, [(line, line.lift) for line in lines], lift, size)
+    # B
     c, D = stress.distance, stress.loads
     closed = float(sum((p * x.bound).sum() for p, x in zip(stress.pressure, lines, strict=True)))
     parts = {
         "constitutive": float(c @ c),
         "complementarity": 2 * closed,
-        "lifting": float(lifting @ lifting),
+        "lifting": float(w @ w),
         "loads": float(D @ (2 * c + D)),
     }
-    below = float(c @ c / 2 + D @ (c + D / 2 + 2 * lifting)) - stress.work
-    above = float((c + D + lifting / 2) @ lifting) + stress.work + closed
-    return Proof(
-        **vars(dual), stress=stress, lifting=lifting, parts=parts, below=below, above=above
-    )
-
-
-def work_on_gap(facing: Facing, pressure: Array, gap: Array) -> float:
-    """Integral of a pressure on a line times a gap, an energy per thickness.
-
-    `pressure` (k, n) has Bernstein coefficients on its k sides, `gap` (k, j) lengths at `PLACES`.
-    """
-    density = pressure @ bernstein(pressure.shape[1] - 1, PLACES).T * facing.weight
-    return float((density * gap).sum())
+    below = float(c @ c / 2 + D @ (c + D / 2 + 2 * w)) - stress.work
+    above = float((c + D + w / 2) @ w) + stress.work + closed
+    return Proof(**vars(dual), stress=stress, lifting=w, parts=parts, below=below, above=above)
 
 
 def _share(problem: Problem, cells: Cells, pair: ContactState) -> float:

@@ -28,7 +28,7 @@ def certificate_arrays(proof: Proof) -> dict[str, np.ndarray]:
         Where cells have curved sides, or normals of drawn curves turn along straight ones.
     """
     cells = proof.cells
-    lines = [line.facing.direction for line in proof.program.lines]
+    lines = [line.direction for line in proof.program.lines]
     turning = sum(int((np.ptp(d, axis=1) > STRAIGHT).any(axis=1).sum()) for d in lines)
     found = {"cells have a curved side": int(cells.curved.sum())}
     found["sides have a direction of contact or guide that turns along them"] = turning
@@ -107,7 +107,7 @@ def _contact(proof: Proof) -> dict[str, np.ndarray]:
     position = np.full(len(proof.cells.ends) + 1, -1)  # the last one where no side is faced
     boundary = np.flatnonzero(~proof.cells.inner)
     position[boundary] = np.arange(len(boundary))
-    faced = [line.facing for line in proof.program.lines]
+    faced = proof.program.lines
 
     def joined(parts: Sequence[np.ndarray], kind: type = float) -> np.ndarray:
         return np.concatenate(parts).astype(kind) if parts else np.zeros(0, kind)

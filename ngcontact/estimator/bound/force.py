@@ -10,9 +10,9 @@ import numpy as np
 
 from ...arrays import Array, Index
 from ...fem import model_of
-from .bound import Proof, work_on_gap
-from .facing import PLACES, WEIGHTS, Facing, bernstein, met, on_segments
-from .lifting import asked_on_supports, lifted
+from .bound import Proof
+from .facing import PLACES, Facing, bernstein, fitted, jump, met, on_segments
+from .lifting import lifted
 from .norms import stress_norms
 from .program import Balanced
 
@@ -47,20 +47,19 @@ def force_bar(displacement: ng.GridFunction, tested: Tested, proof: Proof) -> fl
     ValueError, ContactError
         No bar is proved.
     """
-    problem, G = proof.given.problem, tested.displacement
-    cells, B, p = proof.cells, proof.bound, proof.stress.pressure
-    facing = [line.facing for line in proof.program.lines]
-    ends, excess = [cells.ends[f.side] for f in facing], _jumps(proof, tested)
-    bare = [_least_kappa(*x) for x in zip(ends, facing, excess, strict=True)]
+    cells, B, p, lines = proof.cells, proof.bound, proof.stress.pressure, proof.program.lines
+    excess = _excess(proof, tested)
+    c = [_coefficients(cells.ends[f.side], f, x) for f, x in zip(lines, excess, strict=True)]
+    bare = [_least_kappa(cells.ends[f.side], f, x) for f, x in zip(lines, c, strict=True)]
     kappa = max(*bare, _ratio_beside(proof, displacement, tested))
     if not kappa < np.inf:
         raise ValueError(
             "no bar of the force is proved where supports end contact, or an open gap is 0"
         )
-    strain = model_of(problem).strain(G)
+    problem = proof.given.problem
+    strain = model_of(problem).strain(tested.displacement)
     elements = [e.of_strain(e.places.evaluate(cells, strain)) for e in proof.elements]
-    given = replace(proof.given, loads={})
-    moments = np.zeros_like(proof.moments)
+    given, moments = replace(proof.given, loads={}), np.zeros_like(proof.moments)
     test = replace(proof, given=given, elements=elements, moments=moments)
     found = _within(test, np.inf)
     distance = stress_norms(elements, found.coefficients, len(cells.triangles)).distance
@@ -70,24 +69,25 @@ def force_bar(displacement: ng.GridFunction, tested: Tested, proof: Proof) -> fl
         found = _within(test, limit, found)
     kappa = max(kappa, costless, _largest(test, found))
     t = test.admissible(displacement, found)
-    r = [_lift(*x, kappa) for x in zip(ends, facing, excess, strict=True)]
-    held = [
-        replace(one, amount=np.zeros_like(one.amount)) for one in asked_on_supports(cells, given, G)
-    ]
-    lifts = list(zip(facing, r, strict=True))
-    lifting = lifted(problem, cells, held, lifts, max(cells.trace.order, LEAST), 1.0)
-    M = float(np.linalg.norm(t.distance + t.loads + lifting))
+    # What of [G] - d.e is more than kappa times the gap after its own lifting.
+    kept = [np.clip(x, -kappa * f.after, kappa * f.after) for f, x in zip(lines, c, strict=True)]
+    r = [x - y @ bernstein(y.shape[1] - 1, PLACES).T for x, y in zip(excess, kept, strict=True)]
+    held = [replace(one, amount=np.zeros_like(one.amount)) for one in proof.asked]
+    w = lifted(
+        problem, cells, held, [*zip(lines, r, strict=True)], max(cells.trace.order, LEAST), 1.0
+    )
+    M = float(np.linalg.norm(t.distance + t.loads + w))
     # The largest M e + kappa (X + Y) with e^2 + 2 X + 2 Y <= B^2.
     error = M * B if M >= kappa * B else (M**2 / kappa + kappa * B**2) / 2
-    opened = sum(work_on_gap(*x) for x in zip(facing, p, r, strict=True))
-    crossed = float((proof.stress.distance + proof.stress.loads) @ lifting)
+    opened = sum(float((f.force(x) * y).sum()) for f, x, y in zip(lines, p, r, strict=True))
+    crossed = float((proof.stress.distance + proof.stress.loads) @ w)
     return error + abs(t.work) + crossed + abs(opened)
 
 
 def _within(test: Proof, kappa: float, start: Balanced | None = None) -> Balanced:
     """The stress near to that of G with |q*| <= kappa p*; any q* where forces have any sign."""
     limits = [
-        np.full_like(p, np.inf) if line.facing.equality else np.where(p > 0, kappa, 0) * p
+        np.full_like(p, np.inf) if line.equality else np.where(p > 0, kappa, 0) * p
         for line, p in zip(test.program.lines, test.stress.pressure, strict=True)
     ]
     return test.program.nearest(test.elements, test.moments, limits, start)
@@ -96,24 +96,19 @@ def _within(test: Proof, kappa: float, start: Balanced | None = None) -> Balance
 def _largest(test: Proof, found: Balanced) -> float:
     """The largest |q*| / p*, where forces have one sign."""
     lines = zip(test.program.lines, found.pressure, test.stress.pressure, strict=True)
-    ratios = [np.abs(q[p > 0]) / p[p > 0] for x, q, p in lines if not x.facing.equality]
+    ratios = [np.abs(q[p > 0]) / p[p > 0] for x, q, p in lines if not x.equality]
     return max((float(ratio.max(initial=0.0)) for ratio in ratios), default=0.0)
 
 
-def _jumps(proof: Proof, tested: Tested) -> list[Array]:
+def _excess(proof: Proof, tested: Tested) -> list[Array]:
     """[G] - d.e (k, j) on each line at Gauss points, 0 where it is round-off."""
-    trace, found = proof.cells.trace, []
-    pairs = iter(tested.directions)
-    for line in proof.program.lines:
-        f = line.facing
-        k, j = f.there.shape
+    cells, found, pairs = proof.cells, [], iter(tested.directions)
+    for f in proof.program.lines:
         e = np.zeros(2) if f.pair is None else next(pairs)
-        segment, s = proof.cells.on_side(np.repeat(f.side, j), np.tile(PLACES, k))
-        jump = trace.evaluate(tested.displacement, segment, s).reshape(k, j, 2)
-        if line.opposite:
-            segment, s = proof.cells.on_side(np.repeat(f.other, j), f.there.ravel())
-            jump = jump - trace.evaluate(tested.displacement, segment, s).reshape(k, j, 2)
-        value = ((jump - e) * f.direction).sum(axis=2)
+        other, there = on_segments(cells, f.other, f.there)
+        opposite = np.where(f.other >= 0, other, -1)[:, None].repeat(len(PLACES), 1), there
+        G, _ = jump(cells.trace, tested.displacement, on_segments(cells, f.side, PLACES), opposite)
+        value = ((G - e) * f.direction).sum(axis=2)
         found.append(np.where(np.abs(value) <= NOISE, 0.0, value))
     return found
 
@@ -123,8 +118,7 @@ def _coefficients(ends: Index, f: Facing, values: Array) -> Array:
 
     `ends` (k, 2) are the vertices of the sides.
     """
-    B = bernstein(f.after.shape[1] - 1, PLACES) * np.sqrt(WEIGHTS)[:, None]
-    c = np.linalg.lstsq(B, (np.sqrt(WEIGHTS) * values).T, rcond=None)[0].T
+    c, _ = fitted(values, f.after.shape[1] - 1)
     c[np.abs(c) <= NOISE] = 0.0
     _, number, count = np.unique(ends, return_inverse=True, return_counts=True)
     number = number.reshape(-1, 2)
@@ -133,37 +127,28 @@ def _coefficients(ends: Index, f: Facing, values: Array) -> Array:
     return np.asarray(c)
 
 
-def _least_kappa(ends: Index, f: Facing, jump: Array) -> float:
-    """The least kappa with which nothing is left at vertices that no closed side shares."""
-    c = np.abs(_coefficients(ends, f, jump)[:, [0, -1]])
+def _least_kappa(ends: Index, f: Facing, c: Array) -> float:
+    """The least kappa with which nothing is left at vertices that no closed side shares.
+
+    `ends` (k, 2) are the vertices of the sides, `c` (k, degree + 1) coefficients of the jump.
+    """
+    c, room = np.abs(c[:, [0, -1]]), f.after[:, [0, -1]]
     bare = ~np.isin(ends, ends[f.closed]) & (c > 0)
-    room = f.after[:, [0, -1]]
     ratio = np.divide(c, room, out=np.full_like(c, np.inf), where=room > 0)
     return float(ratio[bare].max(initial=0.0))
 
 
-def _lift(ends: Index, f: Facing, jump: Array, kappa: float) -> Array:
-    """What of [G] - d.e (k, j) is more than kappa times the gap after its own lifting."""
-    room = kappa * f.after
-    kept = np.clip(_coefficients(ends, f, jump), -room, room)
-    return np.asarray(jump - kept @ bernstein(kept.shape[1] - 1, PLACES).T)
-
-
 def _ratio_beside(proof: Proof, displacement: ng.CoefficientFunction, tested: Tested) -> float:
     """The largest ratio of [G] - d.e to the gap where p* does not act, at Gauss points."""
-    cells, ratio, j = proof.cells, 0.0, len(PLACES)
-    facing = [line.facing for line in proof.program.lines]
-    for f, e in zip([f for f in facing if f.pair is not None], tested.directions, strict=True):
+    cells, ratio = proof.cells, 0.0
+    lines = [f for f in proof.program.lines if f.pair is not None]
+    for f, e in zip(lines, tested.directions, strict=True):
         assert f.pair is not None
-        beside = np.isin(cells.segment, f.pair.line.segments)
-        beside[f.side] = False
-        side = np.flatnonzero(beside)
-        segment, s = on_segments(cells, side, PLACES)
-        found = met(cells.trace, displacement, f.pair, segment, s)
-        jump = cells.trace.evaluate(tested.displacement, np.repeat(segment, j), s.ravel())
-        jump, at = jump.reshape(*s.shape, 2), found.segment >= 0
-        jump[at] -= cells.trace.evaluate(tested.displacement, found.segment[at], found.s[at])
-        excess = np.abs(((jump - e) * found.direction).sum(axis=2))
+        side = np.setdiff1d(np.flatnonzero(np.isin(cells.segment, f.pair.line.segments)), f.side)
+        place = on_segments(cells, side, PLACES)
+        found = met(cells.trace, displacement, f.pair, *place)
+        G, _ = jump(cells.trace, tested.displacement, place, (found.segment, found.s))
+        excess = np.abs(((G - e) * found.direction).sum(axis=2))
         some = found.faces & (excess > NOISE)
         room = np.maximum(found.gap[some], np.finfo(float).tiny)
         ratio = max(ratio, float((excess[some] / room).max(initial=0.0)))

@@ -34,7 +34,7 @@ from ...qp import (
 )
 from ...triplets import from_triplets
 from .elements import Element, Multipliers, traces
-from .facing import PLACES, Facing, bernstein
+from .facing import PLACES, Facing
 
 FALLING = 0.5  # ratio of two residuals from which more corrections take nothing off
 ROUND_OFF = 1e-13  # of tractions, relative to the largest: nothing to correct
@@ -43,45 +43,6 @@ ROUND_OFF = 1e-13  # of tractions, relative to the largest: nothing to correct
 QUADRATURE = 1e-5
 ROOM = 1.1  # ratio of a force to its limit up to which it stays as it is
 DEFINITE = 1e-12  # of the diagonal, added to what is factorised: vertices where tractions depend
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """R on the multipliers of k sides and of those that they face, for j Bernstein polynomials.
-
-    Attributes
-    ----------
-    facing : Facing
-    own, opposite : list of ndarray (j, d)
-        R on each side, and on each that it faces: none without a primary.
-    bound : ndarray (k, j)
-        Integrals of psi_j (gap_h + r).
-    mass : ndarray (k, j)
-        Integrals of psi_j: the force of a unit coefficient.
-    """
-
-    facing: Facing
-    own: list[Array]
-    opposite: list[Array]
-    bound: Array
-    mass: Array
-
-
-def rows_of(mu: Multipliers, facing: Facing, degree: int) -> Rows:
-    """The rows of one line, with a pressure of a `degree`."""
-    psi = bernstein(degree, PLACES)
-
-    def tested(side: int, t: Array, load: Array) -> Array:
-        chi = traces(int(mu.degree[side]), t)
-        return np.concatenate([psi.T @ (load[:, c, None] * chi) for c in (0, 1)], axis=1)
-
-    load = facing.weight[..., None] * facing.direction
-    own = [tested(*x) for x in zip(facing.side, np.tile(PLACES, (len(load), 1)), load, strict=True)]
-    opposite = [
-        -tested(*x) for x in zip(facing.other, facing.there, load, strict=True) if x[0] >= 0
-    ]
-    bound = ((facing.gap + facing.lift) * facing.weight) @ psi  # (3.9)
-    return Rows(facing, own, opposite, bound, facing.weight @ psi)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +71,10 @@ class DualProgram:
     Attributes
     ----------
     multipliers : Multipliers
-    lines : sequence of Rows
+    lines : sequence of Facing
+        Contact and guides.
     R : sparse (m, d)
-        All rows over their `Rows.mass`.
+        All rows over their `Facing.mass`.
     T : sparse (d, d)
         mu = T y: each row is an unknown of y.
     program : QuadraticProgram
@@ -120,7 +82,7 @@ class DualProgram:
     """
 
     multipliers: Multipliers
-    lines: Sequence[Rows]
+    lines: Sequence[Facing]
     R: sp.csr_array
     T: sp.csr_array
     program: QuadraticProgram
@@ -166,9 +128,7 @@ class DualProgram:
         load = self.T.T @ (moments - alone)
         if limits is None:
             low, high = np.where(p.equality, -np.inf, 0.0), np.full(len(p.g), np.inf)
-            active = _joined(
-                [np.repeat(x.facing.closed, x.mass.shape[1]) for x in self.lines], bool
-            )
+            active = _joined([np.repeat(x.closed, x.psi.shape[1]) for x in self.lines], bool)
         else:
             high = _joined([x.mass * limit for x, limit in zip(self.lines, limits, strict=True)])
             low, active = -high, high > 0
@@ -201,9 +161,10 @@ class DualProgram:
                 break
             last = size
             y = self._answer(right, active)
-        ends = np.cumsum([x.mass.size for x in self.lines])[:-1]
-        parts = zip(np.split(force, ends), self.lines, strict=bool(self.lines))
-        pressure = [f.reshape(x.mass.shape) / x.mass for f, x in parts]
+        mass = [x.mass for x in self.lines]
+        ends = np.cumsum([m.size for m in mass])[:-1]
+        parts = zip(np.split(force, ends), mass, strict=bool(mass))
+        pressure = [f.reshape(m.shape) / m for f, m in parts]
         return Balanced(coefficients, pressure, left)
 
     def _answer(self, load: Array, active: Mask) -> Array:
@@ -231,7 +192,7 @@ def dual_program(
     elements: Sequence[Element],
     fixed: Mask,
     motions: Array,
-    lines: Sequence[Rows],
+    lines: Sequence[Facing],
 ) -> DualProgram:
     """The program of the condensed triangles.
 
@@ -241,7 +202,7 @@ def dual_program(
         Multipliers of components on which no traction is given.
     motions : ndarray (d, r)
         Multipliers of rigid motions that supports leave free.
-    lines : sequence of Rows
+    lines : sequence of Facing
         Contact and guides.
     """
     d = int(mu.start[-1])
@@ -262,7 +223,7 @@ def dual_program(
         b=np.zeros(d),
         R=from_triplets(np.ones(m), np.arange(m), unknown, (m, d)),
         g=_joined([x.bound / x.mass for x in lines]),
-        equality=_joined([np.full(x.mass.size, x.facing.equality) for x in lines], bool),
+        equality=_joined([np.full(x.mass.size, x.equality) for x in lines], bool),
         fixed=idle,
         values=np.zeros(d),
         unknown=unknown,
@@ -302,33 +263,31 @@ def exerted(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple
     return total, largest
 
 
-def _basis(mu: Multipliers, lines: Sequence[Rows]) -> tuple[sp.csr_array, sp.csr_array, Index]:
+def _basis(mu: Multipliers, lines: Sequence[Facing]) -> tuple[sp.csr_array, sp.csr_array, Index]:
     """`DualProgram.R` and `.T`, and the unknown of each row."""
-    d, rows, solved, coupled, unknown = int(mu.start[-1]), [], [], [], [np.zeros(0, np.intp)]
+    d, own, across, solved, unknown = int(mu.start[-1]), [], [], [], [np.zeros(0, np.intp)]
     plain, m = np.ones(d, dtype=bool), 0
     for line in lines:
-        j = line.mass.shape[1]
-        for i, side in enumerate(line.facing.side):
-            at, row = mu.of(int(side)), np.arange(m, m + j)
-            block = line.own[i] / line.mass[i, :, None]
-            across = np.linalg.svd(block)[2][j:]
-            inverse = np.linalg.inv(np.vstack([block, across]))
+        means = line.psi.T * (line.weight[:, None] / line.mass[..., None])  # (k, n, j)
+        for i, (side, other) in enumerate(zip(line.side, line.other, strict=True)):
+            load = means[i, :, None] * line.direction[i].T  # (n, 2, j)
+            R = (load @ traces(mu.degree[side], PLACES)).reshape(len(load), -1)
+            at, row = mu.of(side), np.arange(m, m + len(R))
+            m += len(R)
             plain[at] = False
-            rows.append((row, at, block))
-            solved.append((at, at, inverse))
-            unknown.append(at[:j])
-            if line.opposite:
-                other = mu.of(int(line.facing.other[i]))
-                block = line.opposite[i] / line.mass[i, :, None]
-                rows.append((row, other, block))
-                coupled.append((at, other, -inverse[:, :j] @ block))
-            m += j
-    rest = np.flatnonzero(plain)
-    own = _of_blocks(solved, d, d) + from_triplets(np.ones(len(rest)), rest, rest, (d, d))
-    M, T = _of_blocks(coupled, d, d), own  # mu = own y + M mu, from the primary to the secondary
-    while (own := M @ own).nnz:  # as often as bodies stand in a row
-        T = T + own
-    return _of_blocks(rows, m, d), T, np.concatenate(unknown)
+            own.append((row, at, R))
+            unknown.append(at[: len(R)])
+            solved.append((at, at, np.linalg.inv(np.vstack([R, np.linalg.svd(R)[2][len(R) :]]))))
+            if other >= 0:
+                R = -(load @ traces(mu.degree[other], line.there[i])).reshape(len(load), -1)
+                across.append((row, mu.of(other), R))
+    rest, of_row = np.flatnonzero(plain), np.concatenate(unknown)
+    part = _of_blocks(solved, d, d) + from_triplets(np.ones(len(rest)), rest, rest, (d, d))
+    R = _of_blocks(across, m, d)
+    M, T = -part[:, of_row] @ R, part  # mu = part y + M mu, from the primary to the secondary
+    while (part := M @ part).nnz:  # as often as bodies stand in a row
+        T = T + part
+    return _of_blocks(own, m, d) + R, T, of_row
 
 
 def _of_blocks(

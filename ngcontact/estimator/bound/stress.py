@@ -89,8 +89,8 @@ class EquilibratedStress:
         """p* of each pair."""
         cells, found = self.proof.cells, []
         for line, p in zip(self.proof.program.lines, self.proof.stress.pressure, strict=True):
-            if line.facing.pair is not None:
-                side = line.facing.side
+            if line.pair is not None:
+                side = line.side
                 found.append(ContactPressure(cells.segment[side], cells.span[side], p))
         return found
 
@@ -102,7 +102,7 @@ class EquilibratedStress:
         and from the given ones.
         """
         lines = zip(self.proof.program.lines, self.proof.stress.pressure, strict=True)
-        least = [p.min(initial=0.0) for line, p in lines if not line.facing.equality]
+        least = [p.min(initial=0.0) for line, p in lines if not line.equality]
         return {
             "tractions": self.proof.stress.residual,
             "least pressure": float(min(least, default=0.0)),

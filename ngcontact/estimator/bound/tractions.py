@@ -6,19 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import ngsolve as ng
 import numpy as np
 from numpy.polynomial import legendre
 
 from ...arrays import Array, Index, Mask
-from ...fem import BoundaryTrace
+from ...lagrange import lagrange
 from ...problem import Problem
 from ...quadrature import known_rough_load, moment_degree, numbers
 from .cells import Cells
 from .elements import Element, Multipliers, among, traces
-from .facing import DATA, LEGENDRE, PLACES, WEIGHTS, bernstein
+from .facing import DATA, LEGENDRE, PLACES, WEIGHTS, Facing, jump, on_segments
 from .parts import LEVELS, PARTS
-from .program import Rows
 
 FINEST = PARTS**LEVELS  # parts of a side
 SAME = 1e-10  # of a side: breaks nearer to its ends are these
@@ -57,6 +55,22 @@ class SideRule:
             np.add.at(total, mu.start[self.side[at], None] + np.arange(2 * (k + 1)), parts)
         return total
 
+    def work(self, values: Array, side: Index, direction: Array, amount: Array) -> float:
+        """Work of tractions `values` (m, j, 2) on some displacement of sides `side` (k,).
+
+        At Gauss-Lobatto points of each side it is an `amount` (k, i) along a `direction` (k, i, 2).
+        """
+        order = np.argsort(side)
+        at = np.flatnonzero(np.isin(self.side, side))
+        own = order[np.searchsorted(side[order], self.side[at])]
+        t = self.t[at]
+        u = (
+            lagrange(DATA, t.ravel()).reshape(*t.shape, DATA + 1)
+            @ (amount[..., None] * direction)[own]
+        )
+        density = (self.weight * self.measure)[at, :, None] * values[at]
+        return float((density * u).sum())
+
     def missed(self, cells: Cells, values: Array, largest: float) -> Array:
         """L2 norms (n, 3) of tractions `values` (m, j, 2) on sides, times the model's measure.
 
@@ -69,11 +83,6 @@ class SideRule:
         square = (self.weight[..., None] * lost**2).sum(axis=(1, 2))
         np.add.at(squares, (owner, cells.local[self.side]), square)
         return np.sqrt(squares)
-
-    def on_segments(self, cells: Cells) -> tuple[Index, Array]:
-        """Segments (m,) and parameters s (m, j) of a rule along sides of the boundary."""
-        a, b = cells.span[self.side].T[..., None]
-        return cells.segment[self.side], a + (b - a) * self.t
 
 
 def side_rule(cells: Cells, breaks: Array, side: Index) -> SideRule:
@@ -103,14 +112,6 @@ def _points(cells: Cells, side: Index, t: Array) -> tuple[Array, Array]:
     return x.reshape(*t.shape, 2), dx.reshape(*t.shape, 2)
 
 
-def _evaluated(
-    trace: BoundaryTrace, function: ng.CoefficientFunction, segment: Index, s: Array
-) -> Array:
-    """Values (m, j, dim) at `s` (m, j) of segments `segment` (m,)."""
-    values = trace.evaluate(function, np.repeat(segment, s.shape[1]), s.ravel())
-    return values.reshape(*s.shape, -1)
-
-
 @dataclass(frozen=True, eq=False)
 class Given:
     """Conditions on e sides.
@@ -125,8 +126,6 @@ class Given:
         Sides of each P of `Problem.traction`.
     supports : list of (values, ndarray of int (k,))
         u_D of `Problem.displacement` with their sides.
-    guides : ndarray of int (k,)
-        Sides of Gamma_0.
     breaks : ndarray (r, 2)
         Segments and s, rising: where rules on the boundary begin anew to follow tractions.
     pressed : ndarray (e, j, 2)
@@ -138,7 +137,6 @@ class Given:
     held: Mask
     loads: dict[str, Index]
     supports: list[tuple[Sequence[Any], Index]]
-    guides: Index
     breaks: Array
     pressed: Array
 
@@ -151,21 +149,13 @@ class Given:
         np.maximum.at(found, cells.owner[side], np.where(count >= FINEST, LEVELS, count > 0))
         return found
 
-    def under(self, lines: Sequence[Rows], pressure: Sequence[Array]) -> Given:
-        """The same with pressures on lines.
-
-        Parameters
-        ----------
-        pressure : sequence of ndarray (k, n)
-            Bernstein coefficients on the k sides of each line.
-        """
+    def under(self, lines: Sequence[Facing], pressure: Sequence[Array]) -> Given:
+        """The same with pressures on lines, Bernstein coefficients (k, n) on the sides of each."""
         pressed = np.zeros_like(self.pressed)
-        for line, p in zip(lines, pressure, strict=True):
-            f = line.facing
-            density = p @ bernstein(p.shape[1] - 1, PLACES).T * f.weight / WEIGHTS
-            force = density[..., None] * f.direction
+        for f, p in zip(lines, pressure, strict=True):
+            force = (f.force(p) / WEIGHTS)[..., None] * f.direction
             np.add.at(pressed, f.side, -force)
-            if line.opposite:
+            if (f.other >= 0).any():
                 np.add.at(pressed, f.other, f.on_primary(force / f.rate[..., None]))
         return replace(self, pressed=pressed)
 
@@ -177,7 +167,7 @@ class Given:
             at = np.flatnonzero(np.isin(side, loaded))
             if at.size:
                 load = self.problem.traction_vector(name)
-                total[at] += _evaluated(cells.trace, load, segment[at], s[at])
+                total[at] += jump(cells.trace, load, (segment[at], s[at]))[0]
         at = np.flatnonzero(self.pressed[side].any(axis=(1, 2)))
         if at.size:
             t = cells.own_parameter(side[at], s[at])
@@ -190,7 +180,7 @@ class Given:
 
     def asked(self, cells: Cells, rule: SideRule, own: Array) -> Array:
         """Tractions (m, j, 2) on sides of `cells`, parts of these; `own` (m, j, 2) without any."""
-        segment, s = rule.on_segments(cells)
+        segment, s = on_segments(cells, rule.side, rule.t)
         on, asked = np.flatnonzero(segment >= 0), own.copy()
         if on.size:
             values, held = self.tractions(segment[on], s[on])
@@ -206,7 +196,7 @@ class Given:
         if self.loads:
             side = np.unique(np.concatenate(list(self.loads.values())))
             rule = side_rule(self.cells, self.breaks, side)
-            values, _ = self.tractions(*rule.on_segments(self.cells))
+            values, _ = self.tractions(*on_segments(self.cells, rule.side, rule.t))
             moments = rule.moments(mu, values)  # (3.7)
         for side, c in zip(*np.nonzero(self.held), strict=True):
             n = mu.degree[side] + 1
@@ -225,14 +215,12 @@ def given_on(problem: Problem, cells: Cells) -> Given:
     for values, at in supports:
         held[at] |= [value is not None for value in values]
     loads = {name: sides(name) for name in problem.traction}
-    guided = None if problem.sliding is None else str(problem.sliding)
     return Given(
         problem,
         cells,
         held,
         loads,
         supports,
-        sides(guided),
         _breaks(problem, cells, loads),
         np.zeros((len(cells.ends), len(PLACES), 2)),
     )
@@ -280,40 +268,3 @@ def tractions_of(
         values[mine, :, 0] = s[:, :, 0] * nx + s[:, :, -1] * ny
         values[mine, :, 1] = s[:, :, -1] * nx + s[:, :, 1] * ny
     return values
-
-
-@dataclass(frozen=True, eq=False)
-class BoundaryTractions:
-    """Tractions s n of a stress along the boundary: `values` (m, j, 2) at the points of `rule`."""
-
-    rule: SideRule
-    values: Array
-
-    def work(self, given: Given, displacement: ng.CoefficientFunction) -> float:
-        """Work of s n on u_D - u_h, an energy per thickness."""
-        total, trace, rule = 0.0, given.cells.trace, self.rule
-        segment, s = rule.on_segments(given.cells)
-        density = (rule.weight * rule.measure)[..., None] * self.values
-        for wanted, side in given.supports:
-            at = np.flatnonzero(np.isin(rule.side, side))
-            u = _evaluated(trace, displacement, segment[at], s[at])
-            for c, value in enumerate(wanted):
-                if value is not None:
-                    rest = _evaluated(trace, ng.CF(value), segment[at], s[at])[..., 0] - u[..., c]
-                    total += float((density[at, :, c] * rest).sum())
-        return total
-
-    def missed(self, given: Given, largest: float) -> Array:
-        """`SideRule.missed`, (n, 3), of what is asked for."""
-        lost = given.asked(given.cells, self.rule, self.values) - self.values
-        return self.rule.missed(given.cells, lost, largest)
-
-
-def boundary_tractions(
-    given: Given, elements: Sequence[Element], coefficients: Sequence[Array]
-) -> BoundaryTractions:
-    """Tractions along the boundary of a stress, with `coefficients` (b, m) on each element."""
-    cells = given.cells
-    rule = side_rule(cells, given.breaks, np.flatnonzero(cells.segment >= 0))
-    at = cells.owner[rule.side]
-    return BoundaryTractions(rule, tractions_of(elements, coefficients, at, rule.x, rule.normal))
