@@ -62,10 +62,10 @@ def jump(
     place: tuple[Index, Array],
     opposite: tuple[Index, Array] | None = None,
 ) -> tuple[Array, float]:
-    """Values (k, j, 2) at a `place` less those `opposite`, and the largest component of both.
+    """Values (k, j, 2) at a place less those opposite, and the largest component of both.
 
-    A `place` are segments (k,) and s (k, j); `opposite` are segments (k, j), -1 where there is
-    none, and s (k, j).
+    Segments and s are, of the `place` (k,) and (k, j), and of the `opposite` (k, j) and (k, j)
+    one, where segments may be -1.
     """
     values = at_places(partial(trace.evaluate, function), *place)
     largest = float(np.abs(values).max(initial=0.0))
@@ -408,7 +408,7 @@ def facing_of(
 def held_motions(cells: Cells, held: Sequence[tuple[Index, Array]]) -> Array:
     """Projections (nv, 2, 2) of motions of all vertices on those that conditions prescribe.
 
-    Of each there are its sides (k,), and the directions (k, 2, 2) at their ends that are `held`.
+    Sides and directions at their ends that are `held` (k,) and (k, 2, 2), of each condition.
     """
     M = np.zeros((len(cells.vertices), 2, 2))
     for side, d in held:
@@ -470,7 +470,7 @@ def guides_of(
 
 
 def fitted(gap: Array, degree: int) -> tuple[Array, Array]:
-    """Bernstein coefficients (k, degree + 1) near to gaps (k, j), the same at the ends.
+    """Bernstein coefficients (k, degree + 1) near to a `gap` (k, j), the same at the ends.
 
     And what the gaps, polynomials of degree `DATA`, differ from these at most (k,): no Legendre
     polynomial is more than 1.

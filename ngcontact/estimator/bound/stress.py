@@ -1,8 +1,9 @@
-"""The equilibrated stress of a bound as a user reads it."""
+"""The equilibrated stress of a bound as a user reads it, and a certificate for others."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,11 +13,14 @@ import numpy as np
 
 from ...arrays import Array, Index
 from .bound import Proof
-from .certificate import certificate_arrays
 from .elements import among
-from .facing import bernstein
+from .facing import ENDS, WEIGHTS, bernstein
+from .norms import stress_norms
+from .polynomials import scalars
 
 INSIDE = 1e-9  # parameters nearer to an end are inside of the part that begins there
+INSET = 0.1  # of a step of the lattice: it keeps off an axis, where stresses are not defined
+STRAIGHT = 1e-12  # difference of unit vectors that are one: round-off
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,16 +48,15 @@ class ContactPressure:
         At the end of two parts the one towards the middle of the segment.
         """
         low, high = np.sort(self.span, axis=1).T
-        order = np.argsort(self.segments + low)
-        inside = np.clip(s, INSIDE, 1 - INSIDE)
-        at = np.searchsorted((self.segments + low)[order], segment + inside, side="right") - 1
-        part = order[np.maximum(at, 0)] if len(order) else np.zeros(len(segment), dtype=np.intp)
-        on = np.flatnonzero((at >= 0) & (segment == np.append(self.segments, -1)[part]))
-        on = on[inside[on] <= high[part[on]]]
-        a, b = self.span[part[on]].T
+        order, inside = np.argsort(self.segments + low), np.clip(s, INSIDE, 1 - INSIDE)
+        start = np.append(-np.inf, (self.segments + low)[order])
+        part = np.append(-1, order)[np.searchsorted(start, segment + inside, side="right") - 1]
+        on = (part >= 0) & (np.append(self.segments, -1)[part] == segment)
+        on &= inside <= np.append(high, 0.0)[part]
+        part, found = part[on], np.zeros(len(segment))
+        a, b = self.span[part].T
         basis = bernstein(self.coefficients.shape[1] - 1, (s[on] - a) / (b - a))
-        found = np.zeros(len(segment))
-        found[on] = (basis * self.coefficients[part[on]]).sum(axis=1)
+        found[on] = (basis * self.coefficients[part]).sum(axis=1)
         return found
 
 
@@ -149,6 +152,88 @@ class EquilibratedStress:
         path = Path(path)
         if path.suffix != ".npz":
             raise ValueError(f'path="{path}" must end in .npz')
-        arrays: dict[str, Any] = dict(certificate_arrays(self.proof))
-        np.savez_compressed(path, **arrays)
+        np.savez_compressed(path, **_certificate(self.proof))
         return path
+
+
+def _certificate(proof: Proof) -> dict[str, Any]:
+    """All arrays of the certificate by name; docs/bounds.md has the list.
+
+    On cells with straight sides all that the proof needs is a polynomial in x: the stress times the
+    model's measure (1, or 2 pi r), the force that it balances, tractions and p* on sides.
+
+    Raises
+    ------
+    ValueError
+        Where cells have curved sides, or normals of drawn curves turn along straight ones.
+    """
+    cells, mu, lines, stress = (
+        proof.cells,
+        proof.program.multipliers,
+        proof.program.lines,
+        proof.stress,
+    )
+    turning = sum(int((np.ptp(f.direction, axis=1) > STRAIGHT).any(axis=1).sum()) for f in lines)
+    found = {"cells have a curved side": int(cells.curved.sum())}
+    found["sides have a direction of contact or guide that turns along them"] = turning
+    if any(found.values()):
+        told = " and ".join(f"{n} {what}" for what, n in found.items() if n)
+        raise ValueError(f"no certificate: {told}; tractions and p* are no polynomials there")
+    own = stress_norms(proof.elements, stress.coefficients, len(cells.triangles)).distance
+    replaced = np.flatnonzero(stress.distance != own)
+    arrays: dict[str, Any] = {
+        "axisymmetric": np.array(cells.trace.model.extent > 0),
+        "vertices": cells.vertices,
+        "triangles": cells.triangles,
+        "replaced": replaced,
+        "replaced_distance": stress.distance[replaced],
+        "loads": stress.loads,
+        "lifting": proof.lifting,
+        "bound": np.array(proof.bound),
+    }
+    # T and F, times the measure, at a lattice; by rules of quadrature e(u_h) and C^-1.
+    k = proof.elements[0].degree
+    i, j = np.array([(i, j) for i in range(k + 1) for j in range(k + 1 - i)]).T
+    lattice = (np.column_stack([i, j]) + INSET) / (k + 3 * INSET)
+    share = np.column_stack([1 - lattice.sum(axis=1), lattice])
+    x = np.einsum("qc,ncd->nqd", share, cells.corners)
+    T, force, measure = np.zeros((*x.shape[:2], 3)), np.zeros(x.shape), cells.measure(x)[..., None]
+    for number, (e, c) in enumerate(zip(proof.elements, stress.coefficients, strict=True)):
+        at = e.places.at
+        T[at] = e.stress(c, x[at])[..., [0, 1, -1]]
+        force[at] = scalars(e.force_degree, e.corners, x[at]) @ e.force
+        a, b = e.places.local.T
+        arrays |= {
+            f"rule{number}_triangle": at,
+            f"rule{number}_points": np.column_stack([1 - a - b, a]),
+            f"rule{number}_weights": e.places.weight[0] / (2 * e.places.weight[0].sum()),
+            f"rule{number}_strain": e.strain,
+            f"rule{number}_compliance": e.compliance,
+            f"rule{number}_radial": e.radial,
+        }
+    # The boundary: tractions in Legendre polynomials, per t of the side and times the measure.
+    side = np.flatnonzero(~cells.inner)
+    traction = proof.moments[mu.of(side)].reshape(len(side), 2, -1)
+    position = np.full(len(cells.ends) + 1, -1)  # the last one where no side is faced
+    position[side] = np.arange(len(side))
+    return arrays | {
+        "degree": np.array(k),
+        "lattice": lattice,
+        "stress": measure * T,
+        "force": measure * force,
+        "side_vertices": cells.ends[side],
+        "side_held": proof.given.held[side],
+        "side_traction": traction * np.sqrt(2 * np.arange(traction.shape[2]) + 1),
+        "contact_side": _joined([position[f.side] for f in lines], int),
+        "contact_other": _joined([position[f.other] for f in lines], int),
+        "contact_turned": _joined([f.there[:, -1] < f.there[:, 0] for f in lines], bool),
+        "contact_direction": _joined([f.direction[:, 0] for f in lines]),
+        "contact_weight": _joined([f.weight / WEIGHTS @ ENDS.T for f in lines]),
+        "contact_equality": _joined([np.full(len(f.side), f.equality) for f in lines], bool),
+        "contact_gap": _joined([f.after for f in lines]),
+        "contact_pressure": _joined(stress.pressure),
+    }
+
+
+def _joined(parts: Sequence[np.ndarray], kind: type = float) -> np.ndarray:
+    return np.concatenate(parts).astype(kind) if parts else np.zeros(0, kind)

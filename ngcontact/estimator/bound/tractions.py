@@ -150,7 +150,7 @@ class Given:
         return found
 
     def under(self, lines: Sequence[Facing], pressure: Sequence[Array]) -> Given:
-        """The same with pressures on lines, Bernstein coefficients (k, n) on the sides of each."""
+        """The same with pressures on lines: coefficients `pressure` (k, n) on each."""
         pressed = np.zeros_like(self.pressed)
         for f, p in zip(lines, pressure, strict=True):
             force = (f.force(p) / WEIGHTS)[..., None] * f.direction
