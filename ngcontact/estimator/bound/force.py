@@ -10,10 +10,9 @@ import numpy as np
 
 from ...arrays import Array, Index
 from ...fem import model_of
-from .bound import Proof
+from .bound import Proof, largest
 from .facing import PLACES, Facing, bernstein, fitted, jump, met, on_segments
 from .lifting import lifted
-from .norms import stress_norms
 from .program import Balanced
 
 NOISE = 1e-13  # of a jump, relative to the largest displacement
@@ -62,13 +61,13 @@ def force_bar(displacement: ng.GridFunction, tested: Tested, proof: Proof) -> fl
     given, moments = replace(proof.given, loads={}), np.zeros_like(proof.moments)
     test = replace(proof, given=given, elements=elements, moments=moments)
     found = _within(test, np.inf)
-    distance = stress_norms(elements, found.coefficients, len(cells.triangles)).distance
-    costless = float(np.linalg.norm(distance)) / B if B > 0 else 0.0
+    t = test.admissible(displacement, found)
+    costless = float(np.linalg.norm(t.distance + t.loads)) / B if B > 0 else 0.0
     limit = max(kappa, TWICE * costless)
     if _largest(test, found) > limit:
         found = _within(test, limit, found)
+        t = test.admissible(displacement, found)
     kappa = max(kappa, costless, _largest(test, found))
-    t = test.admissible(displacement, found)
     # What of [G] - d.e is more than kappa times the gap after its own lifting.
     kept = [np.clip(x, -kappa * f.after, kappa * f.after) for f, x in zip(lines, c, strict=True)]
     r = [x - y @ bernstein(y.shape[1] - 1, PLACES).T for x, y in zip(excess, kept, strict=True)]
@@ -81,7 +80,9 @@ def force_bar(displacement: ng.GridFunction, tested: Tested, proof: Proof) -> fl
     error = M * B if M >= kappa * B else (M**2 / kappa + kappa * B**2) / 2
     opened = sum(float((f.force(x) * y).sum()) for f, x, y in zip(lines, p, r, strict=True))
     crossed = float((proof.stress.distance + proof.stress.loads) @ w)
-    return error + abs(t.work) + crossed + abs(opened)
+    # What holds free motions does work on G.
+    idle = proof.stress.idle and proof.stress.idle * largest(elements, cells, tested.displacement)
+    return error + abs(t.work) + crossed + abs(opened) + idle
 
 
 def _within(test: Proof, kappa: float, start: Balanced | None = None) -> Balanced:
