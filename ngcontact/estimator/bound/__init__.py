@@ -2,7 +2,6 @@
 
 from .bound import Proof as Proof
 from .bound import error_bound as error_bound
-from .force import Tested as Tested
 from .force import force_bar as force_bar
 from .readings import FINE as FINE
 from .readings import Guaranteed as Guaranteed

@@ -8,7 +8,7 @@ import numpy as np
 from ...arrays import Array
 from ...fem import has_rough_loads, load_vector, stress_of
 from ...problem import varies
-from ..bound import FINE, Guaranteed, Tested, force_bar
+from ..bound import FINE, Guaranteed, force_bar
 
 INTEGRATED = 5  # degree of NGSolve's quadrature with dx, without a bonus
 STRAIGHT = 1e-12  # difference of directions that are one: round-off
@@ -53,7 +53,7 @@ def _component(solution: Guaranteed, pair: int, e: Array) -> float:
     solution.work["back_solves"] += found.back_solves
     solution.work["equilibrations"] += 1
     proof = solution.equilibrated.proof
-    error = force_bar(u, Tested(G, directions), proof)
+    error = force_bar(proof, u, G, directions)
     a, b = (x.vec.FV().NumPy() for x in (u, G))
     noise = ROUND_OFF * float(np.sqrt((space.diagonal @ a**2) * (space.diagonal @ b**2)))
     return error + noise + _integrated(solution, G, proof.sampled)
