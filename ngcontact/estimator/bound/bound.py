@@ -23,25 +23,11 @@ from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
 from .cells import Cells, cells_of, places
-from .elements import (
-    ON_CURVES,
-    PARTED,
-    WHOLE,
-    Element,
-    compliance_at,
-    elements_of,
-    rigid_motions,
-)
+from .elements import ON_CURVES, PARTED, WHOLE, Element, compliance_at, elements_of, rigid_motions
 from .facing import ENDS, cuts_of, facing_of, guides_of, held_motions, reach_of
 from .lifting import Asked, asked_on_supports, lifted
 from .missed import Level, data_norms, once_more
-from .norms import (
-    SETTLED,
-    forces_missed,
-    residuals,
-    smallest_moduli,
-    stress_norms,
-)
+from .norms import SETTLED, forces_missed, residuals, smallest_moduli, stress_norms
 from .parts import depths
 from .program import Balanced, DualProgram, dual_program
 from .refusals import refuse_bound, refuse_narrow
@@ -60,10 +46,8 @@ class AdmissibleStress(Balanced):
 
     Attributes
     ----------
-    distance : ndarray (n,)
-        |s - C e|, roots of energies per thickness.
-    loads : ndarray (n,)
-        Norms of what s misses of the data.
+    distance, loads : ndarray (n,)
+        |s - C e|, and norms of what s misses of the data; roots of energies per thickness.
     work : float
         <s n, u_D - u_h> - int p* gap_h, an energy per thickness.
     residual : float

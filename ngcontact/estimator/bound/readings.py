@@ -49,10 +49,8 @@ class Guaranteed(Estimated):
     @property
     def relative_error_bound(self) -> float:
         """`error_bound` over the energy norm of u_h, dimensionless; 0 where both vanish."""
-        bound = self._bound.bound
-        if bound == 0:
-            return 0.0
-        return bound / self.energy_norm if self.energy_norm > 0 else math.inf
+        bound, size = self._bound.bound, self.energy_norm
+        return bound / size if size > 0 else math.inf if bound > 0 else 0.0
 
     @property
     def bound_parts(self) -> dict[str, float]:

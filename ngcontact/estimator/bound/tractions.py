@@ -60,16 +60,11 @@ class SideRule:
 
         At Gauss-Lobatto points of each side it is an `amount` (k, i) along a `direction` (k, i, 2).
         """
-        order = np.argsort(side)
-        at = np.flatnonzero(np.isin(self.side, side))
+        order, at = np.argsort(side), np.flatnonzero(np.isin(self.side, side))
         own = order[np.searchsorted(side[order], self.side[at])]
-        t = self.t[at]
-        u = (
-            lagrange(DATA, t.ravel()).reshape(*t.shape, DATA + 1)
-            @ (amount[..., None] * direction)[own]
-        )
-        density = (self.weight * self.measure)[at, :, None] * values[at]
-        return float((density * u).sum())
+        basis = lagrange(DATA, self.t[at].ravel()).reshape(-1, len(PLACES), DATA + 1)
+        u = basis @ (amount[..., None] * direction)[own]
+        return float(((self.weight * self.measure)[at, :, None] * values[at] * u).sum())
 
     def missed(self, cells: Cells, values: Array, largest: float) -> Array:
         """L2 norms (n, 3) of tractions `values` (m, j, 2) on sides, times the model's measure.
@@ -192,22 +187,16 @@ class Given:
 
         Fixed are those of components with prescribed displacements.
         """
-        moments, fixed = np.zeros(int(mu.start[-1])), np.zeros(int(mu.start[-1]), dtype=bool)
-        if self.loads:
-            side = np.unique(np.concatenate(list(self.loads.values())))
-            rule = side_rule(self.cells, self.breaks, side)
-            values, _ = self.tractions(*on_segments(self.cells, rule.side, rule.t))
-            moments = rule.moments(mu, values)  # (3.7)
-        for side, c in zip(*np.nonzero(self.held), strict=True):
-            n = mu.degree[side] + 1
-            fixed[mu.start[side] + c * n : mu.start[side] + (c + 1) * n] = True
-        return np.where(fixed, 0.0, moments), fixed
+        fixed = np.repeat(self.held.ravel(), np.repeat(mu.degree + 1, 2))
+        rule = side_rule(self.cells, self.breaks, np.flatnonzero(~self.cells.inner))
+        values, _ = self.tractions(*on_segments(self.cells, rule.side, rule.t))
+        return np.where(fixed, 0.0, rule.moments(mu, values)), fixed  # (3.7)
 
 
 def given_on(problem: Problem, cells: Cells) -> Given:
     """The conditions of a problem."""
 
-    def sides(pattern: str | None) -> Index:
+    def sides(pattern: str) -> Index:
         return np.flatnonzero(np.isin(cells.segment, cells.trace.segments(pattern)))
 
     held = np.zeros((len(cells.ends), 2), dtype=bool)
@@ -215,15 +204,8 @@ def given_on(problem: Problem, cells: Cells) -> Given:
     for values, at in supports:
         held[at] |= [value is not None for value in values]
     loads = {name: sides(name) for name in problem.traction}
-    return Given(
-        problem,
-        cells,
-        held,
-        loads,
-        supports,
-        _breaks(problem, cells, loads),
-        np.zeros((len(cells.ends), len(PLACES), 2)),
-    )
+    none = np.zeros((len(cells.ends), len(PLACES), 2))
+    return Given(problem, cells, held, loads, supports, _breaks(problem, cells, loads), none)
 
 
 def _breaks(problem: Problem, cells: Cells, loads: dict[str, Index]) -> Array:
@@ -246,25 +228,14 @@ def _breaks(problem: Problem, cells: Cells, loads: dict[str, Index]) -> Array:
 
 
 def tractions_of(
-    elements: Sequence[Element],
-    coefficients: Sequence[Array],
-    at: Index,
-    x: Array,
-    normal: Array,
+    elements: Sequence[Element], coefficients: Sequence[Array], at: Index, x: Array, normal: Array
 ) -> Array:
-    """Tractions s n (m, j, 2) of a stress at points `x` (m, j, 2) of triangles `at` (m,).
+    """Tractions s n of a stress at `x` (m, j, 2) of triangles `at` (m,), units of stress.
 
-    Parameters
-    ----------
-    coefficients : sequence of ndarray (b, m)
-        Of the stress on the triangles of each element.
-    x, normal : ndarray (m, j, 2)
-        Points, lengths, and unit normals there.
+    By its `coefficients` (b, m) on the triangles of each element, and unit `normal` (m, j, 2).
     """
     values = np.empty_like(x)
     for e, c, mine, some in among(elements, coefficients, at):
-        s = e.stress(c, x[mine], some)
-        nx, ny = normal[mine, :, 0], normal[mine, :, 1]
-        values[mine, :, 0] = s[:, :, 0] * nx + s[:, :, -1] * ny
-        values[mine, :, 1] = s[:, :, -1] * nx + s[:, :, 1] * ny
+        s, n = e.stress(c, x[mine], some), normal[mine]
+        values[mine] = s[..., [0, -1]] * n[..., :1] + s[..., [-1, 1]] * n[..., 1:]
     return values
