@@ -22,17 +22,18 @@ from ...contact import ContactState
 from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
-from .cells import Cells, cells_of, places
-from .elements import ON_CURVES, PARTED, WHOLE, Element, compliance_at, elements_of, rigid_motions
+from ...quadrature import features_of, unresolved
+from .cells import Cells, cells_of
+from .elements import ON_CURVES, PARTED, WHOLE, Element, elements_of, rigid_motions
 from .facing import ENDS, cuts_of, facing_of, guides_of, held_motions, reach_of
 from .lifting import Asked, asked_on_supports, lifted
 from .missed import Level, data_norms, once_more
 from .norms import SETTLED, forces_missed, residuals, smallest_moduli, stress_norms
 from .parts import depths
 from .program import Balanced, DualProgram, dual_program
-from .refusals import refuse_bound, refuse_narrow
 from .tractions import Given, given_on, side_rule, tractions_of
 
+NO_BOUND = "no guaranteed bound is known"
 BESIDE = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
 LIFTED = 3  # degrees by which w is above u_h
 # Part of modulus times displacement over size of an element: equilibrium is measured beside the
@@ -194,7 +195,8 @@ def error_bound(
         No equilibrated stress.
     """
     refuse_bound(problem, trace, pairs)
-    refuse_narrow(problem, trace)
+    for one in unresolved(problem, trace.mesh, in_bounds=True):
+        raise ValueError(f"{NO_BOUND} where {one}; refine the mesh there")
     try:
         return _bound(problem, trace, displacement, pairs, ())
     except ContactError:  # resultants that no polynomial pressure has, as of a body about to tilt
@@ -233,10 +235,9 @@ def _bound(
         lines.append(guides_of(cells, displacement, own, (k - extent, lift)))
     holding = [(x.side, x.direction[:, [0, -1]]) for x in asked]
     held = held_motions(cells, holding + [(x.side, ENDS @ x.direction) for x in lines])
+    moduli = smallest_moduli(elements, len(cells.triangles))
     for reach in reaches:
-        share = _share(problem, cells, reach.pair)
-        degrees = degree - extent, lift
-        lines.append(facing_of(cells, displacement, reach, degrees, held, share))
+        lines.append(facing_of(cells, displacement, reach, (degree - extent, lift), held, moduli))
     # s and p*
     moments, fixed = given.moments(mu)
     program = dual_program(mu, elements, fixed, rigid_motions(cells, mu, fixed), lines)
@@ -270,12 +271,41 @@ def largest(elements: Sequence[Element], cells: Cells, function: ng.CoefficientF
     return max(float(np.abs(e.places.evaluate(cells, function)).max()) for e in elements)
 
 
-def _share(problem: Problem, cells: Cells, pair: ContactState) -> float:
-    """The share of r that the secondary takes: by compliance."""
-    sizes = []
-    for segments in (pair.line.segments, pair.line.facing):
-        at = cells.owner[np.isin(cells.segment, segments)][:1]
-        if not at.size:
-            return 1.0
-        sizes.append(np.trace(compliance_at(problem, cells, places(cells, at, 0))[0, 0]))
-    return float(sizes[0] / sum(sizes))
+def refuse_bound(problem: Problem, trace: BoundaryTrace, pairs: Sequence[ContactState]) -> None:
+    """Raise unless the error of a problem's solutions can be bounded.
+
+    Raises
+    ------
+    ValueError
+        What stands in the way.
+    """
+    bent = trace.curved_segments
+    axis = trace.model.on_axis(trace.curve[:, [0, -1]].reshape(-1, 2)).reshape(-1, 2)
+    for refused, what in (
+        (bent & trace.inner, "curved lines inside a body"),
+        (bent & axis.any(axis=1), "curves that meet the axis"),
+    ):
+        if refused.any():
+            name = trace.mesh.GetBoundaries()[trace.region[refused.argmax()]]
+            raise ValueError(f'{NO_BOUND} for {what}, as "{name}"; use error_estimate')
+    guides = () if problem.sliding is None else (str(problem.sliding),)
+    for pattern in (*problem.displacement, *problem.traction, *guides):
+        if trace.inner[trace.segments(pattern)].any():
+            raise ValueError(
+                f'{NO_BOUND} for conditions on a line inside a body, as on "{pattern}"'
+            )
+    for line, force in ((pair.line, pair.force) for pair in pairs):
+        loaded = (np.append(force, 0.0)[line.rows] != 0).any(axis=1)
+        ends = np.isin(line.rows, [-1, *line.rows[line.faces].ravel()]).all(axis=1)
+        if line.contact.primary is None and (loaded & ~line.faces & ~ends).any():
+            name = line.contact.secondary
+            raise ValueError(
+                f'{NO_BOUND} for segments that face an obstacle in part, as on "{name}"'
+            )
+    for one in features_of(problem, trace.mesh):
+        for x, y, _ in one.jumps.tolist():
+            raise ValueError(
+                f'the displacement prescribed on "{one.name}" jumps near ({x:.6g}, {y:.6g}): '
+                "no displacement of finite energy does; make it continuous, or leave a gap between "
+                "boundaries"
+            )

@@ -323,12 +323,12 @@ def facing_of(
     reach: Reach,
     degrees: tuple[int, int],
     held: Array,
-    share: float,
+    moduli: Array,
 ) -> Facing:
     """What of a pair's reach faces, and the gap after a lifting; `degrees` of p* and of that.
 
-    The secondary takes a `share` of the lifting, but for vertices that cannot move along d; `held`
-    (nv, 2, 2) are the projections of `held_motions`.
+    Both bodies share the lifting by compliance, one over the `moduli` (n,) of the cells, but for
+    vertices that cannot move along d; `held` (nv, 2, 2) are the projections of `held_motions`.
 
     Raises
     ------
@@ -375,15 +375,18 @@ def facing_of(
     low, high = np.sort(cells.span[side], axis=1).T[..., None]
     inside = (segment[:, None] == number) & (low >= start - SAME) & (high <= stop + SAME)
     closed = np.isin(segment, line.segments[whole]) | inside.any(axis=1) | contact.bilateral
-    # Shares: all where only one body can move.
+    # Shares: all where only one body can move, and one number at a vertex.
     d_ends = np.einsum("ej,kjc->kec", ENDS, d)
     own, opposite = _moves(held[cells.ends[side]], d_ends), np.zeros((len(side), 2), dtype=bool)
+    share = np.ones((len(side), 1))
     if contact.primary is not None:
         at = (there @ ENDS.T > 0.5).astype(np.intp)
         opposite = _moves(held[cells.ends[other[:, None], at]], d_ends)
+        stiff, beyond = (moduli[cells.owner[x], None] for x in (side, other))
+        share = beyond / (stiff + beyond)
     one, narrow = _across(cells, side, every[~keep])
     vertices, most = one[cells.ends[side]], np.zeros(len(one))
-    np.maximum.at(most, vertices, np.where(own == opposite, share, own))  # one at a vertex
+    np.maximum.at(most, vertices, np.where(own == opposite, share, own))
     if contact.bilateral:
         after, lift = np.zeros((len(side), degree + 1)), -gap
     else:
@@ -413,10 +416,7 @@ def held_motions(cells: Cells, held: Sequence[tuple[Index, Array]]) -> Array:
     M = np.zeros((len(cells.vertices), 2, 2))
     for side, d in held:
         np.add.at(M, cells.ends[side], d[..., :, None] * d[..., None, :])
-    size, vectors = np.linalg.eigh(M)
-    some = (size > STIFF**2 * size[:, -1:]) & (size > 0)
-    vectors = np.where(some[:, None], vectors, 0.0)
-    return np.asarray(vectors @ vectors.transpose(0, 2, 1))
+    return np.asarray(M @ np.linalg.pinv(M, rcond=STIFF**2, hermitian=True))
 
 
 def _moves(held: Array, d: Array) -> Mask:
