@@ -163,11 +163,6 @@ class Proof(DualProblem):
         """B, root of an energy per thickness."""
         return float(sum(self.parts.values()) ** 0.5)
 
-    @property
-    def sampled(self) -> bool:
-        """Whether quadrature of the stiffness is not exact: curves, or laws that vary."""
-        return bool(self.cells.curved.any()) or any(e.compliance.size > 16 for e in self.elements)
-
 
 def error_bound(
     problem: Problem,
