@@ -113,17 +113,12 @@ def met(
     return Met(gap.reshape(s.shape), d.reshape(u.shape), *opposite, faces.reshape(s.shape))
 
 
-@dataclass(frozen=True, eq=False)
-class Reach:
+class Reach(NamedTuple):
     """Where p* of a pair may act.
 
-    Attributes
-    ----------
-    pair : ContactState
-    segments : ndarray of int (k,)
-        Of the secondary: in contact, beside such, or where u_h goes through the other body.
-    contact : ndarray (r, 3)
-        Segments in which contact ends, and s where intervals in contact begin and end on them.
+    On `segments` (k,) of the secondary: in contact, beside such, or where u_h goes through the
+    other body. Of `contact` (r, 3) each row is a segment in which contact ends, and s where an
+    interval in contact begins and ends on it.
     """
 
     pair: ContactState
@@ -145,30 +140,28 @@ def reach_of(
     nodes, active = trace.nodes[line.segments][:, [0, -1]], np.append(pair.active, False)[line.rows]
     near = np.asarray(np.isin(nodes, nodes[active.any(axis=1)]).any(axis=1))
     if len(rest := np.flatnonzero(~near)):
-        local, faced = np.arange(len(rest)), line.contact.primary is not None
-        start, stop, kinks = 0.0 * local, 0.0 * local + 1, np.full(len(rest), faced)
-        if faced:
+        local, span = np.arange(len(rest)), np.tile([0.0, 1.0], (len(rest), 1))
+        smooth = np.full(len(rest), line.contact.primary is None)  # opposite vertices make kinks
+        if line.contact.primary is not None:
             parts = divided(trace, line.contact, line.segments[rest], line.facing)
-            local = np.append(parts.local, local)
-            start, stop = np.append(parts.start, start), np.append(parts.stop, stop)
-            kinks = np.append(np.zeros(len(parts.local), dtype=bool), kinks)
-        s = start[:, None] + (stop - start)[:, None] * PLACES
+            local = np.append(local, parts.local)
+            span = np.vstack([span, np.column_stack([parts.start, parts.stop])])
+            smooth = np.append(smooth, parts.local >= 0)
+        s = span[:, :1] + np.diff(span, axis=1) * PLACES
         there = met(trace, displacement, pair, line.segments[rest[local]], s)
         overlap = np.asarray(((there.gap < 0) & there.faces).any(axis=1))
-        smooth = there.faces.all(axis=1) & ~kinks
+        smooth &= there.faces.all(axis=1)
         c, off = fitted(there.gap[smooth], degree)
         overlap[smooth] = c.min(axis=1, initial=np.inf) < off
         near[rest[local[overlap]]] = True
     places, turns = trace.places(line.segments), np.diff(active.astype(int), axis=1)
     for i in np.flatnonzero((turns != 0).any(axis=1) & line.faces):
         ends = [0.0] if active[i, 0] else []
-        for j in np.flatnonzero(turns[i]):
+        for j in np.flatnonzero(turns[i]):  # contact up to the last zero of the gap, and farther
             s = np.linspace(places[i, j], places[i, j + 1], SAMPLES)
+            s = s if active[i, j] else s[::-1]
             below = s[met(trace, displacement, pair, line.segments[[i]], s[None]).gap[0] < 0]
-            if active[i, j]:  # contact up to the last zero of the gap, and a little farther
-                ends.append((below[-1] if below.size else s[0]) + MARGIN)
-            else:
-                ends.append((below[0] if below.size else s[-1]) - MARGIN)
+            ends.append(np.append(s[0], below)[-1] + MARGIN * np.sign(s[-1] - s[0]))
         both = np.array([*ends, 1.0] if active[i, -1] else ends).reshape(-1, 2)
         found = np.append(found, np.insert(both, 0, line.segments[i], axis=1), axis=0)
     return Reach(pair, line.segments[near], found)
@@ -495,12 +488,10 @@ def _after(
     On `narrow` sides (k,) r is that number, too.
     """
     c, off = fitted(gap, degree)
-    lift, bare = np.full(ends.max(initial=0) + 1, -np.inf), np.zeros(ends.max(initial=0) + 1, bool)
-    bare[ends[~closed]] = True
-    bare[ends[stiff]] = True
+    lift = np.full(ends.max(initial=0) + 1, -np.inf)
     np.maximum.at(lift, ends, -c[:, [0, -1]])
     np.maximum.at(lift, ends[narrow, 0], -c[narrow].min(axis=1))
-    lift[bare] = np.maximum(lift[bare], 0.0)
+    np.maximum.at(lift, ends[stiff | ~closed[:, None]], 0.0)
     after = np.where(closed[:, None], 0.0, np.maximum(c, 0.0))
     after[:, [0, -1]] = c[:, [0, -1]] + lift[ends]
     after[narrow] = c[narrow] + lift[ends[narrow, :1]]

@@ -23,7 +23,6 @@ from ...errors import ContactError
 from ...linalg import change_of_basis, cholesky, handed_over
 from ...qp import (
     BorderedSystems,
-    NullSpace,
     QuadraticProgram,
     SingularError,
     bordered_systems,
@@ -209,18 +208,19 @@ def dual_program(
         Contact and guides.
     """
     d = int(mu.start[-1])
-    dofs = [e.dofs.astype(np.int32) for e in elements]  # half of the memory, and of the time
-    K = from_triplets(
-        np.concatenate([(e.N.transpose(0, 2, 1) @ e.N).ravel() for e in elements]),
-        np.concatenate([np.repeat(i, i.shape[1]) for i in dofs]),
-        np.concatenate([np.tile(i, (1, i.shape[1])).ravel() for i in dofs]),
-        (d, d),
-    )
     R, T, unknown = _basis(mu, lines)
-    m = len(unknown)
+    m, null_space = len(unknown), no_null_space(d)
+    dofs = [e.dofs.astype(np.int32) for e in elements]  # half of the memory, and of the time
+    squares = [e.N.transpose(0, 2, 1) @ e.N for e in elements]
+    K = _of_blocks(list(zip(dofs, dofs, squares, strict=True)), d, d)
     if m:
         K = K + change_of_basis(K, T)
     idle = fixed | (K.diagonal() <= 0)  # on the axis there is no traction
+    if motions.shape[1]:
+        y = splu(T.tocsc()).solve(motions)
+        y[idle] = 0.0
+        lineal = vanishing_combinations(y[unknown])
+        null_space = pinned_null_space(y, lineal, (y @ lineal).T, unknown, idle)
     program = QuadraticProgram(
         K=K,
         b=np.zeros(d),
@@ -230,7 +230,7 @@ def dual_program(
         fixed=idle,
         values=np.zeros(d),
         unknown=unknown,
-        null_space=_null_space(motions, T, unknown, idle),
+        null_space=null_space,
     )
     return DualProgram(mu, lines, R, T, program)
 
@@ -240,23 +240,10 @@ def _joined(parts: Sequence[Any], kind: type = float) -> Any:
     return np.concatenate([np.zeros(0, kind), *map(np.ravel, parts)])
 
 
-def _null_space(motions: Array, T: sp.csr_array, unknown: Index, fixed: Mask) -> NullSpace:
-    """Rigid motions, multipliers (d, r), in the unknowns."""
-    if motions.shape[1] == 0:
-        return no_null_space(len(motions))
-    y = splu(T.tocsc()).solve(motions)
-    y[fixed] = 0.0
-    lineal = vanishing_combinations(y[unknown])
-    return pinned_null_space(y, lineal, (y @ lineal).T, unknown, fixed)
-
-
 def exerted(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple[Array, float]:
     """Moments (d,) of the tractions of a stress over all triangles, and the largest of one.
 
-    Parameters
-    ----------
-    coefficients : sequence of ndarray (b, m)
-        Of the stress on the triangles of each element.
+    By its `coefficients` (b, m) on the triangles of each element.
     """
     total, largest = np.zeros(1 + max(int(e.dofs.max()) for e in elements)), 0.0
     for e, c in zip(elements, coefficients, strict=True):
@@ -293,11 +280,9 @@ def _basis(mu: Multipliers, lines: Sequence[Facing]) -> tuple[sp.csr_array, sp.c
     return _of_blocks(own, m, d) + R, T, of_row
 
 
-def _of_blocks(
-    blocks: Sequence[tuple[Index, Index, Array]], height: int, width: int
-) -> sp.csr_array:
-    """Sparse sum of dense blocks, each at its rows and columns."""
+def _of_blocks(blocks: Sequence[tuple[Any, Any, Array]], height: int, width: int) -> sp.csr_array:
+    """Sparse sum of dense blocks, each at its rows and columns; or of several of one shape."""
     values = _joined([block for _, _, block in blocks])
-    row = _joined([np.repeat(i, len(j)) for i, j, _ in blocks], int)
-    column = _joined([np.tile(j, len(i)) for i, j, _ in blocks], int)
+    row = _joined([np.repeat(i, j.shape[-1], axis=-1) for i, j, _ in blocks], np.int32)
+    column = _joined([np.tile(j, i.shape[-1]) for i, j, _ in blocks], np.int32)
     return from_triplets(values, row, column, (height, width))
