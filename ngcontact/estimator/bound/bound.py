@@ -170,17 +170,9 @@ def error_bound(
     displacement: ng.GridFunction,
     pairs: Sequence[ContactState],
 ) -> Proof:
-    """Bound of the error of a displacement in the energy norm.
+    """Bound of the error of a displacement u_h, lengths, in the energy norm.
 
-    Parameters
-    ----------
-    problem : Problem
-    trace : BoundaryTrace
-        The boundary of its mesh.
-    displacement : ng.GridFunction
-        u_h, lengths.
-    pairs : sequence of ContactState
-        Contact of u_h, one for each pair of the problem.
+    `trace` is the boundary of its mesh, `pairs` are its contact, one for each pair of the problem.
 
     Raises
     ------
@@ -205,24 +197,27 @@ def _bound(
     pairs: Sequence[ContactState],
     beside: Sequence[float],
 ) -> Proof:
-    """The bound with a p* that is one polynomial between places `beside` ends of segments."""
+    """The bound with a p* that is one polynomial between places `beside` ends of segments.
+
+    In the steps of docs/bounds.md.
+    """
     p, extent = trace.order, trace.model.extent
     degree, lift = max(p + 1, 2 + extent), p + LIFTED
-    # Cells
+    # 1. Cells.
     guided = trace.segments(None if problem.sliding is None else str(problem.sliding))
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
     loaded = np.append(trace.segments(*problem.traction, *touching), guided)
     whole = [name for name, values in problem.displacement.items() if None not in values]
     reaches = [reach_of(trace, displacement, pair, lift) for pair in pairs]
     cells = cells_of(trace, cuts_of(trace, reaches, beside), loaded, trace.segments(*whole))
-    # Stresses
+    # 2. Stresses.
     given = given_on(problem, cells)
     least = np.maximum(given.followed(), cells.curved)
     depth = depths(problem, cells, degree - 1 - extent, 2 * degree + PARTED, least)
     order = 2 * (degree + ON_CURVES * cells.curved) + np.where(depth, PARTED, WHOLE)
     look = np.column_stack([order, depth, least > 0])
     mu, elements = elements_of(problem, cells, displacement, degree, look)
-    # The gap
+    # 3. The gap, on guides and on Gamma_K.
     asked = asked_on_supports(cells, given, displacement)
     lines, side = [], np.flatnonzero(np.isin(cells.segment, guided))
     for k in np.unique(mu.degree[side]).tolist():
@@ -233,7 +228,7 @@ def _bound(
     moduli = smallest_moduli(elements, len(cells.triangles))
     for reach in reaches:
         lines.append(facing_of(cells, displacement, reach, (degree - extent, lift), held, moduli))
-    # s and p*
+    # The dual problem: s and p*.
     moments, fixed = given.moments(mu)
     program = dual_program(mu, elements, fixed, rigid_motions(cells, mu, fixed), lines)
     dual = DualProblem(cells, given, asked, elements, look, moments, program)
@@ -243,9 +238,9 @@ def _bound(
     stiffest = min(np.diagonal(e.compliance, axis1=-2, axis2=-1).min() for e in elements)
     felt = FELT * size / float(stiffest * cells.diameters.min())
     stress = dual.admissible(displacement, program.nearest(elements, moments), felt, degree)
-    # w
+    # 4. w.
     w = lifted(problem, cells, asked, [(line, line.lift) for line in lines], lift, size)
-    # B
+    # The identity.
     c, D = stress.distance, stress.loads
     closed = float(sum((p * x.bound).sum() for p, x in zip(stress.pressure, lines, strict=True)))
     parts = {
