@@ -154,10 +154,12 @@ class Given:
                 np.add.at(pressed, f.other, f.on_primary(force / f.rate[..., None]))
         return replace(self, pressed=pressed)
 
-    def tractions(self, segment: Index, s: Array) -> tuple[Array, Mask]:
-        """Tractions (m, j, 2) at `s` (m, j) of `segment` (m,), and held components (m, 2)."""
-        cells, total = self.cells, np.zeros((*s.shape, 2))
-        side = cells.side_at(segment, s[:, s.shape[1] // 2])
+    def asked(self, cells: Cells, rule: SideRule, own: Array) -> Array:
+        """Tractions (m, j, 2) on sides of `cells`, parts of these; `own` (m, j, 2) without any."""
+        segment, s = on_segments(cells, rule.side, rule.t)
+        on, asked = np.flatnonzero(segment >= 0), own.copy()
+        segment, s, total = segment[on], s[on], np.zeros((len(on), *own.shape[1:]))
+        side = self.cells.side_at(segment, s[:, s.shape[1] // 2])
         for name, loaded in self.loads.items():
             at = np.flatnonzero(np.isin(side, loaded))
             if at.size:
@@ -165,21 +167,12 @@ class Given:
                 total[at] += jump(cells.trace, load, (segment[at], s[at]))[0]
         at = np.flatnonzero(self.pressed[side].any(axis=(1, 2)))
         if at.size:
-            t = cells.own_parameter(side[at], s[at])
-            x, dx = _points(cells, side[at], t)
-            measure = cells.measure(x)[..., None]
-            ds = np.linalg.norm(dx, axis=2, keepdims=True) * measure
+            t = self.cells.own_parameter(side[at], s[at])
+            x, dx = _points(self.cells, side[at], t)
+            ds = np.linalg.norm(dx, axis=2, keepdims=True) * cells.measure(x)[..., None]
             force = legendre.legvander(2 * t - 1, DATA) @ (LEGENDRE @ self.pressed[side[at]])
             total[at] += np.divide(force, ds, out=np.zeros_like(force), where=ds > 0)
-        return total, self.held[side]
-
-    def asked(self, cells: Cells, rule: SideRule, own: Array) -> Array:
-        """Tractions (m, j, 2) on sides of `cells`, parts of these; `own` (m, j, 2) without any."""
-        segment, s = on_segments(cells, rule.side, rule.t)
-        on, asked = np.flatnonzero(segment >= 0), own.copy()
-        if on.size:
-            values, held = self.tractions(segment[on], s[on])
-            asked[on] = np.where(held[:, None], own[on], values)
+        asked[on] = np.where(self.held[side][:, None], own[on], total)
         return asked
 
     def moments(self, mu: Multipliers) -> tuple[Array, Mask]:
@@ -187,10 +180,10 @@ class Given:
 
         Fixed are those of components with prescribed displacements.
         """
-        fixed = np.repeat(self.held.ravel(), np.repeat(mu.degree + 1, 2))
         rule = side_rule(self.cells, self.breaks, np.flatnonzero(~self.cells.inner))
-        values, _ = self.tractions(*on_segments(self.cells, rule.side, rule.t))
-        return np.where(fixed, 0.0, rule.moments(mu, values)), fixed  # (3.7)
+        values = self.asked(self.cells, rule, np.zeros(rule.x.shape))
+        fixed = np.repeat(self.held.ravel(), np.repeat(mu.degree + 1, 2))
+        return rule.moments(mu, values), fixed  # (3.7)
 
 
 def given_on(problem: Problem, cells: Cells) -> Given:
@@ -199,32 +192,26 @@ def given_on(problem: Problem, cells: Cells) -> Given:
     def sides(pattern: str) -> Index:
         return np.flatnonzero(np.isin(cells.segment, cells.trace.segments(pattern)))
 
-    held = np.zeros((len(cells.ends), 2), dtype=bool)
+    held, breaks = np.zeros((len(cells.ends), 2), dtype=bool), [np.zeros((0, 2))]
     supports = [(values, sides(pattern)) for pattern, values in problem.displacement.items()]
     for values, at in supports:
         held[at] |= [value is not None for value in values]
     loads = {name: sides(name) for name in problem.traction}
-    none = np.zeros((len(cells.ends), len(PLACES), 2))
-    return Given(problem, cells, held, loads, supports, _breaks(problem, cells, loads), none)
-
-
-def _breaks(problem: Problem, cells: Cells, loads: dict[str, Index]) -> Array:
-    """`Given.breaks`: ends of parts, and of those that `quadrature` integrates rough loads on."""
-    found = [np.zeros((0, 2))]
-    for name, side in loads.items():
+    for name, side in loads.items():  # ends of parts, and of those for quadrature of rough loads
         data, load = problem.traction[name], problem.traction_vector(name)
         if numbers(data):
             continue
-        a, b = cells.span[side].T[..., None]
-        s = a + (b - a) * np.arange(1, FINEST) / FINEST
-        found.append(np.column_stack([np.repeat(cells.segment[side], FINEST - 1), s.ravel()]))
+        segment, s = on_segments(cells, side, np.arange(1, FINEST) / FINEST)
+        breaks.append(np.column_stack([np.repeat(segment, FINEST - 1), s.ravel()]))
         region = cells.trace.mesh.Boundaries(name)
         rough = known_rough_load(data, load, region, moment_degree(cells.trace.order))
         if rough is not None:  # NGSolve's segments run from s = 1 to s = 0
             start = rough.cells.origin[:, 0]
             for stop in (start, start + rough.cells.side[:, 0, 0]):
-                found.append(np.column_stack([rough.cells.element, 1 - stop]))
-    return np.unique(np.concatenate(found), axis=0)
+                breaks.append(np.column_stack([rough.cells.element, 1 - stop]))
+    none = np.zeros((len(cells.ends), len(PLACES), 2))
+    rising = np.unique(np.concatenate(breaks), axis=0)
+    return Given(problem, cells, held, loads, supports, rising, none)
 
 
 def tractions_of(
