@@ -16,7 +16,7 @@ from ...arrays import Array, Index, Mask
 from ...contact import FACING, ContactState, divided, jacobian, partners, prescribed_gap, rays
 from ...errors import ContactError
 from ...fem import BoundaryTrace
-from ...lagrange import gauss, gauss_derivative, lagrange
+from ...lagrange import gauss, lagrange
 from .cells import Cells
 
 NOISE = 1e-14  # of a gap, relative to the displacements on both sides
@@ -295,11 +295,6 @@ class Facing:
         `pressure` (k, n) are coefficients of p*.
         """
         return np.asarray(pressure @ self.psi.T * self.weight)
-
-    @property
-    def rate(self) -> Array:
-        """|dt| of the primary per dt of the secondary, (k, j)."""
-        return np.abs(self.there @ gauss_derivative(2 * DATA).T)
 
     def on_primary(self, values: Array) -> Array:
         """Functions (k, j, c) at the Gauss points of the primary's sides.

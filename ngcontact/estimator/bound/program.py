@@ -196,16 +196,10 @@ def dual_program(
     motions: Array,
     lines: Sequence[Facing],
 ) -> DualProgram:
-    """The program of the condensed triangles.
+    """The program of the condensed triangles, with `lines` of contact and guides.
 
-    Parameters
-    ----------
-    fixed : ndarray of bool (d,)
-        Multipliers of components on which no traction is given.
-    motions : ndarray (d, r)
-        Multipliers of rigid motions that supports leave free.
-    lines : sequence of Facing
-        Contact and guides.
+    Multipliers are `fixed` (d,) where no traction is given; `motions` (d, r) are those of rigid
+    motions that supports leave free.
     """
     d = int(mu.start[-1])
     R, T, unknown = _basis(mu, lines)

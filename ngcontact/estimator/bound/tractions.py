@@ -10,7 +10,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from ...arrays import Array, Index, Mask
-from ...lagrange import lagrange
+from ...lagrange import gauss_derivative, lagrange
 from ...problem import Problem
 from ...quadrature import known_rough_load, moment_degree, numbers
 from .cells import Cells
@@ -138,10 +138,9 @@ class Given:
     def followed(self) -> Index:
         """How often triangles (n,) are divided for tractions: `LEVELS` where these are rough."""
         cells, found = self.cells, np.zeros(len(self.cells.triangles), dtype=np.intp)
-        side = np.flatnonzero(cells.segment >= 0)
         breaks = np.bincount(self.breaks[:, 0].astype(np.intp), minlength=len(cells.trace.region))
-        count = breaks[cells.segment[side]]
-        np.maximum.at(found, cells.owner[side], np.where(count >= FINEST, LEVELS, count > 0))
+        count = np.append(breaks, 0)[cells.segment]  # none inside, -1
+        np.maximum.at(found, cells.owner, np.where(count >= FINEST, LEVELS, count > 0))
         return found
 
     def under(self, lines: Sequence[Facing], pressure: Sequence[Array]) -> Given:
@@ -151,7 +150,8 @@ class Given:
             force = (f.force(p) / WEIGHTS)[..., None] * f.direction
             np.add.at(pressed, f.side, -force)
             if (f.other >= 0).any():
-                np.add.at(pressed, f.other, f.on_primary(force / f.rate[..., None]))
+                rate = np.abs(f.there @ gauss_derivative(2 * DATA).T)  # of t there by t
+                np.add.at(pressed, f.other, f.on_primary(force / rate[..., None]))
         return replace(self, pressed=pressed)
 
     def asked(self, cells: Cells, rule: SideRule, own: Array) -> Array:
@@ -217,7 +217,7 @@ def given_on(problem: Problem, cells: Cells) -> Given:
 def tractions_of(
     elements: Sequence[Element], coefficients: Sequence[Array], at: Index, x: Array, normal: Array
 ) -> Array:
-    """Tractions s n of a stress at `x` (m, j, 2) of triangles `at` (m,), units of stress.
+    """Tractions s n (m, j, 2) of a stress at `x` (m, j, 2) of triangles `at` (m,).
 
     By its `coefficients` (b, m) on the triangles of each element, and unit `normal` (m, j, 2).
     """
