@@ -127,8 +127,7 @@ class DualProgram:
                 "the loads on a body that moves freely are not in balance: their work on the "
                 f"motion is {ratio:.0e} of the largest; refine where they vary, or hold the body"
             )
-        moments = moments - idle
-        load = self.T.T @ (moments - alone)
+        moments, y = moments - idle, np.zeros(len(p.b))
         if limits is None:
             low, high = np.where(p.equality, -np.inf, 0.0), np.full(len(p.g), np.inf)
             active = _joined([np.repeat(x.closed, x.psi.shape[1]) for x in self.lines], bool)
@@ -136,13 +135,11 @@ class DualProgram:
             high = _joined([x.mass * limit for x, limit in zip(self.lines, limits, strict=True)])
             low, active = -high, high > 0
         if start is not None:
-            y, coefficients = np.zeros(len(load)), start.coefficients
+            coefficients = start.coefficients
         elif limits is None and len(active):
-            self.systems.restart(replace(p, b=load))
+            self.systems.restart(replace(p, b=self.T.T @ (moments - alone)))
             found = minimise(self.systems, active)
             y, active = found.u, found.active
-        else:
-            y = self._answer(load, active)
         force, last = np.zeros(len(p.g)), np.inf
         while True:
             # Stresses of stiff bodies are small differences of multipliers: tractions tell what is
