@@ -22,22 +22,17 @@ from ...contact import ContactState
 from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
-from .cells import Cells, cells_of, places
-from .elements import (
-    Element,
-    compliance_at,
-    elements_of,
-    rigid_motions,
-    stress_norms,
-)
-from .facing import PLACES, Facing, bernstein, cuts_of, facing_of, guides_of, held_motions, reach_of
-from .lifting import asked_on_line, asked_on_supports, lifted
+from ...quadrature import features_of, unresolved
+from .cells import Cells, cells_of
+from .elements import Element, by_triangle, elements_of, rigid_motions, stress_norms
+from .facing import ENDS, cuts_of, facing_of, guides_of, held_motions, reach_of
+from .lifting import Asked, asked_on_supports, lifted
 from .missed import SETTLED, Level, data_norms, once_more, residuals
 from .parts import ForceRules, force_rules
-from .program import Balanced, DualProgram, dual_program, rows_of
-from .refusals import refuse_bound, refuse_narrow
-from .tractions import Given, boundary_tractions, given_on
+from .program import Balanced, DualProgram, dual_program
+from .tractions import Given, given_on, side_rule, tractions_of
 
+NO_BOUND = "no guaranteed bound is known"
 BESIDE = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
 LIFTED = 3  # degrees by which w is above u_h
 # Part of modulus times displacement over size of an element: equilibrium is measured beside the
@@ -51,10 +46,8 @@ class AdmissibleStress(Balanced):
 
     Attributes
     ----------
-    distance : ndarray (n,)
-        |s - C e|, roots of energies per thickness.
-    loads : ndarray (n,)
-        Norms of what s misses of the data.
+    distance, loads : ndarray (n,)
+        |s - C e|, and norms of what s misses of the data; roots of energies per thickness.
     work : float
         <s n, u_D - u_h> - int p* gap_h, an energy per thickness.
     residual : float
@@ -75,6 +68,8 @@ class DualProblem:
     ----------
     cells : Cells
     given : Given
+    asked : list of Asked
+        u_D - u_h.
     elements : list of Element
     rules : ForceRules
         How forces are integrated.
@@ -85,6 +80,7 @@ class DualProblem:
 
     cells: Cells
     given: Given
+    asked: list[Asked]
     elements: list[Element]
     rules: ForceRules
     moments: Array
@@ -117,8 +113,10 @@ class DualProblem:
                 f"no equilibrated stress was found: the residual relative to the largest stress is "
                 f"{residual:.1e}"
             )
-        have = boundary_tractions(given, elements, found.coefficients)
-        missed = have.missed(given, scale)
+        rule = side_rule(cells, given.breaks, np.flatnonzero(~cells.inner))
+        at = cells.owner[rule.side]
+        have = tractions_of(elements, found.coefficients, at, rule.x, rule.normal)
+        missed = rule.missed(cells, given.asked(cells, rule, have) - have, scale)
         loads = data_norms(cells, elements, missed)
         if degree is not None:
             level = Level(cells, elements, found.coefficients, self.rules, distance, loads)
@@ -128,11 +126,12 @@ class DualProblem:
                 "no guaranteed bound is known for loads that are no polynomials beside the axis; "
                 "use error_estimate"
             )
-        work = have.work(given, displacement)
+        work = sum(rule.work(have, one.side, one.direction, one.amount) for one in self.asked)
         for line, p in zip(lines, found.pressure, strict=True):
-            work -= work_on_gap(line.facing, p, line.facing.gap)
-        balanced = found.coefficients, found.pressure, found.left
-        return AdmissibleStress(*balanced, distance, loads, work, residual)
+            work -= float((line.force(p) * line.gap).sum())
+        return AdmissibleStress(
+            **vars(found), distance=distance, loads=loads, work=work, residual=residual
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,11 +161,6 @@ class Proof(DualProblem):
         """B, root of an energy per thickness."""
         return float(sum(self.parts.values()) ** 0.5)
 
-    @property
-    def sampled(self) -> bool:
-        """Whether quadrature of the stiffness is not exact: curves, or laws that vary."""
-        return bool(self.cells.curved.any()) or any(e.compliance.size > 16 for e in self.elements)
-
 
 def error_bound(
     problem: Problem,
@@ -174,17 +168,9 @@ def error_bound(
     displacement: ng.GridFunction,
     pairs: Sequence[ContactState],
 ) -> Proof:
-    """Bound of the error of a displacement in the energy norm.
+    """Bound of the error of a displacement u_h, lengths, in the energy norm.
 
-    Parameters
-    ----------
-    problem : Problem
-    trace : BoundaryTrace
-        The boundary of its mesh.
-    displacement : ng.GridFunction
-        u_h, lengths.
-    pairs : sequence of ContactState
-        Contact of u_h, one for each pair of the problem.
+    `trace` is the boundary of its mesh, `pairs` are its contact, one for each pair of the problem.
 
     Raises
     ------
@@ -194,7 +180,8 @@ def error_bound(
         No equilibrated stress.
     """
     refuse_bound(problem, trace, pairs)
-    refuse_narrow(problem, trace)
+    for one in unresolved(problem, trace.mesh, in_bounds=True):
+        raise ValueError(f"{NO_BOUND} where {one}; refine the mesh there")
     try:
         return _bound(problem, trace, displacement, pairs, ())
     except ContactError:  # resultants that no polynomial pressure has, as of a body about to tilt
@@ -208,75 +195,103 @@ def _bound(
     pairs: Sequence[ContactState],
     beside: Sequence[float],
 ) -> Proof:
-    """The bound with a p* that is one polynomial between places `beside` ends of segments."""
+    """The bound with a p* that is one polynomial between places `beside` ends of segments.
+
+    In the steps of docs/bounds.md.
+    """
     p, extent = trace.order, trace.model.extent
     degree, lift = max(p + 1, 2 + extent), p + LIFTED
-    reaches = [reach_of(trace, displacement, pair, lift) for pair in pairs]
+    # 1. Cells.
+    guided = trace.segments(None if problem.sliding is None else str(problem.sliding))
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
-    guided = None if problem.sliding is None else str(problem.sliding)
-    loaded = trace.segments(*problem.traction, guided, *touching)
+    loaded = np.append(trace.segments(*problem.traction, *touching), guided)
     whole = [name for name, values in problem.displacement.items() if None not in values]
+    reaches = [reach_of(trace, displacement, pair, lift) for pair in pairs]
     cells = cells_of(trace, cuts_of(trace, reaches, beside), loaded, trace.segments(*whole))
+    # 2. Stresses.
     given = given_on(problem, cells)
     least = np.maximum(given.followed(), cells.curved)
     rules = force_rules(problem, cells, degree, least)
     mu, elements = elements_of(problem, cells, displacement, degree, rules)
+    # 3. The gap, on guides and on Gamma_K.
     asked = asked_on_supports(cells, given, displacement)
-    of_guides = mu.degree[given.guides]
-    guides = [
-        (k, guides_of(cells, displacement, given.guides[of_guides == k], lift))
-        for k in np.unique(of_guides).tolist()
-    ]
-    holding = [*asked, *(x for _, g in guides for x in asked_on_line(g, g.gap, alone=True))]
-    held = held_motions(cells, [x.side for x in holding], [x.direction for x in holding])
-    lines = [rows_of(mu, guide, k - extent) for k, guide in guides]
+    lines, side = [], np.flatnonzero(np.isin(cells.segment, guided))
+    for k in np.unique(mu.degree[side]).tolist():
+        own = side[mu.degree[side] == k]
+        lines.append(guides_of(cells, displacement, own, (k - extent, lift)))
+    holding = [(x.side, x.direction[:, [0, -1]]) for x in asked]
+    held = held_motions(cells, holding + [(x.side, ENDS @ x.direction) for x in lines])
+    moduli = by_triangle(elements, [e.modulus for e in elements])
     for reach in reaches:
-        share = _share(problem, cells, reach.pair)
-        facing = facing_of(cells, displacement, reach, lift, held, share)
-        lines.append(rows_of(mu, facing, degree - extent))
+        lines.append(facing_of(cells, displacement, reach, (degree - extent, lift), held, moduli))
+    # The dual problem: s and p*.
     moments, fixed = given.moments(mu)
-    motions = rigid_motions(cells, mu, fixed)
-    program = dual_program(mu, elements, fixed, motions, lines)
-    dual = DualProblem(cells, given, elements, rules, moments, program)
+    program = dual_program(mu, elements, fixed, rigid_motions(cells, mu, fixed), lines)
+    dual = DualProblem(cells, given, asked, elements, rules, moments, program)
     every = np.arange(len(trace.region))
     sizes = [trace.evaluate(displacement, every, np.zeros(len(every)))]
-    size = max(float(np.abs(x).max(initial=0.0)) for x in sizes + [x.facing.gap for x in lines])
+    size = max(float(np.abs(x).max(initial=0.0)) for x in sizes + [x.gap for x in lines])
     stiffest = min(np.diagonal(e.compliance, axis1=-2, axis2=-1).min() for e in elements)
     felt = FELT * size / float(stiffest * cells.diameters.min())
-    found = program.nearest(elements, moments)
-    stress = dual.admissible(displacement, found, felt, degree)
-    lifts = [(line.facing, line.facing.lift) for line in lines]
-    lifting = lifted(problem, cells, asked, lifts, lift, size)
+    stress = dual.admissible(displacement, program.nearest(elements, moments), felt, degree)
+    # 4. w.
+    w = lifted(problem, cells, asked, [(line, line.lift) for line in lines], lift, size)
+    # The identity.
     c, D = stress.distance, stress.loads
     closed = float(sum((p * x.bound).sum() for p, x in zip(stress.pressure, lines, strict=True)))
     parts = {
         "constitutive": float(c @ c),
         "complementarity": 2 * closed,
-        "lifting": float(lifting @ lifting),
+        "lifting": float(w @ w),
         "loads": float(D @ (2 * c + D)),
     }
-    below = float(c @ c / 2 + D @ (c + D / 2 + 2 * lifting)) - stress.work
-    above = float((c + D + lifting / 2) @ lifting) + stress.work + closed
-    return Proof(
-        **vars(dual), stress=stress, lifting=lifting, parts=parts, below=below, above=above
-    )
+    # What holds free motions does work on u_h, of which L(u_h) does not tell.
+    idle = stress.idle and stress.idle * largest(elements, cells, displacement)
+    below = float(c @ c / 2 + D @ (c + D / 2 + 2 * w)) - stress.work + idle
+    above = float((c + D + w / 2) @ w) + stress.work + closed + idle
+    return Proof(**vars(dual), stress=stress, lifting=w, parts=parts, below=below, above=above)
 
 
-def work_on_gap(facing: Facing, pressure: Array, gap: Array) -> float:
-    """Integral of a pressure on a line times a gap, an energy per thickness.
+def largest(elements: Sequence[Element], cells: Cells, function: ng.CoefficientFunction) -> float:
+    """The largest component of a function at points of quadrature."""
+    return max(float(np.abs(e.places.evaluate(cells, function)).max()) for e in elements)
 
-    `pressure` (k, n) has Bernstein coefficients on its k sides, `gap` (k, j) lengths at `PLACES`.
+
+def refuse_bound(problem: Problem, trace: BoundaryTrace, pairs: Sequence[ContactState]) -> None:
+    """Raise unless the error of a problem's solutions can be bounded.
+
+    Raises
+    ------
+    ValueError
+        What stands in the way.
     """
-    density = pressure @ bernstein(pressure.shape[1] - 1, PLACES).T * facing.weight
-    return float((density * gap).sum())
-
-
-def _share(problem: Problem, cells: Cells, pair: ContactState) -> float:
-    """The share of r that the secondary takes: by compliance."""
-    sizes = []
-    for segments in (pair.line.segments, pair.line.facing):
-        at = cells.owner[np.isin(cells.segment, segments)][:1]
-        if not at.size:
-            return 1.0
-        sizes.append(np.trace(compliance_at(problem, cells, places(cells, at, 0))[0, 0]))
-    return float(sizes[0] / sum(sizes))
+    bent = trace.curved_segments
+    axis = trace.model.on_axis(trace.curve[:, [0, -1]].reshape(-1, 2)).reshape(-1, 2)
+    for refused, what in (
+        (bent & trace.inner, "curved lines inside a body"),
+        (bent & axis.any(axis=1), "curves that meet the axis"),
+    ):
+        if refused.any():
+            name = trace.mesh.GetBoundaries()[trace.region[refused.argmax()]]
+            raise ValueError(f'{NO_BOUND} for {what}, as "{name}"; use error_estimate')
+    guides = () if problem.sliding is None else (str(problem.sliding),)
+    for pattern in (*problem.displacement, *problem.traction, *guides):
+        if trace.inner[trace.segments(pattern)].any():
+            raise ValueError(
+                f'{NO_BOUND} for conditions on a line inside a body, as on "{pattern}"'
+            )
+    for line, force in ((pair.line, pair.force) for pair in pairs):
+        loaded = (np.append(force, 0.0)[line.rows] != 0).any(axis=1)
+        ends = np.isin(line.rows, [-1, *line.rows[line.faces].ravel()]).all(axis=1)
+        if line.contact.primary is None and (loaded & ~line.faces & ~ends).any():
+            name = line.contact.secondary
+            raise ValueError(
+                f'{NO_BOUND} for segments that face an obstacle in part, as on "{name}"'
+            )
+    for one in features_of(problem, trace.mesh):
+        for x, y, _ in one.jumps.tolist():
+            raise ValueError(
+                f'the displacement prescribed on "{one.name}" jumps near ({x:.6g}, {y:.6g}): '
+                "no displacement of finite energy does; make it continuous, or leave a gap between "
+                "boundaries"
+            )

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple
 
 import ngsolve as ng
 import numpy as np
@@ -14,7 +16,7 @@ from ...arrays import Array, Index, Mask
 from ...contact import FACING, ContactState, divided, jacobian, partners, prescribed_gap, rays
 from ...errors import ContactError
 from ...fem import BoundaryTrace
-from ...lagrange import gauss, gauss_derivative, lagrange
+from ...lagrange import gauss, lagrange
 from .cells import Cells
 
 NOISE = 1e-14  # of a gap, relative to the displacements on both sides
@@ -48,22 +50,37 @@ def on_segments(cells: Cells, side: Index, t: Array) -> tuple[Index, Array]:
     return cells.segment[side], a + (b - a) * t
 
 
-@dataclass(frozen=True, eq=False)
-class Met:
+def at_places(function: Callable[[Index, Array], Array], segment: Index, s: Array) -> Array:
+    """Values (k, j, ...) of a `function` of n places at `s` (k, j) of segments `segment` (k,)."""
+    values = function(np.repeat(segment, s.shape[1]), s.ravel())
+    return values.reshape(*s.shape, *values.shape[1:])
+
+
+def jump(
+    trace: BoundaryTrace,
+    function: ng.CoefficientFunction,
+    place: tuple[Index, Array],
+    opposite: tuple[Index, Array] | None = None,
+) -> tuple[Array, float]:
+    """Values (k, j, 2) at a place less those opposite, and the largest component of both.
+
+    Segments and s are, of the `place` (k,) and (k, j), and of the `opposite` (k, j) and (k, j)
+    one, where segments may be -1.
+    """
+    values = at_places(partial(trace.evaluate, function), *place)
+    largest = float(np.abs(values).max(initial=0.0))
+    if opposite is not None and (some := opposite[0] >= 0).any():
+        there = trace.evaluate(function, opposite[0][some], opposite[1][some])
+        largest = max(largest, float(np.abs(there).max()))
+        values[some] -= there
+    return values, largest
+
+
+class Met(NamedTuple):
     """What j places on each of k segments of a secondary meet.
 
-    Attributes
-    ----------
-    gap : ndarray (k, j)
-        Of u_h, lengths.
-    direction : ndarray (k, j, 2)
-        d, unit vectors.
-    segment : ndarray of int (k, j)
-        Of the primary, -1 where none is met.
-    s : ndarray (k, j)
-        Parameters on these.
-    faces : ndarray of bool (k, j)
-        Whether the places face the other body or the obstacle.
+    The `gap` (k, j) of u_h; d, the `direction` (k, j, 2); on the primary the `segment` (k, j), -1
+    where none is met, and `s` (k, j); whether the place `faces` (k, j) the body or the obstacle.
     """
 
     gap: Array
@@ -81,37 +98,27 @@ def met(
     s: Array,
 ) -> Met:
     """What `s` (k, j) of the secondary's segments `segment` (k,) meet, with the gap of u_h."""
-    contact, shape = pair.line.contact, s.shape
-    segment, s = np.repeat(segment, shape[1]), s.ravel()
-    x, d = trace.point(segment, s), rays(trace, contact, segment, s)
-    other, place, gap, _ = partners(trace, pair.line.facing, segment, x, d)
-    if contact.gap is not None:
-        gap = prescribed_gap(contact, trace, segment, s, x)
-    jump, faces = trace.evaluate(displacement, segment, s), other >= 0
-    noise = np.abs(jump).max(initial=0.0)
+    contact, every, t = pair.line.contact, np.repeat(segment, s.shape[1]), s.ravel()
+    x, d = trace.point(every, t), rays(trace, contact, every, t)
+    other, there, gap, _ = partners(trace, pair.line.facing, every, x, d)
+    faces = other >= 0
     if contact.primary is None:
-        faces = (trace.normal(segment, s) * d).sum(axis=1) > FACING
-    elif faces.any():
-        there = trace.evaluate(displacement, other[faces], place[faces])
-        noise = max(noise, np.abs(there).max())
-        jump[faces] -= there
-    gap = gap - (jump * d).sum(axis=1)
-    gap[np.abs(gap) <= NOISE * noise] = 0.0
-    at = other.reshape(shape), place.reshape(shape), faces.reshape(shape)
-    return Met(gap.reshape(shape), d.reshape(*shape, 2), *at)
+        faces = (trace.normal(every, t) * d).sum(axis=1) > FACING
+    if contact.gap is not None:
+        gap = prescribed_gap(contact, trace, every, t, x)
+    opposite = other.reshape(s.shape), there.reshape(s.shape)
+    u, size = jump(trace, displacement, (segment, s), opposite)
+    gap = gap - (u.reshape(d.shape) * d).sum(axis=1)
+    gap[np.abs(gap) <= NOISE * size] = 0.0
+    return Met(gap.reshape(s.shape), d.reshape(u.shape), *opposite, faces.reshape(s.shape))
 
 
-@dataclass(frozen=True, eq=False)
-class Reach:
+class Reach(NamedTuple):
     """Where p* of a pair may act.
 
-    Attributes
-    ----------
-    pair : ContactState
-    segments : ndarray of int (k,)
-        Of the secondary: in contact, beside such, or where u_h goes through the other body.
-    contact : ndarray (r, 3)
-        Segments in which contact ends, and s where intervals in contact begin and end on them.
+    On `segments` (k,) of the secondary: in contact, beside such, or where u_h goes through the
+    other body. Of `contact` (r, 3) each row is a segment in which contact ends, and s where an
+    interval in contact begins and ends on it.
     """
 
     pair: ContactState
@@ -122,66 +129,42 @@ class Reach:
 def reach_of(
     trace: BoundaryTrace, displacement: ng.CoefficientFunction, pair: ContactState, degree: int
 ) -> Reach:
-    """The reach of a pair: beyond it Bernstein polynomials of a `degree` show an open gap."""
-    line = pair.line
-    if line.contact.bilateral or not len(line.segments):
-        return Reach(pair, line.segments, np.zeros((0, 3)))
-    nodes = trace.nodes[line.segments][:, [0, -1]]
-    active = np.append(pair.active, False)[line.rows].any(axis=1)
-    near = np.asarray(np.isin(nodes, nodes[active]).any(axis=1))
-    rest = np.flatnonzero(~near)
-    if rest.size:
-        near[rest] = ~_open(trace, displacement, pair, line.segments[rest], degree)
-    return Reach(pair, line.segments[near], _contact_on(trace, displacement, pair))
+    """The reach of a pair: beyond it Bernstein polynomials of a `degree` show an open gap.
 
-
-def _open(
-    trace: BoundaryTrace,
-    displacement: ng.CoefficientFunction,
-    pair: ContactState,
-    segments: Index,
-    degree: int,
-) -> Mask:
-    """Whether the gap is nowhere negative on segments (k,), on each part between vertices.
-
-    Of parts that face in part, as beside the end of a body, points are looked at.
+    On each part between vertices of both bodies. Of segments that face in part, as beside the end
+    of a body, points are looked at.
     """
-    contact = pair.line.contact
-    local, start, stop = np.arange(len(segments)), np.zeros(len(segments)), np.ones(len(segments))
-    if contact.primary is not None:
-        parts = divided(trace, contact, segments, pair.line.facing)
-        local = np.append(parts.local, local)
-        start, stop = np.append(parts.start, start), np.append(parts.stop, stop)
-    s = start[:, None] + (stop - start)[:, None] * PLACES
-    found = met(trace, displacement, pair, segments[local], s)
-    open_ = np.asarray(~((found.gap < 0) & found.faces).any(axis=1))
-    known = np.asarray(found.faces.all(axis=1))
-    if contact.primary is not None:
-        known[len(parts.local) :] = False  # segments as a whole: gaps have kinks
-    c, off = _fitted(found.gap[known], degree)
-    open_[known] = c.min(axis=1, initial=np.inf) >= off
-    return np.bincount(local[~open_], minlength=len(segments)) == 0
-
-
-def _contact_on(
-    trace: BoundaryTrace, displacement: ng.CoefficientFunction, pair: ContactState
-) -> Array:
-    """`Reach.contact`, of segments that face with all nodes."""
     line, found = pair.line, np.zeros((0, 3))
-    active, places = np.append(pair.active, False)[line.rows], trace.places(line.segments)
-    turns = np.diff(active.astype(int), axis=1)
+    if line.contact.bilateral or not len(line.segments):
+        return Reach(pair, line.segments, found)
+    nodes, active = trace.nodes[line.segments][:, [0, -1]], np.append(pair.active, False)[line.rows]
+    near = np.asarray(np.isin(nodes, nodes[active.any(axis=1)]).any(axis=1))
+    if len(rest := np.flatnonzero(~near)):
+        local, span = np.arange(len(rest)), np.tile([0.0, 1.0], (len(rest), 1))
+        smooth = np.full(len(rest), line.contact.primary is None)  # opposite vertices make kinks
+        if line.contact.primary is not None:
+            parts = divided(trace, line.contact, line.segments[rest], line.facing)
+            local = np.append(local, parts.local)
+            span = np.vstack([span, np.column_stack([parts.start, parts.stop])])
+            smooth = np.append(smooth, parts.local >= 0)
+        s = span[:, :1] + np.diff(span, axis=1) * PLACES
+        there = met(trace, displacement, pair, line.segments[rest[local]], s)
+        overlap = np.asarray(((there.gap < 0) & there.faces).any(axis=1))
+        smooth &= there.faces.all(axis=1)
+        c, off = fitted(there.gap[smooth], degree)
+        overlap[smooth] = c.min(axis=1, initial=np.inf) < off
+        near[rest[local[overlap]]] = True
+    places, turns = trace.places(line.segments), np.diff(active.astype(int), axis=1)
     for i in np.flatnonzero((turns != 0).any(axis=1) & line.faces):
         ends = [0.0] if active[i, 0] else []
-        for j in np.flatnonzero(turns[i]):
+        for j in np.flatnonzero(turns[i]):  # contact up to the last zero of the gap, and farther
             s = np.linspace(places[i, j], places[i, j + 1], SAMPLES)
+            s = s if active[i, j] else s[::-1]
             below = s[met(trace, displacement, pair, line.segments[[i]], s[None]).gap[0] < 0]
-            if active[i, j]:  # contact up to the last zero of the gap, and a little farther
-                ends.append((below[-1] if below.size else s[0]) + MARGIN)
-            else:
-                ends.append((below[0] if below.size else s[-1]) - MARGIN)
+            ends.append(np.append(s[0], below)[-1] + MARGIN * np.sign(s[-1] - s[0]))
         both = np.array([*ends, 1.0] if active[i, -1] else ends).reshape(-1, 2)
         found = np.append(found, np.insert(both, 0, line.segments[i], axis=1), axis=0)
-    return found
+    return Reach(pair, line.segments[near], found)
 
 
 def cuts_of(
@@ -199,30 +182,25 @@ def cuts_of(
         """How far (r,) the nearer ends of segments (r,) are, and the `size` there."""
         return np.minimum(s, 1 - s) * length[k], size[trace.nodes[k, np.where(s < 0.5, 0, -1)]]
 
-    segments, places = [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
+    found = [np.zeros((0, 2))]
     for reach in reaches:
-        line = reach.pair.line
+        line, own = reach.pair.line, reach.segments
         k, s = np.repeat(reach.contact[:, 0].astype(np.intp), 2), reach.contact[:, 1:].ravel()
         inner = (s > APART) & (s < 1 - APART)
-        k = np.append(k[inner], np.repeat(reach.segments, len(more)))
-        s = np.append(s[inner], np.tile(more, len(reach.segments)))
-        if line.contact.primary is not None and len(reach.segments):
-            parts = divided(trace, line.contact, reach.segments, line.facing)
-            k = np.append(k, np.tile(reach.segments[parts.local], 2))
-            s, there, t = _opposite(
-                trace, reach.pair, k, np.concatenate([s, parts.start, parts.stop])
-            )
-            (away, own), (beyond, other) = nearest(k, s), nearest(there, t)
-            met_, apart = there >= 0, np.maximum(away, beyond) > NEAR * np.minimum(own, other)
-            segments.append(there[met_ & apart])
-            places.append(t[met_ & apart])
-            k, s = k[~met_ | apart], s[~met_ | apart]
-        segments.append(k)
-        places.append(s)
-    k, s = np.concatenate(segments), np.concatenate(places)
-    order = np.lexsort((s, k))
-    order = order[(s[order] > SAME) & (s[order] < 1 - SAME)]
-    k, s = k[order], s[order]
+        k = np.append(k[inner], np.repeat(own, len(more)))
+        s = np.append(s[inner], np.tile(more, len(own)))
+        if line.contact.primary is not None and len(own):
+            parts = divided(trace, line.contact, own, line.facing)
+            k = np.append(k, np.tile(own[parts.local], 2))
+            s = np.concatenate([s, parts.start, parts.stop])
+            s, there, t = _opposite(trace, reach.pair, k, s)
+            (away, here), (beyond, other) = nearest(k, s), nearest(there, t)
+            faced, apart = there >= 0, np.maximum(away, beyond) > NEAR * np.minimum(here, other)
+            found.append(np.column_stack([there, t])[faced & apart])
+            k, s = k[~faced | apart], s[~faced | apart]
+        found.append(np.column_stack([k, s]))
+    k, s = np.unique(np.concatenate(found), axis=0).T
+    k, s = (x[(s > SAME) & (s < 1 - SAME)] for x in (k, s))
     new = np.append(True, (np.diff(k) > 0) | (np.diff(s) > SAME))[: len(k)]
     return {int(i): s[new & (k == i)] for i in np.unique(k)}
 
@@ -268,6 +246,8 @@ class Facing:
         d.
     weight : ndarray (k, j)
         Arc length (P1) or eta (P2) per t, with the model's measure and the weights of Gauss.
+    psi : ndarray (j, n)
+        Bernstein polynomials of p*.
     gap, lift : ndarray (k, j)
         Gap of u_h, and what w adds to it, r; lengths.
     after : ndarray (k, degree + 1)
@@ -286,6 +266,7 @@ class Facing:
     there: Array
     direction: Array
     weight: Array
+    psi: Array
     gap: Array
     lift: Array
     after: Array
@@ -299,9 +280,21 @@ class Facing:
         return self.pair is None or self.pair.line.contact.bilateral
 
     @property
-    def rate(self) -> Array:
-        """|dt| of the primary per dt of the secondary, (k, j)."""
-        return np.abs(self.there @ gauss_derivative(2 * DATA).T)
+    def bound(self) -> Array:
+        """Integrals (k, n) of psi_j (gap_h + r)."""
+        return np.asarray(((self.gap + self.lift) * self.weight) @ self.psi)  # (3.9)
+
+    @property
+    def mass(self) -> Array:
+        """Integrals (k, n) of psi_j: the force of a unit coefficient."""
+        return np.asarray(self.weight @ self.psi)
+
+    def force(self, pressure: Array) -> Array:
+        """Forces (k, j) at the points, with the weights of Gauss.
+
+        `pressure` (k, n) are coefficients of p*.
+        """
+        return np.asarray(pressure @ self.psi.T * self.weight)
 
     def on_primary(self, values: Array) -> Array:
         """Functions (k, j, c) at the Gauss points of the primary's sides.
@@ -316,14 +309,14 @@ def facing_of(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     reach: Reach,
-    degree: int,
+    degrees: tuple[int, int],
     held: Array,
-    share: float,
+    moduli: Array,
 ) -> Facing:
-    """What of a pair's reach faces, and the gap after a lifting of `degree`.
+    """What of a pair's reach faces, and the gap after a lifting; `degrees` of p* and of that.
 
-    The secondary takes a `share` of that, but for vertices that cannot move along d; `held`
-    (nv, 2, 2) are the projections of `held_motions`.
+    Both bodies share the lifting by compliance, one over the `moduli` (n,) of the cells, but for
+    vertices that cannot move along d; `held` (nv, 2, 2) are the projections of `held_motions`.
 
     Raises
     ------
@@ -332,23 +325,30 @@ def facing_of(
     ValueError
         Sides that face each other do not begin and end at opposite places.
     """
-    pair, trace = reach.pair, cells.trace
-    contact = pair.line.contact
-    side, j = np.flatnonzero(np.isin(cells.segment, reach.segments)), len(PLACES)
-    found = met(trace, displacement, pair, *on_segments(cells, side, PLACES))
-    keep = np.asarray(found.faces.all(axis=1))
-    if (found.gap[found.faces & ~keep[:, None]] < 0).any():
+    pair, trace, line = reach.pair, cells.trace, reach.pair.line
+    contact, (of_pressure, degree) = line.contact, degrees
+    every = np.flatnonzero(np.isin(cells.segment, reach.segments))
+    t = np.concatenate([[INSIDE], PLACES, [1 - INSIDE]])
+    found = met(trace, displacement, pair, *on_segments(cells, every, t))
+    faces = found.faces[:, 1:-1]
+    keep = np.asarray(faces.all(axis=1))
+    if (found.gap[:, 1:-1][faces & ~keep[:, None]] < 0).any():
         raise ContactError("bodies overlap where a side of the mesh faces the other in part")
-    slots, away, side = side[~keep], side[~found.faces.any(axis=1)], side[keep]
-    other, there = np.full(len(side), -1), np.zeros((len(side), j))
+    side, away, ends = every[keep], every[~faces.any(axis=1)], found.gap[keep][:, [0, -1]]
+    d, segments, place = found.direction[keep, 1:-1], found.segment[keep, 1:-1], found.s[keep, 1:-1]
+    # As polynomials with their own values at vertices: those that Gauss points continue to there
+    # are not the same on two sides of a narrow gap.
+    nodes = found.gap[keep, 1:-1] @ THROUGH.T
+    nodes[:, [0, -1]] = np.where(found.faces[keep][:, [0, -1]], ends, nodes[:, [0, -1]])
+    gap = nodes @ lagrange(DATA, PLACES).T
+    other, there = np.full(len(side), -1), np.zeros(gap.shape)
     if contact.primary is not None:
-        place, segments = found.s[keep], found.segment[keep]
-        middle = segments[:, j // 2]
-        other = cells.side_at(middle, place[:, j // 2])
+        middle = gap.shape[1] // 2
+        other = cells.side_at(segments[:, middle], place[:, middle])
         there = cells.own_parameter(other, place)
         ends = there @ ENDS.T
         beyond = np.abs(ends - (ends > 0.5)).max(axis=1)
-        beyond[(segments != middle[:, None]).any(axis=1)] = 1.0
+        beyond[(segments != segments[:, [middle]]).any(axis=1)] = 1.0
         if (beyond > OPPOSITE).any():
             x, y = cells.vertices[cells.ends[side[beyond.argmax()]]].mean(axis=0)
             raise ValueError(
@@ -356,68 +356,55 @@ def facing_of(
                 f'"{contact.primary}" face each other to within {beyond.max():.0e} of a side, as '
                 f"near ({x:.6g}, {y:.6g}): move them together or farther apart, or refine"
             )
-    gap, d = _with_ends(cells, displacement, pair, side, found.gap[keep]), found.direction[keep]
     segment, s = on_segments(cells, side, PLACES)
-    ds = jacobian(trace, contact, np.repeat(segment, j), s.ravel()).reshape(s.shape)
-    whole = np.append(pair.active, False)[pair.line.rows].all(axis=1)
+    ds = at_places(partial(jacobian, trace, contact), segment, s)
+    whole = np.append(pair.active, False)[line.rows].all(axis=1)
     number, start, stop = reach.contact.T
     low, high = np.sort(cells.span[side], axis=1).T[..., None]
     inside = (segment[:, None] == number) & (low >= start - SAME) & (high <= stop + SAME)
-    closed = np.isin(segment, pair.line.segments[whole]) | inside.any(axis=1) | contact.bilateral
-    # Shares: all where only one body can move.
+    closed = np.isin(segment, line.segments[whole]) | inside.any(axis=1) | contact.bilateral
+    # Shares: all where only one body can move, and one number at a vertex.
     d_ends = np.einsum("ej,kjc->kec", ENDS, d)
     own, opposite = _moves(held[cells.ends[side]], d_ends), np.zeros((len(side), 2), dtype=bool)
+    share = np.ones((len(side), 1))
     if contact.primary is not None:
         at = (there @ ENDS.T > 0.5).astype(np.intp)
         opposite = _moves(held[cells.ends[other[:, None], at]], d_ends)
-    one, narrow = _across(cells, slots, side)
+        stiff, beyond = (moduli[cells.owner[x], None] for x in (side, other))
+        share = beyond / (stiff + beyond)
+    one, narrow = _across(cells, side, every[~keep])
     vertices, most = one[cells.ends[side]], np.zeros(len(one))
-    np.maximum.at(most, vertices, np.where(own == opposite, share, own))  # one at a vertex
+    np.maximum.at(most, vertices, np.where(own == opposite, share, own))
     if contact.bilateral:
         after, lift = np.zeros((len(side), degree + 1)), -gap
     else:
         after, lift = _after(vertices, gap, closed, ~own & ~opposite, narrow, degree)
-    weight = WEIGHTS * np.abs(np.diff(cells.span[side], axis=1)) * ds
-    shares = most[vertices]
-    return Facing(pair, side, other, there, d, weight, gap, lift, after, closed, shares, away)
+    return Facing(
+        pair=pair,
+        side=side,
+        other=other,
+        there=there,
+        direction=d,
+        weight=WEIGHTS * (high - low) * ds,
+        psi=bernstein(of_pressure, PLACES),
+        gap=gap,
+        lift=lift,
+        after=after,
+        closed=closed,
+        share=most[vertices],
+        away=away,
+    )
 
 
-def _with_ends(
-    cells: Cells,
-    displacement: ng.CoefficientFunction,
-    pair: ContactState,
-    side: Index,
-    gap: Array,
-) -> Array:
-    """The `gap` (k, j) of sides (k,) as polynomials with its own values at their vertices.
-
-    Those that Gauss points continue to there are not the same on two sides of a narrow gap.
-    """
-    t = np.array([INSIDE, 1 - INSIDE])
-    ends = met(cells.trace, displacement, pair, *on_segments(cells, side, t))
-    nodes = gap @ THROUGH.T
-    nodes[:, [0, -1]] = np.where(ends.faces, ends.gap, nodes[:, [0, -1]])
-    return np.asarray(nodes @ lagrange(DATA, PLACES).T)
-
-
-def held_motions(cells: Cells, sides: Sequence[Index], directions: Sequence[Array]) -> Array:
+def held_motions(cells: Cells, held: Sequence[tuple[Index, Array]]) -> Array:
     """Projections (nv, 2, 2) of motions of all vertices on those that conditions prescribe.
 
-    Parameters
-    ----------
-    sides : sequence of ndarray of int (k,)
-        Of each condition.
-    directions : sequence of ndarray (k, j, 2)
-        Along which it prescribes motions, at j points from t = 0 to t = 1.
+    Sides and directions at their ends that are `held` (k,) and (k, 2, 2), of each condition.
     """
     M = np.zeros((len(cells.vertices), 2, 2))
-    for side, direction in zip(sides, directions, strict=True):
-        d = direction[:, [0, -1]]
+    for side, d in held:
         np.add.at(M, cells.ends[side], d[..., :, None] * d[..., None, :])
-    size, vectors = np.linalg.eigh(M)
-    some = (size > STIFF**2 * size[:, -1:]) & (size > 0)
-    vectors = np.where(some[:, None], vectors, 0.0)
-    return np.asarray(vectors @ vectors.transpose(0, 2, 1))
+    return np.asarray(M @ np.linalg.pinv(M, rcond=STIFF**2, hermitian=True))
 
 
 def _moves(held: Array, d: Array) -> Mask:
@@ -426,7 +413,7 @@ def _moves(held: Array, d: Array) -> Mask:
     return np.asarray(np.linalg.norm(rest, axis=2) > STIFF)
 
 
-def _across(cells: Cells, slots: Index, side: Index) -> tuple[Index, Mask]:
+def _across(cells: Cells, side: Index, slots: Index) -> tuple[Index, Mask]:
     """A vertex for each (nv,): one for both ends of a `side` (k,) or slot far shorter than others.
 
     And whether sides are that short. `slots` (r,) are sides that do not face as a whole.
@@ -442,36 +429,36 @@ def _across(cells: Cells, slots: Index, side: Index) -> tuple[Index, Mask]:
 
 
 def guides_of(
-    cells: Cells, displacement: ng.CoefficientFunction, side: Index, degree: int
+    cells: Cells, displacement: ng.CoefficientFunction, side: Index, degrees: tuple[int, int]
 ) -> Facing:
     """Sides `side` (k,) of Gamma_0, as bilateral contact with an obstacle without a gap.
 
-    `degree` is that of w.
+    `degrees` are those of q* and of w.
     """
-    k, j = len(side), len(PLACES)
-    segment, s = cells.on_side(np.repeat(side, j), np.tile(PLACES, k))
-    x, dx = cells.points(np.repeat(side, j), np.tile(PLACES, k))
-    d = cells.trace.exact_normal(segment, s)
-    gap = -(cells.trace.evaluate(displacement, segment, s) * d).sum(axis=1).reshape(k, j)  # (3.8)
-    ds = np.linalg.norm(dx, axis=1) * cells.trace.model.measure(x)
+    trace, (segment, s) = cells.trace, on_segments(cells, side, PLACES)
+    d = at_places(trace.exact_normal, segment, s)
+    gap = -(jump(trace, displacement, (segment, s))[0] * d).sum(axis=2)  # (3.8)
+    ds = np.linalg.norm(at_places(trace.derivative, segment, s), axis=2)
+    ds *= at_places(trace.measure, segment, s) * np.abs(np.diff(cells.span[side], axis=1))
     return Facing(
         pair=None,
         side=side,
-        other=np.full(k, -1),
-        there=np.zeros((k, j)),
-        direction=d.reshape(k, j, 2),
-        weight=WEIGHTS * ds.reshape(k, j),
+        other=np.full(len(side), -1),
+        there=np.zeros(gap.shape),
+        direction=d,
+        weight=WEIGHTS * ds,
+        psi=bernstein(degrees[0], PLACES),
         gap=gap,
         lift=-gap,
-        after=np.zeros((k, degree + 1)),
-        closed=np.ones(k, dtype=bool),
-        share=np.ones((k, 2)),
+        after=np.zeros((len(side), degrees[1] + 1)),
+        closed=np.ones(len(side), dtype=bool),
+        share=np.ones((len(side), 2)),
         away=side[:0],
     )
 
 
-def _fitted(gap: Array, degree: int) -> tuple[Array, Array]:
-    """Bernstein coefficients (k, degree + 1) near to gaps (k, j), the same at the ends.
+def fitted(gap: Array, degree: int) -> tuple[Array, Array]:
+    """Bernstein coefficients (k, degree + 1) near to a `gap` (k, j), the same at the ends.
 
     And what the gaps, polynomials of degree `DATA`, differ from these at most (k,): no Legendre
     polynomial is more than 1.
@@ -495,13 +482,11 @@ def _after(
     closes the gap where they are `closed` (k,), but not at `stiff` ones (k, 2), which do not move.
     On `narrow` sides (k,) r is that number, too.
     """
-    c, off = _fitted(gap, degree)
-    lift, bare = np.full(ends.max(initial=0) + 1, -np.inf), np.zeros(ends.max(initial=0) + 1, bool)
-    bare[ends[~closed]] = True
-    bare[ends[stiff]] = True
+    c, off = fitted(gap, degree)
+    lift = np.full(ends.max(initial=0) + 1, -np.inf)
     np.maximum.at(lift, ends, -c[:, [0, -1]])
     np.maximum.at(lift, ends[narrow, 0], -c[narrow].min(axis=1))
-    lift[bare] = np.maximum(lift[bare], 0.0)
+    np.maximum.at(lift, ends[stiff | ~closed[:, None]], 0.0)
     after = np.where(closed[:, None], 0.0, np.maximum(c, 0.0))
     after[:, [0, -1]] = c[:, [0, -1]] + lift[ends]
     after[narrow] = c[narrow] + lift[ends[narrow, :1]]

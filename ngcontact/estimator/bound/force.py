@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Index
+from ...arrays import Array
 from ...fem import model_of
-from .bound import Proof, work_on_gap
-from .elements import stress_norms
-from .facing import PLACES, WEIGHTS, Facing, bernstein, met, on_segments
-from .lifting import asked_on_supports, lifted
+from .bound import Proof, largest
+from .facing import PLACES, Facing, bernstein, fitted, jump, met, on_segments
+from .lifting import lifted
 from .program import Balanced
 
 NOISE = 1e-13  # of a jump, relative to the largest displacement
@@ -21,150 +20,119 @@ LEAST = 3  # degree of w on these: higher ones take 2 % off the bar and twice th
 TWICE = 2.0  # times the least M / B, up to which kappa may grow: the bar does by 5 / 4 at most
 
 
-@dataclass(frozen=True, eq=False)
-class Tested:
-    """A displacement G that tests one component of one contact force.
-
-    Attributes
-    ----------
-    displacement : ng.GridFunction
-        G, without a unit: [G] = d.e at the active points of the pair, 0 at those of others.
-    directions : sequence of ndarray (2,)
-        e on the pair, 0 on the others.
-    """
-
-    displacement: ng.GridFunction
-    directions: Sequence[Array]
-
-
-def force_bar(displacement: ng.GridFunction, tested: Tested, proof: Proof) -> float:
-    """How far the tested component of a contact force is from the true one, at most.
+def force_bar(
+    proof: Proof, displacement: ng.GridFunction, G: ng.GridFunction, directions: Sequence[Array]
+) -> float:
+    """How far a component of a contact force is from the true one, at most.
 
     Loads and stiffness count as they are integrated. A force per unit thickness.
+
+    Parameters
+    ----------
+    proof : Proof
+    displacement, G : ng.GridFunction
+        u_h, and G, without a unit: [G] = d.e at the active points of the pair, 0 at those of
+        others.
+    directions : sequence of ndarray (2,)
+        e on the pair, 0 on the others.
 
     Raises
     ------
     ValueError, ContactError
         No bar is proved.
     """
-    problem, G = proof.given.problem, tested.displacement
-    cells, B, p = proof.cells, proof.bound, proof.stress.pressure
-    facing = [line.facing for line in proof.program.lines]
-    ends, excess = [cells.ends[f.side] for f in facing], _jumps(proof, tested)
-    bare = [_least_kappa(*x) for x in zip(ends, facing, excess, strict=True)]
-    kappa = max(*bare, _ratio_beside(proof, displacement, tested))
+    cells, B, lines, stress = proof.cells, proof.bound, proof.program.lines, proof.stress
+    each = iter(directions)
+    e = [np.zeros(2) if f.pair is None else next(each) for f in lines]
+    found = [_excess(proof, G, *x) for x in zip(lines, e, strict=True)]
+    excess, c, least = zip(*found, strict=True)
+    beside = [_beside(proof, displacement, G, *x) for x in zip(lines, e, strict=True)]
+    kappa = max(*least, *beside)
     if not kappa < np.inf:
         raise ValueError(
             "no bar of the force is proved where supports end contact, or an open gap is 0"
         )
+    problem = proof.given.problem
     strain = model_of(problem).strain(G)
     elements = [e.of_strain(e.places.evaluate(cells, strain)) for e in proof.elements]
-    given = replace(proof.given, loads={})
-    moments = np.zeros_like(proof.moments)
+    given, moments = replace(proof.given, loads={}), np.zeros_like(proof.moments)
     test = replace(proof, given=given, elements=elements, moments=moments)
-    found = _within(test, np.inf)
-    distance, _ = stress_norms(elements, found.coefficients)
-    costless = float(np.linalg.norm(distance)) / B if B > 0 else 0.0
+    nearest, ratio = _within(test, np.inf)
+    t = test.admissible(displacement, nearest)
+    costless = float(np.linalg.norm(t.distance + t.loads)) / B if B > 0 else 0.0
     limit = max(kappa, TWICE * costless)
-    if _largest(test, found) > limit:
-        found = _within(test, limit, found)
-    kappa = max(kappa, costless, _largest(test, found))
-    t = test.admissible(displacement, found)
-    r = [_lift(*x, kappa) for x in zip(ends, facing, excess, strict=True)]
-    held = [
-        replace(one, amount=np.zeros_like(one.amount)) for one in asked_on_supports(cells, given, G)
-    ]
-    lifts = list(zip(facing, r, strict=True))
-    lifting = lifted(problem, cells, held, lifts, max(cells.trace.order, LEAST), 1.0)
-    M = float(np.linalg.norm(t.distance + t.loads + lifting))
+    if ratio > limit:
+        nearest, ratio = _within(test, limit, nearest)
+        t = test.admissible(displacement, nearest)
+    kappa = max(kappa, costless, ratio)
+    # What of [G] - d.e is more than kappa times the gap after its own lifting.
+    kept = [np.clip(x, -kappa * f.after, kappa * f.after) for f, x in zip(lines, c, strict=True)]
+    r = [x - y @ bernstein(y.shape[1] - 1, PLACES).T for x, y in zip(excess, kept, strict=True)]
+    held = [replace(one, amount=np.zeros_like(one.amount)) for one in proof.asked]
+    degree, lifts = max(cells.trace.order, LEAST), list(zip(lines, r, strict=True))
+    w = lifted(problem, cells, held, lifts, degree, 1.0)
+    M = float(np.linalg.norm(t.distance + t.loads + w))
     # The largest M e + kappa (X + Y) with e^2 + 2 X + 2 Y <= B^2.
     error = M * B if M >= kappa * B else (M**2 / kappa + kappa * B**2) / 2
-    opened = sum(work_on_gap(*x) for x in zip(facing, p, r, strict=True))
-    crossed = float((proof.stress.distance + proof.stress.loads) @ lifting)
-    return error + abs(t.work) + crossed + abs(opened)
+    pressed = zip(lines, stress.pressure, r, strict=True)
+    opened = sum(float((f.force(p) * opening).sum()) for f, p, opening in pressed)
+    crossed = float((stress.distance + stress.loads) @ w)
+    idle = stress.idle and stress.idle * largest(elements, cells, G)  # work on free motions
+    return error + abs(t.work) + crossed + abs(opened) + idle
 
 
-def _within(test: Proof, kappa: float, start: Balanced | None = None) -> Balanced:
-    """The stress near to that of G with |q*| <= kappa p*; any q* where forces have any sign."""
-    limits = [
-        np.full_like(p, np.inf) if line.facing.equality else np.where(p > 0, kappa, 0) * p
-        for line, p in zip(test.program.lines, test.stress.pressure, strict=True)
-    ]
-    return test.program.nearest(test.elements, test.moments, limits, start)
+def _within(test: Proof, kappa: float, start: Balanced | None = None) -> tuple[Balanced, float]:
+    """The stress near to that of G with |q*| <= kappa p*, and the largest |q*| / p*.
 
-
-def _largest(test: Proof, found: Balanced) -> float:
-    """The largest |q*| / p*, where forces have one sign."""
-    lines = zip(test.program.lines, found.pressure, test.stress.pressure, strict=True)
-    ratios = [np.abs(q[p > 0]) / p[p > 0] for x, q, p in lines if not x.facing.equality]
-    return max((float(ratio.max(initial=0.0)) for ratio in ratios), default=0.0)
-
-
-def _jumps(proof: Proof, tested: Tested) -> list[Array]:
-    """[G] - d.e (k, j) on each line at Gauss points, 0 where it is round-off."""
-    trace, found = proof.cells.trace, []
-    pairs = iter(tested.directions)
-    for line in proof.program.lines:
-        f = line.facing
-        k, j = f.there.shape
-        e = np.zeros(2) if f.pair is None else next(pairs)
-        segment, s = proof.cells.on_side(np.repeat(f.side, j), np.tile(PLACES, k))
-        jump = trace.evaluate(tested.displacement, segment, s).reshape(k, j, 2)
-        if line.opposite:
-            segment, s = proof.cells.on_side(np.repeat(f.other, j), f.there.ravel())
-            jump = jump - trace.evaluate(tested.displacement, segment, s).reshape(k, j, 2)
-        value = ((jump - e) * f.direction).sum(axis=2)
-        found.append(np.where(np.abs(value) <= NOISE, 0.0, value))
-    return found
-
-
-def _coefficients(ends: Index, f: Facing, values: Array) -> Array:
-    """Bernstein coefficients (k, degree + 1) near to `values` (k, j), one number at a vertex.
-
-    `ends` (k, 2) are the vertices of the sides.
+    Any q* where forces have any sign.
     """
-    B = bernstein(f.after.shape[1] - 1, PLACES) * np.sqrt(WEIGHTS)[:, None]
-    c = np.linalg.lstsq(B, (np.sqrt(WEIGHTS) * values).T, rcond=None)[0].T
+    lines, pressure = test.program.lines, test.stress.pressure
+    limits = [
+        np.full_like(p, np.inf) if f.equality else np.where(p > 0, kappa, 0) * p
+        for f, p in zip(lines, pressure, strict=True)
+    ]
+    found, ratio = test.program.nearest(test.elements, test.moments, limits, start), 0.0
+    for f, q, p in zip(lines, found.pressure, pressure, strict=True):
+        if not f.equality:
+            ratio = max(ratio, float((np.abs(q[p > 0]) / p[p > 0]).max(initial=0.0)))
+    return found, ratio
+
+
+def _excess(proof: Proof, G: ng.GridFunction, f: Facing, e: Array) -> tuple[Array, Array, float]:
+    """[G] - d.e (k, j) on a line at Gauss points, 0 where it is round-off.
+
+    And Bernstein coefficients (k, degree + 1) near to it, one number at a vertex; the least kappa
+    with which nothing is left at vertices that no closed side shares.
+    """
+    cells, ends = proof.cells, proof.cells.ends[f.side]
+    other, there = on_segments(cells, f.other, f.there)
+    other = np.where(f.other >= 0, other, -1)[:, None].repeat(len(PLACES), 1)
+    values, _ = jump(cells.trace, G, on_segments(cells, f.side, PLACES), (other, there))
+    excess = ((values - e) * f.direction).sum(axis=2)
+    excess[np.abs(excess) <= NOISE] = 0.0
+    c, _ = fitted(excess, f.after.shape[1] - 1)
     c[np.abs(c) <= NOISE] = 0.0
-    _, number, count = np.unique(ends, return_inverse=True, return_counts=True)
-    number = number.reshape(-1, 2)
-    mean = np.bincount(number.ravel(), c[:, [0, -1]].ravel(), len(count)) / count
-    c[:, [0, -1]] = mean[number]
-    return np.asarray(c)
+    count, total = np.zeros((2, len(cells.vertices)))
+    np.add.at(count, ends, 1.0)
+    np.add.at(total, ends, c[:, [0, -1]])
+    at_ends = c[:, [0, -1]] = total[ends] / count[ends]
+    bare, room = ~np.isin(ends, ends[f.closed]) & (at_ends != 0), f.after[:, [0, -1]]
+    ratio = np.divide(np.abs(at_ends), room, out=np.full_like(room, np.inf), where=room > 0)
+    return excess, c, float(ratio[bare].max(initial=0.0))
 
 
-def _least_kappa(ends: Index, f: Facing, jump: Array) -> float:
-    """The least kappa with which nothing is left at vertices that no closed side shares."""
-    c = np.abs(_coefficients(ends, f, jump)[:, [0, -1]])
-    bare = ~np.isin(ends, ends[f.closed]) & (c > 0)
-    room = f.after[:, [0, -1]]
-    ratio = np.divide(c, room, out=np.full_like(c, np.inf), where=room > 0)
-    return float(ratio[bare].max(initial=0.0))
-
-
-def _lift(ends: Index, f: Facing, jump: Array, kappa: float) -> Array:
-    """What of [G] - d.e (k, j) is more than kappa times the gap after its own lifting."""
-    room = kappa * f.after
-    kept = np.clip(_coefficients(ends, f, jump), -room, room)
-    return np.asarray(jump - kept @ bernstein(kept.shape[1] - 1, PLACES).T)
-
-
-def _ratio_beside(proof: Proof, displacement: ng.CoefficientFunction, tested: Tested) -> float:
+def _beside(
+    proof: Proof, displacement: ng.GridFunction, G: ng.GridFunction, f: Facing, e: Array
+) -> float:
     """The largest ratio of [G] - d.e to the gap where p* does not act, at Gauss points."""
-    cells, ratio, j = proof.cells, 0.0, len(PLACES)
-    facing = [line.facing for line in proof.program.lines]
-    for f, e in zip([f for f in facing if f.pair is not None], tested.directions, strict=True):
-        assert f.pair is not None
-        beside = np.isin(cells.segment, f.pair.line.segments)
-        beside[f.side] = False
-        side = np.flatnonzero(beside)
-        segment, s = on_segments(cells, side, PLACES)
-        found = met(cells.trace, displacement, f.pair, segment, s)
-        jump = cells.trace.evaluate(tested.displacement, np.repeat(segment, j), s.ravel())
-        jump, at = jump.reshape(*s.shape, 2), found.segment >= 0
-        jump[at] -= cells.trace.evaluate(tested.displacement, found.segment[at], found.s[at])
-        excess = np.abs(((jump - e) * found.direction).sum(axis=2))
-        some = found.faces & (excess > NOISE)
-        room = np.maximum(found.gap[some], np.finfo(float).tiny)
-        ratio = max(ratio, float((excess[some] / room).max(initial=0.0)))
-    return ratio
+    if f.pair is None:
+        return 0.0
+    trace, segment = proof.cells.trace, proof.cells.segment
+    side = np.setdiff1d(np.flatnonzero(np.isin(segment, f.pair.line.segments)), f.side)
+    place = on_segments(proof.cells, side, PLACES)
+    found = met(trace, displacement, f.pair, *place)
+    values, _ = jump(trace, G, place, (found.segment, found.s))
+    excess = np.abs(((values - e) * found.direction).sum(axis=2))
+    some = found.faces & (excess > NOISE)
+    room = np.maximum(found.gap[some], np.finfo(float).tiny)
+    return float((excess[some] / room).max(initial=0.0))

@@ -1,20 +1,249 @@
-"""What a solution says of its error that is proved."""
+"""What a solution says of its error that is proved: bounds, their stress, a certificate."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from pathlib import Path
+from typing import Any
 
+import ngsolve as ng
 import numpy as np
 
+from ...arrays import Array, Index
 from ...fem import LOAD_BONUS, load_vector, potential_energy
 from ..residual import Estimated
 from .bound import Proof, error_bound
-from .stress import EquilibratedStress
+from .elements import among, stress_norms
+from .facing import ENDS, WEIGHTS, bernstein
+from .polynomials import scalars
 
 ROUND_OFF = 64 * np.finfo(float).eps  # of an energy, relative to its terms
 FINE = 3 * LOAD_BONUS  # quadrature orders above the default for the work of loads
+INSIDE = 1e-9  # parameters nearer to an end are inside of the part that begins there
+INSET = 0.1  # of a step of the lattice: it keeps off an axis, where stresses are not defined
+STRAIGHT = 1e-12  # difference of unit vectors that are one: round-off
+
+
+@dataclass(frozen=True, eq=False)
+class ContactPressure:
+    """p* of one pair on k parts of segments.
+
+    Attributes
+    ----------
+    segments : ndarray of int (k,)
+        Segments of the boundary of the mesh, the secondary's.
+    span : ndarray (k, 2)
+        Parameters s on them at which each part begins and ends.
+    coefficients : ndarray (k, d + 1)
+        Of Bernstein polynomials from the beginning to the end, units of stress; per unit length
+        (P1), per unit eta (P2).
+    """
+
+    segments: Index
+    span: Array
+    coefficients: Array
+
+    def values(self, segment: Index, s: Array) -> Array:
+        """p* (k,) at `s` (k,) of segments `segment` (k,), 0 where it does not act.
+
+        At the end of two parts the one towards the middle of the segment.
+        """
+        low, high = np.sort(self.span, axis=1).T
+        order, inside = np.argsort(self.segments + low), np.clip(s, INSIDE, 1 - INSIDE)
+        start = np.append(-np.inf, (self.segments + low)[order])
+        part = np.append(-1, order)[np.searchsorted(start, segment + inside, side="right") - 1]
+        on = (part >= 0) & (np.append(self.segments, -1)[part] == segment)
+        on &= inside <= np.append(high, 0.0)[part]
+        part, found = part[on], np.zeros(len(segment))
+        a, b = self.span[part].T
+        basis = bernstein(self.coefficients.shape[1] - 1, (s[on] - a) / (b - a))
+        found[on] = (basis * self.coefficients[part]).sum(axis=1)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class EquilibratedStress:
+    """A stress in equilibrium with the loads on n triangles.
+
+    Attributes
+    ----------
+    proof : Proof
+        What it was made of.
+    """
+
+    proof: Proof
+
+    @property
+    def degree(self) -> int:
+        """Of its polynomials on triangles with straight sides; about an axis of r times it."""
+        return min(e.degree for e in self.proof.elements)
+
+    @property
+    def triangles(self) -> Array:
+        """Corners (n, 3, 2) of the triangles, lengths."""
+        return self.proof.cells.corners
+
+    @property
+    def element(self) -> Index:
+        """Elements (n,) of the mesh that they are, or parts of."""
+        return self.proof.cells.parent
+
+    @property
+    def pressure(self) -> list[ContactPressure]:
+        """p* of each pair."""
+        cells, found = self.proof.cells, []
+        for line, p in zip(self.proof.program.lines, self.proof.stress.pressure, strict=True):
+            if line.pair is not None:
+                side = line.side
+                found.append(ContactPressure(cells.segment[side], cells.span[side], p))
+        return found
+
+    @property
+    def certificate(self) -> dict[str, float]:
+        """Largest residual of equilibrium, relative to the largest stress; the least p*, a stress.
+
+        The divergence holds by construction; what is left are jumps of tractions between triangles
+        and from the given ones.
+        """
+        lines = zip(self.proof.program.lines, self.proof.stress.pressure, strict=True)
+        least = [p.min(initial=0.0) for line, p in lines if not line.equality]
+        return {
+            "tractions": self.proof.stress.residual,
+            "least pressure": float(min(least, default=0.0)),
+        }
+
+    def values(self, element: Index, reference: Array) -> Array:
+        """Stress (k, 3) as (xx, yy, xy), or (k, 4) as (rr, zz, hoop, rz), units of stress.
+
+        Parameters
+        ----------
+        element : ndarray of int (k,)
+            Elements of the mesh.
+        reference : ndarray (k, 2)
+            Places in them, NGSolve's reference coordinates.
+        """
+        proof, cells = self.proof, self.proof.cells
+        first = np.argsort(cells.parent, kind="stable")
+        count = np.bincount(cells.parent, minlength=int(element.max(initial=0)) + 1)
+        start, many = (np.cumsum(count) - count)[element], count[element]
+        x = cells.evaluate(ng.CF((ng.x, ng.y)), first[start], reference)
+        # Of the parts of an element the one that a place lies in, or is the nearest to.
+        last, at = np.cumsum(many), np.repeat(np.arange(len(element)), many)
+        part = first[np.arange(len(at)) + np.repeat(start - last + many, many)]
+        corners = cells.corners[part]
+        edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+        share = np.linalg.solve(edges, (x[at] - corners[:, 0])[..., None])[..., 0]
+        inside = np.minimum(share.min(axis=1), 1 - share.sum(axis=1))
+        own = part[np.lexsort((-np.arange(len(at)), inside, at))[last - 1]]
+        found = np.empty((len(element), proof.elements[0].strain.shape[2]))
+        for e, c, at, some in among(proof.elements, proof.stress.coefficients, own):
+            found[at] = e.stress(c, x[at, None], some)[:, 0]
+            if found.shape[1] > 3:
+                found[at, 2] += e.radial_at(cells, own[at], reference[at])
+        return found
+
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write `path` (.npz): arrays that drivers/check_certificate.py checks with NumPy alone.
+
+        Raises
+        ------
+        ValueError
+            Another suffix, or a stress on curved triangles, of which there is no certificate.
+        """
+        path = Path(path)
+        if path.suffix != ".npz":
+            raise ValueError(f'path="{path}" must end in .npz')
+        np.savez_compressed(path, **_certificate(self.proof))
+        return path
+
+
+def _certificate(proof: Proof) -> dict[str, Any]:
+    """All arrays of the certificate by name; docs/bounds.md has the list.
+
+    On cells with straight sides all that the proof needs is a polynomial in x: the stress times the
+    model's measure (1, or 2 pi r), the force that it balances, tractions and p* on sides.
+
+    Raises
+    ------
+    ValueError
+        Where cells have curved sides, or normals of drawn curves turn along straight ones.
+    """
+    cells, mu, lines, stress = (
+        proof.cells,
+        proof.program.multipliers,
+        proof.program.lines,
+        proof.stress,
+    )
+    turning = sum(int((np.ptp(f.direction, axis=1) > STRAIGHT).any(axis=1).sum()) for f in lines)
+    found = {"cells have a curved side": int(cells.curved.sum())}
+    found["sides have a direction of contact or guide that turns along them"] = turning
+    if any(found.values()):
+        told = " and ".join(f"{n} {what}" for what, n in found.items() if n)
+        raise ValueError(f"no certificate: {told}; tractions and p* are no polynomials there")
+    own, _ = stress_norms(proof.elements, stress.coefficients)
+    replaced = np.flatnonzero(stress.distance != own)
+    arrays: dict[str, Any] = {
+        "axisymmetric": np.array(cells.trace.model.extent > 0),
+        "vertices": cells.vertices,
+        "triangles": cells.triangles,
+        "replaced": replaced,
+        "replaced_distance": stress.distance[replaced],
+        "loads": stress.loads,
+        "lifting": proof.lifting,
+        "bound": np.array(proof.bound),
+    }
+    # T and F, times the measure, at a lattice; by rules of quadrature e(u_h) and C^-1.
+    k = proof.elements[0].degree
+    i, j = np.array([(i, j) for i in range(k + 1) for j in range(k + 1 - i)]).T
+    lattice = (np.column_stack([i, j]) + INSET) / (k + 3 * INSET)
+    share = np.column_stack([1 - lattice.sum(axis=1), lattice])
+    x = np.einsum("qc,ncd->nqd", share, cells.corners)
+    T, force, measure = np.zeros((*x.shape[:2], 3)), np.zeros(x.shape), cells.measure(x)[..., None]
+    for number, (e, c) in enumerate(zip(proof.elements, stress.coefficients, strict=True)):
+        at = e.places.at
+        T[at] = e.stress(c, x[at])[..., [0, 1, -1]]
+        force[at] = scalars(e.force_degree, e.corners, x[at]) @ e.force
+        a, b = e.places.local.T
+        weight = e.places.weight[0] / cells.measure(e.places.x[0])
+        every, places = np.repeat(at, len(a)), e.places.reference.reshape(-1, 2)
+        arrays |= {
+            f"rule{number}_triangle": at,
+            f"rule{number}_points": np.column_stack([1 - a - b, a]),
+            f"rule{number}_weights": weight / (2 * weight.sum()),
+            f"rule{number}_strain": e.strain,
+            f"rule{number}_compliance": e.compliance,
+            f"rule{number}_radial": e.radial_at(cells, every, places).reshape(e.strain.shape[:2]),
+        }
+    # The boundary: tractions in Legendre polynomials, per t of the side and times the measure.
+    side = np.flatnonzero(~cells.inner)
+    traction = proof.moments[mu.of(side)].reshape(len(side), 2, -1)
+    position = np.full(len(cells.ends) + 1, -1)  # the last one where no side is faced
+    position[side] = np.arange(len(side))
+    return arrays | {
+        "degree": np.array(k),
+        "lattice": lattice,
+        "stress": measure * T,
+        "force": measure * force,
+        "side_vertices": cells.ends[side],
+        "side_held": proof.given.held[side],
+        "side_traction": traction * np.sqrt(2 * np.arange(traction.shape[2]) + 1),
+        "contact_side": _joined([position[f.side] for f in lines], int),
+        "contact_other": _joined([position[f.other] for f in lines], int),
+        "contact_turned": _joined([f.there[:, -1] < f.there[:, 0] for f in lines], bool),
+        "contact_direction": _joined([f.direction[:, 0] for f in lines]),
+        "contact_weight": _joined([f.weight / WEIGHTS @ ENDS.T for f in lines]),
+        "contact_equality": _joined([np.full(len(f.side), f.equality) for f in lines], bool),
+        "contact_gap": _joined([f.after for f in lines]),
+        "contact_pressure": _joined(stress.pressure),
+    }
+
+
+def _joined(parts: Sequence[np.ndarray], kind: type = float) -> np.ndarray:
+    return np.concatenate(parts).astype(kind) if parts else np.zeros(0, kind)
 
 
 class Guaranteed(Estimated):
@@ -49,10 +278,8 @@ class Guaranteed(Estimated):
     @property
     def relative_error_bound(self) -> float:
         """`error_bound` over the energy norm of u_h, dimensionless; 0 where both vanish."""
-        bound = self._bound.bound
-        if bound == 0:
-            return 0.0
-        return bound / self.energy_norm if self.energy_norm > 0 else math.inf
+        bound, size = self._bound.bound, self.energy_norm
+        return bound / size if size > 0 else math.inf if bound > 0 else 0.0
 
     @property
     def bound_parts(self) -> dict[str, float]:

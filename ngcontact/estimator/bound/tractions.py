@@ -6,19 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import ngsolve as ng
 import numpy as np
 from numpy.polynomial import legendre
 
 from ...arrays import Array, Index, Mask
-from ...fem import BoundaryTrace
+from ...lagrange import gauss_derivative, lagrange
 from ...problem import Problem
 from ...quadrature import known_rough_load, moment_degree, numbers
 from .cells import Cells
 from .elements import Element, Multipliers, among, traces
-from .facing import DATA, LEGENDRE, PLACES, WEIGHTS, bernstein
+from .facing import DATA, LEGENDRE, PLACES, WEIGHTS, Facing, jump, on_segments
 from .parts import LEVELS, PARTS
-from .program import Rows
 
 FINEST = PARTS**LEVELS  # parts of a side
 SAME = 1e-10  # of a side: breaks nearer to its ends are these
@@ -57,6 +55,17 @@ class SideRule:
             np.add.at(total, mu.start[self.side[at], None] + np.arange(2 * (k + 1)), parts)
         return total
 
+    def work(self, values: Array, side: Index, direction: Array, amount: Array) -> float:
+        """Work of tractions `values` (m, j, 2) on some displacement of sides `side` (k,).
+
+        At Gauss-Lobatto points of each side it is an `amount` (k, i) along a `direction` (k, i, 2).
+        """
+        order, at = np.argsort(side), np.flatnonzero(np.isin(self.side, side))
+        own = order[np.searchsorted(side[order], self.side[at])]
+        basis = lagrange(DATA, self.t[at].ravel()).reshape(-1, len(PLACES), DATA + 1)
+        u = basis @ (amount[..., None] * direction)[own]
+        return float(((self.weight * self.measure)[at, :, None] * values[at] * u).sum())
+
     def missed(self, cells: Cells, values: Array, largest: float) -> Array:
         """L2 norms (n, 3) of tractions `values` (m, j, 2) on sides, times the model's measure.
 
@@ -69,11 +78,6 @@ class SideRule:
         square = (self.weight[..., None] * lost**2).sum(axis=(1, 2))
         np.add.at(squares, (owner, cells.local[self.side]), square)
         return np.sqrt(squares)
-
-    def on_segments(self, cells: Cells) -> tuple[Index, Array]:
-        """Segments (m,) and parameters s (m, j) of a rule along sides of the boundary."""
-        a, b = cells.span[self.side].T[..., None]
-        return cells.segment[self.side], a + (b - a) * self.t
 
 
 def side_rule(cells: Cells, breaks: Array, side: Index) -> SideRule:
@@ -103,14 +107,6 @@ def _points(cells: Cells, side: Index, t: Array) -> tuple[Array, Array]:
     return x.reshape(*t.shape, 2), dx.reshape(*t.shape, 2)
 
 
-def _evaluated(
-    trace: BoundaryTrace, function: ng.CoefficientFunction, segment: Index, s: Array
-) -> Array:
-    """Values (m, j, dim) at `s` (m, j) of segments `segment` (m,)."""
-    values = trace.evaluate(function, np.repeat(segment, s.shape[1]), s.ravel())
-    return values.reshape(*s.shape, -1)
-
-
 @dataclass(frozen=True, eq=False)
 class Given:
     """Conditions on e sides.
@@ -125,8 +121,6 @@ class Given:
         Sides of each P of `Problem.traction`.
     supports : list of (values, ndarray of int (k,))
         u_D of `Problem.displacement` with their sides.
-    guides : ndarray of int (k,)
-        Sides of Gamma_0.
     breaks : ndarray (r, 2)
         Segments and s, rising: where rules on the boundary begin anew to follow tractions.
     pressed : ndarray (e, j, 2)
@@ -138,63 +132,47 @@ class Given:
     held: Mask
     loads: dict[str, Index]
     supports: list[tuple[Sequence[Any], Index]]
-    guides: Index
     breaks: Array
     pressed: Array
 
     def followed(self) -> Index:
         """How often triangles (n,) are divided for tractions: `LEVELS` where these are rough."""
         cells, found = self.cells, np.zeros(len(self.cells.triangles), dtype=np.intp)
-        side = np.flatnonzero(cells.segment >= 0)
         breaks = np.bincount(self.breaks[:, 0].astype(np.intp), minlength=len(cells.trace.region))
-        count = breaks[cells.segment[side]]
-        np.maximum.at(found, cells.owner[side], np.where(count >= FINEST, LEVELS, count > 0))
+        count = np.append(breaks, 0)[cells.segment]  # none inside, -1
+        np.maximum.at(found, cells.owner, np.where(count >= FINEST, LEVELS, count > 0))
         return found
 
-    def under(self, lines: Sequence[Rows], pressure: Sequence[Array]) -> Given:
-        """The same with pressures on lines.
-
-        Parameters
-        ----------
-        pressure : sequence of ndarray (k, n)
-            Bernstein coefficients on the k sides of each line.
-        """
+    def under(self, lines: Sequence[Facing], pressure: Sequence[Array]) -> Given:
+        """The same with pressures on lines: coefficients `pressure` (k, n) on each."""
         pressed = np.zeros_like(self.pressed)
-        for line, p in zip(lines, pressure, strict=True):
-            f = line.facing
-            density = p @ bernstein(p.shape[1] - 1, PLACES).T * f.weight / WEIGHTS
-            force = density[..., None] * f.direction
+        for f, p in zip(lines, pressure, strict=True):
+            force = (f.force(p) / WEIGHTS)[..., None] * f.direction
             np.add.at(pressed, f.side, -force)
-            if line.opposite:
-                np.add.at(pressed, f.other, f.on_primary(force / f.rate[..., None]))
+            if (f.other >= 0).any():
+                rate = np.abs(f.there @ gauss_derivative(2 * DATA).T)  # of t there by t
+                np.add.at(pressed, f.other, f.on_primary(force / rate[..., None]))
         return replace(self, pressed=pressed)
 
-    def tractions(self, segment: Index, s: Array) -> tuple[Array, Mask]:
-        """Tractions (m, j, 2) at `s` (m, j) of `segment` (m,), and held components (m, 2)."""
-        cells, total = self.cells, np.zeros((*s.shape, 2))
-        side = cells.side_at(segment, s[:, s.shape[1] // 2])
+    def asked(self, cells: Cells, rule: SideRule, own: Array) -> Array:
+        """Tractions (m, j, 2) on sides of `cells`, parts of these; `own` (m, j, 2) without any."""
+        segment, s = on_segments(cells, rule.side, rule.t)
+        on, asked = np.flatnonzero(segment >= 0), own.copy()
+        segment, s, total = segment[on], s[on], np.zeros((len(on), *own.shape[1:]))
+        side = self.cells.side_at(segment, s[:, s.shape[1] // 2])
         for name, loaded in self.loads.items():
             at = np.flatnonzero(np.isin(side, loaded))
             if at.size:
                 load = self.problem.traction_vector(name)
-                total[at] += _evaluated(cells.trace, load, segment[at], s[at])
+                total[at] += jump(cells.trace, load, (segment[at], s[at]))[0]
         at = np.flatnonzero(self.pressed[side].any(axis=(1, 2)))
         if at.size:
-            t = cells.own_parameter(side[at], s[at])
-            x, dx = _points(cells, side[at], t)
-            measure = cells.measure(x)[..., None]
-            ds = np.linalg.norm(dx, axis=2, keepdims=True) * measure
+            t = self.cells.own_parameter(side[at], s[at])
+            x, dx = _points(self.cells, side[at], t)
+            ds = np.linalg.norm(dx, axis=2, keepdims=True) * cells.measure(x)[..., None]
             force = legendre.legvander(2 * t - 1, DATA) @ (LEGENDRE @ self.pressed[side[at]])
             total[at] += np.divide(force, ds, out=np.zeros_like(force), where=ds > 0)
-        return total, self.held[side]
-
-    def asked(self, cells: Cells, rule: SideRule, own: Array) -> Array:
-        """Tractions (m, j, 2) on sides of `cells`, parts of these; `own` (m, j, 2) without any."""
-        segment, s = rule.on_segments(cells)
-        on, asked = np.flatnonzero(segment >= 0), own.copy()
-        if on.size:
-            values, held = self.tractions(segment[on], s[on])
-            asked[on] = np.where(held[:, None], own[on], values)
+        asked[on] = np.where(self.held[side][:, None], own[on], total)
         return asked
 
     def moments(self, mu: Multipliers) -> tuple[Array, Mask]:
@@ -202,118 +180,49 @@ class Given:
 
         Fixed are those of components with prescribed displacements.
         """
-        moments, fixed = np.zeros(int(mu.start[-1])), np.zeros(int(mu.start[-1]), dtype=bool)
-        if self.loads:
-            side = np.unique(np.concatenate(list(self.loads.values())))
-            rule = side_rule(self.cells, self.breaks, side)
-            values, _ = self.tractions(*rule.on_segments(self.cells))
-            moments = rule.moments(mu, values)  # (3.7)
-        for side, c in zip(*np.nonzero(self.held), strict=True):
-            n = mu.degree[side] + 1
-            fixed[mu.start[side] + c * n : mu.start[side] + (c + 1) * n] = True
-        return np.where(fixed, 0.0, moments), fixed
+        rule = side_rule(self.cells, self.breaks, np.flatnonzero(~self.cells.inner))
+        values = self.asked(self.cells, rule, np.zeros(rule.x.shape))
+        fixed = np.repeat(self.held.ravel(), np.repeat(mu.degree + 1, 2))
+        return rule.moments(mu, values), fixed  # (3.7)
 
 
 def given_on(problem: Problem, cells: Cells) -> Given:
     """The conditions of a problem."""
 
-    def sides(pattern: str | None) -> Index:
+    def sides(pattern: str) -> Index:
         return np.flatnonzero(np.isin(cells.segment, cells.trace.segments(pattern)))
 
-    held = np.zeros((len(cells.ends), 2), dtype=bool)
+    held, breaks = np.zeros((len(cells.ends), 2), dtype=bool), [np.zeros((0, 2))]
     supports = [(values, sides(pattern)) for pattern, values in problem.displacement.items()]
     for values, at in supports:
         held[at] |= [value is not None for value in values]
     loads = {name: sides(name) for name in problem.traction}
-    guided = None if problem.sliding is None else str(problem.sliding)
-    return Given(
-        problem,
-        cells,
-        held,
-        loads,
-        supports,
-        sides(guided),
-        _breaks(problem, cells, loads),
-        np.zeros((len(cells.ends), len(PLACES), 2)),
-    )
-
-
-def _breaks(problem: Problem, cells: Cells, loads: dict[str, Index]) -> Array:
-    """`Given.breaks`: ends of parts, and of those that `quadrature` integrates rough loads on."""
-    found = [np.zeros((0, 2))]
-    for name, side in loads.items():
+    for name, side in loads.items():  # ends of parts, and of those for quadrature of rough loads
         data, load = problem.traction[name], problem.traction_vector(name)
         if numbers(data):
             continue
-        a, b = cells.span[side].T[..., None]
-        s = a + (b - a) * np.arange(1, FINEST) / FINEST
-        found.append(np.column_stack([np.repeat(cells.segment[side], FINEST - 1), s.ravel()]))
+        segment, s = on_segments(cells, side, np.arange(1, FINEST) / FINEST)
+        breaks.append(np.column_stack([np.repeat(segment, FINEST - 1), s.ravel()]))
         region = cells.trace.mesh.Boundaries(name)
         rough = known_rough_load(data, load, region, moment_degree(cells.trace.order))
         if rough is not None:  # NGSolve's segments run from s = 1 to s = 0
             start = rough.cells.origin[:, 0]
             for stop in (start, start + rough.cells.side[:, 0, 0]):
-                found.append(np.column_stack([rough.cells.element, 1 - stop]))
-    return np.unique(np.concatenate(found), axis=0)
+                breaks.append(np.column_stack([rough.cells.element, 1 - stop]))
+    none = np.zeros((len(cells.ends), len(PLACES), 2))
+    rising = np.unique(np.concatenate(breaks), axis=0)
+    return Given(problem, cells, held, loads, supports, rising, none)
 
 
 def tractions_of(
-    elements: Sequence[Element],
-    coefficients: Sequence[Array],
-    at: Index,
-    x: Array,
-    normal: Array,
+    elements: Sequence[Element], coefficients: Sequence[Array], at: Index, x: Array, normal: Array
 ) -> Array:
-    """Tractions s n (m, j, 2) of a stress at points `x` (m, j, 2) of triangles `at` (m,).
+    """Tractions s n (m, j, 2) of a stress at `x` (m, j, 2) of triangles `at` (m,).
 
-    Parameters
-    ----------
-    coefficients : sequence of ndarray (b, m)
-        Of the stress on the triangles of each element.
-    x, normal : ndarray (m, j, 2)
-        Points, lengths, and unit normals there.
+    By its `coefficients` (b, m) on the triangles of each element, and unit `normal` (m, j, 2).
     """
     values = np.empty_like(x)
     for e, c, mine, some in among(elements, coefficients, at):
-        s = e.stress(c, x[mine], some)
-        nx, ny = normal[mine, :, 0], normal[mine, :, 1]
-        values[mine, :, 0] = s[:, :, 0] * nx + s[:, :, -1] * ny
-        values[mine, :, 1] = s[:, :, -1] * nx + s[:, :, 1] * ny
+        s, n = e.stress(c, x[mine], some), normal[mine]
+        values[mine] = s[..., [0, -1]] * n[..., :1] + s[..., [-1, 1]] * n[..., 1:]
     return values
-
-
-@dataclass(frozen=True, eq=False)
-class BoundaryTractions:
-    """Tractions s n of a stress along the boundary: `values` (m, j, 2) at the points of `rule`."""
-
-    rule: SideRule
-    values: Array
-
-    def work(self, given: Given, displacement: ng.CoefficientFunction) -> float:
-        """Work of s n on u_D - u_h, an energy per thickness."""
-        total, trace, rule = 0.0, given.cells.trace, self.rule
-        segment, s = rule.on_segments(given.cells)
-        density = (rule.weight * rule.measure)[..., None] * self.values
-        for wanted, side in given.supports:
-            at = np.flatnonzero(np.isin(rule.side, side))
-            u = _evaluated(trace, displacement, segment[at], s[at])
-            for c, value in enumerate(wanted):
-                if value is not None:
-                    rest = _evaluated(trace, ng.CF(value), segment[at], s[at])[..., 0] - u[..., c]
-                    total += float((density[at, :, c] * rest).sum())
-        return total
-
-    def missed(self, given: Given, largest: float) -> Array:
-        """`SideRule.missed`, (n, 3), of what is asked for."""
-        lost = given.asked(given.cells, self.rule, self.values) - self.values
-        return self.rule.missed(given.cells, lost, largest)
-
-
-def boundary_tractions(
-    given: Given, elements: Sequence[Element], coefficients: Sequence[Array]
-) -> BoundaryTractions:
-    """Tractions along the boundary of a stress, with `coefficients` (b, m) on each element."""
-    cells = given.cells
-    rule = side_rule(cells, given.breaks, np.flatnonzero(cells.segment >= 0))
-    at = cells.owner[rule.side]
-    return BoundaryTractions(rule, tractions_of(elements, coefficients, at, rule.x, rule.normal))

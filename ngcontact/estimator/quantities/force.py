@@ -8,7 +8,7 @@ import numpy as np
 from ...arrays import Array
 from ...fem import has_rough_loads, load_vector, stress_of
 from ...problem import varies
-from ..bound import FINE, Guaranteed, Tested, force_bar
+from ..bound import FINE, Guaranteed, force_bar
 
 INTEGRATED = 5  # degree of NGSolve's quadrature with dx, without a bonus
 STRAIGHT = 1e-12  # difference of directions that are one: round-off
@@ -52,25 +52,24 @@ def _component(solution: Guaranteed, pair: int, e: Array) -> float:
     solution.work["factorizations"] += found.factorizations
     solution.work["back_solves"] += found.back_solves
     solution.work["equilibrations"] += 1
-    proof = solution.equilibrated.proof
-    error = force_bar(u, Tested(G, directions), proof)
+    error = force_bar(solution.equilibrated.proof, u, G, directions)
     a, b = (x.vec.FV().NumPy() for x in (u, G))
     noise = ROUND_OFF * float(np.sqrt((space.diagonal @ a**2) * (space.diagonal @ b**2)))
-    return error + noise + _integrated(solution, G, proof.sampled)
+    return error + noise + _integrated(solution, G)
 
 
-def _integrated(solution: Guaranteed, G: ng.GridFunction, rough: bool) -> float:
+def _integrated(solution: Guaranteed, G: ng.GridFunction) -> float:
     """Size of what quadrature of stiffness and loads misses of A(u_h, G) - l(G)."""
     space, problem, u = solution.discrete.space, solution.problem, solution.displacement
     a, b = (x.vec.FV().NumPy() for x in (u, G))
     missed = 0.0
     if problem.force or problem.traction:
         missed -= float((load_vector(problem, space.V, FINE) - space.f) @ b)
-    if rough:
+    inexact = space.trace.curved_elements | any(map(varies, problem.materials.values()))
+    if inexact.any():
         p, geometry = space.trace.order, space.trace.geometry_order
         work = ng.InnerProduct(stress_of(problem, u), ng.Sym(ng.Grad(G)))
         fine, mesh = 2 * p * geometry + 2 * geometry + 8, space.trace.mesh
-        inexact = space.trace.curved_elements | any(map(varies, problem.materials.values()))
         for some, order in ((inexact, fine), (~inexact, 2 * p)):
             dx = ng.dx(bonus_intorder=order - INTEGRATED, definedonelements=ng.BitArray(some))
             missed += float(ng.Integrate(work * dx, mesh))

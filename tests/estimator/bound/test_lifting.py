@@ -113,8 +113,8 @@ def opposite(gap, **changes):
 
 
 def facing_of(solution):
-    (line,) = (x for x in solution.equilibrated.proof.program.lines if x.facing.pair is not None)
-    return line.facing
+    (line,) = (x for x in solution.equilibrated.proof.program.lines if x.pair is not None)
+    return line
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
