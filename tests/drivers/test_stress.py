@@ -13,11 +13,8 @@ import pytest
 from drivers.stress import __path__ as folder
 from drivers.stress import refused
 from drivers.stress.__main__ import RANDOM, Trial, line, main, outcomes
-from drivers.stress.differences import differences
-from drivers.stress.motion import Motion, posed
-from drivers.stress.trials import algebra, data, held, symmetry
-from drivers.stress.trials.symmetry import parting
-from ngcontact import Solution, solve
+from drivers.stress.trials import algebra, data, held
+from ngcontact import Solution
 
 # The slow ones run with the driver; what they found has tests with the modules concerned.
 QUICK = ("algebra", "gaps", "held", "shapes")
@@ -31,19 +28,13 @@ def test_every_module_has_its_name():
     assert set(QUICK) < modules
 
 
-def test_seeds_draw_other_cases():
-    """Other quadratic programs, and other numbers of vertices and triangles."""
-
+def test_seeds_draw_other_quadratic_programs():
     def programs(seed):
         return [line(outcome) for outcome in algebra.random_programs(count=2, seed=seed)]
 
-    def numberings(seed):
-        return {motion.seed for motion in symmetry.motions(seed)} - {None}
-
     assert programs(0) == programs(0)
     assert programs(0) != programs(1)
-    assert len(numberings(0) | numberings(1) | numberings(2)) == 3 * len(numberings(0)) > 3
-    assert set(RANDOM) == {"algebra", "data", "scenes", "symmetry"}
+    assert set(RANDOM) == {"algebra", "data", "scenes"}
 
 
 @pytest.mark.parametrize(
@@ -62,22 +53,6 @@ def test_the_exit_status_tells_of_failures(monkeypatch, capsys):
     monkeypatch.setattr(held, "outcomes", lambda: iter([wrong, wrong]))
     assert main(["held"]) == 2
     assert "2 cases, 2 failed" in capsys.readouterr().out
-
-
-@pytest.mark.parametrize("length", [1e-9, 1.0, 1e9])
-@pytest.mark.parametrize("modulus", [1e-9, 1.0, 1e9])
-@pytest.mark.study(witness=["1.0-1.0"])
-def test_units_change_nothing(length, modulus):
-    scene = parting()
-    first = solve(posed(scene, Motion("as it is"))[0], order=2)
-    motion = Motion("units", length=length, modulus=modulus)
-    problem, vertex, triangle = posed(scene, motion)
-    other = solve(problem, order=2)
-    assert other.steps == first.steps
-    # 1e-10 is the figure asked for; measured 6e-15.
-    assert max(differences(first, other, motion, vertex, triangle).values()) <= 1e-10
-    wrong = Motion("another load", length=length, modulus=modulus, load=1.001)
-    assert max(differences(first, other, wrong, vertex, triangle).values()) > 1e-4
 
 
 @pytest.mark.parametrize("seed", [0, 2, 3, 5, 6, 7, 8])  # the quick kinds
