@@ -19,6 +19,7 @@ import pytest
 import pyvista
 
 from drivers.stress.motion import Motion
+from drivers.stress.scenes.drawing import rotation
 from ngcontact import (
     Contact,
     ConvergenceError,
@@ -53,7 +54,7 @@ MOTIONS = (
     # There coordinates are rounded to 1e-12 lengths, 1e-10 of the displacements: the points of
     # order 4 make that 5e-10 of the pressure (measured), just inside of what is asked.
     Motion("far away", shift=(1e4, 1e4)),
-    Motion("far away, turned", turn=TURN, shift=(1e4, -1e4)),
+    Motion("far away, turned", turn=rotation(math.radians(37)), shift=(1e4, -1e4)),
 )
 # Of lengths and moduli; the first three with a witness.
 UNITS = [(1e-9, 1e9), (1e9, 1e9), (1.0, 1e-9)]

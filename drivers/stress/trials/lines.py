@@ -1,4 +1,7 @@
-"""Contact lines: where they end, how they turn, how often contact begins and ends on them."""
+"""Contact lines: corners, where they end, and how often contact begins and ends on them.
+
+What happens at corners where contact ends is in tests/contact/test_transitions.py.
+"""
 
 from __future__ import annotations
 
@@ -9,18 +12,14 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry
-from numpy.typing import NDArray
 
 from drivers.reference import cases
 from drivers.reference.straight import patch, relative_energy_error
 from drivers.reference.westergaard import effective_modulus, moduli
 from drivers.stress import Outcome, solved
 from drivers.stress.trials.shapes import structured
-from ngcontact import Contact, Problem, Solution, adapt, solve
-from ngcontact.contact import pressure_across_corners
+from ngcontact import Contact, Problem, adapt, solve
 from ngcontact.geometries import blocks
-
-Array = NDArray[np.float64]
 
 TURNS = (1e-9, 1e-6, 1e-4, 4e-4, 6e-4, 1e-3, 1e-2, 0.1, 1.0)
 PATCH = 1e-9  # of exactly represented stresses, resultants and pressures
@@ -28,85 +27,29 @@ RIGHT = 0.73  # extent of the line right of its corner; 1 to the left, so that s
 
 WAVES = (1, 8, 64)
 AMPLITUDE = 0.01  # of a wave, in wavelengths
-LIGHT = 0.1  # half-width of the contact on one crest, in wavelengths
-HEAVY = math.asin(math.sqrt(0.9)) / math.pi  # the same at 0.9 of the load that closes all
+# Half-widths of the contact on one crest, in wavelengths; the second at 0.9 of the load that
+# closes all.
+HALF_WIDTHS = {"light": 0.1, "heavy": math.asin(math.sqrt(0.9)) / math.pi}
 NODES = 16  # segments in a wavelength
-
-
-def turned(turn: float) -> list[tuple[float, float]]:
-    """Polygonal line with one corner at the origin: down to both sides for a positive turn."""
-    slope = math.tan(turn / 2)
-    return [(-1.0, -slope), (0.0, 0.0), (RIGHT, -RIGHT * slope)]
 
 
 def _uniform_stress() -> Iterator[Outcome]:
     """The stress -I across lines with one corner: displacement, resultant and pressure."""
     template = cases.polygonal_patch()
-    for size in TURNS:
-        for turn in (size, -size):
-            line = turned(turn)
-            problem = replace(template.problem, geometry=blocks(line=line))
-            exact = template.exact.displacement["upper"]
-            resultant = np.array([line[0][1] - line[-1][1], 1 + RIGHT])
-            for order in (1, 2):
-                s = solve(problem, maxh=0.4, order=order)
-                off = s.displacement - exact
-                errors = [ng.Integrate(ng.InnerProduct(v, v), s.mesh) ** 0.5 for v in (off, exact)]
-                displacement = errors[0] / errors[1]
-                force = np.abs(s.contact_force() - resultant).max()
-                varied = f"turn {turn:g} rad, order {order}"
-                error = max(displacement, force, np.abs(s.pressure - 1).max())
-                yield solved("stress -I across a corner", varied, s, error, PATCH)
-
-
-def _pressed_corner() -> Iterator[Outcome]:
-    """Blocks of different materials: pressure at an almost flat corner, and no end of contact."""
-
-    def at_corner(turn: float, order: int) -> tuple[Solution, Array]:
-        problem = Problem(
-            geometry=blocks(line=turned(turn)),
-            materials=cases.BLOCKS,
-            displacement={"top": (0, -0.1), "bottom": (0, 0)},
-            contact=[Contact(secondary="upper_contact", primary="lower_contact")],
-        )
-        s = solve(problem, maxh=0.2, order=order)
-        pressure = pressure_across_corners(s.discrete.lines[0], s.force, s.active)
-        return s, pressure[np.linalg.norm(s.points, axis=1) < 1e-9]
-
-    for order in (1, 2):
-        _, flat = at_corner(0.0, order)
-        for size in (4e-4, 6e-4, 1e-3, 1e-2):
-            for turn in (size, -size):
-                s, pressure = at_corner(turn, order)
-                varied = f"turn {turn:g} rad, order {order}"
-                # The load path changes with the turn: 0.8 of it measured, at order 2.
-                error = np.abs(pressure / flat[0] - 1).max()
-                yield solved("pressed corner: pressure", varied, s, error, 1e-3 + 2 * size)
-                yield solved("pressed corner: ends", varied, s, len(s.transitions()), 0)
-
-
-def _opening_corner() -> Iterator[Outcome]:
-    """Contact left of a corner, right of which the bodies are apart: it ends at the corner."""
-    for turn in (1e-3, 1e-2, 0.3, 1.0):
-        for mirrored in (False, True):
-            line = [(-1.0, 0.0), (0.0, 0.0), (1.0, 0.9 * math.tan(turn))]
-            if mirrored:
-                line = [(-x, y) for x, y in reversed(line)]
-            x = -ng.x if mirrored else ng.x
-            gap = ng.IfPos(x, 0.3 * x, 0.0)
-            problem = Problem(
-                geometry=blocks(line=line, height=2.0),
-                materials=cases.BLOCKS,
-                displacement={"top": (0, -0.02), "bottom": (0, 0)},
-                contact=[Contact(secondary="upper_contact", primary="lower_contact", gap=gap)],
-            )
-            for order in (1, 2, 3):
-                s = solve(problem, maxh=0.2, order=order)
-                ends = s.transitions()
-                error = np.abs(ends).max() if len(ends) == 1 else math.inf
-                where = "left" if mirrored else "right"
-                varied = f"turn {turn:g} rad, open {where}, order {order}"
-                yield solved("contact ends at a corner", varied, s, error, PATCH)
+    exact = template.exact.displacement["upper"]
+    for turn in (sign * size for size in TURNS for sign in (1, -1)):
+        slope = math.tan(turn / 2)
+        line = [(-1.0, -slope), (0.0, 0.0), (RIGHT, -RIGHT * slope)]
+        problem = replace(template.problem, geometry=blocks(line=line))
+        resultant = np.array([(RIGHT - 1) * slope, 1 + RIGHT])
+        for order in (1, 2):
+            s = solve(problem, maxh=0.4, order=order)
+            fields = (s.displacement - exact, exact)
+            off, size = (ng.Integrate(ng.InnerProduct(v, v), s.mesh) ** 0.5 for v in fields)
+            force = np.abs(s.contact_force() - resultant).max()
+            error = max(off / size, force, np.abs(s.pressure - 1).max())
+            varied = f"turn {turn:g} rad, order {order}"
+            yield solved("stress -I across a corner", varied, s, error, PATCH)
 
 
 def _ends_of_the_line() -> Iterator[Outcome]:
@@ -120,22 +63,16 @@ def _ends_of_the_line() -> Iterator[Outcome]:
         m = moduli(material)
         stiff = m.lam + 2 * m.mu
         held[end] = (None, -ng.y / stiff)
-        across = -m.lam / stiff
-        squeezed[body] = ng.CF((across, 0, 0, -1), dims=(2, 2))
+        squeezed[body] = ng.CF((-m.lam / stiff, 0, 0, -1), dims=(2, 2))
     guided = replace(free, stress=squeezed)
-    contact = [Contact(secondary="upper_contact", primary="lower_contact")]
     for where, exact, displacement, sliding in (
         ("free sides", free, ends, None),
         ("Gamma_u", free, prescribed, None),
         ("Gamma_0", guided, held, f"{left}|{right}"),
         ("Gamma_u and Gamma_0", guided, held | {left: (0, None)}, right),
     ):
-        problem = Problem(
-            geometry=blocks(),
-            materials=cases.BLOCKS,
-            displacement=displacement,
-            sliding=sliding,
-            contact=contact,
+        problem = replace(
+            cases.pressure_patch().problem, displacement=displacement, sliding=sliding
         )
         for order in (1, 2, 3):
             s = solve(problem, maxh=0.25, order=order)
@@ -144,11 +81,7 @@ def _ends_of_the_line() -> Iterator[Outcome]:
 
 
 def wavy(
-    waves: int,
-    height: float,
-    crest_at_ends: bool,
-    geometry: ng.Mesh | OCCGeometry,
-    half: float = LIGHT,
+    waves: int, height: float, crest_at_ends: bool, geometry: ng.Mesh | OCCGeometry, half: float
 ) -> tuple[Problem, float]:
     """Blocks 0 <= x <= 1 with a wavy gap, guided on the sides, and the mean pressure expected.
 
@@ -160,11 +93,8 @@ def wavy(
     """
     amplitude = AMPLITUDE / waves
     q = math.sin(math.pi * half) ** 2
-    mean = q * math.pi * effective_modulus(cases.FIRST, cases.SECOND) * amplitude * waves
-    compliance = 0.0
-    for material in cases.BLOCKS.values():
-        m = moduli(material)
-        compliance += height / (m.lam + 2 * m.mu)
+    mean = q * math.pi * effective_modulus(cases.FIRST, cases.SECOND) * AMPLITUDE
+    compliance = sum(height / (m.lam + 2 * m.mu) for m in map(moduli, cases.BLOCKS.values()))
     depth = mean * compliance + amplitude * (q - q * math.log(q))
     wave = ng.cos(2 * math.pi * waves * ng.x)
     gap = amplitude * (1 - wave if crest_at_ends else 1 + wave)
@@ -173,49 +103,43 @@ def wavy(
         materials=cases.BLOCKS,
         displacement={"top": (None, -depth), "bottom": (None, 0)},
         sliding="upper_left|upper_right|lower_left|lower_right",
-        contact=[
-            Contact(secondary="upper_contact", primary="lower_contact", direction=(0, -1), gap=gap)
-        ],
+        contact=[Contact("upper_contact", "lower_contact", direction=(0, -1), gap=gap)],
     )
     return problem, mean
 
 
-def _layers(waves: int, height: float) -> Array:
-    """Heights of mesh lines: as close as the nodes at the contact, half as many in every 1.5."""
-    y = [0.0]
-    while y[-1] < height:
-        y.append(y[-1] + max(1 / (waves * NODES), y[-1] / 2))
-    return np.array(y) * height / y[-1]
-
-
-def _crests(load: str, half: float) -> Iterator[Outcome]:
+def _crests() -> Iterator[Outcome]:
     """All ends of contact on 1, 8 and 64 crests, their places, and the mean pressure."""
-    for waves in WAVES:
-        height = 2 / waves  # Westergaard's field has decayed to 1e-4
+    for load, waves, crest_at_ends in (
+        (load, waves, ends) for load in HALF_WIDTHS for waves in WAVES for ends in (True, False)
+    ):
+        half, height = HALF_WIDTHS[load], 2 / waves  # Westergaard's field has decayed to 1e-4
+        y = [0.0]  # as close as the nodes at the contact, half as many in every 1.5
+        while y[-1] < height:
+            y.append(y[-1] + max(1 / (waves * NODES), y[-1] / 2))
         x = np.linspace(0, 1, waves * NODES + 1)
-        for crest_at_ends in (True, False):
-            mesh = structured(x, _layers(waves, height))
-            problem, mean = wavy(waves, height, crest_at_ends, mesh, half)
-            s = solve(problem, order=2)
-            places = s.transitions()[:, 0]
-            varied = f"{waves} waves, {'crests' if crest_at_ends else 'troughs'} at the sides"
-            missed = abs(len(places) - 2 * waves)
-            yield solved(f"{load} waves: number of ends", varied, s, missed, 0)
-            crests = (np.arange(waves + 1) - (0 if crest_at_ends else 0.5)) / waves
-            found = np.abs(places[:, None] - crests).min(axis=1) * waves
-            error = np.abs(found / half - 1).max()
-            # Ends lie up to a ninth of a segment off: 1.7e-2 measured for both loads.
-            yield solved(f"{load} waves: half-width", varied, s, error, 0.03)
-            error = abs(np.abs(s.contact_force()[1]) / mean - 1)
-            # Three elements in contact on a light crest: 2.2e-3 measured; 8e-5 on a heavy one.
-            yield solved(f"{load} waves: mean pressure", varied, s, error, 5e-3)
+        mesh = structured(x, np.array(y) * height / y[-1])
+        problem, mean = wavy(waves, height, crest_at_ends, mesh, half)
+        s = solve(problem, order=2)
+        places = s.transitions()[:, 0]
+        varied = f"{waves} waves, {'crests' if crest_at_ends else 'troughs'} at the sides"
+        missed = abs(len(places) - 2 * waves)
+        yield solved(f"{load} waves: number of ends", varied, s, missed, 0)
+        crests = (np.arange(waves + 1) - (0 if crest_at_ends else 0.5)) / waves
+        found = np.abs(places[:, None] - crests).min(axis=1) * waves
+        error = np.abs(found / half - 1).max()
+        # Ends lie up to a ninth of a segment off: 1.7e-2 measured for both loads.
+        yield solved(f"{load} waves: half-width", varied, s, error, 0.03)
+        error = abs(np.abs(s.contact_force()[1]) / mean - 1)
+        # Three elements in contact on a light crest: 2.2e-3 measured; 8e-5 on a heavy one.
+        yield solved(f"{load} waves: mean pressure", varied, s, error, 5e-3)
 
 
 def _adaptive() -> Iterator[Outcome]:
     """Waves that the first mesh does not see: `adapt` finds all of them."""
     for waves, maxh, order, most in ((8, 0.3, 4, 15_000), (64, 0.1, 2, 20_000)):
         geometry = blocks(line=((0, 0), (1, 0)), height=0.5)
-        problem, mean = wavy(waves, 0.5, True, geometry)
+        problem, mean = wavy(waves, 0.5, True, geometry, HALF_WIDTHS["light"])
         levels = list(adapt(problem, maxh=maxh, order=order, max_dofs=most))
         s = levels[-1]
         varied = f"{waves} waves from {len(levels[0].points)} points, order {order}"
@@ -229,9 +153,6 @@ def _adaptive() -> Iterator[Outcome]:
 def outcomes() -> Iterator[Outcome]:
     """All cases of this module."""
     yield from _uniform_stress()
-    yield from _pressed_corner()
-    yield from _opening_corner()
     yield from _ends_of_the_line()
-    yield from _crests("light", LIGHT)
-    yield from _crests("heavy", HEAVY)
+    yield from _crests()
     yield from _adaptive()
