@@ -14,20 +14,11 @@ RESIDUAL = 1e-10  # of the optimality conditions, dimensionless; round-off leave
 
 @dataclass(frozen=True)
 class Outcome:
-    """One line of the table.
+    """One line of the table: what was solved and what was varied, with what came of it.
 
-    Attributes
-    ----------
-    case, varied : str
-        What was solved, and what was varied.
-    steps : int
-        Newton steps; 0 where an error was expected.
-    residual : float
-        Worst residual of the optimality conditions, see `Solution.residuals`.
-    error : float
-        Against the reference, dimensionless.
-    allowed : float
-        Largest error that passes.
+    `steps` of Newton's method are 0 where an error was expected, `residual` is the worst one of the
+    optimality conditions (`Solution.residuals`), `error` the one against the reference and
+    `allowed` the largest that passes, all dimensionless.
     """
 
     case: str
@@ -45,14 +36,8 @@ class Outcome:
 
 def solved(case: str, varied: str, solution: Solution, error: float, allowed: float) -> Outcome:
     """Outcome of a solve whose `error` against a reference may reach `allowed`."""
-    return Outcome(
-        case=case,
-        varied=varied,
-        steps=len(solution.steps),
-        residual=max(solution.residuals.values()),
-        error=float(error),
-        allowed=allowed,
-    )
+    residual = max(solution.residuals.values())
+    return Outcome(case, varied, len(solution.steps), residual, float(error), allowed)
 
 
 def refused(
@@ -62,16 +47,9 @@ def refused(
 
     Its error is 0 if it does, infinite if it returns or the message says something else.
     """
-    right = False
+    error = float("inf")
     try:
         run()
-    except kind as error:
-        right = naming in str(error)
-    return Outcome(
-        case=case,
-        varied=f"{varied}: {kind.__name__}",
-        steps=0,
-        residual=0.0,
-        error=0.0 if right else float("inf"),
-        allowed=0.0,
-    )
+    except kind as failure:
+        error = 0.0 if naming in str(failure) else error
+    return Outcome(case, f"{varied}: {kind.__name__}", 0, 0.0, error, 0.0)

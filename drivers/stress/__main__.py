@@ -24,10 +24,6 @@ Trial: TypeAlias = Literal[
 ]
 RANDOM = ("algebra", "data", "scenes")  # whose cases are drawn
 SCENES = 66  # every kind six times, in two minutes
-SUMMARIES = {  # modules with the tables of drawn scenes; loaded only where they are needed
-    "data": "drivers.stress.trials.data",
-    "scenes": "drivers.stress.scenes.checks.report",
-}
 
 
 def line(outcome: Outcome) -> str:
@@ -42,7 +38,7 @@ def outcomes(name: Trial, seed: int, scenes: int = SCENES) -> Iterator[Outcome]:
     """Outcomes of one module, which is loaded only now; `scenes` of them where scenes are drawn."""
     trial = importlib.import_module(f"drivers.stress.trials.{name}")
     given = {"seed": seed} if name in RANDOM else {}
-    if name in SUMMARIES:
+    if hasattr(trial, "summary"):  # a table of drawn scenes
         given["count"] = scenes
     found: Iterator[Outcome] = trial.outcomes(**given)
     return found
@@ -82,8 +78,9 @@ def main(
                 found.append(outcome)
                 failed += not outcome.passed
                 print(line(outcome), flush=True)
-            if name in SUMMARIES:
-                print(*importlib.import_module(SUMMARIES[name]).summary(found), sep="\n")
+            trial = importlib.import_module(f"drivers.stress.trials.{name}")
+            if hasattr(trial, "summary"):
+                print(*trial.summary(found), sep="\n")
         except ContactError as error:  # the rest of a module falls with a case that raises
             count, failed = count + 1, failed + 1
             print(f"{name:32} {type(error).__name__}: {error} FAIL", flush=True)
