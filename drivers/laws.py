@@ -22,10 +22,10 @@ import numpy as np
 
 from drivers.adaptive_study.runs import uniform
 from drivers.command_line import Count, Order, Positive, printed_in, run
-from drivers.markdown import table
 from drivers.reference.cases import Case
 from drivers.reference.laws import bent_fibres, graded, pressed_fibres, stiff_and_soft
 from drivers.reference.straight import energy_error
+from drivers.tables import table
 from ngcontact import ContactWarning, adapt
 
 Name: TypeAlias = Literal["pressed fibres", "bent fibres", "layers", "graded"]

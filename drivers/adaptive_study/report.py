@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from drivers.adaptive_study.runs import Row, rate, seconds_to
-from drivers.markdown import table
+from drivers.tables import table
 
 Runs = dict[tuple[str, int, str], list[Row]]
 

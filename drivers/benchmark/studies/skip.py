@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
 
+from drivers.benchmark.studies import Extent
 from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Problem, Solution, solve
+from drivers.tables import markdown
+from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.geometries import blocks
 from ngcontact.geometries.region import body, compound, polygon
 
@@ -23,16 +24,7 @@ COUNTS = ("factorizations", "back_solves", "gap_searches", "curved_elements", "e
 
 @dataclass(frozen=True)
 class Scene:
-    """One solution.
-
-    Attributes
-    ----------
-    feature, variant : str
-    unknowns, systems : int
-    work : dict
-        `Solution.work`, what a variant does not need being 0.
-    seconds : float
-    """
+    """One solution; `work` of which a variant does not need is 0."""
 
     feature: str
     variant: str
@@ -62,41 +54,38 @@ def two_blocks(gap: float | None = None, third: bool = False) -> Problem:
     )
 
 
-def timed(problem: Problem, mesh: ng.Mesh, estimated: bool, rounds: int) -> tuple[Solution, float]:
-    """Median of several equal solutions."""
-    seconds = []
-    for _ in range(rounds):
-        start = time.perf_counter()
-        solution = solve(problem, mesh, order=ORDER)
-        if estimated:
-            _ = solution.error_estimate
-        seconds.append(time.perf_counter() - start)
-    return solution, float(np.median(seconds))
-
-
-def scenes(rounds: int, max_dofs: int) -> Iterator[Scene]:
-    """Pairs of scenes, with the feature first."""
+def scenes(extent: Extent) -> tuple[list[Scene], str]:
+    """What scenes skip."""
     opening, rings = two_blocks(), cases.ring_in_ring().problem
-    variants = [
-        ("contact", "touching", opening, False),
-        ("contact", "apart", two_blocks(gap=1.0), False),
-        ("third body", "with", two_blocks(third=True), False),
-        ("third body", "without", opening, False),
-        ("estimate", "asked for", opening, True),
-        ("estimate", "not asked for", opening, False),
-        ("curved edges", "matched rings", rings, False),
-        ("curved edges", "matched blocks", opening, False),
-        ("gap search", "disc on block", cases.pressed_disc(), False),
-        ("gap search", "matched rings", rings, False),
-    ]
-    for feature, variant, problem, estimated in variants:
-        mesh = uniform_mesh(problem, ORDER, min(SIZE, max_dofs))
-        solution, seconds = timed(problem, mesh, estimated, rounds)
-        yield Scene(
-            feature=feature,
-            variant=variant,
-            unknowns=solution.displacement.space.ndof,
-            systems=len(solution.steps),
-            work={name: solution.work[name] for name in COUNTS},
-            seconds=seconds,
-        )
+    found = []
+    for feature, variant, problem in (
+        ("contact", "touching", opening),
+        ("contact", "apart", two_blocks(gap=1.0)),
+        ("third body", "with", two_blocks(third=True)),
+        ("third body", "without", opening),
+        ("estimate", "asked for", opening),
+        ("estimate", "not asked for", opening),
+        ("curved edges", "matched rings", rings),
+        ("curved edges", "matched blocks", opening),
+        ("gap search", "disc on block", cases.pressed_disc()),
+        ("gap search", "matched rings", rings),
+    ):
+        mesh, seconds = uniform_mesh(problem, ORDER, min(SIZE, extent.max_dofs)), []
+        for _ in range(extent.rounds):
+            start = time.perf_counter()
+            solution = solve(problem, mesh, order=ORDER)
+            if variant == "asked for":
+                _ = solution.error_estimate
+            seconds.append(time.perf_counter() - start)
+        unknowns, work = solution.displacement.space.ndof, {k: solution.work[k] for k in COUNTS}
+        spent = len(solution.steps), work, float(np.median(seconds))
+        found.append(Scene(feature, variant, unknowns, *spent))
+    columns = {
+        "feature": "{0.feature}",
+        "scene": "{0.variant}",
+        "unknowns": "{0.unknowns}",
+        "systems": "{0.systems}",
+        **{name.replace("_", " "): f"{{0.work[{name}]}}" for name in COUNTS},
+        "s": "{0.seconds:.3g}",
+    }
+    return found, markdown(columns, found)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import cProfile
 import pstats
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.benchmark.scenes.problems import Common
+from drivers.benchmark.studies import Extent
 from drivers.benchmark.studies.linear import uniform_mesh
+from drivers.tables import table
 from ngcontact import solve
 from ngcontact.adaptivity import doerfler, refined
 
@@ -70,10 +71,16 @@ def stages(common: Common, size: int) -> Stages:
     return Stages(common.name, solution.displacement.space.ndof, spent)
 
 
-def all_stages(commons: list[Common], max_dofs: int) -> Iterator[Stages]:
-    """All problems and sizes up to about `max_dofs` unknowns, after a warm-up."""
-    for common in commons:
-        stages(common, SIZES[0])
-        for size in SIZES:
-            if size <= max_dofs:
-                yield stages(common, size)
+def all_stages(extent: Extent) -> tuple[list[Stages], str]:
+    """Where the time of a level goes."""
+    rows = []
+    for common, _, size in extent.cases((ORDER,), SIZES):
+        if size == SIZES[0]:
+            stages(common, size)  # warm-up
+        rows.append(stages(common, size))
+    table_rows = []
+    for row in rows:
+        total = sum(row.seconds.values())
+        shares = (f"{100 * seconds / total:.0f} %" for seconds in row.seconds.values())
+        table_rows.append((row.problem, row.unknowns, f"{total:.3g}", *shares))
+    return rows, table(("problem", "unknowns", "level, s", *STAGES, "rest"), table_rows)

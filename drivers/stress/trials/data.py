@@ -16,10 +16,10 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import Glue, OCCGeometry
 
-from drivers.markdown import table
 from drivers.reference.laws import fibres
 from drivers.reference.overkill import Overkill
 from drivers.stress import Outcome, solved
+from drivers.tables import table
 from ngcontact import Contact, ContactWarning, Elastic, Hooke, Problem, Solution, adapt, solve
 from ngcontact.geometries import blocks
 from ngcontact.geometries.region import Point, body, compound, polygon

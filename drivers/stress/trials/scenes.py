@@ -6,9 +6,9 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from drivers.markdown import table
 from drivers.stress import Outcome
 from drivers.stress.scenes.checks.judging import Finding, Verdict, judged
+from drivers.tables import table
 
 
 @dataclass(frozen=True)
