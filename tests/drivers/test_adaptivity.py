@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from drivers.adaptive_study.__main__ import main
-from drivers.adaptive_study.runs import rate, run_of, share_near
-from drivers.adaptive_study.studies import STUDIES, Name, error_measure
+from drivers.adaptive_study.runs import STUDIES, Name, error_measure, rate, run_of, share_near
 from drivers.reference import cases
 from ngcontact import adapt
 
