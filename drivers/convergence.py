@@ -185,7 +185,7 @@ PATCHES: dict[str, tuple[Callable[[], Case], int]] = {
 def print_table(title: str, table: Table, one: Run, levels: int) -> list[Level]:
     """Print the rows of one study as they come, then its mean rate and, of rings, P0 and Pn."""
     print(f"\n{title}")
-    case, last = table.case(), []
+    case, last = table.case(), list[Solution]()
     solved = study(
         case,
         order=one.order,

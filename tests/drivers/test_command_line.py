@@ -86,7 +86,7 @@ HELP = {
         "out": ("Folder", "out"),
     },
     "stress": {
-        "trials": ("Kinds of stress", "algebra data gaps held"),
+        "trials": ("Kinds of stress", "algebra data held scenes"),
         "seed": ("Number", "0"),
         "scenes": ("How many", "66"),
     },

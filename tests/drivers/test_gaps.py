@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import ngsolve as ng
 import numpy as np
+import pytest
 from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
@@ -14,10 +15,10 @@ from drivers.reference.curved import rings
 from drivers.reference.straight import Exact, relative_energy_error
 from drivers.reference.westergaard import hooke, moduli
 from drivers.stress import Outcome, solved
-from drivers.stress.trials.shapes import over_the_best, structured, touching
 from ngcontact import Contact, Problem, Solution, solve
 from ngcontact.geometries import rings as ring_geometry
 from ngcontact.geometries.region import body, compound, polygon
+from tests.drivers.test_shapes import over_the_best, structured, touching
 
 TINY = 1e-12  # gaps, in units of the bodies' size 1
 ROUND_OFF = 1e-14  # of displacements of the size 0.1: a hundred last bits
@@ -48,7 +49,7 @@ def stacked(gap: float, base: float) -> OCCGeometry:
     )
 
 
-def _continuity() -> Iterator[Outcome]:
+def continuity() -> Iterator[Outcome]:
     """Gap data of +-1e-12: the solution moves by no more than the gap."""
     for case, problem in (
         ("S6, closed", cases.pressure_patch().problem),
@@ -67,7 +68,7 @@ def _continuity() -> Iterator[Outcome]:
                 yield solved(f"{case}: dp / gap", varied, s, change, 5.0)
 
 
-def _last_bit() -> Iterator[Outcome]:
+def last_bit() -> Iterator[Outcome]:
     """Gaps measured from geometry: one last bit of the coordinates, and +-1e-12."""
 
     def pressed(gap: float, base: float, direction: tuple[float, float] | None) -> Solution:
@@ -91,7 +92,7 @@ def _last_bit() -> Iterator[Outcome]:
                 yield solved("touching blocks: du", varied, s, distance(s, zero), allowed)
 
 
-def _interference() -> Iterator[Outcome]:
+def interference() -> Iterator[Outcome]:
     """S9 without load, a shrink fit with the interference in the geometry, or given as a gap."""
     for interference, measured in (
         (1e-2, False),
@@ -158,7 +159,7 @@ def _degenerate() -> Iterator[tuple[str, str, Problem, Exact, float | None, int,
             yield "half at rest", f"{cells} cells", *_resting(cells), None, order, allowed
 
 
-def _without_strict_complementarity() -> Iterator[Outcome]:
+def without_strict_complementarity() -> Iterator[Outcome]:
     """Pressure and gap that vanish together: at the end of the contact, or on half of it."""
     for case, varied, problem, exact, maxh, order, allowed in _degenerate():
         s = solve(problem, maxh=maxh, order=order)
@@ -176,9 +177,11 @@ def _without_strict_complementarity() -> Iterator[Outcome]:
         yield solved(f"{case}: steps", f"order {order}", s, len(s.steps), MOST_STEPS)
 
 
-def outcomes() -> Iterator[Outcome]:
-    """All cases of this module."""
-    yield from _continuity()
-    yield from _last_bit()
-    yield from _interference()
-    yield from _without_strict_complementarity()
+@pytest.mark.study(witness=["last_bit"])
+@pytest.mark.parametrize(
+    "trial", [continuity, last_bit, interference, without_strict_complementarity]
+)
+def test_nothing_fails(trial):
+    found = list(trial())
+    assert found
+    assert [outcome for outcome in found if not outcome.passed] == []

@@ -11,15 +11,16 @@ from dataclasses import replace
 
 import ngsolve as ng
 import numpy as np
+import pytest
 from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
 from drivers.reference.straight import patch, relative_energy_error
 from drivers.reference.westergaard import effective_modulus, moduli
 from drivers.stress import Outcome, solved
-from drivers.stress.trials.shapes import structured
 from ngcontact import Contact, Problem, adapt, solve
 from ngcontact.geometries import blocks
+from tests.drivers.test_shapes import structured
 
 TURNS = (1e-9, 1e-6, 1e-4, 4e-4, 6e-4, 1e-3, 1e-2, 0.1, 1.0)
 PATCH = 1e-9  # of exactly represented stresses, resultants and pressures
@@ -33,7 +34,7 @@ HALF_WIDTHS = {"light": 0.1, "heavy": math.asin(math.sqrt(0.9)) / math.pi}
 NODES = 16  # segments in a wavelength
 
 
-def _uniform_stress() -> Iterator[Outcome]:
+def uniform_stress() -> Iterator[Outcome]:
     """The stress -I across lines with one corner: displacement, resultant and pressure."""
     template = cases.polygonal_patch()
     exact = template.exact.displacement["upper"]
@@ -52,7 +53,7 @@ def _uniform_stress() -> Iterator[Outcome]:
             yield solved("stress -I across a corner", varied, s, error, PATCH)
 
 
-def _ends_of_the_line() -> Iterator[Outcome]:
+def ends_of_the_line() -> Iterator[Outcome]:
     """Contact up to free, prescribed and guided sides of the bodies, exact at every order."""
     free = patch(cases.FIRST, cases.SECOND)
     ends = {"top": free.displacement["upper"], "bottom": free.displacement["lower"]}
@@ -108,7 +109,7 @@ def wavy(
     return problem, mean
 
 
-def _crests() -> Iterator[Outcome]:
+def crests() -> Iterator[Outcome]:
     """All ends of contact on 1, 8 and 64 crests, their places, and the mean pressure."""
     for load, waves, crest_at_ends in (
         (load, waves, ends) for load in HALF_WIDTHS for waves in WAVES for ends in (True, False)
@@ -135,7 +136,7 @@ def _crests() -> Iterator[Outcome]:
         yield solved(f"{load} waves: mean pressure", varied, s, error, 5e-3)
 
 
-def _adaptive() -> Iterator[Outcome]:
+def adaptive() -> Iterator[Outcome]:
     """Waves that the first mesh does not see: `adapt` finds all of them."""
     for waves, maxh, order, most in ((8, 0.3, 4, 15_000), (64, 0.1, 2, 20_000)):
         geometry = blocks(line=((0, 0), (1, 0)), height=0.5)
@@ -150,9 +151,9 @@ def _adaptive() -> Iterator[Outcome]:
         yield solved("adapt: mean pressure", varied, s, error, 1e-2)
 
 
-def outcomes() -> Iterator[Outcome]:
-    """All cases of this module."""
-    yield from _uniform_stress()
-    yield from _ends_of_the_line()
-    yield from _crests()
-    yield from _adaptive()
+@pytest.mark.study(witness=["ends_of_the_line"])
+@pytest.mark.parametrize("trial", [uniform_stress, ends_of_the_line, crests, adaptive])
+def test_nothing_fails(trial):
+    found = list(trial())
+    assert found
+    assert [outcome for outcome in found if not outcome.passed] == []
