@@ -1,4 +1,4 @@
-"""Tables of rows of one kind: printed as they come, in Markdown, in a file; errors beside Hertz's.
+"""Tables of rows of one kind: printed as they come, in Markdown, in a file.
 
 Columns map titles to entries: a format of the row, as "{0.unknowns:d}", or a function of it. Where
 they are printed a column is as wide as its title.
@@ -64,7 +64,7 @@ def write_csv(path: Path, rows: Sequence[Any]) -> None:
 def last_level(
     levels: Iterable[Solution],
     measured: Callable[[Solution], Q],
-    columns: Mapping[str, Callable[[Q], str]],
+    columns: Columns,
 ) -> tuple[Solution, Q]:
     """Print all levels as they come; the last one and what is `measured` of it."""
     print(f"unknowns  active  steps  estimate  {'  '.join(columns)}  seconds")
@@ -79,11 +79,3 @@ def last_level(
         )
         started = now
     return solution, computed
-
-
-def print_comparison(ratio: float, rows: Mapping[str, tuple[float, float]]) -> None:
-    """Print computed and expected values beside each other, at a `ratio` a/R."""
-    width = max(map(len, rows))
-    print(f"\n{f'At a/R = {ratio:.4f}':{width}s}   computed      Hertz  difference")
-    for name, (a, b) in rows.items():
-        print(f"{name:{width}s} {a:10.4f} {b:10.4f}  {(a / b - 1) * 100:+.3f} %")

@@ -7,7 +7,8 @@ from typing import get_args
 import pytest
 
 from drivers.published import __main__ as driver
-from drivers.published.problems import PUBLISHED, Hertz, lame
+from drivers.published.problems import PUBLISHED, lame
+from drivers.reference.half_spaces import Hertz
 
 
 def test_every_problem_can_be_asked_for_and_has_its_source():
