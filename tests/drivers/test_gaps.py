@@ -14,11 +14,11 @@ from drivers.reference import cases
 from drivers.reference.curved import rings
 from drivers.reference.straight import Exact, relative_energy_error
 from drivers.reference.westergaard import hooke, moduli
-from drivers.stress import Outcome, solved
+from drivers.stress import Outcome
 from ngcontact import Contact, Problem, Solution, solve
 from ngcontact.geometries import rings as ring_geometry
 from ngcontact.geometries.region import body, compound, polygon
-from tests.drivers.test_shapes import over_the_best, structured, touching
+from tests.drivers.test_shapes import over_the_best, solved, structured, touching
 
 TINY = 1e-12  # gaps, in units of the bodies' size 1
 ROUND_OFF = 1e-14  # of displacements of the size 0.1: a hundred last bits

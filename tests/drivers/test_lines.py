@@ -17,10 +17,10 @@ from netgen.occ import OCCGeometry
 from drivers.reference import cases
 from drivers.reference.straight import patch, relative_energy_error
 from drivers.reference.westergaard import effective_modulus, moduli
-from drivers.stress import Outcome, solved
+from drivers.stress import Outcome
 from ngcontact import Contact, Problem, adapt, solve
 from ngcontact.geometries import blocks
-from tests.drivers.test_shapes import structured
+from tests.drivers.test_shapes import solved, structured
 
 TURNS = (1e-9, 1e-6, 1e-4, 4e-4, 6e-4, 1e-3, 1e-2, 0.1, 1.0)
 PATCH = 1e-9  # of exactly represented stresses, resultants and pressures

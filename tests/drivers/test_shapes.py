@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from drivers.reference.cases import BLOCKS, FIRST, OUTSIDE, SECOND
 from drivers.reference.straight import Exact, Hertz, hertz, patch, relative_energy_error, transition
+from drivers.stress import Outcome
 from ngcontact import Contact, Problem, Solution, solve
 
 Array = NDArray[np.float64]
@@ -38,6 +39,12 @@ HALF_WIDTH = 2 / CELLS  # of the contact of S3, between two nodes
 PATCH = 1e-9  # of an exactly represented stress
 EPS = np.finfo(float).eps
 SIDES = ("contact", "right", "top", "left")
+
+
+def solved(case, varied, solution, error, allowed):
+    """A row of a test that makes many: what is solved and varied, the error and what is allowed."""
+    residual = max(solution.residuals.values())
+    return Outcome(case, varied, len(solution.steps), residual, float(error), allowed)
 
 
 def structured(x: Array, y: Array, move: Move = lambda x, y: (x, y)) -> ng.Mesh:
