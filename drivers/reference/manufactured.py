@@ -216,7 +216,6 @@ def polygonal(
         force,
         pressure=lambda x: along(x, "pressure"),
         gap=lambda x: along(x, "gap"),
-        initial_gap=ng.CF(0.0),
     )
 
 
@@ -254,7 +253,7 @@ def _bump_field(
     return near_zone(material, zone, _sum(*a), _sum((sign * bump.slip, hat)), _sum(*q))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Circular(Exact):
     """A zone on the unit circle, first quadrant, open between the angles `ends`."""
 
@@ -314,6 +313,5 @@ def circular(
         force,
         pressure=lambda t: pressure * np.maximum(np.cos(4 * np.asarray(t)) - turn, 0) ** 2,
         gap=lambda t: opening * np.maximum(turn - np.cos(4 * np.asarray(t)), 0) ** 3,
-        initial_gap=ng.CF(0.0),
         ends=(end, math.pi / 2 - end),
     )

@@ -132,8 +132,6 @@ def resting_half() -> Exact:
         stress,
         force,
         pressure=lambda s: np.where(np.asarray(s) < 0, np.asarray(s) ** 2, 0.0),
-        gap=lambda s: np.zeros(np.shape(s)),
-        initial_gap=ng.CF(0.0),
     )
 
 
