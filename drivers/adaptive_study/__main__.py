@@ -74,11 +74,6 @@ def compare(
             if (strategy, order) == ("adaptive", 2):
                 draw_meshes(out / f"meshes_{stem}.png", [s for s, _ in results], study.zone)
     draw_errors(out / f"errors_{stem}.png", name, runs)
-    print(f"\n{name}: seconds to a relative error, adaptive\norder      1e-2     1e-3     1e-4")
-    for (_, order, strategy), rows in runs.items():
-        if strategy == "adaptive":
-            times = [seconds_to(rows, 10.0**-k) for k in (2, 3, 4)]
-            print(f"{order:5d}  " + "  ".join(f"{t:7.2f}" for t in times))
     return [row for rows in runs.values() for row in rows]
 
 

@@ -35,15 +35,9 @@ PUNCHES = 24  # Gauss points of the sum of punches that is a cone: round-off at 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class Revolved(Exact):
-    """Exact solution of bodies of revolution; pressure and gap are functions of the radius.
+    """Exact solution of bodies of revolution; pressure and gap are functions of the radius."""
 
-    Attributes
-    ----------
-    hoop : dict[str, CoefficientFunction]
-        Hoop stress.
-    """
-
-    hoop: dict[str, CF]
+    hoop: dict[str, CF]  # stress
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -144,23 +138,11 @@ def hertz(upper: Elastic, lower: Elastic, *, radius: float, a: float) -> Hertz:
 
 @dataclass(frozen=True, eq=False)
 class Indentation:
-    """A rigid obstacle pressed into the half-space y < 0, contact for r <= a.
+    """A rigid obstacle pressed into the half-space y < 0 by P, contact for r <= a."""
 
-    Attributes
-    ----------
-    displacement : CoefficientFunction
-        (2,), not to be asked for at the edge of a punch and the tip of a cone.
-    pressure : callable
-        p on the circle, a NumPy function of the radius.
-    gap : CoefficientFunction
-        Height of the obstacle above y = 0, negative inside.
-    a, P : float
-        Radius of contact, force.
-    """
-
-    displacement: CF
-    pressure: Profile
-    gap: CF
+    displacement: CF  # (2,), not to be asked for at the edge of a punch and the tip of a cone
+    pressure: Profile  # on the circle, a NumPy function of the radius
+    gap: CF  # height of the obstacle above y = 0, negative inside
     a: float
     P: float
 

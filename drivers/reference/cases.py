@@ -43,15 +43,7 @@ OUTSIDE = {"upper": "top|upper_left|upper_right", "lower": "bottom|lower_left|lo
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A problem and its exact solution.
-
-    Attributes
-    ----------
-    problem : Problem
-        The continuous problem.
-    exact : Exact
-        Its solution.
-    """
+    """A continuous problem and its exact solution."""
 
     problem: Problem
     exact: Exact

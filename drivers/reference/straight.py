@@ -47,28 +47,15 @@ def closed(s: ArrayLike) -> NDArray[np.float64]:
 class Exact:
     """An exact contact solution; the dictionaries are keyed by the body's name.
 
-    Attributes
-    ----------
-    displacement : dict[str, CoefficientFunction]
-        (2,) displacement, finite and correct at every point of the body, vertices included.
-    stress : dict[str, CoefficientFunction]
-        (2, 2) in-plane stress; times the outward normal it gives the traction data.
-    force : dict[str, CoefficientFunction]
-        (2,) body force F = -div(stress).
-    pressure : callable
-        p >= 0 on the contact line, a NumPy function of x (rings: of the angle): -T_n in the bounded
-        zone problem, -T_xi per unit eta in the enlarging zone problem.
-    gap : callable
-        Gap >= 0 after deformation, a NumPy function of the same argument.
-    initial_gap : CoefficientFunction
-        Gap eps before deformation, the right side of the contact condition; negative: interference.
+    Pressure and gap are NumPy functions of x on the contact line, of the angle for rings.
     """
 
-    displacement: dict[str, CF]
-    stress: dict[str, CF]
-    force: dict[str, CF]
-    pressure: Profile
-    gap: Profile = closed
+    displacement: dict[str, CF]  # (2,), finite and correct at every point, vertices included
+    stress: dict[str, CF]  # (2, 2) in the plane; times the outward normal the traction data
+    force: dict[str, CF]  # (2,) body force F = -div(stress)
+    pressure: Profile  # >= 0: -T_n of bounded zones, -T_xi per unit eta of enlarging ones
+    gap: Profile = closed  # >= 0 after deformation
+    # Before deformation, the right side of the contact condition; negative: interference.
     initial_gap: CF = field(default_factory=lambda: ng.CF(0.0))
 
 

@@ -24,7 +24,6 @@ from drivers.benchmark.engines import (
     ngsolve,
 )
 from drivers.benchmark.engines.active_set import solved
-from drivers.benchmark.engines.kratos import forces
 from drivers.benchmark.engines.scipy_active_sets import FELUPE, SCIKIT
 from drivers.benchmark.scenes.meshes import KINDS, made, sides, which
 from drivers.benchmark.scenes.plane import contact_end, peak, weights
@@ -213,20 +212,6 @@ def test_readings_of_known_fields():
     # Both are parabolas where they are read, gap^(2/3) and the pressure: exact but for round-off.
     assert contact_end(x, force, gap) == pytest.approx(a, rel=1e-9)
     assert peak(x, force, 1) == pytest.approx(2, rel=1e-12)
-
-
-def test_forces_of_a_uniform_strain():
-    mesh = made(COMMON["disc"], "uniform", 1, 1000)
-    x, y = mesh.points.T
-    u = np.column_stack([1e-3 * x - 2e-3 * y, 2e-3 * x])  # one strain and a rotation
-    force, energy = forces(mesh.points, mesh.triangles, u, lam=3.0, mu=2.0)
-    corners = mesh.points[mesh.triangles]
-    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]).sum() / 2
-    assert energy == pytest.approx(area * (3.0 + 2 * 2.0) * 1e-6 / 2, rel=1e-12)
-    assert (force * u).sum() == pytest.approx(2 * energy, rel=1e-12)
-    inside = np.setdiff1d(np.arange(len(x)), np.concatenate([*map(np.ravel, mesh.edges.values())]))
-    assert np.abs(force[inside]).max() < 1e-12 * np.abs(force).max()
 
 
 @pytest.mark.study

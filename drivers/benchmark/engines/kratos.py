@@ -12,27 +12,21 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
+import ngsolve as ng
 import numpy as np
-from numpy.typing import NDArray
 
 from drivers.benchmark.engines import Engine, Solved
+from drivers.benchmark.engines.ngsolve import matrix, numbering, read_off
 from drivers.benchmark.scenes.meshes import OBSTACLE, Mesh
 from drivers.benchmark.scenes.plane import (
-    Numbering,
     Reading,
     contact_sides,
-    facing,
-    moduli,
     modulus,
     prescribed,
     pressures,
-    read,
     supports,
 )
 from drivers.benchmark.scenes.problems import Common
-
-Array = NDArray[np.float64]
-Indices = NDArray[np.intp]
 
 KRATOS = "KratosMultiphysics"
 STRUCTURAL = f"{KRATOS}.StructuralMechanicsApplication"
@@ -43,34 +37,31 @@ FAILED = Reading(math.nan, math.nan, math.nan)
 ROUND_OFF = 1e-6  # of nodal forces relative to the largest; the iteration stops before round-off
 
 
-def held(part: str, components: Sequence[float | None]) -> dict[str, Any]:
-    """Displacements of a part of the model that grow with time from 0 to 1."""
+def process(module: str, part: str, variable: str, **parameters: Any) -> dict[str, Any]:
+    """What grows with time from 0 to 1 on a part of the model."""
     return {
-        "python_module": "assign_vector_variable_process",
+        "python_module": f"assign_vector_{module}_process",
         "kratos_module": KRATOS,
         "Parameters": {
             "model_part_name": f"Structure.{part}",
-            "variable_name": "DISPLACEMENT",
-            "constrained": [u is not None for u in components] + [True],
-            "value": [None if u is None else f"{u}*t" for u in components] + [0.0],
+            "variable_name": variable,
             "interval": [0.0, "End"],
+            **parameters,
         },
     }
+
+
+def held(part: str, components: Sequence[float | None]) -> dict[str, Any]:
+    """Displacements of a part of the model."""
+    constrained = [u is not None for u in components] + [True]
+    value = [None if u is None else f"{u}*t" for u in components] + [0.0]
+    return process("variable", part, "DISPLACEMENT", constrained=constrained, value=value)
 
 
 def pressed(part: str, pressure: float) -> dict[str, Any]:
-    """Pressure downwards on a part of the model that grows with time from 0."""
-    return {
-        "python_module": "assign_vector_by_direction_to_condition_process",
-        "kratos_module": KRATOS,
-        "Parameters": {
-            "model_part_name": f"Structure.{part}",
-            "variable_name": "LINE_LOAD",
-            "modulus": f"{pressure}*t",
-            "direction": [0.0, -1.0, 0.0],
-            "interval": [0.0, "End"],
-        },
-    }
+    """Pressure downwards on a part of the model."""
+    down = {"modulus": f"{pressure}*t", "direction": [0.0, -1.0, 0.0]}
+    return process("by_direction_to_condition", part, "LINE_LOAD", **down)
 
 
 def settings(common: Common) -> dict[str, Any]:
@@ -187,45 +178,13 @@ def by_mortar(modules: Any, common: Common, made: Mesh, order: int) -> Solved:
         converged = False
     seconds = time.perf_counter() - started
     u = np.array([node.GetSolutionStepValue(core.DISPLACEMENT) for node in part.Nodes])[:, :2]
-    reading, energy = results(common, made, u) if converged else (FAILED, math.nan)
-    return Solved(seconds, sum(stage.counts), energy, reading)
-
-
-def forces(
-    points: Array, triangles: Indices, u: Array, lam: float, mu: float
-) -> tuple[Array, float]:
-    """Nodal forces (n, 2) that hold the displacements u (n, 2), and the strain energy.
-
-    `lam` and `mu` are Lame's moduli of plane strain.
-    """
-    corners = points[triangles]
-    across = np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1)  # the side opposite
-    (ax, ay), (bx, by) = across[:, 0].T, across[:, 1].T
-    double_area = ax * by - ay * bx
-    slope = np.stack([-across[..., 1], across[..., 0]], axis=2) / double_area[:, None, None]
-    gradient = np.einsum("eai,eaj->eij", u[triangles], slope)
-    strain = (gradient + gradient.transpose(0, 2, 1)) / 2
-    volume = np.trace(strain, axis1=1, axis2=2)
-    stress = 2 * mu * strain + lam * volume[:, None, None] * np.eye(2)
-    area = double_area / 2
-    result = np.zeros_like(u)
-    np.add.at(result, triangles, np.einsum("eij,eaj,e->eai", stress, slope, area))
-    return result, float(np.einsum("eij,eij,e->", stress, strain, area)) / 2
-
-
-def results(common: Common, made: Mesh, u: Array) -> tuple[Reading, float]:
-    """Reading and strain energy of nodal displacements (n, 2)."""
-    own = np.concatenate([at for name, at in made.bodies.items() if name != OBSTACLE])
-    force, energy = forces(made.points, made.triangles[own], u, *moduli(common))
-    n = len(made.points)
-    number = Numbering(made.points, np.arange(2 * n).reshape(2, n), made.edges)
+    if not converged:
+        return Solved(seconds, sum(stage.counts), math.nan, FAILED)
+    mesh, v = made.copy(), u.T.ravel()
+    pushed, number = matrix(common, ng.VectorH1(mesh, order=1)) @ v, numbering(mesh, 1)
     fixed, _ = prescribed(common, number)
-    line = facing(common, number)
-    nodal = np.where(fixed, 0.0, force.T.ravel())[line.at]
-    nodal[np.abs(nodal) < ROUND_OFF * nodal.max()] = 0.0  # open nodes
-    flat = u.T.ravel()
-    gap = line.gap + flat[line.at] - (0.0 if line.opposite is None else flat[line.opposite])
-    return read(common, line.x, nodal, gap, 1), energy
+    reading = read_off(common, number, v, np.where(fixed, 0.0, pushed), 1, ROUND_OFF)
+    return Solved(seconds, sum(stage.counts), float(v @ pushed) / 2, reading)
 
 
 MORTAR = Engine(

@@ -195,12 +195,19 @@ def by_penalty(_: object, common: Common, made: Mesh, order: int, penalty: float
     return Solved(seconds, steps, float(v @ pushed) / 2, reading)
 
 
-def read_off(common: Common, number: Numbering, v: Array, residual: Array, order: int) -> Reading:
-    """Reading of unknowns and their unbalanced forces (n,) without the penalty."""
+def read_off(
+    common: Common,
+    number: Numbering,
+    v: Array,
+    residual: Array,
+    order: int,
+    round_off: float = ROUND_OFF,
+) -> Reading:
+    """Reading of unknowns and their unbalanced forces (n,) without those of contact."""
     forward, backward = nodal(number)
     line, nodes = facing(common, number), backward @ v
     force = (forward.T @ residual)[line.at]
-    force[np.abs(force) < ROUND_OFF * force.max()] = 0.0  # open nodes
+    force[np.abs(force) < round_off * force.max()] = 0.0  # open nodes
     there = 0.0 if line.opposite is None else nodes[line.opposite]
     return read(common, line.x, force, nodes[line.at] - there + line.gap, order)
 

@@ -16,7 +16,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, cast
 
 import ngsolve as ng
 import numpy as np
@@ -27,7 +27,6 @@ from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from drivers.benchmark.scenes.problems import COMMONS, Name
 from drivers.benchmark.studies import Extent
 from drivers.benchmark.studies.linear import linear_solve, uniform_mesh
-from drivers.command_line import Count, Order, run
 from drivers.tables import markdown, table
 from ngcontact import solve
 from ngcontact.discrete import MULTIGRID
@@ -53,29 +52,10 @@ class Process:
     cycles: int  # V-cycles or back-solves for all of them
 
 
-def measure(name: Name, order: Order, size: Count, kind: Kind) -> Process:
+def measure(name: Name, order: int, size: int, kind: Kind) -> Process:
     """One solve, in this process, whose memory so far counts.
 
-    Parameters
-    ----------
-    name : str
-        Common problem.
-    order : int
-        Degree of the displacement on each element, 1 to 4.
-    size : int
-        Number of unknowns, about.
-    kind : str
-        What is solved, and how.
-
-    Returns
-    -------
-    Process
-        Seconds, memory in GB and the exact number of unknowns.
-
-    Raises
-    ------
-    RuntimeError
-        The solve took the other path.
+    Raises RuntimeError if it took another path than the one asked for.
     """
     problem = COMMONS[name]().problem
     mesh = uniform_mesh(problem, order, size)
@@ -207,4 +187,5 @@ def draw(path: Path, rows: Sequence[Process]) -> None:
 
 if __name__ == "__main__":
     ng.SetNumThreads(1)
-    print(json.dumps(asdict(run(measure))))
+    name, order, size, kind = sys.argv[1:]
+    print(json.dumps(asdict(measure(cast(Name, name), int(order), int(size), cast(Kind, kind)))))
