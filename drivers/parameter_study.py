@@ -19,10 +19,10 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from drivers.command_line import Count, Order, Positive, run
+from drivers.hertz import pressed
 from drivers.reference.half_spaces import Hertz, plane_modulus, together
 from drivers.tables import Columns, printed, write_csv
-from ngcontact import Contact, Elastic, Problem, adapt
-from ngcontact.geometries import disc_on_block
+from ngcontact import Elastic, Problem, adapt
 
 Row: TypeAlias = dict[str, float]
 Task: TypeAlias = tuple[Problem, int, float]  # with order and tolerance
@@ -45,17 +45,6 @@ def parameters(solves: int) -> list[tuple[float, float]]:
     depths = math.ceil(solves / len(moduli))
     grid = [(0.001 * 1.1**k, E) for k in range(depths) for E in moduli]
     return grid[:solves]
-
-
-def pressed(depth: float, E: float) -> Problem:
-    """A disc of radius 1 m, pressed on a block by a depth (m)."""
-    return Problem(
-        geometry=disc_on_block(),
-        materials={"disc": Elastic(E=E, nu=NU), "block": Elastic(E=BLOCK, nu=NU)},
-        displacement={"block_bottom": (0, 0), "disc_top": (0, -depth)},
-        sliding="axis",
-        contact=[Contact("disc_arc", "block_top", direction=(0, -1))],
-    )
 
 
 def solved(task: Task) -> Row:
@@ -161,7 +150,10 @@ def main(
     """
     one_thread()
     grid = parameters(solves)
-    tasks = [(pressed(*values), order, tolerance) for values in grid]
+    tasks = [
+        (pressed(1.0, depth, Elastic(E, NU), Elastic(BLOCK, NU)), order, tolerance)
+        for depth, E in grid
+    ]
     found, seconds = [], []
     for count in (1, processes):
         started = time.perf_counter()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import splu
 
 from drivers.benchmark.engines import Solved
-from drivers.benchmark.scenes.plane import Assembled, Bounded, bounded, read
+from drivers.benchmark.scenes.plane import Assembled, Facing, bounded, prescribed, read
 from drivers.benchmark.scenes.problems import Common
 
 Array = NDArray[np.float64]
@@ -29,22 +29,25 @@ SYMMETRIC: dict[str, Any] = {
 }
 
 
-def active_set(problem: Bounded, solve: Solver) -> tuple[Array, Array, int]:
-    """Primal-dual active set (m,) from the bounds that are attained before loading.
+def active_set(
+    K: sp.csr_array, f: Array, line: Facing, fixed: Mask, value: Array, solve: Solver
+) -> tuple[Array, Array, int]:
+    """Min v'Kv/2 - f'v over v (n,) with v[fixed] = value[fixed] and v[line.at] >= -line.gap (m,).
 
-    `solve(free, b)` factorises K and returns x with K x = b in the free unknowns, zero elsewhere.
-    Returns the minimiser (n,), the multipliers (m,) of the bounds, which are not negative, and the
-    number of linear systems. Raises RuntimeError if the set still changes after a hundred steps.
+    Primal-dual active set from the bounds that are attained before loading; `solve(free, b)`
+    factorises K and returns x with K x = b in the free unknowns, zero elsewhere. Returns v, the
+    multipliers (m,) of the bounds, which are not negative, and the number of linear systems. Raises
+    RuntimeError if the set still changes after a hundred steps.
     """
-    at, lower = problem.at, problem.lower
+    at, lower = line.at, -line.gap
     active = lower >= 0
     for step in range(1, STEPS + 1):
-        free = ~problem.fixed
+        free = ~fixed
         free[at[active]] = False
-        v = np.where(problem.fixed, problem.value, 0.0)
+        v = np.where(fixed, value, 0.0)
         v[at[active]] = lower[active]
-        v += solve(free, problem.f - problem.K @ v)
-        force = np.where(active, (problem.K @ v - problem.f)[at], 0.0)
+        v += solve(free, f - K @ v)
+        force = np.where(active, (K @ v - f)[at], 0.0)
         following = np.where(active, force > 0, v[at] < lower)
         if (following == active).all():
             return v, force, step
@@ -73,8 +76,10 @@ def solved(
 ) -> Solved:
     """What `assemble` returns, solved with `factor`; both are timed."""
     started = time.perf_counter()
-    problem, line = bounded(common, assemble())
-    v, force, steps = active_set(problem, factor(problem.K, order))
+    assembled = assemble()
+    K, f, line = bounded(common, assembled)
+    fixed, value = prescribed(common, assembled.numbering)
+    v, force, steps = active_set(K, f, line, fixed, value, factor(K, order))
     seconds = time.perf_counter() - started
     reading = read(common, line.x, force, v[line.at] + line.gap, order)
-    return Solved(seconds, steps, float(v @ (problem.K @ v)) / 2, reading)
+    return Solved(seconds, steps, float(v @ (K @ v)) / 2, reading)

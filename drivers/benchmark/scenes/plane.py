@@ -129,18 +129,6 @@ def facing(common: Common, numbering: Numbering) -> Facing:
     return Facing(place[:, 0], at, numbering.unknown[1, opposite], np.zeros(len(at)))
 
 
-@dataclass(frozen=True, eq=False)
-class Bounded:
-    """min v'Kv/2 - f'v over v (n,) with v[fixed] = value[fixed] and v[at] >= lower (m,)."""
-
-    K: sp.csr_array
-    f: Array
-    value: Array
-    fixed: Mask
-    at: Indices
-    lower: Array
-
-
 class Assembled(NamedTuple):
     """Elasticity of a common problem in a code's own unknowns.
 
@@ -153,8 +141,8 @@ class Assembled(NamedTuple):
     basis: sp.csr_array | None = None
 
 
-def bounded(common: Common, assembled: Assembled) -> tuple[Bounded, Facing]:
-    """The problem with one bound per contact node, and those nodes.
+def bounded(common: Common, assembled: Assembled) -> tuple[sp.csr_array, Array, Facing]:
+    """Stiffness and load in unknowns of which one is bounded per contact node, and those nodes.
 
     Where two bodies meet, the unknown of a secondary node is its opening over the node opposite.
     """
@@ -166,8 +154,7 @@ def bounded(common: Common, assembled: Assembled) -> tuple[Bounded, Facing]:
         basis = opening if basis is None else basis @ opening
     if basis is not None:
         K, f = (basis.T @ K @ basis).tocsr(), basis.T @ f
-    fixed, value = prescribed(common, numbering)
-    return Bounded(K, f, value, fixed, line.at, -line.gap), line
+    return K, f, line
 
 
 def middles(common: Common, made: Mesh, ends: Indices) -> Array:

@@ -61,7 +61,6 @@ class Scene:
     clamped: Mapping[str, Affine] = field(default_factory=dict)  # displacement of sides, vectors
     sliding: tuple[str, ...] = ()  # sides guided along themselves
     pressure: Mapping[str, Affine] = field(default_factory=dict)  # on sides, numbers
-    traction: Mapping[str, Point] = field(default_factory=dict)  # on sides, constant
     weight: Mapping[str, Point] = field(default_factory=dict)  # of bodies, per area
     finer: Mapping[str, float] | None = None
 
@@ -113,7 +112,6 @@ class Scene:
                 for k, a in self.clamped.items()
             },
             pressure={k: number(p, E) for k, p in self.pressure.items()},
-            traction={k: vector(t, E) for k, t in self.traction.items()},
             weight={k: vector(w, E / L) for k, w in self.weight.items()},
         )
 
@@ -127,7 +125,7 @@ class Scene:
             return tuple(new[name] for name in old)
 
         data: dict[str, Any] = {
-            k: keys(getattr(self, k)) for k in ("clamped", "pressure", "traction", "weight")
+            k: keys(getattr(self, k)) for k in ("clamped", "pressure", "weight")
         }
         return replace(
             self,

@@ -87,7 +87,6 @@ def loads(scene: Scene, mesh: ng.Mesh, v: ng.CoefficientFunction, body: Body, or
     own = {side.name for side in (*body.sides, *body.inner)}
     n = ng.specialcf.normal(2)
     rates = [(mesh.Boundaries(k), -field_of(p) * n) for k, p in scene.pressure.items() if k in own]
-    rates += [(mesh.Boundaries(k), ng.CF(t)) for k, t in scene.traction.items() if k in own]
     rates += [(mesh.Materials(k), ng.CF(w)) for k, w in scene.weight.items() if k == body.name]
     return float(sum(ng.Integrate(rate * v, region, order=order) for region, rate in rates))
 

@@ -91,19 +91,15 @@ def stiffness(m: Plane) -> tuple[sp.csr_array, Array]:
     return A, f
 
 
-def tractions(m: Plane) -> Array:
-    """Load (2n,) of tractions and pressures, exact for affine ones on straight sides."""
+def pressures(m: Plane) -> Array:
+    """Load (2n,) of pressures, exact for affine ones on straight sides."""
     f = np.zeros(2 * len(m.x))
-    g = 0.5 + np.array([-0.5, 0.5]) / 3**0.5
-    for name in {*m.scene.pressure, *m.scene.traction}:
+    for name, pressure in m.scene.pressure.items():
         for i, side in enumerate(m.scene.sides[name]):
             v, s = m.nodes[name, i], m.arcs[name, i]
-            for t in g:
+            for t in 0.5 + np.array([-0.5, 0.5]) / 3**0.5:
                 at = s[:-1] + t * np.diff(s)
-                load = np.zeros((len(at), 2))
-                if name in m.scene.pressure:
-                    load -= m.scene.pressure[name](side.point(at))[:, None] * side.normal(at)
-                load += m.scene.traction.get(name, (0.0, 0.0))
+                load = -pressure(side.point(at))[:, None] * side.normal(at)
                 load *= np.diff(s)[:, None] / 2
                 for c in (0, 1):
                     np.add.at(f, 2 * v[:-1] + c, (1 - t) * load[:, c])
@@ -248,7 +244,7 @@ def reference(scene: Scene, factor: float) -> Measures:
     """Numbers of the order-1 solution on a mesh of `factor` times the sizes of the scene."""
     m = plane(scene, netgen_mesh(scene, factor))
     A, f = stiffness(m)
-    f = f + tractions(m)
+    f = f + pressures(m)
     T, u0 = supported(m)
     B, g, places = contact_rows(m)
     node = np.unique(B.nonzero()[1]) // 2  # with both components: no body moves while they rest
