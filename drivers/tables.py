@@ -47,6 +47,11 @@ def table(titles: Iterable[str], rows: Iterable[Sequence[object]]) -> str:
     return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
 
 
+def of_dicts(rows: Sequence[Mapping[str, object]]) -> str:
+    """Markdown table of rows whose keys are the titles."""
+    return table(rows[0], [list(row.values()) for row in rows])
+
+
 def markdown(columns: Columns, rows: Iterable[object]) -> str:
     """Markdown table of rows."""
     return table(columns, [entries(columns, row) for row in rows])

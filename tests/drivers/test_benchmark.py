@@ -236,10 +236,10 @@ def test_small_problems_do_not_stay_iterative():
 def test_driver_writes_the_parts_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     found = main(["tax"], problems=["block"], rounds=1, max_dofs=10_000, out=tmp_path)
     assert list(found) == ["tax"]
-    sizes = [row.unknowns for row in found["tax"]]
+    sizes = [row["unknowns"] for row in found["tax"]]
     assert len(sizes) == 2 * 2  # orders, sizes
     assert max(sizes) < 11_000
-    assert all(row.linear > 0 and row.cold > 0 and row.warm > 0 for row in found["tax"])
+    assert all(float(row[k]) > 0 for row in found["tax"] for k in ("linear, s", "cold", "warm"))
     [path] = tmp_path.iterdir()
     assert path.name == "benchmark_tax.md"
     assert path.read_text() in capsys.readouterr().out
@@ -272,11 +272,11 @@ def test_every_stage_of_a_level_is_found():
 @pytest.mark.study
 def test_stages_fill_a_level():
     if sys.version_info < (3, 12):
-        found = stages.stages(COMMON["block"], 1000).seconds
+        _, found = stages.stages(COMMON["block"], 1000)
         assert [stage for stage, seconds in found.items() if not seconds > 0] == ["multigrid"]
         return
     try:  # newer profilers may miss outer calls: then it says so
-        found = stages.stages(COMMON["block"], 1000).seconds
+        _, found = stages.stages(COMMON["block"], 1000)
     except RuntimeError:
         found = {"assembly": 1.0}
     assert found["assembly"] > 0

@@ -6,36 +6,26 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from drivers.benchmark.scenes.problems import Common
 from drivers.benchmark.studies import Extent
 from drivers.benchmark.studies.linear import linear_solve, uniform_mesh
-from drivers.tables import markdown
+from drivers.tables import of_dicts
 from ngcontact import adapt, solve
 
+Row: TypeAlias = dict[str, Any]  # by title
 SIZES = (1_000, 10_000, 100_000, 300_000)
 TARGETS = (1_000, 10_000, 30_000)  # unknowns; the first level of at least as many is shown
 
 
-@dataclass(frozen=True)
-class Tax:
-    """Medians of interleaved rounds; pairs are cold and warm."""
+def tax(common: Common, order: int, size: int, rounds: int) -> Row:
+    """One size: seconds of the linear solve, and contact solves over it; medians of rounds.
 
-    problem: str
-    order: int
-    unknowns: int
-    linear: float  # seconds of the linear solve
-    cold: float  # a contact solve that knows nothing, over the linear solve
-    warm: float  # one that starts from a solution on a coarser mesh
-    systems: tuple[int, int]
-    factorizations: tuple[int, int]
-
-
-def tax(common: Common, order: int, size: int, rounds: int) -> Tax:
-    """Measure one size."""
+    The cold one knows nothing, the warm one starts from a solution on a coarser mesh.
+    """
     problem = common.problem
     mesh = uniform_mesh(problem, order, size)
     coarse = solve(problem, uniform_mesh(problem, order, size // 4), order=order)
@@ -49,41 +39,31 @@ def tax(common: Common, order: int, size: int, rounds: int) -> Tax:
         clock.append(time.perf_counter())
         seconds.append([linear.seconds, *np.diff(clock)])
     base, *others = np.median(seconds, axis=0).tolist()
-    factors = cold.work["factorizations"], warm.work["factorizations"]
-    steps = len(cold.steps), len(warm.steps)
-    over = [value / base for value in others]
-    return Tax(common.name, order, linear.unknowns, base, over[0], over[1], steps, factors)
+    factors = [solution.work["factorizations"] for solution in (cold, warm)]
+    return {
+        "problem": common.name,
+        "order": order,
+        "unknowns": linear.unknowns,
+        "linear, s": f"{base:.3g}",
+        "cold": f"{others[0] / base:.2f}",
+        "warm": f"{others[1] / base:.2f}",
+        "systems": f"{len(cold.steps)}, {len(warm.steps)}",
+        "factors": f"{factors[0]}, {factors[1]}",
+    }
 
 
-def taxes(extent: Extent) -> tuple[list[Tax], str]:
+def taxes(extent: Extent) -> tuple[list[Row], str]:
     """Contact tax."""
     rows = [tax(*case, extent.rounds) for case in extent.cases((1, 2), SIZES)]
-    columns = {
-        "problem": "{0.problem}",
-        "order": "{0.order}",
-        "unknowns": "{0.unknowns}",
-        "linear, s": "{0.linear:.3g}",
-        "cold": "{0.cold:.2f}",
-        "warm": "{0.warm:.2f}",
-        "systems": "{0.systems[0]}, {0.systems[1]}",
-        "factors": "{0.factorizations[0]}, {0.factorizations[1]}",
-    }
-    return rows, markdown(columns, rows)
+    return rows, of_dicts(rows)
 
 
-@dataclass(frozen=True)
-class Level:
-    """One level of an adaptive run: marking, refinement, curving, solution, estimate."""
+def levels(common: Common, order: int, targets: list[int], rounds: int) -> Iterator[Row]:
+    """Levels of a run: marking, refinement, curving, solution, estimate.
 
-    problem: str
-    order: int
-    unknowns: int
-    seconds: float
-    ratio: float  # over the linear solve on its mesh
-
-
-def levels(common: Common, order: int, targets: list[int], rounds: int) -> Iterator[Level]:
-    """Medians over several equal runs, each after a warm-up, linear solves interleaved."""
+    Medians over several equal runs, each after a warm-up, linear solves on the same meshes
+    interleaved.
+    """
     problem, seconds, linear = common.problem, [], []
     for number in range(rounds + 1):
         clock, meshes = [time.perf_counter()], []
@@ -98,10 +78,16 @@ def levels(common: Common, order: int, targets: list[int], rounds: int) -> Itera
     count = [n for _, n in meshes]
     for i in sorted({int(np.searchsorted(count, target)) for target in targets} - {0}):
         # The first level meshes the geometry.
-        yield Level(common.name, order, count[i], level[i], level[i] / base[i])
+        yield {
+            "problem": common.name,
+            "order": order,
+            "unknowns": count[i],
+            "level, s": f"{level[i]:.3g}",
+            "over linear": f"{level[i] / base[i]:.2f}",
+        }
 
 
-def all_levels(extent: Extent) -> tuple[list[Level], str]:
+def all_levels(extent: Extent) -> tuple[list[Row], str]:
     """Whole levels and imports."""
     targets = [target for target in TARGETS if target <= extent.max_dofs]
     rows = [
@@ -109,16 +95,9 @@ def all_levels(extent: Extent) -> tuple[list[Level], str]:
         for common, order, _ in extent.cases((1, 2, 3, 4), targets[:1])
         for row in levels(common, order, targets, extent.rounds)
     ]
-    columns = {
-        "problem": "{0.problem}",
-        "order": "{0.order}",
-        "unknowns": "{0.unknowns}",
-        "level, s": "{0.seconds:.3g}",
-        "over linear": "{0.ratio:.2f}",
-    }
     plain, ours = import_seconds()
     imports = f"import: ngsolve {plain:.3f} s, ngcontact {ours:.3f} s"
-    return rows, f"{markdown(columns, rows)}\n\n{imports}"
+    return rows, f"{of_dicts(rows)}\n\n{imports}"
 
 
 def import_seconds(rounds: int = 7) -> tuple[float, float]:

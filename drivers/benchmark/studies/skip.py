@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
@@ -11,7 +10,7 @@ import numpy as np
 from drivers.benchmark.studies import Extent
 from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
-from drivers.tables import markdown
+from drivers.tables import of_dicts
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.geometries import blocks
 from ngcontact.geometries.region import body, compound, polygon
@@ -20,18 +19,6 @@ SIZE = 15_000  # unknowns, about
 ORDER = 2
 STEEL = Elastic(E=200.0, nu=0.3)
 COUNTS = ("factorizations", "back_solves", "gap_searches", "curved_elements", "estimates")
-
-
-@dataclass(frozen=True)
-class Scene:
-    """One solution; `work` of which a variant does not need is 0."""
-
-    feature: str
-    variant: str
-    unknowns: int
-    systems: int
-    work: dict[str, int]
-    seconds: float
 
 
 def two_blocks(gap: float | None = None, third: bool = False) -> Problem:
@@ -54,10 +41,10 @@ def two_blocks(gap: float | None = None, third: bool = False) -> Problem:
     )
 
 
-def scenes(extent: Extent) -> tuple[list[Scene], str]:
+def scenes(extent: Extent) -> tuple[list[dict[str, object]], str]:
     """What scenes skip."""
     opening, rings = two_blocks(), cases.ring_in_ring().problem
-    found = []
+    found: list[dict[str, object]] = []
     for feature, variant, problem in (
         ("contact", "touching", opening),
         ("contact", "apart", two_blocks(gap=1.0)),
@@ -77,15 +64,14 @@ def scenes(extent: Extent) -> tuple[list[Scene], str]:
             if variant == "asked for":
                 _ = solution.error_estimate
             seconds.append(time.perf_counter() - start)
-        unknowns, work = solution.displacement.space.ndof, {k: solution.work[k] for k in COUNTS}
-        spent = len(solution.steps), work, float(np.median(seconds))
-        found.append(Scene(feature, variant, unknowns, *spent))
-    columns = {
-        "feature": "{0.feature}",
-        "scene": "{0.variant}",
-        "unknowns": "{0.unknowns}",
-        "systems": "{0.systems}",
-        **{name.replace("_", " "): f"{{0.work[{name}]}}" for name in COUNTS},
-        "s": "{0.seconds:.3g}",
-    }
-    return found, markdown(columns, found)
+        found.append(
+            {
+                "feature": feature,
+                "scene": variant,
+                "unknowns": solution.displacement.space.ndof,
+                "systems": len(solution.steps),
+                **{name.replace("_", " "): solution.work[name] for name in COUNTS},
+                "s": f"{np.median(seconds):.3g}",
+            }
+        )
+    return found, of_dicts(found)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import cProfile
 import pstats
 import time
-from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.benchmark.scenes.problems import Common
 from drivers.benchmark.studies import Extent
 from drivers.benchmark.studies.linear import uniform_mesh
-from drivers.tables import table
+from drivers.tables import of_dicts
 from ngcontact import solve
 from ngcontact.adaptivity import doerfler, refined
 
@@ -34,17 +33,11 @@ STAGES = {  # cumulative seconds of these functions; none calls another
 }
 
 
-@dataclass(frozen=True)
-class Stages:
-    """Seconds of a level by stage; `rest` is what no stage contains."""
+def stages(common: Common, size: int) -> tuple[int, dict[str, float]]:
+    """Unknowns, and seconds by stage; "rest" is what no stage contains.
 
-    problem: str
-    unknowns: int
-    seconds: dict[str, float]
-
-
-def stages(common: Common, size: int) -> Stages:
-    """Profile one level: a solution started from a coarser one, its estimate, a refinement."""
+    Of one profiled level: a solution started from a coarser one, its estimate, a refinement.
+    """
     problem = common.problem
     mesh = uniform_mesh(problem, ORDER, size)
     start = solve(problem, uniform_mesh(problem, ORDER, max(size // 4, 500)), order=ORDER)
@@ -68,19 +61,18 @@ def stages(common: Common, size: int) -> Stages:
             "Python's profiler has missed the assembly; use another Python, like 3.11"
         )
     spent["rest"] = clock - sum(spent.values())
-    return Stages(common.name, solution.displacement.space.ndof, spent)
+    return solution.displacement.space.ndof, spent
 
 
-def all_stages(extent: Extent) -> tuple[list[Stages], str]:
+def all_stages(extent: Extent) -> tuple[list[dict[str, object]], str]:
     """Where the time of a level goes."""
-    rows = []
+    rows: list[dict[str, object]] = []
     for common, _, size in extent.cases((ORDER,), SIZES):
         if size == SIZES[0]:
             stages(common, size)  # warm-up
-        rows.append(stages(common, size))
-    table_rows = []
-    for row in rows:
-        total = sum(row.seconds.values())
-        shares = (f"{100 * seconds / total:.0f} %" for seconds in row.seconds.values())
-        table_rows.append((row.problem, row.unknowns, f"{total:.3g}", *shares))
-    return rows, table(("problem", "unknowns", "level, s", *STAGES, "rest"), table_rows)
+        unknowns, seconds = stages(common, size)
+        total = sum(seconds.values())
+        shares = {name: f"{100 * spent / total:.0f} %" for name, spent in seconds.items()}
+        row = {"problem": common.name, "unknowns": unknowns, "level, s": f"{total:.3g}"}
+        rows.append(row | shares)
+    return rows, of_dicts(rows)
