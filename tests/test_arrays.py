@@ -1,7 +1,5 @@
 """Squares that stay in the range of numbers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,9 +1,4 @@
-"""Bodies of revolution against closed forms: tubes, shells, laws, a ball on its seat, zones.
-
-Tolerances are two to five times what was measured, where no other reason is given.
-"""
-
-from __future__ import annotations
+"""Bodies of revolution against closed forms: tubes, shells, laws, a ball on its seat, zones."""
 
 import math
 

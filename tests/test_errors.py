@@ -1,7 +1,5 @@
 """Warnings point at the caller's line."""
 
-from __future__ import annotations
-
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -17,13 +15,6 @@ def test_a_warning_names_the_line_outside_of_the_package():
     with pytest.warns(ContactWarning, match="may be wrong") as caught:
         warn("this may be wrong")
     assert Path(caught[0].filename) == Path(__file__)
-
-
-def test_a_warning_can_be_made_an_error():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", ContactWarning)
-        with pytest.raises(ContactWarning):
-            warn("this may be wrong")
 
 
 def test_folders_that_begin_like_the_package_are_outside_of_it():

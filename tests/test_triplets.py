@@ -1,7 +1,5 @@
 """Sparse arrays from entries: repeated ones add, indices have as many bits as they need."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp

@@ -1,7 +1,5 @@
 """Meshes from the indicators for another load: forecasts turned round, sizes, coarsening."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -47,11 +45,6 @@ def test_what_is_forecast_of_parts_is_recalled_from_them(power, scale):
     assert squares == pytest.approx([0.7], rel=1e-13)
 
 
-def test_of_an_element_without_known_ones_nothing_is_recalled():
-    known = Forecast(TRIANGLE, np.ones(1), 2, NONE)
-    assert np.isnan(recalled(known, np.array([2]), PARTS)).tolist() == [True, True, False, True]
-
-
 @pytest.mark.parametrize("order", [1, 2, 4])
 @pytest.mark.parametrize("times", [1, 1 / 2, 2])
 def test_the_mesh_is_as_fine_as_the_error_asks_for(order, times):
@@ -67,14 +60,6 @@ def test_the_mesh_is_as_fine_as_the_error_asks_for(order, times):
     assert np.bincount(descent.element).min() >= 0.7 * 16 / times**2  # measured 0.75
 
 
-def test_an_error_that_may_be_large_takes_the_first_mesh():
-    mesh, fine, origin = divided(2)
-    known = Forecast(Triangulation(fine).corners, np.full(fine.ne, 1 / fine.ne), 2, NONE)
-    same, descent = rebuilt(PROBLEM, Descent(mesh, origin), known, aim(1e9), "isoparametric")
-    assert same is mesh
-    assert descent.element.tolist() == list(range(mesh.ne))
-
-
 def test_what_was_refined_without_need_is_not_refined():
     """Indicators in the upper block alone: the lower one is left but for facing segments."""
     mesh, fine, origin = divided(3)
@@ -88,16 +73,3 @@ def test_what_was_refined_without_need_is_not_refined():
     assert (first[descent.element] == above).all()
     assert diameters(new)[~above].max() == pytest.approx(diameters(mesh)[~first].max())
     assert (~above).sum() < 0.3 * (~upper).sum()
-
-
-def test_what_was_refined_with_need_is_refined_there():
-    """Sizes follow the known mesh, which is fine at the left alone."""
-
-    def left(mesh):
-        return Triangulation(mesh).corners.mean(axis=1)[:, 0] < -0.5
-
-    mesh, fine, origin = divided(3, left)
-    known = Forecast(Triangulation(fine).corners, np.full(fine.ne, 1 / fine.ne), 2, NONE)
-    new, _ = rebuilt(PROBLEM, Descent(mesh, origin), known, aim(1.001), "isoparametric")
-    assert left(new).sum() == pytest.approx(left(fine).sum(), rel=0.05)
-    assert new.ne == pytest.approx(fine.ne, rel=0.2)  # measured 1.16: means across the border

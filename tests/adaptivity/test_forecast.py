@@ -1,7 +1,5 @@
 """Forecasts: exact where the behaviour is known, close on real fields; plans and their ends."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import ngsolve as ng
@@ -11,7 +9,6 @@ import pytest
 from drivers.reference import cases
 from ngcontact import Elastic, Problem, adapt, adaptive
 from ngcontact.adaptivity import Aim, Forecast, Refinement, Refining, planned, unresolvable
-from ngcontact.adaptivity.forecast import touching
 from ngcontact.estimator import Estimate
 from ngcontact.fem import unknowns
 from ngcontact.geometries import blocks
@@ -60,14 +57,6 @@ def test_the_error_at_a_singular_point_falls_with_its_own_power():
     assert new.error == pytest.approx(np.sqrt(11 / 64), rel=1e-14)
 
 
-def test_elements_that_touch_a_point():
-    places = np.array([[0.3, 0.3], [0.0, 0.0], [0.5, 0.5], [-0.05, 0.3], [-0.2, 0.3], [0.7, 0.7]])
-    [found] = touching(TRIANGLE, places)
-    assert found.tolist() == [True, True, True, True, False, False]
-    turned = touching(7 * TRIANGLE[:, ::-1] + 3, 7 * places + 3)
-    assert (turned == found).all()
-
-
 def test_plans_end_at_the_aim_and_never_exceed_the_most():
     mesh = first_mesh(problem(), 0.25)
     marked = np.arange(mesh.ne) < 5
@@ -87,19 +76,6 @@ def test_plans_end_at_the_aim_and_never_exceed_the_most():
     assert plan(unknowns=4000, most=sizes[2] - 1)[0] < sizes[2]
     assert plan(unknowns=4000, most=sizes[2]) == (sizes[2], errors[2])
     assert plan(unknowns=4000, most=1) == (sizes[0], errors[0])
-
-
-def test_large_elements_at_ends_of_contact_are_marked():
-    mesh = first_mesh(problem(), 0.25)
-    place = Triangulation(mesh).vertices[:1]
-    singular = replace(unresolvable(list(place)), powers=np.array([1.5]), extents=np.array([2.0]))
-    base = forecast(mesh, singular=singular)
-    base = replace(base, squares=np.where(np.arange(mesh.ne) == mesh.ne - 1, 1.0, 0.0))
-    at = touching(base.corners, place)[:, 0]
-    few, many = base.marked(0.5, 10.0), base.marked(0.5, 0.01)
-    assert np.flatnonzero(few).tolist() == [mesh.ne - 1]
-    assert (many == (few | at)).all()
-    assert many.sum() > few.sum()
 
 
 @pytest.mark.parametrize(

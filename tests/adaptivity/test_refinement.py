@@ -1,7 +1,5 @@
 """Refinement: copies, matched contact lines, exact curves, positive triangles, local marks."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,7 +18,7 @@ from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, rings
 from ngcontact.mesh import curve, first_mesh
 from ngcontact.problem import Triangulation
-from tests.scenes import coordinates, unmatched_blocks, vertices
+from tests.scenes import coordinates, vertices
 
 SOFT = Elastic(E=1.0, nu=0.3)
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
@@ -182,15 +180,6 @@ def test_facing_vertices_of_an_enlarging_zone_keep_common_eta(locally_refined, n
     assert distance.min(axis=1).max() < ROUND_OFF
 
 
-@SIDES
-@pytest.mark.parametrize("name", ["bounded rings", "bounded whole rings"])
-def test_vertices_stay_on_the_circles(locally_refined, name, side):
-    _, mesh = locally_refined(name, side)
-    for boundary, radius in (("hole", 0.5), ("inner_contact|outer_contact", 1.0), ("rim", 2.0)):
-        distance = np.linalg.norm(vertices(mesh, boundary), axis=1)
-        assert np.abs(distance - radius).max() < ROUND_OFF
-
-
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 @pytest.mark.parametrize("name", ALL)
 def test_the_divergence_theorem_holds_on_the_curved_mesh(locally_refined, name, order):
@@ -242,30 +231,6 @@ def test_an_unmarked_facing_segment_is_divided_once_and_no_further():
     assert len(new["upper_contact"]) == 1
 
 
-def test_new_vertices_meet_halfway_between_those_of_the_two_lines():
-    """Of the block: the middle of a segment. Of the disc: that of a chord, thrown on the circle."""
-    problem = ENLARGING["disc on block"].problem()
-    mesh = first_mesh(problem, 0.4)
-    old = np.sort(vertices(mesh, "block_top")[:, 0])
-    old = old[old < 0.9]
-    ends = np.column_stack([old, 1 - np.sqrt(1 - old**2)])
-    chord = (ends[1:] + ends[:-1]) / 2 - [0, 1]
-    on_arc = chord[:, 0] / np.linalg.norm(chord, axis=1)
-    expected = (on_arc + (old[1:] + old[:-1]) / 2) / 2
-    for boundary in ("block_top", "disc_arc"):
-        x = np.sort(vertices(refined(problem, mesh), boundary)[:, 0])
-        new = x[1 : 2 * len(expected) : 2]
-        assert new == pytest.approx(expected, abs=ROUND_OFF)
-
-
-def test_nothing_marked_nothing_refined():
-    problem = ENLARGING["disc on block"].problem()
-    mesh = first_mesh(problem, 0.4)
-    result = refined(problem, mesh, np.zeros(mesh.ne, dtype=bool))
-    assert result is not mesh
-    assert (coordinates(result) == coordinates(mesh)).all()
-
-
 @pytest.mark.parametrize("name", ALL)
 def test_uniform_refinement_quadruples_the_elements(name):
     problem = ALL[name].problem()
@@ -274,46 +239,6 @@ def test_uniform_refinement_quadruples_the_elements(name):
     assert result.ne == 4 * mesh.ne
     assert result.nv == mesh.nv + mesh.nedge
     assert len(list(result.Elements(ng.BND))) == 2 * len(list(mesh.Elements(ng.BND)))
-
-
-@pytest.mark.parametrize("degree", [1, 3])
-def test_the_given_mesh_and_its_functions_stay(degree):
-    problem = ENLARGING["disc on block"].problem()
-    mesh = ng.Mesh(first_mesh(problem, 0.4).ngmesh.Copy())
-    mesh.Curve(degree)
-    function = ng.GridFunction(ng.H1(mesh, order=3))
-    function.Set(ng.sin(3 * ng.x) * ng.exp(ng.y))
-    area = ng.Integrate(ng.CF(1), mesh)
-    before = mesh.ne, mesh.nv, coordinates(mesh), function.vec.FV().NumPy().copy()
-    value, at = function(mesh(0.4, 0.7)), ng.Integrate(function, mesh)
-    refined(problem, mesh)
-    refined(problem, mesh, np.arange(mesh.ne) < 5)
-    assert (mesh.ne, mesh.nv) == before[:2]
-    assert (coordinates(mesh) == before[2]).all()
-    assert (function.vec.FV().NumPy() == before[3]).all()
-    assert function(mesh(0.4, 0.7)) == value
-    assert ng.Integrate(function, mesh) == at
-    assert ng.Integrate(ng.CF(1), mesh) == area
-    assert mesh.GetCurveOrder() == degree
-
-
-def test_refinement_is_the_same_every_time():
-    problem = ENLARGING["disc on disc"].problem()
-    mesh = first_mesh(problem, 0.4)
-    marked = near_tip(mesh, "lower_arc", 0.5)
-    first, second = (coordinates(refined(problem, mesh, marked)) for _ in range(2))
-    assert (first == second).all()
-
-
-def test_names_and_geometry_survive():
-    problem = ENLARGING["disc on block"].problem()
-    mesh = first_mesh(problem, 0.4)
-    result = refined(problem, mesh, near_tip(mesh, "disc_arc", 0.5))
-    assert result.GetMaterials() == mesh.GetMaterials()
-    assert result.GetBoundaries() == mesh.GetBoundaries()
-    result.Curve(4)
-    # The half disc and the block of the geometry, exact to the order of the curve.
-    assert ng.Integrate(ng.CF(1), result) == pytest.approx(math.pi / 4 + 4, rel=1e-6)
 
 
 @SIDES
@@ -394,13 +319,3 @@ def test_a_mesh_without_cad_stays_matched():
     assert np.diff(here).max() == 0.25
     assert here == pytest.approx(there, abs=ROUND_OFF)
     assert problem.geometry.ne == 64
-
-
-def test_lines_that_never_matched_are_left_to_the_gap_search():
-    problem = Problem(
-        geometry=unmatched_blocks(),
-        materials=dict.fromkeys(BLOCKS, SOFT),
-        contact=[Contact("upper_contact", "lower_contact")],
-    )
-    mesh = first_mesh(problem, 0.5)
-    assert refined(problem, mesh).ne == 4 * mesh.ne

@@ -1,7 +1,5 @@
 """Which order a level has."""
 
-from __future__ import annotations
-
 import pytest
 
 from ngcontact.adaptivity import Refinement

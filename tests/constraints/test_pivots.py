@@ -1,13 +1,11 @@
 """Which node hosts a contact row: the secondary's, the softer, one that is free."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from ngcontact.constraints.basis_transformation import change_of_basis
-from ngcontact.constraints.pivots import CONTRAST, coefficients_at
-from tests.constraints.given import X, Y, clamped, conditions, rows
+from ngcontact.constraints.pivots import CONTRAST
+from tests.constraints.given import Y, clamped, conditions, rows
 
 
 def hosts(contact, given=None, stiffness=None):
@@ -34,11 +32,3 @@ def test_a_much_softer_node_that_is_held_does_not_host():
     stiffness = np.array([1.1 * CONTRAST, 1.0, 1.0])
     assert hosts(contact, conditions(*clamped(2)), stiffness) == [0]
     assert hosts(contact, conditions(*clamped(0), *clamped(2)), stiffness) == [1]
-
-
-def test_coefficients_of_rows_at_nodes():
-    B = rows(3, (0, (0.6, 0.8), {1: 0.5}), (1, X, {2: 1.0})).matrix
-    found = coefficients_at(B, np.array([0, 0, 1]), np.array([0, 1, 0]))
-    np.testing.assert_array_equal(found, [[0.6, 0.8], [-0.3, -0.4], [0, 0]])
-    none = np.zeros(0, dtype=np.intp)
-    assert coefficients_at(B, none, none).shape == (0, 2)

@@ -1,7 +1,5 @@
 """Rows where nodes do not face nodes, against exact solutions that the elements contain."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import ngsolve as ng
@@ -34,14 +32,6 @@ def test_pressures_of_degree_p_minus_1_are_exact(slope, order, ratio, swap):
     pressure = case.exact.pressure(solution.points[:, 0])
     np.testing.assert_allclose(solution.pressure, pressure, rtol=EXACT)
     assert abs(np.linalg.norm(solution.contact_force()) - 2.0) < 2 * EXACT  # p = 1 + slope x
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("swap", [False, True])
-def test_polygonal_zones_are_exact(order, swap):
-    case = cases.polygonal_patch()
-    solution = solve(pressed(case, (3, 5), swap), maxh=0.5, order=order)
-    assert relative_energy_error(solution, case.exact) < EXACT
 
 
 @pytest.mark.parametrize("rows", ["auto", "dual"])
@@ -150,17 +140,6 @@ def test_rings_converge_at_the_best_rates(order):
     )  # measured .91, 2.07, 3.2
 
 
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.study(witness=["2"])
-def test_no_worse_than_matched_meshes_of_the_coarser_spacing(order):
-    errors = []
-    for ratio in ((16, 24), (16, 16)):
-        case = cases.one_transition()
-        solution = solve(pressed(case, ratio, False), maxh=0.125, order=order)
-        errors.append(relative_energy_error(solution, case.exact))
-    assert errors[0] <= 1.05 * errors[1]
-
-
 def parts(counts):
     """Two blocks whose upper contact line is made of the edges a, b, c."""
     line = ((-1.0, 0.0), (-0.4, 0.0), (0.3, 0.0), (1.0, 0.0))
@@ -169,24 +148,6 @@ def parts(counts):
     for edge, name in zip(upper, "abc", strict=True):
         edge.name = name
     return divided(OCCGeometry(shape, dim=2), counts)
-
-
-@pytest.mark.parametrize("order", [1, 2, 4])
-@pytest.mark.parametrize("lower", [3, 4])
-def test_overlapping_and_repeated_pairs_are_one(order, lower):
-    """Pairs on a|b and b|c, the first of them twice, on matched (3) and other meshes."""
-    case = cases.pressure_patch()
-    geometry = parts({"a": 3, "b": 3, "c": 3, "lower_contact": lower})
-    names = ("a|b", "b|c", "a|b")
-    problem = replace(
-        case.problem, geometry=geometry, contact=[Contact(x, "lower_contact") for x in names]
-    )
-    solution = solve(problem, maxh=0.5, order=order)
-    assert relative_energy_error(solution, case.exact) < EXACT
-    np.testing.assert_allclose(solution.pressure, 1.0, rtol=EXACT)
-    forces = [solution.contact_force(pair) for pair in range(3)]
-    np.testing.assert_allclose(sum(forces), [0.0, 2.0], atol=2 * EXACT)
-    assert np.linalg.norm(forces[2]) == 0.0
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4])

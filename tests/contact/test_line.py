@@ -1,9 +1,6 @@
 """Contact points: corners, weights, gaps, partners, and which points carry a row."""
 
-from __future__ import annotations
-
 import math
-from dataclasses import replace
 
 import ngsolve as ng
 import numpy as np
@@ -14,10 +11,9 @@ from ngcontact import Contact
 from ngcontact.contact.assembly import contact_line
 from ngcontact.contact.line import at_quadrature, without
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import blocks, disc, disc_on_block, graphs, rings
+from ngcontact.geometries import blocks, disc, disc_on_block, rings
 from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.lagrange import gauss, lagrange
-from tests.scenes import unmatched_blocks
 
 ORDERS = [1, 2, 3, 4]
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
@@ -60,9 +56,6 @@ def at_corner(line, vertex):
 def one_corner(turn, left=1.0, right=0.73):
     slope = math.tan(turn / 2)
     return [(-left, -left * slope), (0.0, 0.0), (right, -right * slope)]
-
-
-# ----------------------------------------------------------------------------- polygonal line
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -180,9 +173,6 @@ def test_steep_sides_do_not_face_a_fixed_direction():
     assert not line.faces[inner].any()
 
 
-# ------------------------------------------------------------------------------ curved lines
-
-
 @pytest.mark.parametrize("order", ORDERS)
 def test_weights_of_a_circle_are_its_length(order):
     trace = trace_of(rings(quarter=True), order, maxh=0.3)
@@ -225,32 +215,6 @@ def test_disc_on_block_measures_the_curves_of_the_mesh(order):
     partner = trace.point(line.partner, line.partner_s)
     np.testing.assert_allclose(partner[:, 0], line.position[:, 0], atol=1e-14)
     np.testing.assert_allclose(partner[:, 1], 0, atol=1e-15)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_two_curves_are_compared_at_equal_eta(order):
-    """Gap and partner between the mesh's curves, not between equal reference points."""
-    geometry = graphs(lambda x: 0.1 + 0.5 * x**2, lambda x: -0.1 * x**3, a=-0.8, b=0.7)
-    trace = trace_of(geometry, order, maxh=0.4)
-    contact = Contact("upper_contact", "lower_contact", direction=(0, -1), rows="nodal")
-    line = contact_line(trace, contact)
-    points_are_consistent(line, trace)
-    partner = trace.point(line.partner, line.partner_s)
-    np.testing.assert_allclose(partner[:, 0], line.position[:, 0], atol=1e-14)
-    distance = line.position[:, 1] - partner[:, 1]
-    np.testing.assert_allclose(line.gap, distance, atol=1e-15)
-    assert line.weight.sum() == pytest.approx(1.5, rel=1e-14)
-
-
-def test_overlap_is_a_negative_gap():
-    geometry = rings(interference=0.02, quarter=True)
-    trace = trace_of(geometry, 3, maxh=0.3)
-    line = contact_line(trace, Contact("outer_contact", "inner_contact"))
-    np.testing.assert_allclose(line.gap, -0.02, rtol=1e-3)  # cubic arcs of length 0.3
-    assert line.searches == 1
-
-
-# ----------------------------------------------------------------------------- other meshes
 
 
 def stacked(upper_nodes, lower_nodes, gap=0.0):
@@ -314,9 +278,6 @@ def test_points_without_an_opposite_carry_no_nodal_row():
                 np.testing.assert_allclose(weight, [0.25, 0.45, 0.2], rtol=1e-14)
 
 
-# -------------------------------------------------------------------------- refused, or bodies
-
-
 @pytest.mark.parametrize(
     "contact",
     [
@@ -333,38 +294,6 @@ def test_pairs_that_do_not_face_are_refused(contact):
         contact_line(trace, contact)
 
 
-def test_roles_may_be_swapped():
-    trace = trace_of(blocks(line=LINE), 2)
-    one = contact_line(trace, Contact("upper_contact", "lower_contact"))
-    other = contact_line(trace, Contact("lower_contact", "upper_contact"))
-    assert len(one.node) == len(other.node)
-
-    def ordered(x, d):
-        return np.lexsort(np.round(np.column_stack([d, x]), 9).T)
-
-    i, j = ordered(one.position, one.direction), ordered(other.position, -other.direction)
-    np.testing.assert_allclose(one.position[i], other.position[j], atol=1e-15)
-    np.testing.assert_allclose(one.direction[i], -other.direction[j], atol=1e-15)
-    np.testing.assert_allclose(one.weight[i], other.weight[j], rtol=1e-13)
-
-
-# --------------------------------------------------------------------------- prescribed gaps
-
-
-@pytest.mark.parametrize(
-    "gap",
-    [0.25, ng.CF(0.25) + 0 * ng.x, lambda x, y: 0.25 + 0 * x],
-    ids=["number", "CoefficientFunction", "function"],
-)
-def test_gap_given_as_a_constant(gap):
-    trace = trace_of(blocks(), 2)
-    for primary in (None, "lower_contact"):
-        line = contact_line(trace, Contact("upper_contact", primary, gap=gap))
-        points_are_consistent(line, trace)
-        assert (line.gap == 0.25).all()
-        assert (line.partner >= 0).all() == (primary is not None)
-
-
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("direction", [None, (0, -1)])
 def test_gap_given_as_a_function_of_place(order, direction):
@@ -376,31 +305,6 @@ def test_gap_given_as_a_function_of_place(order, direction):
         np.testing.assert_allclose(line.gap, x**2 / 2 + y, atol=1e-14)
         assert line.searches == 0
         assert (line.partner == -1).all()
-
-
-def test_rigid_obstacle_behind_the_body_is_refused():
-    trace = trace_of(blocks(), 1)
-    with pytest.raises(ValueError, match="no point of the secondary"):
-        contact_line(trace, Contact("upper_contact", direction=(0, 1), gap=0.0))
-
-
-def test_gap_at_corners_is_that_of_the_place():
-    trace = trace_of(blocks(line=LINE), 1)
-    line = contact_line(trace, Contact("upper_contact", gap=ng.x + 2 * ng.y))
-    np.testing.assert_allclose(line.gap, line.position @ [1, 2], atol=1e-15)
-    assert len(line.gap) == len(line.segments) + 3
-
-
-def test_bilateral_pairs_have_the_same_points():
-    trace = trace_of(blocks(line=LINE), 2)
-    one = contact_line(trace, Contact("upper_contact", "lower_contact"))
-    both = contact_line(trace, Contact("upper_contact", "lower_contact", bilateral=True))
-    assert both.contact.bilateral
-    for name in ("node", "position", "direction", "gap", "weight", "partner", "rows"):
-        assert (getattr(one, name) == getattr(both, name)).all()
-
-
-# ----------------------------------------------------------------- dropped points, quadrature
 
 
 def test_line_without_some_points():
@@ -448,13 +352,3 @@ def test_the_far_side_of_the_own_body_has_no_partner():
     moved = OCCGeometry(Compound([upper.Move(Vec(0, -0.01, 0)), lower]), dim=2)
     line = contact_line(trace_of(moved, 2, maxh=0.4), Contact("upper_rim", "lower_rim", (0, -1)))
     assert line.gap.min() == pytest.approx(-0.01, rel=0.05)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_points_between_matched_vertices_are_matched(order):
-    contact = Contact("upper_contact", "lower_contact")
-    assert not contact_line(trace_of(blocks(), order), contact).means.any()
-    trace = trace_of(unmatched_blocks(), order)
-    assert contact_line(trace, contact).means.all()  # though the ends face nodes
-    assert not contact_line(trace, Contact("upper_contact", gap=0.0)).means.any()
-    assert not contact_line(trace, replace(contact, rows="nodal")).means.any()

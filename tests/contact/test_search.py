@@ -1,7 +1,5 @@
 """Nodes that lie at the same place on both curves."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """One value for each contact pair, cut from arrays over all of them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import ngsolve as ng
@@ -10,7 +8,6 @@ import pytest
 
 from drivers.reference import axisymmetric_cases as cases_about_an_axis
 from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.contact import by_line
 from ngcontact.contact.state import continued_to_axis
 from ngcontact.geometries import blocks
 
@@ -30,20 +27,6 @@ def two_pairs():
         ],
     )
     return solve(problem, maxh=0.4, order=2)
-
-
-def test_parts_are_those_of_the_lines(two_pairs):
-    lines = two_pairs.discrete.lines
-    numbers = np.arange(len(two_pairs.points))
-    parts = by_line(lines, numbers)
-    assert [len(part) for part in parts] == [len(line.node) for line in lines]
-    assert np.concatenate(parts).tolist() == numbers.tolist()
-    for number, part in enumerate(parts):
-        assert (two_pairs.pair[part] == number).all()
-
-
-def test_no_line_has_no_part():
-    assert by_line([], np.zeros(0)) == []
 
 
 def test_states_together_are_the_solution(two_pairs):

@@ -1,7 +1,5 @@
 """Coarser spaces of contact problems: inside the finer ones, as small as they should be."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -72,10 +70,3 @@ def test_spaces_shrink_geometrically(local: bool):
     assert sizes[0][0] == 2 * mesh.nv
     assert sizes[-1][1] <= 4 * first.nv
     assert refined_share(vertex_parents(mesh)) == pytest.approx(1 - first.nv / mesh.nv)
-
-
-def test_the_first_mesh_is_the_coarsest():
-    first = first_mesh(REFINED["disc"], 0.3)
-    mesh = refined(REFINED["disc"], first)
-    steps = steps_of(discretise(REFINED["disc"], mesh, 1, "isoparametric"), 0)
-    assert [step.P.shape for step in steps] == [(2 * mesh.nv, 2 * first.nv)]

@@ -1,7 +1,5 @@
 """First active sets: what touches before the load, and the states of another mesh."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -33,24 +31,12 @@ def test_points_that_touch_start_active():
     np.testing.assert_array_equal(first_active_set(discrete), touching)
 
 
-def test_without_contact_nothing_is_carried():
-    assert carried_active_set([], []).tolist() == []
-
-
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_on_the_same_points_the_state_is_kept(order):
     """Whatever it is: nothing is told by a transition."""
     [line] = prepared(cases.one_transition().problem, 0.3, order).lines
     active = np.random.default_rng(1).random(len(line.node)) < 0.5
     np.testing.assert_array_equal(carried_active_set([line], [state(line, active)]), active)
-
-
-def test_pairs_keep_to_themselves():
-    [line] = prepared(cases.one_transition().problem, 0.3, 1).lines
-    closed, opened = (state(line, np.full(len(line.node), value)) for value in (True, False))
-    carried = carried_active_set([line, line], [opened, closed])
-    assert not carried[: len(line.node)].any()
-    assert carried[len(line.node) :].all()
 
 
 def test_a_new_point_between_two_is_active_if_one_of_them_is():

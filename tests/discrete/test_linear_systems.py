@@ -1,7 +1,5 @@
 """Large problems by multigrid: the solutions that factorisations give, and when they step in."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import ngsolve as ng
@@ -134,41 +132,11 @@ def test_without_coarser_spaces_there_is_a_factor(large):
     same(solution, direct(problem, mesh, order=2))
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_no_larger_than_the_coarsest_space_there_is_a_factor(large, monkeypatch, order):
-    problem = REFINED["block"]
-    mesh = uniform_mesh(problem, order, 1000)
-    known = solve(problem, mesh, order=order)
-    assert known.work["factorizations"] == 0
-    monkeypatch.setattr(MULTIGRID, "coarsest", known.displacement.space.ndof)
-    solution = solve(problem, mesh, order=order)
-    assert type(solution.discrete.systems) is BorderedSystems
-    same(solution, known)
-
-
-def test_small_problems_are_factorised():
-    problem = REFINED["block"]
-    assert (
-        type(solve(problem, uniform_mesh(problem, 2, 3000), order=2).discrete.systems)
-        is BorderedSystems
-    )
-
-
 def test_physical_elements_on_curves_are_factorised(large):
     problem = REFINED["disc"]
     mesh = refined(problem, refined(problem, first_mesh(problem, 0.3)))
     solution = solve(problem, mesh, element="physical")
     assert solution.work["factorizations"] > 0
-
-
-def test_a_mesh_refined_in_place(large):
-    problem = REFINED["block"]
-    mesh = ng.Mesh(first_mesh(problem, 0.3).ngmesh.Copy())
-    for _ in range(3):
-        mesh.Refine()
-    solution = solve(problem, mesh)
-    assert solution.work["factorizations"] == 0
-    same(solution, direct(problem, mesh))
 
 
 @pytest.mark.parametrize("order", [1, 3])

@@ -1,7 +1,5 @@
 """Sequences of loads on one mesh: what is taken over, and that it is right."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import ngsolve as ng
@@ -9,7 +7,7 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Problem, Solution, adapt, solve
+from ngcontact import Contact, Elastic, Problem, Solution, solve
 from ngcontact.geometries import blocks
 from ngcontact.mesh import first_mesh
 from ngcontact.problem import Triangulation, move_vertices
@@ -52,15 +50,6 @@ def test_another_load_costs_back_solves_only(order: int) -> None:
     assert first.work["assemblies"] == first.work["factorizations"] == 1
 
 
-def test_other_prescribed_displacements_cost_back_solves_only() -> None:
-    case = cases.disc_on_rigid_plane()
-    first = solve(case, maxh=0.3, order=2)
-    deeper = replace(case, displacement={"top": (None, -0.006)})
-    second = solve(deeper, first.mesh, order=2, start=first)
-    assert (second.work["assemblies"], second.work["factorizations"]) == (0, 0)
-    same(second, solve(deeper, first.mesh, order=2))
-
-
 def test_an_obstacle_that_moves_costs_back_solves_only() -> None:
     level = ng.Parameter(0.0)  # the same function, of another value: gaps are never remembered
     contact = Contact(secondary="arc", direction=(0, -1), gap=ng.y + level)
@@ -101,31 +90,6 @@ def test_other_supports_and_pairs_are_factorised(order: int) -> None:
         same(second, solve(problem, first.mesh, order=order))
     held = pressed(displacement={"bottom": (0, 0), "top": (None, -0.01)}, traction={})
     assert solve(held, first.mesh, order=order, start=first).work["factorizations"] == 1
-
-
-def test_other_elements_take_nothing_over() -> None:
-    first = solve(pressed(), maxh=0.4)
-    second = solve(pressed(2.0), first.mesh, order=2, start=first)
-    assert (second.work["assemblies"], second.work["factorizations"]) == (1, 1)
-    same(second, solve(pressed(2.0), first.mesh, order=2))
-
-
-def test_a_mesh_changed_in_place_is_another_mesh() -> None:
-    first = solve(pressed(), maxh=0.4)
-    first.mesh.ngmesh.Coordinates()[:] *= 2.0
-    second = solve(pressed(), first.mesh, start=first)
-    assert (second.work["assemblies"], second.work["factorizations"]) == (1, 1)
-    same(second, solve(pressed(), first.mesh))
-
-
-def test_a_level_of_an_adaptive_run_starts_a_sequence() -> None:
-    *_, level = adapt(pressed(), order=2, max_dofs=3000)
-    second = solve(pressed(2.0), level.mesh, order=2, start=level)
-    # The last level of a run keeps its factorisation; those before lose theirs to the next one.
-    assert (second.work["assemblies"], second.work["factorizations"]) == (0, 0)
-    third = solve(pressed(3.0), level.mesh, order=2, start=second)
-    assert (third.work["assemblies"], third.work["factorizations"]) == (0, 0)
-    same(third, solve(pressed(3.0), level.mesh, order=2))
 
 
 def test_a_mesh_whose_interior_moved_is_assembled_again():

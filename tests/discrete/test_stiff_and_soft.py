@@ -1,7 +1,5 @@
 """Contact between bodies of very different stiffness: the softer one hosts the rows."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Public names that take or return arrays, and what their docstrings say of them; read, not run."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator
@@ -63,10 +61,7 @@ def arrays_in(annotation: ast.expr | None, types: set[str]) -> int:
 
 @dataclass(frozen=True)
 class Claim:
-    """Something that a docstring has to say: shapes of `wanted` arrays.
-
-    `owner` is the function or class, `name` its parameter or attribute, "" for what it returns.
-    """
+    """Something that a docstring has to say: shapes of `wanted` arrays."""
 
     owner: str
     name: str

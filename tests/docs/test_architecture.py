@@ -1,7 +1,5 @@
 """The picture of the house shows today's imports, and both walks go the way that the code goes."""
 
-from __future__ import annotations
-
 import inspect
 import re
 import sys

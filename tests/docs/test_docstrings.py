@@ -1,14 +1,4 @@
-"""Every public docstring gives the shapes of arrays, and units of what the contract promises.
-
-The rule. A public function, class or attribute - no underscore, in any module of ngcontact or
-geometries - whose annotation has an array says in its docstring, for each array parameter or
-attribute, its name with a shape: an entry ``name : ndarray (m, 2)``, or "`name` (m, 2)" in the
-text; for arrays it returns as many shapes, or one shape and "each".
-
-Quantities of the public contract give their unit in one of the words of `UNITS`.
-"""
-
-from __future__ import annotations
+"""Every public docstring gives the shapes of arrays, and units of what the contract promises."""
 
 import ast
 import inspect

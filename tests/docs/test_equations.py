@@ -1,7 +1,5 @@
 """Every equation of the theory stands at a line of the code, and the index shows which."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Messages that docs/howto/imported_meshes.md explains are those of files that Netgen refuses."""
 
-from __future__ import annotations
-
 import ngsolve as ng
 import pytest
 from netgen.read_gmsh import ReadGmsh

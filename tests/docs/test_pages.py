@@ -1,7 +1,5 @@
 """What the pages name exists: modules and what they hold, files, drivers, links."""
 
-from __future__ import annotations
-
 import re
 from importlib import import_module
 from importlib.util import find_spec

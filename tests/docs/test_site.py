@@ -1,10 +1,4 @@
-"""Every page of docs is in the tree of the site, and all Python in the pages runs.
-
-Blocks of one page are one program, as a reader would type them. `make docs` alone executes what
-needs more than the package; everything else is executed here, the cells of notebooks included.
-"""
-
-from __future__ import annotations
+"""Every page of docs is in the tree of the site, and all Python in the pages runs."""
 
 import gc
 import re
@@ -83,10 +77,7 @@ def test_the_site_executes(block):
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory) -> Callable[[Block], None]:
-    """Execute a block after those before it in its page, each once, in a folder of the page.
-
-    What a page shows to do is not warned of. Solutions of one page alone are in memory.
-    """
+    """Execute a block after those before it in its page, each once, in a folder of the page."""
     spaces: dict[str, dict[str, object]] = {}
     done: set[Block] = set()
 

@@ -1,7 +1,5 @@
 """Every warning of the package stands in docs/problem.md with what to do, and none that is gone."""
 
-from __future__ import annotations
-
 import ast
 import re
 

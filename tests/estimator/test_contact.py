@@ -1,7 +1,5 @@
 """The pressure pi_h along a contact line, from the pressures of its points."""
 
-from __future__ import annotations
-
 import ngsolve as ng
 import numpy as np
 import pytest
@@ -22,12 +20,6 @@ def test_a_node_without_a_point_continues_the_others(order, axis):
     values = pressure_on_segments(np.array([known, exact]), np.array([s, s]))
     assert values[0] == pytest.approx(exact, abs=1e-13)  # round-off of a fit of degree 3
     assert (values[1] == exact).all()
-
-
-def test_segments_without_points_have_no_pressure():
-    assert pressure_on_segments(np.full((1, 2), np.nan), np.array([[0.0, 1.0]])).tolist() == [
-        [0, 0]
-    ]
 
 
 def on_steps(angle, **options):
@@ -52,12 +44,7 @@ def on_steps(angle, **options):
 @pytest.mark.filterwarnings("ignore::ngcontact.ContactWarning")  # zones of one segment
 @pytest.mark.parametrize("bilateral", [False, True])
 def test_steps_of_a_gap_inside_segments(bilateral):
-    """They are followed to round-off, where points coincide: the estimate was NaN or infinite.
-
-    A larger displacement closes a step as well, so that of one side is 2.5 times the error, which
-    is 0.39 of the energy norm (measured with order 4 on 25 000 unknowns). A bilateral step has no
-    solution of finite energy: any large number is right.
-    """
+    """They are followed to round-off, where points coincide: the estimate was NaN or infinite."""
     solutions = [on_steps(angle, bilateral=bilateral) for angle in (0.3, 0.77, 2.0)]
     estimates = [solution.relative_error_estimate for solution in solutions]
     assert np.isfinite(estimates).all()

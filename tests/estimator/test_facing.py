@@ -1,7 +1,5 @@
 """Parts of contact lines that face: where they end, directions between nodes, what is left free."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import ngsolve as ng
@@ -135,10 +133,7 @@ def test_what_hangs_over_is_free_and_no_more(start, stop, swap):
 @pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.study(witness=["3"])
 def test_a_slip_along_a_curved_zone_is_no_gap(order):
-    """A ring turned about its centre by 1 while the load strains it by 1e-3: nothing changes.
-
-    Measured along the normals of the mesh, that slip is a gap of 20 times the estimate at order 3.
-    """
+    """A ring turned about its centre by 1 while the load strains it by 1e-3: nothing changes."""
     exact = ring_solution(cases.FIRST, cases.SECOND, q0=1e-3)
     found = []
     for turn in (0.0, 1.0):
@@ -154,24 +149,6 @@ def test_a_slip_along_a_curved_zone_is_no_gap(order):
         found.append(solve(problem, maxh=0.4, order=order).relative_error_estimate)
     # Middles of the mesh's curves lie off the circle: measured 7e-4 at order 2, 4e-7 at order 3.
     assert found[1] == pytest.approx(found[0], rel=2e-3)
-
-
-@pytest.mark.parametrize("turn", [0.1, 1.0])
-@pytest.mark.study(witness=["1.0"])
-def test_the_estimate_of_a_slip_falls_as_the_mesh_size(turn):
-    """By the mesh's normals it fell like its root, at order 1."""
-    exact = ring_solution(cases.FIRST, cases.SECOND, q0=1e-3)
-    problem = Problem(
-        geometry=rings(quarter=False),
-        materials={"outer": cases.FIRST, "inner": cases.SECOND},
-        displacement={
-            "rim": exact.displacement["outer"] + turn * ng.CF((-ng.y, ng.x)),
-            "hole": exact.displacement["inner"],
-        },
-        contact=[Contact("outer_contact", "inner_contact")],
-    )
-    coarse, fine = (solve(problem, maxh=h).relative_error_estimate for h in (0.4, 0.1))
-    assert np.log2(coarse / fine) / 2 > 0.85  # meshes made anew; 0.5 before
 
 
 def reference_error(solution, reference):

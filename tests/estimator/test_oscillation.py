@@ -1,7 +1,5 @@
 """Moduli that vary: the estimate depends on the law alone, and sees what the mesh does not."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -47,15 +45,6 @@ def test_a_law_as_numbers_and_as_functions_has_one_estimate(C, order):
     assert functions.error_estimate == pytest.approx(numbers.error_estimate, rel=1e-6)
 
 
-@pytest.mark.parametrize("nu", [-0.5, 0.3])
-def test_auxetic_bodies_have_one_estimate_in_all_forms(nu):
-    law = Elastic(1.0, nu)
-    C = np.array(law.voigt()(SQUARE(0.5, 0.5))).reshape(3, 3)
-    first = solve(pressed(law), order=2).error_estimate
-    for form in (Hooke(C), Hooke(law.voigt())):
-        assert solve(pressed(form), order=2).error_estimate == pytest.approx(first, rel=1e-6)
-
-
 def layers(k, profile="page"):
     """E = 1 / (1 - .9 cos 2 pi k y) under a uniform pressure: sigma_yy = -1 whatever E is."""
     mesh = MakeStructured2DMesh(quads=False, nx=k, ny=k)
@@ -82,18 +71,6 @@ def layers(k, profile="page"):
 def test_moduli_finer_than_the_mesh(k, order):
     # Effectivity without the oscillation: .74 at k = 4, .51 at k = 8. Measured 3.8 to 6.8.
     problem, E = layers(k)
-    solution = solve(problem, order=order)
-    s = solution.stress
-    miss = (s[0, 0] ** 2 + (s[1, 1] + 1) ** 2 + 2 * s[0, 1] ** 2) / E
-    error = math.sqrt(ng.Integrate(miss, solution.mesh, order=30))
-    assert 1 <= solution.error_estimate / error <= 8
-
-
-@pytest.mark.parametrize("order", [1, 2, 3])
-@pytest.mark.parametrize("profile", ["exponential", "other length", "steep"])
-@pytest.mark.study(witness=["other length-1", "exponential-1", "steep-1"])
-def test_other_moduli_finer_than_the_mesh(profile, order):
-    problem, E = layers(6, profile)
     solution = solve(problem, order=order)
     s = solution.stress
     miss = (s[0, 0] ** 2 + (s[1, 1] + 1) ** 2 + 2 * s[0, 1] ** 2) / E

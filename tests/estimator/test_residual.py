@@ -1,7 +1,5 @@
 """Error indicators: every part against its formula, effectivity, scales, where refinement goes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -11,12 +9,10 @@ import pytest
 from netgen.occ import Glue, OCCGeometry, WorkPlane, Y
 
 from drivers.reference import cases
-from drivers.reference.curved import rings as ring_solution
-from drivers.reference.straight import patch as patch_solution
 from drivers.reference.straight import relative_energy_error, transition
 from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.adaptivity.refinement import refined
-from ngcontact.geometries import blocks, rings
+from ngcontact.geometries import blocks
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.problem import Triangulation
 
@@ -36,8 +32,6 @@ PARTS = {
     "displacement",
     "loads",
 }
-LOWER = Elastic(E=3.0, nu=0.2)
-UPPER = Elastic(E=1.0, nu=0.3)
 MU = {"upper": 1.0 / 2.6, "lower": 3.0 / 2.4}
 LINE = "upper_contact|lower_contact"
 
@@ -46,8 +40,6 @@ def effectivity(solution, name):
     error = relative_energy_error(solution, CASES[name]().exact)
     return solution.error_estimate / (error * math.sqrt(ENERGY[name]))
 
-
-# --- the estimate as a whole ---
 
 # The simple estimator of the literature lies between 1 and 6 times the error, and its ratio to the
 # error varies by less than 20 % along a run. Measured: 2.9 to 4.7.
@@ -67,19 +59,6 @@ def test_effectivity_on_uniform_meshes(name, order):
     assert max(found[1:]) / min(found[1:]) < 1.2
 
 
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.study(witness=["S1-2"])
-def test_effectivity_on_adaptive_meshes(name, order):
-    problem = CASES[name]().problem
-    levels = adapt(problem, maxh=0.28, order=order, max_dofs=4000 * (order + 1))
-    found = [effectivity(solution, name) for solution in levels][1:]
-    assert len(found) >= 3
-    assert min(found) >= 1
-    assert max(found) <= 6
-    assert max(found) / min(found) < 1.2
-
-
 @pytest.mark.parametrize("order", [1, 2, 4])
 @pytest.mark.parametrize("contrast", [1e-6, 1e-3, 1e3, 1e12])
 @pytest.mark.study(witness=["1000.0-1", "0.001-2"])
@@ -95,17 +74,6 @@ def test_effectivity_does_not_depend_on_the_contrast_of_moduli(contrast, order):
     )
     solution = solve(problem, maxh=0.28, order=order)
     # Both relative to norms that differ by the discretisation error alone.
-    assert 1 <= solution.relative_error_estimate / relative_energy_error(solution, exact) <= 6
-
-
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("contrast", [1e-12, 1e-3, 1e6])
-def test_effectivity_of_curved_contact_of_unlike_rings(contrast, order):
-    # Measured 3.1 to 5.1.
-    outer, inner = Elastic(E=1.0, nu=0.3), Elastic(E=contrast, nu=0.3)
-    case, exact = cases.ring_in_ring(), ring_solution(outer, inner, qn=0.3, n=2)
-    problem = replace(case.problem, materials={"outer": outer, "inner": inner})
-    solution = solve(problem, maxh=0.15, order=order)
     assert 1 <= solution.relative_error_estimate / relative_energy_error(solution, exact) <= 6
 
 
@@ -205,9 +173,6 @@ def test_the_relative_estimate_does_not_depend_on_units(length, modulus):
     assert other.relative_error_estimate == pytest.approx(one.relative_error_estimate, rel=1e-9)
 
 
-# --- every part alone, against its formula ---
-
-
 @pytest.fixture(scope="module")
 def patch():
     """Solution of order 1 under the uniform pressure 1: all its residuals vanish."""
@@ -266,23 +231,6 @@ def only(solution, *names):
         if name not in names:
             assert abs(value) < 1e-20, name
     return [parts[name] for name in names]
-
-
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("name", CASES)
-def test_no_segment_in_contact_counts_as_free(name, order):
-    # All of the boundary is prescribed or in contact. A side of the primary can be no point's
-    # partner at order 1, where its two vertices may belong to its neighbours.
-    solution = solve(CASES[name]().problem, maxh=0.28, order=order)
-    assert solution.estimate_parts["traction"].sum() < 1e-24 * solution.error_estimate**2
-
-
-def test_traction_part(patch):
-    # A load on the free side of the lower block that is not there: h / 2 mu |P|^2.
-    solution = altered(patch, traction={"lower_left": (0.3, -0.4)})
-    [value] = only(solution, "traction")
-    h, mu, length = along(patch, "lower_left")
-    assert value == pytest.approx((h / (2 * mu) * 0.25 * length).sum(), rel=1e-12)
 
 
 def test_traction_part_of_a_pressure_that_varies(patch):
@@ -382,15 +330,6 @@ def test_jump_part(order):
     assert part == pytest.approx(expected, rel=1e-11, abs=1e-13 * expected.max())
 
 
-def test_displacement_part(patch):
-    # Data of Gamma_u that miss the solution by 0.01: 2 mu / h |u_D - u_h|^2.
-    top = patch.problem.displacement["top"]
-    data = patch.problem.displacement | {"top": (top[0], top[1] + 0.01)}
-    [value] = only(altered(patch, displacement=data), "displacement")
-    h, mu, length = along(patch, "top")
-    assert value == pytest.approx((2 * mu / h * 1e-4 * length).sum(), rel=1e-12)
-
-
 def test_displacement_part_is_the_interpolation_error_of_the_data():
     # u_D = 0.1 x^2 on the top of a straight mesh at order 1: on every segment of length l the
     # interpolation error is w = 0.1 (x - a)(b - x), |w|^2 = 0.01 l^5 / 30, |w'|^2 = 0.01 l^3 / 3.
@@ -486,13 +425,6 @@ def test_complementarity_costs_no_more_than_closing_the_gap(patch, gap):
     assert value == pytest.approx((np.minimum(gap, cost) * length).sum(), rel=1e-11)
 
 
-def test_penetration_part(patch):
-    # mu / h |depth|^2 of the softer side, half of it on each.
-    [value] = only(altered(patch, contact={"gap": -0.01}), "penetration")
-    h, mu, length = facing_pairs(patch)
-    assert value == pytest.approx(((mu / h).min(axis=0) * 1e-4 * length).sum(), rel=1e-11)
-
-
 @pytest.mark.parametrize("gap", [0.01, -0.01])
 def test_a_bilateral_pair_must_neither_open_nor_overlap(patch, gap):
     [value] = only(altered(patch, contact={"gap": gap, "bilateral": True}), "penetration")
@@ -548,9 +480,6 @@ def test_the_jump_counts_inside_bodies_only(patch):
     assert altered(patch, u).estimate_parts["jump"].max() < 1e-24
 
 
-# --- where refinement goes ---
-
-
 def test_no_refinement_inside_a_resolved_contact_zone():
     """Krause, Veeser and Walloth 2015: a closed zone is an interface, not a boundary."""
     *_, solution = adapt(cases.one_transition().problem, maxh=0.28, order=2, max_dofs=5000)
@@ -569,49 +498,6 @@ def test_no_refinement_inside_a_resolved_contact_zone():
     assert share < 1e-2 * solution.error_estimate**2
 
 
-def test_full_contact_of_like_bodies_has_no_pressure_term():
-    # Mirror images under a pressure that varies: sigma_n is the same on both sides by symmetry,
-    # though it is not the nodal pressure.
-    case = cases.pressure_patch(p1=0.5)
-    like = Elastic(E=1.0, nu=0.3)
-    exact = patch_solution(like, like, p0=1.0, p1=0.5)
-    mirrored = mirrored_blocks()
-    problem = replace(
-        case.problem,
-        geometry=mirrored,
-        materials=dict.fromkeys(MU, like),
-        displacement={"top": exact.displacement["upper"], "bottom": exact.displacement["lower"]},
-    )
-    solution = solve(problem)
-    assert solution.active.all()
-    parts = solution.estimate_parts
-    assert parts["pressure"].sum() < 1e-20
-    assert parts["complementarity"].sum() < 1e-20
-    assert parts["jump"].sum() > 1e-4
-
-
-def mirrored_blocks():
-    """Blocks [-1, 1] x [0, 1] and [-1, 1] x [-1, 0] whose triangles are mirror images."""
-    mesh = ng.Mesh(first_mesh(cases.pressure_patch().problem, 1.0).ngmesh.Copy())
-    problem = cases.pressure_patch().problem
-    for _ in range(2):
-        mesh = refined(problem, mesh)
-    x = np.array(mesh.ngmesh.Coordinates())[:, :2]
-    mirror = np.linalg.norm(x[:, None] * [1, -1] - x, axis=2).min(axis=1)
-    assert mirror.max() < 1e-12
-    return mesh
-
-
-def test_the_estimate_is_computed_once_and_on_demand():
-    solution = solve(cases.one_transition().problem, maxh=0.5)
-    assert solution.work["estimates"] == 0
-    assert not solution.estimated
-    first = solution.indicators
-    assert solution.indicators is first
-    assert solution.error_estimate > 0
-    assert solution.work["estimates"] == 1
-
-
 @pytest.mark.parametrize("element", ["superparametric", "physical"])
 def test_effectivity_of_the_curved_elements_of_order_one(element):
     case = cases.ring_in_ring()
@@ -620,18 +506,6 @@ def test_effectivity_of_the_curved_elements_of_order_one(element):
         error = relative_energy_error(solution, case.exact)
         found.append(solution.relative_error_estimate / error)
     assert 1 <= min(found[1:]) <= max(found[1:]) <= 6
-
-
-def test_curved_contact_needs_no_pair_of_equal_curves():
-    # A shrink fit: the circles overlap by 0.01 and every point presses.
-    problem = Problem(
-        geometry=rings(quarter=True, interference=0.01),
-        materials={"outer": UPPER, "inner": LOWER},
-        sliding="inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y",
-        contact=[Contact("outer_contact", "inner_contact")],
-    )
-    coarse, fine = (solve(problem, maxh=h, order=2) for h in (0.4, 0.1))
-    assert fine.relative_error_estimate < coarse.relative_error_estimate / 6
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -654,21 +528,3 @@ def test_lines_inside_a_body_are_no_boundary(order):
     solution = solve(bar, maxh=0.3, order=order)
     # Uniaxial tension in plane strain: u = (-nu (1 + nu) x, (1 - nu^2) y) / E is in V_h.
     assert solution.error_estimate < 1e-12
-
-
-def test_a_finer_primary_is_covered_by_contact():
-    """Segments of the primary without a contact point opposite are no free boundary."""
-    shape = blocks().shape
-    for edge in shape.edges:
-        if edge.name == "lower_contact":
-            edge.partition = np.linspace(0, 1, 16)[1:-1].tolist()
-        if edge.name == "upper_contact":
-            edge.partition = [1 / 3, 2 / 3]
-    case = cases.pressure_patch()
-    mesh = ng.Mesh(OCCGeometry(shape, dim=2).GenerateMesh(maxh=0.7))
-    solution = solve(case.problem, mesh, order=1)
-    sides = solution.estimate_parts["traction"]
-    trace = solution.discrete.space.trace
-    below = trace.element[trace.segments("lower_contact")]
-    corners = trace.element[trace.segments("lower_left|lower_right")]
-    assert sides[np.setdiff1d(below, corners)].max() == 0

@@ -1,7 +1,5 @@
 """Loads and prescribed values that are finer than the mesh: never below the error."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -11,7 +9,6 @@ import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact import Elastic, Problem, adapt, solve
-from ngcontact.lagrange import gauss, gauss_derivative
 from tests.quadrature.test_loads import box, loaded
 
 
@@ -71,11 +68,3 @@ def test_waves_between_the_vertices_of_a_support():
     part = solution.estimate_parts["displacement"].sum()
     expected = 1 / 1.3 * 1e-6 * math.sqrt(1.5 * (64 * math.pi) ** 2 / 2)
     assert part == pytest.approx(expected, rel=1e-3)
-
-
-@pytest.mark.parametrize("order", [2, 6, 12])
-def test_derivatives_at_gauss_points(order):
-    points, _ = gauss(order)
-    degree = len(points) - 1
-    found = gauss_derivative(order) @ points**degree
-    assert found == pytest.approx(degree * points ** (degree - 1), rel=1e-11, abs=1e-11)

@@ -1,7 +1,5 @@
 """Models: one object for each name, and what it says of stresses and rigid motions."""
 
-from __future__ import annotations
-
 import math
 
 import ngsolve as ng
@@ -12,7 +10,6 @@ from ngsolve.meshes import MakeStructured2DMesh
 from ngcontact import Elastic, Hooke
 from ngcontact.fem import MODELS
 from ngcontact.geometries import blocks
-from ngcontact.problem import MODEL_NAMES
 
 ROUND_OFF = 1e-14  # of sums of a few numbers of size 1
 TRANSLATIONS_AND_ROTATION = (ng.CF((1, 0)), ng.CF((0, 1)), ng.CF((-ng.y, ng.x)))
@@ -27,13 +24,6 @@ def size(function, mesh):
     return ng.Integrate(ng.InnerProduct(function, function), mesh) ** 0.5
 
 
-def test_every_model_has_an_object():
-    assert tuple(MODELS) == MODEL_NAMES
-
-
-PLANE = {name: MODELS[name] for name in ("plane strain", "plane stress")}
-
-
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 def test_rigid_motions_are_those_without_strain(mesh, model):
     u = ng.GridFunction(ng.VectorH1(mesh, order=1))
@@ -42,12 +32,6 @@ def test_rigid_motions_are_those_without_strain(mesh, model):
         u.Set(motion)
         without.append(size(model.strain(u), mesh) < ROUND_OFF * 100)  # gradients are over h
     assert tuple(without) == model.motions
-
-
-@pytest.mark.parametrize("model", PLANE.values(), ids=PLANE)
-def test_stress_in_the_plane_is_symmetric(mesh, model):
-    found = model.in_plane([ng.CF(float(k)) for k in (1, 2, 3)])(mesh(0.5, 0.5))
-    assert np.array_equal(np.reshape(found, (2, 2)), [[1, 3], [3, 2]])
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Moduli of elements, and the warning of locking."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 
@@ -51,19 +49,6 @@ def test_bulk_modulus_is_the_least_energy_of_a_unit_dilatation(mesh):
     assert bulk_moduli(made_of(Hooke(C)), mesh) == pytest.approx(expected, rel=1e-13)
     for strain in np.random.default_rng(1).normal(size=(50, 3)):
         assert strain @ C @ strain >= expected * (trace @ strain) ** 2 * (1 - 1e-12)
-
-
-def test_bulk_modulus_follows_a_law_that_varies(mesh):
-    law = Elastic(E=2 + ng.x, nu=0.25)
-    middles = mesh.MapToAllElements(ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1]), ng.VOL)
-    x = np.asarray(ng.x(middles)).ravel()
-    assert bulk_moduli(made_of(law), mesh) == pytest.approx((2 + x) * 0.8, rel=1e-12)
-
-
-def test_nothing_is_nearly_incompressible_in_plane_stress(mesh):
-    law = Elastic(E=1.0, nu=0.499999)
-    assert nearly_incompressible(made_of(law), mesh, NEARLY_INCOMPRESSIBLE).keys() == set(BODIES)
-    assert not nearly_incompressible(made_of(law, "plane stress"), mesh, NEARLY_INCOMPRESSIBLE)
 
 
 def test_only_the_bodies_beyond_the_limit_count(mesh):

@@ -1,7 +1,5 @@
 """The gallery: names, areas, orientation, curves and coincident vertices of every geometry."""
 
-from __future__ import annotations
-
 import inspect
 import math
 import re
@@ -28,7 +26,6 @@ from ngcontact.geometries import (
     rounded_punch,
     sleeve_on_shaft,
 )
-from ngcontact.geometries.graph_edge import follow
 
 PI = math.pi
 LINE = ((-1.0, 0.0), (-0.2, 0.3), (0.5, -0.1), (1.0, 0.2))  # a convex and a re-entrant corner
@@ -222,9 +219,6 @@ def divergence_defect(mesh: ng.Mesh) -> float:
     return abs(through / inside - 1)
 
 
-# --- the gallery as a whole ---------------------------------------------------------------------
-
-
 def test_every_public_geometry_has_a_case_here() -> None:
     assert {case.name for case in CASES} == set(geometries.__all__)
     assert len(set(geometries.__all__)) == len(geometries.__all__)
@@ -240,9 +234,6 @@ def test_docstring_lists_exactly_the_regions(name: str) -> None:
     text = inspect.getdoc(getattr(geometries, name))  # not indented, by any version of Python
     listed = re.findall(r"^``(\w+)`` ", text, flags=re.MULTILINE)
     assert found == set(listed)
-
-
-# --- every case ---------------------------------------------------------------------------------
 
 
 @every_case
@@ -280,15 +271,6 @@ def test_normals_point_outwards_also_after_refinement(case: Case) -> None:
 
 
 @every_case
-def test_faces_look_up(case: Case) -> None:
-    mesh = mesh_of(case.make(), order=1)
-    points = np.array(mesh.ngmesh.Coordinates())[:, :2]
-    corners = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3] - 1
-    first, second = (points[corners[:, k]] - points[corners[:, 0]] for k in (1, 2))
-    assert np.all(first[:, 0] * second[:, 1] > first[:, 1] * second[:, 0])
-
-
-@every_case
 def test_bodies_share_no_vertex(case: Case) -> None:
     mesh = mesh_of(case.make(), order=1)
     bodies = [
@@ -297,8 +279,6 @@ def test_bodies_share_no_vertex(case: Case) -> None:
     ]
     assert len(set.union(*bodies)) == sum(len(body) for body in bodies) == mesh.nv
 
-
-# --- curves -------------------------------------------------------------------------------------
 
 CURVES = {
     "ring": (rings, "inner_contact|outer_contact", lambda x, y: np.hypot(x, y) - 1),
@@ -354,37 +334,6 @@ def test_graph_edge_follows_the_function(f: Callable[[float], float], bound: flo
     assert np.abs([p.x for p in points] - np.linspace(-1, 1, 2001)).max() < 1e-14
 
 
-def test_linear_graph_is_a_straight_segment() -> None:
-    geometry = graphs(lambda x: 0.3 * x + 0.1, lambda x: 0, a=-2, b=1)
-    (edge,) = edges_of(geometry, "upper_contact")
-    start, end = edge.parameter_interval
-    # A segment is parametrised by its length; Bezier curve and spline are not.
-    assert end - start == pytest.approx(3 * math.hypot(1, 0.3), rel=1e-14)
-
-
-def test_lower_graph_is_followed_too() -> None:
-    (edge,) = edges_of(graphs(flat, lambda x: ripple(x) - 0.2, b=0.5), "lower_contact")
-    assert (edge.start.x, edge.end.x) == pytest.approx((0.5, -1), abs=1e-14)  # body on its left
-    points = [edge.Value(t) for t in np.linspace(*edge.parameter_interval, 501)]
-    assert max(abs(p.y + 0.2 - ripple(p.x)) for p in points) < 1e-10  # measured 4e-12
-
-
-def test_graphs_far_from_the_origin() -> None:
-    geometry = graphs(lambda x: 0.1 * (x - 1e6), lambda x: -0.2, a=1e6, b=1e6 + 1)
-    (edge,) = edges_of(geometry, "upper_contact")
-    # Round-off of x = 1e6 must not turn the straight line into a spline.
-    assert np.ptp(edge.parameter_interval) == pytest.approx(math.hypot(1, 0.1), rel=1e-9)
-
-
-def test_graphs_take_vectorised_functions_and_overlap() -> None:
-    geometry = graphs(np.cos, lambda x: 0.8 + 0.0 * x, height=2)  # overlaps near |x| = 1
-    areas = [face.mass for face in geometry.shape.faces]
-    assert areas == pytest.approx([4 - 2 * math.sin(1), 5.6], rel=1e-12)  # measured 4e-16
-
-
-# --- vertices that must coincide ----------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("geometry", "first", "second"),
     [
@@ -401,10 +350,6 @@ def test_contact_edges_end_at_the_same_points(
 ) -> None:
     # Round-off, taken out by the rounding in ends_of: bodies of size 1.
     assert np.array_equal(ends_of(geometry, first), ends_of(geometry, second))
-
-
-def test_blocks_have_vertices_where_the_line_has() -> None:
-    assert ends_of(blocks(line=LINE), "lower_contact") == pytest.approx(np.array(LINE), abs=1e-15)
 
 
 @pytest.mark.parametrize("interference", [0.05, 0.0, -0.05])
@@ -430,49 +375,6 @@ def test_touching_point_is_a_vertex_of_both_bodies(
     mesh = mesh_of(geometry, order=1)
     touching = np.hypot(*np.array(mesh.ngmesh.Coordinates())[:, :2].T) < 1e-15
     assert touching.sum() == 2
-
-
-def test_symmetric_parts_stop_at_their_planes() -> None:
-    mesh = mesh_of(disc_on_block(radius=0.7), order=1)
-    assert np.abs(vertices_on(mesh, "axis")[:, 0]).max() < 1e-15
-    assert np.array(mesh.ngmesh.Coordinates())[:, 0].min() > -1e-15
-    mesh = mesh_of(rings(quarter=True), order=1)
-    assert np.abs(vertices_on(mesh, "inner_cut_x|outer_cut_x")[:, 0]).max() < 1e-15
-    assert np.abs(vertices_on(mesh, "inner_cut_y|outer_cut_y")[:, 1]).max() < 1e-15
-
-
-def test_positions_of_boundaries() -> None:
-    mesh = mesh_of(punch(half_width=0.5, punch_height=2, width=3, depth=4), maxh=1, order=1)
-    assert np.abs(vertices_on(mesh, "punch_contact|foundation_contact")[:, 0]).max() == 0.5
-    assert np.abs(vertices_on(mesh, "foundation_free")[:, 0]).min() == 0.5
-    assert set(np.abs(vertices_on(mesh, "foundation_sides")[:, 0])) == {3.0}
-    assert set(vertices_on(mesh, "foundation_bottom")[:, 1]) == {-4.0}
-    mesh = mesh_of(blocks(height=1.5, lower_height=0.5), order=1)
-    for name, axis, value in [
-        *(("top", 1, 1.5), ("bottom", 1, -0.5), ("upper_left", 0, -1.0)),
-        *(("upper_right", 0, 1.0), ("lower_left", 0, -1.0), ("lower_right", 0, 1.0)),
-    ]:
-        assert set(vertices_on(mesh, name)[:, axis]) == {value}, name
-
-
-@pytest.mark.parametrize("unit", [1e-3, 1e3])
-def test_geometry_scales_with_the_unit_of_length(unit: float) -> None:
-    made = [
-        disc_on_block(radius=unit),
-        rings(inner=0.5 * unit, interface=unit, outer=2 * unit, interference=1e-3 * unit),
-        graphs(lambda x: unit * bowl(x / unit), lambda x: 0, a=-unit, b=unit, height=unit),
-    ]
-    expected = [
-        *(PI / 4, 4.0),
-        *(0.75 * PI, (4 - 0.999**2) * PI),
-        *(2.0, 2.0),
-    ]
-    areas = [face.mass / unit**2 for geometry in made for face in geometry.shape.faces]
-    # Measured 4e-16: the absolute tolerance 1e-7 of the CAD kernel does not show.
-    assert areas == pytest.approx(expected, rel=1e-12)
-
-
-# --- refusals: each names the parameter and the value -------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -529,15 +431,3 @@ def test_bad_parameters_are_refused(
 ) -> None:
     with pytest.raises(error, match=re.escape(message)):
         call()
-
-
-def test_graph_edge_runs_evenly_in_x() -> None:
-    """Equal steps of the edge's parameter are equal steps of x, whatever kind of curve it is."""
-    for f in (lambda x: 0.1 + 0.2 * x, lambda x: x * x / 2, lambda x: 0.01 * math.sin(8 * x)):
-        edge = follow("upper", f, -1.0, 1.0, 261).edge()
-        start, stop = edge.parameter_interval
-        for share in (0.0, 0.25, 0.5, 0.8, 1.0):
-            point = edge.Value(start + share * (stop - start))
-            x = -1 + 2 * share
-            assert abs(point.x - x) < 1e-14  # round-off of lengths of size 1
-            assert abs(point.y - f(x)) < 1e-10  # measured 4e-11 on a faster wave

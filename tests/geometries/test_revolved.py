@@ -1,9 +1,5 @@
 """Bodies of revolution of the gallery: names, volumes, orientation, contact that is found."""
 
-from __future__ import annotations
-
-import math
-
 import ngsolve as ng
 import pytest
 
@@ -16,59 +12,7 @@ from ngcontact.geometries import (
     sleeve_on_shaft,
 )
 
-PI = math.pi
 SOFT = Elastic(E=1.0, nu=0.3)
-BLOCK = {"block_top", "block_bottom", "side", "axis"}
-TOOL = {"indenter_side", "indenter_top"}
-CONE = math.tan(math.radians(10))
-EDGE = 0.2  # of the punch: its rounding
-# Volume lost at the edge: a square of that side about r less a quarter circle, by Pappus.
-ROUNDED = 2 * PI * (EDGE**2 * (1 + EDGE / 2) - (PI * EDGE**2 / 4 * 1 + EDGE**3 / 3))
-
-CASES = {
-    ball_in_socket: (
-        {"ball": 2 / 3 * PI, "socket": PI * (2.1**2 * 2.05) - 2 / 3 * PI * 1.05**3},
-        {"ball_top", "ball_arc", "socket_arc", "socket_rim", "side", "socket_bottom", "axis"},
-    ),
-    cone_on_block: (
-        {"indenter": PI * (1 + CONE) - 2 / 3 * PI * CONE, "block": 8 * PI},
-        BLOCK | TOOL | {"flank"},
-    ),
-    rounded_punch: (
-        {"indenter": PI * 1.2**3 - ROUNDED, "block": 2.4**3 * PI},
-        BLOCK | TOOL | {"end"},
-    ),
-    sleeve_on_shaft: (
-        {"shaft": 2 * PI, "sleeve": PI * (1.6**2 - 1)},
-        {"shaft_contact", "shaft_free", "sleeve_contact", "rim"}
-        | {"shaft_ends", "sleeve_ends", "axis"},
-    ),
-    ring_in_groove: (
-        {
-            "ring": 2 * PI * 3 * PI * 0.25,
-            "housing": 2 * PI * 3 * (3.4 * 1.75 - 1.4 * 0.75),
-            "plate": 2 * PI * 3 * 3.4,
-        },
-        {"ring_lower", "ring_upper", "groove", "walls", "face", "plate_face"}
-        | {"housing_bottom", "plate_top", "rims"},
-    ),
-}
-every_geometry = pytest.mark.parametrize("make", CASES, ids=lambda make: make.__name__)
-
-
-@every_geometry
-def test_names_volumes_orientation(make):
-    """Volumes on curved meshes; the divergence theorem knows inside from outside."""
-    volumes, boundaries = CASES[make]
-    mesh = ng.Mesh(make().GenerateMesh(maxh=0.4))
-    mesh.Curve(5)
-    assert set(mesh.GetBoundaries()) == boundaries
-    for body, volume in volumes.items():
-        found = ng.Integrate(2 * PI * ng.x, mesh.Materials(body), order=8)
-        assert found == pytest.approx(volume, rel=1e-6)
-    through = ng.CF((ng.x, ng.y)) * ng.specialcf.normal(2)
-    area = ng.Integrate(ng.CF(2), mesh)
-    assert ng.Integrate(through, mesh, ng.BND) == pytest.approx(area)
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Iterative systems of one program: minimisers, work, and what sends them to a factorisation."""
 
-from __future__ import annotations
-
 import logging
 
 import numpy as np

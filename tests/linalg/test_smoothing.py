@@ -1,7 +1,5 @@
 """Smoothers: which one when, and the polynomial against its closed form."""
 
-from __future__ import annotations
-
 import ngsolve as ng
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Matrices shared by NGSolve and SciPy: same memory, same values, their owner lives on."""
 
-from __future__ import annotations
-
 import gc
 
 import ngsolve as ng
@@ -9,7 +7,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from ngcontact.linalg.sparse import cholesky, congruent, lower_half, one_thread, shared
+from ngcontact.linalg.sparse import cholesky, congruent, lower_half, shared
 
 SIZE = 40
 
@@ -24,17 +22,6 @@ def definite(rng, size=SIZE):
 def for_ngsolve(K):
     K = K.tocoo()
     return ng.la.SparseMatrixd.CreateFromCOO(K.row, K.col, K.data, *K.shape)
-
-
-@pytest.mark.parametrize("shape", [(SIZE, SIZE), (SIZE, 7)])
-def test_same_values_in_the_same_memory(shape):
-    K = sp.random(*shape, density=0.2, random_state=np.random.default_rng(0)).tocsr()
-    owner = for_ngsolve(K)
-    view = shared(owner)
-    np.testing.assert_array_equal(view.toarray(), K.toarray())
-    values, columns, _ = (np.asarray(x) for x in owner.CSR())
-    assert np.shares_memory(view.data, values)
-    assert np.shares_memory(view.indices, columns)
 
 
 def test_memory_outlives_the_matrix_of_ngsolve():
@@ -97,28 +84,6 @@ def managed():
     """Threads of a manager that is started, or already there."""
     with ng.TaskManager():
         return ng.GetNumThreads()
-
-
-@pytest.mark.usefixtures("two_threads")
-def test_one_thread_within_and_as_many_as_before_after():
-    with one_thread():
-        assert managed() == 1
-        with one_thread():
-            assert managed() == 1
-        assert managed() == 1
-    assert managed() == 2
-    with pytest.raises(KeyError), one_thread():
-        raise KeyError
-    assert managed() == 2
-    assert ng.GetNumThreads() == 1  # none is left running
-
-
-@pytest.mark.usefixtures("two_threads")
-def test_the_callers_threads_stay():
-    with ng.TaskManager():
-        with one_thread():
-            assert ng.GetNumThreads() == 2
-        assert ng.GetNumThreads() == 2
 
 
 @pytest.mark.usefixtures("two_threads")

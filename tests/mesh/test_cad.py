@@ -1,13 +1,10 @@
 """Exact boundary curves: projections, normals, levels and their numbering."""
 
-from __future__ import annotations
-
 import math
 
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.geom2d import SplineGeometry
 from netgen.occ import (
     Axis,
     Glue,
@@ -15,10 +12,8 @@ from netgen.occ import (
     Pnt,
     Segment,
     SplineApproximation,
-    Vec,
     WorkPlane,
 )
-from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact import geometries
 from ngcontact.geometries import blocks, disc, disc_on_block, disc_on_disc, graphs, punch, rings
@@ -43,9 +38,6 @@ def parabola_edge():
 
 def angles(theta):
     return np.column_stack([np.cos(theta), np.sin(theta)])
-
-
-# ----------------------------------------------------------------- positions and derivatives
 
 
 def test_straight_edge():
@@ -80,23 +72,6 @@ def test_circle_normals_are_radial_also_at_the_seam(x, y, radius):
         np.testing.assert_allclose(foot, [x, y] + radius * radial, atol=1e-15 * scale * radius)
 
 
-@pytest.mark.parametrize(("x", "y", "radius"), CENTRES[:2])
-def test_rotations_are_tangential_to_circles(x, y, radius):
-    points = [x, y] + radius * angles(RNG.uniform(0, 2 * math.pi, 200))
-    normal = circle(x, y, radius).normal(points)
-    rotation = np.column_stack([y - points[:, 1], points[:, 0] - x]) / radius
-    assert np.abs((normal * rotation).sum(axis=1)).max() < 1e-14
-
-
-def test_quarter_circles_project_their_ends():
-    shape = rings(quarter=True).shape
-    [edge] = [CadEdge(e) for e in shape.edges if e.name == "rim"]
-    assert not edge.closed
-    ends = np.array([[2.0, 0.0], [0.0, 2.0]])
-    np.testing.assert_allclose(edge.point(edge.project(ends)), ends, atol=1e-15)
-    np.testing.assert_allclose(edge.normal(ends), ends / 2, atol=1e-15)
-
-
 def test_spline_normals():
     edge = parabola_edge()
     x = RNG.uniform(-1, 1, 100)
@@ -127,31 +102,6 @@ def test_ellipse_and_closed_spline_across_the_seam():
     np.testing.assert_allclose(spline.project(spline.point(t)), t, atol=1e-12 * length)
 
 
-def test_moved_and_turned_edges():
-    face = WorkPlane().Rectangle(2, 1).Face()
-    turned = face.Rotate(Axis((0, 0, 0), (0, 0, 1)), 30).Move(Vec(3, 1, 0))
-    edges = [CadEdge(edge) for edge in turned.edges]
-    directions = {tuple(np.round(edge.normal(np.zeros((1, 2)))[0], 12) + 0.0) for edge in edges}
-    c, s = math.sqrt(3) / 2, 0.5
-    assert directions == {tuple(np.round(v, 12)) for v in [(c, s), (-c, -s), (s, -c), (-s, c)]}
-    for edge in edges:
-        t, x, slope = edge.samples(9)
-        assert edge.straight
-        np.testing.assert_allclose(slope, np.diff(x, axis=0)[0] / np.diff(t)[0] + 0 * x, atol=1e-14)
-
-
-def test_derivatives_belong_to_the_parameter():
-    for edge in (parabola_edge(), circle(1, 2, 3)):
-        t, _, slope = edge.samples(9)
-        step = 1e-4
-        inner = t[1:-1]
-        numeric = (edge.point(inner + step) - edge.point(inner - step)) / (2 * step)
-        np.testing.assert_allclose(slope[1:-1], numeric, atol=1e-7)  # error step^2 / 6 |x'''|
-
-
-# ------------------------------------------------------------------------------------- level
-
-
 def test_level_on_a_parabola():
     edge = parabola_edge()
     values = np.array([-1.0, -0.4, 0.0, 0.77, 1.0])
@@ -173,18 +123,6 @@ def test_level_that_is_not_taken_is_nan():
     below = edge.level(np.array([0.0, 1.0]), np.array([-0.01]), np.array([[0.1, 0.0]]))
     assert np.isnan(below).all()
 
-
-def test_level_on_straight_edges():
-    edge = CadEdge(Segment(Pnt(0, 0, 0), Pnt(2, 1, 0)))
-    axis = np.array([0.6, 0.8])
-    t = edge.level(axis, np.array([1.0, 2.5]), np.array([[0.1, 0.0], [1.5, 1.0]]))
-    np.testing.assert_allclose(edge.point(t[:1]) @ axis, 1.0, atol=1e-15)
-    assert np.isnan(t[1])
-    flat = CadEdge(Segment(Pnt(0, 0, 0), Pnt(2, 0, 0)))
-    assert np.isnan(flat.level(np.array([0.0, 1.0]), np.array([0.1]), np.zeros((1, 2)))).all()
-
-
-# ------------------------------------------------------------------------- numbering of edges
 
 GALLERY = {
     "disc": [disc],
@@ -220,10 +158,6 @@ def nameless():
     return OCCGeometry(Glue([ring, WorkPlane().Rectangle(1, 1).Face()]), dim=2)
 
 
-def test_gallery_is_complete():
-    assert set(GALLERY) == set(geometries.__all__)
-
-
 @pytest.mark.parametrize("make", [glued, nameless, *(f for fs in GALLERY.values() for f in fs)])
 def test_segments_lie_on_the_edge_of_their_region(make):
     mesh = ng.Mesh(make().GenerateMesh(maxh=0.6))
@@ -245,21 +179,6 @@ def test_segments_lie_on_the_edge_of_their_region(make):
         np.testing.assert_allclose(foot, points, atol=1e-12)
         met.add(region)
     assert len(met) == len(mesh.GetBoundaries())
-
-
-def test_numbering_survives_copies_and_curving():
-    mesh = ng.Mesh(disc_on_block().GenerateMesh(maxh=0.6))
-    mesh.Curve(3)
-    copy = ng.Mesh(mesh.ngmesh.Copy())
-    copy.Refine()
-    assert [e.name for e in cad_edges(copy)] == [e.name for e in cad_edges(mesh)]
-
-
-def test_meshes_without_cad_have_no_edges():
-    assert cad_edges(MakeStructured2DMesh(quads=False, nx=2, ny=2)) is None
-    spline = SplineGeometry()
-    spline.AddCircle((0, 0), 1, bc="rim")
-    assert cad_edges(ng.Mesh(spline.GenerateMesh(maxh=0.5))) is None
 
 
 def test_geometries_are_the_same_by_shape_and_names():

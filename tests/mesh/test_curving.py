@@ -1,7 +1,5 @@
 """Curved elements: their degree, and when a mesh has to be curved."""
 
-from __future__ import annotations
-
 import math
 
 import ngsolve as ng

@@ -1,7 +1,5 @@
 """First meshes: matched nodes on facing lines, sizes, and the user's geometry left alone."""
 
-from __future__ import annotations
-
 import math
 import threading
 from collections.abc import Callable
@@ -14,7 +12,7 @@ import pytest
 from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact import Contact, Elastic, Problem
 from ngcontact.adaptivity.refinement import matched_vertices
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
@@ -179,13 +177,6 @@ def test_contact_segments_keep_the_size_and_resolve_the_curvature(maxh):
     assert np.diff(matched).max() < 0.5 * (1 + 1e-3)
 
 
-def test_contact_edges_are_filled_outside_of_the_facing_part():
-    mesh = first_mesh(ENLARGING["disc on block"].problem(), 0.2)
-    free = vertices(mesh, "block_top")
-    assert free[:, 0].max() == 2.0
-    assert lengths(mesh, "block_top").max() < 0.2 * (1 + 1e-6)
-
-
 def test_the_default_size_is_an_eighth_of_the_largest_extent():
     problem = pressed(blocks(width=4.0), BLOCKS, *[BOUNDED["blocks"].contact])
     mesh = first_mesh(problem)
@@ -199,35 +190,6 @@ def test_only_zones_that_may_open_are_finer():
     contact = replace(BOUNDED["blocks"].contact, bilateral=True)
     mesh = first_mesh(pressed(blocks(width=4.0), BLOCKS, contact))
     assert lengths(mesh, "upper_contact|lower_contact") == pytest.approx(4 / 8)
-
-
-def test_a_mesh_is_the_same_every_time():
-    pair = ENLARGING["disc on disc"]
-    first, second = (coordinates(first_mesh(pair.problem(), 0.3)) for _ in range(2))
-    assert (first == second).all()
-
-
-@pytest.mark.parametrize("unit", [1e-3, 1e4])
-def test_matching_does_not_depend_on_the_unit_of_length(unit):
-    pair = pressed(
-        disc_on_disc(radius=unit, lower_radius=2 * unit),
-        BLOCKS,
-        Contact("upper_arc", "lower_arc", direction=(0, -1)),
-    )
-    mesh = first_mesh(pair, 0.3 * unit)
-    eta = [vertices(mesh, side)[:, 0] / unit for side in ("upper_arc", "lower_arc")]
-    assert unmatched(*(x[x < MATCHED_PART] for x in eta)) < ROUND_OFF
-
-
-def test_names_of_bodies_and_boundaries_survive():
-    geometry = disc_on_block()
-    direct = ng.Mesh(geometry.GenerateMesh(maxh=0.4))
-    mesh = first_mesh(ENLARGING["disc on block"].problem(), 0.4)
-    assert mesh.GetMaterials() == direct.GetMaterials() == ("disc", "block")
-    assert mesh.GetBoundaries() == direct.GetBoundaries()
-
-
-# --- the facing part of an edge ends where the other edge ends ---
 
 
 def low(name="lower_contact"):
@@ -285,9 +247,6 @@ def test_two_bodies_on_one_edge_are_both_matched(together):
     assert lengths(mesh, "lower_contact").max() < 0.3 * (1 + 1e-6)
 
 
-# --- what the user has set ---
-
-
 def test_the_geometry_is_left_as_it_was():
     geometry = disc_on_block()
     problem = pressed(geometry, ("disc", "block"), ENLARGING["disc on block"].contact)
@@ -297,19 +256,6 @@ def test_the_geometry_is_left_as_it_was():
     after = coordinates(ng.Mesh(geometry.GenerateMesh(maxh=0.3)))
     assert before.shape != matched.shape
     assert (before == after).all()
-
-
-def test_the_geometry_is_left_as_it_was_when_meshing_fails(monkeypatch):
-    problem = BOUNDED["blocks"].problem()
-
-    def fail(shape, dim):
-        assert any(edge.partition is not None for edge in shape.edges)
-        raise RuntimeError("no mesh")
-
-    monkeypatch.setattr(occ, "OCCGeometry", fail)
-    with pytest.raises(RuntimeError, match="no mesh"):
-        first_mesh(problem, 0.3)
-    assert all(edge.partition is None for edge in problem.geometry.shape.edges)
 
 
 def test_partitions_of_the_user_are_honoured():
@@ -338,19 +284,6 @@ def test_the_size_of_one_edge_holds_on_the_facing_one(name):
     for side in ("upper_contact", "lower_contact"):
         assert lengths(mesh, side) == pytest.approx(0.1)
     assert lengths(mesh, "top").min() > 0.2
-
-
-def test_a_mesh_is_returned_as_it_is():
-    mesh = ng.Mesh(blocks().GenerateMesh(maxh=0.5))
-    assert first_mesh(pressed(mesh, BLOCKS, BOUNDED["blocks"].contact)) is mesh
-
-
-def test_nothing_is_placed_for_a_rigid_obstacle():
-    geometry = disc_on_block()
-    contact = Contact("disc_arc", direction=(0, -1), gap=ng.y)
-    mesh = first_mesh(pressed(geometry, ("disc", "block"), contact), 0.3)
-    direct = ng.Mesh(geometry.GenerateMesh(maxh=0.3))
-    assert mesh.nv == direct.nv
 
 
 @pytest.mark.parametrize(
@@ -388,13 +321,6 @@ def test_whole_circles_are_divided_on_the_facing_side():
     for name in ("upper", "lower"):
         # Area of a disc by cubic curves of chord 0.4: O(h^4), measured 3e-5.
         assert ng.Integrate(ng.CF(1), mesh.Materials(name)) == pytest.approx(math.pi, rel=1e-3)
-
-
-def test_a_mesh_has_its_size_already():
-    mesh = ng.Mesh(blocks().GenerateMesh(maxh=0.5))
-    problem = Problem(geometry=mesh, materials={"upper|lower": Elastic(E=1.0, nu=0.3)})
-    with pytest.raises(ValueError, match=r"maxh=0.1 has no effect"):
-        first_mesh(problem, maxh=0.1)
 
 
 @pytest.mark.parametrize(("left", "right", "maxh"), [(1.139, 0.796, 0.3), (0.598, 0.785, 0.3)])
@@ -492,20 +418,6 @@ def test_smaller_curves_ask_for_another_unit(name):
         check_curves(scaled_mesh(geometry, size / 5, 2))
 
 
-def test_small_curves_are_refused_where_elements_are_curved():
-    shape = disc_on_block().shape.Scale(occ.Pnt(0, 0, 0), 1e-6)
-    contact = Contact("disc_arc", "block_top", direction=(0, -1))
-    problem = Problem(
-        geometry=OCCGeometry(shape, dim=2),
-        materials=dict.fromkeys(("disc", "block"), SOFT),
-        displacement={"block_bottom": (0, 0), "disc_top": (0, -1e-8)},
-        contact=[contact],
-    )
-    assert solve(problem, maxh=3e-7, order=1).active.any()  # straight sides, exact vertices
-    with pytest.raises(ValueError, match=r'"disc_arc".*unit of length'):
-        solve(problem, maxh=3e-7, order=2)
-
-
 def test_refinement_beyond_the_kernel_s_lengths_is_refused():
     """Measured: elements beside the end of an arc turn over at 5e-7 units, order 4."""
     mesh = ng.Mesh(disc_on_block().GenerateMesh(maxh=0.3))
@@ -586,9 +498,3 @@ def test_lengths_that_are_meshed(unit, angle):
     mesh = first_mesh(replace(PRESSED, geometry=OCCGeometry(shape, dim=2)))
     area = ng.Integrate(ng.CF(1.0), first_mesh(PRESSED))
     assert ng.Integrate(ng.CF(1.0), mesh) / unit**2 == pytest.approx(area, rel=1e-9)
-
-
-def test_given_meshes_have_no_limits():
-    mesh = ng.Mesh(first_mesh(PRESSED).ngmesh.Copy())
-    mesh.ngmesh.Scale(1e12)
-    assert first_mesh(replace(PRESSED, geometry=mesh)) is mesh

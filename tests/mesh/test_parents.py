@@ -1,14 +1,11 @@
 """Parents of refined vertices: kept by copies, also of meshes that were refined in place."""
 
-from __future__ import annotations
-
 import ngsolve as ng
 import numpy as np
 import pytest
 
 from drivers.reference import cases
 from ngcontact.adaptivity import refined
-from ngcontact.mesh.curving import curve
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.mesh.parents import copied, vertex_parents
 from tests.scenes import coordinates, near_origin
@@ -26,11 +23,6 @@ def check_midpoints(mesh, old):
     assert (family[new] < new[:, None]).all()
     # Round-off of coordinates of size 2.
     np.testing.assert_allclose(xy[new], xy[family[new]].mean(axis=1), rtol=0, atol=1e-15)
-
-
-def test_a_first_mesh_has_no_parents():
-    mesh = first_mesh(BLOCK, 0.5)
-    np.testing.assert_array_equal(vertex_parents(mesh), np.full((mesh.nv, 2), -1))
 
 
 @pytest.mark.parametrize("local", [False, True])
@@ -52,12 +44,3 @@ def test_what_refinement_in_place_knows_is_kept():
     copy.Refine()
     check_midpoints(copy, old)
     check_midpoints(refined(BLOCK, copy), old)
-
-
-def test_curved_copies_keep_them():
-    problem = cases.disc_on_rigid_plane()
-    mesh = refined(problem, first_mesh(problem, 0.3))
-    bent, _ = curve(mesh, 2, "isoparametric")
-    assert bent is not mesh
-    np.testing.assert_array_equal(vertex_parents(bent), vertex_parents(mesh))
-    assert (vertex_parents(bent) >= 0).any()

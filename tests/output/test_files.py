@@ -1,7 +1,5 @@
 """Paths that are checked, and files that are replaced when they are complete."""
 
-from __future__ import annotations
-
 import errno
 import os
 import tempfile

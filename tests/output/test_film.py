@@ -1,7 +1,5 @@
 """Films and pictures of convergence."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
@@ -21,24 +19,6 @@ def test_the_last_frame_is_seen_three_times_as_long(tmp_path, monkeypatch):
             film.seek(k)
             times.append(film.info["duration"])
     assert times == [250, 250, 750]
-
-
-@pytest.mark.study
-def test_a_film_has_a_frame_for_each_solution(tmp_path):
-    path = write_film(tmp_path / "a.gif", [stub(1), stub(2), stub(1)], seconds=0.25)
-    with Image.open(path) as film:
-        times, sizes, colours = [], set(), []
-        for k in range(film.n_frames):
-            film.seek(k)
-            times.append(film.info["duration"])
-            sizes.add(film.size)
-            assert np.asarray(film.convert("L")).std() > 10  # a blank frame: 0; measured: 60
-            colours.append(np.asarray(film.convert("RGB")))
-            assert (colours[-1][0, 0] == 255).all()
-    assert times == [250, 250, 750]
-    assert len(sizes) == 1
-    # One palette, so one stress has one colour in all frames; each has 256 at most.
-    assert len(np.unique(np.reshape(colours, (-1, 3)), axis=0)) <= 256
 
 
 @pytest.mark.parametrize(

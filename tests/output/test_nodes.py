@@ -1,7 +1,5 @@
 """Lagrange nodes of the elements, and what is evaluated there."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from vtkmodules.vtkCommonDataModel import vtkHigherOrderTriangle

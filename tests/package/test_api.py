@@ -1,7 +1,5 @@
 """The public surface: names, signatures, import without side effects, everything tested."""
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 import inspect

@@ -1,7 +1,5 @@
 """Each thing stands in one place of the package; objects have their attributes from the start."""
 
-from __future__ import annotations
-
 import ast
 import re
 from collections.abc import Iterator

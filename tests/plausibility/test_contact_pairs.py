@@ -1,17 +1,14 @@
 """Warnings of single pairs: that they come where they should, once, and nowhere else."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from netgen.occ import Axis, Z
 
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, adapt, solve
-from ngcontact.geometries import blocks, punch, rings
+from ngcontact.geometries import blocks, punch
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from tests.plausibility.messages import only, quiet, told
 
@@ -65,9 +62,6 @@ def finest(problem: Problem, order: int = 3, unknowns: int = 6000):
     return lambda: list(adapt(problem, order=order, max_dofs=unknowns))
 
 
-# --- directions ---
-
-
 @pytest.mark.parametrize(
     ("unit", "modulus", "turn"), [(1.0, 1.0, 0.0), (1e3, 1e-9, 33.0), (1e-2, 1e9, -120.0)]
 )
@@ -101,14 +95,6 @@ def test_inclined_rigid_obstacles_are_told():
     )
     assert only(lambda: solve(grooved, maxh=0.015, order=2), DIRECTION, "a rigid obstacle")
     assert quiet(lambda: solve(disc, maxh=0.015, order=2))
-
-
-def test_a_flat_obstacle_under_an_inclined_surface_is_silent():
-    """A disc pressed by 0.2 of its radius, with normals 25 degrees off where contact ends."""
-    disc = cases.disc_on_rigid_plane()
-    assert quiet(
-        lambda: solve(replace(disc, displacement={"top": (None, -0.2)}), maxh=0.1, order=2)
-    )
 
 
 def edge_of(name: str, left: float):
@@ -149,9 +135,6 @@ def test_the_tip_of_a_wedge_takes_the_direction_of_the_plane(slope, half):
     assert quiet(finest(problem, unknowns=4500))
 
 
-# --- zones ---
-
-
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_contact_far_below_the_size_of_elements_is_told(order):
     problem = cases.pressed_disc()
@@ -167,17 +150,6 @@ def test_the_last_level_resolves_the_zone_of_a_load_however_small(press):
     # One point in contact at 934 unknowns: the peak is 45 % off, 95 % of the lighter load. At 1438
     # the heavier one has three, its peak is 5 % off, and no warning comes.
     assert only(finest(problem, unknowns=1000), ZONE)
-
-
-@pytest.mark.parametrize(("order", "maxh"), [(1, 0.058), (2, 0.06), (3, 0.06), (4, 0.06)])
-@pytest.mark.study
-def test_zones_without_a_warning_have_their_peak(order, maxh):
-    """Hertz, half-width 0.1 in blocks of width 2: measured 3.1 % at order 1, the worst."""
-    case = cases.hertz_contact(half_width=0.1)
-    solution = solve(case.problem, maxh=maxh, order=order)
-    assert quiet(lambda: solve(case.problem, maxh=maxh, order=order))
-    peak = float(case.exact.pressure(np.zeros(1))[0])
-    assert solution.pressure.max() == pytest.approx(peak, rel=0.04)
 
 
 @pytest.mark.parametrize("order", [1, 4])
@@ -197,26 +169,6 @@ def test_whole_lines_in_contact_need_no_number_of_segments(geometry, upper, lowe
     solution = solve(problem, maxh=5.0, order=order)
     assert solution.active.size <= 2 * order + 1
     assert quiet(lambda: solve(problem, maxh=5.0, order=order))
-
-
-def test_contact_without_load_is_silent():
-    problem = replace(
-        cases.pressed_disc(), displacement={"block_bottom": (0, 0), "disc_top": (0, 0)}
-    )
-    assert quiet(lambda: solve(problem, maxh=0.3, order=2))
-
-
-def test_the_coarse_run_that_starts_a_large_mesh_tells_nothing():
-    """Of order 3, it ends on a mesh that does not resolve the zone of so small a load."""
-    solutions = []
-    supports = {"block_bottom": (0, 0), "disc_top": (0, -1e-6)}
-    problem = replace(cases.pressed_disc(), displacement=supports)
-    messages = told(lambda: solutions.append(solve(problem, maxh=0.045, order=2)))
-    assert solutions[0].coarse_levels > 0
-    assert len(messages) == 1  # of the mesh itself
-
-
-# --- strains ---
 
 
 @pytest.mark.parametrize(("unit", "modulus"), [(1.0, 1.0), (1e3, 1e9)])
@@ -241,30 +193,6 @@ def test_the_corners_of_a_punch_are_not_large_strains():
     *_, last = adapt(problem, order=3, max_dofs=7000)
     assert last.pressure.max() > 1.4 * cases.FIRST.E  # lambda + 2 mu = 1.35 E
     assert quiet(finest(problem, unknowns=7000))
-
-
-def test_confined_bodies_that_hardly_compress_bear_pressures_above_e():
-    nearly = Elastic(E=1.0, nu=0.4999)
-    problem = Problem(
-        geometry=blocks(),
-        materials={"upper|lower": nearly},
-        sliding="upper_left|upper_right|lower_left|lower_right",
-        displacement={"bottom": (0, 0)},
-        traction={"top": 10.0},
-        contact=[Contact("upper_contact", "lower_contact")],
-    )
-    assert quiet(lambda: solve(problem, maxh=0.5, order=2))
-
-
-def test_fits_are_silent_at_interferences_that_strains_can_bear():
-    cuts = "inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y"
-    problem = Problem(
-        geometry=rings(interference=1e-3, quarter=True),
-        materials={"inner|outer": SOFT},
-        sliding=cuts,
-        contact=[Contact("outer_contact", "inner_contact")],
-    )
-    assert quiet(finest(problem, order=2, unknowns=2000))
 
 
 PUSHED = "nothing deforms"

@@ -1,7 +1,5 @@
 """Looks behind warnings evaluate functions among the data a stated number of times."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import ngsolve as ng
@@ -11,7 +9,6 @@ import pytest
 from ngcontact import adapt, solve
 from ngcontact.adaptivity import refined
 from ngcontact.mesh import first_mesh
-from ngcontact.quadrature import evaluations, features_of
 from tests.quadrature.test_loads import loaded
 
 PLACES = 2048  # on a boundary, for each component
@@ -32,11 +29,6 @@ def meshes(problem, refinements):
         yield mesh
 
 
-def test_numbers_are_not_looked_at():
-    problem = replace(moved(), displacement={"bottom": (0, 0), "top": (0, 0.1)})
-    assert solve(problem, maxh=0.25, order=2).work["evaluations"] == 0
-
-
 def test_refinement_costs_no_looks():
     """A search on each segment and mesh took 257 points a segment, and 90 for each of its parts."""
     counts = [solve(moved(), mesh, order=2).work["evaluations"] for mesh in meshes(moved(), 4)]
@@ -48,14 +40,6 @@ def test_levels_do_not_look_again():
     levels = list(adapt(moved(), order=2, tolerance=1e-3, max_dofs=3000))
     assert len(levels) > 1
     assert sum(level.work["evaluations"] for level in levels) == 0
-
-
-def test_bounds_share_what_was_seen():
-    solution = solve(moved(), maxh=0.25, order=2)
-    before = evaluations()
-    (seen,) = features_of(solution.problem, solution.mesh)
-    assert evaluations() == before
-    assert seen.largest == pytest.approx(0.1 * np.sin(1), rel=1e-3)  # not at ends
 
 
 def test_parameters_that_change_are_seen_by_the_next_run():

@@ -1,7 +1,5 @@
 """Connected parts of a contact line."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp

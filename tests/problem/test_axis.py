@@ -1,7 +1,5 @@
 """Bodies of revolution: what is refused about their axis, before any work."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import ngsolve as ng

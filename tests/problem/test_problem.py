@@ -1,7 +1,5 @@
 """The problem as data: what is kept, and every refusal with its value and its remedy."""
 
-from __future__ import annotations
-
 import copy
 import math
 import pickle
@@ -63,9 +61,6 @@ def make(geometry):
         return Problem(**(arguments | changes))
 
     return build
-
-
-# --- what is kept ---------------------------------------------------------------------------
 
 
 def test_contact_normalises():
@@ -172,9 +167,6 @@ def test_errors_carry_their_data_and_survive_pickling():
     assert (adrift.body, adrift.motion, adrift.work) == ("punch", (1, 0, 0), 2.5)
 
 
-# --- refused at construction ----------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
@@ -234,8 +226,6 @@ def test_problem_refuses(make, changes, error, message):
     with pytest.raises(error, match=message):
         make(**changes)
 
-
-# --- refused at the mesh --------------------------------------------------------------------
 
 OBSTACLE = {"secondary": "punch_bottom", "direction": (0, -1)}
 

@@ -1,7 +1,5 @@
 """The primal-dual active set method: what safeguards end, and what it cannot solve."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -61,13 +59,3 @@ def test_a_singular_system_is_said():
     with pytest.raises(ConvergenceError, match=r"Newton step 1: .*singular") as failure:
         minimise(systems)
     assert failure.value.iterate.steps == []
-
-
-def test_steps_are_the_changes_of_the_active_set():
-    K, b, g = membrane()
-    program = first_unknowns_bounded(K, -b, g)
-    result = minimise(bordered_systems(program, counting_factor(K, [])))
-    assert result.steps[-1] == 0
-    assert sum(result.steps) >= np.count_nonzero(result.active)
-    again = minimise(bordered_systems(program, counting_factor(K, [])), result.active)
-    assert again.steps == [0]

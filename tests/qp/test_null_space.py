@@ -1,15 +1,11 @@
 """Rigid motions in a program: what resists them, pins, contact as the only hold."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
 from ngcontact.qp.active_set import minimise
 from ngcontact.qp.null_space import (
-    echelon,
-    no_null_space,
     pinned_null_space,
     vanishing_combinations,
 )
@@ -31,15 +27,6 @@ def test_combinations_that_vanish():
     assert vanishing_combinations(np.eye(3)).shape == (3, 0)
     assert vanishing_combinations(np.zeros((0, 2))).tolist() == [[1, 0], [0, 1]]
     assert vanishing_combinations(np.zeros((5, 0))).shape == (0, 0)
-
-
-def test_echelon_form_spans_the_same():
-    rng = np.random.default_rng(1)
-    vectors = rng.normal(size=(7, 3))
-    form = echelon(vectors)
-    unit_rows = (np.count_nonzero(form, axis=1) == 1) & (form.max(axis=1) == 1)
-    assert np.count_nonzero(unit_rows) >= 3
-    assert np.linalg.matrix_rank(np.column_stack([vectors, form]), tol=1e-12) == 3
 
 
 def chain(load, g):
@@ -79,9 +66,3 @@ def test_motions_that_nothing_resists_obey_their_conditions():
     program = first_unknowns_bounded(sp.csr_array(D.T @ D), load, np.zeros(0), null_space)
     result = minimise(bordered_systems(program, counting_factor(program.K, [])))
     np.testing.assert_allclose(result.u, np.arange(n) - SPRINGS / 2, atol=1e-13)
-
-
-def test_a_definite_matrix_has_no_null_space():
-    null_space = no_null_space(4)
-    assert null_space.others.shape == null_space.lineal.shape == (4, 0)
-    assert null_space.resisted(np.zeros(0, dtype=np.intp))

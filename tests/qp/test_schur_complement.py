@@ -1,9 +1,5 @@
 """Systems by few factorisations: bordering is exact, remembers, forgets, keeps one factor."""
 
-from __future__ import annotations
-
-import weakref
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -14,29 +10,6 @@ from ngcontact.qp.active_set import minimise
 from ngcontact.qp.schur_complement import bordered_systems
 from ngcontact.qp.solving import solve_qp
 from tests.qp.programs import counting_factor, first_unknowns_bounded, inequalities, membrane
-
-
-def test_one_factorisation_at_a_time():
-    rng = np.random.default_rng(7)
-    X = rng.normal(size=(12, 14))
-    program = first_unknowns_bounded(sp.csr_array(X @ X.T), rng.normal(size=12), rng.normal(size=6))
-    dense = counting_factor(program.K, [])
-    alive: weakref.WeakSet[Callable] = weakref.WeakSet()
-    before = []
-
-    def factor(free):
-        before.append(len(alive))
-        solve = dense(free)
-        alive.add(solve)
-        return solve
-
-    systems = bordered_systems(program, factor, border=0)
-    minimise(systems, np.ones(6, dtype=bool))
-    assert len(before) > 1
-    for last in range(3):
-        systems.refine(np.arange(6) == last)
-    assert len(before) > 4
-    assert not any(before)
 
 
 @pytest.mark.parametrize("border", [0, 5, 1000])
@@ -86,23 +59,6 @@ def random_bounds(seed):
     rng = np.random.default_rng(seed)
     X = rng.normal(size=(12, 14))
     return first_unknowns_bounded(sp.csr_array(X @ X.T), rng.normal(size=12), rng.normal(size=6))
-
-
-def test_systems_may_be_refined_in_any_order():
-    """Without `solve` before, after that of another set, twice: the same solution."""
-    program = random_bounds(8)
-    one, other = np.arange(6) < 2, np.arange(6) > 3
-    expected = {}
-    for active in (one, other):
-        systems = bordered_systems(program, counting_factor(program.K, []))
-        systems.solve(active)
-        expected[active.tobytes()] = systems.refine(active)
-    systems = bordered_systems(program, counting_factor(program.K, []))
-    for active in (one, other, other, one):
-        for found, right in zip(systems.refine(active), expected[active.tobytes()], strict=True):
-            # Condition of the matrix up to 1e4, entries of size 1.
-            np.testing.assert_allclose(found, right, rtol=0, atol=1e-11)
-        systems.solve(one)
 
 
 def test_another_load_costs_no_factorisation():

@@ -1,7 +1,5 @@
 """Warnings of data: loads that are nowhere, or too fine."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 

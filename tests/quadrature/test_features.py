@@ -1,7 +1,5 @@
 """Narrow features of data: found wherever they lie, told with place and width, or resolved."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from dataclasses import replace
@@ -99,21 +97,6 @@ def test_slopes_waves_kinks_and_steps_are_no_features(kind, number):
     assert not len(found(given(kind, SMOOTH[number]), kind).places)
 
 
-@pytest.mark.parametrize("waves", [12.0, 14.0, 18.6])
-def test_no_part_of_a_crest_is_told_at_an_end(waves):
-    """Of waves that turn at their ends and are features themselves; splinters of 1e-3 were told."""
-    one = found(given("displacement", ng.cos(2 * math.pi * waves * ng.x)), "displacement")
-    assert len(one.places) >= 2 * waves - 3
-    assert one.widths.min() > 0.3 / waves  # measured: 0.40 to 0.52
-
-
-def test_corners_and_arcs_of_wide_parts_are_no_features():
-    disc = ng.IfPos((ng.x - 0.5) ** 2 + (ng.y - 0.4) ** 2 - 0.1**2, 0.0, 1.0)
-    corner = ng.IfPos(ng.x - 0.31, ng.IfPos(ng.y - 0.3, 1.0, 0.0), 0.0)
-    for f in (disc, corner):
-        assert not len(found(given("force", f), "force").places)
-
-
 def test_a_function_on_a_circle_is_seen_across_its_seam():
     face = Circle((0, 0), 2).Face()
     face.faces.name, face.edges.name = "body", "rim"
@@ -155,16 +138,6 @@ def test_a_strip_on_a_uniform_load_is_carried(order, width):
     assert lower < fine.energy < upper
 
 
-@pytest.mark.parametrize(("x", "y"), [(0.41, 0.63), (0.7071, 0.1234)])
-def test_a_box_on_a_uniform_force_is_carried(x, y):
-    width = 6e-3
-    f = 1 + box(ng.x, x, width) * box(ng.y, y, width) / width**2
-    solution = solve(loaded(force={"body": (0, -f)}), maxh=0.3, order=2)
-    assert solution.reactions["bottom"] == pytest.approx([0, 2], rel=1e-3)
-    with pytest.raises(ValueError, match=r'where force "body" has a feature 0\.0\d+ wide near'):
-        _ = solution.error_bound
-
-
 @pytest.mark.parametrize(
     ("kind", "f", "place"),
     [
@@ -193,9 +166,3 @@ def test_adapt_refines_towards_what_is_narrow(kind):
     assert not unresolved(problem, last.mesh, in_bounds=True)
     middle = last.displacement(last.mesh(0.401, 1.0))[1]
     assert abs(middle) == pytest.approx(0.01 * 1.401, rel=0.02)
-
-
-def test_what_is_too_narrow_for_max_dofs_is_told():
-    f = 0.1 * ng.x + 0.01 * bump(ng.x, 0.4, 1e-3)
-    with pytest.warns(ContactWarning, match='displacement "top" has a feature 0.000'):
-        list(adapt(given("displacement", f), maxh=0.3, order=2, max_dofs=150))

@@ -1,7 +1,5 @@
 """Integrals with a measured error."""
 
-from __future__ import annotations
-
 import math
 
 import ngsolve as ng

@@ -1,7 +1,5 @@
 """Moduli that jump inside elements: told with their place, and refined together."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Which elements contain points: against images of known places, sides, sizes of all kinds."""
 
-from __future__ import annotations
-
 import ngsolve as ng
 import numpy as np
 import pytest

@@ -1,14 +1,12 @@
 """One row of a table: plain numbers, the same columns for every solution of a problem."""
 
-from __future__ import annotations
-
 import json
 import math
 
 import pytest
 
 from drivers.reference import cases
-from ngcontact import adapt, solve
+from ngcontact import solve
 
 
 def test_a_record_holds_plain_numbers():
@@ -38,8 +36,3 @@ def test_columns_do_not_depend_on_what_was_asked_before():
     assert list(after) == list(before)
     assert after["error_estimate"] == solution.error_estimate
     assert after["relative_error_bound"] == solution.relative_error_bound
-
-
-def test_levels_of_adapt_have_their_estimate():
-    for solution in adapt(cases.pressed_disc(), order=2, max_dofs=600):
-        assert solution.record()["relative_error_estimate"] == solution.relative_error_estimate

@@ -1,7 +1,5 @@
 """Problems and solutions as short tables."""
 
-from __future__ import annotations
-
 import re
 
 import ngsolve as ng
@@ -64,15 +62,6 @@ def test_a_problem_shows_all_of_its_data():
         assert text in shown
 
 
-def test_names_are_escaped():
-    data = problem()
-    html = Problem(
-        geometry=data.geometry, materials={"<b>": Elastic(1.0, 0.3)}, displacement={"a&b": (0, 0)}
-    )._repr_html_()
-    assert "&lt;b&gt;" in html
-    assert "a&amp;b" in html
-
-
 def test_a_solution_shows_every_pair():
     solution = solve(
         Problem(
@@ -93,30 +82,6 @@ def test_a_solution_shows_every_pair():
     assert "estimate" not in shown
     assert solution.relative_error_estimate > 0
     assert "estimate" in cells(solution._repr_html_())
-
-
-def loaded(load):
-    """A block of width 2 that presses another with that pressure."""
-    return Problem(
-        geometry=blocks(),
-        materials={".*": Elastic(1.0, 0.3)},
-        displacement={"bottom": (0, 0)},
-        sliding="upper_left|upper_right",
-        traction={"top": load},
-        contact=[Contact("upper_contact", "lower_contact")],
-    )
-
-
-def test_lines_of_a_run_have_their_columns_below_each_other():
-    """Numbers of one to five digits each; forces have six digits, also those that end in zeros."""
-    lines = [
-        str(solve(loaded(load), maxh=maxh, order=order))
-        for load, maxh, order in ((0.01, 1.0, 1), (0.02, 0.1, 2), (0.012345, 0.3, 3))
-    ]
-    for word in (" unknowns, ", " active, ", " steps, ", "force "):
-        assert len({line.index(word) for line in lines}) == 1
-    assert lines[0].endswith("force 0.0200000")
-    assert lines[2].endswith("force 0.0246900")
 
 
 def test_the_lines_of_adapt_have_their_columns_below_each_other():

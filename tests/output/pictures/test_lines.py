@@ -1,7 +1,5 @@
 """Lines of contact points."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

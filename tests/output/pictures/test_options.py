@@ -1,7 +1,5 @@
 """What a picture shows when it is asked to: fields, units, curves, mirror images, close-ups."""
 
-from __future__ import annotations
-
 import ngsolve as ng
 import numpy as np
 import pytest
@@ -14,7 +12,6 @@ from ngcontact.output.pictures.scene import picture
 from ngcontact.output.pictures.windows import close_ups, colour_range
 from tests.output.stubs import MAXH, stub
 
-UNIFORM = ((3.0, 1.0), (1.0, -2.0))  # in-plane stress
 ACROSS = 0.5  # normal to the plane
 
 
@@ -44,18 +41,6 @@ def test_fields_of_a_uniform_stress(uniform, field, value):
     shown = picture(uniform, Style(field=field)).shown
     np.testing.assert_allclose(shown.values, value, rtol=1e-12)  # round-off
     assert shown.kind == "stress"
-
-
-def test_displacements_and_any_function_are_fields(uniform):
-    scene = picture(uniform, Style(scale=1.0, field="displacement_y"))
-    still = picture(uniform, Style(scale=0.0, field=ng.x))
-    np.testing.assert_allclose(scene.shown.values, (scene.moved - still.moved)[:, 1], atol=1e-14)
-    np.testing.assert_allclose(still.shown.values, still.moved[:, 0], atol=1e-14)
-    length = picture(uniform, Style(field="displacement")).shown
-    assert length.kind == "length"
-    assert length.values.max() == pytest.approx(
-        np.linalg.norm(scene.moved - still.moved, axis=1).max()
-    )
 
 
 def test_units_name_axes_and_divide_values(tmp_path, uniform):

@@ -1,7 +1,5 @@
 """Panels of a picture: labels seen whole, a panel for each far zone, singular peaks cut."""
 
-from __future__ import annotations
-
 import ngsolve as ng
 import numpy as np
 import pytest
@@ -74,15 +72,6 @@ def test_small_zones_far_apart_have_a_panel_each(tmp_path, solution):
     assert panels[0].get_ylim() == panels[1].get_ylim()
     assert [axes.get_ylabel() for axes in panels] == ["contact pressure", ""]
     write_film(tmp_path / "a.gif", [solution, solution])  # on one panel, as zones may move
-
-
-def test_zones_that_fill_the_line_share_a_panel(solution):
-    assert len(shown_parts(touch(solution, [-0.3, 0.3], 0.25))) == 1
-
-
-def test_without_contact_the_whole_line_is_shown(solution):
-    [part] = shown_parts(solution)
-    assert part == pytest.approx([solution.points[:, 0].min(), solution.points[:, 0].max()])
 
 
 def test_singular_ends_are_cut_and_marked(tmp_path, solution):

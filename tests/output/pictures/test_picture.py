@@ -1,7 +1,5 @@
 """Pictures of a solution."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 
@@ -69,14 +67,6 @@ def test_picture_shows_bodies_and_pressure(tmp_path, hertz):
         np.testing.assert_allclose(drawn[label], expected, atol=1e-12)
 
 
-def test_scale_is_obeyed_and_stated(tmp_path, hertz):
-    figure = plot_solution(hertz, tmp_path / "a.png", scale=3)
-    assert figure.axes[0].get_title() == "deformed bodies, displacement × 3"
-    # disc_top sinks by 0.02, so that its drawn height is 1 - 3 * 0.02
-    [shading] = [c for c in figure.axes[0].collections if hasattr(c, "_triangulation")]
-    assert shading._triangulation.y.max() == pytest.approx(0.94, abs=1e-3)
-
-
 def test_small_displacement_without_a_gap_is_magnified(tmp_path):
     solution = stub(2)
     solution.displacement.vec.data *= 1e-3
@@ -84,26 +74,6 @@ def test_small_displacement_without_a_gap_is_magnified(tmp_path):
     title = plot_solution(solution, tmp_path / "a.png").axes[0].get_title()
     # |u| is largest at (2, -1), 0.297e-3; 4 % of the size 4 are 538 times that.
     assert title == "deformed bodies, displacement × 500"
-
-
-def test_without_a_path_the_picture_is_shown(monkeypatch):
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    pyplot.close("all")  # of pages that were run
-    shown = []
-    monkeypatch.setattr(pyplot, "show", lambda: shown.append(pyplot.get_fignums()))
-    figure = plot_solution(stub(1))
-    assert shown == [[figure.number]]
-    pyplot.close(figure)
-
-
-def test_a_picture_in_a_file_leaves_pyplot_alone(tmp_path):
-    from matplotlib import pyplot
-
-    before = pyplot.get_fignums()
-    plot_solution(stub(1), tmp_path / "a.png")
-    assert pyplot.get_fignums() == before
 
 
 def test_bad_scale_and_suffix_are_refused(tmp_path):
