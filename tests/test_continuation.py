@@ -66,13 +66,6 @@ def test_meshes_do_not_grow_with_the_sequence(sequence):
     assert size_at(sequence[4][-1], end) > 4 * size_at(sequence[2][-1], end)
 
 
-def test_without_a_tolerance_it_goes_on_from_the_estimate_of_start(sequence):
-    start = sequence[0][0]
-    first, second, *_ = adapt(pressed(0.0025), start=start, max_dofs=10_000)
-    assert unknowns(first) <= unknowns(start) < unknowns(second)
-    assert second.relative_error_estimate < first.relative_error_estimate
-
-
 def test_two_bodies_with_matched_nodes_stay_matched():
     def disc(way):
         return Problem(

@@ -3,7 +3,7 @@
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Compound, Glue, OCCGeometry, WorkPlane, X, Y
+from netgen.occ import Compound, OCCGeometry, WorkPlane, X, Y
 
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.mesh import first_mesh
@@ -219,43 +219,6 @@ def test_a_cut_that_takes_nothing_away_is_told():
                 solve(problem, maxh=0.5)
 
 
-def test_a_pressure_between_bodies_has_no_outward_normal():
-    """A line inside a body takes a pair; a number is refused with that advice."""
-    left = rectangle(0, 0, 1, 1, "left", "side")
-    left.edges.Max(X).name = "between"
-    right = rectangle(1, 0, 1, 1, "right", "side")
-    geometry = OCCGeometry(Glue([left, right]), dim=2)
-    data = {"materials": {"left|right": STEEL}, "displacement": {"side": (0, 0)}}
-    with pytest.raises(ValueError, match="give the traction as a pair"):
-        solve(Problem(geometry, **data, traction={"between": 1.0}), maxh=0.5)
-    solution = solve(Problem(geometry, **data, traction={"between": (1.0, 0)}), maxh=0.5)
-    assert solution.reactions["side"] == pytest.approx([-1, 0], abs=1e-12)
-
-
-@pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_fixed_direction_all_round_a_pin_has_an_estimate(order):
-    """On this mesh the direction touches both curves at a point of the quadrature."""
-    hole = disc(1, "block", "hole")
-    block = rectangle(-2, -2, 4, 4, "block", "side")
-    block.edges.Min(Y).name = "bottom"
-    pair = Contact("pin", "hole", direction=(0, -1))
-    problem = Problem(
-        OCCGeometry(Compound([disc(1, "pin", "pin"), block - hole]), dim=2),
-        {"pin|block": STEEL},
-        {"bottom": (0, 0)},
-        force={"pin": (0, -PRESSURE)},
-        contact=[pair],
-    )
-    with pytest.warns(UserWarning, match="inclined"):
-        solution = solve(problem, maxh=0.12, order=order)
-    given = ng.Mesh(problem.geometry.GenerateMesh(maxh=0.12))
-    with pytest.warns(UserWarning, match="inclined"):
-        other = solve(problem, given, order=order)
-    # On other meshes of that size; measured: within 5 %.
-    assert solution.error_estimate == pytest.approx(other.error_estimate, rel=0.2)
-
-
 @pytest.mark.parametrize(("width", "shift"), [(1, 0.3), (0.05, 0.96), (0.02, 0.5)])
 def test_overlaps_are_found_on_fine_meshes(width, shift):
     """By a sample: 70 or 80 % of a body, or all of it, on a square of 4000 triangles."""
@@ -268,13 +231,6 @@ def test_overlaps_are_found_on_fine_meshes(width, shift):
         mesh = ng.Mesh(geometry.GenerateMesh(maxh=0.025))
         with pytest.raises(ValueError, match="lie on top of each other"):
             Problem(geometry, {"square|bar": STEEL}, {"side": (0, 0)}).check(mesh)
-
-
-def test_small_overlaps_are_not_refused_on_fine_meshes():
-    both = [rectangle(0, 0, 1, 1, "square", "side"), rectangle(0.95, 0, 1, 1, "other", "side")]
-    geometry = OCCGeometry(Compound(both), dim=2)
-    mesh = ng.Mesh(geometry.GenerateMesh(maxh=0.025))
-    Problem(geometry, {"square|other": STEEL}, {"side": (0, 0)}).check(mesh)
 
 
 def test_bodies_on_top_of_each_other_are_refused():

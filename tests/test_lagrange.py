@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ngcontact.lagrange import gauss, gauss_lobatto, lagrange, lagrange_derivative, zeros
+from ngcontact.lagrange import gauss, gauss_lobatto, lagrange, lagrange_derivative
 
 ORDERS = [1, 2, 3, 4, 5]
 ROOT5, ROOT21 = np.sqrt(1 / 5), np.sqrt(3 / 7)
@@ -58,20 +58,6 @@ def test_interpolation_reproduces_polynomials_of_its_degree(order):
     error = S ** (order + 1) - lagrange(order, S) @ nodes ** (order + 1)
     expected = np.prod(S[:, None] - nodes, axis=1)
     np.testing.assert_allclose(error, expected, atol=2e-14)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_zeros_are_all_the_roots_in_the_interval(order):
-    values = np.random.default_rng(order).normal(size=(100, order + 1))
-    number, s = zeros(order, values)
-    assert (np.diff(number) >= 0).all()
-    for k in range(100):
-        x = gauss_lobatto(order)
-        roots = np.roots(np.polyfit(x, values[k], order))
-        real = np.sort(roots[np.abs(roots.imag) < 1e-9].real)
-        np.testing.assert_allclose(s[number == k], real[(real >= 0) & (real <= 1)], atol=1e-9)
-    # To the last bits of numbers of order 1, by the sums of at most six of them.
-    assert np.abs((lagrange(order, s) * values[number]).sum(axis=1)).max() < 1e-13
 
 
 @pytest.mark.parametrize("axis", [-1, 1])

@@ -16,16 +16,6 @@ def test_repeated_entries_add(index):
     assert matrix.indices.dtype == matrix.indptr.dtype == np.int32
 
 
-def test_nothing():
-    none = np.zeros(0, dtype=np.intp)
-    assert from_triplets(np.zeros(0), none, none, (0, 3)).shape == (0, 3)
-
-
-def test_large_places_are_kept():
-    matrix = from_triplets(np.ones(1), [0], [2**40], (1, 2**41))
-    assert matrix.indices.tolist() == [2**40]
-
-
 @pytest.mark.parametrize("order", [1, 2])
 def test_all_matrices_of_a_problem_have_short_indices(order):
     """One of 64 bits would make those of every product long, at twice the memory."""

@@ -22,7 +22,6 @@ from ngcontact import (
     solve,
 )
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import rings
 from ngcontact.geometries.region import (
     DOWN,
     LEFT,
@@ -34,7 +33,7 @@ from ngcontact.geometries.region import (
     quarter_arc,
 )
 from ngcontact.mesh import first_mesh
-from tests.given_meshes import mesh_of, two_blocks
+from tests.given_meshes import two_blocks
 from tests.scenes import distance, solved_with_load
 
 EXACT = 1e-10  # round-off times the condition of small meshes
@@ -126,58 +125,6 @@ def test_meshes_as_given_are_exact(lines, swap, order):
     assert abs(np.linalg.norm(solution.contact_force()) / 2 - 1) < EXACT
 
 
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("direction", [None, (0.0, -1.0)])
-@pytest.mark.study(witness=["direction1-1"])
-def test_round_off_at_corners_decides_nothing(order, direction):
-    """A block whose sides belong to its secondary: at its corners these graze the plate."""
-
-    def pressed(angle):
-        x, y = np.linspace(-1, 1, 9), np.linspace(0, 0.5, 3)
-        mesh = mesh_of(
-            [
-                ("plate", x, 2 * y - 1, ("plate_bottom", "side", "plate_top", "side")),
-                ("u", x * 0.3, y, ("u_bottom", "u_side", "u_top", "u_side")),
-            ],
-            angle,
-        )
-        turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-        xi = None if direction is None else tuple(turn @ direction)
-        problem = Problem(
-            geometry=mesh,
-            materials={"plate|u": LAW},
-            displacement={"plate_bottom": (0, 0), "u_top": tuple(turn @ (0, -0.05))},
-            contact=[Contact("u_bottom|u_side", "plate_top", direction=xi)],
-        )
-        solution = solve(problem, order=order)
-        return solution, turn.T @ solution.contact_force()
-
-    right, _ = pressed(0.0)
-    for degrees in range(17, 360, 17):  # twenty angles, 20, 40, 60, 80 among the worst before
-        solution, force = pressed(math.radians(degrees))
-        assert abs(force[0]) < EXACT * force[1]
-        np.testing.assert_array_equal(solution.active, right.active)
-        np.testing.assert_allclose(solution.pressure, right.pressure, rtol=1e-8)
-
-
-@pytest.mark.parametrize("swap", [False, True])
-def test_a_loose_pin_is_held_by_its_hole(swap):
-    """No support but contact, whichever side carries the points; the load is its force."""
-    pair = ("outer_contact", "inner_contact")[:: -1 if swap else 1]
-    problem = Problem(
-        geometry=rings(0.5, 1.0, 2.0, interference=-1e-2),
-        materials={"inner|outer": LAW},
-        displacement={"rim": (0, 0)},
-        traction={"hole": (0, -1e-3)},
-        contact=[Contact(*pair)],
-    )
-    solution = solve(problem, maxh=0.3, order=2)
-    np.testing.assert_allclose(
-        solution.contact_force(), (0, (1 if swap else -1) * 1e-3 * math.pi), atol=1e-5
-    )
-    assert max(solution.residuals.values()) < 1e-12
-
-
 def pin_at_the_bottom(*pairs):
     """A pin that touches its hole, and that contact alone holds against a slanting body force."""
     hole = WorkPlane().Circle(1.0).Face()
@@ -239,34 +186,6 @@ def test_other_roles_are_not_tried_where_the_gap_is_given(monkeypatch):
     with pytest.raises(ContactError):
         solve(problem, mesh, order=2)
     assert len(calls) <= 1
-
-
-@pytest.mark.parametrize("swap", [False, True])
-def test_a_slender_wedge_keeps_its_roles(swap):
-    """It moves far for a small gap whichever roles: forces are its load over the slope, 1/200."""
-    slope = 0.005
-    outlines = {
-        "wedge": ([(0, 0), (2, 0), (2, 1 - 2 * slope), (0, 1)], ["down", "", "up", ""]),
-        "lower": ([(-1, -1), (3, -1), (3, 0), (-1, 0)], ["fixed", "", "floor", ""]),
-        "upper": (
-            [(-1, 1 + slope), (3, 1 - 3 * slope), (3, 2), (-1, 2)],
-            ["roof", "", "fixed", ""],
-        ),
-    }
-    bodies = [body(name, polygon(*outline)) for name, outline in outlines.items()]
-    pairs = [("down", "floor"), ("up", "roof")]
-    problem = Problem(
-        geometry=compound(*bodies),
-        materials={"wedge|lower|upper": Elastic(E=1e5, nu=0.3)},
-        displacement={"fixed": (0, 0)},
-        force={"wedge": (1.0, 0)},
-        contact=[Contact(*(pair[::-1] if swap else pair)) for pair in pairs],
-    )
-    solution = solve(problem, maxh=0.5, order=2)
-    assert solution.problem is problem
-    load = 2 - 2 * slope
-    expected = (-1 if swap else 1) * np.array((-load, -load / slope))
-    np.testing.assert_allclose(solution.contact_force(1), expected, rtol=1e-6)  # round-off / slope
 
 
 def disc_in_vee(contact, settle):

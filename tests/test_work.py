@@ -18,18 +18,6 @@ def test_bodies_apart_cost_one_system(order):
     assert solution.work["back_solves"] <= 3  # the load, and what round-off asks to refine
 
 
-def test_a_third_body_is_not_factorised_again():
-    """The active set changes in several steps; the factor of all bodies is bordered."""
-    alone = solve(two_blocks(), maxh=0.2, order=2)
-    three = solve(two_blocks(third=True), maxh=0.2, order=2)
-    assert len(alone.steps) > 2
-    assert three.steps == alone.steps
-    assert three.work["factorizations"] == alone.work["factorizations"] == 1
-    # One for each changed row in both; round-off decides whether the last system is refined, and
-    # whether one before it is (two threads sum in any order).
-    assert three.work["back_solves"] == pytest.approx(alone.work["back_solves"], abs=2)
-
-
 def test_what_is_not_asked_for_is_not_done():
     solution = solve(two_blocks(), maxh=0.3, order=2)
     assert solution.work["estimates"] == 0

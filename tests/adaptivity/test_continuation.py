@@ -9,7 +9,7 @@ from ngcontact import Elastic, Problem
 from ngcontact.adaptivity import Aim, Descent, Forecast, Refining, unresolvable
 from ngcontact.adaptivity.continuation import rebuilt, recalled
 from ngcontact.geometries import blocks
-from ngcontact.mesh import diameters, first_mesh
+from ngcontact.mesh import first_mesh
 from ngcontact.problem import Triangulation
 
 PROBLEM = Problem(geometry=blocks(), materials={"upper|lower": Elastic(E=1.0, nu=0.3)})
@@ -58,18 +58,3 @@ def test_the_mesh_is_as_fine_as_the_error_asks_for(order, times):
     assert 1 <= new.ne * times**2 / fine.ne < 1.12
     assert len(descent.element) == new.ne
     assert np.bincount(descent.element).min() >= 0.7 * 16 / times**2  # measured 0.75
-
-
-def test_what_was_refined_without_need_is_not_refined():
-    """Indicators in the upper block alone: the lower one is left but for facing segments."""
-    mesh, fine, origin = divided(3)
-    upper = np.array([e.mat == "upper" for e in fine.Elements()])
-    squares = np.where(upper, 1 / upper.sum(), 1e-30)
-    known = Forecast(Triangulation(fine).corners, squares, 2, NONE)
-    new, descent = rebuilt(PROBLEM, Descent(mesh, origin), known, aim(1.001), "isoparametric")
-    above = np.array([e.mat == "upper" for e in new.Elements()])
-    assert above.sum() == pytest.approx(upper.sum(), rel=0.05)  # measured 1.04
-    first = np.array([e.mat == "upper" for e in mesh.Elements()])
-    assert (first[descent.element] == above).all()
-    assert diameters(new)[~above].max() == pytest.approx(diameters(mesh)[~first].max())
-    assert (~above).sum() < 0.3 * (~upper).sum()

@@ -5,16 +5,16 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Compound, OCCGeometry, WorkPlane, Y
+from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
-from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact import Contact, solve
 from ngcontact.contact import contact_line, joined
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block
 from ngcontact.mesh import curve
-from tests.scenes import distance, divided, pressed, solved_with_load
+from tests.scenes import divided, pressed
 
 EXACT = 1e-10  # round-off times the condition of small meshes; measured below 2e-12
 RATIOS = [(4, 6), (5, 37), (10, 73), (4, 8)]
@@ -68,47 +68,6 @@ def test_a_matched_part_keeps_its_rows_to_the_last_bit(order):
     assert (line.gap[inside] == nodal.gap[inside]).all()
     assert (line.weight[inside] == nodal.weight[inside]).all()
     assert (line.coupling[inside] != nodal.coupling[inside]).nnz == 0
-
-
-def overhanging(upper, lower, start, stop):
-    """Blocks on 0 < x < 1 and `start` < x < `stop`, given as a mesh."""
-    top = WorkPlane().MoveTo(0, 0).Rectangle(1, 1).Face()
-    base = WorkPlane().MoveTo(start, -1).Rectangle(stop - start, 1).Face()
-    top.faces.name, base.faces.name = "upper", "lower"
-    top.edges.name, base.edges.name = "side", "side"
-    top.edges.Max(Y).name, base.edges.Min(Y).name = "top", "bottom"
-    top.edges.Min(Y).name, base.edges.Max(Y).name = "upper_contact", "lower_contact"
-    shape = Compound([top, base])
-    counts = {"upper_contact": upper, "lower_contact": lower}
-    return ng.Mesh(divided(OCCGeometry(shape, dim=2), counts).GenerateMesh(maxh=0.4))
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize(
-    ("upper", "lower", "start", "stop"),
-    [
-        (4, 3, 0.0, 0.75),
-        (9, 8, 0.12, 0.83),
-        (4, 7, 0.0, 0.6123),
-        (5, 4, 0.0, 0.9999),
-        (4, 7, 0.25 - 1e-5, 0.75 + 1e-6),  # of two segments next to nothing faces the block
-    ],
-)
-def test_an_overhanging_secondary_is_exact(order, upper, lower, start, stop):
-    """Uniform pressure 1; the same traction on what faces nothing, integrated in parts."""
-    mesh, law = overhanging(upper, lower, start, stop), Elastic(E=1.0, nu=0.3)
-    u = (0.3 * 1.3 * ng.x, -(1 - 0.3**2) * ng.y)  # plane strain under -1 along y
-    problem = Problem(
-        geometry=mesh,
-        materials={"upper|lower": law},
-        displacement={"top": u, "bottom": u},
-        contact=[Contact("upper_contact", "lower_contact")],
-    )
-    bare = [(-np.inf, start), (stop, np.inf)]
-    d, result = solved_with_load(problem, mesh, order, "upper_contact", bare)
-    [line] = d.lines
-    np.testing.assert_allclose(result.force / line.weight, 1.0, rtol=EXACT)
-    assert distance(d, result, u) < EXACT
 
 
 @pytest.mark.parametrize("share", [1e-3, 0.05, 0.3, 0.6])

@@ -9,7 +9,7 @@ from netgen.occ import Compound, OCCGeometry, Vec, WorkPlane
 
 from ngcontact import Contact
 from ngcontact.contact.assembly import contact_line
-from ngcontact.contact.line import at_quadrature, without
+from ngcontact.contact.line import at_quadrature
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc, disc_on_block, rings
 from ngcontact.geometries.region import body, compound, polygon
@@ -90,21 +90,6 @@ def test_weights_at_corners_are_one_sided(order):
         adjacent = [lengths[(line.rows == p).any(axis=1)] for p in points]
         assert all(len(length) == 1 for length in adjacent)
         np.testing.assert_allclose(line.weight[points], end * np.ravel(adjacent), rtol=1e-13)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_matched_lines_touch_without_a_search(order):
-    trace, line = polygonal(order)
-    assert line.searches == 0
-    # The vertices are the same numbers on both sides; the gap is their difference.
-    np.testing.assert_allclose(line.gap, 0, atol=1e-15)
-    partner = trace.point(line.partner, line.partner_s)
-    np.testing.assert_allclose(partner, line.position, atol=1e-15)
-    opposite = trace.normal(line.partner, line.partner_s)
-    assert ((opposite * line.direction).sum(axis=1) < 0).all()
-    smooth = np.bincount(line.node)[line.node] == 1  # at a corner both sides share the node
-    np.testing.assert_allclose(opposite[smooth], -line.direction[smooth], atol=1e-14)
-    assert line.faces.all()
 
 
 @pytest.mark.parametrize("bare", [False, True])
@@ -252,32 +237,6 @@ def test_meshes_that_do_not_match(order, gap):
     np.testing.assert_allclose(met, 3 * line.position[:, 0] - 1, atol=1e-14)
 
 
-def test_points_without_an_opposite_carry_no_nodal_row():
-    """The upper line is longer than the lower one on both ends."""
-    upper = polygon([(-1, 0), (1, 0), (1, 1), (-1, 1)], ["zone", "side", "top", "side"])
-    lower = polygon(
-        [(0.5, -0.1), (-0.5, -0.1), (-0.5, -1), (0.5, -1)], ["below", "side", "bottom", "side"]
-    )
-    geometry = compound(body("upper", upper), body("lower", lower))
-    for edge in geometry.shape.edges:
-        if edge.name == "zone":
-            edge.partition = [0.1, 0.25, 0.5, 0.7]
-    for order in (1, 2):
-        trace = trace_of(OCCGeometry(geometry.shape, dim=2), order, maxh=2)
-        for direction in (None, (0, -1)):
-            line = contact_line(trace, Contact("zone", "below", direction, rows="nodal"))
-            points_are_consistent(line, trace)
-            x = np.sort(line.position[:, 0])
-            expected = [-0.5, 0.0, 0.4] if order == 1 else [-0.5, -0.25, 0.0, 0.2, 0.4]
-            np.testing.assert_allclose(x, expected, atol=1e-15)
-            np.testing.assert_allclose(line.gap, 0.1, rtol=1e-14)
-            assert np.count_nonzero(line.faces) == 2
-            # Half of the adjacent segments that face the lower line with both ends.
-            if order == 1:
-                weight = line.weight[np.argsort(line.position[:, 0])]
-                np.testing.assert_allclose(weight, [0.25, 0.45, 0.2], rtol=1e-14)
-
-
 @pytest.mark.parametrize(
     "contact",
     [
@@ -305,34 +264,6 @@ def test_gap_given_as_a_function_of_place(order, direction):
         np.testing.assert_allclose(line.gap, x**2 / 2 + y, atol=1e-14)
         assert line.searches == 0
         assert (line.partner == -1).all()
-
-
-def test_line_without_some_points():
-    _, line = polygonal(2)
-    dropped = np.array([0, 5])
-    less = without(line, dropped)
-    keep = np.setdiff1d(np.arange(len(line.node)), dropped)
-    assert (less.node == line.node[keep]).all()
-    assert (less.weight == line.weight[keep]).all()
-    gone = np.isin(line.rows, dropped)
-    assert (less.rows[gone] == -1).all()
-    assert (keep[less.rows[~gone]] == line.rows[~gone]).all()
-    assert (less.faces == line.faces).all()
-    same = without(line, np.zeros(0, dtype=int))
-    assert (same.rows == line.rows).all()
-
-
-@pytest.mark.parametrize("direction", [None, (0, -1)])
-def test_quadrature_on_the_line(direction):
-    trace, line = polygonal(2, direction)
-    local, segment, s, weight = at_quadrature(line, trace, 4)
-    assert (line.segments[local] == segment).all()
-    x = trace.point(segment, s)
-    # Integrals of 1 and x over the line, in arc length and in eta.
-    middle = np.array(LINE)[:-1, 0] + SIDES[:, 0] / 2
-    measure = LENGTHS if direction is None else SIDES[:, 0]
-    assert weight.sum() == pytest.approx(measure.sum(), rel=1e-14)
-    assert weight @ x[:, 0] == pytest.approx(measure @ middle, abs=1e-14)
 
 
 def test_the_far_side_of_the_own_body_has_no_partner():

@@ -5,23 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from ngcontact.contact.projection import MATCHED, cast, crossings, snap
-from ngcontact.lagrange import gauss_lobatto
+from ngcontact.contact.projection import cast
 from tests.contact.curves import DOWN, at, circle, graph, rays, upward
 
 RNG = np.random.default_rng(7)
-
-
-def test_oblique_rays_on_a_line():
-    curve = graph(lambda x: 0.5 * x, [-1, 0.2, 3])
-    for angle in (-100, -80, -60, -120):
-        d = np.array([math.cos(math.radians(angle)), math.sin(math.radians(angle))])
-        target = np.column_stack([RNG.uniform(-0.9, 2.9, 20), np.zeros(20)])
-        target[:, 1] = 0.5 * target[:, 0]
-        length = RNG.uniform(-0.5, 2, 20)  # overlap included
-        found = cast(*rays(target - length[:, None] * d, d), curve, upward(curve))
-        np.testing.assert_allclose(at(curve, found), target, atol=1e-14)
-        np.testing.assert_allclose(found.distance, length, atol=1e-14)
 
 
 def test_rays_that_meet_nothing():
@@ -33,28 +20,6 @@ def test_rays_that_meet_nothing():
     # From behind, and along the curve, no point faces.
     assert (cast(points, -directions, curve, upward(curve)).segment == -1).all()
     assert (cast(*rays(points, [1.0, 0.0]), curve, upward(curve)).segment == -1).all()
-
-
-@pytest.mark.parametrize("slope", [0.0, 1.0])
-def test_newton_s_method_stops_where_it_has_arrived(slope):
-    """Through (x, 1) along (slope, -1) onto y = x^2: slope^2 r^2 + (2 x slope + 1) r + x^2 = 1."""
-    curve = graph(lambda x: x**2, [0, 1], 2)
-    x, calls = np.linspace(0.0, 0.4, 9), []
-
-    class Counting(np.ndarray):
-        def __getitem__(self, at):
-            calls.append(at)
-            return super().__getitem__(at)
-
-    points = np.column_stack([x, np.ones_like(x)])
-    across = np.tile([1.0, slope], (len(x), 1))
-    segment, start = np.zeros(len(x), dtype=int), np.full(len(x), 0.5)
-    s = crossings(points, across, curve.view(Counting), segment, start, 1e-8)
-    # x + slope (1 - y) = s, y = s^2.
-    root = (-1 + np.sqrt(1 + 4 * slope * (x + slope))) / (2 * slope) if slope else x
-    assert np.asarray(s) == pytest.approx(root, rel=4e-16, abs=4e-16)
-    # Two looks at the curve a step; the last step is about the square root of the last bit.
-    assert len(calls) <= (2 if not slope else 5) * 2
 
 
 @pytest.mark.parametrize("count", [1, 2, 5])
@@ -79,16 +44,6 @@ def test_rays_that_cross_a_segment_twice(count, degree):
     met = np.isfinite(expected)
     assert met.sum() > 100
     np.testing.assert_allclose(found.distance[met], expected[met], atol=1e-11)
-
-
-def test_three_crossings_of_a_wave():
-    """Y = x (x^2 - 1) as one segment, looked at along x: three crossings, two of them facing."""
-    curve = graph(lambda x: x * (x**2 - 1), [-1.5, 1.5], 3)
-    points, directions = rays([[-2.0, 0.1], [0.2, 0.1], [2.0, 0.1]], [1.0, 0.0])
-    found = cast(points, directions, curve, upward(curve))  # faces where the curve rises
-    roots = np.sort(np.roots([1, 0, -1, -0.1]).real)[[0, 2]]
-    nearest = roots[np.abs(roots - points[:, :1]).argmin(axis=1)]
-    np.testing.assert_allclose(points[:, 0] + found.distance, nearest, atol=1e-14)
 
 
 def test_far_side_of_a_closed_curve_is_not_taken():
@@ -129,17 +84,3 @@ def test_vertex_at_the_end_of_the_facing_side():
     assert (found.segment.tolist(), found.s.tolist()) == ([0], [1.0])
     found = cast(*rays([[1.5, 0.0]], [-1.0, 0.0]), corner, -np.ones(2))
     assert (found.segment.tolist(), found.s.tolist()) == ([1], [0.0])
-
-
-@pytest.mark.parametrize("order", [1, 2, 3, 4])
-def test_snap(order):
-    nodes = gauss_lobatto(order)
-
-    def on(s):
-        return np.tile(nodes, (len(s), 1))
-
-    assert (snap(nodes, on(nodes)) == nodes).all()
-    assert (snap(nodes + 0.9 * MATCHED, on(nodes + 0.9 * MATCHED)) == nodes).all()
-    away = nodes + 1.1 * MATCHED
-    assert (snap(away, on(away)) == away).all()
-    assert snap(np.zeros(0), on(np.zeros(0))).shape == (0,)

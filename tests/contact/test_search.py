@@ -7,7 +7,7 @@ import pytest
 
 from ngcontact.contact.search import coincident
 from ngcontact.lagrange import gauss_lobatto, lagrange
-from tests.contact.curves import DOWN, UP, at, graph, nodes_on, rays, upward
+from tests.contact.curves import at, graph, nodes_on, upward
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
@@ -28,25 +28,6 @@ def test_coincident_nodes(order):
     np.testing.assert_allclose(found.distance, lift, atol=5e-16)  # two ulp of the coordinates
 
 
-def test_points_off_the_nodes_do_not_coincide():
-    curve = graph(lambda x: 0 * x, [0, 1])
-    points, directions = rays([[0.5, 0.0], [0.0, 1e-8], [1.0, 0.0]], DOWN)
-    found = coincident(points, directions, curve, upward(curve), nodes_on(curve, 1))
-    assert found.segment.tolist() == [-1, -1, 0]
-    assert found.s[2] == 1.0
-    assert coincident(
-        points, directions, curve, upward(curve), nodes_on(curve, 2)
-    ).segment.tolist() == [0, -1, 0]
-
-
-def test_coincident_nodes_must_face():
-    curve = graph(lambda x: 0 * x, [0, 1])
-    points, directions = rays([[0.0, 0.0]], UP)
-    assert coincident(
-        points, directions, curve, upward(curve), nodes_on(curve, 1)
-    ).segment.tolist() == [-1]
-
-
 def test_coincident_vertex_of_two_segments():
     """At a corner the row of each side has its partner on the segment that opposes it."""
     corner = np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [1.0, -1.0]]])
@@ -57,11 +38,3 @@ def test_coincident_vertex_of_two_segments():
     assert found.segment.tolist() == [0, 1]
     assert found.s.tolist() == [1.0, 0.0]
     assert found.distance.tolist() == [0.0, 0.0]
-
-
-def test_matched_is_relative_to_the_segment():
-    """Beside a short segment a long one does not widen the tolerance."""
-    curve = graph(lambda x: 0 * x, [0, 1e-4, 1])
-    points, directions = rays([[0.0, 5e-10], [0.0, 5e-14], [1.0, 5e-10]], DOWN)
-    found = coincident(points, directions, curve, upward(curve), nodes_on(curve, 1))
-    assert found.segment.tolist() == [-1, 0, 1]

@@ -43,27 +43,6 @@ def test_the_model_end_is_found_exactly(end, order):
     assert outer == inner + 1
 
 
-def test_a_smooth_factor_of_the_gap_does_no_harm():
-    # gap = d^(3/2) (1 + d) has a smooth 2/3 power: the error is that of a cubic, O(h^4).
-    errors = []
-    for count in (41, 81, 161):
-        x = np.linspace(0, 1, count)
-        gap, active = opening(x - 0.437)
-        found = transitions_on(line(x, 2), gap * (1 + x - 0.437), active)
-        errors.append(abs(found.position[0, 0] - 0.437))
-    rates = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert errors[-1] < 1e-6
-    assert rates.mean() > 3
-
-
-@pytest.mark.parametrize("unit", [1e-9, 1e9])
-def test_the_end_does_not_depend_on_units(unit):
-    x = np.linspace(0, 1, 21)
-    gap, active = opening(x - 0.437)
-    found = transitions_on(line(unit * x), unit * gap, active)
-    assert found.position == pytest.approx(unit * np.array([[0.437, 0.0]]), abs=EXACT * unit)
-
-
 def test_two_zones_have_four_ends():
     x = np.linspace(0, 4, 161)
     # Contact in |x - 1| < 0.43 and |x - 3| < 0.43; between them each end has its half.
@@ -82,18 +61,6 @@ def test_points_of_separate_lines_are_not_neighbours():
     assert len(transitions_on(lines, ~active * 1.0, active).position) == 0
 
 
-def test_points_without_a_row_are_no_neighbours():
-    # Gamma_K ends on Gamma_u, where the row is dropped: -1.
-    x = np.linspace(0, 1, 5)
-    short = SimpleNamespace(
-        position=np.column_stack([x, 0 * x]),
-        rows=np.array([[-1, 0], [0, 1], [1, 2], [3, 4]]),
-        node=np.arange(5),
-    )
-    active = np.array([True, True, True, False, False])
-    assert len(transitions_on(short, ~active * 1.0, active).position) == 0
-
-
 def test_a_closed_line_has_no_first_point():
     count, end = 60, 0.733
     angle = np.linspace(0, 2 * math.pi, count, endpoint=False)
@@ -109,15 +76,6 @@ def test_a_closed_line_has_no_first_point():
     h = 2 * math.pi / count
     expected = np.array([[math.cos(end), -math.sin(end)], [math.cos(end), math.sin(end)]])
     assert found[found[:, 1].argsort()] == pytest.approx(expected, abs=h**2 / 8)
-
-
-@pytest.mark.parametrize("active", [[1, 0, 0, 0], [0, 0, 0, 1], [0, 1, 0, 0], [1, 0, 1, 1]])
-@pytest.mark.parametrize("gap", [0.0, 1.0])
-def test_the_middle_where_few_points_are_open(active, gap):
-    active, x = np.array(active, dtype=bool), np.arange(4.0)
-    changes = np.flatnonzero(active[1:] != active[:-1])
-    found = transitions_on(line(x), gap * ~active, active)
-    assert np.sort(found.position[:, 0]) == pytest.approx(x[changes] + 0.5)
 
 
 def at_a_corner(x, corner, order=1):
@@ -240,35 +198,3 @@ def test_a_uniform_pressure_is_told_whatever_the_split(turn):
     told = pressure_across_corners(line, force, mask("xxxx"))
     assert told == pytest.approx([2, 2, 2, 2], rel=1e-12)
     assert np.abs(force / line.weight - 2).max() > 1e-3
-
-
-def test_one_side_carries_all_inside_the_contact():
-    line = bent(1e-3)
-    force = np.array([0.5, 0.75, 0.0, 0.25])  # of a pressure of 1: 0.5 and 0.25 at the corner
-    # To the square of the turn: the whole force has the direction of one side.
-    assert pressure_across_corners(line, force, mask("xx.x")) == pytest.approx(
-        [1, 1, 1, 1], rel=1e-6
-    )
-
-
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("turn", [6e-4, -6e-4, 1e-2, -1e-2])
-def test_blocks_pressed_together_at_an_almost_flat_corner(turn, order):
-    # The nearly parallel rows share the force by chance: one had twice the pressure, the other none
-    # and counted as an end of the contact.
-    slope = math.tan(turn / 2)
-    problem = Problem(
-        geometry=blocks(line=[(-1, -slope), (0, 0), (0.73, -0.73 * slope)]),
-        materials=cases.BLOCKS,
-        displacement={"top": (0, -0.1), "bottom": (0, 0)},
-        contact=[Contact("upper_contact", "lower_contact")],
-    )
-    solution = solve(problem, maxh=0.2, order=order)
-    x = solution.points[:, 0]
-    [contact] = solution.discrete.lines
-    pressure = pressure_across_corners(contact, solution.force, solution.active)
-    assert np.count_nonzero(np.abs(x) < 1e-12) == 2
-    near = (np.abs(x) > 1e-12) & (np.abs(x) < 0.25)
-    # Measured: 1 % from the mean of the neighbours.
-    assert pressure[np.abs(x) < 1e-12] == pytest.approx(pressure[near].mean(), rel=0.03)
-    assert len(solution.transitions()) == 0

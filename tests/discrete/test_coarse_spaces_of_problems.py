@@ -1,7 +1,5 @@
 """Coarser spaces of contact problems: inside the finer ones, as small as they should be."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -44,19 +42,6 @@ def test_linear_displacements_are_in_all_spaces(order: int):
         # Theory: exact, on straight bodies; 100 times round-off.
         np.testing.assert_allclose(step.P @ y[step.kept], y, rtol=0, atol=1e-14)
         y = y[step.kept]
-
-
-@pytest.mark.parametrize("order", [1, 2, 4])
-@pytest.mark.parametrize("name", REFINED)
-def test_unknowns_that_stay_mean_the_same(name: str, order: int):
-    """Of rows at nodes: the mean of a dual row contains unknowns that do not stay."""
-    pairs = [replace(pair, rows="nodal") for pair in REFINED[name].contact]
-    problem = discrete(replace(REFINED[name], contact=pairs), order, 2)
-    for step in steps_of(problem):
-        chosen = step.P[step.kept]
-        # Theory: the identity, to round-off of the frames; pairs that refinement did not match
-        # exactly refer to other partners.
-        assert abs(chosen - sp.eye_array(chosen.shape[0])).max() < 1e-12
 
 
 @pytest.mark.parametrize("local", [False, True])

@@ -8,11 +8,8 @@ import pytest
 
 from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
-from ngcontact import ConvergenceError, Elastic, Solution, adapt, solve
-from ngcontact.adaptivity.refinement import refined
+from ngcontact import Elastic, Solution, adapt, solve
 from ngcontact.discrete.discrete_problem import MULTIGRID, minimise_energy
-from ngcontact.mesh.generation import first_mesh
-from ngcontact.qp import BorderedSystems
 from tests.scenes import REFINED
 
 ORDERS = (1, 2, 3, 4)
@@ -84,19 +81,6 @@ def test_adaptive_meshes(large, name: str, order: int):
     same(solution, direct(REFINED[name], solution.mesh, order=order))
 
 
-def test_another_load_assembles_nothing(large):
-    problem = cases.disc_on_rigid_plane()
-    first = solve(problem, uniform_mesh(problem, 2, 6000), order=2)
-    deeper = replace(problem, displacement={"top": (None, -0.006)})
-    second = solve(deeper, first.mesh, order=2, start=first)
-    assert (second.work["assemblies"], second.work["factorizations"]) == (0, 0)
-    assert second.discrete.systems is first.discrete.systems
-    same(second, direct(deeper, first.mesh, order=2))
-    first.discrete.systems.forget()
-    assert first.discrete.systems.prepared is None
-    same(solve(problem, first.mesh, order=2, start=second), first)
-
-
 def test_nearly_incompressible_bodies(large):
     """Gauss-Seidel sweeps are slow there: that is seen soon."""
     stiff = Elastic(E=1.0, nu=0.4999)
@@ -122,23 +106,6 @@ def test_motions_that_no_contact_resists_ask_for_a_factor(large):
     np.testing.assert_allclose(result.u, u, rtol=0, atol=1e-10 * np.abs(u).max())
 
 
-def test_without_coarser_spaces_there_is_a_factor(large):
-    problem = REFINED["block"]
-    mesh = first_mesh(problem, 0.1)
-    assert type(solve(problem, mesh).discrete.systems) is BorderedSystems
-    # Degree 1 on the same mesh has a quarter of the unknowns.
-    solution = solve(problem, mesh, order=2)
-    assert solution.work["factorizations"] == 0
-    same(solution, direct(problem, mesh, order=2))
-
-
-def test_physical_elements_on_curves_are_factorised(large):
-    problem = REFINED["disc"]
-    mesh = refined(problem, refined(problem, first_mesh(problem, 0.3)))
-    solution = solve(problem, mesh, element="physical")
-    assert solution.work["factorizations"] > 0
-
-
 @pytest.mark.parametrize("order", [1, 3])
 def test_points_are_moved(order):
     """The jumps are those asked for, forces act there alone, and do the work of the energy."""
@@ -155,12 +122,3 @@ def test_points_are_moved(order):
     energy = g @ (discrete.space.A @ g)
     assert -found.force @ jumps == pytest.approx(energy, rel=1e-10)
     assert discrete.systems.program is discrete.program
-
-
-def test_a_free_motion_is_refused():
-    problem = cases.partly_opening_block()
-    problem = replace(problem, sliding="lower_axis", traction={"pressed|top": 1.0})
-    solution = solve(problem, maxh=0.5, order=1)
-    none = np.zeros_like(solution.active)
-    with pytest.raises(ConvergenceError, match="rigid motion"):
-        solution.discrete.influence(none, np.zeros(none.size))

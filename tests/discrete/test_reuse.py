@@ -50,18 +50,6 @@ def test_another_load_costs_back_solves_only(order: int) -> None:
     assert first.work["assemblies"] == first.work["factorizations"] == 1
 
 
-def test_an_obstacle_that_moves_costs_back_solves_only() -> None:
-    level = ng.Parameter(0.0)  # the same function, of another value: gaps are never remembered
-    contact = Contact(secondary="arc", direction=(0, -1), gap=ng.y + level)
-    case = replace(cases.disc_on_rigid_plane(), contact=[contact])
-    first = solve(case, maxh=0.3, order=2)
-    level.Set(-0.001)
-    second = solve(case, first.mesh, order=2, start=first)
-    assert (second.work["assemblies"], second.work["factorizations"]) == (0, 0)
-    same(second, solve(case, first.mesh, order=2))
-    assert second.contact_force()[1] > 1.1 * first.contact_force()[1]
-
-
 def test_other_bodies_are_assembled() -> None:
     E = ng.Parameter(200.0)
     soft = {"upper": Elastic(E=E, nu=0.3), "lower": STEEL}

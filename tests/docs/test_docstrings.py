@@ -1,29 +1,20 @@
 """Every public docstring gives the shapes of arrays, and units of what the contract promises."""
 
-import ast
 import inspect
 import re
 
 import pytest
 
-import ngcontact
 import ngcontact.geometries as geometries
-from ngcontact import Elastic, Hooke, Problem, Solution, solve_qp
-from ngcontact.qp import Iterate
+from ngcontact import Elastic, Hooke, Problem, Solution
 from tests.docs.docstrings import (
     SHAPE,
-    Claim,
     array_types,
-    arrays_in,
     claims,
-    entries,
     entry,
     modules,
     sections,
-    shapes_returned,
 )
-from tests.docs.names import resolved
-from tests.docs.pages import DOCS
 
 TREES = modules()
 TYPES = array_types(TREES)
@@ -122,12 +113,6 @@ def test_a_solution_says_its_units(name, dimension):
     assert not unitless(said_of(Solution, name), dimension)
 
 
-def test_solve_qp_says_its_units():
-    """Its numbers have the units of the caller's."""
-    assert not unitless(inspect.getdoc(solve_qp), "any")
-    assert not unitless(inspect.getdoc(Iterate), "any")
-
-
 @pytest.mark.parametrize("law", [Elastic, Hooke])
 def test_laws_say_their_units(law):
     for name in inspect.signature(law).parameters:
@@ -154,63 +139,7 @@ def test_geometries_say_their_units(name):
     assert not [n for n, text in said.items() if all(unitless(text, kind) for kind in kinds)]
 
 
-def test_public_names_have_docstrings():
-    assert all(inspect.getdoc(getattr(ngcontact, name)) for name in ngcontact.__all__)
-
-
 # The reader itself.
-
-EXAMPLE = """Mean of `values` (k, 2) and `others`, `more` (k,) at points, (2,) and (k,).
-
-Parameters
-----------
-weight, share : ndarray (k,)
-    Of each.
-point : tuple
-    Its place (x, y).
-index : ndarray of int
-    Which, (m, order + 1).
-
-Returns
--------
-first, second : ndarray (3 b, r)
-int
-"""
-
-
-@pytest.mark.parametrize(
-    ("name", "shape"),
-    [
-        ("values", True),
-        ("others", True),
-        ("more", True),
-        ("weight", True),
-        ("share", True),
-        ("index", True),
-        ("point", False),
-        ("first", False),
-        ("absent", False),
-    ],
-)
-def test_shapes_of_parameters(name, shape):
-    assert Claim("f", name, 1, EXAMPLE).holds() == shape
-
-
-def test_shapes_returned():
-    assert shapes_returned(EXAMPLE) == 4
-    assert shapes_returned("Of `values` (k, 2).") == 0
-    assert shapes_returned("Points and weights, (k,) each.") == float("inf")
-    assert Claim("f", "", 4, EXAMPLE).holds()
-    assert not Claim("f", "", 5, EXAMPLE).holds()
-
-
-def test_sections_and_entries():
-    assert list(sections(EXAMPLE)) == ["", "Parameters", "Returns"]
-    assert [names for names, _ in entries(sections(EXAMPLE)["Parameters"])] == [
-        ["weight", "share"],
-        ["point"],
-        ["index"],
-    ]
 
 
 @pytest.mark.parametrize(
@@ -218,45 +147,3 @@ def test_sections_and_entries():
 )
 def test_shapes(text):
     assert SHAPE.fullmatch(text)
-
-
-@pytest.mark.parametrize(
-    "text", ["(m)", "(x, y)", "(Judice, Pires 1994)", "(P_1h)", "(2.10)", "()"]
-)
-def test_no_shapes(text):
-    assert not SHAPE.search(text)
-
-
-@pytest.mark.parametrize(
-    ("annotation", "count"),
-    [
-        ("Array", 1),
-        ("Array | None", 1),
-        ("NDArray[np.bool_]", 1),
-        ("sp.csr_array", 1),
-        ("'Array'", 1),
-        ("tuple[Array, Index, int]", 2),
-        ("dict[str, Array]", 1),
-        ("list[Array] | tuple[Array, Array]", 2),
-        ("Callable[[Array], Array]", 0),
-        ("float | ng.CoefficientFunction", 0),
-    ],
-)
-def test_arrays_in_annotations(annotation, count):
-    assert arrays_in(ast.parse(annotation, mode="eval").body, TYPES) == count
-
-
-def test_entries_of_the_reference_have_a_text_of_their_own():
-    """`order, element : ...` becomes two entries of one text on the site."""
-    pages = "".join(page.read_text() for page in (DOCS / "reference").glob("*.md"))
-    names = re.findall(r"^\.\. auto\w+:: (?:ngcontact\.)?([\w.]+)$", pages, re.MULTILINE)
-    assert len(names) > 20
-    joint = re.compile(r"^ *(\w+(?:, \w+)+)(?: : .*)?\n +[A-Z0-9]", re.MULTILINE)
-    found = []
-    for name in names:
-        top = resolved(name)
-        members = set(dir(top)) - set(getattr(top, "__dataclass_fields__", ()))
-        for thing in (top, *(getattr(top, member, None) for member in sorted(members))):
-            text = re.split(r"\n *Raises\n", getattr(thing, "__doc__", None) or "")[0]
-            found += [f"{name}: {entry}" for entry in joint.findall(text)]
-    assert not found

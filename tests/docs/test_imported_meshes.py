@@ -9,25 +9,6 @@ from tests.docs.pages import DOCS
 
 PAGE = (DOCS / "howto" / "imported_meshes.md").read_text()
 
-FORMAT_4_1 = """$MeshFormat
-4.1 0 8
-$EndMeshFormat
-$Nodes
-1 3 1 3
-2 1 0 3
-1
-2
-3
-0 0 0
-1 0 0
-0 1 0
-$EndNodes
-$Elements
-1 1 1 1
-2 1 2 1
-1 1 2 3
-$EndElements
-"""
 CORNERS = "1 0 0 0\n2 1 0 0\n3 0 1 0"
 MIDDLES = "4 0.5 0 0\n5 0.5 0.5 0\n6 0 0.5 0"
 
@@ -43,14 +24,6 @@ def file_of(folder, names, nodes, element):
     return str(path)
 
 
-def test_format_4_1(tmp_path):
-    path = tmp_path / "part.msh"
-    path.write_text(FORMAT_4_1)
-    with pytest.raises(ValueError, match=r"invalid literal for int\(\) with base 10:") as caught:
-        ReadGmsh(str(path))
-    assert str(caught.value).split("10:")[0] in PAGE
-
-
 def test_second_order(tmp_path):
     path = file_of(tmp_path, '2 1 "part"', f"{CORNERS}\n{MIDDLES}", "1 9 2 1 1 1 2 3 4 5 6")
     mesh = ng.Mesh(ReadGmsh(path))
@@ -58,10 +31,3 @@ def test_second_order(tmp_path):
     with pytest.raises(ValueError, match=rf"{message}: .*Mesh\.ElementOrder = 1"):
         Problem(geometry=mesh, materials={"part": Elastic(E=1.0, nu=0.3)}).check(mesh)
     assert message in PAGE
-
-
-def test_a_group_without_a_name(tmp_path):
-    path = file_of(tmp_path, '2 1 "part"', CORNERS, "1 2 2 3 1 1 2 3")
-    with pytest.raises(KeyError, match="3"):
-        ReadGmsh(path)
-    assert "`KeyError: 3`" in PAGE

@@ -11,10 +11,8 @@ from drivers.reference import cases
 from drivers.reference.curved import rings as ring_solution
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.estimator.contact import remaining
-from ngcontact.estimator.contact.facing import between_nodes
 from ngcontact.estimator.terms import Parts
 from ngcontact.geometries import blocks, rings
-from ngcontact.lagrange import gauss_lobatto
 from tests.scenes import unmatched_blocks
 
 LAW = Elastic(E=1.0, nu=0.3)
@@ -37,20 +35,6 @@ def test_what_is_left_of_segments():
     found = list(zip(left.segment, left.start, left.stop, strict=True))
     assert found == [(1, 0.0, 0.25), (1, 0.75, 1.0), (3, 0.0, 0.5), (4, 0.0, 1.0)]
     assert remaining(inner, []).segment.tolist() == [0, 1, 3, 4]
-
-
-@pytest.mark.parametrize("order", [1, 2, 3, 4])
-def test_directions_between_nodes_are_those_of_the_circle_through_them(order):
-    angle = 0.7 * gauss_lobatto(order)
-    nodal = np.column_stack([np.cos(angle), np.sin(angle)])[None]
-    s, step = np.linspace(0.1, 0.9, 7), 1e-6
-    (d, slope), (after, _), (before, _) = (
-        between_nodes(np.repeat(nodal, 7, axis=0), s + t) for t in (0, step, -step)
-    )
-    weights = np.linalg.norm(d, axis=1)
-    assert weights == pytest.approx(1, rel=1e-14)
-    # Central differences: their error is 1e-12, their round-off 1e-10.
-    assert slope == pytest.approx((after - before) / (2 * step), abs=1e-8)
 
 
 def named(face, name, sides):
@@ -199,22 +183,6 @@ def test_gaps_that_nodes_do_not_resolve_are_estimated(wavy, order):
     solution = solve(problem, maxh=0.5, order=order)
     ratio = solution.relative_error_estimate / reference_error(solution, reference)
     assert 1.5 < ratio < 6
-
-
-def test_narrow_gaps_are_found_between_quadrature_points():
-    """The penetration of a ridge of width 0.02 on segments of length 0.4, off the nodes."""
-    ridge = 1e-3 * ng.exp(-(((ng.x - 0.137) / 0.01) ** 2))
-    problem = Problem(
-        geometry=blocks(),
-        materials=cases.BLOCKS,
-        displacement={"bottom": (0, 0), "top": (0, -0.05)},
-        contact=[Contact("lower_contact", "upper_contact", direction=(0, 1), gap=-ridge)],
-    )
-    parts = solve(problem, maxh=0.4).estimate_parts
-    # |r| |r'| of e exp(-(x / w)^2) is e^2 (pi / 2)^(1/2), times mu of the softer block; differences
-    # between points make it an approximation.
-    expected = 1e-6 * np.sqrt(np.pi / 2) / 2.6
-    assert parts["penetration"].sum() == pytest.approx(expected, rel=0.15)
 
 
 @pytest.mark.parametrize("case", [cases.one_transition, cases.hertz_contact])

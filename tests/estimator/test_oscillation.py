@@ -1,15 +1,13 @@
 """Moduli that vary: the estimate depends on the law alone, and sees what the mesh does not."""
 
 import math
-from dataclasses import replace
 
 import ngsolve as ng
 import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
-from drivers.reference.overkill import Overkill
-from ngcontact import Elastic, Hooke, Problem, adapt, solve
+from ngcontact import Elastic, Hooke, Problem, solve
 
 SQUARE = MakeStructured2DMesh(quads=False, nx=8, ny=8)
 [BODY] = SQUARE.GetMaterials()
@@ -89,23 +87,3 @@ def test_moduli_that_jump_along_edges(order):
     per_element.Set(E)  # at the middle of each element
     constant = solve(pressed(Elastic(per_element, 0.3), mesh), order=order)
     assert jumping.error_estimate == pytest.approx(constant.error_estimate, rel=1e-9)
-
-
-LAWS = [
-    ((3.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 0.0, 1e4)),
-    ((3.0, 1.0, 0.0), (1.0, 30.0, 0.0), (0.0, 0.0, 1.0)),
-    ((5.0, 2.0, 0.7), (2.0, 3.0, -0.4), (0.7, -0.4, 1.1)),
-    ((2.0, -1.9, 0.0), (-1.9, 2.0, 0.0), (0.0, 0.0, 1.0)),
-]
-
-
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("C", LAWS)
-@pytest.mark.study(witness=["C1-1", "C2-1", "C1-2"])
-def test_the_softest_strain_counts(C, order):
-    # Under a body force; the shear entry as modulus left 0.11 of the error in the first case.
-    problem = replace(pressed(as_function(Hooke(C))), force={BODY: (1.0, -2.0)})
-    *_, reference = adapt(replace(problem, materials={BODY: Hooke(C)}), order=4, max_dofs=6000)
-    solution = solve(problem, order=order)
-    error = Overkill(reference).relative_error(solution) * reference.energy_norm
-    assert solution.error_estimate >= error

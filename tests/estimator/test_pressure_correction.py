@@ -67,18 +67,6 @@ def test_effectivity_towards_incompressibility(make, nu, order):
     assert 1 <= effectivity(solution, exact) <= 6
 
 
-@pytest.mark.parametrize("nu", [0.499, 0.4999, 0.499999])
-@pytest.mark.parametrize("make", [one_transition, hertz_contact])
-@pytest.mark.study(witness=["one_transition-0.4999"])
-def test_locking_is_not_underestimated(make, nu):
-    # Where the error exceeds the solution the contact forces are wrong, too, and effectivities
-    # grow: S1 measured 1.3, 2.2, 20; S3, with errors from 110 to 3300 %, 2.2, 6.0, 60.
-    problem, exact = make(Elastic(E=1.0, nu=nu), Elastic(E=3.0, nu=nu))
-    solution = solve(problem, maxh=0.14, order=1)
-    error = relative_energy_error(solution, exact)
-    assert 1 <= effectivity(solution, exact) <= 6 * max(1, error)
-
-
 @pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.parametrize("n", [4, 8])
 @pytest.mark.study(witness=["4-1", "4-3"])

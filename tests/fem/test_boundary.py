@@ -113,16 +113,6 @@ def test_point_evaluation_agrees_with_ngsolve(make):
 
 
 @every_mesh
-def test_elements_and_bodies(make):
-    trace = boundary_trace(make(1), 1)
-    mesh = trace.mesh
-    for k, number in enumerate(trace.element):
-        element = mesh[ng.ElementId(ng.VOL, int(number))]
-        assert set(trace.nodes[k]) <= {v.nr for v in element.vertices}
-        assert element.mat == mesh.GetMaterials()[trace.body[k]]
-
-
-@every_mesh
 def test_normals_agree_with_ngsolve(make):
     for order in ORDERS:
         trace = boundary_trace(make(order), 1)
@@ -145,16 +135,6 @@ def test_exact_normals_are_those_of_the_geometry(order):
     np.testing.assert_allclose(trace.exact_normal(segment, s), radial, atol=2e-15)
     # Not so the mesh's own normals.
     assert np.abs(trace.normal(segment, s) - radial).max() > 1e-7
-
-
-def test_exact_normals_without_cad_are_those_of_the_mesh():
-    trace = boundary_trace(MakeStructured2DMesh(quads=False, nx=3, ny=2), 2)
-    assert trace.edges is None
-    segment, s = everywhere(trace)
-    outward = {"left": (-1, 0), "right": (1, 0), "bottom": (0, -1), "top": (0, 1)}
-    names = np.array(trace.mesh.GetBoundaries())[trace.region[segment]]
-    expected = np.array([outward[name] for name in names])
-    np.testing.assert_allclose(trace.exact_normal(segment, s), expected, atol=1e-15)
 
 
 def numbered(trace, segments):

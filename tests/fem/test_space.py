@@ -16,7 +16,6 @@ from ngcontact.fem.boundary import boundary_trace
 from ngcontact.fem.element import check_element
 from ngcontact.fem.space import assemble
 from ngcontact.geometries import blocks, disc, graphs, rings
-from ngcontact.lagrange import gauss
 from ngcontact.mesh import curve, first_mesh
 
 ORDERS = [1, 2, 3, 4]
@@ -45,79 +44,6 @@ CURVED = {
     "coarse": lambda: mesh_of(disc(), maxh=2.0),
 }
 every_curved = pytest.mark.parametrize("make", CURVED.values(), ids=list(CURVED))
-
-
-class Quadrature:
-    """Points and weights on the triangles bounded by the parabolas of a mesh of degree 2."""
-
-    def __init__(self, trace, count=8):
-        mesh = trace.mesh
-        vertices = np.array(mesh.ngmesh.Coordinates())[:, :2]
-        self.triangles = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
-        self.corners = vertices[self.triangles]
-        middles = (self.corners + np.roll(self.corners, -1, axis=1)) / 2
-        for k, element in enumerate(trace.element):
-            ends = trace.nodes[k]
-            [side] = [
-                i
-                for i in range(3)
-                if {self.triangles[element, i], self.triangles[element, (i + 1) % 3]} == set(ends)
-            ]
-            middles[element, side] = trace.point(np.array([k]), np.array([0.5]))[0]
-        # Quadratic map of the unit triangle, by a product rule on the square.
-        t, w = np.polynomial.legendre.leggauss(count)
-        t, w = (1 + t) / 2, w / 2
-        a, b = (g.ravel() for g in np.meshgrid(t, t, indexing="ij"))
-        r, s, w = a, b * (1 - a), np.outer(w * (1 - t), w).ravel()
-        q = 1 - r - s
-        values = [
-            q * (2 * q - 1),
-            r * (2 * r - 1),
-            s * (2 * s - 1),
-            4 * q * r,
-            4 * r * s,
-            4 * s * q,
-        ]
-        zero = 0 * r
-        by_r = [1 - 4 * q, 4 * r - 1, zero, 4 * (q - r), 4 * s, -4 * s]
-        by_s = [1 - 4 * q, zero, 4 * s - 1, -4 * r, 4 * r, 4 * (q - s)]
-        nodes = np.concatenate([self.corners, middles], axis=1)
-        self.points = np.einsum("iq,tid->tqd", values, nodes)
-        x_r, x_s = (np.einsum("iq,tid->tqd", d, nodes) for d in (by_r, by_s))
-        self.weights = w * (x_r[..., 0] * x_s[..., 1] - x_r[..., 1] * x_s[..., 0])
-
-    def barycentric(self, element, x):
-        """Linear functions (k, 3) of the straight triangles (k,), also outside of them."""
-        corners = self.corners[element]
-        matrix = np.concatenate([corners.transpose(0, 2, 1), np.ones((len(corners), 1, 3))], axis=1)
-        right = np.concatenate([x, np.ones((len(x), 1))], axis=1)
-        return np.linalg.solve(matrix, right[..., None])[..., 0]
-
-    def strain_matrices(self):
-        """G (t, 3, 6): Voigt strain from the vertices' x components, then y."""
-        unit = np.eye(2)
-        gradient = np.stack(
-            [
-                self.barycentric(np.arange(len(self.corners)), self.corners[:, 0] + e)
-                - self.barycentric(np.arange(len(self.corners)), self.corners[:, 0])
-                for e in unit
-            ],
-            axis=1,
-        )
-        zero = np.zeros_like(gradient[:, :1])
-        dx, dy = gradient[:, :1], gradient[:, 1:]
-        return np.block([[dx, zero], [zero, dy], [dy, dx]])
-
-
-def independent_stiffness(quadrature, C, vertices):
-    """Sum of G' (integral of C over the curved element) G; C maps points (q, 2) to (q, 3, 3)."""
-    A = np.zeros((2 * vertices, 2 * vertices))
-    G = quadrature.strain_matrices()
-    for element, corners in enumerate(quadrature.triangles):
-        law = np.einsum("q,qij->ij", quadrature.weights[element], C(quadrature.points[element]))
-        dofs = np.concatenate([corners, corners + vertices])
-        A[np.ix_(dofs, dofs)] += G[element].T @ law @ G[element]
-    return A
 
 
 def isotropic(E, nu):
@@ -150,63 +76,6 @@ def test_physical_element_reproduces_linear_fields(make):
     u = field(space, values.T.ravel())
     np.testing.assert_allclose(strains(u, mesh), np.tile(STRAIN, (3 * mesh.ne, 1)), atol=1e-13)
     assert math.sqrt(ng.Integrate(ng.InnerProduct(u - LINEAR, u - LINEAR), mesh)) < 1e-14
-
-
-@every_curved
-def test_physical_stiffness_with_variable_modulus(make):
-    """Polynomial entries, so that the quadrature of both sides is exact."""
-    mesh = make()
-    E = 2 + 0.3 * ng.x - 0.2 * ng.y + 0.1 * ng.x * ng.y
-    space = space_of(mesh, materials=dict.fromkeys(mesh.GetMaterials(), Elastic(E, 0.3)))
-    A = (space.basis.T @ space.A @ space.basis).toarray()
-
-    def law(x):
-        values = 2 + 0.3 * x[:, 0] - 0.2 * x[:, 1] + 0.1 * x[:, 0] * x[:, 1]
-        return values[:, None, None] * isotropic(1.0, 0.3)
-
-    expected = independent_stiffness(Quadrature(space.trace), law, space.trace.mesh.nv)
-    np.testing.assert_allclose(A, expected, atol=1e-13 * np.abs(expected).max())
-
-
-@every_curved
-def test_physical_load_of_a_body_force(make):
-    mesh = make()
-    F = (0.7, -0.4)
-    space = space_of(mesh, force=dict.fromkeys(mesh.GetMaterials(), F))
-    nv = space.trace.mesh.nv
-    quadrature = Quadrature(space.trace)
-    expected = np.zeros(nv)
-    for element, corners in enumerate(quadrature.triangles):
-        x = quadrature.points[element]
-        functions = quadrature.barycentric(np.full(len(x), element), x)
-        expected[corners] += quadrature.weights[element] @ functions
-    load = (space.basis.T @ space.f).reshape(2, nv)
-    np.testing.assert_allclose(load, np.outer(F, expected), atol=1e-14)
-
-
-def test_physical_load_of_a_traction_reaches_the_inner_vertex():
-    mesh = mesh_of(disc(symmetric=False))
-    P = (0.7, -0.4)
-    space = space_of(mesh, traction={"arc": P})
-    trace, nv = space.trace, space.trace.mesh.nv
-    quadrature = Quadrature(trace)
-    s, w = gauss(12)
-    expected = np.zeros(nv)
-    inner_loads = []
-    for k in np.flatnonzero(np.array(trace.mesh.GetBoundaries())[trace.region] == "arc"):
-        segment, element = np.full(len(s), k), int(trace.element[k])
-        x = trace.point(segment, s)
-        speed = np.linalg.norm(trace.derivative(segment, s), axis=1)
-        functions = quadrature.barycentric(np.full(len(s), element), x)
-        corners = quadrature.triangles[element]
-        expected[corners] += (w * speed) @ functions
-        inner = ~np.isin(corners, trace.nodes[k])
-        inner_loads.append(((w * speed) @ functions[:, inner])[0])
-    load = (space.basis.T @ space.f).reshape(2, nv)
-    np.testing.assert_allclose(load, np.outer(P, expected), atol=1e-11)  # the speed is a root
-    # Outside the straight triangle the function of the inner vertex is negative.
-    assert max(inner_loads) < -1e-3
-    assert expected.sum() == pytest.approx(math.pi, rel=1e-3)  # length of the arc
 
 
 def test_physical_element_on_straight_meshes_is_the_linear_one():
@@ -321,21 +190,6 @@ def test_anisotropic_bar(model):
     )
     assert error(solution, exact) < 1e-14
     np.testing.assert_allclose(solution.stress(solution.mesh(0.6, 0.7)), [1, 0, 0, 0], atol=1e-13)
-
-
-def test_bodies_have_their_own_laws():
-    mesh = CURVED["rings"]()
-    laws = {"inner": Elastic(1.0, 0.2), "outer": Elastic(5.0, 0.4)}
-    space = space_of(mesh, "isoparametric", 1, materials=laws)
-    u = ng.GridFunction(space.V)
-    u.Set(LINEAR)
-    vector = u.vec.FV().NumPy()
-    energy = sum(
-        ng.Integrate(ng.CF(1), space.trace.mesh.Materials(body))
-        * (STRAIN @ isotropic(law.E, law.nu) @ STRAIN)
-        for body, law in laws.items()
-    )
-    assert vector @ (space.A @ vector) == pytest.approx(energy, rel=1e-12)
 
 
 def test_pressure_and_traction_loads():

@@ -270,16 +270,6 @@ def test_normals_point_outwards_also_after_refinement(case: Case) -> None:
     assert divergence_defect(mesh) < 1e-12
 
 
-@every_case
-def test_bodies_share_no_vertex(case: Case) -> None:
-    mesh = mesh_of(case.make(), order=1)
-    bodies = [
-        {v.nr for element in mesh.Materials(name).Elements() for v in element.vertices}
-        for name in case.areas
-    ]
-    assert len(set.union(*bodies)) == sum(len(body) for body in bodies) == mesh.nv
-
-
 CURVES = {
     "ring": (rings, "inner_contact|outer_contact", lambda x, y: np.hypot(x, y) - 1),
     "hole": (lambda: rings(quarter=True), "hole", lambda x, y: np.hypot(x, y) - 0.5),
@@ -334,24 +324,6 @@ def test_graph_edge_follows_the_function(f: Callable[[float], float], bound: flo
     assert np.abs([p.x for p in points] - np.linspace(-1, 1, 2001)).max() < 1e-14
 
 
-@pytest.mark.parametrize(
-    ("geometry", "first", "second"),
-    [
-        (blocks(line=LINE), "upper_contact", "lower_contact"),
-        (blocks(width=3), "upper_contact", "lower_contact"),
-        (rings(), "inner_contact", "outer_contact"),
-        (rings(quarter=True), "inner_contact", "outer_contact"),
-        (punch(half_width=0.3), "punch_contact", "foundation_contact"),
-        (graphs(ripple, ripple), "upper_contact", "lower_contact"),
-    ],
-)
-def test_contact_edges_end_at_the_same_points(
-    geometry: OCCGeometry, first: str, second: str
-) -> None:
-    # Round-off, taken out by the rounding in ends_of: bodies of size 1.
-    assert np.array_equal(ends_of(geometry, first), ends_of(geometry, second))
-
-
 @pytest.mark.parametrize("interference", [0.05, 0.0, -0.05])
 def test_rings_have_vertices_at_equal_angles(interference: float) -> None:
     geometry = rings(interference=interference)
@@ -359,22 +331,6 @@ def test_rings_have_vertices_at_equal_angles(interference: float) -> None:
     assert len(inner) == 4
     assert outer == pytest.approx(inner * (1 - interference), abs=1e-12)  # rounded by ends_of
     assert {(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)} == set(map(tuple, inner))
-
-
-@pytest.mark.parametrize("symmetric", [True, False])
-@pytest.mark.parametrize(
-    ("make", "first", "second"),
-    [(disc_on_block, "disc_arc", "block_top"), (disc_on_disc, "upper_arc", "lower_arc")],
-)
-def test_touching_point_is_a_vertex_of_both_bodies(
-    make: Callable[..., OCCGeometry], first: str, second: str, symmetric: bool
-) -> None:
-    geometry = make(symmetric=symmetric)
-    for name in (first, second):
-        assert (0.0, 0.0) in set(map(tuple, ends_of(geometry, name)))
-    mesh = mesh_of(geometry, order=1)
-    touching = np.hypot(*np.array(mesh.ngmesh.Coordinates())[:, :2].T) < 1e-15
-    assert touching.sum() == 2
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 from ngcontact.linalg.iterative import Limits, iterative_systems
 from ngcontact.linalg.multigrid import truncated_multigrid
 from ngcontact.linalg.sparse import cholesky, congruent
-from ngcontact.qp import Anchor, Iterate, bordered_systems, minimise
+from ngcontact.qp import Iterate, bordered_systems, minimise
 from tests.scenes import REFINED, discrete, steps_of
 
 
@@ -53,20 +53,6 @@ def test_minimisers_are_those_of_a_factor(name: str, order: int):
     same(result, scene.direct())
 
 
-def test_new_coarse_matrices_where_old_ones_are_slow():
-    scene = Scene("disc", 1, 4)
-    counts = []
-    for dear in (0, 10**6):
-        scene.made = 0
-        result = minimise(scene.systems(Limits(dear=dear)))
-        same(result, scene.direct())
-        counts.append((scene.made, result.back_solves))
-    (often, few), (once, many) = counts
-    assert once == 1
-    assert often > 1
-    assert few < many
-
-
 @pytest.mark.parametrize("limits", [Limits(most=1), Limits(restarts=0)])
 def test_systems_that_stall_are_factorised(caplog, limits: Limits):
     """In a Newton step, and in the last refinement."""
@@ -76,25 +62,6 @@ def test_systems_that_stall_are_factorised(caplog, limits: Limits):
     assert caplog.text.count("the matrix is factorised: ") == 1
     assert result.factorizations > 0
     same(result, scene.direct())
-
-
-def test_proximal_terms_are_factorised_for_good(caplog):
-    scene = Scene("block", 1, 3)
-    pins = scene.program.null_space.pins
-    assert pins.size
-    anchor = Anchor(scene.program.diagonal[pins], np.zeros(pins.size))
-    systems, active = scene.systems(), np.ones(len(scene.program.g), dtype=bool)
-    with caplog.at_level(logging.INFO, logger="ngcontact"):
-        found = systems.refine(active, anchor)
-        systems.refine(active, anchor)
-        systems.solve(active)
-    assert caplog.text.count("the matrix is factorised: motions") == 1
-    assert (scene.made, systems.factorizations) == (0, 1)
-    for one, other in zip(
-        found, bordered_systems(scene.program, scene.factor).refine(active, anchor), strict=True
-    ):
-        # The round-off of two factorisations: measured 2e-14.
-        np.testing.assert_allclose(one, other, rtol=0, atol=1e-12 * np.abs(other).max())
 
 
 def test_systems_may_be_refined_in_any_order():

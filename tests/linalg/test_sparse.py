@@ -60,16 +60,6 @@ def test_congruent_matrices(changed, full):
     np.testing.assert_allclose(product.FV().NumPy(), reference, atol=allowed)
 
 
-def test_congruent_matrix_of_fewer_unknowns():
-    rng = np.random.default_rng(3)
-    A = for_ngsolve(definite(rng))
-    T = sp.csr_matrix(rng.normal(size=(SIZE, 5)))
-    K, lower = congruent(A, shared(A), T)
-    expected = T.T @ shared(A).toarray() @ T
-    np.testing.assert_allclose(K.toarray(), expected, atol=1e-13 * np.abs(expected).max())
-    np.testing.assert_array_equal(shared(lower).toarray(), np.tril(K.toarray()))
-
-
 def test_factorisation_of_principal_parts():
     rng = np.random.default_rng(2)
     free = rng.random(SIZE) < 0.7
@@ -78,30 +68,3 @@ def test_factorisation_of_principal_parts():
     solution = cholesky(lower_half(K))(free)(right)
     assert (solution[~free] == 0).all()
     np.testing.assert_allclose((K @ solution)[free], right[free], atol=1e-13 * np.abs(right).max())
-
-
-def managed():
-    """Threads of a manager that is started, or already there."""
-    with ng.TaskManager():
-        return ng.GetNumThreads()
-
-
-@pytest.mark.usefixtures("two_threads")
-def test_small_factorisations_are_the_same_on_any_number_of_threads(monkeypatch):
-    """To the last bit, since one thread makes them."""
-    inside = []
-    inverse = ng.BaseMatrix.Inverse
-
-    def watched(matrix, *given, **named):
-        inside.append(managed())
-        return inverse(matrix, *given, **named)
-
-    monkeypatch.setattr(ng.BaseMatrix, "Inverse", watched)
-    rng = np.random.default_rng(4)
-    K, right = definite(rng, 400), rng.normal(size=400)
-    solutions = []
-    for count in (1, 2):
-        ng.SetNumThreads(count)
-        solutions.append(cholesky(lower_half(K))(np.ones(400, dtype=bool))(right))
-    np.testing.assert_array_equal(*solutions)
-    assert inside == [1, 1]

@@ -11,7 +11,6 @@ from netgen.occ import (
     OCCGeometry,
     Pnt,
     Segment,
-    SplineApproximation,
     WorkPlane,
 )
 
@@ -72,36 +71,6 @@ def test_circle_normals_are_radial_also_at_the_seam(x, y, radius):
         np.testing.assert_allclose(foot, [x, y] + radius * radial, atol=1e-15 * scale * radius)
 
 
-def test_spline_normals():
-    edge = parabola_edge()
-    x = RNG.uniform(-1, 1, 100)
-    points = np.column_stack([x, x**2 / 2])
-    slope = np.column_stack([np.ones(100), x]) / np.hypot(1, x)[:, None]
-    expected = np.column_stack([slope[:, 1], -slope[:, 0]])  # the body lies above
-    np.testing.assert_allclose(edge.normal(points), expected, atol=1e-15)
-    # From a distance less than the radius of curvature 1 the foot stays the same.
-    for distance in (-0.1, 0.2):
-        t = edge.project(points + distance * expected)
-        np.testing.assert_allclose(edge.point(t), points, atol=1e-14)
-
-
-def test_ellipse_and_closed_spline_across_the_seam():
-    theta = RNG.uniform(-0.1, 0.1, 200)
-    [edge] = WorkPlane().MoveTo(1, 1).Ellipse(2, 0.5).Face().edges
-    normal = np.column_stack([np.cos(theta) / 2, np.sin(theta) / 0.5])
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    points = [1, 1] + angles(theta) * [2, 0.5]
-    np.testing.assert_allclose(CadEdge(edge).normal(points), normal, atol=1e-14)
-
-    around = angles(np.linspace(0, 2 * math.pi, 60))
-    around[-1] = around[0]
-    spline = CadEdge(SplineApproximation([Pnt(a, b, 0) for a, b in around], tol=1e-8))
-    assert spline.closed
-    length = spline.stop - spline.start
-    t = np.concatenate([spline.start + length * theta[:50] ** 2, spline.stop - length * theta**2])
-    np.testing.assert_allclose(spline.project(spline.point(t)), t, atol=1e-12 * length)
-
-
 def test_level_on_a_parabola():
     edge = parabola_edge()
     values = np.array([-1.0, -0.4, 0.0, 0.77, 1.0])
@@ -113,15 +82,6 @@ def test_level_on_a_parabola():
     sides = np.array([[0.7, 0.2], [-0.5, 0.2]])
     t = edge.level(np.array([0.0, 1.0]), np.full(2, 0.18), sides)
     np.testing.assert_allclose(edge.point(t), [[0.6, 0.18], [-0.6, 0.18]], atol=1e-15)
-
-
-def test_level_that_is_not_taken_is_nan():
-    edge = parabola_edge()
-    values = np.array([1.001, -3.0, 0.5])
-    t = edge.level(np.array([1.0, 0.0]), values, np.column_stack([values, values**2 / 2]))
-    assert np.isnan(t).tolist() == [True, True, False]
-    below = edge.level(np.array([0.0, 1.0]), np.array([-0.01]), np.array([[0.1, 0.0]]))
-    assert np.isnan(below).all()
 
 
 GALLERY = {

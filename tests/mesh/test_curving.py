@@ -8,20 +8,12 @@ import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.geometries import blocks, disc
-from ngcontact.mesh.curving import curve, geometry_order
+from ngcontact.mesh.curving import curve
 from ngcontact.problem import Triangulation
-
-ORDERS = [1, 2, 3, 4]
 
 
 def mesh_of(geometry, maxh=0.5):
     return ng.Mesh(geometry.GenerateMesh(maxh=maxh))
-
-
-def test_geometry_order():
-    assert [geometry_order(p, "isoparametric") for p in ORDERS] == ORDERS
-    assert [geometry_order(p, "superparametric") for p in ORDERS] == [2, 3, 4, 5]
-    assert geometry_order(1, "physical") == 2
 
 
 def test_curve_copies_only_where_it_must():

@@ -1,7 +1,6 @@
 """First meshes: matched nodes on facing lines, sizes, and the user's geometry left alone."""
 
 import math
-import threading
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -11,12 +10,11 @@ import numpy as np
 import pytest
 from netgen.occ import OCCGeometry
 
-from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.adaptivity.refinement import matched_vertices
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
-from ngcontact.geometries.region import body, compound, polygon, quarter_arc
+from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.mesh import generation
 from ngcontact.mesh.curving import check_curves
 from ngcontact.mesh.generation import first_mesh
@@ -186,12 +184,6 @@ def test_the_default_size_is_an_eighth_of_the_largest_extent():
     assert lengths(first_mesh(problem, 0.5), "upper_contact|lower_contact") == pytest.approx(0.5)
 
 
-def test_only_zones_that_may_open_are_finer():
-    contact = replace(BOUNDED["blocks"].contact, bilateral=True)
-    mesh = first_mesh(pressed(blocks(width=4.0), BLOCKS, contact))
-    assert lengths(mesh, "upper_contact|lower_contact") == pytest.approx(4 / 8)
-
-
 def low(name="lower_contact"):
     """Block from x = -1 to 1 below y = 0, its top one edge."""
     corners = [(1.0, 0.0), (-1.0, 0.0), (-1.0, -1.0), (1.0, -1.0)]
@@ -227,24 +219,6 @@ def test_a_corner_of_the_primary_meets_a_node_of_the_secondary():
     upper, lower = (vertices(mesh, n)[:, 0] for n in ("upper_contact", "lower_contact"))
     assert unmatched(upper, lower) < ROUND_OFF
     assert np.diff(np.sort(lower)).min() > 0.2  # no slivers beside the corner
-
-
-@pytest.mark.parametrize("together", [True, False])
-def test_two_bodies_on_one_edge_are_both_matched(together):
-    geometry = compound(
-        high("first", -0.9, -0.7, "first_contact"),
-        high("second", 0.5, 0.8, "second_contact"),
-        low(),
-    )
-    names = ["first_contact|second_contact"] if together else ["first_contact", "second_contact"]
-    pairs = [Contact(name, "lower_contact") for name in names]
-    mesh = first_mesh(pressed(geometry, ("first", "second", "lower"), *pairs), 0.3)
-    x = vertices(mesh, "lower_contact")[:, 0]
-    for name, low_end, high_end in (("first", -0.9, -0.7), ("second", 0.5, 0.8)):
-        inside = x[(x > low_end - 0.01) & (x < high_end + 0.01)]
-        assert unmatched(inside, vertices(mesh, f"{name}_contact")[:, 0]) < ROUND_OFF
-    # The free part between the two bodies, 1.2 long, is divided as well.
-    assert lengths(mesh, "lower_contact").max() < 0.3 * (1 + 1e-6)
 
 
 def test_the_geometry_is_left_as_it_was():
@@ -323,41 +297,6 @@ def test_whole_circles_are_divided_on_the_facing_side():
         assert ng.Integrate(ng.CF(1), mesh.Materials(name)) == pytest.approx(math.pi, rel=1e-3)
 
 
-@pytest.mark.parametrize(("left", "right", "maxh"), [(1.139, 0.796, 0.3), (0.598, 0.785, 0.3)])
-def test_two_pairs_that_share_an_edge_leave_no_slivers_on_it(left, right, maxh):
-    """Nodes that both pairs ask for on one arc keep apart, and the bodies are filled."""
-    disc = [("arc", quarter_arc((0, 0), 1.0, k, (k + 1) % 4)) for k in range(4)]
-    down = [np.array([-np.sin(left), -np.cos(left)]), np.array([np.sin(right), -np.cos(right)])]
-    root = np.linalg.solve(np.array(down), [1.03, 1.03])
-    a = root + 8 * np.array([-np.cos(left), np.sin(left)])
-    b = root + 8 * np.array([np.cos(right), np.sin(right)])
-    low = root[1] - 1.5
-    notch = [tuple(root), tuple(a), (a[0], low), (b[0], low), tuple(b)]
-    names = ["left", "side", "bottom", "side", "right"]
-    problem = Problem(
-        geometry=compound(body("disc", disc), body("notch", polygon(notch, names))),
-        materials={"disc|notch": Elastic(E=1.0, nu=0.3)},
-        contact=[
-            Contact("arc", name, direction=tuple(d))
-            for name, d in zip(("left", "right"), down, strict=True)
-        ],
-    )
-    mesh = first_mesh(problem, maxh)
-    ends = mesh.ngmesh.Elements1D().NumPy()["nodes"][:, :2].astype(int) - 1
-    xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
-    sides = xy[ends[:, 1]] - xy[ends[:, 0]]
-    assert np.linalg.norm(sides, axis=1).min() > 1e-3 * maxh  # measured 4e-3, before 5e-4 and 8e-4
-    x, y = xy[ends].mean(axis=1).T
-    enclosed = (x * sides[:, 1] - y * sides[:, 0]).sum() / 2
-    assert ng.Integrate(1, mesh) == pytest.approx(enclosed, rel=1e-12)
-
-
-def test_solids_are_no_bodies():
-    box = occ.Box((0, 0, 0), (1, 1, 1))
-    with pytest.raises(ValueError, match="contains solids"):
-        first_mesh(Problem(geometry=OCCGeometry(box), materials={"a": SOFT}))
-
-
 def test_two_pairs_on_one_circle_do_not_ask_for_nodes_on_its_far_sides():
     """What lies behind a disc sees the other face through it, and would spoil the nodes there."""
     disc = occ.Circle((0, 0), 1.0).Face()
@@ -411,13 +350,6 @@ def test_accepted_sizes_are_curved_as_size_1_is(name, large):
     assert np.abs(nodes[1] / size - nodes[0]).max() < ROUND_OFF
 
 
-@pytest.mark.parametrize("name", CURVED)
-def test_smaller_curves_ask_for_another_unit(name):
-    geometry, size = CURVED[name]
-    with pytest.raises(ValueError, match=r'curved edge ".*" has the extent .* unit of length'):
-        check_curves(scaled_mesh(geometry, size / 5, 2))
-
-
 def test_refinement_beyond_the_kernel_s_lengths_is_refused():
     """Measured: elements beside the end of an arc turn over at 5e-7 units, order 4."""
     mesh = ng.Mesh(disc_on_block().GenerateMesh(maxh=0.3))
@@ -432,44 +364,6 @@ def test_refinement_beyond_the_kernel_s_lengths_is_refused():
     with pytest.raises(ValueError, match=r'"disc_arc".* segments of [0-9.]+e-07'):
         check_curves(mesh)
     check_curves(ng.Mesh(blocks().GenerateMesh(maxh=0.3)))
-
-
-def test_meshes_made_in_several_threads_do_not_see_each_other():
-    """Sizes are told to Netgen on the shape, which both threads share."""
-    problem = cases.pressed_disc()
-    sizes = (0.1, 0.4)
-    alone = {size: first_mesh(problem, size).ne for size in sizes}
-    found = {size: [] for size in sizes}
-
-    def work(size):
-        found[size].extend(first_mesh(problem, size).ne for _ in range(4))
-
-    threads = [threading.Thread(target=work, args=(size,)) for size in sizes]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert found == {size: [alone[size]] * 4 for size in sizes}
-
-
-def test_two_cams_without_a_direction_are_told_to_give_one():
-    """Normals of one full ellipse divide the other, which faces away for the most part."""
-    parts = []
-    for name, y in (("upper", 1.2), ("lower", 0.0)):
-        face = occ.WorkPlane(occ.Axes((0, y, 0), n=occ.Z, h=occ.X)).Ellipse(1.0, 0.6).Face()
-        face.name, face.edges.name = name, f"{name}_rim"
-        parts.append(face)
-    steel = Elastic(E=1.0, nu=0.3)
-    problem = Problem(
-        geometry=OCCGeometry(occ.Compound(parts), dim=2),
-        materials={"upper": steel, "lower": steel},
-        contact=[Contact("upper_rim", "lower_rim")],
-    )
-    message = 'bulge towards each other give contact 0 of "upper_rim" with "lower_rim" a direction'
-    with pytest.raises(ValueError, match=message):
-        first_mesh(problem, 0.2)
-    along = replace(problem, contact=[Contact("upper_rim", "lower_rim", direction=(0, -1))])
-    assert first_mesh(along, 0.2).ne > 50
 
 
 PRESSED = pressed(blocks(), BLOCKS, BOUNDED["blocks"].contact)

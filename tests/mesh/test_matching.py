@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ngcontact.mesh.matching import TURN, narrowest, spaced
+from ngcontact.mesh.matching import narrowest, spaced
 
 EXACT = 1e-12  # round-off of places; a parabola's vertex on the finer step is good to 1e-9
 T = np.linspace(0.0, 1.0, 513)
@@ -57,12 +57,3 @@ def test_places_beside_ends_and_others_leave_no_slivers():
     nodes = spaced(T, x, x, 0.2, np.array([0.01, 0.37, 0.38, 0.6, 0.99]))
     assert np.diff(nodes).min() > 0.02
     assert np.abs(nodes[:, None] - [0.37, 0.6]).min(axis=0).max() < EXACT
-
-
-def test_segments_keep_size_and_turn():
-    """A quarter of a circle of radius 1 whose gap is least at 0.3 of it."""
-    angle = np.pi / 2 * T
-    x = np.column_stack([np.cos(angle), np.sin(angle)])
-    for maxh in (0.1, 10.0):
-        nodes = spaced(T, x, x, maxh, np.array([0.3]))
-        assert np.diff(nodes).max() * np.pi / 2 <= min(maxh, TURN) * (1 + 1e-3)

@@ -1,9 +1,5 @@
 """Paths that are checked, and files that are replaced when they are complete."""
 
-import errno
-import os
-import tempfile
-
 import pytest
 
 from ngcontact.output.files import check_path, replacing
@@ -42,19 +38,3 @@ def test_bad_paths_are_refused(tmp_path, name, error, message):
     with pytest.raises(error, match=message):
         check_path(tmp_path / name, ".vtu")
     assert sorted(file.name for file in tmp_path.iterdir()) == ["file", "folder.vtu"]
-
-
-def test_folder_that_refuses_files_is_refused(tmp_path, monkeypatch):
-    def refuse(dir):  # the keyword of tempfile.TemporaryFile
-        raise OSError(errno.EACCES, "Permission denied")
-
-    monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
-    with pytest.raises(PermissionError, match=r"refuses new files \(Permission denied\)"):
-        check_path(tmp_path / "a.vtu", ".vtu")
-
-
-def test_protected_file_is_refused(tmp_path, monkeypatch):
-    (tmp_path / "a.vtu").write_text("old")
-    monkeypatch.setattr(os, "access", lambda path, mode: False)
-    with pytest.raises(PermissionError, match="write-protected"):
-        check_path(tmp_path / "a.vtu", ".vtu")

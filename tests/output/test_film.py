@@ -5,7 +5,7 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from ngcontact import plot_convergence, write_film
+from ngcontact import write_film
 from ngcontact.output import slope_triangle
 from tests.output.stubs import stub
 
@@ -44,18 +44,3 @@ def test_the_triangle_has_the_slope(above):
     (x0, y0), (x1, y1) = line.get_xydata()[:2]  # its long side
     assert np.log(y1 / y0) / np.log(x1 / x0) == pytest.approx(-1.5)
     assert (y1 > x1**-1.5) == above
-
-
-def test_runs_are_drawn_with_their_rates(tmp_path):
-    x = np.array([1e2, 1e3, 1e4])
-    runs = {"one": (x, x**-0.5), "two": (x, 0.8 * x**-0.5)}
-    figure = plot_convergence(runs, tmp_path / "a.png", rates={"one": 0.5})
-    [axes] = figure.axes
-    assert [line.get_label() for line in axes.lines[:1]] == ["one"]
-    triangle = next(line.get_xydata() for line in axes.lines if len(line.get_xydata()) == 4)
-    assert (triangle[:, 1] >= 1e-2).all()  # above, where the other run is not
-    assert (tmp_path / "a.png").stat().st_size > 0
-    with pytest.raises(ValueError, match="no run is called three"):
-        plot_convergence(runs, tmp_path / "b.png", rates={"three": 1.0})
-    with pytest.raises(ValueError, match='run "one" is empty'):
-        plot_convergence({"one": []}, tmp_path / "b.png")

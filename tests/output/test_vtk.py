@@ -1,20 +1,15 @@
 """Files for ParaView: bodies, contact points, series."""
 
-from pathlib import Path
-
 import ngsolve as ng
 import numpy as np
 import pytest
 import pyvista
 from netgen.occ import Compound, Glue
 from ngsolve.meshes import MakeStructured2DMesh
-from vtkmodules.vtkCommonCore import vtkObject
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
-from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
 from ngcontact.output import plot_solution, write_series, write_solution
 from ngcontact.output.nodes import lattice
-from ngcontact.output.vtk import write_data
 from tests.output.stubs import MAXH, stub, two_bodies
 
 
@@ -95,26 +90,6 @@ def test_bodies_keep_their_own_stress_where_they_touch(tmp_path, glue):
     np.testing.assert_allclose(stress, expected[:, None] + np.zeros_like(stress), rtol=1e-14)
 
 
-def test_jumping_stress_is_averaged_over_the_cells_at_a_node(tmp_path):
-    solution = stub(1)
-    jump = ng.GridFunction(ng.L2(solution.mesh, order=0))
-    values = np.sin(np.arange(solution.mesh.ne))
-    jump.vec.FV().NumPy()[:] = values
-    solution.stress = ng.CF((jump, 0, 0, 0), dims=(2, 2))
-    grid = written(tmp_path, solution)
-    nodes = grid.cells.reshape(-1, 4)[:, 1:]
-    for node in (0, 5, grid.n_points - 1):
-        mean = values[np.any(nodes == node, axis=1)].mean()
-        assert grid["stress"][node, 0] == pytest.approx(mean, rel=1e-12)
-
-
-def test_indicators_are_written_only_if_known(tmp_path):
-    solution = stub(2)
-    assert "indicators" not in written(tmp_path, solution).cell_data
-    solution.estimated = True
-    np.testing.assert_array_equal(written(tmp_path, solution)["indicators"], solution.indicators)
-
-
 def test_quadrilaterals_are_refused(tmp_path):
     solution = stub(1, mesh=MakeStructured2DMesh(quads=True, nx=2, ny=2))
     with pytest.raises(ValueError, match="4 elements of the mesh are no triangles"):
@@ -143,18 +118,6 @@ def test_contact_points_carry_their_values(tmp_path):
     assert sorted(links.tolist()) == [[k, k + 1] for k in range(8)]
 
 
-@pytest.mark.parametrize("count", [0, 1])
-@pytest.mark.study(witness=["0"])
-def test_hardly_any_contact_points(tmp_path, count):
-    solution = stub(2)
-    for name in ("points", "gap", "pressure", "force", "active", "pair", "direction"):
-        setattr(solution, name, getattr(solution, name)[:count])
-    write_solution(tmp_path / "a.vtu", solution)
-    assert pyvista.read(tmp_path / "a_contact.vtp").n_points == count
-    plot_solution(solution, tmp_path / "a.png")
-    assert (tmp_path / "a.png").stat().st_size > 10_000
-
-
 def test_series_lists_levels_with_both_files(tmp_path):
     path = write_series(tmp_path / "run & more.pvd", (stub(p) for p in (1, 2)))
     reader = pyvista.PVDReader(path)
@@ -172,21 +135,6 @@ def test_series_lists_levels_with_both_files(tmp_path):
     assert contact.n_points == 9
 
 
-@pytest.mark.parametrize(
-    ("times", "error", "message"),
-    [
-        ([0.0], ValueError, "1 entries, fewer than there are solutions"),
-        ([0.0, 1.0, 2.0], ValueError, "1 entries more than there are solutions"),
-        ([1.0, 1.0], ValueError, "1.0 after 1.0: give finite, increasing"),
-        ([0.0, float("nan")], ValueError, "increasing"),
-        (["a", "b"], TypeError, "'a': give numbers"),
-    ],
-)
-def test_times_that_do_not_fit_are_refused(tmp_path, times, error, message):
-    with pytest.raises(error, match=message):
-        write_series(tmp_path / "run.pvd", [stub(1), stub(1)], times=times)
-
-
 def test_interrupted_series_lists_what_was_written(tmp_path):
     def levels():
         yield stub(1)
@@ -196,27 +144,6 @@ def test_interrupted_series_lists_what_was_written(tmp_path):
         write_series(tmp_path / "run.pvd", levels())
     assert pyvista.PVDReader(tmp_path / "run.pvd").time_values == [0.0]
     assert len(list(tmp_path.iterdir())) == 3
-
-
-def test_failure_leaves_old_files_and_no_others(tmp_path):
-    """Contact points are read when the file of the bodies is written under its other name."""
-    path = write_solution(tmp_path / "a.vtu", stub(1))
-    old = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
-    broken = stub(2)
-    del broken.pressure
-    with pytest.raises(AttributeError, match="pressure"):
-        write_solution(path, broken)
-    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == old
-
-
-def test_a_full_disk_is_an_error_without_noise(capfd):
-    full = Path("/dev/full")
-    if not full.exists():
-        pytest.skip("this system has no /dev/full")
-    with pytest.raises(OSError, match=r"disk full\?"):
-        write_data(vtkXMLPolyDataWriter(), pyvista.Sphere(), full)
-    assert capfd.readouterr() == ("", "")
-    assert vtkObject.GetGlobalWarningDisplay() == 1
 
 
 @pytest.mark.parametrize(

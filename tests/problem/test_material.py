@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
-from ngcontact.problem.material import MODEL_NAMES, VOIGT, Elastic, Hooke
+from ngcontact.problem.material import VOIGT, Elastic, Hooke
 
 # A few products and one inversion of numbers of size one: some units of round-off.
 ROUND_OFF = 1e-13
@@ -49,15 +49,6 @@ def test_isotropic_law_inverts_the_compliance(mesh, model, nu):
     assert np.abs(product - np.eye(3)).max() < ROUND_OFF / (1 - 2 * nu)
 
 
-@pytest.mark.parametrize("model", MODEL_NAMES)
-def test_coefficient_functions_give_the_numbers_at_each_point(mesh, model):
-    varying = Elastic(E=1 + ng.x, nu=ng.y / 2)
-    for x, y in [(0.3, 0.2), (0.7, 0.9)]:
-        expected = matrix_of(Elastic(1 + x, y / 2), model, mesh)
-        found = matrix_of(varying, model, mesh, at=(x, y))
-        assert np.abs(found - expected).max() < ROUND_OFF * np.abs(expected).max()
-
-
 def test_hooke_is_used_as_it_is(mesh):
     given = orthotropic()
     law = Hooke(given.tolist())
@@ -69,15 +60,6 @@ def test_hooke_is_used_as_it_is(mesh):
     assert np.abs(found - 1.5 * given).max() < ROUND_OFF * given.max()
 
 
-def transversely_isotropic():
-    """A law about an axis, (rr, zz, hoop, rz), with another stiffness along it."""
-    compliance = np.array(
-        [[1, -0.1, -0.3, 0], [-0.1, 0.25, -0.1, 0], [-0.3, -0.1, 1, 0], [0, 0, 0, 3.0]]
-    )
-    stiffness = np.linalg.inv(compliance)
-    return (stiffness + stiffness.T) / 2
-
-
 @pytest.mark.parametrize("nu", [-0.5, 0.0, 0.3, 0.4999])
 def test_isotropic_law_about_an_axis_inverts_the_compliance(mesh, nu):
     E = 7.0
@@ -85,14 +67,6 @@ def test_isotropic_law_about_an_axis_inverts_the_compliance(mesh, nu):
     compliance[:3, :3] -= nu
     product = matrix_of(Elastic(E, nu), "axisymmetric", mesh) @ (compliance / E)
     assert np.abs(product - np.eye(4)).max() < ROUND_OFF / (1 - 2 * nu)
-
-
-def test_hooke_about_an_axis_is_used_as_it_is(mesh):
-    given = transversely_isotropic()
-    assert np.array_equal(matrix_of(Hooke(given), "axisymmetric", mesh), given)
-    varying = Hooke((1 + ng.x) * ng.CF(tuple(given.ravel()), dims=(4, 4)))
-    found = matrix_of(varying, "axisymmetric", mesh, at=(0.5, 0.5))
-    assert np.abs(found - 1.5 * given).max() < ROUND_OFF * given.max()
 
 
 @pytest.mark.parametrize(
@@ -142,28 +116,6 @@ def test_elastic_refuses(E, nu, error, message):
 def test_hooke_refuses(data, error, message):
     with pytest.raises(error, match=message):
         Hooke(data)
-
-
-@pytest.mark.parametrize("unit", [1e-300, 1e-9, 1e9, 1e290])
-def test_hooke_judges_alike_in_all_units(mesh, unit):
-    nearly_incompressible = matrix_of(Elastic(1, 0.5 - 1e-10), "plane strain", mesh)
-    assert Hooke(unit * nearly_incompressible).C[2, 2] > 0
-    with pytest.raises(ValueError, match="positive definite"):
-        Hooke(unit * np.array([[1, 1, 0], [1, 1, 0], [0, 0, 1]]))
-
-
-@pytest.mark.parametrize(
-    ("model", "error", "message"),
-    [
-        ("axial", ValueError, r'"axial" is unknown: .*"?plane strain'),
-        ("plane", ValueError, r'"plane" is unknown: choose one of .*plane strain.*plane stress'),
-        (2, TypeError, r"model = 2: give one of the strings .*plane strain"),
-    ],
-)
-@pytest.mark.parametrize("law", [Elastic(1, 0.3), Hooke(np.eye(3))])
-def test_laws_refuse_models(law, model, error, message):
-    with pytest.raises(error, match=message):
-        law.voigt(model)
 
 
 # The centroids of the structured mesh have x and y between 1/6 and 5/6.

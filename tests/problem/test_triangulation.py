@@ -3,7 +3,6 @@
 import ngsolve as ng
 import numpy as np
 import pytest
-from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.geometries import disc_on_block
 from ngcontact.problem import Triangulation, bisect
@@ -27,14 +26,6 @@ def test_numbers_are_those_of_ngsolve(mesh):
         assert regions.tolist() == [el.index for el in elements]
     assert view.vertices.tolist() == [list(v.point) for v in mesh.vertices]
     assert view.others() == 0
-
-
-def test_layouts_of_netgen_are_told_apart(mesh):
-    """Records of quadrilaterals are longer than those of triangles."""
-    quadrilaterals = MakeStructured2DMesh(quads=True, nx=2, ny=2)
-    for one in (mesh, quadrilaterals, mesh):
-        expected = one.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
-        np.testing.assert_array_equal(Triangulation(one).triangles, expected)
 
 
 def test_only_marked_elements_are_bisected(mesh):

@@ -7,26 +7,11 @@ import scipy.sparse as sp
 from ngcontact.qp.active_set import minimise
 from ngcontact.qp.null_space import (
     pinned_null_space,
-    vanishing_combinations,
 )
 from ngcontact.qp.schur_complement import bordered_systems
 from tests.qp.programs import counting_factor, first_unknowns_bounded
 
 SPRINGS = 6
-
-
-def test_combinations_that_vanish():
-    """Columns x, y, x + y and 2 x of a few points: two combinations are zero."""
-    rng = np.random.default_rng(0)
-    x, y = rng.normal(size=(2, 9))
-    resisted = np.column_stack([x, y, x + y, 2 * x])
-    found = vanishing_combinations(resisted)
-    assert found.shape == (4, 2)
-    assert np.linalg.matrix_rank(found) == 2
-    np.testing.assert_allclose(resisted @ found, 0, atol=1e-14)  # sums of four numbers of size 1
-    assert vanishing_combinations(np.eye(3)).shape == (3, 0)
-    assert vanishing_combinations(np.zeros((0, 2))).tolist() == [[1, 0], [0, 1]]
-    assert vanishing_combinations(np.zeros((5, 0))).shape == (0, 0)
 
 
 def chain(load, g):

@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from ngcontact.qp.active_set import minimise
 from ngcontact.qp.schur_complement import bordered_systems
 from ngcontact.qp.solving import solve_qp
-from tests.qp.programs import counting_factor, first_unknowns_bounded, inequalities, membrane
+from tests.qp.programs import counting_factor, first_unknowns_bounded, membrane
 
 
 @pytest.mark.parametrize("border", [0, 5, 1000])
@@ -74,32 +74,6 @@ def test_another_load_costs_no_factorisation():
     reference = minimise(bordered_systems(other, counting_factor(program.K, [])))
     np.testing.assert_array_equal(result.active, reference.active)
     np.testing.assert_allclose(result.u, reference.u, rtol=0, atol=1e-11)  # condition up to 1e4
-
-
-def test_what_is_forgotten_is_factorised_again():
-    program, calls = random_bounds(10), []
-    systems = bordered_systems(program, counting_factor(program.K, calls))
-    first = minimise(systems)
-    systems.forget()
-    systems.restart(program)
-    again = minimise(systems)
-    assert len(calls) == 2
-    np.testing.assert_array_equal(again.u, first.u)
-    np.testing.assert_array_equal(again.force, first.force)
-
-
-def test_stiffness_of_rows_bounds_their_forces():
-    """Unit rows: the diagonal. Others: the inverse of the compliance, once a row was met."""
-    program = random_bounds(11)
-    systems = bordered_systems(program, counting_factor(program.K, []))
-    np.testing.assert_array_equal(systems.stiffness(), program.K.diagonal()[:6])
-    general = inequalities(program.K, program.b, program.R, program.g)
-    systems = bordered_systems(general, counting_factor(program.K, []))
-    assert np.isinf(systems.stiffness()).all()
-    systems.solve(np.arange(6) == 2)
-    compliance = np.linalg.inv(program.K.toarray())[2, 2]
-    assert systems.stiffness()[2] == pytest.approx(1 / compliance, rel=1e-10)
-    assert np.isinf(np.delete(systems.stiffness(), 2)).all()
 
 
 def test_values_that_balance_leave_round_off_not_a_singular_system():

@@ -7,9 +7,8 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Circle, OCCGeometry
 
-from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
+from ngcontact import Contact, ContactWarning, Elastic, adapt, solve
 from ngcontact.mesh import first_mesh
 from ngcontact.quadrature import look, unresolved
 from ngcontact.quadrature.features import features_of
@@ -57,15 +56,6 @@ def test_a_strip_is_found_with_its_place_and_width(kind, start, width):
     assert one.widths[off.argmin()] == pytest.approx(width, rel=0.25)  # measured: 0.2 at the end
 
 
-@pytest.mark.parametrize(("x", "y"), [(0.1, 0.2), (0.3333, 0.7777), (0.985, 0.41)])
-def test_a_box_of_six_thousandths_of_a_body_is_found(x, y):
-    f = 1.0 + 1e4 * box(ng.x, x, 6e-3) * box(ng.y, y, 6e-3)
-    one = found(given("force", f), "force")
-    assert len(one.places) >= 1
-    # In a circle about it, and half a sample more.
-    assert np.abs(one.places - [x + 3e-3, y + 3e-3]).max() < 6e-3
-
-
 @pytest.mark.parametrize("slope", [0.0, 0.31])
 @pytest.mark.parametrize("width", [2e-3, 0.02])
 def test_a_soft_layer_is_found_with_its_width(slope, width):
@@ -95,32 +85,6 @@ SMOOTH = [
 @pytest.mark.parametrize("number", range(len(SMOOTH)))
 def test_slopes_waves_kinks_and_steps_are_no_features(kind, number):
     assert not len(found(given(kind, SMOOTH[number]), kind).places)
-
-
-def test_a_function_on_a_circle_is_seen_across_its_seam():
-    face = Circle((0, 0), 2).Face()
-    face.faces.name, face.edges.name = "body", "rim"
-    load = ng.IfPos(ng.x - 1.999, 1.0, 0.0)  # over an angle of 0.06
-    problem = Problem(OCCGeometry(face, dim=2), {"body": Elastic(1, 0.3)}, traction={"rim": load})
-    one = found(problem, "traction", 1.0)
-    assert np.linalg.norm(one.places - [2, 0], axis=1).max() < 0.05
-
-
-def test_functions_are_looked_at_once_in_a_run():
-    calls = []
-
-    def gap(x, y):
-        calls.append(len(x))
-        return 1 + x
-
-    problem = given("gap", gap)
-    mesh = first_mesh(problem, 0.3)
-    look(problem, mesh)
-    count = len(calls)
-    for maxh in (0.3, 0.1):
-        assert not unresolved(problem, first_mesh(problem, maxh))
-    assert len(calls) == count
-    assert sum(calls) < 2100
 
 
 @pytest.mark.parametrize("order", [1, 3])

@@ -8,12 +8,9 @@ import pytest
 from netgen.occ import OCCGeometry, Rectangle, X, Y
 from ngsolve.meshes import MakeStructured2DMesh
 
-from drivers.reference import cases
 from ngcontact import Elastic, Problem, solve
 from ngcontact.fem.space import LOAD_BONUS, load_vector
-from ngcontact.mesh import first_mesh
-from ngcontact.quadrature import keep_rough_load, known_rough_load, rough_load, rough_segments
-from ngcontact.quadrature.loads import numbers
+from ngcontact.quadrature import rough_load
 
 
 def square():
@@ -101,16 +98,6 @@ def test_loads_that_jump_along_edges_are_left_to_the_usual_rule(nx):
     assert rough_load(ng.CF((load, 0)), mesh.Boundaries("top"), 3) is None
 
 
-@pytest.mark.parametrize("maxh", [0.3, 0.03])
-def test_loads_that_turn_with_a_curved_side_are_smooth(maxh):
-    """Both a pressure and a load of one direction, of which the values of neighbours differ."""
-    problem = cases.ring_in_ring().problem
-    mesh = first_mesh(problem, maxh)
-    normal, angle = ng.specialcf.normal(2), ng.atan2(ng.y, ng.x)
-    for load in (normal * (1 + 0.3 * ng.cos(2 * angle)), ng.CF((0, 1 + 1e-9 * ng.x))):
-        assert rough_load(load, mesh.Boundaries("rim"), 3) is None
-
-
 @pytest.mark.parametrize(("unit", "load"), [(1e-9, 1.0), (1.0, 1e-200), (1e9, 1.0)])
 def test_rough_loads_in_any_unit(unit, load):
     """On a given mesh: the geometry kernel has neither of these lengths."""
@@ -124,37 +111,3 @@ def test_rough_loads_in_any_unit(unit, load):
     inside = ng.Integrate((projection[1] / load) ** 2, mesh, ng.BND, order=8)
     rest = ((rough.rest / load) ** 2).sum()
     assert inside + rest == pytest.approx(0.01 * unit, rel=1e-4)
-
-
-@pytest.mark.parametrize(
-    "data",
-    [
-        (0, 0),
-        (0, -1.5),
-        (1e-9, 0),
-        -ng.CF(0.2),
-        3 * ng.CF((0, 1)),
-        ng.CF(2) * ng.specialcf.normal(2),
-    ],
-)
-def test_numbers_are_not_looked_at(data, monkeypatch):
-    """Zeros neither, which NGSolve prints in its own ways."""
-    mesh, data = first_mesh(loaded()), ng.CF(data)
-    assert numbers(data)
-    assert not numbers(ng.CF((ng.x, 0)))
-    monkeypatch.delattr("ngcontact.quadrature.values.looked_at")
-    assert not rough_segments([data], mesh, np.arange(mesh.GetNE(ng.BND)), 1.0).any()
-
-
-def test_what_was_found_is_kept_until_a_value_changes():
-    """`Parameter`s change the values of a load that is the same object."""
-    mesh, position = first_mesh(loaded()), ng.Parameter(0.3)
-    load = ng.CF((0, ng.IfPos((ng.x - position) ** 2 - 0.01**2, 0.0, 1.0)))
-    region = mesh.Boundaries("top")
-    found = keep_rough_load(load, load, region, 3)
-    assert keep_rough_load(load, load, region, 3) is found
-    assert known_rough_load(load, load, region, 3) is found
-    position.Set(0.6)
-    moved = keep_rough_load(load, load, region, 3)
-    middles = ng.Integrate(ng.x * moved.projection[1], mesh, ng.BND, definedon=region)
-    assert middles == pytest.approx(0.6 * 0.02, rel=1e-4)  # parts are halved to 1e-6 of the load

@@ -47,16 +47,3 @@ def test_small_jumps_are_found_beside_large_changes(length, size):
     at, amount = found(lambda x: np.sin(3 * x / length) + size * (x > place), 0.0, length)
     assert at == pytest.approx([place], rel=1e-12)
     assert amount == pytest.approx([size], rel=1e-9)
-
-
-@pytest.mark.parametrize("places", [7, 400, 2048])
-def test_smooth_functions_are_hardly_looked_into(places):
-    """Where their slope is extreme alone."""
-    seen = []
-
-    def values(x):
-        seen.append(len(x))
-        return np.sin(3 * x)
-
-    assert found(values, 0.0, 1.0, places)[0].size == 0
-    assert sum(seen) <= 1.2 * places + 2 + 90 * 2  # 18 times 5 in each part, measured up to 2 parts

@@ -44,8 +44,3 @@ def test_the_bar_counts_digits_towards_the_tolerance(capsys):
     levels = [level(10, 1e-1), level(20, 1e-2), level(40, 1e-3)]
     assert list(with_progress(iter(levels), 1e-3, 100)) == levels
     assert [row.count("#") for row in lines(capsys)[1:]] == [0, 10, 20]
-
-
-def test_the_bar_counts_unknowns_without_a_tolerance(capsys):
-    list(with_progress(iter([level(25, 1.0), level(100, 0.5), level(120, 0.4)]), None, 100))
-    assert [row.count("#") for row in lines(capsys)[1:]] == [5, 20, 20]

@@ -6,8 +6,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from drivers.reference import cases
-from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
+from ngcontact import Contact, Elastic, Hooke, Problem, solve
 from ngcontact.geometries import blocks
 from ngcontact.problem.values import told
 
@@ -82,15 +81,3 @@ def test_a_solution_shows_every_pair():
     assert "estimate" not in shown
     assert solution.relative_error_estimate > 0
     assert "estimate" in cells(solution._repr_html_())
-
-
-def test_the_lines_of_adapt_have_their_columns_below_each_other():
-    lines = [str(s) for s in adapt(cases.pressed_disc(), order=2, tolerance=0.03)]
-    assert len(lines) > 2
-    assert re.fullmatch(
-        r"order 2, +\d+ unknowns, +\d+/\d+ active, +\d+ steps, estimate \d\.\d\de-\d\d, "
-        r"force \d\.\d+",
-        lines[-1],
-    )
-    for word in (" unknowns, ", " active, ", " steps, ", "estimate ", "force "):
-        assert len({line.index(word) for line in lines}) == 1

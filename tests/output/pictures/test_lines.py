@@ -44,10 +44,3 @@ def test_contact_lines_of_pairs_and_of_separate_pieces():
     assert first.tolist() == list(range(20))
     assert second.tolist() == list(range(20, 40))
     assert third.tolist() == list(range(40, 60))
-
-
-def test_contact_line_of_a_fixed_direction_runs_along_eta():
-    points = np.array([[3.0, 1.0], [-1.0, 2.0], [0.5, 7.0]])
-    [(_, rows, eta)] = lines_of(points, direction=(0, -2))
-    assert rows.tolist() == [1, 2, 0]
-    np.testing.assert_allclose(eta, [-1, 0.5, 3])

@@ -9,8 +9,8 @@ from ngcontact import solve
 from ngcontact.output import plot_solution
 from ngcontact.output.pictures import Style
 from ngcontact.output.pictures.scene import picture
-from ngcontact.output.pictures.windows import close_ups, colour_range
-from tests.output.stubs import MAXH, stub
+from ngcontact.output.pictures.windows import colour_range
+from tests.output.stubs import stub
 
 ACROSS = 0.5  # normal to the plane
 
@@ -55,14 +55,6 @@ def test_units_name_axes_and_divide_values(tmp_path, uniform):
     assert any(axes.get_ylabel() == "contact pressure [Pa]" for axes in (profile, *figure.axes))
 
 
-def test_curves_over_the_pressure(tmp_path, uniform):
-    curves = {"twice": lambda s: 2 * s, "measured": ([0.0, 1.0], [3.0, 4.0])}
-    figure = plot_solution(uniform, tmp_path / "a.png", profile=curves)
-    lines = {line.get_label(): line.get_xydata() for axes in figure.axes for line in axes.lines}
-    np.testing.assert_allclose(lines["twice"][:, 1], 2 * lines["twice"][:, 0])
-    np.testing.assert_allclose(lines["measured"], [(0, 3), (1, 4)])
-
-
 @pytest.mark.parametrize(
     ("options", "error", "text"),
     [
@@ -105,19 +97,6 @@ def test_a_symmetric_half_is_mirrored(pressed_half):
 def test_only_lines_of_symmetry_mirror(tmp_path, pressed_half, mirror, text):
     with pytest.raises(ValueError, match=text):
         plot_solution(pressed_half, tmp_path / "a.png", mirror=mirror)
-
-
-def test_each_small_zone_has_a_close_up(tmp_path):
-    solution = stub(2)
-    x = solution.points[:, 0]
-    solution.active[:] = False
-    solution.active[[np.argmin(np.abs(x + 0.4)), np.argmin(np.abs(x - 0.4))]] = True
-    windows = close_ups([picture(solution, Style(scale=0.0))])
-    middles = sorted((low[0] + high[0]) / 2 for low, high in windows)
-    # The nearest nodes of a picture, whose spacing is MAXH over twice the order.
-    assert middles == pytest.approx(sorted(x[solution.active]), abs=MAXH / 8)
-    figure = plot_solution(solution, tmp_path / "a.png")
-    assert [axes.get_title() for axes in figure.axes[1:3]] == ["zone 1", "zone 2"]
 
 
 def test_a_singular_corner_leaves_the_colours(tmp_path, uniform):
