@@ -108,7 +108,7 @@ def unit_load(trace, pattern, parts):
 
 
 def solved_with_load(problem, mesh, order, pattern, parts):
-    """Discrete problem with a unit traction along y on parts of a contact line, and its solution."""
+    """Discrete problem with a unit traction along y on parts of a line, and its solution."""
     d = discretise(problem, mesh, order, "isoparametric")
     load = unit_load(d.space.trace, pattern, parts)
     nodal = np.concatenate([np.zeros_like(load), load])

@@ -19,16 +19,11 @@ SOFT = Elastic(E=1.0, nu=0.3)
     ("make", "changes", "message"),
     [
         (ball_in_socket, {"clearance": 0}, "clearance = 0: expected a positive length"),
-        (ball_in_socket, {"width": 1.0}, "width = 1.0: expected more than radius"),
         (cone_on_block, {"slope": 90}, "slope = 90: expected degrees between 0 and 90"),
         (cone_on_block, {"height": 0.1}, "height = 0.1: expected more than that of the cone"),
         (rounded_punch, {"height": 0.1}, "height = 0.1: expected more than rounding"),
-        (rounded_punch, {"width": 1.1}, "width = 1.1: expected more than the indenter's"),
-        (sleeve_on_shaft, {"outer": 0.9}, "outer = 0.9: expected more than radius"),
-        (sleeve_on_shaft, {"interference": 1.0}, "interference = 0.0: expected more than zero"),
         (sleeve_on_shaft, {"interference": -1}, "outer = 1.6: expected more than radius - int"),
         (ring_in_groove, {"depth": 1.0}, "depth = 1.0: expected less than 2 section = 1.0"),
-        (ring_in_groove, {"width": 1.0}, "width = 1.0: expected more than 2 section"),
         (ring_in_groove, {"radius": 1.5}, "radius = 1.5: expected more than half the groove"),
     ],
 )

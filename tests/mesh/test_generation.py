@@ -1,8 +1,7 @@
 """First meshes: matched nodes on facing lines, sizes, and the user's geometry left alone."""
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import netgen.occ as occ
 import ngsolve as ng
@@ -13,110 +12,27 @@ from netgen.occ import OCCGeometry
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.adaptivity.refinement import matched_vertices
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
+from ngcontact.geometries import blocks, disc_on_block, graphs
 from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.mesh import generation
 from ngcontact.mesh.curving import check_curves
 from ngcontact.mesh.generation import first_mesh
+from tests.pairs import (
+    ALL,
+    BLOCKS,
+    BOUNDED,
+    ENLARGING,
+    RISING,
+    ROUND_OFF,
+    SOFT,
+    pressed,
+    unmatched,
+    valley,
+    wave,
+)
 from tests.scenes import coordinates, vertices
 
-SOFT = Elastic(E=1.0, nu=0.3)
-LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
-ROUND_OFF = 1e-12  # of coordinates of size 1; the bound of the published method's matched nodes
-MATCHED_PART = 0.86  # of a radius: the steepest part of a circle stays unmatched by design
-
-
-def wave(x: float) -> float:
-    return 0.02 + 0.01 * math.sin(9 * x)
-
-
-def valley(x: float) -> float:
-    return -0.2 * math.cos(3 * x)
-
-
-def swell(x: float) -> float:
-    return 0.2 * math.sin(4 * x)
-
-
-def parabola(x: float) -> float:
-    return x * x / 2
-
-
-def hill(x: float) -> float:
-    return -x * x / 4
-
-
-def arc(radius: float) -> Callable[[float], float]:
-    """Lower half of the circle about (0, radius), or upper one for a negative radius."""
-    return lambda x: radius - math.copysign(math.sqrt(max(radius**2 - x * x, 0.0)), radius)
-
-
-@dataclass(frozen=True)
-class Pair:
-    """A geometry, its bodies and pair; the height of both lines over x, matched for |x| < part."""
-
-    geometry: Callable[[], OCCGeometry]
-    bodies: tuple[str, str]
-    contact: Contact
-    curves: tuple[Callable[[float], float], Callable[[float], float]] | None = None
-    part: float = math.inf
-
-    def problem(self) -> Problem:
-        return pressed(self.geometry(), self.bodies, self.contact)
-
-
-BLOCKS = ("upper", "lower")
-UP = Contact("lower_contact", "upper_contact", direction=(0, 1))
-BOUNDED = {
-    "blocks": Pair(blocks, BLOCKS, Contact("upper_contact", "lower_contact")),
-    "polygon": Pair(lambda: blocks(line=LINE), BLOCKS, Contact("lower_contact", "upper_contact")),
-    "one graph": Pair(
-        lambda: graphs(swell, swell), BLOCKS, Contact("lower_contact", "upper_contact")
-    ),
-    "punch": Pair(punch, ("punch", "foundation"), Contact("punch_contact", "foundation_contact")),
-    "rings": Pair(rings, ("inner", "outer"), Contact("outer_contact", "inner_contact")),
-    "quarter rings": Pair(
-        lambda: rings(quarter=True), ("inner", "outer"), Contact("inner_contact", "outer_contact")
-    ),
-}
-ENLARGING = {
-    "blocks": Pair(blocks, BLOCKS, UP, (lambda x: 0.0, lambda x: 0.0)),
-    "graphs": Pair(lambda: graphs(parabola, hill, -0.6, 0.6, 0.6), BLOCKS, UP, (hill, parabola)),
-    "waves": Pair(lambda: graphs(wave, valley), BLOCKS, UP, (valley, wave)),
-    "disc on block": Pair(
-        disc_on_block,
-        ("disc", "block"),
-        Contact("disc_arc", "block_top", direction=(0, -1)),
-        (arc(1.0), lambda x: 0.0),
-        MATCHED_PART,
-    ),
-    "whole disc on block": Pair(
-        lambda: disc_on_block(symmetric=False),
-        ("disc", "block"),
-        Contact("block_top", "disc_arc", direction=(0, 1)),
-        (lambda x: 0.0, arc(1.0)),
-        MATCHED_PART,
-    ),
-    "disc on disc": Pair(
-        lambda: disc_on_disc(lower_radius=2.0),
-        BLOCKS,
-        Contact("upper_arc", "lower_arc", direction=(0, -1)),
-        (arc(1.0), arc(-2.0)),
-        MATCHED_PART,
-    ),
-    "whole disc on disc": Pair(
-        lambda: disc_on_disc(radius=2.0, lower_radius=1.0, symmetric=False),
-        BLOCKS,
-        Contact("upper_arc", "lower_arc", direction=(0, -1)),
-        (arc(2.0), arc(-1.0)),
-        MATCHED_PART,
-    ),
-}
 SIZES = (None, 1.0, 0.4, 0.11)
-
-
-def pressed(geometry, bodies, *contact):
-    return Problem(geometry=geometry, materials=dict.fromkeys(bodies, SOFT), contact=contact)
 
 
 def lengths(mesh, pattern):
@@ -125,43 +41,26 @@ def lengths(mesh, pattern):
     return trace.lengths(trace.segments(pattern))
 
 
-def unmatched(a, b):
-    """Largest distance from a point of one set to the nearest one of the other, both ways."""
-    a, b = (v.reshape(len(v), -1) for v in (a, b))
-    distance = np.linalg.norm(a[:, None] - b, axis=2)
-    return max(distance.min(axis=0).max(), distance.min(axis=1).max())
-
-
 @pytest.mark.parametrize("maxh", SIZES)
-@pytest.mark.parametrize("name", BOUNDED)
-@pytest.mark.study(witness=["blocks-1.0", "punch-1.0", "polygon-1.0"])
-def test_vertices_coincide_on_a_bounded_zone(name, maxh):
-    if name == "punch" and maxh is not None:
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.study(
+    witness=[
+        *("bounded blocks-1.0", "bounded punch-1.0", "bounded polygon-1.0"),
+        *("enlarging blocks-1.0", "enlarging disc on block-None", "enlarging disc on block-0.4"),
+    ]
+)
+def test_vertices_coincide_or_have_common_eta(name, maxh):
+    if "punch" in name and maxh is not None:
         maxh = max(maxh, 0.4)  # the foundation is large
-    pair = BOUNDED[name]
-    mesh = first_mesh(pair.problem(), maxh)
-    here, there = (vertices(mesh, side) for side in (pair.contact.secondary, pair.contact.primary))
-    assert len(here) >= 2
-    assert unmatched(here, there) < ROUND_OFF
-
-
-@pytest.mark.parametrize("maxh", SIZES)
-@pytest.mark.parametrize("name", ENLARGING)
-@pytest.mark.study(witness=["blocks-1.0", "disc on block-None", "disc on block-0.4"])
-def test_vertices_have_common_eta_on_an_enlarging_zone(name, maxh):
-    pair = ENLARGING[name]
-    mesh = first_mesh(pair.problem(), maxh)
-    eta = []
-    for side, curve in zip(
-        (pair.contact.secondary, pair.contact.primary), pair.curves, strict=True
-    ):
-        points = vertices(mesh, side)
-        x, y = points[np.abs(points[:, 0]) < pair.part].T
+    pair = ALL[name]
+    points = [vertices(first_mesh(pair.problem(), maxh), side) for side in pair.sides]
+    for k, curve in enumerate(pair.curves):
+        x, y = points[k][np.abs(points[k][:, 0]) < pair.part].T
         # The spline of a graph is good to 1e-12 here; circles and lines are exact.
         assert np.abs(y - [curve(v) for v in x]).max() < ROUND_OFF
-        eta.append(x)
-    assert len(eta[0]) >= 2
-    assert unmatched(*eta) < ROUND_OFF
+        points[k] = x
+    assert len(points[0]) >= 2
+    assert unmatched(*points) < ROUND_OFF
 
 
 @pytest.mark.parametrize("maxh", [2.0, 0.4, 0.11])
@@ -215,7 +114,7 @@ def test_a_corner_of_the_primary_meets_a_node_of_the_secondary():
     kinked = body(
         "upper", polygon(corners, ["upper_contact"] * 2 + ["sides", "upper_top", "sides"])
     )
-    mesh = first_mesh(pressed(compound(kinked, low()), BLOCKS, UP), 0.4)
+    mesh = first_mesh(pressed(compound(kinked, low()), BLOCKS, RISING), 0.4)
     upper, lower = (vertices(mesh, n)[:, 0] for n in ("upper_contact", "lower_contact"))
     assert unmatched(upper, lower) < ROUND_OFF
     assert np.diff(np.sort(lower)).min() > 0.2  # no slivers beside the corner
@@ -334,7 +233,7 @@ def scaled_mesh(geometry, size, degree):
 
 CURVED = {  # the smallest size of which check_curves accepts the mesh
     "arcs": (disc_on_block(), 5e-5),
-    "splines": (graphs(lambda x: wave(x) + 0.01, hill), 1e-2),
+    "splines": (graphs(wave, valley), 1e-2),
 }
 
 
