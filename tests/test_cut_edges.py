@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from netgen.occ import Compound, OCCGeometry, WorkPlane, X, Y
 
-from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact import Elastic, Problem, solve
 from ngcontact.mesh import first_mesh
 
 ORDERS = (1, 2, 3, 4)
@@ -231,20 +231,3 @@ def test_overlaps_are_found_on_fine_meshes(width, shift):
         mesh = ng.Mesh(geometry.GenerateMesh(maxh=0.025))
         with pytest.raises(ValueError, match="lie on top of each other"):
             Problem(geometry, {"square|bar": STEEL}, {"side": (0, 0)}).check(mesh)
-
-
-def test_bodies_on_top_of_each_other_are_refused():
-    """Two circles in one face are two discs for OCC; a press fit is drawn with an interference."""
-    twice = WorkPlane().Circle(RIM).Circle(BORE).Face()
-    twice.faces.name, twice.edges.name = "tube", "side"
-    both = Compound([disc(2, "one", "side"), rectangle(-1, -1, 4, 1, "other", "side")])
-    for shape, names in ((twice, '"tube" .* "tube"'), (both, '"other" .* "one"')):
-        geometry = OCCGeometry(shape, dim=2)
-        mesh = ng.Mesh(geometry.GenerateMesh(maxh=0.5))
-        laws = dict.fromkeys(mesh.GetMaterials(), STEEL)
-        with pytest.raises(ValueError, match=f"body {names} .* lie on top of each other"):
-            Problem(geometry, laws, {"side": (0, 0)}).check(mesh)
-    hub = rectangle(-4, -4, 8, 8, "hub", "side") - disc(1.99, "hub", "seat")
-    fit = OCCGeometry(Compound([hub, disc(2, "pin", "pin")]), dim=2)
-    mesh = ng.Mesh(fit.GenerateMesh(maxh=0.5))
-    Problem(fit, {"hub|pin": STEEL}, {"side": (0, 0)}, contact=[Contact("pin", "seat")]).check(mesh)

@@ -3,17 +3,15 @@
 import copy
 import math
 from dataclasses import replace
-from itertools import pairwise
 
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.meshing import Element1D, Element2D, FaceDescriptor, Mesh, MeshPoint, Pnt
 from netgen.occ import Axis, OCCGeometry, Vec, WorkPlane
 from netgen.occ import Pnt as Point
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
+from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.geometries import blocks, disc, disc_on_block, rings
 from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.mesh.generation import first_mesh
@@ -124,26 +122,6 @@ def difference(first, second):
     return np.abs(values(first) - values(second)).max() / np.abs(values(second)).max()
 
 
-def test_a_solution_without_pairs():
-    solution = solve(
-        Problem(
-            geometry=disc(),
-            materials={"disc": SOFT},
-            displacement={"top": (0, 0)},
-            force={"disc": (0, -1)},
-        ),
-        maxh=0.4,
-        order=2,
-    )
-    assert solution.points.shape == (0, 2)
-    assert solution.steps == [0]
-    # The weight of the quarter disc, up to the area of the curved mesh.
-    assert solution.reactions["top"] == pytest.approx([0, math.pi / 4], abs=1e-3)
-    assert max(solution.residuals.values()) < EXACT
-    with pytest.raises(ValueError, match=r"pair=0 .* there is no contact"):
-        solution.contact_force()
-
-
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", PROBLEMS)
 @pytest.mark.study(witness=["B-1", "S9-2", "S9-1"])
@@ -182,25 +160,6 @@ def test_every_body_is_in_equilibrium(name, order):
         assert np.abs(loads + reaction + contact).max() < EXACT * size
 
 
-def test_total_force_and_its_moment_are_those_of_the_load():
-    """Partial uplift: a block pressed beyond the third of its width; all forces are vertical."""
-    load = ng.IfPos(ng.x - 0.5, 0.2, 0.0)
-    solution = solve(two_blocks(traction={"top": (0, -load)}), maxh=0.3, order=2)
-    assert 0 < np.count_nonzero(solution.active) < len(solution.active)
-    # On top, the horizontal reactions have no moment about the points of y = 1.
-    force = solution.force
-    # The load jumps inside of an edge of the mesh: what was assembled counts.
-    unit, arm = (ng.GridFunction(solution.displacement.space) for _ in range(2))
-    upper = solution.mesh.Materials("upper")
-    unit.Set(ng.CF((0, 1)), definedon=upper)
-    arm.Set(ng.CF((-(ng.y - 1), ng.x)), definedon=upper)
-    f = solution.discrete.space.f
-    assert force.sum() == pytest.approx(-f @ unit.vec.FV().NumPy(), rel=1e-12)
-    moment = -f @ arm.vec.FV().NumPy()
-    assert force @ solution.points[:, 0] == pytest.approx(moment, rel=1e-12)
-    assert moment / force.sum() > 2 / 6  # outside of the kern
-
-
 def test_the_contact_force_pushes_the_secondary_off_the_primary():
     problem = two_blocks(traction={"top": 0.1})
     assert solve(problem, maxh=0.5).contact_force() == pytest.approx([0, 0.2], abs=1e-13)
@@ -229,14 +188,6 @@ def test_uniform_pressure_in_units_of_stress():
         assert stress == pytest.approx(np.array([0, 0, 0, -0.1]), abs=1e-14)
 
 
-def test_curves_apart_need_a_search_each():
-    solution = solve(pressed_disc(), maxh=0.4, order=2)
-    assert solution.work["gap_searches"] == 1
-    on_arc = boundary_mask(solution.mesh, "disc_arc")
-    region = solution.mesh.ngmesh.Elements1D().NumPy()["index"] - 1
-    assert solution.work["curved_elements"] == np.count_nonzero(on_arc[region])
-
-
 @pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize("name", ["S1", "S7", "S9", "B", "polygon"])
 @pytest.mark.study(witness=["S9-1", "B-1", "S9-3"])
@@ -246,50 +197,6 @@ def test_secondary_and_primary_may_be_swapped_on_matched_lines(name, order):
     solution = solve(problem, maxh=0.3, order=order)
     swapped = replace(problem, contact=[Contact(contact.primary, contact.secondary)])
     assert difference(solve(swapped, solution.mesh, order=order), solution) < 1e-9
-
-
-def squares(sign, n=6):
-    """Problem B's blocks on n x n squares, halved into triangles; mirrored in x for sign = -1."""
-    mesh = Mesh(dim=2)
-    for k, (name, low) in enumerate((("upper", 0.0), ("lower", -1.0))):
-        p = [
-            [mesh.Add(MeshPoint(Pnt(sign * 2 * i / n, low + j / n, 0))) for i in range(n + 1)]
-            for j in range(n + 1)
-        ]
-        face = mesh.Add(FaceDescriptor(surfnr=k + 1, domin=k + 1, bc=k + 1))
-        mesh.SetMaterial(k + 1, name)
-        for i, j in np.ndindex(n, n):
-            a, b, c, d = p[j][i], p[j][i + 1], p[j + 1][i + 1], p[j + 1][i]
-            for triangle in ([a, b, c], [a, c, d]):
-                mesh.Add(Element2D(face, triangle[::sign]))
-        right, left = [row[-1] for row in p], [row[0] for row in p[::-1]]
-        sides = {"low": p[0], "far": right, "high": p[-1][::-1], "near": left}
-        for number, (side, line) in enumerate(sides.items(), start=4 * k + 1):
-            for ends in pairwise(line[::sign]):
-                mesh.Add(Element1D(list(ends), index=number))
-            mesh.SetBCName(number - 1, f"{name}_{side}")
-    return ng.Mesh(mesh)
-
-
-@pytest.mark.parametrize("order", [1, 2, 3])
-def test_a_mirrored_problem_has_the_mirrored_solution(order):
-    both = []
-    for sign in (1, -1):
-        problem = Problem(
-            geometry=squares(sign),
-            materials={"upper": SOFT, "lower": STIFF},
-            displacement={"lower_low": (0, 0), "upper_near|lower_near": (0, None)},
-            traction={"upper_high": ng.IfPos(1 - sign * ng.x, 0.01, 0.0)},
-            contact=[Contact("upper_low", "lower_high")],
-        )
-        both.append(solve(problem, order=order))
-    one, other = both
-    assert 0 < np.count_nonzero(one.active) < len(one.active)
-    assert other.points == pytest.approx(one.points * [-1, 1], abs=1e-14)
-    assert (other.active == one.active).all()
-    assert other.pressure == pytest.approx(one.pressure, abs=1e-11 * one.pressure.max())
-    assert other.energy == pytest.approx(one.energy, rel=1e-11)
-    assert other.transitions() == pytest.approx(one.transitions() * [-1, 1], rel=1e-9)
 
 
 def test_a_turned_problem_has_the_turned_solution():
@@ -381,46 +288,6 @@ def test_bilateral_pairs_pull():
         assert solution.steps == [0]
         assert len(solution.transitions()) == 0
         assert max(solution.residuals.values()) < EXACT
-
-
-@pytest.mark.parametrize("measured", [False, True])
-def test_an_interference_presses(measured):
-    # Shrink fit: p = delta / R1 / [compliances of the two rings], in plane strain.
-    delta, (r0, r1, r2) = 0.001, (0.5, 1.0, 2.0)
-    problem = Problem(
-        geometry=rings(quarter=True, interference=delta if measured else 0.0),
-        materials={"outer": SOFT, "inner": STIFF},
-        sliding="inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y",
-        contact=[Contact("outer_contact", "inner_contact", gap=None if measured else -delta)],
-    )
-    solution = solve(problem, maxh=0.3, order=3)
-    outer = ((r2**2 + r1**2) / (r2**2 - r1**2) + 0.3 / 0.7) / (1.0 / (1 - 0.3**2))
-    inner = ((r1**2 + r0**2) / (r1**2 - r0**2) - 0.2 / 0.8) / (3.0 / (1 - 0.2**2))
-    assert solution.active.all()
-    # The rays of the points on the cuts run along the cuts.
-    angle = np.degrees(np.arctan2(*solution.points.T[::-1]))
-    assert angle.min() == pytest.approx(0, abs=1e-9)
-    assert angle.max() == pytest.approx(90, abs=1e-9)
-    # Order 3 at this size: measured 6.5e-3 at an end of the zone, 1e-5 in the mean. Overlapping
-    # circles have radii that differ by 1e-3.
-    expected = delta / r1 / (outer + inner)
-    assert solution.pressure == pytest.approx(expected, rel=1e-2)
-    assert solution.force.sum() == pytest.approx(
-        expected * math.pi / 2, rel=3e-3 if measured else 1e-4
-    )
-
-
-def test_an_anisotropic_patch_is_exact():
-    # Uniform stress sigma_yy = -0.1 in a material that couples compression and shear.
-    C = np.array([[2.0, 0.5, 0.1], [0.5, 1.0, 0.05], [0.1, 0.05, 0.4]])
-    exx, eyy, gxy = np.linalg.solve(C, [0, -0.1, 0])
-    u = ng.CF((exx * ng.x + gxy * ng.y, eyy * ng.y))
-    problem = two_blocks(
-        materials={"upper": Hooke(C), "lower": Hooke(C)}, displacement={"bottom|top": u}
-    )
-    solution = solve(problem, maxh=0.5)
-    assert solution.pressure == pytest.approx(0.1)
-    assert ng.Integrate((solution.displacement - u) ** 2, solution.mesh) < 1e-28
 
 
 def test_components_of_the_displacement():

@@ -13,7 +13,6 @@ from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
 from ngcontact import (
     Contact,
-    ContactError,
     ContactWarning,
     ConvergenceError,
     Elastic,
@@ -165,27 +164,6 @@ def test_roles_that_fail_are_exchanged_with_a_warning(monkeypatch):
     area = ng.Integrate(1.0, solution.mesh, definedon=solution.mesh.Materials("pin"), order=4)
     load = area * np.array((0.3, -1.0))
     np.testing.assert_allclose(solution.contact_force(), -load, atol=1e-9 * abs(load).max())
-
-
-def test_other_roles_are_not_tried_where_the_gap_is_given(monkeypatch):
-    """The error of the roles that were given is raised, as where the others fail, too."""
-    problem = pin_at_the_bottom(("hole", "pin"))
-    calls = []
-
-    def fail(discrete, active):
-        calls.append(discrete.problem.contact)
-        raise ConvergenceError(f"attempt {len(calls)}")
-
-    monkeypatch.setattr(one_mesh, "minimise_energy", fail)
-    mesh = first_mesh(problem, 0.5)
-    with pytest.raises(ConvergenceError, match="attempt 1"):
-        solve(problem, mesh, order=2)
-    assert [pairs[0].secondary for pairs in calls] == ["hole", "pin"]
-    calls.clear()
-    problem = replace(problem, contact=[replace(problem.contact[0], gap=0.01)])
-    with pytest.raises(ContactError):
-        solve(problem, mesh, order=2)
-    assert len(calls) <= 1
 
 
 def disc_in_vee(contact, settle):

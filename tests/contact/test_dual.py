@@ -10,10 +10,9 @@ from netgen.occ import OCCGeometry
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
 from ngcontact import Contact, solve
-from ngcontact.contact import contact_line, joined
+from ngcontact.contact import contact_line
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import blocks, disc_on_block
-from ngcontact.mesh import curve
+from ngcontact.geometries import blocks
 from tests.scenes import divided, pressed
 
 EXACT = 1e-10  # round-off times the condition of small meshes; measured below 2e-12
@@ -68,22 +67,6 @@ def test_a_matched_part_keeps_its_rows_to_the_last_bit(order):
     assert (line.gap[inside] == nodal.gap[inside]).all()
     assert (line.weight[inside] == nodal.weight[inside]).all()
     assert (line.coupling[inside] != nodal.coupling[inside]).nnz == 0
-
-
-@pytest.mark.parametrize("share", [1e-3, 0.05, 0.3, 0.6])
-def test_a_rotation_of_a_disc_about_its_centre_closes_no_gap(share):
-    """Also where the block ends under a segment of the disc; nodes of order 2 lie on the circle."""
-    count = 9  # segments of a quarter of the circle
-    width = np.tan((3 + share) * np.pi / 2 / count)  # where the normal of a segment ends
-    shape = disc_on_block(radius=1.0, width=width, symmetric=False)
-    mesh = divided(shape, {"disc_arc": count, "block_top": 5}).GenerateMesh(maxh=0.3)
-    trace = boundary_trace(curve(ng.Mesh(mesh), 2, "isoparametric")[0], 2)
-    line = contact_line(trace, Contact("disc_arc", "block_top"))
-    assert line.means.any()
-    motion = np.zeros((2, trace.space.ndof))
-    x = trace.point(*trace.at_nodes(line.segments))
-    motion[:, trace.nodes[line.segments].ravel()] = np.array([1 - x[:, 1], x[:, 0]])
-    assert np.abs(joined([line], trace).matrix @ motion.ravel()).max() < EXACT
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

@@ -5,7 +5,7 @@ import math
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Compound, OCCGeometry, Vec, WorkPlane
+from netgen.occ import OCCGeometry
 
 from ngcontact import Contact
 from ngcontact.contact.assembly import contact_line
@@ -123,22 +123,6 @@ def test_a_uniform_pressure_is_that_of_the_weights_where_sides_share_a_point(ord
     normals = trace.normal(here[at], np.full(2, 0.5))
     expected = share * (lengths[at] @ normals)
     np.testing.assert_allclose(line.weight[point] * line.direction[point], expected, rtol=1e-13)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_fixed_direction_has_one_point_at_corners(order):
-    trace, line = polygonal(order, direction=(0, -1))
-    points_are_consistent(line, trace)
-    assert len(line.node) == len(np.unique(line.node)) == order * len(line.segments) + 1
-    assert (line.direction == [0, -1]).all()
-    assert line.weight.sum() == pytest.approx(2.0, rel=1e-14)  # the extent of eta
-    # At a corner the weights of both segments add up: shares of their extents.
-    end = {1: 1 / 2, 2: 1 / 6, 3: 1 / 12, 4: 1 / 20}[order]
-    extent = np.ptp(line.position[line.rows][:, [0, -1], 0], axis=1)
-    for k in (1, 2):
-        [point] = at_corner(line, LINE[k])
-        adjacent = extent[(line.rows == point).any(axis=1)]
-        assert line.weight[point] == pytest.approx(end * adjacent.sum(), rel=1e-13)
 
 
 def test_steep_sides_do_not_face_a_fixed_direction():
@@ -264,22 +248,3 @@ def test_gap_given_as_a_function_of_place(order, direction):
         np.testing.assert_allclose(line.gap, x**2 / 2 + y, atol=1e-14)
         assert line.searches == 0
         assert (line.partner == -1).all()
-
-
-def test_the_far_side_of_the_own_body_has_no_partner():
-    """Whole discs: the ray inwards from the far side leaves the disc before it meets the other."""
-    upper = WorkPlane().Circle(0, 1, 1).Face()
-    lower = WorkPlane().Circle(0, -1, 1).Face()
-    for face, name in ((upper, "upper"), (lower, "lower")):
-        face.faces.name, face.edges.name = name, f"{name}_rim"
-    geometry = OCCGeometry(Compound([upper, lower]), dim=2)
-    for direction in (None, (0, -1)):
-        line = contact_line(
-            trace_of(geometry, 2, maxh=0.4), Contact("upper_rim", "lower_rim", direction)
-        )
-        assert (line.position[:, 1] < 1).all()
-        assert line.gap.min() > -1e-3  # the chords of the mesh overlap by O(h^3) at most
-    # Overlap that is meant stays: the same discs 0.01 into each other.
-    moved = OCCGeometry(Compound([upper.Move(Vec(0, -0.01, 0)), lower]), dim=2)
-    line = contact_line(trace_of(moved, 2, maxh=0.4), Contact("upper_rim", "lower_rim", (0, -1)))
-    assert line.gap.min() == pytest.approx(-0.01, rel=0.05)

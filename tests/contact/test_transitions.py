@@ -10,7 +10,7 @@ import pytest
 from drivers.reference import cases
 from ngcontact import Contact, Problem, solve
 from ngcontact.contact.corners import in_contact, pressure_across_corners
-from ngcontact.contact.transitions import ending_segments, transitions_on
+from ngcontact.contact.transitions import transitions_on
 from ngcontact.geometries import blocks
 
 
@@ -49,16 +49,6 @@ def test_two_zones_have_four_ends():
     found = transitions_on(line(x), *opening(np.abs(np.abs(x - 2) - 1) - 0.43))
     expected = [0.57, 1.43, 2.57, 3.43]
     assert np.sort(found.position[:, 0]) == pytest.approx(expected, abs=EXACT)
-
-
-def test_points_of_separate_lines_are_not_neighbours():
-    # Two contact lines of one pair: the first in contact, the second open.
-    x = np.arange(4.0)
-    lines = SimpleNamespace(
-        position=np.column_stack([x, 0 * x]), rows=np.array([[0, 1], [2, 3]]), node=np.arange(4)
-    )
-    active = np.array([True, True, False, False])
-    assert len(transitions_on(lines, ~active * 1.0, active).position) == 0
 
 
 def test_a_closed_line_has_no_first_point():
@@ -100,16 +90,6 @@ def test_contact_that_ends_at_a_corner(order):
         # The warm start takes the way from `inner` to `outer` for the direction of the contact.
         assert found.outer.tolist() == [outer]
         assert lines.node[found.inner].tolist() == [corner]
-
-
-@pytest.mark.parametrize("order", [1, 2, 4])
-def test_contact_ends_in_one_segment_for_each_end(order):
-    x = np.linspace(0, 1, 8 * order + 1)
-    zone = line(x, order)
-    gap, active = opening(np.abs(x - 0.5) - 0.2)  # ends at 0.3 and 0.7, segments of 1 / 8
-    assert ending_segments(zone, transitions_on(zone, gap, active)).tolist() == [2, 5]
-    all_open = transitions_on(zone, np.ones(len(x)), np.zeros(len(x), dtype=bool))
-    assert ending_segments(zone, all_open).size == 0
 
 
 def test_no_end_at_a_corner_inside_the_contact():

@@ -3,7 +3,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 
 from drivers.reference import cases
 from ngcontact import solve
@@ -29,14 +28,6 @@ def test_points_that_touch_start_active():
     [line] = discrete.lines
     touching = np.linalg.norm(line.position, axis=1) < 1e-9  # the disc touches the origin
     np.testing.assert_array_equal(first_active_set(discrete), touching)
-
-
-@pytest.mark.parametrize("order", [1, 2, 4])
-def test_on_the_same_points_the_state_is_kept(order):
-    """Whatever it is: nothing is told by a transition."""
-    [line] = prepared(cases.one_transition().problem, 0.3, order).lines
-    active = np.random.default_rng(1).random(len(line.node)) < 0.5
-    np.testing.assert_array_equal(carried_active_set([line], [state(line, active)]), active)
 
 
 def test_a_new_point_between_two_is_active_if_one_of_them_is():

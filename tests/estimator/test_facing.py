@@ -1,7 +1,5 @@
 """Parts of contact lines that face: where they end, directions between nodes, what is left free."""
 
-from dataclasses import replace
-
 import ngsolve as ng
 import numpy as np
 import pytest
@@ -12,8 +10,7 @@ from drivers.reference.curved import rings as ring_solution
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.estimator.contact import remaining
 from ngcontact.estimator.terms import Parts
-from ngcontact.geometries import blocks, rings
-from tests.scenes import unmatched_blocks
+from ngcontact.geometries import rings
 
 LAW = Elastic(E=1.0, nu=0.3)
 # Plane strain under -1 along y.
@@ -133,69 +130,3 @@ def test_a_slip_along_a_curved_zone_is_no_gap(order):
         found.append(solve(problem, maxh=0.4, order=order).relative_error_estimate)
     # Middles of the mesh's curves lie off the circle: measured 7e-4 at order 2, 4e-7 at order 3.
     assert found[1] == pytest.approx(found[0], rel=2e-3)
-
-
-def reference_error(solution, reference):
-    """Stress of a solution less that of another on other elements, relative, by energy."""
-    points = reference.mesh.MapToAllElements(ng.IntegrationRule(ng.TRIG, 8), ng.VOL)
-    x, y = np.ascontiguousarray(ng.CF((ng.x, ng.y))(points).T)
-    fine, coarse = (
-        s.stress(at).reshape(-1, 4)
-        for s, at in ((reference, points), (solution, solution.mesh(x, y)))
-    )
-    jacobian = ng.specialcf.JacobianMatrix(2)(points)
-    weights = np.tile(ng.IntegrationRule(ng.TRIG, 8).weights, reference.mesh.ne)
-    weights = weights * np.abs(jacobian[:, 0] * jacobian[:, 3] - jacobian[:, 1] * jacobian[:, 2])
-    mu, nu = np.where(y > 0, 1 / 2.6, 3 / 2.4), np.where(y > 0, 0.3, 0.2)
-    squares = [
-        (weights / mu * ((s**2).sum(axis=1) - nu * (s[:, 0] + s[:, 3]) ** 2)).sum()
-        for s in (fine - coarse, fine)
-    ]
-    return np.sqrt(squares[0] / squares[1])
-
-
-@pytest.fixture(scope="module", params=[False, True], ids=["unilateral", "bilateral"])
-def wavy(request):
-    """Blocks pressed together over a wave of length 0.16, and their solution on a fine mesh."""
-    wave = 2e-3 * (ng.cos(40 * ng.x) if request.param else 1 - ng.cos(40 * ng.x))
-    problem = Problem(
-        geometry=blocks(),
-        materials=cases.BLOCKS,
-        displacement={"bottom": (0, 0), "top": (0, -0.05)},
-        contact=[
-            Contact(
-                *("lower_contact", "upper_contact"),
-                direction=(0, 1),
-                gap=wave,
-                bilateral=request.param,
-            )
-        ],
-    )
-    # Its error is 1e-3, a hundredth of those measured below.
-    return problem, solve(problem, maxh=0.05, order=4)
-
-
-@pytest.mark.parametrize("order", [1, 2, 3, 4])
-@pytest.mark.study(witness=["unilateral-2", "bilateral-2", "unilateral-3"])
-def test_gaps_that_nodes_do_not_resolve_are_estimated(wavy, order):
-    """Three waves on each segment: measured 2.3 to 3.0."""
-    problem, reference = wavy
-    solution = solve(problem, maxh=0.5, order=order)
-    ratio = solution.relative_error_estimate / reference_error(solution, reference)
-    assert 1.5 < ratio < 6
-
-
-@pytest.mark.parametrize("case", [cases.one_transition, cases.hertz_contact])
-def test_matched_lines_that_end_on_supports_are_not_divided(case, monkeypatch):
-    """The ends of Gamma_K on Gamma_u carry no point, and face what lies at the same place."""
-    solution = solve(case().problem, maxh=0.3, order=2)
-    assert (solution.pairs[0].line.rows < 0).any()
-    expected = solution.error_estimate
-
-    def refuse(*_):
-        raise AssertionError("a search where nodes face nodes")
-
-    monkeypatch.setattr("ngcontact.estimator.contact.pieces.divided", refuse)
-    assert replace(solution).error_estimate == expected
-    with pytest.raises(AssertionError, match="a search"):
-        _ = solve(replace(case().problem, geometry=unmatched_blocks())).error_estimate

@@ -124,19 +124,6 @@ def test_normals_agree_with_ngsolve(make):
         np.testing.assert_allclose(trace.normal(segment, s), expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_exact_normals_are_those_of_the_geometry(order):
-    trace = boundary_trace(meshed(rings(), order), order)
-    segment, s = everywhere(trace)
-    names = np.array(trace.mesh.GetBoundaries())[trace.region[segment]]
-    out = np.where(np.isin(names, ["rim", "inner_contact"]), 1.0, -1.0)
-    x = trace.point(segment, s)
-    radial = x / np.linalg.norm(x, axis=1)[:, None] * out[:, None]
-    np.testing.assert_allclose(trace.exact_normal(segment, s), radial, atol=2e-15)
-    # Not so the mesh's own normals.
-    assert np.abs(trace.normal(segment, s) - radial).max() > 1e-7
-
-
 def numbered(trace, segments):
     """Points of the nodes of segments: numbers by entry, vectors, nodes by point."""
     segment, s = trace.at_nodes(segments)
@@ -165,19 +152,6 @@ def test_two_points_at_corners_of_the_geometry(order):
     along = np.diff(np.array(LINE), axis=0)
     right = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
     np.testing.assert_allclose(vector[number], right[np.repeat(side, order + 1)], atol=1e-15)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_one_point_at_smooth_vertices(order):
-    # The arc is split at the origin into two CAD edges with a common tangent.
-    trace = boundary_trace(meshed(disc_on_block(symmetric=False), order), order)
-    segments = named(trace, "disc_arc")
-    assert len(np.unique(trace.region[segments])) == 2
-    _, vector, at = numbered(trace, segments)
-    assert len(at) == len(np.unique(trace.nodes[segments])) == order * len(segments) + 1
-    np.testing.assert_allclose(np.linalg.norm(vector, axis=1), 1, atol=1e-15)
-    [bottom] = np.flatnonzero(vector[:, 1] == vector[:, 1].min())
-    np.testing.assert_allclose(vector[bottom], [0, -1], atol=1e-15)
 
 
 CORNERS = {  # vertices k between side k - 1 and side k that are corners

@@ -62,25 +62,3 @@ def test_systems_that_stall_are_factorised(caplog, limits: Limits):
     assert caplog.text.count("the matrix is factorised: ") == 1
     assert result.factorizations > 0
     same(result, scene.direct())
-
-
-def test_systems_may_be_refined_in_any_order():
-    """Without `solve` before, or after that of another set: the same solution."""
-    scene = Scene("disc on block", 1, 2)
-    m = len(scene.program.g)
-    one, other = np.arange(m) < m // 2, np.arange(m) > m // 3
-    known, systems = bordered_systems(scene.program, scene.factor), scene.systems()
-    for active in (one, other, one):
-        u, force = systems.refine(active)
-        right, forces = known.refine(active)
-        np.testing.assert_allclose(u, right, rtol=0, atol=1e-10 * np.abs(right).max())
-        np.testing.assert_allclose(force, forces, rtol=0, atol=1e-10 * np.abs(forces).max())
-        systems.solve(one)
-    assert scene.made == 1
-    systems.forget()
-    systems.restart(scene.program)
-    assert systems.back_solves == 0
-    u, _ = systems.refine(one)
-    right, _ = known.refine(one)
-    np.testing.assert_allclose(u, right, rtol=0, atol=1e-10 * np.abs(right).max())
-    assert scene.made == 2

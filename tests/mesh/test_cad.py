@@ -28,13 +28,6 @@ def circle(x=0.0, y=0.0, radius=1.0):
     return CadEdge(edge)
 
 
-def parabola_edge():
-    """Parabola y = x^2 / 2 from x = -1 to x = 1; x is linear in the parameter."""
-    geometry = graphs(lambda x: x**2 / 2, lambda x: -0.1)
-    [edge] = [edge for edge in geometry.shape.edges if edge.name == "upper_contact"]
-    return CadEdge(edge)
-
-
 def angles(theta):
     return np.column_stack([np.cos(theta), np.sin(theta)])
 
@@ -69,19 +62,6 @@ def test_circle_normals_are_radial_also_at_the_seam(x, y, radius):
         np.testing.assert_allclose(edge.normal(points), radial, atol=1e-15 * scale)
         foot = edge.point(edge.project(points))
         np.testing.assert_allclose(foot, [x, y] + radius * radial, atol=1e-15 * scale * radius)
-
-
-def test_level_on_a_parabola():
-    edge = parabola_edge()
-    values = np.array([-1.0, -0.4, 0.0, 0.77, 1.0])
-    near = np.column_stack([values + 0.03, values**2 / 2])
-    t = edge.level(np.array([1.0, 0.0]), values, near)
-    expected = np.column_stack([values, values**2 / 2])
-    np.testing.assert_allclose(edge.point(t), expected, atol=1e-15)
-    # y = 0.18 is taken at x = 0.6 and x = -0.6: the near point decides.
-    sides = np.array([[0.7, 0.2], [-0.5, 0.2]])
-    t = edge.level(np.array([0.0, 1.0]), np.full(2, 0.18), sides)
-    np.testing.assert_allclose(edge.point(t), [[0.6, 0.18], [-0.6, 0.18]], atol=1e-15)
 
 
 GALLERY = {

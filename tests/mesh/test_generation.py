@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from netgen.occ import OCCGeometry
 
-from ngcontact import Contact, Elastic, Problem
+from ngcontact import Contact, Problem
 from ngcontact.adaptivity.refinement import matched_vertices
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import blocks, disc_on_block, graphs
-from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.geometries import blocks, disc_on_block
+from ngcontact.geometries.region import body, polygon
 from ngcontact.mesh import generation
 from ngcontact.mesh.curving import check_curves
 from ngcontact.mesh.generation import first_mesh
@@ -22,13 +22,10 @@ from tests.pairs import (
     BLOCKS,
     BOUNDED,
     ENLARGING,
-    RISING,
     ROUND_OFF,
     SOFT,
     pressed,
     unmatched,
-    valley,
-    wave,
 )
 from tests.scenes import coordinates, vertices
 
@@ -81,43 +78,6 @@ def test_the_default_size_is_an_eighth_of_the_largest_extent():
     assert lengths(mesh, "upper_contact|lower_contact") == pytest.approx(4 / 16)
     # The user's geometry is left as it was, and a size that is given holds everywhere.
     assert lengths(first_mesh(problem, 0.5), "upper_contact|lower_contact") == pytest.approx(0.5)
-
-
-def low(name="lower_contact"):
-    """Block from x = -1 to 1 below y = 0, its top one edge."""
-    corners = [(1.0, 0.0), (-1.0, 0.0), (-1.0, -1.0), (1.0, -1.0)]
-    return body("lower", polygon(corners, [name, "sides", "bottom", "sides"]))
-
-
-def high(name, left, right, contact):
-    """Block from x = left to right above y = 0."""
-    corners = [(left, 0.0), (right, 0.0), (right, 1.0), (left, 1.0)]
-    return body(name, polygon(corners, [contact, "sides", f"{name}_top", "sides"]))
-
-
-@pytest.mark.parametrize("direction", [None, 1])
-@pytest.mark.parametrize("wide_is_secondary", [True, False])
-def test_a_line_inside_a_longer_one_has_its_ends_among_the_nodes(wide_is_secondary, direction):
-    geometry = compound(high("upper", -0.47, 0.33, "upper_contact"), low())
-    names = ["lower_contact", "upper_contact"] if wide_is_secondary else None
-    secondary, primary = names or ["upper_contact", "lower_contact"]
-    xi = None if direction is None else (0, 1 if wide_is_secondary else -1)
-    mesh = first_mesh(pressed(geometry, BLOCKS, Contact(secondary, primary, direction=xi)), 0.4)
-    short, wide = (np.sort(vertices(mesh, n)[:, 0]) for n in ("upper_contact", "lower_contact"))
-    assert unmatched(short, wide[(wide > -0.5) & (wide < 0.35)]) < ROUND_OFF
-    assert np.diff(wide).min() > 0.2  # two halves of 0.8 and two of at most 0.4: no slivers
-    assert np.diff(wide).max() < 0.4 * (1 + 1e-6)
-
-
-def test_a_corner_of_the_primary_meets_a_node_of_the_secondary():
-    corners = [(-1.0, 0.0), (0.1, 0.05), (1.0, 0.0), (1.0, 1.0), (-1.0, 1.0)]
-    kinked = body(
-        "upper", polygon(corners, ["upper_contact"] * 2 + ["sides", "upper_top", "sides"])
-    )
-    mesh = first_mesh(pressed(compound(kinked, low()), BLOCKS, RISING), 0.4)
-    upper, lower = (vertices(mesh, n)[:, 0] for n in ("upper_contact", "lower_contact"))
-    assert unmatched(upper, lower) < ROUND_OFF
-    assert np.diff(np.sort(lower)).min() > 0.2  # no slivers beside the corner
 
 
 def test_the_geometry_is_left_as_it_was():
@@ -178,24 +138,6 @@ def test_a_bad_size_is_refused_with_its_value(maxh, error):
     assert "maxh" in str(caught.value)
 
 
-def test_whole_circles_are_divided_on_the_facing_side():
-    """A full circle is no graph over eta: nodes match where the discs face, areas stay right."""
-    upper, lower = (occ.WorkPlane().Circle(0, y, 1).Face() for y in (1, -1))
-    for face, name in ((upper, "upper"), (lower, "lower")):
-        face.faces.name, face.edges.name = name, f"{name}_rim"
-    discs = Problem(
-        geometry=OCCGeometry(occ.Compound([upper, lower]), dim=2),
-        materials={"upper|lower": Elastic(E=1.0, nu=0.3)},
-        contact=[Contact("upper_rim", "lower_rim", direction=(0, -1))],
-    )
-    mesh = first_mesh(discs, maxh=0.4)
-    assert mesh.ne < 200  # measured 95
-    mesh.Curve(3)
-    for name in ("upper", "lower"):
-        # Area of a disc by cubic curves of chord 0.4: O(h^4), measured 3e-5.
-        assert ng.Integrate(ng.CF(1), mesh.Materials(name)) == pytest.approx(math.pi, rel=1e-3)
-
-
 def test_two_pairs_on_one_circle_do_not_ask_for_nodes_on_its_far_sides():
     """What lies behind a disc sees the other face through it, and would spoil the nodes there."""
     disc = occ.Circle((0, 0), 1.0).Face()
@@ -221,32 +163,6 @@ def test_two_pairs_on_one_circle_do_not_ask_for_nodes_on_its_far_sides():
         assert len(facing) >= 3
         distance = np.linalg.norm(facing[:, None] - matched, axis=2)
         assert distance.min(axis=1).max() < ROUND_OFF
-
-
-def scaled_mesh(geometry, size, degree):
-    """Curved mesh of a geometry of `size` times its own."""
-    shape = geometry.shape.Scale(occ.Pnt(0, 0, 0), size)
-    mesh = ng.Mesh(OCCGeometry(shape, dim=2).GenerateMesh(maxh=0.25 * size))
-    mesh.Curve(degree)
-    return mesh
-
-
-CURVED = {  # the smallest size of which check_curves accepts the mesh
-    "arcs": (disc_on_block(), 5e-5),
-    "splines": (graphs(wave, valley), 1e-2),
-}
-
-
-@pytest.mark.parametrize("large", [False, True])
-@pytest.mark.parametrize("name", CURVED)
-def test_accepted_sizes_are_curved_as_size_1_is(name, large):
-    geometry, size = CURVED[name]
-    size = 1e8 if large else size  # Netgen meshes sizes to 3e8
-    one, other = (scaled_mesh(geometry, s, 5) for s in (1.0, size))
-    check_curves(other)
-    nodes = [boundary_trace(mesh, 4).curve for mesh in (one, other)]
-    # Round-off; measured 1e-15. At a fifth of the smallest size arcs are off by 3e-4.
-    assert np.abs(nodes[1] / size - nodes[0]).max() < ROUND_OFF
 
 
 def test_refinement_beyond_the_kernel_s_lengths_is_refused():

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 import pyvista
 from netgen.occ import Compound, Glue
-from ngsolve.meshes import MakeStructured2DMesh
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
 from ngcontact.output import plot_solution, write_series, write_solution
@@ -90,13 +89,6 @@ def test_bodies_keep_their_own_stress_where_they_touch(tmp_path, glue):
     np.testing.assert_allclose(stress, expected[:, None] + np.zeros_like(stress), rtol=1e-14)
 
 
-def test_quadrilaterals_are_refused(tmp_path):
-    solution = stub(1, mesh=MakeStructured2DMesh(quads=True, nx=2, ny=2))
-    with pytest.raises(ValueError, match="4 elements of the mesh are no triangles"):
-        write_solution(tmp_path / "a.vtu", solution)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_contact_points_carry_their_values(tmp_path):
     solution = stub(2)
     assert write_solution(tmp_path / "a.b.vtu", solution) == tmp_path / "a.b.vtu"
@@ -133,17 +125,6 @@ def test_series_lists_levels_with_both_files(tmp_path):
     bodies, contact = reader.read()
     assert bodies.n_cells == stub(2).mesh.ne
     assert contact.n_points == 9
-
-
-def test_interrupted_series_lists_what_was_written(tmp_path):
-    def levels():
-        yield stub(1)
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        write_series(tmp_path / "run.pvd", levels())
-    assert pyvista.PVDReader(tmp_path / "run.pvd").time_values == [0.0]
-    assert len(list(tmp_path.iterdir())) == 3
 
 
 @pytest.mark.parametrize(

@@ -73,18 +73,12 @@ def test_isotropic_law_about_an_axis_inverts_the_compliance(mesh, nu):
     ("E", "nu", "error", "message"),
     [
         (-1, 0.3, ValueError, r"E = -1\.0: Young's modulus must be positive"),
-        (0, 0.3, ValueError, r"E = 0\.0: Young's modulus must be positive"),
-        (math.inf, 0.3, ValueError, r"E = inf: give a finite number"),
         (math.nan, 0.3, ValueError, r"E = nan: give a finite number"),
         ("210e9", 0.3, TypeError, r"E = '210e9': give a real number"),
-        (True, 0.3, TypeError, r"E = True: give a real number"),
-        (1 + 1j, 0.3, TypeError, r"E = \(1\+1j\): give a real number"),
         (ng.CF((1, 2)), 0.3, ValueError, r"E is a CoefficientFunction of dim 2: give a scalar"),
         (ng.CF(1j), 0.3, TypeError, r"E is a complex CoefficientFunction: it must be real"),
         (1, 0.5, ValueError, r"nu = 0\.5: Poisson's ratio must lie in -1 < nu < 1/2"),
         (1, -1, ValueError, r"nu = -1\.0: Poisson's ratio must lie in -1 < nu < 1/2"),
-        (1, math.nan, ValueError, r"nu = nan: give a finite number"),
-        (1, None, TypeError, r"nu = None: give a real number"),
     ],
 )
 def test_elastic_refuses(E, nu, error, message):
@@ -96,19 +90,13 @@ def test_elastic_refuses(E, nu, error, message):
     ("data", "error", "message"),
     [
         (np.eye(2), ValueError, r"shape \(2, 2\): a Voigt matrix has \(3, 3\)"),
-        ([1, 2, 3], ValueError, r"shape \(3,\): a Voigt matrix has \(3, 3\)"),
         ([[1, 0], [0]], TypeError, r"C = .*: give a 3x3 matrix .* of real numbers"),
-        (None, TypeError, r"C = None: give a 3x3 matrix .* of real numbers"),
         (1j * np.eye(3), TypeError, r"give a 3x3 matrix .* of real numbers"),
         (np.diag([1, math.nan, 1]), ValueError, r"nan.*must be finite"),
         ([[2, 0, 0], [1e-9, 2, 0], [0, 0, 1]], ValueError, r"1e-09.*must be symmetric"),
         ([[1, 2, 0], [2, 1, 0], [0, 0, 1]], ValueError, r"2\.0.*must be positive definite"),
         (np.ones((3, 3)), ValueError, r"1\.0.*must be positive definite"),
-        (np.zeros((3, 3)), ValueError, r"0\.0.*must be positive definite"),
-        (np.diag([-1, 1, 1]), ValueError, r"-1\.0.*must be positive definite"),
-        (np.diag([1, -1, 1]), ValueError, r"-1\.0.*must be positive definite"),
         (np.diag([1, 1, -1]), ValueError, r"-1\.0.*must be positive definite"),
-        (-np.eye(3), ValueError, r"-1\.0.*must be positive definite"),
         (ng.CF((1, 2, 3)), ValueError, r"dims \(3,\): a Voigt matrix has \(3, 3\)"),
         (ng.CF((1j,) * 9, dims=(3, 3)), TypeError, r"complex.*must be real"),
     ],
@@ -123,7 +111,6 @@ def test_hooke_refuses(data, error, message):
     ("law", "message"),
     [
         (Elastic(ng.x - 0.5, 0.3), r"body\.E = -0\.\d+ at \(.*\): Young's modulus must be pos"),
-        (Elastic(1 / (ng.x - ng.x), 0.3), r"body\.E = (inf|nan) at \(.*\): Young's modulus"),
         (Elastic(1, ng.sqrt(ng.x - 2)), r"body\.nu = -?nan at \(.*\): Poisson's ratio must lie"),
         (Elastic(1, ng.x), r"body\.nu = 0\.\d+ at \(.*\): Poisson's ratio must lie in -1 < nu"),
         (

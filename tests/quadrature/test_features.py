@@ -56,18 +56,6 @@ def test_a_strip_is_found_with_its_place_and_width(kind, start, width):
     assert one.widths[off.argmin()] == pytest.approx(width, rel=0.25)  # measured: 0.2 at the end
 
 
-@pytest.mark.parametrize("slope", [0.0, 0.31])
-@pytest.mark.parametrize("width", [2e-3, 0.02])
-def test_a_soft_layer_is_found_with_its_width(slope, width):
-    along = ng.y - 0.4321 - slope * ng.x
-    one = found(given("materials", 1 - 0.99 * box(along, 0, width)), "materials")
-    assert len(one.places) > 50
-    off = one.places[:, 1] - 0.4321 - slope * one.places[:, 0] - width / 2
-    assert np.abs(off).max() < width
-    across = width / math.hypot(1, slope)
-    assert one.widths.min() == pytest.approx(across, rel=0.5)  # at most 8 % by direction, and steps
-
-
 SMOOTH = [
     ng.x,
     1 + ng.sin(3 * ng.x) * ng.cos(20 * ng.y),

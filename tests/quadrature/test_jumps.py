@@ -9,7 +9,7 @@ import pytest
 from drivers.reference import cases
 from ngcontact import ContactWarning, Elastic, Hooke, Problem, adapt
 from ngcontact.mesh import first_mesh
-from ngcontact.quadrature import jumping_moduli, warn_of_jumps
+from ngcontact.quadrature import warn_of_jumps
 from tests.quadrature.test_loads import square
 
 BODIES = ("upper", "lower")
@@ -66,13 +66,6 @@ def test_jumps_inside_elements_are_told_with_their_place(name, unit, mesh):
         assert "an edge of the geometry" in message
         x, y = map(float, message.split("near (")[1].split(")")[0].split(","))
         assert x == pytest.approx(0.37 + 0.1 * y, abs=1e-3)  # printed with four digits
-
-
-def test_jumps_on_edges_of_the_mesh_are_none():
-    """The bodies meet on y = 0, where the law of both jumps."""
-    law = Elastic(ng.IfPos(ng.y, 1.0, 1e4), 0.3)
-    mesh = first_mesh(made_of(law), 0.3)
-    assert not jumping_moduli(made_of(law), mesh).any()
 
 
 def test_elements_in_which_moduli_jump_are_refined_together():

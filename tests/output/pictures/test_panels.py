@@ -6,8 +6,8 @@ import pytest
 from matplotlib import pyplot
 
 from ngcontact import Contact
-from ngcontact.output import plot_solution, write_film
-from ngcontact.output.pictures.panels import cut_pressure, shown_parts
+from ngcontact.output import plot_solution
+from ngcontact.output.pictures.panels import cut_pressure
 from tests.output.stubs import stub
 
 
@@ -57,21 +57,6 @@ def test_labels_lie_inside_and_apart(monkeypatch, solution, factor):
     if offset.get_text():
         assert not note.get_window_extent().overlaps(offset.get_window_extent())
     pyplot.close(figure)
-
-
-def test_small_zones_far_apart_have_a_panel_each(tmp_path, solution):
-    touch(solution, [-0.5, 0.6], 0.06)
-    parts = shown_parts(solution)
-    assert len(parts) == 2
-    for part, place in zip(parts, (-0.5, 0.6), strict=True):
-        assert part.mean() == pytest.approx(place, abs=0.06)
-        assert part[0] < place < part[1]
-    figure = plot_solution(solution, tmp_path / "a.png")
-    panels = [axes for axes in figure.axes if "contact line" in axes.get_xlabel()]
-    assert len(panels) == 2
-    assert panels[0].get_ylim() == panels[1].get_ylim()
-    assert [axes.get_ylabel() for axes in panels] == ["contact pressure", ""]
-    write_film(tmp_path / "a.gif", [solution, solution])  # on one panel, as zones may move
 
 
 def test_singular_ends_are_cut_and_marked(tmp_path, solution):
