@@ -7,7 +7,7 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Axis, OCCGeometry, Vec, WorkPlane
+from netgen.occ import Axis, OCCGeometry, Vec
 from netgen.occ import Pnt as Point
 
 from drivers.reference import cases
@@ -122,40 +122,28 @@ def difference(first, second):
     return np.abs(values(first) - values(second)).max() / np.abs(values(second)).max()
 
 
-@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("order", [1, 4])
 @pytest.mark.parametrize("name", PROBLEMS)
-@pytest.mark.study(witness=["B-1", "S9-2", "S9-1"])
-def test_optimality_conditions(name, order):
+@pytest.mark.study(witness=["B-1", "B-4", "S9-4"])
+def test_every_body_is_in_equilibrium_and_every_point_optimal(name, order):
     solution = solve(PROBLEMS[name](), maxh=0.4, order=order)
     assert max(solution.residuals.values()) < EXACT
-    largest = solution.force.max()
+    largest, length = solution.force.max(), np.abs(values(solution)).max()
     assert solution.force.min() > -EXACT * largest
-    length = np.abs(values(solution)).max()
     assert solution.gap.min() > -EXACT * length
-    assert np.abs(solution.force * solution.gap).max() < EXACT * largest * length
     assert (solution.force[~solution.active] == 0).all()
     assert np.abs(solution.gap[solution.active]).max() < EXACT * length
-
-
-@pytest.mark.parametrize("order", [1, 4])
-@pytest.mark.parametrize("name", SIDES)
-@pytest.mark.study(witness=["B-1", "B-4", "S9-4"])
-def test_every_body_is_in_equilibrium(name, order):
-    problem = PROBLEMS[name]()
-    solution = solve(problem, maxh=0.4, order=order)
     size = sum(np.abs(force).sum() for force in solution.reactions.values())
     size += np.abs(solution.force).sum()
     boundaries = np.array(solution.mesh.GetBoundaries())
-    for body_name, (pattern, pairs) in SIDES[name].items():
+    for body_name, (pattern, pairs) in SIDES.get(name, {}).items():
         loads = np.zeros(2)
         for axis, direction in enumerate(((1, 0), (0, 1))):
             unit = ng.GridFunction(solution.displacement.space)
             unit.Set(ng.CF(direction), definedon=solution.mesh.Materials(body_name))
             loads[axis] = solution.discrete.space.f @ unit.vec.FV().NumPy()
-        names = set(boundaries[boundary_mask(solution.mesh, pattern)])
-        reaction = sum(
-            (solution.reactions[n] for n in names & set(solution.reactions)), np.zeros(2)
-        )
+        names = set(boundaries[boundary_mask(solution.mesh, pattern)]) & set(solution.reactions)
+        reaction = sum((solution.reactions[n] for n in names), np.zeros(2))
         contact = sum(sign * solution.contact_force(pair) for pair, sign in pairs.items())
         assert np.abs(loads + reaction + contact).max() < EXACT * size
 
@@ -333,26 +321,6 @@ def test_a_guide_on_a_circle_holds_the_exact_normal(order):
     assert max(solution.residuals.values()) < EXACT
 
 
-@pytest.mark.parametrize("order", [1, 2, 3, 4])
-def test_a_body_guided_on_its_circular_rim_can_rotate(order):
-    """The rotation stays in V_h exactly: turned at an eccentric hole, the body has no stress."""
-    shape = WorkPlane().Circle(0, 0, 2).Face() - WorkPlane().Circle(0.3, 0.1, 0.5).Face()
-    shape.name = "wheel"
-    for edge in shape.edges:
-        edge.name = "rim" if edge.mass > 2 * math.pi else "hole"
-    problem = Problem(
-        geometry=OCCGeometry(shape, dim=2),
-        materials={"wheel": SOFT},
-        sliding="rim",
-        displacement={"hole": (-0.1 * ng.y, 0.1 * ng.x)},
-    )
-    solution = solve(problem, maxh=0.6, order=order)
-    stress = ng.InnerProduct(solution.stress, solution.stress)
-    assert math.sqrt(ng.Integrate(stress, solution.mesh)) < 1e-13
-    rotation = ng.CF((-0.1 * ng.y, 0.1 * ng.x))
-    assert ng.Integrate((solution.displacement - rotation) ** 2, solution.mesh) < 1e-26
-
-
 @pytest.mark.parametrize(
     ("order", "unknowns", "force", "peak", "width", "energy"),
     [
@@ -361,7 +329,7 @@ def test_a_body_guided_on_its_circular_rim_can_rotate(order):
     ],
 )
 def test_problem_a(order, unknowns, force, peak, width, energy):
-    """Problem A: quarter disc on a rigid plane, to the accuracy of small meshes."""
+    """A disc on a plane: references of forces, peak, half-width and energy to six digits."""
     problem = Problem(
         geometry=disc(),
         materials={"disc": Elastic(E=200.0, nu=0.3)},
@@ -385,7 +353,7 @@ def test_problem_a(order, unknowns, force, peak, width, energy):
     [(2, 2500, 2e-4, 2e-3, 5e-3), (3, 4100, 3e-5, 5e-4, 3e-4)],
 )
 def test_problem_b(order, unknowns, energy, end, peak):
-    """Problem B, see `partly_open`: strain energy 7.164124(1)e-4, end of contact x = 1.5453(1),"""
+    """Strain energy 7.164124(1)e-4, end of contact x = 1.5453(1), peak 0.97572(2), force 1."""
     *_, solution = adapt(partly_open(), order=order, max_dofs=unknowns)
     u = values(solution)
     strain = u @ (solution.discrete.space.A @ u) / 2
@@ -437,3 +405,30 @@ def test_a_mesh_that_was_changed_after_solving_is_told(name, change, tmp_path):
         READ[name](solution, tmp_path)
     assert not list(tmp_path.iterdir())
     np.testing.assert_array_equal(solution.pressure, pressure)  # what was read stays
+
+
+@pytest.mark.parametrize("measured", [False, True])
+def test_an_interference_presses(measured):
+    # Shrink fit: p = delta / R1 / [compliances of the two rings], in plane strain.
+    delta, (r0, r1, r2) = 0.001, (0.5, 1.0, 2.0)
+    problem = Problem(
+        geometry=rings(quarter=True, interference=delta if measured else 0.0),
+        materials={"outer": SOFT, "inner": STIFF},
+        sliding="inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y",
+        contact=[Contact("outer_contact", "inner_contact", gap=None if measured else -delta)],
+    )
+    solution = solve(problem, maxh=0.3, order=3)
+    outer = ((r2**2 + r1**2) / (r2**2 - r1**2) + 0.3 / 0.7) / (1.0 / (1 - 0.3**2))
+    inner = ((r1**2 + r0**2) / (r1**2 - r0**2) - 0.2 / 0.8) / (3.0 / (1 - 0.2**2))
+    assert solution.active.all()
+    # The rays of the points on the cuts run along the cuts.
+    angle = np.degrees(np.arctan2(*solution.points.T[::-1]))
+    assert angle.min() == pytest.approx(0, abs=1e-9)
+    assert angle.max() == pytest.approx(90, abs=1e-9)
+    # Order 3 at this size: measured 6.5e-3 at an end of the zone, 1e-5 in the mean. Overlapping
+    # circles have radii that differ by 1e-3.
+    expected = delta / r1 / (outer + inner)
+    assert solution.pressure == pytest.approx(expected, rel=1e-2)
+    assert solution.force.sum() == pytest.approx(
+        expected * math.pi / 2, rel=3e-3 if measured else 1e-4
+    )

@@ -1,12 +1,14 @@
 """Large problems by multigrid: the solutions that factorisations give, and when they step in."""
 
+from dataclasses import replace
+
 import ngsolve as ng
 import numpy as np
 import pytest
 
 from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
-from ngcontact import Solution, adapt, solve
+from ngcontact import Elastic, Solution, adapt, solve
 from ngcontact.discrete.discrete_problem import MULTIGRID, minimise_energy
 from tests.scenes import REFINED
 
@@ -108,3 +110,15 @@ def test_points_are_moved(order):
     energy = g @ (discrete.space.A @ g)
     assert -found.force @ jumps == pytest.approx(energy, rel=1e-10)
     assert discrete.systems.program is discrete.program
+
+
+def test_nearly_incompressible_bodies(large):
+    """Gauss-Seidel sweeps are slow there: that is seen soon."""
+    stiff = Elastic(E=1.0, nu=0.4999)
+    problem = replace(REFINED["disc on block"], materials={"disc": stiff, "block": stiff})
+    mesh = uniform_mesh(problem, 2, 3000)
+    solution = solve(problem, mesh, order=2)
+    assert solution.work["factorizations"] > 0
+    known = direct(problem, mesh, order=2)
+    np.testing.assert_array_equal(solution.active, known.active)
+    assert solution.work["back_solves"] <= known.work["back_solves"] + 30

@@ -9,7 +9,7 @@ import pytest
 from netgen.occ import OCCGeometry, Rectangle
 
 from drivers.reference import cases
-from drivers.reference.straight import hertz, patch, relative_energy_error, transition
+from drivers.reference.straight import patch, relative_energy_error, transition
 from ngcontact import Elastic, Problem, solve
 from ngcontact.arrays import root_of_squares
 from ngcontact.estimator import estimate
@@ -22,17 +22,6 @@ def one_transition(upper, lower):
         materials={"upper": upper, "lower": lower},
         displacement={cases.OUTSIDE[body]: u for body, u in exact.displacement.items()},
         contact=cases.one_transition().problem.contact,
-    ), exact
-
-
-def hertz_contact(upper, lower):
-    exact = hertz(upper, lower, radius=5.0, half_width=0.3)
-    problem = cases.hertz_contact().problem
-    return replace(
-        problem,
-        materials={"upper": upper, "lower": lower},
-        displacement={cases.OUTSIDE[body]: u for body, u in exact.displacement.items()},
-        contact=[replace(problem.contact[0], gap=exact.initial_gap)],
     ), exact
 
 
@@ -59,10 +48,9 @@ TOWARDS_INCOMPRESSIBILITY = [
 
 
 @pytest.mark.parametrize(("nu", "order"), TOWARDS_INCOMPRESSIBILITY)
-@pytest.mark.parametrize("make", [one_transition, hertz_contact])
-@pytest.mark.study(witness=["one_transition-0.4-4", "one_transition-0.4-3"])
-def test_effectivity_towards_incompressibility(make, nu, order):
-    problem, exact = make(Elastic(E=1.0, nu=nu), Elastic(E=3.0, nu=nu))
+@pytest.mark.study(witness=["0.4-4", "0.4-3"])
+def test_effectivity_towards_incompressibility(nu, order):
+    problem, exact = one_transition(Elastic(E=1.0, nu=nu), Elastic(E=3.0, nu=nu))
     solution = solve(problem, maxh=0.14 if order < 3 else 0.28, order=order)
     assert 1 <= effectivity(solution, exact) <= 6
 

@@ -1,6 +1,7 @@
 """Exact boundary curves: projections, normals, levels and their numbering."""
 
 import math
+from functools import partial
 
 import ngsolve as ng
 import numpy as np
@@ -14,9 +15,9 @@ from netgen.occ import (
     WorkPlane,
 )
 
-from ngcontact import geometries
-from ngcontact.geometries import blocks, disc, disc_on_block, disc_on_disc, graphs, punch, rings
+from ngcontact.geometries import disc, disc_on_block
 from ngcontact.mesh.cad import CadEdge, cad_edges, same_geometry
+from tests.geometries.test_geometries import CASES
 
 RNG = np.random.default_rng(3)
 CENTRES = [(0.0, 0.0, 1.0), (0.3, 0.7, 0.1), (100.0, -50.0, 2.0)]
@@ -64,25 +65,6 @@ def test_circle_normals_are_radial_also_at_the_seam(x, y, radius):
         np.testing.assert_allclose(foot, [x, y] + radius * radial, atol=1e-15 * scale * radius)
 
 
-GALLERY = {
-    "disc": [disc],
-    "blocks": [blocks, lambda: blocks(line=((-1, 0), (-0.2, 0.3), (0.5, -0.1), (1, 0.2)))],
-    "disc_on_block": [disc_on_block, lambda: disc_on_block(symmetric=False)],
-    "disc_on_disc": [
-        disc_on_disc,
-        lambda: disc_on_disc(radius=1, lower_radius=2, symmetric=False),
-    ],
-    "graphs": [lambda: graphs(lambda x: 0.1 * math.sin(4 * x), lambda x: x**2 / 2 - 0.7)],
-    "punch": [punch],
-    "rings": [rings, lambda: rings(interference=0.1, quarter=True)],
-    "ball_in_socket": [geometries.ball_in_socket],
-    "cone_on_block": [geometries.cone_on_block],
-    "ring_in_groove": [geometries.ring_in_groove],
-    "rounded_punch": [geometries.rounded_punch],
-    "sleeve_on_shaft": [geometries.sleeve_on_shaft],
-}
-
-
 def glued():
     """A square with a disc inside, one geometry with an inner boundary and a closed edge."""
     square = WorkPlane().Rectangle(2, 2).Face()
@@ -98,7 +80,9 @@ def nameless():
     return OCCGeometry(Glue([ring, WorkPlane().Rectangle(1, 1).Face()]), dim=2)
 
 
-@pytest.mark.parametrize("make", [glued, nameless, *(f for fs in GALLERY.values() for f in fs)])
+@pytest.mark.parametrize(
+    "make", [glued, nameless, *(partial(make, **options) for make, options, _ in CASES)]
+)
 def test_segments_lie_on_the_edge_of_their_region(make):
     mesh = ng.Mesh(make().GenerateMesh(maxh=0.6))
     mesh.Refine()

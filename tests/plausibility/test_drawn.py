@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from netgen.occ import Axis, WorkPlane, Y, Z
+from netgen.occ import Axis, Z
 
 from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.geometries import disc_on_disc, rings
@@ -69,44 +69,6 @@ def test_peaks_are_wrong_by_what_is_said(radii):
 @pytest.mark.study(witness=["direction"])
 def test_bodies_whose_normals_are_right_are_silent(problem):
     assert quiet(lambda: list(adapt(problem, order=2, tolerance=0.1)))
-
-
-def pin(clearance, down, secondary="pin_surface", primary="hole"):
-    """Half of a pin of radius 1 under its weight in a block, drawn below the middle of its hole."""
-    right = WorkPlane().MoveTo(0, -9).Rectangle(9, 18).Face()
-    right.edges.name = "axis"
-    parts = {
-        "hole": WorkPlane().Circle(0, 0, 1 + clearance).Face(),
-        "pin_surface": WorkPlane().Circle(0, -down, 1.0).Face(),
-        "side": WorkPlane().MoveTo(-3, -3).Rectangle(6, 6).Face(),
-    }
-    for name, face in parts.items():
-        face.edges.name = name
-    parts["side"].edges.Max(Y).name = "top"
-    block, disc = (parts["side"] - parts["hole"]) * right, parts["pin_surface"] * right
-    block.faces.name, disc.faces.name = "block", "pin"
-    return Problem(
-        geometry=compound(block, disc),
-        materials={"block|pin": Elastic(E=1.0, nu=0.3)},
-        displacement={"top": (0, 0)},
-        sliding="axis",
-        force={"pin": (0, -2e-4 / math.pi)},
-        contact=[Contact(secondary, primary)],
-    )
-
-
-@pytest.mark.parametrize(
-    ("pair", "sign"), [(("pin_surface", "hole"), 1), (("hole", "pin_surface"), -1)]
-)
-@pytest.mark.study
-def test_pins_in_the_middle_are_wrong_by_half_their_clearance(pair, sign):
-    """Compared with the same pin drawn where it touches, of which nothing is said."""
-    *_, touching = adapt(pin(0.1, 0.1, *pair), order=3, tolerance=1e-2)
-    wrong, way, error = measured(pin(0.1, 0.0, *pair), lambda force: touching.pressure.max())
-    assert way == pytest.approx(0.1, rel=1e-6)
-    assert error == pytest.approx(0.05, rel=0.12)
-    assert wrong == pytest.approx(sign * error, rel=0.1)
-    assert quiet(lambda: list(adapt(pin(0.1, 0.1, *pair), order=2, tolerance=0.1)))
 
 
 def pressed_ring(interference, gap=None):

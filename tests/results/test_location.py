@@ -34,19 +34,3 @@ def test_images_of_places_in_elements_are_found_there(order):
     np.testing.assert_array_equal(found.point, np.arange(len(element)))
     np.testing.assert_array_equal(found.element, element)
     np.testing.assert_allclose(found.reference, reference, atol=1e-11)
-
-
-def test_a_vertex_lies_in_every_element_around_it():
-    mesh = graded(2)
-    trace = boundary_trace(mesh, 2)
-    vertices = [tuple(v.point) for v in mesh.vertices]
-    found = locate(trace, np.array(vertices))
-    bodies = mesh.GetMaterials()
-    for k in range(0, len(vertices), 17):
-        here = {int(e) for e in found.element[found.point == k]}
-        around = {e.nr for e in mesh.vertices[k].elements}
-        assert around <= here
-        own = {mesh[ng.ElementId(ng.VOL, e)].mat for e in around}
-        others = here - around  # of the other body, where lines touch
-        assert not own & {mesh[ng.ElementId(ng.VOL, e)].mat for e in others}
-    assert set(bodies) == {"disc", "block"}
