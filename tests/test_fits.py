@@ -1,0 +1,88 @@
+"""Press fits drawn as overlap, against Lame's rings: nodes face nodes along the normals."""
+
+import math
+
+import ngsolve as ng
+import numpy as np
+import pytest
+
+from ngcontact import Contact, Elastic, Problem, adapt
+from ngcontact.geometries import rings
+
+BORE, RIM = 0.5, 2.0  # radii; the shaft has 1
+LAWS = {"inner": (1.0, 0.3), "outer": (2.0, 0.25)}  # E, nu
+CUTS = "inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y"
+SIDES = ("outer_contact", "inner_contact")
+
+
+def lame(a, b, at):
+    """B and C of the radial stress B - C / r^2 in a ring a < r < b under pressure 1 at one rim."""
+    if at == b:
+        B = -(b**2) / (b**2 - a**2)
+        return B, B * a**2
+    C = 1 / (1 / a**2 - 1 / b**2)
+    return C / b**2, C
+
+
+def exact(interference):
+    """Stress (xx, yy, xy) of each ring, and the pressure on each side; p R is the same on both."""
+    radius = {"inner": 1.0, "outer": 1.0 - interference}
+    part = {"inner": lame(BORE, 1.0, 1.0), "outer": lame(radius["outer"], RIM, radius["outer"])}
+    give = {}
+    for name, (E, nu) in LAWS.items():
+        (B, C), r = part[name], radius[name]
+        give[name] = abs((1 + nu) / E * ((1 - 2 * nu) * B * r + C / r))
+    line = interference / sum(give[name] / radius[name] for name in LAWS)  # p R
+    r2, stress = ng.x**2 + ng.y**2, {}
+    for name, (B, C) in part.items():
+        p = line / radius[name]
+        radial, hoop = p * (B - C / r2), p * (B + C / r2)
+        xx, yy = (radial * u**2 + hoop * v**2 for u, v in ((ng.x, ng.y), (ng.y, ng.x)))
+        stress[name] = ng.CF((xx / r2, yy / r2, (radial - hoop) * ng.x * ng.y / r2))
+    return stress, {name: line / radius[name] for name in LAWS}
+
+
+def relative_error(solution, stress):
+    """Of the stress in the energy norm, over that of the exact stress."""
+    sigma = solution.stress
+    squares = np.zeros(2)
+    for name, (E, nu) in LAWS.items():
+        right = stress[name]
+        miss = ng.CF((sigma[0, 0], sigma[1, 1], sigma[0, 1])) - right
+        for k, s in enumerate((miss, right)):
+            density = (1 - nu) * (s[0] ** 2 + s[1] ** 2) - 2 * nu * s[0] * s[1] + 2 * s[2] ** 2
+            region = solution.mesh.Materials(name)
+            squares[k] += (1 + nu) / E * ng.Integrate(density, region, order=12)
+    return math.sqrt(squares[0] / squares[1])
+
+
+def fit(interference, swap=False, **options):
+    """A quarter of the rings."""
+    return Problem(
+        geometry=rings(BORE, 1.0, RIM, interference, quarter=True),
+        materials={name: Elastic(*law) for name, law in LAWS.items()},
+        sliding=CUTS,
+        contact=[Contact(*(SIDES[::-1] if swap else SIDES), **options)],
+    )
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("interference", [1e-5, 1e-1])
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+@pytest.mark.study(witness=["4-0.1-False"])
+def test_press_fits_converge_to_lame(order, interference, swap):
+    stress, pressure = exact(interference)
+    right = pressure["inner" if swap else "outer"]
+    levels = list(adapt(fit(interference, swap), order=order, max_dofs=5000))
+    estimates = [level.relative_error_estimate for level in levels]
+    errors = [relative_error(level, stress) for level in levels]
+    assert all(error <= known for error, known in zip(errors, estimates, strict=True))
+    unknowns = [level.displacement.space.ndof for level in levels]
+    rate = np.polyfit(np.log(unknowns[-4:]), np.log(estimates[-4:]), 1)[0]
+    assert rate < -0.45 * order  # theory: half the order
+    last = levels[-1]
+    assert last.active.all()
+    # Asked for on the last level: force within 2e-2 (order 1), 1e-3; peak within 5e-2, 1e-2.
+    line = last.force.sum() / (right * (1.0 if swap else 1.0 - interference) * math.pi / 2)
+    assert abs(line - 1) < (2e-2 if order == 1 else 1e-3)
+    assert abs(last.pressure.max() / right - 1) < (5e-2 if order == 1 else 1e-2)
