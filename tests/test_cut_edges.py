@@ -12,8 +12,6 @@ ORDERS = (1, 2, 3, 4)
 BORE, RIM, PRESSURE = 3.0, 5.0, 100.0
 STEEL = Elastic(E=2e5, nu=0.3)
 GUIDES = {"quarter": "left|below", "half": "left", "whole": None}
-# Relative error of the bore's radial displacement at maxh 0.5: twice the largest measured.
-MISSED = {1: 0.08, 2: 8e-4, 3: 8e-5, 4: 4e-6}
 
 
 def rectangle(x, y, width, height, name, edges):
@@ -41,45 +39,28 @@ def tube(part):
     return OCCGeometry(shape, dim=2)
 
 
-def pressed_tube(part, load=PRESSURE, geometry=None):
+def pressed_tube(part, geometry=None):
     return Problem(
         tube(part) if geometry is None else geometry,
         {"tube": STEEL},
         sliding=GUIDES[part],
-        traction={"bore": load},
+        traction={"bore": PRESSURE},
     )
 
 
 def lame():
-    """Radial displacement of the bore and stress (2, 2) of the tube in plane strain."""
+    """Stress (2, 2) of the tube in plane strain."""
     a = PRESSURE * BORE**2 / (RIM**2 - BORE**2)
     b = a * RIM**2
-    radial = (1 + STEEL.nu) / STEEL.E * ((1 - 2 * STEEL.nu) * a * BORE + b / BORE)
     square = ng.x**2 + ng.y**2
     deviator = b / square**2 * ng.CF((ng.x**2 - ng.y**2, 2 * ng.x * ng.y))
     xx, xy, yy = a - deviator[0], -deviator[1], a + deviator[0]
-    return radial, ng.CF((xx, xy, xy, yy), dims=(2, 2))
-
-
-def radial_error(solution):
-    """Largest relative error of the bore's radial displacement, rigid motions apart."""
-    trace = solution.discrete.space.trace
-    segment, s = trace.at_nodes(trace.segments("bore"))
-    u = trace.evaluate(solution.displacement, segment, s)
-    normal = -trace.exact_normal(segment, s)
-    rigid = np.column_stack([normal, np.ones(len(s))])
-    radial = (u * normal).sum(axis=1)
-    if solution.problem.sliding is None:  # the mean radial displacement alone is no rigid motion
-        radial = np.full(1, np.linalg.lstsq(rigid, radial, rcond=None)[0][2])
-    elif solution.problem.sliding == "left":
-        shift = np.linalg.lstsq(rigid[:, 1:], radial, rcond=None)[0][0]
-        radial -= shift * normal[:, 1]
-    return np.abs(radial / lame()[0] - 1).max()
+    return ng.CF((xx, xy, xy, yy), dims=(2, 2))
 
 
 def energy_error(solution):
     """Energy norm of the error of the stress, in plane strain."""
-    error = solution.stress - lame()[1]
+    error = solution.stress - lame()
     trace = ng.Trace(error)
     density = (ng.InnerProduct(error, error) - STEEL.nu * trace**2) * (1 + STEEL.nu) / STEEL.E
     return np.sqrt(ng.Integrate(density, solution.mesh, order=2 * solution.order + 6))
@@ -90,7 +71,6 @@ def energy_error(solution):
 @pytest.mark.study(witness=["quarter-1", "quarter-4", "half-3", "whole-2"])
 def test_pressure_in_a_bore_is_the_one_of_lame(part, order):
     solution = solve(pressed_tube(part), maxh=0.5, order=order)
-    assert radial_error(solution) < MISSED[order]
     error = energy_error(solution)
     # Measured: 1.00 to 1.32; the exact domain is another one than the mesh's, by 4e-5 at order 4.
     assert 0.999 * error <= solution.error_bound < 1.5 * error
@@ -136,16 +116,8 @@ def rebuilt(source, turned):
     return ng.Mesh(mesh)
 
 
-def notched():
-    return rectangle(0, 0, 4, 3, "body", "side") - rectangle(1, 2, 1, 1.5, "hole", "loaded")
-
-
 def l_shape():
     return rectangle(0, 0, 4, 3, "body", "side") - rectangle(2, 1, 2.5, 2.5, "hole", "loaded")
-
-
-def square_hole():
-    return rectangle(0, 0, 4, 3, "body", "side") - rectangle(1, 1, 1, 1, "hole", "loaded")
 
 
 def cut_twice():
@@ -153,8 +125,7 @@ def cut_twice():
     return body - WorkPlane().MoveTo(2, 1.5).Circle(0.7).Face()
 
 
-# The resultant of the pressure 1 on "loaded": of the open end of a notch, as if it were closed.
-RESULTANTS = {notched: (0, -1), l_shape: (-2, -2), square_hole: (0, 0), cut_twice: None}
+RESULTANTS = {l_shape: (-2, -2), cut_twice: None}  # of the pressure 1 on "loaded"
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -167,10 +138,9 @@ def test_reactions_balance_loads_on_cuts(make, order):
     )
     solution = solve(problem, maxh=0.5, order=order)
     trace = solution.discrete.space.trace
-    s, w = np.array([0.5]), 1.0  # edges of "loaded" are straight
-    segments = trace.segments("loaded")
-    at = np.repeat(s, len(segments))
-    load = -PRESSURE * w * (trace.normal(segments, at).T * trace.lengths(segments)).sum(axis=1)
+    segments = trace.segments("loaded")  # straight
+    normals = trace.normal(segments, np.full(len(segments), 0.5))
+    load = -PRESSURE * trace.lengths(segments) @ normals
     scale = PRESSURE * trace.lengths(segments).sum()
     assert solution.reactions["held"] + load == pytest.approx([0, 0], abs=1e-12 * scale)
     if RESULTANTS[make] is not None:

@@ -278,31 +278,6 @@ def test_bilateral_pairs_pull():
         assert max(solution.residuals.values()) < EXACT
 
 
-def test_components_of_the_displacement():
-    # u_x = 0.01 (1 + y) on the left sides, u_y free; the rest of the data in pieces.
-    shear = 0.01 * (1 + ng.y)
-    problem = two_blocks(
-        displacement={
-            "bottom": (None, 0),
-            "upper_left|lower_left": (shear, None),
-            "top": ng.CF((0.02, -0.05)),
-        }
-    )
-    solution = solve(problem, maxh=0.4, order=2)
-    for pattern, axis, expected in (
-        ("bottom", 1, lambda x: 0 * x[:, 0]),
-        ("upper_left", 0, lambda x: 0.01 * (1 + x[:, 1])),
-        ("lower_left", 0, lambda x: 0.01 * (1 + x[:, 1])),
-        ("top", 0, lambda x: 0 * x[:, 0] + 0.02),
-        ("top", 1, lambda x: 0 * x[:, 0] - 0.05),
-    ):
-        x, u = nodes_on(solution, pattern)
-        assert u[:, axis] == pytest.approx(expected(x), abs=1e-14), pattern
-    _, u = nodes_on(solution, "bottom")
-    assert np.ptp(u[:, 0]) > 1e-4  # free, as None says
-    assert max(solution.residuals.values()) < EXACT
-
-
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_a_guide_on_a_circle_holds_the_exact_normal(order):
     # A quarter of two rings, pressed from the hole against a guided rim.

@@ -195,10 +195,6 @@ VEE_PAIRS = {
         Contact("right", "arc", direction=(-SLOPE, SLOPE)),
         Contact("left", "arc", direction=(SLOPE, SLOPE)),
     ],
-    "fixed, disc": [
-        Contact("arc", "right", direction=(SLOPE, -SLOPE)),
-        Contact("arc", "left", direction=(-SLOPE, -SLOPE)),
-    ],
 }
 
 
@@ -237,16 +233,14 @@ def told(problem, **options):
     return solution, sum(PASSED in str(warning.message) for warning in caught)
 
 
-@pytest.mark.parametrize("modulus", [1.0, 1e9])
 @pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize("pairs", ["flanks", "fixed"])
-def test_what_a_mesh_as_given_does_not_see_is_told(pairs, order, modulus):
+def test_what_a_mesh_as_given_does_not_see_is_told(pairs, order):
     """No node where the curves touch: no contact at order 1, a third of the force lost at 3."""
     problem = disc_in_vee(VEE_PAIRS[pairs], -0.01)
-    problem = replace(problem, materials={"disc|vee": Elastic(E=modulus, nu=0.3)})
     mesh = ng.Mesh(problem.geometry.GenerateMesh(maxh=0.4))
     solution, count = told(replace(problem, geometry=mesh), order=order)
-    assert solution.force.sum() / 2 < 0.8 * 1.21e-3 * modulus
+    assert solution.force.sum() / 2 < 0.8 * 1.21e-3
     assert count == (1 if order == 1 else 2)  # the flank with or without a chord across the place
 
 

@@ -1,6 +1,8 @@
-"""Loads that quadrature misses: found, integrated, and numbers pay nothing."""
+"""Loads that quadrature misses: found, integrated, told; numbers pay nothing."""
 
 import math
+import warnings
+from dataclasses import replace
 
 import ngsolve as ng
 import numpy as np
@@ -8,7 +10,7 @@ import pytest
 from netgen.occ import OCCGeometry, Rectangle, X, Y
 from ngsolve.meshes import MakeStructured2DMesh
 
-from ngcontact import Elastic, Problem, solve
+from ngcontact import ContactWarning, Elastic, Problem, solve
 from ngcontact.fem.space import LOAD_BONUS, load_vector
 from ngcontact.quadrature import rough_load
 
@@ -111,3 +113,22 @@ def test_rough_loads_in_any_unit(unit, load):
     inside = ng.Integrate((projection[1] / load) ** 2, mesh, ng.BND, order=8)
     rest = ((rough.rest / load) ** 2).sum()
     assert inside + rest == pytest.approx(0.01 * unit, rel=1e-4)
+
+
+def test_a_load_that_is_nowhere():
+    problem = loaded(traction={"top": 1e9 * box(ng.x, 0.1234567, 1e-9)})
+    with pytest.warns(ContactWarning, match='traction "top" is zero at all'):
+        solve(problem, maxh=0.3)
+
+
+def test_a_load_finer_than_any_quadrature():
+    problem = loaded(traction={"top": ng.IfPos(ng.sin(1e7 * ng.x), 1.0, 0.0)})
+    with pytest.warns(ContactWarning, match='traction "top" is finer than any quadrature'):
+        solve(problem, maxh=0.3)
+
+
+def test_sound_data_are_no_doubt():
+    data = {"bottom": (0, 0), "left": (0, 0.1 * ng.y), "top": (None, 0.1)}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", ContactWarning)
+        solve(replace(loaded(force={"body": (0, ng.x)}), displacement=data), maxh=0.3)
