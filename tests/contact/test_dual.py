@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import ngsolve as ng
 import numpy as np
 import pytest
 from netgen.occ import OCCGeometry
@@ -10,14 +9,11 @@ from netgen.occ import OCCGeometry
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
 from ngcontact import Contact, solve
-from ngcontact.contact import contact_line
-from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks
 from tests.scenes import divided, pressed
 
 EXACT = 1e-10  # round-off times the condition of small meshes; measured below 2e-12
 RATIOS = [(4, 6), (5, 37), (10, 73), (4, 8)]
-ORDERS = [1, 2, 3, 4]
 
 
 @pytest.mark.parametrize("swap", [False, True])
@@ -43,30 +39,6 @@ def test_matched_meshes_take_the_rows_of_the_paper_unless_asked(rows):
     [pair] = solution.pairs
     assert pair.line.means.all() == (rows == "dual")
     assert relative_energy_error(solution, case.exact) < EXACT
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_a_matched_part_keeps_its_rows_to_the_last_bit(order):
-    """The left half of the line has equal segments on both sides, the right half has not."""
-    shape, contact = blocks().shape, Contact("upper_contact", "lower_contact")
-    for edge in shape.edges:
-        if edge.name in ("upper_contact", "lower_contact"):
-            left = [0.1, 0.2, 0.3, 0.4, 0.5]
-            right = [0.6, 0.8] if edge.name == "upper_contact" else [0.7, 0.85, 0.95]
-            start = edge.start.x > 0  # the lower edge runs to the left
-            nodes = sorted(1 - s for s in left + right) if start else left + right
-            edge.partition = nodes
-    mesh = ng.Mesh(OCCGeometry(shape, dim=2).GenerateMesh(maxh=0.5))
-    trace = boundary_trace(mesh, order)
-    line = contact_line(trace, contact)
-    nodal = contact_line(trace, replace(contact, rows="nodal"))
-    inside = nodal.position[:, 0] < -1e-9  # the half with x < 0, its end excluded
-    assert inside.sum() == 5 * order
-    np.testing.assert_array_equal(line.position, nodal.position)
-    np.testing.assert_array_equal(line.means, ~inside)
-    assert (line.gap[inside] == nodal.gap[inside]).all()
-    assert (line.weight[inside] == nodal.weight[inside]).all()
-    assert (line.coupling[inside] != nodal.coupling[inside]).nnz == 0
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

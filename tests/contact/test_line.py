@@ -5,14 +5,12 @@ import math
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import OCCGeometry
 
 from ngcontact import Contact
 from ngcontact.contact.assembly import contact_line
 from ngcontact.contact.line import at_quadrature
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import blocks, disc, disc_on_block, rings
-from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.geometries import blocks, disc, disc_on_block
 from ngcontact.lagrange import gauss, lagrange
 
 ORDERS = [1, 2, 3, 4]
@@ -143,25 +141,6 @@ def test_steep_sides_do_not_face_a_fixed_direction():
 
 
 @pytest.mark.parametrize("order", ORDERS)
-def test_weights_of_a_circle_are_its_length(order):
-    trace = trace_of(rings(quarter=True), order, maxh=0.3)
-    line = contact_line(trace, Contact("outer_contact", "inner_contact"))
-    points_are_consistent(line, trace)
-    s, w = np.polynomial.legendre.leggauss(20)
-    segment, k = np.repeat(line.segments, 20), len(line.segments)
-    speed = np.linalg.norm(trace.derivative(segment, np.tile((1 + s) / 2, k)), axis=1)
-    length = speed @ np.tile(w / 2, k)
-    # The speed along a segment is no polynomial: the rule has an error, measured 8e-11.
-    assert line.weight.sum() == pytest.approx(length, rel=1e-9)
-    # Error of the mesh's curves, measured 4.1e-3, 3.2e-5, 8.9e-6, 4.9e-8.
-    curve_error = {1: 5e-3, 2: 5e-5, 3: 1e-5, 4: 1e-7}[order]
-    assert line.weight.sum() == pytest.approx(math.pi / 2, rel=curve_error)
-    radial = -line.position / np.linalg.norm(line.position, axis=1)[:, None]
-    np.testing.assert_allclose(line.direction, radial, atol=2e-15)
-    assert len(line.node) == order * len(line.segments) + 1
-
-
-@pytest.mark.parametrize("order", ORDERS)
 def test_disc_on_block_measures_the_curves_of_the_mesh(order):
     trace = trace_of(disc_on_block(), order, maxh=0.3)
     line = contact_line(trace, Contact("disc_arc", "block_top", direction=(0, -1), rows="nodal"))
@@ -184,41 +163,6 @@ def test_disc_on_block_measures_the_curves_of_the_mesh(order):
     partner = trace.point(line.partner, line.partner_s)
     np.testing.assert_allclose(partner[:, 0], line.position[:, 0], atol=1e-14)
     np.testing.assert_allclose(partner[:, 1], 0, atol=1e-15)
-
-
-def stacked(upper_nodes, lower_nodes, gap=0.0):
-    """Two blocks whose contact edges are divided at their own places."""
-    upper = polygon(
-        [(-1, gap), (1, gap), (1, 1), (-1, 1)], ["upper_contact", "side", "top", "side"]
-    )
-    lower = polygon(
-        [(1, 0), (-1, 0), (-1, -1), (1, -1)], ["lower_contact", "side", "bottom", "side"]
-    )
-    geometry = compound(body("upper", upper), body("lower", lower))
-    for edge in geometry.shape.edges:
-        nodes = {"upper_contact": upper_nodes, "lower_contact": lower_nodes}.get(edge.name)
-        if nodes is not None:
-            edge.partition = nodes
-    return OCCGeometry(geometry.shape, dim=2)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("gap", [0.0, 0.125])
-def test_meshes_that_do_not_match(order, gap):
-    trace = trace_of(stacked([0.3, 0.5, 0.9], [0.25, 0.5], gap), order, maxh=2.0)
-    line = contact_line(trace, Contact("upper_contact", "lower_contact"))
-    points_are_consistent(line, trace)
-    assert line.searches == 1
-    np.testing.assert_allclose(line.gap, gap, atol=1e-15)
-    partner = trace.point(line.partner, line.partner_s)
-    np.testing.assert_allclose(partner[:, 0], line.position[:, 0], atol=1e-15)
-    # A linear function on the primary is met exactly by its trace.
-    share = lagrange(order, line.partner_s)
-    segment, s = trace.at_nodes(line.facing)
-    value = np.zeros(trace.space.ndof)
-    value[trace.nodes[line.facing].ravel()] = 3 * trace.point(segment, s)[:, 0] - 1
-    met = (share * value[trace.nodes[line.partner]]).sum(axis=1)
-    np.testing.assert_allclose(met, 3 * line.position[:, 0] - 1, atol=1e-14)
 
 
 @pytest.mark.parametrize(

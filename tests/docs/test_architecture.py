@@ -9,8 +9,8 @@ from itertools import islice
 import pytest
 from PIL import Image
 
-from ngcontact import Contact, Elastic, Problem, adapt, solve
-from ngcontact.geometries import disc_on_block
+from drivers.reference import cases
+from ngcontact import adapt, solve
 from tests.docs.names import resolved
 
 NEW = "run python docs/developers/architecture.py"
@@ -66,21 +66,9 @@ def walk(architecture, name):
     return steps
 
 
-def press():
-    """A disc on a block: two bodies, supports, an enlarging zone."""
-    steel = Elastic(E=210e9, nu=0.3)
-    return Problem(
-        geometry=disc_on_block(radius=1.0),
-        materials={"disc": steel, "block": steel},
-        displacement={"block_bottom": (0, 0), "disc_top": (0, -0.002)},
-        sliding="axis",
-        contact=[Contact(secondary="disc_arc", primary="block_top", direction=(0, -1))],
-    )
-
-
 @pytest.mark.parametrize("name", ["solve", "adapt"])
 def test_walk_goes_the_way_of_the_code(architecture, name):
-    steps, problem, calls = walk(architecture, name), press(), []
+    steps, problem, calls = walk(architecture, name), cases.pressed_disc(), []
     with recorded(calls):
         if name == "solve":
             solve(problem, maxh=0.4, order=2)

@@ -6,30 +6,16 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Glue, OCCGeometry, WorkPlane, Y
 
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error, transition
-from ngcontact import Elastic, Problem, adapt, solve
+from ngcontact import Elastic, adapt, solve
 from ngcontact.adaptivity.refinement import refined
 from ngcontact.mesh.generation import first_mesh
 
 # A(u, u) of the exact solutions over both bodies, from Clapeyron's theorem.
 ENERGY = {"S1": 1.293180760825 + 0.520333087196, "S3": 1.30696e-4 + 4.9496e-5}
 CASES = {"S1": cases.one_transition, "S3": cases.hertz_contact}
-PARTS = {
-    "element",
-    "jump",
-    "oscillation",
-    "traction",
-    "sliding",
-    "tangential",
-    "pressure",
-    "complementarity",
-    "penetration",
-    "displacement",
-    "loads",
-}
 MU = {"upper": 1.0 / 2.6, "lower": 3.0 / 2.4}
 LINE = "upper_contact|lower_contact"
 
@@ -77,22 +63,12 @@ def test_effectivity_does_not_depend_on_the_contrast_of_moduli(contrast, order):
 
 @pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize(
-    "make",
-    [
-        cases.one_transition,
-        cases.hertz_contact,
-        cases.clamped_transition,
-        cases.curved_lines,
-        cases.ring_in_ring,
-        cases.polygonal_patch,
-    ],
+    "make", [cases.one_transition, cases.curved_lines, cases.ring_in_ring, cases.polygonal_patch]
 )
 @pytest.mark.study(witness=["ring_in_ring-3", "ring_in_ring-1", "polygonal_patch-1"])
 def test_parts_are_not_negative_and_sum_to_the_squares(make, order):
     solution = solve(make().problem, maxh=0.4, order=order)
     parts = solution.estimate_parts
-    assert set(parts) <= PARTS
-    assert all(part.shape == (solution.mesh.ne,) for part in parts.values())
     assert min(part.min() for part in parts.values()) >= 0
     assert solution.indicators**2 == pytest.approx(sum(parts.values()), rel=1e-13)
     total = math.sqrt((solution.indicators**2).sum())
@@ -179,19 +155,6 @@ def test_traction_part_of_a_pressure_that_varies(patch):
     h, mu, length = along(patch, "lower_left")
     squares = (a * a + a * b + b * b) / 3 * length  # integral of y^2 on each segment
     assert value == pytest.approx((h / (2 * mu) * squares).sum(), rel=1e-12)
-
-
-def test_element_part(patch):
-    # div sigma_h = 0 at order 1: h^2 / 2 mu |F|^2 on the elements of the body.
-    solution = altered(patch, force={"upper": (0.6, 0.8)})
-    [value] = only(solution, "element")
-    areas = np.array(ng.Integrate(ng.CF(1), patch.mesh, element_wise=True))
-    upper = patch.mesh.ngmesh.Elements2D().NumPy()["index"] == 1
-    h = diameters(patch.mesh)
-    expected = (h**2 / (2 * MU["upper"]) * areas)[upper].sum()
-    assert value == pytest.approx(expected, rel=1e-12)
-    part = solution.estimate_parts["element"]  # squares: of round-off they are 1e-32
-    assert part[~upper].max() < 1e-28 * part.max()
 
 
 @pytest.mark.parametrize("order", [2, 3, 4])
@@ -334,25 +297,3 @@ def test_no_refinement_inside_a_resolved_contact_zone():
         for name in ("pressure", "complementarity", "penetration")
     )
     assert share < 1e-2 * solution.error_estimate**2
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_lines_inside_a_body_are_no_boundary(order):
-    """A bar glued from two parts under its exact load: no residual on the line between them."""
-    lower, upper = (
-        WorkPlane().Rectangle(1, 1).Face(),
-        WorkPlane().MoveTo(0, 1).Rectangle(1, 1).Face(),
-    )
-    lower.faces.name, upper.faces.name = "lower", "upper"
-    lower.edges.name = upper.edges.name = "side"
-    lower.edges.Min(Y).name, upper.edges.Max(Y).name = "bottom", "top"
-    lower.edges.Max(Y).name = upper.edges.Min(Y).name = "between"
-    bar = Problem(
-        geometry=OCCGeometry(Glue([lower, upper]), dim=2),
-        materials={"lower|upper": Elastic(E=1.0, nu=0.3)},
-        displacement={"bottom": (-0.39 * ng.x, 0)},
-        traction={"top": (0, 1)},
-    )
-    solution = solve(bar, maxh=0.3, order=order)
-    # Uniaxial tension in plane strain: u = (-nu (1 + nu) x, (1 - nu^2) y) / E is in V_h.
-    assert solution.error_estimate < 1e-12

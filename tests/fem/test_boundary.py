@@ -5,7 +5,6 @@ import math
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.geom2d import SplineGeometry
 from netgen.occ import Glue, OCCGeometry, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
@@ -15,8 +14,6 @@ from ngcontact.geometries import blocks, disc_on_block, graphs, rings
 
 ORDERS = [1, 2, 3, 4]
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
-# Two sides of a hexagon turn by 20 degrees, the next two by 40: both names and angles matter.
-TURNS = np.deg2rad([0, 20, 40, 80, 180, 270])
 
 
 def meshed(geometry, order=1, maxh=0.5):
@@ -43,22 +40,6 @@ def glued(order):
     square.edges.name, disc.edges.name = "side", "between"
     square.faces.name, disc.faces.name = "square", "disc"
     return meshed(OCCGeometry(Glue([square - disc, disc]), dim=2), order)
-
-
-def polygon(names, turns=TURNS):
-    """Mesh without CAD of a polygon whose sides run at the angles `turns`."""
-    lengths = np.ones(len(turns))
-    sides = np.column_stack([np.cos(turns), np.sin(turns)])
-    # The last two sides close the loop.
-    lengths[-2:] = np.linalg.solve(sides[-2:].T, -sides[:-2].sum(axis=0))
-    assert (lengths > 0).all()
-    vertices = np.cumsum(np.vstack([[0.0, 0.0], sides * lengths[:, None]]), axis=0)[:-1]
-    geometry = SplineGeometry()
-    points = [geometry.AppendPoint(*p) for p in vertices]
-    for k, name in enumerate(names):
-        ends = points[k], points[(k + 1) % len(points)]
-        geometry.Append(["line", *ends], leftdomain=1, rightdomain=0, bc=name)
-    return ng.Mesh(geometry.GenerateMesh(maxh=0.5)), vertices
 
 
 def everywhere(trace, count=5):
@@ -152,32 +133,6 @@ def test_two_points_at_corners_of_the_geometry(order):
     along = np.diff(np.array(LINE), axis=0)
     right = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
     np.testing.assert_allclose(vector[number], right[np.repeat(side, order + 1)], atol=1e-15)
-
-
-CORNERS = {  # vertices k between side k - 1 and side k that are corners
-    ("a", "a", "a", "a", "a", "a"): {0, 3, 4, 5},  # turns above 30 degrees
-    ("a", "b", "a", "a", "a", "a"): {0, 1, 2, 3, 4, 5},  # 20 degrees between two names count
-    ("a", "a", "b", "b", "b", "b"): {0, 2, 3, 4, 5},
-}
-
-
-@pytest.mark.parametrize("names", CORNERS)
-def test_corners_without_cad_by_name_or_thirty_degrees(names):
-    mesh, vertices = polygon(names)
-    trace = boundary_trace(mesh, 1)
-    assert trace.edges is None
-    _, vector, at = numbered(trace, np.arange(len(trace.region)))
-    xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
-    twice = xy[np.bincount(at, minlength=mesh.nv) == 2]
-    found = {int(np.linalg.norm(vertices - p, axis=1).argmin()) for p in twice}
-    assert found == CORNERS[names]
-    assert len(twice) == len(found)
-    # At a smooth vertex the normals of both sides are averaged.
-    smooth = sorted({1, 2} - found)
-    for k in smooth:
-        mean = (TURNS[k - 1] + TURNS[k]) / 2 - math.pi / 2
-        [point] = np.flatnonzero(np.linalg.norm(xy[at] - vertices[k], axis=1) < 1e-12)
-        np.testing.assert_allclose(vector[point], [math.cos(mean), math.sin(mean)], atol=1e-15)
 
 
 def test_segments_are_selected_by_names_and_patterns():

@@ -9,11 +9,8 @@ import numpy as np
 import pytest
 from netgen.occ import OCCGeometry
 
-from ngcontact import Contact, Problem
-from ngcontact.adaptivity.refinement import matched_vertices
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block
-from ngcontact.geometries.region import body, polygon
 from ngcontact.mesh import generation
 from ngcontact.mesh.curving import check_curves
 from ngcontact.mesh.generation import first_mesh
@@ -23,7 +20,6 @@ from tests.pairs import (
     BOUNDED,
     ENLARGING,
     ROUND_OFF,
-    SOFT,
     pressed,
     unmatched,
 )
@@ -136,33 +132,6 @@ def test_a_bad_size_is_refused_with_its_value(maxh, error):
     with pytest.raises(error, match=f"maxh={value}.*0.25") as caught:
         first_mesh(BOUNDED["blocks"].problem(), maxh)
     assert "maxh" in str(caught.value)
-
-
-def test_two_pairs_on_one_circle_do_not_ask_for_nodes_on_its_far_sides():
-    """What lies behind a disc sees the other face through it, and would spoil the nodes there."""
-    disc = occ.Circle((0, 0), 1.0).Face()
-    disc.name, disc.edges.name = "disc", "rim"
-    deep = math.sqrt(2)
-    outline = [(0, -deep), (-2, 2 - deep), (-2, -3), (2, -3), (2, 2 - deep)]
-    notch = body("notch", polygon(outline, ["left", "side", "bottom", "side", "right"]))
-    problem = Problem(
-        geometry=OCCGeometry(occ.Compound([disc, *notch.faces]), dim=2),
-        materials={"disc|notch": SOFT},
-        contact=[
-            Contact("rim", "left", direction=(-1, -1)),
-            Contact("rim", "right", direction=(1, -1)),
-        ],
-    )
-    mesh = first_mesh(problem, 0.25)
-    rim = vertices(mesh, "rim")
-    for contact in problem.contact:
-        trace = boundary_trace(mesh, 1)
-        matched = coordinates(mesh)[list(matched_vertices(trace, contact))]
-        # Each matches up to 60 degrees from its direction; from 30 on the other's nodes are there.
-        facing = rim[rim @ contact.direction > math.cos(math.radians(29))]
-        assert len(facing) >= 3
-        distance = np.linalg.norm(facing[:, None] - matched, axis=2)
-        assert distance.min(axis=1).max() < ROUND_OFF
 
 
 def test_refinement_beyond_the_kernel_s_lengths_is_refused():

@@ -7,7 +7,7 @@ import pyvista
 from netgen.occ import Compound, Glue
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
-from ngcontact.output import plot_solution, write_series, write_solution
+from ngcontact.output import write_series, write_solution
 from ngcontact.output.nodes import lattice
 from tests.output.stubs import MAXH, stub, two_bodies
 
@@ -125,13 +125,3 @@ def test_series_lists_levels_with_both_files(tmp_path):
     bodies, contact = reader.read()
     assert bodies.n_cells == stub(2).mesh.ne
     assert contact.n_points == 9
-
-
-@pytest.mark.parametrize(
-    ("write", "suffix"), [(write_solution, "vtu"), (write_series, "pvd"), (None, "png")]
-)
-def test_paths_are_checked_before_any_work(tmp_path, write, suffix):
-    path = tmp_path / "none" / f"a.{suffix}"
-    untouchable = object()  # has none of the attributes of a solution and cannot be iterated
-    with pytest.raises(FileNotFoundError):
-        plot_solution(untouchable, path) if write is None else write(path, untouchable)

@@ -183,26 +183,6 @@ OBSTACLE = {"secondary": "punch_bottom", "direction": (0, -1)}
 
 
 @pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        {"displacement": {"bottom": (0, 0), "top": (0, -1)}, "sliding": "left"},
-        {"displacement": {"bottom": (0, 0), "top": (None, -1)}, "traction": {"top": (1, 0)}},
-        {"materials": {".*": Elastic(1 + ng.x, ng.y / 5)}, "force": {"block|punch": (0, -1)}},
-        {"traction": {"left|right": ng.x, "top": ng.specialcf.normal(2)}},
-        {"traction": {"top": 1 / ng.sqrt(ng.x)}},  # integrable, though infinite at the corner
-        {"contact": [Contact(gap=lambda x, y: x + y, **OBSTACLE)]},
-        {"contact": [Contact(gap=ng.x, **OBSTACLE)]},
-        {"contact": [Contact("punch_bottom", gap=0), Contact("block_top", gap=0)]},
-    ],
-)
-def test_check_accepts(make, mesh, changes):
-    before = np.array(mesh.ngmesh.Coordinates())
-    assert make(**changes).check(mesh) is None
-    assert np.array_equal(before, mesh.ngmesh.Coordinates())
-
-
-@pytest.mark.parametrize(
     ("changes", "message"),
     [
         ({"materials": {"blok": STEEL}}, r'materials "blok" .*mean "block"\? .*\[\'block\', \'pun'),

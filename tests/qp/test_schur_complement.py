@@ -74,19 +74,3 @@ def test_another_load_costs_no_factorisation():
     reference = minimise(bordered_systems(other, counting_factor(program.K, [])))
     np.testing.assert_array_equal(result.active, reference.active)
     np.testing.assert_allclose(result.u, reference.u, rtol=0, atol=1e-11)  # condition up to 1e4
-
-
-def test_values_that_balance_leave_round_off_not_a_singular_system():
-    """Two springs pull the middle to both sides with equal forces: it stays, to round-off."""
-    k = np.array([1.0, 3.0])
-    K = sp.csr_array(np.array([[k[0], -k[0], 0], [-k[0], k.sum(), -k[1]], [0, -k[1], k[1]]]))
-    program = first_unknowns_bounded(K, np.array([0.0, 1e-17, 0.0]), np.zeros(0))
-    fixed = np.array([True, False, True])
-    program = replace(program, fixed=fixed, values=np.array([0.3, 0.0, -0.1]))
-
-    def noisy(free):
-        inverse = np.diag(np.where(free, 1 / K.diagonal(), 0.0))
-        return lambda right: inverse @ right + np.where(free, 1e-17, 0.0)
-
-    result = minimise(bordered_systems(program, noisy))
-    assert abs(result.u[1]) < 1e-16

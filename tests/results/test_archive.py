@@ -51,10 +51,7 @@ def on_a_mesh():
 
 SCENES = {
     "pressed disc": lambda: solve(cases.pressed_disc(), maxh=0.4, order=3),
-    "physical": lambda: solve(cases.pressed_disc(), maxh=0.4, element="physical"),
-    "superparametric": lambda: solve(cases.pressed_disc(), maxh=0.4, element="superparametric"),
     "adapted": lambda: list(adapt(cases.partly_opening_block(), order=2, max_dofs=1500))[-1],
-    "rigid obstacle": lambda: solve(cases.disc_on_rigid_plane(), maxh=0.3, order=2),
     "a gap function": lambda: solve(
         two_blocks(contact=[replace(LINE, gap=rising)]), maxh=0.5, order=2
     ),
@@ -62,9 +59,6 @@ SCENES = {
     "a mesh that is given": lambda: solve(on_a_mesh(), order=2),
     "free motion": lambda: solve(
         two_blocks(displacement={"bottom": (0, 0)}, traction={"top": 0.01}), maxh=0.5
-    ),
-    "no contact": lambda: solve(
-        two_blocks(contact=[], displacement={"bottom": (0, 0), "top": (0, 0.1)}), maxh=0.5
     ),
 }
 

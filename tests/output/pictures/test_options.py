@@ -43,18 +43,6 @@ def test_fields_of_a_uniform_stress(uniform, field, value):
     assert shown.kind == "stress"
 
 
-def test_units_name_axes_and_divide_values(tmp_path, uniform):
-    units = {"length": ("mm", 1e-3), "stress": "Pa"}
-    figure = plot_solution(uniform, tmp_path / "a.png", units=units, scale=0.0)
-    bodies, profile = figure.axes[0], figure.axes[-2]
-    assert bodies.get_xlabel() == "x [mm]"
-    assert bodies.get_xlim()[1] > 1000  # the block ends at x = 2
-    assert figure.axes[-1].get_ylabel() == "von Mises stress [Pa]" or any(
-        axes.get_ylabel() == "von Mises stress [Pa]" for axes in figure.axes
-    )
-    assert any(axes.get_ylabel() == "contact pressure [Pa]" for axes in (profile, *figure.axes))
-
-
 @pytest.mark.parametrize(
     ("options", "error", "text"),
     [
