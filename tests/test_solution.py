@@ -124,7 +124,7 @@ def difference(first, second):
 
 @pytest.mark.parametrize("order", [1, 4])
 @pytest.mark.parametrize("name", PROBLEMS)
-@pytest.mark.study(witness=["B-1", "B-4", "S9-4"])
+@pytest.mark.study(witness=["B-1", "B-4", "S9-4", "stack-1"])
 def test_every_body_is_in_equilibrium_and_every_point_optimal(name, order):
     solution = solve(PROBLEMS[name](), maxh=0.4, order=order)
     assert max(solution.residuals.values()) < EXACT

@@ -3,15 +3,12 @@
 import math
 from types import SimpleNamespace
 
-import ngsolve as ng
 import numpy as np
 import pytest
 
-from drivers.reference import cases
-from ngcontact import Contact, Problem, solve
+from ngcontact import Contact
 from ngcontact.contact.corners import in_contact, pressure_across_corners
 from ngcontact.contact.transitions import transitions_on
-from ngcontact.geometries import blocks
 
 
 def line(x, order=1, y=None):
@@ -100,27 +97,6 @@ def test_no_end_at_a_corner_inside_the_contact():
         one_side = active.copy()
         one_side[i] = False
         assert len(transitions_on(lines, ~one_side * 1e-6, one_side).position) == 0
-
-
-@pytest.mark.parametrize("mirrored", [False, True])
-@pytest.mark.parametrize("turn", [1e-3, 1.0])
-def test_blocks_that_part_at_a_corner(turn, mirrored):
-    line_ = [(-1.0, 0.0), (0.0, 0.0), (1.0, 0.9 * math.tan(turn))]
-    x = ng.x
-    if mirrored:
-        line_, x = [(-a, b) for a, b in reversed(line_)], -ng.x
-    problem = Problem(
-        geometry=blocks(line=line_, height=2.0),
-        materials=cases.BLOCKS,
-        displacement={"top": (0, -0.02), "bottom": (0, 0)},
-        contact=[Contact("upper_contact", "lower_contact", gap=ng.IfPos(x, 0.3 * x, 0.0))],
-    )
-    solution = solve(problem, maxh=0.25, order=2)
-    assert solution.transitions() == pytest.approx(np.zeros((1, 2)), abs=1e-14)
-    again = solve(problem, maxh=0.125, order=2, start=solution)
-    cold = solve(problem, maxh=0.125, order=2)
-    assert (again.active == cold.active).all()
-    assert len(again.steps) <= len(cold.steps)
 
 
 TURN = 0.3

@@ -5,10 +5,9 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Glue, OCCGeometry
 
 from drivers.reference.overkill import Overkill
-from ngcontact import ContactWarning, Elastic, adapt
+from ngcontact import adapt
 from ngcontact.geometries.region import body, compound, polygon
 from tests.quadrature.test_loads import box, loaded
 
@@ -35,10 +34,6 @@ def strips(*ends):
     names = ["bottom", "right", *["top", "loaded"] * len(ends), "top", "left"]
     vertices = [(0, 0), (1, 0), *((each, 1.0) for each in x)]
     return compound(body("body", polygon(vertices, names)))
-
-
-def inside(x, y, radius):
-    return ng.IfPos(radius**2 - (ng.x - x) ** 2 - (ng.y - y) ** 2, 1.0, 0.0)
 
 
 PULL = 80 * box(ng.x, 0.31, 0.01) - 80 * box(ng.x, 0.633, 0.01)
@@ -69,37 +64,3 @@ def test_loads(name, order):
     size = max(np.abs(force).max(), 0.8)
     for solution in levels:
         assert solution.reactions["bottom"] == pytest.approx(-np.array(force), abs=1e-3 * size)
-
-
-def above_a_line(E):
-    """The modulus E above a slanting line, 1 below; the line as an edge."""
-    lower = [(0, 0), (1, 0), (1, 0.63), (0, 0.41)]
-    upper = [(0, 0.41), (1, 0.63), (1, 1), (0, 1)]
-    faces = [
-        body("body", polygon(lower, ["bottom", "right", "between", "left"])),
-        body("body", polygon(upper, ["between", "right", "top", "left"])),
-    ]
-    return ng.IfPos(ng.y - 0.41 - 0.22 * ng.x, E, 1.0), OCCGeometry(Glue(faces), dim=2)
-
-
-JUMPS = {
-    "a slanting line, 1e2": above_a_line(1e2),
-    "a soft half, 1e-4": above_a_line(1e-4),
-}
-
-
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("name", JUMPS)
-@pytest.mark.study(witness=["a soft half, 1e-4-1"])
-def test_moduli_that_jump_inside_elements(name, order):
-    E, edges = JUMPS[name]
-    problem = replace(loaded(traction={"top": (0.3, -1.0)}), materials={"body": Elastic(E, 0.3)})
-    resolved = replace(problem, geometry=edges)
-    with pytest.warns(ContactWarning, match="jump inside"):
-        found, levels = of_levels(problem, order, resolved)
-    # Measured 1.4 to 75 where a line cuts elements badly.
-    assert min(found) >= 1
-    assert len(levels) <= 12
-    # With edges the data are resolved: measured 2.8 to 4.9.
-    found, _ = of_levels(resolved, order)
-    assert 1 <= min(found) <= max(found) <= 8

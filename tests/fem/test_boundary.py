@@ -133,18 +133,3 @@ def test_two_points_at_corners_of_the_geometry(order):
     along = np.diff(np.array(LINE), axis=0)
     right = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
     np.testing.assert_allclose(vector[number], right[np.repeat(side, order + 1)], atol=1e-15)
-
-
-def test_segments_are_selected_by_names_and_patterns():
-    mesh = ng.Mesh(blocks().GenerateMesh(maxh=0.5))
-    trace = boundary_trace(mesh, 2)
-    names = np.array(mesh.GetBoundaries())[trace.region]
-    upper, lower = (np.flatnonzero(names == f"{body}_contact") for body in ("upper", "lower"))
-    both = np.sort(np.concatenate([upper, lower]))
-    assert trace.segments("upper_contact").tolist() == upper.tolist()
-    assert trace.segments("(upper|lower)_contact").tolist() == both.tolist()
-    assert trace.segments("lower_contact", None, "upper_contact").tolist() == both.tolist()
-    assert trace.segments(None).size == trace.segments().size == 0
-    assert (
-        trace.lies_on(both[::-1], "upper_contact").tolist() == np.isin(both[::-1], upper).tolist()
-    )

@@ -54,27 +54,6 @@ def section():
     return MakeStructured2DMesh(quads=False, nx=4, ny=4)
 
 
-def test_stress_about_an_axis(section):
-    model = MODELS["axisymmetric"]
-    voigt = [ng.CF(float(k)) for k in (1, 2, 3, 4)]
-    found = model.in_plane(voigt)(section(0.5, 0.5))
-    assert np.array_equal(np.reshape(found, (2, 2)), [[1, 4], [4, 2]])
-    assert model.out_of_plane({}, section, voigt)(section(0.5, 0.5)) == 3
-
-
-def test_strains_about_an_axis(section):
-    """U = (r^2 + r z, z^2 - r): also on the axis, where the hoop strain is the radial one."""
-    u = ng.GridFunction(ng.VectorH1(section, order=2))
-    u.Set(ng.CF((ng.x**2 + ng.x * ng.y, ng.y**2 - ng.x)))
-    model = MODELS["axisymmetric"]
-    for r, z in ((0.0, 0.3), (0.0, 1.0), (0.3, 0.6), (1.0, 0.1)):
-        expected = [2 * r + z, 2 * z, r + z, r - 1]
-        assert model.strain(u)(section(r, z)) == pytest.approx(expected, abs=1e-13)
-    assert ng.Integrate(model.volume(u), section) == pytest.approx(1.5 + 1 + 1)
-    gradient = ng.InnerProduct(ng.Grad(u), ng.Grad(u)) + (ng.x + ng.y) ** 2
-    assert size(model.gradients(u, u) - gradient, section) < 1e-12
-
-
 def test_divergence_about_an_axis(section):
     """Sigma = ((r^2, r z), (r z, z)), hoop r z: the divergence in cylindrical coordinates."""
     stress = ng.CF((ng.x**2, ng.x * ng.y, ng.x * ng.y, ng.y), dims=(2, 2))

@@ -1,19 +1,15 @@
 """The spaces V_h against independent assemblies, linear fields, rigid motions and bars."""
 
 import math
-from functools import partial
 
 import ngsolve as ng
 import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
-from drivers.reference import cases, paper
-from drivers.reference.straight import relative_energy_error
+from drivers.reference import cases
 from ngcontact import Elastic, Hooke, Problem, solve
-from ngcontact.fem import moduli
 from ngcontact.fem.boundary import boundary_trace
-from ngcontact.fem.element import check_element
 from ngcontact.fem.space import assemble
 from ngcontact.geometries import disc, graphs, rings
 from ngcontact.mesh import curve, first_mesh
@@ -109,22 +105,6 @@ def test_stiffness_and_loads_of_any_function_are_integrals(make, element, order)
     assert v @ space.f == pytest.approx(work, rel=1e-7)
 
 
-@pytest.mark.parametrize(
-    ("order", "element", "error", "match"),
-    [
-        (1, "mortar", ValueError, "element='mortar' is not available; choose one of"),
-        (5, "isoparametric", ValueError, "order=5 is not available"),
-        (0, "isoparametric", ValueError, "order=0"),
-        (2, "physical", ValueError, "order=2 is not available; element='physical' has"),
-        (1.0, "isoparametric", TypeError, "order=1.0 is not an integer"),
-        (True, "isoparametric", TypeError, "order=True"),
-    ],
-)
-def test_elements_that_do_not_exist(order, element, error, match):
-    with pytest.raises(error, match=match):
-        check_element(order, element)
-
-
 def square(order=1, **data):
     """Unit square without contact, solved; the exact solution is linear."""
     mesh = MakeStructured2DMesh(quads=False, nx=3, ny=3)
@@ -189,40 +169,6 @@ def test_pressure_and_traction_loads():
         u[n : n + mesh.nv] = 1
         # The vertex functions add up to one: a translation. The ends of the arc are exact.
         assert u @ space.f == pytest.approx(0.3 * 2.0, rel=1e-12)
-
-
-# Orders and elements, and the change of u_h by 4 more orders of quadrature over its error:
-# measured below 6e-4 (the next lower order: 1e-2 superparametric at order 1; the default 0.15).
-@pytest.mark.parametrize("element", ["isoparametric", "superparametric"])
-@pytest.mark.parametrize(
-    ("make", "order"),
-    [
-        *((cases.ring_in_ring, order) for order in ORDERS),
-        (cases.curved_lines, 2),
-        (paper.opening_ring, 1),
-        (partial(cases.ring_in_ring, 0.2, 4), 2),
-        (partial(cases.ring_in_ring, 0.2, 4), 4),
-    ],
-)
-@pytest.mark.study(
-    witness=[
-        "ring_in_ring-3-isoparametric",
-        "ring_in_ring-1-isoparametric",
-        "ring_in_ring-3-superparametric",
-    ]
-)
-def test_quadrature_on_curved_elements_is_no_part_of_the_error(make, order, element, monkeypatch):
-    case = make()
-    found = []
-    for bonus in (moduli.CURVED, moduli.CURVED + 4):
-        monkeypatch.setattr(moduli, "CURVED", bonus)
-        found.append(solve(case.problem, maxh=0.4, order=order, element=element))
-    usual, fine = found
-    apart = usual.displacement.vec.FV().NumPy() - fine.displacement.vec.FV().NumPy()
-    A = fine.discrete.space.A
-    whole = fine.displacement.vec.FV().NumPy()
-    change = np.sqrt(apart @ (A @ apart) / (whole @ (A @ whole)))
-    assert change < 1e-2 * relative_energy_error(fine, case.exact)
 
 
 def test_only_elements_with_curved_sides_are_curved():

@@ -1,6 +1,5 @@
 """Bodies of revolution of the gallery: names, volumes, orientation, contact that is found."""
 
-import ngsolve as ng
 import pytest
 
 from ngcontact import Contact, Elastic, Problem, solve
@@ -30,46 +29,6 @@ SOFT = Elastic(E=1.0, nu=0.3)
 def test_what_is_refused(make, changes, message):
     with pytest.raises(ValueError, match=message):
         make(**changes)
-
-
-PROBLEMS = {
-    ball_in_socket: {
-        "displacement": {"socket_bottom": (0, 0), "ball_top": (None, -0.01)},
-        "contact": [Contact("ball_arc", "socket_arc", direction=(0, -1))],
-    },
-    cone_on_block: {
-        "displacement": {"block_bottom": (0, 0), "indenter_top": (None, -0.02)},
-        "contact": [Contact("flank", "block_top", direction=(0, -1))],
-    },
-    rounded_punch: {
-        "displacement": {"block_bottom": (0, 0), "indenter_top": (None, -0.02)},
-        "contact": [Contact("end", "block_top", direction=(0, -1))],
-    },
-    ring_in_groove: {
-        "displacement": {"housing_bottom": (0, 0), "plate_top": (0, -0.02)},
-        "contact": [
-            Contact("ring_lower", "groove", direction=(0, -1)),
-            Contact("ring_upper", "plate_face", direction=(0, 1)),
-        ],
-    },
-}
-
-
-@pytest.mark.filterwarnings("ignore::ngcontact.ContactWarning")
-@pytest.mark.parametrize("make", PROBLEMS, ids=lambda make: make.__name__)
-def test_pressed_bodies_are_in_contact_and_in_balance(make):
-    """The force of contact is the reaction of the support, on the whole body."""
-    geometry = make()
-    bodies = set(ng.Mesh(geometry.GenerateMesh(maxh=1.0)).GetMaterials())
-    data = PROBLEMS[make]
-    problem = Problem(
-        geometry=geometry, materials=dict.fromkeys(bodies, SOFT), model="axisymmetric", **data
-    )
-    solution = solve(problem, maxh=0.3, order=2)
-    assert solution.active.any()
-    held = next(iter(data["displacement"]))
-    assert solution.reactions[held][1] == pytest.approx(abs(solution.contact_force()[1]))
-    assert solution.contact_force()[0] == 0
 
 
 def test_a_pressed_on_sleeve_presses_all_along():

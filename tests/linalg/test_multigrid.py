@@ -8,8 +8,6 @@ from ngcontact.linalg.smoothing import chebyshev, gauss_seidel
 from ngcontact.linalg.sparse import congruent
 from tests.scenes import REFINED, discrete, steps_of
 
-SMOOTHERS = (gauss_seidel, chebyshev)
-
 
 def prepared(name: str, order: int, rounds: int, maxh: float = 0.5, smoother=gauss_seidel):
     """Matrix, multigrid and free unknowns, every second contact row active."""
@@ -33,36 +31,6 @@ def cycles(multigrid: Multigrid, size: int) -> np.ndarray:
         multigrid.cycle(right, solution)
         columns[i] = solution.FV().NumPy()
     return columns
-
-
-@pytest.mark.parametrize("smoother", SMOOTHERS)
-@pytest.mark.parametrize("released", [False, True])
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("name", REFINED)
-@pytest.mark.study(
-    witness=["disc-1-True-gauss_seidel", "disc-2-False-gauss_seidel", "disc-1-False-gauss_seidel"]
-)
-def test_a_cycle_is_symmetric_and_positive_definite(
-    name: str, order: int, released: bool, smoother
-):
-    K, multigrid, free = prepared(name, order, 1 if order > 1 else 2, 1.0, smoother)
-    if released:  # coarser matrices are those of another set
-        free = free.copy()
-        held = np.flatnonzero(~free)[::3]
-        free[held] = True
-        free[np.flatnonzero(free)[:2]] = False
-        multigrid.hold(free)
-    whole = cycles(multigrid, K.shape[0])
-    inside = whole[np.ix_(free, free)]
-    # Round-off of sums; entries are alike.
-    np.testing.assert_allclose(inside, inside.T, rtol=0, atol=1e-12 * np.abs(inside).max())
-    assert not whole[:, ~free].any()
-    root = np.linalg.cholesky(K[free][:, free].toarray())
-    values = np.linalg.eigvalsh(root.T @ inside @ root)
-    # Theory: 1 - (contraction)^2, in (0, 1] with coarse matrices of the set itself.
-    assert values[0] > 0
-    if not released:
-        assert values[-1] <= 1 + 1e-12
 
 
 @pytest.mark.parametrize(

@@ -10,13 +10,10 @@ from netgen.occ import (
     Axis,
     Glue,
     OCCGeometry,
-    Pnt,
-    Segment,
     WorkPlane,
 )
 
-from ngcontact.geometries import disc, disc_on_block
-from ngcontact.mesh.cad import CadEdge, cad_edges, same_geometry
+from ngcontact.mesh.cad import CadEdge, cad_edges
 from tests.geometries.test_geometries import CASES
 
 RNG = np.random.default_rng(3)
@@ -31,23 +28,6 @@ def circle(x=0.0, y=0.0, radius=1.0):
 
 def angles(theta):
     return np.column_stack([np.cos(theta), np.sin(theta)])
-
-
-def test_straight_edge():
-    edge = CadEdge(Segment(Pnt(1, 2, 0), Pnt(4, 6, 0)))
-    assert edge.straight
-    assert not edge.closed
-    assert edge.size == pytest.approx(4)
-    points = np.array([[1.0, 2.0], [2.5, 4.0], [4.0, 6.0]])
-    t = edge.project(points)
-    np.testing.assert_allclose(edge.point(t), points, atol=1e-15)
-    # A foot of the perpendicular, and points beyond both ends.
-    off = points[1] + 0.3 * np.array([-4, 3]) / 5
-    t = edge.project(np.array([off, [0.0, 0.0], [9.0, 9.0]]))
-    np.testing.assert_allclose(edge.point(t), [[2.5, 4.0], [1.0, 2.0], [4.0, 6.0]], atol=1e-15)
-    np.testing.assert_allclose(edge.normal(points), np.tile([4 / 5, -3 / 5], (3, 1)), atol=1e-16)
-    assert edge.point(np.zeros(0)).shape == (0, 2)
-    assert edge.normal(np.zeros((0, 2))).shape == (0, 2)
 
 
 @pytest.mark.parametrize(("x", "y", "radius"), CENTRES)
@@ -103,22 +83,6 @@ def test_segments_lie_on_the_edge_of_their_region(make):
         np.testing.assert_allclose(foot, points, atol=1e-12)
         met.add(region)
     assert len(met) == len(mesh.GetBoundaries())
-
-
-def test_geometries_are_the_same_by_shape_and_names():
-    one = disc_on_block(radius=10.0)
-    assert same_geometry(one, one)
-    assert same_geometry(one, disc_on_block(radius=10.0))
-    assert not same_geometry(one, disc_on_block(radius=10.0 * (1 + 1e-6)))
-    renamed = disc_on_block(radius=10.0)
-    for edge in renamed.shape.edges:
-        edge.name = "other" if edge.name == "disc_arc" else edge.name
-    assert not same_geometry(one, renamed)
-    assert not same_geometry(one, disc(radius=10.0))
-    mesh = ng.Mesh(one.GenerateMesh(maxh=5.0))
-    assert same_geometry(mesh, mesh)
-    assert not same_geometry(mesh, one)
-    assert not same_geometry(mesh, ng.Mesh(mesh.ngmesh.Copy()))
 
 
 @pytest.mark.parametrize("angle", [10.0, 70.0, 250.0])

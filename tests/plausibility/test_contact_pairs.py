@@ -85,26 +85,6 @@ def test_flanks_across_their_direction_are_silent(slope, contact):
     assert not any(DIRECTION in message for message in told(run))
 
 
-@pytest.mark.parametrize("half", [False, True])
-@pytest.mark.parametrize("slope", [5.0, 45.0])
-def test_the_tip_of_a_wedge_takes_the_direction_of_the_plane(slope, half):
-    t = math.tan(math.radians(slope))
-    corners = [(0, 0), (1, t), (1, 1 + t), *([(0, 1 + t)] if half else [(-1, 1 + t), (-1, t)])]
-    names = ["flank", "side", "top", *(["axis"] if half else ["side", "flank"])]
-    x = 0 if half else -2
-    plane = polygon(
-        [(x, 0), (x, -2), (2, -2), (2, 0)], ["axis" if half else "side", "base", "side", "plane"]
-    )
-    problem = Problem(
-        geometry=compound(body("wedge", polygon(corners, names)), body("block", plane)),
-        materials={"wedge": Elastic(E=100.0, nu=0.3), "block": SOFT},
-        displacement={"base": (0, 0), "top": (0, -0.01)},
-        sliding="axis" if half else None,
-        contact=[Contact("flank", "plane", direction=DOWN)],
-    )
-    assert quiet(finest(problem, unknowns=4500))
-
-
 @pytest.mark.parametrize("press", [2e-3, 1e-6])
 def test_the_last_level_resolves_the_zone_of_a_load_however_small(press):
     supports = {"block_bottom": (0, 0), "disc_top": (0, -press)}
