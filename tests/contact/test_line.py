@@ -11,7 +11,6 @@ from ngcontact.contact.assembly import contact_line
 from ngcontact.contact.line import at_quadrature
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc, disc_on_block
-from ngcontact.lagrange import gauss, lagrange
 
 ORDERS = [1, 2, 3, 4]
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
@@ -110,17 +109,6 @@ def test_a_uniform_pressure_is_that_of_the_weights_where_sides_share_a_point(ord
     along = vertices[-1] - vertices[0]
     resultant = line.weight @ line.direction
     np.testing.assert_allclose(resultant, [along[1], -along[0]], rtol=1e-14, atol=1e-15)
-    # At the vertex itself, from both segments there.
-    [point] = np.flatnonzero(np.linalg.norm(line.position, axis=1) < 1e-12)
-    s, w = gauss(order)
-    share = w @ lagrange(order, s)[:, 0]  # of a segment's length at its end
-    middle = trace.curve[here].mean(axis=1)[:, 0]
-    at = np.array(
-        [np.where(middle < 0, middle, -9).argmax(), np.where(middle > 0, middle, 9).argmin()]
-    )
-    normals = trace.normal(here[at], np.full(2, 0.5))
-    expected = share * (lengths[at] @ normals)
-    np.testing.assert_allclose(line.weight[point] * line.direction[point], expected, rtol=1e-13)
 
 
 def test_steep_sides_do_not_face_a_fixed_direction():

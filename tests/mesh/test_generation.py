@@ -76,17 +76,6 @@ def test_the_default_size_is_an_eighth_of_the_largest_extent():
     assert lengths(first_mesh(problem, 0.5), "upper_contact|lower_contact") == pytest.approx(0.5)
 
 
-def test_the_geometry_is_left_as_it_was():
-    geometry = disc_on_block()
-    problem = pressed(geometry, ("disc", "block"), ENLARGING["disc on block"].contact)
-    before = coordinates(ng.Mesh(geometry.GenerateMesh(maxh=0.3)))
-    matched = coordinates(first_mesh(problem, 0.3))
-    assert all(edge.partition is None for edge in geometry.shape.edges)
-    after = coordinates(ng.Mesh(geometry.GenerateMesh(maxh=0.3)))
-    assert before.shape != matched.shape
-    assert (before == after).all()
-
-
 def test_partitions_of_the_user_are_honoured():
     geometry = blocks()
     fractions = {"upper_contact": [0.2, 0.5, 0.6], "top": [0.125]}
@@ -113,25 +102,6 @@ def test_the_size_of_one_edge_holds_on_the_facing_one(name):
     for side in ("upper_contact", "lower_contact"):
         assert lengths(mesh, side) == pytest.approx(0.1)
     assert lengths(mesh, "top").min() > 0.2
-
-
-@pytest.mark.parametrize(
-    ("maxh", "error"),
-    [
-        (0, ValueError),
-        (-0.1, ValueError),
-        (math.nan, ValueError),
-        (math.inf, ValueError),
-        ("0.1", TypeError),
-        (True, TypeError),
-        (0.1j, TypeError),
-    ],
-)
-def test_a_bad_size_is_refused_with_its_value(maxh, error):
-    value = repr(maxh) if error is TypeError else str(maxh)
-    with pytest.raises(error, match=f"maxh={value}.*0.25") as caught:
-        first_mesh(BOUNDED["blocks"].problem(), maxh)
-    assert "maxh" in str(caught.value)
 
 
 def test_refinement_beyond_the_kernel_s_lengths_is_refused():
@@ -165,14 +135,3 @@ def test_lengths_that_are_not_meshed_are_refused(unit, offset, angle, monkeypatc
     problem = replace(PRESSED, geometry=OCCGeometry(shape, dim=2))
     with pytest.raises(ValueError, match=r"has the extent \S+ and reaches \S+ .* unit of length"):
         first_mesh(problem)
-
-
-@pytest.mark.parametrize("unit", [1e-6, 2e8])
-@pytest.mark.parametrize("angle", [0.0, 17.3])
-def test_lengths_that_are_meshed(unit, angle):
-    """Areas scale; the kernel's tolerance is 1e-7 of a length, 0.1 of one of 1e-6."""
-    turned = PRESSED.geometry.shape.Rotate(occ.Axis((0, 0, 0), occ.Z), angle)
-    shape = turned.Scale(occ.Pnt(0, 0, 0), unit)
-    mesh = first_mesh(replace(PRESSED, geometry=OCCGeometry(shape, dim=2)))
-    area = ng.Integrate(ng.CF(1.0), first_mesh(PRESSED))
-    assert ng.Integrate(ng.CF(1.0), mesh) / unit**2 == pytest.approx(area, rel=1e-9)

@@ -60,20 +60,6 @@ def test_the_last_frame_is_seen_three_times_as_long(tmp_path, monkeypatch):
     assert times == [250, 250, 750]
 
 
-@pytest.mark.parametrize(
-    ("solutions", "options", "text"),
-    [
-        ([], {}, "give one at least"),
-        ([None], {"titles": ["a", "b"]}, "2 for 1"),
-        ([None], {"seconds": 0.0}, "positive time"),
-    ],
-)
-def test_films_that_cannot_be_are_refused(tmp_path, solutions, options, text):
-    with pytest.raises(ValueError, match=text):
-        write_film(tmp_path / "a.gif", solutions, **options)
-    assert not list(tmp_path.iterdir())
-
-
 @pytest.mark.parametrize("above", [False, True])
 def test_the_triangle_has_the_slope(above):
     axes = Figure().subplots()

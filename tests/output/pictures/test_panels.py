@@ -107,15 +107,3 @@ def test_contact_line_keeps_both_rows_of_a_corner():
     [(_, rows, s)] = lines_of(points)
     assert rows.tolist() == [0, 1, 2, 3, 4, 5]
     assert s.tolist() == [0, 1, 2, 2, 3, 4]
-
-
-def test_contact_lines_of_pairs_and_of_separate_pieces():
-    x = np.arange(20) / 20
-    piece = np.column_stack([x, 0 * x])
-    points = np.concatenate([piece, np.add(piece, (5, 0)), np.add(piece, (0, 9))])
-    (a, first, s), (b, second, t), (c, third, _) = lines_of(points, pair=np.arange(60) // 40)
-    assert (a, b, c) == (0, 0, 1)
-    assert s[-1] <= t[0]
-    assert first.tolist() == list(range(20))
-    assert second.tolist() == list(range(20, 40))
-    assert third.tolist() == list(range(40, 60))
