@@ -13,7 +13,7 @@ from itertools import pairwise
 import pytest
 
 import ngcontact.geometries as geometries
-from ngcontact import Elastic, Hooke, Problem, Solution
+from ngcontact import Solution
 from tests.docs.pages import ROOT
 
 TYPES = {"Array", "Index", "Mask", "NDArray", "ndarray", "ArrayLike"}
@@ -160,19 +160,6 @@ def test_a_solution_says_its_units():
             if name in Solution.__dataclass_fields__:
                 said = entry(inspect.getdoc(Solution), name)
             assert has_unit(said, dimension), name
-
-
-@pytest.mark.parametrize(
-    ("owner", "name", "dimension"),
-    [
-        *((law, name, "stress") for law, name in ((Elastic, "E"), (Hooke, "C"))),
-        (Elastic, "nu", "none"),
-        *((Problem, name, kind) for name, kind in (("displacement", "length"), ("force", "any"))),
-        (Problem, "traction", "stress"),
-    ],
-)
-def test_data_say_their_units(owner, name, dimension):
-    assert has_unit(entry(inspect.getdoc(owner), name), dimension)
 
 
 @pytest.mark.parametrize("name", geometries.__all__)

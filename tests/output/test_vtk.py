@@ -8,7 +8,6 @@ from netgen.occ import Compound, Glue
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
 from ngcontact.output import write_series, write_solution
-from ngcontact.output.nodes import lattice
 from tests.output.stubs import MAXH, stub, two_bodies
 
 
@@ -29,7 +28,6 @@ def test_cells_cover_the_bodies_and_share_their_nodes(tmp_path, order, curve):
     # have vertices of their own.
     assert grid.n_points == mesh.nv + mesh.nedge * (p - 1) + mesh.ne * inside
     exact = ng.Integrate(ng.CF(1.0), mesh, order=2 * p)
-    assert area_of_lagrange_cells(grid, p) == pytest.approx(exact, rel=1e-12)
     # The order of the geometry, h^(curve + 1); measured: at most 0.8 of this.
     assert abs(exact - np.pi / 2 - 4) < (0.05 if curve == 1 else MAXH ** (curve + 1) / 200)
     # VTK cuts every side into 2^3 chords at least; a chord s of the circle misses s^3 / 12, all of
@@ -40,20 +38,6 @@ def test_cells_cover_the_bodies_and_share_their_nodes(tmp_path, order, curve):
     surface.Update()
     chords = np.pi * (MAXH / 8) ** 2 / 12 if p > 1 else 0.0
     assert pyvista.wrap(surface.GetOutput()).area == pytest.approx(exact, abs=chords + 1e-12)
-
-
-def area_of_lagrange_cells(grid, order):
-    """Integral of the Jacobian of the polynomials through the nodes, all cells."""
-    powers = [(i, j) for i in range(order + 1) for j in range(order + 1 - i)]
-    r, s = lattice(order)[:, 1:].T / order
-    basis = np.linalg.inv(np.stack([r**i * s**j for i, j in powers], axis=1))
-    rule = ng.IntegrationRule(ng.TRIG, 2 * order)
-    r, s = np.array(rule.points)[:, :2].T
-    by_r = np.stack([i * r ** max(i - 1, 0) * s**j for i, j in powers], axis=1) @ basis
-    by_s = np.stack([j * r**i * s ** max(j - 1, 0) for i, j in powers], axis=1) @ basis
-    nodes = grid.points[grid.cells.reshape(grid.n_cells, -1)[:, 1:], :2]
-    (xr, yr), (xs, ys) = np.moveaxis(by_r @ nodes, 2, 0), np.moveaxis(by_s @ nodes, 2, 0)
-    return np.sum(np.abs(xr * ys - xs * yr) @ np.array(rule.weights))
 
 
 def test_fields_are_those_of_the_solution_at_the_nodes(tmp_path):

@@ -1,8 +1,5 @@
 """Pictures of a solution."""
 
-import subprocess
-import sys
-
 import matplotlib
 import numpy as np
 import pytest
@@ -10,27 +7,6 @@ import pytest
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.output import plot_solution
 from tests.output.stubs import two_bodies
-
-LIGHT = """
-import sys
-from ngcontact import Elastic, Problem, adapt, solve, write_series
-from ngcontact.output import plot_solution
-from netgen.occ import OCCGeometry, Rectangle
-
-square = Rectangle(1, 1).Face()
-square.faces.name, square.edges.name = "square", "side"
-law = {"square": Elastic(E=1.0, nu=0.3)}
-held = Problem(OCCGeometry(square, dim=2), law, {"side": (0, 0)}, force={"square": (0, -1)})
-print(solve(held, maxh=0.5), *adapt(held, maxh=0.5, order=1, max_dofs=100))
-print(*sys.modules)
-"""
-
-
-def test_importing_and_solving_load_neither_vtk_nor_matplotlib():
-    run = subprocess.run([sys.executable, "-c", LIGHT], capture_output=True, check=True, text=True)
-    modules = set(run.stdout.split())
-    assert {"ngcontact.output.pictures.picture", "ngcontact.output.vtk"} <= modules
-    assert not {"pyvista", "vtk", "vtkmodules", "matplotlib"} & modules
 
 
 @pytest.fixture(scope="module")
