@@ -1,6 +1,7 @@
 """The adaptive loop and its entry points: validity of levels, stopping, budgets, bad arguments."""
 
 from dataclasses import replace
+from functools import partial
 
 import ngsolve as ng
 import numpy as np
@@ -216,3 +217,44 @@ def test_adapt_stops_at_the_bound():
     plain = adapt(case.problem, order=3, max_dofs=8000)
     fine = next(level for level in plain if level.relative_error_bound <= tolerance)
     assert unknowns(levels[-1]) <= 1.2 * unknowns(fine)
+
+
+@pytest.mark.parametrize(
+    ("ask", "error", "asked"),
+    [
+        (lambda run: run.pressure, AttributeError, "has no pressure"),
+        (lambda run: run[-1], TypeError, r"has no \[-1\]"),
+    ],
+)
+def test_a_run_that_is_taken_for_a_solution_says_how_to_get_one(ask, error, asked):
+    run = adapt(cases.one_transition().problem, order=2, max_dofs=3000)
+    with pytest.raises(error, match=rf"{asked}: .*\*_, solution = adapt\(...\)"):
+        ask(run)
+    first = next(run)  # which is still to be had
+    *_, last = run
+    assert last.displacement.space.ndof > first.displacement.space.ndof
+
+
+def test_guaranteed_needs_a_tolerance():
+    with pytest.raises(ValueError, match="tolerance=None"):
+        adapt(cases.one_transition().problem, guaranteed=True)
+    with pytest.raises(TypeError, match="guaranteed=1"):
+        adapt(cases.one_transition().problem, guaranteed=1, tolerance=1e-2)
+
+
+def test_refinement_ends_where_no_curve_can_be_divided(monkeypatch):
+    every = partial(np.ones, dtype=bool)
+    monkeypatch.setattr("ngcontact.adaptivity.planning.at_limit", lambda mesh, _: every(mesh.ne))
+    with pytest.warns(ContactWarning, match="refinement ends here"):
+        [solution] = adapt(small_disc(1.0), order=2, max_dofs=3000)
+    assert solution.relative_error_estimate > 1e-3
+
+
+def test_a_tolerance_out_of_reach_is_told_by_the_bound():
+    """The bound of the last level is made, whatever the estimate suggests."""
+    problem = cases.hertz_contact().problem
+    with pytest.warns(
+        ContactWarning, match=r"the bound is \d\.\d\de-0\d, more than tolerance=1e-06"
+    ):
+        *_, last = adapt(problem, order=2, max_dofs=800, tolerance=1e-6, guaranteed=True)
+    assert last.bounded

@@ -2,9 +2,11 @@
 
 import math
 
+import ngsolve as ng
 import numpy as np
 import pytest
 
+from drivers.reference import axisymmetric_cases as cases
 from drivers.reference.cases import FIRST, SECOND
 from drivers.reference.westergaard import moduli
 from ngcontact import Contact, Elastic, Problem, adapt, solve
@@ -120,3 +122,22 @@ def test_a_ball_on_a_conical_seat(order):
     assert (low + high) / 2 == pytest.approx(q, rel=2e-3)
     assert (high - low) / 2 == pytest.approx(a * q, rel=2e-3)
     assert solution.pressure.max() == pytest.approx(2 * per_length / math.pi / a, rel=5e-3)
+
+
+@pytest.mark.parametrize("order", [2, 3, 4])
+def test_a_modulus_that_varies_with_the_radius(order):
+    """Nu = 0: sigma_zz = E(r) times a strain, all else 0, which the elements contain."""
+    problem = Problem(
+        geometry=cases.cylinders(),
+        materials={"upper|lower": Elastic(1 + 3 * ng.x**2, 0.0)},
+        displacement={"bottom": (None, 0), "top": (None, -0.02)},
+        contact=[Contact("upper_contact", "lower_contact")],
+        model="axisymmetric",
+    )
+    solution = solve(problem, maxh=0.25, order=order)
+    force = 2 * math.pi * 0.01 * (1 / 2 + 3 / 4)
+    assert abs(solution.contact_force()[1]) == pytest.approx(force, rel=ROUND_OFF)
+    assert solution.relative_error_bound < ROUND_OFF
+    if order == 4:  # whose rows contain pressures of degree 2
+        p = 0.01 * (1 + 3 * solution.points[:, 0] ** 2)
+        assert solution.pressure == pytest.approx(p, rel=ROUND_OFF)

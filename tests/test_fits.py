@@ -6,7 +6,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from ngcontact import Contact, Elastic, Problem, adapt
+from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.geometries import rings
 
 BORE, RIM = 0.5, 2.0  # radii; the shaft has 1
@@ -86,3 +86,10 @@ def test_press_fits_converge_to_lame(order, interference, swap):
     line = last.force.sum() / (right * (1.0 if swap else 1.0 - interference) * math.pi / 2)
     assert abs(line - 1) < (2e-2 if order == 1 else 1e-3)
     assert abs(last.pressure.max() / right - 1) < (5e-2 if order == 1 else 1e-2)
+
+
+@pytest.mark.parametrize("swap", [False, True])
+def test_roles_that_are_chosen_do_not_depend_on_those_given(swap):
+    """Of two sides that cover each other, with equal segments, the convex one."""
+    solution = solve(fit(1e-3, swap, roles="auto"), maxh=0.2, order=2)
+    assert solution.pairs[0].line.contact.secondary == "inner_contact"

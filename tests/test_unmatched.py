@@ -13,6 +13,7 @@ from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
 from ngcontact import (
     Contact,
+    ContactError,
     ContactWarning,
     ConvergenceError,
     Elastic,
@@ -253,3 +254,24 @@ def test_overlaps_between_points_in_contact_are_not_told(settle, order):
         solution, count = told(disc_in_vee(VEE_PAIRS[pairs], settle), maxh=0.4, order=order)
         assert solution.active.any()
         assert count == 0
+
+
+def test_other_roles_are_not_tried_where_the_gap_is_given(monkeypatch):
+    """The error of the roles that were given is raised, as where the others fail, too."""
+    problem = pin_at_the_bottom(("hole", "pin"))
+    calls = []
+
+    def fail(discrete, active):
+        calls.append(discrete.problem.contact)
+        raise ConvergenceError(f"attempt {len(calls)}")
+
+    monkeypatch.setattr(one_mesh, "minimise_energy", fail)
+    mesh = first_mesh(problem, 0.5)
+    with pytest.raises(ConvergenceError, match="attempt 1"):
+        solve(problem, mesh, order=2)
+    assert [pairs[0].secondary for pairs in calls] == ["hole", "pin"]
+    calls.clear()
+    problem = replace(problem, contact=[replace(problem.contact[0], gap=0.01)])
+    with pytest.raises(ContactError):
+        solve(problem, mesh, order=2)
+    assert len(calls) <= 1

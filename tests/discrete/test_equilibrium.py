@@ -19,10 +19,11 @@ from ngcontact import (
 )
 from ngcontact.discrete.discrete_problem import discretise, minimise_energy
 from ngcontact.geometries import blocks
-from ngcontact.geometries.region import quarter_arc
+from ngcontact.geometries.region import body, compound, quarter_arc
 from ngcontact.mesh import first_mesh
 
 STEEL = Elastic(E=1000.0, nu=0.3)
+WEIGHT = 0.1  # of a disc, per area
 ROUND_OFF = 1e-12  # of sums of forces and moments: the figure asked for; measured 4e-14
 
 
@@ -34,6 +35,10 @@ def pressed_blocks(load=1.0, **more):
         traction={"top": load},
         contact=[Contact("upper_contact", "lower_contact", **more)],
     )
+
+
+def mesh_area(solution, body):
+    return ng.Integrate(1, solution.mesh.Materials(body), order=2 * solution.order)
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])
@@ -184,3 +189,35 @@ def test_the_shape_of_a_mesh_does_no_work(order):
     assert np.abs(solution.contact_force() - [0, weight]).max() < 1e-9 * weight
     with pytest.raises(NoEquilibriumError, match="rotation"):
         solve(shaft((0, -1 - 1e-4 * ng.x)), maxh=0.2, order=order)
+
+
+def disc_in_ring(force=(0, 0), **more):
+    """A loose disc in a ring, 0.02 from it all around."""
+    bore = [("bore", quarter_arc((0, 0), 1.02, (4 - k) % 4, 3 - k)) for k in range(4)]
+    ring = body("ring", circle((0, 0), 2.0, "rim"), bore)
+    return Problem(
+        geometry=compound(body("disc", circle((0, 0), 1.0, "arc")), ring),
+        materials={"disc|ring": STEEL},
+        force={"disc": force},
+        contact=[Contact("arc", "bore")],
+        **more,
+    )
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_body_that_may_turn_from_every_first_active_set(order):
+    """The proximal force turns the disc, which its contact cannot: no singular system."""
+    problem = disc_in_ring((0, -WEIGHT), displacement={"rim": (0, 0)})
+    solution = solve(problem, maxh=0.4, order=order)
+    weight = WEIGHT * mesh_area(solution, "disc")
+    m = len(solution.points)
+    for carried in ([], [0], [m // 3, 2 * m // 3], range(m)):
+        active = np.zeros(m, dtype=bool)
+        active[list(carried)] = True
+        result = minimise_energy(solution.discrete, active)
+        directions = solution.discrete.lines[0].direction
+        np.testing.assert_allclose(
+            result.force @ directions,
+            [0, -weight],
+            atol=1e-10 * weight,  # measured 2e-13
+        )

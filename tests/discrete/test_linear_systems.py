@@ -8,7 +8,7 @@ import pytest
 
 from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
-from ngcontact import Elastic, Solution, adapt, solve
+from ngcontact import ConvergenceError, Elastic, Solution, adapt, solve
 from ngcontact.discrete.discrete_problem import MULTIGRID, minimise_energy
 from tests.scenes import REFINED
 
@@ -122,3 +122,12 @@ def test_nearly_incompressible_bodies(large):
     known = direct(problem, mesh, order=2)
     np.testing.assert_array_equal(solution.active, known.active)
     assert solution.work["back_solves"] <= known.work["back_solves"] + 30
+
+
+def test_a_free_motion_is_refused():
+    problem = cases.partly_opening_block()
+    problem = replace(problem, sliding="lower_axis", traction={"pressed|top": 1.0})
+    solution = solve(problem, maxh=0.5, order=1)
+    none = np.zeros_like(solution.active)
+    with pytest.raises(ConvergenceError, match="rigid motion"):
+        solution.discrete.influence(none, np.zeros(none.size))

@@ -75,3 +75,16 @@ def test_measures_are_those_of_the_body_of_revolution(section):
     assert model.on_axis(points).tolist() == [True, True, False, False]
     assert model.on_axis(1e9 * points).tolist() == [True, True, False, False]
     assert model.resultant(np.array([3.0, 4.0])).tolist() == [0.0, 4.0]
+
+
+def test_strains_about_an_axis(section):
+    """U = (r^2 + r z, z^2 - r): also on the axis, where the hoop strain is the radial one."""
+    u = ng.GridFunction(ng.VectorH1(section, order=2))
+    u.Set(ng.CF((ng.x**2 + ng.x * ng.y, ng.y**2 - ng.x)))
+    model = MODELS["axisymmetric"]
+    for r, z in ((0.0, 0.3), (0.0, 1.0), (0.3, 0.6), (1.0, 0.1)):
+        expected = [2 * r + z, 2 * z, r + z, r - 1]
+        assert model.strain(u)(section(r, z)) == pytest.approx(expected, abs=1e-13)
+    assert ng.Integrate(model.volume(u), section) == pytest.approx(1.5 + 1 + 1)
+    gradient = ng.InnerProduct(ng.Grad(u), ng.Grad(u)) + (ng.x + ng.y) ** 2
+    assert size(model.gradients(u, u) - gradient, section) < 1e-12

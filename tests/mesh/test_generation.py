@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from netgen.occ import OCCGeometry
 
+from ngcontact import Contact, Elastic, Problem
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc_on_block
 from ngcontact.mesh import generation
@@ -20,6 +21,7 @@ from tests.pairs import (
     BOUNDED,
     ENLARGING,
     ROUND_OFF,
+    SOFT,
     pressed,
     unmatched,
 )
@@ -135,3 +137,36 @@ def test_lengths_that_are_not_meshed_are_refused(unit, offset, angle, monkeypatc
     problem = replace(PRESSED, geometry=OCCGeometry(shape, dim=2))
     with pytest.raises(ValueError, match=r"has the extent \S+ and reaches \S+ .* unit of length"):
         first_mesh(problem)
+
+
+def test_two_cams_without_a_direction_are_told_to_give_one():
+    """Normals of one full ellipse divide the other, which faces away for the most part."""
+    parts = []
+    for name, y in (("upper", 1.2), ("lower", 0.0)):
+        face = occ.WorkPlane(occ.Axes((0, y, 0), n=occ.Z, h=occ.X)).Ellipse(1.0, 0.6).Face()
+        face.name, face.edges.name = name, f"{name}_rim"
+        parts.append(face)
+    steel = Elastic(E=1.0, nu=0.3)
+    problem = Problem(
+        geometry=OCCGeometry(occ.Compound(parts), dim=2),
+        materials={"upper": steel, "lower": steel},
+        contact=[Contact("upper_rim", "lower_rim")],
+    )
+    message = 'bulge towards each other give contact 0 of "upper_rim" with "lower_rim" a direction'
+    with pytest.raises(ValueError, match=message):
+        first_mesh(problem, 0.2)
+    along = replace(problem, contact=[Contact("upper_rim", "lower_rim", direction=(0, -1))])
+    assert first_mesh(along, 0.2).ne > 50
+
+
+def test_solids_are_no_bodies():
+    box = occ.Box((0, 0, 0), (1, 1, 1))
+    with pytest.raises(ValueError, match="contains solids"):
+        first_mesh(Problem(geometry=OCCGeometry(box), materials={"a": SOFT}))
+
+
+def test_a_mesh_has_its_size_already():
+    mesh = ng.Mesh(blocks().GenerateMesh(maxh=0.5))
+    problem = Problem(geometry=mesh, materials={"upper|lower": Elastic(E=1.0, nu=0.3)})
+    with pytest.raises(ValueError, match=r"maxh=0.1 has no effect"):
+        first_mesh(problem, maxh=0.1)

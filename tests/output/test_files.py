@@ -1,12 +1,16 @@
 """Paths and drafts of files, films, and the nodes of elements."""
 
+import errno
+import os
+import tempfile
+
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 from vtkmodules.vtkCommonDataModel import vtkHigherOrderTriangle
 
-from ngcontact import write_film
+from ngcontact import plot_convergence, write_film
 from ngcontact.fem import von_mises
 from ngcontact.output import slope_triangle
 from ngcontact.output.files import check_path, replacing
@@ -87,3 +91,48 @@ def test_von_mises_of_large_stresses():
     expected = [1.0, np.sqrt(3.0), 0.0]
     for size in (1.0, 1e-200, 1e200):
         assert von_mises(size * pull) / size == pytest.approx(expected, rel=1e-15)
+
+
+def test_runs_are_drawn_with_their_rates(tmp_path):
+    x = np.array([1e2, 1e3, 1e4])
+    runs = {"one": (x, x**-0.5), "two": (x, 0.8 * x**-0.5)}
+    figure = plot_convergence(runs, tmp_path / "a.png", rates={"one": 0.5})
+    [axes] = figure.axes
+    assert [line.get_label() for line in axes.lines[:1]] == ["one"]
+    triangle = next(line.get_xydata() for line in axes.lines if len(line.get_xydata()) == 4)
+    assert (triangle[:, 1] >= 1e-2).all()  # above, where the other run is not
+    assert (tmp_path / "a.png").stat().st_size > 0
+    with pytest.raises(ValueError, match="no run is called three"):
+        plot_convergence(runs, tmp_path / "b.png", rates={"three": 1.0})
+    with pytest.raises(ValueError, match='run "one" is empty'):
+        plot_convergence({"one": []}, tmp_path / "b.png")
+
+
+@pytest.mark.parametrize(
+    ("solutions", "options", "text"),
+    [
+        ([], {}, "give one at least"),
+        ([None], {"titles": ["a", "b"]}, "2 for 1"),
+        ([None], {"seconds": 0.0}, "positive time"),
+    ],
+)
+def test_films_that_cannot_be_are_refused(tmp_path, solutions, options, text):
+    with pytest.raises(ValueError, match=text):
+        write_film(tmp_path / "a.gif", solutions, **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_folder_that_refuses_files_is_refused(tmp_path, monkeypatch):
+    def refuse(dir):  # the keyword of tempfile.TemporaryFile
+        raise OSError(errno.EACCES, "Permission denied")
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
+    with pytest.raises(PermissionError, match=r"refuses new files \(Permission denied\)"):
+        check_path(tmp_path / "a.vtu", ".vtu")
+
+
+def test_protected_file_is_refused(tmp_path, monkeypatch):
+    (tmp_path / "a.vtu").write_text("old")
+    monkeypatch.setattr(os, "access", lambda path, mode: False)
+    with pytest.raises(PermissionError, match="write-protected"):
+        check_path(tmp_path / "a.vtu", ".vtu")

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import pyvista
 from netgen.occ import Compound, Glue
+from ngsolve.meshes import MakeStructured2DMesh
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
 from ngcontact.output import write_series, write_solution
@@ -109,3 +110,38 @@ def test_series_lists_levels_with_both_files(tmp_path):
     bodies, contact = reader.read()
     assert bodies.n_cells == stub(2).mesh.ne
     assert contact.n_points == 9
+
+
+@pytest.mark.parametrize(
+    ("times", "error", "message"),
+    [
+        ([0.0], ValueError, "1 entries, fewer than there are solutions"),
+        ([0.0, 1.0, 2.0], ValueError, "1 entries more than there are solutions"),
+        ([1.0, 1.0], ValueError, "1.0 after 1.0: give finite, increasing"),
+        ([0.0, float("nan")], ValueError, "increasing"),
+        (["a", "b"], TypeError, "'a': give numbers"),
+    ],
+)
+def test_times_that_do_not_fit_are_refused(tmp_path, times, error, message):
+    with pytest.raises(error, match=message):
+        write_series(tmp_path / "run.pvd", [stub(1), stub(1)], times=times)
+
+
+def test_indicators_are_written_only_if_known(tmp_path):
+    solution = stub(2)
+    assert "indicators" not in written(tmp_path, solution).cell_data
+    solution.estimated = True
+    np.testing.assert_array_equal(written(tmp_path, solution)["indicators"], solution.indicators)
+
+
+def test_empty_series_is_refused(tmp_path):
+    with pytest.raises(ValueError, match="the series is empty"):
+        write_series(tmp_path / "run.pvd", [])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_quadrilaterals_are_refused(tmp_path):
+    solution = stub(1, mesh=MakeStructured2DMesh(quads=True, nx=2, ny=2))
+    with pytest.raises(ValueError, match="4 elements of the mesh are no triangles"):
+        write_solution(tmp_path / "a.vtu", solution)
+    assert list(tmp_path.iterdir()) == []

@@ -131,3 +131,11 @@ def test_a_body_that_nothing_resists_is_told(order):
     assert only(lambda: solve(pushed(), maxh=0.5, order=order), PUSHED)
     assert only(lambda: list(adapt(pushed(), order=order)), PUSHED)
     assert len(list(adapt(pushed(), order=order, tolerance=1e-3))) == 1
+
+
+def test_a_flat_obstacle_under_an_inclined_surface_is_silent():
+    """A disc pressed by 0.2 of its radius, with normals 25 degrees off where contact ends."""
+    disc = cases.disc_on_rigid_plane()
+    assert quiet(
+        lambda: solve(replace(disc, displacement={"top": (None, -0.2)}), maxh=0.1, order=2)
+    )

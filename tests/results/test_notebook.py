@@ -1,5 +1,8 @@
 """What a notebook shows, in a kernel of its own: tables, progress, webgui."""
 
+import importlib.util
+import sys
+
 import pytest
 
 pytest.importorskip("anywidget")
@@ -60,3 +63,18 @@ def test_problem_and_solution_are_tables(outputs):
     assert "E = 2.1e+11, nu = 0.3" in problem
     [solution] = shown(outputs[4], "text/html")
     assert "disc_arc" in solution
+
+
+def test_without_the_extra_draw_says_what_to_install(monkeypatch):
+    from ngcontact import solve
+    from tests.results.test_values import two_blocks
+
+    solution = solve(two_blocks(), maxh=1.0)
+    find = importlib.util.find_spec
+    monkeypatch.setattr(
+        sys.modules["ngcontact.solution"],
+        "find_spec",
+        lambda name: None if name == "anywidget" else find(name),
+    )
+    with pytest.raises(ImportError, match=r"anywidget.*ngcontact\[notebook\].*plot\(\)"):
+        solution.draw()

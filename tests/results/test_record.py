@@ -126,3 +126,25 @@ def test_a_problem_shows_all_of_its_data():
         "&quot;upper_contact&quot; with &quot;lower_contact&quot;",
     ):
         assert text in shown
+
+
+def test_a_solution_shows_every_pair():
+    solution = solve(
+        Problem(
+            geometry=blocks(),
+            materials={".*": Elastic(1.0, 0.3)},
+            displacement={"bottom": (0, 0), "top": (0, -0.1)},
+            contact=[Contact("upper_contact", "lower_contact")],
+        ),
+        maxh=1.0,
+        order=2,
+    )
+    shown = cells(solution._repr_html_())
+    assert str(solution.displacement.space.ndof) in shown
+    x, y = solution.contact_force() + 0.0
+    assert f"({x:.6g}, {y:.6g})" in shown
+    assert f"{solution.pressure.max():.6g}" in shown
+    assert f"{solution.active.sum()}/{solution.active.size}" in shown
+    assert "estimate" not in shown
+    assert solution.relative_error_estimate > 0
+    assert "estimate" in cells(solution._repr_html_())

@@ -110,3 +110,11 @@ def test_refusals_name_the_first_point():
     with pytest.raises(ValueError, match="at least 2"):
         solution.along((0, 0), (0, 1), 1)
     assert solution.at(np.zeros((0, 2))).stress.shape == (0, 2, 2)
+
+
+def test_a_table_of_columns():
+    values = solve(two_blocks(), maxh=1.0).along((0.1, 0.1), (0.2, 0.3), 5)
+    table = values.columns()
+    assert {len(column) for column in table.values()} == {5}
+    np.testing.assert_array_equal(table["sxy"], values.stress[:, 0, 1])
+    np.testing.assert_array_equal(table["principal_1"], values.principal_stresses[:, 0])
