@@ -9,23 +9,39 @@ processor. Writes bounds.csv, and bounds.png, the picture of docs/bounds.md.
 
 from __future__ import annotations
 
-import csv
 import math
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 
+import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from drivers.adaptive_study.studies import STUDIES, Name, energy_errors
+from drivers.adaptive_study.runs import STUDIES, Name, energy_errors
 from drivers.command_line import Count, Order, run
+from drivers.tables import Columns, printed, write_csv
 from ngcontact import adapt
 
 SHOWN: tuple[Name, ...] = ("one transition", "hertz a=0.3", "flat punch", "disc on rigid plane")
 ROUND = (1.0, 1.5, 2.0, 3.0, 5.0, 7.0)  # effectivities with a tick
+
+
+COLUMNS: Columns = {
+    "case" + 16 * " ": "{0.case:20s}",
+    " p": "{0.order}",
+    "unknowns": "{0.unknowns}",
+    "   error": "{0.error:.2e}",
+    "estimate": "{0.estimate:.2f}",
+    "bound": "{0.bound:.2f}",
+    "width": "{0.width:.2f}",
+    "run s": "{0.run:.2f}",
+    "bound s": "{0.bounding:.2f}",
+    "bars s": "{0.quantities:.2f}",
+}
 
 
 @dataclass(frozen=True)
@@ -51,25 +67,16 @@ def rows_of(name: Name, order: int, max_dofs: int, reference: int) -> Iterator[R
     spent, started = 0.0, time.process_time()
     for level in adapt(study.problem, order=order, max_dofs=max_dofs):
         estimate = level.error_estimate
-        spent += time.process_time() - started
-        begun = time.process_time()
+        clock = [time.process_time()]
+        spent += clock[0] - started
         bound, (low, high) = level.error_bound, level.energy_bounds
-        proved = time.process_time()
+        clock.append(time.process_time())
         level.quantities()
-        told = time.process_time()
+        clock.append(time.process_time())
         error, norm = measure(level)
-        yield Row(
-            case=name,
-            order=order,
-            unknowns=level.displacement.space.ndof,
-            error=error / norm,
-            estimate=estimate / error,
-            bound=bound / error,
-            width=(high - low) / bound**2,
-            run=spent,
-            bounding=proved - begun,
-            quantities=told - proved,
-        )
+        ratios = error / norm, estimate / error, bound / error, (high - low) / bound**2
+        unknowns, seconds = level.displacement.space.ndof, np.diff(clock).tolist()
+        yield Row(name, order, unknowns, *ratios, spent, *seconds)
         started = time.process_time()
 
 
@@ -77,9 +84,9 @@ def draw(path: Path, rows: Sequence[Row]) -> None:
     """Effectivities against unknowns: bounds solid, estimates dashed."""
     names = list(dict.fromkeys(row.case for row in rows))
     orders = sorted({row.order for row in rows})
-    wide = math.ceil(len(names) / 2)
-    figure = Figure(figsize=(10, 4 * wide), layout="constrained")
-    every = figure.subplots(wide, 2, sharey=True, squeeze=False).ravel()
+    deep = math.ceil(len(names) / 2)
+    figure = Figure(figsize=(10, 4 * deep), layout="constrained")
+    every = figure.subplots(deep, 2, sharey=True, squeeze=False).ravel()
     for axes in every[len(names) :]:
         axes.set_visible(False)
     for axes, name in zip(every, names, strict=False):
@@ -131,22 +138,9 @@ def main(
         All levels.
     """
     out.mkdir(parents=True, exist_ok=True)
-    found = []
-    print(f"{'case':20s}  p  unknowns  error     estimate  bound  width  run s  bound s  bars s")
-    for name in studies:
-        for order in orders:
-            for row in rows_of(name, order, max_dofs, reference):
-                found.append(row)
-                print(
-                    f"{row.case:20s} {row.order:2d}  {row.unknowns:8d}  {row.error:.2e}  "
-                    f"{row.estimate:8.2f}  {row.bound:5.2f}  {row.width:5.2f}  {row.run:5.2f}  "
-                    f"{row.bounding:7.2f}  {row.quantities:6.2f}",
-                    flush=True,
-                )
-    with (out / "bounds.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow([field.name for field in fields(Row)])
-        writer.writerows(map(astuple, found))
+    rows = (rows_of(name, order, max_dofs, reference) for name in studies for order in orders)
+    found = printed(COLUMNS, chain.from_iterable(rows))
+    write_csv(out / "bounds.csv", found)
     draw(out / "bounds.png", found)
     return found
 

@@ -26,6 +26,7 @@ from drivers.reference.cases import Case
 from drivers.reference.curved import Rings
 from drivers.reference.norms import relative_h1_error
 from drivers.reference.straight import Exact, relative_energy_error
+from drivers.tables import Columns, printed
 from ngcontact import Solution, solve
 from ngcontact.adaptivity import refined
 from ngcontact.mesh import first_mesh
@@ -35,26 +36,22 @@ Norm: TypeAlias = Callable[[Solution, Exact], float]
 
 @dataclass(frozen=True)
 class Level:
-    """One row of a table.
-
-    Attributes
-    ----------
-    unknowns : int
-    error : float
-        Relative error, in the energy norm unless the table says another.
-    rate : float
-        Exponent of the mesh size since the level before.
-    steps : int
-        Newton steps from a cold start.
-    identities : float
-        Worst residual of `identities`.
-    """
+    """One row of a table."""
 
     unknowns: int
-    error: float
-    rate: float
-    steps: int
-    identities: float
+    error: float  # relative, in the energy norm unless the table says another
+    rate: float  # exponent of the mesh size since the level before
+    steps: int  # Newton steps from a cold start
+    identities: float  # worst residual of `identities`
+
+
+COLUMNS: Columns = {
+    "unknowns": "{0.unknowns}",
+    "    error": "{0.error:.3e}",
+    "rate": "{0.rate:.2f}",
+    "steps": "{0.steps}",
+    "identities": "{0.identities:.1e}",
+}
 
 
 def identities(solution: Solution) -> float:
@@ -129,41 +126,20 @@ class Run:
 
 @dataclass(frozen=True)
 class Table:
-    """A case with its studies.
-
-    Attributes
-    ----------
-    title : str
-    case : callable
-        Makes the `Case`.
-    runs : tuple of Run
-    norm : callable
-        Relative error of a solution against the exact one.
-    """
+    """A case with its studies."""
 
     title: str
     case: Callable[[], Case]
     runs: tuple[Run, ...]
-    norm: Norm = relative_energy_error
+    norm: Norm = relative_energy_error  # relative error of a solution against the exact one
 
 
-Part: TypeAlias = Literal[
-    "patch",
-    "S1",
-    "S3",
-    "S7",
-    "S8",
-    "S9",
-    "polygon",
-    "circle",
-    "remark 3.3",
-    "remark 3.7",
-    "theorem 3.2",
-    "theorem 3.3",
-    "theorem 3.5",
+Solid: TypeAlias = Literal["S1", "S3", "S7", "S8", "S9", "polygon", "circle"]
+Theorem: TypeAlias = Literal[
+    "remark 3.3", "remark 3.7", "theorem 3.2", "theorem 3.3", "theorem 3.5"
 ]
+Part: TypeAlias = Literal["patch", Solid, Theorem]
 LEVELS = 5  # of order 1, one less at order 2: about 30k unknowns at the end
-
 ISO, SUPER, PHYSICAL = "isoparametric", "superparametric", "physical"
 H1 = relative_h1_error
 
@@ -206,27 +182,11 @@ PATCHES: dict[str, tuple[Callable[[], Case], int]] = {
 }
 
 
-def print_patches() -> dict[str, list[Level]]:
-    """Print patch tests, one level each; their rows by title."""
-    print(f"{'patch test':28s} order  unknowns  error     steps  identities")
-    found = {}
-    for name, (make, order) in PATCHES.items():
-        found[name] = [row for _, row in study(make(), order=order, maxh=0.3, levels=1)]
-        for row in found[name]:
-            print(
-                f"{name:28s} {order:5d}  {row.unknowns:8d}  {row.error:.2e}  {row.steps:5d}  "
-                f"{row.identities:.1e}"
-            )
-    return found
-
-
 def print_table(title: str, table: Table, one: Run, levels: int) -> list[Level]:
     """Print the rows of one study as they come, then its mean rate and, of rings, P0 and Pn."""
     print(f"\n{title}")
-    print("unknowns  error      rate  steps  identities")
-    rows = []
-    case = table.case()
-    levels_of = study(
+    case, last = table.case(), list[Solution]()
+    solved = study(
         case,
         order=one.order,
         element=one.element,
@@ -234,21 +194,21 @@ def print_table(title: str, table: Table, one: Run, levels: int) -> list[Level]:
         levels=levels,
         norm=table.norm,
     )
-    for solved, row in levels_of:
-        solution = solved
-        rows.append(row)
-        print(
-            f"{row.unknowns:8d}  {row.error:.3e}  {row.rate:4.2f}  {row.steps:5d}  "
-            f"{row.identities:.1e}"
-        )
-    print(f"rate of the last three levels: {mean_rate(rows):.2f}, to expect: {one.expected:g}")
+
+    def rows() -> Iterator[Level]:
+        for solution, row in solved:
+            last[:] = [solution]
+            yield row
+
+    found = printed(COLUMNS, rows())
+    print(f"rate of the last three levels: {mean_rate(found):.2f}, to expect: {one.expected:g}")
     if isinstance(case.exact, Rings):
-        mean, amplitude = cases.harmonics(solution, radius=1.0, n=2)
+        mean, amplitude = cases.harmonics(last[0], radius=1.0, n=2)
         print(
             f"pressure: P0 {mean:.7f} (error {mean / case.exact.P0 - 1:+.1e}), "
             f"P2 {amplitude:.7f} (error {amplitude / case.exact.Pn - 1:+.1e})"
         )
-    return rows
+    return found
 
 
 def main(
@@ -273,21 +233,19 @@ def main(
     dict of list of Level
         Rows by title of the table.
     """
-    with printed_in(out, "convergence.txt"):
-        return _tables(parts, levels)
-
-
-def _tables(parts: Sequence[Part], levels: int) -> dict[str, list[Level]]:
-    """Print all tables; their rows by title."""
     found: dict[str, list[Level]] = {}
-    for part in parts:
-        if part == "patch":
-            found |= print_patches()
-            continue
-        table = TABLES[part]
-        for one in table.runs:
-            title = f"{table.title}, {one.element}, order {one.order}"
-            found[title] = print_table(title, table, one, max(1, levels + 1 - one.order))
+    with printed_in(out, "convergence.txt"):
+        for part in parts:
+            if part == "patch":
+                for name, (make, order) in PATCHES.items():
+                    print(f"\npatch test: {name}, order {order}")
+                    rows = study(make(), order=order, maxh=0.3, levels=1)
+                    found[name] = printed(COLUMNS, (row for _, row in rows))
+                continue
+            table = TABLES[part]
+            for one in table.runs:
+                title = f"{table.title}, {one.element}, order {one.order}"
+                found[title] = print_table(title, table, one, max(1, levels + 1 - one.order))
     return found
 
 

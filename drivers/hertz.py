@@ -14,14 +14,15 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, TypeAlias
+from typing import Annotated, Any, TypeAlias
 
 import ngsolve as ng
 import numpy as np
 from cyclopts import Parameter
 
 from drivers.command_line import Count, Order, Positive, run
-from drivers.tables import last_level, print_comparison
+from drivers.reference.half_spaces import Hertz, plane_modulus, together
+from drivers.tables import Columns, last_level
 from ngcontact import Contact, Elastic, Problem, Solution, adapt
 from ngcontact.geometries import disc_on_block
 
@@ -38,11 +39,11 @@ Law: TypeAlias = Annotated[tuple[float, float], Parameter(validator=_check)]
 
 @dataclass(frozen=True)
 class Quantities:
-    """Contact `force` per unit thickness, `peak` pressure and `half_width` of a line contact."""
+    """Contact `force`, of lines per thickness, `peak` pressure, and half-width or radius `a`."""
 
     force: float
     peak: float
-    half_width: float
+    a: float
 
 
 def pressed(radius: float, press: float, disc: Elastic, block: Elastic) -> Problem:
@@ -56,43 +57,56 @@ def pressed(radius: float, press: float, disc: Elastic, block: Elastic) -> Probl
     )
 
 
-def measured(solution: Solution) -> Quantities:
-    """What the computed half says about the whole contact."""
-    transitions = solution.transitions()
-    return Quantities(
-        force=2 * float(solution.contact_force()[1]),
-        peak=float(solution.pressure.max()),
-        half_width=float(transitions[:, 0].max()) if len(transitions) else math.nan,
-    )
+def computed_and_expected(
+    problem: Problem,
+    columns: Columns,
+    expected: Callable[[float], tuple[float, float]],
+    halves: int = 1,
+    **options: Any,
+) -> tuple[Solution, Quantities, Quantities]:
+    """The last level of an adaptive run, what it says, and what Hertz does under its force.
+
+    Every level is printed. `expected` gives a and the peak; the force counts `halves` times.
+    """
+
+    def measured(solution: Solution) -> Quantities:
+        transitions = solution.transitions()
+        return Quantities(
+            force=halves * float(solution.contact_force()[1]),
+            peak=float(solution.pressure.max()),
+            a=float(transitions[:, 0].max()) if len(transitions) else math.nan,
+        )
+
+    solution, computed = last_level(adapt(problem, **options), measured, columns)
+    a, peak = expected(computed.force)
+    return solution, computed, Quantities(computed.force, peak, a)
 
 
-def hertz(force: float, radius: float, *laws: tuple[float, float]) -> Quantities:
-    """Hertz's line contact of a cylinder and a half-space under the same force (Johnson 1985)."""
-    stiffness = 1 / sum((1 - nu**2) / E for E, nu in laws)
-    return Quantities(
-        force=force,
-        peak=math.sqrt(force * stiffness / (math.pi * radius)),
-        half_width=math.sqrt(4 * force * radius / (math.pi * stiffness)),
-    )
+def compare(name: str, radius: float, computed: Quantities, expected: Quantities) -> None:
+    """Print computed and expected values beside each other; `name` is that of a."""
+    print(f"\n{f'At a/R = {computed.a / radius:.4f}':22s}   computed      Hertz  difference")
+    for title, x, y in (
+        ("peak pressure, MPa", computed.peak / 1e6, expected.peak / 1e6),
+        (name, computed.a * 1e3, expected.a * 1e3),
+    ):
+        print(f"{title:22s} {x:10.4f} {y:10.4f}  {(x / y - 1) * 100:+.3f} %")
 
 
-COLUMNS: dict[str, Callable[[Quantities], str]] = {
-    "   force/N/m": lambda q: f"{q.force:.1f}",
-    "peak/MPa": lambda q: f"{q.peak / 1e6:.2f}",
-    "half-width/mm": lambda q: f"{q.half_width * 1e3:.5f}",
-}
-
-
-def draw(
-    path: Path, solution: Solution, peak: float, half_width: float, mirror: str | None = None
-) -> None:
+def draw(path: Path, solution: Solution, expected: Quantities, mirror: str | None = None) -> None:
     """Picture in mm and MPa, Hertz's pressure p0 (1 - (x/a)^2)^(1/2) over the computed one."""
 
     def pressure(x: np.ndarray) -> np.ndarray:
-        return peak * np.sqrt(np.maximum(1 - (x / half_width) ** 2, 0.0))
+        return expected.peak * np.sqrt(np.maximum(1 - (x / expected.a) ** 2, 0.0))
 
     units = {"length": ("mm", 1e-3), "stress": ("MPa", 1e6)}
     solution.plot(path, units=units, profile={"Hertz": pressure}, mirror=mirror)
+
+
+COLUMNS: Columns = {
+    "   force/N/m": "{0.force:.1f}",
+    "peak/MPa": lambda q: f"{q.peak / 1e6:.2f}",
+    "half-width/mm": lambda q: f"{q.a * 1e3:.5f}",
+}
 
 
 def main(
@@ -138,21 +152,23 @@ def main(
         f"A disc of radius {radius * 1e3:g} mm, E = {disc[0] / 1e9:g} GPa, nu = {disc[1]:g}, "
         f"pressed on a block, E = {block[0] / 1e9:g} GPa, nu = {block[1]:g}"
     )
-    problem = pressed(radius, press, Elastic(*disc), Elastic(*block))
-    levels = adapt(problem, order=order, tolerance=tolerance, max_dofs=max_dofs)
-    solution, computed = last_level(levels, measured, COLUMNS)
-    expected = hertz(computed.force, radius, disc, block)
-    rows = {
-        "peak pressure, MPa": (computed.peak / 1e6, expected.peak / 1e6),
-        "half-width, mm": (computed.half_width * 1e3, expected.half_width * 1e3),
-    }
-    print_comparison(computed.half_width / radius, rows)
+    modulus = together([plane_modulus(*disc), plane_modulus(*block)])
+    solution, computed, expected = computed_and_expected(
+        pressed(radius, press, Elastic(*disc), Elastic(*block)),
+        COLUMNS,
+        lambda force: Hertz(force, radius, modulus).cylinder(),
+        halves=2,
+        order=order,
+        tolerance=tolerance,
+        max_dofs=max_dofs,
+    )
+    compare("half-width, mm", radius, computed, expected)
     print("\nThe computed half, with errors (N/m, Pa, m):")
     print(solution.quantities())
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         solution.write(out / "hertz.vtu")
-        draw(out / "hertz.png", solution, expected.peak, expected.half_width, mirror="axis")
+        draw(out / "hertz.png", solution, expected, mirror="axis")
         print(f"\nWritten: {out}/hertz.vtu, hertz_contact.vtp, hertz.png")
     return computed, expected
 

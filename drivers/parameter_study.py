@@ -9,7 +9,6 @@ study by one process first, so that numbers and times can be compared. Writes st
 
 from __future__ import annotations
 
-import csv
 import math
 import multiprocessing
 import os
@@ -20,14 +19,24 @@ from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
 from drivers.command_line import Count, Order, Positive, run
-from ngcontact import Contact, Elastic, Problem, adapt
-from ngcontact.geometries import disc_on_block
+from drivers.hertz import pressed
+from drivers.reference.half_spaces import Hertz, plane_modulus, together
+from drivers.tables import Columns, printed, write_csv
+from ngcontact import Elastic, Problem, adapt
 
 Row: TypeAlias = dict[str, float]
 Task: TypeAlias = tuple[Problem, int, float]  # with order and tolerance
 Engine: TypeAlias = Literal["processes", "joblib", "dask"]
 
 BLOCK, NU = 70e9, 0.3  # of the block, Pa; of both
+COLUMNS: Columns = {
+    "depth/R": "{0[depth]:.5f}",
+    "E/GPa": lambda row: f"{row['E'] / 1e9:.0f}",
+    "unknowns": "{0[unknowns]}",
+    "force kN/m": lambda row: f"{row['contact_0_force_y'] / 1e3:.1f}",
+    "peak/MPa": lambda row: f"{row['contact_0_peak_pressure'] / 1e6:.1f}",
+    "Hertz/MPa": lambda row: f"{row['hertz_peak'] / 1e6:.1f}",
+}
 
 
 def parameters(solves: int) -> list[tuple[float, float]]:
@@ -36,17 +45,6 @@ def parameters(solves: int) -> list[tuple[float, float]]:
     depths = math.ceil(solves / len(moduli))
     grid = [(0.001 * 1.1**k, E) for k in range(depths) for E in moduli]
     return grid[:solves]
-
-
-def pressed(depth: float, E: float) -> Problem:
-    """A disc of radius 1 m, pressed on a block by a depth (m)."""
-    return Problem(
-        geometry=disc_on_block(),
-        materials={"disc": Elastic(E=E, nu=NU), "block": Elastic(E=BLOCK, nu=NU)},
-        displacement={"block_bottom": (0, 0), "disc_top": (0, -depth)},
-        sliding="axis",
-        contact=[Contact("disc_arc", "block_top", direction=(0, -1))],
-    )
 
 
 def solved(task: Task) -> Row:
@@ -107,23 +105,14 @@ def difference(first: Sequence[Row], second: Sequence[Row]) -> float:
     return worst
 
 
-def hertz_peak(force: float, E: float) -> float:
-    """Peak pressure (Pa) of Hertz's line contact under a force (N/m) on half of a disc of 1 m."""
-    stiffness = 1 / ((1 - NU**2) * (1 / E + 1 / BLOCK))
-    return math.sqrt(2 * force * stiffness / math.pi)
-
-
 def table(grid: Sequence[tuple[float, float]], rows: Sequence[Row]) -> list[dict[str, Any]]:
-    """Parameters, Hertz's peak and the record, one dict a solve."""
-    return [
-        {
-            "depth": depth,
-            "E": E,
-            "hertz_peak": hertz_peak(row["contact_0_force_y"], E),
-            **row,
-        }
-        for (depth, E), row in zip(grid, rows, strict=True)
-    ]
+    """Parameters, Hertz's peak under the force of both halves, and the record, one dict a solve."""
+    found = []
+    for (depth, E), row in zip(grid, rows, strict=True):
+        stiffness = together([plane_modulus(E, NU), plane_modulus(BLOCK, NU)])
+        _, peak = Hertz(2 * row["contact_0_force_y"], 1.0, stiffness).cylinder()
+        found.append({"depth": depth, "E": E, "hertz_peak": peak, **row})
+    return found
 
 
 def main(
@@ -161,7 +150,10 @@ def main(
     """
     one_thread()
     grid = parameters(solves)
-    tasks = [(pressed(*values), order, tolerance) for values in grid]
+    tasks = [
+        (pressed(1.0, depth, Elastic(E, NU), Elastic(BLOCK, NU)), order, tolerance)
+        for depth, E in grid
+    ]
     found, seconds = [], []
     for count in (1, processes):
         started = time.perf_counter()
@@ -171,19 +163,10 @@ def main(
     worst = difference(*found)
     print(f"speed-up {seconds[0] / seconds[1]:.2f}, largest relative difference {worst:.1e}\n")
     rows = table(grid, found[1])
-    print("   depth/R   E/GPa  unknowns  force kN/m  peak/MPa  Hertz/MPa")
-    for row in rows[:: max(1, solves // 8)]:
-        print(
-            f"{row['depth']:10.5f} {row['E'] / 1e9:7.0f} {row['unknowns']:9d} "
-            f"{row['contact_0_force_y'] / 1e3:11.1f} {row['contact_0_peak_pressure'] / 1e6:9.1f} "
-            f"{row['hertz_peak'] / 1e6:10.1f}"
-        )
+    printed(COLUMNS, rows[:: max(1, solves // 8)])
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
-        with (out / "study.csv").open("w", newline="") as file:
-            writer = csv.DictWriter(file, fieldnames=list(rows[0]))
-            writer.writeheader()
-            writer.writerows(rows)
+        write_csv(out / "study.csv", rows)
         print(f"\nWritten: {out}/study.csv")
     return rows, worst
 

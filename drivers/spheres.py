@@ -10,27 +10,24 @@ spheres.vtu, spheres_contact.vtp, spheres_revolved.vtu, spheres_revolved_contact
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
 
 import ngsolve as ng
 
 from drivers.command_line import Count, Order, Positive, run
-from drivers.hertz import ALUMINIUM, STEEL, Law, draw
-from drivers.tables import last_level, print_comparison
-from ngcontact import Contact, Elastic, Problem, Solution, adapt
+from drivers.hertz import (
+    ALUMINIUM,
+    STEEL,
+    Law,
+    Quantities,
+    compare,
+    computed_and_expected,
+    draw,
+)
+from drivers.reference.half_spaces import Hertz, plane_modulus, together
+from drivers.tables import Columns
+from ngcontact import Contact, Elastic, Problem
 from ngcontact.geometries import disc_on_disc
-
-
-@dataclass(frozen=True)
-class Quantities:
-    """Contact `force`, `peak` pressure and `radius` of the circle of contact."""
-
-    force: float
-    peak: float
-    radius: float
 
 
 def pressed(radii: tuple[float, float], approach: float, upper: Elastic, lower: Elastic) -> Problem:
@@ -44,28 +41,10 @@ def pressed(radii: tuple[float, float], approach: float, upper: Elastic, lower: 
     )
 
 
-def measured(solution: Solution) -> Quantities:
-    """What a solution says of the contact."""
-    transitions = solution.transitions()
-    return Quantities(
-        force=float(solution.contact_force()[1]),
-        peak=float(solution.pressure.max()),
-        radius=float(transitions[:, 0].max()) if len(transitions) else math.nan,
-    )
-
-
-def hertz(force: float, radii: tuple[float, float], *laws: tuple[float, float]) -> Quantities:
-    """Hertz's contact of two balls under the same force (Johnson 1985, chapter 4)."""
-    stiffness = 1 / sum((1 - nu**2) / E for E, nu in laws)
-    radius = 1 / sum(1 / r for r in radii)
-    a = (3 * force * radius / (4 * stiffness)) ** (1 / 3)
-    return Quantities(force=force, peak=3 * force / (2 * math.pi * a**2), radius=a)
-
-
-COLUMNS: dict[str, Callable[[Quantities], str]] = {
-    "     force/N": lambda q: f"{q.force:.4f}",
+COLUMNS: Columns = {
+    "     force/N": "{0.force:.4f}",
     "peak/MPa": lambda q: f"{q.peak / 1e6:.2f}",
-    "  radius/mm": lambda q: f"{q.radius * 1e3:.6f}",
+    "  radius/mm": lambda q: f"{q.a * 1e3:.6f}",
 }
 
 
@@ -117,20 +96,21 @@ def main(
         f"A ball of radius {radius * 1e3:g} mm, E = {upper[0] / 1e9:g} GPa, nu = {upper[1]:g}, on "
         f"one of radius {lower_radius * 1e3:g} mm, E = {lower[0] / 1e9:g} GPa, nu = {lower[1]:g}"
     )
-    problem = pressed(radii, press * radius, Elastic(*upper), Elastic(*lower))
-    levels = adapt(problem, order=order, tolerance=tolerance, max_dofs=max_dofs)
-    solution, computed = last_level(levels, measured, COLUMNS)
-    expected = hertz(computed.force, radii, upper, lower)
-    rows = {
-        "peak pressure, MPa": (computed.peak / 1e6, expected.peak / 1e6),
-        "radius of contact, mm": (computed.radius * 1e3, expected.radius * 1e3),
-    }
-    print_comparison(computed.radius / min(radii), rows)
+    modulus = together([plane_modulus(*upper), plane_modulus(*lower)])
+    solution, computed, expected = computed_and_expected(
+        pressed(radii, press * radius, Elastic(*upper), Elastic(*lower)),
+        COLUMNS,
+        lambda force: Hertz(force, together(radii), modulus).sphere(),
+        order=order,
+        tolerance=tolerance,
+        max_dofs=max_dofs,
+    )
+    compare("radius of contact, mm", min(radii), computed, expected)
     if out is not None:
         out.mkdir(parents=True, exist_ok=True)
         solution.write(out / "spheres.vtu")
         solution.revolved(out / "spheres_revolved.vtu")
-        draw(out / "spheres.png", solution, expected.peak, expected.radius)
+        draw(out / "spheres.png", solution, expected)
         print(f"\nWritten: {out}/spheres.vtu, _contact.vtp, _revolved.vtu, spheres.png")
     return computed, expected
 

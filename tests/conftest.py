@@ -1,7 +1,5 @@
 """Fixtures of several rooms. Nothing here loads NGSolve: tests of arrays run without it."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 

@@ -1,7 +1,5 @@
 """Meshes as an import gives them: no geometry, any nodes on straight contact lines."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 

@@ -1,9 +1,4 @@
-"""Runs that several tests read: solutions are immutable, so are estimates and bounds made once.
-
-A test that counts work or warnings, or changes a mesh, makes a run of its own.
-"""
-
-from __future__ import annotations
+"""Runs that several tests read: solutions are immutable, so are estimates and bounds made once."""
 
 from collections.abc import Callable
 from functools import lru_cache

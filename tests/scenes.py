@@ -1,7 +1,5 @@
 """Scenes and meshes that several test modules use."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 
@@ -110,11 +108,7 @@ def unit_load(trace, pattern, parts):
 
 
 def solved_with_load(problem, mesh, order, pattern, parts):
-    """Discrete problem with a unit traction along y on parts of a contact line, and its solution.
-
-    Parts that end inside segments are integrated exactly, so that trials of uniform pressure have
-    an exact solution.
-    """
+    """Discrete problem with a unit traction along y on parts of a line, and its solution."""
     d = discretise(problem, mesh, order, "isoparametric")
     load = unit_load(d.space.trace, pattern, parts)
     nodal = np.concatenate([np.zeros_like(load), load])

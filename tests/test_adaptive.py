@@ -1,39 +1,29 @@
 """The adaptive loop and its entry points: validity of levels, stopping, budgets, bad arguments."""
 
-from __future__ import annotations
-
-import logging
-import math
 from dataclasses import replace
 from functools import partial
-from itertools import islice
 
 import ngsolve as ng
 import numpy as np
 import pytest
 
 from drivers.reference import cases
-from drivers.reference.straight import patch, relative_energy_error
+from drivers.reference.straight import relative_energy_error
 from ngcontact import (
     Contact,
-    ContactError,
     ContactWarning,
     Elastic,
-    NoEquilibriumError,
     Problem,
     adapt,
     adaptive,
     solve,
 )
 from ngcontact.adaptivity import Refinement
-from ngcontact.estimator import Estimate
-from ngcontact.geometries import blocks, disc_on_block
 from ngcontact.geometries import disc as quarter_disc
-from ngcontact.mesh import diameters, first_mesh
-from tests.scenes import unmatched_blocks
+from ngcontact.geometries import disc_on_block
+from ngcontact.mesh import first_mesh
 
 SOFT = Elastic(E=1.0, nu=0.3)
-FAIL = "error::ngcontact.ContactWarning"
 
 
 def disc() -> Problem:
@@ -47,16 +37,6 @@ def disc() -> Problem:
     )
 
 
-def unloaded() -> Problem:
-    """Blocks that touch, without any load."""
-    return Problem(
-        geometry=blocks(),
-        materials={"upper": SOFT, "lower": SOFT},
-        displacement={"top": (0, 0), "bottom": (0, 0)},
-        contact=[Contact("upper_contact", "lower_contact")],
-    )
-
-
 def unknowns(solution):
     return solution.displacement.space.ndof
 
@@ -67,70 +47,24 @@ def refinement(**changes):
     return Refinement(**(default | changes))
 
 
-def marked_once(problem, maxh=None, **options):
-    """The levels of a run that plans no further than one marking."""
-    plain = refinement(**{"max_dofs": 100_000, **options}, growth=1.0)
-    return adaptive.levels(problem, first_mesh(problem, maxh), plain)
-
-
-def decay(values, sizes):
-    """Exponent r of values ~ sizes^r by least squares."""
-    return np.polyfit(np.log(sizes), np.log(values), 1)[0]
-
-
-# --- levels ---
+def state(solution):
+    """What refinement in place would change."""
+    rule = {ng.TRIG: ng.IntegrationRule(ng.TRIG, 3)}
+    u = solution.displacement(solution.mesh.MapToAllElements(rule, ng.VOL)).copy()
+    vertices = np.array(solution.mesh.ngmesh.Coordinates())
+    return u, vertices, solution.pressure.copy(), solution.indicators.copy()
 
 
 def test_earlier_levels_stay_valid():
     """Refinement in place would change older functions silently."""
-    levels = adapt(disc(), maxh=0.6, order=2, max_dofs=4000)
-    kept, seen = [], []
-    rule = ng.IntegrationRule(ng.TRIG, 3)
-    for solution in levels:
-        points = solution.mesh.MapToAllElements({ng.TRIG: rule}, ng.VOL)
-        kept.append(solution)
-        seen.append(
-            (
-                solution.displacement(points).copy(),
-                ng.Integrate(ng.CF(1), solution.mesh),
-                solution.pressure.copy(),
-                solution.indicators.copy(),
-                np.array(solution.mesh.ngmesh.Coordinates()),
-            )
-        )
-    assert len(kept) >= 5
-    for solution, (values, area, pressure, indicators, coordinates) in zip(kept, seen, strict=True):
-        points = solution.mesh.MapToAllElements({ng.TRIG: rule}, ng.VOL)
-        assert (solution.displacement(points) == values).all()
-        assert ng.Integrate(ng.CF(1), solution.mesh) == area
-        assert (np.array(solution.mesh.ngmesh.Coordinates()) == coordinates).all()
-        assert (solution.pressure == pressure).all()
-        assert (solution.indicators == indicators).all()
+    seen = [(s, state(s)) for s in adapt(disc(), maxh=0.6, order=2, max_dofs=4000)]
+    assert len(seen) >= 5
+    for solution, before in seen:
+        assert all(map(np.array_equal, state(solution), before))
         # What is computed late agrees with what would have been computed at once.
         fresh = replace(solution, work=dict(solution.work))
         assert fresh.error_estimate == solution.error_estimate
         assert max(fresh.residuals.values()) < 1e-10
-
-
-def test_every_level_has_more_unknowns_and_a_smaller_estimate():
-    levels = list(adapt(cases.one_transition().problem, maxh=0.4, order=2, max_dofs=16_000))
-    sizes = [unknowns(s) for s in levels]
-    estimates = [s.relative_error_estimate for s in levels]
-    assert len(levels) >= 5
-    assert (np.diff(sizes) > 0).all()
-    assert (np.diff(estimates) < 0).all()
-
-
-def test_the_marked_part_alone_is_refined():
-    once = marked_once(cases.one_transition().problem, maxh=0.28, order=2, max_dofs=3000)
-    first, second = islice(once, 2)
-    # Doerfler's half of the squares lies in few elements, here at the transition.
-    assert second.mesh.ne < 2 * first.mesh.ne
-    # Planned further, it is refined further: elements away from the transition stay.
-    _, planned = islice(adapt(cases.one_transition().problem, maxh=0.28, order=2), 2)
-    largest = diameters(first.mesh).max()
-    assert diameters(planned.mesh).max() == pytest.approx(largest, rel=1e-14)
-    assert diameters(planned.mesh).min() < diameters(second.mesh).min() / 1.9
 
 
 def sides_at_the_end(solution):
@@ -153,67 +87,6 @@ def test_elements_in_which_contact_ends_are_always_refined():
     assert sides_at_the_end(last) == pytest.approx(1 / 8)
 
 
-def test_the_estimator_decides_where_to_refine(monkeypatch):
-    """It is a function of what was solved."""
-    problem, seen = cases.one_transition().problem, []
-
-    def left(solved):
-        """Indicators that ask for the elements on the left alone."""
-        size = solved.displacement.space.ndof
-        seen.append((size, len(solved.pairs), tuple(solved.stress.dims)))
-        x = np.array(ng.Integrate(ng.x, solved.mesh, element_wise=True))
-        return Estimate(indicators=np.maximum(-x, 0.0), parts={})
-
-    monkeypatch.setattr("ngcontact.estimator.residual.estimate", left)
-    chosen = refinement(order=2, max_dofs=2000)
-    mesh = first_mesh(problem, 0.5)
-    solutions = list(adaptive.levels(problem, mesh, chosen))
-    assert seen == [(unknowns(s), 1, (2, 2)) for s in solutions]
-    centre = np.array(ng.Integrate(ng.x, solutions[-1].mesh, element_wise=True))
-    assert np.count_nonzero(centre < 0) > 3 * np.count_nonzero(centre > 0)
-
-
-@pytest.mark.parametrize("theta", [0.2, 1.0])
-def test_theta_is_the_share_that_is_marked(theta):
-    problem = cases.one_transition().problem
-    first, second = islice(marked_once(problem, order=1, theta=theta), 2)
-    if theta == 1:
-        assert second.mesh.ne >= 3.9 * first.mesh.ne
-    else:
-        assert second.mesh.ne < 1.5 * first.mesh.ne
-
-
-@pytest.mark.parametrize("order", [2])
-def test_hertz_contact_decays_at_the_optimal_rate(order):
-    """S3: u ~ r^(3/2) at the ends, N^-p/2 with the right meshes and N^-3/4 with uniform ones."""
-    case = cases.hertz_contact()
-    levels = list(adapt(case.problem, maxh=0.28, order=order, max_dofs=6000))
-    errors = [relative_energy_error(s, case.exact) for s in levels]
-    sizes = [unknowns(s) for s in levels]
-    # Measured -1.06 and -1.00; theory -1, band 15 %.
-    assert decay(errors, sizes) == pytest.approx(-order / 2, rel=0.15)
-    assert decay([s.relative_error_estimate for s in levels], sizes) == pytest.approx(
-        -order / 2, rel=0.15
-    )
-
-
-@pytest.mark.parametrize(("half_width", "order"), [(0.3, 4), (0.05, 3)])
-@pytest.mark.study(witness=["0.3-4"])
-def test_planned_levels_are_few_and_as_good(half_width, order):
-    """Energy errors at equal unknowns, against one marking a level."""
-    case, most = cases.hertz_contact(half_width=half_width), 10_000
-    planned = list(adapt(case.problem, order=order, max_dofs=most))
-    single = list(marked_once(case.problem, order=order, max_dofs=most))
-    assert len(planned) <= 0.7 * len(single)  # measured 0.5, 0.4
-    size, error = (
-        np.log([f(s) for s in single])
-        for f in (unknowns, lambda s: relative_energy_error(s, case.exact))
-    )
-    for solution in planned[2:]:  # the second is planned on a mesh that does not resolve the zone
-        expected = np.exp(np.interp(np.log(unknowns(solution)), size, error))
-        assert relative_energy_error(solution, case.exact) <= 1.5 * expected
-
-
 def test_orders_rise_with_accuracy():
     """Without order and tolerance: 3 as long as errors are of percents, then 4."""
     case = cases.hertz_contact()
@@ -231,133 +104,15 @@ def test_orders_rise_with_accuracy():
     assert errors[-1] <= 1.5 * relative_energy_error(single[-1], case.exact)
 
 
-def test_the_order_is_chosen_for_a_tolerance():
-    problem = cases.partly_opening_block()
-    assert {level.order for level in adapt(problem, order=None, tolerance=0.05)} == {3}
-    *_, last = adapt(problem, order=None, tolerance=0.01)
-    assert last.order == 4
-    *_, other = adapt(problem, order=2, tolerance=0.1)
-    assert {s.order for s in adapt(problem, order=None, tolerance=0.1, start=other)} == {2}
-    assert {s.order for s in adapt(problem, order=None, element="physical", max_dofs=2000)} == {1}
-
-
-def test_with_a_tolerance_planning_ends_there():
-    """Meshes hardly larger than those of single markings, which grow by a tenth to a half."""
-    problem = cases.partly_opening_block()
-    *_, last = adapt(problem, order=3, tolerance=2e-3)
-    assert last.relative_error_estimate <= 2e-3
-    *_, single = marked_once(problem, order=3, tolerance=2e-3)
-    assert unknowns(last) <= 1.5 * unknowns(single)
-
-
-@pytest.mark.parametrize("order", [1, 2, 3])
-@pytest.mark.study(witness=["2"])
-def test_warm_starts_leave_few_newton_steps(order):
-    for make in (disc, lambda: cases.hertz_contact().problem):
-        levels = list(adapt(make(), maxh=0.3, order=order, max_dofs=4000 * order))
-        steps = [len(s.steps) for s in levels]
-        assert len(levels) >= 4
-        assert max(steps[2:]) <= 3
-        assert np.mean(steps[2:]) <= 2
-        assert all(s.work["factorizations"] == 1 for s in levels[1:])
-
-
-def test_the_given_mesh_is_not_refined():
-    mesh = first_mesh(cases.one_transition().problem, 0.5)
-    count, area = mesh.ne, ng.Integrate(ng.CF(1), mesh)
-    levels = list(adapt(replace(cases.one_transition().problem, geometry=mesh), max_dofs=3000))
-    assert levels[0].mesh is mesh
-    assert len(levels) >= 3
-    assert mesh.ne == count
-    assert ng.Integrate(ng.CF(1), mesh) == area
-
-
-def test_the_loop_is_the_same_every_time():
-    runs = [list(adapt(disc(), order=2, max_dofs=900)) for _ in range(2)]
-    for first, second in zip(*runs, strict=True):
-        assert unknowns(first) == unknowns(second)
-        assert first.steps == second.steps
-        assert (first.active == second.active).all()
-        # Sums of the linear algebra are ordered by the alignment of arrays in memory.
-        assert first.energy == pytest.approx(second.energy, rel=1e-13)
-
-
-def test_levels_are_logged(caplog):
-    with caplog.at_level(logging.INFO, logger="ngcontact"):
-        levels = list(adapt(cases.one_transition().problem, maxh=0.5, order=1, max_dofs=300))
-    for solution in levels:
-        assert str(solution) in caplog.text
-
-
-def test_solutions_print_on_one_line():
-    *_, solution = adapt(disc(), order=2, max_dofs=1000)
-    line = str(solution)
-    assert "\n" not in line
-    assert str(unknowns(solution)) in line
-    assert f"{solution.relative_error_estimate:.2e}" in line
-    assert f"{np.linalg.norm(solution.contact_force()):.6g}" in line
-
-
-# --- where it stops ---
-
-
-@pytest.mark.parametrize(
-    ("ask", "error", "asked"),
-    [
-        (lambda run: run.pressure, AttributeError, "has no pressure"),
-        (lambda run: run[-1], TypeError, r"has no \[-1\]"),
-    ],
-)
-def test_a_run_that_is_taken_for_a_solution_says_how_to_get_one(ask, error, asked):
-    run = adapt(cases.one_transition().problem, order=2, max_dofs=3000)
-    with pytest.raises(error, match=rf"{asked}: .*\*_, solution = adapt\(...\)"):
-        ask(run)
-    first = next(run)  # which is still to be had
-    *_, last = run
-    assert last.displacement.space.ndof > first.displacement.space.ndof
-
-
-def test_a_run_that_is_closed_ends():
-    run = adapt(cases.one_transition().problem, order=2)
-    next(run)
-    run.close()
-    assert list(run) == []
-
-
-@pytest.mark.parametrize("tolerance", [0.2, 0.05])
-def test_it_stops_at_the_tolerance(tolerance):
-    problem = cases.one_transition().problem
-    levels = list(adapt(problem, maxh=0.4, order=2, tolerance=tolerance))
-    estimates = [s.relative_error_estimate for s in levels]
-    assert estimates[-1] <= tolerance
-    assert all(e > tolerance for e in estimates[:-1])
-
-
 def test_an_exact_solution_is_not_refined(reproduced):
     case, order = reproduced
     [solution] = adapt(case.problem, maxh=0.4, order=order)
     assert relative_energy_error(solution, case.exact) < 1e-11
 
 
-def test_no_load_is_exact_as_well():
-    [solution] = adapt(unloaded(), order=2)
-    assert np.abs(solution.displacement.vec.FV().NumPy()).max() == 0
-    assert solution.relative_error_estimate == 0
-    assert solution.energy == 0
-    assert max(solution.residuals.values()) == 0
-
-
 @pytest.mark.parametrize(
     ("order", "element"),
-    [
-        (1, "isoparametric"),
-        (2, "isoparametric"),
-        (3, "isoparametric"),
-        (4, "isoparametric"),
-        (1, "superparametric"),
-        (2, "superparametric"),
-        (1, "physical"),
-    ],
+    [(1, "physical"), *((p, "isoparametric") for p in (1, 2, 3, 4)), (2, "superparametric")],
 )
 @pytest.mark.study(witness=["4-isoparametric", "3-isoparametric", "2-superparametric"])
 def test_no_level_exceeds_the_number_of_unknowns(order, element):
@@ -376,38 +131,21 @@ def test_no_level_exceeds_the_number_of_unknowns(order, element):
         assert max(found) <= budget
 
 
-# --- arguments ---
-
-
 BAD = [
     ("theta", 0, ValueError),
-    ("theta", -0.5, ValueError),
     ("theta", 1.01, ValueError),
-    ("theta", math.nan, ValueError),
     ("theta", "0.5", TypeError),
-    ("theta", None, TypeError),
     ("tolerance", 0, ValueError),
-    ("tolerance", -1e-3, ValueError),
-    ("tolerance", math.nan, ValueError),
     ("tolerance", "1e-3", TypeError),
     ("tolerance", 5, ValueError),  # percent is not meant, nor an absolute error
-    ("tolerance", 1, ValueError),
     ("max_dofs", 0, ValueError),
-    ("max_dofs", -100, ValueError),
-    ("max_dofs", math.nan, ValueError),
     ("max_dofs", "many", TypeError),
-    ("max_dofs", None, TypeError),
     ("order", 0, ValueError),
     ("order", 5, ValueError),
-    ("order", -1, ValueError),
     ("order", 2.0, TypeError),
-    ("order", "2", TypeError),
     ("order", True, TypeError),
     ("element", "curved", ValueError),
-    ("element", None, ValueError),
     ("maxh", 0, ValueError),
-    ("maxh", -0.1, ValueError),
-    ("maxh", math.inf, ValueError),
     ("maxh", "0.1", TypeError),
 ]
 
@@ -417,21 +155,6 @@ BAD = [
 def test_bad_arguments_of_adapt_are_refused_at_the_call(name, value, error):
     with pytest.raises(error, match=rf"{name}={value!r}|{name}={value}"):
         adapt(cases.one_transition().problem, **{name: value})
-
-
-@pytest.mark.usefixtures("no_work")
-@pytest.mark.parametrize(
-    ("name", "value", "error"), [row for row in BAD if row[0] in ("order", "element", "maxh")]
-)
-def test_bad_arguments_of_solve_are_refused_before_any_work(name, value, error):
-    with pytest.raises(error, match=rf"{name}={value!r}|{name}={value}"):
-        solve(cases.one_transition().problem, **{name: value})
-
-
-@pytest.mark.usefixtures("no_work")
-def test_the_physical_element_has_order_one():
-    with pytest.raises(ValueError, match=r"order=2.*physical"):
-        adapt(cases.ring_in_ring().problem, order=2, element="physical")
 
 
 @pytest.mark.usefixtures("no_work")
@@ -450,79 +173,6 @@ def test_a_tolerance_out_of_reach_is_told():
     assert warning.filename == __file__
 
 
-@pytest.mark.filterwarnings(FAIL)
-def test_a_tolerance_within_reach_is_silent():
-    *_, last = adapt(cases.one_transition().problem, order=2, tolerance=0.1, max_dofs=2000)
-    assert last.relative_error_estimate <= 0.1
-
-
-@pytest.mark.filterwarnings(FAIL)
-def test_nodes_that_do_not_match_cost_no_rate():
-    """The clamped ends of the blocks are corners; the rate of order 2 on their singularity is 1."""
-    supports = {"top": (0, -1), "bottom": (0, 0)}
-    problem = replace(unloaded(), geometry=unmatched_blocks(), displacement=supports)
-    levels = list(adapt(problem, order=2, max_dofs=3000))
-    unknowns = [level.displacement.space.ndof for level in levels]
-    estimates = [level.relative_error_estimate for level in levels]
-    assert np.polyfit(np.log(unknowns), np.log(estimates), 1)[0] < -0.9  # measured -1.0
-
-
-@pytest.mark.usefixtures("no_work")
-def test_names_are_checked_before_any_work():
-    problem = cases.one_transition().problem
-    wrong = replace(problem, materials={"upper": SOFT, "lover": SOFT})
-    for start in (solve, adapt):
-        with pytest.raises(ValueError, match=r"lover.*lower"):
-            start(wrong)
-
-
-@pytest.mark.usefixtures("no_work")
-def test_a_size_and_a_mesh_exclude_each_other():
-    problem = cases.one_transition().problem
-    with pytest.raises(ValueError, match=r"maxh=0\.1"):
-        solve(problem, first_mesh(problem, 0.5), maxh=0.1)
-
-
-@pytest.mark.usefixtures("no_work")
-@pytest.mark.parametrize("mesh", ["mesh", 0.1, blocks()])
-def test_a_mesh_must_be_a_mesh(mesh):
-    with pytest.raises(TypeError, match=r"give an ngsolve\.Mesh"):
-        solve(cases.one_transition().problem, mesh)
-
-
-@pytest.mark.usefixtures("no_work")
-def test_a_pair_that_does_not_face_is_refused_before_assembly():
-    contact = [Contact("disc_arc", "block_top", direction=(0, 1))]  # away from the block
-    with pytest.raises(ValueError, match='"disc_arc" faces the primary "block_top"'):
-        solve(replace(disc(), contact=contact))
-
-
-@pytest.mark.usefixtures("no_work")
-def test_normals_that_meet_nothing_are_told_without_a_direction():
-    """Normals of the block's bottom look down, away from the disc."""
-    contact = [Contact("block_bottom", "disc_arc")]
-    problem = replace(disc(), contact=contact, displacement={"disc_top": (0, 0)})
-    with pytest.raises(ValueError, match="along its outward normals: choose boundaries that"):
-        solve(problem)
-
-
-def test_a_start_of_other_pairs_is_refused():
-    problem = cases.one_transition().problem
-    solution = solve(problem, maxh=0.5)
-    with pytest.raises(ValueError, match="start has 1 contact pairs, the problem 0"):
-        solve(replace(problem, contact=[]), maxh=0.5, start=solution)
-    with pytest.raises(TypeError, match="start is a str: give a Solution"):
-        solve(problem, maxh=0.5, start="warm")
-
-
-def test_an_unsupported_body_is_a_named_failure():
-    # Nothing holds the upper block along x: no unique solution, and no silent spring.
-    problem = replace(unloaded(), displacement={"bottom": (0, 0)}, traction={"top": (0.1, -1.0)})
-    with pytest.raises(ContactError, match=r"along \(1, 0\)") as caught:
-        solve(problem, maxh=0.5)
-    assert isinstance(caught.value, NoEquilibriumError)
-
-
 def test_the_warm_start_from_another_mesh_and_order():
     problem = disc()
     coarse = solve(problem, maxh=0.2, order=1)
@@ -531,60 +181,6 @@ def test_the_warm_start_from_another_mesh_and_order():
     assert (warm.active == cold.active).all()
     assert len(warm.steps) < len(cold.steps)
     assert warm.energy == pytest.approx(cold.energy, rel=1e-12)
-
-
-@pytest.mark.parametrize("order", [1, 2, 4])
-def test_the_warm_start_from_the_same_mesh_takes_one_step(order):
-    for make in (disc, lambda: cases.one_transition().problem):
-        first = solve(make(), maxh=0.3, order=order)
-        again = solve(make(), first.mesh, order=order, start=first)
-        assert again.steps == [0]
-        assert (again.active == first.active).all()
-        assert again.force == pytest.approx(first.force, abs=1e-10 * first.force.max())
-
-
-def test_bodies_that_only_move_rigidly_take_one_level():
-    """No strain, no contact: estimate and norm are both round-off, nothing is left to refine."""
-    lifted = Problem(
-        geometry=blocks(),
-        materials={"upper|lower": Elastic(E=1.0, nu=0.3)},
-        displacement={"bottom": (0, 0), "top": (0, 0.1)},
-        contact=[Contact("upper_contact", "lower_contact")],
-    )
-    [solution] = adapt(lifted, order=2, max_dofs=5000)
-    assert not solution.active.any()
-
-
-def nearly_exact(nu, part):
-    """A constant stress, and `part` of it times a smooth one that no element represents."""
-    material = Elastic(E=1.0, nu=nu)
-    exact = patch(material, material)
-    top = exact.displacement["upper"] + part * ng.CF((0, ng.sin(3 * ng.x)))
-    return Problem(
-        geometry=blocks(),
-        materials={"upper|lower": material},
-        displacement={"top": top, "bottom": exact.displacement["lower"]},
-        contact=[Contact("upper_contact", "lower_contact")],
-    )
-
-
-@pytest.mark.parametrize("nu", [0.3, 0.499999, 0.49999999])
-@pytest.mark.parametrize("order", [2, 3, 4])
-@pytest.mark.study(witness=["2-0.3", "3-0.3", "4-0.3"])
-def test_an_exact_solution_takes_one_level(order, nu):
-    """Its estimate is round-off, which grows with kappa / mu: at 5e7 it is 6e-8 of the norm."""
-    [solution] = adapt(nearly_exact(nu, 0.0), maxh=0.3, order=order, max_dofs=6000)
-    assert solution.active.all()
-
-
-@pytest.mark.parametrize(("nu", "part", "tolerance"), [(0.3, 1e-7, 1e-9), (0.499999, 1e-4, 5e-6)])
-def test_small_errors_are_no_round_off(nu, part, tolerance):
-    """Real errors are refined away down to digits that round-off leaves."""
-    first, *_, last = adapt(
-        nearly_exact(nu, part), maxh=0.6, order=4, tolerance=tolerance, max_dofs=20_000
-    )
-    assert first.relative_error_estimate > 3 * tolerance
-    assert last.relative_error_estimate <= tolerance
 
 
 def small_disc(radius):
@@ -606,14 +202,6 @@ def test_segments_at_the_limit_of_the_kernel_are_left_alone():
     assert np.hypot(*last.contact_force()) == pytest.approx(0.2232663 * 0.05, rel=1e-5)
 
 
-def test_refinement_ends_where_no_curve_can_be_divided(monkeypatch):
-    every = partial(np.ones, dtype=bool)
-    monkeypatch.setattr("ngcontact.adaptivity.planning.at_limit", lambda mesh, _: every(mesh.ne))
-    with pytest.warns(ContactWarning, match="refinement ends here"):
-        [solution] = adapt(small_disc(1.0), order=2, max_dofs=3000)
-    assert solution.relative_error_estimate > 1e-3
-
-
 def test_adapt_stops_at_the_bound():
     case, tolerance = cases.hertz_contact(), 1e-2
     levels = list(adapt(case.problem, order=3, tolerance=tolerance, guaranteed=True))
@@ -631,6 +219,37 @@ def test_adapt_stops_at_the_bound():
     assert unknowns(levels[-1]) <= 1.2 * unknowns(fine)
 
 
+@pytest.mark.parametrize(
+    ("ask", "error", "asked"),
+    [
+        (lambda run: run.pressure, AttributeError, "has no pressure"),
+        (lambda run: run[-1], TypeError, r"has no \[-1\]"),
+    ],
+)
+def test_a_run_that_is_taken_for_a_solution_says_how_to_get_one(ask, error, asked):
+    run = adapt(cases.one_transition().problem, order=2, max_dofs=3000)
+    with pytest.raises(error, match=rf"{asked}: .*\*_, solution = adapt\(...\)"):
+        ask(run)
+    first = next(run)  # which is still to be had
+    *_, last = run
+    assert last.displacement.space.ndof > first.displacement.space.ndof
+
+
+def test_guaranteed_needs_a_tolerance():
+    with pytest.raises(ValueError, match="tolerance=None"):
+        adapt(cases.one_transition().problem, guaranteed=True)
+    with pytest.raises(TypeError, match="guaranteed=1"):
+        adapt(cases.one_transition().problem, guaranteed=1, tolerance=1e-2)
+
+
+def test_refinement_ends_where_no_curve_can_be_divided(monkeypatch):
+    every = partial(np.ones, dtype=bool)
+    monkeypatch.setattr("ngcontact.adaptivity.planning.at_limit", lambda mesh, _: every(mesh.ne))
+    with pytest.warns(ContactWarning, match="refinement ends here"):
+        [solution] = adapt(small_disc(1.0), order=2, max_dofs=3000)
+    assert solution.relative_error_estimate > 1e-3
+
+
 def test_a_tolerance_out_of_reach_is_told_by_the_bound():
     """The bound of the last level is made, whatever the estimate suggests."""
     problem = cases.hertz_contact().problem
@@ -639,10 +258,3 @@ def test_a_tolerance_out_of_reach_is_told_by_the_bound():
     ):
         *_, last = adapt(problem, order=2, max_dofs=800, tolerance=1e-6, guaranteed=True)
     assert last.bounded
-
-
-def test_guaranteed_needs_a_tolerance():
-    with pytest.raises(ValueError, match="tolerance=None"):
-        adapt(cases.one_transition().problem, guaranteed=True)
-    with pytest.raises(TypeError, match="guaranteed=1"):
-        adapt(cases.one_transition().problem, guaranteed=1, tolerance=1e-2)

@@ -1,9 +1,4 @@
-"""Bodies of revolution against closed forms: tubes, shells, laws, a ball on its seat, zones.
-
-Tolerances are two to five times what was measured, where no other reason is given.
-"""
-
-from __future__ import annotations
+"""Bodies of revolution against closed forms: tubes, shells, laws, a ball on its seat, zones."""
 
 import math
 
@@ -14,7 +9,7 @@ import pytest
 from drivers.reference import axisymmetric_cases as cases
 from drivers.reference.cases import FIRST, SECOND
 from drivers.reference.westergaard import moduli
-from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
+from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.geometries import rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc, segment
 
@@ -69,29 +64,6 @@ def test_a_tube_blown_up_through_its_clearance(order, maxh, limit, swapped):
     assert not below.active.any()
 
 
-def spun(law, a, b, f, r):
-    """U_r at r of a tube under the radial force f r per volume, without axial strain."""
-    m = moduli(law)
-    stiff = m.lam + 2 * m.mu
-
-    def stress(x):  # of the particular solution -f r^3 / 8 (lambda + 2 mu)
-        return -f / 8 / stiff * (3 * stiff + m.lam) * x * x
-
-    A = [[2 * (m.lam + m.mu), -2 * m.mu / x**2] for x in (a, b)]
-    C, D = np.linalg.solve(A, [-stress(a), -stress(b)])
-    return -f * r**3 / 8 / stiff + C * r + D / r
-
-
-def test_rotation_loosens_a_fit():
-    """Sigma_rr of u = C r + D / r is 2 (lambda + mu) C - 2 mu D / r^2. Measured 9e-5."""
-    interference, f = 1e-2, 2e-3 * FIRST.E
-    force = {"inner": (f * ng.x, 0), "outer": (3 * f * ng.x, 0)}
-    solution = solve(tubes(0.0, -interference, force=force), maxh=0.1, order=3)
-    softness, _ = at_joint(FIRST, SECOND, 0.0)
-    apart = spun(FIRST, BORE, JOINT, f, JOINT) - spun(SECOND, JOINT, RIM, 3 * f, JOINT)
-    assert solution.pressure == pytest.approx((interference + apart) / softness, rel=3e-4)
-
-
 def swollen(law, a, b, inner, outer, r):
     """Lame: radial displacement at r of a spherical shell a < r < b under pressures."""
     sums = (1 - 2 * law.nu) * (inner * a**3 - outer * b**3) * r
@@ -117,43 +89,6 @@ def test_a_spherical_shell_shrunk_on_another(order, maxh, limit, rows):
     assert np.abs(solution.pressure / p - 1).max() < limit
     assert len(solution.transitions()) == 0
     assert abs(solution.contact_force()[1]) == pytest.approx(math.pi * p, rel=limit)
-
-
-@pytest.mark.parametrize("order", [2, 3, 4])
-def test_a_modulus_that_varies_with_the_radius(order):
-    """Nu = 0: sigma_zz = E(r) times a strain, all else 0, which the elements contain."""
-    problem = Problem(
-        geometry=cases.cylinders(),
-        materials={"upper|lower": Elastic(1 + 3 * ng.x**2, 0.0)},
-        displacement={"bottom": (None, 0), "top": (None, -0.02)},
-        contact=[Contact("upper_contact", "lower_contact")],
-        model="axisymmetric",
-    )
-    solution = solve(problem, maxh=0.25, order=order)
-    force = 2 * math.pi * 0.01 * (1 / 2 + 3 / 4)
-    assert abs(solution.contact_force()[1]) == pytest.approx(force, rel=ROUND_OFF)
-    assert solution.relative_error_bound < ROUND_OFF
-    if order == 4:  # whose rows contain pressures of degree 2
-        p = 0.01 * (1 + 3 * solution.points[:, 0] ** 2)
-        assert solution.pressure == pytest.approx(p, rel=ROUND_OFF)
-
-
-@pytest.mark.parametrize("order", [1, 3])
-def test_fibres_along_the_axis(order):
-    """A stiff direction z in rr, zz, hoop, rz: both bodies are springs in a row."""
-    along, across, shared, around, shear = 5.0, 1.0, 0.25, 0.3, 0.4
-    S = np.diag([1 / across, 1 / along, 1 / across, 1 / shear])
-    S[0, 2] = S[2, 0] = -around / across
-    S[[0, 1, 1, 2], [1, 0, 2, 1]] = -shared / along
-    problem = Problem(
-        geometry=cases.cylinders(),
-        materials={"upper": Hooke(np.linalg.inv(S)), "lower": Elastic(1.0, 0.3)},
-        displacement={"bottom": (None, 0), "top": (None, -0.02)},
-        contact=[Contact("upper_contact", "lower_contact")],
-        model="axisymmetric",
-    )
-    solution = solve(problem, maxh=0.4, order=order)
-    assert solution.pressure == pytest.approx(0.02 / (1 / along + 1), rel=ROUND_OFF)
 
 
 @pytest.mark.parametrize("order", [2, 3])
@@ -189,32 +124,20 @@ def test_a_ball_on_a_conical_seat(order):
     assert solution.pressure.max() == pytest.approx(2 * per_length / math.pi / a, rel=5e-3)
 
 
-@pytest.mark.filterwarnings("ignore:.*segments long")
-def test_a_disc_and_a_ring_of_contact():
-    """Three ends at which orders agree; their proved energies overlap. Forces: measured 1.6e-4."""
+@pytest.mark.parametrize("order", [2, 3, 4])
+def test_a_modulus_that_varies_with_the_radius(order):
+    """Nu = 0: sigma_zz = E(r) times a strain, all else 0, which the elements contain."""
     problem = Problem(
         geometry=cases.cylinders(),
-        materials=cases.BLOCKS,
-        displacement={"bottom": (None, 0), "top": (None, -0.006)},
-        contact=[
-            Contact(
-                "upper_contact",
-                "lower_contact",
-                direction=(0, -1),
-                gap=0.004 * (1 - ng.cos(3 * math.pi * ng.x)),
-            )
-        ],
+        materials={"upper|lower": Elastic(1 + 3 * ng.x**2, 0.0)},
+        displacement={"bottom": (None, 0), "top": (None, -0.02)},
+        contact=[Contact("upper_contact", "lower_contact")],
         model="axisymmetric",
     )
-    forces, energies = [], []
-    for order in (2, 3):
-        *_, solution = adapt(problem, order=order, max_dofs=2500)
-        ends = np.sort(solution.transitions()[:, 0])
-        assert ends == pytest.approx([0.1157, 0.5748, 0.7686], abs=3e-3)  # order 4, 5700 unknowns
-        assert solution.active[np.argmin(solution.points[:, 0])]
-        forces.append(solution.contact_force()[1])
-        energies.append(solution.energy_bounds)
-        reaction = solution.reactions["bottom"][1]
-        assert abs(solution.contact_force()[1]) == pytest.approx(reaction, rel=ROUND_OFF)
-    assert forces[0] == pytest.approx(forces[1], rel=5e-4)
-    assert max(low for low, _ in energies) <= min(high for _, high in energies)
+    solution = solve(problem, maxh=0.25, order=order)
+    force = 2 * math.pi * 0.01 * (1 / 2 + 3 / 4)
+    assert abs(solution.contact_force()[1]) == pytest.approx(force, rel=ROUND_OFF)
+    assert solution.relative_error_bound < ROUND_OFF
+    if order == 4:  # whose rows contain pressures of degree 2
+        p = 0.01 * (1 + 3 * solution.points[:, 0] ** 2)
+        assert solution.pressure == pytest.approx(p, rel=ROUND_OFF)

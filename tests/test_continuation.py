@@ -1,7 +1,5 @@
 """Load sequences: `adapt` goes on from another load's solution, for no more than its own levels."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 
@@ -9,13 +7,10 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Problem, adapt, load, solve
-from ngcontact.geometries import blocks, disc_on_block
+from ngcontact import adapt
+from ngcontact.geometries import disc_on_block
 from ngcontact.mesh import diameters
 from ngcontact.problem import Triangulation
-from tests.scenes import vertices
-
-SOFT = Elastic(E=1.0, nu=0.3)
 
 
 def pressed(way):
@@ -66,70 +61,6 @@ def test_meshes_do_not_grow_with_the_sequence(sequence):
     # Where contact ended under the largest load, elements are large again.
     [end] = sequence[2][-1].transitions()
     assert size_at(sequence[4][-1], end) > 4 * size_at(sequence[2][-1], end)
-
-
-def test_without_a_tolerance_it_goes_on_from_the_estimate_of_start(sequence):
-    start = sequence[0][0]
-    first, second, *_ = adapt(pressed(0.0025), start=start, max_dofs=10_000)
-    assert unknowns(first) <= unknowns(start) < unknowns(second)
-    assert second.relative_error_estimate < first.relative_error_estimate
-
-
-@pytest.mark.filterwarnings("ignore:.*segments long")
-def test_a_proof_is_continued_too():
-    options = {"tolerance": 5e-2, "order": 2, "guaranteed": True}
-    *_, start = adapt(pressed(0.005), **options)
-    levels = list(adapt(pressed(0.006), **options, start=start))
-    assert levels[-1].relative_error_bound <= 5e-2
-    assert len(levels) <= 3
-
-
-def test_two_bodies_with_matched_nodes_stay_matched():
-    def disc(way):
-        return Problem(
-            geometry=disc_on_block(),
-            materials={"disc": SOFT, "block": SOFT},
-            displacement={"block_bottom": (0, 0), "disc_top": (0, -way)},
-            sliding="axis",
-            contact=[Contact("disc_arc", "block_top", direction=(0, -1))],
-        )
-
-    *_, start = adapt(disc(0.02), order=3, tolerance=2e-2)
-    levels = list(adapt(disc(0.01), order=3, tolerance=2e-2, start=start))
-    assert len(levels) <= 3
-    for level in levels:
-        arc, top = (vertices(level.mesh, name)[:, 0] for name in ("disc_arc", "block_top"))
-        facing = arc[arc < 0.9]  # farther out nodes of the first mesh do not face each other
-        assert np.abs(facing[:, None] - top).min(axis=1).max() < 1e-9
-    *_, alone = adapt(disc(0.01), order=3, tolerance=2e-2)
-    assert levels[-1].contact_force()[1] == pytest.approx(alone.contact_force()[1], rel=1e-3)
-
-
-@pytest.mark.filterwarnings("ignore:.*segments long")
-@pytest.mark.study
-def test_a_saved_solution_and_one_of_solve_are_starts_too(sequence, tmp_path):
-    saved = load(sequence[0][-1].save(tmp_path / "last.ngcontact"))
-    again = list(adapt(pressed(0.005), tolerance=1e-3, start=saved))
-    assert [unknowns(level) for level in again] == [unknowns(level) for level in sequence[1]]
-    # The mesh of `solve` is the first of a sequence: it is not made coarser.
-    single = solve(pressed(0.005), maxh=0.03, order=4)
-    first, *_, last = adapt(pressed(0.006), tolerance=1e-2, start=single)
-    assert first.mesh.ne >= single.mesh.ne
-    assert last.relative_error_estimate <= 1e-2
-
-
-def test_nothing_is_recalled_where_nothing_was_estimated():
-    """Bodies that only move rigidly have no indicators: the first mesh is taken."""
-    lifted = Problem(
-        geometry=blocks(),
-        materials={"upper|lower": SOFT},
-        displacement={"bottom": (0, 0), "top": (0, 0.1)},
-        contact=[Contact("upper_contact", "lower_contact")],
-    )
-    [apart] = adapt(lifted, order=2, tolerance=1e-2)
-    pressed_on = replace(lifted, displacement={"bottom": (0, 0), "top": (0, -0.1)})
-    first, *_ = adapt(pressed_on, order=2, tolerance=1e-2, start=apart)
-    assert first.mesh.ne == apart.mesh.ne
 
 
 @pytest.mark.usefixtures("no_work")

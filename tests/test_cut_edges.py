@@ -1,28 +1,17 @@
 """Loads on edges that a cut makes, along which segments may run either way: exact answers."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Compound, Glue, OCCGeometry, WorkPlane, X, Y
+from netgen.occ import Compound, OCCGeometry, WorkPlane, X, Y
 
-from ngcontact import Contact, Elastic, Problem, adapt, solve
+from ngcontact import Elastic, Problem, solve
 from ngcontact.mesh import first_mesh
 
 ORDERS = (1, 2, 3, 4)
 BORE, RIM, PRESSURE = 3.0, 5.0, 100.0
 STEEL = Elastic(E=2e5, nu=0.3)
 GUIDES = {"quarter": "left|below", "half": "left", "whole": None}
-# Relative error of the bore's radial displacement at maxh 0.5: twice the largest measured.
-MISSED = {1: 0.08, 2: 8e-4, 3: 8e-5, 4: 4e-6}
-FORMS = {
-    "number": PRESSURE,
-    "pair": PRESSURE * ng.CF((ng.x, ng.y)) / ng.sqrt(ng.x**2 + ng.y**2),
-    "function": PRESSURE * (ng.x**2 + ng.y**2) / BORE**2,
-}
 
 
 def rectangle(x, y, width, height, name, edges):
@@ -50,45 +39,28 @@ def tube(part):
     return OCCGeometry(shape, dim=2)
 
 
-def pressed_tube(part, load=PRESSURE, geometry=None):
+def pressed_tube(part, geometry=None):
     return Problem(
         tube(part) if geometry is None else geometry,
         {"tube": STEEL},
         sliding=GUIDES[part],
-        traction={"bore": load},
+        traction={"bore": PRESSURE},
     )
 
 
 def lame():
-    """Radial displacement of the bore and stress (2, 2) of the tube in plane strain."""
+    """Stress (2, 2) of the tube in plane strain."""
     a = PRESSURE * BORE**2 / (RIM**2 - BORE**2)
     b = a * RIM**2
-    radial = (1 + STEEL.nu) / STEEL.E * ((1 - 2 * STEEL.nu) * a * BORE + b / BORE)
     square = ng.x**2 + ng.y**2
     deviator = b / square**2 * ng.CF((ng.x**2 - ng.y**2, 2 * ng.x * ng.y))
     xx, xy, yy = a - deviator[0], -deviator[1], a + deviator[0]
-    return radial, ng.CF((xx, xy, xy, yy), dims=(2, 2))
-
-
-def radial_error(solution):
-    """Largest relative error of the bore's radial displacement, rigid motions apart."""
-    trace = solution.discrete.space.trace
-    segment, s = trace.at_nodes(trace.segments("bore"))
-    u = trace.evaluate(solution.displacement, segment, s)
-    normal = -trace.exact_normal(segment, s)
-    rigid = np.column_stack([normal, np.ones(len(s))])
-    radial = (u * normal).sum(axis=1)
-    if solution.problem.sliding is None:  # the mean radial displacement alone is no rigid motion
-        radial = np.full(1, np.linalg.lstsq(rigid, radial, rcond=None)[0][2])
-    elif solution.problem.sliding == "left":
-        shift = np.linalg.lstsq(rigid[:, 1:], radial, rcond=None)[0][0]
-        radial -= shift * normal[:, 1]
-    return np.abs(radial / lame()[0] - 1).max()
+    return ng.CF((xx, xy, xy, yy), dims=(2, 2))
 
 
 def energy_error(solution):
     """Energy norm of the error of the stress, in plane strain."""
-    error = solution.stress - lame()[1]
+    error = solution.stress - lame()
     trace = ng.Trace(error)
     density = (ng.InnerProduct(error, error) - STEEL.nu * trace**2) * (1 + STEEL.nu) / STEEL.E
     return np.sqrt(ng.Integrate(density, solution.mesh, order=2 * solution.order + 6))
@@ -99,7 +71,6 @@ def energy_error(solution):
 @pytest.mark.study(witness=["quarter-1", "quarter-4", "half-3", "whole-2"])
 def test_pressure_in_a_bore_is_the_one_of_lame(part, order):
     solution = solve(pressed_tube(part), maxh=0.5, order=order)
-    assert radial_error(solution) < MISSED[order]
     error = energy_error(solution)
     # Measured: 1.00 to 1.32; the exact domain is another one than the mesh's, by 4e-5 at order 4.
     assert 0.999 * error <= solution.error_bound < 1.5 * error
@@ -109,50 +80,6 @@ def test_pressure_in_a_bore_is_the_one_of_lame(part, order):
     for name, reaction in solution.reactions.items():
         expected = size * np.array(resultant[name])
         assert reaction == pytest.approx(expected, abs=1e-12 * size)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_a_whole_tube_held_along_its_axes_of_symmetry(order):
-    """Four quarters glued: components of the displacement vanish on lines inside of the body."""
-    quarters = []
-    for x, y in ((0, 0), (-6, 0), (-6, -6), (0, -6)):
-        part = tube("whole").shape * rectangle(x, y, 6, 6, "tube", "cut")
-        for edge in part.edges:
-            if abs(edge.center.x) < 1e-9 or abs(edge.center.y) < 1e-9:
-                edge.name = "upright" if abs(edge.center.x) < 1e-9 else "level"
-        quarters.append(part)
-    geometry = OCCGeometry(Glue(quarters), dim=2)
-    problem = replace(
-        pressed_tube("whole", geometry=geometry),
-        displacement={"upright": (0, None), "level": (None, 0)},
-    )
-    solution = solve(problem, maxh=0.5, order=order)
-    trace = solution.discrete.space.trace
-    segment, s = trace.at_nodes(trace.segments("bore"))
-    u, x = trace.evaluate(solution.displacement, segment, s), trace.point(segment, s)
-    radial = (u * x).sum(axis=1) / np.linalg.norm(x, axis=1)
-    assert np.abs(radial / lame()[0] - 1).max() < MISSED[order]
-    resultant = sum(solution.reactions.values())
-    assert resultant == pytest.approx([0, 0], abs=1e-12 * PRESSURE * BORE)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_radial_displacement_of_the_bore_converges_at_full_rate(order):
-    errors = [radial_error(solve(pressed_tube("quarter"), maxh=h, order=order)) for h in (1, 0.25)]
-    assert errors[0] / errors[1] > 0.8 * 4 ** (order + 1)  # measured: 0.95 of that and more
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("given", [False, True])
-@pytest.mark.parametrize("form", ["pair", "function"])
-def test_a_load_is_the_same_in_every_form(form, given, order):
-    """The pair and the function differ from the number on the polynomial curves only."""
-    geometry = first_mesh(pressed_tube("quarter"), 0.5) if given else None
-    if given and order > 1:
-        geometry.Curve(order)
-    problem = pressed_tube("quarter", FORMS[form], geometry)
-    solution = solve(problem, maxh=None if given else 0.5, order=order)
-    assert radial_error(solution) < MISSED[order]
 
 
 @pytest.mark.parametrize("order", [1, 3])
@@ -189,16 +116,8 @@ def rebuilt(source, turned):
     return ng.Mesh(mesh)
 
 
-def notched():
-    return rectangle(0, 0, 4, 3, "body", "side") - rectangle(1, 2, 1, 1.5, "hole", "loaded")
-
-
 def l_shape():
     return rectangle(0, 0, 4, 3, "body", "side") - rectangle(2, 1, 2.5, 2.5, "hole", "loaded")
-
-
-def square_hole():
-    return rectangle(0, 0, 4, 3, "body", "side") - rectangle(1, 1, 1, 1, "hole", "loaded")
 
 
 def cut_twice():
@@ -206,8 +125,7 @@ def cut_twice():
     return body - WorkPlane().MoveTo(2, 1.5).Circle(0.7).Face()
 
 
-# The resultant of the pressure 1 on "loaded": of the open end of a notch, as if it were closed.
-RESULTANTS = {notched: (0, -1), l_shape: (-2, -2), square_hole: (0, 0), cut_twice: None}
+RESULTANTS = {l_shape: (-2, -2), cut_twice: None}  # of the pressure 1 on "loaded"
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -220,10 +138,9 @@ def test_reactions_balance_loads_on_cuts(make, order):
     )
     solution = solve(problem, maxh=0.5, order=order)
     trace = solution.discrete.space.trace
-    s, w = np.array([0.5]), 1.0  # edges of "loaded" are straight
-    segments = trace.segments("loaded")
-    at = np.repeat(s, len(segments))
-    load = -PRESSURE * w * (trace.normal(segments, at).T * trace.lengths(segments)).sum(axis=1)
+    segments = trace.segments("loaded")  # straight
+    normals = trace.normal(segments, np.full(len(segments), 0.5))
+    load = -PRESSURE * trace.lengths(segments) @ normals
     scale = PRESSURE * trace.lengths(segments).sum()
     assert solution.reactions["held"] + load == pytest.approx([0, 0], abs=1e-12 * scale)
     if RESULTANTS[make] is not None:
@@ -254,54 +171,6 @@ def test_a_cut_that_takes_nothing_away_is_told():
                 solve(problem, maxh=0.5)
 
 
-def test_a_pressure_between_bodies_has_no_outward_normal():
-    """A line inside a body takes a pair; a number is refused with that advice."""
-    left = rectangle(0, 0, 1, 1, "left", "side")
-    left.edges.Max(X).name = "between"
-    right = rectangle(1, 0, 1, 1, "right", "side")
-    geometry = OCCGeometry(Glue([left, right]), dim=2)
-    data = {"materials": {"left|right": STEEL}, "displacement": {"side": (0, 0)}}
-    with pytest.raises(ValueError, match="give the traction as a pair"):
-        solve(Problem(geometry, **data, traction={"between": 1.0}), maxh=0.5)
-    solution = solve(Problem(geometry, **data, traction={"between": (1.0, 0)}), maxh=0.5)
-    assert solution.reactions["side"] == pytest.approx([-1, 0], abs=1e-12)
-
-
-@pytest.mark.filterwarnings("error::RuntimeWarning")
-@pytest.mark.parametrize("order", [1, 2])
-def test_a_fixed_direction_all_round_a_pin_has_an_estimate(order):
-    """On this mesh the direction touches both curves at a point of the quadrature."""
-    hole = disc(1, "block", "hole")
-    block = rectangle(-2, -2, 4, 4, "block", "side")
-    block.edges.Min(Y).name = "bottom"
-    pair = Contact("pin", "hole", direction=(0, -1))
-    problem = Problem(
-        OCCGeometry(Compound([disc(1, "pin", "pin"), block - hole]), dim=2),
-        {"pin|block": STEEL},
-        {"bottom": (0, 0)},
-        force={"pin": (0, -PRESSURE)},
-        contact=[pair],
-    )
-    with pytest.warns(UserWarning, match="inclined"):
-        solution = solve(problem, maxh=0.12, order=order)
-    given = ng.Mesh(problem.geometry.GenerateMesh(maxh=0.12))
-    with pytest.warns(UserWarning, match="inclined"):
-        other = solve(problem, given, order=order)
-    # On other meshes of that size; measured: within 5 %.
-    assert solution.error_estimate == pytest.approx(other.error_estimate, rel=0.2)
-
-
-@pytest.mark.parametrize("order", [2, 4])
-def test_a_guarantee_is_refused_at_once_where_supports_contradict_each_other(order):
-    shape = rectangle(0, 0, 1, 1, "body", "side")
-    shape.edges.Min(Y).name, shape.edges.Max(X).name = "bottom", "right"
-    problem = Problem(
-        OCCGeometry(shape, dim=2), {"body": STEEL}, {"bottom": (0, 0), "right": (0.1, 0)}
-    )
-    with pytest.raises(ValueError, match=r'"bottom" and "right" prescribe 0 and 0\.1'):
-        adapt(problem, order=order, guaranteed=True, tolerance=1e-3)
-
-
 @pytest.mark.parametrize(("width", "shift"), [(1, 0.3), (0.05, 0.96), (0.02, 0.5)])
 def test_overlaps_are_found_on_fine_meshes(width, shift):
     """By a sample: 70 or 80 % of a body, or all of it, on a square of 4000 triangles."""
@@ -314,27 +183,3 @@ def test_overlaps_are_found_on_fine_meshes(width, shift):
         mesh = ng.Mesh(geometry.GenerateMesh(maxh=0.025))
         with pytest.raises(ValueError, match="lie on top of each other"):
             Problem(geometry, {"square|bar": STEEL}, {"side": (0, 0)}).check(mesh)
-
-
-def test_small_overlaps_are_not_refused_on_fine_meshes():
-    both = [rectangle(0, 0, 1, 1, "square", "side"), rectangle(0.95, 0, 1, 1, "other", "side")]
-    geometry = OCCGeometry(Compound(both), dim=2)
-    mesh = ng.Mesh(geometry.GenerateMesh(maxh=0.025))
-    Problem(geometry, {"square|other": STEEL}, {"side": (0, 0)}).check(mesh)
-
-
-def test_bodies_on_top_of_each_other_are_refused():
-    """Two circles in one face are two discs for OCC; a press fit is drawn with an interference."""
-    twice = WorkPlane().Circle(RIM).Circle(BORE).Face()
-    twice.faces.name, twice.edges.name = "tube", "side"
-    both = Compound([disc(2, "one", "side"), rectangle(-1, -1, 4, 1, "other", "side")])
-    for shape, names in ((twice, '"tube" .* "tube"'), (both, '"other" .* "one"')):
-        geometry = OCCGeometry(shape, dim=2)
-        mesh = ng.Mesh(geometry.GenerateMesh(maxh=0.5))
-        laws = dict.fromkeys(mesh.GetMaterials(), STEEL)
-        with pytest.raises(ValueError, match=f"body {names} .* lie on top of each other"):
-            Problem(geometry, laws, {"side": (0, 0)}).check(mesh)
-    hub = rectangle(-4, -4, 8, 8, "hub", "side") - disc(1.99, "hub", "seat")
-    fit = OCCGeometry(Compound([hub, disc(2, "pin", "pin")]), dim=2)
-    mesh = ng.Mesh(fit.GenerateMesh(maxh=0.5))
-    Problem(fit, {"hub|pin": STEEL}, {"side": (0, 0)}, contact=[Contact("pin", "seat")]).check(mesh)

@@ -1,9 +1,5 @@
 """Warnings point at the caller's line."""
 
-from __future__ import annotations
-
-import warnings
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -19,20 +15,6 @@ def test_a_warning_names_the_line_outside_of_the_package():
     assert Path(caught[0].filename) == Path(__file__)
 
 
-def test_a_warning_can_be_made_an_error():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", ContactWarning)
-        with pytest.raises(ContactWarning):
-            warn("this may be wrong")
-
-
-def test_folders_that_begin_like_the_package_are_outside_of_it():
-    script = Path(errors.PACKAGE[:-1] + "_study.py")  # beside the package; need not exist
-    with pytest.warns(ContactWarning) as caught:
-        exec(compile("warn('from a study')", script, "exec"), {"warn": warn})
-    assert Path(caught[0].filename) == script
-
-
 def test_a_generator_warns_at_the_line_that_asks_for_its_next_value():
     source = "def levels():\n    warn('of a level')\n    yield 1\n"
     room: dict[str, Any] = {"warn": warn}
@@ -41,11 +23,3 @@ def test_a_generator_warns_at_the_line_that_asks_for_its_next_value():
     with pytest.warns(ContactWarning) as caught:
         next(levels)
     assert Path(caught[0].filename) == Path(__file__)
-
-
-def test_threads_warn_and_leave_the_filters_alone():
-    before = list(warnings.filters)
-    with pytest.warns(ContactWarning) as caught, ThreadPoolExecutor(2) as pool:
-        list(pool.map(warn, ["first", "second"]))
-    assert {str(warning.message) for warning in caught} == {"first", "second"}
-    assert warnings.filters == before

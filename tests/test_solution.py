@@ -1,22 +1,18 @@
 """What a user reads from a solution: identities, signs, certificates, counts, variants of data."""
 
-from __future__ import annotations
-
 import copy
 import math
 from dataclasses import replace
-from itertools import pairwise
 
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.meshing import Element1D, Element2D, FaceDescriptor, Mesh, MeshPoint, Pnt
-from netgen.occ import Axis, OCCGeometry, Vec, WorkPlane
+from netgen.occ import Axis, OCCGeometry, Vec
 from netgen.occ import Pnt as Point
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
-from ngcontact.geometries import blocks, disc, disc_on_block, disc_on_disc, rings
+from ngcontact import Contact, Elastic, Problem, adapt, solve
+from ngcontact.geometries import blocks, disc, disc_on_block, rings
 from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.problem.values import boundary_mask
@@ -40,11 +36,7 @@ def two_blocks(**data) -> Problem:
 
 
 def partly_open() -> Problem:
-    """Problem B: a block on a block, pressed on half of its top; the other half lifts off.
-
-    [0, 2] x [-1, 0] clamped below and [0, 2] x [0, 1] on it, E = 1000, nu = 0.3, plane strain,
-    pressure 1 on the top for x < 1, u_x = 0 on x = 0 of both.
-    """
+    """Problem B: a block on a block, pressed on half of its top; the other half lifts off."""
     steel = Elastic(E=1000.0, nu=0.3)
     return Problem(
         geometry=blocks(line=((0, 0), (2, 0))),
@@ -130,202 +122,30 @@ def difference(first, second):
     return np.abs(values(first) - values(second)).max() / np.abs(values(second)).max()
 
 
-# --- the contract ---
-
-
-@pytest.mark.parametrize("order", [1, 2, 3, 4])
-def test_attributes_of_the_contract(order):
-    solution = solve(pressed_disc(), maxh=0.4, order=order)
-    m, mesh = len(solution.points), solution.mesh
-    assert isinstance(mesh, ng.Mesh)
-    assert solution.order == order
-    assert isinstance(solution.displacement, ng.GridFunction)
-    assert solution.displacement.space.type == "VectorH1"
-    assert solution.displacement.dim == 2
-    assert tuple(solution.stress.dims) == (2, 2)
-    assert solution.points.shape == (m, 2)
-    for name in ("gap", "pressure", "force", "active", "pair"):
-        assert getattr(solution, name).shape == (m,), name
-    assert solution.active.dtype == bool
-    assert solution.contact_force().shape == (2,)
-    assert solution.transitions().shape == (1, 2)
-    assert isinstance(solution.energy, float)
-    assert solution.indicators.shape == (mesh.ne,)
-    assert isinstance(solution.error_estimate, float)
-    assert isinstance(solution.relative_error_estimate, float)
-    assert solution.steps[-1] == 0
-    assert set(solution.residuals) == {
-        "equilibrium",
-        "penetration",
-        "tension",
-        "complementarity",
-    }
-    assert set(solution.work) == {
-        "assemblies",
-        "factorizations",
-        "back_solves",
-        "gap_searches",
-        "curved_elements",
-        "estimates",
-        "equilibrations",
-        "evaluations",
-    }
-    assert set(solution.reactions) == {"block_bottom", "disc_top", "axis"}
-    assert all(force.shape == (2,) for force in solution.reactions.values())
-    for name in ("write", "plot", "draw"):
-        assert callable(getattr(solution, name))
-
-
-def test_contact_points_lie_at_the_nodes_of_the_secondary():
-    for order in (1, 2, 4):
-        solution = solve(two_blocks(), maxh=0.5, order=order)
-        segments = len(np.unique(solution.discrete.lines[0].segments))
-        assert len(solution.points) == segments * order + 1
-        assert solution.points[:, 1] == pytest.approx(0, abs=1e-15)
-        lobatto = {1: [0, 1], 2: [0, 0.5, 1], 4: [0, 0.5 - math.sqrt(3 / 28), 0.5]}[order]
-        x = np.sort(solution.points[:, 0])[: len(lobatto)]
-        length = 2 / segments
-        assert (x + 1) / length == pytest.approx(lobatto, abs=1e-12)
-
-
-def test_a_solution_is_shown_on_one_line():
-    solution = solve(partly_open(), maxh=0.5)
-    assert str(solution) == repr(solution)
-    assert "\n" not in str(solution)
-    assert "order 1" in str(solution)
-    assert "estimate" not in str(solution)  # nobody asked for it
-    assert solution.work["estimates"] == 0
-
-
-def test_a_solution_without_pairs():
-    solution = solve(
-        Problem(
-            geometry=disc(),
-            materials={"disc": SOFT},
-            displacement={"top": (0, 0)},
-            force={"disc": (0, -1)},
-        ),
-        maxh=0.4,
-        order=2,
-    )
-    assert solution.points.shape == (0, 2)
-    assert solution.steps == [0]
-    # The weight of the quarter disc, up to the area of the curved mesh.
-    assert solution.reactions["top"] == pytest.approx([0, math.pi / 4], abs=1e-3)
-    assert max(solution.residuals.values()) < EXACT
-    with pytest.raises(ValueError, match=r"pair=0 .* there is no contact"):
-        solution.contact_force()
-
-
-@pytest.mark.parametrize("method", ["contact_force", "transitions"])
-def test_a_pair_that_is_none_is_refused_with_its_value(method):
-    read = getattr(solve(partly_open(), maxh=0.5), method)
-    for error, values in ((ValueError, (1, -1, 7)), (TypeError, ("a", None, 0.0, True))):
-        for pair in values:
-            with pytest.raises(error, match=f"pair={pair!r} is .* numbered from 0 to 0"):
-                read(pair)
-    assert read(np.int32(0)).tolist() == read().tolist()
-
-
-@pytest.mark.parametrize("name", ["missing/disc.vtu", "disc.txt"])
-def test_an_unwritable_path_is_refused_before_any_work(tmp_path, name):
-    solution = solve(partly_open(), maxh=0.5)
-    with pytest.raises((OSError, ValueError), match=name.split("/")[0]):
-        solution.write(tmp_path / name)
-    assert solution.work["estimates"] == 0  # the indicators are part of the file
-    assert list(tmp_path.iterdir()) == []
-
-
-# --- exact discrete identities ---
-
-
-@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("order", [1, 4])
 @pytest.mark.parametrize("name", PROBLEMS)
-@pytest.mark.study(witness=["B-1", "S9-2", "S9-1"])
-def test_optimality_conditions(name, order):
+@pytest.mark.study(witness=["B-1", "B-4", "S9-4", "stack-1"])
+def test_every_body_is_in_equilibrium_and_every_point_optimal(name, order):
     solution = solve(PROBLEMS[name](), maxh=0.4, order=order)
     assert max(solution.residuals.values()) < EXACT
-    largest = solution.force.max()
+    largest, length = solution.force.max(), np.abs(values(solution)).max()
     assert solution.force.min() > -EXACT * largest
-    length = np.abs(values(solution)).max()
     assert solution.gap.min() > -EXACT * length
-    assert np.abs(solution.force * solution.gap).max() < EXACT * largest * length
     assert (solution.force[~solution.active] == 0).all()
     assert np.abs(solution.gap[solution.active]).max() < EXACT * length
-
-
-@pytest.mark.parametrize("order", [1, 4])
-@pytest.mark.parametrize("name", SIDES)
-@pytest.mark.study(witness=["B-1", "B-4", "S9-4"])
-def test_every_body_is_in_equilibrium(name, order):
-    problem = PROBLEMS[name]()
-    solution = solve(problem, maxh=0.4, order=order)
     size = sum(np.abs(force).sum() for force in solution.reactions.values())
     size += np.abs(solution.force).sum()
     boundaries = np.array(solution.mesh.GetBoundaries())
-    for body_name, (pattern, pairs) in SIDES[name].items():
+    for body_name, (pattern, pairs) in SIDES.get(name, {}).items():
         loads = np.zeros(2)
         for axis, direction in enumerate(((1, 0), (0, 1))):
             unit = ng.GridFunction(solution.displacement.space)
             unit.Set(ng.CF(direction), definedon=solution.mesh.Materials(body_name))
             loads[axis] = solution.discrete.space.f @ unit.vec.FV().NumPy()
-        names = set(boundaries[boundary_mask(solution.mesh, pattern)])
-        reaction = sum(
-            (solution.reactions[n] for n in names & set(solution.reactions)), np.zeros(2)
-        )
+        names = set(boundaries[boundary_mask(solution.mesh, pattern)]) & set(solution.reactions)
+        reaction = sum((solution.reactions[n] for n in names), np.zeros(2))
         contact = sum(sign * solution.contact_force(pair) for pair, sign in pairs.items())
         assert np.abs(loads + reaction + contact).max() < EXACT * size
-
-
-@pytest.mark.parametrize("order", [1, 3])
-@pytest.mark.parametrize("name", PROBLEMS)
-@pytest.mark.study(witness=["S9-1", "stack-3", "disc-1"])
-def test_energy_identity(name, order):
-    """Work of loads, supports and gaps: u'Au = f'u + r'u - g'force, r the nodal reactions."""
-    solution = solve(PROBLEMS[name](), maxh=0.4, order=order)
-    u, space = values(solution), solution.discrete.space
-    strain = u @ (space.A @ u)
-    nodal = solution.discrete.basis.T @ solution.minimiser.u
-    support = solution.nodal_reaction.T.ravel() @ nodal
-    gaps = solution.discrete.program.g @ solution.force
-    assert strain == pytest.approx(space.f @ u + support - gaps, rel=EXACT)
-    assert solution.energy == pytest.approx(strain / 2 - space.f @ u, rel=EXACT)
-
-
-def test_energy_of_homogeneous_data_is_minus_the_strain_energy():
-    # S7: u = 0 on Gamma_u and no gap: u'Au = f'u, so L(u_h) = -u'Au / 2.
-    solution = solve(cases.clamped_transition().problem, maxh=0.3, order=2)
-    u = values(solution)
-    assert solution.energy == pytest.approx(-u @ (solution.discrete.space.A @ u) / 2, rel=EXACT)
-
-
-def test_energy_of_an_exact_solution():
-    # S1 has no loads: L(u) = A(u, u) / 2, known by Clapeyron's theorem. The error of the energy is
-    # of the second order of that of u, 1e-2: measured 1.1e-4.
-    solution = solve(cases.one_transition().problem, maxh=0.28, order=2)
-    assert solution.energy == pytest.approx((1.293180760825 + 0.520333087196) / 2, rel=2e-4)
-
-
-def test_total_force_and_its_moment_are_those_of_the_load():
-    """Partial uplift: a block pressed beyond the third of its width; all forces are vertical."""
-    load = ng.IfPos(ng.x - 0.5, 0.2, 0.0)
-    solution = solve(two_blocks(traction={"top": (0, -load)}), maxh=0.3, order=2)
-    assert 0 < np.count_nonzero(solution.active) < len(solution.active)
-    # On top, the horizontal reactions have no moment about the points of y = 1.
-    force = solution.force
-    # The load jumps inside of an edge of the mesh: what was assembled counts.
-    unit, arm = (ng.GridFunction(solution.displacement.space) for _ in range(2))
-    upper = solution.mesh.Materials("upper")
-    unit.Set(ng.CF((0, 1)), definedon=upper)
-    arm.Set(ng.CF((-(ng.y - 1), ng.x)), definedon=upper)
-    f = solution.discrete.space.f
-    assert force.sum() == pytest.approx(-f @ unit.vec.FV().NumPy(), rel=1e-12)
-    moment = -f @ arm.vec.FV().NumPy()
-    assert force @ solution.points[:, 0] == pytest.approx(moment, rel=1e-12)
-    assert moment / force.sum() > 2 / 6  # outside of the kern
-
-
-# --- signs ---
 
 
 def test_the_contact_force_pushes_the_secondary_off_the_primary():
@@ -333,18 +153,6 @@ def test_the_contact_force_pushes_the_secondary_off_the_primary():
     assert solve(problem, maxh=0.5).contact_force() == pytest.approx([0, 0.2], abs=1e-13)
     swapped = replace(problem, contact=[Contact("lower_contact", "upper_contact")])
     assert solve(swapped, maxh=0.5).contact_force() == pytest.approx([0, -0.2], abs=1e-13)
-
-
-def test_pressure_is_force_over_weight():
-    # Weights of order 2 are those of Simpson's rule: h/6, 4h/6, h/6.
-    solution = solve(two_blocks(traction={"top": 0.1}), maxh=0.5, order=2)
-    x = solution.points[:, 0]
-    share = solution.force / solution.pressure
-    middle = np.isclose((x / 0.25) % 2, 1)
-    ends = np.abs(x) == 1
-    assert share[ends] == pytest.approx(0.5 / 6)
-    assert share[middle] == pytest.approx(4 * 0.5 / 6)
-    assert share[~ends & ~middle] == pytest.approx(2 * 0.5 / 6)
 
 
 def test_uniform_pressure_in_units_of_stress():
@@ -369,59 +177,6 @@ def test_uniform_pressure_in_units_of_stress():
 
 
 @pytest.mark.parametrize("order", [1, 3])
-def test_traction_by_a_scalar_is_a_pressure(order):
-    problem = cases.ring_in_ring().problem
-    scalar = solve(problem, maxh=0.4, order=order)
-    pressure = next(iter(problem.traction.values()))
-    vector = replace(problem, traction={"rim": -pressure * ng.specialcf.normal(2)})
-    assert difference(solve(vector, maxh=0.4, order=order), scalar) < 1e-13
-
-
-# --- counts ---
-
-
-def test_matched_straight_lines_need_no_search_and_no_curving():
-    solution = solve(partly_open(), maxh=0.3, order=2)
-    assert solution.work["assemblies"] == 1
-    assert solution.work["factorizations"] == 1
-    assert solution.work["gap_searches"] == 0
-    assert solution.work["curved_elements"] == 0
-    assert solution.work["estimates"] == 0
-    assert solution.mesh.GetCurveOrder() == 1
-
-
-@pytest.mark.parametrize("order", [1, 2, 4])
-def test_matched_circles_need_no_search(order):
-    solution = solve(cases.ring_in_ring().problem, maxh=0.4, order=order)
-    assert solution.work["gap_searches"] == 0
-    assert solution.work["curved_elements"] > 0
-
-
-def test_curves_apart_need_a_search_each():
-    solution = solve(pressed_disc(), maxh=0.4, order=2)
-    assert solution.work["gap_searches"] == 1
-    on_arc = boundary_mask(solution.mesh, "disc_arc")
-    region = solution.mesh.ngmesh.Elements1D().NumPy()["index"] - 1
-    assert solution.work["curved_elements"] == np.count_nonzero(on_arc[region])
-
-
-def test_a_rigid_obstacle_needs_no_search():
-    solution = solve(cases.disc_on_rigid_plane(), maxh=0.3, order=2)
-    assert solution.work["gap_searches"] == 0
-    assert solution.work["assemblies"] == 1
-
-
-def test_full_contact_takes_one_system():
-    solution = solve(cases.ring_in_ring().problem, maxh=0.3, order=2)
-    assert solution.steps == [0]
-    assert solution.work["factorizations"] == 1
-    assert solution.active.all()
-
-
-# --- variants of the data ---
-
-
-@pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize("name", ["S1", "S7", "S9", "B", "polygon"])
 @pytest.mark.study(witness=["S9-1", "B-1", "S9-3"])
 def test_secondary_and_primary_may_be_swapped_on_matched_lines(name, order):
@@ -430,62 +185,6 @@ def test_secondary_and_primary_may_be_swapped_on_matched_lines(name, order):
     solution = solve(problem, maxh=0.3, order=order)
     swapped = replace(problem, contact=[Contact(contact.primary, contact.secondary)])
     assert difference(solve(swapped, solution.mesh, order=order), solution) < 1e-9
-
-
-@pytest.mark.parametrize("order", [1, 2, 3])
-@pytest.mark.study(witness=["3"])
-def test_secondary_and_primary_may_be_swapped_with_a_direction(order):
-    problem = cases.hertz_contact().problem
-    [contact] = problem.contact
-    solution = solve(problem, maxh=0.3, order=order)
-    back = Contact(contact.primary, contact.secondary, direction=(0, -1), gap=contact.gap)
-    other = solve(replace(problem, contact=[back]), solution.mesh, order=order)
-    assert difference(other, solution) < 1e-9
-    assert other.contact_force() == pytest.approx(-solution.contact_force(), rel=1e-9)
-
-
-def squares(sign, n=6):
-    """Problem B's blocks on n x n squares, halved into triangles; mirrored in x for sign = -1."""
-    mesh = Mesh(dim=2)
-    for k, (name, low) in enumerate((("upper", 0.0), ("lower", -1.0))):
-        p = [
-            [mesh.Add(MeshPoint(Pnt(sign * 2 * i / n, low + j / n, 0))) for i in range(n + 1)]
-            for j in range(n + 1)
-        ]
-        face = mesh.Add(FaceDescriptor(surfnr=k + 1, domin=k + 1, bc=k + 1))
-        mesh.SetMaterial(k + 1, name)
-        for i, j in np.ndindex(n, n):
-            a, b, c, d = p[j][i], p[j][i + 1], p[j + 1][i + 1], p[j + 1][i]
-            for triangle in ([a, b, c], [a, c, d]):
-                mesh.Add(Element2D(face, triangle[::sign]))
-        right, left = [row[-1] for row in p], [row[0] for row in p[::-1]]
-        sides = {"low": p[0], "far": right, "high": p[-1][::-1], "near": left}
-        for number, (side, line) in enumerate(sides.items(), start=4 * k + 1):
-            for ends in pairwise(line[::sign]):
-                mesh.Add(Element1D(list(ends), index=number))
-            mesh.SetBCName(number - 1, f"{name}_{side}")
-    return ng.Mesh(mesh)
-
-
-@pytest.mark.parametrize("order", [1, 2, 3])
-def test_a_mirrored_problem_has_the_mirrored_solution(order):
-    both = []
-    for sign in (1, -1):
-        problem = Problem(
-            geometry=squares(sign),
-            materials={"upper": SOFT, "lower": STIFF},
-            displacement={"lower_low": (0, 0), "upper_near|lower_near": (0, None)},
-            traction={"upper_high": ng.IfPos(1 - sign * ng.x, 0.01, 0.0)},
-            contact=[Contact("upper_low", "lower_high")],
-        )
-        both.append(solve(problem, order=order))
-    one, other = both
-    assert 0 < np.count_nonzero(one.active) < len(one.active)
-    assert other.points == pytest.approx(one.points * [-1, 1], abs=1e-14)
-    assert (other.active == one.active).all()
-    assert other.pressure == pytest.approx(one.pressure, abs=1e-11 * one.pressure.max())
-    assert other.energy == pytest.approx(one.energy, rel=1e-11)
-    assert other.transitions() == pytest.approx(one.transitions() * [-1, 1], rel=1e-9)
 
 
 def test_a_turned_problem_has_the_turned_solution():
@@ -579,171 +278,6 @@ def test_bilateral_pairs_pull():
         assert max(solution.residuals.values()) < EXACT
 
 
-def test_a_bilateral_gap_is_kept_closed_to_its_value():
-    problem = two_blocks(
-        displacement={"bottom": (0, 0), "top": (0, 0)},
-        contact=[replace(LINE, gap=0.01, bilateral=True)],
-    )
-    solution = solve(problem, maxh=0.5)
-    # d.(v_secondary - v_primary) = 0.01: the bodies are drawn together by that much.
-    _, up = nodes_on(solution, "upper_contact")
-    _, down = nodes_on(solution, "lower_contact")
-    assert np.sort(up[:, 1]).mean() - np.sort(down[:, 1]).mean() == pytest.approx(-0.01, rel=1e-9)
-    assert solution.force.max() < 0
-
-
-@pytest.mark.parametrize("measured", [False, True])
-def test_an_interference_presses(measured):
-    # Shrink fit: p = delta / R1 / [compliances of the two rings], in plane strain.
-    delta, (r0, r1, r2) = 0.001, (0.5, 1.0, 2.0)
-    problem = Problem(
-        geometry=rings(quarter=True, interference=delta if measured else 0.0),
-        materials={"outer": SOFT, "inner": STIFF},
-        sliding="inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y",
-        contact=[Contact("outer_contact", "inner_contact", gap=None if measured else -delta)],
-    )
-    solution = solve(problem, maxh=0.3, order=3)
-    outer = ((r2**2 + r1**2) / (r2**2 - r1**2) + 0.3 / 0.7) / (1.0 / (1 - 0.3**2))
-    inner = ((r1**2 + r0**2) / (r1**2 - r0**2) - 0.2 / 0.8) / (3.0 / (1 - 0.2**2))
-    assert solution.active.all()
-    # The rays of the points on the cuts run along the cuts.
-    angle = np.degrees(np.arctan2(*solution.points.T[::-1]))
-    assert angle.min() == pytest.approx(0, abs=1e-9)
-    assert angle.max() == pytest.approx(90, abs=1e-9)
-    # Order 3 at this size: measured 6.5e-3 at an end of the zone, 1e-5 in the mean. Overlapping
-    # circles have radii that differ by 1e-3.
-    expected = delta / r1 / (outer + inner)
-    assert solution.pressure == pytest.approx(expected, rel=1e-2)
-    assert solution.force.sum() == pytest.approx(
-        expected * math.pi / 2, rel=3e-3 if measured else 1e-4
-    )
-
-
-def test_a_rigid_obstacle_along_the_normal():
-    # Uniaxial strain in a guided column of height 2 on a rigid floor that its own normals meet.
-    problem = two_blocks(
-        materials={"upper": SOFT, "lower": SOFT},
-        displacement={"top": (None, -0.02)},
-        sliding="upper_left|upper_right|lower_left|lower_right",
-        contact=[LINE, Contact("bottom", gap=0.01)],
-    )
-    solution = solve(problem, maxh=0.5, order=2)
-    # The column falls by 0.01, then is squeezed by 0.01 over its height of 2.
-    modulus = 0.7 / (1.3 * 0.4)
-    assert solution.pressure == pytest.approx(modulus * 0.01 / 2)
-    assert solution.contact_force(1) == pytest.approx([0, modulus * 0.01], abs=1e-13)
-    assert (solution.pair == np.repeat([0, 1], [9, 9])).all()
-    assert solution.points[solution.pair == 1][:, 1] == pytest.approx(-1)
-
-
-def test_three_bodies_in_a_stack():
-    solution = solve(stack(), maxh=0.3, order=2)
-    # c is pressed by 0.2 in all and b weighs 0.05.
-    assert solution.contact_force(1) == pytest.approx([0, 0.2], abs=1e-12)
-    assert solution.contact_force(0) == pytest.approx([0, 0.25], abs=1e-12)
-    assert solution.reactions["a_below"] == pytest.approx([0, 0.25], abs=1e-12)
-    assert set(solution.pair) == {0, 1}
-    names = [contact.secondary for contact in solution.problem.contact]
-    assert str(solution).endswith(f"force {names[0]} 0.250000, {names[1]} 0.200000")
-    for pair, height in ((0, 1.0), (1, 1.5)):
-        assert solution.points[solution.pair == pair][:, 1] == pytest.approx(height)
-
-
-def test_general_hooke_equals_its_isotropic_case():
-    lam, mu = 0.3 / (1.3 * 0.4), 1 / 2.6
-    C = np.array([[lam + 2 * mu, lam, 0], [lam, lam + 2 * mu, 0], [0, 0, mu]])
-    problem = cases.one_transition().problem
-    solution = solve(problem, maxh=0.4, order=2)
-    materials = {"upper": Hooke(C), "lower": problem.materials["lower"]}
-    other = solve(replace(problem, materials=materials), solution.mesh, order=2)
-    assert difference(other, solution) < 1e-12
-
-
-def test_an_anisotropic_patch_is_exact():
-    # Uniform stress sigma_yy = -0.1 in a material that couples compression and shear.
-    C = np.array([[2.0, 0.5, 0.1], [0.5, 1.0, 0.05], [0.1, 0.05, 0.4]])
-    exx, eyy, gxy = np.linalg.solve(C, [0, -0.1, 0])
-    u = ng.CF((exx * ng.x + gxy * ng.y, eyy * ng.y))
-    problem = two_blocks(
-        materials={"upper": Hooke(C), "lower": Hooke(C)}, displacement={"bottom|top": u}
-    )
-    solution = solve(problem, maxh=0.5)
-    assert solution.pressure == pytest.approx(0.1)
-    assert ng.Integrate((solution.displacement - u) ** 2, solution.mesh) < 1e-28
-
-
-def test_a_modulus_that_varies():
-    # A column with nu = 0 and 1 / E = 1 + y^2 under the pressure 0.1: u_y = -0.1 int 1/E, a cubic.
-    law = Elastic(E=1 / (1 + ng.y**2), nu=0.0)
-    problem = two_blocks(
-        materials={"upper": law, "lower": law},
-        displacement={"bottom": (0, 0)},
-        sliding="upper_left",
-        traction={"top": 0.1},
-    )
-    solution = solve(problem, maxh=0.4, order=3)
-    assert solution.pressure == pytest.approx(0.1, rel=1e-9)
-    x, u = nodes_on(solution, "upper_.*|lower_.*|top")
-    y = x[:, 1]
-    assert u[:, 1] == pytest.approx(-0.1 * (y + y**3 / 3 + 4 / 3), abs=1e-10)
-
-
-def test_components_of_the_displacement():
-    # u_x = 0.01 (1 + y) on the left sides, u_y free; the rest of the data in pieces.
-    shear = 0.01 * (1 + ng.y)
-    problem = two_blocks(
-        displacement={
-            "bottom": (None, 0),
-            "upper_left|lower_left": (shear, None),
-            "top": ng.CF((0.02, -0.05)),
-        }
-    )
-    solution = solve(problem, maxh=0.4, order=2)
-    for pattern, axis, expected in (
-        ("bottom", 1, lambda x: 0 * x[:, 0]),
-        ("upper_left", 0, lambda x: 0.01 * (1 + x[:, 1])),
-        ("lower_left", 0, lambda x: 0.01 * (1 + x[:, 1])),
-        ("top", 0, lambda x: 0 * x[:, 0] + 0.02),
-        ("top", 1, lambda x: 0 * x[:, 0] - 0.05),
-    ):
-        x, u = nodes_on(solution, pattern)
-        assert u[:, axis] == pytest.approx(expected(x), abs=1e-14), pattern
-    _, u = nodes_on(solution, "bottom")
-    assert np.ptp(u[:, 0]) > 1e-4  # free, as None says
-    assert max(solution.residuals.values()) < EXACT
-
-
-# --- Gamma_0 ---
-
-
-def test_a_guide_on_an_inclined_boundary():
-    # A column under uniform pressure, turned: only its guides hold it.
-    angle = 0.5
-    axes = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-
-    def block(name, low, names):
-        corners = [(-1, low), (1, low), (1, low + 1), (-1, low + 1)]
-        return body(name, polygon([tuple(axes @ c) for c in corners], names))
-
-    problem = Problem(
-        geometry=compound(
-            block("upper", 0, ["upper_contact", "upper_right", "top", "upper_left"]),
-            block("lower", -1, ["bottom", "lower_right", "lower_contact", "lower_left"]),
-        ),
-        materials={"upper": SOFT, "lower": SOFT},
-        sliding=["bottom", "upper_left", "lower_left"],
-        traction={"top": 0.1},
-        contact=[LINE],
-    )
-    solution = solve(problem, maxh=0.4, order=2)
-    x, u = nodes_on(solution, "top|upper_.*|lower_.*|bottom")
-    local = x @ axes + [1, 1]
-    strain = np.array([0.1 * 0.3 * 1.3, -0.1 * (1 - 0.3**2)])
-    assert u @ axes == pytest.approx(local * strain, abs=1e-13)
-    assert solution.reactions["bottom"] == pytest.approx(axes @ [0, 0.2], abs=1e-12)
-    assert solution.contact_force() == pytest.approx(axes @ [0, 0.2], abs=1e-12)
-
-
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_a_guide_on_a_circle_holds_the_exact_normal(order):
     # A quarter of two rings, pressed from the hole against a guided rim.
@@ -762,29 +296,6 @@ def test_a_guide_on_a_circle_holds_the_exact_normal(order):
     assert max(solution.residuals.values()) < EXACT
 
 
-@pytest.mark.parametrize("order", [1, 2, 3, 4])
-def test_a_body_guided_on_its_circular_rim_can_rotate(order):
-    """The rotation stays in V_h exactly: turned at an eccentric hole, the body has no stress."""
-    shape = WorkPlane().Circle(0, 0, 2).Face() - WorkPlane().Circle(0.3, 0.1, 0.5).Face()
-    shape.name = "wheel"
-    for edge in shape.edges:
-        edge.name = "rim" if edge.mass > 2 * math.pi else "hole"
-    problem = Problem(
-        geometry=OCCGeometry(shape, dim=2),
-        materials={"wheel": SOFT},
-        sliding="rim",
-        displacement={"hole": (-0.1 * ng.y, 0.1 * ng.x)},
-    )
-    solution = solve(problem, maxh=0.6, order=order)
-    stress = ng.InnerProduct(solution.stress, solution.stress)
-    assert math.sqrt(ng.Integrate(stress, solution.mesh)) < 1e-13
-    rotation = ng.CF((-0.1 * ng.y, 0.1 * ng.x))
-    assert ng.Integrate((solution.displacement - rotation) ** 2, solution.mesh) < 1e-26
-
-
-# --- known numbers ---
-
-
 @pytest.mark.parametrize(
     ("order", "unknowns", "force", "peak", "width", "energy"),
     [
@@ -793,13 +304,7 @@ def test_a_body_guided_on_its_circular_rim_can_rotate(order):
     ],
 )
 def test_problem_a(order, unknowns, force, peak, width, energy):
-    """Problem A: quarter disc on a rigid plane, to the accuracy of small meshes.
-
-    x >= 0, x^2 + (y - 1)^2 <= 1, y <= 1; E = 200, nu = 0.3, plane strain; u_x = 0 on x = 0,
-    u_y = -0.005 and u_x free on y = 1; plane y = 0, direction (0, -1), gap y. References: force of
-    the whole disc 0.4465326(2), greatest pressure 5.5919(1), half-width 0.05082(1), strain energy
-    of the half 5.221032(1)e-4. Measured: 5e-5, 6e-5, 7e-4, 9e-5 and 3e-6, 7e-6, 7e-5, 1e-6.
-    """
+    """A disc on a plane: references of forces, peak, half-width and energy to six digits."""
     problem = Problem(
         geometry=disc(),
         materials={"disc": Elastic(E=200.0, nu=0.3)},
@@ -823,11 +328,7 @@ def test_problem_a(order, unknowns, force, peak, width, energy):
     [(2, 2500, 2e-4, 2e-3, 5e-3), (3, 4100, 3e-5, 5e-4, 3e-4)],
 )
 def test_problem_b(order, unknowns, energy, end, peak):
-    """Problem B, see `partly_open`: strain energy 7.164124(1)e-4, end of contact x = 1.5453(1),
-    greatest pressure 0.97572(2) at x = 0, contact force 1.
-
-    Measured: 5e-5, 3e-4, 7e-4 and 2e-5, 1e-5, 1e-5.
-    """  # noqa: D205
+    """Strain energy 7.164124(1)e-4, end of contact x = 1.5453(1), peak 0.97572(2), force 1."""
     *_, solution = adapt(partly_open(), order=order, max_dofs=unknowns)
     u = values(solution)
     strain = u @ (solution.discrete.space.A @ u) / 2
@@ -840,58 +341,6 @@ def test_problem_b(order, unknowns, energy, end, peak):
     assert solution.points[largest] == pytest.approx([0, 0], abs=1e-14)
     # The load's jump at x = 1 is a node of these meshes: integrated exactly.
     assert solution.contact_force() == pytest.approx([0, 1], abs=1e-12)
-
-
-def test_two_discs_touch_as_one_on_a_plane():
-    """Equal discs of one material meet on their plane of symmetry, a rigid one for each."""
-    pair = Problem(
-        geometry=disc_on_disc(),
-        materials={"upper": SOFT, "lower": SOFT},
-        displacement={"top": (None, -0.02), "bottom": (None, 0.02)},
-        sliding="axis",
-        contact=[Contact("upper_arc", "lower_arc", direction=(0, -1))],
-    )
-    single = Problem(
-        geometry=disc(),
-        materials={"disc": SOFT},
-        displacement={"top": (None, -0.02)},
-        sliding="axis",
-        contact=[Contact("arc", direction=(0, -1), gap=ng.y)],
-    )
-    first, second = (
-        list(adapt(p, order=3, max_dofs=n))[-1] for p, n in ((pair, 3000), (single, 1500))
-    )
-    # Up to the errors of either: measured 4e-6, 4e-5 and 3e-5.
-    assert first.contact_force()[1] == pytest.approx(second.contact_force()[1], rel=1e-4)
-    assert first.pressure.max() == pytest.approx(second.pressure.max(), rel=5e-4)
-    assert first.energy == pytest.approx(2 * second.energy, rel=1e-4)
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_part_of_the_zone_in_bilateral_contact(order):
-    """Remark 3.3: bilateral on a given part of a smooth line, which shares a node with the rest."""
-    shape = blocks(line=[(-1, 0), (0, 0), (1, 0)]).shape
-    for edge in shape.edges:
-        if edge.name == "upper_contact":
-            edge.name = "glued" if edge.center.x < 0 else "loose"
-    pulled = Problem(
-        geometry=OCCGeometry(shape, dim=2),
-        materials={"upper|lower": Elastic(E=1.0, nu=0.3)},
-        displacement={"bottom": (0, 0), "top": (0, 0.001)},
-        contact=[
-            Contact("glued", "lower_contact", bilateral=True),
-            Contact("loose", "lower_contact"),
-        ],
-    )
-    solution = solve(pulled, maxh=0.25, order=order)
-    glued = solution.pair == 0
-    assert np.count_nonzero(np.hypot(*solution.points.T) < 1e-12) == 1  # one row at the join
-    assert np.abs(solution.gap[glued]).max() < 1e-15  # fixed unknowns
-    assert solution.force[glued].min() < 0  # it may pull
-    assert not solution.active[~glued].any()
-    assert solution.gap[~glued].min() > 0
-    total = sum(solution.reactions.values(), np.zeros(2))
-    assert np.abs(total).max() < 1e-10 * np.abs(solution.force).sum()
 
 
 READ = {
@@ -931,13 +380,3 @@ def test_a_mesh_that_was_changed_after_solving_is_told(name, change, tmp_path):
         READ[name](solution, tmp_path)
     assert not list(tmp_path.iterdir())
     np.testing.assert_array_equal(solution.pressure, pressure)  # what was read stays
-
-
-def test_what_was_estimated_before_a_mesh_is_changed_stays():
-    solution = solve(two_blocks(), maxh=0.5, order=2)
-    estimate, bound, energy = solution.error_estimate, solution.error_bound, solution.energy
-    refined(solution.mesh)
-    assert (solution.error_estimate, solution.error_bound) == (estimate, bound)
-    assert solution.energy == energy
-    with pytest.raises(RuntimeError, match="changed after solving"):
-        solution.quantities()

@@ -1,7 +1,5 @@
 """Scenes on which rows at single nodes went wrong without a word, each against what is known."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from dataclasses import replace
@@ -20,13 +18,10 @@ from ngcontact import (
     ConvergenceError,
     Elastic,
     Problem,
-    adapt,
     one_mesh,
     solve,
-    solving,
 )
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import rings
 from ngcontact.geometries.region import (
     DOWN,
     LEFT,
@@ -36,10 +31,9 @@ from ngcontact.geometries.region import (
     compound,
     polygon,
     quarter_arc,
-    segment,
 )
 from ngcontact.mesh import first_mesh
-from tests.given_meshes import mesh_of, two_blocks
+from tests.given_meshes import two_blocks
 from tests.scenes import distance, solved_with_load
 
 EXACT = 1e-10  # round-off times the condition of small meshes
@@ -89,9 +83,6 @@ def test_a_slot_of_any_width_leaves_pressures_right(order, swap, primaries):
         assert distance(d, result, UNIFORM) < EXACT
 
 
-# ------------------------------------------------------------------------- meshes as given
-
-
 def spread(count, seed):
     """Nodes of so many segments on -1 < x < 1, the inner ones moved by up to a third."""
     x = np.linspace(-1, 1, count + 1)
@@ -134,135 +125,6 @@ def test_meshes_as_given_are_exact(lines, swap, order):
     assert abs(np.linalg.norm(solution.contact_force()) / 2 - 1) < EXACT
 
 
-@pytest.mark.parametrize("order", [1, 2, 3, 4])
-@pytest.mark.parametrize("end", [0.6, 0.7123])
-def test_an_overhang_of_a_mesh_as_given_is_exact(order, end):
-    """The lower block ends at a node of the upper one, and inside a segment."""
-    x, y = np.linspace(0, 1, 6), np.linspace(0, 0.5, 4)
-    mesh = mesh_of(
-        [
-            ("plate", x, y, ("plate_bottom", "side", "plate_top", "side")),
-            ("a", x * end, y - 0.5, ("a_bottom", "side", "a_top", "side")),
-        ]
-    )
-    problem = Problem(
-        geometry=mesh,
-        materials={"plate|a": LAW},
-        displacement={"plate_top|a_bottom": UNIFORM},
-        contact=[Contact("plate_bottom", "a_top")],
-    )
-    d, result = solved_with_load(problem, mesh, order, "plate_bottom", [(end, 1.1)])
-    [line] = d.lines
-    np.testing.assert_allclose(result.force / line.weight, 1.0, rtol=EXACT)
-    assert distance(d, result, UNIFORM) < EXACT
-
-
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("direction", [None, (0.0, -1.0)])
-@pytest.mark.study(witness=["direction1-1"])
-def test_round_off_at_corners_decides_nothing(order, direction):
-    """A block whose sides belong to its secondary: at its corners these graze the plate."""
-
-    def pressed(angle):
-        x, y = np.linspace(-1, 1, 9), np.linspace(0, 0.5, 3)
-        mesh = mesh_of(
-            [
-                ("plate", x, 2 * y - 1, ("plate_bottom", "side", "plate_top", "side")),
-                ("u", x * 0.3, y, ("u_bottom", "u_side", "u_top", "u_side")),
-            ],
-            angle,
-        )
-        turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-        xi = None if direction is None else tuple(turn @ direction)
-        problem = Problem(
-            geometry=mesh,
-            materials={"plate|u": LAW},
-            displacement={"plate_bottom": (0, 0), "u_top": tuple(turn @ (0, -0.05))},
-            contact=[Contact("u_bottom|u_side", "plate_top", direction=xi)],
-        )
-        solution = solve(problem, order=order)
-        return solution, turn.T @ solution.contact_force()
-
-    right, _ = pressed(0.0)
-    for degrees in range(17, 360, 17):  # twenty angles, 20, 40, 60, 80 among the worst before
-        solution, force = pressed(math.radians(degrees))
-        assert abs(force[0]) < EXACT * force[1]
-        np.testing.assert_array_equal(solution.active, right.active)
-        np.testing.assert_allclose(solution.pressure, right.pressure, rtol=1e-8)
-
-
-# ---------------------------------------------------------------------------- pins and discs
-
-
-def half_ring(name, middle, inner, outer, names):
-    """The half x > 0 of a ring about (0, `middle`) with the names of its two circles."""
-    at = (0, middle)
-    low = segment((0, middle - inner), (0, middle - outer))
-    high = segment((0, middle + outer), (0, middle + inner))
-    return body(
-        name,
-        [
-            (names[1], quarter_arc(at, outer, DOWN, RIGHT)),
-            (names[1], quarter_arc(at, outer, RIGHT, UP)),
-            ("axis", high),
-            (names[0], quarter_arc(at, inner, UP, RIGHT)),
-            (names[0], quarter_arc(at, inner, RIGHT, DOWN)),
-            ("axis", low),
-        ],
-    )
-
-
-def pin_in_hole(clearance, swap, touching, settle=-0.02):
-    """Half of a pin in a hole of radius 1, which its bore is pushed into."""
-    pin = half_ring("pin", -clearance * touching, 0.4, 1 - clearance, ("bore", "pin"))
-    plate = half_ring("plate", 0.0, 1.0, 3.0, ("hole", "rim"))
-    return Problem(
-        geometry=compound(pin, plate),
-        materials={"pin|plate": LAW},
-        displacement={"rim": (0, 0), "bore": (None, settle)},
-        sliding="axis",
-        contact=[Contact(*("pin", "hole")[:: -1 if swap else 1])],
-    )
-
-
-@pytest.mark.parametrize(("clearance", "touching"), [(1e-3, False), (1e-5, True)])
-@pytest.mark.study(witness=["0.001-False"])
-def test_pins_do_not_depend_on_orders_and_roles(clearance, touching):
-    """Force and peak of order 1 within 2 and 6 %, of order 2 within 0.1 and 0.3 % of order 3.
-
-    Where a pin that touches is 1e-5 too small, vertices of both arcs all but meet. Measured
-    1.2, 5.1 % and 0.04, 0.1 %; roles differ by the clearance over the radius.
-    """
-    values = {}
-    for order in (1, 2, 3):
-        for swap in (False, True):
-            solution = solve(pin_in_hole(clearance, swap, touching), maxh=0.2, order=order)
-            force = abs(solution.contact_force()[1])
-            values[order, swap] = np.array([force, solution.pressure.max()])
-        roles = values[order, False] / values[order, True]
-        np.testing.assert_allclose(roles, 1.0, atol=1e-3 + clearance)
-    for order, close in ((1, (0.02, 0.06)), (2, (0.001, 0.003))):
-        assert (np.abs(values[order, True] / values[3, True] - 1) < close).all()
-
-
-@pytest.mark.parametrize("swap", [False, True])
-def test_a_loose_pin_is_held_by_its_hole(swap):
-    """No support but contact, whichever side carries the points; the load is its force."""
-    pair = ("outer_contact", "inner_contact")[:: -1 if swap else 1]
-    problem = Problem(
-        geometry=rings(0.5, 1.0, 2.0, interference=-1e-2),
-        materials={"inner|outer": LAW},
-        displacement={"rim": (0, 0)},
-        traction={"hole": (0, -1e-3)},
-        contact=[Contact(*pair)],
-    )
-    solution = solve(problem, maxh=0.3, order=2)
-    np.testing.assert_allclose(
-        solution.contact_force(), (0, (1 if swap else -1) * 1e-3 * math.pi), atol=1e-5
-    )
-    assert max(solution.residuals.values()) < 1e-12
-
-
 def pin_at_the_bottom(*pairs):
     """A pin that touches its hole, and that contact alone holds against a slanting body force."""
     hole = WorkPlane().Circle(1.0).Face()
@@ -283,10 +145,7 @@ def pin_at_the_bottom(*pairs):
 
 
 def test_roles_that_fail_are_exchanged_with_a_warning(monkeypatch):
-    """What is solved is the problem with roles the other way round, on the same mesh.
-
-    Whether the first roles fail hangs on round-off, so that here they do not depend on it.
-    """
+    """What is solved is the problem with roles the other way round, on the same mesh."""
     given = pin_at_the_bottom(("hole", "pin"))
     mesh, solved = first_mesh(given, 0.35), one_mesh.minimise_energy
 
@@ -308,128 +167,6 @@ def test_roles_that_fail_are_exchanged_with_a_warning(monkeypatch):
     np.testing.assert_allclose(solution.contact_force(), -load, atol=1e-9 * abs(load).max())
 
 
-def test_other_roles_are_not_tried_where_the_gap_is_given(monkeypatch):
-    """The error of the roles that were given is raised, as where the others fail, too."""
-    problem = pin_at_the_bottom(("hole", "pin"))
-    calls = []
-
-    def fail(discrete, active):
-        calls.append(discrete.problem.contact)
-        raise ConvergenceError(f"attempt {len(calls)}")
-
-    monkeypatch.setattr(one_mesh, "minimise_energy", fail)
-    mesh = first_mesh(problem, 0.5)
-    with pytest.raises(ConvergenceError, match="attempt 1"):
-        solve(problem, mesh, order=2)
-    assert [pairs[0].secondary for pairs in calls] == ["hole", "pin"]
-    calls.clear()
-    problem = replace(problem, contact=[replace(problem.contact[0], gap=0.01)])
-    with pytest.raises(ContactError):
-        solve(problem, mesh, order=2)
-    assert len(calls) <= 1
-
-
-def test_roles_that_all_but_leave_a_pin_free_are_exchanged():
-    """They turn it far, with large forces: energies -2.0 and -2.0e-4."""
-    given = pin_at_the_bottom(("hole", "pin"))
-    mesh = first_mesh(given, 0.35)
-    with pytest.warns(ContactWarning, match="exchanged"):
-        solution = solve(given, mesh, order=1)
-    right = solve(replace(given, contact=[given.contact[0].swapped()]), mesh, order=1)
-    assert solution.problem.contact[0].secondary == "pin"
-    np.testing.assert_allclose(solution.energy, right.energy, rtol=1e-9)  # round-off, amplified
-
-
-@pytest.mark.parametrize("swap", [False, True])
-def test_a_pin_that_lies_askew_in_a_loose_bush_is_refused(swap):
-    """Normals of either side of a pair turn one of the two bodies, which nothing holds."""
-    clearance = 0.03
-    hole = WorkPlane().Circle(1.0).Face()
-    plate = WorkPlane().MoveTo(-2, -2).Rectangle(4, 4).Face() - hole
-    at = -clearance
-    bush = WorkPlane().Circle(0, at, 1.0 - clearance).Face()
-    bush.edges.name = "outside"
-    bush -= WorkPlane().Circle(0, at, 0.6).Face()
-    pin = WorkPlane().Circle(0, 2 * at, 0.6 - clearance).Face()
-    for name, face in (("plate", plate), ("bush", bush), ("pin", pin)):
-        face.faces.name = name
-    pin.edges.name = "pin"
-    for edge in plate.edges:
-        edge.name = "rim" if max(abs(edge.center.x), abs(edge.center.y)) > 1.5 else "hole"
-    for edge in bush.edges:
-        if edge.name != "outside":
-            edge.name = "inside"
-    pairs = [("hole", "outside"), ("inside", "pin")]
-    problem = Problem(
-        geometry=OCCGeometry(Compound([plate, bush, pin]), dim=2),
-        materials={"pin|bush|plate": Elastic(E=210e3, nu=0.3)},
-        displacement={"rim": (0, 0)},
-        force={"pin": (3.0, -10.0)},
-        contact=[Contact(*(pair[::-1] if swap else pair)) for pair in pairs],
-    )
-    for order in (1, 2):
-        with pytest.raises(ContactError):
-            solve(problem, maxh=0.35, order=order)
-
-
-@pytest.mark.parametrize("swap", [False, True])
-def test_a_slender_wedge_keeps_its_roles(swap):
-    """It moves far for a small gap whichever roles: forces are its load over the slope, 1/200."""
-    slope = 0.005
-    outlines = {
-        "wedge": ([(0, 0), (2, 0), (2, 1 - 2 * slope), (0, 1)], ["down", "", "up", ""]),
-        "lower": ([(-1, -1), (3, -1), (3, 0), (-1, 0)], ["fixed", "", "floor", ""]),
-        "upper": (
-            [(-1, 1 + slope), (3, 1 - 3 * slope), (3, 2), (-1, 2)],
-            ["roof", "", "fixed", ""],
-        ),
-    }
-    bodies = [body(name, polygon(*outline)) for name, outline in outlines.items()]
-    pairs = [("down", "floor"), ("up", "roof")]
-    problem = Problem(
-        geometry=compound(*bodies),
-        materials={"wedge|lower|upper": Elastic(E=1e5, nu=0.3)},
-        displacement={"fixed": (0, 0)},
-        force={"wedge": (1.0, 0)},
-        contact=[Contact(*(pair[::-1] if swap else pair)) for pair in pairs],
-    )
-    solution = solve(problem, maxh=0.5, order=2)
-    assert solution.problem is problem
-    load = 2 - 2 * slope
-    expected = (-1 if swap else 1) * np.array((-load, -load / slope))
-    np.testing.assert_allclose(solution.contact_force(1), expected, rtol=1e-6)  # round-off / slope
-
-
-def test_roles_are_exchanged_in_adapt_and_from_its_solutions():
-    """In `adapt` once, in the coarse run of `solve`, and from a start with exchanged roles."""
-    given = pin_at_the_bottom(("hole", "pin"))
-    with pytest.warns(ContactWarning, match="exchanged") as said:
-        *_, solution = adapt(given, maxh=0.5, order=2, max_dofs=3000)
-    assert sum("exchanged" in str(one.message) for one in said) == 1
-    assert solution.problem.contact[0].secondary == "pin"
-    heavier = replace(given, force={"pin": (0.6, -2.0)})
-    with pytest.warns(ContactWarning, match="exchanged"):
-        *_, continued = adapt(heavier, order=2, max_dofs=3000, start=solution)
-    right = replace(heavier, contact=[given.contact[0].swapped()])
-    *_, fresh = adapt(right, maxh=0.5, order=2, max_dofs=3000)
-    # Either is wrong by the square of its relative error.
-    wrong = continued.relative_error_estimate**2 + fresh.relative_error_estimate**2
-    np.testing.assert_allclose(continued.energy, fresh.energy, rtol=wrong)
-
-
-def test_roles_are_exchanged_in_the_coarse_run(monkeypatch):
-    """That starts a large mesh, which takes its roles over."""
-    monkeypatch.setattr(solving, "COARSE_RUN_FROM", 500)
-    given = pin_at_the_bottom(("hole", "pin"))
-    with pytest.warns(ContactWarning, match="exchanged"):
-        solution = solve(given, maxh=0.35, order=2)
-    assert solution.coarse_levels > 0
-    assert solution.problem.contact[0].secondary == "pin"
-    right = replace(given, contact=[given.contact[0].swapped()])
-    other = solve(right, solution.mesh, order=2)
-    np.testing.assert_allclose(solution.energy, other.energy, rtol=1e-9)  # round-off, amplified
-
-
 def disc_in_vee(contact, settle):
     """A disc of radius 1 in a groove of two flanks at 45 degrees."""
     middle = (0, math.sqrt(2))
@@ -449,22 +186,6 @@ def disc_in_vee(contact, settle):
     )
 
 
-def test_one_direction_for_each_flank_is_that_without_any():
-    """Measured: the sum of forces the same to 3e-4, each flank half of it."""
-    half = math.sqrt(0.5)
-    fixed = [
-        Contact("right", "arc", direction=(-half, half)),
-        Contact("left", "arc", direction=(half, half)),
-    ]
-    free = [Contact("right", "arc"), Contact("left", "arc")]
-    forces = []
-    for contact in (fixed, free):
-        solution = solve(disc_in_vee(contact, -0.005), maxh=0.4, order=3)
-        forces.append([np.linalg.norm(solution.contact_force(k)) for k in (0, 1)])
-    np.testing.assert_allclose(forces[0], forces[1], rtol=2e-3)
-    np.testing.assert_allclose(forces[0][0], forces[0][1], rtol=2e-3)
-
-
 FLANKS = ("left", "right")
 SLOPE = math.sqrt(0.5)
 VEE_PAIRS = {
@@ -475,10 +196,6 @@ VEE_PAIRS = {
         Contact("right", "arc", direction=(-SLOPE, SLOPE)),
         Contact("left", "arc", direction=(SLOPE, SLOPE)),
     ],
-    "fixed, disc": [
-        Contact("arc", "right", direction=(SLOPE, -SLOPE)),
-        Contact("arc", "left", direction=(-SLOPE, -SLOPE)),
-    ],
 }
 
 
@@ -486,11 +203,7 @@ VEE_PAIRS = {
 @pytest.mark.parametrize("pairs", VEE_PAIRS)
 @pytest.mark.study(witness=["disc, both-0.4", "disc, both-0.23", "disc-0.4"])
 def test_both_curves_have_a_node_where_they_touch(pairs, maxh):
-    """And feel a settlement to which nodes beside it, .02 apart, were blind without a word.
-
-    Forces within 23 % of those at maxh=.17 by both roles, 1.18 and 1.24e-3. A node's own
-    row feels any settlement; where runs of two pairs overlap rows are means, of gaps of O(h^2).
-    """
+    """And feel a settlement to which nodes beside it, .02 apart, were blind without a word."""
     problem = disc_in_vee(VEE_PAIRS[pairs], -0.01)
     mesh = first_mesh(problem, maxh)
     trace = boundary_trace(mesh, 1)
@@ -521,16 +234,14 @@ def told(problem, **options):
     return solution, sum(PASSED in str(warning.message) for warning in caught)
 
 
-@pytest.mark.parametrize("modulus", [1.0, 1e9])
 @pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize("pairs", ["flanks", "fixed"])
-def test_what_a_mesh_as_given_does_not_see_is_told(pairs, order, modulus):
+def test_what_a_mesh_as_given_does_not_see_is_told(pairs, order):
     """No node where the curves touch: no contact at order 1, a third of the force lost at 3."""
     problem = disc_in_vee(VEE_PAIRS[pairs], -0.01)
-    problem = replace(problem, materials={"disc|vee": Elastic(E=modulus, nu=0.3)})
     mesh = ng.Mesh(problem.geometry.GenerateMesh(maxh=0.4))
     solution, count = told(replace(problem, geometry=mesh), order=order)
-    assert solution.force.sum() / 2 < 0.8 * 1.21e-3 * modulus
+    assert solution.force.sum() / 2 < 0.8 * 1.21e-3
     assert count == (1 if order == 1 else 2)  # the flank with or without a chord across the place
 
 
@@ -543,3 +254,24 @@ def test_overlaps_between_points_in_contact_are_not_told(settle, order):
         solution, count = told(disc_in_vee(VEE_PAIRS[pairs], settle), maxh=0.4, order=order)
         assert solution.active.any()
         assert count == 0
+
+
+def test_other_roles_are_not_tried_where_the_gap_is_given(monkeypatch):
+    """The error of the roles that were given is raised, as where the others fail, too."""
+    problem = pin_at_the_bottom(("hole", "pin"))
+    calls = []
+
+    def fail(discrete, active):
+        calls.append(discrete.problem.contact)
+        raise ConvergenceError(f"attempt {len(calls)}")
+
+    monkeypatch.setattr(one_mesh, "minimise_energy", fail)
+    mesh = first_mesh(problem, 0.5)
+    with pytest.raises(ConvergenceError, match="attempt 1"):
+        solve(problem, mesh, order=2)
+    assert [pairs[0].secondary for pairs in calls] == ["hole", "pin"]
+    calls.clear()
+    problem = replace(problem, contact=[replace(problem.contact[0], gap=0.01)])
+    with pytest.raises(ContactError):
+        solve(problem, mesh, order=2)
+    assert len(calls) <= 1

@@ -1,1 +1,1 @@
-"""Uniform against adaptive refinement: `studies`, their `runs` and `pictures` of both."""
+"""Uniform against adaptive refinement: `runs` of both, tables and pictures of them."""

@@ -13,7 +13,6 @@ import importlib.metadata
 import os
 import platform
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeAlias, get_args
 
@@ -21,9 +20,8 @@ import ngsolve as ng
 from cyclopts import Parameter
 from cyclopts.validators import Number
 
-from drivers.benchmark.report import pictures, tables
-from drivers.benchmark.scenes.problems import COMMONS, Common, Name
-from drivers.benchmark.studies import accuracy, growth, large, levels, skip, stages, tax
+from drivers.benchmark.scenes.problems import Name
+from drivers.benchmark.studies import Extent, accuracy, overhead, processes, skip, stages
 from drivers.command_line import Count, run
 
 Size: TypeAlias = Annotated[Count, Parameter(validator=Number(gte=10_000))]
@@ -44,83 +42,16 @@ def machine() -> str:
     )
 
 
-@dataclass(frozen=True)
-class Extent:
-    """How much is measured, and where pictures go; see `main`."""
-
-    problems: Sequence[Name]
-    rounds: int
-    max_dofs: int
-    out: Path
-
-    @property
-    def commons(self) -> list[Common]:
-        """The problems themselves."""
-        return [COMMONS[name]() for name in self.problems]
-
-
-Measured: TypeAlias = tuple[list[Any], str]  # rows, and their table in Markdown
-
-
-def contact_tax(extent: Extent) -> Measured:
-    """Contact tax."""
-    rows = list(tax.taxes(extent.commons, extent.rounds, extent.max_dofs))
-    return rows, tables.of_tax(rows)
-
-
-def adaptive_levels(extent: Extent) -> Measured:
-    """Whole levels and imports."""
-    rows = list(levels.all_levels(extent.commons, extent.rounds, extent.max_dofs))
-    plain, ours = levels.import_seconds()
-    imports = f"import: ngsolve {plain:.3f} s, ngcontact {ours:.3f} s"
-    return rows, f"{tables.of_levels(rows)}\n\n{imports}"
-
-
-def growth_of_time(extent: Extent) -> Measured:
-    """Growth of time and memory."""
-    rows = list(growth.growths(extent.problems, extent.max_dofs))
-    pictures.draw_growth(extent.out / "benchmark_growth.png", rows)
-    return rows, tables.of_growth(rows)
-
-
-def large_problems(extent: Extent) -> Measured:
-    """Large problems, direct and iterative."""
-    rows = list(large.larges(extent.problems, extent.max_dofs))
-    return rows, tables.of_large(rows)
-
-
-def time_to_accuracy(extent: Extent) -> Measured:
-    """Time to accuracy."""
-    found, missing = [], set()
-    for common in extent.commons:
-        points, lines = accuracy.points(common, extent.rounds, extent.max_dofs)
-        found += points
-        missing |= set(lines)
-    pictures.draw_accuracy(extent.out / "benchmark_accuracy.png", found)
-    return found, "\n\n".join([tables.of_accuracy(found), *sorted(missing)])
-
-
-def skipped(extent: Extent) -> Measured:
-    """What scenes skip."""
-    rows = list(skip.scenes(extent.rounds, extent.max_dofs))
-    return rows, tables.of_scenes(rows)
-
-
-def time_by_stage(extent: Extent) -> Measured:
-    """Where the time of a level goes."""
-    rows = list(stages.all_stages(extent.commons, extent.max_dofs))
-    return rows, tables.of_stages(rows)
-
-
 Part: TypeAlias = Literal["tax", "levels", "growth", "large", "accuracy", "skip", "stages"]
-PARTS: dict[Part, Callable[[Extent], Measured]] = {
-    "tax": contact_tax,
-    "levels": adaptive_levels,
-    "growth": growth_of_time,
-    "large": large_problems,
-    "accuracy": time_to_accuracy,
-    "skip": skipped,
-    "stages": time_by_stage,
+# Each returns rows and their table in Markdown; its docstring is the title.
+PARTS: dict[Part, Callable[[Extent], tuple[list[Any], str]]] = {
+    "tax": overhead.taxes,
+    "levels": overhead.all_levels,
+    "growth": processes.growth,
+    "large": processes.large,
+    "accuracy": accuracy.accuracy,
+    "skip": skip.scenes,
+    "stages": stages.all_stages,
 }
 
 

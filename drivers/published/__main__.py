@@ -17,6 +17,7 @@ import ngsolve as ng
 
 from drivers.command_line import Count, Order, printed_in, run
 from drivers.published.problems import PUBLISHED, Figure, Published
+from drivers.tables import table
 from ngcontact import Solution, adapt
 
 Name: TypeAlias = Literal[
@@ -54,19 +55,17 @@ def rows_of(figures: Sequence[Figure], solution: Solution) -> list[tuple[str, fl
 
 def section(published: Published, solution: Solution) -> str:
     """One problem on the page."""
-    lines = [
-        f"\n## {published.title}\n",
-        f"{published.statement}\n",
-        "| | published | ours | difference |\n|---|---|---|---|",
-    ]
-    for name, theirs, ours, difference in rows_of(published.figures, solution):
-        lines.append(f"| {name} | {theirs:.6g} | {ours:.6g} | {difference:+.1e} |")
+    rows = (
+        (name, f"{theirs:.6g}", f"{ours:.6g}", f"{difference:+.1e}")
+        for name, theirs, ours, difference in rows_of(published.figures, solution)
+    )
     unknowns, error = solution.displacement.space.ndof, solution.relative_error_estimate
-    lines += [
-        f"\n{unknowns} unknowns, estimated error {error:.1e}. {published.why}\n",
-        f"Source: {published.source}.",
-    ]
-    return "\n".join(lines)
+    return (
+        f"\n## {published.title}\n\n{published.statement}\n\n"
+        f"{table(('', 'published', 'ours', 'difference'), rows)}\n\n"
+        f"{unknowns} unknowns, estimated error {error:.1e}. {published.why}\n\n"
+        f"Source: {published.source}."
+    )
 
 
 def main(

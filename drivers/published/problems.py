@@ -15,6 +15,7 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import Compound, OCCGeometry, Rectangle, WorkPlane, Y
 
+from drivers.reference.half_spaces import Hertz
 from ngcontact import Contact, Elastic, Problem, Solution
 from ngcontact.geometries import disc, disc_on_block, disc_on_disc
 
@@ -23,46 +24,20 @@ Measure = Callable[[Solution], float]
 
 @dataclass(frozen=True)
 class Figure:
-    """A published number, and how it is read off a solution.
-
-    Attributes
-    ----------
-    name : str
-        With its unit.
-    published : float
-        The number.
-    measure : callable
-        The same of a `Solution`.
-    within : float
-        Relative difference that `why` explains.
-    """
+    """A published number, with its unit in the name, and how it is read off a solution."""
 
     name: str
     published: float
     measure: Measure
-    within: float
+    within: float  # relative difference that `why` explains
 
 
 @dataclass(frozen=True)
 class Published:
-    """A problem with its source.
-
-    Attributes
-    ----------
-    title, source : str
-        What it is, and where it is published.
-    statement : str
-        The data, in the source's units.
-    problem : callable
-        Makes the `Problem`.
-    figures : tuple of Figure
-        The numbers.
-    why : str
-        What explains the differences.
-    """
+    """A problem with its data in the source's units, and what explains the differences."""
 
     title: str
-    source: str
+    source: str  # where it is published
     statement: str
     problem: Callable[[], Problem]
     figures: tuple[Figure, ...]
@@ -184,74 +159,6 @@ def rotating_rings() -> Problem:
     )
 
 
-@dataclass(frozen=True)
-class Hertz:
-    """Hertz's formulas for spheres or parallel cylinders under a force.
-
-    Attributes
-    ----------
-    force : float
-        Of spheres, or of cylinders per length.
-    radius : float
-        1 / R = 1 / R_1 + 1 / R_2.
-    modulus : float
-        1 / E = (1 - nu_1^2) / E_1 + (1 - nu_2^2) / E_2.
-    """
-
-    force: float
-    radius: float
-    modulus: float
-
-    def sphere(self) -> tuple[float, float]:
-        """Radius of the circle of contact, and largest pressure."""
-        a = (3 * self.force * self.radius / (4 * self.modulus)) ** (1 / 3)
-        return float(a), float(1.5 * self.force / (np.pi * a**2))
-
-    def cylinder(self) -> tuple[float, float]:
-        """Half-width of the strip of contact, and largest pressure."""
-        a = np.sqrt(4 * self.force * self.radius / (np.pi * self.modulus))
-        return float(a), float(2 * self.force / (np.pi * a))
-
-
-def lame() -> tuple[float, float]:
-    """Pressures between three rotating rings in plane stress, by Lame's formulas.
-
-    u = A r + B / r - c r^3 with c = (1 - nu^2) rho omega^2 / (8 E) on each of the rings.
-    """
-    speed, M, b = 420.0, np.zeros((6, 6)), np.zeros(6)
-
-    def radial(k: int, r: float) -> tuple[float, float, float, float]:
-        """Coefficients of A, B and 1 in sigma_rr at `r`, and c r^3."""
-        E, nu, density, *_ = list(RINGS.values())[k]
-        c, factor = (1 - nu**2) * density * speed**2 / (8 * E), E / (1 - nu**2)
-        return (
-            factor * (1 + nu),
-            -factor * (1 - nu) / r**2,
-            -factor * (3 + nu) * c * r**2,
-            c * r**3,
-        )
-
-    radii = [(outside, inside) for *_, outside, inside in RINGS.values()]
-    for row, (k, r, given) in enumerate(((0, radii[0][0], 150.0), (2, radii[2][1], 30.0))):
-        *M[row, 2 * k : 2 * k + 2], load, _ = radial(k, r)
-        b[row] = -given - load
-    for k, interference in enumerate((0.025, 0.010)):
-        r = radii[k][1]
-        (a, b1, load, c), (a2, b2, load2, c2) = radial(k, r), radial(k + 1, r)
-        M[2 + k, 2 * k : 2 * k + 4] = a, b1, -a2, -b2
-        b[2 + k] = load2 - load
-        M[4 + k, 2 * k : 2 * k + 4] = r, 1 / r, -r, -1 / r
-        b[4 + k] = interference + c - c2
-    x = np.linalg.solve(M, b)
-
-    def pressure(k: int) -> float:
-        """Inside ring `k`."""
-        a, b1, load, _ = radial(k, radii[k][1])
-        return float(-(a * x[2 * k] + b1 * x[2 * k + 1] + load))
-
-    return pressure(0), pressure(1)
-
-
 KRATOS = Hertz(5e5 * np.pi * 6.1237**2, 6.1237, 1e8 / (1 - 0.29**2))
 
 PUBLISHED: dict[str, Published] = {
@@ -304,10 +211,7 @@ PUBLISHED: dict[str, Published] = {
         source="MOOSE, modules/contact/test/tests/hertz_spherical, comments of hertz_contact_rz.i",
         statement="Spheres R = 2, E = 1.40625e7, nu = 0.25; F = 10 000.",
         problem=pressed_halves(
-            2.0,
-            Elastic(E=1.40625e7, nu=0.25),
-            1e4 / (np.pi * 2**2),
-            model="axisymmetric",
+            2.0, Elastic(E=1.40625e7, nu=0.25), 1e4 / (np.pi * 2**2), model="axisymmetric"
         ),
         figures=(
             Figure("radius of contact", 0.1, half_width(), 5e-3),

@@ -20,32 +20,27 @@ from typing import TYPE_CHECKING, NamedTuple
 import ngsolve as ng
 import numpy as np
 
-from drivers.reference.straight import NO_FORCE, Exact, Profile, compiled, positive
+from drivers.reference.straight import NO_FORCE, Exact, Profile, compiled
+from drivers.reference.straight import energy_error as energy_error
+from drivers.reference.straight import relative_energy_error as relative_energy_error
 from drivers.reference.westergaard import CF, SIDES, depth, effective_modulus, moduli
 from ngcontact.problem import Elastic
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
-    from ngcontact import Solution
 
 PUNCHES = 24  # Gauss points of the sum of punches that is a cone: round-off at a distance
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Revolved(Exact):
-    """Exact solution of bodies of revolution; pressure and gap are functions of the radius.
+    """Exact solution of bodies of revolution; pressure and gap are functions of the radius."""
 
-    Attributes
-    ----------
-    hoop : dict[str, CoefficientFunction]
-        Hoop stress.
-    """
-
-    hoop: dict[str, CF]
+    hoop: dict[str, CF]  # stress
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Hertz(Revolved):
     """Hertz contact of radius a, greatest pressure p0, force P and approach delta."""
 
@@ -113,9 +108,8 @@ def hertz(upper: Elastic, lower: Elastic, *, radius: float, a: float) -> Hertz:
 
     The upper one moves down by delta = a^2 / radius at a distance, the lower one not at all.
     """
-    positive("radius", radius)
     stiffness = effective_modulus(upper, lower)
-    p0, delta = 2 * stiffness * positive("a", a) / (math.pi * radius), a * a / radius
+    p0, delta = 2 * stiffness * a / (math.pi * radius), a * a / radius
     bodies = {"upper": upper, "lower": lower}
     stress = {body: huber_stress(law, p0, a, body) for body, law in bodies.items()}
     displacement = {body: huber_displacement(law, p0, a, body) for body, law in bodies.items()}
@@ -144,23 +138,11 @@ def hertz(upper: Elastic, lower: Elastic, *, radius: float, a: float) -> Hertz:
 
 @dataclass(frozen=True, eq=False)
 class Indentation:
-    """A rigid obstacle pressed into the half-space y < 0, contact for r <= a.
+    """A rigid obstacle pressed into the half-space y < 0 by P, contact for r <= a."""
 
-    Attributes
-    ----------
-    displacement : CoefficientFunction
-        (2,), not to be asked for at the edge of a punch and the tip of a cone.
-    pressure : callable
-        p on the circle, a NumPy function of the radius.
-    gap : CoefficientFunction
-        Height of the obstacle above y = 0, negative inside.
-    a, P : float
-        Radius of contact, force.
-    """
-
-    displacement: CF
-    pressure: Profile
-    gap: CF
+    displacement: CF  # (2,), not to be asked for at the edge of a punch and the tip of a cone
+    pressure: Profile  # on the circle, a NumPy function of the radius
+    gap: CF  # height of the obstacle above y = 0, negative inside
     a: float
     P: float
 
@@ -178,7 +160,7 @@ def punch_displacement(material: Elastic, P: CF | float, a: float, body: str) ->
 
 def flat_punch(material: Elastic, *, a: float, depth: float) -> Indentation:
     """Boussinesq's flat rigid punch of radius a, pressed in by `depth`: P = 2 E* a depth."""
-    P = 2 * moduli(material).plane * positive("a", a) * positive("depth", depth)
+    P = 2 * moduli(material).plane * a * depth
     return Indentation(
         punch_displacement(material, P, a, "lower"),
         pressure=lambda r: P / (2 * math.pi * a * np.sqrt(a * a - np.asarray(r, float) ** 2)),
@@ -198,18 +180,18 @@ def cone(material: Elastic, *, a: float, slope: float) -> Indentation:
     nodes, weights = np.polynomial.legendre.leggauss(PUNCHES)
     u = ng.CF((0.0, 0.0))
     for s, w in zip(a * (1 + nodes) / 2, a * weights / 2, strict=True):
-        P = math.pi * plane * positive("slope", slope) * s * w
+        P = math.pi * plane * slope * s * w
         u += punch_displacement(material, P, float(s), "lower")
     return Indentation(
         u,
         pressure=lambda r: plane * slope / 2 * np.arccosh(a / np.asarray(r, float)),
         gap=slope * ng.x - math.pi / 2 * a * slope,
-        a=positive("a", a),
+        a=a,
         P=math.pi / 2 * plane * a * a * slope,
     )
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Fit(Revolved):
     """Shrink fit with the contact pressure p everywhere."""
 
@@ -246,37 +228,7 @@ def shrink_fit(
         stress,
         force=dict.fromkeys(fields, NO_FORCE),
         pressure=lambda z: np.full(np.shape(z), p),
-        gap=lambda z: np.zeros(np.shape(z)),
         initial_gap=ng.CF(-interference),
         hoop=hoop,
         p=p,
     )
-
-
-def relative_energy_error(solution: Solution, exact: Revolved) -> float:
-    """Relative error of a discrete stress in the energy norm, over all bodies of revolution."""
-    error, norm = energy_error(solution, exact)
-    return error / norm
-
-
-def energy_error(solution: Solution, exact: Revolved) -> tuple[float, float]:
-    """The error itself, and the norm of the exact stress."""
-    error = norm = 0.0
-    for body, stress in exact.stress.items():
-        material, region = solution.problem.materials[body], solution.mesh.Materials(body)
-        if not isinstance(material, Elastic):
-            raise TypeError(
-                f"materials[{body!r}] = {material!r}: the exact solutions are isotropic"
-            )
-        energies = []
-        for s, hoop in (
-            (solution.stress - stress, solution.hoop_stress - exact.hoop[body]),
-            (stress, exact.hoop[body]),
-        ):
-            trace = s[0, 0] + s[1, 1] + hoop
-            squares = ng.InnerProduct(s, s) + hoop * hoop
-            energy = squares - material.nu / (1 + material.nu) * trace * trace
-            energies.append(2 * math.pi * ng.x * energy / (2 * moduli(material).mu))
-        integrals = ng.Integrate(ng.CF(tuple(energies)), region, order=2 * solution.order + 8)
-        error, norm = error + integrals[0], norm + integrals[1]
-    return math.sqrt(error), math.sqrt(norm)

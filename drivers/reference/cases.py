@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -38,20 +39,14 @@ FIRST = Elastic(E=1.0, nu=0.3)
 SECOND = Elastic(E=3.0, nu=0.2)
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))  # of a polygonal zone
 BLOCKS = {"upper": FIRST, "lower": SECOND}
+TOUCHING = Contact(secondary="upper_contact", primary="lower_contact")
+UPWARDS = Contact(secondary="lower_contact", primary="upper_contact", direction=(0, 1))
 OUTSIDE = {"upper": "top|upper_left|upper_right", "lower": "bottom|lower_left|lower_right"}
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A problem and its exact solution.
-
-    Attributes
-    ----------
-    problem : Problem
-        The continuous problem.
-    exact : Exact
-        Its solution.
-    """
+    """A continuous problem and its exact solution."""
 
     problem: Problem
     exact: Exact
@@ -62,56 +57,41 @@ def _on_outside(exact: Exact) -> dict[str, ng.CoefficientFunction]:
     return {OUTSIDE[body]: u for body, u in exact.displacement.items()}
 
 
+def touching_blocks(displacement: dict[str, Any], **others: Any) -> Problem:
+    """Blocks without a gap, of the two materials unless told otherwise."""
+    whole = {"geometry": blocks(), "materials": BLOCKS, "contact": [TOUCHING], **others}
+    return Problem(displacement=displacement, **whole)
+
+
 def one_transition() -> Case:
     """S1: blocks that part at the origin, pressure (-x)^(1/2), gap x^(3/2); bounded zone."""
     exact = transition(FIRST, SECOND)
-    problem = Problem(
-        geometry=blocks(),
-        materials=BLOCKS,
-        displacement=_on_outside(exact),
-        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
-    )
-    return Case(problem, exact)
+    return Case(touching_blocks(_on_outside(exact)), exact)
 
 
 def hertz_contact(radius: float = 5.0, half_width: float = 0.3) -> Case:
     """S3: blocks with the gap x^2 / 2R as data, Hertz's pressure; enlarging zone."""
     exact = hertz(FIRST, SECOND, radius=radius, half_width=half_width)
-    contact = Contact(
-        secondary="lower_contact",
-        primary="upper_contact",
-        direction=(0, 1),
-        gap=exact.initial_gap,
-    )
-    problem = Problem(
-        geometry=blocks(), materials=BLOCKS, displacement=_on_outside(exact), contact=[contact]
-    )
-    return Case(problem, exact)
+    contact = replace(UPWARDS, gap=exact.initial_gap)
+    return Case(touching_blocks(_on_outside(exact), contact=[contact]), exact)
 
 
 def pressure_patch(p1: float = 0.0) -> Case:
     """S6: full contact under the pressure 1 + p1 x of blocks clamped above and below."""
     exact = patch(FIRST, SECOND, p0=1.0, p1=p1)
     ends = {"top": exact.displacement["upper"], "bottom": exact.displacement["lower"]}
-    problem = Problem(
-        geometry=blocks(),
-        materials=BLOCKS,
-        displacement=ends,
-        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
-    )
-    return Case(problem, exact)
+    return Case(touching_blocks(ends), exact)
 
 
 def polygonal_patch(p: float = 1.0) -> Case:
     """Uniform stress -p I across a zone with a convex and a re-entrant corner, one material."""
     exact = uniform_pressure(FIRST, tuple(BLOCKS), p=p)
     u = exact.displacement["upper"]
-    problem = Problem(
+    problem = touching_blocks(
+        {"top": u, "bottom": u},
         geometry=blocks(line=LINE),
         materials=dict.fromkeys(BLOCKS, FIRST),
-        displacement={"top": u, "bottom": u},
         traction={"upper_left|upper_right|lower_left|lower_right": p},
-        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
     )
     return Case(problem, exact)
 
@@ -125,15 +105,8 @@ def clamped_transition() -> Case:
         for body, stress in exact.stress.items()
         for name, normal in side.items()
     }
-    problem = Problem(
-        geometry=blocks(),
-        materials=BLOCKS,
-        displacement={"top": (0, 0), "bottom": (0, 0)},
-        traction=traction,
-        force=exact.force,
-        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
-    )
-    return Case(problem, exact)
+    ends = {"top": (0, 0), "bottom": (0, 0)}
+    return Case(touching_blocks(ends, traction=traction, force=exact.force), exact)
 
 
 def guided_transition() -> Case:
@@ -153,14 +126,8 @@ def curved_lines() -> Case:
         b=0.6,
         height=0.6,
     )
-    problem = Problem(
-        geometry=geometry,
-        materials=BLOCKS,
-        displacement=_on_outside(exact),
-        force=exact.force,
-        contact=[Contact(secondary="lower_contact", primary="upper_contact", direction=(0, 1))],
-    )
-    return Case(problem, exact)
+    others = {"geometry": geometry, "force": exact.force, "contact": [UPWARDS]}
+    return Case(touching_blocks(_on_outside(exact), **others), exact)
 
 
 def ring_in_ring(qn: float = 0.3, n: int = 2) -> Case:
@@ -255,7 +222,7 @@ def partly_opening_block() -> Problem:
         displacement={"bottom": (0, 0)},
         sliding="upper_axis|lower_axis",
         traction={"pressed": 1.0},
-        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
+        contact=[TOUCHING],
     )
 
 

@@ -53,8 +53,6 @@ def _exact(displacement: dict[str, CF], laws: dict[str, Law], p: float) -> Exact
         stress,
         force,
         pressure=lambda x: np.full(np.shape(x), p),
-        gap=lambda x: np.zeros(np.shape(x)),
-        initial_gap=ng.CF(0.0),
     )
 
 

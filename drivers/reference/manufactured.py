@@ -32,27 +32,13 @@ OPEN = 0.5  # part of the half-length of a bump over which an opening one parts 
 
 @dataclass(frozen=True)
 class Bump:
-    """What happens around the middle of one side of a polygonal line, besides the mean pressure.
+    """What happens around the middle of one side of a polygonal line, besides the mean pressure."""
 
-    Attributes
-    ----------
-    half_length : float
-        Of the part of the side that takes part; it must not reach the ends of the side.
-    pressure : float
-        Added to the mean pressure in the middle; not where the bodies part.
-    opening : float
-        Gap in the middle; 0: contact all along.
-    bow : float
-        Displacement of both bodies across the side, in the middle.
-    slip : float
-        Displacement of the upper body along the side, in the middle; of the lower one, minus that.
-    """
-
-    half_length: float
-    pressure: float = 0.0
-    opening: float = 0.0
-    bow: float = 0.0
-    slip: float = 0.0
+    half_length: float  # of the part of the side that takes part; it must not reach the ends
+    pressure: float = 0.0  # added to the mean one in the middle; not where the bodies part
+    opening: float = 0.0  # gap in the middle; 0: contact all along
+    bow: float = 0.0  # displacement of both bodies across the side, in the middle
+    slip: float = 0.0  # of the upper body along the side, there; of the lower one, minus that
 
 
 class Zone(NamedTuple):
@@ -216,7 +202,6 @@ def polygonal(
         force,
         pressure=lambda x: along(x, "pressure"),
         gap=lambda x: along(x, "gap"),
-        initial_gap=ng.CF(0.0),
     )
 
 
@@ -254,7 +239,7 @@ def _bump_field(
     return near_zone(material, zone, _sum(*a), _sum((sign * bump.slip, hat)), _sum(*q))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Circular(Exact):
     """A zone on the unit circle, first quadrant, open between the angles `ends`."""
 
@@ -314,6 +299,5 @@ def circular(
         force,
         pressure=lambda t: pressure * np.maximum(np.cos(4 * np.asarray(t)) - turn, 0) ** 2,
         gap=lambda t: opening * np.maximum(turn - np.cos(4 * np.asarray(t)), 0) ** 3,
-        initial_gap=ng.CF(0.0),
         ends=(end, math.pi / 2 - end),
     )

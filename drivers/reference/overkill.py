@@ -30,15 +30,9 @@ BONUS = 4  # order of integration above that of the square of the finer stress
 
 @dataclass(frozen=True, eq=False)
 class Overkill:
-    """A solution that stands for the exact one, by its stress at the points of a quadrature.
+    """A solution that stands for the exact one, by its stress at the points of a quadrature."""
 
-    Attributes
-    ----------
-    solution : Solution
-        Of any laws, in plane strain or plane stress.
-    """
-
-    solution: Solution
+    solution: Solution  # of any laws, in plane strain or plane stress
 
     def __post_init__(self) -> None:
         """Refuse a model with other stresses than those in the plane."""

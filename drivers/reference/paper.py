@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import ngsolve as ng
 from netgen.occ import OCCGeometry
 
-from drivers.reference.cases import BLOCKS, FIRST, LINE, OUTSIDE, SECOND, Case
+from drivers.reference.cases import (
+    BLOCKS,
+    FIRST,
+    LINE,
+    OUTSIDE,
+    SECOND,
+    TOUCHING,
+    UPWARDS,
+    Case,
+    touching_blocks,
+)
 from drivers.reference.manufactured import Bump, circular, polygonal
 from drivers.reference.singular import slits, with_end_of_guide
 from drivers.reference.straight import Exact, hertz, uniform_pressure
@@ -52,13 +63,12 @@ def polygonal_zone() -> Case:
         Bump(0.32, pressure=-0.4, bow=-0.05, slip=-0.1),
     )
     exact = polygonal(FIRST, ALIKE, line=LINE, bumps=bumps)
-    problem = Problem(
+    problem = touching_blocks(
+        {"top": exact.displacement["upper"], "bottom": exact.displacement["lower"]},
         geometry=_polygonal_blocks(["contact"] * 3),
         materials={"upper": FIRST, "lower": ALIKE},
-        displacement={"top": exact.displacement["upper"], "bottom": exact.displacement["lower"]},
         traction=_tractions(exact, SIDES),
         force=exact.force,
-        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
     )
     return Case(problem, exact)
 
@@ -82,7 +92,7 @@ def bilateral_part() -> Case:
         force=exact.force,
         contact=[
             Contact(secondary="upper_held", primary="lower_held", bilateral=True),
-            Contact(secondary="upper_contact", primary="lower_contact"),
+            TOUCHING,
         ],
     )
     return Case(problem, exact)
@@ -127,13 +137,9 @@ def slit_blocks(half_width: float = 0.5) -> Case:
     below: list[Point] = [(1, 0), (a, 0), (-a, 0), (-1, 0), (-1, -1), (1, -1)]
     up = ["slit", "upper_contact", "slit", "upper_right", "top", "upper_left"]
     down = ["slit", "lower_contact", "slit", "lower_left", "bottom", "lower_right"]
-    problem = Problem(
-        geometry=compound(body("upper", polygon(above, up)), body("lower", polygon(below, down))),
-        materials=BLOCKS,
-        displacement={OUTSIDE[name]: u for name, u in exact.displacement.items()},
-        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
-    )
-    return Case(problem, exact)
+    geometry = compound(body("upper", polygon(above, up)), body("lower", polygon(below, down)))
+    displacement = {OUTSIDE[name]: u for name, u in exact.displacement.items()}
+    return Case(touching_blocks(displacement, geometry=geometry), exact)
 
 
 def end_of_guide(c: float = 0.2) -> Case:
@@ -149,20 +155,12 @@ def end_of_guide(c: float = 0.2) -> Case:
         "lower_right": (1, 0),
         "lower_loose": (0, -1),
     }
-    problem = Problem(
+    problem = touching_blocks(
+        {"top": (0, 0)},
         geometry=compound(body("upper", polygon(above, up)), body("lower", polygon(below, down))),
-        materials=BLOCKS,
-        displacement={"top": (0, 0)},
         sliding="upper_axis|lower_axis|lower_guide",
-        traction=_tractions(exact, loaded | {"lower_loose": (0, -1)}),
+        traction=_tractions(exact, loaded),
         force=exact.force,
-        contact=[
-            Contact(
-                secondary="lower_contact",
-                primary="upper_contact",
-                direction=(0, 1),
-                gap=exact.initial_gap,
-            )
-        ],
+        contact=[replace(UPWARDS, gap=exact.initial_gap)],
     )
     return Case(problem, exact)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
 import ngsolve as ng
@@ -38,49 +38,34 @@ Profile: TypeAlias = Callable[[ArrayLike], NDArray[np.float64]]
 NO_FORCE = ng.CF((0.0, 0.0))
 
 
+def closed(s: ArrayLike) -> NDArray[np.float64]:
+    """No gap anywhere."""
+    return np.zeros(np.shape(s))
+
+
 @dataclass(frozen=True, eq=False)
 class Exact:
     """An exact contact solution; the dictionaries are keyed by the body's name.
 
-    Attributes
-    ----------
-    displacement : dict[str, CoefficientFunction]
-        (2,) displacement, finite and correct at every point of the body, vertices included.
-    stress : dict[str, CoefficientFunction]
-        (2, 2) in-plane stress; times the outward normal it gives the traction data.
-    force : dict[str, CoefficientFunction]
-        (2,) body force F = -div(stress).
-    pressure : callable
-        p >= 0 on the contact line, a NumPy function of x (rings: of the angle): -T_n in the bounded
-        zone problem, -T_xi per unit eta in the enlarging zone problem.
-    gap : callable
-        Gap >= 0 after deformation, a NumPy function of the same argument.
-    initial_gap : CoefficientFunction
-        Gap eps before deformation, the right side of the contact condition; negative: interference.
+    Pressure and gap are NumPy functions of x on the contact line, of the angle for rings.
     """
 
-    displacement: dict[str, CF]
-    stress: dict[str, CF]
-    force: dict[str, CF]
-    pressure: Profile
-    gap: Profile
-    initial_gap: CF
+    displacement: dict[str, CF]  # (2,), finite and correct at every point, vertices included
+    stress: dict[str, CF]  # (2, 2) in the plane; times the outward normal the traction data
+    force: dict[str, CF]  # (2,) body force F = -div(stress)
+    pressure: Profile  # >= 0: -T_n of bounded zones, -T_xi per unit eta of enlarging ones
+    gap: Profile = closed  # >= 0 after deformation
+    # Before deformation, the right side of the contact condition; negative: interference.
+    initial_gap: CF = field(default_factory=lambda: ng.CF(0.0))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Hertz(Exact):
     """Hertz contact with half width a, greatest pressure p0 and total force P per unit depth."""
 
     half_width: float
     p0: float
     P: float
-
-
-def positive(name: str, value: float) -> float:
-    """Return the value, or raise ValueError if it is not a positive finite number."""
-    if not 0 < value < math.inf:
-        raise ValueError(f"{name} = {value!r}: must be positive and finite")
-    return value
 
 
 def compiled(fields: dict[str, CF]) -> dict[str, CF]:
@@ -112,10 +97,8 @@ def transition(upper: Elastic, lower: Elastic, *, c: float = 1.0, bending: float
     Z = i c sqrt(z): p = c sqrt(-x), gap = 4 c x^(3/2) / (3 E*). The displacement grows as r^(3/2),
     which is the regularity of frictionless contact with smooth data. `bending` is a curvature
     common to both bodies, u_y = -bending x^2 / 2 on y = 0: the contact line deflects, the pressure
-    stays. Units: c stress per square root of length, bending 1 / length. Raises ValueError unless
-    c > 0.
+    stays. Units: c stress per square root of length, bending 1 / length.
     """
-    positive("c", c)
     materials = {"upper": upper, "lower": lower}
     x, y, fields = ng.x, ng.y, {}
     for body, material in materials.items():
@@ -123,9 +106,7 @@ def transition(upper: Elastic, lower: Elastic, *, c: float = 1.0, bending: float
         bent = bending * ng.CF((x * y, -(x * x + ratio * y * y) / 2))
         grad = bending * ng.CF((y, x, -x, -ratio * y), dims=(2, 2))
         fields[body] = Field(root.u + bent, root.grad + grad)
-    return Exact(
-        *equilibrium_fields(fields, materials), *_root_profiles(c, upper, lower), ng.CF(0.0)
-    )
+    return Exact(*equilibrium_fields(fields, materials), *_root_profiles(c, upper, lower))
 
 
 def transition_cutoff(
@@ -136,25 +117,21 @@ def transition_cutoff(
     Displacement and traction vanish on |y| = height, the homogeneous data of HH81 (3.6) and (3.8):
     clamped top, guided bottom. The remaining data are tractions on the sides and a body force, zero
     for |y| <= plateau. With a guided bottom the problem is semicoercive (HH81 Remark 3.7): the
-    lower body is determined up to a translation along x. Raises ValueError unless c > 0 and
-    0 <= plateau < height.
+    lower body is determined up to a translation along x.
     """
-    positive("c", c)
     materials = {"upper": upper, "lower": lower}
     fields = {
         body: half_plane(root_potential(c, body), material, body)
         for body, material in materials.items()
     }
     cut = _cut_off(fields, materials, height, plateau)
-    return Exact(*cut, *_root_profiles(c, upper, lower), ng.CF(0.0))
+    return Exact(*cut, *_root_profiles(c, upper, lower))
 
 
 def _cut_off(
     fields: dict[str, Field], materials: dict[str, Elastic], height: float, plateau: float
 ) -> tuple[dict[str, CF], dict[str, CF], dict[str, CF]]:
     """Displacement, stress and force of equilibrated fields times the cut-off in |y|."""
-    if not 0 <= plateau < height:
-        raise ValueError(f"plateau = {plateau!r}: must be at least 0 and below height = {height!r}")
     displacement, stress, force = {}, {}, {}
     for body, material in materials.items():
         u, grad = fields[body]
@@ -187,11 +164,11 @@ def hertz(
     p = p0 sqrt(1 - x^2/a^2), p0 = a E* / (2 R), P = pi a p0 / 2 (K. L. Johnson, Contact Mechanics,
     1985, chapter 4): exact for the linearised enlarging zone problem, direction along y. For two
     curved bodies 1/R is the sum of both curvatures. With a `plateau` displacement and traction fall
-    to zero on |y| = 1, see `transition_cutoff`. Raises ValueError unless R and a are positive.
+    to zero on |y| = 1, see `transition_cutoff`.
     """
     materials = {"upper": upper, "lower": lower}
-    a = positive("half_width", half_width)
-    p0 = a * effective_modulus(upper, lower) / (2 * positive("radius", radius))
+    a = half_width
+    p0 = a * effective_modulus(upper, lower) / (2 * radius)
     fields = {
         body: half_plane(hertz_potential(p0 / a, a, body), material, body)
         for body, material in materials.items()
@@ -232,8 +209,6 @@ def patch(upper: Elastic, lower: Elastic, *, p0: float = 1.0, p1: float = 0.0) -
     return Exact(
         *equilibrium_fields(fields, materials),
         pressure=lambda x: p0 + p1 * np.asarray(x, float),
-        gap=lambda x: np.zeros_like(np.asarray(x, float)),
-        initial_gap=ng.CF(0.0),
     )
 
 
@@ -253,8 +228,6 @@ def uniform_pressure(material: Elastic, bodies: Sequence[str], *, p: float = 1.0
         stress=dict.fromkeys(bodies, ng.CF((-p, 0, 0, -p), dims=(2, 2))),
         force=dict.fromkeys(bodies, NO_FORCE),
         pressure=lambda s: np.full(np.shape(s), p),
-        gap=lambda s: np.zeros(np.shape(s)),
-        initial_gap=ng.CF(0.0),
     )
 
 
@@ -269,28 +242,37 @@ def energy_error(solution: Solution, exact: Exact) -> tuple[float, float]:
 
     The norm is the square root of the sum over bodies of the integral of s : C^-1 : s. The order of
     integration, 2 p + 8, leaves room for the exact stress, whose gradient grows as r^(-1/2) at the
-    ends of the contact zone. Raises ValueError for another model than plane strain and for a body
-    that the mesh does not have.
+    ends of the contact zone. Raises ValueError for another model than that of the exact solution
+    and for a body that the mesh does not have.
     """
     problem, mesh = solution.problem, solution.mesh
-    if problem.model != "plane strain":
-        raise ValueError(f"model = {problem.model!r}: the exact solutions are in 'plane strain'")
+    hoop = getattr(exact, "hoop", None)  # of bodies of revolution
+    if problem.model != ("plane strain" if hoop is None else "axisymmetric"):
+        raise ValueError(f"model = {problem.model!r}: the exact solution is of another one")
     error = norm = 0.0
     for body, stress in exact.stress.items():
         if body not in mesh.GetMaterials():
             raise ValueError(f"no body {body!r} in the mesh: it has {mesh.GetMaterials()}")
         material, region = problem.materials[body], mesh.Materials(body)
-        energies = [_complementary_energy(material, s) for s in (solution.stress - stress, stress)]
+        stresses = [(solution.stress - stress, None), (stress, None)]
+        if hoop is not None:
+            hoops = (solution.hoop_stress - hoop[body], hoop[body])
+            stresses = [(s, h) for (s, _), h in zip(stresses, hoops, strict=True)]
+        energies = [_complementary_energy(material, *pair) for pair in stresses]
         both = ng.CF(tuple(energies)).Compile()  # the exact stress once
         integrals = ng.Integrate(both, region, order=2 * solution.order + 8)
         error, norm = error + integrals[0], norm + integrals[1]
     return math.sqrt(error), math.sqrt(norm)
 
 
-def _complementary_energy(material: Elastic | Hooke, s: CF) -> CF:
-    """Twice the complementary energy density, s : C^-1 : s, in plane strain."""
+def _complementary_energy(material: Elastic | Hooke, s: CF, hoop: CF | None) -> CF:
+    """Twice the complementary energy density, s : C^-1 : s; with a `hoop` times 2 pi r."""
     if isinstance(material, Hooke):
         voigt = ng.CF((s[0, 0], s[1, 1], s[0, 1]))
         return ng.InnerProduct(ng.Inv(material.voigt()) * voigt, voigt)
-    trace = s[0, 0] + s[1, 1]
-    return (ng.InnerProduct(s, s) - material.nu * trace * trace) / (2 * moduli(material).mu)
+    square, trace, nu = ng.InnerProduct(s, s), s[0, 0] + s[1, 1], material.nu
+    if hoop is None:
+        return (square - nu * trace * trace) / (2 * moduli(material).mu)
+    trace = trace + hoop
+    energy = square + hoop * hoop - nu / (1 + nu) * trace * trace
+    return 2 * math.pi * ng.x * energy / (2 * moduli(material).mu)

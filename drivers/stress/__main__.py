@@ -1,7 +1,6 @@
 """Numerical stability: a table of cases under stress, with what passes and what fails.
 
     python -m drivers.stress
-    python -m drivers.stress held scaling
     python -m drivers.stress scenes --scenes 600
     python -m drivers.stress data --scenes 200
 
@@ -12,32 +11,15 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Literal, TypeAlias, get_args
 
 from drivers.command_line import Count, Seed, run
 from drivers.stress import Outcome
 from ngcontact import ContactError
 
-Trial: TypeAlias = Literal[
-    "algebra",
-    "data",
-    "gaps",
-    "held",
-    "interruption",
-    "lines",
-    "materials",
-    "scaling",
-    "scenes",
-    "shapes",
-    "symmetry",
-]
-RANDOM = ("algebra", "data", "scenes", "symmetry")  # whose cases are drawn
+Trial: TypeAlias = Literal["data", "scenes"]
 SCENES = 66  # every kind six times, in two minutes
-SUMMARIES = {  # modules with the tables of drawn scenes; loaded only where they are needed
-    "data": "drivers.stress.trials.data",
-    "scenes": "drivers.stress.scenes.checks.report",
-}
 
 
 def line(outcome: Outcome) -> str:
@@ -46,16 +28,6 @@ def line(outcome: Outcome) -> str:
         f"{outcome.case:32} {outcome.varied:44} {outcome.steps:5d} {outcome.residual:9.1e} "
         f"{outcome.error:9.1e} {outcome.allowed:9.1e} {'pass' if outcome.passed else 'FAIL'}"
     )
-
-
-def outcomes(name: Trial, seed: int, scenes: int = SCENES) -> Iterator[Outcome]:
-    """Outcomes of one module, which is loaded only now; `scenes` of them where scenes are drawn."""
-    trial = importlib.import_module(f"drivers.stress.trials.{name}")
-    given = {"seed": seed} if name in RANDOM else {}
-    if name in SUMMARIES:
-        given["count"] = scenes
-    found: Iterator[Outcome] = trial.outcomes(**given)
-    return found
 
 
 def main(
@@ -72,10 +44,9 @@ def main(
     trials : sequence of str
         Kinds of stress.
     seed : int
-        Number from which quadratic programs of `algebra` and numberings of `symmetry` are drawn;
-        of the first of `data` and `scenes`.
+        Number of the first scene.
     scenes : int
-        How many random scenes `data` and `scenes` draw each, of seeds one after the other.
+        How many random scenes each kind draws, of seeds one after the other.
 
     Returns
     -------
@@ -85,18 +56,16 @@ def main(
     failed = count = 0
     print(f"{'case':32} {'varied':44} {'steps':>5} {'residual':>9} {'error':>9} {'allowed':>9}")
     for name in trials:
+        trial, found = importlib.import_module(f"drivers.stress.trials.{name}"), list[Outcome]()
         try:
-            found = []
-            for outcome in outcomes(name, seed, scenes):
-                count += 1
+            for outcome in trial.outcomes(seed, scenes):
                 found.append(outcome)
-                failed += not outcome.passed
                 print(line(outcome), flush=True)
-            if name in SUMMARIES:
-                print(*importlib.import_module(SUMMARIES[name]).summary(found), sep="\n")
+            print(*trial.summary(found), sep="\n")
         except ContactError as error:  # the rest of a module falls with a case that raises
             count, failed = count + 1, failed + 1
             print(f"{name:32} {type(error).__name__}: {error} FAIL", flush=True)
+        count, failed = count + len(found), failed + sum(not outcome.passed for outcome in found)
     print(f"{count} cases, {failed} failed")
     return failed
 

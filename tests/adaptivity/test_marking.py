@@ -1,6 +1,4 @@
-"""Doerfler marking: the smallest set, ties, zeros, scales."""
-
-from __future__ import annotations
+"""Doerfler marking: the smallest set, ties, zeros, scales; which order a level has."""
 
 from itertools import combinations
 
@@ -9,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from ngcontact.adaptivity import Refinement
 from ngcontact.adaptivity.marking import doerfler, together
+from ngcontact.adaptivity.planning import best_order
 
 SHARES = st.floats(0.01, 1.0)
 INDICATORS = st.lists(st.floats(0.0, 1.0, width=32), min_size=1, max_size=8).map(np.array)
@@ -31,14 +31,6 @@ def test_no_smaller_set_carries_the_share(indicators, theta):
         if count:
             sum_of_squares = (indicators[list(smaller)] ** 2).sum()
             assert sum_of_squares < theta * (indicators**2).sum() * (1 + ROUND_OFF)
-
-
-@given(INDICATORS, SHARES)
-@settings(max_examples=100, deadline=None)
-def test_the_marked_elements_are_the_largest(indicators, theta):
-    marked = doerfler(indicators, theta)
-    if marked.any() and not marked.all():
-        assert indicators[marked].min() >= indicators[~marked].max()
 
 
 @pytest.mark.parametrize("scale", [1e-300, 1e-150, 1e-9, 1e9, 1e150, 1e300])
@@ -64,20 +56,6 @@ def test_round_off_does_not_choose_among_equals(theta):
     assert (doerfler(noisy, theta) == doerfler(indicators, theta)).all()
 
 
-def test_a_million_equal_indicators():
-    assert np.count_nonzero(doerfler(np.full(1_000_000, 0.3), 0.5)) == 500_000
-
-
-def test_all_but_the_zeros_at_theta_one():
-    indicators = np.array([0.0, 0.5, 0.0, 1e-3, 2.0])
-    assert doerfler(indicators, 1.0).tolist() == [False, True, False, True, True]
-
-
-def test_one_dominant_element_is_marked_alone():
-    indicators = np.r_[np.full(99, 1e-8), 1.0]
-    assert np.flatnonzero(doerfler(indicators, 0.999)).tolist() == [99]
-
-
 @pytest.mark.parametrize("theta", [0.3, 1.0])
 @pytest.mark.parametrize("size", [0, 1, 5])
 def test_nothing_is_marked_where_all_indicators_vanish(size, theta):
@@ -87,12 +65,6 @@ def test_nothing_is_marked_where_all_indicators_vanish(size, theta):
     assert not marked.any()
 
 
-def test_the_indicators_are_not_changed():
-    indicators = np.array([1.0, 3.0, 2.0])
-    doerfler(indicators, 0.5)
-    assert indicators.tolist() == [1.0, 3.0, 2.0]
-
-
 def test_alike_elements_are_marked_together_down_to_the_smallest_marked():
     alike = np.array([True, True, True, False, True])
     sizes = np.array([1.0, 2.0, 0.5, 4.0, 1.0])
@@ -100,3 +72,35 @@ def test_alike_elements_are_marked_together_down_to_the_smallest_marked():
     assert together(marked, alike, sizes).tolist() == [True, True, False, False, True]
     others = np.array([False, False, False, True, False])
     assert (together(others, alike, sizes) == others).all()
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_two_orders_need_equal_unknowns_where_the_best_one_changes(order):
+    """Orders p on one mesh: errors c^p, unknowns ~ p^2; from there N ~ error^(-2/p)."""
+    change = (order / (order + 1)) ** (order * (order + 1))
+    assert best_order(1.001 * change) == order
+    assert best_order(0.999 * change) == order + 1
+    for c in (0.2, 0.6):  # whatever the mesh
+        needed = [p**2 * (c**p / change) ** (2 / p) for p in (order, order + 1)]
+        assert needed[0] == pytest.approx(needed[1], rel=1e-12)
+
+
+def chosen(tolerance, start=None, element="isoparametric"):
+    return Refinement(1, element, 0.5, tolerance, 1000).choosing(start)
+
+
+def test_what_chooses_the_order():
+    assert [chosen(t).order for t in (0.5, 0.05, 0.03, 1e-6)] == [3, 3, 4, 4]
+    assert not chosen(0.05).rising
+    assert chosen(None).order == 3
+    assert chosen(None).rising
+    assert chosen(1e-3, start=2).order == 2
+    assert chosen(1e-3, element="physical").order == 1
+
+
+def test_orders_rise_and_never_fall():
+    rising = chosen(None)
+    assert [rising.next_order(3, error) for error in (1.0, 0.04, 0.03)] == [3, 3, 4]
+    assert rising.next_order(4, 1.0) == 4
+    assert chosen(1e-3).next_order(4, 1.0) == 4
+    assert chosen(0.05).next_order(3, 1e-9) == 3

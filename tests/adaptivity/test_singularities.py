@@ -1,14 +1,12 @@
 """Where solutions are not smooth: ends of contact, changes of condition, corners that point in."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from netgen.occ import Axis, OCCGeometry, Rectangle, Z
 
 from drivers.reference import cases
 from ngcontact import Elastic, Problem, adapt
-from ngcontact.adaptivity import corners, ends_of_contact, unresolvable
+from ngcontact.adaptivity import corners, ends_of_contact
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import rings
 from ngcontact.mesh import first_mesh
@@ -61,10 +59,3 @@ def test_ends_of_contact_lie_on_both_bodies():
     assert (ends.powers == 1.5).all()
     extent = np.linalg.norm(np.ptp(disc.pairs[0].line.position, axis=0))
     assert ends.extents == pytest.approx(extent)
-
-
-def test_joined_keeps_all():
-    first, second = unresolvable([np.array([0.0, 1.0])]), unresolvable([])
-    both = first.joined(second).joined(first)
-    assert both.unresolvable.tolist() == [[0, 1], [0, 1]]
-    assert np.isinf(both.extents).all()

@@ -1,7 +1,5 @@
 """Conditions and rows of a few nodes, as tests write them down."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 

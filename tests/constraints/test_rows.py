@@ -1,12 +1,10 @@
-"""Rows and conditions as arrays: their matrix, parts of them, several together."""
-
-from __future__ import annotations
+"""Rows as arrays, and which node hosts a row."""
 
 import numpy as np
 import pytest
 
-from ngcontact.constraints.rows import concatenated, no_conditions, no_rows
-from ngcontact.lagrange import lagrange
+from ngcontact.constraints.basis_transformation import CONTRAST, change_of_basis
+from ngcontact.constraints.rows import concatenated, no_rows
 from tests.constraints.given import X, Y, clamped, conditions, rows, unit
 
 
@@ -20,24 +18,6 @@ def test_matrix_of_rows():
     np.testing.assert_allclose(B.toarray(), expected, atol=1e-16)
     assert B.nnz == 7  # nothing stored where the partner has no share
     assert rows(3).matrix.shape == (0, 6)
-
-
-def test_the_left_side_of_a_row_is_a_jump():
-    rng = np.random.default_rng(0)
-    u = rng.normal(size=(5, 2))
-    d, share = unit(0.7), lagrange(1, 0.3)[0]
-    B = rows(5, (4, d, {1: share[0], 2: share[1]})).matrix
-    jump = d @ (u[4] - share[0] * u[1] - share[1] * u[2])
-    assert B @ u.T.ravel() == pytest.approx(jump, rel=1e-14)
-
-
-def test_rows_of_any_support():
-    """A mean over three facing nodes and more, in any row and none in another."""
-    contact = rows(6, (0, Y, {2: 0.5, 3: 0.25, 5: 0.25}), (1, Y, {2: -0.1, 3: 1.1}), (1, X, {}))
-    u = np.random.default_rng(1).normal(size=(2, 6))
-    jump = [u[1, 0] - u[1] @ [0, 0, 0.5, 0.25, 0, 0.25], u[1, 1] - 1.1 * u[1, 3] + 0.1 * u[1, 2]]
-    # Sums of four numbers of size 1.
-    np.testing.assert_allclose(contact.matrix @ u.ravel(), [*jump, u[0, 1]], atol=1e-15)
 
 
 def test_rows_concatenated_and_selected_are_the_same():
@@ -56,17 +36,34 @@ def test_rows_concatenated_and_selected_are_the_same():
     assert no_rows(5).matrix.shape == (0, 10)
 
 
-def test_conditions_concatenated():
-    given = concatenated(
-        [conditions(*clamped(0, 1.0, 2.0)), no_conditions(), conditions((3, X, 3.0))]
-    )
-    assert given.node.tolist() == [0, 0, 3]
-    assert given.direction.tolist() == [[1, 0], [0, 1], [1, 0]]
-    assert given.value.tolist() == [1, 2, 3]
-
-
 def test_repeated_rows_have_the_number_of_the_first():
     d = unit(0.7)
     alike = (1, d, {3: 0.5, 4: 0.5}), (1, d + 1e-12, {3: 0.5, 4: 0.5}), (1, d, {3: 0.4, 4: 0.6})
     contact = rows(5, (0, d, {3: 1.0}), *alike, (2, d, {4: 1.0}))
     assert contact.repeated().tolist() == [0, 1, 1, 3, 4]
+
+
+def hosts(contact, given=None, stiffness=None):
+    """Host node of each row, (m,)."""
+    basis = change_of_basis(given or conditions(), contact, stiffness=stiffness)
+    return (basis.unknown % contact.coupling.shape[1]).tolist()
+
+
+def test_the_secondary_hosts_between_bodies_alike():
+    contact = rows(3, (0, Y, {1: 0.4, 2: 0.6}))
+    assert hosts(contact) == [0]
+    assert hosts(contact, stiffness=np.array([0.9 * CONTRAST, 1.0, 1.0])) == [0]
+
+
+@pytest.mark.parametrize("weights", [(0.4, 0.6), (1.1, -0.1), (0.0, 1.0)])
+def test_the_nearest_node_of_a_much_softer_body_hosts(weights):
+    contact = rows(4, (0, Y, dict(zip((1, 2), weights, strict=True))), (3, Y, {}))
+    stiffness = np.array([1.1 * CONTRAST, 1.0, 1.0, 1.1 * CONTRAST])
+    assert hosts(contact, stiffness=stiffness) == [1 + int(np.argmax(np.abs(weights))), 3]
+
+
+def test_a_much_softer_node_that_is_held_does_not_host():
+    contact = rows(3, (0, Y, {1: 0.4, 2: 0.6}))
+    stiffness = np.array([1.1 * CONTRAST, 1.0, 1.0])
+    assert hosts(contact, conditions(*clamped(2)), stiffness) == [0]
+    assert hosts(contact, conditions(*clamped(0), *clamped(2)), stiffness) == [1]

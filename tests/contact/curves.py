@@ -1,7 +1,5 @@
 """Curves and rays that tests of their crossings share."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

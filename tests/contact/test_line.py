@@ -1,23 +1,16 @@
 """Contact points: corners, weights, gaps, partners, and which points carry a row."""
 
-from __future__ import annotations
-
 import math
-from dataclasses import replace
 
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Compound, OCCGeometry, Vec, WorkPlane
 
 from ngcontact import Contact
 from ngcontact.contact.assembly import contact_line
-from ngcontact.contact.line import at_quadrature, without
+from ngcontact.contact.line import at_quadrature
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import blocks, disc, disc_on_block, graphs, rings
-from ngcontact.geometries.region import body, compound, polygon
-from ngcontact.lagrange import gauss, lagrange
-from tests.scenes import unmatched_blocks
+from ngcontact.geometries import blocks, disc, disc_on_block
 
 ORDERS = [1, 2, 3, 4]
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
@@ -62,9 +55,6 @@ def one_corner(turn, left=1.0, right=0.73):
     return [(-left, -left * slope), (0.0, 0.0), (right, -right * slope)]
 
 
-# ----------------------------------------------------------------------------- polygonal line
-
-
 @pytest.mark.parametrize("order", ORDERS)
 def test_bounded_zone_has_two_points_at_corners(order):
     trace, line = polygonal(order)
@@ -99,21 +89,6 @@ def test_weights_at_corners_are_one_sided(order):
         np.testing.assert_allclose(line.weight[points], end * np.ravel(adjacent), rtol=1e-13)
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_matched_lines_touch_without_a_search(order):
-    trace, line = polygonal(order)
-    assert line.searches == 0
-    # The vertices are the same numbers on both sides; the gap is their difference.
-    np.testing.assert_allclose(line.gap, 0, atol=1e-15)
-    partner = trace.point(line.partner, line.partner_s)
-    np.testing.assert_allclose(partner, line.position, atol=1e-15)
-    opposite = trace.normal(line.partner, line.partner_s)
-    assert ((opposite * line.direction).sum(axis=1) < 0).all()
-    smooth = np.bincount(line.node)[line.node] == 1  # at a corner both sides share the node
-    np.testing.assert_allclose(opposite[smooth], -line.direction[smooth], atol=1e-14)
-    assert line.faces.all()
-
-
 @pytest.mark.parametrize("bare", [False, True])
 @pytest.mark.parametrize("order", ORDERS)
 def test_a_uniform_pressure_is_that_of_the_weights_where_sides_share_a_point(order, bare):
@@ -134,33 +109,6 @@ def test_a_uniform_pressure_is_that_of_the_weights_where_sides_share_a_point(ord
     along = vertices[-1] - vertices[0]
     resultant = line.weight @ line.direction
     np.testing.assert_allclose(resultant, [along[1], -along[0]], rtol=1e-14, atol=1e-15)
-    # At the vertex itself, from both segments there.
-    [point] = np.flatnonzero(np.linalg.norm(line.position, axis=1) < 1e-12)
-    s, w = gauss(order)
-    share = w @ lagrange(order, s)[:, 0]  # of a segment's length at its end
-    middle = trace.curve[here].mean(axis=1)[:, 0]
-    at = np.array(
-        [np.where(middle < 0, middle, -9).argmax(), np.where(middle > 0, middle, 9).argmin()]
-    )
-    normals = trace.normal(here[at], np.full(2, 0.5))
-    expected = share * (lengths[at] @ normals)
-    np.testing.assert_allclose(line.weight[point] * line.direction[point], expected, rtol=1e-13)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_fixed_direction_has_one_point_at_corners(order):
-    trace, line = polygonal(order, direction=(0, -1))
-    points_are_consistent(line, trace)
-    assert len(line.node) == len(np.unique(line.node)) == order * len(line.segments) + 1
-    assert (line.direction == [0, -1]).all()
-    assert line.weight.sum() == pytest.approx(2.0, rel=1e-14)  # the extent of eta
-    # At a corner the weights of both segments add up: shares of their extents.
-    end = {1: 1 / 2, 2: 1 / 6, 3: 1 / 12, 4: 1 / 20}[order]
-    extent = np.ptp(line.position[line.rows][:, [0, -1], 0], axis=1)
-    for k in (1, 2):
-        [point] = at_corner(line, LINE[k])
-        adjacent = extent[(line.rows == point).any(axis=1)]
-        assert line.weight[point] == pytest.approx(end * adjacent.sum(), rel=1e-13)
 
 
 def test_steep_sides_do_not_face_a_fixed_direction():
@@ -178,28 +126,6 @@ def test_steep_sides_do_not_face_a_fixed_direction():
     assert (facing == ~inner).all()
     assert (line.rows[inner] == -1).all()
     assert not line.faces[inner].any()
-
-
-# ------------------------------------------------------------------------------ curved lines
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_weights_of_a_circle_are_its_length(order):
-    trace = trace_of(rings(quarter=True), order, maxh=0.3)
-    line = contact_line(trace, Contact("outer_contact", "inner_contact"))
-    points_are_consistent(line, trace)
-    s, w = np.polynomial.legendre.leggauss(20)
-    segment, k = np.repeat(line.segments, 20), len(line.segments)
-    speed = np.linalg.norm(trace.derivative(segment, np.tile((1 + s) / 2, k)), axis=1)
-    length = speed @ np.tile(w / 2, k)
-    # The speed along a segment is no polynomial: the rule has an error, measured 8e-11.
-    assert line.weight.sum() == pytest.approx(length, rel=1e-9)
-    # Error of the mesh's curves, measured 4.1e-3, 3.2e-5, 8.9e-6, 4.9e-8.
-    curve_error = {1: 5e-3, 2: 5e-5, 3: 1e-5, 4: 1e-7}[order]
-    assert line.weight.sum() == pytest.approx(math.pi / 2, rel=curve_error)
-    radial = -line.position / np.linalg.norm(line.position, axis=1)[:, None]
-    np.testing.assert_allclose(line.direction, radial, atol=2e-15)
-    assert len(line.node) == order * len(line.segments) + 1
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -227,96 +153,6 @@ def test_disc_on_block_measures_the_curves_of_the_mesh(order):
     np.testing.assert_allclose(partner[:, 1], 0, atol=1e-15)
 
 
-@pytest.mark.parametrize("order", ORDERS)
-def test_two_curves_are_compared_at_equal_eta(order):
-    """Gap and partner between the mesh's curves, not between equal reference points."""
-    geometry = graphs(lambda x: 0.1 + 0.5 * x**2, lambda x: -0.1 * x**3, a=-0.8, b=0.7)
-    trace = trace_of(geometry, order, maxh=0.4)
-    contact = Contact("upper_contact", "lower_contact", direction=(0, -1), rows="nodal")
-    line = contact_line(trace, contact)
-    points_are_consistent(line, trace)
-    partner = trace.point(line.partner, line.partner_s)
-    np.testing.assert_allclose(partner[:, 0], line.position[:, 0], atol=1e-14)
-    distance = line.position[:, 1] - partner[:, 1]
-    np.testing.assert_allclose(line.gap, distance, atol=1e-15)
-    assert line.weight.sum() == pytest.approx(1.5, rel=1e-14)
-
-
-def test_overlap_is_a_negative_gap():
-    geometry = rings(interference=0.02, quarter=True)
-    trace = trace_of(geometry, 3, maxh=0.3)
-    line = contact_line(trace, Contact("outer_contact", "inner_contact"))
-    np.testing.assert_allclose(line.gap, -0.02, rtol=1e-3)  # cubic arcs of length 0.3
-    assert line.searches == 1
-
-
-# ----------------------------------------------------------------------------- other meshes
-
-
-def stacked(upper_nodes, lower_nodes, gap=0.0):
-    """Two blocks whose contact edges are divided at their own places."""
-    upper = polygon(
-        [(-1, gap), (1, gap), (1, 1), (-1, 1)], ["upper_contact", "side", "top", "side"]
-    )
-    lower = polygon(
-        [(1, 0), (-1, 0), (-1, -1), (1, -1)], ["lower_contact", "side", "bottom", "side"]
-    )
-    geometry = compound(body("upper", upper), body("lower", lower))
-    for edge in geometry.shape.edges:
-        nodes = {"upper_contact": upper_nodes, "lower_contact": lower_nodes}.get(edge.name)
-        if nodes is not None:
-            edge.partition = nodes
-    return OCCGeometry(geometry.shape, dim=2)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@pytest.mark.parametrize("gap", [0.0, 0.125])
-def test_meshes_that_do_not_match(order, gap):
-    trace = trace_of(stacked([0.3, 0.5, 0.9], [0.25, 0.5], gap), order, maxh=2.0)
-    line = contact_line(trace, Contact("upper_contact", "lower_contact"))
-    points_are_consistent(line, trace)
-    assert line.searches == 1
-    np.testing.assert_allclose(line.gap, gap, atol=1e-15)
-    partner = trace.point(line.partner, line.partner_s)
-    np.testing.assert_allclose(partner[:, 0], line.position[:, 0], atol=1e-15)
-    # A linear function on the primary is met exactly by its trace.
-    share = lagrange(order, line.partner_s)
-    segment, s = trace.at_nodes(line.facing)
-    value = np.zeros(trace.space.ndof)
-    value[trace.nodes[line.facing].ravel()] = 3 * trace.point(segment, s)[:, 0] - 1
-    met = (share * value[trace.nodes[line.partner]]).sum(axis=1)
-    np.testing.assert_allclose(met, 3 * line.position[:, 0] - 1, atol=1e-14)
-
-
-def test_points_without_an_opposite_carry_no_nodal_row():
-    """The upper line is longer than the lower one on both ends."""
-    upper = polygon([(-1, 0), (1, 0), (1, 1), (-1, 1)], ["zone", "side", "top", "side"])
-    lower = polygon(
-        [(0.5, -0.1), (-0.5, -0.1), (-0.5, -1), (0.5, -1)], ["below", "side", "bottom", "side"]
-    )
-    geometry = compound(body("upper", upper), body("lower", lower))
-    for edge in geometry.shape.edges:
-        if edge.name == "zone":
-            edge.partition = [0.1, 0.25, 0.5, 0.7]
-    for order in (1, 2):
-        trace = trace_of(OCCGeometry(geometry.shape, dim=2), order, maxh=2)
-        for direction in (None, (0, -1)):
-            line = contact_line(trace, Contact("zone", "below", direction, rows="nodal"))
-            points_are_consistent(line, trace)
-            x = np.sort(line.position[:, 0])
-            expected = [-0.5, 0.0, 0.4] if order == 1 else [-0.5, -0.25, 0.0, 0.2, 0.4]
-            np.testing.assert_allclose(x, expected, atol=1e-15)
-            np.testing.assert_allclose(line.gap, 0.1, rtol=1e-14)
-            assert np.count_nonzero(line.faces) == 2
-            # Half of the adjacent segments that face the lower line with both ends.
-            if order == 1:
-                weight = line.weight[np.argsort(line.position[:, 0])]
-                np.testing.assert_allclose(weight, [0.25, 0.45, 0.2], rtol=1e-14)
-
-
-# -------------------------------------------------------------------------- refused, or bodies
-
-
 @pytest.mark.parametrize(
     "contact",
     [
@@ -333,38 +169,6 @@ def test_pairs_that_do_not_face_are_refused(contact):
         contact_line(trace, contact)
 
 
-def test_roles_may_be_swapped():
-    trace = trace_of(blocks(line=LINE), 2)
-    one = contact_line(trace, Contact("upper_contact", "lower_contact"))
-    other = contact_line(trace, Contact("lower_contact", "upper_contact"))
-    assert len(one.node) == len(other.node)
-
-    def ordered(x, d):
-        return np.lexsort(np.round(np.column_stack([d, x]), 9).T)
-
-    i, j = ordered(one.position, one.direction), ordered(other.position, -other.direction)
-    np.testing.assert_allclose(one.position[i], other.position[j], atol=1e-15)
-    np.testing.assert_allclose(one.direction[i], -other.direction[j], atol=1e-15)
-    np.testing.assert_allclose(one.weight[i], other.weight[j], rtol=1e-13)
-
-
-# --------------------------------------------------------------------------- prescribed gaps
-
-
-@pytest.mark.parametrize(
-    "gap",
-    [0.25, ng.CF(0.25) + 0 * ng.x, lambda x, y: 0.25 + 0 * x],
-    ids=["number", "CoefficientFunction", "function"],
-)
-def test_gap_given_as_a_constant(gap):
-    trace = trace_of(blocks(), 2)
-    for primary in (None, "lower_contact"):
-        line = contact_line(trace, Contact("upper_contact", primary, gap=gap))
-        points_are_consistent(line, trace)
-        assert (line.gap == 0.25).all()
-        assert (line.partner >= 0).all() == (primary is not None)
-
-
 @pytest.mark.parametrize("order", ORDERS)
 @pytest.mark.parametrize("direction", [None, (0, -1)])
 def test_gap_given_as_a_function_of_place(order, direction):
@@ -376,85 +180,3 @@ def test_gap_given_as_a_function_of_place(order, direction):
         np.testing.assert_allclose(line.gap, x**2 / 2 + y, atol=1e-14)
         assert line.searches == 0
         assert (line.partner == -1).all()
-
-
-def test_rigid_obstacle_behind_the_body_is_refused():
-    trace = trace_of(blocks(), 1)
-    with pytest.raises(ValueError, match="no point of the secondary"):
-        contact_line(trace, Contact("upper_contact", direction=(0, 1), gap=0.0))
-
-
-def test_gap_at_corners_is_that_of_the_place():
-    trace = trace_of(blocks(line=LINE), 1)
-    line = contact_line(trace, Contact("upper_contact", gap=ng.x + 2 * ng.y))
-    np.testing.assert_allclose(line.gap, line.position @ [1, 2], atol=1e-15)
-    assert len(line.gap) == len(line.segments) + 3
-
-
-def test_bilateral_pairs_have_the_same_points():
-    trace = trace_of(blocks(line=LINE), 2)
-    one = contact_line(trace, Contact("upper_contact", "lower_contact"))
-    both = contact_line(trace, Contact("upper_contact", "lower_contact", bilateral=True))
-    assert both.contact.bilateral
-    for name in ("node", "position", "direction", "gap", "weight", "partner", "rows"):
-        assert (getattr(one, name) == getattr(both, name)).all()
-
-
-# ----------------------------------------------------------------- dropped points, quadrature
-
-
-def test_line_without_some_points():
-    _, line = polygonal(2)
-    dropped = np.array([0, 5])
-    less = without(line, dropped)
-    keep = np.setdiff1d(np.arange(len(line.node)), dropped)
-    assert (less.node == line.node[keep]).all()
-    assert (less.weight == line.weight[keep]).all()
-    gone = np.isin(line.rows, dropped)
-    assert (less.rows[gone] == -1).all()
-    assert (keep[less.rows[~gone]] == line.rows[~gone]).all()
-    assert (less.faces == line.faces).all()
-    same = without(line, np.zeros(0, dtype=int))
-    assert (same.rows == line.rows).all()
-
-
-@pytest.mark.parametrize("direction", [None, (0, -1)])
-def test_quadrature_on_the_line(direction):
-    trace, line = polygonal(2, direction)
-    local, segment, s, weight = at_quadrature(line, trace, 4)
-    assert (line.segments[local] == segment).all()
-    x = trace.point(segment, s)
-    # Integrals of 1 and x over the line, in arc length and in eta.
-    middle = np.array(LINE)[:-1, 0] + SIDES[:, 0] / 2
-    measure = LENGTHS if direction is None else SIDES[:, 0]
-    assert weight.sum() == pytest.approx(measure.sum(), rel=1e-14)
-    assert weight @ x[:, 0] == pytest.approx(measure @ middle, abs=1e-14)
-
-
-def test_the_far_side_of_the_own_body_has_no_partner():
-    """Whole discs: the ray inwards from the far side leaves the disc before it meets the other."""
-    upper = WorkPlane().Circle(0, 1, 1).Face()
-    lower = WorkPlane().Circle(0, -1, 1).Face()
-    for face, name in ((upper, "upper"), (lower, "lower")):
-        face.faces.name, face.edges.name = name, f"{name}_rim"
-    geometry = OCCGeometry(Compound([upper, lower]), dim=2)
-    for direction in (None, (0, -1)):
-        line = contact_line(
-            trace_of(geometry, 2, maxh=0.4), Contact("upper_rim", "lower_rim", direction)
-        )
-        assert (line.position[:, 1] < 1).all()
-        assert line.gap.min() > -1e-3  # the chords of the mesh overlap by O(h^3) at most
-    # Overlap that is meant stays: the same discs 0.01 into each other.
-    moved = OCCGeometry(Compound([upper.Move(Vec(0, -0.01, 0)), lower]), dim=2)
-    line = contact_line(trace_of(moved, 2, maxh=0.4), Contact("upper_rim", "lower_rim", (0, -1)))
-    assert line.gap.min() == pytest.approx(-0.01, rel=0.05)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_points_between_matched_vertices_are_matched(order):
-    contact = Contact("upper_contact", "lower_contact")
-    assert not contact_line(trace_of(blocks(), order), contact).means.any()
-    trace = trace_of(unmatched_blocks(), order)
-    assert contact_line(trace, contact).means.all()  # though the ends face nodes
-    assert not contact_line(trace, Contact("upper_contact", gap=0.0)).means.any()
-    assert not contact_line(trace, replace(contact, rows="nodal")).means.any()

@@ -1,19 +1,14 @@
 """Ends of the contact zone: exact on model data, inside elements on discrete solutions."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 
-import ngsolve as ng
 import numpy as np
 import pytest
 
-from drivers.reference import cases
-from ngcontact import Contact, Problem, adapt, solve
-from ngcontact.contact.line import in_contact, pressure_across_corners, twins
-from ngcontact.contact.state import ending_segments, transitions_on
-from ngcontact.geometries import blocks
+from ngcontact import Contact
+from ngcontact.contact.line import in_contact, pressure_across_corners
+from ngcontact.contact.state import transitions_on
 
 
 def line(x, order=1, y=None):
@@ -28,10 +23,6 @@ def line(x, order=1, y=None):
 def opening(distance):
     """Gap distance^(3/2) outside of the contact zone, and where there is contact."""
     return np.maximum(distance, 0) ** 1.5, distance < 0
-
-
-def sorted_by_x(points):
-    return points[points[:, 0].argsort()]
 
 
 # gap^(2/3) is linear in the data, and so is every fit: exact up to the round-off of the fit.
@@ -49,77 +40,12 @@ def test_the_model_end_is_found_exactly(end, order):
     assert outer == inner + 1
 
 
-def test_a_smooth_factor_of_the_gap_does_no_harm():
-    # gap = d^(3/2) (1 + d) has a smooth 2/3 power: the error is that of a cubic, O(h^4).
-    errors = []
-    for count in (41, 81, 161):
-        x = np.linspace(0, 1, count)
-        gap, active = opening(x - 0.437)
-        found = transitions_on(line(x, 2), gap * (1 + x - 0.437), active)
-        errors.append(abs(found.position[0, 0] - 0.437))
-    rates = np.log2(np.array(errors[:-1]) / errors[1:])
-    assert errors[-1] < 1e-6
-    assert rates.mean() > 3
-
-
-@pytest.mark.parametrize("unit", [1e-9, 1e9])
-def test_the_end_does_not_depend_on_units(unit):
-    x = np.linspace(0, 1, 21)
-    gap, active = opening(x - 0.437)
-    found = transitions_on(line(unit * x), unit * gap, active)
-    assert found.position == pytest.approx(unit * np.array([[0.437, 0.0]]), abs=EXACT * unit)
-
-
-def test_the_direction_of_the_line_does_not_matter():
-    x = np.linspace(0, 1, 21)
-    gap, active = opening(x - 0.437)
-    there = transitions_on(line(x), gap, active)
-    back = transitions_on(line(x[::-1]), gap[::-1], active[::-1])
-    assert back.position == pytest.approx(there.position, abs=EXACT)
-
-
-def test_both_ends_of_a_zone_on_an_inclined_line():
-    x, a, slope = np.linspace(-1, 1, 41), 0.333, 0.2
-    found = transitions_on(line(x, y=slope * x), *opening(np.abs(x) - a))
-    expected = np.array([[-a, -slope * a], [a, slope * a]])
-    assert sorted_by_x(found.position) == pytest.approx(expected, abs=EXACT)
-
-
 def test_two_zones_have_four_ends():
     x = np.linspace(0, 4, 161)
     # Contact in |x - 1| < 0.43 and |x - 3| < 0.43; between them each end has its half.
     found = transitions_on(line(x), *opening(np.abs(np.abs(x - 2) - 1) - 0.43))
     expected = [0.57, 1.43, 2.57, 3.43]
     assert np.sort(found.position[:, 0]) == pytest.approx(expected, abs=EXACT)
-
-
-@pytest.mark.parametrize("state", [True, False])
-def test_no_end_without_a_change(state):
-    found = transitions_on(line(np.linspace(0, 1, 9)), np.ones(9), np.full(9, state))
-    assert found.position.shape == (0, 2)
-    assert len(found.inner) == len(found.outer) == 0
-
-
-def test_points_of_separate_lines_are_not_neighbours():
-    # Two contact lines of one pair: the first in contact, the second open.
-    x = np.arange(4.0)
-    lines = SimpleNamespace(
-        position=np.column_stack([x, 0 * x]), rows=np.array([[0, 1], [2, 3]]), node=np.arange(4)
-    )
-    active = np.array([True, True, False, False])
-    assert len(transitions_on(lines, ~active * 1.0, active).position) == 0
-
-
-def test_points_without_a_row_are_no_neighbours():
-    # Gamma_K ends on Gamma_u, where the row is dropped: -1.
-    x = np.linspace(0, 1, 5)
-    short = SimpleNamespace(
-        position=np.column_stack([x, 0 * x]),
-        rows=np.array([[-1, 0], [0, 1], [1, 2], [3, 4]]),
-        node=np.arange(5),
-    )
-    active = np.array([True, True, True, False, False])
-    assert len(transitions_on(short, ~active * 1.0, active).position) == 0
 
 
 def test_a_closed_line_has_no_first_point():
@@ -137,15 +63,6 @@ def test_a_closed_line_has_no_first_point():
     h = 2 * math.pi / count
     expected = np.array([[math.cos(end), -math.sin(end)], [math.cos(end), math.sin(end)]])
     assert found[found[:, 1].argsort()] == pytest.approx(expected, abs=h**2 / 8)
-
-
-@pytest.mark.parametrize("active", [[1, 0, 0, 0], [0, 0, 0, 1], [0, 1, 0, 0], [1, 0, 1, 1]])
-@pytest.mark.parametrize("gap", [0.0, 1.0])
-def test_the_middle_where_few_points_are_open(active, gap):
-    active, x = np.array(active, dtype=bool), np.arange(4.0)
-    changes = np.flatnonzero(active[1:] != active[:-1])
-    found = transitions_on(line(x), gap * ~active, active)
-    assert np.sort(found.position[:, 0]) == pytest.approx(x[changes] + 0.5)
 
 
 def at_a_corner(x, corner, order=1):
@@ -172,27 +89,6 @@ def test_contact_that_ends_at_a_corner(order):
         assert lines.node[found.inner].tolist() == [corner]
 
 
-@pytest.mark.parametrize("end", [0.21, 0.41, 0.62])
-def test_contact_that_ends_next_to_a_corner(end):
-    # The fit does not mind that a point occurs twice; flat but for the corner at 1/3.
-    x, corner = np.linspace(0, 1, 25), 8
-    lines = at_a_corner(x, corner)
-    lines.position[:, 1] = 0
-    gap, active = opening(lines.position[:, 0] - end)
-    found = transitions_on(lines, gap, active)
-    assert found.position == pytest.approx(np.array([[end, 0.0]]), abs=EXACT)
-
-
-@pytest.mark.parametrize("order", [1, 2, 4])
-def test_contact_ends_in_one_segment_for_each_end(order):
-    x = np.linspace(0, 1, 8 * order + 1)
-    zone = line(x, order)
-    gap, active = opening(np.abs(x - 0.5) - 0.2)  # ends at 0.3 and 0.7, segments of 1 / 8
-    assert ending_segments(zone, transitions_on(zone, gap, active)).tolist() == [2, 5]
-    all_open = transitions_on(zone, np.ones(len(x)), np.zeros(len(x), dtype=bool))
-    assert ending_segments(zone, all_open).size == 0
-
-
 def test_no_end_at_a_corner_inside_the_contact():
     x, corner = np.linspace(0, 1, 9), 4
     lines = at_a_corner(x, corner)
@@ -202,60 +98,6 @@ def test_no_end_at_a_corner_inside_the_contact():
         one_side[i] = False
         assert len(transitions_on(lines, ~one_side * 1e-6, one_side).position) == 0
 
-
-@pytest.mark.parametrize("mirrored", [False, True])
-@pytest.mark.parametrize("turn", [1e-3, 1.0])
-def test_blocks_that_part_at_a_corner(turn, mirrored):
-    line_ = [(-1.0, 0.0), (0.0, 0.0), (1.0, 0.9 * math.tan(turn))]
-    x = ng.x
-    if mirrored:
-        line_, x = [(-a, b) for a, b in reversed(line_)], -ng.x
-    problem = Problem(
-        geometry=blocks(line=line_, height=2.0),
-        materials=cases.BLOCKS,
-        displacement={"top": (0, -0.02), "bottom": (0, 0)},
-        contact=[Contact("upper_contact", "lower_contact", gap=ng.IfPos(x, 0.3 * x, 0.0))],
-    )
-    solution = solve(problem, maxh=0.25, order=2)
-    assert solution.transitions() == pytest.approx(np.zeros((1, 2)), abs=1e-14)
-    again = solve(problem, maxh=0.125, order=2, start=solution)
-    cold = solve(problem, maxh=0.125, order=2)
-    assert (again.active == cold.active).all()
-    assert len(again.steps) <= len(cold.steps)
-
-
-def test_an_end_stays_next_to_the_last_active_point():
-    # Data that extrapolate far off, to the left or to the right, or have no zero at all.
-    x = np.linspace(0, 1, 21)
-    active = x < 0.42
-    for gap in (np.ones(21), 5 - x, x**3, (1 - x) ** 2, np.zeros(21)):
-        [place] = transitions_on(line(x), gap * ~active, active).position
-        assert 0.35 <= place[0] <= 0.6
-
-
-@pytest.mark.parametrize("order", [1, 2, 3])
-@pytest.mark.study(witness=["2"])
-def test_transition_of_two_blocks(order):
-    # S1: the gap ~ x^(3/2) closes at the origin. Spacing of the points: 0.125 / order.
-    solution = solve(cases.one_transition().problem, maxh=0.13, order=order)
-    [(x, y)] = solution.transitions()
-    assert y == pytest.approx(0, abs=1e-14)
-    # Nodes resolve half a spacing; measured 3.6e-4, 2.0e-4 and 1.9e-4 at the orders 1, 2, 3.
-    assert abs(x) < 1e-3
-
-
-@pytest.mark.parametrize(("order", "allowed"), [(1, 1e-2), (2, 2.5e-3), (3, 2e-3)])
-@pytest.mark.study(witness=["3-0.002"])
-def test_half_width_of_hertz_contact(order, allowed):
-    # S3, a = 0.3; measured 1.8e-3, 1.2e-3 and 7e-4 of a.
-    *_, solution = adapt(cases.hertz_contact().problem, maxh=0.28, order=order, max_dofs=4000)
-    ends = sorted_by_x(solution.transitions())
-    assert ends == pytest.approx(np.array([[-0.3, 0.0], [0.3, 0.0]]), abs=0.3 * allowed)
-    # Inside of elements, not snapped to nodes.
-    assert np.abs(ends[:, :1] - solution.points[:, 0]).min() > 0
-
-
-# -------------------------------------------------------- the two points at a corner
 
 TURN = 0.3
 
@@ -276,12 +118,6 @@ def bent(turn=TURN, lengths=(1.0, 0.5)):
 
 def mask(text):
     return np.array([c == "x" for c in text])
-
-
-def test_twins_share_a_node():
-    assert twins(bent()).tolist() == [[1, 2]]
-    straight = SimpleNamespace(node=np.arange(3))
-    assert twins(straight).shape == (0, 2)
 
 
 @pytest.mark.parametrize(
@@ -318,50 +154,3 @@ def test_a_uniform_pressure_is_told_whatever_the_split(turn):
     told = pressure_across_corners(line, force, mask("xxxx"))
     assert told == pytest.approx([2, 2, 2, 2], rel=1e-12)
     assert np.abs(force / line.weight - 2).max() > 1e-3
-
-
-def test_one_side_carries_all_inside_the_contact():
-    line = bent(1e-3)
-    force = np.array([0.5, 0.75, 0.0, 0.25])  # of a pressure of 1: 0.5 and 0.25 at the corner
-    # To the square of the turn: the whole force has the direction of one side.
-    assert pressure_across_corners(line, force, mask("xx.x")) == pytest.approx(
-        [1, 1, 1, 1], rel=1e-6
-    )
-
-
-def test_sides_keep_their_own_pressure():
-    sharp = bent(math.radians(60))
-    force = np.array([1.0, 2.0, 3.0, 4.0])
-    assert (
-        pressure_across_corners(sharp, force, mask("xxxx")).tolist()
-        == (force / sharp.weight).tolist()
-    )
-    force[2:] = 0  # contact that ends at the corner
-    line = bent()
-    assert (
-        pressure_across_corners(line, force, mask("xx..")).tolist()
-        == (force / line.weight).tolist()
-    )
-
-
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("turn", [6e-4, -6e-4, 1e-2, -1e-2])
-def test_blocks_pressed_together_at_an_almost_flat_corner(turn, order):
-    # The nearly parallel rows share the force by chance: one had twice the pressure, the other none
-    # and counted as an end of the contact.
-    slope = math.tan(turn / 2)
-    problem = Problem(
-        geometry=blocks(line=[(-1, -slope), (0, 0), (0.73, -0.73 * slope)]),
-        materials=cases.BLOCKS,
-        displacement={"top": (0, -0.1), "bottom": (0, 0)},
-        contact=[Contact("upper_contact", "lower_contact")],
-    )
-    solution = solve(problem, maxh=0.2, order=order)
-    x = solution.points[:, 0]
-    [contact] = solution.discrete.lines
-    pressure = pressure_across_corners(contact, solution.force, solution.active)
-    assert np.count_nonzero(np.abs(x) < 1e-12) == 2
-    near = (np.abs(x) > 1e-12) & (np.abs(x) < 0.25)
-    # Measured: 1 % from the mean of the neighbours.
-    assert pressure[np.abs(x) < 1e-12] == pytest.approx(pressure[near].mean(), rel=0.03)
-    assert len(solution.transitions()) == 0

@@ -1,16 +1,11 @@
 """Whole zones in unknowns of their rows: no penetration, no dependence on roles, shared nodes."""
 
-from __future__ import annotations
-
 import ngsolve as ng
 import numpy as np
 import pytest
 
-from drivers.convergence import identities
-from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.geometries import blocks, rings
-from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.geometries import blocks
 
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))  # a convex and a re-entrant corner
 SOFT, HARD = Elastic(E=1.0, nu=0.3), Elastic(E=3.0, nu=0.2)
@@ -54,83 +49,3 @@ def test_polygonal_zones_are_free_of_penetration_everywhere(tilt, maxh):
     doubled = np.bincount(solution.discrete.lines[0].node) == 2
     assert np.count_nonzero(doubled) == 2
     assert (solution.gap >= -1e-15).all()
-
-
-def test_known_transition_is_free_of_penetration_everywhere():
-    solution = solve(cases.one_transition().problem, maxh=0.3)
-    closed = penetration(solution)
-    assert closed.max() <= 1e-15 * max(1.0, np.abs(solution.displacement.vec.FV().NumPy()).max())
-    assert closed.min() < -0.1
-
-
-def test_zone_between_clamped_ends():
-    """Both bodies are clamped where the zone ends: no row there, also for a gap of -1e-34."""
-    cuts = "inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y"
-    problem = Problem(
-        geometry=rings(quarter=True),
-        materials={"inner": HARD, "outer": SOFT},
-        displacement={cuts: (0, 0)},
-        traction={"rim": 1.0},
-        contact=[Contact("outer_contact", "inner_contact")],
-    )
-    for order in (1, 2):
-        solution = solve(problem, maxh=0.4, order=order)
-        line = solution.discrete.lines[0]
-        assert len(solution.points) == order * len(line.segments) - 1
-        assert (solution.points > 0.01).all()  # none on the cuts x = 0 and y = 0
-
-
-def rectangle(name, x0, x1, y0, y1):
-    """A body whose sides are called <name>_bottom, <name>_right, <name>_top, <name>_left."""
-    sides = [f"{name}_{side}" for side in ("bottom", "right", "top", "left")]
-    return body(name, polygon([(x0, y0), (x1, y0), (x1, y1), (x0, y1)], sides))
-
-
-@pytest.mark.parametrize("order", [1, 3])
-def test_stack_of_layers_does_not_depend_on_the_roles(order):
-    """Matched meshes: the set K_h is the same whichever side carries the points."""
-    layers = [rectangle("a", -1, 1, 1, 2), rectangle("b", -1, 1, 0.8, 1)]
-    layers += [rectangle("c", -1, 1, 0.6, 0.8), rectangle("d", -1, 1, 0, 0.6)]
-    pairs = [("a_bottom", "b_top"), ("b_bottom", "c_top"), ("c_bottom", "d_top")]
-    energies, forces = [], []
-    for roles in (pairs, [pair[::-1] for pair in pairs], [pairs[0], pairs[1][::-1], pairs[2]]):
-        problem = Problem(
-            geometry=compound(*layers),
-            materials={"a": SOFT, "b": HARD, "c": SOFT, "d": HARD},
-            displacement={
-                "a_top": (0, ng.CF(-0.01) - 0.06 * ng.x),
-                "b_left|c_left": (0, None),
-                "d_bottom": (0, 0),
-            },
-            contact=[Contact(*role) for role in roles],
-        )
-        solution = solve(problem, maxh=0.5, order=order)
-        assert 0 < np.count_nonzero(~solution.active)
-        energies.append(solution.energy)
-        forces.append([abs(solution.contact_force(k)[1]) for k in range(3)])
-    # One minimum, reached through systems whose condition is about 1e4.
-    np.testing.assert_allclose(energies, energies[0], rtol=1e-11)
-    np.testing.assert_allclose(forces, np.full((3, 3), forces[0][0]), rtol=1e-10)
-
-
-def test_three_pairs_at_one_point():
-    """The seam between two blocks meets the surface of a third: two rows at its node."""
-    geometry = compound(
-        rectangle("over", -2, 2, 0, 1), rectangle("l", -2, 0, -1, 0), rectangle("r", 0, 2, -1, 0)
-    )
-    problem = Problem(
-        geometry=geometry,
-        materials={"over": SOFT, "l": HARD, "r": SOFT},
-        displacement={"over_top": (0, -0.05), "l_bottom|r_bottom": (0, 0)},
-        contact=[
-            Contact("over_bottom", "l_top"),
-            Contact("over_bottom", "r_top"),
-            Contact("l_right", "r_left"),
-        ],
-    )
-    for order in (1, 2):
-        solution = solve(problem, maxh=0.5, order=order)
-        triple = np.linalg.norm(solution.points, axis=1) < 1e-12
-        assert solution.pair[triple].tolist() == [0, 1, 2]
-        assert identities(solution) < 1e-13  # round-off; measured 2e-15
-        assert solution.gap.min() > -1e-15

@@ -1,7 +1,5 @@
 """The scripts that make pages, as modules."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 

@@ -1,22 +1,12 @@
 """Names in the pages, as objects of the package."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from importlib.util import find_spec
 from typing import get_type_hints
 
 
 def resolved(name: str) -> object:
-    """Module, function, class or attribute of `ngcontact` by its dotted name below it.
-
-    What follows a property is a name of the class that the property gives.
-
-    Raises
-    ------
-    AttributeError
-        There is none.
-    """
+    """Module, function, class or attribute of `ngcontact` by its dotted name below it."""
     found: object = import_module("ngcontact")
     for part in name.split("."):
         if isinstance(found, property):

@@ -1,7 +1,5 @@
 """The pages as they lie: their tables of contents, and the Python in them."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 from collections.abc import Iterator
@@ -19,10 +17,7 @@ _OPTION = re.compile(r"^:[\w-]+:.*\n", re.MULTILINE)
 
 @dataclass(frozen=True)
 class Block:
-    """Python in a page: `code` from `line` on.
-
-    A `cell` is one that the site executes, too; `quiet` where the page speaks of its warning.
-    """
+    """Python in a page: `code` from `line` on."""
 
     page: str
     line: int

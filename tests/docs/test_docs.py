@@ -1,7 +1,5 @@
 """The README's example, its table and its commands; test_pages has its links."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

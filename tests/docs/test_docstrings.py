@@ -1,59 +1,126 @@
-"""Every public docstring gives the shapes of arrays, and units of what the contract promises.
+"""Docstrings give shapes of arrays, and units of what the contract promises.
 
-The rule. A public function, class or attribute - no underscore, in any module of ngcontact or
-geometries - whose annotation has an array says in its docstring, for each array parameter or
-attribute, its name with a shape: an entry ``name : ndarray (m, 2)``, or "`name` (m, 2)" in the
-text; for arrays it returns as many shapes, or one shape and "each".
-
-Quantities of the public contract give their unit in one of the words of `UNITS`.
+A public function, class or attribute whose annotation has an array says for each array parameter
+or attribute its name with a shape, in an entry ``name : ndarray (m, 2)`` or as "`name` (m, 2)" in
+the text; for arrays it returns as many shapes, or one and "each".
 """
-
-from __future__ import annotations
 
 import ast
 import inspect
 import re
+from itertools import pairwise
 
 import pytest
 
-import ngcontact
 import ngcontact.geometries as geometries
-from ngcontact import Elastic, Hooke, Problem, Solution, solve_qp
-from ngcontact.qp import Iterate
-from tests.docs.docstrings import (
-    SHAPE,
-    Claim,
-    array_types,
-    arrays_in,
-    claims,
-    entries,
-    entry,
-    modules,
-    sections,
-    shapes_returned,
-)
-from tests.docs.names import resolved
-from tests.docs.pages import DOCS
+from ngcontact import Solution
+from tests.docs.pages import ROOT
 
-TREES = modules()
-TYPES = array_types(TREES)
+TYPES = {"Array", "Index", "Mask", "NDArray", "ndarray", "ArrayLike"}
+TYPES |= {"sparray", "spmatrix", "csr_array", "csc_array"}
+# "(m, 2)", "(n,)", "(3 b, r)", "(k, order + 1)", but not "(x, y)" nor "(Judice, Pires 1994)".
+_TERM = r"(?:\d+|\d*\s?(?:[a-wA-Z]|ne|nv|dim|(?:geometry_)?order|degree)(?!\w))"
+_DIMENSION = rf"(?:\.\.\.|{_TERM}(?:\s?[-+*]\s?{_TERM})*)"
+SHAPE = re.compile(rf"\({_DIMENSION},(?:\s{_DIMENSION},)*(?:\s{_DIMENSION})?\)")
 
 
-@pytest.mark.parametrize("module", TREES)
-def test_arrays_have_shapes(module):
-    missing = [str(claim) for claim in claims(module, TREES[module], TYPES) if not claim.holds()]
-    assert not missing
+def arrays_in(annotation):
+    """Number of arrays in an annotation; what functions in it take or return does not count."""
+    match annotation:
+        case None | ast.Subscript(value=ast.Name(id="Callable")):
+            return 0
+        case ast.Constant(value=str(text)):
+            return arrays_in(ast.parse(text, mode="eval").body)
+        case ast.Subscript(value=value) if arrays_in(value):
+            return 1
+        case ast.BinOp(left=left, right=right):  # alternatives
+            return max(arrays_in(left), arrays_in(right))
+        case ast.Name(id=name) | ast.Attribute(attr=name):
+            return int(name in TYPES)
+        case _:
+            return sum(map(arrays_in, ast.iter_child_nodes(annotation)))
 
 
-def test_claims_are_found():
-    """About the number of today: a reader that finds nothing would find no fault."""
-    assert sum(1 for module in TREES for _ in claims(module, TREES[module], TYPES)) > 300
-    assert {"Array", "Index", "Mask"} <= TYPES
+def sections(docstring):
+    """Text by the numpydoc sections of a docstring; "" is what stands before them."""
+    parts = re.split(r"^(\w[\w ]*)\n-+$", docstring, flags=re.MULTILINE)
+    return {"": parts[0], **dict(zip(parts[1::2], parts[2::2], strict=True))}
 
 
-# Units.
+def entries(section):
+    """Names and text of each entry of a section: ``segment, s : ndarray (k,)`` and below."""
+    heads = list(re.finditer(r"^(\S[^:\n]*?)(?: : .*)?$", section, re.MULTILINE))
+    bounds = [*(head.start() for head in heads), len(section)]
+    for head, at in zip(heads, pairwise(bounds), strict=True):
+        yield re.split(r",\s*", head.group(1)), section[slice(*at)]
 
-# What a docstring may call the unit of a quantity, by dimension. Units are any consistent set.
+
+def in_words(name):
+    """A name in backticks and its shape; several names may share one: "`a`, `b` and `c` (m, 2)"."""
+    return rf"`{name}`+(?:(?:,| and|, and)\s`+\w+`+)*\s{SHAPE.pattern}"
+
+
+def entry(docstring, name):
+    """What a docstring says of a parameter or an attribute; "" if nothing."""
+    parts = sections(docstring)
+    for title in ("Parameters", "Attributes"):
+        for names, text in entries(parts.get(title, "")):
+            if name in names:
+                return text
+    found = re.search(in_words(name), parts[""])
+    return found.group() if found else ""
+
+
+def shapes_returned(docstring):
+    """Number of arrays that a docstring gives shapes of, those of parameters aside."""
+    parts, told = sections(docstring), 0
+    for title in ("Returns", "Yields"):
+        for names, text in entries(parts.get(title, "")):
+            told += len(names) * bool(SHAPE.search(text))
+    words = re.sub(in_words(r"\w+"), "", parts[""])
+    shapes = len(SHAPE.findall(words))
+    return float("inf") if shapes and re.search(r"\beach\b", words) else told + shapes
+
+
+def of_function(owner, node, docstring):
+    """Claims (what, whether the docstring holds it) of parameters and of what is returned."""
+    for parameter in [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]:
+        if arrays_in(parameter.annotation):
+            said = entry(docstring, parameter.arg)
+            yield f"{owner}({parameter.arg})", bool(SHAPE.search(said))
+    if count := arrays_in(node.returns):
+        yield f"{owner} -> shape", shapes_returned(docstring) >= count
+
+
+def claims(path):
+    """What the docstrings of a module's public functions and classes have to say."""
+    for node in ast.parse(path.read_text()).body:
+        if getattr(node, "name", "_").startswith("_"):
+            continue
+        docstring, owner = ast.get_docstring(node) or "", f"{path}:{node.name}"
+        if isinstance(node, ast.FunctionDef):
+            yield from of_function(owner, node, docstring)
+            continue
+        for part in node.body:
+            match part:
+                case ast.AnnAssign(target=ast.Name(id=name), annotation=annotation):
+                    if arrays_in(annotation) and not name.startswith("_"):
+                        yield f"{owner}.{name}", bool(SHAPE.search(entry(docstring, name)))
+                case ast.FunctionDef(name="__init__"):
+                    yield from of_function(owner, part, docstring)
+                case ast.FunctionDef(name=name) if not name.startswith("_") or name == "__call__":
+                    text = ast.get_docstring(part) or ""
+                    yield from of_function(f"{owner}.{name}", part, text)
+
+
+def test_arrays_have_shapes():
+    files = [*(ROOT / "ngcontact").rglob("*.py"), *(ROOT / "geometries").glob("*.py")]
+    found = [claim for path in files for claim in claims(path)]
+    assert len(found) > 300  # about the number of today: who finds nothing finds no fault
+    assert not [what for what, holds in found if not holds]
+
+
+# What a docstring may call the unit of a quantity; "any consistent units" serves for all.
 UNITS = {
     "length": r"(?:any consistent |in )?units? of length|\ba length\b",
     "stress": r"units? of stress",
@@ -64,89 +131,35 @@ UNITS = {
     "angle": r"\b(?:degrees|radians)\b",
     "any": r"any consistent units?",
 }
-
-# Every attribute and method of `Solution`, and the dimension of what it gives.
-SOLUTION = {
-    "displacement": "length",
-    "stress": "stress",
-    "out_of_plane_stress": "stress",
-    "hoop_stress": "stress",
-    "points": "length",
-    "direction": "none",
-    "gap": "length",
-    "force": "force",
-    "pressure": "stress",
-    "contact_force": "force",
-    "nodal_reaction": "force",
-    "reactions": "force",
-    "transitions": "length",
-    "energy": "energy",
-    "energy_norm": "energy norm",
-    "indicators": "energy norm",
-    "error_estimate": "energy norm",
-    "estimate_parts": "energy",
-    "relative_error_estimate": "none",
-    "error_bound": "energy norm",
-    "relative_error_bound": "none",
-    "bound_parts": "energy",
-    "energy_bounds": "energy",
-    "quantities": "any",
-    "contact_area": "any",
-    "equilibrated": "stress",
-    "residuals": "none",
-    "at": "any",
-    "along": "any",
-    "record": "any",
+SOLUTION = {  # every attribute and method of `Solution` by the dimension of what it gives
+    "length": "displacement points gap transitions",
+    "stress": "stress out_of_plane_stress hoop_stress pressure equilibrated",
+    "force": "force contact_force nodal_reaction reactions",
+    "energy": "energy estimate_parts bound_parts energy_bounds",
+    "energy norm": "energy_norm indicators error_estimate error_bound",
+    "none": "direction relative_error_estimate relative_error_bound residuals",
+    "any": "quantities contact_area at along record",
 }
 # ... and those that are no quantities: objects, names, numbers of things, truth values, files.
-PLAIN = {
-    *("problem", "mesh", "order", "element", "discrete", "minimiser", "work", "coarse_levels"),
-    "descent",
-    *("adaptive", "pair", "active", "steps", "free_motions", "estimated", "bounded"),
-    *("pairs", "write", "revolved", "plot", "draw", "save"),
-}
+PLAIN = """problem mesh order element discrete minimiser work coarse_levels descent adaptive pair
+active steps free_motions estimated bounded pairs write revolved plot draw save"""
 
 
-def said_of(cls, name):
-    """What the class or the attribute itself says of it."""
-    member = inspect.getattr_static(cls, name, None)
-    if name in getattr(cls, "__dataclass_fields__", {}):
-        return entry(inspect.getdoc(cls), name)
-    return inspect.getdoc(getattr(member, "func", member)) or ""
+def has_unit(text, *dimensions):
+    return any(re.search(UNITS[word], text) for word in (*dimensions, "any"))
 
 
-def unitless(text, dimension):
-    """Whether a text gives no unit of that dimension; "any consistent units" serves for all."""
-    return not any(re.search(UNITS[word], text) for word in (dimension, "any"))
-
-
-def test_every_attribute_of_a_solution_is_listed():
+def test_a_solution_says_its_units():
     public = {name for name in dir(Solution) if not name.startswith("_")}
     public |= Solution.__dataclass_fields__.keys()
-    assert public - SOLUTION.keys() - PLAIN == set()
-    assert SOLUTION.keys() | PLAIN == public
-
-
-@pytest.mark.parametrize(("name", "dimension"), SOLUTION.items())
-def test_a_solution_says_its_units(name, dimension):
-    assert not unitless(said_of(Solution, name), dimension)
-
-
-def test_solve_qp_says_its_units():
-    """Its numbers have the units of the caller's."""
-    assert not unitless(inspect.getdoc(solve_qp), "any")
-    assert not unitless(inspect.getdoc(Iterate), "any")
-
-
-@pytest.mark.parametrize("law", [Elastic, Hooke])
-def test_laws_say_their_units(law):
-    for name in inspect.signature(law).parameters:
-        assert not unitless(entry(inspect.getdoc(law), name), "none" if name == "nu" else "stress")
-
-
-def test_a_problem_says_its_units():
-    for name, dimension in {"displacement": "length", "traction": "stress", "force": "any"}.items():
-        assert not unitless(entry(inspect.getdoc(Problem), name), dimension)
+    assert public == {*" ".join(SOLUTION.values()).split(), *PLAIN.split()}
+    for dimension, names in SOLUTION.items():
+        for name in names.split():
+            member = inspect.getattr_static(Solution, name, None)
+            said = inspect.getdoc(getattr(member, "func", member)) or ""
+            if name in Solution.__dataclass_fields__:
+                said = entry(inspect.getdoc(Solution), name)
+            assert has_unit(said, dimension), name
 
 
 @pytest.mark.parametrize("name", geometries.__all__)
@@ -157,116 +170,6 @@ def test_geometries_say_their_units(name):
     parameters = inspect.signature(function).parameters.items()
     numbers = [parameter for parameter, kind in parameters if "float" in str(kind.annotation)]
     assert numbers
-    if "Lengths are in any consistent unit" in sections(docstring)[""]:
-        return
-    kinds = ("length", "angle", "none")
-    said = {number: entry(docstring, number) for number in numbers}
-    assert not [n for n, text in said.items() if all(unitless(text, kind) for kind in kinds)]
-
-
-def test_public_names_have_docstrings():
-    assert all(inspect.getdoc(getattr(ngcontact, name)) for name in ngcontact.__all__)
-
-
-# The reader itself.
-
-EXAMPLE = """Mean of `values` (k, 2) and `others`, `more` (k,) at points, (2,) and (k,).
-
-Parameters
-----------
-weight, share : ndarray (k,)
-    Of each.
-point : tuple
-    Its place (x, y).
-index : ndarray of int
-    Which, (m, order + 1).
-
-Returns
--------
-first, second : ndarray (3 b, r)
-int
-"""
-
-
-@pytest.mark.parametrize(
-    ("name", "shape"),
-    [
-        ("values", True),
-        ("others", True),
-        ("more", True),
-        ("weight", True),
-        ("share", True),
-        ("index", True),
-        ("point", False),
-        ("first", False),
-        ("absent", False),
-    ],
-)
-def test_shapes_of_parameters(name, shape):
-    assert Claim("f", name, 1, EXAMPLE).holds() == shape
-
-
-def test_shapes_returned():
-    assert shapes_returned(EXAMPLE) == 4
-    assert shapes_returned("Of `values` (k, 2).") == 0
-    assert shapes_returned("Points and weights, (k,) each.") == float("inf")
-    assert Claim("f", "", 4, EXAMPLE).holds()
-    assert not Claim("f", "", 5, EXAMPLE).holds()
-
-
-def test_sections_and_entries():
-    assert list(sections(EXAMPLE)) == ["", "Parameters", "Returns"]
-    assert [names for names, _ in entries(sections(EXAMPLE)["Parameters"])] == [
-        ["weight", "share"],
-        ["point"],
-        ["index"],
-    ]
-
-
-@pytest.mark.parametrize(
-    "text", ["(m,)", "(m, 2)", "(3 b, r)", "(k, order + 1)", "(..., degree + 1)", "(2N, 2n)"]
-)
-def test_shapes(text):
-    assert SHAPE.fullmatch(text)
-
-
-@pytest.mark.parametrize(
-    "text", ["(m)", "(x, y)", "(Judice, Pires 1994)", "(P_1h)", "(2.10)", "()"]
-)
-def test_no_shapes(text):
-    assert not SHAPE.search(text)
-
-
-@pytest.mark.parametrize(
-    ("annotation", "count"),
-    [
-        ("Array", 1),
-        ("Array | None", 1),
-        ("NDArray[np.bool_]", 1),
-        ("sp.csr_array", 1),
-        ("'Array'", 1),
-        ("tuple[Array, Index, int]", 2),
-        ("dict[str, Array]", 1),
-        ("list[Array] | tuple[Array, Array]", 2),
-        ("Callable[[Array], Array]", 0),
-        ("float | ng.CoefficientFunction", 0),
-    ],
-)
-def test_arrays_in_annotations(annotation, count):
-    assert arrays_in(ast.parse(annotation, mode="eval").body, TYPES) == count
-
-
-def test_entries_of_the_reference_have_a_text_of_their_own():
-    """`order, element : ...` becomes two entries of one text on the site."""
-    pages = "".join(page.read_text() for page in (DOCS / "reference").glob("*.md"))
-    names = re.findall(r"^\.\. auto\w+:: (?:ngcontact\.)?([\w.]+)$", pages, re.MULTILINE)
-    assert len(names) > 20
-    joint = re.compile(r"^ *(\w+(?:, \w+)+)(?: : .*)?\n +[A-Z0-9]", re.MULTILINE)
-    found = []
-    for name in names:
-        top = resolved(name)
-        members = set(dir(top)) - set(getattr(top, "__dataclass_fields__", ()))
-        for thing in (top, *(getattr(top, member, None) for member in sorted(members))):
-            text = re.split(r"\n *Raises\n", getattr(thing, "__doc__", None) or "")[0]
-            found += [f"{name}: {entry}" for entry in joint.findall(text)]
-    assert not found
+    if "Lengths are in any consistent unit" not in sections(docstring)[""]:
+        kinds = ("length", "angle", "none")
+        assert not [n for n in numbers if not has_unit(entry(docstring, n), *kinds)]

@@ -1,7 +1,5 @@
 """Every mistake of docs/mistakes.md is refused with its message, before any work."""
 
-from __future__ import annotations
-
 import re
 from fractions import Fraction
 from pathlib import Path

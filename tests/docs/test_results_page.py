@@ -1,7 +1,5 @@
 """The blocks of docs/results.md run one after the other."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

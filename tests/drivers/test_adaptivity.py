@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from drivers.adaptive_study.__main__ import main
-from drivers.adaptive_study.runs import rate, run_of, share_near
-from drivers.adaptive_study.studies import STUDIES, Name, error_measure
+from drivers.adaptive_study.runs import STUDIES, Name, error_measure, rate, run_of, share_near
 from drivers.reference import cases
 from ngcontact import adapt
 
@@ -127,7 +126,7 @@ def test_elements_follow_the_optimal_density():
 
 
 @pytest.mark.study
-def test_driver_writes_rows_and_pictures(tmp_path, capsys):
+def test_driver_writes_rows_and_pictures(tmp_path):
     sizes = {"max_dofs": 2000, "reference": 6000}
     rows = main(["disc on rigid plane"], orders=(1, 2), **sizes, out=tmp_path)
     assert max(row.unknowns for row in rows) <= 2000
@@ -144,7 +143,6 @@ def test_driver_writes_rows_and_pictures(tmp_path, capsys):
     page = (tmp_path / "adaptive_study.md").read_text(encoding="utf-8")
     line = f"| disc on rigid plane | 2 | {rates['uniform']:.2f} | {rates['adaptive']:.2f} | -1.0 |"
     assert line in page
-    assert "seconds to a relative error" in capsys.readouterr().out
 
 
 def test_problem_a_references():

@@ -86,7 +86,7 @@ HELP = {
         "out": ("Folder", "out"),
     },
     "stress": {
-        "trials": ("Kinds of stress", "algebra data gaps held"),
+        "trials": ("Kinds of stress", "data scenes"),
         "seed": ("Number", "0"),
         "scenes": ("How many", "66"),
     },
@@ -167,7 +167,7 @@ def test_help_states_units_and_defaults_and_runs_nothing(name, tmp_path):
         ("hertz", "--disc 1e9 0.2 --block 2e9 0.4", {"disc": (1e9, 0.2), "block": (2e9, 0.4)}),
         ("convergence", "S1 S9 --levels 3", {"parts": ["S1", "S9"], "levels": 3}),
         ("adaptive_study", "--orders 1 2 --reference 9000", {"orders": [1, 2], "reference": 9000}),
-        ("stress", "held gaps --seed 4", {"trials": ["held", "gaps"], "seed": 4}),
+        ("stress", "data scenes --seed 4", {"trials": ["data", "scenes"], "seed": 4}),
         ("benchmark", "tax --rounds 2 --max-dofs 1e5", {"parts": ["tax"], "max_dofs": 100_000}),
     ],
 )
@@ -211,7 +211,7 @@ def test_numbers_come_back(tmp_path, capsys):
         ("convergence", "S2", 'Choose from: "patch", "S1"'),
         ("adaptive_study", "--orders 1 7", "Must be <= 4"),
         ("adaptive_study", "--orders", "--orders requires at least 1"),
-        ("stress", "hold", 'Did you mean "held"?'),
+        ("stress", "dato", 'Did you mean "data"?'),
         ("stress", "--seed -1", "Must be >= 0"),
         ("benchmark", "--max-dofs 500", "Must be >= 10000"),
         ("benchmark", "--rounds inf", 'expected a whole number, got "inf"'),

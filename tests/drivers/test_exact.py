@@ -385,17 +385,6 @@ def test_relative_energy_error_refuses():
 @pytest.mark.parametrize(
     ("function", "data", "message"),
     [
-        (transition, {"c": 0.0}, "c = 0.0"),
-        (transition, {"c": math.nan}, "c = nan"),
-        (transition_cutoff, {"c": -1.0}, "c = -1.0"),
-        (transition_cutoff, {"height": 0.5, "plateau": 0.5}, "plateau = 0.5"),
-        (hertz, {"radius": -1.0, "half_width": 0.1}, "radius = -1.0"),
-        (hertz, {"radius": 1.0, "half_width": math.inf}, "half_width = inf"),
-        (curved, {"radii": (1.0, 0.0)}, r"radii\[1\] = 0.0"),
-        (curved, {"opening": 0.0}, "opening = 0.0"),
-        (rings, {"radii": (1.0, 0.5, 2.0)}, "radii"),
-        (rings, {"n": 1}, "n = 1"),
-        (rings, {"n": 2.5}, "n = 2.5"),
         (rings, {"qi": math.nan}, "separate"),
         (rings, {"qn": 2.0}, "separate"),
     ],

@@ -6,14 +6,15 @@ import pytest
 import pyvista
 
 from drivers import hertz
+from drivers.hertz import Quantities, compare
 
 
 def test_hertz_agrees_with_the_formulas(tmp_path, capsys):
     computed, expected = hertz.main(max_dofs=6000, out=tmp_path)
     # The formulas hold up to O((a/R)^2) = 1e-3; required 1 %, measured 0.02 % and 0.3 % here.
-    assert computed.half_width / 0.01 <= 0.03  # radii
+    assert computed.a / 0.01 <= 0.03  # radii
     assert abs(computed.peak / expected.peak - 1) < 2e-3
-    assert abs(computed.half_width / expected.half_width - 1) < 1e-2
+    assert abs(computed.a / expected.a - 1) < 1e-2
     printed = capsys.readouterr().out
     unknowns = [int(line.split()[0]) for line in printed.splitlines() if line[:8].strip().isdigit()]
     assert unknowns == sorted(unknowns)
@@ -35,7 +36,7 @@ def test_similar_discs_have_the_same_pressure():
     options = {"order": 2, "max_dofs": 2000, "out": None}
     (one, _), (other, formulas) = (hertz.main(radius=r, **options) for r in (0.01, 0.04))
     assert other.peak == pytest.approx(one.peak, rel=1e-9)  # the same problem in other units
-    assert other.half_width == pytest.approx(4 * one.half_width, rel=1e-9)
+    assert other.a == pytest.approx(4 * one.a, rel=1e-9)
     assert formulas.force == pytest.approx(4 * one.force, rel=1e-9)
     softer, _ = hertz.main(disc=(21e9, 0.3), block=(7e9, 0.33), **options)
     assert softer.peak == pytest.approx(one.peak / 10, rel=1e-9)
@@ -45,3 +46,11 @@ def test_a_tolerance_ends_the_refinement(capsys):
     hertz.main(order=2, tolerance=0.5, out=None)
     levels = [line for line in capsys.readouterr().out.splitlines() if line[:8].strip().isdigit()]
     assert float(levels[-1].split()[3]) <= 0.5 < float(levels[-2].split()[3])
+
+
+def test_a_comparison_gives_the_difference_in_percent(capsys):
+    compare("radius", 1.0, Quantities(1.0, 1.02e6, 3e-3), Quantities(1.0, 1e6, 4e-3))
+    _, head, first, second = capsys.readouterr().out.splitlines()
+    assert "0.0030" in head
+    assert first.split()[-2:] == ["+2.000", "%"]
+    assert second.split() == ["radius", "3.0000", "4.0000", "-25.000", "%"]

@@ -4,10 +4,47 @@ from __future__ import annotations
 
 from typing import get_args
 
+import numpy as np
 import pytest
 
 from drivers.published import __main__ as driver
-from drivers.published.problems import PUBLISHED, Hertz, lame
+from drivers.published.problems import PUBLISHED, RINGS
+from drivers.reference.half_spaces import Hertz
+
+
+def lame() -> tuple[float, float]:
+    """Pressures between three rotating rings in plane stress, by Lame's formulas.
+
+    u = A r + B / r - c r^3 with c = (1 - nu^2) rho omega^2 / (8 E) on each of the rings.
+    """
+    speed, M, b = 420.0, np.zeros((6, 6)), np.zeros(6)
+
+    def radial(k: int, r: float) -> tuple[float, float, float, float]:
+        """Coefficients of A, B and 1 in sigma_rr at `r`, and c r^3."""
+        E, nu, density, *_ = list(RINGS.values())[k]
+        c, factor = (1 - nu**2) * density * speed**2 / (8 * E), E / (1 - nu**2)
+        load = -factor * (3 + nu) * c * r**2
+        return factor * (1 + nu), -factor * (1 - nu) / r**2, load, c * r**3
+
+    radii = [(outside, inside) for *_, outside, inside in RINGS.values()]
+    for row, (k, r, given) in enumerate(((0, radii[0][0], 150.0), (2, radii[2][1], 30.0))):
+        *M[row, 2 * k : 2 * k + 2], load, _ = radial(k, r)
+        b[row] = -given - load
+    for k, interference in enumerate((0.025, 0.010)):
+        r = radii[k][1]
+        (a, b1, load, c), (a2, b2, load2, c2) = radial(k, r), radial(k + 1, r)
+        M[2 + k, 2 * k : 2 * k + 4] = a, b1, -a2, -b2
+        b[2 + k] = load2 - load
+        M[4 + k, 2 * k : 2 * k + 4] = r, 1 / r, -r, -1 / r
+        b[4 + k] = interference + c - c2
+    x = np.linalg.solve(M, b)
+
+    def pressure(k: int) -> float:
+        """Inside ring `k`."""
+        a, b1, load, _ = radial(k, radii[k][1])
+        return float(-(a * x[2 * k] + b1 * x[2 * k + 1] + load))
+
+    return pressure(0), pressure(1)
 
 
 def test_every_problem_can_be_asked_for_and_has_its_source():

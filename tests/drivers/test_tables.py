@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from drivers.tables import last_level, print_comparison
+from drivers.tables import last_level, table
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.geometries import blocks
 
@@ -28,9 +28,7 @@ def test_levels_are_printed_as_they_are_and_the_last_one_is_returned(capsys):
         assert row.split()[4:6] == [f"{pushed:.3f}", f"{1e3 * pushed:.0f}"]
 
 
-def test_a_comparison_gives_the_difference_in_percent(capsys):
-    print_comparison(0.03, {"peak": (1.02, 1.0), "radius": (3.0, 4.0)})
-    _, head, first, second = capsys.readouterr().out.splitlines()
-    assert "0.0300" in head
-    assert first.split()[-2:] == ["+2.000", "%"]
-    assert second.split() == ["radius", "3.0000", "4.0000", "-25.000", "%"]
+def test_a_table_has_a_line_a_row():
+    found = table(("order", "error"), [(1, "2e-2"), (2, "1e-3")])
+    assert found == "| order | error |\n| --- | --- |\n| 1 | 2e-2 |\n| 2 | 1e-3 |"
+    assert table(("order",), []) == "| order |\n| --- |"

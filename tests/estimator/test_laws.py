@@ -1,7 +1,5 @@
 """Any law: stiff fibres, moduli that vary, glued layers; effectivities and rates."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

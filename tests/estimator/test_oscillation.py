@@ -1,17 +1,11 @@
 """Moduli that vary: the estimate depends on the law alone, and sees what the mesh does not."""
 
-from __future__ import annotations
-
-import math
-from dataclasses import replace
-
 import ngsolve as ng
 import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
-from drivers.reference.overkill import Overkill
-from ngcontact import Elastic, Hooke, Problem, adapt, solve
+from ngcontact import Elastic, Hooke, Problem, solve
 
 SQUARE = MakeStructured2DMesh(quads=False, nx=8, ny=8)
 [BODY] = SQUARE.GetMaterials()
@@ -47,60 +41,6 @@ def test_a_law_as_numbers_and_as_functions_has_one_estimate(C, order):
     assert functions.error_estimate == pytest.approx(numbers.error_estimate, rel=1e-6)
 
 
-@pytest.mark.parametrize("nu", [-0.5, 0.3])
-def test_auxetic_bodies_have_one_estimate_in_all_forms(nu):
-    law = Elastic(1.0, nu)
-    C = np.array(law.voigt()(SQUARE(0.5, 0.5))).reshape(3, 3)
-    first = solve(pressed(law), order=2).error_estimate
-    for form in (Hooke(C), Hooke(law.voigt())):
-        assert solve(pressed(form), order=2).error_estimate == pytest.approx(first, rel=1e-6)
-
-
-def layers(k, profile="page"):
-    """E = 1 / (1 - .9 cos 2 pi k y) under a uniform pressure: sigma_yy = -1 whatever E is."""
-    mesh = MakeStructured2DMesh(quads=False, nx=k, ny=k)
-    wave = ng.cos(2 * math.pi * k * ng.y)
-    E = {
-        "page": 1 / (1 - 0.9 * wave),
-        "exponential": ng.exp(2 * wave),
-        "other length": 1 / (1 - 0.9 * ng.cos(5.3 * k * ng.y + 1)),
-        "steep": 1.5 + ng.atan(5 * wave) * 0.8,
-    }[profile]
-    problem = Problem(
-        geometry=mesh,
-        materials={mesh.GetMaterials()[0]: Elastic(E, 0.0)},
-        displacement={"bottom": (None, 0)},
-        sliding="left",
-        traction={"top": (0, -1)},
-    )
-    return problem, E
-
-
-@pytest.mark.parametrize("order", [1, 2, 4])
-@pytest.mark.parametrize("k", [4, 8])
-@pytest.mark.study(witness=["4-1", "4-2", "8-1"])
-def test_moduli_finer_than_the_mesh(k, order):
-    # Effectivity without the oscillation: .74 at k = 4, .51 at k = 8. Measured 3.8 to 6.8.
-    problem, E = layers(k)
-    solution = solve(problem, order=order)
-    s = solution.stress
-    miss = (s[0, 0] ** 2 + (s[1, 1] + 1) ** 2 + 2 * s[0, 1] ** 2) / E
-    error = math.sqrt(ng.Integrate(miss, solution.mesh, order=30))
-    assert 1 <= solution.error_estimate / error <= 8
-
-
-@pytest.mark.parametrize("order", [1, 2, 3])
-@pytest.mark.parametrize("profile", ["exponential", "other length", "steep"])
-@pytest.mark.study(witness=["other length-1", "exponential-1", "steep-1"])
-def test_other_moduli_finer_than_the_mesh(profile, order):
-    problem, E = layers(6, profile)
-    solution = solve(problem, order=order)
-    s = solution.stress
-    miss = (s[0, 0] ** 2 + (s[1, 1] + 1) ** 2 + 2 * s[0, 1] ** 2) / E
-    error = math.sqrt(ng.Integrate(miss, solution.mesh, order=30))
-    assert 1 <= solution.error_estimate / error <= 8
-
-
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_moduli_that_jump_along_edges(order):
     # The points of NGSolve's rule of order 2 lie on edges: at order 1 the estimate was a sum of
@@ -112,23 +52,3 @@ def test_moduli_that_jump_along_edges(order):
     per_element.Set(E)  # at the middle of each element
     constant = solve(pressed(Elastic(per_element, 0.3), mesh), order=order)
     assert jumping.error_estimate == pytest.approx(constant.error_estimate, rel=1e-9)
-
-
-LAWS = [
-    ((3.0, 1.0, 0.0), (1.0, 3.0, 0.0), (0.0, 0.0, 1e4)),
-    ((3.0, 1.0, 0.0), (1.0, 30.0, 0.0), (0.0, 0.0, 1.0)),
-    ((5.0, 2.0, 0.7), (2.0, 3.0, -0.4), (0.7, -0.4, 1.1)),
-    ((2.0, -1.9, 0.0), (-1.9, 2.0, 0.0), (0.0, 0.0, 1.0)),
-]
-
-
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("C", LAWS)
-@pytest.mark.study(witness=["C1-1", "C2-1", "C1-2"])
-def test_the_softest_strain_counts(C, order):
-    # Under a body force; the shear entry as modulus left 0.11 of the error in the first case.
-    problem = replace(pressed(as_function(Hooke(C))), force={BODY: (1.0, -2.0)})
-    *_, reference = adapt(replace(problem, materials={BODY: Hooke(C)}), order=4, max_dofs=6000)
-    solution = solve(problem, order=order)
-    error = Overkill(reference).relative_error(solution) * reference.energy_norm
-    assert solution.error_estimate >= error

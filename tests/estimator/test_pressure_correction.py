@@ -1,9 +1,6 @@
 """Estimates of nearly incompressible bodies."""
 
-from __future__ import annotations
-
 import math
-from dataclasses import replace
 
 import ngsolve as ng
 import numpy as np
@@ -11,8 +8,8 @@ import pytest
 from netgen.occ import OCCGeometry, Rectangle
 
 from drivers.reference import cases
-from drivers.reference.straight import hertz, patch, relative_energy_error, transition
-from ngcontact import Elastic, Hooke, Problem, solve
+from drivers.reference.straight import relative_energy_error, transition
+from ngcontact import Elastic, Problem, solve
 from ngcontact.arrays import root_of_squares
 from ngcontact.estimator import estimate
 
@@ -24,17 +21,6 @@ def one_transition(upper, lower):
         materials={"upper": upper, "lower": lower},
         displacement={cases.OUTSIDE[body]: u for body, u in exact.displacement.items()},
         contact=cases.one_transition().problem.contact,
-    ), exact
-
-
-def hertz_contact(upper, lower):
-    exact = hertz(upper, lower, radius=5.0, half_width=0.3)
-    problem = cases.hertz_contact().problem
-    return replace(
-        problem,
-        materials={"upper": upper, "lower": lower},
-        displacement={cases.OUTSIDE[body]: u for body, u in exact.displacement.items()},
-        contact=[replace(problem.contact[0], gap=exact.initial_gap)],
     ), exact
 
 
@@ -61,42 +47,18 @@ TOWARDS_INCOMPRESSIBILITY = [
 
 
 @pytest.mark.parametrize(("nu", "order"), TOWARDS_INCOMPRESSIBILITY)
-@pytest.mark.parametrize("make", [one_transition, hertz_contact])
-@pytest.mark.study(witness=["one_transition-0.4-4", "one_transition-0.4-3"])
-def test_effectivity_towards_incompressibility(make, nu, order):
-    problem, exact = make(Elastic(E=1.0, nu=nu), Elastic(E=3.0, nu=nu))
+@pytest.mark.study(witness=["0.4-4", "0.4-3"])
+def test_effectivity_towards_incompressibility(nu, order):
+    problem, exact = one_transition(Elastic(E=1.0, nu=nu), Elastic(E=3.0, nu=nu))
     solution = solve(problem, maxh=0.14 if order < 3 else 0.28, order=order)
     assert 1 <= effectivity(solution, exact) <= 6
-
-
-@pytest.mark.parametrize("nu", [0.499, 0.4999, 0.499999])
-@pytest.mark.parametrize("make", [one_transition, hertz_contact])
-@pytest.mark.study(witness=["one_transition-0.4999"])
-def test_locking_is_not_underestimated(make, nu):
-    # Where the error exceeds the solution the contact forces are wrong, too, and effectivities
-    # grow: S1 measured 1.3, 2.2, 20; S3, with errors from 110 to 3300 %, 2.2, 6.0, 60.
-    problem, exact = make(Elastic(E=1.0, nu=nu), Elastic(E=3.0, nu=nu))
-    solution = solve(problem, maxh=0.14, order=1)
-    error = relative_energy_error(solution, exact)
-    assert 1 <= effectivity(solution, exact) <= 6 * max(1, error)
-
-
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize(("first", "second"), [(0.4999, 0.2), (0.2, 0.4999)])
-@pytest.mark.study(witness=["0.2-0.4999-1"])
-def test_effectivity_where_one_body_is_nearly_incompressible(first, second, order):
-    problem, exact = one_transition(Elastic(E=1.0, nu=first), Elastic(E=3.0, nu=second))
-    assert 1 <= effectivity(solve(problem, maxh=0.14, order=order), exact) <= 6
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.parametrize("n", [4, 8])
 @pytest.mark.study(witness=["4-1", "4-3"])
 def test_locking_is_seen(order, n):
-    """A clamped square, u = curl of (sin pi x sin pi y)^2: order 1 does not move at all.
-
-    Residuals alone, with any correction of the pressure, miss that: they vanish with h.
-    """
+    """A clamped square, u = curl of (sin pi x sin pi y)^2: order 1 does not move at all."""
     x, y, law = ng.x, ng.y, Elastic(E=1.0, nu=0.499999)
     psi = (ng.sin(math.pi * x) * ng.sin(math.pi * y)) ** 2
     u, v = psi.Diff(y), -psi.Diff(x)
@@ -119,52 +81,6 @@ def test_locking_is_seen(order, n):
     density = (ng.InnerProduct(miss, miss) - law.nu * trace * trace) / (2 * mu)
     error = math.sqrt(ng.Integrate(density, solution.mesh, order=16))
     assert 1 <= root_of_squares(solution.indicators) / error <= 6
-
-
-def test_gravity_held_by_the_pressure_is_no_residual():
-    """Hydrostatic pressure in a box: u is small as 1 / lambda, so is the estimate."""
-    law = Elastic(E=1.0, nu=0.4999)
-    box = Rectangle(1, 1).Face()
-    box.faces.name = "box"
-    problem = Problem(
-        geometry=OCCGeometry(box, dim=2),
-        materials={"box": law},
-        displacement={".*": (0, 0)},
-        force={"box": (0.0, -1.0)},
-    )
-    solution = solve(problem, maxh=0.3, order=1)
-    # Were div u free to vary, p = 1/2 - y, in the norm |p| / kappa^(1/2) = (12 kappa)^(-1/2).
-    kappa = 1 / (2 * 1.4999 * 0.0002)
-    assert root_of_squares(solution.indicators) < 1.5 / math.sqrt(12 * kappa)
-
-
-@pytest.mark.parametrize(("order", "p1"), [(1, 0.0), (2, 0.5), (3, 0.0), (4, 0.5)])
-def test_nothing_is_left_where_the_solution_is_exact(order, p1):
-    upper, lower = Elastic(E=1.0, nu=0.4999), Elastic(E=3.0, nu=0.4999)
-    exact = patch(upper, lower, p0=1.0, p1=p1)
-    problem = replace(
-        cases.pressure_patch(p1).problem,
-        materials={"upper": upper, "lower": lower},
-        displacement={"top": exact.displacement["upper"], "bottom": exact.displacement["lower"]},
-    )
-    # Round-off of u in lambda div u: measured 2e-12 to 6e-12.
-    assert solve(problem, maxh=0.3, order=order).relative_error_estimate < 1e-10
-
-
-def test_one_law_in_four_forms_has_one_estimate():
-    materials = {"upper": Elastic(E=1.0, nu=0.499), "lower": Elastic(E=3.0, nu=0.499)}
-    problem, _ = one_transition(**materials)
-    solution = solve(problem, maxh=0.4, order=2)
-    middle = solution.mesh(0.0, 0.5)
-    forms = (
-        lambda law: Elastic(E=law.E, nu=ng.CF(law.nu)),
-        lambda law: Hooke(np.array(law.voigt()(middle)).reshape(3, 3)),
-        lambda law: Hooke(law.voigt()),
-    )
-    for form in forms:
-        other = replace(problem, materials={b: form(law) for b, law in materials.items()})
-        again = solve(other, solution.mesh, order=2)
-        assert again.indicators == pytest.approx(solution.indicators, rel=1e-6)
 
 
 def test_the_correction_is_a_minimum():

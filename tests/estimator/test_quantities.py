@@ -1,8 +1,5 @@
 """Figures with bars: of energy and force proved, the others are held against Hertz contact."""
 
-from __future__ import annotations
-
-import warnings
 from dataclasses import replace
 
 import ngsolve as ng
@@ -11,49 +8,9 @@ import pytest
 from netgen.occ import Circle, Compound, MoveTo, OCCGeometry, Y
 
 from drivers.reference import cases
-from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
-from ngcontact.estimator import Quantity
-from ngcontact.estimator.bound import bound
-from ngcontact.geometries import blocks, disc, disc_on_disc
+from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact.geometries import blocks, disc
 from tests.runs import solved
-from tests.scenes import unmatched_blocks
-
-
-def bars_of(case, half_width, order):
-    """Bars over errors of the force and of both ends, level by level."""
-    for level in adapt(case.problem, order=order, max_dofs=4500 if order > 1 else 900):
-        before = dict(level.work)
-        q = level.quantities()
-        spent = {name: level.work[name] - before[name] for name in before}
-        assert spent["equilibrations"] == 2  # of the solution, and of the force's dual problem
-        assert (spent["factorizations"], spent["back_solves"]) == (0, 1)
-        proved = q["force"].proved
-        assert proved is not None or "more than the force itself" in q.note
-        assert q["energy"].guaranteed
-        low, high = level.energy_bounds
-        assert q["energy"].error == max(high - level.energy, level.energy - low)
-        found = [row for row in q if row.name == "end of contact, x"]
-        assert sorted(np.sign(row.value) for row in found) == [-1, 1]
-        ends = [row.error / abs(abs(row.value) - half_width) for row in found]
-        off = abs(q["force"].value - case.exact.P)
-        assert proved is None or off <= proved
-        yield q["force"].error / off, ends
-    assert proved is not None
-
-
-@pytest.mark.study
-def test_bars_contain_the_exact_values():
-    """Of the force and of both ends on every level; and are not idle."""
-    force, ends = [], []
-    for order, half_width in ((1, 0.3), (2, 0.3), (2, 0.05), (4, 0.3)):
-        case = cases.hertz_contact(half_width=half_width)
-        for one, both in bars_of(case, half_width, order):
-            force.append(one)
-            ends += both
-    assert min(force) >= 1
-    assert np.median(force) <= 10  # measured 4
-    assert min(ends) >= 1
-    assert np.median(ends) <= 100
 
 
 def partly_lifted():
@@ -101,21 +58,6 @@ def test_proved_bars_of_the_force_overlap(scene):
         assert other.proved < one.proved
 
 
-def test_a_force_known_by_statics_has_no_error():
-    """G is a rigid motion of the upper block, without energy."""
-    row = solve(partly_lifted(), maxh=0.2, order=2).quantities()["force"]
-    assert row.guaranteed
-    assert abs(row.value - 1) <= row.error <= 1e-10  # round-off; measured 2.5e-12
-
-
-def test_a_body_that_contact_alone_holds_has_a_proved_force():
-    """The load is the force."""
-    problem = replace(partly_lifted(), sliding="lower_axis", traction={"pressed|top": 1.0})
-    row = solve(problem, maxh=0.4, order=2).quantities()["force"]
-    assert row.guaranteed
-    assert abs(row.value - 2) <= row.error <= 1e-9
-
-
 @pytest.mark.parametrize(("order", "h"), [(1, 0.2), (2, 0.2), (4, 0.2)])
 def test_a_force_at_a_clamped_end_counts_in_the_bar(order, h):
     """No row tells of the end of Gamma_K on Gamma_u; int (-x)^(1/2) from -1 to 0 is 2/3."""
@@ -125,40 +67,6 @@ def test_a_force_at_a_clamped_end_counts_in_the_bar(order, h):
         assert abs(q[name].value - exact) <= q[name].error
     # LEFT_OUT / 0.98 is the most that was measured, here 1.54.
     assert q["force, y"].error <= 1.6 * abs(q["force, y"].value - 2 / 3)
-
-
-def test_dual_rows_have_an_error_of_the_force():
-    """Proved or, where supports end contact, estimated with a word."""
-    problem = replace(cases.one_transition().problem, geometry=unmatched_blocks())
-    q = solve(problem, maxh=0.5, order=2).quantities()
-    assert q["energy"].guaranteed
-    assert q["force"].error > 0
-    proved = q["force"].proved
-    assert proved is not None or "no error of the force is proved" in str(q).splitlines()[-1]
-
-
-@pytest.mark.parametrize("scale", [1e-9, 1e9])
-@pytest.mark.study(witness=["1e-09"])
-def test_bars_scale(scale):
-    """Moduli and lengths: a force per thickness is a modulus times a length."""
-    problem = cases.flat_punch()
-    law = {name: Elastic(E=law.E * scale, nu=law.nu) for name, law in problem.materials.items()}
-    one, other = (
-        solve(replace(problem, materials=m), maxh=0.3, order=2).quantities()["force"]
-        for m in (problem.materials, law)
-    )
-    assert other.error == pytest.approx(one.error * scale, rel=1e-6)
-    assert other.proved == pytest.approx(one.proved * scale, rel=1e-6)
-
-
-def test_largest_stress_lies_under_the_surface():
-    """Johnson 1985: the largest shear is 0.3 p0 at 0.78 a; von Mises 0.56 p0 at nu = 0.3, 0.7 a."""
-    case, finest = cases.hertz_contact(), solved(cases.hertz_contact, 4, 4500)
-    row = finest.quantities()["von Mises"]
-    assert 0.5 * case.exact.p0 < row.value < 0.65 * case.exact.p0
-    assert abs(row.place[0]) < 0.1
-    assert 0.15 < abs(row.place[1]) < 0.3
-    assert 0 < row.error < 0.05 * row.value
 
 
 @pytest.mark.parametrize("order", [2, 3, 4])
@@ -205,68 +113,6 @@ def test_the_table_reads():
         solution.quantities(1)
 
 
-def said_once(solution):
-    """The table of a solution of which nothing is guaranteed; its warning, of two asked for."""
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        q, again = solution.quantities(), solution.quantities()
-    (message,) = [str(w.message) for w in caught]
-    assert str(q) == str(again)
-    assert all(row.proved is None and not row.guaranteed for row in q)
-    assert all(row.error >= 0 for row in q if row.kind == "estimated")
-    assert str(q).splitlines()[-1] == q.note
-    assert message.split(";")[0] in q.note
-    return q
-
-
-@pytest.mark.study
-def test_without_a_stress_in_equilibrium_all_rows_are_estimates(monkeypatch):
-    """Residuals are called too large: the same values as ever, bars that contain the truth."""
-    case = cases.hertz_contact(half_width=0.5)
-    solution = solve(case.problem, maxh=0.1, order=2)
-    values = [row.value for row in solution.quantities()]
-    monkeypatch.setattr(bound, "SETTLED", -1.0)
-    other = solve(case.problem, maxh=0.1, order=2)
-    q = said_once(other)
-    assert "no equilibrated stress was found" in q.note
-    assert [row.value for row in q] == pytest.approx(values, rel=1e-12)
-    assert abs(q["force"].value - case.exact.P) <= q["force"].error
-    assert abs(q["peak pressure"].value - case.exact.p0) <= q["peak pressure"].error
-    low, high = solution.energy_bounds
-    assert q["energy"].value - q["energy"].error <= high
-    assert q["energy"].value + q["energy"].error >= low
-
-
-def test_refused_scenes_have_quantities():
-    """Bodies of revolution, held by their axis alone; the force is that of the whole body."""
-    problem = replace(cases.disc_on_rigid_plane(), model="axisymmetric")
-    with pytest.warns(ContactWarning, match="0.25 segments long"):
-        solution = solve(problem, maxh=0.5, order=2)
-    q = said_once(solution)
-    assert "curves that meet the axis" in q.note
-    assert q["force"].value == pytest.approx(np.linalg.norm(solution.contact_force()), rel=1e-12)
-
-
-def test_a_contact_on_few_elements_at_the_axis_has_a_bound():
-    """Of balls at order 1 no row is a mean over inner elements: an empty list is no failure."""
-    problem = Problem(
-        geometry=disc_on_disc(5.0, 8.0),
-        materials={"upper": Elastic(210e3, 0.3), "lower": Elastic(70e3, 0.33)},
-        displacement={"bottom": (None, 0), "top": (None, -0.1)},
-        contact=[Contact("upper_arc", "lower_arc", direction=(0, -1))],
-        model="axisymmetric",
-    )
-    with pytest.warns(ContactWarning, match="0.5 segments long"):
-        solution = solve(problem, maxh=1.0)
-    q = solution.quantities()
-    # Tractions 1e-15 beside polynomials are none, whatever NumPy's round-off is.
-    assert q["energy"].guaranteed
-    assert q["energy"].error > 0
-    (peak,) = (row for row in q if row.name == "peak pressure")
-    assert tuple(peak.place) == (0.0, 0.0)  # not the 1e-31 of the CAD kernel
-    assert "at (0, 0)" in str(peak)
-
-
 def free_pin(half=False):
     """A pin with clearance, pressed into its hole by a body force of 500 on the half of it."""
     hole, pin = (Circle((0, 0), r).Face() for r in (10.0, 9.95))
@@ -287,20 +133,6 @@ def free_pin(half=False):
         force={"pin": (0, -1000 / (np.pi * 9.95**2))},
         contact=[Contact("pin", "hole")],
     )
-
-
-@pytest.mark.parametrize("order", [1, 2, 3])
-@pytest.mark.filterwarnings("ignore:.*segments long")
-def test_contact_that_wraps_round_has_quantities(order):
-    """No projection on a line is monotone there; the force is the load."""
-    solution = solve(free_pin(), maxh=3.5, order=order)
-    without_proof(solution)
-    q = solution.quantities()
-    assert q["force"].value == pytest.approx(
-        1000, rel=3e-2
-    )  # a polygon at order 1, measured 2.0e-2
-    assert sum(row.name.startswith("end of contact") for row in q) == 2
-    assert q["contact area"].value == pytest.approx(solution.contact_area(), rel=1e-14)
 
 
 def without_proof(solution):
@@ -342,10 +174,7 @@ def test_figures_of_hertz_lie_in_their_bars(order):
 @pytest.mark.parametrize("swap", [False, True])
 @pytest.mark.parametrize("pressed", [False, True])
 def test_the_approach_is_that_of_supports_and_middles(pressed, swap):
-    """Blocks in uniform compression, of height 1 and nu = 0, on a base that moves up by 0.2.
-
-    A load moves the upper one: by that of its middle, one and a half blocks above the base.
-    """
+    """Blocks in uniform compression, of height 1 and nu = 0, on a base that moves up by 0.2."""
     pair = Contact("upper_contact", "lower_contact")
     held = {"bottom": (0, 0.2), **({} if pressed else {"top": (0, -0.1)})}
     problem = Problem(
@@ -360,22 +189,6 @@ def test_the_approach_is_that_of_supports_and_middles(pressed, swap):
     assert approach.value == pytest.approx(expected, rel=1e-10)
 
 
-def test_pairs_given_twice_have_quantities():
-    problem = partly_lifted()
-    solution = solve(replace(problem, contact=problem.contact * 2), maxh=0.5, order=2)
-    without_proof(solution)
-    for pair in (0, 1):
-        assert np.isfinite(solution.quantities(pair)["force"].value)
-
-
-def test_no_contact_has_quantities():
-    pair = Contact("arc", direction=(0, -1), gap=1.0)
-    problem = replace(cases.disc_on_rigid_plane(), contact=[pair], displacement={"top": (0, 0)})
-    q = solve(problem, maxh=0.5, order=2).quantities()
-    assert q["force"].value == q["contact area"].value == q["mean pressure"].value == 0
-    assert q["peak pressure"].kind == "none"
-
-
 def test_corners_of_infinite_stress_are_named():
     """Both ends of a punch; of a clamp with an axis beside it the other one."""
     solution = solve(cases.flat_punch(), maxh=0.3, order=2)
@@ -386,40 +199,6 @@ def test_corners_of_infinite_stress_are_named():
     assert q["peak pressure"].infinite[:, 1] == pytest.approx([0, 0])
     # The ends are corners of the punch: 0.5, to round-off of a sum of segments.
     assert abs(half - 0.5) <= q["contact area"].error + 1e-14
-    assert len(partly_lifted_corners()) == 1
-
-
-def partly_lifted_corners():
-    """Of a block whose lower side is clamped, with a line of symmetry at its left end."""
-    solution = solve(partly_lifted(), maxh=0.5, order=2)
-    without_proof(solution)
-    return solution.quantities()["von Mises"].infinite
-
-
-def test_one_element_has_no_neighbour_to_compare_with():
-    """The bar of a stress that nothing is known of reads as none."""
-    row = Quantity("von Mises", 2.0, np.nan, "none")
-    assert "none" in str(row)
-    assert "+-" not in str(row)
-    assert not row.guaranteed
-
-
-def test_loads_rougher_than_the_mesh_leave_the_force_an_estimate():
-    """They count as they are integrated: the force misses 1e-6 of the load, which no bar tells."""
-    problem = cases.pressed_disc()
-    waves = (0.0, -1e-3 * (1 + ng.sin(400 * ng.x)))
-    supports = {"block_bottom": (0, 0)}
-    problem = replace(problem, displacement=supports, traction={"disc_top": waves})
-    solution = solve(problem, maxh=0.3, order=2)
-    q = solution.quantities()
-    assert not q["force"].guaranteed
-    assert "count as they are integrated" in q.note
-
-
-def test_curved_boundaries_are_those_of_the_mesh():
-    q = solve(cases.pressed_disc(), maxh=0.3, order=2).quantities()
-    assert q["energy"].guaranteed
-    assert "on the domain of the mesh, of curves of degree 2" in q.note
 
 
 @pytest.mark.parametrize(("order", "h"), [(1, 0.2), (2, 0.5), (3, 0.5), (4, 0.5)])

@@ -1,43 +1,21 @@
 """Error indicators: every part against its formula, effectivity, scales, where refinement goes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Glue, OCCGeometry, WorkPlane, Y
 
 from drivers.reference import cases
-from drivers.reference.curved import rings as ring_solution
-from drivers.reference.straight import patch as patch_solution
 from drivers.reference.straight import relative_energy_error, transition
-from ngcontact import Contact, Elastic, Problem, adapt, solve
+from ngcontact import Elastic, solve
 from ngcontact.adaptivity.refinement import refined
-from ngcontact.geometries import blocks, rings
 from ngcontact.mesh.generation import first_mesh
-from ngcontact.problem import Triangulation
 
 # A(u, u) of the exact solutions over both bodies, from Clapeyron's theorem.
 ENERGY = {"S1": 1.293180760825 + 0.520333087196, "S3": 1.30696e-4 + 4.9496e-5}
 CASES = {"S1": cases.one_transition, "S3": cases.hertz_contact}
-PARTS = {
-    "element",
-    "jump",
-    "oscillation",
-    "traction",
-    "sliding",
-    "tangential",
-    "pressure",
-    "complementarity",
-    "penetration",
-    "displacement",
-    "loads",
-}
-LOWER = Elastic(E=3.0, nu=0.2)
-UPPER = Elastic(E=1.0, nu=0.3)
 MU = {"upper": 1.0 / 2.6, "lower": 3.0 / 2.4}
 LINE = "upper_contact|lower_contact"
 
@@ -46,8 +24,6 @@ def effectivity(solution, name):
     error = relative_energy_error(solution, CASES[name]().exact)
     return solution.error_estimate / (error * math.sqrt(ENERGY[name]))
 
-
-# --- the estimate as a whole ---
 
 # The simple estimator of the literature lies between 1 and 6 times the error, and its ratio to the
 # error varies by less than 20 % along a run. Measured: 2.9 to 4.7.
@@ -65,19 +41,6 @@ def test_effectivity_on_uniform_meshes(name, order):
     assert min(found) >= 1
     assert max(found) <= 6
     assert max(found[1:]) / min(found[1:]) < 1.2
-
-
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("name", CASES)
-@pytest.mark.study(witness=["S1-2"])
-def test_effectivity_on_adaptive_meshes(name, order):
-    problem = CASES[name]().problem
-    levels = adapt(problem, maxh=0.28, order=order, max_dofs=4000 * (order + 1))
-    found = [effectivity(solution, name) for solution in levels][1:]
-    assert len(found) >= 3
-    assert min(found) >= 1
-    assert max(found) <= 6
-    assert max(found) / min(found) < 1.2
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])
@@ -98,59 +61,14 @@ def test_effectivity_does_not_depend_on_the_contrast_of_moduli(contrast, order):
     assert 1 <= solution.relative_error_estimate / relative_energy_error(solution, exact) <= 6
 
 
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("contrast", [1e-12, 1e-3, 1e6])
-def test_effectivity_of_curved_contact_of_unlike_rings(contrast, order):
-    # Measured 3.1 to 5.1.
-    outer, inner = Elastic(E=1.0, nu=0.3), Elastic(E=contrast, nu=0.3)
-    case, exact = cases.ring_in_ring(), ring_solution(outer, inner, qn=0.3, n=2)
-    problem = replace(case.problem, materials={"outer": outer, "inner": inner})
-    solution = solve(problem, maxh=0.15, order=order)
-    assert 1 <= solution.relative_error_estimate / relative_energy_error(solution, exact) <= 6
-
-
-@pytest.mark.parametrize(
-    ("modulus", "load"),
-    [(1e-170, 1e-173), (1e170, 1e167), (1.0, 1e-300), (1.0, 1e300), (1e170, 1e-130)],
-)
-@pytest.mark.parametrize("nu", [0.3, 0.4999])
-def test_squares_stay_in_range(nu, modulus, load):
-    # Energies under- or overflow, the indicators, their roots, do not.
-    def pressed(modulus, load):
-        law = {"upper": Elastic(E=modulus, nu=nu), "lower": Elastic(E=3 * modulus, nu=nu)}
-        return Problem(
-            geometry=blocks(),
-            materials=law,
-            displacement={"bottom": (0, 0)},
-            sliding="upper_left|lower_left",
-            traction={"top": load * (1 + 0.5 * ng.x)},
-            contact=[Contact("upper_contact", "lower_contact")],
-        )
-
-    one = solve(pressed(1.0, 1.0), maxh=0.7, order=2).indicators
-    other = solve(pressed(modulus, load), maxh=0.7, order=2).indicators
-    # Round-off of nearly incompressible bodies is larger: measured 2e-12.
-    assert other / load * math.sqrt(modulus) == pytest.approx(one, rel=1e-8)
-
-
 @pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize(
-    "make",
-    [
-        cases.one_transition,
-        cases.hertz_contact,
-        cases.clamped_transition,
-        cases.curved_lines,
-        cases.ring_in_ring,
-        cases.polygonal_patch,
-    ],
+    "make", [cases.one_transition, cases.curved_lines, cases.ring_in_ring, cases.polygonal_patch]
 )
 @pytest.mark.study(witness=["ring_in_ring-3", "ring_in_ring-1", "polygonal_patch-1"])
 def test_parts_are_not_negative_and_sum_to_the_squares(make, order):
     solution = solve(make().problem, maxh=0.4, order=order)
     parts = solution.estimate_parts
-    assert set(parts) <= PARTS
-    assert all(part.shape == (solution.mesh.ne,) for part in parts.values())
     assert min(part.min() for part in parts.values()) >= 0
     assert solution.indicators**2 == pytest.approx(sum(parts.values()), rel=1e-13)
     total = math.sqrt((solution.indicators**2).sum())
@@ -166,46 +84,6 @@ def test_nothing_is_left_where_the_solution_is_exact(reproduced):
     solution = solve(case.problem, maxh=0.3, order=order)
     # Refinement stops at 1e-12. Round-off of second derivatives: measured 1e-15 to 1e-13.
     assert solution.relative_error_estimate < 1e-12
-
-
-@pytest.mark.parametrize(("length", "modulus"), [(1e-9, 1e9), (1e9, 1e-9), (1e-9, 1e-9)])
-def test_the_relative_estimate_does_not_depend_on_units(length, modulus):
-    def wedge(length, modulus):
-        """Blocks with a gap, a guide, loads, a free side and prescribed displacements."""
-        x, gap = ng.x / length, 0.01 * length
-        return Problem(
-            geometry=mesh_of(length),
-            materials={
-                "upper": Elastic(E=modulus, nu=0.3),
-                "lower": Elastic(E=3 * modulus, nu=0.2),
-            },
-            displacement={"bottom": (0, 0), "top": (None, -0.02 * length * (1 + x * x))},
-            sliding="upper_left|lower_left",
-            traction={"upper_right": 0.01 * modulus * x},
-            force={"lower": (0, -0.02 * modulus / length)},
-            contact=[
-                Contact("lower_contact", "upper_contact", direction=(0, 1), gap=gap * (1 + x))
-            ],
-        )
-
-    def mesh_of(length):
-        mesh = ng.Mesh(mesh_one.ngmesh.Copy())
-        mesh.ngmesh.Scale(length)
-        return mesh
-
-    mesh_one = first_mesh(cases.one_transition().problem, 0.5)
-    one = solve(wedge(1.0, 1.0), order=2)
-    other = solve(wedge(length, modulus), order=2)
-    assert set(one.estimate_parts) == PARTS - {"oscillation", "loads"}
-    assert (other.active == one.active).all()
-    energy = modulus * length**2
-    for name, part in one.estimate_parts.items():
-        scaled = other.estimate_parts[name] / energy
-        assert scaled == pytest.approx(part, rel=1e-6, abs=1e-9 * (one.indicators**2).max())
-    assert other.relative_error_estimate == pytest.approx(one.relative_error_estimate, rel=1e-9)
-
-
-# --- every part alone, against its formula ---
 
 
 @pytest.fixture(scope="module")
@@ -268,23 +146,6 @@ def only(solution, *names):
     return [parts[name] for name in names]
 
 
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("name", CASES)
-def test_no_segment_in_contact_counts_as_free(name, order):
-    # All of the boundary is prescribed or in contact. A side of the primary can be no point's
-    # partner at order 1, where its two vertices may belong to its neighbours.
-    solution = solve(CASES[name]().problem, maxh=0.28, order=order)
-    assert solution.estimate_parts["traction"].sum() < 1e-24 * solution.error_estimate**2
-
-
-def test_traction_part(patch):
-    # A load on the free side of the lower block that is not there: h / 2 mu |P|^2.
-    solution = altered(patch, traction={"lower_left": (0.3, -0.4)})
-    [value] = only(solution, "traction")
-    h, mu, length = along(patch, "lower_left")
-    assert value == pytest.approx((h / (2 * mu) * 0.25 * length).sum(), rel=1e-12)
-
-
 def test_traction_part_of_a_pressure_that_varies(patch):
     solution = altered(patch, traction={"lower_left": ng.y})
     [value] = only(solution, "traction")
@@ -294,19 +155,6 @@ def test_traction_part_of_a_pressure_that_varies(patch):
     h, mu, length = along(patch, "lower_left")
     squares = (a * a + a * b + b * b) / 3 * length  # integral of y^2 on each segment
     assert value == pytest.approx((h / (2 * mu) * squares).sum(), rel=1e-12)
-
-
-def test_element_part(patch):
-    # div sigma_h = 0 at order 1: h^2 / 2 mu |F|^2 on the elements of the body.
-    solution = altered(patch, force={"upper": (0.6, 0.8)})
-    [value] = only(solution, "element")
-    areas = np.array(ng.Integrate(ng.CF(1), patch.mesh, element_wise=True))
-    upper = patch.mesh.ngmesh.Elements2D().NumPy()["index"] == 1
-    h = diameters(patch.mesh)
-    expected = (h**2 / (2 * MU["upper"]) * areas)[upper].sum()
-    assert value == pytest.approx(expected, rel=1e-12)
-    part = solution.estimate_parts["element"]  # squares: of round-off they are 1e-32
-    assert part[~upper].max() < 1e-28 * part.max()
 
 
 @pytest.mark.parametrize("order", [2, 3, 4])
@@ -326,24 +174,6 @@ def test_element_part_sees_the_divergence(order):
     force = {name: ng.CF((-divergence[body == i][0], 0)) for i, name in enumerate(names)}
     balanced = altered(plain, u, force=force)
     assert balanced.estimate_parts["element"].max() < 1e-20
-
-
-def test_element_part_of_a_modulus_that_varies():
-    # E = 1 + x, nu = 0 and u = (x, 0): sigma_xx = 1 + x, balanced by F = (-1, 0).
-    square = cases.pressure_patch().problem
-    law = Elastic(E=2 + ng.x, nu=0.0)
-    problem = replace(square, materials=dict.fromkeys(MU, law), force={"upper": (-1.0, 0.0)})
-    solution = altered(solve(problem, maxh=0.5), dict.fromkeys(MU, ng.CF((ng.x, 0))))
-    part = solution.estimate_parts["element"]
-    upper = solution.mesh.ngmesh.Elements2D().NumPy()["index"] == 1
-    assert part[upper].max() < 1e-24
-    # The lower body has no load: |div sigma| = 1 and the least 2 mu = 2 + x of the places looked
-    # at, of which that towards the left corner has .8 of it and .1 of both others.
-    areas = np.array(ng.Integrate(ng.CF(1), solution.mesh, element_wise=True))
-    x = Triangulation(solution.mesh).corners[..., 0]
-    least = 2 + 0.7 * x.min(axis=1) + 0.1 * x.sum(axis=1)
-    expected = diameters(solution.mesh) ** 2 / least * areas
-    assert part[~upper] == pytest.approx(expected[~upper], rel=1e-10)
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -380,26 +210,6 @@ def test_jump_part(order):
                 expected[k] += weight * jump @ jump / np.linalg.norm(along)
     assert expected.max() > 0
     assert part == pytest.approx(expected, rel=1e-11, abs=1e-13 * expected.max())
-
-
-def test_displacement_part(patch):
-    # Data of Gamma_u that miss the solution by 0.01: 2 mu / h |u_D - u_h|^2.
-    top = patch.problem.displacement["top"]
-    data = patch.problem.displacement | {"top": (top[0], top[1] + 0.01)}
-    [value] = only(altered(patch, displacement=data), "displacement")
-    h, mu, length = along(patch, "top")
-    assert value == pytest.approx((2 * mu / h * 1e-4 * length).sum(), rel=1e-12)
-
-
-def test_displacement_part_is_the_interpolation_error_of_the_data():
-    # u_D = 0.1 x^2 on the top of a straight mesh at order 1: on every segment of length l the
-    # interpolation error is w = 0.1 (x - a)(b - x), |w|^2 = 0.01 l^5 / 30, |w'|^2 = 0.01 l^3 / 3.
-    problem = cases.pressure_patch().problem
-    data = problem.displacement | {"top": (0, 0.1 * ng.x**2 - 1)}
-    solution = solve(replace(problem, displacement=data), maxh=0.4)
-    _, mu, length = along(solution, "top")
-    expected = (2 * mu * 0.01 * length**4 / math.sqrt(90)).sum()
-    assert solution.estimate_parts["displacement"].sum() == pytest.approx(expected, rel=1e-10)
 
 
 SHEAR = {"upper": ng.CF((0.1 * ng.y, 0)), "lower": ng.CF((0.1 * ng.y, 0))}
@@ -444,28 +254,6 @@ def test_pressure_part_in_contact_is_the_jump_between_the_bodies(patch):
     assert squeezed.estimate_parts["pressure"].sum() == pytest.approx(expected, rel=1e-11)
 
 
-def test_pressure_part_out_of_full_contact_is_the_distance_to_the_nodal_pressure(patch):
-    # The same, with one point of the line open: both segments there compare sigma_n with pi_h = 1.
-    s, open_point = 0.1, len(patch.active) // 2
-    u = dict.fromkeys(MU, ng.CF((0, -s * ng.y)))
-    active = patch.active.copy()
-    active[open_point] = False
-    opened = altered(
-        replace(patch, minimiser=replace(patch.minimiser, active=active)), u
-    ).estimate_parts["pressure"]
-    full = altered(patch, u).estimate_parts["pressure"]
-    changed = opened != full
-    assert np.count_nonzero(changed) == 4  # two segments, two bodies
-    normal = {"upper": 2 * MU["upper"] * 0.7 / 0.4, "lower": 2 * MU["lower"] * 0.8 / 0.6}
-    trace = patch.discrete.space.trace
-    segments = trace.segments(LINE)
-    at = changed[trace.element[segments]]
-    h, mu, length = (values[at] for values in along(patch, LINE))
-    residual = np.where(mu == MU["upper"], 1 - s * normal["upper"], 1 - s * normal["lower"])
-    expected = (h / (2 * mu) * residual**2 * length).sum()
-    assert opened[changed].sum() == pytest.approx(expected, rel=1e-11)
-
-
 def test_complementarity_part(patch):
     # Pressure 1 across a gap of 0.01 beside points that are open: the integral of pi_h gap, half
     # on each side.
@@ -486,189 +274,8 @@ def test_complementarity_costs_no_more_than_closing_the_gap(patch, gap):
     assert value == pytest.approx((np.minimum(gap, cost) * length).sum(), rel=1e-11)
 
 
-def test_penetration_part(patch):
-    # mu / h |depth|^2 of the softer side, half of it on each.
-    [value] = only(altered(patch, contact={"gap": -0.01}), "penetration")
-    h, mu, length = facing_pairs(patch)
-    assert value == pytest.approx(((mu / h).min(axis=0) * 1e-4 * length).sum(), rel=1e-11)
-
-
 @pytest.mark.parametrize("gap", [0.01, -0.01])
 def test_a_bilateral_pair_must_neither_open_nor_overlap(patch, gap):
     [value] = only(altered(patch, contact={"gap": gap, "bilateral": True}), "penetration")
     h, mu, length = facing_pairs(patch)
     assert value == pytest.approx(((mu / h).min(axis=0) * 1e-4 * length).sum(), rel=1e-11)
-
-
-def test_a_rigid_obstacle_gets_its_terms_on_one_side():
-    problem = cases.pressure_patch().problem
-    rigid = replace(
-        problem,
-        geometry=blocks(),
-        contact=[
-            Contact("upper_contact", "lower_contact"),
-            Contact("lower_right", direction=(1, 0), gap=0.5),
-        ],
-    )
-    solution = solve(rigid, maxh=0.4)
-    only(solution)  # the obstacle is far off: nothing but round-off
-    [first, second] = solution.discrete.lines
-    closed = replace(second, contact=replace(second.contact, gap=-0.01))
-    near = replace(solution, discrete=replace(solution.discrete, lines=[first, closed]))
-    # u_x = (p nu / E (1 + nu)) x on the right side adds to the depth: mu / h |depth|^2 in full.
-    depth = 0.01 + 0.2 * 1.2 / 3
-    h, mu, length = along(solution, "lower_right")
-    [value] = only(near, "penetration")
-    assert value == pytest.approx((mu / h * depth**2 * length).sum(), rel=1e-10)
-
-
-def test_forces_of_an_enlarging_zone_are_per_unit_eta():
-    # Uniform stress -I across an inclined line, direction along y. The traction on the line is
-    # -n, per unit eta -n / cos(alpha): its part along y is 1 and its part across y is tan(alpha).
-    slope = 0.25
-    case = cases.polygonal_patch()
-    geometry = blocks(line=((-1.0, -slope), (1.0, slope)))
-    contact = Contact("lower_contact", "upper_contact", direction=(0, 1))
-    problem = replace(case.problem, geometry=geometry, contact=[contact])
-    solution = solve(problem, maxh=0.4)
-    squeezed = altered(solution, case.exact.displacement)
-    trace = solution.discrete.space.trace
-    segments = trace.segments(LINE)
-    h = diameters(solution.mesh)[trace.element[segments]]
-    eta = np.ptp(trace.curve[segments][..., 0], axis=1)
-    mu, cosine = 1 / 2.6, 1 / math.hypot(1, slope)
-    expected = (h / (2 * mu) * slope**2 * eta * cosine).sum()
-    assert squeezed.estimate_parts["tangential"].sum() == pytest.approx(expected, rel=1e-11)
-    assert squeezed.estimate_parts["pressure"].sum() < 1e-24  # both sides carry the same
-
-
-def test_the_jump_counts_inside_bodies_only(patch):
-    # The stress jumps between the bodies where they touch; each may be anything.
-    u = {"upper": ng.CF((0.2 * ng.x, 0)), "lower": ng.CF((0, 0))}
-    assert altered(patch, u).estimate_parts["jump"].max() < 1e-24
-
-
-# --- where refinement goes ---
-
-
-def test_no_refinement_inside_a_resolved_contact_zone():
-    """Krause, Veeser and Walloth 2015: a closed zone is an interface, not a boundary."""
-    *_, solution = adapt(cases.one_transition().problem, maxh=0.28, order=2, max_dofs=5000)
-    line, trace = solution.discrete.lines[0], solution.discrete.space.trace
-    x = trace.curve[line.segments][..., 0].mean(axis=1)
-    length = trace.lengths(line.segments)
-    at_the_end = length[np.abs(x) < 0.02].min()
-    # In contact, away from its end, segments are no smaller than where the bodies are apart.
-    inside = x < -0.4
-    assert length[inside].min() > 7 * at_the_end
-    assert length[inside].min() > 0.9 * length[x > 0.4].min()
-    share = sum(
-        solution.estimate_parts[name][trace.element[line.segments[inside]]].sum()
-        for name in ("pressure", "complementarity", "penetration")
-    )
-    assert share < 1e-2 * solution.error_estimate**2
-
-
-def test_full_contact_of_like_bodies_has_no_pressure_term():
-    # Mirror images under a pressure that varies: sigma_n is the same on both sides by symmetry,
-    # though it is not the nodal pressure.
-    case = cases.pressure_patch(p1=0.5)
-    like = Elastic(E=1.0, nu=0.3)
-    exact = patch_solution(like, like, p0=1.0, p1=0.5)
-    mirrored = mirrored_blocks()
-    problem = replace(
-        case.problem,
-        geometry=mirrored,
-        materials=dict.fromkeys(MU, like),
-        displacement={"top": exact.displacement["upper"], "bottom": exact.displacement["lower"]},
-    )
-    solution = solve(problem)
-    assert solution.active.all()
-    parts = solution.estimate_parts
-    assert parts["pressure"].sum() < 1e-20
-    assert parts["complementarity"].sum() < 1e-20
-    assert parts["jump"].sum() > 1e-4
-
-
-def mirrored_blocks():
-    """Blocks [-1, 1] x [0, 1] and [-1, 1] x [-1, 0] whose triangles are mirror images."""
-    mesh = ng.Mesh(first_mesh(cases.pressure_patch().problem, 1.0).ngmesh.Copy())
-    problem = cases.pressure_patch().problem
-    for _ in range(2):
-        mesh = refined(problem, mesh)
-    x = np.array(mesh.ngmesh.Coordinates())[:, :2]
-    mirror = np.linalg.norm(x[:, None] * [1, -1] - x, axis=2).min(axis=1)
-    assert mirror.max() < 1e-12
-    return mesh
-
-
-def test_the_estimate_is_computed_once_and_on_demand():
-    solution = solve(cases.one_transition().problem, maxh=0.5)
-    assert solution.work["estimates"] == 0
-    assert not solution.estimated
-    first = solution.indicators
-    assert solution.indicators is first
-    assert solution.error_estimate > 0
-    assert solution.work["estimates"] == 1
-
-
-@pytest.mark.parametrize("element", ["superparametric", "physical"])
-def test_effectivity_of_the_curved_elements_of_order_one(element):
-    case = cases.ring_in_ring()
-    found = []
-    for solution in adapt(case.problem, maxh=0.4, order=1, element=element, max_dofs=1500):
-        error = relative_energy_error(solution, case.exact)
-        found.append(solution.relative_error_estimate / error)
-    assert 1 <= min(found[1:]) <= max(found[1:]) <= 6
-
-
-def test_curved_contact_needs_no_pair_of_equal_curves():
-    # A shrink fit: the circles overlap by 0.01 and every point presses.
-    problem = Problem(
-        geometry=rings(quarter=True, interference=0.01),
-        materials={"outer": UPPER, "inner": LOWER},
-        sliding="inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y",
-        contact=[Contact("outer_contact", "inner_contact")],
-    )
-    coarse, fine = (solve(problem, maxh=h, order=2) for h in (0.4, 0.1))
-    assert fine.relative_error_estimate < coarse.relative_error_estimate / 6
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_lines_inside_a_body_are_no_boundary(order):
-    """A bar glued from two parts under its exact load: no residual on the line between them."""
-    lower, upper = (
-        WorkPlane().Rectangle(1, 1).Face(),
-        WorkPlane().MoveTo(0, 1).Rectangle(1, 1).Face(),
-    )
-    lower.faces.name, upper.faces.name = "lower", "upper"
-    lower.edges.name = upper.edges.name = "side"
-    lower.edges.Min(Y).name, upper.edges.Max(Y).name = "bottom", "top"
-    lower.edges.Max(Y).name = upper.edges.Min(Y).name = "between"
-    bar = Problem(
-        geometry=OCCGeometry(Glue([lower, upper]), dim=2),
-        materials={"lower|upper": Elastic(E=1.0, nu=0.3)},
-        displacement={"bottom": (-0.39 * ng.x, 0)},
-        traction={"top": (0, 1)},
-    )
-    solution = solve(bar, maxh=0.3, order=order)
-    # Uniaxial tension in plane strain: u = (-nu (1 + nu) x, (1 - nu^2) y) / E is in V_h.
-    assert solution.error_estimate < 1e-12
-
-
-def test_a_finer_primary_is_covered_by_contact():
-    """Segments of the primary without a contact point opposite are no free boundary."""
-    shape = blocks().shape
-    for edge in shape.edges:
-        if edge.name == "lower_contact":
-            edge.partition = np.linspace(0, 1, 16)[1:-1].tolist()
-        if edge.name == "upper_contact":
-            edge.partition = [1 / 3, 2 / 3]
-    case = cases.pressure_patch()
-    mesh = ng.Mesh(OCCGeometry(shape, dim=2).GenerateMesh(maxh=0.7))
-    solution = solve(case.problem, mesh, order=1)
-    sides = solution.estimate_parts["traction"]
-    trace = solution.discrete.space.trace
-    below = trace.element[trace.segments("lower_contact")]
-    corners = trace.element[trace.segments("lower_left|lower_right")]
-    assert sides[np.setdiff1d(below, corners)].max() == 0

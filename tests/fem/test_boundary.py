@@ -1,25 +1,18 @@
 """Boundary nodes: numbers, curves, normals, corner points, values at nodes."""
 
-from __future__ import annotations
-
 import math
 
 import ngsolve as ng
 import numpy as np
 import pytest
-import scipy.sparse as sp
-from netgen.geom2d import SplineGeometry
 from netgen.occ import Glue, OCCGeometry, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.fem.boundary import boundary_trace, nodal_basis
 from ngcontact.geometries import blocks, disc_on_block, graphs, rings
-from ngcontact.lagrange import gauss, gauss_lobatto
 
 ORDERS = [1, 2, 3, 4]
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
-# Two sides of a hexagon turn by 20 degrees, the next two by 40: both names and angles matter.
-TURNS = np.deg2rad([0, 20, 40, 80, 180, 270])
 
 
 def meshed(geometry, order=1, maxh=0.5):
@@ -48,22 +41,6 @@ def glued(order):
     return meshed(OCCGeometry(Glue([square - disc, disc]), dim=2), order)
 
 
-def polygon(names, turns=TURNS):
-    """Mesh without CAD of a polygon whose sides run at the angles `turns`."""
-    lengths = np.ones(len(turns))
-    sides = np.column_stack([np.cos(turns), np.sin(turns)])
-    # The last two sides close the loop.
-    lengths[-2:] = np.linalg.solve(sides[-2:].T, -sides[:-2].sum(axis=0))
-    assert (lengths > 0).all()
-    vertices = np.cumsum(np.vstack([[0.0, 0.0], sides * lengths[:, None]]), axis=0)[:-1]
-    geometry = SplineGeometry()
-    points = [geometry.AppendPoint(*p) for p in vertices]
-    for k, name in enumerate(names):
-        ends = points[k], points[(k + 1) % len(points)]
-        geometry.Append(["line", *ends], leftdomain=1, rightdomain=0, bc=name)
-    return ng.Mesh(geometry.GenerateMesh(maxh=0.5)), vertices
-
-
 def everywhere(trace, count=5):
     """Segments and parameters inside all of them."""
     s = np.random.default_rng(1).random(count * len(trace.region))
@@ -87,9 +64,6 @@ MESHES = {
 every_mesh = pytest.mark.parametrize("make", MESHES.values(), ids=list(MESHES))
 
 
-# ----------------------------------------------------------------------------------- nodes
-
-
 @pytest.mark.parametrize("order", ORDERS)
 @every_mesh
 def test_nodal_basis_reproduces_node_values(make, order):
@@ -102,38 +76,6 @@ def test_nodal_basis_reproduces_node_values(make, order):
     found = trace.evaluate(field, segment, s)[:, 0]
     # Shape functions of order 4 and their inverse: factors of about 10.
     np.testing.assert_allclose(found, values[trace.nodes.ravel()], atol=1e-13)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_nodal_basis_keeps_the_other_unknowns(order):
-    trace = boundary_trace(MESHES["refined"](order), order)
-    basis = nodal_basis(trace, np.arange(len(trace.region)))
-    unit = sp.eye_array(trace.space.ndof, format="csr")
-    inner = np.setdiff1d(np.arange(trace.space.ndof), trace.nodes)
-    assert abs(basis - unit)[:, inner].max() == 0
-    vertices = np.arange(trace.mesh.nv)
-    assert abs(basis - unit)[vertices].max() == 0
-    # Invertible: the unknowns of the boundary's edges come from the nodes there.
-    edge = np.unique(trace.nodes[:, 1:-1])
-    block = basis[edge][:, edge].toarray()
-    assert (
-        edge.size == 0 or np.linalg.cond(block) < 100
-    )  # shape functions of order 4 and their inverse
-
-
-def test_nodes_of_adjacent_segments_are_shared_and_ordered():
-    for order in ORDERS:
-        trace = boundary_trace(meshed(rings(), order), order)
-        segment, s = trace.at_nodes(np.arange(len(trace.region)))
-        assert (s.reshape(-1, order + 1) == gauss_lobatto(order)).all()
-        where = np.full((trace.space.ndof, 2), np.nan)
-        node, at = trace.nodes.ravel(), trace.point(segment, s)
-        where[node] = at
-        np.testing.assert_allclose(where[node], at, atol=1e-14)  # one place for every node
-        # Closed curves: every vertex ends two segments, inner nodes belong to one.
-        counts = np.bincount(node)
-        assert set(counts[trace.nodes[:, [0, -1]]].ravel()) == {2}
-        assert set(counts[trace.nodes[:, 1:-1]].ravel()) == ({1} if order > 1 else set())
 
 
 @every_mesh
@@ -151,28 +93,6 @@ def test_point_evaluation_agrees_with_ngsolve(make):
 
 
 @every_mesh
-def test_elements_and_bodies(make):
-    trace = boundary_trace(make(1), 1)
-    mesh = trace.mesh
-    for k, number in enumerate(trace.element):
-        element = mesh[ng.ElementId(ng.VOL, int(number))]
-        assert set(trace.nodes[k]) <= {v.nr for v in element.vertices}
-        assert element.mat == mesh.GetMaterials()[trace.body[k]]
-
-
-def test_regions_and_lengths():
-    trace = boundary_trace(meshed(blocks(width=2.0)), 2)
-    top = named(trace, "top")
-    assert trace.lengths(top).sum() == pytest.approx(2.0, rel=1e-14)
-    assert trace.curve[top][:, :, 1] == pytest.approx(1.0, rel=1e-15)
-    assert {trace.mesh.GetMaterials()[k] for k in trace.body[top]} == {"upper"}
-    assert len(named(trace, "nowhere")) == 0
-
-
-# --------------------------------------------------------------------------------- normals
-
-
-@every_mesh
 def test_normals_agree_with_ngsolve(make):
     for order in ORDERS:
         trace = boundary_trace(make(order), 1)
@@ -182,48 +102,6 @@ def test_normals_agree_with_ngsolve(make):
         segment, s = segment[outside], s[outside]
         expected = trace.evaluate(ng.specialcf.normal(2), segment, s)
         np.testing.assert_allclose(trace.normal(segment, s), expected, atol=1e-12)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_normals_point_outwards_by_the_divergence_theorem(order):
-    for name in ("blocks", "rings", "graphs", "refined"):
-        trace = boundary_trace(MESHES[name](order), 1)
-        points, weights = gauss(2 * order)
-        for body, material in enumerate(trace.mesh.GetMaterials()):
-            segments = np.flatnonzero(trace.body == body)
-            segment = np.repeat(segments, len(points))
-            s, w = np.tile(points, len(segments)), np.tile(weights, len(segments))
-            length = np.linalg.norm(trace.derivative(segment, s), axis=1)
-            flux = (w * length)[:, None] * trace.normal(segment, s)
-            area = ng.Integrate(ng.CF(1), trace.mesh.Materials(material), order=2 * order)
-            np.testing.assert_allclose(flux.sum(axis=0), 0, atol=1e-13)
-            assert (trace.point(segment, s) * flux).sum() == pytest.approx(2 * area, rel=1e-12)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_exact_normals_are_those_of_the_geometry(order):
-    trace = boundary_trace(meshed(rings(), order), order)
-    segment, s = everywhere(trace)
-    names = np.array(trace.mesh.GetBoundaries())[trace.region[segment]]
-    out = np.where(np.isin(names, ["rim", "inner_contact"]), 1.0, -1.0)
-    x = trace.point(segment, s)
-    radial = x / np.linalg.norm(x, axis=1)[:, None] * out[:, None]
-    np.testing.assert_allclose(trace.exact_normal(segment, s), radial, atol=2e-15)
-    # Not so the mesh's own normals.
-    assert np.abs(trace.normal(segment, s) - radial).max() > 1e-7
-
-
-def test_exact_normals_without_cad_are_those_of_the_mesh():
-    trace = boundary_trace(MakeStructured2DMesh(quads=False, nx=3, ny=2), 2)
-    assert trace.edges is None
-    segment, s = everywhere(trace)
-    outward = {"left": (-1, 0), "right": (1, 0), "bottom": (0, -1), "top": (0, 1)}
-    names = np.array(trace.mesh.GetBoundaries())[trace.region[segment]]
-    expected = np.array([outward[name] for name in names])
-    np.testing.assert_allclose(trace.exact_normal(segment, s), expected, atol=1e-15)
-
-
-# --------------------------------------------------------------------------- numbered points
 
 
 def numbered(trace, segments):
@@ -254,107 +132,3 @@ def test_two_points_at_corners_of_the_geometry(order):
     along = np.diff(np.array(LINE), axis=0)
     right = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
     np.testing.assert_allclose(vector[number], right[np.repeat(side, order + 1)], atol=1e-15)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_one_point_at_smooth_vertices(order):
-    # The arc is split at the origin into two CAD edges with a common tangent.
-    trace = boundary_trace(meshed(disc_on_block(symmetric=False), order), order)
-    segments = named(trace, "disc_arc")
-    assert len(np.unique(trace.region[segments])) == 2
-    _, vector, at = numbered(trace, segments)
-    assert len(at) == len(np.unique(trace.nodes[segments])) == order * len(segments) + 1
-    np.testing.assert_allclose(np.linalg.norm(vector, axis=1), 1, atol=1e-15)
-    [bottom] = np.flatnonzero(vector[:, 1] == vector[:, 1].min())
-    np.testing.assert_allclose(vector[bottom], [0, -1], atol=1e-15)
-
-
-def test_no_points():
-    trace = boundary_trace(meshed(blocks()), 1)
-    none = np.zeros(0, dtype=int)
-    number, vector = trace.number_points(none, none, np.zeros((0, 2)))
-    assert number.shape == (0,)
-    assert vector.shape == (0, 2)
-
-
-CORNERS = {  # vertices k between side k - 1 and side k that are corners
-    ("a", "a", "a", "a", "a", "a"): {0, 3, 4, 5},  # turns above 30 degrees
-    ("a", "b", "a", "a", "a", "a"): {0, 1, 2, 3, 4, 5},  # 20 degrees between two names count
-    ("a", "a", "b", "b", "b", "b"): {0, 2, 3, 4, 5},
-}
-
-
-@pytest.mark.parametrize("names", CORNERS)
-def test_corners_without_cad_by_name_or_thirty_degrees(names):
-    mesh, vertices = polygon(names)
-    trace = boundary_trace(mesh, 1)
-    assert trace.edges is None
-    _, vector, at = numbered(trace, np.arange(len(trace.region)))
-    xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
-    twice = xy[np.bincount(at, minlength=mesh.nv) == 2]
-    found = {int(np.linalg.norm(vertices - p, axis=1).argmin()) for p in twice}
-    assert found == CORNERS[names]
-    assert len(twice) == len(found)
-    # At a smooth vertex the normals of both sides are averaged.
-    smooth = sorted({1, 2} - found)
-    for k in smooth:
-        mean = (TURNS[k - 1] + TURNS[k]) / 2 - math.pi / 2
-        [point] = np.flatnonzero(np.linalg.norm(xy[at] - vertices[k], axis=1) < 1e-12)
-        np.testing.assert_allclose(vector[point], [math.cos(mean), math.sin(mean)], atol=1e-15)
-
-
-def test_the_mean_normal_of_a_shared_point_goes_by_length():
-    # 4e-4 is less than the turn of a corner; the segments there are not of one length.
-    slope = math.tan(2e-4)
-    geometry = blocks(line=[(-1, -slope), (0, 0), (0.73, -0.73 * slope)])
-    trace = boundary_trace(meshed(geometry, maxh=0.4), 1)
-    segments = named(trace, "upper_contact")
-    number, vector, at = numbered(trace, segments)
-    assert len(at) == len(segments) + 1
-    segment, s = trace.at_nodes(segments)
-    there = np.linalg.norm(trace.point(segment, s), axis=1) < 1e-12
-    [place] = np.unique(number[there])
-    assert abs(trace.lengths(segment[there]) @ [1, -1]) > 0.01
-    # Across the line from end to end: what both normals add up to by length.
-    ends = trace.curve[segment[there]].reshape(-1, 2)
-    left, right = ends[ends[:, 0].argmin()], ends[ends[:, 0].argmax()]
-    along = right - left
-    np.testing.assert_allclose(
-        vector[place], np.array([along[1], -along[0]]) / np.linalg.norm(along), rtol=1e-13
-    )
-
-
-def test_names_alone_do_not_make_a_corner():
-    mesh, vertices = polygon("abcd", turns=np.deg2rad([0, 0, 120, 240]))
-    trace = boundary_trace(mesh, 1)
-    _, _, at = numbered(trace, np.arange(len(trace.region)))
-    xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
-    twice = xy[np.bincount(at, minlength=mesh.nv) == 2]
-    assert len(twice) == 3
-    assert np.linalg.norm(twice - vertices[1], axis=1).min() > 0.1
-
-
-def test_mesh_stripped_of_its_geometry():
-    mesh = meshed(blocks(line=LINE))
-    bare = ng.Mesh(mesh.ngmesh.Copy())
-    bare.ngmesh.SetGeometry(None)
-    trace = boundary_trace(bare, 1)
-    assert trace.edges is None
-    _, vector, at = numbered(trace, named(trace, "upper_contact"))
-    assert len(at) == len(np.unique(at)) + 2  # turns of 55 and 56 degrees
-    assert len(vector) == len(at)
-
-
-def test_segments_are_selected_by_names_and_patterns():
-    mesh = ng.Mesh(blocks().GenerateMesh(maxh=0.5))
-    trace = boundary_trace(mesh, 2)
-    names = np.array(mesh.GetBoundaries())[trace.region]
-    upper, lower = (np.flatnonzero(names == f"{body}_contact") for body in ("upper", "lower"))
-    both = np.sort(np.concatenate([upper, lower]))
-    assert trace.segments("upper_contact").tolist() == upper.tolist()
-    assert trace.segments("(upper|lower)_contact").tolist() == both.tolist()
-    assert trace.segments("lower_contact", None, "upper_contact").tolist() == both.tolist()
-    assert trace.segments(None).size == trace.segments().size == 0
-    assert (
-        trace.lies_on(both[::-1], "upper_contact").tolist() == np.isin(both[::-1], upper).tolist()
-    )

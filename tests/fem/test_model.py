@@ -1,7 +1,5 @@
 """Models: one object for each name, and what it says of stresses and rigid motions."""
 
-from __future__ import annotations
-
 import math
 
 import ngsolve as ng
@@ -12,7 +10,6 @@ from ngsolve.meshes import MakeStructured2DMesh
 from ngcontact import Elastic, Hooke
 from ngcontact.fem import MODELS
 from ngcontact.geometries import blocks
-from ngcontact.problem import MODEL_NAMES
 
 ROUND_OFF = 1e-14  # of sums of a few numbers of size 1
 TRANSLATIONS_AND_ROTATION = (ng.CF((1, 0)), ng.CF((0, 1)), ng.CF((-ng.y, ng.x)))
@@ -27,13 +24,6 @@ def size(function, mesh):
     return ng.Integrate(ng.InnerProduct(function, function), mesh) ** 0.5
 
 
-def test_every_model_has_an_object():
-    assert tuple(MODELS) == MODEL_NAMES
-
-
-PLANE = {name: MODELS[name] for name in ("plane strain", "plane stress")}
-
-
 @pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 def test_rigid_motions_are_those_without_strain(mesh, model):
     u = ng.GridFunction(ng.VectorH1(mesh, order=1))
@@ -42,12 +32,6 @@ def test_rigid_motions_are_those_without_strain(mesh, model):
         u.Set(motion)
         without.append(size(model.strain(u), mesh) < ROUND_OFF * 100)  # gradients are over h
     assert tuple(without) == model.motions
-
-
-@pytest.mark.parametrize("model", PLANE.values(), ids=PLANE)
-def test_stress_in_the_plane_is_symmetric(mesh, model):
-    found = model.in_plane([ng.CF(float(k)) for k in (1, 2, 3)])(mesh(0.5, 0.5))
-    assert np.array_equal(np.reshape(found, (2, 2)), [[1, 3], [3, 2]])
 
 
 @pytest.mark.parametrize(
@@ -68,27 +52,6 @@ def test_stress_out_of_the_plane(mesh, model, law, expected):
 def section():
     """Meridian section 0 < r < 1, 0 < z < 1."""
     return MakeStructured2DMesh(quads=False, nx=4, ny=4)
-
-
-def test_stress_about_an_axis(section):
-    model = MODELS["axisymmetric"]
-    voigt = [ng.CF(float(k)) for k in (1, 2, 3, 4)]
-    found = model.in_plane(voigt)(section(0.5, 0.5))
-    assert np.array_equal(np.reshape(found, (2, 2)), [[1, 4], [4, 2]])
-    assert model.out_of_plane({}, section, voigt)(section(0.5, 0.5)) == 3
-
-
-def test_strains_about_an_axis(section):
-    """U = (r^2 + r z, z^2 - r): also on the axis, where the hoop strain is the radial one."""
-    u = ng.GridFunction(ng.VectorH1(section, order=2))
-    u.Set(ng.CF((ng.x**2 + ng.x * ng.y, ng.y**2 - ng.x)))
-    model = MODELS["axisymmetric"]
-    for r, z in ((0.0, 0.3), (0.0, 1.0), (0.3, 0.6), (1.0, 0.1)):
-        expected = [2 * r + z, 2 * z, r + z, r - 1]
-        assert model.strain(u)(section(r, z)) == pytest.approx(expected, abs=1e-13)
-    assert ng.Integrate(model.volume(u), section) == pytest.approx(1.5 + 1 + 1)
-    gradient = ng.InnerProduct(ng.Grad(u), ng.Grad(u)) + (ng.x + ng.y) ** 2
-    assert size(model.gradients(u, u) - gradient, section) < 1e-12
 
 
 def test_divergence_about_an_axis(section):
@@ -112,3 +75,16 @@ def test_measures_are_those_of_the_body_of_revolution(section):
     assert model.on_axis(points).tolist() == [True, True, False, False]
     assert model.on_axis(1e9 * points).tolist() == [True, True, False, False]
     assert model.resultant(np.array([3.0, 4.0])).tolist() == [0.0, 4.0]
+
+
+def test_strains_about_an_axis(section):
+    """U = (r^2 + r z, z^2 - r): also on the axis, where the hoop strain is the radial one."""
+    u = ng.GridFunction(ng.VectorH1(section, order=2))
+    u.Set(ng.CF((ng.x**2 + ng.x * ng.y, ng.y**2 - ng.x)))
+    model = MODELS["axisymmetric"]
+    for r, z in ((0.0, 0.3), (0.0, 1.0), (0.3, 0.6), (1.0, 0.1)):
+        expected = [2 * r + z, 2 * z, r + z, r - 1]
+        assert model.strain(u)(section(r, z)) == pytest.approx(expected, abs=1e-13)
+    assert ng.Integrate(model.volume(u), section) == pytest.approx(1.5 + 1 + 1)
+    gradient = ng.InnerProduct(ng.Grad(u), ng.Grad(u)) + (ng.x + ng.y) ** 2
+    assert size(model.gradients(u, u) - gradient, section) < 1e-12

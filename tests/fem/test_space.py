@@ -1,23 +1,17 @@
 """The spaces V_h against independent assemblies, linear fields, rigid motions and bars."""
 
-from __future__ import annotations
-
 import math
-from functools import partial
 
 import ngsolve as ng
 import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
-from drivers.reference import cases, paper
-from drivers.reference.straight import relative_energy_error
+from drivers.reference import cases
 from ngcontact import Elastic, Hooke, Problem, solve
-from ngcontact.fem import moduli
-from ngcontact.fem.boundary import boundary_trace, check_element
+from ngcontact.fem.boundary import boundary_trace
 from ngcontact.fem.space import assemble
-from ngcontact.geometries import blocks, disc, graphs, rings
-from ngcontact.lagrange import gauss
+from ngcontact.geometries import disc, graphs, rings
 from ngcontact.mesh import curve, first_mesh
 
 ORDERS = [1, 2, 3, 4]
@@ -48,79 +42,6 @@ CURVED = {
 every_curved = pytest.mark.parametrize("make", CURVED.values(), ids=list(CURVED))
 
 
-class Quadrature:
-    """Points and weights on the triangles bounded by the parabolas of a mesh of degree 2."""
-
-    def __init__(self, trace, count=8):
-        mesh = trace.mesh
-        vertices = np.array(mesh.ngmesh.Coordinates())[:, :2]
-        self.triangles = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
-        self.corners = vertices[self.triangles]
-        middles = (self.corners + np.roll(self.corners, -1, axis=1)) / 2
-        for k, element in enumerate(trace.element):
-            ends = trace.nodes[k]
-            [side] = [
-                i
-                for i in range(3)
-                if {self.triangles[element, i], self.triangles[element, (i + 1) % 3]} == set(ends)
-            ]
-            middles[element, side] = trace.point(np.array([k]), np.array([0.5]))[0]
-        # Quadratic map of the unit triangle, by a product rule on the square.
-        t, w = np.polynomial.legendre.leggauss(count)
-        t, w = (1 + t) / 2, w / 2
-        a, b = (g.ravel() for g in np.meshgrid(t, t, indexing="ij"))
-        r, s, w = a, b * (1 - a), np.outer(w * (1 - t), w).ravel()
-        q = 1 - r - s
-        values = [
-            q * (2 * q - 1),
-            r * (2 * r - 1),
-            s * (2 * s - 1),
-            4 * q * r,
-            4 * r * s,
-            4 * s * q,
-        ]
-        zero = 0 * r
-        by_r = [1 - 4 * q, 4 * r - 1, zero, 4 * (q - r), 4 * s, -4 * s]
-        by_s = [1 - 4 * q, zero, 4 * s - 1, -4 * r, 4 * r, 4 * (q - s)]
-        nodes = np.concatenate([self.corners, middles], axis=1)
-        self.points = np.einsum("iq,tid->tqd", values, nodes)
-        x_r, x_s = (np.einsum("iq,tid->tqd", d, nodes) for d in (by_r, by_s))
-        self.weights = w * (x_r[..., 0] * x_s[..., 1] - x_r[..., 1] * x_s[..., 0])
-
-    def barycentric(self, element, x):
-        """Linear functions (k, 3) of the straight triangles (k,), also outside of them."""
-        corners = self.corners[element]
-        matrix = np.concatenate([corners.transpose(0, 2, 1), np.ones((len(corners), 1, 3))], axis=1)
-        right = np.concatenate([x, np.ones((len(x), 1))], axis=1)
-        return np.linalg.solve(matrix, right[..., None])[..., 0]
-
-    def strain_matrices(self):
-        """G (t, 3, 6): Voigt strain from the vertices' x components, then y."""
-        unit = np.eye(2)
-        gradient = np.stack(
-            [
-                self.barycentric(np.arange(len(self.corners)), self.corners[:, 0] + e)
-                - self.barycentric(np.arange(len(self.corners)), self.corners[:, 0])
-                for e in unit
-            ],
-            axis=1,
-        )
-        zero = np.zeros_like(gradient[:, :1])
-        dx, dy = gradient[:, :1], gradient[:, 1:]
-        return np.block([[dx, zero], [zero, dy], [dy, dx]])
-
-
-def independent_stiffness(quadrature, C, vertices):
-    """Sum of G' (integral of C over the curved element) G; C maps points (q, 2) to (q, 3, 3)."""
-    A = np.zeros((2 * vertices, 2 * vertices))
-    G = quadrature.strain_matrices()
-    for element, corners in enumerate(quadrature.triangles):
-        law = np.einsum("q,qij->ij", quadrature.weights[element], C(quadrature.points[element]))
-        dofs = np.concatenate([corners, corners + vertices])
-        A[np.ix_(dofs, dofs)] += G[element].T @ law @ G[element]
-    return A
-
-
 def isotropic(E, nu):
     scale = E / ((1 + nu) * (1 - 2 * nu))
     return scale * np.array([[1 - nu, nu, 0], [nu, 1 - nu, 0], [0, 0, (1 - 2 * nu) / 2]])
@@ -141,9 +62,6 @@ def strains(u, mesh):
     return np.asarray(e(mesh.MapToAllElements(rule, ng.VOL))).reshape(-1, 3)
 
 
-# ------------------------------------------------------------------- the element of HH81 (2.4)
-
-
 @every_curved
 def test_physical_element_reproduces_linear_fields(make):
     space = space_of(make())
@@ -156,208 +74,35 @@ def test_physical_element_reproduces_linear_fields(make):
     assert math.sqrt(ng.Integrate(ng.InnerProduct(u - LINEAR, u - LINEAR), mesh)) < 1e-14
 
 
-@every_curved
-def test_physical_strain_is_constant_in_each_element(make):
-    space = space_of(make())
-    rng = np.random.default_rng(0)
-    u = field(space, rng.normal(size=space.basis.shape[1]))
-    e = strains(u, space.trace.mesh).reshape(-1, 3, 3)
-    np.testing.assert_allclose(e, np.repeat(e[:, :1], 3, axis=1), atol=1e-12 * np.abs(e).max())
-
-
-@every_curved
-def test_physical_stiffness_with_constant_modulus(make):
-    space = space_of(make())
-    A = (space.basis.T @ space.A @ space.basis).toarray()
-    quadrature = Quadrature(space.trace)
-    C = isotropic(2.0, 0.3)
-    expected = independent_stiffness(
-        quadrature, lambda x: np.tile(C, (len(x), 1, 1)), space.trace.mesh.nv
-    )
-    np.testing.assert_allclose(A, expected, atol=1e-13 * np.abs(expected).max())
-    # As |T_curved| G' C G: the areas are what the curves change.
-    area = quadrature.weights.sum(axis=1)
-    assert area.sum() == pytest.approx(ng.Integrate(ng.CF(1), space.trace.mesh), rel=1e-13)
-    c = quadrature.corners
-    side_a, side_b = c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]
-    straight = (side_a[:, 0] * side_b[:, 1] - side_a[:, 1] * side_b[:, 0]) / 2
-    assert np.abs(area / straight - 1).max() > 1e-3
-    scaled = np.zeros_like(expected)
-    for t, (G, corners) in enumerate(
-        zip(quadrature.strain_matrices(), quadrature.triangles, strict=True)
-    ):
-        dofs = np.concatenate([corners, corners + space.trace.mesh.nv])
-        scaled[np.ix_(dofs, dofs)] += area[t] * G.T @ C @ G
-    np.testing.assert_allclose(A, scaled, atol=1e-13 * np.abs(expected).max())
-
-
-@every_curved
-def test_physical_stiffness_with_variable_modulus(make):
-    """Polynomial entries, so that the quadrature of both sides is exact."""
-    mesh = make()
-    E = 2 + 0.3 * ng.x - 0.2 * ng.y + 0.1 * ng.x * ng.y
-    space = space_of(mesh, materials=dict.fromkeys(mesh.GetMaterials(), Elastic(E, 0.3)))
-    A = (space.basis.T @ space.A @ space.basis).toarray()
-
-    def law(x):
-        values = 2 + 0.3 * x[:, 0] - 0.2 * x[:, 1] + 0.1 * x[:, 0] * x[:, 1]
-        return values[:, None, None] * isotropic(1.0, 0.3)
-
-    expected = independent_stiffness(Quadrature(space.trace), law, space.trace.mesh.nv)
-    np.testing.assert_allclose(A, expected, atol=1e-13 * np.abs(expected).max())
-
-
-@every_curved
-def test_physical_load_of_a_body_force(make):
-    mesh = make()
-    F = (0.7, -0.4)
-    space = space_of(mesh, force=dict.fromkeys(mesh.GetMaterials(), F))
-    nv = space.trace.mesh.nv
-    quadrature = Quadrature(space.trace)
-    expected = np.zeros(nv)
-    for element, corners in enumerate(quadrature.triangles):
-        x = quadrature.points[element]
-        functions = quadrature.barycentric(np.full(len(x), element), x)
-        expected[corners] += quadrature.weights[element] @ functions
-    load = (space.basis.T @ space.f).reshape(2, nv)
-    np.testing.assert_allclose(load, np.outer(F, expected), atol=1e-14)
-
-
-def test_physical_load_of_a_traction_reaches_the_inner_vertex():
-    mesh = mesh_of(disc(symmetric=False))
-    P = (0.7, -0.4)
-    space = space_of(mesh, traction={"arc": P})
-    trace, nv = space.trace, space.trace.mesh.nv
-    quadrature = Quadrature(trace)
-    s, w = gauss(12)
-    expected = np.zeros(nv)
-    inner_loads = []
-    for k in np.flatnonzero(np.array(trace.mesh.GetBoundaries())[trace.region] == "arc"):
-        segment, element = np.full(len(s), k), int(trace.element[k])
-        x = trace.point(segment, s)
-        speed = np.linalg.norm(trace.derivative(segment, s), axis=1)
-        functions = quadrature.barycentric(np.full(len(s), element), x)
-        corners = quadrature.triangles[element]
-        expected[corners] += (w * speed) @ functions
-        inner = ~np.isin(corners, trace.nodes[k])
-        inner_loads.append(((w * speed) @ functions[:, inner])[0])
-    load = (space.basis.T @ space.f).reshape(2, nv)
-    np.testing.assert_allclose(load, np.outer(P, expected), atol=1e-11)  # the speed is a root
-    # Outside the straight triangle the function of the inner vertex is negative.
-    assert max(inner_loads) < -1e-3
-    assert expected.sum() == pytest.approx(math.pi, rel=1e-3)  # length of the arc
-
-
-@every_curved
-def test_physical_rigid_motions_have_no_energy(make):
-    space = space_of(make())
-    xy = np.array(space.trace.mesh.ngmesh.Coordinates())[:, :2]
-    zero, one = np.zeros(len(xy)), np.ones(len(xy))
-    for motion in ([one, zero], [zero, one], [-xy[:, 1], xy[:, 0]]):
-        assert (np.abs(space.A @ (space.basis @ np.concatenate(motion))) < 1e-13).all()
-
-
-def test_physical_element_on_straight_meshes_is_the_linear_one():
-    mesh = mesh_of(blocks())
-    physical, linear = space_of(mesh), space_of(mesh, "isoparametric")
-    assert physical.trace.mesh is mesh
-    assert physical.V.ndof == linear.V.ndof == 2 * mesh.nv
-    assert abs(physical.A - linear.A).max() < 1e-14 * abs(linear.A).max()
-    assert abs(physical.basis - linear.basis).max() < 1e-14
-
-
-# -------------------------------------------------------------------- the mapped polynomials
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@every_curved
-def test_isoparametric_elements_reproduce_linear_fields(make, order):
-    space = space_of(make(), "isoparametric", order)
-    mesh = space.trace.mesh
-    assert mesh.GetCurveOrder() == order
-    u = ng.GridFunction(space.V)
-    u.Set(LINEAR)
-    # Gradients of the solution of a projection: its condition grows with the order.
-    np.testing.assert_allclose(strains(u, mesh), np.tile(STRAIN, (3 * mesh.ne, 1)), atol=1e-11)
-    energy = u.vec.FV().NumPy() @ (space.A @ u.vec.FV().NumPy())
-    area = ng.Integrate(ng.CF(1), mesh, order=2 * order)
-    assert energy == pytest.approx(area * STRAIN @ isotropic(2.0, 0.3) @ STRAIN, rel=1e-12)
-
-
-def rigid_energies(make, element, order):
-    """Energies of both translations and a rotation, relative to the largest of their size."""
-    space = space_of(make(), element, order)
-    u = ng.GridFunction(space.V)
-    energies = []
-    for motion in ((1, 0), (0, 1), (0.3 - ng.y, ng.x + 1.1)):
-        u.Set(ng.CF(motion))
-        vector = u.vec.FV().NumPy()
-        energies.append(vector @ (space.A @ vector) / abs(space.A).max() / (vector @ vector))
-    return np.abs(energies)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-@every_curved
-def test_isoparametric_rigid_motions_have_no_energy(make, order):
-    assert rigid_energies(make, "isoparametric", order).max() < 1e-15
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_superparametric_rotations_have_a_little_energy(order):
-    """P_order mapped by degree order + 1 contains constants, not the coordinates."""
-    *translations, rotation = rigid_energies(CURVED["disc"], "superparametric", order)
-    assert max(translations) < 1e-15
-    assert 1e-13 < rotation < 1e-3  # measured 2.7e-5 at order 1 to 1.0e-9 at order 4
-
-
-@pytest.mark.parametrize("element", ["isoparametric", "superparametric"])
-def test_nodal_basis_of_the_space(element):
-    """Node values of the boundary, per component, x first."""
-    for order in ORDERS:
-        space = space_of(CURVED["rings"](), element, order)
-        n = space.trace.space.ndof
-        assert space.basis.shape == (space.V.ndof, 2 * n) == (2 * n, 2 * n)
-        values = np.random.default_rng(order).normal(size=2 * n)
-        u = field(space, values)
-        segment, s = space.trace.at_nodes(np.arange(len(space.trace.region)))
-        node = space.trace.nodes.ravel()
-        found = space.trace.evaluate(u, segment, s)
-        np.testing.assert_allclose(found, values.reshape(2, n)[:, node].T, atol=1e-13)
-
-
-def test_stiffness_is_symmetric():
-    for element, order in (("physical", 1), ("isoparametric", 3), ("superparametric", 2)):
-        A = space_of(CURVED["rings"](), element, order).A
-        assert abs(A - A.T).max() < 1e-14 * abs(A).max()
-
-
-# ---------------------------------------------------------------------------------- elements
-
-
 @pytest.mark.parametrize(
-    ("order", "element", "error", "match"),
-    [
-        (1, "mortar", ValueError, "element='mortar' is not available; choose one of"),
-        (5, "isoparametric", ValueError, "order=5 is not available"),
-        (0, "isoparametric", ValueError, "order=0"),
-        (2, "physical", ValueError, "order=2 is not available; element='physical' has"),
-        (1.0, "isoparametric", TypeError, "order=1.0 is not an integer"),
-        (True, "isoparametric", TypeError, "order=True"),
-    ],
+    ("element", "order"),
+    [("physical", 1), *(("isoparametric", order) for order in ORDERS), ("superparametric", 2)],
 )
-def test_elements_that_do_not_exist(order, element, error, match):
-    with pytest.raises(error, match=match):
-        check_element(order, element)
-
-
-def test_elements_that_exist():
-    for order in (*ORDERS, np.int64(2)):
-        check_element(order, "isoparametric")
-        check_element(order, "superparametric")
-    check_element(1, "physical")
-
-
-# --------------------------------------------------------------------------------- materials
+@every_curved
+def test_stiffness_and_loads_of_any_function_are_integrals(make, element, order):
+    """Of a law that varies, a body force and a traction; linear fields are in isoparametric V_h."""
+    mesh, F, P = make(), ng.CF((0.7, -0.4)), ng.CF((-0.2, 0.5))
+    E = 2 + 0.3 * ng.x - 0.2 * ng.y + 0.1 * ng.x * ng.y
+    bodies = mesh.GetMaterials()
+    laws = dict.fromkeys(bodies, Elastic(E, 0.3))
+    data = {"force": dict.fromkeys(bodies, F), "traction": {".*": P}}
+    space = space_of(mesh, element, order, materials=laws, **data)
+    mesh, u = space.trace.mesh, ng.GridFunction(space.V)
+    assert mesh.GetCurveOrder() == order + (element != "isoparametric")
+    if element == "isoparametric":
+        u.Set(LINEAR)
+        # Gradients of the solution of a projection: its condition grows with the order.
+        expected = np.tile(STRAIN, (3 * mesh.ne, 1))
+        np.testing.assert_allclose(strains(u, mesh), expected, atol=1e-11)
+    u = field(space, np.random.default_rng(order).normal(size=space.basis.shape[1]))
+    grad, v = ng.Grad(u), u.vec.FV().NumPy()
+    e = ng.CF((grad[0, 0], grad[1, 1], grad[0, 1] + grad[1, 0]))
+    C = ng.CF(tuple(isotropic(1.0, 0.3).ravel()), dims=(3, 3))
+    energy = ng.Integrate(E * ng.InnerProduct(C * e, e), mesh, order=20)
+    # Gradients of mapped polynomials are rational: the rule has an error, measured up to 6e-5.
+    assert v @ (space.A @ v) == pytest.approx(energy, rel=2e-4)
+    work = ng.Integrate(F * u, mesh, order=12) + ng.Integrate(P * u, mesh, ng.BND, order=20)
+    assert v @ space.f == pytest.approx(work, rel=1e-7)
 
 
 def square(order=1, **data):
@@ -414,37 +159,6 @@ def test_anisotropic_bar(model):
     np.testing.assert_allclose(solution.stress(solution.mesh(0.6, 0.7)), [1, 0, 0, 0], atol=1e-13)
 
 
-def test_general_law_of_an_isotropic_body():
-    mesh = CURVED["rings"]()
-    names = mesh.GetMaterials()
-    C = isotropic(2.0, 0.3)
-    # Functions are integrated with more points than numbers.
-    for special, general in [
-        (STEEL, Hooke(C)),
-        (Elastic(ng.CF(2.0), 0.3), Hooke(ng.CF(tuple(C.ravel()), dims=(3, 3)))),
-    ]:
-        one, other = (
-            space_of(mesh, "isoparametric", 2, materials=dict.fromkeys(names, law)).A
-            for law in (special, general)
-        )
-        assert abs(one - other).max() < 1e-14 * abs(one).max()
-
-
-def test_bodies_have_their_own_laws():
-    mesh = CURVED["rings"]()
-    laws = {"inner": Elastic(1.0, 0.2), "outer": Elastic(5.0, 0.4)}
-    space = space_of(mesh, "isoparametric", 1, materials=laws)
-    u = ng.GridFunction(space.V)
-    u.Set(LINEAR)
-    vector = u.vec.FV().NumPy()
-    energy = sum(
-        ng.Integrate(ng.CF(1), space.trace.mesh.Materials(body))
-        * (STRAIN @ isotropic(law.E, law.nu) @ STRAIN)
-        for body, law in laws.items()
-    )
-    assert vector @ (space.A @ vector) == pytest.approx(energy, rel=1e-12)
-
-
 def test_pressure_and_traction_loads():
     """A number is a pressure against the outward normal: the total of -p n over an arc."""
     mesh = mesh_of(disc(symmetric=False), maxh=0.4)
@@ -455,40 +169,6 @@ def test_pressure_and_traction_loads():
         u[n : n + mesh.nv] = 1
         # The vertex functions add up to one: a translation. The ends of the arc are exact.
         assert u @ space.f == pytest.approx(0.3 * 2.0, rel=1e-12)
-
-
-# Orders and elements, and the change of u_h by 4 more orders of quadrature over its error:
-# measured below 6e-4 (the next lower order: 1e-2 superparametric at order 1; the default 0.15).
-@pytest.mark.parametrize("element", ["isoparametric", "superparametric"])
-@pytest.mark.parametrize(
-    ("make", "order"),
-    [
-        *((cases.ring_in_ring, order) for order in ORDERS),
-        (cases.curved_lines, 2),
-        (paper.opening_ring, 1),
-        (partial(cases.ring_in_ring, 0.2, 4), 2),
-        (partial(cases.ring_in_ring, 0.2, 4), 4),
-    ],
-)
-@pytest.mark.study(
-    witness=[
-        "ring_in_ring-3-isoparametric",
-        "ring_in_ring-1-isoparametric",
-        "ring_in_ring-3-superparametric",
-    ]
-)
-def test_quadrature_on_curved_elements_is_no_part_of_the_error(make, order, element, monkeypatch):
-    case = make()
-    found = []
-    for bonus in (moduli.CURVED, moduli.CURVED + 4):
-        monkeypatch.setattr(moduli, "CURVED", bonus)
-        found.append(solve(case.problem, maxh=0.4, order=order, element=element))
-    usual, fine = found
-    apart = usual.displacement.vec.FV().NumPy() - fine.displacement.vec.FV().NumPy()
-    A = fine.discrete.space.A
-    whole = fine.displacement.vec.FV().NumPy()
-    change = np.sqrt(apart @ (A @ apart) / (whole @ (A @ whole)))
-    assert change < 1e-2 * relative_energy_error(fine, case.exact)
 
 
 def test_only_elements_with_curved_sides_are_curved():

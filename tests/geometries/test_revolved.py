@@ -1,10 +1,5 @@
 """Bodies of revolution of the gallery: names, volumes, orientation, contact that is found."""
 
-from __future__ import annotations
-
-import math
-
-import ngsolve as ng
 import pytest
 
 from ngcontact import Contact, Elastic, Problem, solve
@@ -16,121 +11,24 @@ from ngcontact.geometries import (
     sleeve_on_shaft,
 )
 
-PI = math.pi
 SOFT = Elastic(E=1.0, nu=0.3)
-BLOCK = {"block_top", "block_bottom", "side", "axis"}
-TOOL = {"indenter_side", "indenter_top"}
-CONE = math.tan(math.radians(10))
-EDGE = 0.2  # of the punch: its rounding
-# Volume lost at the edge: a square of that side about r less a quarter circle, by Pappus.
-ROUNDED = 2 * PI * (EDGE**2 * (1 + EDGE / 2) - (PI * EDGE**2 / 4 * 1 + EDGE**3 / 3))
-
-CASES = {
-    ball_in_socket: (
-        {"ball": 2 / 3 * PI, "socket": PI * (2.1**2 * 2.05) - 2 / 3 * PI * 1.05**3},
-        {"ball_top", "ball_arc", "socket_arc", "socket_rim", "side", "socket_bottom", "axis"},
-    ),
-    cone_on_block: (
-        {"indenter": PI * (1 + CONE) - 2 / 3 * PI * CONE, "block": 8 * PI},
-        BLOCK | TOOL | {"flank"},
-    ),
-    rounded_punch: (
-        {"indenter": PI * 1.2**3 - ROUNDED, "block": 2.4**3 * PI},
-        BLOCK | TOOL | {"end"},
-    ),
-    sleeve_on_shaft: (
-        {"shaft": 2 * PI, "sleeve": PI * (1.6**2 - 1)},
-        {"shaft_contact", "shaft_free", "sleeve_contact", "rim"}
-        | {"shaft_ends", "sleeve_ends", "axis"},
-    ),
-    ring_in_groove: (
-        {
-            "ring": 2 * PI * 3 * PI * 0.25,
-            "housing": 2 * PI * 3 * (3.4 * 1.75 - 1.4 * 0.75),
-            "plate": 2 * PI * 3 * 3.4,
-        },
-        {"ring_lower", "ring_upper", "groove", "walls", "face", "plate_face"}
-        | {"housing_bottom", "plate_top", "rims"},
-    ),
-}
-every_geometry = pytest.mark.parametrize("make", CASES, ids=lambda make: make.__name__)
-
-
-@every_geometry
-def test_names_volumes_orientation(make):
-    """Volumes on curved meshes; the divergence theorem knows inside from outside."""
-    volumes, boundaries = CASES[make]
-    mesh = ng.Mesh(make().GenerateMesh(maxh=0.4))
-    mesh.Curve(5)
-    assert set(mesh.GetBoundaries()) == boundaries
-    for body, volume in volumes.items():
-        found = ng.Integrate(2 * PI * ng.x, mesh.Materials(body), order=8)
-        assert found == pytest.approx(volume, rel=1e-6)
-    through = ng.CF((ng.x, ng.y)) * ng.specialcf.normal(2)
-    area = ng.Integrate(ng.CF(2), mesh)
-    assert ng.Integrate(through, mesh, ng.BND) == pytest.approx(area)
 
 
 @pytest.mark.parametrize(
     ("make", "changes", "message"),
     [
         (ball_in_socket, {"clearance": 0}, "clearance = 0: expected a positive length"),
-        (ball_in_socket, {"width": 1.0}, "width = 1.0: expected more than radius"),
         (cone_on_block, {"slope": 90}, "slope = 90: expected degrees between 0 and 90"),
         (cone_on_block, {"height": 0.1}, "height = 0.1: expected more than that of the cone"),
         (rounded_punch, {"height": 0.1}, "height = 0.1: expected more than rounding"),
-        (rounded_punch, {"width": 1.1}, "width = 1.1: expected more than the indenter's"),
-        (sleeve_on_shaft, {"outer": 0.9}, "outer = 0.9: expected more than radius"),
-        (sleeve_on_shaft, {"interference": 1.0}, "interference = 0.0: expected more than zero"),
         (sleeve_on_shaft, {"interference": -1}, "outer = 1.6: expected more than radius - int"),
         (ring_in_groove, {"depth": 1.0}, "depth = 1.0: expected less than 2 section = 1.0"),
-        (ring_in_groove, {"width": 1.0}, "width = 1.0: expected more than 2 section"),
         (ring_in_groove, {"radius": 1.5}, "radius = 1.5: expected more than half the groove"),
     ],
 )
 def test_what_is_refused(make, changes, message):
     with pytest.raises(ValueError, match=message):
         make(**changes)
-
-
-PROBLEMS = {
-    ball_in_socket: {
-        "displacement": {"socket_bottom": (0, 0), "ball_top": (None, -0.01)},
-        "contact": [Contact("ball_arc", "socket_arc", direction=(0, -1))],
-    },
-    cone_on_block: {
-        "displacement": {"block_bottom": (0, 0), "indenter_top": (None, -0.02)},
-        "contact": [Contact("flank", "block_top", direction=(0, -1))],
-    },
-    rounded_punch: {
-        "displacement": {"block_bottom": (0, 0), "indenter_top": (None, -0.02)},
-        "contact": [Contact("end", "block_top", direction=(0, -1))],
-    },
-    ring_in_groove: {
-        "displacement": {"housing_bottom": (0, 0), "plate_top": (0, -0.02)},
-        "contact": [
-            Contact("ring_lower", "groove", direction=(0, -1)),
-            Contact("ring_upper", "plate_face", direction=(0, 1)),
-        ],
-    },
-}
-
-
-@pytest.mark.filterwarnings("ignore::ngcontact.ContactWarning")
-@pytest.mark.parametrize("make", PROBLEMS, ids=lambda make: make.__name__)
-def test_pressed_bodies_are_in_contact_and_in_balance(make):
-    """The force of contact is the reaction of the support, on the whole body."""
-    geometry = make()
-    bodies = set(ng.Mesh(geometry.GenerateMesh(maxh=1.0)).GetMaterials())
-    data = PROBLEMS[make]
-    problem = Problem(
-        geometry=geometry, materials=dict.fromkeys(bodies, SOFT), model="axisymmetric", **data
-    )
-    solution = solve(problem, maxh=0.3, order=2)
-    assert solution.active.any()
-    held = next(iter(data["displacement"]))
-    assert solution.reactions[held][1] == pytest.approx(abs(solution.contact_force()[1]))
-    assert solution.contact_force()[0] == 0
 
 
 def test_a_pressed_on_sleeve_presses_all_along():

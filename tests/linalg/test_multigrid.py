@@ -1,7 +1,5 @@
 """V-cycles: symmetric, positive definite, as good on every level; conjugate gradients with them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -9,8 +7,6 @@ from ngcontact.linalg.multigrid import Multigrid, StalledError, truncated_multig
 from ngcontact.linalg.smoothing import chebyshev, gauss_seidel
 from ngcontact.linalg.sparse import congruent
 from tests.scenes import REFINED, discrete, steps_of
-
-SMOOTHERS = (gauss_seidel, chebyshev)
 
 
 def prepared(name: str, order: int, rounds: int, maxh: float = 0.5, smoother=gauss_seidel):
@@ -35,36 +31,6 @@ def cycles(multigrid: Multigrid, size: int) -> np.ndarray:
         multigrid.cycle(right, solution)
         columns[i] = solution.FV().NumPy()
     return columns
-
-
-@pytest.mark.parametrize("smoother", SMOOTHERS)
-@pytest.mark.parametrize("released", [False, True])
-@pytest.mark.parametrize("order", [1, 2])
-@pytest.mark.parametrize("name", REFINED)
-@pytest.mark.study(
-    witness=["disc-1-True-gauss_seidel", "disc-2-False-gauss_seidel", "disc-1-False-gauss_seidel"]
-)
-def test_a_cycle_is_symmetric_and_positive_definite(
-    name: str, order: int, released: bool, smoother
-):
-    K, multigrid, free = prepared(name, order, 1 if order > 1 else 2, 1.0, smoother)
-    if released:  # coarser matrices are those of another set
-        free = free.copy()
-        held = np.flatnonzero(~free)[::3]
-        free[held] = True
-        free[np.flatnonzero(free)[:2]] = False
-        multigrid.hold(free)
-    whole = cycles(multigrid, K.shape[0])
-    inside = whole[np.ix_(free, free)]
-    # Round-off of sums; entries are alike.
-    np.testing.assert_allclose(inside, inside.T, rtol=0, atol=1e-12 * np.abs(inside).max())
-    assert not whole[:, ~free].any()
-    root = np.linalg.cholesky(K[free][:, free].toarray())
-    values = np.linalg.eigvalsh(root.T @ inside @ root)
-    # Theory: 1 - (contraction)^2, in (0, 1] with coarse matrices of the set itself.
-    assert values[0] > 0
-    if not released:
-        assert values[-1] <= 1 + 1e-12
 
 
 @pytest.mark.parametrize(
@@ -93,23 +59,6 @@ def test_cycles_do_not_grow_with_the_mesh(name: str, smoother, order: int, most:
         counts.append(count)
     assert max(counts) <= most
     assert counts[-1] <= 1.25 * counts[-2] + 1  # measured 1.2; and a whole one
-
-
-def test_the_solution_is_that_of_a_factor():
-    K, multigrid, free = prepared("disc on block", 2, 2)
-    b = np.where(free, 1.0, 0.0)
-    x, _ = multigrid.solve(b, 1e-14, 100)
-    expected = np.linalg.solve(K[free][:, free].toarray(), b[free])
-    # Condition about 1e4 times the residual.
-    np.testing.assert_allclose(x[free], expected, rtol=0, atol=1e-10 * np.abs(expected).max())
-
-
-def test_no_residual_takes_no_cycle():
-    K, multigrid, free = prepared("disc", 1, 2)
-    x, count = multigrid.solve(np.where(free, 0.0, 1.0), 0.0, 10)
-    assert count == 0
-    assert not x.any()
-    assert x.shape == (K.shape[0],)
 
 
 def test_what_does_not_converge_is_said():

@@ -1,7 +1,5 @@
 """Smoothers: which one when, and the polynomial against its closed form."""
 
-from __future__ import annotations
-
 import ngsolve as ng
 import numpy as np
 import pytest
@@ -13,7 +11,6 @@ from ngcontact.linalg.smoothing import (
     GaussSeidel,
     chebyshev,
     fastest,
-    gauss_seidel,
 )
 from ngcontact.linalg.sparse import handed_over
 from tests.linalg.test_multigrid import prepared
@@ -73,17 +70,3 @@ def test_the_polynomial_is_that_of_the_fourth_kind(name: str):
             error = vector - smoothed(smoother, right, start)
             round_off = 1e-12 * np.abs(vector).max()
             np.testing.assert_allclose(error, factor * vector, rtol=0, atol=round_off)
-
-
-@pytest.mark.parametrize("make", [gauss_seidel, chebyshev])
-def test_what_is_not_free_stays(make):
-    _, matrix, free = matrix_of("disc", 2)
-    smoother = make(matrix, free)
-    right = np.ones(free.size)
-    assert not smoothed(smoother, right, None)[~free].any()
-    fewer = free & (np.arange(free.size) % 3 > 0)
-    held = smoother.holding(fewer)
-    assert not smoothed(held, right, None)[~fewer].any()
-    expected = smoothed(make(matrix, fewer), right, None)
-    round_off = 1e-13 * np.abs(expected).max()
-    np.testing.assert_allclose(smoothed(held, right, None), expected, rtol=0, atol=round_off)

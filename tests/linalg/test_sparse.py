@@ -1,15 +1,11 @@
 """Matrices shared by NGSolve and SciPy: same memory, same values, their owner lives on."""
 
-from __future__ import annotations
-
-import gc
-
 import ngsolve as ng
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from ngcontact.linalg.sparse import cholesky, congruent, lower_half, one_thread, shared
+from ngcontact.linalg.sparse import cholesky, congruent, lower_half, shared
 
 SIZE = 40
 
@@ -24,27 +20,6 @@ def definite(rng, size=SIZE):
 def for_ngsolve(K):
     K = K.tocoo()
     return ng.la.SparseMatrixd.CreateFromCOO(K.row, K.col, K.data, *K.shape)
-
-
-@pytest.mark.parametrize("shape", [(SIZE, SIZE), (SIZE, 7)])
-def test_same_values_in_the_same_memory(shape):
-    K = sp.random(*shape, density=0.2, random_state=np.random.default_rng(0)).tocsr()
-    owner = for_ngsolve(K)
-    view = shared(owner)
-    np.testing.assert_array_equal(view.toarray(), K.toarray())
-    values, columns, _ = (np.asarray(x) for x in owner.CSR())
-    assert np.shares_memory(view.data, values)
-    assert np.shares_memory(view.indices, columns)
-
-
-def test_memory_outlives_the_matrix_of_ngsolve():
-    K = definite(np.random.default_rng(1))
-    parts = [shared(for_ngsolve(K)).data for _ in range(100)]
-    gc.collect()
-    others = [for_ngsolve(-K) for _ in range(200)]  # would take memory that had been given back
-    assert len(others) == 200
-    for part in parts:
-        np.testing.assert_array_equal(part, K.data)
 
 
 @pytest.mark.parametrize("full", [False, True])
@@ -73,16 +48,6 @@ def test_congruent_matrices(changed, full):
     np.testing.assert_allclose(product.FV().NumPy(), reference, atol=allowed)
 
 
-def test_congruent_matrix_of_fewer_unknowns():
-    rng = np.random.default_rng(3)
-    A = for_ngsolve(definite(rng))
-    T = sp.csr_matrix(rng.normal(size=(SIZE, 5)))
-    K, lower = congruent(A, shared(A), T)
-    expected = T.T @ shared(A).toarray() @ T
-    np.testing.assert_allclose(K.toarray(), expected, atol=1e-13 * np.abs(expected).max())
-    np.testing.assert_array_equal(shared(lower).toarray(), np.tril(K.toarray()))
-
-
 def test_factorisation_of_principal_parts():
     rng = np.random.default_rng(2)
     free = rng.random(SIZE) < 0.7
@@ -91,52 +56,3 @@ def test_factorisation_of_principal_parts():
     solution = cholesky(lower_half(K))(free)(right)
     assert (solution[~free] == 0).all()
     np.testing.assert_allclose((K @ solution)[free], right[free], atol=1e-13 * np.abs(right).max())
-
-
-def managed():
-    """Threads of a manager that is started, or already there."""
-    with ng.TaskManager():
-        return ng.GetNumThreads()
-
-
-@pytest.mark.usefixtures("two_threads")
-def test_one_thread_within_and_as_many_as_before_after():
-    with one_thread():
-        assert managed() == 1
-        with one_thread():
-            assert managed() == 1
-        assert managed() == 1
-    assert managed() == 2
-    with pytest.raises(KeyError), one_thread():
-        raise KeyError
-    assert managed() == 2
-    assert ng.GetNumThreads() == 1  # none is left running
-
-
-@pytest.mark.usefixtures("two_threads")
-def test_the_callers_threads_stay():
-    with ng.TaskManager():
-        with one_thread():
-            assert ng.GetNumThreads() == 2
-        assert ng.GetNumThreads() == 2
-
-
-@pytest.mark.usefixtures("two_threads")
-def test_small_factorisations_are_the_same_on_any_number_of_threads(monkeypatch):
-    """To the last bit, since one thread makes them."""
-    inside = []
-    inverse = ng.BaseMatrix.Inverse
-
-    def watched(matrix, *given, **named):
-        inside.append(managed())
-        return inverse(matrix, *given, **named)
-
-    monkeypatch.setattr(ng.BaseMatrix, "Inverse", watched)
-    rng = np.random.default_rng(4)
-    K, right = definite(rng, 400), rng.normal(size=400)
-    solutions = []
-    for count in (1, 2):
-        ng.SetNumThreads(count)
-        solutions.append(cholesky(lower_half(K))(np.ones(400, dtype=bool))(right))
-    np.testing.assert_array_equal(*solutions)
-    assert inside == [1, 1]

@@ -1,28 +1,20 @@
 """Exact boundary curves: projections, normals, levels and their numbering."""
 
-from __future__ import annotations
-
 import math
+from functools import partial
 
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.geom2d import SplineGeometry
 from netgen.occ import (
     Axis,
     Glue,
     OCCGeometry,
-    Pnt,
-    Segment,
-    SplineApproximation,
-    Vec,
     WorkPlane,
 )
-from ngsolve.meshes import MakeStructured2DMesh
 
-from ngcontact import geometries
-from ngcontact.geometries import blocks, disc, disc_on_block, disc_on_disc, graphs, punch, rings
-from ngcontact.mesh.cad import CadEdge, cad_edges, same_geometry
+from ngcontact.mesh.cad import CadEdge, cad_edges
+from tests.geometries.test_geometries import CASES
 
 RNG = np.random.default_rng(3)
 CENTRES = [(0.0, 0.0, 1.0), (0.3, 0.7, 0.1), (100.0, -50.0, 2.0)]
@@ -34,35 +26,8 @@ def circle(x=0.0, y=0.0, radius=1.0):
     return CadEdge(edge)
 
 
-def parabola_edge():
-    """Parabola y = x^2 / 2 from x = -1 to x = 1; x is linear in the parameter."""
-    geometry = graphs(lambda x: x**2 / 2, lambda x: -0.1)
-    [edge] = [edge for edge in geometry.shape.edges if edge.name == "upper_contact"]
-    return CadEdge(edge)
-
-
 def angles(theta):
     return np.column_stack([np.cos(theta), np.sin(theta)])
-
-
-# ----------------------------------------------------------------- positions and derivatives
-
-
-def test_straight_edge():
-    edge = CadEdge(Segment(Pnt(1, 2, 0), Pnt(4, 6, 0)))
-    assert edge.straight
-    assert not edge.closed
-    assert edge.size == pytest.approx(4)
-    points = np.array([[1.0, 2.0], [2.5, 4.0], [4.0, 6.0]])
-    t = edge.project(points)
-    np.testing.assert_allclose(edge.point(t), points, atol=1e-15)
-    # A foot of the perpendicular, and points beyond both ends.
-    off = points[1] + 0.3 * np.array([-4, 3]) / 5
-    t = edge.project(np.array([off, [0.0, 0.0], [9.0, 9.0]]))
-    np.testing.assert_allclose(edge.point(t), [[2.5, 4.0], [1.0, 2.0], [4.0, 6.0]], atol=1e-15)
-    np.testing.assert_allclose(edge.normal(points), np.tile([4 / 5, -3 / 5], (3, 1)), atol=1e-16)
-    assert edge.point(np.zeros(0)).shape == (0, 2)
-    assert edge.normal(np.zeros((0, 2))).shape == (0, 2)
 
 
 @pytest.mark.parametrize(("x", "y", "radius"), CENTRES)
@@ -80,131 +45,6 @@ def test_circle_normals_are_radial_also_at_the_seam(x, y, radius):
         np.testing.assert_allclose(foot, [x, y] + radius * radial, atol=1e-15 * scale * radius)
 
 
-@pytest.mark.parametrize(("x", "y", "radius"), CENTRES[:2])
-def test_rotations_are_tangential_to_circles(x, y, radius):
-    points = [x, y] + radius * angles(RNG.uniform(0, 2 * math.pi, 200))
-    normal = circle(x, y, radius).normal(points)
-    rotation = np.column_stack([y - points[:, 1], points[:, 0] - x]) / radius
-    assert np.abs((normal * rotation).sum(axis=1)).max() < 1e-14
-
-
-def test_quarter_circles_project_their_ends():
-    shape = rings(quarter=True).shape
-    [edge] = [CadEdge(e) for e in shape.edges if e.name == "rim"]
-    assert not edge.closed
-    ends = np.array([[2.0, 0.0], [0.0, 2.0]])
-    np.testing.assert_allclose(edge.point(edge.project(ends)), ends, atol=1e-15)
-    np.testing.assert_allclose(edge.normal(ends), ends / 2, atol=1e-15)
-
-
-def test_spline_normals():
-    edge = parabola_edge()
-    x = RNG.uniform(-1, 1, 100)
-    points = np.column_stack([x, x**2 / 2])
-    slope = np.column_stack([np.ones(100), x]) / np.hypot(1, x)[:, None]
-    expected = np.column_stack([slope[:, 1], -slope[:, 0]])  # the body lies above
-    np.testing.assert_allclose(edge.normal(points), expected, atol=1e-15)
-    # From a distance less than the radius of curvature 1 the foot stays the same.
-    for distance in (-0.1, 0.2):
-        t = edge.project(points + distance * expected)
-        np.testing.assert_allclose(edge.point(t), points, atol=1e-14)
-
-
-def test_ellipse_and_closed_spline_across_the_seam():
-    theta = RNG.uniform(-0.1, 0.1, 200)
-    [edge] = WorkPlane().MoveTo(1, 1).Ellipse(2, 0.5).Face().edges
-    normal = np.column_stack([np.cos(theta) / 2, np.sin(theta) / 0.5])
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
-    points = [1, 1] + angles(theta) * [2, 0.5]
-    np.testing.assert_allclose(CadEdge(edge).normal(points), normal, atol=1e-14)
-
-    around = angles(np.linspace(0, 2 * math.pi, 60))
-    around[-1] = around[0]
-    spline = CadEdge(SplineApproximation([Pnt(a, b, 0) for a, b in around], tol=1e-8))
-    assert spline.closed
-    length = spline.stop - spline.start
-    t = np.concatenate([spline.start + length * theta[:50] ** 2, spline.stop - length * theta**2])
-    np.testing.assert_allclose(spline.project(spline.point(t)), t, atol=1e-12 * length)
-
-
-def test_moved_and_turned_edges():
-    face = WorkPlane().Rectangle(2, 1).Face()
-    turned = face.Rotate(Axis((0, 0, 0), (0, 0, 1)), 30).Move(Vec(3, 1, 0))
-    edges = [CadEdge(edge) for edge in turned.edges]
-    directions = {tuple(np.round(edge.normal(np.zeros((1, 2)))[0], 12) + 0.0) for edge in edges}
-    c, s = math.sqrt(3) / 2, 0.5
-    assert directions == {tuple(np.round(v, 12)) for v in [(c, s), (-c, -s), (s, -c), (-s, c)]}
-    for edge in edges:
-        t, x, slope = edge.samples(9)
-        assert edge.straight
-        np.testing.assert_allclose(slope, np.diff(x, axis=0)[0] / np.diff(t)[0] + 0 * x, atol=1e-14)
-
-
-def test_derivatives_belong_to_the_parameter():
-    for edge in (parabola_edge(), circle(1, 2, 3)):
-        t, _, slope = edge.samples(9)
-        step = 1e-4
-        inner = t[1:-1]
-        numeric = (edge.point(inner + step) - edge.point(inner - step)) / (2 * step)
-        np.testing.assert_allclose(slope[1:-1], numeric, atol=1e-7)  # error step^2 / 6 |x'''|
-
-
-# ------------------------------------------------------------------------------------- level
-
-
-def test_level_on_a_parabola():
-    edge = parabola_edge()
-    values = np.array([-1.0, -0.4, 0.0, 0.77, 1.0])
-    near = np.column_stack([values + 0.03, values**2 / 2])
-    t = edge.level(np.array([1.0, 0.0]), values, near)
-    expected = np.column_stack([values, values**2 / 2])
-    np.testing.assert_allclose(edge.point(t), expected, atol=1e-15)
-    # y = 0.18 is taken at x = 0.6 and x = -0.6: the near point decides.
-    sides = np.array([[0.7, 0.2], [-0.5, 0.2]])
-    t = edge.level(np.array([0.0, 1.0]), np.full(2, 0.18), sides)
-    np.testing.assert_allclose(edge.point(t), [[0.6, 0.18], [-0.6, 0.18]], atol=1e-15)
-
-
-def test_level_that_is_not_taken_is_nan():
-    edge = parabola_edge()
-    values = np.array([1.001, -3.0, 0.5])
-    t = edge.level(np.array([1.0, 0.0]), values, np.column_stack([values, values**2 / 2]))
-    assert np.isnan(t).tolist() == [True, True, False]
-    below = edge.level(np.array([0.0, 1.0]), np.array([-0.01]), np.array([[0.1, 0.0]]))
-    assert np.isnan(below).all()
-
-
-def test_level_on_straight_edges():
-    edge = CadEdge(Segment(Pnt(0, 0, 0), Pnt(2, 1, 0)))
-    axis = np.array([0.6, 0.8])
-    t = edge.level(axis, np.array([1.0, 2.5]), np.array([[0.1, 0.0], [1.5, 1.0]]))
-    np.testing.assert_allclose(edge.point(t[:1]) @ axis, 1.0, atol=1e-15)
-    assert np.isnan(t[1])
-    flat = CadEdge(Segment(Pnt(0, 0, 0), Pnt(2, 0, 0)))
-    assert np.isnan(flat.level(np.array([0.0, 1.0]), np.array([0.1]), np.zeros((1, 2)))).all()
-
-
-# ------------------------------------------------------------------------- numbering of edges
-
-GALLERY = {
-    "disc": [disc],
-    "blocks": [blocks, lambda: blocks(line=((-1, 0), (-0.2, 0.3), (0.5, -0.1), (1, 0.2)))],
-    "disc_on_block": [disc_on_block, lambda: disc_on_block(symmetric=False)],
-    "disc_on_disc": [
-        disc_on_disc,
-        lambda: disc_on_disc(radius=1, lower_radius=2, symmetric=False),
-    ],
-    "graphs": [lambda: graphs(lambda x: 0.1 * math.sin(4 * x), lambda x: x**2 / 2 - 0.7)],
-    "punch": [punch],
-    "rings": [rings, lambda: rings(interference=0.1, quarter=True)],
-    "ball_in_socket": [geometries.ball_in_socket],
-    "cone_on_block": [geometries.cone_on_block],
-    "ring_in_groove": [geometries.ring_in_groove],
-    "rounded_punch": [geometries.rounded_punch],
-    "sleeve_on_shaft": [geometries.sleeve_on_shaft],
-}
-
-
 def glued():
     """A square with a disc inside, one geometry with an inner boundary and a closed edge."""
     square = WorkPlane().Rectangle(2, 2).Face()
@@ -220,11 +60,9 @@ def nameless():
     return OCCGeometry(Glue([ring, WorkPlane().Rectangle(1, 1).Face()]), dim=2)
 
 
-def test_gallery_is_complete():
-    assert set(GALLERY) == set(geometries.__all__)
-
-
-@pytest.mark.parametrize("make", [glued, nameless, *(f for fs in GALLERY.values() for f in fs)])
+@pytest.mark.parametrize(
+    "make", [glued, nameless, *(partial(make, **options) for make, options, _ in CASES)]
+)
 def test_segments_lie_on_the_edge_of_their_region(make):
     mesh = ng.Mesh(make().GenerateMesh(maxh=0.6))
     mesh.Refine()
@@ -245,37 +83,6 @@ def test_segments_lie_on_the_edge_of_their_region(make):
         np.testing.assert_allclose(foot, points, atol=1e-12)
         met.add(region)
     assert len(met) == len(mesh.GetBoundaries())
-
-
-def test_numbering_survives_copies_and_curving():
-    mesh = ng.Mesh(disc_on_block().GenerateMesh(maxh=0.6))
-    mesh.Curve(3)
-    copy = ng.Mesh(mesh.ngmesh.Copy())
-    copy.Refine()
-    assert [e.name for e in cad_edges(copy)] == [e.name for e in cad_edges(mesh)]
-
-
-def test_meshes_without_cad_have_no_edges():
-    assert cad_edges(MakeStructured2DMesh(quads=False, nx=2, ny=2)) is None
-    spline = SplineGeometry()
-    spline.AddCircle((0, 0), 1, bc="rim")
-    assert cad_edges(ng.Mesh(spline.GenerateMesh(maxh=0.5))) is None
-
-
-def test_geometries_are_the_same_by_shape_and_names():
-    one = disc_on_block(radius=10.0)
-    assert same_geometry(one, one)
-    assert same_geometry(one, disc_on_block(radius=10.0))
-    assert not same_geometry(one, disc_on_block(radius=10.0 * (1 + 1e-6)))
-    renamed = disc_on_block(radius=10.0)
-    for edge in renamed.shape.edges:
-        edge.name = "other" if edge.name == "disc_arc" else edge.name
-    assert not same_geometry(one, renamed)
-    assert not same_geometry(one, disc(radius=10.0))
-    mesh = ng.Mesh(one.GenerateMesh(maxh=5.0))
-    assert same_geometry(mesh, mesh)
-    assert not same_geometry(mesh, one)
-    assert not same_geometry(mesh, ng.Mesh(mesh.ngmesh.Copy()))
 
 
 @pytest.mark.parametrize("angle", [10.0, 70.0, 250.0])

@@ -1,6 +1,4 @@
-"""Curved elements: their degree, and when a mesh has to be curved."""
-
-from __future__ import annotations
+"""Curved elements: when a mesh has to be curved; parents of refined vertices."""
 
 import math
 
@@ -9,21 +7,16 @@ import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
+from drivers.reference import cases
+from ngcontact.adaptivity import refined
 from ngcontact.geometries import blocks, disc
-from ngcontact.mesh.generation import curve, geometry_order
+from ngcontact.mesh.generation import copied, curve, first_mesh, vertex_parents
 from ngcontact.problem import Triangulation
-
-ORDERS = [1, 2, 3, 4]
+from tests.scenes import coordinates, near_origin
 
 
 def mesh_of(geometry, maxh=0.5):
     return ng.Mesh(geometry.GenerateMesh(maxh=maxh))
-
-
-def test_geometry_order():
-    assert [geometry_order(p, "isoparametric") for p in ORDERS] == ORDERS
-    assert [geometry_order(p, "superparametric") for p in ORDERS] == [2, 3, 4, 5]
-    assert geometry_order(1, "physical") == 2
 
 
 def test_curve_copies_only_where_it_must():
@@ -58,3 +51,39 @@ def test_elements_that_refinement_straightened_are_curved_again(order):
     assert area == pytest.approx(ng.Integrate(flux, again, ng.BND, order=2 * order), rel=1e-13)
     assert area == pytest.approx(math.pi / 4, rel=1e-3)
     assert ng.Integrate(ng.CF(1), mesh, order=2 * order) != pytest.approx(area, rel=1e-3)
+
+
+BLOCK = cases.partly_opening_block()  # straight, nodes matched
+
+
+def check_midpoints(mesh, old):
+    """Vertices after the first `old` ones lie in the middle of their parents."""
+    family, xy = vertex_parents(mesh), coordinates(mesh)
+    assert len(family) == mesh.nv
+    assert (family[:old] == -1).all()
+    new = np.arange(old, mesh.nv)
+    assert (family[new] >= 0).all()
+    assert (family[new] < new[:, None]).all()
+    # Round-off of coordinates of size 2.
+    np.testing.assert_allclose(xy[new], xy[family[new]].mean(axis=1), rtol=0, atol=1e-15)
+
+
+@pytest.mark.parametrize("local", [False, True])
+def test_vertices_lie_between_their_parents(local):
+    mesh = first = first_mesh(BLOCK, 0.5)
+    for _ in range(3):
+        mesh = refined(BLOCK, mesh, near_origin(mesh) if local else None)
+    check_midpoints(mesh, first.nv)
+    np.testing.assert_array_equal(vertex_parents(first), np.full((first.nv, 2), -1))
+
+
+def test_what_refinement_in_place_knows_is_kept():
+    mesh = ng.Mesh(first_mesh(BLOCK, 0.5).ngmesh.Copy())
+    old = mesh.nv
+    mesh.Refine()
+    mesh.Refine()
+    copy = copied(mesh)
+    check_midpoints(copy, old)
+    copy.Refine()
+    check_midpoints(copy, old)
+    check_midpoints(refined(BLOCK, copy), old)

@@ -1,11 +1,7 @@
 """First meshes: matched nodes on facing lines, sizes, and the user's geometry left alone."""
 
-from __future__ import annotations
-
 import math
-import threading
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import netgen.occ as occ
 import ngsolve as ng
@@ -13,113 +9,24 @@ import numpy as np
 import pytest
 from netgen.occ import OCCGeometry
 
-from drivers.reference import cases
-from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.adaptivity.refinement import matched_vertices
+from ngcontact import Contact, Elastic, Problem
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
-from ngcontact.geometries.region import body, compound, polygon, quarter_arc
+from ngcontact.geometries import blocks, disc_on_block
 from ngcontact.mesh import generation
 from ngcontact.mesh.generation import check_curves, first_mesh
+from tests.pairs import (
+    ALL,
+    BLOCKS,
+    BOUNDED,
+    ENLARGING,
+    ROUND_OFF,
+    SOFT,
+    pressed,
+    unmatched,
+)
 from tests.scenes import coordinates, vertices
 
-SOFT = Elastic(E=1.0, nu=0.3)
-LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
-ROUND_OFF = 1e-12  # of coordinates of size 1; the bound of the published method's matched nodes
-MATCHED_PART = 0.86  # of a radius: the steepest part of a circle stays unmatched by design
-
-
-def wave(x: float) -> float:
-    return 0.02 + 0.01 * math.sin(9 * x)
-
-
-def valley(x: float) -> float:
-    return -0.2 * math.cos(3 * x)
-
-
-def swell(x: float) -> float:
-    return 0.2 * math.sin(4 * x)
-
-
-def parabola(x: float) -> float:
-    return x * x / 2
-
-
-def hill(x: float) -> float:
-    return -x * x / 4
-
-
-def arc(radius: float) -> Callable[[float], float]:
-    """Lower half of the circle about (0, radius), or upper one for a negative radius."""
-    return lambda x: radius - math.copysign(math.sqrt(max(radius**2 - x * x, 0.0)), radius)
-
-
-@dataclass(frozen=True)
-class Pair:
-    """A geometry, its bodies and pair; the height of both lines over x, matched for |x| < part."""
-
-    geometry: Callable[[], OCCGeometry]
-    bodies: tuple[str, str]
-    contact: Contact
-    curves: tuple[Callable[[float], float], Callable[[float], float]] | None = None
-    part: float = math.inf
-
-    def problem(self) -> Problem:
-        return pressed(self.geometry(), self.bodies, self.contact)
-
-
-BLOCKS = ("upper", "lower")
-UP = Contact("lower_contact", "upper_contact", direction=(0, 1))
-BOUNDED = {
-    "blocks": Pair(blocks, BLOCKS, Contact("upper_contact", "lower_contact")),
-    "polygon": Pair(lambda: blocks(line=LINE), BLOCKS, Contact("lower_contact", "upper_contact")),
-    "one graph": Pair(
-        lambda: graphs(swell, swell), BLOCKS, Contact("lower_contact", "upper_contact")
-    ),
-    "punch": Pair(punch, ("punch", "foundation"), Contact("punch_contact", "foundation_contact")),
-    "rings": Pair(rings, ("inner", "outer"), Contact("outer_contact", "inner_contact")),
-    "quarter rings": Pair(
-        lambda: rings(quarter=True), ("inner", "outer"), Contact("inner_contact", "outer_contact")
-    ),
-}
-ENLARGING = {
-    "blocks": Pair(blocks, BLOCKS, UP, (lambda x: 0.0, lambda x: 0.0)),
-    "graphs": Pair(lambda: graphs(parabola, hill, -0.6, 0.6, 0.6), BLOCKS, UP, (hill, parabola)),
-    "waves": Pair(lambda: graphs(wave, valley), BLOCKS, UP, (valley, wave)),
-    "disc on block": Pair(
-        disc_on_block,
-        ("disc", "block"),
-        Contact("disc_arc", "block_top", direction=(0, -1)),
-        (arc(1.0), lambda x: 0.0),
-        MATCHED_PART,
-    ),
-    "whole disc on block": Pair(
-        lambda: disc_on_block(symmetric=False),
-        ("disc", "block"),
-        Contact("block_top", "disc_arc", direction=(0, 1)),
-        (lambda x: 0.0, arc(1.0)),
-        MATCHED_PART,
-    ),
-    "disc on disc": Pair(
-        lambda: disc_on_disc(lower_radius=2.0),
-        BLOCKS,
-        Contact("upper_arc", "lower_arc", direction=(0, -1)),
-        (arc(1.0), arc(-2.0)),
-        MATCHED_PART,
-    ),
-    "whole disc on disc": Pair(
-        lambda: disc_on_disc(radius=2.0, lower_radius=1.0, symmetric=False),
-        BLOCKS,
-        Contact("upper_arc", "lower_arc", direction=(0, -1)),
-        (arc(2.0), arc(-1.0)),
-        MATCHED_PART,
-    ),
-}
 SIZES = (None, 1.0, 0.4, 0.11)
-
-
-def pressed(geometry, bodies, *contact):
-    return Problem(geometry=geometry, materials=dict.fromkeys(bodies, SOFT), contact=contact)
 
 
 def lengths(mesh, pattern):
@@ -128,43 +35,26 @@ def lengths(mesh, pattern):
     return trace.lengths(trace.segments(pattern))
 
 
-def unmatched(a, b):
-    """Largest distance from a point of one set to the nearest one of the other, both ways."""
-    a, b = (v.reshape(len(v), -1) for v in (a, b))
-    distance = np.linalg.norm(a[:, None] - b, axis=2)
-    return max(distance.min(axis=0).max(), distance.min(axis=1).max())
-
-
 @pytest.mark.parametrize("maxh", SIZES)
-@pytest.mark.parametrize("name", BOUNDED)
-@pytest.mark.study(witness=["blocks-1.0", "punch-1.0", "polygon-1.0"])
-def test_vertices_coincide_on_a_bounded_zone(name, maxh):
-    if name == "punch" and maxh is not None:
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.study(
+    witness=[
+        *("bounded blocks-1.0", "bounded punch-1.0", "bounded polygon-1.0"),
+        *("enlarging blocks-1.0", "enlarging disc on block-None", "enlarging disc on block-0.4"),
+    ]
+)
+def test_vertices_coincide_or_have_common_eta(name, maxh):
+    if "punch" in name and maxh is not None:
         maxh = max(maxh, 0.4)  # the foundation is large
-    pair = BOUNDED[name]
-    mesh = first_mesh(pair.problem(), maxh)
-    here, there = (vertices(mesh, side) for side in (pair.contact.secondary, pair.contact.primary))
-    assert len(here) >= 2
-    assert unmatched(here, there) < ROUND_OFF
-
-
-@pytest.mark.parametrize("maxh", SIZES)
-@pytest.mark.parametrize("name", ENLARGING)
-@pytest.mark.study(witness=["blocks-1.0", "disc on block-None", "disc on block-0.4"])
-def test_vertices_have_common_eta_on_an_enlarging_zone(name, maxh):
-    pair = ENLARGING[name]
-    mesh = first_mesh(pair.problem(), maxh)
-    eta = []
-    for side, curve in zip(
-        (pair.contact.secondary, pair.contact.primary), pair.curves, strict=True
-    ):
-        points = vertices(mesh, side)
-        x, y = points[np.abs(points[:, 0]) < pair.part].T
+    pair = ALL[name]
+    points = [vertices(first_mesh(pair.problem(), maxh), side) for side in pair.sides]
+    for k, curve in enumerate(pair.curves):
+        x, y = points[k][np.abs(points[k][:, 0]) < pair.part].T
         # The spline of a graph is good to 1e-12 here; circles and lines are exact.
         assert np.abs(y - [curve(v) for v in x]).max() < ROUND_OFF
-        eta.append(x)
-    assert len(eta[0]) >= 2
-    assert unmatched(*eta) < ROUND_OFF
+        points[k] = x
+    assert len(points[0]) >= 2
+    assert unmatched(*points) < ROUND_OFF
 
 
 @pytest.mark.parametrize("maxh", [2.0, 0.4, 0.11])
@@ -178,13 +68,6 @@ def test_contact_segments_keep_the_size_and_resolve_the_curvature(maxh):
     assert np.diff(matched).max() < 0.5 * (1 + 1e-3)
 
 
-def test_contact_edges_are_filled_outside_of_the_facing_part():
-    mesh = first_mesh(ENLARGING["disc on block"].problem(), 0.2)
-    free = vertices(mesh, "block_top")
-    assert free[:, 0].max() == 2.0
-    assert lengths(mesh, "block_top").max() < 0.2 * (1 + 1e-6)
-
-
 def test_the_default_size_is_an_eighth_of_the_largest_extent():
     problem = pressed(blocks(width=4.0), BLOCKS, *[BOUNDED["blocks"].contact])
     mesh = first_mesh(problem)
@@ -192,123 +75,6 @@ def test_the_default_size_is_an_eighth_of_the_largest_extent():
     assert lengths(mesh, "upper_contact|lower_contact") == pytest.approx(4 / 16)
     # The user's geometry is left as it was, and a size that is given holds everywhere.
     assert lengths(first_mesh(problem, 0.5), "upper_contact|lower_contact") == pytest.approx(0.5)
-
-
-def test_only_zones_that_may_open_are_finer():
-    contact = replace(BOUNDED["blocks"].contact, bilateral=True)
-    mesh = first_mesh(pressed(blocks(width=4.0), BLOCKS, contact))
-    assert lengths(mesh, "upper_contact|lower_contact") == pytest.approx(4 / 8)
-
-
-def test_a_mesh_is_the_same_every_time():
-    pair = ENLARGING["disc on disc"]
-    first, second = (coordinates(first_mesh(pair.problem(), 0.3)) for _ in range(2))
-    assert (first == second).all()
-
-
-@pytest.mark.parametrize("unit", [1e-3, 1e4])
-def test_matching_does_not_depend_on_the_unit_of_length(unit):
-    pair = pressed(
-        disc_on_disc(radius=unit, lower_radius=2 * unit),
-        BLOCKS,
-        Contact("upper_arc", "lower_arc", direction=(0, -1)),
-    )
-    mesh = first_mesh(pair, 0.3 * unit)
-    eta = [vertices(mesh, side)[:, 0] / unit for side in ("upper_arc", "lower_arc")]
-    assert unmatched(*(x[x < MATCHED_PART] for x in eta)) < ROUND_OFF
-
-
-def test_names_of_bodies_and_boundaries_survive():
-    geometry = disc_on_block()
-    direct = ng.Mesh(geometry.GenerateMesh(maxh=0.4))
-    mesh = first_mesh(ENLARGING["disc on block"].problem(), 0.4)
-    assert mesh.GetMaterials() == direct.GetMaterials() == ("disc", "block")
-    assert mesh.GetBoundaries() == direct.GetBoundaries()
-
-
-# --- the facing part of an edge ends where the other edge ends ---
-
-
-def low(name="lower_contact"):
-    """Block from x = -1 to 1 below y = 0, its top one edge."""
-    corners = [(1.0, 0.0), (-1.0, 0.0), (-1.0, -1.0), (1.0, -1.0)]
-    return body("lower", polygon(corners, [name, "sides", "bottom", "sides"]))
-
-
-def high(name, left, right, contact):
-    """Block from x = left to right above y = 0."""
-    corners = [(left, 0.0), (right, 0.0), (right, 1.0), (left, 1.0)]
-    return body(name, polygon(corners, [contact, "sides", f"{name}_top", "sides"]))
-
-
-@pytest.mark.parametrize("direction", [None, 1])
-@pytest.mark.parametrize("wide_is_secondary", [True, False])
-def test_a_line_inside_a_longer_one_has_its_ends_among_the_nodes(wide_is_secondary, direction):
-    geometry = compound(high("upper", -0.47, 0.33, "upper_contact"), low())
-    names = ["lower_contact", "upper_contact"] if wide_is_secondary else None
-    secondary, primary = names or ["upper_contact", "lower_contact"]
-    xi = None if direction is None else (0, 1 if wide_is_secondary else -1)
-    mesh = first_mesh(pressed(geometry, BLOCKS, Contact(secondary, primary, direction=xi)), 0.4)
-    short, wide = (np.sort(vertices(mesh, n)[:, 0]) for n in ("upper_contact", "lower_contact"))
-    assert unmatched(short, wide[(wide > -0.5) & (wide < 0.35)]) < ROUND_OFF
-    assert np.diff(wide).min() > 0.2  # two halves of 0.8 and two of at most 0.4: no slivers
-    assert np.diff(wide).max() < 0.4 * (1 + 1e-6)
-
-
-def test_a_corner_of_the_primary_meets_a_node_of_the_secondary():
-    corners = [(-1.0, 0.0), (0.1, 0.05), (1.0, 0.0), (1.0, 1.0), (-1.0, 1.0)]
-    kinked = body(
-        "upper", polygon(corners, ["upper_contact"] * 2 + ["sides", "upper_top", "sides"])
-    )
-    mesh = first_mesh(pressed(compound(kinked, low()), BLOCKS, UP), 0.4)
-    upper, lower = (vertices(mesh, n)[:, 0] for n in ("upper_contact", "lower_contact"))
-    assert unmatched(upper, lower) < ROUND_OFF
-    assert np.diff(np.sort(lower)).min() > 0.2  # no slivers beside the corner
-
-
-@pytest.mark.parametrize("together", [True, False])
-def test_two_bodies_on_one_edge_are_both_matched(together):
-    geometry = compound(
-        high("first", -0.9, -0.7, "first_contact"),
-        high("second", 0.5, 0.8, "second_contact"),
-        low(),
-    )
-    names = ["first_contact|second_contact"] if together else ["first_contact", "second_contact"]
-    pairs = [Contact(name, "lower_contact") for name in names]
-    mesh = first_mesh(pressed(geometry, ("first", "second", "lower"), *pairs), 0.3)
-    x = vertices(mesh, "lower_contact")[:, 0]
-    for name, low_end, high_end in (("first", -0.9, -0.7), ("second", 0.5, 0.8)):
-        inside = x[(x > low_end - 0.01) & (x < high_end + 0.01)]
-        assert unmatched(inside, vertices(mesh, f"{name}_contact")[:, 0]) < ROUND_OFF
-    # The free part between the two bodies, 1.2 long, is divided as well.
-    assert lengths(mesh, "lower_contact").max() < 0.3 * (1 + 1e-6)
-
-
-# --- what the user has set ---
-
-
-def test_the_geometry_is_left_as_it_was():
-    geometry = disc_on_block()
-    problem = pressed(geometry, ("disc", "block"), ENLARGING["disc on block"].contact)
-    before = coordinates(ng.Mesh(geometry.GenerateMesh(maxh=0.3)))
-    matched = coordinates(first_mesh(problem, 0.3))
-    assert all(edge.partition is None for edge in geometry.shape.edges)
-    after = coordinates(ng.Mesh(geometry.GenerateMesh(maxh=0.3)))
-    assert before.shape != matched.shape
-    assert (before == after).all()
-
-
-def test_the_geometry_is_left_as_it_was_when_meshing_fails(monkeypatch):
-    problem = BOUNDED["blocks"].problem()
-
-    def fail(shape, dim):
-        assert any(edge.partition is not None for edge in shape.edges)
-        raise RuntimeError("no mesh")
-
-    monkeypatch.setattr(occ, "OCCGeometry", fail)
-    with pytest.raises(RuntimeError, match="no mesh"):
-        first_mesh(problem, 0.3)
-    assert all(edge.partition is None for edge in problem.geometry.shape.edges)
 
 
 def test_partitions_of_the_user_are_honoured():
@@ -339,172 +105,6 @@ def test_the_size_of_one_edge_holds_on_the_facing_one(name):
     assert lengths(mesh, "top").min() > 0.2
 
 
-def test_a_mesh_is_returned_as_it_is():
-    mesh = ng.Mesh(blocks().GenerateMesh(maxh=0.5))
-    assert first_mesh(pressed(mesh, BLOCKS, BOUNDED["blocks"].contact)) is mesh
-
-
-def test_nothing_is_placed_for_a_rigid_obstacle():
-    geometry = disc_on_block()
-    contact = Contact("disc_arc", direction=(0, -1), gap=ng.y)
-    mesh = first_mesh(pressed(geometry, ("disc", "block"), contact), 0.3)
-    direct = ng.Mesh(geometry.GenerateMesh(maxh=0.3))
-    assert mesh.nv == direct.nv
-
-
-@pytest.mark.parametrize(
-    ("maxh", "error"),
-    [
-        (0, ValueError),
-        (-0.1, ValueError),
-        (math.nan, ValueError),
-        (math.inf, ValueError),
-        ("0.1", TypeError),
-        (True, TypeError),
-        (0.1j, TypeError),
-    ],
-)
-def test_a_bad_size_is_refused_with_its_value(maxh, error):
-    value = repr(maxh) if error is TypeError else str(maxh)
-    with pytest.raises(error, match=f"maxh={value}.*0.25") as caught:
-        first_mesh(BOUNDED["blocks"].problem(), maxh)
-    assert "maxh" in str(caught.value)
-
-
-def test_whole_circles_are_divided_on_the_facing_side():
-    """A full circle is no graph over eta: nodes match where the discs face, areas stay right."""
-    upper, lower = (occ.WorkPlane().Circle(0, y, 1).Face() for y in (1, -1))
-    for face, name in ((upper, "upper"), (lower, "lower")):
-        face.faces.name, face.edges.name = name, f"{name}_rim"
-    discs = Problem(
-        geometry=OCCGeometry(occ.Compound([upper, lower]), dim=2),
-        materials={"upper|lower": Elastic(E=1.0, nu=0.3)},
-        contact=[Contact("upper_rim", "lower_rim", direction=(0, -1))],
-    )
-    mesh = first_mesh(discs, maxh=0.4)
-    assert mesh.ne < 200  # measured 95
-    mesh.Curve(3)
-    for name in ("upper", "lower"):
-        # Area of a disc by cubic curves of chord 0.4: O(h^4), measured 3e-5.
-        assert ng.Integrate(ng.CF(1), mesh.Materials(name)) == pytest.approx(math.pi, rel=1e-3)
-
-
-def test_a_mesh_has_its_size_already():
-    mesh = ng.Mesh(blocks().GenerateMesh(maxh=0.5))
-    problem = Problem(geometry=mesh, materials={"upper|lower": Elastic(E=1.0, nu=0.3)})
-    with pytest.raises(ValueError, match=r"maxh=0.1 has no effect"):
-        first_mesh(problem, maxh=0.1)
-
-
-@pytest.mark.parametrize(("left", "right", "maxh"), [(1.139, 0.796, 0.3), (0.598, 0.785, 0.3)])
-def test_two_pairs_that_share_an_edge_leave_no_slivers_on_it(left, right, maxh):
-    """Nodes that both pairs ask for on one arc keep apart, and the bodies are filled."""
-    disc = [("arc", quarter_arc((0, 0), 1.0, k, (k + 1) % 4)) for k in range(4)]
-    down = [np.array([-np.sin(left), -np.cos(left)]), np.array([np.sin(right), -np.cos(right)])]
-    root = np.linalg.solve(np.array(down), [1.03, 1.03])
-    a = root + 8 * np.array([-np.cos(left), np.sin(left)])
-    b = root + 8 * np.array([np.cos(right), np.sin(right)])
-    low = root[1] - 1.5
-    notch = [tuple(root), tuple(a), (a[0], low), (b[0], low), tuple(b)]
-    names = ["left", "side", "bottom", "side", "right"]
-    problem = Problem(
-        geometry=compound(body("disc", disc), body("notch", polygon(notch, names))),
-        materials={"disc|notch": Elastic(E=1.0, nu=0.3)},
-        contact=[
-            Contact("arc", name, direction=tuple(d))
-            for name, d in zip(("left", "right"), down, strict=True)
-        ],
-    )
-    mesh = first_mesh(problem, maxh)
-    ends = mesh.ngmesh.Elements1D().NumPy()["nodes"][:, :2].astype(int) - 1
-    xy = np.array(mesh.ngmesh.Coordinates())[:, :2]
-    sides = xy[ends[:, 1]] - xy[ends[:, 0]]
-    assert np.linalg.norm(sides, axis=1).min() > 1e-3 * maxh  # measured 4e-3, before 5e-4 and 8e-4
-    x, y = xy[ends].mean(axis=1).T
-    enclosed = (x * sides[:, 1] - y * sides[:, 0]).sum() / 2
-    assert ng.Integrate(1, mesh) == pytest.approx(enclosed, rel=1e-12)
-
-
-def test_solids_are_no_bodies():
-    box = occ.Box((0, 0, 0), (1, 1, 1))
-    with pytest.raises(ValueError, match="contains solids"):
-        first_mesh(Problem(geometry=OCCGeometry(box), materials={"a": SOFT}))
-
-
-def test_two_pairs_on_one_circle_do_not_ask_for_nodes_on_its_far_sides():
-    """What lies behind a disc sees the other face through it, and would spoil the nodes there."""
-    disc = occ.Circle((0, 0), 1.0).Face()
-    disc.name, disc.edges.name = "disc", "rim"
-    deep = math.sqrt(2)
-    outline = [(0, -deep), (-2, 2 - deep), (-2, -3), (2, -3), (2, 2 - deep)]
-    notch = body("notch", polygon(outline, ["left", "side", "bottom", "side", "right"]))
-    problem = Problem(
-        geometry=OCCGeometry(occ.Compound([disc, *notch.faces]), dim=2),
-        materials={"disc|notch": SOFT},
-        contact=[
-            Contact("rim", "left", direction=(-1, -1)),
-            Contact("rim", "right", direction=(1, -1)),
-        ],
-    )
-    mesh = first_mesh(problem, 0.25)
-    rim = vertices(mesh, "rim")
-    for contact in problem.contact:
-        trace = boundary_trace(mesh, 1)
-        matched = coordinates(mesh)[list(matched_vertices(trace, contact))]
-        # Each matches up to 60 degrees from its direction; from 30 on the other's nodes are there.
-        facing = rim[rim @ contact.direction > math.cos(math.radians(29))]
-        assert len(facing) >= 3
-        distance = np.linalg.norm(facing[:, None] - matched, axis=2)
-        assert distance.min(axis=1).max() < ROUND_OFF
-
-
-def scaled_mesh(geometry, size, degree):
-    """Curved mesh of a geometry of `size` times its own."""
-    shape = geometry.shape.Scale(occ.Pnt(0, 0, 0), size)
-    mesh = ng.Mesh(OCCGeometry(shape, dim=2).GenerateMesh(maxh=0.25 * size))
-    mesh.Curve(degree)
-    return mesh
-
-
-CURVED = {  # the smallest size of which check_curves accepts the mesh
-    "arcs": (disc_on_block(), 5e-5),
-    "splines": (graphs(lambda x: wave(x) + 0.01, hill), 1e-2),
-}
-
-
-@pytest.mark.parametrize("large", [False, True])
-@pytest.mark.parametrize("name", CURVED)
-def test_accepted_sizes_are_curved_as_size_1_is(name, large):
-    geometry, size = CURVED[name]
-    size = 1e8 if large else size  # Netgen meshes sizes to 3e8
-    one, other = (scaled_mesh(geometry, s, 5) for s in (1.0, size))
-    check_curves(other)
-    nodes = [boundary_trace(mesh, 4).curve for mesh in (one, other)]
-    # Round-off; measured 1e-15. At a fifth of the smallest size arcs are off by 3e-4.
-    assert np.abs(nodes[1] / size - nodes[0]).max() < ROUND_OFF
-
-
-@pytest.mark.parametrize("name", CURVED)
-def test_smaller_curves_ask_for_another_unit(name):
-    geometry, size = CURVED[name]
-    with pytest.raises(ValueError, match=r'curved edge ".*" has the extent .* unit of length'):
-        check_curves(scaled_mesh(geometry, size / 5, 2))
-
-
-def test_small_curves_are_refused_where_elements_are_curved():
-    shape = disc_on_block().shape.Scale(occ.Pnt(0, 0, 0), 1e-6)
-    contact = Contact("disc_arc", "block_top", direction=(0, -1))
-    problem = Problem(
-        geometry=OCCGeometry(shape, dim=2),
-        materials=dict.fromkeys(("disc", "block"), SOFT),
-        displacement={"block_bottom": (0, 0), "disc_top": (0, -1e-8)},
-        contact=[contact],
-    )
-    assert solve(problem, maxh=3e-7, order=1).active.any()  # straight sides, exact vertices
-    with pytest.raises(ValueError, match=r'"disc_arc".*unit of length'):
-        solve(problem, maxh=3e-7, order=2)
-
-
 def test_refinement_beyond_the_kernel_s_lengths_is_refused():
     """Measured: elements beside the end of an arc turn over at 5e-7 units, order 4."""
     mesh = ng.Mesh(disc_on_block().GenerateMesh(maxh=0.3))
@@ -521,22 +121,21 @@ def test_refinement_beyond_the_kernel_s_lengths_is_refused():
     check_curves(ng.Mesh(blocks().GenerateMesh(maxh=0.3)))
 
 
-def test_meshes_made_in_several_threads_do_not_see_each_other():
-    """Sizes are told to Netgen on the shape, which both threads share."""
-    problem = cases.pressed_disc()
-    sizes = (0.1, 0.4)
-    alone = {size: first_mesh(problem, size).ne for size in sizes}
-    found = {size: [] for size in sizes}
+PRESSED = pressed(blocks(), BLOCKS, BOUNDED["blocks"].contact)
 
-    def work(size):
-        found[size].extend(first_mesh(problem, size).ne for _ in range(4))
 
-    threads = [threading.Thread(target=work, args=(size,)) for size in sizes]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert found == {size: [alone[size]] * 4 for size in sizes}
+@pytest.mark.parametrize(
+    ("unit", "offset"), [(1e9, 0.0), (1e12, 0.0), (1.0, 1e9), (1e-7, 0.0)], ids=str
+)
+@pytest.mark.parametrize("angle", [0.0, 17.3])
+def test_lengths_that_are_not_meshed_are_refused(unit, offset, angle, monkeypatch):
+    """Netgen never returned, at angles that depend on the shape."""
+    monkeypatch.setattr(generation, "_generated", lambda *_: pytest.fail("meshed"))
+    turned = PRESSED.geometry.shape.Rotate(occ.Axis((0, 0, 0), occ.Z), angle)
+    shape = turned.Scale(occ.Pnt(0, 0, 0), unit).Move(occ.Vec(offset, 0, 0))
+    problem = replace(PRESSED, geometry=OCCGeometry(shape, dim=2))
+    with pytest.raises(ValueError, match=r"has the extent \S+ and reaches \S+ .* unit of length"):
+        first_mesh(problem)
 
 
 def test_two_cams_without_a_direction_are_told_to_give_one():
@@ -559,35 +158,14 @@ def test_two_cams_without_a_direction_are_told_to_give_one():
     assert first_mesh(along, 0.2).ne > 50
 
 
-PRESSED = pressed(blocks(), BLOCKS, BOUNDED["blocks"].contact)
+def test_solids_are_no_bodies():
+    box = occ.Box((0, 0, 0), (1, 1, 1))
+    with pytest.raises(ValueError, match="contains solids"):
+        first_mesh(Problem(geometry=OCCGeometry(box), materials={"a": SOFT}))
 
 
-@pytest.mark.parametrize(
-    ("unit", "offset"), [(1e9, 0.0), (1e12, 0.0), (1.0, 1e9), (1e-7, 0.0)], ids=str
-)
-@pytest.mark.parametrize("angle", [0.0, 17.3])
-def test_lengths_that_are_not_meshed_are_refused(unit, offset, angle, monkeypatch):
-    """Netgen never returned, at angles that depend on the shape."""
-    monkeypatch.setattr(generation, "_generated", lambda *_: pytest.fail("meshed"))
-    turned = PRESSED.geometry.shape.Rotate(occ.Axis((0, 0, 0), occ.Z), angle)
-    shape = turned.Scale(occ.Pnt(0, 0, 0), unit).Move(occ.Vec(offset, 0, 0))
-    problem = replace(PRESSED, geometry=OCCGeometry(shape, dim=2))
-    with pytest.raises(ValueError, match=r"has the extent \S+ and reaches \S+ .* unit of length"):
-        first_mesh(problem)
-
-
-@pytest.mark.parametrize("unit", [1e-6, 2e8])
-@pytest.mark.parametrize("angle", [0.0, 17.3])
-def test_lengths_that_are_meshed(unit, angle):
-    """Areas scale; the kernel's tolerance is 1e-7 of a length, 0.1 of one of 1e-6."""
-    turned = PRESSED.geometry.shape.Rotate(occ.Axis((0, 0, 0), occ.Z), angle)
-    shape = turned.Scale(occ.Pnt(0, 0, 0), unit)
-    mesh = first_mesh(replace(PRESSED, geometry=OCCGeometry(shape, dim=2)))
-    area = ng.Integrate(ng.CF(1.0), first_mesh(PRESSED))
-    assert ng.Integrate(ng.CF(1.0), mesh) / unit**2 == pytest.approx(area, rel=1e-9)
-
-
-def test_given_meshes_have_no_limits():
-    mesh = ng.Mesh(first_mesh(PRESSED).ngmesh.Copy())
-    mesh.ngmesh.Scale(1e12)
-    assert first_mesh(replace(PRESSED, geometry=mesh)) is mesh
+def test_a_mesh_has_its_size_already():
+    mesh = ng.Mesh(blocks().GenerateMesh(maxh=0.5))
+    problem = Problem(geometry=mesh, materials={"upper|lower": Elastic(E=1.0, nu=0.3)})
+    with pytest.raises(ValueError, match=r"maxh=0.1 has no effect"):
+        first_mesh(problem, maxh=0.1)

@@ -1,7 +1,5 @@
 """What files and pictures read of a solution, with fields chosen by a test."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any

@@ -1,7 +1,5 @@
 """Bodies of revolution: files of the whole body, pictures on both sides of the axis."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 
@@ -11,8 +9,6 @@ import pyvista
 
 from drivers.reference import axisymmetric_cases as cases
 from ngcontact import solve
-from ngcontact.output.pictures import Style
-from ngcontact.output.pictures.scene import picture
 
 
 @pytest.fixture(scope="module")
@@ -56,17 +52,6 @@ def test_the_surface_of_contact_is_turned(tmp_path, pressed, angle, sections):
     assert list(surface.field_data["secondary_names"]) == ["upper_contact"]
 
 
-def test_radial_tractions_turn_with_the_surface(tmp_path):
-    problem, exact = cases.fitted_rings()
-    solve(problem, maxh=0.3, order=2).revolved(tmp_path / "fit.vtu")
-    surface = pyvista.read(tmp_path / "fit_contact.vtp")
-    x, y, _ = surface.points.T
-    # On the sleeve, inwards.
-    radial = -(surface["traction"][:, :2] * np.column_stack([x, y])).sum(axis=1) / np.hypot(x, y)
-    assert radial == pytest.approx(surface["pressure"], rel=1e-6)
-    assert radial == pytest.approx(np.full(len(radial), exact.p), rel=0.1)
-
-
 def test_what_is_refused(tmp_path, pressed):
     for angle in (0, -1, 361, math.nan):
         with pytest.raises(ValueError, match="give degrees above 0, at most 360"):
@@ -77,35 +62,3 @@ def test_what_is_refused(tmp_path, pressed):
     with pytest.raises(ValueError, match='model "plane strain": a body of revolution has'):
         plane.revolved(tmp_path / "body.vtu")
     assert list(tmp_path.iterdir()) == []
-
-
-def test_hoop_stress_is_in_the_file(tmp_path):
-    problem, exact = cases.fitted_rings()
-    solution = solve(problem, maxh=0.2, order=3)
-    grid = pyvista.read(solution.write(tmp_path / "fit.vtu"))
-    r = grid.points[:, 0]
-    hub = grid.points[:, 0] > 1.1 + 1e-6
-    at = [exact.hoop["hub"](solution.mesh(x, 0.1)) for x in r[hub]]
-    # Nodal means of a stress of degree 2 on elements of size 0.2.
-    assert grid["hoop_stress"][hub] == pytest.approx(at, abs=0.02 * np.abs(at).max())
-
-
-def test_values_on_the_axis_are_numbers(tmp_path):
-    solution = solve(cases.hertz_contact()[0], maxh=0.4, order=3)
-    grid = pyvista.read(solution.write(tmp_path / "hertz.vtu"))
-    assert (grid.points[:, 0] == 0).any()
-    for name in grid.point_data:
-        assert np.isfinite(grid[name]).all()
-
-
-def test_the_picture_shows_both_sides(pressed):
-    solid = solve(cases.pressed_cylinders(), maxh=0.5, order=2)
-    for solution in (pressed, solid):
-        scene = picture(solution, Style(1.0))
-        half = len(scene.moved) // 2
-        assert scene.axes == ("r", "z")
-        assert np.array_equal(scene.moved[half:], scene.moved[:half] * (-1, 1))
-        ends = scene.moved[scene.edges[scene.outline]][:, :, 0]
-        # The axis of a solid body is no outline.
-        assert not (np.abs(ends).max(axis=1) < 1e-9).any()
-        assert scene.triangles.max() == 2 * half - 1

@@ -1,25 +1,14 @@
 """Files for ParaView: bodies, contact points, series."""
 
-from __future__ import annotations
-
-import errno
-import os
-from pathlib import Path
-
 import ngsolve as ng
 import numpy as np
 import pytest
 import pyvista
 from netgen.occ import Compound, Glue
 from ngsolve.meshes import MakeStructured2DMesh
-from vtkmodules.vtkCommonCore import mutable, vtkObject
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
-from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter
 
-from ngcontact import Elastic, Hooke
-from ngcontact.output import plot_solution, write_series, write_solution
-from ngcontact.output.vtk import lattice, write_data
-from ngcontact.quadrature import mesh_points
+from ngcontact.output import write_series, write_solution
 from tests.output.stubs import MAXH, stub, two_bodies
 
 
@@ -40,7 +29,6 @@ def test_cells_cover_the_bodies_and_share_their_nodes(tmp_path, order, curve):
     # have vertices of their own.
     assert grid.n_points == mesh.nv + mesh.nedge * (p - 1) + mesh.ne * inside
     exact = ng.Integrate(ng.CF(1.0), mesh, order=2 * p)
-    assert area_of_lagrange_cells(grid, p) == pytest.approx(exact, rel=1e-12)
     # The order of the geometry, h^(curve + 1); measured: at most 0.8 of this.
     assert abs(exact - np.pi / 2 - 4) < (0.05 if curve == 1 else MAXH ** (curve + 1) / 200)
     # VTK cuts every side into 2^3 chords at least; a chord s of the circle misses s^3 / 12, all of
@@ -51,81 +39,6 @@ def test_cells_cover_the_bodies_and_share_their_nodes(tmp_path, order, curve):
     surface.Update()
     chords = np.pi * (MAXH / 8) ** 2 / 12 if p > 1 else 0.0
     assert pyvista.wrap(surface.GetOutput()).area == pytest.approx(exact, abs=chords + 1e-12)
-
-
-def area_of_lagrange_cells(grid, order):
-    """Integral of the Jacobian of the polynomials through the nodes, all cells."""
-    powers = [(i, j) for i in range(order + 1) for j in range(order + 1 - i)]
-    r, s = lattice(order)[:, 1:].T / order
-    basis = np.linalg.inv(np.stack([r**i * s**j for i, j in powers], axis=1))
-    rule = ng.IntegrationRule(ng.TRIG, 2 * order)
-    r, s = np.array(rule.points)[:, :2].T
-    by_r = np.stack([i * r ** max(i - 1, 0) * s**j for i, j in powers], axis=1) @ basis
-    by_s = np.stack([j * r**i * s ** max(j - 1, 0) for i, j in powers], axis=1) @ basis
-    nodes = grid.points[grid.cells.reshape(grid.n_cells, -1)[:, 1:], :2]
-    (xr, yr), (xs, ys) = np.moveaxis(by_r @ nodes, 2, 0), np.moveaxis(by_s @ nodes, 2, 0)
-    return np.sum(np.abs(xr * ys - xs * yr) @ np.array(rule.weights))
-
-
-@pytest.mark.parametrize("order", [1, 2, 3, 4])
-def test_vtk_reads_areas_and_values_of_curved_cells(tmp_path, order):
-    """By VTK's own shape functions: of degree 4 at most, so that its stencil is exact."""
-    solution = stub(order)
-    mesh, u = solution.mesh, solution.displacement
-    grid = written(tmp_path, solution)
-    rule = ng.IntegrationRule(ng.TRIG, 2 * order)
-    area = 0.0
-    for k in range(0, mesh.ne, 3):
-        cell, own = grid.GetCell(k), 0.0
-        for (r, s), weight in zip(np.array(rule.points)[:, :2], rule.weights, strict=True):
-            place, shapes = vtk_location(cell, r, s)
-            # VTK's first vertex is at (0, 0), NGSolve's at (1, 0).
-            [at] = mesh_points(mesh, np.array([k]), np.array([[[1 - r - s, r]]]))
-            np.testing.assert_allclose(place, ng.CF((ng.x, ng.y))(at)[0], atol=1e-13)
-            nodes = [cell.GetPointId(j) for j in range(len(shapes))]
-            np.testing.assert_allclose(
-                shapes @ grid["displacement"][nodes][:, :2], u(at)[0], atol=1e-13
-            )
-            by_r, by_s = (derivative(cell, r, s, d) for d in ((1, 0), (0, 1)))
-            own += weight * (by_r[0] * by_s[1] - by_r[1] * by_s[0])
-        area += own
-        [exact] = element_areas(mesh, order, k)
-        assert own == pytest.approx(exact, rel=1e-11)  # steps of 1e-2 lose three digits
-    assert area > 1
-
-
-def vtk_location(cell, r, s):
-    """Point (2,) and shape functions (n,) of a VTK cell at its coordinates."""
-    place, shapes = [0.0] * 3, [0.0] * cell.GetNumberOfPoints()
-    cell.EvaluateLocation(mutable(0), (r, s, 0.0), place, shapes)
-    return np.array(place[:2]), np.array(shapes)
-
-
-def derivative(cell, r, s, direction, h=1e-2):
-    """Derivative (2,) of the place; exact for polynomials of degree 4."""
-    by = [vtk_location(cell, r + k * h * direction[0], s + k * h * direction[1])[0] for k in STEPS]
-    return (by[0] - 8 * by[1] + 8 * by[2] - by[3]) / (12 * h)
-
-
-STEPS = (-2, -1, 1, 2)
-
-
-def element_areas(mesh, order, element):
-    """Area (1,) of an element, by NGSolve."""
-    areas = ng.Integrate(ng.CF(1.0), mesh, order=2 * order, element_wise=True)
-    return [areas[element]]
-
-
-def test_curved_nodes_lie_on_the_circle(tmp_path):
-    solution = stub(3)
-    grid = written(tmp_path, solution)
-    disc = list(grid.field_data["body_names"]).index("disc")
-    nodes = np.unique(grid.cells.reshape(-1, 11)[:, 1:][grid["body"] == disc])
-    distance = np.sort(np.abs(np.hypot(*(grid.points[nodes, :2] - (0, 1)).T) - 1))
-    count = 3 * sum(side.mat == "disc_arc" for side in solution.mesh.Elements(ng.BND)) + 1
-    assert count > 3 * np.pi / MAXH
-    assert distance[count - 1] < MAXH**4 / 200  # cubics deviate by O(h^4); measured: an eighth
-    assert distance[count] > 10 * MAXH**4 / 200  # the others are inside
 
 
 def test_fields_are_those_of_the_solution_at_the_nodes(tmp_path):
@@ -161,52 +74,6 @@ def test_bodies_keep_their_own_stress_where_they_touch(tmp_path, glue):
     np.testing.assert_allclose(stress, expected[:, None] + np.zeros_like(stress), rtol=1e-14)
 
 
-def test_jumping_stress_is_averaged_over_the_cells_at_a_node(tmp_path):
-    solution = stub(1)
-    jump = ng.GridFunction(ng.L2(solution.mesh, order=0))
-    values = np.sin(np.arange(solution.mesh.ne))
-    jump.vec.FV().NumPy()[:] = values
-    solution.stress = ng.CF((jump, 0, 0, 0), dims=(2, 2))
-    grid = written(tmp_path, solution)
-    nodes = grid.cells.reshape(-1, 4)[:, 1:]
-    for node in (0, 5, grid.n_points - 1):
-        mean = values[np.any(nodes == node, axis=1)].mean()
-        assert grid["stress"][node, 0] == pytest.approx(mean, rel=1e-12)
-
-
-C_ISOTROPIC = np.array([[1.2, 0.4, 0.0], [0.4, 1.2, 0.0], [0.0, 0.0, 0.4]])
-
-
-@pytest.mark.parametrize(
-    ("model", "material", "expected"),
-    [
-        ("plane stress", Elastic(E=1.0, nu=0.3), 5.0),
-        ("plane strain", Elastic(E=1.0, nu=0.3), 5.0 * np.sqrt(1 - 0.3 + 0.09)),
-        ("plane strain", Elastic(E=1.0, nu=ng.CF(0.3)), 5.0 * np.sqrt(1 - 0.3 + 0.09)),
-        ("plane strain", Hooke(C_ISOTROPIC), 5.0),
-    ],
-)
-def test_von_mises_of_uniaxial_stress(tmp_path, model, material, expected):
-    materials = {"disc|block": material}
-    pull = ng.CF((5.0, 0, 0, 0), dims=(2, 2))
-    grid = written(tmp_path, stub(1, pull, model, materials))
-    np.testing.assert_allclose(grid["von_mises"], expected, rtol=1e-14)
-
-
-def test_indicators_are_written_only_if_known(tmp_path):
-    solution = stub(2)
-    assert "indicators" not in written(tmp_path, solution).cell_data
-    solution.estimated = True
-    np.testing.assert_array_equal(written(tmp_path, solution)["indicators"], solution.indicators)
-
-
-def test_quadrilaterals_are_refused(tmp_path):
-    solution = stub(1, mesh=MakeStructured2DMesh(quads=True, nx=2, ny=2))
-    with pytest.raises(ValueError, match="4 elements of the mesh are no triangles"):
-        write_solution(tmp_path / "a.vtu", solution)
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_contact_points_carry_their_values(tmp_path):
     solution = stub(2)
     assert write_solution(tmp_path / "a.b.vtu", solution) == tmp_path / "a.b.vtu"
@@ -228,18 +95,6 @@ def test_contact_points_carry_their_values(tmp_path):
     assert sorted(links.tolist()) == [[k, k + 1] for k in range(8)]
 
 
-@pytest.mark.parametrize("count", [0, 1])
-@pytest.mark.study(witness=["0"])
-def test_hardly_any_contact_points(tmp_path, count):
-    solution = stub(2)
-    for name in ("points", "gap", "pressure", "force", "active", "pair", "direction"):
-        setattr(solution, name, getattr(solution, name)[:count])
-    write_solution(tmp_path / "a.vtu", solution)
-    assert pyvista.read(tmp_path / "a_contact.vtp").n_points == count
-    plot_solution(solution, tmp_path / "a.png")
-    assert (tmp_path / "a.png").stat().st_size > 10_000
-
-
 def test_series_lists_levels_with_both_files(tmp_path):
     path = write_series(tmp_path / "run & more.pvd", (stub(p) for p in (1, 2)))
     reader = pyvista.PVDReader(path)
@@ -257,11 +112,6 @@ def test_series_lists_levels_with_both_files(tmp_path):
     assert contact.n_points == 9
 
 
-def test_series_of_loads_have_their_times(tmp_path):
-    path = write_series(tmp_path / "run.pvd", [stub(1), stub(1)], times=[0.1, np.float64(2.5e6)])
-    assert pyvista.PVDReader(path).time_values == [0.1, 2.5e6]
-
-
 @pytest.mark.parametrize(
     ("times", "error", "message"),
     [
@@ -277,15 +127,11 @@ def test_times_that_do_not_fit_are_refused(tmp_path, times, error, message):
         write_series(tmp_path / "run.pvd", [stub(1), stub(1)], times=times)
 
 
-def test_interrupted_series_lists_what_was_written(tmp_path):
-    def levels():
-        yield stub(1)
-        raise KeyboardInterrupt
-
-    with pytest.raises(KeyboardInterrupt):
-        write_series(tmp_path / "run.pvd", levels())
-    assert pyvista.PVDReader(tmp_path / "run.pvd").time_values == [0.0]
-    assert len(list(tmp_path.iterdir())) == 3
+def test_indicators_are_written_only_if_known(tmp_path):
+    solution = stub(2)
+    assert "indicators" not in written(tmp_path, solution).cell_data
+    solution.estimated = True
+    np.testing.assert_array_equal(written(tmp_path, solution)["indicators"], solution.indicators)
 
 
 def test_empty_series_is_refused(tmp_path):
@@ -294,53 +140,8 @@ def test_empty_series_is_refused(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_failure_leaves_old_files_and_no_others(tmp_path):
-    """Contact points are read when the file of the bodies is written under its other name."""
-    path = write_solution(tmp_path / "a.vtu", stub(1))
-    old = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
-    broken = stub(2)
-    del broken.pressure
-    with pytest.raises(AttributeError, match="pressure"):
-        write_solution(path, broken)
-    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == old
-
-
-def test_failing_rename_leaves_old_files_and_no_others(tmp_path, monkeypatch):
-    write_solution(tmp_path / "a.vtu", stub(1))
-    old = {file.name: file.read_bytes() for file in tmp_path.iterdir()}
-
-    def refuse(source, target):
-        raise OSError(errno.ENOSPC, "no space")
-
-    monkeypatch.setattr(os, "replace", refuse)
-    with pytest.raises(OSError, match="no space"):
-        write_solution(tmp_path / "a.vtu", stub(2))
-    with pytest.raises(OSError, match="no space"):
-        plot_solution(stub(1), tmp_path / "a.png")
-    assert {file.name: file.read_bytes() for file in tmp_path.iterdir()} == old
-
-
-def test_failure_of_vtk_is_an_error(tmp_path):
-    missing = tmp_path / "missing" / "draft.vtp"
-    with pytest.raises(OSError, match="VTK could not write"):
-        write_data(vtkXMLPolyDataWriter(), pyvista.PolyData(), missing)
-
-
-def test_a_full_disk_is_an_error_without_noise(capfd):
-    full = Path("/dev/full")
-    if not full.exists():
-        pytest.skip("this system has no /dev/full")
-    with pytest.raises(OSError, match=r"disk full\?"):
-        write_data(vtkXMLPolyDataWriter(), pyvista.Sphere(), full)
-    assert capfd.readouterr() == ("", "")
-    assert vtkObject.GetGlobalWarningDisplay() == 1
-
-
-@pytest.mark.parametrize(
-    ("write", "suffix"), [(write_solution, "vtu"), (write_series, "pvd"), (None, "png")]
-)
-def test_paths_are_checked_before_any_work(tmp_path, write, suffix):
-    path = tmp_path / "none" / f"a.{suffix}"
-    untouchable = object()  # has none of the attributes of a solution and cannot be iterated
-    with pytest.raises(FileNotFoundError):
-        plot_solution(untouchable, path) if write is None else write(path, untouchable)
+def test_quadrilaterals_are_refused(tmp_path):
+    solution = stub(1, mesh=MakeStructured2DMesh(quads=True, nx=2, ny=2))
+    with pytest.raises(ValueError, match="4 elements of the mesh are no triangles"):
+        write_solution(tmp_path / "a.vtu", solution)
+    assert list(tmp_path.iterdir()) == []

@@ -1,9 +1,6 @@
 """The public surface: names, signatures, import without side effects, everything tested."""
 
-from __future__ import annotations
-
 import ast
-import dataclasses
 import inspect
 import logging
 import subprocess
@@ -16,91 +13,19 @@ import ngcontact
 from ngcontact import geometries
 
 ROOT = Path(__file__).parents[2]
-PUBLIC = [
-    "Contact",
-    "ContactError",
-    "ContactWarning",
-    "ConvergenceError",
-    "Elastic",
-    "Hooke",
-    "NoEquilibriumError",
-    "Problem",
-    "Solution",
-    "adapt",
-    "load",
-    "plot_convergence",
-    "solve",
-    "solve_qp",
-    "write_film",
-    "write_series",
-]
-REQUIRED = inspect.Parameter.empty
+PUBLIC = """Contact ContactError ContactWarning ConvergenceError Elastic Hooke NoEquilibriumError
+Problem Solution adapt load plot_convergence solve solve_qp write_film write_series""".split()
 SIGNATURES = {
-    "Contact": {
-        "secondary": REQUIRED,
-        "primary": None,
-        "direction": None,
-        "gap": None,
-        "bilateral": False,
-        "rows": "auto",
-        "roles": "given",
-    },
-    "solve": {
-        "problem": REQUIRED,
-        "mesh": None,
-        "maxh": None,
-        "order": 1,
-        "element": "isoparametric",
-        "start": None,
-    },
-    "adapt": {
-        "problem": REQUIRED,
-        "maxh": None,
-        "order": None,  # the measured best, whichever it is
-        "element": "isoparametric",
-        "theta": 0.5,
-        "tolerance": None,
-        "max_dofs": 100_000,
-        "guaranteed": False,
-        "start": None,
-        "progress": False,
-    },
-    "solve_qp": {
-        "A": REQUIRED,
-        "f": REQUIRED,
-        "B": REQUIRED,
-        "g": REQUIRED,
-        "E": None,
-        "e": None,
-        "active": None,
-    },
-    "load": {"path": REQUIRED},
-    "write_series": {"path": REQUIRED, "solutions": REQUIRED, "times": None},
-    "write_film": {
-        "path": REQUIRED,
-        "solutions": REQUIRED,
-        "seconds": 0.6,
-        "titles": None,
-        "options": REQUIRED,
-    },
-    "plot_convergence": {"runs": REQUIRED, "path": None, "rates": None},
-}
-MEMBERS = {
-    *("problem", "mesh", "order", "element", "displacement", "stress", "work"),
-    *("points", "pair", "direction", "gap", "pressure", "force", "active", "steps"),
-    *("contact_force", "reactions", "transitions", "energy", "residuals"),
-    *("indicators", "error_estimate", "relative_error_estimate"),
-    *(
-        "error_bound",
-        "relative_error_bound",
-        "bound_parts",
-        "energy_bounds",
-        "equilibrated",
-        "quantities",
-        "contact_area",
-    ),
-    *("write", "plot", "draw"),
-    *("at", "along", "record", "save"),
+    "Contact": "(secondary, primary=None, direction=None, gap=None, bilateral=False, rows='auto', "
+    "roles='given')",
+    "solve": "(problem, mesh=None, *, maxh=None, order=1, element='isoparametric', start=None)",
+    "adapt": "(problem, *, maxh=None, order=4, element='isoparametric', theta=0.5, tolerance=None, "
+    "max_dofs=100000, guaranteed=False, start=None, progress=False)",
+    "solve_qp": "(A, f, B, g, E=None, e=None, active=None)",
+    "load": "(path)",
+    "write_series": "(path, solutions, times=None)",
+    "write_film": "(path, solutions, *, seconds=0.6, titles=None, **options)",
+    "plot_convergence": "(runs, path=None, *, rates=None)",
 }
 
 
@@ -119,71 +44,16 @@ def test_the_public_names_are_the_documented_ones():
     assert public - modules == set(PUBLIC)
 
 
-@pytest.mark.parametrize("name", PUBLIC)
-def test_public_names_explain_themselves(name):
-    documentation = inspect.getdoc(getattr(ngcontact, name))
-    assert documentation
-    assert documentation.splitlines()[0].endswith((".", ":"))
-
-
 @pytest.mark.parametrize("name", SIGNATURES)
 def test_signatures(name):
-    parameters = inspect.signature(getattr(ngcontact, name)).parameters
-    defaults = {key: parameter.default for key, parameter in parameters.items()}
-    expected = SIGNATURES[name]
-    assert list(defaults) == list(expected)
-    if name == "adapt":
-        assert defaults["order"] in (1, 2, 3, 4)
-        defaults["order"] = None
-    assert defaults == expected
-
-
-@pytest.mark.parametrize("name", ["solve", "adapt"])
-def test_options_are_given_by_name(name):
-    parameters = inspect.signature(getattr(ngcontact, name)).parameters
-    positional = [
-        key for key, p in parameters.items() if p.kind is inspect.Parameter.POSITIONAL_OR_KEYWORD
-    ]
-    assert positional == {"solve": ["problem", "mesh"], "adapt": ["problem"]}[name]
-    assert not any(
-        p.kind in (inspect.Parameter.VAR_KEYWORD, inspect.Parameter.VAR_POSITIONAL)
-        for p in parameters.values()
-    )
-
-
-def test_members_of_a_solution():
-    fields = {field.name for field in dataclasses.fields(ngcontact.Solution)}
-    assert set(dir(ngcontact.Solution)) | fields >= MEMBERS
-
-
-def test_data_are_frozen():
-    contact = ngcontact.Contact("left", "right")
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        contact.secondary = "other"
-    assert contact == contact
-    assert contact != ngcontact.Contact("left", "right")  # holds arrays: no equality by value
-
-
-def test_failures_have_one_base():
-    assert issubclass(ngcontact.ContactError, RuntimeError)
-    for error in (ngcontact.ConvergenceError, ngcontact.NoEquilibriumError):
-        assert issubclass(error, ngcontact.ContactError)
-    assert ngcontact.ConvergenceError("stopped", iterate=3).iterate == 3
-    driven = ngcontact.NoEquilibriumError("moves", body="upper", motion=(1, 0), work=2.0)
-    assert (driven.body, driven.motion, driven.work) == ("upper", (1, 0), 2.0)
-    assert str(driven) == "moves"
+    """Names, defaults, and which are given by name."""
+    signature = inspect.signature(getattr(ngcontact, name))
+    plain = [p.replace(annotation=p.empty) for p in signature.parameters.values()]
+    assert str(inspect.Signature(plain)) == SIGNATURES[name]
 
 
 def test_import_is_silent_and_light():
-    heavy = (
-        "scipy",
-        "pyvista",
-        "vtk",
-        "vtkmodules",
-        "matplotlib",
-        "IPython",
-        "webgui_jupyter_widgets",
-    )
+    heavy = "scipy pyvista vtk vtkmodules matplotlib IPython webgui_jupyter_widgets".split()
     out, err = run_python(
         f"import sys, ngcontact; print([name for name in {heavy} if name in sys.modules])"
     )

@@ -1,7 +1,5 @@
 """The package as others get it: what a wheel holds, one version, and which Python is taken."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """What the package warns of during a call."""
 
-from __future__ import annotations
-
 import warnings
 
 from ngcontact import ContactWarning

@@ -1,17 +1,13 @@
 """Bodies drawn apart: that what is said of their pressures is so, and nothing of right scenes."""
 
-from __future__ import annotations
-
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from netgen.occ import Axis, WorkPlane, Y, Z
+from netgen.occ import Axis, Z
 
-from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, adapt, solve
-from ngcontact.geometries import ball_in_socket, disc_on_disc, rings
+from ngcontact.geometries import disc_on_disc, rings
 from ngcontact.geometries.region import compound
 from ngcontact.plausibility.drawn import FAR, way_and_error
 from tests.plausibility.messages import only, quiet, told
@@ -59,15 +55,6 @@ def test_peaks_are_wrong_by_what_is_said(radii):
     assert wrong == pytest.approx(error, rel=0.1, abs=1e-3)
 
 
-@pytest.mark.parametrize(("unit", "turn"), [(1.0, 0.0), (1e3, 30.0), (1e-2, 180.0)])
-@pytest.mark.study(witness=["1000.0-30.0"])
-def test_discs_far_apart_are_told_once(unit, turn):
-    problem = discs(0.04, unit=unit, turn=turn)
-    assert only(
-        lambda: list(adapt(problem, order=2, tolerance=0.1)), APART, "about 0.04", "direction"
-    )
-
-
 @pytest.mark.parametrize(
     "problem",
     [
@@ -84,49 +71,6 @@ def test_bodies_whose_normals_are_right_are_silent(problem):
     assert quiet(lambda: list(adapt(problem, order=2, tolerance=0.1)))
 
 
-def pin(clearance, down, secondary="pin_surface", primary="hole"):
-    """Half of a pin of radius 1 under its weight in a block, drawn below the middle of its hole."""
-    right = WorkPlane().MoveTo(0, -9).Rectangle(9, 18).Face()
-    right.edges.name = "axis"
-    parts = {
-        "hole": WorkPlane().Circle(0, 0, 1 + clearance).Face(),
-        "pin_surface": WorkPlane().Circle(0, -down, 1.0).Face(),
-        "side": WorkPlane().MoveTo(-3, -3).Rectangle(6, 6).Face(),
-    }
-    for name, face in parts.items():
-        face.edges.name = name
-    parts["side"].edges.Max(Y).name = "top"
-    block, disc = (parts["side"] - parts["hole"]) * right, parts["pin_surface"] * right
-    block.faces.name, disc.faces.name = "block", "pin"
-    return Problem(
-        geometry=compound(block, disc),
-        materials={"block|pin": Elastic(E=1.0, nu=0.3)},
-        displacement={"top": (0, 0)},
-        sliding="axis",
-        force={"pin": (0, -2e-4 / math.pi)},
-        contact=[Contact(secondary, primary)],
-    )
-
-
-@pytest.mark.parametrize(
-    ("pair", "sign"), [(("pin_surface", "hole"), 1), (("hole", "pin_surface"), -1)]
-)
-@pytest.mark.study
-def test_pins_in_the_middle_are_wrong_by_half_their_clearance(pair, sign):
-    """Compared with the same pin drawn where it touches, of which nothing is said."""
-    *_, touching = adapt(pin(0.1, 0.1, *pair), order=3, tolerance=1e-2)
-    wrong, way, error = measured(pin(0.1, 0.0, *pair), lambda force: touching.pressure.max())
-    assert way == pytest.approx(0.1, rel=1e-6)
-    assert error == pytest.approx(0.05, rel=0.12)
-    assert wrong == pytest.approx(sign * error, rel=0.1)
-    assert quiet(lambda: list(adapt(pin(0.1, 0.1, *pair), order=2, tolerance=0.1)))
-
-
-def test_small_clearances_are_silent():
-    """Of 3 % of the radius, the peak wrong by 1.5 %."""
-    assert quiet(lambda: list(adapt(pin(0.03, 0.0), order=2, tolerance=0.1)))
-
-
 def pressed_ring(interference, gap=None):
     return Problem(
         geometry=rings(interference=interference, quarter=True),
@@ -137,12 +81,6 @@ def pressed_ring(interference, gap=None):
     )
 
 
-@pytest.mark.parametrize("interference", [0.05, -0.01, 0.0])
-def test_rings_that_fit_are_silent(interference):
-    """An overlap is borne by strains, a small clearance closes along the normals."""
-    assert quiet(lambda: solve(pressed_ring(interference), maxh=0.3, order=2))
-
-
 @pytest.mark.parametrize(
     ("interference", "gap"), [(-0.01, -0.01), (-0.01, -0.015), (0.01, 0.01), (0.01, 0.002)]
 )
@@ -151,33 +89,3 @@ def test_a_gap_of_the_other_sign_than_the_drawing_is_told(interference, gap):
     says, draws = sides if gap > 0 else sides[::-1]
     parts = (f"gap says that bodies are {abs(gap):.3g} {says}", f"0.01 {draws}")
     assert only(lambda: solve(pressed_ring(interference, gap), maxh=0.3, order=2), *parts)
-
-
-@pytest.mark.parametrize(
-    ("interference", "gap"),
-    [(-0.01, 0.01), (0.01, -0.02), (0.0, -0.01), (0.0, 0.01), (1e-3, 0.01), (-0.01, 0.0)],
-)
-def test_a_gap_that_the_drawing_does_not_contradict_is_silent(interference, gap):
-    assert quiet(lambda: solve(pressed_ring(interference, gap), maxh=0.3, order=2))
-
-
-def test_a_press_by_the_gap_is_silent():
-    """Beside the place that touches the drawing is apart where the gap is negative."""
-    problem = cases.pressed_disc()
-    pair = replace(problem.contact[0], gap=lambda x, y: x**2 / 2 - 0.02)
-    problem = replace(
-        problem, displacement={"block_bottom": (0, 0), "disc_top": (0, 0)}, contact=[pair]
-    )
-    assert CONTRADICTED not in str(told(lambda: solve(problem, maxh=0.2, order=2)))
-
-
-def test_a_ball_that_touches_its_socket_is_silent():
-    """However large the clearance: what matters is the way to the contact."""
-    problem = Problem(
-        geometry=ball_in_socket(clearance=0.3),
-        materials={"ball|socket": Elastic(E=1.0, nu=0.3)},
-        displacement={"socket_bottom": (0, 0), "ball_top": (None, -1e-2)},
-        contact=[Contact("ball_arc", "socket_arc")],
-        model="axisymmetric",
-    )
-    assert quiet(lambda: list(adapt(problem, order=2, tolerance=0.1)))

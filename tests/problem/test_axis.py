@@ -1,16 +1,9 @@
 """Bodies of revolution: what is refused about their axis, before any work."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-
-import ngsolve as ng
-import numpy as np
 import pytest
 
-from ngcontact import Contact, Elastic, Hooke, Problem, solve
+from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.geometries.region import body, compound, polygon
-from ngcontact.problem import on_axis
 
 SOFT = Elastic(E=1.0, nu=0.3)
 
@@ -30,13 +23,6 @@ def problem(**changes):
         model="axisymmetric",
         **data | changes,
     )
-
-
-def test_points_on_the_axis_in_all_units():
-    points = np.array([[0.0, 5.0], [1e-17, 0.0], [1e-3, 0.0], [1.0, 0.0]])
-    for size in (1e-9, 1.0, 1e9):
-        assert on_axis(size * points).tolist() == [True, True, False, False]
-    assert on_axis(np.zeros((0, 2))).shape == (0,)
 
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e6])
@@ -62,28 +48,3 @@ def test_points_on_the_axis_in_all_units():
 def test_what_is_refused(changes, message, size):
     with pytest.raises(ValueError, match=message):
         solve(problem(size=size, **changes), maxh=size / 2)
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"traction": {"side": (-1.0, 0)}},
-        {"traction": {"side": 1.0, "top": ng.CF((ng.x, -1))}},
-        {"force": {"body": ng.CF((ng.x, -1.0))}},
-        {"displacement": {"bottom": (0, 0), "axis": (0, None)}},
-        {"displacement": {"bottom": ng.CF((0.1 * ng.x, 0))}},
-        {"sliding": "axis|bottom", "displacement": {}},
-        {"left": 0.3, "traction": {"top": (1.0, 0)}, "force": {"body": (2.0, 0)}},
-        {"left": 0.3, "traction": {"axis": 1.0}},
-    ],
-)
-def test_what_is_solved(changes):
-    assert solve(problem(**changes), maxh=0.5, order=2).residuals["equilibrium"] < 1e-12
-
-
-def test_laws_have_four_components():
-    with pytest.raises(ValueError, match=r'materials "body".C has shape \(3, 3\): .*4x4'):
-        replace(problem(), materials={"body": Hooke(np.eye(3))})
-    with pytest.raises(ValueError, match=r'materials "body".C has shape \(4, 4\): .*3x3'):
-        replace(problem(), materials={"body": Hooke(np.eye(4))}, model="plane strain")
-    assert solve(replace(problem(), materials={"body": Hooke(np.eye(4))}), maxh=0.5)

@@ -1,7 +1,5 @@
 """Hooke's laws: values against the textbook compliances, refusals with value and remedy."""
 
-from __future__ import annotations
-
 import math
 
 import ngsolve as ng
@@ -9,7 +7,7 @@ import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
-from ngcontact.problem.material import MODEL_NAMES, VOIGT, Elastic, Hooke
+from ngcontact.problem.material import VOIGT, Elastic, Hooke
 
 # A few products and one inversion of numbers of size one: some units of round-off.
 ROUND_OFF = 1e-13
@@ -18,11 +16,6 @@ ROUND_OFF = 1e-13
 @pytest.fixture(scope="module")
 def mesh():
     return MakeStructured2DMesh(quads=False, nx=2, ny=2)
-
-
-@pytest.fixture(scope="module")
-def points(mesh):
-    return mesh.MapToAllElements(ng.IntegrationRule(ng.TRIG, 1), ng.VOL)
 
 
 def matrix_of(law, model, mesh, at=(0.3, 0.2)):
@@ -51,15 +44,6 @@ def test_isotropic_law_inverts_the_compliance(mesh, model, nu):
     assert np.abs(product - np.eye(3)).max() < ROUND_OFF / (1 - 2 * nu)
 
 
-@pytest.mark.parametrize("model", MODEL_NAMES)
-def test_coefficient_functions_give_the_numbers_at_each_point(mesh, model):
-    varying = Elastic(E=1 + ng.x, nu=ng.y / 2)
-    for x, y in [(0.3, 0.2), (0.7, 0.9)]:
-        expected = matrix_of(Elastic(1 + x, y / 2), model, mesh)
-        found = matrix_of(varying, model, mesh, at=(x, y))
-        assert np.abs(found - expected).max() < ROUND_OFF * np.abs(expected).max()
-
-
 def test_hooke_is_used_as_it_is(mesh):
     given = orthotropic()
     law = Hooke(given.tolist())
@@ -71,15 +55,6 @@ def test_hooke_is_used_as_it_is(mesh):
     assert np.abs(found - 1.5 * given).max() < ROUND_OFF * given.max()
 
 
-def transversely_isotropic():
-    """A law about an axis, (rr, zz, hoop, rz), with another stiffness along it."""
-    compliance = np.array(
-        [[1, -0.1, -0.3, 0], [-0.1, 0.25, -0.1, 0], [-0.3, -0.1, 1, 0], [0, 0, 0, 3.0]]
-    )
-    stiffness = np.linalg.inv(compliance)
-    return (stiffness + stiffness.T) / 2
-
-
 @pytest.mark.parametrize("nu", [-0.5, 0.0, 0.3, 0.4999])
 def test_isotropic_law_about_an_axis_inverts_the_compliance(mesh, nu):
     E = 7.0
@@ -89,59 +64,16 @@ def test_isotropic_law_about_an_axis_inverts_the_compliance(mesh, nu):
     assert np.abs(product - np.eye(4)).max() < ROUND_OFF / (1 - 2 * nu)
 
 
-def test_hooke_about_an_axis_is_used_as_it_is(mesh):
-    given = transversely_isotropic()
-    assert np.array_equal(matrix_of(Hooke(given), "axisymmetric", mesh), given)
-    varying = Hooke((1 + ng.x) * ng.CF(tuple(given.ravel()), dims=(4, 4)))
-    found = matrix_of(varying, "axisymmetric", mesh, at=(0.5, 0.5))
-    assert np.abs(found - 1.5 * given).max() < ROUND_OFF * given.max()
-
-
-def test_a_law_of_another_model_is_refused(mesh):
-    plane, axial = Hooke(orthotropic()), Hooke(transversely_isotropic())
-    with pytest.raises(
-        ValueError, match=r'shape \(3, 3\): .*"axisymmetric" needs a 4x4.*rr, zz, h'
-    ):
-        plane.voigt("axisymmetric")
-    with pytest.raises(
-        ValueError, match=r'shape \(4, 4\): .*"plane stress" needs a 3x3.*xx, yy, xy'
-    ):
-        axial.voigt("plane stress")
-
-
-@pytest.mark.parametrize("entry", [(0, 1), (2, 2), (3, 3), (0, 2)])
-def test_a_law_about_an_axis_must_be_definite(entry):
-    matrix = transversely_isotropic()
-    matrix[entry] = matrix[entry[::-1]] = 20.0 if entry[0] != entry[1] else -1e-3
-    with pytest.raises(ValueError, match="must be positive definite"):
-        Hooke(matrix)
-
-
-def test_hooke_keeps_a_copy():
-    given = orthotropic()
-    law = Hooke(given)
-    given[0, 0] = -1
-    assert law.C[0, 0] > 0
-    with pytest.raises(ValueError, match="read-only"):
-        law.C[0, 0] = -1
-
-
 @pytest.mark.parametrize(
     ("E", "nu", "error", "message"),
     [
         (-1, 0.3, ValueError, r"E = -1\.0: Young's modulus must be positive"),
-        (0, 0.3, ValueError, r"E = 0\.0: Young's modulus must be positive"),
-        (math.inf, 0.3, ValueError, r"E = inf: give a finite number"),
         (math.nan, 0.3, ValueError, r"E = nan: give a finite number"),
         ("210e9", 0.3, TypeError, r"E = '210e9': give a real number"),
-        (True, 0.3, TypeError, r"E = True: give a real number"),
-        (1 + 1j, 0.3, TypeError, r"E = \(1\+1j\): give a real number"),
         (ng.CF((1, 2)), 0.3, ValueError, r"E is a CoefficientFunction of dim 2: give a scalar"),
         (ng.CF(1j), 0.3, TypeError, r"E is a complex CoefficientFunction: it must be real"),
         (1, 0.5, ValueError, r"nu = 0\.5: Poisson's ratio must lie in -1 < nu < 1/2"),
         (1, -1, ValueError, r"nu = -1\.0: Poisson's ratio must lie in -1 < nu < 1/2"),
-        (1, math.nan, ValueError, r"nu = nan: give a finite number"),
-        (1, None, TypeError, r"nu = None: give a real number"),
     ],
 )
 def test_elastic_refuses(E, nu, error, message):
@@ -153,19 +85,13 @@ def test_elastic_refuses(E, nu, error, message):
     ("data", "error", "message"),
     [
         (np.eye(2), ValueError, r"shape \(2, 2\): a Voigt matrix has \(3, 3\)"),
-        ([1, 2, 3], ValueError, r"shape \(3,\): a Voigt matrix has \(3, 3\)"),
         ([[1, 0], [0]], TypeError, r"C = .*: give a 3x3 matrix .* of real numbers"),
-        (None, TypeError, r"C = None: give a 3x3 matrix .* of real numbers"),
         (1j * np.eye(3), TypeError, r"give a 3x3 matrix .* of real numbers"),
         (np.diag([1, math.nan, 1]), ValueError, r"nan.*must be finite"),
         ([[2, 0, 0], [1e-9, 2, 0], [0, 0, 1]], ValueError, r"1e-09.*must be symmetric"),
         ([[1, 2, 0], [2, 1, 0], [0, 0, 1]], ValueError, r"2\.0.*must be positive definite"),
         (np.ones((3, 3)), ValueError, r"1\.0.*must be positive definite"),
-        (np.zeros((3, 3)), ValueError, r"0\.0.*must be positive definite"),
-        (np.diag([-1, 1, 1]), ValueError, r"-1\.0.*must be positive definite"),
-        (np.diag([1, -1, 1]), ValueError, r"-1\.0.*must be positive definite"),
         (np.diag([1, 1, -1]), ValueError, r"-1\.0.*must be positive definite"),
-        (-np.eye(3), ValueError, r"-1\.0.*must be positive definite"),
         (ng.CF((1, 2, 3)), ValueError, r"dims \(3,\): a Voigt matrix has \(3, 3\)"),
         (ng.CF((1j,) * 9, dims=(3, 3)), TypeError, r"complex.*must be real"),
     ],
@@ -173,68 +99,6 @@ def test_elastic_refuses(E, nu, error, message):
 def test_hooke_refuses(data, error, message):
     with pytest.raises(error, match=message):
         Hooke(data)
-
-
-def test_hooke_refuses_what_is_singular_up_to_round_off():
-    # Of rank 2 in exact arithmetic; the last pivot computed is round-off of either sign.
-    for factor in np.random.default_rng(1).normal(size=(100, 3, 2)):
-        with pytest.raises(ValueError, match="must be positive definite"):
-            Hooke(factor @ factor.T)
-
-
-@pytest.mark.parametrize("unit", [1e-300, 1e-9, 1e9, 1e290])
-def test_hooke_judges_alike_in_all_units(mesh, unit):
-    nearly_incompressible = matrix_of(Elastic(1, 0.5 - 1e-10), "plane strain", mesh)
-    assert Hooke(unit * nearly_incompressible).C[2, 2] > 0
-    with pytest.raises(ValueError, match="positive definite"):
-        Hooke(unit * np.array([[1, 1, 0], [1, 1, 0], [0, 0, 1]]))
-
-
-@pytest.mark.parametrize(
-    ("model", "error", "message"),
-    [
-        ("axial", ValueError, r'"axial" is unknown: .*"?plane strain'),
-        ("plane", ValueError, r'"plane" is unknown: choose one of .*plane strain.*plane stress'),
-        (2, TypeError, r"model = 2: give one of the strings .*plane strain"),
-    ],
-)
-@pytest.mark.parametrize("law", [Elastic(1, 0.3), Hooke(np.eye(3))])
-def test_laws_refuse_models(law, model, error, message):
-    with pytest.raises(error, match=message):
-        law.voigt(model)
-
-
-# The centroids of the structured mesh have x and y between 1/6 and 5/6.
-@pytest.mark.parametrize(
-    ("law", "message"),
-    [
-        (Elastic(ng.x - 0.5, 0.3), r"body\.E = -0\.\d+ at \(.*\): Young's modulus must be pos"),
-        (Elastic(1 / (ng.x - ng.x), 0.3), r"body\.E = (inf|nan) at \(.*\): Young's modulus"),
-        (Elastic(1, ng.sqrt(ng.x - 2)), r"body\.nu = -?nan at \(.*\): Poisson's ratio must lie"),
-        (Elastic(1, ng.x), r"body\.nu = 0\.\d+ at \(.*\): Poisson's ratio must lie in -1 < nu"),
-        (
-            Hooke(ng.CF((1, 2 * ng.x, 0, 2 * ng.x, 1, 0, 0, 0, 1), dims=(3, 3))),
-            r"body\.C = \[\[1\.0, 1\..* at \(.*\): .*positive definite",
-        ),
-        (
-            Hooke(ng.CF((1, ng.x, 0, 0, 1, 0, 0, 0, 1), dims=(3, 3))),
-            r"body\.C = .* at \(.*\): .*symmetric",
-        ),
-        (
-            Hooke(ng.CF((ng.sqrt(ng.x - 2), 0, 0, 0, 1, 0, 0, 0, 1), dims=(3, 3))),
-            r"body\.C = \[\[-?nan.* at \(.*\): .*finite",
-        ),
-    ],
-)
-def test_check_at_refuses(points, law, message):
-    with pytest.raises(ValueError, match=message):
-        law.check_at(points, "body")
-
-
-def test_check_at_accepts(points):
-    good = Elastic(1 + ng.x, ng.y / 3)
-    for law in (Elastic(1, 0.3), good, Hooke(np.eye(3)), Hooke(good.voigt("plane stress"))):
-        assert law.check_at(points, "body") is None
 
 
 @pytest.mark.parametrize("model", PLANE)

@@ -1,10 +1,6 @@
 """The problem as data: what is kept, and every refusal with its value and its remedy."""
 
-from __future__ import annotations
-
-import copy
 import math
-import pickle
 
 import netgen.meshing
 import ngsolve as ng
@@ -13,8 +9,6 @@ import pytest
 from netgen.occ import Box, Compound, Glue, OCCGeometry, Pnt, WorkPlane, X, Y
 from ngsolve.meshes import MakeStructured2DMesh
 
-from ngcontact.errors import ContactError, ConvergenceError, NoEquilibriumError
-from ngcontact.geometries import blocks
 from ngcontact.problem.contact import Contact
 from ngcontact.problem.material import Elastic, Hooke
 from ngcontact.problem.problem import Problem
@@ -65,9 +59,6 @@ def make(geometry):
     return build
 
 
-# --- what is kept ---------------------------------------------------------------------------
-
-
 def test_contact_normalises():
     pair = Contact("a", "b", direction=(3, -4), gap=2)
     assert pair.direction == pytest.approx((0.6, -0.8), rel=1e-15)
@@ -100,29 +91,10 @@ def test_problem_normalises(make, mesh):
     }
     assert values == {"bottom": (0, None), "left": (0.25, 2), "top": (None, 3)}
     assert problem.sliding == "right|axis"
-    assert {name: load.dim for name, load in problem.traction.items()} == {
-        "a": 1, "b": 2, "c": 2, "d": 1,
-    }  # fmt: skip
+    assert [load.dim for load in problem.traction.values()] == [1, 2, 2, 1]
     assert problem.traction["b"](at) == (1, 0.5)
     assert problem.force["block"](at) == (0, -9.81)
     assert problem.contact == (TOUCH,)
-
-
-def test_problem_defaults(geometry, mesh):
-    problem = Problem(geometry, {"block": STEEL}, displacement=None, sliding=[])
-    assert (problem.displacement, problem.traction, problem.force) == ({}, {}, {})
-    assert (problem.sliding, problem.contact, problem.model) == (None, (), "plane strain")
-    assert Problem(mesh, {"block": STEEL}).geometry is mesh
-    with pytest.raises(AttributeError, match="cannot assign"):
-        problem.model = "plane stress"
-
-
-def test_vector_data_are_kept_as_given(make, mesh):
-    field = ng.GridFunction(ng.VectorH1(mesh))
-    problem = make(traction={"top": field}, force={"block": field})
-    assert problem.traction["top"] is field
-    assert problem.force["block"] is field
-    problem.check(mesh)
 
 
 def test_pressure_pushes_against_the_outward_normal(make, mesh):
@@ -161,36 +133,17 @@ def test_bodies_are_the_connected_pieces(mesh):
     assert len(np.unique(body_of_vertex(glued))) == 1
 
 
-def test_errors_carry_their_data_and_survive_pickling():
-    missed = ConvergenceError("no luck", iterate=[1, 2])
-    adrift = NoEquilibriumError("adrift", body="punch", motion=(1, 0, 0), work=2.5)
-    for error in (missed, adrift):
-        assert isinstance(error, ContactError)
-        copy = pickle.loads(pickle.dumps(error))
-        assert (type(copy), str(copy), vars(copy)) == (type(error), str(error), vars(error))
-    assert missed.iterate == [1, 2]
-    assert (adrift.body, adrift.motion, adrift.work) == ("punch", (1, 0, 0), 2.5)
-
-
-# --- refused at construction ----------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("arguments", "error", "message"),
     [
         ({"secondary": 3}, TypeError, "secondary = 3: give a region name"),
-        ({"secondary": ""}, ValueError, 'secondary = "": give a region name'),
         ({"primary": ["b"]}, TypeError, r"primary = \['b'\]: give a region name"),
         ({"primary": None}, ValueError, '"a" has primary=None and gap=None: .* needs gap'),
         ({"direction": (0, 0)}, ValueError, r"direction = \(0\.0, 0\.0\): give a vector from"),
-        ({"direction": (0, math.inf)}, ValueError, "direction = inf: give a finite number"),
         ({"direction": (1, 0, 0)}, ValueError, "has length 3: give a pair"),
-        ({"direction": "down"}, TypeError, "direction = 'down': give a pair"),
         ({"direction": (ng.x, 1)}, TypeError, r"direction = \(.*: give a pair of numbers"),
-        ({"direction": ng.CF((0, 1))}, TypeError, "direction = .*: give a pair of numbers"),
         ({"gap": math.nan}, ValueError, "gap = nan: give a finite number"),
         ({"gap": ng.CF((1, 2))}, ValueError, "gap is a CoefficientFunction of dim 2: give a sca"),
-        ({"gap": "0"}, TypeError, "gap = '0': give a real number"),
         ({"bilateral": 1}, TypeError, "bilateral = 1: give True or False"),
         ({"friction": 0.2}, TypeError, r"frictionless, .* no friction=0\.2.*topics/limits\.md"),
     ],
@@ -205,29 +158,20 @@ def test_contact_refuses(arguments, error, message):
     [
         ({"geometry": "disc"}, TypeError, "geometry is a str: give an OCCGeometry or ngsolve.Mesh"),
         ({"materials": {}}, ValueError, "materials = {}: give every body an Elastic or a Hooke"),
-        ({"materials": STEEL}, TypeError, "materials = Elastic.*: give a dict"),
         ({"materials": {"block": 210e9}}, TypeError, 'materials "block" = 2.*: give an Elastic'),
-        ({"materials": {1: STEEL}}, TypeError, "a name in materials = 1: give a region name"),
-        ({"displacement": {"": (0, 0)}}, ValueError, 'a name in displacement = "": give a reg'),
         ({"displacement": {"top": 0}}, TypeError, 'displacement "top" = 0: give a pair'),
         ({"displacement": {"top": (0, 0, 0)}}, ValueError, r"\(0, 0, 0\) has length 3: give a"),
         ({"displacement": {"top": ng.x}}, ValueError, r'"top" is .* dims \(\): give a 2-vector'),
         ({"displacement": {"top": (0, math.nan)}}, ValueError, '"top" = nan: give a finite'),
-        ({"displacement": {"top": (0, "up")}}, TypeError, "\"top\" = 'up': give a real number"),
         ({"displacement": {"top": (None, None)}}, ValueError, "None, None.*: leave the boundary"),
-        ({"sliding": 1}, TypeError, "sliding = 1: give a region name or a sequence"),
         ({"sliding": ["left", 1]}, TypeError, "an entry of sliding = 1: give a region name"),
-        ({"traction": {"top": math.inf}}, ValueError, 'traction "top" = inf: give a finite'),
         ({"traction": {"top": (1, None)}}, TypeError, 'traction "top" = None: give a real'),
-        ({"traction": {"top": "1"}}, TypeError, "traction \"top\" = '1': give a real number"),
         ({"traction": {"top": ng.CF((1, 2, 3))}}, ValueError, r"dims \(3,\): give a 2-vector"),
         ({"traction": {"top": ng.CF((1j, 2))}}, TypeError, '"top" is a complex .*: it must be r'),
         ({"force": {"block": -9.81}}, TypeError, 'force "block" = -9.81: give a pair'),
         ({"force": [("block", (0, 1))]}, TypeError, r"force = \[.*: give a dict"),
-        ({"contact": TOUCH}, TypeError, r"contact = Contact.*: give a list of Contact"),
         ({"contact": [TOUCH, ("a", "b")]}, TypeError, r"contact\[1\] = \('a', 'b'\): give a Con"),
         ({"model": "3d"}, ValueError, 'model "3d" is unknown: choose one of .*plane stress'),
-        ({"model": "axial"}, ValueError, '"axial" is unknown: choose one of .*axisymmetric'),
     ],
 )
 def test_problem_refuses(make, changes, error, message):
@@ -235,150 +179,50 @@ def test_problem_refuses(make, changes, error, message):
         make(**changes)
 
 
-# --- refused at the mesh --------------------------------------------------------------------
-
 OBSTACLE = {"secondary": "punch_bottom", "direction": (0, -1)}
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {},
-        {"displacement": {"bottom": (0, 0), "top": (0, -1)}, "sliding": "left"},
-        {"displacement": {"bottom": (0, 0), "top": (None, -1)}, "traction": {"top": (1, 0)}},
-        {"materials": {".*": Elastic(1 + ng.x, ng.y / 5)}, "force": {"block|punch": (0, -1)}},
-        {"traction": {"left|right": ng.x, "top": ng.specialcf.normal(2)}},
-        {"traction": {"top": 1 / ng.sqrt(ng.x)}},  # integrable, though infinite at the corner
-        {"contact": [Contact(gap=lambda x, y: x + y, **OBSTACLE)]},
-        {"contact": [Contact(gap=ng.x, **OBSTACLE)]},
-        {"contact": [Contact("punch_bottom", gap=0), Contact("block_top", gap=0)]},
-    ],
-)
-def test_check_accepts(make, mesh, changes):
-    before = np.array(mesh.ngmesh.Coordinates())
-    assert make(**changes).check(mesh) is None
-    assert np.array_equal(before, mesh.ngmesh.Coordinates())
 
 
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        # names
         ({"materials": {"blok": STEEL}}, r'materials "blok" .*mean "block"\? .*\[\'block\', \'pun'),
         ({"force": {"bottom": (0, 1)}}, r'force "bottom" selects no region; .*\[\'block\', \'pun'),
-        ({"displacement": {"botom": (0, 0)}}, 'displacement "botom" .*did you mean "bottom"'),
-        ({"traction": {"Top": 1}}, 'traction "Top" selects no region; did you mean "top"'),
         ({"traction": {"left|rigth": 1}}, 'traction "rigth" .*did you mean "right"'),
-        ({"sliding": ["left", "rigth"]}, 'sliding "rigth" .*did you mean "right"'),
         ({"sliding": "(a|b)x"}, r'sliding "\(a\|b\)x" selects no region; there are \[\'block_top'),
         ({"sliding": "left("}, r'"left\(" is no name and no regular expression'),
-        (
-            {"contact": [TOUCH, Contact("xyz", gap=0)]},
-            r'contact\[1\].secondary "xyz" sel.*there ar',
-        ),
+        ({"contact": [TOUCH, Contact("xyz", gap=0)]}, r'contact\[1\].secondary "xyz" sel.*there a'),
         ({"contact": [Contact("top", "blocktop")]}, r'\[0\].primary "blocktop" .*mean "block_top"'),
-        # bodies
-        (
-            {"materials": {"block": STEEL}},
-            r'body "punch" has no material: add materials\["punch"\]',
-        ),
-        (
-            {"materials": {"block": STEEL, ".*": STEEL}},
-            r'"block" is both in .*"block" and in .*"\.',
-        ),
-        (
-            {"force": {"block": (0, 1), "b.*": (0, 1)}},
-            r'"block" is both in force .* every region o',
-        ),
-        # two conditions on one boundary
-        (
-            {"displacement": {"left": (0, 0), "left|top": (0, 1)}},
-            '"left" is both in .* region once',
-        ),
-        ({"traction": {"top": 1, "t.*": 2}}, '"top" is both in traction .* every region once'),
+        ({"materials": {"block": STEEL}}, r'body "punch" has no material: add materials'),
+        ({"materials": {"block": STEEL, ".*": STEEL}}, r'"block" is both in .*"block" and in .*"'),
+        ({"force": {"block": (0, 1), "b.*": (0, 1)}}, r'"block" is both in force .* every region '),
+        ({"displacement": {"left": (0, 0), "left|top": (0, 1)}}, '"left" is both in .* region onc'),
         ({"sliding": "bottom"}, '"bottom" is both in sliding .* in displacement .*: keep one'),
-        ({"sliding": "left", "traction": {"left": 1}}, '"left" is both in traction .*: keep one'),
         ({"traction": {"bottom": 1}}, '"bottom" is both in traction .* or leave a component free'),
         ({"sliding": "block_top"}, r'"block_top" is both in contact\[0\].primary .* takes no oth'),
         ({"traction": {"punch_bottom": 1}}, r'"punch_bottom" .*contact\[0\].secondary .* takes no'),
         ({"displacement": {"block_top": (None, 0)}}, '"block_top" .*displacement .* takes no oth'),
-        # pairs
         ({"contact": [Contact(".*top", "block_top")]}, '"block_top" is both in .*: name two diff'),
         ({"contact": [Contact("punch_bottom", "top")]}, '"top" lie on the same body: .*Compound'),
-        ({"contact": [Contact("left", "block_top")]}, '"block_top" lie on the same body'),
-        # values
         ({"materials": {".*": Elastic(ng.x - 1, 0.3)}}, r'".\*"\.E = -0\..* at \(.*\): Young.*pos'),
         ({"materials": {".*": Elastic(1, ng.y)}}, r'".\*"\.nu = .* at \(.*\): Poisson.*must lie'),
         (
             {"materials": {".*": Hooke(ng.x * ng.CF((1, 2, 0, 2, 1, 0, 0, 0, 1), dims=(3, 3)))}},
             r'".\*"\.C = .* at \(.*\): .*positive definite',
         ),
-        (
-            {"force": {"punch": (0, NAN)}},
-            r'force "punch" = \[0\.0, -?nan\] at \(.*, 1\..*must be fi',
-        ),
+        ({"force": {"punch": (0, NAN)}}, r'force "punch" = \[0\.0, -?nan\] at \(.*, 1\..*must be '),
         ({"traction": {"top": NAN}}, r'traction "top" = \[-?nan\] at \(.*, 2\): must be finite'),
-        (
-            {"displacement": {"bottom": (0, 1 / ng.x)}},
-            r'"bottom" = \[.*inf\] at \(0, 0\): must be f',
-        ),
-        ({"displacement": {"top": (NAN, None)}}, r'"top" = \[-?nan\] at \(.*, 2\): must be finite'),
-        (
-            {"contact": [Contact(gap=1 / ng.x, **OBSTACLE)]},
-            r'contact\[0\]\.gap of "punch_bottom" = \[.*inf\] at \(0, 1\): must be f',
-        ),
+        ({"displacement": {"bottom": (0, 1 / ng.x)}}, r'"bottom" = \[.*inf\] at \(0, 0\): must be'),
+        ({"contact": [Contact(gap=1 / ng.x, **OBSTACLE)]}, r'contact\[0\]\.gap of "punch_bottom" '),
         (
             {"contact": [TOUCH, Contact(gap=lambda x, y: x + np.nan, **OBSTACLE)]},
             r"contact\[1\]\.gap of .* = nan at \(.*, 1\): must be finite",
         ),
-        (
-            {"contact": [Contact(gap=lambda x, y: 1.0, **OBSTACLE)]},
-            r"gap of .* returns shape \(\) for x and y of shape \(12,\): return one value per",
-        ),
+        ({"contact": [Contact(gap=lambda x, y: 1.0, **OBSTACLE)]}, r"gap of .* returns shape \(\)"),
     ],
 )
 def test_check_refuses(make, mesh, changes, message):
     with pytest.raises(ValueError, match=message):
         make(**changes).check(mesh)
-
-
-def test_check_refuses_a_gap_without_numbers(make, mesh):
-    words = Contact("punch_bottom", gap=lambda x, y: np.full(x.shape, "a"))
-    with pytest.raises(TypeError, match=r"contact\[0\]\.gap of .* returns .*<U1: return real"):
-        make(contact=[words]).check(mesh)
-
-
-def test_data_are_checked_only_where_they_act(make, mesh):
-    sound_above = ng.sqrt(ng.y - 1)  # not a number on the block
-    make(force={"punch": (0, sound_above)}, traction={"top": sound_above}).check(mesh)
-    with pytest.raises(ValueError, match=r'force "block" = .*nan'):
-        make(force={"block": (0, sound_above)}).check(mesh)
-
-
-def test_parameters_are_read_at_each_check(make, mesh):
-    load = ng.Parameter(1.0)
-    problem = make(traction={"top": load})
-    problem.check(mesh)
-    load.Set(math.nan)
-    with pytest.raises(ValueError, match=r'traction "top" = .*nan'):
-        problem.check(mesh)
-
-
-def test_contact_inside_a_glued_body(make):
-    glued = ng.Mesh(OCCGeometry(Glue(shapes()), dim=2).GenerateMesh(maxh=1))
-    (interface,) = {"block_top", "punch_bottom"} & set(glued.GetBoundaries())
-    inside = make(contact=[Contact(interface, gap=0)])
-    with pytest.raises(ValueError, match=f'"{interface}" .* inside one body; .*Compound, not Glue'):
-        inside.check(glued)
-    with pytest.raises(ValueError, match=r'"top" lie on the same body: .*Compound, not Glue'):
-        make(contact=[Contact("bottom", "top")], displacement={}).check(glued)
-
-
-def test_body_without_a_name(make, mesh):
-    unnamed = ng.Mesh(mesh.ngmesh.Copy())
-    unnamed.ngmesh.SetMaterial(2, "")
-    with pytest.raises(ValueError, match='material region 1 has the name "": give every face'):
-        make(materials={".*": STEEL}).check(ng.Mesh(unnamed.ngmesh))
 
 
 def empty():
@@ -405,57 +249,3 @@ def quadrilaterals():
 def test_check_refuses_the_mesh(make, bad, error, message):
     with pytest.raises(error, match=message):
         make().check(bad())
-
-
-@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
-def test_triangles_are_judged_alike_in_all_units(unit):
-    mesh = MakeStructured2DMesh(quads=False, nx=1, ny=1)
-    problem = Problem(mesh, {"dom": STEEL}, {"bottom": (0, 0)})
-    points = mesh.ngmesh.Coordinates()
-    points *= unit
-    nodes = mesh.ngmesh.Elements2D().NumPy()["nodes"] - 1
-    lonely = int(np.flatnonzero(np.bincount(nodes.ravel()) == 1)[0])
-    corner, middle = np.array(points[lonely]), points.mean(axis=0)
-    # Squeezed to angles of 1e-6 the triangle is poor but valid; flat or mirrored it is not.
-    for height in (1.0, 1e-6):
-        points[lonely] = middle + height * (corner - middle)
-        problem.check(mesh)
-    for height, area in [(0.0, r"-?\d"), (-0.5, "-"), (math.nan, "nan")]:
-        points[lonely] = middle + height * (corner - middle)
-        with pytest.raises(ValueError, match=f"1 inverted .* area {area}.* must be positive"):
-            problem.check(mesh)
-
-
-@pytest.mark.parametrize("argument", ["materials", "displacement", "traction", "force"])
-def test_data_cannot_be_changed_in_place(argument):
-    problem = two_blocks_loaded()
-    data = getattr(problem, argument)
-    name = next(iter(data))
-    before = dict(data)
-    changes = [
-        lambda: data.__setitem__(name, 10.0),
-        lambda: data.__delitem__(name),
-        lambda: data.update({name: 10.0}),
-        lambda: data.pop(name),
-        lambda: data.popitem(),
-        lambda: data.clear(),
-        lambda: data.setdefault("other", 1.0),
-        lambda: data.__ior__({name: 1.0}),
-    ]
-    for change in changes:
-        with pytest.raises(TypeError, match=rf"problem\.{argument}.*dataclasses\.replace\("):
-            change()
-    assert dict(data) == before
-    assert type(data | {}) is dict  # and what is made of it is the caller's
-    assert copy.deepcopy(data).keys() == before.keys()
-
-
-def two_blocks_loaded():
-    law = Elastic(1.0, 0.3)
-    return Problem(
-        geometry=blocks(),
-        materials={"upper": law, "lower": law},
-        displacement={"bottom": (0, 0)},
-        traction={"top": 1.0},
-        force={"upper": (0, -1)},
-    )

@@ -1,16 +1,11 @@
 """NGSolve's mesh as arrays: against NGSolve's own elements."""
 
-from __future__ import annotations
-
 import ngsolve as ng
 import numpy as np
 import pytest
-from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.geometries import disc_on_block
-from ngcontact.problem import Triangulation, bisect, move_vertices, triangle_sides
-
-ROUND_OFF = 1e-14  # of coordinates and areas of size 1
+from ngcontact.problem import Triangulation, bisect
 
 
 @pytest.fixture(params=[1, 3], ids=["straight", "curved"])
@@ -33,36 +28,6 @@ def test_numbers_are_those_of_ngsolve(mesh):
     assert view.others() == 0
 
 
-def test_layouts_of_netgen_are_told_apart(mesh):
-    """Records of quadrilaterals are longer than those of triangles."""
-    quadrilaterals = MakeStructured2DMesh(quads=True, nx=2, ny=2)
-    for one in (mesh, quadrilaterals, mesh):
-        expected = one.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
-        np.testing.assert_array_equal(Triangulation(one).triangles, expected)
-
-
-def test_triangles_run_anticlockwise(mesh):
-    a, b, c = np.moveaxis(Triangulation(mesh).corners, 1, 0)
-    area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
-    assert (area > 0).all()
-
-
-def test_every_inner_side_belongs_to_two_triangles(mesh):
-    sides = np.sort(triangle_sides(Triangulation(mesh).triangles), axis=1)
-    _, count = np.unique(sides, axis=0, return_counts=True)
-    assert (len(count), (count == 1).sum()) == (mesh.nedge, len(Triangulation(mesh).segments))
-
-
-def test_a_view_is_a_copy(mesh):
-    """It outlives its mesh and does not follow it."""
-    before = Triangulation(mesh).vertices
-    view = Triangulation(ng.Mesh(mesh.ngmesh.Copy()))
-    assert np.array_equal(view.vertices, before)
-    move_vertices(mesh, before + 1.0)
-    assert np.array_equal(Triangulation(mesh).vertices, before + 1.0)
-    assert np.array_equal(view.vertices, before)
-
-
 def test_only_marked_elements_are_bisected(mesh):
     """Apart from the closure: far from them nothing changes, nor do earlier marks count."""
     marked = np.zeros(mesh.ne, dtype=bool)
@@ -73,7 +38,3 @@ def test_only_marked_elements_are_bisected(mesh):
     assert 0 < once < old / 2
     bisect(mesh, np.zeros(mesh.ne, dtype=bool))
     assert mesh.ne == old + once
-
-
-def test_quadrilaterals_are_counted():
-    assert Triangulation(MakeStructured2DMesh(quads=True, nx=2, ny=3)).others() == 6

@@ -1,7 +1,5 @@
 """Quadratic programs and factorisations that several tests use."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.sparse as sp
 

@@ -1,6 +1,6 @@
-"""The primal-dual active set method: what safeguards end, and what it cannot solve."""
+"""The primal-dual active set method: what ends it, rigid motions, residuals."""
 
-from __future__ import annotations
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ import scipy.sparse as sp
 from drivers.stress.trials.algebra import CYCLES, dual
 from ngcontact.errors import ConvergenceError
 from ngcontact.qp.active_set import minimise
-from ngcontact.qp.quadratic_program import QuadraticProgram
+from ngcontact.qp.quadratic_program import kkt_residuals, pinned_null_space
 from ngcontact.qp.schur_complement import bordered_systems
 from tests.qp.programs import counting_factor, first_unknowns_bounded, inequalities, membrane
 
@@ -26,33 +26,6 @@ def test_plain_method_cycles():
     np.testing.assert_allclose(result.force, force, atol=1e-12)  # condition below 100
 
 
-def test_given_values_and_equalities_with_unit_rows():
-    K, b, g = membrane(n=9)
-    n = g.size
-    rows = np.array([3, 6])
-    R = sp.eye_array(n, format="csr")[rows]
-    fixed, values = np.zeros(n, dtype=bool), np.zeros(n)
-    fixed[0], values[0] = True, 0.01
-    program = QuadraticProgram(
-        K=K,
-        b=b,
-        R=R,
-        g=np.array([0.05, 1.0]),
-        equality=np.array([True, False]),
-        fixed=fixed,
-        values=values,
-        unknown=rows,
-    )
-    result = minimise(bordered_systems(program, counting_factor(K, [])))
-    assert result.u[0] == 0.01
-    assert result.u[3] == 0.05
-    assert result.active.tolist() == [True, False]
-    assert result.force[0] < 0  # pulled up to the bound: an equality may pull
-    free = np.ones(n, dtype=bool)
-    free[[0, 3]] = False
-    assert np.abs((b - K @ result.u)[free]).max() < 1e-13 * abs(K).max()
-
-
 def test_a_singular_system_is_said():
     """Two springs of which nothing holds the second: never a number."""
     K = sp.csr_array(np.diag([1.0, 0.0]))
@@ -63,11 +36,59 @@ def test_a_singular_system_is_said():
     assert failure.value.iterate.steps == []
 
 
-def test_steps_are_the_changes_of_the_active_set():
+def test_residuals_name_what_is_violated():
     K, b, g = membrane()
     program = first_unknowns_bounded(K, -b, g)
     result = minimise(bordered_systems(program, counting_factor(K, [])))
-    assert result.steps[-1] == 0
-    assert sum(result.steps) >= np.count_nonzero(result.active)
-    again = minimise(bordered_systems(program, counting_factor(K, [])), result.active)
-    assert again.steps == [0]
+    assert max(kkt_residuals(program, result).values()) < 1e-13  # round-off
+    contact, apart = np.flatnonzero(result.active)[0], np.flatnonzero(~result.active)[0]
+    length, largest = np.abs(result.u).max(), result.force.max()
+    u, force = result.u.copy(), result.force.copy()
+    u[contact] += 0.1 * length
+    force[apart] -= 0.2 * largest
+    wrong = kkt_residuals(program, replace(result, u=u, force=force))
+    assert wrong["penetration"] == pytest.approx(0.1 / 1.1, rel=1e-9)
+    assert wrong["tension"] == pytest.approx(0.2, rel=1e-12)
+    assert min(wrong["equilibrium"], wrong["complementarity"]) > 1e-3
+
+
+SPRINGS = 6
+
+
+def chain(load, g):
+    """Springs in a row that nothing holds but bounds at their first two joints."""
+    n = SPRINGS + 1
+    D = np.diff(np.eye(n), axis=0)
+    fixed = np.zeros(n, dtype=bool)
+    rows = np.arange(len(g))
+    null_space = pinned_null_space(np.ones((n, 1)), np.zeros((1, 0)), np.zeros((0, n)), rows, fixed)
+    return first_unknowns_bounded(sp.csr_array(D.T @ D), load, np.array(g), null_space)
+
+
+@pytest.mark.parametrize("start", [False, True])
+def test_contact_alone_holds_a_chain(start):
+    """Pushed at its far end it moves until the first joint meets its bound: no spring is left."""
+    load = np.zeros(SPRINGS + 1)
+    load[-1] = 1.0
+    program = chain(load, [0.3, 5.0])
+    assert program.null_space.pins.size == 1
+    systems = bordered_systems(program, counting_factor(program.K, []))
+    result = minimise(systems, np.full(2, start))
+    np.testing.assert_allclose(result.u, 0.3 + np.arange(SPRINGS + 1), rtol=1e-12)
+    np.testing.assert_allclose(result.force, [1, 0], atol=1e-12)  # condition of the chain: 50
+    assert result.active.tolist() == [True, False]
+    assert systems.factorizations == 1
+
+
+def test_motions_that_nothing_resists_obey_their_conditions():
+    """No bounds at all, a load in equilibrium: the mean of the displacement is zero."""
+    n = SPRINGS + 1
+    D = np.diff(np.eye(n), axis=0)
+    ones, none = np.ones((n, 1)), np.zeros(0, dtype=np.intp)
+    null_space = pinned_null_space(ones, np.eye(1), ones.T / n, none, np.zeros(n, dtype=bool))
+    assert (null_space.held.size, null_space.pins.size) == (1, 0)
+    load = np.zeros(n)
+    load[[0, -1]] = -1.0, 1.0
+    program = first_unknowns_bounded(sp.csr_array(D.T @ D), load, np.zeros(0), null_space)
+    result = minimise(bordered_systems(program, counting_factor(program.K, [])))
+    np.testing.assert_allclose(result.u, np.arange(n) - SPRINGS / 2, atol=1e-13)

@@ -1,9 +1,5 @@
 """Systems by few factorisations: bordering is exact, remembers, forgets, keeps one factor."""
 
-from __future__ import annotations
-
-import weakref
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,30 +8,7 @@ import scipy.sparse as sp
 
 from ngcontact.qp.active_set import minimise, solve_qp
 from ngcontact.qp.schur_complement import bordered_systems
-from tests.qp.programs import counting_factor, first_unknowns_bounded, inequalities, membrane
-
-
-def test_one_factorisation_at_a_time():
-    rng = np.random.default_rng(7)
-    X = rng.normal(size=(12, 14))
-    program = first_unknowns_bounded(sp.csr_array(X @ X.T), rng.normal(size=12), rng.normal(size=6))
-    dense = counting_factor(program.K, [])
-    alive: weakref.WeakSet[Callable] = weakref.WeakSet()
-    before = []
-
-    def factor(free):
-        before.append(len(alive))
-        solve = dense(free)
-        alive.add(solve)
-        return solve
-
-    systems = bordered_systems(program, factor, border=0)
-    minimise(systems, np.ones(6, dtype=bool))
-    assert len(before) > 1
-    for last in range(3):
-        systems.refine(np.arange(6) == last)
-    assert len(before) > 4
-    assert not any(before)
+from tests.qp.programs import counting_factor, first_unknowns_bounded, membrane
 
 
 @pytest.mark.parametrize("border", [0, 5, 1000])
@@ -87,23 +60,6 @@ def random_bounds(seed):
     return first_unknowns_bounded(sp.csr_array(X @ X.T), rng.normal(size=12), rng.normal(size=6))
 
 
-def test_systems_may_be_refined_in_any_order():
-    """Without `solve` before, after that of another set, twice: the same solution."""
-    program = random_bounds(8)
-    one, other = np.arange(6) < 2, np.arange(6) > 3
-    expected = {}
-    for active in (one, other):
-        systems = bordered_systems(program, counting_factor(program.K, []))
-        systems.solve(active)
-        expected[active.tobytes()] = systems.refine(active)
-    systems = bordered_systems(program, counting_factor(program.K, []))
-    for active in (one, other, other, one):
-        for found, right in zip(systems.refine(active), expected[active.tobytes()], strict=True):
-            # Condition of the matrix up to 1e4, entries of size 1.
-            np.testing.assert_allclose(found, right, rtol=0, atol=1e-11)
-        systems.solve(one)
-
-
 def test_another_load_costs_no_factorisation():
     program, calls = random_bounds(9), []
     systems = bordered_systems(program, counting_factor(program.K, calls))
@@ -117,45 +73,3 @@ def test_another_load_costs_no_factorisation():
     reference = minimise(bordered_systems(other, counting_factor(program.K, [])))
     np.testing.assert_array_equal(result.active, reference.active)
     np.testing.assert_allclose(result.u, reference.u, rtol=0, atol=1e-11)  # condition up to 1e4
-
-
-def test_what_is_forgotten_is_factorised_again():
-    program, calls = random_bounds(10), []
-    systems = bordered_systems(program, counting_factor(program.K, calls))
-    first = minimise(systems)
-    systems.forget()
-    systems.restart(program)
-    again = minimise(systems)
-    assert len(calls) == 2
-    np.testing.assert_array_equal(again.u, first.u)
-    np.testing.assert_array_equal(again.force, first.force)
-
-
-def test_stiffness_of_rows_bounds_their_forces():
-    """Unit rows: the diagonal. Others: the inverse of the compliance, once a row was met."""
-    program = random_bounds(11)
-    systems = bordered_systems(program, counting_factor(program.K, []))
-    np.testing.assert_array_equal(systems.stiffness(), program.K.diagonal()[:6])
-    general = inequalities(program.K, program.b, program.R, program.g)
-    systems = bordered_systems(general, counting_factor(program.K, []))
-    assert np.isinf(systems.stiffness()).all()
-    systems.solve(np.arange(6) == 2)
-    compliance = np.linalg.inv(program.K.toarray())[2, 2]
-    assert systems.stiffness()[2] == pytest.approx(1 / compliance, rel=1e-10)
-    assert np.isinf(np.delete(systems.stiffness(), 2)).all()
-
-
-def test_values_that_balance_leave_round_off_not_a_singular_system():
-    """Two springs pull the middle to both sides with equal forces: it stays, to round-off."""
-    k = np.array([1.0, 3.0])
-    K = sp.csr_array(np.array([[k[0], -k[0], 0], [-k[0], k.sum(), -k[1]], [0, -k[1], k[1]]]))
-    program = first_unknowns_bounded(K, np.array([0.0, 1e-17, 0.0]), np.zeros(0))
-    fixed = np.array([True, False, True])
-    program = replace(program, fixed=fixed, values=np.array([0.3, 0.0, -0.1]))
-
-    def noisy(free):
-        inverse = np.diag(np.where(free, 1 / K.diagonal(), 0.0))
-        return lambda right: inverse @ right + np.where(free, 1e-17, 0.0)
-
-    result = minimise(bordered_systems(program, noisy))
-    assert abs(result.u[1]) < 1e-16

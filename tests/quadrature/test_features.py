@@ -1,7 +1,5 @@
 """Narrow features of data: found wherever they lie, told with place and width, or resolved."""
 
-from __future__ import annotations
-
 import math
 import warnings
 from dataclasses import replace
@@ -9,9 +7,8 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Circle, OCCGeometry
 
-from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
+from ngcontact import Contact, ContactWarning, Elastic, adapt, solve
 from ngcontact.mesh import first_mesh
 from ngcontact.quadrature import look, unresolved
 from ngcontact.quadrature.features import features_of
@@ -59,27 +56,6 @@ def test_a_strip_is_found_with_its_place_and_width(kind, start, width):
     assert one.widths[off.argmin()] == pytest.approx(width, rel=0.25)  # measured: 0.2 at the end
 
 
-@pytest.mark.parametrize(("x", "y"), [(0.1, 0.2), (0.3333, 0.7777), (0.985, 0.41)])
-def test_a_box_of_six_thousandths_of_a_body_is_found(x, y):
-    f = 1.0 + 1e4 * box(ng.x, x, 6e-3) * box(ng.y, y, 6e-3)
-    one = found(given("force", f), "force")
-    assert len(one.places) >= 1
-    # In a circle about it, and half a sample more.
-    assert np.abs(one.places - [x + 3e-3, y + 3e-3]).max() < 6e-3
-
-
-@pytest.mark.parametrize("slope", [0.0, 0.31])
-@pytest.mark.parametrize("width", [2e-3, 0.02])
-def test_a_soft_layer_is_found_with_its_width(slope, width):
-    along = ng.y - 0.4321 - slope * ng.x
-    one = found(given("materials", 1 - 0.99 * box(along, 0, width)), "materials")
-    assert len(one.places) > 50
-    off = one.places[:, 1] - 0.4321 - slope * one.places[:, 0] - width / 2
-    assert np.abs(off).max() < width
-    across = width / math.hypot(1, slope)
-    assert one.widths.min() == pytest.approx(across, rel=0.5)  # at most 8 % by direction, and steps
-
-
 SMOOTH = [
     ng.x,
     1 + ng.sin(3 * ng.x) * ng.cos(20 * ng.y),
@@ -99,47 +75,6 @@ def test_slopes_waves_kinks_and_steps_are_no_features(kind, number):
     assert not len(found(given(kind, SMOOTH[number]), kind).places)
 
 
-@pytest.mark.parametrize("waves", [12.0, 14.0, 18.6])
-def test_no_part_of_a_crest_is_told_at_an_end(waves):
-    """Of waves that turn at their ends and are features themselves; splinters of 1e-3 were told."""
-    one = found(given("displacement", ng.cos(2 * math.pi * waves * ng.x)), "displacement")
-    assert len(one.places) >= 2 * waves - 3
-    assert one.widths.min() > 0.3 / waves  # measured: 0.40 to 0.52
-
-
-def test_corners_and_arcs_of_wide_parts_are_no_features():
-    disc = ng.IfPos((ng.x - 0.5) ** 2 + (ng.y - 0.4) ** 2 - 0.1**2, 0.0, 1.0)
-    corner = ng.IfPos(ng.x - 0.31, ng.IfPos(ng.y - 0.3, 1.0, 0.0), 0.0)
-    for f in (disc, corner):
-        assert not len(found(given("force", f), "force").places)
-
-
-def test_a_function_on_a_circle_is_seen_across_its_seam():
-    face = Circle((0, 0), 2).Face()
-    face.faces.name, face.edges.name = "body", "rim"
-    load = ng.IfPos(ng.x - 1.999, 1.0, 0.0)  # over an angle of 0.06
-    problem = Problem(OCCGeometry(face, dim=2), {"body": Elastic(1, 0.3)}, traction={"rim": load})
-    one = found(problem, "traction", 1.0)
-    assert np.linalg.norm(one.places - [2, 0], axis=1).max() < 0.05
-
-
-def test_functions_are_looked_at_once_in_a_run():
-    calls = []
-
-    def gap(x, y):
-        calls.append(len(x))
-        return 1 + x
-
-    problem = given("gap", gap)
-    mesh = first_mesh(problem, 0.3)
-    look(problem, mesh)
-    count = len(calls)
-    for maxh in (0.3, 0.1):
-        assert not unresolved(problem, first_mesh(problem, maxh))
-    assert len(calls) == count
-    assert sum(calls) < 2100
-
-
 @pytest.mark.parametrize("order", [1, 3])
 @pytest.mark.parametrize("width", [1e-3, 0.03])
 def test_a_strip_on_a_uniform_load_is_carried(order, width):
@@ -153,16 +88,6 @@ def test_a_strip_on_a_uniform_load_is_carried(order, width):
     assert solution.error_estimate**2 > least
     lower, upper = solution.energy_bounds
     assert lower < fine.energy < upper
-
-
-@pytest.mark.parametrize(("x", "y"), [(0.41, 0.63), (0.7071, 0.1234)])
-def test_a_box_on_a_uniform_force_is_carried(x, y):
-    width = 6e-3
-    f = 1 + box(ng.x, x, width) * box(ng.y, y, width) / width**2
-    solution = solve(loaded(force={"body": (0, -f)}), maxh=0.3, order=2)
-    assert solution.reactions["bottom"] == pytest.approx([0, 2], rel=1e-3)
-    with pytest.raises(ValueError, match=r'where force "body" has a feature 0\.0\d+ wide near'):
-        _ = solution.error_bound
 
 
 @pytest.mark.parametrize(
@@ -195,7 +120,12 @@ def test_adapt_refines_towards_what_is_narrow(kind):
     assert abs(middle) == pytest.approx(0.01 * 1.401, rel=0.02)
 
 
-def test_what_is_too_narrow_for_max_dofs_is_told():
-    f = 0.1 * ng.x + 0.01 * bump(ng.x, 0.4, 1e-3)
-    with pytest.warns(ContactWarning, match='displacement "top" has a feature 0.000'):
-        list(adapt(given("displacement", f), maxh=0.3, order=2, max_dofs=150))
+def test_a_displacement_that_no_node_knows_of():
+    """At nodes it is 1e-200, which is no unit of squares; the error is the solution's norm."""
+    bump = -0.01 * ng.exp(-(((ng.x - 0.87) / 2e-3) ** 2))
+    problem = replace(loaded(), displacement={"bottom": (0, 0), "top": (None, bump)})
+    with pytest.warns(ContactWarning, match="has a feature"):
+        solution = solve(problem, maxh=0.34)
+    *_, fine = adapt(problem, order=2, max_dofs=4000)
+    assert solution.energy_norm < 1e-6 * fine.energy_norm
+    assert 1 <= solution.error_estimate / fine.energy_norm <= 8  # measured 1.3

@@ -1,11 +1,8 @@
 """Integrals with a measured error."""
 
-from __future__ import annotations
-
 import math
 
 import ngsolve as ng
-import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
@@ -48,28 +45,3 @@ def test_the_error_is_not_more_than_is_measured(function, dim, value, unit):
     assert abs(found / unit - value) <= error / unit + 1e-14 * abs(value)
     # Of jumps along curves and infinite functions, halved while points differ, measured 4e-6.
     assert error / unit < 1e-5
-
-
-def test_smooth_functions_are_not_followed():
-    """One look at the halves tells: polynomials, up to what the rule integrates."""
-    seen = []
-
-    class Counted(View):
-        def evaluate(self, function, elements, reference):
-            seen.append(len(elements))
-            return super().evaluate(function, elements, reference)
-
-    view = Counted(MESH, 2)
-    here = view.inside(MESH.Materials(".*"))
-    [value], [error] = integral_over(ng.CF((ng.x + ng.y) ** 5), view, here, None)
-    assert value == pytest.approx((2**7 - 2) / 42, rel=1e-13)
-    assert error < 1e-13
-    assert sum(seen) == 2 * (1 + 4) * MESH.ne  # function and measure
-
-
-@pytest.mark.parametrize("step", np.linspace(0.2, 0.4, 9))
-def test_an_integral_that_vanishes_by_halves_is_not_without_error(step):
-    """Two jumps whose differences cancel: the sum of the differences alone would say none."""
-    jump = ng.IfPos(ng.x - step, 1.0, 0.0) - ng.IfPos(ng.y - step, 1.0, 0.0)
-    found, error = over(MESH, jump, 2)
-    assert abs(found) <= error + 1e-14

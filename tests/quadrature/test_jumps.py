@@ -1,8 +1,5 @@
-"""Moduli that jump inside elements: told with their place, and refined together."""
+"""Moduli that jump inside elements, and jumps along lines: told with place and size."""
 
-from __future__ import annotations
-
-import warnings
 from dataclasses import replace
 
 import ngsolve as ng
@@ -12,7 +9,9 @@ import pytest
 from drivers.reference import cases
 from ngcontact import ContactWarning, Elastic, Hooke, Problem, adapt
 from ngcontact.mesh import first_mesh
-from ngcontact.quadrature import jumping_moduli, warn_of_jumps
+from ngcontact.quadrature import warn_of_jumps
+from ngcontact.quadrature.cells import lattice
+from ngcontact.quadrature.jumps import steps_along
 from tests.quadrature.test_loads import square
 
 BODIES = ("upper", "lower")
@@ -71,24 +70,6 @@ def test_jumps_inside_elements_are_told_with_their_place(name, unit, mesh):
         assert x == pytest.approx(0.37 + 0.1 * y, abs=1e-3)  # printed with four digits
 
 
-@pytest.mark.parametrize(
-    "E",
-    [1 + ng.x * ng.x, 2 + ng.atan(1e3 * (ng.x - 0.37)), 2 + ng.sin(50 * ng.x), ng.exp(9 * ng.x)],
-)
-def test_smooth_laws_do_not_jump_however_steep(E, mesh):
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", ContactWarning)
-        warn_of_jumps(made_of(Elastic(E, 0.3)), mesh)
-    assert not jumping_moduli(made_of(Elastic(E, 0.3)), mesh).any()
-
-
-def test_jumps_on_edges_of_the_mesh_are_none():
-    """The bodies meet on y = 0, where the law of both jumps."""
-    law = Elastic(ng.IfPos(ng.y, 1.0, 1e4), 0.3)
-    mesh = first_mesh(made_of(law), 0.3)
-    assert not jumping_moduli(made_of(law), mesh).any()
-
-
 def test_elements_in_which_moduli_jump_are_refined_together():
     # One at a time, as chance cuts it, more than 64 levels led to 10 000 unknowns. Measured: 5.
     problem = Problem(
@@ -99,3 +80,46 @@ def test_elements_in_which_moduli_jump_are_refined_together():
     )
     with pytest.warns(ContactWarning, match="jump inside"):
         assert len(list(adapt(problem, order=2, max_dofs=10_000))) <= 8
+
+
+START, END = 3.0, 6.0
+
+
+def found(function, start=START, end=END, places=2048):
+    """Jumps of a function seen at some places, as on boundaries, and at both ends."""
+    inner = start + (end - start) * lattice(1, places)[:, 0]
+    t = np.concatenate([[start], inner, [end]])
+    return steps_along(function, t, function(t))
+
+
+@pytest.mark.parametrize("place", [3.0, 5.0, 5.2, 5.25, 5.7071, 5.999999])
+def test_jumps_are_found_where_they_are(place):
+    at, size = found(lambda x: np.cos(x) + 1e-3 * (x > place))
+    assert at == pytest.approx([place], abs=1e-12)
+    assert size == pytest.approx([1e-3], rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "smooth",
+    [
+        np.zeros_like,
+        np.cos,
+        lambda x: np.abs(x - 5.3),
+        lambda x: np.sqrt(np.maximum(x - 5.3, 0)),
+        lambda x: np.maximum(x - 5.3, 0) ** 0.1,
+        lambda x: np.arctan(1e6 * (x - 5.3)),
+    ],
+    ids=["zero", "smooth", "kink", "root", "tenth root", "steep"],
+)
+def test_what_is_continuous_does_not_jump(smooth):
+    assert found(smooth)[0].size == 0
+
+
+@pytest.mark.parametrize("length", [1.0, 3000.0])
+@pytest.mark.parametrize("size", [1.0, 1e-3])
+def test_small_jumps_are_found_beside_large_changes(length, size):
+    """Of 1e-3 beside a change of 1, which in 2048 parts bends by 1e-6 from one to the next."""
+    place = 0.70710678 * length
+    at, amount = found(lambda x: np.sin(3 * x / length) + size * (x > place), 0.0, length)
+    assert at == pytest.approx([place], rel=1e-12)
+    assert amount == pytest.approx([size], rel=1e-9)

@@ -1,7 +1,5 @@
 """What a notebook shows, in a kernel of its own: tables, progress, webgui."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 

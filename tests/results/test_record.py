@@ -1,14 +1,19 @@
-"""One row of a table: plain numbers, the same columns for every solution of a problem."""
-
-from __future__ import annotations
+"""Solutions as rows of a table, as short tables, and as lines of progress."""
 
 import json
 import math
+import re
+from types import SimpleNamespace
 
+import ngsolve as ng
+import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact import adapt, solve
+from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
+from ngcontact.geometries import blocks
+from ngcontact.problem.values import told
+from ngcontact.results import with_progress
 
 
 def test_a_record_holds_plain_numbers():
@@ -40,6 +45,106 @@ def test_columns_do_not_depend_on_what_was_asked_before():
     assert after["relative_error_bound"] == solution.relative_error_bound
 
 
-def test_levels_of_adapt_have_their_estimate():
-    for solution in adapt(cases.pressed_disc(), order=2, max_dofs=600):
-        assert solution.record()["relative_error_estimate"] == solution.relative_error_estimate
+def level(unknowns, error, bound=None):
+    return SimpleNamespace(
+        displacement=SimpleNamespace(space=SimpleNamespace(ndof=unknowns)),
+        relative_error_estimate=error,
+        bounded=bound is not None,
+        relative_error_bound=bound,
+    )
+
+
+def lines(capsys):
+    out, err = capsys.readouterr()
+    assert out == ""
+    return err.splitlines()
+
+
+def test_a_run_is_quiet_unless_asked(capsys):
+    options = {"order": 2, "max_dofs": 1500}
+    quiet = list(adapt(cases.partly_opening_block(), **options))
+    assert lines(capsys) == []
+    told = list(adapt(cases.partly_opening_block(), **options, progress=True))
+    head, *rows = lines(capsys)
+    assert head.split() == ["level", "unknowns", "estimate", "seconds"]
+    assert [int(row.split()[1]) for row in rows] == [s.displacement.space.ndof for s in quiet]
+    assert len(told) == len(rows)
+    estimates = [f"{s.relative_error_estimate:.2e}" for s in told]
+    assert [row.split()[2] for row in rows] == estimates
+    with pytest.raises(TypeError, match="progress='yes'"):
+        adapt(cases.partly_opening_block(), progress="yes")
+
+
+def test_the_bar_counts_digits_towards_the_tolerance(capsys):
+    """From 1e-1 to 1e-3: 1e-2 is half of the way."""
+    levels = [level(10, 1e-1), level(20, 1e-2), level(40, 1e-3)]
+    assert list(with_progress(iter(levels), 1e-3, 100)) == levels
+    assert [row.count("#") for row in lines(capsys)[1:]] == [0, 10, 20]
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (None, "free"),
+        (ng.CF(-2e9), "-2e+09"),
+        (ng.CF((0.1, -3.0)), "(0.1, -3)"),
+        ((ng.CF(0.5), None), "(0.5, free)"),
+        (ng.CF((0, 0)), "(0, 0)"),
+        (ng.x * 2, "function"),
+        (2 * ng.CF(3.0) + ng.Parameter(1.0), "function"),
+        (lambda x, y: x, "function"),
+    ],
+)
+def test_values_in_a_few_characters(value, text):
+    assert told(value) == text
+
+
+def cells(html):
+    return re.findall(r"<t[dh]>(.*?)</t[dh]>", html)
+
+
+def problem():
+    return Problem(
+        geometry=blocks(),
+        materials={"upper": Elastic(1.0, 0.3), "lower": Hooke(np.diag([2.0, 2.0, 0.5]))},
+        displacement={"bottom": (0, 0), "top": (None, -0.1)},
+        sliding="upper_left",
+        force={"upper": (0, ng.x)},
+        traction={"lower_left": 0.5, "upper_right": (1.0, 0.0)},
+        contact=[Contact("upper_contact", "lower_contact", gap=0.01, bilateral=True)],
+    )
+
+
+def test_a_problem_shows_all_of_its_data():
+    html = problem()._repr_html_()
+    assert len(html) < 1500
+    shown = cells(html)
+    for text in (
+        *("plane strain", "E = 1, nu = 0.3", "(0, 0)", "(free, -0.1)", "upper_left"),
+        *("function", "pressure 0.5", "(1, 0)", "along the normal, gap 0.01, bilateral"),
+        "C = (2, 0, 0), (0, 2, 0), (0, 0, 0.5)",
+        "&quot;upper_contact&quot; with &quot;lower_contact&quot;",
+    ):
+        assert text in shown
+
+
+def test_a_solution_shows_every_pair():
+    solution = solve(
+        Problem(
+            geometry=blocks(),
+            materials={".*": Elastic(1.0, 0.3)},
+            displacement={"bottom": (0, 0), "top": (0, -0.1)},
+            contact=[Contact("upper_contact", "lower_contact")],
+        ),
+        maxh=1.0,
+        order=2,
+    )
+    shown = cells(solution._repr_html_())
+    assert str(solution.displacement.space.ndof) in shown
+    x, y = solution.contact_force() + 0.0
+    assert f"({x:.6g}, {y:.6g})" in shown
+    assert f"{solution.pressure.max():.6g}" in shown
+    assert f"{solution.active.sum()}/{solution.active.size}" in shown
+    assert "estimate" not in shown
+    assert solution.relative_error_estimate > 0
+    assert "estimate" in cells(solution._repr_html_())

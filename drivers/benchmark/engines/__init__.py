@@ -1,15 +1,24 @@
 """Codes that solve the common problems, for comparison with ngcontact.
 
-Every engine is a module with a function ``runs(problem, kinds, sizes)`` that yields one `Run` per
-order, kind of mesh and size. Engines whose package is missing raise `NotInstalledError` there;
-their modules can always be imported. NGSolve's threads are the caller's: ``with TaskManager():``.
+Every code is an `Engine`. The modules can be imported without the optional packages, which are
+looked for when an engine runs. NGSolve's threads are the caller's: ``with TaskManager():``.
 """
 
 from __future__ import annotations
 
 import importlib
-from dataclasses import dataclass
-from types import ModuleType
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from itertools import product
+from typing import Any, NamedTuple
+
+from drivers.benchmark.scenes.meshes import made
+from drivers.benchmark.scenes.plane import Reading
+from drivers.benchmark.scenes.problems import Common
+
+# In units of E / h, all run: the best one depends on order and size. A small one takes few steps
+# and errs less than the mesh does only while that is coarse.
+PENALTIES = (10.0, 100.0, 1000.0)
 
 
 class NotInstalledError(RuntimeError):
@@ -18,53 +27,79 @@ class NotInstalledError(RuntimeError):
 
 @dataclass(frozen=True)
 class Run:
-    """One engine's solution of one problem on one mesh.
-
-    Attributes
-    ----------
-    engine, problem : str
-        Names of the code and of the problem.
-    mesh_kind : str
-        "uniform", or "graded" around a contact zone known beforehand.
-    order : int
-        Polynomial degree of the displacement.
-    unknowns : int
-        Displacement components of all nodes of the bodies, supports included.
-    seconds_mesh : float
-        Mesh generation; 0 for graded meshes, which are made by hand.
-    seconds : float
-        Assembly and solution, without reading off results.
-    steps : int
-        Linear systems solved.
-    force, peak, half_width, energy : float
-        As in `problems.Reference`.
-    """
+    """One solution of one problem on one mesh; the last four as in `problems.Reference`."""
 
     engine: str
     problem: str
-    mesh_kind: str
+    mesh_kind: str  # "uniform", or "graded" around a contact zone known beforehand
     order: int
-    unknowns: int
-    seconds_mesh: float
-    seconds: float
-    steps: int
+    unknowns: int  # displacement components of all nodes of the bodies, supports included
+    seconds_mesh: float  # 0 for graded meshes, which are made by hand
+    seconds: float  # assembly and solution, without reading off results
+    steps: int  # linear systems solved
     force: float
     peak: float
     half_width: float
     energy: float
 
 
-def needed(engine: str, *packages: str) -> list[ModuleType]:
-    """Modules `packages` of an optional engine.
+class Solved(NamedTuple):
+    """What an engine measures and reads off itself, see `Run`."""
 
-    Raises
-    ------
-    NotInstalledError
-        One of them is missing.
-    """
+    seconds: float
+    steps: int
+    energy: float
+    reading: Reading
+
+
+def needed(engine: str, *packages: str) -> list[Any]:
+    """Modules `packages` of an optional engine; raises NotInstalledError if one is missing."""
     try:
         return [importlib.import_module(name) for name in packages]
     except ImportError as error:
         raise NotInstalledError(
             f"{engine} needs {error.name}, which is not installed: pip install '.[bench]'"
         ) from error
+
+
+@dataclass(frozen=True)
+class Engine:
+    """A code with its settings.
+
+    `solve` takes the modules of `packages`, the problem, a mesh and its order, and a penalty where
+    several `penalties` are tried, which are part of the engine's name then.
+    """
+
+    name: str
+    solve: Callable[..., Solved]
+    packages: tuple[str, ...] = ()
+    orders: tuple[int, ...] = (1, 2)
+    penalties: tuple[float, ...] = ()
+    meshed_obstacle: bool = False  # a rigid foundation is a mesh that is held
+    two_bodies: bool = True
+    largest: int = 10**9  # unknowns; more would take minutes a run, and up to 18 s with Akantu
+
+    def runs(self, common: Common, kinds: Sequence[str], sizes: Sequence[int]) -> Iterator[Run]:
+        """Runs on meshes of the given kinds and numbers of unknowns."""
+        modules = needed(self.name, *self.packages)
+        rigid = common.problem.contact[0].primary is None
+        if not (rigid or self.two_bodies):
+            return
+        for kind, order, size in product(kinds, self.orders, sizes):
+            mesh = made(common, kind, order, size, self.meshed_obstacle and rigid)
+            for penalty in self.penalties or (None,):
+                mesh.read()
+                given = () if penalty is None else (penalty,)
+                seconds, steps, energy, reading = self.solve(modules, common, mesh, order, *given)
+                yield Run(
+                    engine=" ".join([self.name, *(f"{value:g} E/h" for value in given)]),
+                    problem=common.name,
+                    mesh_kind=kind,
+                    order=order,
+                    unknowns=mesh.unknowns(order),
+                    seconds_mesh=mesh.seconds,
+                    seconds=seconds,
+                    steps=steps,
+                    energy=energy,
+                    **asdict(reading),
+                )

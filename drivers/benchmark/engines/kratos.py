@@ -9,66 +9,124 @@ from __future__ import annotations
 import json
 import math
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict
-from types import ModuleType
+from collections.abc import Sequence
 from typing import Any
 
+import ngsolve as ng
 import numpy as np
-from numpy.typing import NDArray
 
-from drivers.benchmark.engines import Run, needed
-from drivers.benchmark.engines.kratos_settings import (
-    CONTACT,
-    KRATOS,
-    MOST,
-    STRUCTURAL,
-    settings,
-    sides,
+from drivers.benchmark.engines import Engine, Solved
+from drivers.benchmark.engines.ngsolve import matrix, numbering, read_off
+from drivers.benchmark.scenes.meshes import OBSTACLE, Mesh
+from drivers.benchmark.scenes.plane import (
+    Reading,
+    contact_sides,
+    modulus,
+    prescribed,
+    pressures,
+    supports,
 )
-from drivers.benchmark.scenes.meshes import OBSTACLE, Mesh, made
-from drivers.benchmark.scenes.plane import Numbering, facing, moduli, prescribed, pressures
 from drivers.benchmark.scenes.problems import Common
-from drivers.benchmark.scenes.reading import Reading, read
-from drivers.benchmark.scenes.triangles import forces
 
-Array = NDArray[np.float64]
-
-ENGINE = "Kratos mortar"
+KRATOS = "KratosMultiphysics"
+STRUCTURAL = f"{KRATOS}.StructuralMechanicsApplication"
+CONTACT = f"{KRATOS}.ContactStructuralMechanicsApplication"
+LOAD_STEPS = 4
+MOST = 50  # linear systems in a load step; Kratos goes on without a word when they do not converge
 FAILED = Reading(math.nan, math.nan, math.nan)
 ROUND_OFF = 1e-6  # of nodal forces relative to the largest; the iteration stops before round-off
 
 
-def runs(common: Common, kinds: Sequence[str], sizes: Sequence[int]) -> Iterator[Run]:
-    """Runs of order 1 on meshes of the given kinds and numbers of unknowns.
-
-    Raises
-    ------
-    NotInstalledError
-        A package of Kratos is missing.
-    """
-    core, structural, _, analysis, *_ = needed(
-        ENGINE,
-        KRATOS,
-        STRUCTURAL,
-        CONTACT,
-        f"{STRUCTURAL}.structural_mechanics_analysis",
-        f"{KRATOS}.LinearSolversApplication",
-    )
-    core.Logger.GetDefaultOutput().SetSeverity(core.Logger.Severity.WARNING)
-    obstacle = common.problem.contact[0].primary is None
-    for kind in kinds:
-        for size in sizes:
-            mesh = made(common, kind, 1, size, obstacle)
-            yield run((core, structural, analysis), common, kind, mesh)
+def process(module: str, part: str, variable: str, **parameters: Any) -> dict[str, Any]:
+    """What grows with time from 0 to 1 on a part of the model."""
+    return {
+        "python_module": f"assign_vector_{module}_process",
+        "kratos_module": KRATOS,
+        "Parameters": {
+            "model_part_name": f"Structure.{part}",
+            "variable_name": variable,
+            "interval": [0.0, "End"],
+            **parameters,
+        },
+    }
 
 
-def fill(core: ModuleType, structural: ModuleType, part: Any, common: Common, made: Mesh) -> None:
+def held(part: str, components: Sequence[float | None]) -> dict[str, Any]:
+    """Displacements of a part of the model."""
+    constrained = [u is not None for u in components] + [True]
+    value = [None if u is None else f"{u}*t" for u in components] + [0.0]
+    return process("variable", part, "DISPLACEMENT", constrained=constrained, value=value)
+
+
+def pressed(part: str, pressure: float) -> dict[str, Any]:
+    """Pressure downwards on a part of the model."""
+    down = {"modulus": f"{pressure}*t", "direction": [0.0, -1.0, 0.0]}
+    return process("by_direction_to_condition", part, "LINE_LOAD", **down)
+
+
+def settings(common: Common) -> dict[str, Any]:
+    """Kratos' project parameters; tolerances are its own defaults."""
+    supported = [
+        held(name, components)
+        for pattern, components in supports(common).items()
+        for name in pattern.split("|")
+    ]
+    if common.problem.contact[0].primary is None:
+        supported.append(held(OBSTACLE, (0.0, 0.0)))
+    contact = {
+        "python_module": "alm_contact_process",
+        "kratos_module": CONTACT,
+        "process_name": "ALMContactProcess",
+        "Parameters": {
+            "model_part_name": "Structure",
+            "contact_model_part": {"0": list(contact_sides(common))},
+            # The secondary is the slave; with the other one systems turned out singular.
+            "assume_master_slave": {"0": [common.problem.contact[0].secondary]},
+            "contact_type": "Frictionless",
+        },
+    }
+    return {
+        "problem_data": {
+            "problem_name": "benchmark",
+            "parallel_type": "OpenMP",
+            "start_time": 0.0,
+            "end_time": 1 - 1e-9,  # the clock's round-off must not add a step
+            "echo_level": 0,
+        },
+        "solver_settings": {
+            "model_part_name": "Structure",
+            "domain_size": 2,
+            "solver_type": "Static",
+            "echo_level": 0,
+            "analysis_type": "non_linear",
+            "model_import_settings": {"input_type": "use_input_model_part"},
+            "material_import_settings": {"materials_filename": ""},
+            "contact_settings": {
+                "mortar_type": "ALMContactFrictionless",
+                "fancy_convergence_criterion": False,
+            },
+            "time_stepping": {"time_step": 1 / LOAD_STEPS},
+            # The criteria with multipliers go on long after the active set has settled.
+            "convergence_criterion": "contact_residual_criterion",
+            "max_iteration": MOST,
+            "clear_storage": True,
+            "reform_dofs_at_each_step": True,
+            "linear_solver_settings": {"solver_type": "LinearSolversApplication.sparse_lu"},
+        },
+        "processes": {
+            "constraints_process_list": supported,
+            "loads_process_list": [pressed(*item) for item in pressures(common).items()],
+            "contact_process_list": [contact],
+        },
+    }
+
+
+def fill(core: Any, structural: Any, part: Any, common: Common, made: Mesh) -> None:
     """Nodes, triangles, boundaries and the material of `made` in Kratos' model part."""
-    [law] = common.problem.materials.values()
+    law, loaded = modulus(common), pressures(common)
     properties = part.CreateNewProperties(1)
-    properties.SetValue(core.YOUNG_MODULUS, law.E)  # type: ignore[union-attr]
-    properties.SetValue(core.POISSON_RATIO, law.nu)  # type: ignore[union-attr]
+    properties.SetValue(core.YOUNG_MODULUS, law.E)
+    properties.SetValue(core.POISSON_RATIO, law.nu)
     properties.SetValue(core.THICKNESS, 1.0)
     properties.SetValue(core.CONSTITUTIVE_LAW, structural.LinearElasticPlaneStrain2DLaw())
     for number, (x, y) in enumerate(made.points.tolist(), start=1):
@@ -79,9 +137,9 @@ def fill(core: ModuleType, structural: ModuleType, part: Any, common: Common, ma
     for name, ends in made.edges.items():
         boundary = part.CreateSubModelPart(name)
         boundary.AddNodes((np.unique(ends) + 1).tolist())
-        if name not in pressures(common) and name not in sides(common):
+        if name not in loaded and name not in contact_sides(common):
             continue
-        kind = "LineLoadCondition2D2N" if name in pressures(common) else "LineCondition2D2N"
+        kind = "LineLoadCondition2D2N" if name in loaded else "LineCondition2D2N"
         first = count + 1
         for pair in (ends + 1).tolist():
             count += 1
@@ -92,9 +150,10 @@ def fill(core: ModuleType, structural: ModuleType, part: Any, common: Common, ma
         part.CreateSubModelPart(OBSTACLE).AddNodes(nodes.tolist())
 
 
-def run(modules: Sequence[ModuleType], common: Common, kind: str, made: Mesh) -> Run:
-    """One run on vertices and triangles of the common mesh; NaN where Kratos fails."""
-    core, structural, analysis = modules
+def by_mortar(modules: Any, common: Common, made: Mesh, order: int) -> Solved:
+    """On vertices and triangles of the common mesh; NaN where Kratos fails."""
+    core, structural, _, analysis, *_ = modules
+    core.Logger.GetDefaultOutput().SetSeverity(core.Logger.Severity.WARNING)
     parameters = core.Parameters(json.dumps(settings(common)))
 
     class Counted(analysis.StructuralMechanicsAnalysis):  # type: ignore[name-defined]
@@ -107,7 +166,6 @@ def run(modules: Sequence[ModuleType], common: Common, kind: str, made: Mesh) ->
             info = self._GetSolver().GetComputingModelPart().ProcessInfo
             self.counts = (*self.counts, info[core.NL_ITERATION_NUMBER])
 
-    made.read()
     started = time.perf_counter()
     model = core.Model()
     stage = Counted(model, parameters)
@@ -120,31 +178,23 @@ def run(modules: Sequence[ModuleType], common: Common, kind: str, made: Mesh) ->
         converged = False
     seconds = time.perf_counter() - started
     u = np.array([node.GetSolutionStepValue(core.DISPLACEMENT) for node in part.Nodes])[:, :2]
-    reading, energy = results(common, made, u) if converged else (FAILED, math.nan)
-    return Run(
-        engine=ENGINE,
-        problem=common.name,
-        mesh_kind=kind,
-        order=1,
-        unknowns=made.unknowns(1),
-        seconds_mesh=made.seconds,
-        seconds=seconds,
-        steps=sum(stage.counts),
-        energy=energy,
-        **asdict(reading),
-    )
-
-
-def results(common: Common, made: Mesh, u: Array) -> tuple[Reading, float]:
-    """Reading and strain energy of nodal displacements (n, 2)."""
-    own = np.concatenate([at for name, at in made.bodies.items() if name != OBSTACLE])
-    force, energy = forces(made.points, made.triangles[own], u, *moduli(common))
-    n = len(made.points)
-    number = Numbering(made.points, np.arange(2 * n).reshape(2, n), made.edges)
+    if not converged:
+        return Solved(seconds, sum(stage.counts), math.nan, FAILED)
+    mesh, v = made.copy(), u.T.ravel()
+    pushed, number = matrix(common, ng.VectorH1(mesh, order=1)) @ v, numbering(mesh, 1)
     fixed, _ = prescribed(common, number)
-    line = facing(common, number)
-    nodal = np.where(fixed, 0.0, force.T.ravel())[line.at]
-    nodal[np.abs(nodal) < ROUND_OFF * nodal.max()] = 0.0  # open nodes
-    flat = u.T.ravel()
-    gap = line.gap + flat[line.at] - (0.0 if line.opposite is None else flat[line.opposite])
-    return read(common, line.x, nodal, gap, 1), energy
+    reading = read_off(common, number, v, np.where(fixed, 0.0, pushed), 1, ROUND_OFF)
+    return Solved(seconds, sum(stage.counts), float(v @ pushed) / 2, reading)
+
+
+MORTAR = Engine(
+    "Kratos mortar",
+    by_mortar,
+    (
+        *(KRATOS, STRUCTURAL, CONTACT),
+        *(f"{STRUCTURAL}.structural_mechanics_analysis", f"{KRATOS}.LinearSolversApplication"),
+    ),
+    orders=(1,),
+    meshed_obstacle=True,
+    largest=16_000,
+)

@@ -14,7 +14,6 @@ from netgen.occ import Compound, OCCGeometry, TopoDS_Shape
 from numpy.typing import NDArray
 
 from drivers.benchmark.scenes.problems import Common
-from drivers.benchmark.scenes.triangles import sides
 from ngcontact import Problem
 from ngcontact.geometries.region import body, polygon
 from ngcontact.mesh import first_mesh
@@ -34,22 +33,30 @@ TRIES = 12
 GRADING = 0.3  # growth of element sizes with distance, netgen's default
 SAMPLES = 20_001
 OBSTACLE = "obstacle"
+SIDES = [[0, 1], [1, 2], [2, 0]]  # corners of a triangle that its sides join
+
+
+def sides(triangles: Indices) -> tuple[Indices, Indices]:
+    """End vertices (k, 2) of all sides, each once, and the sides (ne, 3) of the triangles."""
+    every = np.sort(triangles[:, SIDES], axis=2).reshape(-1, 2)
+    ends, number = np.unique(every, axis=0, return_inverse=True)
+    return ends, number.reshape(-1, 3)
+
+
+def which(ends: Indices, wanted: Indices) -> Indices:
+    """Numbers (m,) of the sides that join `wanted` (m, 2) among those that join `ends` (k, 2)."""
+    count = ends.max() + 1
+    keys, found = (np.sort(pairs, axis=1) @ [count, 1] for pairs in (ends, wanted))
+    sorter = np.argsort(keys)
+    return sorter[np.searchsorted(keys, found, sorter=sorter)]
 
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """Triangles of one common problem.
+    """Triangles of one common problem."""
 
-    Attributes
-    ----------
-    ngmesh : netgen mesh
-        With its geometry; engines work on a copy.
-    seconds : float
-        Spent on it where that counts, else 0.
-    """
-
-    ngmesh: object
-    seconds: float
+    ngmesh: object  # with its geometry; engines work on a copy
+    seconds: float  # spent on it where that counts, else 0
 
     def copy(self) -> ng.Mesh:
         """NGSolve mesh of its own, straight-sided until it is curved."""
@@ -99,18 +106,10 @@ class Mesh:
 
 @lru_cache
 def made(common: Common, kind: str, order: int, size: int, obstacle: bool = False) -> Mesh:
-    """Mesh with about `size` unknowns of order 1 or 2, remembered.
+    """Mesh with about `size` unknowns of order 1 or 2, "uniform" or "graded", remembered.
 
-    Parameters
-    ----------
-    common : Common
-        The problem to mesh.
-    kind : str
-        "uniform" or "graded".
-    order, size : int
-        Degree of the elements to be used, and unknowns wanted with them.
-    obstacle : bool
-        Put a block under a rigid foundation's boundary, for codes that need two bodies.
+    With an `obstacle` it has a block under a rigid foundation's boundary, for codes that need two
+    bodies.
     """
     if kind not in KINDS:
         raise ValueError(f"kind={kind!r}: expected one of {KINDS}")

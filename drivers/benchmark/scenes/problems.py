@@ -17,53 +17,29 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Reference:
-    """What every engine has to find, in any consistent units.
+    """What every engine has to find, in any consistent units."""
 
-    Attributes
-    ----------
-    force : float
-        Contact force, of the whole disc where half of it is solved.
-    peak : float
-        Contact pressure at x = 0, where it is largest.
-    half_width : float
-        The x at which contact ends.
-    energy : float
-        Strain energy of what is solved.
-    """
-
-    force: float
-    peak: float
-    half_width: float
-    energy: float
+    force: float  # of contact, of the whole disc where half of it is solved
+    peak: float  # contact pressure at x = 0, where it is largest
+    half_width: float  # the x at which contact ends
+    energy: float  # strain energy of what is solved
 
 
 @dataclass(frozen=True, eq=False)
 class Common:
     """A common problem: one pair, vertical direction of contact, contact for 0 <= x <= a.
 
-    Attributes
-    ----------
-    name : str
-        Title in tables.
-    problem : Problem
-        Its statement; ``materials``, ``displacement``, ``sliding`` (vertical lines only) and
-        ``traction`` (pressures only) hold numbers, which other codes can read as well.
-    reference : Reference
-        Its solution.
-    parts : int
-        Mirror images that `Reference.force` counts.
-    mesh_size : callable
-        Element size, a length, at points (n, 2) of a mesh graded by hand, for a fineness c < 1.
-    on_curve : callable
-        Points (n, 2) near the contact curve, moved onto it.
+    The statement's ``materials``, ``displacement``, ``sliding`` (vertical lines only) and
+    ``traction`` (pressures only) hold numbers, which other codes can read as well.
     """
 
     name: str
     problem: Problem
     reference: Reference
-    parts: int
+    parts: int  # mirror images that `Reference.force` counts
+    # Element size at points (n, 2) of a mesh graded by hand, for a fineness c < 1.
     mesh_size: Callable[[Array, float], Array]
-    on_curve: Callable[[Array], Array]
+    on_curve: Callable[[Array], Array]  # points (n, 2) near the contact curve, moved onto it
 
 
 # `adapt` up to 200 000 unknowns. The last four levels of order 4 agree, relative to their values,

@@ -5,69 +5,56 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from importlib import import_module
 from itertools import groupby
+from pathlib import Path
 
 import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
-from drivers.benchmark.engines import NotInstalledError, Run
-from drivers.benchmark.scenes.problems import Common, Reference
+from drivers.benchmark.engines import NotInstalledError, Run, akantu, kratos, ngsolve
+from drivers.benchmark.engines.scipy_active_sets import FELUPE, SCIKIT
+from drivers.benchmark.scenes.meshes import KINDS
+from drivers.benchmark.scenes.problems import COMMONS, Common
+from drivers.benchmark.studies import Extent
+from drivers.tables import table
 from ngcontact import adapt
 
-PACKAGE = "drivers.benchmark.engines"
-ENGINES = (
-    "ngsolve_penalty",
-    "ngsolve_active_set",
-    "scikit",
-    "felupe_active_set",
-    "kratos",
-    "akantu_penalty",
-)
+ENGINES = (ngsolve.PENALTY, ngsolve.ACTIVE_SET, SCIKIT, FELUPE, kratos.MORTAR, akantu.PENALTY)
 OURS = "ngcontact"
-ORDERS = (2, 3, 4)
-BUDGET = {2: 100_000, 3: 60_000, 4: 40_000}
-SIZES = {
-    "uniform": (1_000, 4_000, 16_000, 64_000),
-    "graded": (1_000, 4_000, 16_000, 64_000),
-}
-# More would take minutes a run, and up to 18 s with Akantu.
-LARGEST = {"kratos": 16_000, "ngsolve_penalty": 16_000, "akantu_penalty": 4_000}
+BUDGET = {2: 100_000, 3: 60_000, 4: 40_000}  # unknowns by order
+SIZES = (1_000, 4_000, 16_000, 64_000)
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 QUANTITIES = ("force", "peak", "half_width", "energy")
 TOGETHER = ("force", "peak", "half_width")
+BOUNDS = np.logspace(-1, -7, 61)  # errors below the last are those of the references
+LINES = {"uniform": "--", "graded": ":", "adaptive": "-"}
 
 
 @dataclass(frozen=True)
 class Point:
-    """Seconds and relative errors of one run, or of one level of an adaptive run.
+    """One run, or one level of an adaptive run, and its relative errors by quantity.
 
-    Attributes
-    ----------
-    engine, problem, mesh_kind : str
-    variant : str
-        The engine with its settings, where several are tried.
-    order, unknowns : int
-    seconds : float
-        What counts: meshing and all levels but for meshes graded by hand.
-    errors : dict
-        Relative errors by quantity.
+    `engine` has no settings, those that are tried are in the run's. `seconds` are what counts:
+    meshing and all levels but for meshes graded by hand.
     """
 
     engine: str
-    problem: str
-    mesh_kind: str
-    variant: str
-    order: int
-    unknowns: int
+    run: Run
     seconds: float
     errors: dict[str, float]
 
+    @property
+    def settings(self) -> tuple[str, int]:
+        """Settings of the engine, and the order."""
+        return self.run.engine, self.run.order
 
-def errors(found: Run, reference: Reference) -> dict[str, float]:
-    """Relative errors of the four quantities."""
-    return {name: abs(getattr(found, name) / getattr(reference, name) - 1) for name in QUANTITIES}
+    @property
+    def series(self) -> tuple[str, str]:
+        """Engine and kind of mesh."""
+        return self.engine, self.run.mesh_kind
 
 
 def adaptive_run(common: Common, order: int, max_dofs: int) -> list[Run]:
@@ -97,61 +84,37 @@ def adaptive_run(common: Common, order: int, max_dofs: int) -> list[Run]:
     return result
 
 
-def median_runs(rounds: Sequence[Sequence[Run]]) -> list[Run]:
-    """The runs of the first round with the medians of all rounds' seconds."""
-    return [
-        replace(
-            same[0],
-            seconds=float(np.median([run.seconds for run in same])),
-            seconds_mesh=float(np.median([run.seconds_mesh for run in same])),
-        )
-        for same in zip(*rounds, strict=True)
-    ]
-
-
-def engine_runs(name: str, common: Common, max_dofs: int) -> list[Run]:
-    """All runs of one other code."""
-    engine = import_module(f"{PACKAGE}.{name}")
-    most = min(LARGEST.get(name, max_dofs), max_dofs)
-    return [
-        run
-        for kind, sizes in SIZES.items()
-        for run in engine.runs(common, (kind,), [size for size in sizes if size <= most])
-    ]
+def point(engine: str, common: Common, same: Sequence[Run]) -> Point:
+    """The run of the first round with the medians of all rounds' seconds."""
+    seconds, meshing = np.median([(r.seconds, r.seconds_mesh) for r in same], axis=0).tolist()
+    run = replace(same[0], seconds=seconds, seconds_mesh=meshing)
+    errors = {q: abs(getattr(run, q) / getattr(common.reference, q) - 1) for q in QUANTITIES}
+    whole = seconds + (meshing if run.mesh_kind == "uniform" else 0.0)
+    return Point(engine, run, whole, errors)
 
 
 def points(common: Common, rounds: int, max_dofs: int) -> tuple[list[Point], list[str]]:
     """All engines on one problem, interleaved, and what could not be run."""
     missing: dict[str, str] = {}
-    collected: dict[str, list[list[Run]]] = {}
-    adaptive_run(common, ORDERS[0], max_dofs)  # warm-up
+    collected: dict[tuple[str, int], list[list[Run]]] = {}
+    adaptive_run(common, min(BUDGET), max_dofs)  # warm-up
     for number in range(rounds):
         print(f"{common.name}: round {number + 1} of {rounds}", file=sys.stderr, flush=True)
-        for order in ORDERS:
-            collected.setdefault(f"{OURS} {order}", []).append(
-                adaptive_run(common, order, max_dofs)
-            )
-        for name in ENGINES:
-            if name in missing:
-                continue
+        for order in BUDGET:
+            runs = adaptive_run(common, order, max_dofs)
+            collected.setdefault((OURS, order), []).append(runs)
+        for engine in ENGINES:
+            sizes = [size for size in SIZES if size <= min(engine.largest, max_dofs)]
             try:
-                collected.setdefault(name, []).append(engine_runs(name, common, max_dofs))
+                runs = list(engine.runs(common, KINDS, sizes))
             except NotInstalledError as error:
-                missing[name] = str(error)
-                collected.pop(name)
+                missing[engine.name] = str(error)
+                continue
+            collected.setdefault((engine.name, 0), []).append(runs)
     found = [
-        Point(
-            engine=OURS if name.startswith(OURS) else import_module(f"{PACKAGE}.{name}").ENGINE,
-            problem=run.problem,
-            mesh_kind=run.mesh_kind,
-            variant=run.engine,
-            order=run.order,
-            unknowns=run.unknowns,
-            seconds=run.seconds + (run.seconds_mesh if run.mesh_kind == "uniform" else 0.0),
-            errors=errors(run, common.reference),
-        )
-        for name, rounds_of_one in collected.items()
-        for run in median_runs(rounds_of_one)
+        point(engine, common, same)
+        for (engine, _), rounds_of_one in collected.items()
+        for same in zip(*rounds_of_one, strict=True)
     ]
     return found, list(missing.values())
 
@@ -162,7 +125,7 @@ def seconds_to(series: Sequence[Point], names: Sequence[str], tolerance: float) 
     One run that is right by chance, with finer ones that are not, does not count.
     """
     best = math.inf
-    for point in sorted(series, key=lambda p: -p.unknowns):
+    for point in sorted(series, key=lambda p: -p.run.unknowns):
         if not np.max([point.errors[name] for name in names]) <= tolerance:  # NaN is a failure
             break
         best = point.seconds
@@ -170,20 +133,73 @@ def seconds_to(series: Sequence[Point], names: Sequence[str], tolerance: float) 
 
 
 def best_seconds(
-    found: Sequence[Point], engine: str, kind: str, names: Sequence[str], tolerance: float
+    found: Sequence[Point], series: tuple[str, str], names: Sequence[str], tolerance: float
 ) -> float:
-    """The same for the best order and settings of an engine."""
+    """The same for the best order and settings of an engine on one kind of mesh."""
+    mine = sorted((p for p in found if p.series == series), key=lambda p: p.settings)
+    groups = (list(group) for _, group in groupby(mine, lambda p: p.settings))
+    return min((seconds_to(group, names, tolerance) for group in groups), default=math.inf)
 
-    def settings(point: Point) -> tuple[str, int]:
-        return point.variant, point.order
 
-    mine = sorted((p for p in found if (p.engine, p.mesh_kind) == (engine, kind)), key=settings)
-    return min(
-        (seconds_to(list(group), names, tolerance) for _, group in groupby(mine, settings)),
-        default=math.inf,
+def accuracy(extent: Extent) -> tuple[list[Point], str]:
+    """Time to accuracy."""
+    found, missing = [], set()
+    for name in extent.problems:
+        here, lines = points(COMMONS[name](), extent.rounds, extent.max_dofs)
+        found += here
+        missing |= set(lines)
+    draw(extent.out / "benchmark_accuracy.png", found)
+    return found, "\n\n".join([of_accuracy(found), *sorted(missing)])
+
+
+def of_accuracy(found: Sequence[Point]) -> str:
+    """Seconds of each engine's best order to relative errors."""
+    rows = []
+    for problem in dict.fromkeys(p.run.problem for p in found):
+        mine = [p for p in found if p.run.problem == problem]
+        for names in (*((name,) for name in QUANTITIES), TOGETHER):
+            title = "the first three" if names == TOGETHER else names[0].replace("_", "-")
+            for series in dict.fromkeys(p.series for p in mine):
+                times = [best_seconds(mine, series, names, t) for t in TOLERANCES]
+                label = f"**{OURS}**" if series[0] == OURS else series[0]
+                cells = ("-" if math.isinf(t) else f"{t:.3g}" for t in times)
+                rows.append((problem, title, label, series[1], *cells))
+    return table(
+        ("problem", "quantity", "engine", "meshes", *(f"{t:.0e}" for t in TOLERANCES)), rows
     )
 
 
-def series(found: Sequence[Point]) -> Iterator[tuple[str, str]]:
-    """Every engine with every kind of mesh, ngcontact first."""
-    yield from dict.fromkeys((p.engine, p.mesh_kind) for p in found)
+def draw(path: Path, found: Sequence[Point]) -> None:
+    """Seconds from which errors stay below a bound: problems in rows, quantities in columns.
+
+    One line for an engine and kind of mesh, of its best order and settings, as in the table.
+    """
+    problems = list(dict.fromkeys(p.run.problem for p in found))
+    figure = Figure(figsize=(4 * len(QUANTITIES), 3.6 * len(problems)), layout="constrained")
+    panels = figure.subplots(
+        len(problems), len(QUANTITIES), sharex=True, sharey=True, squeeze=False
+    )
+    engines = [e for e in dict.fromkeys(p.engine for p in found) if e != OURS]
+    for row, problem in zip(panels, problems, strict=True):
+        mine = [p for p in found if p.run.problem == problem]
+        for panel, name in zip(row, QUANTITIES, strict=True):
+            panel.set_title(f"{problem}: {name.replace('_', '-')}", fontsize=10)
+            panel.grid(which="major", alpha=0.3)
+            for series in dict.fromkeys(p.series for p in found):
+                engine, kind = series
+                ours = engine == OURS
+                panel.loglog(
+                    [best_seconds(mine, series, (name,), bound) for bound in BOUNDS],
+                    BOUNDS,
+                    LINES[kind],
+                    color="black" if ours else f"C{engines.index(engine)}",
+                    lw=2.2 if ours else 1.2,
+                    label=f"{engine}, {kind}",
+                )
+    for panel in panels[-1]:
+        panel.set_xlabel("seconds")
+    for row in panels:
+        row[0].set_ylabel("relative error")
+    handles, labels = panels[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=8)
+    FigureCanvasAgg(figure).print_png(path)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
 
+from drivers.benchmark.studies import Extent
 from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Problem, Solution, solve
+from drivers.tables import of_dicts
+from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.geometries import blocks
 from ngcontact.geometries.region import body, compound, polygon
 
@@ -19,27 +19,6 @@ SIZE = 15_000  # unknowns, about
 ORDER = 2
 STEEL = Elastic(E=200.0, nu=0.3)
 COUNTS = ("factorizations", "back_solves", "gap_searches", "curved_elements", "estimates")
-
-
-@dataclass(frozen=True)
-class Scene:
-    """One solution.
-
-    Attributes
-    ----------
-    feature, variant : str
-    unknowns, systems : int
-    work : dict
-        `Solution.work`, what a variant does not need being 0.
-    seconds : float
-    """
-
-    feature: str
-    variant: str
-    unknowns: int
-    systems: int
-    work: dict[str, int]
-    seconds: float
 
 
 def two_blocks(gap: float | None = None, third: bool = False) -> Problem:
@@ -62,41 +41,37 @@ def two_blocks(gap: float | None = None, third: bool = False) -> Problem:
     )
 
 
-def timed(problem: Problem, mesh: ng.Mesh, estimated: bool, rounds: int) -> tuple[Solution, float]:
-    """Median of several equal solutions."""
-    seconds = []
-    for _ in range(rounds):
-        start = time.perf_counter()
-        solution = solve(problem, mesh, order=ORDER)
-        if estimated:
-            _ = solution.error_estimate
-        seconds.append(time.perf_counter() - start)
-    return solution, float(np.median(seconds))
-
-
-def scenes(rounds: int, max_dofs: int) -> Iterator[Scene]:
-    """Pairs of scenes, with the feature first."""
+def scenes(extent: Extent) -> tuple[list[dict[str, object]], str]:
+    """What scenes skip."""
     opening, rings = two_blocks(), cases.ring_in_ring().problem
-    variants = [
-        ("contact", "touching", opening, False),
-        ("contact", "apart", two_blocks(gap=1.0), False),
-        ("third body", "with", two_blocks(third=True), False),
-        ("third body", "without", opening, False),
-        ("estimate", "asked for", opening, True),
-        ("estimate", "not asked for", opening, False),
-        ("curved edges", "matched rings", rings, False),
-        ("curved edges", "matched blocks", opening, False),
-        ("gap search", "disc on block", cases.pressed_disc(), False),
-        ("gap search", "matched rings", rings, False),
-    ]
-    for feature, variant, problem, estimated in variants:
-        mesh = uniform_mesh(problem, ORDER, min(SIZE, max_dofs))
-        solution, seconds = timed(problem, mesh, estimated, rounds)
-        yield Scene(
-            feature=feature,
-            variant=variant,
-            unknowns=solution.displacement.space.ndof,
-            systems=len(solution.steps),
-            work={name: solution.work[name] for name in COUNTS},
-            seconds=seconds,
+    found: list[dict[str, object]] = []
+    for feature, variant, problem in (
+        ("contact", "touching", opening),
+        ("contact", "apart", two_blocks(gap=1.0)),
+        ("third body", "with", two_blocks(third=True)),
+        ("third body", "without", opening),
+        ("estimate", "asked for", opening),
+        ("estimate", "not asked for", opening),
+        ("curved edges", "matched rings", rings),
+        ("curved edges", "matched blocks", opening),
+        ("gap search", "disc on block", cases.pressed_disc()),
+        ("gap search", "matched rings", rings),
+    ):
+        mesh, seconds = uniform_mesh(problem, ORDER, min(SIZE, extent.max_dofs)), []
+        for _ in range(extent.rounds):
+            start = time.perf_counter()
+            solution = solve(problem, mesh, order=ORDER)
+            if variant == "asked for":
+                _ = solution.error_estimate
+            seconds.append(time.perf_counter() - start)
+        found.append(
+            {
+                "feature": feature,
+                "scene": variant,
+                "unknowns": solution.displacement.space.ndof,
+                "systems": len(solution.steps),
+                **{name.replace("_", " "): solution.work[name] for name in COUNTS},
+                "s": f"{np.median(seconds):.3g}",
+            }
         )
+    return found, of_dicts(found)

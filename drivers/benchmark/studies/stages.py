@@ -5,12 +5,12 @@ from __future__ import annotations
 import cProfile
 import pstats
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.benchmark.scenes.problems import Common
+from drivers.benchmark.studies import Extent
 from drivers.benchmark.studies.linear import uniform_mesh
+from drivers.tables import of_dicts
 from ngcontact import solve
 from ngcontact.adaptivity import doerfler, refined
 
@@ -33,17 +33,11 @@ STAGES = {  # cumulative seconds of these functions; none calls another
 }
 
 
-@dataclass(frozen=True)
-class Stages:
-    """Seconds of a level by stage; `rest` is what no stage contains."""
+def stages(common: Common, size: int) -> tuple[int, dict[str, float]]:
+    """Unknowns, and seconds by stage; "rest" is what no stage contains.
 
-    problem: str
-    unknowns: int
-    seconds: dict[str, float]
-
-
-def stages(common: Common, size: int) -> Stages:
-    """Profile one level: a solution started from a coarser one, its estimate, a refinement."""
+    Of one profiled level: a solution started from a coarser one, its estimate, a refinement.
+    """
     problem = common.problem
     mesh = uniform_mesh(problem, ORDER, size)
     start = solve(problem, uniform_mesh(problem, ORDER, max(size // 4, 500)), order=ORDER)
@@ -67,13 +61,18 @@ def stages(common: Common, size: int) -> Stages:
             "Python's profiler has missed the assembly; use another Python, like 3.11"
         )
     spent["rest"] = clock - sum(spent.values())
-    return Stages(common.name, solution.displacement.space.ndof, spent)
+    return solution.displacement.space.ndof, spent
 
 
-def all_stages(commons: list[Common], max_dofs: int) -> Iterator[Stages]:
-    """All problems and sizes up to about `max_dofs` unknowns, after a warm-up."""
-    for common in commons:
-        stages(common, SIZES[0])
-        for size in SIZES:
-            if size <= max_dofs:
-                yield stages(common, size)
+def all_stages(extent: Extent) -> tuple[list[dict[str, object]], str]:
+    """Where the time of a level goes."""
+    rows: list[dict[str, object]] = []
+    for common, _, size in extent.cases((ORDER,), SIZES):
+        if size == SIZES[0]:
+            stages(common, size)  # warm-up
+        unknowns, seconds = stages(common, size)
+        total = sum(seconds.values())
+        shares = {name: f"{100 * spent / total:.0f} %" for name, spent in seconds.items()}
+        row = {"problem": common.name, "unknowns": unknowns, "level, s": f"{total:.3g}"}
+        rows.append(row | shares)
+    return rows, of_dicts(rows)

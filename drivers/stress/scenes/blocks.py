@@ -21,8 +21,12 @@ def polygon(name: str, vertices: Sequence[Point], sides: Sequence[str], draw: Dr
     found = tuple(
         Side(f"{name}_{side}", a, b) for side, a, b in zip(sides, vertices, ends, strict=True)
     )
-    E = float(10 ** draw.uniform(-1, 1.5))
-    return Body(name, found, E, float(draw.uniform(0, 0.4)))
+    return Body(name, found, *moduli(draw))
+
+
+def moduli(draw: Draw) -> tuple[float, float]:
+    """Young's modulus and Poisson's ratio."""
+    return float(10 ** draw.uniform(-1, 1.5)), float(draw.uniform(0, 0.4))
 
 
 def block(name: str, x: Point, y: Point, draw: Draw) -> Body:
@@ -55,10 +59,7 @@ def pressed(scene: Scene, body: Body, middle: float, half: float, draw: Draw) ->
 
 def swapped_sides(pair: Pair, draw: Draw) -> Pair:
     """The pair, or with its roles exchanged."""
-    if draw.random() < 0.5:
-        return pair
-    d = None if pair.direction is None else (-pair.direction[0], -pair.direction[1])
-    return replace(pair, secondary=pair.primary, primary=pair.secondary, direction=d)
+    return pair if draw.random() < 0.5 else pair.swapped()
 
 
 def line(draw: Draw) -> Scene:
@@ -76,10 +77,9 @@ def line(draw: Draw) -> Scene:
 
 def unmatched(draw: Draw) -> Scene:
     """The same, one side finer, at any ratio up to 8."""
-    finer = float(draw.uniform(1 / 8, 1.0))
-    names = draw.permutation(["u", "l"])
-    sizes = {str(names[0]): finer, str(names[1]): 1.0}
-    return replace(line(draw), kind="unmatched", finer=sizes)
+    share = float(draw.uniform(1 / 8, 1.0))
+    finer, other = draw.permutation(["u", "l"]).tolist()
+    return replace(line(draw), kind="unmatched", finer={finer: share, other: 1.0})
 
 
 def corner(draw: Draw) -> Scene:
@@ -101,8 +101,7 @@ def corner(draw: Draw) -> Scene:
         p = LOAD * min(u.E, low.E) * float(draw.uniform(0, 1))
         scene = replace(scene, pressure={**scene.pressure, "u_right": scalar(p)})
     if wall and draw.random() < 0.4:
-        pair = Pair(("l_top", "l_wall"), ("u_bottom", "u_left"))
-        scene = replace(scene, pairs=(pair,))
+        scene = replace(scene, pairs=(pair.swapped(),))
     return scene
 
 
@@ -150,7 +149,7 @@ def branch(draw: Draw) -> Scene:
     if draw.random() < 0.4:
         pairs = (Pair(("u_bottom",), ("a_top", "b_top")),)
     elif draw.random() < 0.3:
-        pairs = (Pair(("a_top",), ("u_bottom",)), Pair(("b_top",), ("u_bottom",)))
+        pairs = tuple(pair.swapped() for pair in pairs)
     clamped = {**fixed("a_bottom"), **fixed("b_bottom")}
     return pressed(Scene("branch", (u, a, b), pairs, clamped=clamped), u, 0.0, 1.0, draw)
 

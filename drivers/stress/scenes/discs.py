@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from drivers.stress.scenes.blocks import Draw, block, fixed, polygon, swapped_sides
+from drivers.stress.scenes.blocks import Draw, block, fixed, moduli, polygon, swapped_sides
 from drivers.stress.scenes.scene import Body, Pair, Scene
 from drivers.stress.scenes.sides import Point, Side, scalar, vector
 
@@ -25,8 +25,7 @@ def circle(names: tuple[str, ...], radius: float, hole: bool = False) -> tuple[S
 
 def disc(name: str, radius: float, names: tuple[str, ...], draw: Draw) -> Body:
     """A disc about the origin."""
-    E = float(10 ** draw.uniform(-1, 1.5))
-    return Body(name, circle(names, radius), E, float(draw.uniform(0, 0.4)))
+    return Body(name, circle(names, radius), *moduli(draw))
 
 
 def _stiffness(scene: Scene) -> float:
@@ -46,15 +45,8 @@ def vee(draw: Draw) -> Scene:
     apex = (0.0, -1 / sine)
     right = (reach * sine, apex[1] + reach * cosine)
     wide, bottom = right[0] + 0.3, apex[1] - 0.6
-    vertices: list[Point] = [
-        (-wide, bottom),
-        (wide, bottom),
-        (wide, right[1]),
-        right,
-        apex,
-        (-right[0], right[1]),
-        (-wide, right[1]),
-    ]
+    rim: list[Point] = [(wide, right[1]), right, apex, (-right[0], right[1]), (-wide, right[1])]
+    vertices = [(-wide, bottom), (wide, bottom), *rim]
     names = ["bottom", "side", "rim", "right", "left", "rim", "side"]
     low = polygon("v", vertices, names, draw)
     d = disc("d", 1.0, ("d_top", "d_top", "d_left", "d_right"), draw)
@@ -98,21 +90,10 @@ def pin(draw: Draw) -> Scene:
     return replace(scene, weight={"d": (float(draw.uniform(-1, 1)) * w, -w)})
 
 
-def _half_disc(draw: Draw) -> Body:
-    """The lower half of a disc of radius 1 about the origin: sides top and arc."""
-    E = float(10 ** draw.uniform(-1, 1.5))
-    o = (0.0, 0.0)
-    sides = (
-        Side("d_top", (1.0, 0.0), (-1.0, 0.0)),
-        Side("d_arc", (-1.0, 0.0), (0.0, -1.0), o),
-        Side("d_arc", (0.0, -1.0), (1.0, 0.0), o),
-    )
-    return Body("d", sides, E, float(draw.uniform(0, 0.4)))
-
-
 def rolling(draw: Draw) -> Scene:
     """Half a disc on a block, or on a rigid plane."""
-    d = _half_disc(draw)
+    arc = circle(("", "", "d_arc", "d_arc"), 1.0)[2:]
+    d = Body("d", (Side("d_top", (1.0, 0.0), (-1.0, 0.0)), *arc), *moduli(draw))
     depth = float(draw.uniform(0.01, 0.06))
     clamped = {"d_top": vector((0.0, -depth))}
     rigid = draw.random() < 0.3
@@ -124,7 +105,6 @@ def rolling(draw: Draw) -> Scene:
     pair = swapped_sides(Pair(("d_arc",), ("l_top",), direction), draw)
     scene = Scene("disc", (d, low), (pair,), clamped={**clamped, **fixed("l_bottom")})
     if draw.random() < 0.3:
-        names = draw.permutation(["d", "l"])
-        sizes = {str(names[0]): float(draw.uniform(0.2, 1)), str(names[1]): 1.0}
-        scene = replace(scene, finer=sizes)
+        finer, other = draw.permutation(["d", "l"]).tolist()
+        scene = replace(scene, finer={finer: float(draw.uniform(0.2, 1)), other: 1.0})
     return scene

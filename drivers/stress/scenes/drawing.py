@@ -14,17 +14,8 @@ from drivers.stress.scenes.scene import Scene
 from drivers.stress.scenes.sides import Array
 
 KINDS: tuple[Callable[[np.random.Generator], Scene], ...] = (
-    blocks.line,
-    blocks.unmatched,
-    blocks.corner,
-    blocks.stack,
-    blocks.polygonal,
-    blocks.branch,
-    blocks.overlap,
-    blocks.obstacle,
-    discs.vee,
-    discs.pin,
-    discs.rolling,
+    *(blocks.line, blocks.unmatched, blocks.corner, blocks.stack, blocks.polygonal),
+    *(blocks.branch, blocks.overlap, blocks.obstacle, discs.vee, discs.pin, discs.rolling),
 )
 UNKNOWNS = (300, 1600)  # of a scene, about
 SHARE = 0.43  # of the square of its size that an element has as area
@@ -41,10 +32,8 @@ def _area(scene: Scene) -> float:
     total = 0.0
     for body in scene.bodies:
         for part in (body.sides, body.inner):
-            x = np.concatenate(
-                [side.point(np.array([0.0, side.length / 2])) for side in part or ()]
-                or [np.zeros((1, 2))]
-            )
+            ends = [side.point(np.array([0.0, side.length / 2])) for side in part]
+            x = np.concatenate([np.zeros((0, 2)), *ends])
             y = np.roll(x, -1, axis=0)
             total += 0.5 * float((x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum())
     return total

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
 from netgen.occ import ArcOfCircle, Edge, Face, OCCGeometry, Pnt
 
-from drivers.stress.scenes.scene import Scene
+from drivers.stress.scenes.scene import Pair, Scene
 from drivers.stress.scenes.sides import Affine, Array, Side
 from ngcontact import Contact, ContactWarning, Elastic, Problem, Solution, adapt, solve
 from ngcontact.geometries.region import body, compound, segment
@@ -51,8 +51,7 @@ def field_of(a: Affine) -> ng.CoefficientFunction:
     return ng.CF(tuple(field_of(Affine(v, row)) for v, row in zip(a.value, a.slope, strict=True)))
 
 
-def _contact(scene: Scene, number: int) -> Contact:
-    pair = scene.pairs[number]
+def _contact(pair: Pair) -> Contact:
     gap = pair.gap
     return Contact(
         secondary="|".join(pair.secondary),
@@ -69,32 +68,19 @@ def posed(scene: Scene, shape: OCCGeometry | ng.Mesh | None = None) -> Problem:
         materials={b.name: Elastic(b.E, b.nu) for b in scene.bodies},
         displacement={name: field_of(u) for name, u in scene.clamped.items()},
         sliding=list(scene.sliding) or None,
-        traction={
-            **{name: field_of(p) for name, p in scene.pressure.items()},
-            **dict(scene.traction),
-        },
+        traction={name: field_of(p) for name, p in scene.pressure.items()},
         force=dict(scene.weight),
-        contact=[_contact(scene, j) for j in range(len(scene.pairs))],
+        contact=[_contact(pair) for pair in scene.pairs],
         model=scene.model,
     )
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What the package says to a scene.
+    """What the package says to a scene."""
 
-    Attributes
-    ----------
-    solution : Solution or None
-        None where it refused.
-    warned : tuple of str
-        Messages of its own class of warnings.
-    refusal : Exception or None
-        What it raised.
-    """
-
-    solution: Solution | None
-    warned: tuple[str, ...] = field(default=())
+    solution: Solution | None  # None where it refused
+    warned: tuple[str, ...] = ()  # messages of its own class of warnings
     refusal: Exception | None = None
 
 
@@ -114,16 +100,12 @@ def _heard(run: Callable[[], Solution]) -> Answer:
 
 def answer(scene: Scene, mesh: ng.Mesh | None = None, order: int | None = None) -> Answer:
     """Solve a scene, on `mesh` if it is given."""
-
-    def run() -> Solution:
-        degree = order or scene.order
-        if mesh is not None:
-            return solve(posed(scene, mesh), order=degree)
-        if scene.finer is not None:
-            return solve(posed(scene), mesh=netgen_mesh(scene), order=degree)
-        return solve(posed(scene), maxh=scene.maxh, order=degree)
-
-    return _heard(run)
+    degree = order or scene.order
+    if mesh is not None:
+        return _heard(lambda: solve(posed(scene, mesh), order=degree))
+    if scene.finer is not None:
+        return _heard(lambda: solve(posed(scene), mesh=netgen_mesh(scene), order=degree))
+    return _heard(lambda: solve(posed(scene), maxh=scene.maxh, order=degree))
 
 
 def adapted(scene: Scene, max_dofs: int) -> Answer:

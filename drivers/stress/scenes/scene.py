@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,11 @@ class Body:
     nu: float
     inner: tuple[Side, ...] = ()
 
+    def mapped(self, side: Callable[[Side], Side], **others: Any) -> Body:
+        """The body with every side mapped, and with other values."""
+        sides, inner = (tuple(map(side, part)) for part in (self.sides, self.inner))
+        return replace(self, sides=sides, inner=inner, **others)
+
 
 @dataclass(frozen=True)
 class Pair:
@@ -32,44 +38,30 @@ class Pair:
     direction: Point | None = None
     gap: Affine | None = None
 
+    def swapped(self) -> Pair:
+        """The pair with its roles exchanged."""
+        d = None if self.direction is None else (-self.direction[0], -self.direction[1])
+        return replace(self, secondary=self.primary, primary=self.secondary, direction=d)
+
 
 @dataclass(frozen=True)
 class Scene:
-    """Bodies, supports, loads and pairs.
+    """Bodies, supports, loads and pairs; `kind` is what was drawn.
 
-    Attributes
-    ----------
-    kind : str
-        What was drawn.
-    bodies : tuple of Body
-    pairs : tuple of Pair
-    maxh : float
-        Largest element size, a length.
-    order : int
-    model : str
-    clamped : mapping
-        Displacement of sides, affine vectors.
-    sliding : tuple of str
-        Sides guided along themselves.
-    pressure : mapping
-        Affine numbers on sides.
-    traction, weight : mapping
-        Constant vectors on sides, and per area of bodies.
-    finer : mapping, optional
-        Share of `maxh` for each body: the mesh is made of each body alone. None: by the package.
+    `finer` is the share of `maxh` for each body, whose mesh is made of it alone; by default the
+    package meshes.
     """
 
     kind: str
     bodies: tuple[Body, ...]
     pairs: tuple[Pair, ...]
-    maxh: float = 0.3
+    maxh: float = 0.3  # largest element size, a length
     order: int = 1
     model: str = "plane strain"
-    clamped: Mapping[str, Affine] = field(default_factory=dict)
-    sliding: tuple[str, ...] = ()
-    pressure: Mapping[str, Affine] = field(default_factory=dict)
-    traction: Mapping[str, Point] = field(default_factory=dict)
-    weight: Mapping[str, Point] = field(default_factory=dict)
+    clamped: Mapping[str, Affine] = field(default_factory=dict)  # displacement of sides, vectors
+    sliding: tuple[str, ...] = ()  # sides guided along themselves
+    pressure: Mapping[str, Affine] = field(default_factory=dict)  # on sides, numbers
+    weight: Mapping[str, Point] = field(default_factory=dict)  # of bodies, per area
     finer: Mapping[str, float] | None = None
 
     @cached_property
@@ -92,70 +84,60 @@ class Scene:
         return all(side.centre is None for sides in self.sides.values() for side in sides)
 
     def moved(self, motion: Motion) -> Scene:
-        """The scene carried along; without a shift, `load` scales displacements and loads."""
+        """The scene carried along, without a shift and at the same load."""
         turn, L, E = motion.turn, motion.length, motion.modulus
 
-        def point(x: Point) -> Point:
-            a, b = L * turn @ np.array(x)
-            return float(a), float(b)
-
-        def direction(x: Point, factor: float = 1.0) -> Point:
+        def vector(x: Point, factor: float = L) -> Point:
             a, b = factor * turn @ np.array(x)
             return float(a), float(b)
 
         def side(s: Side) -> Side:
-            centre = None if s.centre is None else point(s.centre)
-            return replace(s, start=point(s.start), end=point(s.end), centre=centre)
-
-        def body(b: Body) -> Body:
-            sides, inner = (tuple(side(s) for s in part) for part in (b.sides, b.inner))
-            return replace(b, sides=sides, inner=inner, E=E * b.E)
+            centre = None if s.centre is None else vector(s.centre)
+            return replace(s, start=vector(s.start), end=vector(s.end), centre=centre)
 
         def number(a: Affine, factor: float) -> Affine:
             return Affine(factor * a.value, factor / L * turn @ a.slope)
 
         def pair(p: Pair) -> Pair:
-            d = None if p.direction is None else direction(p.direction)
+            d = None if p.direction is None else vector(p.direction, 1.0)
             return replace(p, direction=d, gap=None if p.gap is None else number(p.gap, L))
 
         return replace(
             self,
-            bodies=tuple(body(b) for b in self.bodies),
-            pairs=tuple(pair(p) for p in self.pairs),
+            bodies=tuple(b.mapped(side, E=E * b.E) for b in self.bodies),
+            pairs=tuple(map(pair, self.pairs)),
             maxh=L * self.maxh,
             clamped={
                 k: Affine(L * turn @ a.value, turn @ a.slope @ turn.T)
                 for k, a in self.clamped.items()
             },
             pressure={k: number(p, E) for k, p in self.pressure.items()},
-            traction={k: direction(t, E) for k, t in self.traction.items()},
-            weight={k: direction(w, E / L) for k, w in self.weight.items()},
+            weight={k: vector(w, E / L) for k, w in self.weight.items()},
         )
 
     def renamed(self, new: Mapping[str, str]) -> Scene:
         """The scene with other names of bodies and sides."""
 
-        def keys(data: Mapping[str, object]) -> dict[str, object]:
+        def keys(data: Mapping[str, Any]) -> dict[str, Any]:
             return {new[k]: v for k, v in sorted(data.items(), key=lambda item: new[item[0]])}
 
         def names(old: tuple[str, ...]) -> tuple[str, ...]:
             return tuple(new[name] for name in old)
 
-        def body(b: Body) -> Body:
-            sides, inner = (
-                tuple(replace(s, name=new[s.name]) for s in part) for part in (b.sides, b.inner)
-            )
-            return replace(b, name=new[b.name], sides=sides, inner=inner)
-
-        data = {k: keys(getattr(self, k)) for k in ("clamped", "pressure", "traction", "weight")}
+        data: dict[str, Any] = {
+            k: keys(getattr(self, k)) for k in ("clamped", "pressure", "weight")
+        }
         return replace(
             self,
-            bodies=tuple(body(b) for b in self.bodies),
+            bodies=tuple(
+                b.mapped(lambda s: replace(s, name=new[s.name]), name=new[b.name])
+                for b in self.bodies
+            ),
             pairs=tuple(
                 replace(p, secondary=names(p.secondary), primary=names(p.primary))
                 for p in self.pairs
             ),
             sliding=names(self.sliding),
-            finer=None if self.finer is None else keys(self.finer),  # type: ignore[arg-type]
-            **data,  # type: ignore[arg-type]
+            finer=None if self.finer is None else keys(self.finer),
+            **data,
         )

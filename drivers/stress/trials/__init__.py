@@ -1,5 +1,5 @@
-"""Kinds of stress, one a module.
+"""Random scenes that are tried, `data` and `scenes`; problems of tests, `algebra` and `held`.
 
-Each module has a function ``outcomes()`` that yields one `Outcome` per line of the table; where
-numbers are drawn it takes a ``seed``.
+A trial has functions ``outcomes(seed, count)``, which yields one `Outcome` per line of the table,
+and ``summary``.
 """

@@ -1,4 +1,4 @@
-"""Stress: quadratic programs on which active-set methods cycle, and random ones by the hundred.
+"""Quadratic programs on which active-set methods cycle, and random ones; what is right of them.
 
 The matrices come from the dual 0 <= force, S force - d >= 0: `solve_qp` gets A = S^-1, B = I,
 g = 0, f = S^-1 d.
@@ -6,14 +6,11 @@ g = 0, f = S^-1 d.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.stress import Outcome, refused
-from ngcontact import solve_qp
 from ngcontact.qp import Iterate
 
 Array = NDArray[np.float64]
@@ -21,7 +18,6 @@ Program = tuple[Array, Array, Array, Array]  # A, f, B, g
 Generator = np.random.Generator
 
 ROUND_OFF = 1e-14  # of a solve, times the condition number: 45 units, entries are summed by tens
-BRUTE = 8  # rows up to which all active sets are tried
 
 # The plain method cycles on the first two for ever, on the third in round-off of a tie.
 CYCLES = {
@@ -114,67 +110,3 @@ def condition(program: Program) -> float:
     A, _, B, _ = program
     rows = np.linalg.svd(np.linalg.solve(np.linalg.cholesky(A), B.T), compute_uv=False)
     return float(max(np.linalg.cond(A), (rows[0] / rows[-1]) ** 2))
-
-
-def _off(value: Array, right: Array) -> float:
-    return float(np.abs(value - right).max() / max(np.abs(right).max(), 1.0))
-
-
-def _worst(outcomes: list[Outcome]) -> Outcome:
-    """The one that comes nearest to what is allowed, or exceeds it most."""
-    return max(outcomes, key=lambda o: (not o.passed, o.error / o.allowed))
-
-
-def cycles() -> Iterator[Outcome]:
-    """The known cycles in units from 1e-150 to 1e150: the worst of all first active sets."""
-    for name, (S, d, force) in CYCLES.items():
-        for unit in (1e-150, 1.0, 1e150):
-            program = dual(np.array(S, float), unit * np.array(d, float))
-            found = []
-            for first in product([False, True], repeat=3):
-                result = solve_qp(*program, active=np.array(first))
-                outcome = Outcome(
-                    case=name,
-                    varied=f"unit {unit:g}, first active set {''.join(str(int(x)) for x in first)}",
-                    steps=len(result.steps),
-                    residual=kkt_residual(program, result),
-                    error=_off(result.force / unit, np.array(force, float)),
-                    allowed=ROUND_OFF * condition(program),
-                )
-                found.append(outcome)
-            yield _worst(found)
-    data = dual(NOT_SYMMETRIC, -np.ones(3))
-    yield refused("T-cyc-0", "not symmetric", ValueError, "symmetric", lambda: solve_qp(*data))
-
-
-def random_programs(count: int = 60, seed: int = 0) -> Iterator[Outcome]:
-    """The worst of `count` programs for each number of rows, from random first active sets."""
-    for m in (1, 2, 3, 4, 5, 6, 7, BRUTE, 12, 20, 40):
-        draw = np.random.default_rng(m + 1000 * seed)
-        normal, tied = [], []
-        for _ in range(count):
-            program = random_program(draw, m)
-            result = solve_qp(*program, active=draw.random(m) < 0.5)
-            residual = kkt_residual(program, result)
-            right = brute_force(program) if m <= BRUTE else result.u
-            allowed = ROUND_OFF * condition(program)
-            error = max(_off(result.u, right), residual)
-            normal.append(
-                Outcome(f"normal, {m} rows", "worst", len(result.steps), residual, error, allowed)
-            )
-            program, u, force = tied_program(draw, m)
-            result = solve_qp(*program, active=draw.random(m) < 0.5)
-            residual = kkt_residual(program, result)
-            error = max(_off(result.u, u), _off(result.force, force))
-            allowed = ROUND_OFF * condition(program)
-            tied.append(
-                Outcome(f"tied, {m} rows", "worst", len(result.steps), residual, error, allowed)
-            )
-        yield _worst(normal)
-        yield _worst(tied)
-
-
-def outcomes(seed: int = 0) -> Iterator[Outcome]:
-    """Known cycles, then random programs."""
-    yield from cycles()
-    yield from random_programs(seed=seed)

@@ -1,7 +1,5 @@
 """What a picture shows when it is asked to: fields, units, curves, mirror images, close-ups."""
 
-from __future__ import annotations
-
 import ngsolve as ng
 import numpy as np
 import pytest
@@ -10,11 +8,10 @@ from drivers.reference import cases
 from ngcontact import solve
 from ngcontact.output import plot_solution
 from ngcontact.output.pictures import Style
-from ngcontact.output.pictures.panels import close_ups, colour_range
+from ngcontact.output.pictures.panels import colour_range
 from ngcontact.output.pictures.scene import picture
-from tests.output.stubs import MAXH, stub
+from tests.output.stubs import stub
 
-UNIFORM = ((3.0, 1.0), (1.0, -2.0))  # in-plane stress
 ACROSS = 0.5  # normal to the plane
 
 
@@ -44,38 +41,6 @@ def test_fields_of_a_uniform_stress(uniform, field, value):
     shown = picture(uniform, Style(field=field)).shown
     np.testing.assert_allclose(shown.values, value, rtol=1e-12)  # round-off
     assert shown.kind == "stress"
-
-
-def test_displacements_and_any_function_are_fields(uniform):
-    scene = picture(uniform, Style(scale=1.0, field="displacement_y"))
-    still = picture(uniform, Style(scale=0.0, field=ng.x))
-    np.testing.assert_allclose(scene.shown.values, (scene.moved - still.moved)[:, 1], atol=1e-14)
-    np.testing.assert_allclose(still.shown.values, still.moved[:, 0], atol=1e-14)
-    length = picture(uniform, Style(field="displacement")).shown
-    assert length.kind == "length"
-    assert length.values.max() == pytest.approx(
-        np.linalg.norm(scene.moved - still.moved, axis=1).max()
-    )
-
-
-def test_units_name_axes_and_divide_values(tmp_path, uniform):
-    units = {"length": ("mm", 1e-3), "stress": "Pa"}
-    figure = plot_solution(uniform, tmp_path / "a.png", units=units, scale=0.0)
-    bodies, profile = figure.axes[0], figure.axes[-2]
-    assert bodies.get_xlabel() == "x [mm]"
-    assert bodies.get_xlim()[1] > 1000  # the block ends at x = 2
-    assert figure.axes[-1].get_ylabel() == "von Mises stress [Pa]" or any(
-        axes.get_ylabel() == "von Mises stress [Pa]" for axes in figure.axes
-    )
-    assert any(axes.get_ylabel() == "contact pressure [Pa]" for axes in (profile, *figure.axes))
-
-
-def test_curves_over_the_pressure(tmp_path, uniform):
-    curves = {"twice": lambda s: 2 * s, "measured": ([0.0, 1.0], [3.0, 4.0])}
-    figure = plot_solution(uniform, tmp_path / "a.png", profile=curves)
-    lines = {line.get_label(): line.get_xydata() for axes in figure.axes for line in axes.lines}
-    np.testing.assert_allclose(lines["twice"][:, 1], 2 * lines["twice"][:, 0])
-    np.testing.assert_allclose(lines["measured"], [(0, 3), (1, 4)])
 
 
 @pytest.mark.parametrize(
@@ -120,19 +85,6 @@ def test_a_symmetric_half_is_mirrored(pressed_half):
 def test_only_lines_of_symmetry_mirror(tmp_path, pressed_half, mirror, text):
     with pytest.raises(ValueError, match=text):
         plot_solution(pressed_half, tmp_path / "a.png", mirror=mirror)
-
-
-def test_each_small_zone_has_a_close_up(tmp_path):
-    solution = stub(2)
-    x = solution.points[:, 0]
-    solution.active[:] = False
-    solution.active[[np.argmin(np.abs(x + 0.4)), np.argmin(np.abs(x - 0.4))]] = True
-    windows = close_ups([picture(solution, Style(scale=0.0))])
-    middles = sorted((low[0] + high[0]) / 2 for low, high in windows)
-    # The nearest nodes of a picture, whose spacing is MAXH over twice the order.
-    assert middles == pytest.approx(sorted(x[solution.active]), abs=MAXH / 8)
-    figure = plot_solution(solution, tmp_path / "a.png")
-    assert [axes.get_title() for axes in figure.axes[1:3]] == ["zone 1", "zone 2"]
 
 
 def test_a_singular_corner_leaves_the_colours(tmp_path, uniform):

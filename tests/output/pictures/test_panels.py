@@ -1,6 +1,6 @@
-"""Panels of a picture: labels seen whole, a panel for each far zone, singular peaks cut."""
+"""Panels of a picture: labels seen whole, singular peaks cut, contact lines in order."""
 
-from __future__ import annotations
+from types import SimpleNamespace
 
 import ngsolve as ng
 import numpy as np
@@ -8,8 +8,9 @@ import pytest
 from matplotlib import pyplot
 
 from ngcontact import Contact
-from ngcontact.output import plot_solution, write_film
-from ngcontact.output.pictures.panels import cut_pressure, shown_parts
+from ngcontact.output import plot_solution
+from ngcontact.output.pictures.panels import cut_pressure
+from ngcontact.output.pictures.scene import contact_lines
 from tests.output.stubs import stub
 
 
@@ -61,30 +62,6 @@ def test_labels_lie_inside_and_apart(monkeypatch, solution, factor):
     pyplot.close(figure)
 
 
-def test_small_zones_far_apart_have_a_panel_each(tmp_path, solution):
-    touch(solution, [-0.5, 0.6], 0.06)
-    parts = shown_parts(solution)
-    assert len(parts) == 2
-    for part, place in zip(parts, (-0.5, 0.6), strict=True):
-        assert part.mean() == pytest.approx(place, abs=0.06)
-        assert part[0] < place < part[1]
-    figure = plot_solution(solution, tmp_path / "a.png")
-    panels = [axes for axes in figure.axes if "contact line" in axes.get_xlabel()]
-    assert len(panels) == 2
-    assert panels[0].get_ylim() == panels[1].get_ylim()
-    assert [axes.get_ylabel() for axes in panels] == ["contact pressure", ""]
-    write_film(tmp_path / "a.gif", [solution, solution])  # on one panel, as zones may move
-
-
-def test_zones_that_fill_the_line_share_a_panel(solution):
-    assert len(shown_parts(touch(solution, [-0.3, 0.3], 0.25))) == 1
-
-
-def test_without_contact_the_whole_line_is_shown(solution):
-    [part] = shown_parts(solution)
-    assert part == pytest.approx([solution.points[:, 0].min(), solution.points[:, 0].max()])
-
-
 def test_singular_ends_are_cut_and_marked(tmp_path, solution):
     """(1 - t**2)**-1/2 with ends of a thousand: all but a tenth lie below 2.3."""
     touch(solution, [0.0], 0.9, lambda t: (1 - t**2) ** -0.5)
@@ -103,3 +80,30 @@ def test_singular_ends_are_cut_and_marked(tmp_path, solution):
 def test_other_peaks_are_not_cut(solution, pressure):
     """Hertz's, a linear one, that of a punch with rounded corners."""
     assert cut_pressure(touch(solution, [0.0], 0.9, pressure)) is None
+
+
+def lines_of(points, direction=None, pair=None):
+    contact = [SimpleNamespace(direction=direction)] * 2
+    pair = np.zeros(len(points), dtype=int) if pair is None else pair
+    solution = SimpleNamespace(points=points, pair=pair, problem=SimpleNamespace(contact=contact))
+    return contact_lines(solution)
+
+
+def test_contact_line_follows_an_arc_in_any_numbering():
+    angle = np.sort(np.random.default_rng(1).uniform(0, 5.5, 60))
+    shuffle = np.random.default_rng(2).permutation(60)
+    points = np.column_stack([np.cos(angle), np.sin(angle)])[shuffle]
+    [(pair, rows, s)] = lines_of(points)
+    along = angle[shuffle][rows]
+    assert pair == 0
+    assert np.all(np.diff(along) > 0) or np.all(np.diff(along) < 0)
+    chords = 2 * np.sin(np.abs(np.diff(along)) / 2)
+    np.testing.assert_allclose(np.diff(s), chords, rtol=1e-12)
+    assert s[0] == 0
+
+
+def test_contact_line_keeps_both_rows_of_a_corner():
+    points = np.array([[0, 0], [1, 0], [2, 0], [2, 0], [2, 1], [2, 2.0]])
+    [(_, rows, s)] = lines_of(points)
+    assert rows.tolist() == [0, 1, 2, 3, 4, 5]
+    assert s.tolist() == [0, 1, 2, 2, 3, 4]

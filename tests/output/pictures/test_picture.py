@@ -1,38 +1,12 @@
 """Pictures of a solution."""
 
-from __future__ import annotations
-
-import subprocess
-import sys
-
 import matplotlib
 import numpy as np
 import pytest
 
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.output import plot_solution
-from tests.output.stubs import stub, two_bodies
-
-LIGHT = """
-import sys
-from ngcontact import Elastic, Problem, adapt, solve, write_series
-from ngcontact.output import plot_solution
-from netgen.occ import OCCGeometry, Rectangle
-
-square = Rectangle(1, 1).Face()
-square.faces.name, square.edges.name = "square", "side"
-law = {"square": Elastic(E=1.0, nu=0.3)}
-held = Problem(OCCGeometry(square, dim=2), law, {"side": (0, 0)}, force={"square": (0, -1)})
-print(solve(held, maxh=0.5), *adapt(held, maxh=0.5, order=1, max_dofs=100))
-print(*sys.modules)
-"""
-
-
-def test_importing_and_solving_load_neither_vtk_nor_matplotlib():
-    run = subprocess.run([sys.executable, "-c", LIGHT], capture_output=True, check=True, text=True)
-    modules = set(run.stdout.split())
-    assert {"ngcontact.output.pictures.picture", "ngcontact.output.vtk"} <= modules
-    assert not {"pyvista", "vtk", "vtkmodules", "matplotlib"} & modules
+from tests.output.stubs import two_bodies
 
 
 @pytest.fixture(scope="module")
@@ -67,43 +41,6 @@ def test_picture_shows_bodies_and_pressure(tmp_path, hertz):
     for label, state in (("in contact", hertz.active), ("open", ~hertz.active)):
         expected = points[state][np.argsort(points[state][:, 0])]
         np.testing.assert_allclose(drawn[label], expected, atol=1e-12)
-
-
-def test_scale_is_obeyed_and_stated(tmp_path, hertz):
-    figure = plot_solution(hertz, tmp_path / "a.png", scale=3)
-    assert figure.axes[0].get_title() == "deformed bodies, displacement × 3"
-    # disc_top sinks by 0.02, so that its drawn height is 1 - 3 * 0.02
-    [shading] = [c for c in figure.axes[0].collections if hasattr(c, "_triangulation")]
-    assert shading._triangulation.y.max() == pytest.approx(0.94, abs=1e-3)
-
-
-def test_small_displacement_without_a_gap_is_magnified(tmp_path):
-    solution = stub(2)
-    solution.displacement.vec.data *= 1e-3
-    solution.active[:] = False
-    title = plot_solution(solution, tmp_path / "a.png").axes[0].get_title()
-    # |u| is largest at (2, -1), 0.297e-3; 4 % of the size 4 are 538 times that.
-    assert title == "deformed bodies, displacement × 500"
-
-
-def test_without_a_path_the_picture_is_shown(monkeypatch):
-    matplotlib.use("Agg")
-    from matplotlib import pyplot
-
-    pyplot.close("all")  # of pages that were run
-    shown = []
-    monkeypatch.setattr(pyplot, "show", lambda: shown.append(pyplot.get_fignums()))
-    figure = plot_solution(stub(1))
-    assert shown == [[figure.number]]
-    pyplot.close(figure)
-
-
-def test_a_picture_in_a_file_leaves_pyplot_alone(tmp_path):
-    from matplotlib import pyplot
-
-    before = pyplot.get_fignums()
-    plot_solution(stub(1), tmp_path / "a.png")
-    assert pyplot.get_fignums() == before
 
 
 def test_bad_scale_and_suffix_are_refused(tmp_path):

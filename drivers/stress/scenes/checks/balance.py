@@ -51,8 +51,6 @@ def residual(scene: Scene, solution: Solution) -> float:
     for name, p in scene.pressure.items():
         ds = ng.ds(definedon=mesh.Boundaries(name))
         f += -field_of(p) * (v * ng.specialcf.normal(2)) * ds
-    for name, t in scene.traction.items():
-        f += ng.CF(t) * v * ng.ds(definedon=mesh.Boundaries(name))
     a.Assemble()
     f.Assemble()
     left = (a.mat * solution.displacement.vec - f.vec).Evaluate().FV().NumPy()

@@ -1,44 +1,230 @@
-"""A scene's verdict: what the package says of it, against balance, variants and other solvers."""
+"""A scene's verdict: balance, variants that must agree with it, and another solver."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
 
+import ngsolve as ng
 import numpy as np
 
+from drivers.stress.motion import Motion, moved_mesh
 from drivers.stress.scenes.checks.balance import penetration, residual, unbalanced
-from drivers.stress.scenes.checks.measures import measured
+from drivers.stress.scenes.checks.measures import Measures, differences, measured
 from drivers.stress.scenes.checks.reference import reference
-from drivers.stress.scenes.checks.variants import CHECKS, FACTOR, SAME, Case, Finding, named
-from drivers.stress.scenes.drawing import scene_of
-from drivers.stress.scenes.posing import Answer, answer
-from drivers.stress.scenes.scene import Scene
+from drivers.stress.scenes.drawing import rotation, scene_of
+from drivers.stress.scenes.posing import Answer, adapted, answer
+from drivers.stress.scenes.scene import Pair, Scene
+from ngcontact import ContactError, Solution
 
 BALANCED = 1e-8  # of the largest force: cancellation of moduli to 1e2 and of loads, round-off
+FACTOR = 3.0  # of the sum of both estimates, above which two solutions disagree
+SAME = 1e-6  # relative difference of one discrete problem posed in two ways; ties need not be alike
+NODES = 2000  # of the finer mesh of the reference, about
+UNITS = 1e9  # by which lengths and moduli are multiplied
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One check of one scene: what was compared, and the difference found and allowed."""
+
+    check: str
+    difference: float
+    allowed: float
+    warned: bool = False  # whether a solution compared came with a ContactWarning
+
+    @property
+    def ratio(self) -> float:
+        """Difference over what is allowed; infinite if it is not a number."""
+        ratio = self.difference / self.allowed if self.allowed > 0 else np.inf
+        return float(ratio) if ratio == ratio else np.inf
+
+
+@dataclass(frozen=True)
+class Case:
+    """A scene that was solved, for its checks."""
+
+    scene: Scene
+    answer: Answer
+    measures: Measures
+    draw: np.random.Generator
+
+    @property
+    def solution(self) -> Solution:
+        """The solution."""
+        assert self.answer.solution is not None
+        return self.answer.solution
+
+    @cached_property
+    def without_geometry(self) -> Case | None:
+        """The same straight mesh without geometry, which knows corners by their angle or names."""
+        mesh, *_ = moved_mesh(self.solution.mesh, Motion("as it is"))
+        other = answer(self.scene, mesh)
+        m = _there(self.scene, other)
+        return None if m is None else replace(self, answer=other, measures=m)
+
+
+def named(scene: Scene, error: Exception) -> bool:
+    """Whether a refusal says what it is about: a class of the package's own kind, and a name."""
+    names = {*scene.body_of, *scene.body_of.values(), *(str(j) for j in range(len(scene.pairs)))}
+    told = any(f'"{name}' in str(error) or f"contact[{name}]" in str(error) for name in names)
+    return isinstance(error, ValueError | ContactError) and told
+
+
+def close(scene: Scene, what: str, case: Case, other: Answer, m: Measures | None) -> list[Finding]:
+    """Findings against another solution with an estimate; `m` are its measures in this frame."""
+    warned = bool(case.answer.warned or other.warned)
+    if m is None:
+        error = other.refusal
+        wrong = 0.0 if error is not None and named(scene, error) else np.inf
+        return [Finding(f"{what}: {type(error).__name__}", wrong, 1.0, warned)]
+    allowed = FACTOR * (case.measures.relative_error + m.relative_error) + SAME
+    found = differences(case.scene, case.measures, m)
+    return [Finding(f"{what}: {k}", d, allowed, warned) for k, d in found.items()]
+
+
+def equal(what: str, case: Case | None, other: Answer, m: Measures | None) -> list[Finding]:
+    """Findings against the same discrete problem: both are solved, or both refused."""
+    if case is None and m is None:
+        return []
+    if case is None or m is None:
+        return [Finding(f"{what}: {type(other.refusal).__name__}", np.inf, SAME)]
+    found = differences(case.scene, case.measures, m)
+    found["energy"] = found.get("energy", 0.0) ** 2
+    return [Finding(f"{what}: {k}", d, SAME) for k, d in found.items()]
+
+
+def _there(scene: Scene, other: Answer) -> Measures | None:
+    return None if other.solution is None else measured(scene, other.solution)
+
+
+def _alike(
+    case: Case,
+    what: str,
+    scene: Scene,
+    mesh: ng.Mesh | None,
+    back: Callable[[Measures], Measures],
+) -> list[Finding]:
+    """Findings against a scene posed in another way: straight ones on their mesh, others on a new.
+
+    `back` takes measures into the frame and to the names of the case.
+    """
+    other = answer(scene, mesh)
+    m = _there(scene, other)
+    m = None if m is None else back(m)
+    if mesh is None:
+        return close(scene, what, case, other, m)
+    return equal(what, case.without_geometry, other, m)
+
+
+def _carried(case: Case, what: str, motion: Motion) -> list[Finding]:
+    """The scene moved."""
+    mesh = moved_mesh(case.solution.mesh, motion)[0] if case.scene.straight else None
+    return _alike(case, what, case.scene.moved(motion), mesh, lambda m: m.back(motion))
+
+
+def rotated(case: Case) -> list[Finding]:
+    """Any other angle."""
+    angle = float(case.draw.uniform(0, 2 * np.pi))
+    return _carried(case, "rotated", Motion("rotated", turn=rotation(angle)))
+
+
+def scaled(case: Case) -> list[Finding]:
+    """Lengths and moduli times 1e9 or 1e-9; curved sides need lengths that the CAD kernel takes."""
+    power = case.draw.choice([-1, 1], 2)
+    length = UNITS ** float(power[0]) if case.scene.straight else 1.0
+    motion = Motion("scaled", length=length, modulus=UNITS ** float(power[1]))
+    return _carried(case, "scaled", motion)
+
+
+def renamed(case: Case) -> list[Finding]:
+    """Bodies and sides with names in another order."""
+    scene = case.scene
+    names = sorted({*scene.body_of, *scene.body_of.values()})
+    order = case.draw.permutation(len(names))
+    new = {name: f"n{order[i]:02d}" for i, name in enumerate(names)}
+    old, mesh, still = {b: a for a, b in new.items()}, None, Motion("as it is")
+    if scene.straight:
+        mesh, *_ = moved_mesh(case.solution.mesh, still)
+        for i, name in enumerate(mesh.GetBoundaries()):
+            mesh.ngmesh.SetBCName(i, new.get(name, name))
+        for i, name in enumerate(mesh.GetMaterials()):
+            mesh.ngmesh.SetMaterial(i + 1, new[name])
+        mesh = ng.Mesh(mesh.ngmesh)
+    return _alike(case, "renamed", scene.renamed(new), mesh, lambda m: m.back(still, old))
+
+
+def permuted(case: Case) -> list[Finding]:
+    """Pairs, and the sides that they name, in the other order."""
+
+    def turned(pair: Pair) -> Pair:
+        return replace(pair, secondary=pair.secondary[::-1], primary=pair.primary[::-1])
+
+    scene = replace(case.scene, pairs=tuple(turned(p) for p in case.scene.pairs[::-1]))
+    other = answer(scene, case.solution.mesh)
+    m = _there(scene, other)
+    return equal("permuted", case, other, m)
+
+
+def swapped(case: Case) -> list[Finding]:
+    """The primary carries the points."""
+    if any(pair.gap is not None or not pair.primary for pair in case.scene.pairs):
+        return []
+
+    scene = replace(case.scene, pairs=tuple(pair.swapped() for pair in case.scene.pairs))
+    other = answer(scene, case.solution.mesh)
+    return close(scene, "swapped", case, other, _there(scene, other))
+
+
+def other_order(case: Case) -> list[Finding]:
+    """The next order on the same mesh."""
+    order = case.scene.order + 1 if case.scene.order < 4 else 3
+    other = answer(case.scene, case.solution.mesh, order)
+    return close(case.scene, f"order {order}", case, other, _there(case.scene, other))
+
+
+def refined(case: Case) -> list[Finding]:
+    """An adaptive run to twice the unknowns."""
+    other = adapted(case.scene, 2 * case.solution.displacement.space.ndof)
+    return close(case.scene, "adaptive", case, other, _there(case.scene, other))
+
+
+def referred(case: Case) -> list[Finding]:
+    """The order-1 solver that shares no code, on two meshes whose energies tell its error."""
+    triangles, order = case.solution.mesh.ne, case.scene.order
+    factor = min(1.0 / order, (triangles / NODES) ** 0.5)
+    for finer in (1.0, 0.5):  # a coarse mesh may not hold what corners hold
+        try:
+            coarse, fine = (reference(case.scene, k * factor * finer) for k in (2.0, 1.0))
+        except ArithmeticError:
+            continue
+        error = abs(2 * (coarse.energy - fine.energy)) ** 0.5
+        m = replace(fine, error=error)
+        return close(case.scene, "reference", case, Answer(None), m)
+    return [Finding("reference: no minimum", np.inf, 1.0, bool(case.answer.warned))]
+
+
+CHECKS: tuple[tuple[Callable[[Case], list[Finding]], float], ...] = (
+    (rotated, 0.3),
+    (scaled, 0.25),
+    (renamed, 0.2),
+    (permuted, 0.25),
+    (swapped, 0.4),
+    (other_order, 0.4),
+    (refined, 0.25),
+    (referred, 0.25),
+)
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """What became of the scene of a seed.
-
-    Attributes
-    ----------
-    seed : int
-    scene : Scene
-    answer : Answer
-    findings : tuple of Finding
-    """
+    """What became of the scene of a seed."""
 
     seed: int
     scene: Scene
     answer: Answer
     findings: tuple[Finding, ...]
-
-    @property
-    def worst(self) -> Finding:
-        """The finding that uses most of what it is allowed."""
-        return max(self.findings, key=lambda f: f.ratio)
 
     @property
     def silent(self) -> tuple[Finding, ...]:

@@ -23,27 +23,16 @@ ALIKE = 1e-6  # relative difference of lengths and cosines that are the same but
 
 @dataclass(frozen=True)
 class Measures:
-    """Numbers of one solution.
+    """Numbers of one solution, per thickness.
 
-    Attributes
-    ----------
-    norm : mapping
-        Energy norm of each body, the root of an energy per thickness.
-    energy : float
-        Potential energy, per thickness.
-    force : mapping
-        Contact force (2,) on each body, per thickness, or on several, see `contact_forces`.
-    along : mapping
-        Of each side of the secondaries, by name and number: arc lengths (k,) and forces (k,).
-    error : float
-        Estimated error in the energy norm.
+    `along` are arc lengths (k,) and forces (k,) on each side of the secondaries, by name, number.
     """
 
-    norm: Mapping[str, float]
-    energy: float
-    force: Mapping[str, Array]
+    norm: Mapping[str, float]  # energy norm of each body, the root of an energy
+    energy: float  # potential energy
+    force: Mapping[str, Array]  # contact force (2,) on each body, or on several: `contact_forces`
     along: Mapping[tuple[str, int], tuple[Array, Array]]
-    error: float
+    error: float  # estimated error in the energy norm
 
     @property
     def whole(self) -> float:
@@ -96,16 +85,10 @@ def stress(grad: ng.CoefficientFunction, body: Body, model: str) -> ng.Coefficie
 def loads(scene: Scene, mesh: ng.Mesh, v: ng.CoefficientFunction, body: Body, order: int) -> float:
     """Work of the loads of a body on a displacement v, per thickness."""
     own = {side.name for side in (*body.sides, *body.inner)}
-    total = 0.0
-    for name in own & scene.pressure.keys():
-        rate = -field_of(scene.pressure[name]) * (v * ng.specialcf.normal(2))
-        total += ng.Integrate(rate, mesh.Boundaries(name), order=order)
-    for name in own & scene.traction.keys():
-        total += ng.Integrate(ng.CF(scene.traction[name]) * v, mesh.Boundaries(name), order=order)
-    if body.name in scene.weight:
-        rate = ng.CF(scene.weight[body.name]) * v
-        total += ng.Integrate(rate, mesh.Materials(body.name), order=order)
-    return total
+    n = ng.specialcf.normal(2)
+    rates = [(mesh.Boundaries(k), -field_of(p) * n) for k, p in scene.pressure.items() if k in own]
+    rates += [(mesh.Materials(k), ng.CF(w)) for k, w in scene.weight.items() if k == body.name]
+    return float(sum(ng.Integrate(rate * v, region, order=order) for region, rate in rates))
 
 
 def _along(scene: Scene, solution: Solution) -> dict[tuple[str, int], tuple[Array, Array]]:
@@ -123,10 +106,11 @@ def _along(scene: Scene, solution: Solution) -> dict[tuple[str, int], tuple[Arra
         x, force, normal = solution.points[at], solution.force[at], solution.pairs[j].line.direction
         place = [side.arc_length(x) for *_, side in sides]
         size = max(side.length for *_, side in sides)
+        found_at = zip(sides, place, strict=True)
         score = np.array(
             [
-                distance / size + 1 - (side.normal(s) * normal).sum(axis=1)
-                for (*_, side), (s, distance) in zip(sides, place, strict=True)
+                x / size + 1 - (side.normal(s) * normal).sum(axis=1)
+                for (*_, side), (s, x) in found_at
             ]
         )
         best = (score <= score.min(axis=0) + ALIKE).argmax(axis=0)

@@ -9,20 +9,59 @@ dense quadratic program, all others are eliminated.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import daqp
+import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from drivers.stress.scenes.checks.lines import LEAST, Plane, plane, side_rows
+from drivers.stress.scenes.checks.balance import opposite
 from drivers.stress.scenes.checks.measures import Measures, law
 from drivers.stress.scenes.posing import netgen_mesh
 from drivers.stress.scenes.scene import Pair, Scene
-from drivers.stress.scenes.sides import Array, Index
+from drivers.stress.scenes.sides import Array, Index, Side
 
+PIECES = 8  # of a segment in integrals along lines, with two Gauss points each
+LEAST = 1e-3  # share of a hat that must face the primary for a row
+Place = tuple[str, int]
 BALANCED = 1e-6  # of the largest force; the tolerance of the quadratic program is 1e-10
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A mesh as arrays."""
+
+    scene: Scene
+    x: Array  # nodes (n, 2)
+    triangles: Index  # (t, 3)
+    body: Index  # number (t,) of the body of each triangle
+    nodes: dict[Place, Index]  # (k,) of each side, in order
+    arcs: dict[Place, Array]  # their arc lengths (k,)
+
+
+def plane(scene: Scene, mesh: ng.Mesh) -> Plane:
+    """Arrays of a straight mesh."""
+    x = np.array(mesh.ngmesh.Coordinates())[:, :2]
+    faces, ends = mesh.ngmesh.Elements2D().NumPy(), mesh.ngmesh.Elements1D().NumPy()
+    names = np.array(mesh.GetBoundaries())[ends["index"].astype(int) - 1]
+    segment = ends["nodes"][:, :2].astype(int) - 1
+    middle = x[segment].mean(axis=1)
+    nodes: dict[Place, Index] = {}
+    arcs: dict[Place, Array] = {}
+    for name, sides in scene.sides.items():
+        at = np.flatnonzero(names == name)
+        nearest = np.argmin([side.arc_length(middle[at])[1] for side in sides], axis=0)
+        for i, side in enumerate(sides):
+            found = np.unique(segment[at[nearest == i]])
+            s, _ = side.arc_length(x[found])
+            order = np.argsort(s)
+            nodes[name, i], arcs[name, i] = found[order], s[order]
+    number = {b.name: k for k, b in enumerate(scene.bodies)}
+    material = np.array([number[name] for name in mesh.GetMaterials()])
+    body = material[faces["index"].astype(int) - 1]
+    return Plane(scene, x, faces["nodes"][:, :3].astype(int) - 1, body, nodes, arcs)
 
 
 def stiffness(m: Plane) -> tuple[sp.csr_array, Array]:
@@ -52,19 +91,15 @@ def stiffness(m: Plane) -> tuple[sp.csr_array, Array]:
     return A, f
 
 
-def tractions(m: Plane) -> Array:
-    """Load (2n,) of tractions and pressures, exact for affine ones on straight sides."""
+def pressures(m: Plane) -> Array:
+    """Load (2n,) of pressures, exact for affine ones on straight sides."""
     f = np.zeros(2 * len(m.x))
-    g = 0.5 + np.array([-0.5, 0.5]) / 3**0.5
-    for name in {*m.scene.pressure, *m.scene.traction}:
+    for name, pressure in m.scene.pressure.items():
         for i, side in enumerate(m.scene.sides[name]):
             v, s = m.nodes[name, i], m.arcs[name, i]
-            for t in g:
+            for t in 0.5 + np.array([-0.5, 0.5]) / 3**0.5:
                 at = s[:-1] + t * np.diff(s)
-                load = np.zeros((len(at), 2))
-                if name in m.scene.pressure:
-                    load -= m.scene.pressure[name](side.point(at))[:, None] * side.normal(at)
-                load += m.scene.traction.get(name, (0.0, 0.0))
+                load = -pressure(side.point(at))[:, None] * side.normal(at)
                 load *= np.diff(s)[:, None] / 2
                 for c in (0, 1):
                     np.add.at(f, 2 * v[:-1] + c, (1 - t) * load[:, c])
@@ -98,6 +133,59 @@ def supported(m: Plane) -> tuple[sp.csc_array, Array]:
             r += 1
     T = sp.csc_array((entry, (row, column)), shape=(2 * n, r))
     return T, u0.ravel()
+
+
+def _hats(s: Array, at: Array) -> tuple[Index, Array]:
+    """Numbers (k, 2) and values (k, 2) of the hats on nodes `s` (n,) at arc lengths `at` (k,)."""
+    left = np.clip(np.searchsorted(s, at, side="right") - 1, 0, len(s) - 2)
+    t = (at - s[left]) / (s[left + 1] - s[left])
+    return np.column_stack([left, left + 1]), np.column_stack([1 - t, t])
+
+
+def side_rows(
+    m: Plane, key: Place, pair: Pair, side: Side
+) -> tuple[sp.csr_array, Array, Array, Array]:
+    """Rows (k, 2n), right sides, weights and shares that face (k,) of the hats of one side."""
+    s, n = m.arcs[key], len(m.x)
+    t = (np.arange(PIECES)[:, None] + 0.5 + np.array([-0.5, 0.5]) / 3**0.5).ravel() / PIECES
+    at = (s[:-1, None] + t * np.diff(s)[:, None]).ravel()
+    w = np.repeat(np.diff(s) / len(t), len(t))
+    x, normal = side.point(at), side.normal(at)
+    d = normal if pair.direction is None else np.tile(pair.direction, (len(at), 1))
+    cosine = (normal * d).sum(axis=1)
+    entries: list[tuple[Index, Index, Array]] = []
+    number, phi = _hats(s, at)
+    if pair.primary:
+        gap, sides, which, there = opposite(m.scene, pair, x, d)
+        faces = ~np.isnan(gap) & (cosine > 1e-8)
+    else:
+        gap, faces = np.zeros(len(at)), np.ones(len(at), dtype=bool)
+    if pair.gap is not None:
+        gap = pair.gap(x)
+    w = np.where(faces, w * cosine, 0.0)  # per eta along a direction
+    whole = np.zeros(len(s))
+    np.add.at(whole, number, phi * np.repeat(np.diff(s) / len(t), len(t))[:, None])
+    weight, g = np.zeros(len(s)), np.zeros(len(s))
+    np.add.at(weight, number, phi * w[:, None])
+    np.add.at(g, number, phi * (w * np.where(faces, gap, 0.0))[:, None])
+
+    def add(nodes: Index, value: Array, sign: float, on: Index) -> None:
+        for a in (0, 1):
+            for b in (0, 1):
+                for c in (0, 1):
+                    v = sign * w[on] * phi[on, a] * value[:, b] * d[on, c]
+                    entries.append((number[on, a], 2 * nodes[:, b] + c, v))
+
+    every = np.flatnonzero(faces)
+    add(m.nodes[key][number[every]], phi[every], 1.0, every)
+    if pair.primary:
+        for k, (name, i, _) in enumerate(sides):
+            on = np.flatnonzero(faces & (which == k))
+            hat, value = _hats(m.arcs[name, i], there[on])
+            add(m.nodes[name, i][hat], value, -1.0, on)
+    row, column, value = (np.concatenate(part) for part in zip(*entries, strict=True))
+    B = sp.csr_array((value, (row, column)), shape=(len(s), 2 * n))
+    return B, g, weight, weight / whole
 
 
 def contact_rows(m: Plane) -> tuple[sp.csr_array, Array, list[tuple[tuple[str, int], Array]]]:
@@ -156,7 +244,7 @@ def reference(scene: Scene, factor: float) -> Measures:
     """Numbers of the order-1 solution on a mesh of `factor` times the sizes of the scene."""
     m = plane(scene, netgen_mesh(scene, factor))
     A, f = stiffness(m)
-    f = f + tractions(m)
+    f = f + pressures(m)
     T, u0 = supported(m)
     B, g, places = contact_rows(m)
     node = np.unique(B.nonzero()[1]) // 2  # with both components: no body moves while they rest

@@ -8,47 +8,20 @@ diverges; gaps to quadratic segments end in "computeD2NDS2 : not implemented yet
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 
-from drivers.benchmark.engines import Run, needed
-from drivers.benchmark.engines.ngsolve_penalty import PENALTIES
-from drivers.benchmark.scenes.meshes import OBSTACLE, Mesh, made
-from drivers.benchmark.scenes.nodes import interleaved
-from drivers.benchmark.scenes.plane import Numbering, facing, prescribed
+from drivers.benchmark.engines import PENALTIES, Engine, Solved
+from drivers.benchmark.scenes.meshes import OBSTACLE, Mesh
+from drivers.benchmark.scenes.plane import facing, interleaved, modulus, prescribed, read
 from drivers.benchmark.scenes.problems import Common
-from drivers.benchmark.scenes.reading import read
 
-ENGINE = "Akantu penalty"
 LOAD_STEPS = 4  # in one, the search may miss nodes that are many elements deep: no force, no word
 STEPS = 100  # of Newton's method in a load step
 CONVERGED = 1e-9  # unbalanced force relative to E times the largest prescribed displacement
-
-
-def runs(common: Common, kinds: Sequence[str], sizes: Sequence[int]) -> Iterator[Run]:
-    """Runs of order 1 with each penalty, which is part of the engine's name.
-
-    On meshes of the given kinds and numbers of unknowns; none where two bodies meet.
-
-    Raises
-    ------
-    NotInstalledError
-        Akantu is missing.
-    """
-    [akantu] = needed(ENGINE, "akantu")
-    if common.problem.contact[0].primary is not None:
-        return
-    for kind in kinds:
-        for size in sizes:
-            mesh = made(common, kind, 1, size, obstacle=True)
-            for penalty in PENALTIES:
-                yield run(akantu, common, kind, mesh, penalty)
 
 
 def gmsh(made: Mesh) -> str:
@@ -71,11 +44,10 @@ def gmsh(made: Mesh) -> str:
 
 def settings(common: Common, made: Mesh, penalty: float) -> str:
     """Materials and contact in Akantu's format; the penalty in units of E / h, h the smallest."""
-    [law] = common.problem.materials.values()
-    [contact] = common.problem.contact
+    law, [contact] = modulus(common), common.problem.contact
     ends = made.points[made.edges[contact.secondary]]
     h = np.hypot(*(ends[:, 1] - ends[:, 0]).T).min()
-    elastic = {"rho": 1.0, "E": law.E, "nu": law.nu}  # type: ignore[union-attr]
+    elastic = {"rho": 1.0, "E": law.E, "nu": law.nu}
     detector = {
         "type": "explicit",
         "master": f"{OBSTACLE}_contact",
@@ -87,20 +59,22 @@ def settings(common: Common, made: Mesh, penalty: float) -> str:
     resolution = {
         "name": contact.secondary,
         "mu": 0.0,
-        "epsilon_n": penalty * elastic["E"] / h,
+        "epsilon_n": penalty * law.E / h,
         "epsilon_t": 0.0,
         "is_master_deformable": "false",
     }
-    sections = [("material elastic", {"name": body, **elastic}) for body in made.bodies]
-    sections += [("contact_detector", detector)]
-    sections += [("contact_resolution penalty_linear", resolution)]
+    sections: list[tuple[str, dict[str, Any]]] = [
+        *(("material elastic", {"name": body, **elastic}) for body in made.bodies),
+        ("contact_detector", detector),
+        ("contact_resolution penalty_linear", resolution),
+    ]
     lines = []
     for title, values in sections:
         lines += [f"{title} [", *(f"{key} = {value}" for key, value in values.items()), "]"]
     return "\n".join(lines)
 
 
-def parsed(akantu: ModuleType, mesh: str, settings: str) -> Any:
+def parsed(akantu: Any, mesh: str, settings: str) -> Any:
     """Akantu's mesh, after the settings have been read."""
     with TemporaryDirectory() as folder:
         files = [Path(folder) / "settings.dat", Path(folder) / "mesh.msh"]
@@ -112,9 +86,9 @@ def parsed(akantu: ModuleType, mesh: str, settings: str) -> Any:
     return result
 
 
-def run(akantu: ModuleType, common: Common, kind: str, made: Mesh, penalty: float) -> Run:
-    """One run on vertices and triangles of the common mesh."""
-    made.read()
+def by_penalty(modules: Any, common: Common, made: Mesh, order: int, penalty: float) -> Solved:
+    """On vertices and triangles of the common mesh; supports move in load steps."""
+    [akantu] = modules
     mesh = parsed(akantu, gmsh(made), settings(common, made, penalty))
     started = time.perf_counter()
     coupler = akantu.CouplerSolidContact(mesh)
@@ -126,42 +100,31 @@ def run(akantu: ModuleType, common: Common, kind: str, made: Mesh, penalty: floa
     surfaces = akantu.PhysicalSurfaceSelector(mesh)
     contact.getContactDetector().setSurfaceSelector(surfaces)
     _, _, numbering = interleaved(common, made, 1)
-    steps = solved(akantu, coupler, common, made, numbering)
-    seconds = time.perf_counter() - started
-    line = facing(common, numbering)
-    force = np.array(contact.getNormalForce()).ravel()[line.at]
-    gap = line.gap + np.array(solid.getDisplacement()).ravel()[line.at]
-    return Run(
-        engine=f"{ENGINE} {penalty:g} E/h",
-        problem=common.name,
-        mesh_kind=kind,
-        order=1,
-        unknowns=made.unknowns(1),
-        seconds_mesh=made.seconds,
-        seconds=seconds,
-        steps=steps,
-        energy=solid.getEnergy("potential"),
-        **asdict(read(common, line.x, force, gap, 1)),
-    )
-
-
-def solved(
-    akantu: ModuleType, coupler: Any, common: Common, made: Mesh, numbering: Numbering
-) -> int:
-    """Supports moved in load steps, the obstacle held; the number of linear systems."""
     fixed, value = prescribed(common, numbering)
     held = np.unique(made.triangles[made.bodies[OBSTACLE]])
     fixed[numbering.unknown[:, held]] = True
     fixed, value = fixed.reshape(-1, 2), value.reshape(-1, 2)
-    solid, newton = coupler.getSolidMechanicsModel(), coupler.getNonLinearSolver()
+    newton = coupler.getNonLinearSolver()
     solid.getBlockedDOFs()[:] = fixed
     newton.set("max_iterations", STEPS)
-    [law] = common.problem.materials.values()
-    newton.set("threshold", CONVERGED * law.E * np.abs(value).max())  # type: ignore[union-attr]
+    newton.set("threshold", CONVERGED * modulus(common).E * np.abs(value).max())
     newton.set("convergence_type", akantu.SolveConvergenceCriteria.residual)
     u, steps = solid.getDisplacement(), 0
     for step in range(1, LOAD_STEPS + 1):
         u[fixed] = value[fixed] * step / LOAD_STEPS
         coupler.solveStep()
         steps += newton.getInt("nb_iterations")
-    return steps
+    seconds = time.perf_counter() - started
+    line = facing(common, numbering)
+    force = np.array(contact.getNormalForce()).ravel()[line.at]
+    gap = line.gap + np.array(u).ravel()[line.at]
+    reading = read(common, line.x, force, gap, 1)
+    return Solved(seconds, steps, solid.getEnergy("potential"), reading)
+
+
+PENALTY = Engine(
+    *("Akantu penalty", by_penalty, ("akantu",), (1,), PENALTIES),
+    meshed_obstacle=True,
+    two_bodies=False,
+    largest=4_000,
+)

@@ -1,1 +1,0 @@
-"""The measurements as tables and pictures."""

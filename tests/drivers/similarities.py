@@ -1,0 +1,231 @@
+"""Contact problems carried along by similarities of the plane: what must not change, does not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import ngsolve as ng
+import numpy as np
+from scipy.spatial import cKDTree
+
+from drivers.reference import cases
+from drivers.stress.motion import Motion, moved_mesh
+from ngcontact import Contact, Elastic, Problem
+from ngcontact.geometries import blocks
+from ngcontact.mesh import first_mesh
+from ngcontact.problem import Triangulation
+
+AS_IT_IS = Motion("as it is")
+# On the curve, or at the points, of the secondary: not the same when the bodies are swapped.
+ON_SECONDARY = ("estimate", "indicators", "relative", "transitions")
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A problem on a straight-sided mesh without geometry, with what a motion must carry along."""
+
+    problem: Problem
+    prescribed: np.ndarray  # displacement (nv, 2) of the vertices of the supports
+    pressure: dict[str, float] = field(default_factory=dict)  # normal to boundaries
+    force: dict[str, tuple[float, float]] = field(default_factory=dict)  # per body and area
+
+    @property
+    def contact(self) -> Contact:
+        return self.problem.contact[0]
+
+
+def on_its_mesh(problem: Problem, maxh: float, matched: bool = True) -> Scene:
+    """The scene of a problem on its first mesh, whose facing nodes lie opposite if `matched`."""
+    unmatched = None if matched else ng.Mesh(problem.geometry.GenerateMesh(maxh=maxh))
+    mesh, *_ = moved_mesh(unmatched or first_mesh(problem, maxh), AS_IT_IS)
+    value, view = np.zeros((mesh.nv, 2)), Triangulation(mesh)
+    ends = ng.IntegrationRule([(1, 0, 0), (0, 0, 0)], [1, 1])
+    nodes, names = view.segments, np.array(mesh.GetBoundaries())[view.boundaries]
+    points = mesh.MapToAllElements(ends, ng.BND).reshape(-1, 2)
+    for pattern, components in problem.displacement.items():
+        at = np.isin(names, pattern.split("|"))
+        value[nodes[at].ravel()] = ng.CF(components)(points[at].ravel()).reshape(-1, 2)
+    return Scene(replace(problem, geometry=mesh), value)
+
+
+def parting() -> Scene:
+    """S1: blocks that part at the origin, bounded zone."""
+    return on_its_mesh(cases.one_transition().problem, 0.25)
+
+
+def hertz_scene() -> Scene:
+    """S3: blocks with the gap x^2 / 2R as data."""
+    problem = cases.hertz_contact(half_width=0.5).problem
+    contact = replace(problem.contact[0], gap=lambda x, y: x**2 / 10)
+    return on_its_mesh(replace(problem, contact=[contact]), 0.25)
+
+
+def disc_scene(matched: bool = True) -> Scene:
+    """A polygonal disc on a block, gaps measured."""
+    scene = on_its_mesh(cases.pressed_disc(), 0.15, matched)
+    return replace(scene, prescribed=20 * scene.prescribed)  # several nodes in contact
+
+
+def unmatched_disc() -> Scene:
+    """The same on a mesh whose facing nodes do not lie opposite to each other."""
+    return disc_scene(matched=False)
+
+
+def graph_scene() -> Scene:
+    """S8: two polygons in place of parabolas that face each other, gaps measured."""
+    return on_its_mesh(cases.curved_lines().problem, 0.15)
+
+
+def cornered() -> Scene:
+    """Contact along a line with corners both ways, in part, under all kinds of load."""
+    problem = Problem(
+        geometry=blocks(line=cases.LINE),
+        materials=cases.BLOCKS,
+        displacement={"top": (0.01, -0.02 + 0.015 * ng.x), "bottom": (0, 0)},
+        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
+    )
+    return replace(
+        on_its_mesh(problem, 0.25),
+        pressure={"upper_left|upper_right": 0.01},
+        force={"lower": (0.002, -0.01)},
+    )
+
+
+def moved_contact(contact: Contact, motion: Motion) -> Contact:
+    """The pair with its direction and its gap carried along."""
+    gap, moved = contact.gap, {}
+    if contact.direction is not None:
+        moved["direction"] = tuple(motion.turn @ np.array(contact.direction))
+    if callable(gap):
+        moved["gap"] = lambda x, y: (
+            motion.length * motion.load * gap(*motion.back(np.column_stack([x, y])).T)
+        )
+    return replace(contact, **moved)
+
+
+def posed(scene: Scene, motion: Motion) -> tuple[Problem, np.ndarray, np.ndarray]:
+    """The moved problem, and the numbers there of the vertices and triangles."""
+    problem, turned = scene.problem, motion.seed is not None
+    mesh, vertex, triangle = moved_mesh(problem.geometry, motion)
+    u = ng.GridFunction(ng.VectorH1(mesh, order=1))
+    values = motion.length * motion.load * scene.prescribed @ motion.turn.T
+    u.vec.FV().NumPy().reshape(2, -1)[:, vertex] = values.T
+    stress = motion.modulus * motion.load
+    moved = Problem(
+        geometry=mesh,
+        materials={
+            body: Elastic(motion.modulus * law.E, law.nu)
+            for body, law in sorted(problem.materials.items(), reverse=turned)
+        },
+        displacement=dict.fromkeys(problem.displacement, u),
+        sliding=problem.sliding,
+        traction={name: stress * p for name, p in scene.pressure.items()},
+        force={
+            body: tuple(stress / motion.length * (motion.turn @ np.array(F)))
+            for body, F in scene.force.items()
+        },
+        contact=[moved_contact(scene.contact, motion)],
+    )
+    return moved, vertex, triangle
+
+
+def swapped(scene: Scene) -> Scene:
+    """The facing side carries the contact points."""
+    pair = scene.contact
+    direction = None if pair.direction is None else tuple(-np.array(pair.direction))
+    pair = replace(pair, secondary=str(pair.primary), primary=pair.secondary, direction=direction)
+    return replace(scene, problem=replace(scene.problem, contact=[pair]))
+
+
+def nodal(solution):
+    """Displacements (nv, 2) of the vertices."""
+    return solution.displacement.vec.FV().NumPy().reshape(2, -1)[:, : solution.mesh.nv].T
+
+
+def same_points(first, other, motion, exchanged):
+    """Numbers in both solutions of the contact points that are the same.
+
+    Of swapped bodies they are so if they face each other; means are taken on the secondary.
+    """
+    origin, size = first.points[:1], np.ptp(first.points, axis=0).max()
+    x = (motion.place(first.points) - motion.place(origin)) / (motion.length * size)
+    y = (other.points - motion.place(origin)) / (motion.length * size)
+    here, there = (
+        np.concatenate([pair.line.direction for pair in s.pairs]) for s in (first, other)
+    )
+    here = here @ motion.turn.T * (-1 if exchanged else 1)
+    if exchanged and other.problem.contact[0].direction is not None:  # only the place across it
+        x, y = (z - (z * there[0]).sum(axis=1)[:, None] * there[0] for z in (x, y))
+    distance, number = cKDTree(np.column_stack([y, there])).query(np.column_stack([x, here]))
+    same = np.flatnonzero(distance < 1e-6)
+    if exchanged:
+        means = [np.concatenate([pair.line.means for pair in s.pairs]) for s in (first, other)]
+        same = same[~(means[0][same] | means[1][number[same]])]
+    return same, number[same]
+
+
+def apart(ends, images, motion, length):
+    """Distance of the transitions `images` from those of the first solution over `length`."""
+    if len(ends) != len(images) or len(ends) == 0:
+        return 0.0 if len(ends) == len(images) else math.inf
+    origin = motion.place(ends[:1])
+    distance, _ = cKDTree(images - origin).query(motion.place(ends) - origin)
+    return float(distance.max() / (motion.length * length))
+
+
+def differences(first, other, motion, vertex, triangle) -> dict[str, float]:
+    """What `other` misses of the image of `first`, each relative to the largest of its kind.
+
+    Infinite where active sets, steps or the number of transitions differ.
+    """
+    exchanged = first.problem.contact[0].secondary != other.problem.contact[0].secondary
+    same, number = same_points(first, other, motion, exchanged)
+    if exchanged:  # only points without force may have no counterpart
+        counts = np.count_nonzero(first.active), np.count_nonzero(other.active)
+        complete = counts == (first.active[same].sum(), other.active[np.unique(number)].sum())
+    else:
+        complete = len(same) == len(np.unique(number)) == len(first.points) == len(other.points)
+    size, modulus = motion.length * motion.load, motion.modulus
+    force, root = modulus * motion.load * motion.length, math.sqrt(modulus)
+    sign = -1 if exchanged else 1
+    u = np.abs(nodal(first)).max()
+    pushed = first.contact_force()
+    # Coordinates that are rounded otherwise, and gaps that are data, decide otherwise which points
+    # are the nearest.
+    rounded = np.abs(motion.shift).max() > 1 or motion.load != 1 or exchanged
+    scaled = first.energy * force * size  # beyond the range of numbers 0 or infinite
+
+    def off(value, image, scale):
+        return float(np.abs(value - image).max(initial=0.0) / scale)
+
+    found = {
+        "points": 0.0 if complete else math.inf,
+        "active": 0.0 if (other.active[number] == first.active[same]).all() else math.inf,
+        "steps": 0.0 if other.steps == first.steps or rounded else math.inf,
+        "displacement": off(nodal(other)[vertex] / size, nodal(first) @ motion.turn.T, u),
+        "pressure": off(
+            other.pressure[number] / (modulus * motion.load),
+            first.pressure[same],
+            first.pressure.max(),
+        ),
+        "gap": off(other.gap[number] / size, first.gap[same], max(u, first.gap.max())),
+        "force": off(
+            sign * other.contact_force() / force, pushed @ motion.turn.T, np.linalg.norm(pushed)
+        ),
+        "energy": 0.0 if other.energy == scaled else off(other.energy / scaled, 1.0, 1.0),
+        "estimate": abs(other.error_estimate / (root * size) / first.error_estimate - 1),
+        # What is left where the stresses of neighbours cancel.
+        "indicators": off(
+            other.indicators[triangle] / (root * size), first.indicators, first.energy_norm
+        ),
+        "relative": abs(other.relative_error_estimate / first.relative_error_estimate - 1),
+        "transitions": apart(
+            first.transitions(), other.transitions(), motion, np.ptp(first.points, axis=0).max()
+        ),
+    }
+    return {
+        name: value if value == value else math.inf
+        for name, value in found.items()
+        if not (exchanged and name in ON_SECONDARY)
+    }

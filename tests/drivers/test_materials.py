@@ -1,0 +1,111 @@
+"""Near incompressibility and contrasts of stiffness: S1, S9 and the flat punch, other moduli.
+
+Errors are relative, in the energy norm of the exact stress; "times nu=0.3" is the ratio to that of
+nu = 0.3 at the same number of unknowns N. What the estimate says of these problems is in
+tests/estimator.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+
+from drivers.adaptive_study.runs import uniform
+from drivers.reference import cases
+from drivers.reference.cases import Case
+from drivers.reference.curved import rings
+from drivers.reference.straight import relative_energy_error, transition
+from drivers.stress import RESIDUAL
+from ngcontact import Elastic, adapt, solve
+from ngcontact.geometries import punch
+
+FIRST = Elastic(E=1.0, nu=0.3)
+TOWARDS_HALF = (0.3, 0.49, 0.499, 0.4999)
+
+
+def one_transition(upper: Elastic, lower: Elastic) -> Case:
+    """S1 of these materials."""
+    exact = transition(upper, lower)
+    problem = replace(
+        cases.one_transition().problem,
+        materials={"upper": upper, "lower": lower},
+        displacement={cases.OUTSIDE[body]: u for body, u in exact.displacement.items()},
+    )
+    return Case(problem, exact)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize(
+    ("levels_of", "rate", "values"),
+    [  # h^(3/2) on uniform meshes: the exact solution grows as r^(3/2)
+        (partial(uniform, order=2, max_dofs=15_000, maxh=0.28), 0.75, (*TOWARDS_HALF, 0.499999)),
+        (partial(uniform, order=3, max_dofs=30_000, maxh=0.28), 0.75, TOWARDS_HALF),
+        (partial(adapt, order=2, max_dofs=10_000), 1.0, TOWARDS_HALF),
+    ],
+    ids=["uniform 2", "uniform 3", "adaptive 2"],
+)
+def test_rate_and_constant_stay_towards_incompressibility(levels_of, rate, values):
+    """S1, both bodies of one nu: the rate in N, and the constant of nu = 0.3 nearly."""
+    constants = []
+    for nu in values:
+        case, found = one_transition(Elastic(E=1.0, nu=nu), Elastic(E=3.0, nu=nu)), []
+        for solution in levels_of(case.problem):
+            error = relative_energy_error(solution, case.exact)
+            found.append((solution.displacement.space.ndof, error))
+            assert max(solution.residuals.values()) <= RESIDUAL
+        N, errors = np.array([row for row in found if row[0] >= found[-1][0] / 20]).T
+        assert -np.polyfit(np.log(N), np.log(errors), 1)[0] >= rate - 0.1
+        constants.append(errors[-1] * N[-1] ** rate)
+    # Promised: no blow-up. Order 2 at 0.499999 measured 1.55 times the error of nu = 0.3.
+    assert max(constants) <= 2 * constants[0]
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("contrast", [1e-6, 1e-3, 1e3, 1e6])
+def test_errors_do_not_depend_on_the_contrast(contrast):
+    """The error of S1 and the pressure of S9, whatever E''/E'."""
+    like, second = one_transition(FIRST, FIRST), Elastic(E=contrast, nu=0.3)
+    alike = solve(like.problem, maxh=0.07, order=2)
+    case = one_transition(FIRST, second)
+    errors = [
+        relative_energy_error(solve(x.problem, alike.mesh, order=2), x.exact) for x in (case, like)
+    ]
+    # The softer body alone counts: its mesh is not the mirror image of the other's.
+    assert errors[0] == pytest.approx(errors[1], rel=0.05)
+    exact = rings(FIRST, second, qn=0.3, n=2)
+    problem = cases.ring_in_ring().problem
+    problem = replace(problem, materials={"outer": FIRST, "inner": second})
+    mean, wave = cases.harmonics(solve(problem, maxh=0.15, order=3), 1.0, 2)
+    # Discretisation error on these meshes: measured 2e-5 to 4e-4.
+    assert (mean, wave) == pytest.approx((exact.P0, exact.Pn), rel=1e-3)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("stiffness", [1e6, 1e12])
+def test_pressure_of_a_stiff_flat_punch(stiffness):
+    """On a foundation of 40 half widths, where |x| < 0.9 a.
+
+    The exact pressure under a rigid frictionless punch on a half-plane is P / pi (a^2 - x^2)^(1/2);
+    the finite foundation changes it by the square of a over its size, 1e-3.
+    """
+    problem = replace(cases.flat_punch(), geometry=punch(width=20.0, depth=20.0))
+    materials = {**problem.materials, "punch": Elastic(E=stiffness, nu=0.3)}
+    *_, solution = adapt(replace(problem, materials=materials), order=4, max_dofs=10_000)
+    x = solution.points[:, 0]
+    a = np.abs(x).max()
+    inside = np.abs(x) < 0.9 * a
+    force = np.linalg.norm(solution.contact_force())
+    exact = force / (np.pi * np.sqrt(a * a - x[inside] ** 2))
+    np.testing.assert_allclose(solution.pressure[inside], exact, rtol=1e-2)
+
+
+@pytest.mark.parametrize("contrast", [1e-12, 1e12])
+def test_bodies_of_any_contrast_part(contrast):
+    """S1 of order 2; like bodies reach 4.7e-3 on this mesh."""
+    case = one_transition(FIRST, Elastic(E=contrast, nu=0.3))
+    solution = solve(case.problem, maxh=0.14, order=2)
+    assert relative_energy_error(solution, case.exact) <= 6e-3
+    assert max(solution.residuals.values()) <= RESIDUAL
