@@ -8,7 +8,7 @@ from netgen.occ import Compound, Glue
 from ngsolve.meshes import MakeStructured2DMesh
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
-from drivers.reference import cases
+from drivers.reference import axisymmetric_cases as cases
 from ngcontact import solve
 from ngcontact.output import write_series, write_solution
 from tests.output.stubs import MAXH, stub, two_bodies
