@@ -10,8 +10,10 @@ from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
+from drivers.stress.trials import held
 from ngcontact import (
     Contact,
+    ConvergenceError,
     Elastic,
     NoEquilibriumError,
     Problem,
@@ -21,6 +23,8 @@ from ngcontact.discrete.discrete_problem import discretise, minimise_energy
 from ngcontact.geometries import blocks
 from ngcontact.geometries.region import body, compound, quarter_arc
 from ngcontact.mesh import first_mesh
+from ngcontact.qp import BorderedSystems
+from ngcontact.qp.systems import SingularError
 
 STEEL = Elastic(E=1000.0, nu=0.3)
 WEIGHT = 0.1  # of a disc, per area
@@ -221,3 +225,36 @@ def test_a_body_that_may_turn_from_every_first_active_set(order):
             [0, -weight],
             atol=1e-10 * weight,  # measured 2e-13
         )
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_disc_on_a_block(order):
+    problem, weight = held.disc_above_block()
+    solution = solve(problem, maxh=0.3, order=order)
+    weight *= mesh_area(solution, "disc") / np.pi
+    assert solution.contact_force()[1] == pytest.approx(weight, rel=1e-10)
+    assert max(solution.residuals.values()) <= ROUND_OFF
+    assert str(solution.free_motions[0]) == 'translation of "disc" along (1, 0)'
+
+
+@pytest.mark.parametrize("stopped", [1, 2])
+def test_a_failure_carries_the_iterate_where_the_bodies_are(stopped, monkeypatch):
+    """The rows of the last system are closed; relative to the placing they would be 0.1 off."""
+    problem = pressed_blocks(0.1, direction=(0, -1), gap=0.02 * ng.x**2 + 0.1)
+    discrete = discretise(problem, solve(problem, maxh=0.3).mesh, 2, "isoparametric")
+    p = discrete.program
+    assert np.abs(discrete.rigid.rows @ discrete.rigid.placing).max() > 0.09
+    original, met = BorderedSystems.solve, []
+
+    def fail(self, active, anchor=None):
+        if len(met) == stopped:
+            raise SingularError("stopped")
+        met.append(active)
+        return original(self, active, anchor)
+
+    monkeypatch.setattr(BorderedSystems, "solve", fail)
+    with pytest.raises(ConvergenceError, match="stopped") as failure:
+        minimise_energy(discrete, np.ones(len(p.g), dtype=bool))
+    u, closed = failure.value.iterate.u, met[-1]
+    np.testing.assert_allclose(u[p.unknown[closed]], p.g[closed], rtol=ROUND_OFF)
+    assert np.abs(p.null_space.conditions @ u).max() <= ROUND_OFF * np.abs(u).max()

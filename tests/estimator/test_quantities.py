@@ -218,3 +218,11 @@ def test_a_disc_weighs_more_than_its_mesh(order, h):
     assert q["force"].error <= 1.05 * off
     assert not q["force"].guaranteed
     assert q["force"].proved < off
+
+
+def test_a_body_that_contact_alone_holds_has_a_proved_force():
+    """The load is the force."""
+    problem = replace(partly_lifted(), sliding="lower_axis", traction={"pressed|top": 1.0})
+    row = solve(problem, maxh=0.4, order=2).quantities()["force"]
+    assert row.guaranteed
+    assert abs(row.value - 2) <= row.error <= 1e-9

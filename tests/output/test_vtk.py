@@ -8,6 +8,8 @@ from netgen.occ import Compound, Glue
 from ngsolve.meshes import MakeStructured2DMesh
 from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
+from drivers.reference import axisymmetric_cases as cases
+from ngcontact import solve
 from ngcontact.output import write_series, write_solution
 from tests.output.stubs import MAXH, stub, two_bodies
 
@@ -145,3 +147,14 @@ def test_quadrilaterals_are_refused(tmp_path):
     with pytest.raises(ValueError, match="4 elements of the mesh are no triangles"):
         write_solution(tmp_path / "a.vtu", solution)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_hoop_stress_is_in_the_file(tmp_path):
+    problem, exact = cases.fitted_rings()
+    solution = solve(problem, maxh=0.2, order=3)
+    grid = pyvista.read(solution.write(tmp_path / "fit.vtu"))
+    r = grid.points[:, 0]
+    hub = grid.points[:, 0] > 1.1 + 1e-6
+    at = [exact.hoop["hub"](solution.mesh(x, 0.1)) for x in r[hub]]
+    # Nodal means of a stress of degree 2 on elements of size 0.2.
+    assert grid["hoop_stress"][hub] == pytest.approx(at, abs=0.02 * np.abs(at).max())

@@ -1,5 +1,6 @@
 """The problem as data: what is kept, and every refusal with its value and its remedy."""
 
+import copy
 import math
 
 import netgen.meshing
@@ -9,6 +10,7 @@ import pytest
 from netgen.occ import Box, Compound, Glue, OCCGeometry, Pnt, WorkPlane, X, Y
 from ngsolve.meshes import MakeStructured2DMesh
 
+from ngcontact.geometries import blocks
 from ngcontact.problem.contact import Contact
 from ngcontact.problem.material import Elastic, Hooke
 from ngcontact.problem.problem import Problem
@@ -249,3 +251,31 @@ def quadrilaterals():
 def test_check_refuses_the_mesh(make, bad, error, message):
     with pytest.raises(error, match=message):
         make().check(bad())
+
+
+@pytest.mark.parametrize("argument", ["materials", "displacement", "traction", "force"])
+def test_data_cannot_be_changed_in_place(argument):
+    law = Elastic(1.0, 0.3)
+    data = getattr(
+        Problem(
+            geometry=blocks(),
+            materials={"upper": law, "lower": law},
+            displacement={"bottom": (0, 0)},
+            traction={"top": 1.0},
+            force={"upper": (0, -1)},
+        ),
+        argument,
+    )
+    name, before = next(iter(data)), dict(data)
+    for change in (
+        lambda: data.__setitem__(name, 10.0),
+        lambda: data.__delitem__(name),
+        lambda: data.update({name: 10.0}),
+        lambda: data.pop(name),
+        lambda: data.__ior__({name: 1.0}),
+    ):
+        with pytest.raises(TypeError, match=rf"problem\.{argument}.*dataclasses\.replace\("):
+            change()
+    assert dict(data) == before
+    assert type(data | {}) is dict  # and what is made of it is the caller's
+    assert copy.deepcopy(data).keys() == before.keys()

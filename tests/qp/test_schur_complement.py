@@ -73,3 +73,20 @@ def test_another_load_costs_no_factorisation():
     reference = minimise(bordered_systems(other, counting_factor(program.K, [])))
     np.testing.assert_array_equal(result.active, reference.active)
     np.testing.assert_allclose(result.u, reference.u, rtol=0, atol=1e-11)  # condition up to 1e4
+
+
+def test_systems_may_be_refined_in_any_order():
+    """Without `solve` before, after that of another set, twice: the same solution."""
+    program = random_bounds(8)
+    one, other = np.arange(6) < 2, np.arange(6) > 3
+    expected = {}
+    for active in (one, other):
+        systems = bordered_systems(program, counting_factor(program.K, []))
+        systems.solve(active)
+        expected[active.tobytes()] = systems.refine(active)
+    systems = bordered_systems(program, counting_factor(program.K, []))
+    for active in (one, other, other, one):
+        for found, right in zip(systems.refine(active), expected[active.tobytes()], strict=True):
+            # Condition of the matrix up to 1e4, entries of size 1.
+            np.testing.assert_allclose(found, right, rtol=0, atol=1e-11)
+        systems.solve(one)

@@ -82,6 +82,11 @@ def test_the_bar_counts_digits_towards_the_tolerance(capsys):
     assert [row.count("#") for row in lines(capsys)[1:]] == [0, 10, 20]
 
 
+def test_a_bound_counts_where_there_is_one(capsys):
+    list(with_progress(iter([level(10, 1e-1), level(10, 1e-2, bound=1e-3)]), 1e-3, 100))
+    assert lines(capsys)[-1].split()[2] == "1.00e-03"
+
+
 @pytest.mark.parametrize(
     ("value", "text"),
     [
