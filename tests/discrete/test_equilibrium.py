@@ -24,7 +24,7 @@ from ngcontact.geometries import blocks
 from ngcontact.geometries.region import body, compound, quarter_arc
 from ngcontact.mesh import first_mesh
 from ngcontact.qp import BorderedSystems
-from ngcontact.qp.systems import SingularError
+from ngcontact.qp.quadratic_program import SingularError
 
 STEEL = Elastic(E=1000.0, nu=0.3)
 WEIGHT = 0.1  # of a disc, per area
