@@ -224,18 +224,18 @@ def _bound(
     moduli = by_triangle(elements, [e.modulus for e in elements])
     for reach in reaches:
         lines.append(facing_of(cells, displacement, reach, (degree - extent, lift), held, moduli))
+    every = np.arange(len(trace.region))
+    sizes = [trace.evaluate(displacement, every, np.zeros(len(every)))]
+    size = max(float(np.abs(x).max(initial=0.0)) for x in sizes + [x.gap for x in lines])
+    # 4. w, before a factor takes memory.
+    w = lifted(problem, cells, asked, [(line, line.lift) for line in lines], lift, size)
     # The dual problem: s and p*.
     moments, fixed = given.moments(mu)
     program = dual_program(mu, elements, fixed, rigid_motions(cells, mu, fixed), lines)
     dual = DualProblem(cells, given, asked, elements, rules, moments, program)
-    every = np.arange(len(trace.region))
-    sizes = [trace.evaluate(displacement, every, np.zeros(len(every)))]
-    size = max(float(np.abs(x).max(initial=0.0)) for x in sizes + [x.gap for x in lines])
     stiffest = min(np.diagonal(e.compliance, axis1=-2, axis2=-1).min() for e in elements)
     felt = FELT * size / float(stiffest * cells.diameters.min())
     stress = dual.admissible(displacement, program.nearest(elements, moments), felt, degree)
-    # 4. w.
-    w = lifted(problem, cells, asked, [(line, line.lift) for line in lines], lift, size)
     # The identity.
     c, D = stress.distance, stress.loads
     closed = float(sum((p * x.bound).sum() for p, x in zip(stress.pressure, lines, strict=True)))
