@@ -1,0 +1,107 @@
+"""Coarser spaces of two lines that face each other, halved again and again: arrays only."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from ngcontact.arrays import from_triplets
+from ngcontact.constraints import Conditions, Rows, change_of_basis
+from ngcontact.lagrange import gauss_lobatto
+from ngcontact.linalg.coarse_spaces import COARSEST, RingError, coarsenings, refined_share
+
+FIRST = 4  # vertices of each line at first
+
+
+def facing_lines(rounds):
+    """Vertices (nv, 2), parents (nv, 2) and the segments (k, 2) of both lines, in one order."""
+    rng = np.random.default_rng(rounds)
+    points = np.tile(np.sort(rng.random((FIRST, 2)), axis=0), (2, 1))
+    parents = np.full((2 * FIRST, 2), -1)
+    one = np.column_stack([np.arange(FIRST - 1), np.arange(1, FIRST)])
+    both = np.stack([one, one + FIRST])
+    for _ in range(rounds):
+        edges = both.reshape(-1, 2)
+        new = len(points) + np.arange(len(edges)).reshape(2, -1)
+        points = np.concatenate([points, points[edges].mean(axis=1)])
+        parents = np.concatenate([parents, np.sort(edges, axis=1)])
+        halves = [np.stack([both[..., 0], new]), np.stack([new, both[..., 1]])]
+        both = np.concatenate([half.transpose(1, 2, 0) for half in halves], axis=1)
+    return points, parents, both
+
+
+def transformed(n, one, other):
+    """Basis T in which the jump between facing nodes is an unknown, and a node slides aslant."""
+    angle = np.linspace(0.3, 1.2, len(one))
+    direction = np.column_stack([np.cos(angle), np.sin(angle)])
+    coupling = from_triplets(np.ones(len(one)), np.arange(len(one)), other, (len(one), n))
+    none = np.zeros(len(one), dtype=bool)
+    rows = Rows(one, direction, coupling, np.zeros(len(one)), equality=none)
+    return change_of_basis(Conditions(other[:1], direction[:1], np.zeros(1)), rows).T
+
+
+def space(order, rounds):
+    """T, parents and nodes of the two lines, and a linear displacement (2n,)."""
+    points, parents, both = facing_lines(rounds)
+    segments = both.reshape(-1, 2)
+    inner = len(points) + np.arange(len(segments) * (order - 1)).reshape(len(segments), -1)
+    nodes = np.column_stack([segments[:, 0], inner, segments[:, 1]])
+    s = gauss_lobatto(order)[1:-1, None]
+    ends = points[segments][:, :, None]
+    points = np.concatenate([points, ((1 - s) * ends[:, 0] + s * ends[:, 1]).reshape(-1, 2)])
+    one, other = (np.unique(half) for half in np.split(nodes, 2))
+    at = np.argsort(points[one, 0]), np.argsort(points[other, 0])
+    u = points @ [[0.3, -0.7], [1.1, 0.2]] + [0.5, -0.4]
+    return transformed(len(points), one[at[0]], other[at[1]]), parents, nodes, u.T.ravel()
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+def test_linear_displacements_are_in_all_spaces(order):
+    T, parents, nodes, u = space(order, 4)
+    y = sp.linalg.spsolve(T.tocsc(), u)
+    steps = coarsenings(T, parents, nodes, 2 * FIRST)
+    # Half of a line's segments have more than half of its vertices: two generations a step.
+    assert len(steps) == (2 if order == 1 else 3)
+    for step in steps:
+        # Theory: exact; sums of a few numbers of size 1, in blocks of condition below 10.
+        np.testing.assert_allclose(step.P @ y[step.kept], y, rtol=0, atol=1e-13)
+        y = y[step.kept]
+    assert y.size == 4 * FIRST
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_unknowns_that_stay_mean_the_same(order):
+    T, parents, nodes, _ = space(order, 3)
+    for step in coarsenings(T, parents, nodes, 0):
+        chosen = step.P[step.kept]
+        # Theory: the identity; round-off of the frames.
+        assert abs(chosen - sp.eye_array(chosen.shape[0])).max() < 1e-13
+
+
+def test_spaces_shrink_geometrically_where_refinement_is_local():
+    """One generation adds a vertex only: several go at a time."""
+    depth = 12
+    first = np.full((2, 2), -1)
+    chain = np.column_stack([np.zeros(depth, dtype=int), np.arange(1, depth + 1)])
+    parents = np.concatenate([first, chain])
+    nodes = np.array([[0, depth + 1]])
+    T = sp.eye_array(2 * len(parents), format="csr")
+    sizes = [step.P.shape for step in coarsenings(T, parents, nodes, 4)]
+    assert all(k <= n / 2 for n, k in sizes)
+    assert sizes[0][0] == 2 * len(parents)
+    assert sizes[-1][1] <= 8
+    assert refined_share(parents) == depth / (depth + 2)
+
+
+def test_small_spaces_have_no_coarser_ones():
+    T, parents, nodes, _ = space(1, 3)
+    assert T.shape[0] < COARSEST
+    assert coarsenings(T, parents, nodes) == []
+
+
+def test_rows_in_a_ring_are_refused():
+    T = sp.eye_array(8, format="lil")
+    T[0, 1] = T[1, 0] = 0.5
+    with pytest.raises(RingError, match="ring"):
+        coarsenings(T.tocsr(), np.array([[-1, -1]] * 2 + [[0, 1]] * 2), np.array([[0, 1]]), 0)
