@@ -93,18 +93,12 @@ def side_rule(cells: Cells, breaks: Array, side: Index) -> SideRule:
     one = np.diff(every[order]) == 0
     piece, start, stop = every[order][:-1][one], t[order][:-1][one], t[order][1:][one]
     t = start[:, None] + (stop - start)[:, None] * PLACES
-    x, dx = _points(cells, piece, t)
+    x, dx = cells.points(piece, t)
     length = np.linalg.norm(dx, axis=2)
     normal = np.stack([dx[..., 1], -dx[..., 0]], axis=-1) / length[..., None]
     normal[cells.backward[cells.owner[piece], cells.local[piece]]] *= -1
     measure = cells.measure(x)
     return SideRule(piece, t, (stop - start)[:, None] * WEIGHTS * length, x, normal, measure)
-
-
-def _points(cells: Cells, side: Index, t: Array) -> tuple[Array, Array]:
-    """`Cells.points`, (m, j, 2) each, at `t` (m, j) of sides `side` (m,)."""
-    x, dx = cells.points(np.repeat(side, t.shape[1]), t.ravel())
-    return x.reshape(*t.shape, 2), dx.reshape(*t.shape, 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,7 +162,7 @@ class Given:
         at = np.flatnonzero(self.pressed[side].any(axis=(1, 2)))
         if at.size:
             t = self.cells.own_parameter(side[at], s[at])
-            x, dx = _points(self.cells, side[at], t)
+            x, dx = self.cells.points(side[at], t)
             ds = np.linalg.norm(dx, axis=2, keepdims=True) * cells.measure(x)[..., None]
             force = legendre.legvander(2 * t - 1, DATA) @ (LEGENDRE @ self.pressed[side[at]])
             total[at] += np.divide(force, ds, out=np.zeros_like(force), where=ds > 0)
