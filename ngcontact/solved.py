@@ -18,33 +18,18 @@ from .qp import Iterate, kkt_residuals
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """Exact minimiser u_h of L over K_h on one mesh: HH81 (P_1h), (P_2h).
-
-    Contact quantities are arrays over the m contact points, all pairs in order.
+    """What `Solution` is made of, and what all rooms read; its fields are explained there.
 
     Attributes
     ----------
     problem : Problem
-        What was solved.
     mesh : ng.Mesh
-        The (curved) mesh.
     order : int
-        Polynomial degree of the displacement.
     element : str
-        "isoparametric", "superparametric" or "physical".
     displacement : ng.GridFunction
-        u_h, a length, on a VectorH1 space; "unknowns" means ``displacement.space.ndof``.
     discrete : DiscreteProblem
-        The algebraic problem.
     minimiser : Iterate
-        Its solution.
     work : dict
-        Counts of assemblies, factorizations, back_solves, gap_searches, curved_elements, estimates
-        and equilibrations spent on this solution, on its mesh. Without factorisation V-cycles of
-        multigrid count as back_solves. And evaluations: points at which functions among the data
-        were looked at for warnings, jumps and roughness, in `adapt` by the level itself; beside
-        those are checks that data are finite, interpolation and quadrature. 0 where all data are
-        numbers.
     """
 
     problem: Problem
