@@ -111,7 +111,8 @@ class Element:
         """The same triangles for a displacement of `strain` (b, q, v), without body forces."""
         local = coordinates(self.corners, self.places.x)
         T = stresses(self.degree, self.corners, local, self.axial, self.on_axis)
-        _, g, beyond = _condensed(T, self.places.weight, self.compliance, strain)
+        rows, rest = _weighted(T, self.places.weight, self.compliance, strain)
+        g, beyond = _nearest(rows @ self.combined, rest)
         none = {name: np.zeros_like(getattr(self, name)) for name in ("force", "missed", "own")}
         return replace(self, strain=strain, source=None, g=g, beyond=beyond, **none)
 
@@ -131,7 +132,7 @@ class Element:
         """
         corners = self.corners[some]
         T = stresses(self.degree, corners, coordinates(corners, x), self.axial, self.on_axis)
-        c = self.combined[some] @ c[some][..., None]
+        c = (self.combined @ c[..., None])[some]
         s = (T.reshape(len(c), -1, T.shape[-1]) @ c).reshape(T.shape[:-1])
         if self.force.any():
             s = s + balancing(self.force_degree, corners, x, self.force[some], self.axial)
@@ -316,7 +317,9 @@ def _element(
     if axial:
         s_p[..., 2] += hoop
     rest = strain - (compliance @ s_p[..., None])[..., 0]
-    combined, g, beyond = _condensed(T, points.weight, compliance, rest)
+    rows, rest = _weighted(T, points.weight, compliance, rest)
+    combined = np.linalg.inv(np.linalg.qr(rows, mode="r"))
+    g, beyond = _nearest(rows @ combined, rest)
     mandel = np.append(np.ones(compliance.shape[-1] - 1), 0.5**0.5)
     largest = np.linalg.eigvalsh(compliance * mandel * mandel[:, None])[..., -1].max(axis=1)
     N, own = _moments(cells, mu, at, degree, columns)
@@ -327,23 +330,24 @@ def _element(
     return Element(points, corners, degree, n, axial, on_axis, *data, *condensed)
 
 
-def _condensed(
-    T: Array, weight: Array, compliance: Array, strain: Array
-) -> tuple[Array, Array, Array]:
-    """`Element.combined`, `.g` and `.beyond` of stresses T (b, q, v, n) for a `strain` (b, q, v).
+def _weighted(T: Array, weight: Array, compliance: Array, strain: Array) -> tuple[Array, Array]:
+    """Rows (b, q v, n) of which products are those of stresses T (b, q, v, n) in the norm of C^-1.
 
-    `weight` is (b, q), `compliance` C^-1 = L L' (b, q, v, v) or (1, 1, v, v).
+    And of a `strain` (b, q, v), (b, 1, q v). `weight` is (b, q), `compliance` C^-1 = L L'
+    (b, q, v, v) or (1, 1, v, v).
     """
     L, root = np.linalg.cholesky(compliance), np.sqrt(weight)[..., None, None]
     rows = (root * L.swapaxes(2, 3) @ T).reshape(len(T), -1, T.shape[-1])
-    combined = np.linalg.inv(np.linalg.qr(rows, mode="r"))
-    rows = rows @ combined
-    rest = (root * (np.linalg.inv(L) @ strain[..., None])).reshape(len(T), 1, -1)
-    g = np.zeros((len(T), 1, rows.shape[2]))
+    return rows, (root * (np.linalg.inv(L) @ strain[..., None])).reshape(len(T), 1, -1)
+
+
+def _nearest(rows: Array, rest: Array) -> tuple[Array, Array]:
+    """`Element.g` and `.beyond` of orthonormal stresses `rows` (b, k, m) for strains (b, 1, k)."""
+    g = np.zeros((len(rows), 1, rows.shape[2]))
     for _ in range(2):  # once more, as the rows are orthonormal but for round-off
         more = rest @ rows
         g, rest = g + more, rest - more @ rows.swapaxes(1, 2)
-    return combined, g[:, 0], (rest**2).sum(axis=(1, 2))
+    return g[:, 0], (rest**2).sum(axis=(1, 2))
 
 
 def _moments(
