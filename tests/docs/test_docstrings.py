@@ -2,7 +2,8 @@
 
 A public function, class or attribute whose annotation has an array says for each array parameter
 or attribute its name with a shape, in an entry ``name : ndarray (m, 2)`` or as "`name` (m, 2)" in
-the text; for arrays it returns as many shapes, or one and "each".
+the text, fields also in a comment at their line or above it; for arrays it returns as many shapes,
+or one and "each".
 """
 
 import ast
@@ -71,6 +72,19 @@ def entry(docstring, name):
     return found.group() if found else ""
 
 
+def comment(lines, field):
+    """What a comment says of a field: at its line, or above it and its neighbours."""
+    at = field.lineno - 1
+    if "#" in lines[at]:
+        return lines[at].partition("#")[2]
+    while re.match(r"    \w+: [^#]*$", lines[at]):
+        at -= 1
+    stop = at
+    while lines[at].startswith("    #"):
+        at -= 1
+    return " ".join(lines[at + 1 : stop + 1])
+
+
 def shapes_returned(docstring):
     """Number of arrays that a docstring gives shapes of, those of parameters aside."""
     parts, told = sections(docstring), 0
@@ -94,7 +108,8 @@ def of_function(owner, node, docstring):
 
 def claims(path):
     """What the docstrings of a module's public functions and classes have to say."""
-    for node in ast.parse(path.read_text()).body:
+    source = path.read_text()
+    for node in ast.parse(source).body:
         if getattr(node, "name", "_").startswith("_"):
             continue
         docstring, owner = ast.get_docstring(node) or "", f"{path}:{node.name}"
@@ -105,7 +120,8 @@ def claims(path):
             match part:
                 case ast.AnnAssign(target=ast.Name(id=name), annotation=annotation):
                     if arrays_in(annotation) and not name.startswith("_"):
-                        yield f"{owner}.{name}", bool(SHAPE.search(entry(docstring, name)))
+                        said = entry(docstring, name) + comment(source.splitlines(), part)
+                        yield f"{owner}.{name}", bool(SHAPE.search(said))
                 case ast.FunctionDef(name="__init__"):
                     yield from of_function(owner, part, docstring)
                 case ast.FunctionDef(name=name) if not name.startswith("_") or name == "__call__":

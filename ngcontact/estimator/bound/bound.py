@@ -42,48 +42,24 @@ FELT = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class AdmissibleStress(Balanced):
-    """A stress s in equilibrium on n triangles, beside C e of a displacement u_h.
+    """A stress s in equilibrium on n triangles, beside C e of a displacement u_h."""
 
-    Attributes
-    ----------
-    distance, loads : ndarray (n,)
-        |s - C e|, and norms of what s misses of the data; roots of energies per thickness.
-    work : float
-        <s n, u_D - u_h> - int p* gap_h, an energy per thickness.
-    residual : float
-        Of equilibrium, relative to the largest stress.
-    """
-
-    distance: Array
-    loads: Array
-    work: float
-    residual: float
+    distance: Array  # (n,) |s - C e|, root of an energy per thickness
+    loads: Array  # (n,) norms of what s misses of the data, the same
+    work: float  # <s n, u_D - u_h> - int p* gap_h, an energy per thickness
+    residual: float  # of equilibrium, relative to the largest stress
 
 
 @dataclass(frozen=True, eq=False)
 class DualProblem:
-    """Conditions on n cells, and their program for the strain of a displacement.
-
-    Attributes
-    ----------
-    cells : Cells
-    given : Given
-    asked : list of Asked
-        u_D - u_h.
-    elements : list of Element
-    rules : ForceRules
-        How forces are integrated.
-    moments : ndarray (d,)
-        Of the given tractions with the multipliers.
-    program : DualProgram
-    """
+    """Conditions on n cells, and their program for the strain of a displacement."""
 
     cells: Cells
     given: Given
-    asked: list[Asked]
+    asked: list[Asked]  # u_D - u_h
     elements: list[Element]
-    rules: ForceRules
-    moments: Array
+    rules: ForceRules  # how forces are integrated
+    moments: Array  # (d,) of the given tractions with the multipliers
     program: DualProgram
 
     def admissible(
@@ -136,23 +112,12 @@ class DualProblem:
 
 @dataclass(frozen=True, eq=False)
 class Proof(DualProblem):
-    """What a bound was made of.
+    """What a bound was made of."""
 
-    Attributes
-    ----------
-    stress : AdmissibleStress
-        The nearest one, and p* >= 0.
-    lifting : ndarray (n,)
-        Norms of w.
-    parts : dict of float
-        What B^2 is the sum of.
-    below, above : float
-        L(u_h) - below <= L(u) <= L(u_h) + above, energies per thickness.
-    """
-
-    stress: AdmissibleStress
-    lifting: Array
-    parts: dict[str, float]
+    stress: AdmissibleStress  # the nearest one, and p* >= 0
+    lifting: Array  # (n,) norms of w
+    parts: dict[str, float]  # what B^2 is the sum of
+    # L(u_h) - below <= L(u) <= L(u_h) + above, energies per thickness
     below: float
     above: float
 

@@ -34,39 +34,21 @@ class Cells:
     Side i of a triangle is opposite to corner i and runs from corner i + 1 to corner i + 2; a
     side's own parameter t in [0, 1] runs from its vertex of the lower number to the other. The
     base, side 0, is the one that may be curved, else the shortest.
-
-    Attributes
-    ----------
-    trace : BoundaryTrace
-        Boundary of the mesh that they divide.
-    vertices, triangles : ndarray (nv, 2), of int (n, 3)
-        Places, lengths, and their numbers at the corners, anticlockwise.
-    parent, barycentric : ndarray of int (n,), (n, 3, 3)
-        Element of the mesh that each is a part of, and coordinates of the corners in it.
-    ends, sides : ndarray of int (e, 2), (n, 3)
-        Vertices of the sides, the lower number first, and the sides of triangles.
-    owner, local : ndarray of int (e,)
-        A triangle of each side, and which of its sides it is.
-    segment, span : ndarray of int (e,), (e, 2)
-        Segment of the boundary that a side is part of, -1 inside of bodies, and parameters s on it
-        at t = 0 and t = 1.
-    curved, bent : ndarray of bool (n,), (e,)
-        Triangles with a curved base, and curved sides.
     """
 
-    trace: BoundaryTrace
-    vertices: Array
-    triangles: Index
-    parent: Index
-    barycentric: Array
-    ends: Index
-    sides: Index
-    owner: Index
-    local: Index
-    segment: Index
-    span: Array
-    curved: Mask
-    bent: Mask
+    trace: BoundaryTrace  # boundary of the mesh that they divide
+    vertices: Array  # (nv, 2) lengths
+    triangles: Index  # (n, 3) numbers of the corners, anticlockwise
+    parent: Index  # (n,) element of the mesh that each is a part of
+    barycentric: Array  # (n, 3, 3) coordinates of the corners in it
+    ends: Index  # (e, 2) vertices of the sides, the lower number first
+    sides: Index  # (n, 3) sides of the triangles
+    owner: Index  # (e,) a triangle of each side ...
+    local: Index  # (e,) ... and which of its sides it is
+    segment: Index  # (e,) segment of the boundary that a side is part of, -1 inside of bodies
+    span: Array  # (e, 2) parameters s on it at t = 0 and t = 1
+    curved: Mask  # (n,) triangles with a curved base
+    bent: Mask  # (e,) curved sides
 
     @property
     def corners(self) -> Array:
@@ -164,28 +146,14 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Places:
-    """Quadrature points of b triangles, q in each.
+    """Quadrature points of b triangles, q in each."""
 
-    Attributes
-    ----------
-    at : ndarray of int (b,)
-        The triangles.
-    local : ndarray (q, 2)
-        Their places (a, b) in each, as of `Cells.image`.
-    x, slopes : ndarray (b, q, 2), (b, q, 2, 2)
-        Points, lengths, and derivatives by (a, b).
-    weight : ndarray (b, q)
-        Weights in the plane times the model's measure.
-    reference : ndarray (b, q, 2)
-        Reference coordinates in the parents.
-    """
-
-    at: Index
-    local: Array
-    x: Array
-    slopes: Array
-    weight: Array
-    reference: Array
+    at: Index  # (b,) the triangles
+    local: Array  # (q, 2) their places (a, b) in each, as of `Cells.image`
+    x: Array  # (b, q, 2) points, lengths
+    slopes: Array  # (b, q, 2, 2) derivatives by (a, b)
+    weight: Array  # (b, q) weights in the plane times the model's measure
+    reference: Array  # (b, q, 2) reference coordinates in the parents
 
     def evaluate(self, cells: Cells, function: ng.CoefficientFunction) -> Array:
         """Values (b, q, dim) of a function at the points."""

@@ -43,61 +43,28 @@ def traces(degree: int, t: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Element:
-    """Condensed triangles of one kind: b triangles, v Voigt components, d multipliers on each.
+    """Condensed triangles of one kind: b triangles, v Voigt components, d multipliers on each."""
 
-    Attributes
-    ----------
-    places : Places
-        Quadrature points, q in each.
-    corners : ndarray (b, 3, 2)
-        Lengths.
-    degree, force_degree : int
-        Of the stresses, and of the body force that s_p balances.
-    axial, on_axis : bool
-        Whether the model is axisymmetric; whether a side of each lies on the axis.
-    compliance : ndarray (b, q, v, v)
-        C^-1, one over a stress; (1, 1, v, v) where it is one matrix for all.
-    strain : ndarray (b, q, v)
-        e(u_h), Voigt.
-    source : CoefficientFunction or None
-        The body force.
-    force : ndarray (b, j, 2)
-        Coefficients, as of `scalars`, of the body force that s_p balances.
-    pieces : ndarray of int (b,)
-        Parts of each triangle on which forces are integrated, two at least where tractions are.
-    missed, modulus : ndarray (b,)
-        L2 norm of what of the body force s_p does not balance, times the measure; smallest
-        eigenvalue of C in Mandel's scaling, a stress.
-    combined : ndarray (b, n, m)
-        T from the n polynomials of `stresses`, orthonormal: (T, T) = 1.
-    N, own : ndarray (b, m, d), (b, d)
-        Moments <T n, .> of the tractions with the multipliers, and those of s_p n.
-    g, beyond : ndarray (b, m), (b,)
-        (T, e(u_h) - C^-1 s_p), the coefficients without multipliers; squares of
-        |C e(u_h) - s_p - T g|, which no coefficients reach.
-    dofs : ndarray of int (b, d)
-        Numbers of the multipliers.
-    """
-
-    places: Places
-    corners: Array
-    degree: int
-    force_degree: int
-    axial: bool
-    on_axis: bool
-    compliance: Array
-    strain: Array
-    source: ng.CoefficientFunction | None
-    force: Array
+    places: Places  # quadrature points, q in each
+    corners: Array  # (b, 3, 2) lengths
+    degree: int  # of the stresses
+    force_degree: int  # of the body force that s_p balances
+    axial: bool  # whether the model is axisymmetric
+    on_axis: bool  # whether a side of each lies on the axis
+    compliance: Array  # (b, q, v, v) C^-1, or (1, 1, v, v) where it is one matrix for all
+    strain: Array  # (b, q, v) e(u_h), Voigt
+    source: ng.CoefficientFunction | None  # the body force
+    force: Array  # (b, j, 2) coefficients, as of `scalars`, of the body force that s_p balances
+    # (b,) parts of each triangle on which forces are integrated, two at least where tractions are
     pieces: Index
-    missed: Array
-    modulus: Array
-    combined: Array
-    N: Array
-    own: Array
-    g: Array
-    beyond: Array
-    dofs: Index
+    missed: Array  # (b,) L2 norm of what of the body force s_p does not balance, times the measure
+    modulus: Array  # (b,) smallest eigenvalue of C in Mandel's scaling, a stress
+    combined: Array  # (b, n, m) T from the n polynomials of `stresses`, orthonormal: (T, T) = 1
+    N: Array  # (b, m, d) moments <T n, .> of the tractions with the multipliers
+    own: Array  # (b, d) those of s_p n
+    g: Array  # (b, m) (T, e(u_h) - C^-1 s_p), the coefficients without multipliers
+    beyond: Array  # (b,) squares of |C e(u_h) - s_p - T g|, which no coefficients reach
+    dofs: Index  # (b, d) numbers of the multipliers
 
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with the multipliers, by coefficients `c` (b, m)."""

@@ -233,46 +233,21 @@ class Facing:
     """k sides on which the motion along d is bounded: by the other body, an obstacle, a guide.
 
     Functions are given at the j Gauss points of `PLACES` on each side, t of the secondary's.
-
-    Attributes
-    ----------
-    pair : ContactState or None
-        None for a guide.
-    side, other : ndarray of int (k,)
-        Of the secondary, and of the primary, -1 without one.
-    there : ndarray (k, j)
-        Parameters on the primary's sides.
-    direction : ndarray (k, j, 2)
-        d.
-    weight : ndarray (k, j)
-        Arc length (P1) or eta (P2) per t, with the model's measure and the weights of Gauss.
-    psi : ndarray (j, n)
-        Bernstein polynomials of p*.
-    gap, lift : ndarray (k, j)
-        Gap of u_h, and what w adds to it, r; lengths.
-    after : ndarray (k, degree + 1)
-        Bernstein coefficients, not negative, of the gap of u_h + w, or near to it where r is 0.
-    closed : ndarray of bool (k,)
-        Sides in contact as a whole.
-    share : ndarray (k, 2)
-        Of what w adds to the gap, that the secondary takes at t = 0 and t = 1.
-    away : ndarray of int (r,)
-        Sides of the secondary of which nothing faces, as over a slot.
     """
 
-    pair: ContactState | None
-    side: Index
-    other: Index
-    there: Array
-    direction: Array
-    weight: Array
-    psi: Array
-    gap: Array
-    lift: Array
-    after: Array
-    closed: Mask
-    share: Array
-    away: Index
+    pair: ContactState | None  # None for a guide
+    side: Index  # (k,) of the secondary
+    other: Index  # (k,) of the primary, -1 without one
+    there: Array  # (k, j) parameters on the primary's sides
+    direction: Array  # (k, j, 2) d
+    weight: Array  # (k, j) length (P1) or eta (P2) per t, with the measure and Gauss weights
+    psi: Array  # (j, n) Bernstein polynomials of p*
+    gap: Array  # (k, j) of u_h, lengths
+    lift: Array  # (k, j) r, what w adds to it
+    after: Array  # (k, n) Bernstein coefficients >= 0 of gap + r, or near to it where r is 0
+    closed: Mask  # (k,) sides in contact as a whole
+    share: Array  # (k, 2) of what w adds to the gap, that the secondary takes at t = 0 and t = 1
+    away: Index  # (r,) sides of the secondary of which nothing faces, as over a slot
 
     @property
     def equality(self) -> bool:

@@ -52,23 +52,14 @@ class ForceRules:
 
     They are rough where they are far from polynomials on a triangle. The rule on it is that on its
     parts: resultants are the same.
-
-    Attributes
-    ----------
-    thresholds : list of float
-        For each of `Problem.force` the root mean square that polynomials may miss.
-    degree, levels, lowest : int
-        Of these polynomials; how often triangles may be divided; order of rules where they may not.
-    least, thirds : ndarray of int (n,), of bool (n,)
-        How often they are at least, and whether parts at corners are in thirds, as of `pattern`.
     """
 
-    thresholds: list[float]
-    degree: int
-    levels: int
-    lowest: int
-    least: Index
-    thirds: Mask
+    thresholds: list[float]  # for each of `Problem.force`, root mean square that may be missed
+    degree: int  # of the polynomials that miss it
+    levels: int  # how often triangles may be divided
+    lowest: int  # order of rules where they may not
+    least: Index  # (n,) how often they are at least
+    thirds: Mask  # (n,) whether parts at corners are in thirds, as of `pattern`
 
     @property
     def order(self) -> int:

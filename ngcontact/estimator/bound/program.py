@@ -46,48 +46,23 @@ DEFINITE = 1e-12  # of the diagonal, added to what is factorised: vertices where
 
 @dataclass(frozen=True, eq=False)
 class Balanced:
-    """A stress in equilibrium, and what acts on the lines.
+    """A stress in equilibrium, and what acts on the lines."""
 
-    Attributes
-    ----------
-    coefficients : list of ndarray (b, m)
-        Of the stress on the triangles of each `Element`.
-    pressure : list of ndarray (k, j)
-        Bernstein coefficients of p* on the sides of each line, per length (P1) or eta (P2).
-    left : ndarray (d,)
-        Moments of tractions that do not balance.
-    idle : float
-        Sum of the moments that hold motions which nothing resists, a force per thickness.
-    """
-
-    coefficients: list[Array]
-    pressure: list[Array]
-    left: Array
-    idle: float
+    coefficients: list[Array]  # (b, m) each, of the stress on the triangles of an `Element`
+    pressure: list[Array]  # (k, j) each, Bernstein coefficients of p*, per length (P1), eta (P2)
+    left: Array  # (d,) moments of tractions that do not balance
+    idle: float  # sum of the moments that hold motions which nothing resists, a force per thickness
 
 
 @dataclass(frozen=True, eq=False)
 class DualProgram:
-    """The matrix of d multipliers, factorised once, for several loads.
-
-    Attributes
-    ----------
-    multipliers : Multipliers
-    lines : sequence of Facing
-        Contact and guides.
-    R : sparse (m, d)
-        All rows over their `Facing.mass`.
-    T : sparse (d, d)
-        mu = T y: each row is an unknown of y.
-    program : QuadraticProgram
-        Of y, with the bounds of the lines.
-    """
+    """The matrix of d multipliers, factorised once, for several loads."""
 
     multipliers: Multipliers
-    lines: Sequence[Facing]
-    R: sp.csr_array
-    T: sp.csr_array
-    program: QuadraticProgram
+    lines: Sequence[Facing]  # contact and guides
+    R: sp.csr_array  # (m, d) all rows over their `Facing.mass`
+    T: sp.csr_array  # (d, d) mu = T y: each row is an unknown of y
+    program: QuadraticProgram  # of y, with the bounds of the lines
 
     @cached_property
     def systems(self) -> BorderedSystems:

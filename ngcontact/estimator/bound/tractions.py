@@ -25,26 +25,14 @@ ROUND_OFF = 1e-10  # of tractions, relative to the largest stress: as equilibriu
 
 @dataclass(frozen=True, eq=False)
 class SideRule:
-    """Quadrature along sides of cells, j points on each of m pieces.
+    """Quadrature along sides of cells, j points on each of m pieces."""
 
-    Attributes
-    ----------
-    side : ndarray of int (m,)
-        Of each piece.
-    t, weight : ndarray (m, j)
-        Parameters of the sides, and weights in arc length.
-    x, normal : ndarray (m, j, 2)
-        Points, lengths; unit normals, out of the owners of the sides.
-    measure : ndarray (m, j)
-        The model's.
-    """
-
-    side: Index
-    t: Array
-    weight: Array
-    x: Array
-    normal: Array
-    measure: Array
+    side: Index  # (m,) of each piece
+    t: Array  # (m, j) parameters of the sides
+    weight: Array  # (m, j) in arc length
+    x: Array  # (m, j, 2) points, lengths
+    normal: Array  # (m, j, 2) unit normals, out of the owners of the sides
+    measure: Array  # (m, j) the model's
 
     def moments(self, mu: Multipliers, values: Array) -> Array:
         """Integrals (d,) of tractions `values` (m, j, 2) times the multipliers."""
@@ -103,30 +91,16 @@ def side_rule(cells: Cells, breaks: Array, side: Index) -> SideRule:
 
 @dataclass(frozen=True, eq=False)
 class Given:
-    """Conditions on e sides.
-
-    Attributes
-    ----------
-    problem : Problem
-    cells : Cells
-    held : ndarray of bool (e, 2)
-        Components with prescribed displacements: no traction is given.
-    loads : dict of ndarray of int (k,)
-        Sides of each P of `Problem.traction`.
-    supports : list of (values, ndarray of int (k,))
-        u_D of `Problem.displacement` with their sides.
-    breaks : ndarray (r, 2)
-        Segments and s, rising: where rules on the boundary begin anew to follow tractions.
-    pressed : ndarray (e, j, 2)
-        What pressures of lines exert: forces per t, with the measure, at `PLACES`.
-    """
+    """Conditions on e sides."""
 
     problem: Problem
     cells: Cells
-    held: Mask
-    loads: dict[str, Index]
-    supports: list[tuple[Sequence[Any], Index]]
+    held: Mask  # (e, 2) components with prescribed displacements: no traction is given
+    loads: dict[str, Index]  # sides (k,) of each P of `Problem.traction`
+    supports: list[tuple[Sequence[Any], Index]]  # u_D of `Problem.displacement`, with sides (k,)
+    # (r, 2) segments and s, rising: where rules on the boundary begin anew to follow tractions
     breaks: Array
+    # (e, j, 2) what pressures of lines exert: forces per t, with the measure, at `PLACES`
     pressed: Array
 
     def followed(self) -> Index:
