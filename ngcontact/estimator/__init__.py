@@ -1,5 +1,6 @@
 """Error indicators of a solution, and bounds of its error."""
 
+from .bound import Guaranteed as Guaranteed
 from .bound import refuse_bound as refuse_bound
 from .quantities import Measured as Measured
 from .quantities import Quantities as Quantities

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..arrays import Array
-from .files import check_path, replacing
-from .pictures.scene import COLOURS, MARKS
+from ..estimator import Guaranteed
+from .files import check_path
+from .pictures import COLOURS, MARKS, new_figure, show
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,53 +20,7 @@ if TYPE_CHECKING:
 SPAN = 2.5  # of a triangle's side along the unknowns
 BELOW = 0.6  # of the curve, where a triangle lies
 
-
-class Level(Protocol):
-    """A solution with its error estimate, and its bound where that has been made."""
-
-    @property
-    def order(self) -> int:
-        """Degree of the displacement."""
-
-    @property
-    def displacement(self) -> Any:
-        """u_h, whose space knows the unknowns."""
-
-    @property
-    def relative_error_estimate(self) -> float:
-        """Estimated error over the energy norm."""
-
-    @property
-    def bounded(self) -> bool:
-        """Whether the bound has been made."""
-
-    @property
-    def relative_error_bound(self) -> float:
-        """Bound of the error over the energy norm."""
-
-
-Run = Sequence[Level] | tuple[Any, Any]
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """What is drawn of one run.
-
-    Attributes
-    ----------
-    name : str
-        In the legend.
-    x, y, bound : ndarray (k,)
-        Unknowns, errors, and bounds, NaN where there are none.
-    rate : float or None
-        Of its triangle.
-    """
-
-    name: str
-    x: Array
-    y: Array
-    bound: Array
-    rate: float | None
+Run = Sequence[Guaranteed] | tuple[Any, Any]
 
 
 def slope_triangle(axes: Axes, x: Array, y: Array, rate: float, above: bool = False) -> None:
@@ -83,13 +37,14 @@ def slope_triangle(axes: Axes, x: Array, y: Array, rate: float, above: bool = Fa
     above : bool
         Whether the triangle lies above the curve and not below.
     """
-    corners, upright, level = _triangle(x, y, rate, above)
+    corners = _triangle(x, y, rate, above)
     axes.plot(*corners.T, color="0.4", lw=0.8)
+    (left, start), (_, end), corner, _ = corners
     sideways, up = (3, 2) if above else (-3, -2)
     beside: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "color": "0.3"}
     axes.annotate(
         f"{rate:g}",
-        (upright[0], upright[1]),
+        (corner[0], np.sqrt(end * start)),
         xytext=(sideways, 0),
         ha="left" if above else "right",
         va="center",
@@ -97,7 +52,7 @@ def slope_triangle(axes: Axes, x: Array, y: Array, rate: float, above: bool = Fa
     )
     axes.annotate(
         "1",
-        (level[0], level[1]),
+        (np.sqrt(left * float(x[-1])), corner[1]),
         xytext=(0, up),
         ha="center",
         va="bottom" if above else "top",
@@ -105,32 +60,28 @@ def slope_triangle(axes: Axes, x: Array, y: Array, rate: float, above: bool = Fa
     )
 
 
-def _triangle(x: Array, y: Array, rate: float, above: bool) -> tuple[Array, Array, Array]:
-    """Corners (4, 2) of a triangle, closed, and the middles (2,) of its upright and level sides."""
+def _triangle(x: Array, y: Array, rate: float, above: bool) -> Array:
+    """Corners (4, 2) of a triangle, closed; the third one is at the right angle."""
     right = float(x[-1])
     left = right / SPAN
     end = float(y[-1]) * (1 / BELOW if above else BELOW)
     start = end * SPAN**rate
     corner = (right, start) if above else (left, end)
-    corners = np.array([(left, start), (right, end), corner, (left, start)])
-    middle = np.sqrt(start * end), np.sqrt(left * right)
-    return corners, np.array([corner[0], middle[0]]), np.array([middle[1], corner[1]])
+    return np.array([(left, start), (right, end), corner, (left, start)])
 
 
-def _crossed(corners: Array, curves: Sequence[Curve]) -> int:
+def _crossed(corners: Array, curves: Sequence[tuple[Array, Array]]) -> int:
     """How many points of `curves`, and of the lines between, lie in the box of a triangle."""
     low, high = np.log(corners.min(axis=0)), np.log(corners.max(axis=0))
-    count = 0
-    for curve in curves:
-        x, y = np.log(curve.x), np.log(curve.y)
-        at = np.linspace(low[0], high[0], 50)
-        there = np.interp(at, x, y, left=np.nan, right=np.nan)
+    at, count = np.linspace(low[0], high[0], 50), 0
+    for x, y in curves:
+        there = np.interp(at, np.log(x), np.log(y), left=np.nan, right=np.nan)
         count += int(np.count_nonzero((there > low[1]) & (there < high[1])))
     return count
 
 
 def plot_convergence(
-    runs: Mapping[str, Run] | Sequence[Level],
+    runs: Mapping[str, Run] | Sequence[Guaranteed],
     path: str | os.PathLike[str] | None = None,
     *,
     rates: Mapping[str, float] | None = None,
@@ -166,60 +117,45 @@ def plot_convergence(
         if len(run) == 0 or (isinstance(run, tuple) and len(run[0]) == 0):
             raise ValueError(f'run "{label}" is empty')
     target = None if path is None else check_path(path, ".png")
-    from matplotlib.figure import Figure
-
-    if target is None:
-        from matplotlib import pyplot
-
-        figure = pyplot.figure(figsize=(6.5, 5), layout="constrained")
-    else:
-        figure = Figure(figsize=(6.5, 5), layout="constrained")
+    figure = new_figure(target, figsize=(6.5, 5))
     _draw(figure.subplots(), named, rates or {})
-    if target is None:
-        pyplot.show()
-        return figure
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    with replacing(target) as (draft,):
-        FigureCanvasAgg(figure).print_figure(draft, format="png", dpi=150)
+    show(figure, target)
     return figure
-
-
-def _curve(label: str, run: Run) -> Curve:
-    """Name and arrays of one run."""
-    if isinstance(run, tuple):
-        x, y = (np.asarray(values, dtype=float) for values in run)
-        return Curve(label, x, y, np.full(len(x), np.nan), None)
-    order = run[-1].order
-    return Curve(
-        name=label or f"estimate, order {order}",
-        x=np.array([level.displacement.space.ndof for level in run], dtype=float),
-        y=np.array([level.relative_error_estimate for level in run]),
-        bound=np.array([s.relative_error_bound if s.bounded else np.nan for s in run]),
-        rate=order / 2,
-    )
 
 
 def _draw(axes: Axes, runs: Mapping[str, Run], rates: Mapping[str, float]) -> None:
     """All curves with their triangles."""
-    curves = {label: _curve(label, run) for label, run in runs.items()}
-    for k, (label, curve) in enumerate(curves.items()):
+    curves: dict[str, tuple[Array, Array]] = {}
+    for label, run in runs.items():
+        if isinstance(run, tuple):
+            x, y = (np.asarray(values, dtype=float) for values in run)
+        else:
+            x = np.array([level.displacement.space.ndof for level in run], dtype=float)
+            y = np.array([level.relative_error_estimate for level in run])
+        curves[label] = x, y
+    for k, (label, run) in enumerate(runs.items()):
+        (x, y), rate, name = curves[label], rates.get(label), label
         style: dict[str, Any] = {
             "color": COLOURS[k % len(COLOURS)],
             "marker": MARKS[k % len(MARKS)],
+            "ms": 4,
         }
-        axes.plot(curve.x, curve.y, label=curve.name, ms=4, **style)
-        known = np.isfinite(curve.bound)
-        if known.any():
+        known = []
+        if not isinstance(run, tuple):
+            order = run[-1].order
+            name, rate = label or f"estimate, order {order}", rates.get(label, order / 2)
+            known = [level for level in run if level.bounded]
+        axes.plot(x, y, label=name, **style)
+        if known:
+            size = [float(level.displacement.space.ndof) for level in known]
+            bound = [level.relative_error_bound for level in known]
             name = f"{label}, bound".lstrip(", ")
-            bound = curve.x[known], curve.bound[known]
-            axes.plot(*bound, ls="--", mfc="w", label=name, ms=4, **style)
-        rate = rates.get(label, curve.rate)
+            axes.plot(size, bound, ls="--", mfc="w", label=name, **style)
         if rate is not None:
-            others = [other for other in curves.values() if other is not curve]
-            places = [_triangle(curve.x, curve.y, rate, above)[0] for above in (False, True)]
+            others = [curve for other, curve in curves.items() if other != label]
+            places = [_triangle(x, y, rate, above) for above in (False, True)]
             under, over = (_crossed(place, others) for place in places)
-            slope_triangle(axes, curve.x, curve.y, rate, above=over < under)
+            slope_triangle(axes, x, y, rate, above=over < under)
     axes.set(xscale="log", yscale="log", xlabel="unknowns", ylabel="relative error, energy norm")
     axes.grid(which="major", alpha=0.3)
     axes.legend()

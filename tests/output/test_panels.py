@@ -9,8 +9,8 @@ from matplotlib import pyplot
 
 from ngcontact import Contact
 from ngcontact.output import plot_solution
-from ngcontact.output.pictures.panels import cut_pressure
-from ngcontact.output.pictures.scene import contact_lines
+from ngcontact.output.pictures import cut_pressure
+from ngcontact.output.scene import contact_lines
 from tests.output.stubs import stub
 
 

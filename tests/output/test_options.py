@@ -7,9 +7,8 @@ import pytest
 from drivers.reference import cases
 from ngcontact import solve
 from ngcontact.output import plot_solution
-from ngcontact.output.pictures import Style
-from ngcontact.output.pictures.panels import colour_range
-from ngcontact.output.pictures.scene import picture
+from ngcontact.output.pictures import colour_range
+from ngcontact.output.scene import Style, picture
 from tests.output.stubs import stub
 
 ACROSS = 0.5  # normal to the plane

@@ -1,61 +1,37 @@
-"""What a picture shows: style, curved elements as triangles, contact lines and their zones."""
+"""What a picture shows: style, field, curved elements as triangles, contact lines and zones."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import ngsolve as ng
 import numpy as np
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
-from ...arrays import Array, Index, Mask
-from ...problem import ABOUT_AN_AXIS
-from ...solved import Solved
-from ..vtk import neighbour_tree, nodes_of, subdivision
-from .fields import Field, evaluated
+from ..arrays import Array, Index, Mask
+from ..fem import von_mises
+from ..problem import ABOUT_AN_AXIS
+from ..solved import Solved
+from .vtk import Nodes, full_stress, neighbour_tree, nodes_of, subdivision
 
-MOST_TRIANGLES = 200_000  # of a picture: more cannot be seen
+MAX_TRIANGLES = 200_000  # of a picture: more cannot be seen
 NEAR = 0.25  # of a zone's size: distance to a line of symmetry up to which both halves are one zone
 STRAIGHT = 1e-6  # distance from the line, relative to its length, of a straight boundary
 ACROSS = 1e-6  # displacement across a line, relative to the largest on it, that is round-off
-# Colours of Okabe and Ito, told apart with any colour vision, and marks for those who print grey.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
-MARKS = ("o", "s", "^", "D", "v", "P", "X")
-
-
-RISING, SIGNED = "viridis", "RdBu_r"  # colour maps, told apart with any colour vision
-KINDS = ("length", "stress")  # what has a unit
+UNITS = ("length", "stress")  # what has a unit
 
 Unit = str | tuple[str, float]
 Profile = Callable[[Array], Any] | tuple[Any, Any]
+Evaluated = Callable[[Array, Array], Array]
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Style:
-    """What a picture shows, and how.
-
-    Attributes
-    ----------
-    scale : float, optional
-        Factor of the displacement; None chooses one.
-    field : str or ng.CoefficientFunction
-        What colours show.
-    limits : tuple of float, optional
-        Ends of the colour scale, in the unit of the data; None chooses them.
-    units : mapping
-        Of "length" and "stress": a name, or a name and its size in the unit of the data.
-    profile : mapping
-        What is drawn over the pressure, by label: functions of the coordinate (k,) with pressures
-        (k,) as values, or two arrays, coordinates and pressures, in the unit of the data.
-    mesh : bool
-        Whether edges of elements are drawn.
-    mirror : str, optional
-        Boundary at which bodies are mirrored, a line of symmetry.
-    """
+    """What a picture shows, and how: the options of `Solution.plot`, and what they must be."""
 
     scale: float | None = None
     field: str | ng.CoefficientFunction = "von_mises"
@@ -78,8 +54,8 @@ class Style:
         ):
             raise ValueError(f"limits = {self.limits}: give two finite numbers, the smaller first")
         for kind in self.units:
-            if kind not in KINDS:
-                raise ValueError(f'units: "{kind}" is none of {", ".join(KINDS)}')
+            if kind not in UNITS:
+                raise ValueError(f'units: "{kind}" is none of {", ".join(UNITS)}')
             name, size = self.unit(kind)
             if not isinstance(name, str) or not (np.isfinite(size) and size > 0):
                 raise ValueError(
@@ -103,6 +79,21 @@ class Style:
         name, _ = self.unit(kind)
         return f"{text} [{name}]" if name else text
 
+    def check_field(self, solution: Solved) -> None:
+        """Raise ``ValueError`` or ``TypeError`` unless the field can be shown."""
+        if isinstance(self.field, ng.CoefficientFunction):
+            if self.field.dim != 1 or self.field.is_complex:
+                raise ValueError(
+                    f"field: a function of {self.field.dim} components; give one real number"
+                )
+            return
+        known = fields(solution)
+        choice = f"give a CoefficientFunction or one of {', '.join(known)}"
+        if not isinstance(self.field, str):
+            raise TypeError(f"field = {self.field!r}: {choice}")
+        if self.field not in known:
+            raise ValueError(f'field = "{self.field}": {choice}')
+
 
 def _two_arrays(profile: Any) -> bool:
     """Whether it is a pair of arrays (k,)."""
@@ -113,14 +104,91 @@ def _two_arrays(profile: Any) -> bool:
     return one.ndim == 1 and one.shape == other.shape
 
 
-def contact_lines(solution: Solved) -> list[tuple[int, Index, Array]]:
-    """Contact points in order along their lines: (pair, rows, coordinate) for every line.
+def coordinates(solution: Solved) -> tuple[str, str]:
+    """Names of both coordinates."""
+    return ("r", "z") if solution.problem.model in ABOUT_AN_AXIS else ("x", "y")
 
-    Of the k points of each line `rows` (k,) index ``solution.points``, and the coordinate (k,) is a
-    length: eta, across the fixed direction xi (P2), or without one (P1) the arc position, a sum of
-    chords. Both rise with the coordinate of which more changes along the line, whichever body is
-    the secondary. A pair whose points lie on separate pieces of boundary gives several lines, one
-    behind the other.
+
+def fields(solution: Solved) -> dict[str, tuple[str, str, Evaluated]]:
+    """Label, kind and function of every field by name.
+
+    Kinds are those of `UNITS`, or "" where none is known; functions map stresses xx, yy, xy, zz
+    (4, k) and displacements (2, k) to values (k,).
+    """
+    x, y = coordinates(solution)
+    normal = "hoop" if solution.problem.model in ABOUT_AN_AXIS else "zz"
+
+    def component(number: int) -> Evaluated:
+        return lambda stress, _: stress[number]
+
+    def principal(stress: Array, sign: int) -> Array:
+        xx, yy, xy, zz = stress
+        in_plane = (xx + yy) / 2 + sign * np.hypot((xx - yy) / 2, xy)
+        return np.asarray(sign * np.maximum(sign * in_plane, sign * zz))
+
+    return {
+        "von_mises": ("von Mises stress", "stress", lambda s, _: von_mises(s.T)),
+        **{
+            f"stress_{name}": (f"stress {name}", "stress", component(k))
+            for k, name in enumerate((f"{x}{x}", f"{y}{y}", f"{x}{y}", normal))
+        },
+        "largest_principal": ("largest principal stress", "stress", lambda s, _: principal(s, 1)),
+        "smallest_principal": (
+            "smallest principal stress",
+            "stress",
+            lambda s, _: principal(s, -1),
+        ),
+        "mean_pressure": (
+            "mean pressure, −tr σ/3",
+            "stress",
+            lambda s, _: -(s[0] + s[1] + s[3]) / 3,
+        ),
+        "displacement": ("displacement, absolute value", "length", lambda _, u: np.hypot(*u)),
+        f"displacement_{x}": (f"displacement along {x}", "length", lambda _, u: u[0]),
+        f"displacement_{y}": (f"displacement along {y}", "length", lambda _, u: u[1]),
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """A scalar field of a picture, with `values` (k,) at its nodes, and the label of its scale.
+
+    The kind is "stress", "length", or "" where that is not known.
+    """
+
+    label: str
+    kind: str
+    values: Array
+
+
+def _shown(solution: Solved, nodes: Nodes, field: str | ng.CoefficientFunction) -> Field:
+    """The chosen `field` at the nodes."""
+    if not isinstance(field, str):
+        return Field("field", "", nodes.values(field)[:, 0])
+    label, kind, function = fields(solution)[field]
+    u = solution.displacement
+    values = nodes.values(ng.CF((full_stress(solution), u[0], u[1]))).T
+    return Field(label, kind, function(values[:4], values[4:]))
+
+
+class ContactPath(NamedTuple):
+    """Contact points in order along a line.
+
+    `rows` (k,) are their numbers in ``solution.points``, the coordinate `s` (k,) is a length.
+    """
+
+    pair: int
+    rows: Index
+    s: Array
+
+
+def contact_lines(solution: Solved) -> list[ContactPath]:
+    """Contact points in order along their lines.
+
+    Their coordinate is eta, across the fixed direction xi (P2), or without one (P1) the arc
+    position, a sum of chords. Both rise with the coordinate of which more changes along the line,
+    whichever body is the secondary. A pair whose points lie on separate pieces of boundary gives
+    several lines, one behind the other.
     """
     lines = []
     for pair in np.unique(solution.pair).tolist():
@@ -128,13 +196,13 @@ def contact_lines(solution: Solved) -> list[tuple[int, Index, Array]]:
         points = solution.points[rows]
         direction = solution.problem.contact[pair].direction
         if direction is None:
-            lines += [(pair, rows[order], s) for order, s in _arcs(points)]
+            lines += [ContactPath(pair, rows[order], s) for order, s in _arcs(points)]
         else:
             dx, dy = np.asarray(direction, dtype=float) / np.hypot(*direction)
             across = np.array([-dy, dx])
             eta = points @ (_rising(across) * across)
             order = np.argsort(eta, kind="stable")
-            lines.append((pair, rows[order], eta[order]))
+            lines.append(ContactPath(pair, rows[order], eta[order]))
     return lines
 
 
@@ -161,31 +229,21 @@ def _arcs(points: Array) -> list[tuple[Index, Array]]:
     return arcs
 
 
-def zones_of(solution: Solved) -> list[Index]:
-    """Contact points (c,) of each zone in contact, the zone of the largest force first.
-
-    A zone is a run of neighbouring points in contact on one line.
-    """
+def zones_of(solution: Solved, lines: Sequence[ContactPath]) -> list[ContactPath]:
+    """Zones in contact: runs of neighbouring points in contact on one line."""
     zones = []
-    for _, rows, _ in contact_lines(solution):
-        active = solution.active[rows]
-        run = np.cumsum(np.diff(active, prepend=False))  # odd in contact, even where open
-        zones += [rows[run == k] for k in range(1, run[-1] + 1, 2)]
-    return sorted(zones, key=lambda zone: -float(np.abs(solution.force[zone]).sum()))
+    for pair, rows, s in lines:
+        run = np.cumsum(np.diff(solution.active[rows], prepend=False))  # odd in contact
+        at = [run == k for k in range(1, run[-1] + 1, 2)]
+        zones += [ContactPath(pair, rows[zone], s[zone]) for zone in at]
+    return zones
 
 
 @dataclass(frozen=True, eq=False)
 class SymmetryLine:
-    """A straight line.
+    """A straight line through `point` (2,) with the unit vector `normal` (2,).
 
-    Attributes
-    ----------
-    point : ndarray (2,)
-        On it, a length.
-    normal : ndarray (2,)
-        Unit vector.
-    slack : float
-        Distance up to which points lie on it, a length.
+    Points lie on it up to a distance `slack`, a length.
     """
 
     point: Array
@@ -203,12 +261,6 @@ class SymmetryLine:
     def reflected(self, x: Array) -> Array:
         """Mirror images (k, 2) of points `x` (k, 2)."""
         return np.asarray(x - 2 * self.distance(x)[:, None] * self.normal)
-
-
-def axis_of(place: Array) -> SymmetryLine:
-    """The axis r = 0 of a body of revolution with nodes at `place` (k, 2)."""
-    slack = STRAIGHT * float(np.abs(place).max(initial=0.0))
-    return SymmetryLine(np.zeros(2), np.array([1.0, 0.0]), slack)
 
 
 def symmetry_line(mesh: ng.Mesh, displacement: ng.GridFunction, pattern: str) -> SymmetryLine:
@@ -248,6 +300,8 @@ class Scene:
 
     Attributes
     ----------
+    solution : Solved
+    style : Style
     moved : ndarray (k, 2)
         Nodes after `scale` times the displacement, lengths.
     shown : Field
@@ -262,10 +316,10 @@ class Scene:
         Points of each zone in contact, moved as the nodes are, those of the largest force first.
     scale : float
         Factor of the displacement.
-    axes : tuple of str
-        Names of the coordinates.
     """
 
+    solution: Solved
+    style: Style
     moved: Array
     shown: Field
     triangles: Index
@@ -273,7 +327,6 @@ class Scene:
     outline: Mask
     zones: list[Array]
     scale: float
-    axes: tuple[str, str] = ("x", "y")
 
     def areas(self) -> Array:
         """Areas (t,) of the triangles."""
@@ -282,19 +335,13 @@ class Scene:
         return np.asarray(np.abs(ux * vy - uy * vx) / 2)
 
 
-def names_of(solution: Solved) -> tuple[tuple[str, str], str]:
-    """Names of both coordinates and of the stress normal to the plane."""
-    revolved = solution.problem.model in ABOUT_AN_AXIS
-    return (("r", "z"), "hoop") if revolved else (("x", "y"), "zz")
-
-
 def picture(solution: Solved, style: Style) -> Scene:
     """Evaluate a solution for the picture."""
     _ = solution.stress  # refuses a mesh that was changed, whatever field is shown
     mesh, u, scale = solution.mesh, solution.displacement, style.scale
     order = max(mesh.GetCurveOrder(), solution.order)
     if order > 1:  # enough to look smooth on coarse meshes, no more than can be seen on fine ones
-        order = int(np.clip(np.sqrt(MOST_TRIANGLES / mesh.ne), 1, 2 * order))
+        order = int(np.clip(np.sqrt(MAX_TRIANGLES / mesh.ne), 1, 2 * order))
     nodes = nodes_of(mesh, order)
     triangles, sides = subdivision(order)
     edges = nodes.cells[:, sides].reshape(-1, order + 1)
@@ -306,27 +353,30 @@ def picture(solution: Solved, style: Style) -> Scene:
         body = np.empty(len(place), dtype=np.intp)
         body[nodes.cells] = nodes.body[:, None]
         scale = _chosen_scale(solution, place, move, body)
+    zones = [zone.rows for zone in zones_of(solution, contact_lines(solution))]
+    zones.sort(key=lambda rows: -float(np.abs(solution.force[rows]).sum()))
     tree = KDTree(place)
-    zones = [tree.query(solution.points[rows])[1].astype(int) for rows in zones_of(solution)]
-    axes, across = names_of(solution)
+    at = [tree.query(solution.points[rows])[1].astype(int) for rows in zones]
     scene = Scene(
+        solution=solution,
+        style=style,
         moved=place + scale * move,
-        shown=evaluated(solution, nodes, style.field, axes, across),
+        shown=_shown(solution, nodes, style.field),
         triangles=nodes.cells[:, triangles].reshape(-1, 3),
         edges=edges[first],
         outline=count == 1,
-        zones=[place[at] + scale * move[at] for at in zones],
+        zones=[place[zone] + scale * move[zone] for zone in at],
         scale=scale,
-        axes=axes,
     )
     if solution.problem.model in ABOUT_AN_AXIS:
-        return mirrored(scene, axis_of(place), place)
+        slack = STRAIGHT * float(np.abs(place).max(initial=0.0))
+        return _mirrored(scene, SymmetryLine(np.zeros(2), np.array([1.0, 0.0]), slack), place)
     if style.mirror is None:
         return scene
-    return mirrored(scene, symmetry_line(mesh, u, style.mirror), place)
+    return _mirrored(scene, symmetry_line(mesh, u, style.mirror), place)
 
 
-def mirrored(scene: Scene, line: SymmetryLine, place: Array) -> Scene:
+def _mirrored(scene: Scene, line: SymmetryLine, place: Array) -> Scene:
     """A scene on both sides of a line of symmetry; `place` (k, 2) are its nodes before."""
     inside = line.holds(place)[scene.edges].all(axis=1)
     count = len(scene.moved)

@@ -1,0 +1,542 @@
+"""Pictures and films of solutions: deformed bodies with a field, close-ups, contact pressure."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..arrays import Array
+from ..solved import Solved
+from .files import check_path, replacing
+from .scene import Scene, Style, contact_lines, coordinates, picture, zones_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import ScalarFormatter
+    from PIL.Image import Image
+
+# Colours of Okabe and Ito, told apart with any colour vision, and marks for those who print grey.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+MARKS = ("o", "s", "^", "D", "v", "P", "X")
+RISING, SIGNED = "viridis", "RdBu_r"  # colour maps, told apart with any colour vision
+HEIGHT = 5.0  # of a picture, inches
+POWERS = -3, 4  # of ten, from which numbers on a scale are given with one for all
+PROFILE_SAMPLES = 400  # of a function that is drawn over the pressure
+
+MAX_CLOSE_UPS = 4
+SMALL = 0.2  # half of a close-up's size over that of the picture, from which the picture shows it
+MARGIN = 0.9  # half of a close-up's size over that of its zone
+HALF_SIZES = 0.02, 0.002  # half-sizes, relative to the picture, of single points and of any zone
+PEAK_AREA = 0.005  # share of an area, beyond whose value colours may saturate
+CUT_OFF = 1.25  # largest value over that one up to which they do not
+
+BESIDE_ZONE = 0.75, 0.002  # shown beside a zone: of its length, and of all that is shown
+OWN_PANELS = 0.4, 4  # zones have panels of their own where they fill less, and are so many
+SINGLE, SPARE = 0.1, 4.0  # share of a zone whose pressures are cut if they are so much above others
+
+FILM_DPI = 80
+HEADROOM = 1.05  # of the largest pressure in a film
+
+Window = tuple[Array, Array]  # lower left and upper right corner, each (2,)
+
+
+def plot_solution(
+    solution: Solved,
+    path: str | os.PathLike[str] | None = None,
+    scale: float | None = None,
+    **options: Any,
+) -> Figure:
+    """Picture of the deformed bodies with a field, and of the contact pressure.
+
+    Close-ups of small zones in contact stand between the two. The pressure is drawn over eta (P2)
+    or the arc position (P1). Lengths and stresses in the consistent units of the data. With a
+    `path` (``.png``) the picture is written there without any window, otherwise it is shown on the
+    screen. `scale` multiplies the displacement; None chooses a factor that lets the deformation be
+    seen, but not so large that bodies seem to run into each other. `options` are those of `Style`.
+
+    Raises ``ValueError`` or ``TypeError`` where an option is none, and as `check_path` does, before
+    any work.
+    """
+    style = Style(scale, **options)
+    target = None if path is None else check_path(path, ".png")
+    style.check_field(solution)
+    figure = new_figure(target)
+    scene = picture(solution, style)
+    windows = close_ups([scene])
+    draw_scene(figure, scene, windows, style.limits or colour_range(scene, windows))
+    if (engine := figure.get_layout_engine()) is not None:
+        for _ in range(2):  # labels move with the ticks that a first layout leaves
+            engine.execute(figure)
+    show(figure, target, bbox_inches="tight", pad_inches=0.05)
+    return figure
+
+
+def new_figure(target: Path | None, **options: Any) -> Figure:
+    """A figure for a file, or for the screen."""
+    if target is None:
+        from matplotlib import pyplot
+
+        return pyplot.figure(layout="constrained", **options)
+    from matplotlib.figure import Figure
+
+    return Figure(layout="constrained", **options)
+
+
+def show(figure: Figure, target: Path | None, **options: Any) -> None:
+    """Write a figure to its file, or show it on the screen."""
+    if target is None:
+        from matplotlib import pyplot
+
+        pyplot.show()
+        return
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    with replacing(target) as (draft,):
+        FigureCanvasAgg(figure).print_figure(draft, format="png", dpi=150, **options)
+
+
+def write_film(
+    path: str | os.PathLike[str],
+    solutions: Sequence[Solved],
+    *,
+    seconds: float = 0.6,
+    titles: Sequence[str] | None = None,
+    **options: Any,
+) -> Path:
+    """Write a film (``.gif``) of a load sequence or of the levels of an adaptive run.
+
+    Colours, windows and the scales of displacement and pressure are those of all frames together.
+
+    Parameters
+    ----------
+    path : path
+        File (.gif).
+    solutions : sequence of Solution
+        One for each frame, of one problem or of several with the same names.
+    seconds : float
+        Time that each frame is seen; the last one is three times as long.
+    titles : sequence of str, optional
+        Of the frames. Default: their numbers and unknowns.
+    options
+        As of `Solution.plot`: scale, field, limits, units, profile, mesh, mirror.
+
+    Returns
+    -------
+    Path
+        The file.
+
+    Raises
+    ------
+    ValueError, TypeError, OSError
+        No solutions, titles of another number, an option that is none, a path that cannot be
+        written: before any work.
+    """
+    frames, style = list(solutions), Style(**options)
+    if not frames:
+        raise ValueError("solutions: give one at least")
+    if titles is not None and len(titles) != len(frames):
+        raise ValueError(f"titles: {len(titles)} for {len(frames)} solutions")
+    if not (np.isfinite(seconds) and seconds > 0):
+        raise ValueError(f"seconds = {seconds}: give a positive time")
+    target = check_path(path, ".gif")
+    style.check_field(frames[0])
+    scenes = [picture(solution, style) for solution in frames]
+    scale = min(scene.scale for scene in scenes)  # one for all, the most careful one
+    for k, scene in enumerate(scenes):
+        if scene.scale != scale:
+            scenes[k] = picture(frames[k], replace(style, scale=scale))
+    names = titles or [
+        f"{k + 1} of {len(frames)}: {s.displacement.space.ndof} unknowns"
+        for k, s in enumerate(frames)
+    ]
+    images = _images(scenes, style, names)
+    times = [round(1000 * seconds)] * (len(images) - 1) + [round(3000 * seconds)]
+    with replacing(target) as (draft,):
+        images[0].save(
+            draft, format="GIF", save_all=True, append_images=images[1:], duration=times, loop=0
+        )
+    return target
+
+
+def _images(scenes: Sequence[Scene], style: Style, names: Sequence[str]) -> list[Image]:
+    """The frames, drawn with one scale for all."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+    from PIL import Image
+
+    windows = close_ups(scenes)
+    ranges = [style.limits or colour_range(scene, windows) for scene in scenes]
+    limits = min(low for low, _ in ranges), max(high for _, high in ranges)
+    if style.limits is None and limits[0] < 0:
+        limits = -max(-limits[0], limits[1]), max(-limits[0], limits[1])
+    frames = [scene.solution for scene in scenes]
+    tops = [cut_pressure(s) or HEADROOM * float(s.pressure.max(initial=0.0)) for s in frames]
+    top = max(tops) / style.unit("stress")[1]
+    low, high = (corner / style.unit("length")[1] for corner in _corners(scenes))
+    margin = 0.03 * (high - low).max()
+    ends = np.array([part for part in map(shown_part, frames) if part is not None])
+    along = [np.array([ends.min(), ends.max()])] if len(ends) else [np.zeros(2)]
+    images = []
+    for scene, name in zip(scenes, names, strict=True):
+        figure = Figure(layout="constrained")
+        [profile] = draw_scene(figure, scene, windows, limits, along)
+        figure.axes[0].set(
+            xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin)
+        )
+        if top > 0:
+            profile.set_ylim(min(profile.get_ylim()[0], -0.02 * top), top)
+        figure.suptitle(name)
+        canvas = FigureCanvasAgg(figure)
+        figure.set_dpi(FILM_DPI)
+        canvas.draw()
+        images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
+    size = images[0].size
+    images = [image if image.size == size else image.resize(size) for image in images]
+    # One palette for all: of its own each frame would show one stress in another colour.
+    strip = Image.fromarray(np.vstack([np.asarray(image) for image in images]))
+    colours = np.array(strip.quantize(256).getpalette() or [255] * 3).reshape(-1, 3)
+    colours[(colours >= 240).all(axis=1)] = 255  # Pillow would take a neighbour of white
+    palette = Image.new("P", (1, 1))
+    palette.putpalette(colours.ravel().tolist())
+    return [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
+
+
+def _corners(scenes: Sequence[Scene]) -> Window:
+    """Lower left and upper right corner of all that the scenes show."""
+    low = np.min([scene.moved.min(axis=0) for scene in scenes], axis=0)
+    return low, np.max([scene.moved.max(axis=0) for scene in scenes], axis=0)
+
+
+def _window(zone: Array, low: Array, high: Array) -> Window:
+    """The square about the points of a zone (c, 2), inside of the picture from `low` to `high`."""
+    size = (high - low).max()
+    first, last = zone.min(axis=0), zone.max(axis=0)
+    extent = (last - first).max()
+    half = max(MARGIN * extent, HALF_SIZES[0 if len(zone) < 3 else 1] * size)
+    middle = (first + last) / 2
+    # At the rim of the picture, as on a symmetry plane, the window moves inwards.
+    inner, outer = low + 0.95 * half, high - 0.95 * half
+    middle = np.where(inner < outer, np.clip(middle, inner, outer), middle)
+    return middle - half, middle + half
+
+
+def close_ups(scenes: Sequence[Scene]) -> list[Window]:
+    """Windows on the small zones in contact of one or more scenes, those of large forces first.
+
+    Zones whose windows overlap share one; of those that a picture of all shows well there is none.
+    """
+    low, high = _corners(scenes)
+    groups: list[Array] = []
+    for zone in [zone for scene in scenes[::-1] for zone in scene.zones]:
+        joined = zone
+        while True:
+            first, last = _window(joined, low, high)
+            windows = [_window(group, low, high) for group in groups]
+            met = [k for k, (a, b) in enumerate(windows) if (first < b).all() and (a < last).all()]
+            if not met:
+                break
+            joined = np.concatenate([*(groups[k] for k in met), joined])
+            groups = [g for k, g in enumerate(groups) if k not in met]
+        groups.append(joined)
+    windows = [_window(group, low, high) for group in groups]
+    size = (high - low).max()
+    return [w for w in windows if (w[1] - w[0]).max() < 2 * SMALL * size][:MAX_CLOSE_UPS]
+
+
+def _typical(values: Array, areas: Array) -> float:
+    """Value that all but `PEAK_AREA` of the area (t,) keeps below."""
+    order = np.argsort(values)
+    share = np.cumsum(areas[order]) / areas.sum()
+    return float(values[order][np.searchsorted(share, 1 - PEAK_AREA).clip(0, len(order) - 1)])
+
+
+def colour_range(scene: Scene, windows: Sequence[Window]) -> tuple[float, float]:
+    """Ends of the colour scale: of the bodies and in each window, without single peaks.
+
+    Peaks are what lies above the value that all but `PEAK_AREA` of an area keeps below, far above:
+    stresses at corners and at ends of supports, which grow on every finer mesh. Where both signs
+    occur colours are symmetric about 0.
+    """
+    values, areas = np.abs(scene.shown.values), scene.areas()
+    mean, middle = values[scene.triangles].mean(axis=1), scene.moved[scene.triangles].mean(axis=1)
+    top = _typical(mean, areas)
+    for low, high in windows:
+        seen = np.all((middle >= low) & (middle <= high), axis=1)
+        if seen.any():
+            top = max(top, _typical(mean[seen], areas[seen]))
+    largest = float(values.max(initial=0.0))
+    top = largest if largest <= CUT_OFF * top else top
+    top = top or 1.0
+    return (-top, top) if scene.shown.values.min(initial=0.0) < 0 else (0.0, top)
+
+
+def draw_scene(
+    figure: Figure,
+    scene: Scene,
+    windows: Sequence[Window],
+    limits: tuple[float, float],
+    parts: Sequence[Array] | None = None,
+) -> list[Axes]:
+    """Draw a scene with its close-ups, its colours and the pressure; returns the axes of that.
+
+    Bodies are on the left, close-ups, two above each other, in the middle, pressures on the right:
+    on `parts` (2,) of the contact lines, which are chosen when left out.
+    """
+    parts, style = parts or _shown_parts(scene.solution), scene.style
+    width, height = np.ptp(scene.moved, axis=0)
+    tall = 1 if len(windows) < 2 else 2
+    columns = -(-len(windows) // tall)
+    ratios = [float(np.clip(width / height, 0.6, 2)), *[1.0 / tall] * columns]
+    ratios.append(1.2 if len(parts) == 1 else 0.8 * len(parts))
+    figure.set_size_inches(2 + HEIGHT * 0.9 * sum(ratios), HEIGHT)
+    grid = figure.add_gridspec(tall, columns + 2, width_ratios=ratios)
+    bodies = figure.add_subplot(grid[:, 0])
+    close = [figure.add_subplot(grid[k % tall, 1 + k // tall]) for k in range(len(windows))]
+    beside = grid[:, -1].subgridspec(1, len(parts), wspace=0.05)
+    pressures = [figure.add_subplot(beside[k]) for k in range(len(parts))]
+    shading, *_ = [_draw_bodies(axes, scene, limits) for axes in (bodies, *close)]
+    space = " " if width / height > 0.9 else "\n"
+    bodies.set_title(f"deformed bodies,{space}displacement × {scene.scale:g}")
+    _draw_windows(bodies, close, windows, style.unit("length")[1])
+    _colour_bar(figure, shading, [bodies, *close], scene, limits)
+    _draw_pressures(pressures, scene.solution, style, parts)
+    return pressures
+
+
+def _draw_bodies(axes: Axes, scene: Scene, limits: tuple[float, float]) -> Any:
+    """The field on the deformed bodies, element edges where asked for, outlines of the bodies."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.tri import Triangulation
+
+    style = scene.style
+    _, length = style.unit("length")
+    _, unit = style.unit(scene.shown.kind)
+    moved = scene.moved / length
+    triangles = Triangulation(moved[:, 0], moved[:, 1], scene.triangles)
+    signed = limits[0] < 0 < limits[1]
+    shading = axes.tripcolor(
+        triangles,
+        scene.shown.values / unit,
+        shading="gouraud",
+        vmin=limits[0] / unit,
+        vmax=limits[1] / unit,
+        cmap=SIGNED if signed else RISING,
+    )
+    inner, outer = (list(moved[scene.edges[at]]) for at in (~scene.outline, scene.outline))
+    if style.mesh:
+        light = "0.35" if signed else "w"
+        axes.add_collection(LineCollection(inner, colors=light, lw=0.25, alpha=0.5))
+    axes.add_collection(LineCollection(outer, colors="k", lw=0.8))
+    x, y = coordinates(scene.solution)
+    axes.set(aspect="equal", xlabel=style.title(x, "length"), ylabel=style.title(y, "length"))
+    axes.locator_params(nbins=5)
+    _format(axes)
+    return shading
+
+
+def _powers() -> ScalarFormatter:
+    """Numbers of a scale, with one power of ten for all where they are large or small."""
+    from matplotlib.ticker import ScalarFormatter
+
+    formatter = ScalarFormatter(useMathText=True)
+    formatter.set_powerlimits(POWERS)
+    return formatter
+
+
+def _format(axes: Axes) -> None:
+    """The same on both axes."""
+    axes.xaxis.set_major_formatter(_powers())
+    axes.yaxis.set_major_formatter(_powers())
+
+
+def _draw_windows(
+    bodies: Axes, close: Sequence[Axes], windows: Sequence[Window], unit: float
+) -> None:
+    """Frames of the windows in the picture of the bodies, and the close-ups cut to them."""
+    from matplotlib.patches import Rectangle
+
+    several = len(windows) > 1
+    for k, (axes, window) in enumerate(zip(close, windows, strict=True)):
+        low, high = (corner / unit for corner in window)
+        frame = Rectangle((low[0], low[1]), *(high - low), fill=False, color="crimson", lw=1.2)
+        bodies.add_patch(frame)
+        name = f"zone {k + 1}" if several else "zone in contact"
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=name)
+        axes.locator_params(nbins=3 if several else 5)
+        axes.spines[:].set_color("crimson")
+        if several:
+            bodies.annotate(
+                str(k + 1),
+                (high[0], high[1]),
+                xytext=(2, 2),
+                textcoords="offset points",
+                color="crimson",
+                weight="bold",
+            )
+
+
+def _colour_bar(
+    figure: Figure, shading: Any, axes: list[Axes], scene: Scene, limits: tuple[float, float]
+) -> None:
+    """Scale of colours; an arrow and a number say what lies beyond its ends."""
+    values, (low, high) = scene.shown.values, limits
+    _, unit = scene.style.unit(scene.shown.kind)
+    least, most = float(values.min()), float(values.max())
+    below, above = least < low, most > high
+    extend = {(True, True): "both", (True, False): "min", (False, True): "max"}
+    bar = figure.colorbar(
+        shading,
+        ax=axes,
+        label=scene.style.title(scene.shown.label, scene.shown.kind),
+        extend=extend.get((below, above), "neither"),
+        format=_powers(),
+    )
+    bar.formatter.set_locs(bar.get_ticks().tolist())
+    power = 16 if bar.formatter.get_offset() else 0  # which stands above the bar
+    for beyond, value, y, offset in ((above, most, 1.0, 14 + power), (below, least, 0.0, -14)):
+        if beyond:
+            bar.ax.annotate(
+                f"{'largest' if offset > 0 else 'least'} {value / unit:.3g}",
+                (0.5, y),
+                xycoords="axes fraction",
+                xytext=(0, offset),
+                textcoords="offset points",
+                ha="center",
+                va="bottom" if offset > 0 else "top",
+                fontsize=8,
+            )
+
+
+def shown_part(solution: Solved) -> Array | None:
+    """Ends (2,) of what is shown of long boundaries: the zones in contact and what is beside."""
+    if not solution.active.any() or len(solution.points) < 2:
+        return None
+    lines = contact_lines(solution)
+    places = np.concatenate([s[solution.active[rows]] for _, rows, s in lines])
+    every = np.concatenate([s for *_, s in lines])
+    low, high = places.min(), places.max()
+    margin = max(0.75 * (high - low), 0.02 * np.ptp(every))
+    low, high = max(low - margin, every.min()), min(high + margin, every.max())
+    return np.array([low - 0.03 * margin, high + 0.03 * margin])
+
+
+def _shown_parts(solution: Solved) -> list[Array]:
+    """Ends (2,) of each interval of the coordinate in which pressures are shown.
+
+    One for each zone, where zones are small and far from each other, or one for all.
+    """
+    lines, whole = contact_lines(solution), shown_part(solution)
+    if whole is None:
+        every = np.concatenate([s for *_, s in lines] or [np.zeros(1)])
+        return [np.array([every.min(), every.max()])]
+    parts: list[Array] = []
+    for zone in sorted(zones_of(solution, lines), key=lambda zone: float(zone.s.min())):
+        low, high = zone.s.min(), zone.s.max()
+        margin = max(BESIDE_ZONE[0] * (high - low), BESIDE_ZONE[1] * np.ptp(whole))
+        part = np.array([low - margin, high + margin])
+        if parts and part[0] <= parts[-1][1]:
+            parts[-1][1] = max(parts[-1][1], part[1])
+        else:
+            parts.append(part)
+    share, most = OWN_PANELS
+    far = 1 < len(parts) <= most and sum(map(np.ptp, parts)) < share * np.ptp(whole)
+    return parts if far else [whole]
+
+
+def cut_pressure(solution: Solved) -> float | None:
+    """End of the scale of pressures where single points, as at corners, lie far above the others.
+
+    In each zone all but `SINGLE` of its length lie below.
+    """
+    typical = 0.0
+    for _, rows, s in zones_of(solution, contact_lines(solution)):
+        p = solution.pressure[rows]
+        order = np.argsort(p, kind="stable")
+        share = np.cumsum(np.gradient(s)[order]) if len(s) > 1 else np.ones(1)
+        last = int(np.searchsorted(share, (1 - SINGLE) * share[-1]))
+        typical = max(typical, float(p[order][min(last, len(p) - 1)]))
+    largest = float(solution.pressure.max(initial=0.0))
+    return SPARE / 2 * typical if largest > SPARE * typical > 0 else None
+
+
+def _draw_pressures(
+    several: Sequence[Axes], solution: Solved, style: Style, parts: Sequence[Array]
+) -> None:
+    """Pressure along the contact lines: one panel for each of the `parts` (2,), with one scale."""
+    (_, stress), top = style.unit("stress"), cut_pressure(solution)
+    for axes, part in zip(several, parts, strict=True):
+        _draw_pressure(axes, solution, style, part)
+    first, *others = several
+    if top is not None:
+        first.set_ylim(-0.03 * top / stress, top / stress)
+        text = f"↑ largest {solution.pressure.max() / stress:.3g}"
+        first.annotate(text, (0.5, 0.98), xycoords="axes fraction", ha="center", va="top")
+    if others:
+        low = min(axes.get_ylim()[0] for axes in several)
+        first.set_ylim(low, max(axes.get_ylim()[1] for axes in several))
+        for axes in others:
+            axes.sharey(first)
+            axes.set(ylabel="", title="")
+            axes.tick_params(labelleft=False)
+            axes.yaxis.get_offset_text().set_visible(False)
+        for axes in several[:-1]:
+            if (legend := axes.get_legend()) is not None:
+                legend.remove()
+        if others[-1].get_legend() is not None:
+            # Above its panel, which has no title: inside it would cover points.
+            above = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.3}
+            others[-1].legend(fontsize="small", ncols=2, **above)
+
+
+def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> None:
+    """Pressure along one `part` (2,) of the lines, full where in contact and hollow where open."""
+    (_, length), (_, stress) = style.unit("length"), style.unit("stress")
+    lines, contact = contact_lines(solution), solution.problem.contact
+    several = len(contact) > 1
+    for k, (pair, rows, s) in enumerate(lines):
+        colour, mark = COLOURS[pair % len(COLOURS)], MARKS[pair % len(MARKS)]
+        active, p, at = solution.active[rows], solution.pressure[rows] / stress, s / length
+        new = several and pair not in [other for other, *_ in lines[:k]]
+        title = f"pair {pair}: {contact[pair].secondary}" if new else None
+        size = 4 + 2 * min(len(contact) - 1 - pair, 2)  # seen behind those of later pairs
+        axes.plot(at, p, color=colour, lw=1, marker=mark, ms=4, markevery=[], label=title)
+        for state, fill, name in ((active, colour, "in contact"), (~active, "w", "open")):
+            label = name if state.any() and not several and k == 0 else None
+            axes.plot(at[state], p[state], mark, ms=size, mec=colour, mfc=fill, label=label)
+    for state, fill, name in (
+        (solution.active, "0.4", "in contact"),
+        (~solution.active, "w", "open"),
+    ):
+        if several and state.any():
+            axes.plot([], [], "o", ms=4, mec="0.4", mfc=fill, label=name)
+    if np.ptp(part) > 0:
+        axes.set_xlim(*part / length)
+    strokes = ("-", "--", ":", "-.")
+    for k, (label, profile) in enumerate(style.profile.items()):
+        if callable(profile):
+            s = np.linspace(part[0], part[1], PROFILE_SAMPLES)
+            p = np.broadcast_to(np.asarray(profile(s), dtype=float), s.shape)
+        else:
+            s, p = (np.asarray(values, dtype=float) for values in profile)
+        stroke = strokes[k % len(strokes)]
+        axes.plot(s / length, p / stress, stroke, color="k", lw=1.2, label=label, zorder=3)
+    if several or style.profile or not solution.active.all():
+        axes.legend()
+    axes.axhline(0, color="0.6", lw=0.8, zorder=0)
+    names = {
+        "arc position" if pair.direction is None else "η, along the contact line"
+        for pair in contact
+    }
+    axes.set(
+        xlabel=style.title(" or ".join(sorted(names)), "length"),
+        ylabel=style.title("contact pressure", "stress"),
+        title="contact pressure",
+    )
+    _format(axes)
+    axes.grid(alpha=0.3)
