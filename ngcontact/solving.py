@@ -14,7 +14,7 @@ from .fem import check_element, unknowns
 from .mesh import first_mesh
 from .one_mesh import check_start, solve_on, warn_of_doubts
 from .plausibility import warn_of_implausible
-from .problem import Problem, Triangulation
+from .problem import MeshArrays, Problem
 from .quadrature import evaluations, look
 from .solution import Solution
 
@@ -101,7 +101,7 @@ def coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> lis
     size = unknowns(mesh, order, element)
     if given or not searched or size < COARSE_RUN_FROM:
         return []
-    maxh = float(np.ptp(Triangulation(mesh).vertices, axis=0).max()) / COARSE_ELEMENTS
+    maxh = float(np.ptp(MeshArrays(mesh).vertices, axis=0).max()) / COARSE_ELEMENTS
     most = max(COARSE_DOFS, round(COARSE_SHARE * size))
     refinement = Refinement(COARSE_ORDER, "isoparametric", 0.5, None, most)
     try:

@@ -9,8 +9,7 @@ import pytest
 from drivers.reference import cases
 from ngcontact import adapt
 from ngcontact.geometries import disc_on_block
-from ngcontact.mesh import diameters
-from ngcontact.problem import Triangulation
+from ngcontact.problem import MeshArrays
 
 
 def pressed(way):
@@ -24,8 +23,8 @@ def unknowns(solution):
 
 def size_at(solution, place):
     """Diameter of the element whose centre is nearest to a place."""
-    centres = Triangulation(solution.mesh).corners.mean(axis=1)
-    return diameters(solution.mesh)[np.linalg.norm(centres - place, axis=1).argmin()]
+    centres = MeshArrays(solution.mesh).corners.mean(axis=1)
+    return MeshArrays(solution.mesh).diameters[np.linalg.norm(centres - place, axis=1).argmin()]
 
 
 @pytest.fixture(scope="module")

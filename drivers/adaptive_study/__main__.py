@@ -38,7 +38,7 @@ from drivers.command_line import Count, Order, run
 from drivers.tables import Columns, printed, table, write_csv
 from ngcontact import Solution
 from ngcontact.output import slope_triangle
-from ngcontact.problem import Triangulation
+from ngcontact.problem import MeshArrays
 
 Runs: TypeAlias = dict[tuple[str, int, str], list[Row]]  # by case, order and strategy
 COLUMNS: Columns = {
@@ -138,7 +138,7 @@ def draw_meshes(path: Path, solutions: Sequence[Solution], zone: float) -> None:
     ends = chosen[-1].transitions()
     centre = ends[np.argmax(ends[:, 0])] if len(ends) else chosen[-1].points.mean(axis=0)
     for column, solution in enumerate(chosen):
-        corners = Triangulation(solution.mesh).corners
+        corners = MeshArrays(solution.mesh).corners
         x, y = corners[..., 0].ravel(), corners[..., 1].ravel()
         for axes in rows[:, column]:
             axes.triplot(x, y, np.arange(len(x)).reshape(-1, 3), color="C0", lw=0.4)

@@ -16,7 +16,7 @@ from drivers.reference.straight import Exact, Hertz, energy_error
 from ngcontact import Problem, Solution, adapt, solve
 from ngcontact.adaptivity import refined
 from ngcontact.mesh import first_mesh
-from ngcontact.problem import Triangulation
+from ngcontact.problem import MeshArrays
 
 Name: TypeAlias = Literal[
     "one transition",
@@ -119,7 +119,7 @@ def share_near(solution: Solution, zone: float) -> float:
     ends = solution.transitions()
     if len(ends) == 0:
         return 0.0
-    middles = Triangulation(solution.mesh).corners.mean(axis=1)
+    middles = MeshArrays(solution.mesh).corners.mean(axis=1)
     distances = np.linalg.norm(middles[:, None] - ends, axis=2).min(axis=1)
     return float((distances < NEAR * zone).mean())
 
@@ -178,7 +178,7 @@ def run_of(
             effectivity=estimate / actual,
             near=share_near(solution, study.zone),
             half_width=half_width_error(study, solution),
-            angle=smallest_angle(Triangulation(solution.mesh).corners),
+            angle=smallest_angle(MeshArrays(solution.mesh).corners),
             steps=len(solution.steps),
             seconds=seconds,
         )

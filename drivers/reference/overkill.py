@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ngcontact.problem import Triangulation
+from ngcontact.problem import MeshArrays
 
 if TYPE_CHECKING:
     from ngcontact.solution import Solution
@@ -59,7 +59,7 @@ class Overkill:
         result = np.empty((len(points), 3, 3))
         for pattern, law in problem.materials.items():
             mask = np.array(list(mesh.Materials(pattern).Mask()), dtype=bool)
-            at = mask[Triangulation(mesh).bodies[points["nr"]]]
+            at = mask[MeshArrays(mesh).bodies[points["nr"]]]
             result[at] = np.linalg.inv(law.voigt(problem.model)(points[at]).reshape(-1, 3, 3))
         return result
 
@@ -92,7 +92,7 @@ def _quadrature(mesh: ng.Mesh, order: int) -> tuple[NDArray[np.void], Array]:
 def _bodies(mesh: ng.Mesh, points: NDArray[np.void]) -> NDArray[np.intp]:
     """Number (n,) of the body at points; the parts of one body have one name."""
     _, number = np.unique(mesh.GetMaterials(), return_inverse=True)
-    return np.asarray(number[Triangulation(mesh).bodies], dtype=np.intp)[points["nr"]]
+    return np.asarray(number[MeshArrays(mesh).bodies], dtype=np.intp)[points["nr"]]
 
 
 def _stress_at(solution: Solution, place: Array, body: NDArray[np.intp]) -> Array:

@@ -9,7 +9,7 @@ import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 
-from ngcontact.problem import Triangulation
+from ngcontact.problem import MeshArrays
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -41,8 +41,8 @@ class Motion:
 
 def moved_mesh(mesh: ng.Mesh, motion: Motion) -> tuple[ng.Mesh, Index, Index]:
     """A new mesh without geometry, and the numbers there of the old vertices and triangles."""
-    old = Triangulation(mesh)
-    triangles, segments, body, side = old.triangles, old.segments, old.bodies, old.boundaries
+    old = MeshArrays(mesh)
+    triangles, segments, body, side = old.elements, old.facets, old.bodies, old.boundaries
     names = list(mesh.GetMaterials()), list(mesh.GetBoundaries())
     sizes = (len(old.vertices), len(triangles), len(segments), *map(len, names))
     if motion.seed is None:

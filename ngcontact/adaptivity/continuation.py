@@ -9,7 +9,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask
-from ..problem import Problem, Triangulation
+from ..problem import MeshArrays, Problem
 from .marking import doerfler
 from .refinement import Aim, Forecast, areas, depths, planned, touching
 from .singularities import at_limit
@@ -127,7 +127,7 @@ def rebuilt(
     one does not need it.
     """
     mesh = descent.mesh
-    corners = Triangulation(mesh).corners
+    corners = MeshArrays(mesh).corners
     squares = recalled(known, descent.element, corners)
     guess = Recalled(
         corners, squares, known.order, known.singular, known, descent.element, aim.error

@@ -11,8 +11,8 @@ import numpy as np
 from ..arrays import Array, Mask, root_of_squares
 from ..estimator import Estimated
 from ..fem import ORDERS, BoundaryTrace, check_element, unknowns
-from ..mesh import curve, diameters, unresolved
-from ..problem import Problem, Triangulation
+from ..mesh import curve, unresolved
+from ..problem import MeshArrays, Problem
 from ..quadrature import jumping_moduli
 from .continuation import Descent, rebuilt
 from .marking import doerfler, together
@@ -169,7 +169,7 @@ def next_plan(
     marked = doerfler(indicators, theta)
     if (marked & limit).any():  # for ever: the others are refined instead
         marked |= doerfler(np.where(limit, 0.0, indicators), theta)
-    marked = together(marked, jumping, diameters(mesh))
+    marked = together(marked, jumping, MeshArrays(mesh).diameters)
     marked |= at_ends(trace, solution.pairs, size) | narrow
     stuck, marked = bool((marked & limit).any()), marked & ~limit
     if not marked.any():
@@ -182,7 +182,7 @@ def next_plan(
     relative = min(solution.relative_error_estimate, 1.0)
     scale = relative ** (order / last.order - 1)  # errors of orders p on one mesh are c^p
     forecast = Forecast(
-        corners=Triangulation(mesh).corners,
+        corners=MeshArrays(mesh).corners,
         squares=(scale * indicators / error) ** 2,
         order=order,
         singular=last.corners.joined(ends_of_contact(solution.pairs)),
@@ -208,7 +208,7 @@ def continued(
     rest = start.indicators if small.all() else np.where(small, 0.0, start.indicators)
     order, element, error = refinement.order, refinement.element, root_of_squares(rest)
     known = Forecast(
-        corners=Triangulation(start.mesh).corners,
+        corners=MeshArrays(start.mesh).corners,
         squares=(rest / error) ** 2,
         order=order,
         singular=first.corners.joined(ends_of_contact(start.pairs)),

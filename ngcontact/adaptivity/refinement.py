@@ -11,8 +11,8 @@ import numpy as np
 from ..arrays import Array, Index, Mask
 from ..contact import nodal_line
 from ..fem import BoundaryTrace, boundary_trace, unknowns_of
-from ..mesh import CadEdge, copied, neighbours
-from ..problem import Contact, Problem, Triangulation, bisect, move_vertices
+from ..mesh import CadEdge, copied
+from ..problem import Contact, MeshArrays, Problem, bisect, move_vertices
 from .marking import doerfler
 from .singularities import Singularities, at_limit, settled
 
@@ -34,15 +34,15 @@ def matched_vertices(trace: BoundaryTrace, contact: Contact) -> dict[int, int]:
 
 def _boundary_edges(mesh: ng.Mesh) -> dict[tuple[int, int], int]:
     """Element at each boundary segment, by its vertices."""
-    view = Triangulation(mesh)
-    element, _ = neighbours(view.segments, view.triangles, mesh.nv)
-    ends = np.sort(view.segments, axis=1).tolist()
+    view = MeshArrays(mesh)
+    element = view.facet_elements
+    ends = np.sort(view.facets, axis=1).tolist()
     return {(a, b): el for (a, b), el in zip(ends, element.tolist(), strict=True)}
 
 
 def _children(mesh: ng.Mesh, first: int) -> dict[tuple[int, int], int]:
     """New vertex on each bisected boundary segment, by the segment's vertices."""
-    ends = Triangulation(mesh).segments
+    ends = MeshArrays(mesh).facets
     parents = ((v, mesh.GetParentVertices(v)) for v in np.unique(ends[ends >= first]).tolist())
     return {(min(a, b), max(a, b)): v for v, (a, b) in parents}
 
@@ -127,7 +127,7 @@ def _move_to_partners(
     new = [(a, b) for a, b in matched.items() if a >= first or b >= first]
     if trace.edges is None or not new:
         return
-    pairs, xy = np.array(new), Triangulation(trace.mesh).vertices
+    pairs, xy = np.array(new), MeshArrays(trace.mesh).vertices
     if contact.direction is None:
         pairs, axis, level = _on_normals(trace, pairs, xy)
         moving: tuple[int, ...] = (1,)
@@ -147,7 +147,7 @@ def _move_to_partners(
 
 def _without_inversion(mesh: ng.Mesh, old: Array, new: Array) -> Array:
     """The new positions, but the old ones at triangles they would turn over."""
-    triangles = Triangulation(mesh).triangles
+    triangles = MeshArrays(mesh).elements
     while True:
         a, b, c = (new[triangles[:, i]] for i in range(3))
         area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
@@ -394,7 +394,7 @@ def planned(
     refining, marks, forecasts = Refining(problem, mesh), [marked], [forecast]
     while True:
         parent = refining.bisect(marks[-1])
-        forecast = forecasts[-1].after(Triangulation(refining.mesh).corners, parent)
+        forecast = forecasts[-1].after(MeshArrays(refining.mesh).corners, parent)
         small = settled(refining.mesh, forecast.singular.unresolvable)
         forecasts.append(replace(forecast, squares=np.where(small, 0.0, forecast.squares)))
         unknowns, error = refining.unknowns(forecast.order, element), forecasts[-1].error

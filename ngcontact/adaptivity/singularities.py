@@ -12,8 +12,8 @@ from ..arrays import Array, Index, Mask
 from ..contact import ContactState, ending_segments
 from ..errors import warn
 from ..fem import BoundaryTrace
-from ..mesh import neighbours, resolved_lengths
-from ..problem import Problem, Triangulation
+from ..mesh import resolved_lengths
+from ..problem import MeshArrays, Problem
 
 AT_ENDS = 1.5  # u ~ r^(3/2) where contact ends: the squared error of an element is ~ h^3
 AT_CHANGES = 0.75  # of conditions: u ~ r^0.71 where right angles are clamped to one side
@@ -41,8 +41,8 @@ def at_limit(mesh: ng.Mesh, degree: int) -> Mask:
     """
     limit = np.zeros(mesh.ne, dtype=bool)
     if degree > 1:  # straight segments have no middles to place
-        view = Triangulation(mesh)
-        element, _ = neighbours(view.segments, view.triangles, mesh.nv)
+        view = MeshArrays(mesh)
+        element = view.facet_elements
         limit[element[resolved_lengths(mesh) < HALVED]] = True
     return limit
 
@@ -65,12 +65,12 @@ def settled(mesh: ng.Mesh, places: Array) -> Mask:
 
     All within a thousandth of the mesh's extent of one.
     """
-    view = Triangulation(mesh)
+    view = MeshArrays(mesh)
     radius = SETTLED * np.ptp(view.vertices, axis=0).max()
     result = np.zeros(mesh.ne, dtype=bool)
     for place in places:
         near = np.linalg.norm(view.vertices - place, axis=1) <= radius
-        result |= near[view.triangles].all(axis=1)
+        result |= near[view.elements].all(axis=1)
     return result
 
 
@@ -150,7 +150,7 @@ def _conditions(problem: Problem, trace: BoundaryTrace) -> Index:
 
 def _reentrant(trace: BoundaryTrace) -> Index:
     """Vertices (j,) of the geometry at which a body has an angle of more than 180 degrees."""
-    angle = Triangulation(trace.mesh).angles
+    angle = MeshArrays(trace.mesh).angles
     outer = np.flatnonzero(~trace.inner)
     segment, s = np.repeat(outer, 2), np.tile([0.0, 1.0], len(outer))
     vertex = trace.nodes[outer][:, [0, -1]].ravel()
@@ -168,9 +168,9 @@ def _reentrant(trace: BoundaryTrace) -> Index:
 
 def corners(problem: Problem, trace: BoundaryTrace) -> Singularities:
     """Vertices where one condition ends and another begins, and those that point inwards."""
-    view = Triangulation(trace.mesh)
+    view = MeshArrays(trace.mesh)
     outer = ~trace.inner
-    ends, kind = view.segments[outer].ravel(), np.repeat(_conditions(problem, trace)[outer], 2)
+    ends, kind = view.facets[outer].ravel(), np.repeat(_conditions(problem, trace)[outer], 2)
     least, most = (np.full(trace.mesh.nv, start) for start in (kind.max(initial=0), -1))
     np.minimum.at(least, ends, kind)
     np.maximum.at(most, ends, kind)

@@ -12,7 +12,7 @@ from ..arrays import Index
 from ..constraints import BasisTransformation
 from ..contact import ContactLine, contact_line
 from ..fem import BoundaryTrace, Space
-from ..problem import Contact, Elastic, Hooke, Problem, Triangulation, varies
+from ..problem import Contact, Elastic, Hooke, MeshArrays, Problem, varies
 from ..qp import LinearSystems
 
 
@@ -62,7 +62,7 @@ def same_mesh(trace: BoundaryTrace, space: Space) -> bool:
         trace.model is old.model
         and np.array_equal(trace.nodes, old.nodes)
         and np.array_equal(trace.curve, old.curve)
-        and np.array_equal(Triangulation(trace.mesh).vertices, space.vertices)
+        and np.array_equal(MeshArrays(trace.mesh).vertices, space.vertices)
     )
 
 

@@ -20,7 +20,7 @@ from ..fem import (
     connected_bodies,
     loads_of,
 )
-from ..problem import Problem, Triangulation
+from ..problem import MeshArrays, Problem
 from ..qp import FREE, vanishing_combinations
 from ..quadrature import View, integral_over, known_rough_load, moment_degree, numbers
 
@@ -118,7 +118,7 @@ def node_values(space: Space, bodies: Bodies, of_node: Index) -> Array:
     one = np.zeros(n)
     one[: trace.mesh.nv] = 1.0
     if trace.geometry_order == 1:  # edge and inner functions have no part in straight elements
-        place[: trace.mesh.nv] = Triangulation(trace.mesh).vertices
+        place[: trace.mesh.nv] = MeshArrays(trace.mesh).vertices
     else:
         field = ng.GridFunction(trace.space)
         for axis, x in enumerate((ng.x, ng.y)):
@@ -254,7 +254,7 @@ def measured_work(problem: Problem, free: FreeMotions) -> tuple[Array, Array] | 
         view = View(mesh, 2 if region.VB() == ng.VOL else 1)
         found = known_rough_load(data, load, region, degree)
         rough = None if found is None else found.rough
-        ends = view.arrays.triangles if view.dim == 2 else view.arrays.segments
+        ends = view.arrays.elements if view.dim == 2 else view.arrays.facets
         inside = view.inside(region)
         for b, ((x, y), size) in enumerate(zip(bodies.middle, bodies.size, strict=True)):
             amounts = free.combinations[3 * b : 3 * b + 3]

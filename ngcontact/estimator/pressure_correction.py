@@ -25,7 +25,7 @@ import scipy.sparse as sp
 from ..arrays import Array, from_triplets
 from ..fem import BoundaryTrace, bulk_moduli
 from ..linalg import cholesky, lower_half, shared
-from ..problem import Problem, Triangulation
+from ..problem import MeshArrays, Problem
 from .terms import BoundaryResidual, PressureShare, ScaledSolution
 
 HELD = 1e6  # stiffness of supports in the last term, relative to the elements beside them
@@ -216,7 +216,7 @@ class _Forms:
         [[A, B'], [B, -K]] is quasi-definite: it has a factorisation without pivots.
         """
         size = self.space.ndof
-        inside = np.array(self.region.Mask())[Triangulation(self.space.mesh).bodies]
+        inside = np.array(self.region.Mask())[MeshArrays(self.space.mesh).bodies]
         free = np.append(np.repeat(inside, self.functions), K.diagonal() > 0)
         saddle = sp.block_array([[A, B.T], [B, -K]], format="csr")
         right = np.append(b, np.zeros(K.shape[0]))

@@ -12,8 +12,7 @@ from ..arrays import Array, Index, Mask, power_of_two
 from ..fem import BoundaryTrace, Model, law_measures, normal_stress_of, rough_moduli, stiffnesses
 from ..lagrange import gauss
 from ..linalg import cholesky, lower_half, shared
-from ..mesh import diameters
-from ..problem import Problem, Triangulation, varies
+from ..problem import MeshArrays, Problem, varies
 from ..quadrature import features_of
 
 DATA_BONUS = 4  # quadrature order above that of the discrete terms, for the loads
@@ -140,7 +139,7 @@ def edge_integral(
 def _differs_at_a_vertex(mesh: ng.Mesh, mu: Array) -> bool:
     """Whether elements with a common vertex have different moduli."""
     low, high = np.full(mesh.nv, np.inf), np.zeros(mesh.nv)
-    for corner in Triangulation(mesh).triangles.T:
+    for corner in MeshArrays(mesh).elements.T:
         np.minimum.at(low, corner, mu)
         np.maximum.at(high, corner, mu)
     return bool((high > low).any())
@@ -231,7 +230,7 @@ class ScaledSolution:
     @cached_property
     def measure(self) -> Array:
         """What an area of the mesh stands for in the body, in the middle of elements, (ne,)."""
-        return self.boundary.model.measure(Triangulation(self.mesh).corners.mean(axis=1))
+        return self.boundary.model.measure(MeshArrays(self.mesh).corners.mean(axis=1))
 
     def missed(self, element: Index, force: Array) -> Squares:
         """Squares of errors `force` (k,) of the loads' quadrature, each in an `element` (k,).
@@ -281,7 +280,7 @@ def scaled(
         rigidity=rigidity / modulus,
         incompressibility=ratio,
         rough=rough,
-        diameter=diameters(boundary.mesh),
+        diameter=MeshArrays(boundary.mesh).diameters,
     )
 
 

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask, for_both_components, from_triplets
 from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative
-from ..mesh import CadEdge, cad_edges, neighbours, rightward
-from ..problem import Triangulation, boundary_mask, triangle_sides
+from ..mesh import CadEdge, cad_edges, rightward
+from ..problem import MeshArrays, boundary_mask
 from .model import PLANE, Model
 
 CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two rows at a smaller
@@ -116,8 +116,8 @@ def _physical_basis(V: ng.FESpace, trace: BoundaryTrace) -> sp.csr_array:
     mesh = trace.mesh
     if V.ndof == 2 * mesh.nv:
         return sp.eye_array(mesh.nv, format="csr")
-    view = Triangulation(mesh)
-    xy, triangles = view.vertices, view.triangles[trace.element]
+    view = MeshArrays(mesh)
+    xy, triangles = view.vertices, view.elements[trace.element]
     if trace.geometry_order > 2:
         raise ValueError(
             f"the mesh is curved to degree {trace.geometry_order}; element='physical' lives on "
@@ -301,15 +301,11 @@ class BoundaryTrace:
     @cached_property
     def curved_elements(self) -> Mask:
         """Elements (ne,) with a curved side."""
-        view = Triangulation(self.mesh)
+        view = MeshArrays(self.mesh)
         if self.geometry_order == 1:
             return np.zeros(self.mesh.ne, dtype=bool)
         bent = self.curved_segments
-        sides = np.sort(triangle_sides(view.triangles), axis=1)
-        low, high = np.sort(view.segments[bent], axis=1).T
-        keys = sides[:, 0] * self.mesh.nv + sides[:, 1]
-        found = np.isin(keys, low * self.mesh.nv + high).reshape(-1, 3)
-        return np.asarray(found.any(axis=1))
+        return np.asarray(np.isin(view.keys(view.sides), view.keys(view.facets[bent])).any(axis=1))
 
     @cached_property
     def _mesh_points(self) -> NDArray:
@@ -367,8 +363,8 @@ class BoundaryTrace:
 
 def boundary_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTrace:
     """Trace of the displacements of degree `order` on the boundary of `mesh`, in a model."""
-    view = Triangulation(mesh)
-    nodes = ends = view.segments
+    view = MeshArrays(mesh)
+    nodes = ends = view.facets
     space = ng.H1(mesh, order=order)
     if order > 1:
         # From the end with the lower number, as NGSolve orients its edges.
@@ -381,9 +377,9 @@ def boundary_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryT
     curve = np.asarray(ng.CF((ng.x, ng.y))(mesh.MapToAllElements(rule, ng.BND)))
     curve = curve.reshape(-1, degree + 1, 2)
 
-    element, inner = neighbours(ends, view.triangles, mesh.nv)
+    element, inner = view.facet_elements, view.inner_facets
     xy = view.vertices
-    opposite = xy[view.triangles[element]].mean(axis=1) - xy[ends[:, 0]]
+    opposite = xy[view.elements[element]].mean(axis=1) - xy[ends[:, 0]]
     right = rightward(xy[ends[:, 1]] - xy[ends[:, 0]])
     axis = model.on_axis(curve.reshape(-1, 2)).reshape(-1, degree + 1)
     return BoundaryTrace(

@@ -13,7 +13,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..problem import ON_AXIS, Elastic, Hooke, Problem, Triangulation, on_axis
+from ..problem import ON_AXIS, Elastic, Hooke, MeshArrays, Problem, on_axis
 
 CF: TypeAlias = ng.CoefficientFunction
 Laws: TypeAlias = Mapping[str, Elastic | Hooke]
@@ -185,7 +185,7 @@ class Axisymmetric(_Linear):
         grad = ng.Grad(u)
         hoop = u[0] / ng.x
         if isinstance(u, ng.GridFunction):  # forms are integrated inside of elements
-            tiny = ON_AXIS * float(Triangulation(u.space.mesh).vertices[:, 0].max())
+            tiny = ON_AXIS * float(MeshArrays(u.space.mesh).vertices[:, 0].max())
             hoop = ng.IfPos(ng.x - tiny, hoop, grad[0, 0])
         return ng.CF((grad[0, 0], grad[1, 1], hoop, grad[0, 1] + grad[1, 0]))  # (2.6)
 

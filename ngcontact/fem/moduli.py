@@ -11,8 +11,7 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from ..errors import warn
-from ..mesh import diameters
-from ..problem import Elastic, Hooke, Problem, Triangulation, varies
+from ..problem import Elastic, Hooke, MeshArrays, Problem, varies
 from ..quadrature import composite, on_lattice
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
@@ -48,7 +47,7 @@ def _laws(
 
     Voigt components q, the shear last. Only elements `asked` (ne,) for are met.
     """
-    region, samples = Triangulation(mesh).bodies, len(SAMPLES)
+    region, samples = MeshArrays(mesh).bodies, len(SAMPLES)
     for pattern, law in problem.materials.items():
         inside = np.array(mesh.Materials(pattern).Mask())[region]
         at = inside if asked is None else inside & asked
@@ -183,7 +182,7 @@ def rough_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
     for pattern, law in problem.materials.items():
         if not varies(law):
             continue
-        region, diameter = Triangulation(mesh).bodies, diameters(mesh)
+        region, diameter = MeshArrays(mesh).bodies, MeshArrays(mesh).diameters
         at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
         C = law.voigt(problem.model)
         for here, points in on_lattice(mesh, at, diameter):
@@ -244,7 +243,7 @@ def nearly_incompressible(
         ratio = incompressibilities(problem, mesh)
     if not (ratio > limit).any():
         return {}
-    region = Triangulation(mesh).bodies
+    region = MeshArrays(mesh).bodies
     most = dict.fromkeys(mesh.GetMaterials(), 0.0)
     for number, name in enumerate(mesh.GetMaterials()):
         most[name] = max(most[name], float(ratio[region == number].max(initial=0.0)))

@@ -14,7 +14,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Index, Mask, power_of_two
 from ..linalg import shared
-from ..problem import Problem, Triangulation, body_of_vertex, varies
+from ..problem import MeshArrays, Problem, varies
 from ..quadrature import keep_rough_load, known_rough_load, moment_degree
 from .boundary import BoundaryTrace, node_basis, vector_space
 from .model import model_of
@@ -66,7 +66,7 @@ class Space:
 
     def require_mesh(self) -> None:
         """Raise a RuntimeError where the mesh was changed in place, so that no data fit it."""
-        here = Triangulation(self.V.mesh).vertices
+        here = MeshArrays(self.V.mesh).vertices
         if not np.array_equal(here, self.vertices):
             moved = (
                 "other places of them" if len(here) == len(self.vertices) else f"{len(here)} now"
@@ -172,7 +172,7 @@ def assemble(
         A=shared(a.mat),
         matrix=a.mat,
         f=load_vector(problem, V, LOAD_BONUS),
-        vertices=Triangulation(mesh).vertices,
+        vertices=MeshArrays(mesh).vertices,
     )
 
 
@@ -201,7 +201,7 @@ class Bodies:
 
 def connected_bodies(trace: BoundaryTrace) -> Bodies:
     """The connected pieces of the mesh of `trace`."""
-    piece = body_of_vertex(trace.mesh)
+    piece = MeshArrays(trace.mesh).pieces
     pieces, number = np.unique(piece[trace.nodes[:, 0]], return_inverse=True)
     materials = trace.mesh.GetMaterials()
     names = {int(b): materials[m] for b, m in zip(number, trace.body, strict=True)}

@@ -25,6 +25,12 @@ EXACT = 8 * np.finfo(float).eps  # distance, relative to the edge, at which a fo
 SETTLED = 1e-15  # relative change of a parameter at which Newton's method has arrived
 
 
+def rightward(vectors: Array) -> Array:
+    """Unit vectors (k, 2) to the right of `vectors` (k, 2)."""
+    right = np.column_stack([vectors[:, 1], -vectors[:, 0]])
+    return right / np.linalg.norm(right, axis=1)[:, None]
+
+
 class CadEdge:
     """One CAD edge as a parametrised plane curve.
 
@@ -128,9 +134,7 @@ class CadEdge:
     def normal(self, points: Array) -> Array:
         """Unit normals (k, 2) at the projections of `points` (k, 2), right of the tangent."""
         t = np.full(len(points), self.start) if self.straight else self.project(points)
-        tangent = self.derivative(t)
-        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
-        return np.column_stack([tangent[:, 1], -tangent[:, 0]])
+        return rightward(self.derivative(t))
 
     def level(self, axis: Array, values: Array, near: Array) -> Array:
         """Parameters (k,) where coordinates along `axis` (2,), or (k, 2), take `values` (k,).

@@ -9,8 +9,8 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Integers, Mask
-from ..problem import Problem, Triangulation, triangle_sides
+from ..arrays import Array, Integers
+from ..problem import MeshArrays, Problem
 from .cad import cad_edges
 from .matching import Edge, divided
 
@@ -63,45 +63,11 @@ def keep_parents(mesh: ng.Mesh, parents: Integers) -> None:
     setattr(mesh, KEPT, parents)
 
 
-def diameters(mesh: ng.Mesh) -> Array:
-    """Longest side of each triangle, (ne,), lengths."""
-    corners = Triangulation(mesh).corners
-    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-
-
-def neighbours(segments: Index, triangles: Index, vertices: int) -> tuple[Index, Mask]:
-    """Number (k,) of a triangle at each segment, and whether there is another one, (k,).
-
-    `segments` (k, 2) and `triangles` (ne, 3) are those of a mesh of so many `vertices`.
-    """
-    marked = np.zeros(vertices, dtype=bool)
-    marked[segments] = True
-    sides = triangle_sides(triangles)
-    some = np.flatnonzero(marked[sides].all(axis=1))  # few, which are sorted in no time
-    sides = np.sort(sides[some], axis=1)
-    keys = sides[:, 0] * vertices + sides[:, 1]
-    order = np.argsort(keys)
-    low, high = np.sort(segments, axis=1).T
-    wanted = low * vertices + high
-    first = np.searchsorted(keys[order], wanted)
-    last = np.searchsorted(keys[order], wanted, side="right")
-    return some[order[first]] // 3, last - first > 1
-
-
-def rightward(vectors: Array) -> Array:
-    """Unit vectors (k, 2) to the right of `vectors` (k, 2)."""
-    right = np.column_stack([vectors[:, 1], -vectors[:, 0]])
-    return right / np.linalg.norm(right, axis=1)[:, None]
-
-
 def _require_complete(mesh: ng.Mesh, problem: Problem) -> None:
     """Raise where Netgen, which only prints a message, left a part of a body without elements."""
-    view = Triangulation(mesh)
-    side, rim = (
-        np.sort(ends, axis=1) @ np.array([mesh.nv, 1])
-        for ends in (triangle_sides(view.triangles), view.segments)
-    )
-    known, count = np.unique(side, return_counts=True)
+    view = MeshArrays(mesh)
+    rim = view.keys(view.facets)
+    known, count = np.unique(view.keys(view.sides), return_counts=True)
     missing = np.setxor1d(known[count == 1], rim[~np.isin(rim, known[count > 1])])
     if missing.size:
         pairs = [f"contact {k} of {p.named()}" for k, p in enumerate(problem.contact)]
@@ -178,8 +144,8 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
 
 def resolved_lengths(mesh: ng.Mesh) -> Array:
     """Length (k,) of each boundary segment over the least on its curve; inf on straight edges."""
-    view = Triangulation(mesh)
-    ends = view.vertices[view.segments]
+    view = MeshArrays(mesh)
+    ends = view.vertices[view.facets]
     least = [
         0.0 if edge.straight else SHORTEST_ON_SMALL if edge.size < SMALL_EDGE else SHORTEST
         for edge in cad_edges(mesh) or []
@@ -203,7 +169,7 @@ def check_curves(mesh: ng.Mesh) -> None:
     ValueError
         Names the edge and its length; another unit of length mends it.
     """
-    boundaries, length = Triangulation(mesh).boundaries, resolved_lengths(mesh)
+    boundaries, length = MeshArrays(mesh).boundaries, resolved_lengths(mesh)
     for number, edge in enumerate(cad_edges(mesh) or []):
         if edge.straight:
             continue
@@ -242,7 +208,7 @@ def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
     edges = cad_edges(mesh)
     if edges is None:
         return mesh, 0
-    curved = np.array([not edge.straight for edge in edges])[Triangulation(mesh).boundaries]
+    curved = np.array([not edge.straight for edge in edges])[MeshArrays(mesh).boundaries]
     count = int(np.count_nonzero(curved))
     if count == 0 or (mesh.GetCurveOrder() == degree and not _straightened(mesh)):
         return mesh, count

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array
 from ..problem import Contact, Problem
-from .cad import CadEdge
+from .cad import CadEdge, rightward
 
 STEEPEST = 0.5  # cosine between a curve's normal and the direction below which nodes go unmatched
 NEARER = 0.01  # of an edge: what a polygon of its samples tells apart
@@ -170,11 +170,6 @@ def _nearest_crossing(samples: Array, x: Array, across: Array, along: Array) -> 
     return points[np.arange(len(x)), best]
 
 
-def _right(slope: Array) -> Array:
-    """Unit normals (k, 2) to the right of tangents (k, 2)."""
-    return np.column_stack([slope[:, 1], -slope[:, 0]]) / np.linalg.norm(slope, axis=1)[:, None]
-
-
 def _nearest_of(x: Array, edge: CadEdge, others: list[Edge]) -> NDArray[np.bool_]:
     """Whether no other edge is nearer to the points `x` (k, 2) than `edge`."""
 
@@ -199,7 +194,7 @@ def _opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple
         t = other.project(x)
         apart = np.linalg.norm(other.point(t) - x, axis=1) > COINCIDENT * other.size
         if contact.gap is None and apart.any():  # clearance or interference: along the normals
-            t[apart] = other.opposite(x[apart], _right(slope[apart]))
+            t[apart] = other.opposite(x[apart], rightward(slope[apart]))
         else:
             t[apart] = np.nan  # (2.3): common nodes
     else:
@@ -218,7 +213,7 @@ def _signed_gap(contact: Contact, curve: CadEdge, t: Array, other: CadEdge) -> A
     """
     x, slope = curve.point(t), curve.derivative(t)
     there, y = _opposite(contact, x, slope, other)
-    along = _right(slope) if contact.direction is None else np.array(contact.direction)
+    along = rightward(slope) if contact.direction is None else np.array(contact.direction)
     return np.where(np.isnan(there), np.nan, ((y - x) * along).sum(axis=1))
 
 

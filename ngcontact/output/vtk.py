@@ -20,7 +20,7 @@ from scipy.spatial import KDTree
 from ..arrays import Array, Index, from_triplets
 from ..estimator import Estimated
 from ..fem import von_mises
-from ..problem import ABOUT_AN_AXIS, Triangulation
+from ..problem import ABOUT_AN_AXIS, MeshArrays
 from ..solved import Solved
 from .files import check_path, replacing
 
@@ -99,13 +99,13 @@ def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
     places = [(a / order, b / order, 0.0) for a, b, _ in weights]
     rule = ng.IntegrationRule(places, [0.0] * len(places))
     at = mesh.MapToAllElements({ng.TRIG: rule}, ng.VOL)
-    view = Triangulation(mesh)
-    if others := view.others():
+    view = MeshArrays(mesh)
+    if others := view.without_simplices():
         raise ValueError(f"{others} elements of the mesh are no triangles; mesh without quads")
     names = tuple(dict.fromkeys(mesh.GetMaterials()))
     regions = np.array([names.index(name) for name in mesh.GetMaterials()], dtype=np.intp)
     body = regions[view.bodies]
-    vertices = view.triangles * len(names) + body[:, None]
+    vertices = view.elements * len(names) + body[:, None]
     # A node is known by the vertices it leans on and its weights there, from any triangle.
     key = np.where(weights > 0, vertices[:, None, :] * (order + 1) + weights, 0)
     key = np.sort(key.reshape(-1, 3), axis=1)

@@ -87,7 +87,7 @@ def _shared(problem: Problem, view: View) -> Mask:
     """Vertices at which segments of several prescribed regions, or of guides, meet."""
     guides = [str(problem.sliding)] if problem.sliding is not None else []
     at = view.inside(view.mesh.Boundaries("|".join([*problem.displacement, *guides])))
-    vertex, region = view.arrays.segments[at], view.arrays.boundaries[at]
+    vertex, region = view.arrays.facets[at], view.arrays.boundaries[at]
     low, high = np.full(view.mesh.nv, len(view.mesh.GetBoundaries())), np.full(view.mesh.nv, -1)
     np.minimum.at(low, vertex, region[:, None])
     np.maximum.at(high, vertex, region[:, None])
@@ -100,7 +100,7 @@ def _ends(view: View, pattern: str, shared: Mask) -> tuple[Index, Index, Array]:
     And the places (k, 1, 1) on these, as NGSolve's parameter runs.
     """
     segments = view.inside(view.mesh.Boundaries(pattern))
-    vertices = view.arrays.segments[segments]
+    vertices = view.arrays.facets[segments]
     k, end = np.nonzero(shared[vertices])
     return vertices[k, end], segments[k], np.asarray(1.0 - end[:, None, None])
 

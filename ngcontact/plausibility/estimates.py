@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Array, power_of_two, root_of_squares
 from ..fem import Space, energy_norm, incompressibilities
-from ..problem import Problem, Triangulation
+from ..problem import MeshArrays, Problem
 
 LEVELS = 2  # after the best one: at twice the unknowns each no mesh is still too coarse
 EXACT = 1e-12  # relative estimate at which refinement stops: the solution is exact
@@ -62,7 +62,7 @@ def estimates_rise(estimates: Sequence[float]) -> bool:
 
 def doubt_of_refinement(mesh: ng.Mesh, indicators: Array, estimates: Sequence[float]) -> str:
     """Message for estimates that rise, with the place of the largest of the `indicators` (ne,)."""
-    view, worst = Triangulation(mesh), int(np.argmax(indicators))
+    view, worst = MeshArrays(mesh), int(np.argmax(indicators))
     x, y = view.corners[worst].mean(axis=0)
     share = float((indicators[worst] / root_of_squares(indicators)) ** 2)
     rise = ", ".join(f"{estimate:.2e}" for estimate in estimates[int(np.argmin(estimates)) :])

@@ -10,12 +10,10 @@ from .material import MODEL_NAMES as MODEL_NAMES
 from .material import Elastic as Elastic
 from .material import Hooke as Hooke
 from .material import varies as varies
+from .mesh_arrays import MeshArrays as MeshArrays
+from .mesh_arrays import bisect as bisect
+from .mesh_arrays import move_vertices as move_vertices
 from .problem import Problem as Problem
-from .triangulation import Triangulation as Triangulation
-from .triangulation import bisect as bisect
-from .triangulation import move_vertices as move_vertices
-from .triangulation import triangle_sides as triangle_sides
 from .values import body_mask as body_mask
-from .values import body_of_vertex as body_of_vertex
 from .values import boundary_mask as boundary_mask
 from .values import table as table

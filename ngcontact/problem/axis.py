@@ -10,7 +10,7 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from .contact import Contact
-from .triangulation import Triangulation
+from .mesh_arrays import MeshArrays
 from .values import body_mask, boundary_mask
 
 ON_AXIS = 1e-9  # radius, relative to the largest, up to which a point lies on the axis
@@ -38,10 +38,10 @@ def check_about_axis(
     A vector with a radial part on the axis is no field of revolution: what pushes a body sideways
     is not axisymmetric. The data are those of a `Problem`.
     """
-    view = Triangulation(mesh)
+    view = MeshArrays(mesh)
     _check_side(view.vertices)
     axis = on_axis(view.vertices)
-    along: Mask = np.asarray(axis[view.segments].all(axis=1))
+    along: Mask = np.asarray(axis[view.facets].all(axis=1))
 
     def refuse_along(what: str, pattern: str, right: str) -> None:
         if along[boundary_mask(mesh, pattern)[view.boundaries]].any():
@@ -64,10 +64,10 @@ def check_about_axis(
     vectors += [("force", pattern, load[0], True) for pattern, load in force.items()]
     for what, pattern, radial, inside in vectors:
         if inside:
-            at, vertex = body_mask(mesh, pattern)[view.bodies], view.triangles
+            at, vertex = body_mask(mesh, pattern)[view.bodies], view.elements
             points = mesh.MapToAllElements(CORNERS, ng.VOL)
         else:
-            at, vertex = boundary_mask(mesh, pattern)[view.boundaries], view.segments
+            at, vertex = boundary_mask(mesh, pattern)[view.boundaries], view.facets
             points = mesh.MapToAllElements(ENDS, ng.BND)
         values = np.asarray(radial(points[np.repeat(at, vertex.shape[1])])).ravel()
         _check_radial(f'{what} "{pattern}"', values, axis[vertex[at]].ravel())

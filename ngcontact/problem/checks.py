@@ -16,8 +16,8 @@ import numpy as np
 
 from .contact import Contact
 from .material import Elastic, Hooke
-from .triangulation import Triangulation, triangle_sides
-from .values import body_mask, body_of_vertex, boundary_mask, refuse_where
+from .mesh_arrays import MeshArrays
+from .values import body_mask, boundary_mask, refuse_where
 
 # By 'argument "pattern"': which of the r boundaries or bodies of a mesh it selects, bool (r,).
 Masks = dict[str, np.ndarray]
@@ -66,8 +66,8 @@ def check_mesh(mesh: ng.Mesh) -> None:
         )
     if mesh.ne == 0:
         raise ValueError("mesh has 0 elements: generate it first")
-    view = Triangulation(mesh)
-    if others := view.others():
+    view = MeshArrays(mesh)
+    if others := view.without_simplices():
         raise ValueError(f"mesh has {others} quadrilaterals: it must be a triangulation")
     vertex = view.corners
     edge = np.roll(vertex, -1, axis=1) - vertex
@@ -152,10 +152,9 @@ def check_pairs(mesh: ng.Mesh, contact: Sequence[Masks]) -> None:
     if not contact:
         return
     names = mesh.GetBoundaries()
-    view = Triangulation(mesh)
-    region, ends = view.boundaries, view.segments
-    body = body_of_vertex(mesh)
-    inner = np.bincount(region[_has_two_sides(view)], minlength=len(names)) > 0
+    view = MeshArrays(mesh)
+    region, ends, body = view.boundaries, view.facets, view.pieces
+    inner = np.bincount(region[view.inner_facets], minlength=len(names)) > 0
     for sides in contact:
         right = "it lies inside one body; join bodies by Compound, not Glue"
         refuse_common(names, sides, {"the interfaces of the mesh": inner}, right)
@@ -179,8 +178,8 @@ def check_pressures(
     ]
     if not pressures:
         return
-    view, names = Triangulation(mesh), mesh.GetBoundaries()
-    inner = np.bincount(view.boundaries[_has_two_sides(view)], minlength=len(names)) > 0
+    view, names = MeshArrays(mesh), mesh.GetBoundaries()
+    inner = np.bincount(view.boundaries[view.inner_facets], minlength=len(names)) > 0
     for label, mask in pressures:
         if (mask & inner).any():
             name = names[int(np.argmax(mask & inner))]
@@ -197,8 +196,8 @@ def check_overlaps(mesh: ng.Mesh) -> None:
     An interference at a contact line is none. Of each two connected pieces whose boxes overlap by
     so much, places at equal steps of the smaller one's area are looked for in the larger one.
     """
-    view, body = Triangulation(mesh), body_of_vertex(mesh)
-    piece = body[view.triangles[:, 0]]
+    view = MeshArrays(mesh)
+    piece = view.pieces[view.elements[:, 0]]
     parts = [np.flatnonzero(piece == k) for k in range(piece.max(initial=0) + 1)]
     if len(parts) == 1:
         return
@@ -225,34 +224,19 @@ def check_overlaps(mesh: ng.Mesh) -> None:
             )
 
 
-def _inside(points: np.ndarray, view: Triangulation, part: np.ndarray) -> np.ndarray:
+def _inside(points: np.ndarray, view: MeshArrays, part: np.ndarray) -> np.ndarray:
     """Return which points (k, 2) lie in the triangles `part` (n,) of a mesh, bool (k,).
 
     Where a line to the right crosses their boundary, the sides of one triangle alone, an odd number
     of times.
     """
-    sides = triangle_sides(view.triangles[part])
-    keys, count = np.unique(
-        sides.min(axis=1) * len(view.vertices) + sides.max(axis=1), return_counts=True
-    )
+    keys, count = np.unique(view.keys(view.sides[part]), return_counts=True)
     a, b = (view.vertices[k] for k in np.divmod(keys[count == 1], len(view.vertices)))
     x, y = points[:, 0, None], points[:, 1, None]
     crossed = (a[:, 1] > y) != (b[:, 1] > y)
     rise = np.where(a[:, 1] == b[:, 1], 1.0, b[:, 1] - a[:, 1])
     right = x < a[:, 0] + (y - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
     return np.asarray((crossed & right).sum(axis=1) % 2 == 1)
-
-
-def _has_two_sides(view: Triangulation) -> np.ndarray:
-    """Return which boundary segments (k,) lie between two triangles, bool (k,)."""
-    size, ends = len(view.vertices), view.segments
-    marked = np.zeros(size, dtype=bool)
-    marked[ends] = True
-    sides = triangle_sides(view.triangles)
-    sides = np.sort(sides[marked[sides].all(axis=1)], axis=1)
-    keys, count = np.unique(sides[:, 0] * size + sides[:, 1], return_counts=True)
-    ends = np.sort(ends, axis=1)
-    return np.isin(ends[:, 0] * size + ends[:, 1], keys[count > 1])
 
 
 def check_laws(mesh: ng.Mesh, materials: Masks, laws: Iterable[Elastic | Hooke]) -> None:
@@ -277,7 +261,7 @@ def check_gaps(mesh: ng.Mesh, contact: Sequence[Masks], pairs: Sequence[Contact]
 
 def _points(mesh: ng.Mesh, mask: np.ndarray, places: Places) -> np.ndarray:
     """Return NGSolve's mesh points of the places on every element of the selected regions."""
-    (vb, rule), view = places, Triangulation(mesh)
+    (vb, rule), view = places, MeshArrays(mesh)
     regions = view.bodies if vb == ng.VOL else view.boundaries
     points = mesh.MapToAllElements(rule, vb)
     return points[mask[regions][points["nr"]]]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask
-from ..problem import Triangulation
+from ..problem import MeshArrays
 
 ORDER = {1: 7, 2: 4}  # of the rule on a part
 DEEPEST = {1: 40, 2: 10}  # halvings of the sides of a part
@@ -29,7 +29,7 @@ GOLDEN = (1 + 5**0.5) / 2  # takes points on a line out of step with waves
 
 def extent(mesh: ng.Mesh) -> float:
     """Largest extent of the mesh along x or y, a length."""
-    return float(np.ptp(Triangulation(mesh).vertices, axis=0).max())
+    return float(np.ptp(MeshArrays(mesh).vertices, axis=0).max())
 
 
 @lru_cache

@@ -112,7 +112,7 @@ def _met(features: Features, view: View) -> tuple[Index, Index]:
 def _bent(view: View, segments: Index) -> Mask:
     """Which `segments` (k,) are curved, (k,)."""
     middle = view.evaluate(ng.CF((ng.x, ng.y)), segments, np.array([[0.5]]))[:, 0]
-    chord = view.arrays.vertices[view.arrays.segments[segments]].mean(axis=1)
+    chord = view.arrays.vertices[view.arrays.facets[segments]].mean(axis=1)
     return np.asarray(np.linalg.norm(middle - chord, axis=1) > BENT * view.sizes[segments])
 
 
@@ -120,8 +120,8 @@ def _triangles(view: View, elements: Index) -> Mask:
     """Mask (ne,) of triangles `elements` (k,), or of those at such segments."""
     if view.dim == 2:
         return np.bincount(elements, minlength=view.mesh.ne) > 0
-    triangles = view.arrays.triangles
-    ends = np.isin(triangles, view.arrays.segments[elements])
+    triangles = view.arrays.elements
+    ends = np.isin(triangles, view.arrays.facets[elements])
     return np.asarray(ends.sum(axis=1) > 1)
 
 

@@ -324,7 +324,7 @@ def _departures(values: Array, limit: float) -> Array:
 
 def _chains(view: View, segments: Index) -> list[tuple[Index, Mask]]:
     """The `segments` (k,) one after the other, as chains, and whether each is run backwards."""
-    ends = view.arrays.segments[segments, ::-1].tolist()  # as NGSolve's parameter runs
+    ends = view.arrays.facets[segments, ::-1].tolist()  # as NGSolve's parameter runs
     at: dict[int, list[int]] = defaultdict(list)
     for k, pair in enumerate(ends):
         for vertex in pair:

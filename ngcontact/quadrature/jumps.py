@@ -10,8 +10,7 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask
 from ..errors import warn
-from ..mesh import diameters
-from ..problem import Problem, Triangulation, varies
+from ..problem import MeshArrays, Problem, varies
 from .cells import mesh_points, on_lattice
 from .view import looked
 
@@ -97,7 +96,7 @@ def _jumps(problem: Problem, mesh: ng.Mesh) -> Iterator[tuple[str, Jumps]]:
     laws = [(pattern, law) for pattern, law in problem.materials.items() if varies(law)]
     if not laws:
         return
-    region, diameter = Triangulation(mesh).bodies, diameters(mesh)
+    region, diameter = MeshArrays(mesh).bodies, MeshArrays(mesh).diameters
     for pattern, law in laws:
         at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
         yield pattern, _found(law.voigt(problem.model), mesh, at, diameter, JUMP)
@@ -108,7 +107,7 @@ def jumping_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
 
     A line may cut off a corner that no point of a small element shows.
     """
-    triangles = Triangulation(mesh).triangles
+    triangles = MeshArrays(mesh).elements
     touched = np.zeros(mesh.nv, dtype=bool)
     for _, found in _jumps(problem, mesh):
         touched[triangles[found.element]] = True

@@ -174,7 +174,7 @@ def _steps(
     A step whose far side has none of the points leaves values of neighbours that do not meet: there
     it is looked for at the edges. `least` and `most` (k, c) are those at the points.
     """
-    ends = view.arrays.triangles if view.dim == 2 else view.arrays.segments
+    ends = view.arrays.elements if view.dim == 2 else view.arrays.facets
     at, shape, varies = ends[elements], (view.mesh.nv, load.dim), most - least
     lowest, highest, most_varied = np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape)
     np.minimum.at(lowest, at, most[:, None])

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask
-from ..mesh import diameters
-from ..problem import Triangulation
+from ..problem import MeshArrays
 from .cells import Cells, divisions, joined, lattice, mesh_points, monomials, whole
 
 POINTS = {1: 3, 2: 3}  # parts of a lattice that one of the rule is as good as
@@ -65,9 +64,9 @@ class View:
     dim: int
 
     @cached_property
-    def arrays(self) -> Triangulation:
+    def arrays(self) -> MeshArrays:
         """The mesh as arrays."""
-        return Triangulation(self.mesh)
+        return MeshArrays(self.mesh)
 
     @cached_property
     def extent(self) -> float:
@@ -81,7 +80,7 @@ class View:
 
     def with_neighbours(self, some: Mask, inside: Index) -> Mask:
         """Mask (n,) of `some` (n,) and of those `inside` (k,) that share a vertex with one."""
-        ends = self.arrays.triangles if self.dim == 2 else self.arrays.segments
+        ends = self.arrays.elements if self.dim == 2 else self.arrays.facets
         touched = np.zeros(self.mesh.nv, dtype=bool)
         touched[ends[some]] = True
         result = some.copy()
@@ -92,8 +91,8 @@ class View:
     def sizes(self) -> Array:
         """Diameters or lengths (n,) of all elements."""
         if self.dim == 2:
-            return diameters(self.mesh)
-        ends = self.arrays.vertices[self.arrays.segments]
+            return MeshArrays(self.mesh).diameters
+        ends = self.arrays.vertices[self.arrays.facets]
         return np.asarray(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1))
 
     @property

@@ -13,7 +13,7 @@ from scipy.spatial import KDTree
 from ..arrays import Array, Index, Mask
 from ..fem import BoundaryTrace, von_mises
 from ..output import full_stress
-from ..problem import Triangulation, body_mask, body_of_vertex, regions_of, triangle_sides
+from ..problem import MeshArrays, body_mask, regions_of
 from ..quadrature import mesh_points
 from ..solved import Solved
 
@@ -66,7 +66,7 @@ class _Finder:
 
     def __init__(self, trace: BoundaryTrace) -> None:
         self.trace, self.mesh = trace, trace.mesh
-        view = Triangulation(trace.mesh)
+        view = MeshArrays(trace.mesh)
         self.body = view.bodies
         self.corners, self.curved = view.corners, trace.geometry_order > 1
         middle = self.corners.mean(axis=1)
@@ -78,14 +78,14 @@ class _Finder:
         self.groups = [(at, KDTree(middle[at]), float(radius[at].max())) for at in groups]
         self.segment = self._segments(view)
 
-    def _segments(self, view: Triangulation) -> Index:
+    def _segments(self, view: MeshArrays) -> Index:
         """Boundary segment (ne, 3) opposite to each vertex of an element; -1 inside."""
-        keys = np.sort(triangle_sides(view.triangles), axis=1) @ [self.mesh.nv, 1]
-        known = np.sort(view.segments, axis=1) @ [self.mesh.nv, 1]
+        keys = view.keys(view.sides)
+        known = view.keys(view.facets)
         order = np.argsort(known)
         at = np.minimum(np.searchsorted(known[order], keys), len(known) - 1)
         found = np.where(known[order][at] == keys, order[at], -1)
-        return found.reshape(-1, 3)[:, [1, 2, 0]]  # sides 01, 12, 20 lie opposite to 2, 0, 1
+        return found[:, [1, 2, 0]]  # sides 01, 12, 20 lie opposite to 2, 0, 1
 
     def find(self, points: Array, at: Index) -> Location:
         """Elements of the points numbered `at` (j,) among `points` (k, 2)."""
@@ -251,7 +251,7 @@ def values_at(
         ux, uy, xx, yy, xy, zz = np.stack(sums) / count  # 0 / 0 is NaN
     names = np.array([*mesh.GetMaterials(), ""])
     region = np.full(len(flat), -1)
-    region[found.point] = Triangulation(mesh).bodies[found.element]
+    region[found.point] = MeshArrays(mesh).bodies[found.element]
     shape = where.shape[:-1]
     return Values(
         points=where,
@@ -278,7 +278,7 @@ def _points(points: Any) -> Array:
 def _in_bodies(trace: BoundaryTrace, points: Array, body: str | None, outside: str) -> Location:
     """Elements of each of `points` (k, 2), all of one body."""
     mesh, found = trace.mesh, locate(trace, points)
-    names, region = mesh.GetMaterials(), Triangulation(mesh).bodies
+    names, region = mesh.GetMaterials(), MeshArrays(mesh).bodies
     if body is not None:
         [chosen] = regions_of(mesh, "body", [body], body_mask).values()
         kept = found.of(chosen[region[found.element]])
@@ -300,7 +300,8 @@ def _in_bodies(trace: BoundaryTrace, points: Array, body: str | None, outside: s
 
 def _refuse_ambiguous(mesh: ng.Mesh, points: Array, found: Location, names: list[str]) -> None:
     """Refuse points in several bodies, by `names` of each incidence or by connection."""
-    piece = body_of_vertex(mesh)[Triangulation(mesh).triangles[found.element, 0]]
+    view = MeshArrays(mesh)
+    piece = view.pieces[view.elements[found.element, 0]]
     _, name = np.unique(names, return_inverse=True)
     two = _differ(found.point, name) | _differ(found.point, piece)
     if not two.any():

@@ -13,7 +13,7 @@ from ngcontact.adaptivity.continuation import rebuilt, recalled
 from ngcontact.fem import unknowns
 from ngcontact.geometries import blocks
 from ngcontact.mesh import first_mesh
-from ngcontact.problem import Triangulation
+from ngcontact.problem import MeshArrays
 
 NONE = unresolvable([])
 TRIANGLE = np.array([[[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]]])
@@ -26,7 +26,7 @@ def problem() -> Problem:
 
 def forecast(mesh, order=2, singular=NONE):
     """Of equal indicators."""
-    return Forecast(Triangulation(mesh).corners, np.full(mesh.ne, 1 / mesh.ne), order, singular)
+    return Forecast(MeshArrays(mesh).corners, np.full(mesh.ne, 1 / mesh.ne), order, singular)
 
 
 def aim(**changes):
@@ -156,7 +156,7 @@ def test_what_is_forecast_of_parts_is_recalled_from_them(power, scale):
 def test_the_mesh_is_as_fine_as_the_error_asks_for(order, times):
     """From equal indicators: `times` the size is times^p the error."""
     mesh, fine, origin = divided(2)
-    known = Forecast(Triangulation(fine).corners, np.full(fine.ne, 1 / fine.ne), order, NONE)
+    known = Forecast(MeshArrays(fine).corners, np.full(fine.ne, 1 / fine.ne), order, NONE)
     new, descent = rebuilt(
         PROBLEM, Descent(mesh, origin), known, aim(error=1.001 * times**order), "isoparametric"
     )

@@ -8,7 +8,7 @@ from ngcontact.adaptivity import Refining, refined
 from ngcontact.adaptivity.refinement import touching
 from ngcontact.fem import boundary_trace
 from ngcontact.mesh import curve, first_mesh
-from ngcontact.problem import Triangulation
+from ngcontact.problem import MeshArrays
 from tests.given_meshes import two_blocks
 from tests.pairs import ALL, BLOCKS, BOUNDED, ROUND_OFF, pressed, unmatched
 from tests.scenes import vertices
@@ -19,7 +19,7 @@ SIDES = pytest.mark.parametrize("side", ["secondary", "primary"])
 
 def shapes(mesh):
     """Signed areas (ne,) and smallest angles in degrees (ne,) of the straight triangles."""
-    corners = Triangulation(mesh).corners
+    corners = MeshArrays(mesh).corners
     side = np.roll(corners, -1, axis=1) - corners
     area = (side[:, 0, 0] * side[:, 1, 1] - side[:, 0, 1] * side[:, 1, 0]) / 2
     length = np.linalg.norm(side, axis=2)
@@ -110,13 +110,13 @@ def test_several_bisections(name, side):
     pair = ALL[name]
     refining = Refining(pair.problem(), first_mesh(pair.problem(), 0.4))
     for level in range(3):
-        old, mesh = Triangulation(refining.mesh).corners, refining.mesh
+        old, mesh = MeshArrays(refining.mesh).corners, refining.mesh
         size = shapes(mesh)[0]
         marked = near_tip(mesh, getattr(pair.contact, side), 0.5 / 2**level)
         parent = refining.bisect(marked)
         assert (parent[: len(old)] == np.arange(len(old))).all()
         if "polygon" in name:  # new vertices leave the sides of curved elements
-            centres = Triangulation(refining.mesh).corners.mean(axis=1)
+            centres = MeshArrays(refining.mesh).corners.mean(axis=1)
             assert all(touching(old[[i]], centres[[k]])[0, 0] for k, i in enumerate(parent))
             assert np.bincount(parent, shapes(refining.mesh)[0]) == pytest.approx(size, rel=1e-12)
         assert (np.bincount(parent)[marked] >= 2).all()

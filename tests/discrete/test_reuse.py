@@ -10,7 +10,7 @@ from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, Solution, solve
 from ngcontact.geometries import blocks
 from ngcontact.mesh import first_mesh
-from ngcontact.problem import Triangulation, move_vertices
+from ngcontact.problem import MeshArrays, move_vertices
 
 STEEL = Elastic(E=200.0, nu=0.3)
 PAIR = Contact(secondary="upper_contact", primary="lower_contact")
@@ -69,8 +69,8 @@ def test_a_mesh_whose_interior_moved_is_assembled_again():
     problem = cases.one_transition().problem
     mesh = first_mesh(problem, 0.3)
     first = solve(problem, mesh, order=2)
-    view = Triangulation(mesh)
-    places, inner = view.vertices.copy(), np.setdiff1d(np.arange(mesh.nv), view.segments)
+    view = MeshArrays(mesh)
+    places, inner = view.vertices.copy(), np.setdiff1d(np.arange(mesh.nv), view.facets)
     places[inner] += 0.02  # a tenth of an element
     move_vertices(mesh, places)
     again, fresh = solve(problem, mesh, order=2, start=first), solve(problem, mesh, order=2)

@@ -14,7 +14,7 @@ from drivers.stress.motion import Motion, moved_mesh
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.geometries import blocks
 from ngcontact.mesh import first_mesh
-from ngcontact.problem import Triangulation
+from ngcontact.problem import MeshArrays
 
 AS_IT_IS = Motion("as it is")
 # On the curve, or at the points, of the secondary: not the same when the bodies are swapped.
@@ -39,9 +39,9 @@ def on_its_mesh(problem: Problem, maxh: float, matched: bool = True) -> Scene:
     """The scene of a problem on its first mesh, whose facing nodes lie opposite if `matched`."""
     unmatched = None if matched else ng.Mesh(problem.geometry.GenerateMesh(maxh=maxh))
     mesh, *_ = moved_mesh(unmatched or first_mesh(problem, maxh), AS_IT_IS)
-    value, view = np.zeros((mesh.nv, 2)), Triangulation(mesh)
+    value, view = np.zeros((mesh.nv, 2)), MeshArrays(mesh)
     ends = ng.IntegrationRule([(1, 0, 0), (0, 0, 0)], [1, 1])
-    nodes, names = view.segments, np.array(mesh.GetBoundaries())[view.boundaries]
+    nodes, names = view.facets, np.array(mesh.GetBoundaries())[view.boundaries]
     points = mesh.MapToAllElements(ends, ng.BND).reshape(-1, 2)
     for pattern, components in problem.displacement.items():
         at = np.isin(names, pattern.split("|"))

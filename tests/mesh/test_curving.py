@@ -11,7 +11,7 @@ from drivers.reference import cases
 from ngcontact.adaptivity import refined
 from ngcontact.geometries import blocks, disc
 from ngcontact.mesh.generation import copied, curve, first_mesh, vertex_parents
-from ngcontact.problem import Triangulation
+from ngcontact.problem import MeshArrays
 from tests.scenes import coordinates, near_origin
 
 
@@ -29,7 +29,7 @@ def test_curve_copies_only_where_it_must():
     assert curved is not mesh
     assert (mesh.GetCurveOrder(), curved.GetCurveOrder()) == (1, 2)
     names = np.array(mesh.GetBoundaries())
-    on_arc = names[Triangulation(mesh).boundaries] == "arc"
+    on_arc = names[MeshArrays(mesh).boundaries] == "arc"
     assert count == np.count_nonzero(on_arc) > 0
     assert curve(curved, 2, "isoparametric") == (curved, count)
     assert curve(curved, 1, "superparametric") == (curved, count)

@@ -55,7 +55,7 @@ def test_types_of_arrays_stand_in_one_module():
 
 
 def test_meshes_are_read_as_arrays_in_one_module():
-    assert with_lines(r"\b(Elements[12]D|Coordinates)\(") == {"ngcontact/problem/triangulation.py"}
+    assert with_lines(r"\b(Elements[123]D|Coordinates)\(") == {"ngcontact/problem/mesh_arrays.py"}
 
 
 def test_boundaries_are_selected_by_name_in_one_module():

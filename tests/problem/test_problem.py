@@ -11,10 +11,11 @@ from netgen.occ import Box, Compound, Glue, OCCGeometry, Pnt, WorkPlane, X, Y
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.geometries import blocks
+from ngcontact.problem import MeshArrays
 from ngcontact.problem.contact import Contact
 from ngcontact.problem.material import Elastic, Hooke
 from ngcontact.problem.problem import Problem
-from ngcontact.problem.values import body_mask, body_of_vertex, boundary_mask
+from ngcontact.problem.values import body_mask, boundary_mask
 
 STEEL = Elastic(E=210e9, nu=0.3)
 NAN = ng.sqrt(-1 - ng.x * ng.x)  # not a number at every point
@@ -128,11 +129,11 @@ def test_masks_follow_the_mesh(mesh):
 
 def test_bodies_are_the_connected_pieces(mesh):
     height = np.asarray(mesh.ngmesh.Coordinates())[:, 1]
-    body = body_of_vertex(mesh)
+    body = MeshArrays(mesh).pieces
     assert len(np.unique(body)) == 2
     assert len(np.unique(body[height < 0.99])) == len(np.unique(body[height > 1.01])) == 1
     glued = ng.Mesh(OCCGeometry(Glue(shapes()), dim=2).GenerateMesh(maxh=1))
-    assert len(np.unique(body_of_vertex(glued))) == 1
+    assert len(np.unique(MeshArrays(glued).pieces)) == 1
 
 
 @pytest.mark.parametrize(

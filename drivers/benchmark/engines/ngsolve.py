@@ -31,7 +31,7 @@ from drivers.benchmark.scenes.plane import (
 from drivers.benchmark.scenes.problems import Common
 from ngcontact.arrays import from_triplets
 from ngcontact.linalg import lower_half, shared
-from ngcontact.problem import Triangulation
+from ngcontact.problem import MeshArrays
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -76,7 +76,7 @@ def numbering(mesh: ng.Mesh, order: int) -> Numbering:
         middle = [mesh.nv + element.edges[0].nr] if order == 2 else []
         segments.setdefault(element.mat, []).append([first, *middle, last])
     return Numbering(
-        points=Triangulation(mesh).vertices,
+        points=MeshArrays(mesh).vertices,
         unknown=np.arange(2 * nodes).reshape(2, nodes),
         segments={name: np.array(rows) for name, rows in segments.items()},
     )

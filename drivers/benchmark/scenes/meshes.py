@@ -17,7 +17,7 @@ from drivers.benchmark.scenes.problems import Common
 from ngcontact import Problem
 from ngcontact.geometries.region import body, polygon
 from ngcontact.mesh import first_mesh
-from ngcontact.problem import Triangulation
+from ngcontact.problem import MeshArrays
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -63,8 +63,8 @@ class Mesh:
         return ng.Mesh(self.ngmesh.Copy())  # type: ignore[attr-defined]
 
     @cached_property
-    def _view(self) -> Triangulation:
-        return Triangulation(self.copy())
+    def _view(self) -> MeshArrays:
+        return MeshArrays(self.copy())
 
     @cached_property
     def points(self) -> Array:
@@ -74,7 +74,7 @@ class Mesh:
     @cached_property
     def triangles(self) -> Indices:
         """Vertices (ne, 3) of the triangles, anticlockwise."""
-        return self._view.triangles
+        return self._view.elements
 
     @cached_property
     def bodies(self) -> dict[str, Indices]:
@@ -85,7 +85,7 @@ class Mesh:
     @cached_property
     def edges(self) -> dict[str, Indices]:
         """Vertices (k, 2) of the segments of each boundary."""
-        names, ends = np.array(self._view.mesh.GetBoundaries()), self._view.segments
+        names, ends = np.array(self._view.mesh.GetBoundaries()), self._view.facets
         names = names[self._view.boundaries]
         return {str(name): ends[names == name] for name in np.unique(names)}
 

@@ -12,7 +12,7 @@ from ngcontact import Problem
 from ngcontact.adaptivity import refined
 from ngcontact.fem import model_of, unknowns_of
 from ngcontact.mesh import curve, first_mesh
-from ngcontact.problem import Triangulation
+from ngcontact.problem import MeshArrays
 
 START = 300  # unknowns of a first mesh, about; refinement is much quicker than meshing at size
 
@@ -54,7 +54,7 @@ def linear_solve(problem: Problem, mesh: ng.Mesh, order: int) -> Linear:
 def uniform_mesh(problem: Problem, order: int, size: int) -> ng.Mesh:
     """Uniformly refined mesh of about `size` unknowns, curved to the order."""
     rounds = max(0, round(np.log(size / START) / np.log(4)))
-    extent = np.ptp(Triangulation(first_mesh(problem)).vertices, axis=0).max()
+    extent = np.ptp(MeshArrays(first_mesh(problem)).vertices, axis=0).max()
     trials = [first_mesh(problem, float(extent) / count) for count in np.linspace(2, 16, 29)]
 
     def miss(mesh: ng.Mesh) -> float:

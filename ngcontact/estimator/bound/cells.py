@@ -19,7 +19,7 @@ from ...arrays import Array, Index, Mask
 from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...lagrange import gauss
-from ...problem import Triangulation
+from ...problem import MeshArrays
 
 NEWTON_STEPS = 8
 CLOSE = 1e-9  # of an element: the next step is round-off
@@ -75,7 +75,7 @@ class Cells:
     @property
     def bodies(self) -> Index:
         """Numbers (n,) of the material regions."""
-        return Triangulation(self.trace.mesh).bodies[self.parent]
+        return MeshArrays(self.trace.mesh).bodies[self.parent]
 
     def on_side(self, side: Index, t: Array) -> tuple[Index, Array]:
         """Segment (k,) and parameter s (k,) of places `t` (k,) on boundary sides `side` (k,)."""
@@ -209,8 +209,8 @@ def cells_of(trace: BoundaryTrace, cuts: Mapping[int, Array], loaded: Index, hel
     loaded, held : ndarray of int (k,)
         Segments that carry something, and those on which the whole displacement is prescribed.
     """
-    view, unit = Triangulation(trace.mesh), np.eye(3)
-    old, ne = view.triangles, trace.mesh.ne
+    view, unit = MeshArrays(trace.mesh), np.eye(3)
+    old, ne = view.elements, trace.mesh.ne
     cells = joined(trace, view.vertices, old, np.broadcast_to(unit, (ne, 3, 3)), np.arange(ne))
     cut = np.isin(cells.segment, list(cuts))
     several = (cells.bent | cut)[cells.sides].sum(axis=1) > 1
@@ -227,10 +227,10 @@ def joined(
     `parent` (n,) and `barycentric` (n, 3, 3) are those of `Cells`, in the order of the triangles.
     Sides on one side of a parent lie on its segment of the boundary.
     """
-    view = Triangulation(trace.mesh)
-    at = view.triangles[trace.element][:, :, None] == view.segments[:, None]  # (k, corners, ends)
+    view = MeshArrays(trace.mesh)
+    at = view.elements[trace.element][:, :, None] == view.facets[:, None]  # (k, corners, ends)
     last, outer = at[..., 1].argmax(axis=1), np.flatnonzero(~trace.inner)
-    segments = np.full(view.triangles.shape, -1)  # opposite to each corner of the elements
+    segments = np.full(view.elements.shape, -1)  # opposite to each corner of the elements
     segments[trace.element[outer], (~at.any(axis=2))[outer].argmax(axis=1)] = outer
     zero = barycentric == 0
     on = np.roll(zero, -1, axis=1) & np.roll(zero, -2, axis=1)  # (n, 3 sides, 3 of the parent)

@@ -22,7 +22,7 @@ from numpy.polynomial import legendre
 from ...arrays import Array, Index, Mask
 from ...fem import connected_bodies, model_of
 from ...lagrange import gauss
-from ...problem import Problem, Triangulation, varies
+from ...problem import MeshArrays, Problem, varies
 from ...qp import vanishing_combinations
 from .cells import Cells, Places, places
 from .parts import ForceRules, projection
@@ -185,7 +185,7 @@ def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
     """
     trace, e, highest = cells.trace, len(cells.ends), int(mu.degree.max())
     bodies = connected_bodies(trace)
-    body = bodies.of_vertex[Triangulation(trace.mesh).triangles[cells.parent[cells.owner], 0]]
+    body = bodies.of_vertex[MeshArrays(trace.mesh).elements[cells.parent[cells.owner], 0]]
     t, w = gauss(highest + trace.geometry_order)
     x, _ = cells.points(np.arange(e), np.tile(t, (e, 1)))
     arm = (x - bodies.middle[body, None]) / bodies.size[body, None, None]

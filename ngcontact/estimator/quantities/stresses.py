@@ -18,7 +18,7 @@ import numpy as np
 from ...arrays import Array, Index, Mask
 from ...contact import ContactState, in_contact
 from ...fem import BoundaryTrace, von_mises
-from ...problem import Elastic, Problem, Triangulation, body_mask, body_of_vertex
+from ...problem import Elastic, MeshArrays, Problem, body_mask
 from ..bound import EquilibratedStress
 from .table import Quantity, error_of_largest, unknown
 
@@ -71,7 +71,7 @@ def singular_corners(
     angle, kind = _angles(trace, vertex, first, second), _conditions(problem, trace)
     drawn = (np.abs(angle - np.pi) > SMOOTH) | (kind[first] != kind[second])
     vertex, first, second, angle = vertex[drawn], first[drawn], second[drawn], angle[drawn]
-    place = Triangulation(trace.mesh).vertices[vertex]
+    place = MeshArrays(trace.mesh).vertices[vertex]
     h = np.maximum(trace.lengths(first), trace.lengths(second))
     closed, rigid = _closed(pairs, place, h)
     sides = np.sort([kind[first], kind[second]], axis=0)
@@ -97,7 +97,7 @@ def singular_corners(
 def _vertices(trace: BoundaryTrace) -> tuple[Index, Index, Index]:
     """Vertices (v,) of the boundary, and the two segments (v,) that meet at each."""
     outer = np.flatnonzero(~trace.inner)
-    ends = Triangulation(trace.mesh).segments[outer].ravel()
+    ends = MeshArrays(trace.mesh).facets[outer].ravel()
     order = np.argsort(ends, kind="stable")
     vertex, start, count = np.unique(ends[order], return_index=True, return_counts=True)
     start, vertex = start[count == 2], vertex[count == 2]
@@ -109,10 +109,10 @@ def _angles(trace: BoundaryTrace, vertex: Index, first: Index, second: Index) ->
     """Angle (v,) of the body at each vertex, by the normals of the geometry."""
     normals = []
     for segment in (first, second):
-        s = (Triangulation(trace.mesh).segments[segment, 1] == vertex).astype(float)
+        s = (MeshArrays(trace.mesh).facets[segment, 1] == vertex).astype(float)
         normals.append(trace.exact_normal(segment, s))
     turn = np.arccos(np.clip((normals[0] * normals[1]).sum(axis=1), -1, 1))
-    inwards = Triangulation(trace.mesh).angles[vertex] > np.pi
+    inwards = MeshArrays(trace.mesh).angles[vertex] > np.pi
     return np.asarray(np.pi + np.where(inwards, turn, -turn))
 
 
@@ -268,8 +268,8 @@ def largest_von_mises(
 
 def _jumps(mesh: ng.Mesh, points: Array, mises: Array, n: int) -> Array:
     """Differences (k,) of `mises` (k,) at equal ones of the `points` (k, 2) of a body, n by n."""
-    view = Triangulation(mesh)
-    body = body_of_vertex(mesh)[view.triangles[:, 0]]
+    view = MeshArrays(mesh)
+    body = view.pieces[view.elements[:, 0]]
     least = SAME * float(np.ptp(view.corners, axis=1).max(axis=1).min())
     key = np.round(points / least).astype(np.int64)
     key = np.column_stack([key, np.repeat(body, n)])

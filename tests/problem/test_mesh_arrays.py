@@ -4,10 +4,11 @@ import ngsolve as ng
 import numpy as np
 import pytest
 from netgen.occ import OCCGeometry
+from ngsolve.meshes import MakeStructured3DMesh
 
 from ngcontact.geometries import disc_on_block
 from ngcontact.geometries.region import body, polygon
-from ngcontact.problem import Triangulation, bisect
+from ngcontact.problem import MeshArrays, bisect
 from ngcontact.problem.checks import _inside
 
 
@@ -19,16 +20,32 @@ def mesh(request):
 
 
 def test_numbers_are_those_of_ngsolve(mesh):
-    view = Triangulation(mesh)
+    view = MeshArrays(mesh)
     for vb, vertices, regions in (
-        (ng.VOL, view.triangles, view.bodies),
-        (ng.BND, view.segments, view.boundaries),
+        (ng.VOL, view.elements, view.bodies),
+        (ng.BND, view.facets, view.boundaries),
     ):
         elements = list(mesh.Elements(vb))
         assert vertices.tolist() == [[v.nr for v in el.vertices] for el in elements]
         assert regions.tolist() == [el.index for el in elements]
     assert view.vertices.tolist() == [list(v.point) for v in mesh.vertices]
-    assert view.others() == 0
+    assert view.without_simplices() == 0
+
+
+def test_arrays_of_tetrahedra():
+    mesh = MakeStructured3DMesh(hexes=False, nx=2)
+    view = MeshArrays(mesh)
+    for vb, vertices in ((ng.VOL, view.elements), (ng.BND, view.facets)):
+        assert np.sort(vertices).tolist() == [
+            sorted(v.nr for v in el.vertices) for el in mesh.Elements(vb)
+        ]
+    corners = np.sort(view.elements[view.facet_elements])
+    assert (corners[:, :, None] == view.facets[:, None]).any(axis=1).all()
+    assert not view.inner_facets.any()
+    assert view.diameters == pytest.approx(0.5 * 3**0.5)
+    assert not view.pieces.any()
+    _, count = np.unique(view.keys(view.sides), return_counts=True)
+    assert np.count_nonzero(count == 1) == len(view.facets)
 
 
 def test_only_marked_elements_are_bisected(mesh):
@@ -46,7 +63,7 @@ def test_only_marked_elements_are_bisected(mesh):
 def test_places_inside_a_body_are_told_beside_slanted_sides():
     corners = [(1, 0), (0, 1), (-1, 0), (0, -1)]
     geometry = OCCGeometry(body("diamond", polygon(corners, ["free"] * 4)), dim=2)
-    view = Triangulation(ng.Mesh(geometry.GenerateMesh(maxh=0.4)))
+    view = MeshArrays(ng.Mesh(geometry.GenerateMesh(maxh=0.4)))
     x = np.random.default_rng(0).uniform(-1.2, 1.2, (200, 2))
-    found = _inside(x, view, np.arange(len(view.triangles)))
+    found = _inside(x, view, np.arange(len(view.elements)))
     np.testing.assert_array_equal(found, np.abs(x).sum(axis=1) < 1)

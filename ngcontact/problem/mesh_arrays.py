@@ -1,0 +1,167 @@
+"""NGSolve's mesh as arrays: the one place that reads and writes Netgen's own."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import ngsolve as ng
+import numpy as np
+
+from ..arrays import Array, Index, Mask
+
+SIMPLICES = {2: (10, 12), 3: (20, 21)}  # Netgen's types of triangles and tetrahedra, by dimension
+SIDES = {2: [[0, 1], [1, 2], [2, 0]], 3: [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]}
+
+_RECORDS: dict[tuple[type, int], np.dtype] = {}  # Netgen's layouts, of kinds of so many bytes
+
+
+def _records(elements: Any) -> np.ndarray:
+    """Netgen's elements as they are, in its memory: `NumPy` takes 40 us for their type alone."""
+    kind = type(elements), memoryview(elements).nbytes // max(1, len(elements))
+    if kind not in _RECORDS:
+        _RECORDS[kind] = elements.NumPy().dtype
+    return np.frombuffer(elements, dtype=_RECORDS[kind])
+
+
+@dataclass(frozen=True)
+class MeshArrays:
+    """A mesh of simplices as arrays, each copied when it is first asked for; numbers count from 0.
+
+    Attributes
+    ----------
+    mesh : ng.Mesh
+        Of dimension d, with nv vertices, ne elements and k facets of the boundary: triangles and
+        segments in the plane. A mesh that is refined or moved in place needs another object.
+    """
+
+    mesh: ng.Mesh
+
+    @cached_property
+    def dim(self) -> int:
+        """The dimension d."""
+        return int(self.mesh.dim)
+
+    @cached_property
+    def vertices(self) -> Array:
+        """Coordinates (nv, d), lengths."""
+        return np.array(self.mesh.ngmesh.Coordinates())[:, : self.dim]
+
+    @cached_property
+    def elements(self) -> Index:
+        """Vertices (ne, d + 1) of each element, in the plane anticlockwise."""
+        return self._elements["nodes"][:, : self.dim + 1].astype(np.intp) - 1
+
+    @cached_property
+    def bodies(self) -> Index:
+        """Material region number (ne,) of each element."""
+        return self._elements["index"].astype(np.intp) - 1
+
+    @cached_property
+    def facets(self) -> Index:
+        """Vertices (k, d) of each facet of the boundary, also of those inside bodies."""
+        return self._facets["nodes"][:, : self.dim].astype(np.intp) - 1
+
+    @cached_property
+    def boundaries(self) -> Index:
+        """Boundary region number (k,) of each facet."""
+        return self._facets["index"].astype(np.intp) - 1
+
+    @property
+    def corners(self) -> Array:
+        """Coordinates (ne, d + 1, d) of the vertices of each element, lengths."""
+        return self.vertices[self.elements]
+
+    @property
+    def sides(self) -> Index:
+        """Vertices (ne, d + 1, d) of the sides of each element."""
+        return self.elements[:, SIDES[self.dim]]
+
+    @property
+    def diameters(self) -> Array:
+        """Longest edge (ne,) of each element, lengths."""
+        corners, k = self.corners, np.arange(self.dim + 1)
+        edges = corners[:, k] - corners[:, k - 1]
+        if self.dim == 3:
+            edges = np.hstack([edges, corners[:, :2] - corners[:, 2:]])
+        return np.linalg.norm(edges, axis=2).max(axis=1)
+
+    @cached_property
+    def extent(self) -> float:
+        """Largest extent along an axis of coordinates, a length."""
+        return float(np.ptp(self.vertices, axis=0).max())
+
+    @cached_property
+    def angles(self) -> Array:
+        """Sum (nv,) of the angles of plane triangles at each vertex, radians."""
+        side = np.roll(self.corners, -1, axis=1) - self.corners
+        back = -np.roll(side, 1, axis=1)
+        sine = side[..., 0] * back[..., 1] - side[..., 1] * back[..., 0]
+        angles = np.arctan2(sine, (side * back).sum(axis=2))
+        sums = np.bincount(self.elements.ravel(), angles.ravel(), len(self.vertices))
+        return np.asarray(sums, dtype=float)
+
+    @cached_property
+    def pieces(self) -> Index:
+        """Number (nv,) of the connected piece of the mesh that each vertex belongs to."""
+        from scipy.sparse import csr_array  # not needed to state a problem
+        from scipy.sparse.csgraph import connected_components
+
+        nv, (ne, corners) = len(self.vertices), self.elements.shape
+        # Vertices first, to be numbered first, then elements, each joined to its vertices.
+        starts = np.concatenate([np.zeros(nv), corners * np.arange(ne + 1)]).astype(np.int32)
+        joins = self.elements.ravel().astype(np.int32)
+        graph = csr_array((np.ones(joins.size), joins, starts), (nv + ne, nv + ne))
+        return np.asarray(connected_components(graph, directed=False)[1][:nv], dtype=np.intp)
+
+    @property
+    def facet_elements(self) -> Index:
+        """Number (k,) of an element at each facet."""
+        return self._at_facets[0]
+
+    @property
+    def inner_facets(self) -> Mask:
+        """Facets (k,) between two elements: lines inside bodies."""
+        return self._at_facets[1]
+
+    def keys(self, vertices: Index) -> Index:
+        """One number (...) for each set of `vertices` (..., d), in whatever order these come."""
+        return np.sort(vertices, axis=-1) @ len(self.vertices) ** np.arange(self.dim)[::-1]
+
+    def without_simplices(self) -> int:
+        """Number of elements that are no simplices."""
+        return int(np.count_nonzero(~np.isin(self._elements["type"], SIMPLICES[self.dim])))
+
+    @property
+    def _elements(self) -> np.ndarray:
+        mesh = self.mesh.ngmesh
+        return _records(mesh.Elements2D() if self.dim == 2 else mesh.Elements3D())
+
+    @property
+    def _facets(self) -> np.ndarray:
+        mesh = self.mesh.ngmesh
+        return _records(mesh.Elements1D() if self.dim == 2 else mesh.Elements2D())
+
+    @cached_property
+    def _at_facets(self) -> tuple[Index, Mask]:
+        marked = np.zeros(len(self.vertices), dtype=bool)
+        marked[self.facets] = True
+        sides = self.sides.reshape(-1, self.dim)
+        some = np.flatnonzero(marked[sides].all(axis=1))  # few, which are sorted in no time
+        keys, wanted = self.keys(sides[some]), self.keys(self.facets)
+        order = np.argsort(keys)
+        first = np.searchsorted(keys[order], wanted)
+        last = np.searchsorted(keys[order], wanted, side="right")
+        return some[order[first]] // (self.dim + 1), last - first > 1
+
+
+def move_vertices(mesh: ng.Mesh, positions: Array) -> None:
+    """Move the vertices of a mesh to `positions` (nv, d), in place; curves stay as they were."""
+    mesh.ngmesh.Coordinates()[:, : positions.shape[1]] = positions
+
+
+def bisect(mesh: ng.Mesh, marked: Mask) -> None:
+    """Refine the elements `marked` (ne,) of a mesh in place, which straightens it."""
+    MeshArrays(mesh)._elements["refine"] = marked  # all of them: they are True by default
+    mesh.Refine()
