@@ -126,7 +126,7 @@ class MeshArrays:
         return self._at_facets[1]
 
     def keys(self, vertices: Index) -> Index:
-        """One number (...) for each set of `vertices` (..., d), in whatever order these come."""
+        """Numbers (k, ...) of sets of `vertices` (k, ..., d), whatever the order of these is."""
         return np.sort(vertices, axis=-1) @ len(self.vertices) ** np.arange(self.dim)[::-1]
 
     def without_simplices(self) -> int:
