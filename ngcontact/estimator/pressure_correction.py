@@ -23,39 +23,48 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Array, from_triplets
-from ..fem import BoundaryTrace, bulk_moduli
+from ..fem import bulk_moduli
 from ..linalg import cholesky, lower_half, shared
-from ..problem import MeshArrays, Problem
+from ..problem import MeshArrays
 from .terms import BoundaryResidual, PressureShare, ScaledSolution
 
 HELD = 1e6  # stiffness of supports in the last term, relative to the elements beside them
 FLOATING = 1e-9  # ... and of the bedding that keeps free bodies, relative to their size
 
 
+def correcting_pressure(
+    solution: ScaledSolution,
+    names: Sequence[str],
+    residuals: tuple[ng.CoefficientFunction, ng.CoefficientFunction],
+    terms: Sequence[BoundaryResidual],
+) -> PressureCorrection:
+    """Find delta on the nearly incompressible bodies `names`.
+
+    `residuals` are div sigma_h + F, (2,), in the elements and [sigma_h n], (2,), on their edges,
+    `terms` those on the boundary.
+    """
+    forms = _Forms(solution, names)
+    (inner, f), (outer, g) = forms.inside(*residuals), forms.on_boundary(terms)
+    A, b, B, K = (inner + outer).tocsr(), f + g, forms.divergence(), forms.stiffness()
+    # Optimality of delta and of v_h; [[A, B'], [B, -K]] is quasi-definite: it has a factorisation
+    # without pivots.
+    size = forms.space.ndof
+    inside = np.array(forms.region.Mask())[MeshArrays(solution.mesh).bodies]
+    free = np.append(np.repeat(inside, forms.functions), K.diagonal() > 0)
+    saddle = sp.block_array([[A, B.T], [B, -K]], format="csr")
+    right = np.append(b, np.zeros(K.shape[0]))
+    found = np.where(free, cholesky(lower_half(saddle))(free)(right), 0.0)
+    pressure, motion = ng.GridFunction(forms.space), ng.GridFunction(forms.V)
+    pressure.vec.FV().NumPy()[:] = found[:size]
+    motion.vec.FV().NumPy()[:] = found[size:]
+    return PressureCorrection(forms, pressure, motion)
+
+
 @dataclass(frozen=True, eq=False)
 class PressureCorrection:
-    """The minimising delta on some bodies, of the displacement's degree on each element.
+    """The minimising delta, and the v_h of the supremum, for which that is mu |grad v_h|^2."""
 
-    Moduli and pressures are relative to the units of a `ScaledSolution`.
-
-    Attributes
-    ----------
-    boundary : BoundaryTrace
-        The boundary of the mesh.
-    region : ng.Region
-        Those bodies.
-    mu, kappa : ng.GridFunction
-        Shear and bulk modulus of each element.
-    pressure : ng.GridFunction
-        delta.
-    motion : ng.GridFunction
-        The v_h of the supremum, for which that term is mu |grad v_h|^2.
-    """
-
-    boundary: BoundaryTrace
-    region: ng.Region
-    mu: ng.GridFunction
-    kappa: ng.GridFunction
+    forms: _Forms
     pressure: ng.GridFunction
     motion: ng.GridFunction
 
@@ -64,7 +73,8 @@ class PressureCorrection:
         on_boundary = ng.BoundaryFromVolumeCF(self.pressure)
         for share in shares:
             if len(share.at):
-                delta = self.boundary.evaluate(on_boundary, share.segment, share.s)
+                boundary = self.forms.solution.boundary
+                delta = boundary.evaluate(on_boundary, share.segment, share.s)
                 residual[share.at] += share.factor * delta
 
     def divergence_and_jump(self) -> tuple[ng.CoefficientFunction, ng.CoefficientFunction]:
@@ -74,88 +84,65 @@ class PressureCorrection:
 
     def squares(self) -> Array:
         """Squares (ne,) of the two terms that delta itself adds."""
-        model = self.boundary.model
+        forms, model = self.forms, self.forms.model
         gradients = model.gradients(self.motion, self.motion)
-        density = self.pressure**2 / self.kappa + self.mu * gradients
-        values = ng.Integrate(model.weighted(density), self.region, element_wise=True)
+        density = self.pressure**2 / forms.kappa + forms.mu * gradients
+        values = ng.Integrate(model.weighted(density), forms.region, element_wise=True)
         return np.asarray(values)
 
 
-def correcting_pressure(
-    solution: ScaledSolution,
-    names: Sequence[str],
-    residuals: tuple[ng.CoefficientFunction, ng.CoefficientFunction],
-    terms: Sequence[BoundaryResidual],
-) -> PressureCorrection:
-    """Find delta on the bodies `names`.
-
-    Parameters
-    ----------
-    solution : ScaledSolution
-        In units of its own.
-    names : sequence of str
-        The nearly incompressible bodies.
-    residuals : pair of ng.CoefficientFunction
-        div sigma_h + F, (2,), in the elements and [sigma_h n], (2,), on their edges.
-    terms : sequence of BoundaryResidual
-        Those on the boundary.
-    """
-    forms = _forms(solution, names)
-    (inner, f), (outer, g) = forms.inside(*residuals), forms.on_boundary(terms)
-    A, b = (inner + outer).tocsr(), f + g
-    return forms.minimiser(A, b, forms.divergence(), forms.stiffness())
-
-
-@dataclass(frozen=True, eq=False)
 class _Forms:
     """The quadratic forms of the sum that delta minimises: on V, and on `space`, both global.
 
-    `element` and `edge` are the weights of squared residuals, constant on each element.
+    `element` and `edge` are the weights of squared residuals, constant on each element, as are
+    shear and bulk moduli; pressures and moduli are in the units of the `solution`.
     """
 
-    problem: Problem
-    boundary: BoundaryTrace
-    region: ng.Region
-    space: ng.FESpace
-    V: ng.FESpace
-    element: ng.GridFunction
-    edge: ng.GridFunction
-    mu: ng.GridFunction
-    kappa: ng.GridFunction
+    def __init__(self, solution: ScaledSolution, names: Sequence[str]) -> None:
+        mesh, order = solution.mesh, solution.order
+        self.solution, self.model = solution, solution.model
+        self.region = mesh.Materials("|".join(map(re.escape, names)))
+        self.space = ng.L2(mesh, order=order, dgjumps=True)
+        self.functions = self.space.ndof // mesh.ne  # on an element; they are numbered one by one
+        self.V = ng.VectorH1(mesh, order=order, definedon=self.region)
 
-    @property
-    def functions(self) -> int:
-        """Number of pressures on an element; they are numbered one by one."""
-        return int(self.space.ndof // self.space.mesh.ne)
+        def constant(values: Array) -> ng.GridFunction:
+            function = ng.GridFunction(ng.L2(mesh, order=0))
+            function.vec.FV().NumPy()[:] = values
+            return function
+
+        self.element = constant(solution.element_weight)
+        self.edge = constant(solution.edge_weight)
+        self.mu = constant(solution.mu)
+        self.kappa = constant(bulk_moduli(solution.problem, mesh) / solution.modulus)
 
     def inside(
         self, divergence: ng.CoefficientFunction, jump: ng.CoefficientFunction
     ) -> tuple[sp.csr_array, Array]:
-        """Quadratic form and right side of the terms in elements and between them."""
+        """Quadratic form and right side (n,) of the terms in elements and between them."""
         d, t = self.space.TnT()
-        model = self.boundary.model
-        element, edge = self.element, (self.edge + self.edge.Other()) / 2
-        n = ng.specialcf.normal(2)
+        weighted, element = self.model.weighted, self.element
+        edge, n = (self.edge + self.edge.Other()) / 2, ng.specialcf.normal(2)
         skeleton = ng.dx(skeleton=True, bonus_intorder=2)
         a = ng.BilinearForm(self.space, symmetric=True)
-        a += model.weighted(element * ng.Grad(d) * ng.Grad(t) + d * t / self.kappa) * ng.dx
-        a += model.weighted(edge * (d - d.Other()) * (t - t.Other())) * skeleton
+        a += weighted(element * ng.Grad(d) * ng.Grad(t) + d * t / self.kappa) * ng.dx
+        a += weighted(edge * (d - d.Other()) * (t - t.Other())) * skeleton
         f = ng.LinearForm(self.space)
-        f += model.weighted(-element * divergence * ng.Grad(t)) * ng.dx(bonus_intorder=2)
-        f += model.weighted(-edge * (jump * n) * (t - t.Other())) * skeleton
+        f += weighted(-element * divergence * ng.Grad(t)) * ng.dx(bonus_intorder=2)
+        f += weighted(-edge * (jump * n) * (t - t.Other())) * skeleton
         a.Assemble()
         f.Assemble()
         return shared(a.mat), f.vec.FV().NumPy().copy()
 
     def on_boundary(self, terms: Sequence[BoundaryResidual]) -> tuple[sp.csr_array, Array]:
-        """The same of the boundary terms."""
+        """The same of the boundary terms, right side (n,)."""
+        boundary, size = self.solution.boundary, self.space.ndof
         shape = []
         for j in range(self.functions):
             function = ng.GridFunction(self.space)
             function.vec.FV().NumPy()[j :: self.functions] = 1.0
             shape.append(ng.BoundaryFromVolumeCF(function))
         shapes = ng.CF(tuple(shape))
-        size = self.space.ndof
         A, b = sp.csr_array((size, size)), np.zeros(size)
         for term in terms:
             k, c = term.residual.shape
@@ -163,8 +150,8 @@ class _Forms:
             for share in term.shares:
                 if len(share.at) == 0:
                     continue
-                value = self.boundary.evaluate(shapes, share.segment, share.s)
-                first = self.boundary.element[share.segment] * self.functions
+                value = boundary.evaluate(shapes, share.segment, share.s)
+                first = boundary.element[share.segment] * self.functions
                 column = first[:, None, None] + np.arange(self.functions)
                 row = share.at[:, None, None] * c + np.arange(c)[:, None]
                 row, column = np.broadcast_arrays(row, column)
@@ -177,9 +164,9 @@ class _Forms:
 
     def stiffness(self) -> sp.csr_array:
         """Form of mu |grad v|^2, with v held where displacements are prescribed."""
-        problem, mesh, model = self.problem, self.space.mesh, self.boundary.model
+        problem, mesh, model = self.solution.problem, self.solution.mesh, self.model
         u, v = self.V.TnT()
-        position = self.boundary.curve.reshape(-1, 2)
+        position = self.solution.boundary.curve.reshape(-1, 2)
         bedding = FLOATING / float(np.ptp(position, axis=0).max()) ** 2
         a = ng.BilinearForm(self.V, symmetric=True)
         work = self.mu * (model.gradients(u, v) + bedding * u * v)
@@ -199,52 +186,10 @@ class _Forms:
 
     def divergence(self) -> sp.csr_array:
         """(q, div v) of pressures q and displacements v."""
-        pressures = ng.L2(self.space.mesh, order=self.boundary.order)
+        pressures = ng.L2(self.solution.mesh, order=self.solution.order)
         q, v = pressures.TrialFunction(), self.V.TestFunction()
         b = ng.BilinearForm(trialspace=pressures, testspace=self.V)
-        model = self.boundary.model
-        work = model.weighted(q * model.volume(v))
-        b += work * ng.dx(definedon=self.region, bonus_intorder=model.bonus)
+        work = self.model.weighted(q * self.model.volume(v))
+        b += work * ng.dx(definedon=self.region, bonus_intorder=self.model.bonus)
         b.Assemble()
         return shared(b.mat)
-
-    def minimiser(
-        self, A: sp.csr_array, b: Array, B: sp.csr_array, K: sp.csr_array
-    ) -> PressureCorrection:
-        """Solve the optimality conditions of delta and of the v_h of the supremum.
-
-        [[A, B'], [B, -K]] is quasi-definite: it has a factorisation without pivots.
-        """
-        size = self.space.ndof
-        inside = np.array(self.region.Mask())[MeshArrays(self.space.mesh).bodies]
-        free = np.append(np.repeat(inside, self.functions), K.diagonal() > 0)
-        saddle = sp.block_array([[A, B.T], [B, -K]], format="csr")
-        right = np.append(b, np.zeros(K.shape[0]))
-        solution = np.where(free, cholesky(lower_half(saddle))(free)(right), 0.0)
-        pressure, motion = ng.GridFunction(self.space), ng.GridFunction(self.V)
-        pressure.vec.FV().NumPy()[:] = solution[:size]
-        motion.vec.FV().NumPy()[:] = solution[size:]
-        return PressureCorrection(self.boundary, self.region, self.mu, self.kappa, pressure, motion)
-
-
-def _forms(solution: ScaledSolution, names: Sequence[str]) -> _Forms:
-    """Spaces and weights of the sum."""
-    mesh, order = solution.mesh, solution.order
-    region = mesh.Materials("|".join(map(re.escape, names)))
-
-    def constant(values: Array) -> ng.GridFunction:
-        function = ng.GridFunction(ng.L2(mesh, order=0))
-        function.vec.FV().NumPy()[:] = values
-        return function
-
-    return _Forms(
-        problem=solution.problem,
-        boundary=solution.boundary,
-        region=region,
-        space=ng.L2(mesh, order=order, dgjumps=True),
-        V=ng.VectorH1(mesh, order=order, definedon=region),
-        element=constant(solution.element_weight),
-        edge=constant(solution.edge_weight),
-        mu=constant(solution.mu),
-        kappa=constant(bulk_moduli(solution.problem, mesh) / solution.modulus),
-    )

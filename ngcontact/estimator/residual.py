@@ -42,10 +42,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, root_of_squares
-from ..fem import (
-    NEARLY_INCOMPRESSIBLE,
-    nearly_incompressible,
-)
+from ..fem import NEARLY_INCOMPRESSIBLE, nearly_incompressible
 from ..lagrange import gauss, gauss_derivative
 from ..problem import varies
 from ..quadrature import known_rough_load, moment_degree, pieces, rough_segments
@@ -54,6 +51,7 @@ from .contact import between_nodes, closing_energy, on_contact, remaining
 from .pressure_correction import PressureCorrection, correcting_pressure
 from .terms import (
     DATA_BONUS,
+    BoundaryPoints,
     BoundaryResidual,
     BoundaryTerms,
     Parts,
@@ -67,27 +65,22 @@ from .terms import (
     scaled,
 )
 
-NOISE = 4e-15  # of displacements along the normal of a guide, relative to the largest
+GUIDE_NOISE = 4e-15  # of displacements along the normal of a guide, relative to the largest
 
 
 def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTerms:
-    """Residuals on all of the boundary that contact has not covered.
-
-    Parameters
-    ----------
-    solution : ScaledSolution
-        In units of its own.
-    parts : Parts
-        What no body faces.
-    """
+    """Residuals on the `parts` of the boundary that no body faces."""
     boundary, problem = solution.boundary, solution.problem
-    _, segment, s, weight = parts.points(2 * solution.order + DATA_BONUS)
+    _, (segment, s, weight) = parts.points(2 * solution.order + DATA_BONUS)
     ds = np.linalg.norm(boundary.derivative(segment, s), axis=1) * weight
     ds *= boundary.measure(segment, s)
 
-    residual = _unbalanced(solution, segment, s)  # (3.7)
+    residual = -solution.traction(segment, s)  # (3.7)
+    for pattern in problem.traction:
+        at, load = boundary.lies_on(segment, pattern), problem.traction_vector(pattern)
+        residual[at] += boundary.evaluate(load, segment[at], s[at]) / solution.unit
     factor = -boundary.normal(segment, s)  # of a pressure in the residual
-    squares = _rough_loads(solution, segment, s, residual)
+    squares = _rough_tractions(solution, segment, s, residual)
     for pattern, components in problem.displacement.items():  # (3.6)
         at = boundary.lies_on(segment, pattern)
         given = {axis: value for axis, value in enumerate(components) if value is not None}
@@ -97,8 +90,9 @@ def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTer
     guided = np.zeros(len(segment), dtype=bool)
     if problem.sliding is not None:  # (3.8): any force along the normal, none across it
         guided = boundary.lies_on(segment, str(problem.sliding))
-        normal = _guiding(solution, segment[guided], s[guided])
-        squares.append(_off_guide(solution, segment[guided], s[guided], ds[guided], normal))
+        points = BoundaryPoints(segment[guided], s[guided], ds[guided])
+        normal = _guide_normals(solution, points)
+        squares.append(_off_guide(solution, points, normal))
         for vector in (residual, factor):
             along = (vector[guided] * normal).sum(axis=1)
             vector[guided] -= along[:, None] * normal
@@ -112,18 +106,7 @@ def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTer
     return BoundaryTerms(residuals, squares, parts)
 
 
-def _unbalanced(solution: ScaledSolution, segment: Index, s: Array) -> Array:
-    """P - sigma_h n (k, 2) at points of the boundary, with P = 0 where no traction is given."""
-    boundary, problem = solution.boundary, solution.problem
-    residual = -solution.traction(segment, s)
-    for pattern in problem.traction:
-        at = boundary.lies_on(segment, pattern)
-        load = problem.traction_vector(pattern)
-        residual[at] += boundary.evaluate(load, segment[at], s[at]) / solution.unit
-    return residual
-
-
-def _rough_loads(
+def _rough_tractions(
     solution: ScaledSolution, segment: Index, s: Array, residual: Array
 ) -> list[Squares]:
     """Squares of what polynomials miss of tractions where these are rough.
@@ -131,12 +114,9 @@ def _rough_loads(
     There `residual` (k, 2) at `s` (k,) of segments (k,) is made that of the polynomials.
     """
     boundary, problem, squares = solution.boundary, solution.problem, []
-    for pattern in problem.traction:
-        load = problem.traction_vector(pattern)
-        found = known_rough_load(
-            *(problem.traction[pattern], load, boundary.mesh.Boundaries(pattern)),
-            moment_degree(solution.order),
-        )
+    for pattern, data in problem.traction.items():
+        load, region = problem.traction_vector(pattern), boundary.mesh.Boundaries(pattern)
+        found = known_rough_load(data, load, region, moment_degree(solution.order))
         if found is None:
             continue
         at = found.rough[segment]
@@ -144,8 +124,7 @@ def _rough_loads(
         residual[at] += boundary.evaluate(change, segment[at], s[at]) / solution.unit
         element = boundary.element
         rest = solution.edge_weight[element] * (found.rest / solution.unit) ** 2
-        rest *= solution.measure[element]
-        squares.append(Squares("traction", element, rest))
+        squares.append(Squares("traction", element, rest * solution.measure[element]))
         squares.append(solution.missed(element, found.missed))
     return squares
 
@@ -159,28 +138,24 @@ def _displacement(
     """
     boundary, order = solution.boundary, 2 * solution.order + DATA_BONUS
     points, weights = gauss(order)
-    size = boundary.lengths(segments)
-    u = solution.displacement
+    u, mesh, count = solution.displacement, solution.mesh, len(segments)
     missed = ng.CF(tuple(value - u[axis] for axis, value in data.items()))
 
-    def miss(segment: Index, s: Array) -> Array:
-        """Values (k, m, c) at `s` (k, m) of segments (k,), without a unit."""
-        w = boundary.evaluate(missed, np.repeat(segment, s.shape[1]), s.ravel())
+    def miss(number: Index, s: Array) -> Array:
+        """Values (k, m, c) at `s` (k, m) of segments of those numbers (k,), without a unit."""
+        w = boundary.evaluate(missed, np.repeat(segments[number], s.shape[1]), s.ravel())
         return np.asarray(w.reshape(*s.shape, len(data)) / solution.strain)
 
-    count, mesh = len(segments), boundary.mesh
     number, start, length = np.arange(count), np.zeros(count), np.ones(count)
-    w = miss(segments, np.tile(points, (count, 1)))
+    w = miss(number, np.tile(points, (count, 1)))
     rough = rough_segments([*data.values()], mesh, segments, solution.strain * np.abs(w).max())
     if rough.any():
-        found = pieces(
-            lambda k, s: miss(segments[k], s), boundary.mesh, size, np.flatnonzero(rough)
-        )
+        found = pieces(miss, mesh, boundary.lengths(segments), np.flatnonzero(rough))
         number, start, length = (
             np.concatenate([x[~rough], y])
             for x, y in zip((number, start, length), found, strict=True)
         )
-        w = miss(segments[number], start[:, None] + length[:, None] * points)
+        w = miss(number, start[:, None] + length[:, None] * points)
     s = start[:, None] + length[:, None] * points
     every = np.repeat(segments[number], len(points))
     stretch = np.linalg.norm(boundary.derivative(every, s.ravel()), axis=1).reshape(s.shape)
@@ -194,58 +169,44 @@ def _displacement(
     return Squares("displacement", element, 2 * solution.rigidity[element] * worst)
 
 
-def _guiding(solution: ScaledSolution, segment: Index, s: Array) -> Array:
-    """Unit vectors (k, 2) by which Gamma_0 is held at `s` (k,) of segments (k,)."""
+def _guide_normals(solution: ScaledSolution, points: BoundaryPoints) -> Array:
+    """Unit vectors (k, 2) by which Gamma_0 is held at points of it."""
     boundary = solution.boundary
     segments = boundary.segments(str(solution.problem.sliding))
     at, at_node = boundary.at_nodes(segments)
     node = boundary.nodes[segments].ravel()
     number, normal = boundary.number_points(at, node, boundary.exact_normal(at, at_node))
     nodal = normal[number].reshape(len(segments), -1, 2)
-    return between_nodes(nodal[np.searchsorted(segments, segment)], s)[0]
+    return between_nodes(nodal[np.searchsorted(segments, points.segment)], points.s)[0]
 
 
-def _off_guide(
-    solution: ScaledSolution, segment: Index, s: Array, ds: Array, normal: Array
-) -> Squares:
-    """What u_h.n between the nodes of Gamma_0 costs, at points (k,) with weights `ds` (k,)."""
-    boundary, element = solution.boundary, solution.boundary.element[segment]
-    u = boundary.evaluate(solution.displacement, segment, s)
+def _off_guide(solution: ScaledSolution, points: BoundaryPoints, normal: Array) -> Squares:
+    """What u_h.n between the nodes of Gamma_0 costs."""
+    element = solution.boundary.element[points.segment]
+    u = solution.boundary.evaluate(solution.displacement, points.segment, points.s)
     miss = (u * normal).sum(axis=1)
-    miss[np.abs(miss) <= NOISE * np.abs(u).max(initial=0.0)] = 0.0
+    miss[np.abs(miss) <= GUIDE_NOISE * np.abs(u).max(initial=0.0)] = 0.0
     stiffness = 2 * solution.rigidity[element] / solution.diameter[element]
-    where = segment, ds, boundary.point(segment, s)
-    cost = closing_energy(solution, where, stiffness, miss / solution.strain)
-    return Squares("displacement", element, ds * cost)
+    cost = closing_energy(solution, points, stiffness, miss / solution.strain)
+    return Squares("displacement", element, points.weight * cost)
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Error indicators of the ne elements.
+    """Error indicators of the elements."""
 
-    Attributes
-    ----------
-    indicators : ndarray (ne,)
-        eta_T, an energy norm: the root of an energy per unit thickness.
-    parts : dict of ndarray (ne,)
-        Squared contributions by name: energies, 0 or inf where these are out of a float's range.
-    """
-
-    indicators: Array
+    indicators: Array  # (ne,), eta_T, an energy norm: the root of an energy per unit thickness
+    # (ne,) each, squared contributions by name: energies, 0 or inf out of a float's range
     parts: dict[str, Array]
 
 
 def estimate(solved: Solved, corrected_from: float = NEARLY_INCOMPRESSIBLE) -> Estimate:
     """Residual error estimate of a displacement in the energy norm.
 
-    Parameters
-    ----------
-    solved : Solved
-    corrected_from : float
-        kappa / mu from which the pressure of a body is corrected.
+    The pressure of a body is corrected if its kappa / mu is `corrected_from` or more.
     """
     pairs, boundary = solved.pairs, solved.discrete.space.trace
-    solution = scaled(solved.problem, boundary, solved.displacement, solved.stress)
+    solution = scaled(solved)
     terms = [on_contact(solution, pair, pairs) for pair in pairs]
     rest = remaining(boundary.inner | boundary.on_axis, [term.covered for term in terms])
     terms.append(on_supports_and_loads(solution, rest))
@@ -263,24 +224,17 @@ def _squares(
     """Squared contributions (ne,) by name, after the pressure has been corrected where needed."""
     parts = {"element": np.zeros(solution.mesh.ne)}
 
-    def of(name: str) -> Array:
-        return parts.setdefault(name, np.zeros(solution.mesh.ne))
+    def add(name: str, element: Index, values: Array) -> None:
+        np.add.at(parts.setdefault(name, np.zeros(solution.mesh.ne)), element, values)
 
     if any(map(varies, solution.problem.materials.values())):
-        of("oscillation")[:] = oscillation(
-            *(solution.problem, solution.projected, solution.stress),
-            *(solution.modulus, solution.rough),
-            model=solution.boundary.model,
-        )
-    for squares in (x for term in terms for x in term.squares):
-        np.add.at(of(squares.name), squares.element, squares.values)
+        parts["oscillation"] = oscillation(solution)
+    force, of_loads = _body_forces(solution)
+    for squares in [x for term in terms for x in term.squares] + of_loads:
+        add(squares.name, squares.element, squares.values)
     residuals = [x for term in terms for x in term.residuals]
     divergence, jump = divergence_and_jump(solution.projected)
-    model = solution.boundary.model
-    divergence = model.divergence(divergence, solution.stress, solution.normal_stress)
-    force, rest = _body_forces(solution)
-    for squares in rest:
-        np.add.at(of(squares.name), squares.element, squares.values)
+    divergence = solution.model.divergence(divergence, solution.stress, solution.normal_stress)
     if force is not None:
         divergence += force  # (3.5)
     names = nearly_incompressible(
@@ -289,7 +243,7 @@ def _squares(
     correction = None
     if names:
         correction = correcting_pressure(solution, list(names), (divergence, jump), residuals)
-        of("incompressibility")[:] = correction.squares()
+        parts["incompressibility"] = correction.squares()
         of_pressure = correction.divergence_and_jump()
         divergence += of_pressure[0]
         jump += of_pressure[1]
@@ -298,7 +252,7 @@ def _squares(
         residual = term.residual.copy()
         if correction is not None:
             correction.add_to(residual, term.shares)
-        np.add.at(of(term.name), term.element, term.weight * (residual**2).sum(axis=1))
+        add(term.name, term.element, term.weight * (residual**2).sum(axis=1))
     return parts
 
 
@@ -311,8 +265,7 @@ def _body_forces(
         return None, []
     forces, squares, every = {}, [], np.arange(mesh.ne)
     for body, F in problem.force.items():
-        region = mesh.Materials(body)
-        found = known_rough_load(F, F, region, moment_degree(solution.order))
+        found = known_rough_load(F, F, mesh.Materials(body), moment_degree(solution.order))
         forces[body] = ng.CF(F) * (1 / solution.unit)
         if found is not None:
             rough = ng.GridFunction(ng.L2(mesh, order=0))
@@ -333,25 +286,19 @@ def _inside(
     """Squared residuals (ne,) in the elements and on the edges between them."""
     data = DATA_BONUS if solution.problem.force else 0
     degree = solution.order if correction else solution.projected.space.globalorder
-    element, model = np.zeros(solution.mesh.ne), solution.boundary.model
+    element = np.zeros(solution.mesh.ne)
     if degree or data:  # else there is no divergence
-        squares = element_integral(solution.mesh, divergence, 2 * degree + data, model)
+        squares = element_integral(solution, divergence, 2 * degree + data)
         element = solution.element_weight * squares
-    edges = edge_integral(solution.mesh, jump, 2 * degree, solution.mu, model)
+    edges = edge_integral(solution, jump, 2 * degree)
     return {"element": element, "jump": solution.edge_weight / 2 * edges}
 
 
 @dataclass(frozen=True, eq=False)
 class Estimated(Solved):
-    """Members of `Solution` that estimate its error, made when the first of them is asked for.
+    """Members of `Solution` that estimate its error, made when the first of them is asked for."""
 
-    Attributes
-    ----------
-    adaptive : bool
-        Whether it is a level of `adapt`, whose estimate is needed anyway.
-    """
-
-    adaptive: bool = False
+    adaptive: bool = False  # whether it is a level of `adapt`, whose estimate is needed anyway
 
     @cached_property
     def _estimate(self) -> Estimate:

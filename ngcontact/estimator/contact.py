@@ -1,0 +1,531 @@
+"""Residuals on Gamma_K: parts of segments that face, points opposite, tractions, gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.polynomial.legendre import legvander
+
+from ..arrays import Array, Index, Mask
+from ..contact import (
+    FACING,
+    MATCHED,
+    TOUCHING,
+    ContactLine,
+    ContactState,
+    Pieces,
+    at,
+    crossings,
+    divided,
+    end_to_end,
+    jacobian,
+    prescribed_gap,
+)
+from ..fem import BoundaryTrace
+from ..lagrange import gauss, gauss_lobatto, lagrange, lagrange_derivative
+from .terms import (
+    DATA_BONUS,
+    BoundaryPoints,
+    BoundaryResidual,
+    BoundaryTerms,
+    Parts,
+    PressureShare,
+    ScaledSolution,
+    Squares,
+)
+
+ARRIVED = 1e-8  # last step of Newton's method for a parameter: the next one would be its square
+SLIVER = 1e-9  # share of a segment below which a part of it is none
+ALIKE = 1 - 1e-6  # cosine of directions from which points of two pairs at a node are one
+GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
+BUMP = 2.0  # |w| |d_s w| over the largest w^2; 1 at least, 1.2 to 1.7 of hats, Gauss's, parabolas
+UNRESOLVED = 0.1  # distance of a gap from polynomials over its range, from which it is followed
+NO_GAP = 1e-12  # ... relative to the gap, below which there is none
+DIVISIONS = 4  # of a piece on which the gap is no polynomial
+MAX_PIECES = 100_000  # pieces looked at, from which no more are divided
+
+
+def _select(pieces: Pieces, at: Index) -> Pieces:
+    """Pieces of the numbers `at` (n,)."""
+    return Pieces(**{name: values[at] for name, values in vars(pieces).items()})
+
+
+def _joined(parts: Sequence[Pieces]) -> Pieces:
+    """All pieces, one after the other."""
+    return Pieces(
+        **{name: np.concatenate([vars(x)[name] for x in parts]) for name in vars(parts[0])}
+    )
+
+
+def facing_pieces(boundary: BoundaryTrace, line: ContactLine, carrying: Mask) -> tuple[Pieces, int]:
+    """Parts of the secondary that face one segment of the primary each, or the obstacle.
+
+    On segments that wholly face, and on those `carrying` (k,) contact points, of any pair. So many
+    of them, the first ones, are whole segments whose ends face the ends of one.
+    """
+    if line.contact.primary is None:
+        whole, facing = np.flatnonzero(line.faces), np.full(len(line.segments), -1)
+    else:
+        facing = _opposite_segments(boundary, line, carrying)
+        whole = np.flatnonzero(facing >= 0)
+    ends = np.zeros(len(whole)), np.ones(len(whole))
+    pieces = Pieces(whole, *ends, facing[whole], np.full(len(whole), 0.5))
+    rest = np.flatnonzero((facing < 0) & (line.faces | carrying))
+    if line.contact.primary is not None and len(rest):
+        parts = _divided(boundary, line, rest)
+        pieces = _joined([pieces, replace(parts, local=rest[parts.local])])
+    return pieces, len(whole)
+
+
+def _opposite_segments(boundary: BoundaryTrace, line: ContactLine, carrying: Mask) -> Index:
+    """Segment of the primary whose ends the ends of each segment (k,) face, -1 where none.
+
+    Ends without a point, as on Gamma_u, face the ends at the same place; they are looked at on
+    segments `carrying` (k,) others.
+    """
+    faces = line.partner >= 0
+    local, end = np.nonzero((line.rows[:, [0, -1]] < 0) & carrying[:, None])
+    if len(local):
+        segment = line.segments[local]
+        x = boundary.curve[segment, -end]
+        ends = boundary.curve[line.facing][:, [0, -1]].reshape(-1, 2)
+        apart = np.linalg.norm(x[:, None] - ends, axis=2)
+        nearest = apart.argmin(axis=1)
+        rows = line.rows.copy()
+        rows[local, -end] = len(faces) + np.arange(len(local))
+        faces = np.append(faces, apart.min(axis=1) <= MATCHED * boundary.lengths(segment))
+        partner = np.append(line.partner, line.facing[nearest // 2])
+        partner_s = np.append(line.partner_s, nearest % 2)
+        line = replace(line, rows=rows, partner=partner, partner_s=partner_s)
+    return end_to_end(boundary, line, faces)
+
+
+def _divided(boundary: BoundaryTrace, line: ContactLine, rest: Index) -> Pieces:
+    """Pieces of the segments `rest` (j,), by their numbers there.
+
+    Looked for beside the partners of their points; elsewhere where those do not cover them.
+    """
+    points, segments = line.rows[rest], line.segments[rest]
+    ends = boundary.nodes[line.facing][:, [0, -1]]
+    met = boundary.nodes[line.partner[points[points >= 0]]][:, [0, -1]]
+    near = line.facing[np.isin(ends, met).any(axis=1)]
+    if len(near):
+        parts = divided(boundary, line.contact, segments, near)
+        covered = np.bincount(parts.local, parts.stop - parts.start, len(rest))
+        if (covered > 1 - SLIVER).all():
+            return parts
+    return divided(boundary, line.contact, segments, line.facing)
+
+
+def covered_parts(boundary: BoundaryTrace, line: ContactLine, pieces: Pieces, whole: int) -> Parts:
+    """Parts of both bodies' boundaries that face each other, two of every piece.
+
+    The first `whole` ones are segments whose ends face the ends of another.
+    """
+    segment = line.segments[pieces.local]
+    own = Parts(segment, pieces.start, pieces.stop)
+    if line.contact.primary is None:
+        return own
+    low, high = np.zeros(len(segment)), np.ones(len(segment))
+    if whole < len(segment):
+        rest = _select(pieces, np.arange(whole, len(segment)))
+        s = np.concatenate([rest.start, rest.stop])
+        twice = _joined([rest, rest])
+        d, _ = directions(boundary, line, twice.local, s)
+        x = boundary.point(line.segments[twice.local], s)
+        t = _opposite(boundary, x, d, twice.facing, twice.opposite)
+        inside = (s > 0) & (s < 1)  # where a vertex of the primary is passed
+        ends = np.where(inside, np.round(t), t).reshape(2, -1)
+        low[whole:], high[whole:] = np.sort(ends, axis=0)
+    return Parts(
+        np.concatenate([segment, pieces.facing]),
+        np.concatenate([pieces.start, low]),
+        np.concatenate([pieces.stop, high]),
+    )
+
+
+def remaining(inner: Mask, covered: list[Parts]) -> Parts:
+    """What `covered` leaves of all segments that are not `inner` (q,)."""
+    outer = np.flatnonzero(~inner)
+    count = len(outer)
+    # Every segment as an interval [2 n, 2 n + 1] of one axis; an empty part at both of its ends.
+    ends = Parts(np.tile(outer, 2), np.repeat([0.0, 1.0], count), np.repeat([0.0, 1.0], count))
+    segment, start, stop = (
+        np.concatenate([getattr(parts, name) for parts in (*covered, ends)])
+        for name in ("segment", "start", "stop")
+    )
+    start, stop = 2 * segment + start, 2 * segment + stop
+    order = np.lexsort((stop, start))
+    reached = np.maximum.accumulate(stop[order])
+    low, high, number = reached[:-1], start[order][1:], segment[order]
+    left = (number[1:] == number[:-1]) & (high - low > SLIVER)
+    number = number[1:][left]
+    return Parts(number, low[left] - 2 * number, high[left] - 2 * number)
+
+
+def followed_gap(boundary: BoundaryTrace, line: ContactLine, pieces: Pieces, order: int) -> Pieces:
+    """Pieces divided until `gap` data are polynomials on each, by its Gauss points of `order`.
+
+    Or until there are `MAX_PIECES`. Gaps between measured curves are resolved by those.
+    """
+    gap, rule = line.contact.gap, gauss(order)[0]
+    if gap is None or isinstance(gap, float) or len(pieces.local) == 0:
+        return pieces
+    ends = np.concatenate([[0.0], rule, [1.0]])
+    between = (ends[1:] + ends[:-1]) / 2
+    basis = [legvander(2 * s - 1, len(rule) - 1) for s in (rule, between)]
+    follow = basis[1] @ np.linalg.inv(basis[0])
+
+    def gap_at(s: Array) -> Array:
+        """Data (r, n) at places `s` (n,) of the pieces (r,), lengths."""
+        s = pieces.start[:, None] + (pieces.stop - pieces.start)[:, None] * s
+        segment = np.repeat(line.segments[pieces.local], s.shape[1])
+        x = boundary.point(segment, s.ravel())
+        return prescribed_gap(line.contact, boundary, segment, s.ravel(), x).reshape(s.shape)
+
+    done, number = [], 0
+    while len(pieces.local):
+        at_rule, at_between = gap_at(rule), gap_at(between)
+        number += len(pieces.local)
+        allowed = UNRESOLVED * np.ptp(at_rule, axis=1) + NO_GAP * np.abs(at_rule).max()
+        rough = np.abs(at_between - at_rule @ follow.T).max(axis=1) > allowed
+        rough &= number < MAX_PIECES
+        done.append(_select(pieces, np.flatnonzero(~rough)))
+        pieces = _select(pieces, np.repeat(np.flatnonzero(rough), DIVISIONS))
+        step = (pieces.stop - pieces.start) / DIVISIONS
+        start = pieces.start + step * np.tile(np.arange(DIVISIONS), rough.sum())
+        pieces = replace(pieces, start=start, stop=start + step)
+    if len(done) == 1:
+        return done[0]
+    found = _joined(done)
+    return _select(found, np.lexsort((found.start, found.local)))
+
+
+def directions(
+    boundary: BoundaryTrace, line: ContactLine, local: Index, s: Array
+) -> tuple[Array, Array]:
+    """Unit directions d of contact (k, 2), and their derivatives (k, 2) with respect to s.
+
+    At `s` (k,) of the line's segments of the numbers `local` (k,). On a bounded zone those of the
+    rows at the nodes, interpolated: exact on circles, on other curves to the degree plus one.
+    """
+    if line.contact.direction is not None:
+        d = np.tile(line.contact.direction, (len(s), 1))
+        return d, np.zeros_like(d)
+    nodal = np.append(line.direction, np.zeros((1, 2)), axis=0)[line.rows]
+    without = line.rows < 0  # ends of Gamma_K on Gamma_u; parts that do not face
+    if without.any():
+        segment, at_node = boundary.at_nodes(line.segments)
+        here = without.ravel()
+        nodal[without] = boundary.exact_normal(segment[here], at_node[here])
+    for k in np.flatnonzero(boundary.axis[line.segments]):  # whose nodes are others
+        s_here = gauss_lobatto(boundary.order)
+        nodal[k] = boundary.exact_normal(np.full(len(s_here), line.segments[k]), s_here)
+    return between_nodes(nodal[local], s)
+
+
+def between_nodes(nodal: Array, s: Array) -> tuple[Array, Array]:
+    """Unit vectors (k, 2) at `s` (k,), derivatives (k, 2), from `nodal` (k, order + 1, 2) ones."""
+    degree = nodal.shape[1] - 1
+    d = np.einsum("ki,kid->kd", lagrange(degree, s), nodal)
+    slope = np.einsum("ki,kid->kd", lagrange_derivative(degree, s), nodal)
+    size = np.linalg.norm(d, axis=1)[:, None]
+    d, slope = d / size, slope / size
+    return d, slope - d * (d * slope).sum(axis=1)[:, None]
+
+
+@dataclass(frozen=True, eq=False)
+class FacingPoints:
+    """Points of quadrature on the parts of a contact line that face the primary, k of them."""
+
+    local: Index  # (k,), rows of `line.rows`
+    own: BoundaryPoints  # weights in arc length of the secondary (P1) or in eta (P2)
+    facing: BoundaryPoints  # on the primary; segments are -1 for a rigid obstacle
+    direction: Array  # (k, 2), d
+    distance: Array  # (k,), eps along d before deformation, a length
+    # (2, k), arc length on the secondary and on the primary, per arc length of the secondary (P1)
+    # or per eta (P2); about an axis areas per area
+    stretch: Array
+
+
+def facing_points(
+    boundary: BoundaryTrace, line: ContactLine, pieces: Pieces, order: int
+) -> FacingPoints:
+    """Gauss points of degree `order` on the pieces of a line, and what is opposite to them."""
+    parts = Parts(line.segments[pieces.local], pieces.start, pieces.stop)
+    part, (segment, s, weight) = parts.points(order)
+    local, facing = pieces.local[part], pieces.facing[part]
+    d, turn = directions(boundary, line, local, s)
+    x, slope = boundary.point(segment, s), boundary.derivative(segment, s)
+    speed = jacobian(boundary, line.contact, segment, s)
+    length = np.linalg.norm(slope, axis=1) * boundary.measure(segment, s)
+    along = speed <= FACING * length  # the direction touches a curve: nothing is per eta there
+    weight, speed = weight * speed, np.where(along, length, speed)
+    stretch = np.ones((2, len(s)))
+    stretch[0] = length / speed
+    if line.contact.primary is None:
+        s_there, distance = np.zeros(len(s)), np.zeros(len(s))
+    else:
+        s_there = _opposite(boundary, x, d, facing, pieces.opposite[part])
+        offset = at(boundary.curve, facing, s_there) - x
+        distance = (offset * d).sum(axis=1)
+        distance[np.abs(distance) <= TOUCHING * np.abs(x).max(initial=0.0)] = 0.0
+        # Of (y(t) - x(s)) x d(s) = 0: dt / ds = (x' x d - (y - x) x d') / (y' x d).
+        there = boundary.derivative(facing, s_there)
+        across, size = _cross(there, d), np.linalg.norm(there, axis=1)
+        along |= np.abs(across) <= FACING * size
+        across = np.where(along, size, across)
+        rate = (_cross(slope, d) - _cross(offset, turn)) / across
+        length = size * boundary.measure(facing, s_there)
+        stretch[1] = np.abs(rate) * length / speed
+    weight[along], stretch[:, along] = 0.0, 1.0
+    if line.contact.gap is not None:
+        distance = prescribed_gap(line.contact, boundary, segment, s, x)
+    own, other = BoundaryPoints(segment, s, weight), BoundaryPoints(facing, s_there, weight)
+    return FacingPoints(local, own, other, d, distance, stretch)
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """A x b (k,) of vectors (k, 2)."""
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+
+
+def _opposite(boundary: BoundaryTrace, x: Array, d: Array, facing: Index, near: Array) -> Array:
+    """Parameters (k,) on segments `facing` (k,) on the rays from `x` (k, 2) along `d` (k, 2).
+
+    Those that Newton's method reaches from `near` (k,).
+    """
+    across = np.column_stack([-d[:, 1], d[:, 0]])
+    return crossings(x, across, boundary.curve, facing, near, ARRIVED)
+
+
+def closing_energy(
+    solution: ScaledSolution,
+    points: BoundaryPoints,
+    stiffness: Array,
+    w: Array,
+    *,
+    or_more: bool = False,
+) -> Array:
+    """Energy (k,) of a displacement `w` (k,) of the boundary, without a unit: c |w|^2 h / l.
+
+    The `stiffness` (k,) is c, a modulus over h; l is the element's diameter h, or where it is
+    shorter the length |w| / |d_s w| in which w changes on the segment: |w| |d_s w| bounds the
+    square of w in H^(1/2). Of a w that jumps it is infinite; where more than w does as well
+    (`or_more`) it is at most that of a bump as high as w.
+    """
+    segment, s, weight = points
+    boundary = solution.boundary
+    same = segment[1:] == segment[:-1]
+    change = np.diff(w) ** 2 * same
+    if not change.any():
+        return stiffness * w**2
+    size, position = len(boundary.region), boundary.point(segment, s)
+    measure = solution.model.measure(position)
+    apart = np.linalg.norm(np.diff(position, axis=0), axis=1)
+    # Points coincide to round-off at a jump.
+    steep = np.divide(change, apart, out=np.zeros_like(change), where=apart > 0) * measure[1:]
+    square = np.bincount(segment, weight * w**2, size)
+    rise, seen = (np.bincount(segment[1:], x, size) for x in (steep, apart * same))
+    whole = boundary.lengths(np.arange(size))
+    sloping = rise * whole / np.where(seen > 0, seen, np.inf)
+    h = solution.diameter[boundary.element]
+
+    def over_square(values: Array) -> Array:
+        return np.divide(values, square, out=np.zeros(size), where=square > 0)
+
+    times = h * np.sqrt(over_square(sloping))
+    if or_more:
+        largest = np.zeros(size)
+        np.maximum.at(largest, segment, measure * w**2)
+        times = np.minimum(times, BUMP * h * over_square(largest))
+    return stiffness * w**2 * np.maximum(times, 1)[segment]
+
+
+def on_contact(
+    solution: ScaledSolution, pair: ContactState, pairs: Sequence[ContactState]
+) -> BoundaryTerms:
+    """Residuals on both sides of one pair of all `pairs`."""
+    boundary, line = solution.boundary, pair.line
+    nodal, active = at_nodes(boundary, pair, pairs)
+    pieces, whole = facing_pieces(boundary, line, np.asarray(np.isfinite(nodal).any(axis=1)))
+    if len(pieces.local) == 0:
+        return BoundaryTerms()
+    order = 2 * solution.order + DATA_BONUS
+    points = facing_points(boundary, line, followed_gap(boundary, line, pieces, order), order)
+    nodal = _pressure_on_segments(nodal, boundary.places(line.segments))
+    pressure = (boundary.shapes(*points.own[:2]) * nodal[points.local]).sum(axis=1) / solution.unit
+    full = np.asarray(active.all(axis=1))[points.local]
+    sides = [_side(solution, points, pressure, own=True)]
+    if line.contact.primary is not None:
+        sides.append(_side(solution, points, -pressure, own=False))
+    residuals = []
+    for side in sides:  # (3.11), (3.11'): no friction
+        segment, s, _ = side.points
+        share = PressureShare(np.arange(len(s)), segment, s, side.across[..., 1])
+        tangential = side.across[..., 0]
+        term = BoundaryResidual("tangential", side.element, side.weight, tangential, [share])
+        residuals.append(term)
+    residuals += _normal(sides, pressure, full, line.contact.bilateral)  # (3.10), (3.10')
+    # Where both bodies meet the softer gives way to a depth.
+    stiffness = np.min([side.stiffness for side in sides], axis=0)
+    closed, depth = _gap_squares(solution, line, points, pressure, full, stiffness)
+    squares = []
+    for side in sides:
+        share_of_side = points.own.weight / len(sides)
+        for name, values in (("complementarity", closed), ("penetration", depth)):
+            squares.append(Squares(name, side.element, share_of_side * values))
+    return BoundaryTerms(residuals, squares, covered_parts(boundary, line, pieces, whole))
+
+
+def at_nodes(
+    boundary: BoundaryTrace, pair: ContactState, pairs: Sequence[ContactState]
+) -> tuple[Array, Mask]:
+    """Pressure and state of the points at the nodes of each segment of the secondary.
+
+    Where the point is another pair's, as between two primaries, that one's. Of k segments the
+    pressure (k, order + 1) is force over weight, NaN without a point, at an end of Gamma_K on
+    Gamma_u; the state (k, order + 1) is whether it is in contact, without a point true.
+    """
+    line = pair.line
+    pressure = np.append(pair.pressure, np.nan)[line.rows]
+    active = np.append(pair.active, True)[line.rows]
+    nodes, (segment, s) = boundary.nodes[line.segments].ravel(), boundary.at_nodes(line.segments)
+    for other in pairs if (line.rows < 0).any() else ():
+        if other is pair:
+            continue
+        at = np.flatnonzero(np.isnan(pressure).ravel() & np.isin(nodes, other.line.node))
+        if at.size == 0:
+            continue
+        d = boundary.exact_normal(segment[at], s[at])
+        if line.contact.direction is not None:
+            d[:] = line.contact.direction
+        # At a corner the point whose direction is the nearer one.
+        alike = np.where(nodes[at, None] == other.line.node, d @ other.line.direction.T, -1.0)
+        best, same = alike.argmax(axis=1), alike.max(axis=1) > ALIKE
+        pressure.ravel()[at[same]] = other.pressure[best[same]]
+        active.ravel()[at[same]] = other.active[best[same]]
+    return pressure, active
+
+
+def _pressure_on_segments(values: Array, places: Array) -> Array:
+    """Nodal values (k, order + 1) of pi_h on each segment of the secondary.
+
+    From `values` at the nodes with the parameters `places` (k, order + 1); at a node without one,
+    NaN, what the polynomial through the other nodes has there, 0 where there are none.
+    """
+    missing = np.isnan(values)
+    values = np.where(missing, 0.0, values)
+    for k in np.flatnonzero(missing.any(axis=1) & ~missing.all(axis=1)):
+        known = ~missing[k]
+        powers = np.vander(2 * places[k] - 1, int(known.sum()))
+        values[k, missing[k]] = powers[missing[k]] @ np.linalg.solve(
+            powers[known], values[k, known]
+        )
+    return values
+
+
+@dataclass(frozen=True, eq=False)
+class _Side:
+    """One body's tractions at the k points of a line, per unit of s (P1) or eta (P2).
+
+    The last axis of tractions is sigma_h n, along d with pi_h, and that of a unit pressure.
+    """
+
+    points: BoundaryPoints
+    element: Index  # (k,)
+    weight: Array  # (k,), of squared tractions
+    stiffness: Array  # (k,), of squared depths
+    along: Array  # (k, 2)
+    across: Array  # (k, 2, 2)
+
+
+def _side(solution: ScaledSolution, points: FacingPoints, pressure: Array, *, own: bool) -> _Side:
+    """The tractions of the secondary, or those of the primary; `pressure` (k,) is pi_h or -pi_h."""
+    boundary, d = solution.boundary, points.direction
+    here = points.own if own else points.facing
+    segment, s, weight = here
+    stretch, element = points.stretch[0 if own else 1], boundary.element[segment]
+    t = np.stack([solution.traction(segment, s), boundary.normal(segment, s)], axis=2)
+    t *= stretch[:, None, None]
+    along = np.einsum("kij,ki->kj", t, d)
+    across = t - d[:, :, None] * along[:, None, :]
+    along[:, 0] += pressure
+    return _Side(
+        points=here,
+        element=element,
+        weight=solution.edge_weight[element] * weight / stretch,
+        stiffness=solution.rigidity[element] / solution.diameter[element],
+        along=along,
+        across=across,
+    )
+
+
+def _normal(
+    sides: list[_Side], pressure: Array, full: Mask, bilateral: bool
+) -> list[BoundaryResidual]:
+    """The traction along d plus the positive part of pi_h; in contact half the jump.
+
+    Any pressure that is not negative may stand for pi_h, by which the estimate compares both sides:
+    where a segment is in contact with all its nodes (`full`) that is the mean of both tractions,
+    and the stiffer body takes up the difference. `pressure` and `full` (k,) are at all points.
+    """
+    own, other = sides[0], sides[-1]
+    tension = np.zeros_like(pressure) if bilateral else np.maximum(-pressure, 0)
+    signs = (1, -1)[: len(sides)]
+    if len(sides) == 1:
+        full = np.zeros_like(full)
+    elif not bilateral:
+        full = full & (pressure + (other.along[:, 0] - own.along[:, 0]) / 2 >= 0)
+    at, least = np.flatnonzero(full), np.min([side.weight for side in sides], axis=0)
+    residuals = []
+    for side, opposite, sign in zip(sides, sides[::-1], signs, strict=True):
+        value = side.along.copy()
+        value[:, 0] += sign * tension
+        value[at] = side.along[at] / 2
+        value[at, 0] += opposite.along[at, 0] / 2
+        (segment, s, _), (there, s_there, _) = side.points, opposite.points
+        shares = [
+            PressureShare(at, there[at], s_there[at], opposite.along[at, 1:] / 2),
+            PressureShare(np.arange(len(s)), segment, s, value[:, 1:]),
+        ]
+        weight = np.where(full, least, side.weight)
+        residuals.append(BoundaryResidual("pressure", side.element, weight, value[:, :1], shares))
+    return residuals
+
+
+def _gap_squares(
+    solution: ScaledSolution,
+    line: ContactLine,
+    points: FacingPoints,
+    pressure: Array,
+    full: Mask,
+    stiffness: Array,
+) -> tuple[Array, Array]:
+    """Squares (k,) of complementarity and of penetration, per unit of s or eta.
+
+    `full` (k,) is whether all nodes of the segment are in contact, `stiffness` (k,) that of the
+    softer body.
+    """
+    boundary, contact = solution.boundary, line.contact
+    segment, s, _ = points.own
+    u = boundary.evaluate(solution.displacement, segment, s)
+    noise = np.full(len(s), GAP_NOISE * np.abs(u).max())
+    if contact.gap is None:
+        position = boundary.point(segment, s)
+        noise[points.distance != 0] += GAP_NOISE * np.abs(position).max()
+    if contact.primary is not None:
+        u -= boundary.evaluate(solution.displacement, *points.facing[:2])
+    gap = points.distance - (u * points.direction).sum(axis=1)
+    gap[np.abs(gap) <= noise] = 0.0  # its root counts: 1e-16 would be an estimate of 1e-8
+    gap /= solution.strain
+    opening, depth = np.maximum(gap, 0), np.minimum(gap, 0)
+    cost = partial(closing_energy, solution, points.own, stiffness)
+    if contact.bilateral:  # Remark 3.3: apart is as wrong as overlapping, and any force is right
+        return np.zeros_like(gap), cost(gap)
+    closed = np.maximum(pressure, 0) * opening  # (3.12), (3.12')
+    # (3.9), (3.9')
+    return np.where(full, np.minimum(closed, cost(opening)), closed), cost(depth, or_more=True)
