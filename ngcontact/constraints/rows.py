@@ -23,7 +23,7 @@ class Conditions:
     ----------
     node : ndarray of int (k,)
         Numbers i of the nodes.
-    direction : ndarray (k, 2)
+    direction : ndarray (k, d)
         Unit vectors a.
     value : ndarray (k,)
         Prescribed displacements along them, in units of length.
@@ -45,8 +45,8 @@ class Rows:
     ----------
     node : ndarray of int (m,)
         Node j of the secondary.
-    direction : ndarray (m, 2)
-        Unit vectors d.
+    direction : ndarray (m, d)
+        Unit vectors.
     coupling : sparse (m, n)
         Weights c of the nodes of the facing body; an empty row for a rigid obstacle.
     g : ndarray (m,)
@@ -63,16 +63,16 @@ class Rows:
 
     @cached_property
     def matrix(self) -> sp.csr_array:
-        """B (m, 2n) on node values: x components first, then y."""
-        m, n = self.coupling.shape
+        """B (m, dn) on node values: x components first, then y."""
+        (m, n), d = self.coupling.shape, self.direction.shape[1]
         c = self.coupling.tocoo()
         row = np.concatenate([np.arange(m), c.row])
         column = np.concatenate([self.node, c.col])
         weight = np.concatenate([np.ones(m), -c.data])
         # (2.3), (2.5): n.(v' - v''); (2.10): v''_xi - v'_xi
         values = (weight[:, None] * self.direction[row]).T
-        columns = np.concatenate([column, column + n])
-        B = from_triplets(values.ravel(), np.tile(row, 2), columns, (m, 2 * n))
+        columns = np.concatenate([column + i * n for i in range(d)])
+        B = from_triplets(values.ravel(), np.tile(row, d), columns, (m, d * n))
         B.eliminate_zeros()
         return B
 
@@ -80,13 +80,7 @@ class Rows:
         """Some of the rows, by their numbers `rows` (k,)."""
         if np.array_equal(rows, np.arange(len(self.node))):
             return self
-        return Rows(
-            node=self.node[rows],
-            direction=self.direction[rows],
-            coupling=self.coupling[rows],
-            g=self.g[rows],
-            equality=self.equality[rows],
-        )
+        return Rows(*(getattr(self, x.name)[rows] for x in fields(Rows)))
 
     def repeated(self) -> Index:
         """Number (m,) of an earlier row with the same left side, or the row's own number.
@@ -105,22 +99,15 @@ class Rows:
         return number
 
 
-def no_rows(n: int) -> Rows:
+def no_rows(n: int, d: int = 2) -> Rows:
     """The rows of a problem without contact on n nodes."""
-    return Rows(
-        node=np.zeros(0, dtype=np.intp),
-        direction=np.zeros((0, 2)),
-        coupling=sp.csr_array((0, n)),
-        g=np.zeros(0),
-        equality=np.zeros(0, dtype=bool),
-    )
+    none = np.zeros(0, dtype=np.intp)
+    return Rows(none, np.zeros((0, d)), sp.csr_array((0, n)), np.zeros(0), none > 0)
 
 
-def no_conditions() -> Conditions:
+def no_conditions(d: int = 2) -> Conditions:
     """The conditions of a problem without supports."""
-    return Conditions(
-        node=np.zeros(0, dtype=np.intp), direction=np.zeros((0, 2)), value=np.zeros(0)
-    )
+    return Conditions(np.zeros(0, dtype=np.intp), np.zeros((0, d)), np.zeros(0))
 
 
 Part = TypeVar("Part", Conditions, Rows)
@@ -131,11 +118,9 @@ def concatenated(parts: Sequence[Part]) -> Part:
     if len(parts) == 1:
         return parts[0]
     kind = type(parts[0])
-    return kind(*(_stacked([getattr(part, x.name) for part in parts]) for x in fields(kind)))
 
+    def stacked(name: str) -> Any:
+        arrays = [getattr(part, name) for part in parts]
+        return sp.vstack(arrays, format="csr") if sp.issparse(arrays[0]) else np.concatenate(arrays)
 
-def _stacked(arrays: list[Any]) -> Any:
-    """Arrays, dense or sparse, one after the other."""
-    if sp.issparse(arrays[0]):
-        return sp.vstack(arrays, format="csr")
-    return np.concatenate(arrays)
+    return kind(*(stacked(x.name) for x in fields(kind)))

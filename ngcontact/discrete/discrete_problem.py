@@ -32,7 +32,6 @@ from ..linalg import (
     coarsenings,
     congruent,
     iterative_systems,
-    refined_share,
     truncated_multigrid,
 )
 from ..mesh import vertex_parents
@@ -125,7 +124,7 @@ def linear_systems(
     factor, order = cholesky(matrix), nodes.shape[1] - 1
     size = program.b.size
     small = size < MULTIGRID.large.get(order, np.inf) or size <= MULTIGRID.coarsest
-    coarsest = 2 * len(parents) * (1 - refined_share(parents))
+    coarsest = 2 * np.count_nonzero(parents[:, 0] < 0)  # of the first mesh
     half = matrix.nze < program.K.nnz  # all that a factorisation reads
     if small or half or coarsest > (1 - FEWEST) * size:
         return bordered_systems(program, factor)

@@ -1,6 +1,5 @@
 from .coarse_spaces import COARSEST as COARSEST
 from .coarse_spaces import coarsenings as coarsenings
-from .coarse_spaces import refined_share as refined_share
 from .iterative import IterativeSystems as IterativeSystems
 from .iterative import Limits as Limits
 from .iterative import iterative_systems as iterative_systems

@@ -15,9 +15,9 @@ from ..arrays import Integers, from_triplets
 from ..lagrange import gauss_lobatto
 
 COARSEST = 10_000  # unknowns below which a factor costs less than what coarser spaces save
-SHARE = 0.5  # of the vertices that the next coarser space has at most
+VERTEX_RATIO = 0.5  # of the vertices that the next coarser space has at most
 CANCELLED = 1e-14  # entries of products of changes of basis, of size 1, that are zero in truth
-IN_A_ROW = 10  # bodies whose contact lines share nodes; more only where they refer to each other
+MAX_LINKS = 10  # bodies whose contact lines share nodes; more only in rings
 
 
 class RingError(ArithmeticError):
@@ -40,19 +40,14 @@ class Coarsening:
     kept: Integers
 
 
-def refined_share(parents: Integers) -> float:
-    """Share of the vertices that refinement made, by their `parents` (nv, 2): -1 for others."""
-    return float(np.count_nonzero(parents[:, 0] >= 0) / len(parents))
-
-
 def coarsenings(
-    T: sp.csr_array, parents: Integers, nodes: Integers, coarsest: int = COARSEST
+    T: sp.csr_array, parents: Integers, nodes: Integers, coarsest: int = COARSEST, d: int = 2
 ) -> list[Coarsening]:
     """Coarser spaces, finest first, until one has `coarsest` unknowns or the first mesh is met.
 
     Parameters
     ----------
-    T : sparse (2n, 2n)
+    T : sparse (dn, dn)
         Node values and edge functions u = T y for the unknowns y: x of all nodes first, vertices
         before all others.
     parents : ndarray of int (nv, 2)
@@ -61,20 +56,22 @@ def coarsenings(
         Nodes of the segments where unknowns are node values.
     coarsest : int
         A space of fewer unknowns has no coarser one.
+    d : int
+        Unknowns of a node.
 
     Raises
     ------
     RingError
         Contact rows refer to each other in a ring.
     """
-    n, vertices = T.shape[0] // 2, len(parents)
+    n, vertices = T.shape[0] // d, len(parents)
     steps = [(_linear(n, vertices, nodes), np.arange(vertices))] if nodes.shape[1] > 2 else []
     found = []
-    for P, kept in steps + _vertex_steps(parents, coarsest):
-        both = np.concatenate([kept, kept + P.shape[0]])
-        P = sp.block_diag([P, P], format="csr")
-        coarse = (T[both] @ P).tocsr()  # rows there refer to partners that stay
-        found.append(Coarsening((_inverse(T) @ (P @ coarse)).tocsr(), both))
+    for P, kept in steps + _vertex_steps(parents, coarsest // d):
+        every = np.concatenate([kept + i * P.shape[0] for i in range(d)])
+        P = sp.block_diag([P] * d, format="csr")
+        coarse = (T[every] @ P).tocsr()  # rows there refer to partners that stay
+        found.append(Coarsening((_inverse(T, d) @ (P @ coarse)).tocsr(), every))
         T = coarse
     return found
 
@@ -90,8 +87,8 @@ def _depths(parents: Integers) -> Integers:
         depth[new] = deeper
 
 
-def _vertex_steps(parents: Integers, coarsest: int) -> list[tuple[sp.csr_array, Integers]]:
-    """Interpolation (n, k) of vertex values and the vertices that stay, finest first.
+def _vertex_steps(parents: Integers, most: int) -> list[tuple[sp.csr_array, Integers]]:
+    """Interpolation (n, k) of vertex values and the vertices that stay, until `most` do.
 
     A step takes as many generations away as halve the vertices: work falls geometrically also
     where refinement is local.
@@ -99,8 +96,8 @@ def _vertex_steps(parents: Integers, coarsest: int) -> list[tuple[sp.csr_array, 
     steps: list[tuple[sp.csr_array, Integers]] = []
     depth = _depths(parents)
     counts = np.bincount(depth).cumsum()
-    while 2 * depth.size > coarsest:
-        few = np.flatnonzero(counts <= SHARE * depth.size)
+    while depth.size > most:
+        few = np.flatnonzero(counts <= VERTEX_RATIO * depth.size)
         if few.size == 0:
             break
         last, deepest = int(few[-1]), len(counts) - 1
@@ -132,21 +129,20 @@ def _linear(n: int, vertices: int, nodes: Integers) -> sp.csr_array:
     return from_triplets(values, rows, columns, (n, vertices))
 
 
-def _inverse(T: sp.csr_array) -> sp.csr_array:
+def _inverse(T: sp.csr_array, d: int) -> sp.csr_array:
     """Inverse of a change of basis: blocks of the nodes, and what rows contain of other nodes."""
-    n = T.shape[0] // 2
-    a, d = np.split(T.diagonal(), 2)
-    b, c = T.diagonal(n), T.diagonal(-n)
-    determinant = a * d - b * c
-    diagonal = np.concatenate([d, a]) / np.tile(determinant, 2)
-    blocks = sp.diags_array(
-        [diagonal, -b / determinant, -c / determinant], offsets=[0, n, -n], format="csr"
-    )
-    rest = sp.eye_array(2 * n, format="csr") - blocks @ T
+    n = T.shape[0] // d
+    pairs = [(i, j) for i in range(d) for j in range(d)]
+    parts = [T.diagonal((j - i) * n)[min(i, j) * n :][:n] for i, j in pairs]
+    blocks = np.linalg.inv(np.array(parts).T.reshape(n, d, d)).transpose(1, 2, 0)
+    rows, columns = (np.add.outer(n * np.array(x), np.arange(n)) for x in zip(*pairs, strict=True))
+    G = from_triplets(blocks.ravel(), rows.ravel(), columns.ravel(), T.shape)
+    G.eliminate_zeros()
+    rest = sp.eye_array(d * n, format="csr") - G @ T
     rest.data[np.abs(rest.data) < CANCELLED] = 0.0
     rest.eliminate_zeros()
-    inverse, term = blocks, rest @ blocks
-    for _ in range(IN_A_ROW):
+    inverse, term = G, rest @ G
+    for _ in range(MAX_LINKS):
         if term.nnz == 0:
             return inverse.tocsr()
         inverse, term = inverse + term, rest @ term

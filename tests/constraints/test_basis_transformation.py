@@ -1,5 +1,7 @@
 """Rows and prescribed conditions as single unknowns: exact algebra of the change of basis."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 from ngcontact.arrays import from_triplets
 from ngcontact.constraints.basis_transformation import change_of_basis
-from ngcontact.constraints.rows import Rows, concatenated
+from ngcontact.constraints.rows import Conditions, Rows, concatenated
 from ngcontact.lagrange import lagrange
 from tests.constraints.given import X, Y, clamped, conditions, rows, unit
 
@@ -15,24 +17,27 @@ from tests.constraints.given import X, Y, clamped, conditions, rows, unit
 def check(given_, contact, tolerance=1e-13, **options):
     """Solve the defining equations of a basis for what holds at every y; return the basis."""
     basis = change_of_basis(given_, contact, **options)
-    n = contact.coupling.shape[1]
+    n, d = contact.coupling.shape[1], contact.direction.shape[1]
     T, B = basis.T.toarray(), contact.matrix.toarray()
     assert np.linalg.cond(T) < 1e8
     assert len(basis.unknown) == len(basis.kept)
     assert len(set(basis.unknown)) == len(basis.unknown)
     assert not basis.fixed[basis.unknown].any()
     # Row j of B T is the unit vector of its unknown.
-    expected = np.zeros((len(basis.kept), 2 * n))
+    expected = np.zeros((len(basis.kept), d * n))
     expected[np.arange(len(basis.kept)), basis.unknown] = 1
     np.testing.assert_allclose(B[basis.kept] @ T, expected, atol=tolerance)
-    # Conditions hold whatever the free unknowns are.
+    # Conditions hold whatever the free unknowns are, and these are told from node values.
     rng = np.random.default_rng(5)
-    size = 1 + np.abs(basis.values).max(initial=0)
+    allowed = tolerance * (1 + np.abs(basis.values).max(initial=0)) * np.linalg.cond(T)
     for _ in range(3):
-        y = np.where(basis.fixed, basis.values, rng.normal(size=2 * n))
-        u = (T @ y).reshape(2, n).T
+        y = np.where(basis.fixed, basis.values, rng.normal(size=d * n))
+        u = (T @ y).reshape(d, n).T
         left = (u[given_.node] * given_.direction).sum(axis=1)
-        np.testing.assert_allclose(left, given_.value, atol=tolerance * size * np.linalg.cond(T))
+        np.testing.assert_allclose(left, given_.value, atol=allowed)
+        values = (T @ np.where(basis.fixed, 0.0, y))[:, None]
+        told = basis.coordinates(values, B[basis.kept] @ values)[:, 0]
+        np.testing.assert_allclose(told, np.where(basis.fixed, 0.0, y), atol=allowed)
     # As many unknowns are fixed as there are independent conditions.
     rank = 0
     for node in np.unique(given_.node):
@@ -129,7 +134,13 @@ def test_round_off_of_a_measured_gap_is_no_interference():
         change_of_basis(given_, contact, length=1e-6)
 
 
-def random_contact(rng, n, secondary, primary, order=2):
+def directions(rng, *shape):
+    """Random unit vectors."""
+    v = rng.normal(size=shape)
+    return v / np.linalg.norm(v, axis=-1, keepdims=True)
+
+
+def random_contact(rng, n, secondary, primary, d, order=2):
     """Rows on n nodes, of one body with partner points on another, some nodes with two rows."""
     entries = [k for k in secondary for _ in range(1 + (rng.random() < 0.3))]
     m = len(entries)
@@ -137,39 +148,34 @@ def random_contact(rng, n, secondary, primary, order=2):
     first = rng.integers(0, len(primary) - order, size=m)
     facing = np.array(primary)[first[:, None] + np.arange(order + 1)]
     row = np.repeat(np.arange(m), order + 1)
-    direction = unit(rng.uniform(-np.pi, np.pi, size=m)).T
     return Rows(
         node=np.array(entries),
-        direction=direction,
+        direction=directions(rng, m, d),
         coupling=from_triplets(lagrange(order, s).ravel(), row, facing.ravel(), (m, n)),
         g=rng.normal(size=m),
         equality=np.zeros(m, dtype=bool),
     )
 
 
-def random_conditions(rng, nodes):
-    """Some nodes clamped, some with one direction, some with two slanted ones."""
-    entries = []
-    for node in nodes:
-        kind = rng.integers(0, 3)
-        entries.append((node, unit(rng.uniform(0, 7)), rng.normal()))
-        if kind == 0:
-            entries[-1:] = clamped(node, *rng.normal(size=2))
-        elif kind == 1:
-            entries.append((node, unit(rng.uniform(0, 7)), rng.normal()))
-    return conditions(*entries)
+def random_conditions(rng, nodes, d):
+    """One to d conditions at each node, along axes or aslant."""
+    count = rng.integers(1, d + 1, size=len(nodes))
+    sets = [np.eye(d)[:k] if rng.random() < 0.3 else directions(rng, k, d) for k in count]
+    node = np.repeat(nodes, count).astype(int)
+    return Conditions(node, np.concatenate([np.zeros((0, d)), *sets]), rng.normal(size=len(node)))
 
 
 def well_separated(given_, contact):
     """Whether directions at the same node differ: else the inverse loses digits by right."""
-    directions = np.concatenate([contact.direction, given_.direction])
+    vectors = np.concatenate([contact.direction, given_.direction])
     nodes = np.concatenate([contact.node, given_.node])
-    for node in np.unique(nodes):
-        d = directions[nodes == node]
-        cross = np.abs(d[:, None, 0] * d[None, :, 1] - d[:, None, 1] * d[None, :, 0])
-        if (cross[np.triu_indices(len(d), 1)] < 0.05).any():
-            return False
-    return True
+    d = vectors.shape[1]
+    return all(
+        np.linalg.svd(vectors[list(some)], compute_uv=False)[-1] > 0.05
+        for node in np.unique(nodes)
+        for k in range(2, d + 1)
+        for some in combinations(np.flatnonzero(nodes == node), k)
+    )
 
 
 # Pivots of 0.05 and sines of 0.05, in chains of three bodies: four digits may go.
@@ -177,29 +183,36 @@ SEPARATED = 1e-11
 
 
 @settings(max_examples=150, deadline=None)
-@given(st.integers(0, 2**32 - 1))
-def test_random_pairs(seed):
+@given(st.integers(0, 2**32 - 1), st.sampled_from([2, 3]))
+def test_random_pairs(seed, d):
     """Two bodies, supported inside, at the end of the zone or on one side of it."""
     rng = np.random.default_rng(seed)
     secondary, primary, inner = np.arange(5), np.arange(5, 12), np.arange(12, 16)
     ends = [[], secondary[:1], primary[:2]][rng.integers(3)]
-    contact = random_contact(rng, 16, secondary, primary)
-    given_ = random_conditions(rng, [*inner, *ends])
+    contact = random_contact(rng, 16, secondary, primary, d)
+    given_ = random_conditions(rng, [*inner, *ends], d)
     assume(well_separated(given_, contact))
     basis = check(given_, contact, tolerance=SEPARATED)
     assert basis.kept.tolist() == list(range(len(contact.g)))
 
 
 @settings(max_examples=150, deadline=None)
-@given(st.integers(0, 2**32 - 1))
-def test_random_stacks(seed):
+@given(st.integers(0, 2**32 - 1), st.sampled_from([2, 3]))
+def test_random_stacks(seed, d):
     """Three bodies: the middle one is primary to the first and secondary to the last."""
     rng = np.random.default_rng(seed)
     top, middle, bottom = np.arange(4), np.arange(4, 10), np.arange(10, 15)
     contact = concatenated(
-        [random_contact(rng, 15, top, middle), random_contact(rng, 15, middle[:4], bottom)]
+        [random_contact(rng, 15, top, middle, d), random_contact(rng, 15, middle[:4], bottom, d)]
     )
-    given_ = random_conditions(rng, rng.choice(bottom, size=2, replace=False))
+    given_ = random_conditions(rng, rng.choice(bottom, size=2, replace=False), d)
     assume(well_separated(given_, contact))
     basis = check(given_, contact, tolerance=SEPARATED)
     assert basis.kept.tolist() == list(range(len(contact.g)))
+
+
+def test_a_ring_of_independent_rows_is_solved():
+    """Both rows are fixed at their own nodes along x: each needs the unknown of the other."""
+    contact = rows(2, (0, (0, -1), {1: 0.5}), (1, (0, 1), {0: 0.25}))
+    basis = check(conditions((0, X, 0.0), (1, X, 0.1)), contact)
+    assert basis.unknown.tolist() == [2, 3]

@@ -12,8 +12,7 @@ from drivers.reference import cases
 from ngcontact.adaptivity.refinement import refined
 from ngcontact.discrete.discrete_problem import DiscreteProblem, discretise
 from ngcontact.lagrange import gauss_lobatto
-from ngcontact.linalg import refined_share
-from ngcontact.mesh.generation import first_mesh, vertex_parents
+from ngcontact.mesh.generation import first_mesh
 from tests.scenes import REFINED, coordinates, discrete, near_origin, steps_of
 
 
@@ -70,7 +69,6 @@ def test_spaces_shrink_geometrically(local: bool):
     assert all(k <= n / 2 for n, k in sizes)
     assert sizes[0][0] == 2 * mesh.nv
     assert sizes[-1][1] <= 4 * first.nv
-    assert refined_share(vertex_parents(mesh)) == pytest.approx(1 - first.nv / mesh.nv)
 
 
 def test_the_first_mesh_is_the_coarsest():

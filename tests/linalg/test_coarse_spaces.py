@@ -9,15 +9,15 @@ import scipy.sparse as sp
 from ngcontact.arrays import from_triplets
 from ngcontact.constraints import Conditions, Rows, change_of_basis
 from ngcontact.lagrange import gauss_lobatto
-from ngcontact.linalg.coarse_spaces import COARSEST, RingError, coarsenings, refined_share
+from ngcontact.linalg.coarse_spaces import COARSEST, RingError, coarsenings
 
 FIRST = 4  # vertices of each line at first
 
 
-def facing_lines(rounds):
-    """Vertices (nv, 2), parents (nv, 2) and the segments (k, 2) of both lines, in one order."""
+def facing_lines(rounds, d):
+    """Vertices (nv, d), parents (nv, 2) and the segments (2, k, 2) of both lines, in one order."""
     rng = np.random.default_rng(rounds)
-    points = np.tile(np.sort(rng.random((FIRST, 2)), axis=0), (2, 1))
+    points = np.tile(np.sort(rng.random((FIRST, d)), axis=0), (2, 1))
     parents = np.full((2 * FIRST, 2), -1)
     one = np.column_stack([np.arange(FIRST - 1), np.arange(1, FIRST)])
     both = np.stack([one, one + FIRST])
@@ -31,49 +31,53 @@ def facing_lines(rounds):
     return points, parents, both
 
 
-def transformed(n, one, other):
+def transformed(n, one, other, d):
     """Basis T in which the jump between facing nodes is an unknown, and a node slides aslant."""
     angle = np.linspace(0.3, 1.2, len(one))
-    direction = np.column_stack([np.cos(angle), np.sin(angle)])
+    direction = np.column_stack([np.cos(angle), np.sin(angle), 0.5 * np.cos(3 * angle)])[:, :d]
+    direction /= np.linalg.norm(direction, axis=1)[:, None]
     coupling = from_triplets(np.ones(len(one)), np.arange(len(one)), other, (len(one), n))
     none = np.zeros(len(one), dtype=bool)
     rows = Rows(one, direction, coupling, np.zeros(len(one)), equality=none)
     return change_of_basis(Conditions(other[:1], direction[:1], np.zeros(1)), rows).T
 
 
-def space(order, rounds):
-    """T, parents and nodes of the two lines, and a linear displacement (2n,)."""
-    points, parents, both = facing_lines(rounds)
+def space(order, rounds, d=2):
+    """T, parents and nodes of the two lines, and a linear displacement (dn,)."""
+    points, parents, both = facing_lines(rounds, d)
     segments = both.reshape(-1, 2)
     inner = len(points) + np.arange(len(segments) * (order - 1)).reshape(len(segments), -1)
     nodes = np.column_stack([segments[:, 0], inner, segments[:, 1]])
     s = gauss_lobatto(order)[1:-1, None]
     ends = points[segments][:, :, None]
-    points = np.concatenate([points, ((1 - s) * ends[:, 0] + s * ends[:, 1]).reshape(-1, 2)])
+    points = np.concatenate([points, ((1 - s) * ends[:, 0] + s * ends[:, 1]).reshape(-1, d)])
     one, other = (np.unique(half) for half in np.split(nodes, 2))
     at = np.argsort(points[one, 0]), np.argsort(points[other, 0])
-    u = points @ [[0.3, -0.7], [1.1, 0.2]] + [0.5, -0.4]
-    return transformed(len(points), one[at[0]], other[at[1]]), parents, nodes, u.T.ravel()
+    rng = np.random.default_rng(order)
+    u = points @ rng.normal(size=(d, d)) + rng.normal(size=d)
+    return transformed(len(points), one[at[0]], other[at[1]], d), parents, nodes, u.T.ravel()
 
 
+@pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
-def test_linear_displacements_are_in_all_spaces(order):
-    T, parents, nodes, u = space(order, 4)
+def test_linear_displacements_are_in_all_spaces(order, d):
+    T, parents, nodes, u = space(order, 4, d)
     y = sp.linalg.spsolve(T.tocsc(), u)
-    steps = coarsenings(T, parents, nodes, 2 * FIRST)
+    steps = coarsenings(T, parents, nodes, d * FIRST, d)
     # Half of a line's segments have more than half of its vertices: two generations a step.
     assert len(steps) == (2 if order == 1 else 3)
     for step in steps:
         # Theory: exact; sums of a few numbers of size 1, in blocks of condition below 10.
         np.testing.assert_allclose(step.P @ y[step.kept], y, rtol=0, atol=1e-13)
         y = y[step.kept]
-    assert y.size == 4 * FIRST
+    assert y.size == 2 * d * FIRST
 
 
+@pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("order", [1, 2, 4])
-def test_unknowns_that_stay_mean_the_same(order):
-    T, parents, nodes, _ = space(order, 3)
-    for step in coarsenings(T, parents, nodes, 0):
+def test_unknowns_that_stay_mean_the_same(order, d):
+    T, parents, nodes, _ = space(order, 3, d)
+    for step in coarsenings(T, parents, nodes, 0, d):
         chosen = step.P[step.kept]
         # Theory: the identity; round-off of the frames.
         assert abs(chosen - sp.eye_array(chosen.shape[0])).max() < 1e-13
@@ -91,7 +95,6 @@ def test_spaces_shrink_geometrically_where_refinement_is_local():
     assert all(k <= n / 2 for n, k in sizes)
     assert sizes[0][0] == 2 * len(parents)
     assert sizes[-1][1] <= 8
-    assert refined_share(parents) == depth / (depth + 2)
 
 
 def test_small_spaces_have_no_coarser_ones():
