@@ -27,21 +27,20 @@ from ..fem import (
 )
 from ..linalg import (
     COARSEST,
+    IterativeSystems,
     Multigrid,
     cholesky,
     coarsenings,
     congruent,
-    iterative_systems,
     truncated_multigrid,
 )
 from ..mesh import vertex_parents
 from ..problem import Problem
 from ..qp import (
+    BorderedSystems,
     Iterate,
-    LinearSystems,
     QuadraticProgram,
     SingularError,
-    bordered_systems,
     minimise,
     no_null_space,
 )
@@ -108,7 +107,7 @@ def linear_systems(
     T: sp.csr_array,
     parents: Integers,
     nodes: Integers,
-) -> LinearSystems:
+) -> BorderedSystems:
     """Systems of a discrete problem: by multigrid where it is large and has coarser spaces.
 
     Parameters
@@ -127,12 +126,12 @@ def linear_systems(
     coarsest = 2 * np.count_nonzero(parents[:, 0] < 0)  # of the first mesh
     half = matrix.nze < program.K.nnz  # all that a factorisation reads
     if small or half or coarsest > (1 - FEWEST) * size:
-        return bordered_systems(program, factor)
+        return BorderedSystems(program, factor)
 
     def prepare(free: Mask) -> Multigrid:
         return truncated_multigrid(matrix, coarsenings(T, parents, nodes, MULTIGRID.coarsest), free)
 
-    return iterative_systems(program, factor, prepare)
+    return IterativeSystems(program, factor, prepare)
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +155,7 @@ class Influence:
 
 
 def influence(
-    program: QuadraticProgram, systems: LinearSystems, active: Mask, jumps: Array
+    program: QuadraticProgram, systems: BorderedSystems, active: Mask, jumps: Array
 ) -> Influence:
     """Move the `active` (m,) points by `jumps` (m,); supports rest, the other points are free.
 
@@ -166,7 +165,7 @@ def influence(
         Active points and supports leave a rigid motion free.
     """
     null_space, zero = program.null_space, np.zeros_like(program.b)
-    if null_space.pins.size and not null_space.resisted(program.unknown[active]):
+    if not null_space.resisted(program.unknown[active]):
         raise ConvergenceError("contact leaves a rigid motion free")
     systems.restart(replace(program, b=zero, g=jumps, values=zero))
     try:
@@ -199,7 +198,7 @@ class DiscreteProblem:
         Unknowns in which rows and prescribed values are single unknowns.
     program : QuadraticProgram
         The quadratic program in those unknowns.
-    systems : LinearSystems
+    systems : BorderedSystems
         Its linear systems, with the factorisation once there is one.
     rigid : Rigid or None
         Rigid motions that supports leave free, if there are any.
@@ -215,7 +214,7 @@ class DiscreteProblem:
     B: sp.csr_array
     basis: BasisTransformation
     program: QuadraticProgram
-    systems: LinearSystems
+    systems: BorderedSystems
     rigid: Rigid | None
     assembled: bool
 
@@ -308,7 +307,7 @@ def _space(
 
 def _program(
     space: Space, admissible: AdmissibleSet, rigid: Rigid | None, known: Reduced | None
-) -> tuple[QuadraticProgram, LinearSystems]:
+) -> tuple[QuadraticProgram, BorderedSystems]:
     """L over K_h in the unknowns of rows and supports, and its linear systems.
 
     Raises

@@ -13,7 +13,7 @@ from ..constraints import BasisTransformation
 from ..contact import ContactLine, contact_line
 from ..fem import BoundaryTrace, Space
 from ..problem import Contact, Elastic, Hooke, MeshArrays, Problem, varies
-from ..qp import LinearSystems
+from ..qp import BorderedSystems
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,13 +26,13 @@ class Reduced:
         The unknowns, n of them.
     K : sparse (n, n)
         The stiffness, force per length.
-    systems : LinearSystems
+    systems : BorderedSystems
         Its linear systems, with the factorisation once there is one.
     """
 
     basis: BasisTransformation
     K: sp.csr_array
-    systems: LinearSystems
+    systems: BorderedSystems
 
 
 @dataclass(frozen=True, eq=False)

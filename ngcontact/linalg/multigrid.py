@@ -113,6 +113,10 @@ class Multigrid:
         """Let `free` (n,) be the unknowns; coarser spaces change only in what they correct."""
         self.levels[0] = self.levels[0].holding(free)
 
+    def largest(self, residual: Array) -> float:
+        """Largest size of `residual` (n,) at the free unknowns."""
+        return float(np.abs(residual[self.levels[0].free]).max(initial=0.0))
+
     def cycle(self, right: ng.BaseVector, solution: ng.BaseVector, level: int = 0) -> None:
         """Set `solution` to the preconditioner times `right`; both vanish where not free."""
         if level == len(self.levels):

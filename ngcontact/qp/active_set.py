@@ -22,16 +22,14 @@ from scipy.sparse.linalg import splu
 
 from ..arrays import Array, Factor, Mask, Solve
 from ..errors import ConvergenceError
-from .quadratic_program import FREE, Anchor, Iterate, LinearSystems, QuadraticProgram, SingularError
-from .schur_complement import bordered_systems
-
-SYMMETRIC = 1e-10  # difference of A and its transpose, relative to the largest entry
+from .quadratic_program import FREE, Anchor, Iterate, QuadraticProgram, SingularError
+from .schur_complement import BorderedSystems
 
 Matrix: TypeAlias = sp.sparray | sp.spmatrix | ArrayLike  # a dense one may be a list of rows
 
-
 log = logging.getLogger("ngcontact")
 
+SYMMETRIC = 1e-10  # difference of A and its transpose, relative to the largest entry
 TIE = 1e-13  # relative size below which a force or a slack keeps its state
 CLEAR = 1e-9  # ... below which it is judged by the refined solution only
 WIDEST_TIE = 1e-9  # ... and to which that grows, tenfold, each time an active set comes back
@@ -39,66 +37,39 @@ PATIENCE = 10  # full switches allowed without fewer violated rows: p of Judice 
 
 PROXIMAL = 1e-3  # of the stiffness at the pins, where contact leaves rigid motions free
 WEAKEST = 1e-6  # of that, to which it falls, tenfold at each proximal step
-RESTED = 1e-14  # force of the proximal term, relative to stiffness times displacement
+AT_REST = 1e-14  # force of the proximal term, relative to stiffness times displacement
 STEADY = 0.9  # ratio of that force to the last from which a motion is steady, not slowing down
-OUTER = 100  # proximal steps; most problems need less than five
-
-
-@dataclass
-class _Pivoting:
-    """Block principal pivoting: which of the rows on the wrong side change theirs.
-
-    As in Judice and Pires, ninf is the fewest violated rows so far, and p the full switches left.
-    """
-
-    patience: int
-    ninf: int
-    p: int
-
-    def switched(self, wrong: Mask) -> Mask:
-        """Of the violated rows `wrong` (m,) those that switch, (m,)."""
-        count = int(np.count_nonzero(wrong))
-        if count < self.ninf:
-            self.ninf, self.p = count, self.patience
-        else:
-            self.p -= 1
-        if count == 0 or self.p >= 0:
-            return wrong
-        single = np.zeros_like(wrong)  # Murty's rule, until fewer rows are violated
-        single[np.flatnonzero(wrong)[-1]] = True
-        return single
+MAX_PROXIMAL = 100  # proximal steps; most problems need less than five
 
 
 @dataclass(eq=False)
 class ActiveSetIteration:
-    """The iterate of one quadratic program; `first_iterate` makes it.
+    """The iterate of one quadratic program.
 
     Attributes
     ----------
-    systems : LinearSystems
-        Of the program with n unknowns and m rows.
+    systems : BorderedSystems
+        Of the program with n unknowns and m rows; its solution is that of the last system.
     active : ndarray of bool (m,)
         Current active set.
-    y : ndarray (n,)
-        Solution of the last linear system.
-    force : ndarray (m,)
-        Its multipliers.
     size : ndarray (m,)
         Sums of the sizes of the rows' coefficients.
     patience : int
         See `minimise`.
+    y, force : ndarray (n,), (m,)
+        Solution of the last linear system and its multipliers.
     steps : list of int
         Changes of the active set after each linear system.
     extent : float
         Largest displacement met so far.
     """
 
-    systems: LinearSystems
+    systems: BorderedSystems
     active: Mask
-    y: Array
-    force: Array
     size: Array
     patience: int
+    y: Array
+    force: Array
     steps: list[int] = field(default_factory=list)
     extent: float = 0.0
 
@@ -140,18 +111,25 @@ class ActiveSetIteration:
         return float(steps.min())
 
     def settle(self, anchor: Anchor | None) -> None:
-        """Newton steps until the active set repeats or, without anchor, leaves a motion free."""
+        """Newton steps until the active set repeats or, without anchor, leaves a motion free.
+
+        Rows on the wrong side change theirs by block principal pivoting: as in Judice and Pires,
+        ninf is the fewest of them so far, and p the full switches left.
+        """
         m = self.systems.program.g.size
-        pivoting = _Pivoting(patience=self.patience, ninf=m + 1, p=self.patience)
+        ninf, p = m + 1, self.patience
         seen: set[bytes] = set()
         tie, limit = TIE, 100 + 20 * m
         for _ in range(limit):
-            wrong = self._solved(anchor, tie)
-            switched = pivoting.switched(wrong)
+            switched = wrong = self._solved(anchor, tie)
+            count = int(np.count_nonzero(wrong))
+            ninf, p = (count, self.patience) if count < ninf else (ninf, p - 1)
+            if count and p < 0:  # Murty's rule, until fewer rows are violated
+                switched = np.arange(m) == np.flatnonzero(wrong)[-1]
             self.steps.append(int(np.count_nonzero(switched)))
             step = len(self.steps), self.active.sum(), self.steps[-1]
             log.debug("Newton step %d: %d active, %d change", *step)
-            if not wrong.any():
+            if count == 0:
                 return  # (iv)
             if (key := self.active.tobytes()) in seen:
                 tie = min(10 * tie, WIDEST_TIE)
@@ -160,7 +138,7 @@ class ActiveSetIteration:
             if anchor is None and not self.resisted():
                 return
         raise ConvergenceError(
-            f"the active set did not settle in {limit} Newton steps ({np.count_nonzero(wrong)} "
+            f"the active set did not settle in {limit} Newton steps ({count} "
             "rows still change); check that the matrix is symmetric and positive definite",
             iterate=self.result(),
         )
@@ -195,29 +173,14 @@ class ActiveSetIteration:
         return np.where(self.active, pulling, penetrating) & ~p.equality
 
 
-def first_iterate(
-    systems: LinearSystems, active: Mask | None = None, patience: int = PATIENCE
-) -> ActiveSetIteration:
-    """Prescribed values, no force, and the first active set `active` (m,)."""
-    p = systems.program
-    return ActiveSetIteration(
-        systems=systems,
-        active=p.equality.copy() if active is None else p.equality | active,
-        y=np.where(p.fixed, p.values, 0.0),
-        force=np.zeros(p.g.size),
-        size=np.asarray(abs(p.R).sum(axis=1)).ravel(),
-        patience=patience,
-    )
-
-
 def minimise(
-    systems: LinearSystems, active: Mask | None = None, patience: int = PATIENCE
+    systems: BorderedSystems, active: Mask | None = None, patience: int = PATIENCE
 ) -> Iterate:
     """Solve a quadratic program by semismooth Newton steps.
 
     Parameters
     ----------
-    systems : LinearSystems
+    systems : BorderedSystems
         The program, with its factorisation where there is one already.
     active : ndarray of bool (m,), optional
         First active set; the equalities alone when left out.
@@ -236,12 +199,20 @@ def minimise(
         A system is singular, or the step limit was reached, to which only a matrix that is not
         positive definite is known to lead; with the last `Iterate`.
     """
-    current = first_iterate(systems, active, patience)  # (i)
-    pins = systems.program.null_space.pins
-    hardness = systems.program.diagonal[pins]  # of bodies that may be very unlike
+    p = systems.program
+    current = ActiveSetIteration(  # (i)
+        systems=systems,
+        active=p.equality.copy() if active is None else p.equality | active,
+        size=np.asarray(abs(p.R).sum(axis=1)).ravel(),
+        patience=patience,
+        y=np.where(p.fixed, p.values, 0.0),
+        force=np.zeros(p.g.size),
+    )
+    pins = p.null_space.pins
+    hardness = p.diagonal[pins]  # of bodies that may be very unlike
     anchor = Anchor(PROXIMAL * hardness, np.zeros(pins.size))
     share, last = PROXIMAL, np.inf
-    for _ in range(OUTER):
+    for _ in range(MAX_PROXIMAL):
         if current.resisted():
             current.settle(None)
             if current.resisted():
@@ -251,7 +222,7 @@ def minimise(
         at = current.y[pins]
         moved = at - anchor.at
         force = anchor.stiffness * np.abs(moved)
-        if (force <= RESTED * hardness * current.extent).all():
+        if (force <= AT_REST * hardness * current.extent).all():
             return current.result()
         # A steady motion: go where it leads.
         if force.max() > STEADY * last and not current.resisted():
@@ -260,7 +231,8 @@ def minimise(
         share = max(share / 10, WEAKEST * PROXIMAL)
         anchor = Anchor(share * hardness, at)
     raise ConvergenceError(
-        f"the rigid motions did not settle in {OUTER} proximal steps", iterate=current.result()
+        f"the rigid motions did not settle in {MAX_PROXIMAL} proximal steps",
+        iterate=current.result(),
     )
 
 
@@ -390,6 +362,6 @@ def solve_qp(
     if start.shape != (m,) or start.dtype != bool:
         raise ValueError(f"active is {active!r}; it must be {m} booleans, one per row of B")
     first = np.concatenate([start, program.equality[m:]])
-    result = minimise(bordered_systems(program, _factor(program.K)), first)
+    result = minimise(BorderedSystems(program, _factor(program.K)), first)
     force, multiplier = np.split(result.force, [m])
     return replace(result, force=force, multiplier=multiplier, active=result.active[:m])

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 import scipy.sparse as sp
@@ -20,8 +19,6 @@ from ..arrays import Array, Index, Mask
 
 FREE = 1e-8  # singular value, relative to motions of size 1, below which nothing resists
 IN_CACHE = 1 << 14  # rows that are copied at a time: the copy stays in the cache
-ROUGH = 1e-11  # residual, relative to the largest met, of a system that tells the next active set
-REFINED = 1e-14  # ... and of the last system
 
 
 def vanishing_combinations(resisted: Array) -> Array:
@@ -73,8 +70,6 @@ class NullSpace:
 
     def resisted(self, rows: Index) -> bool:
         """Whether rows with the unknowns `rows` (k,) resist all motions that are not lineal."""
-        if self.pins.size == 0:
-            return True
         return vanishing_combinations(self.others[rows]).shape[1] == 0
 
 
@@ -101,7 +96,6 @@ def pinned_null_space(
         Unknowns that are the values of contact rows.
     fixed : ndarray of bool (n,)
         Unknowns with given values.
-
     """
     free = ~fixed
     free[rows] = False
@@ -211,30 +205,19 @@ class Iterate:
 
 
 def terms(A: sp.csr_array, x: Array, rows: int = IN_CACHE) -> Array:
-    """|A| |x| (m,), the size of the terms of A x, without a second matrix of that size.
+    """|A| |x| (m,), the size of the terms of A x for `x` (n,), by as many `rows` at a time.
 
-    Parameters
-    ----------
-    A : sparse (m, n)
-    x : ndarray (n,) or (n, k)
-        With k columns the result is (m, k).
-    rows : int
-        Rows that are copied at a time.
+    A second matrix of the size of `A` (m, n) is not made.
     """
     x = np.abs(x)
     parts = [abs(A[start : start + rows]) @ x for start in range(0, A.shape[0], rows)]
-    return np.concatenate([np.zeros((0, *x.shape[1:])), *parts])
+    return np.concatenate([np.zeros(0), *parts])
 
 
 def kkt_residuals(program: QuadraticProgram, minimiser: Iterate) -> dict[str, float]:
     """Dimensionless residuals of the Karush-Kuhn-Tucker conditions, see `Solution.residuals`.
 
-    Parameters
-    ----------
-    program : QuadraticProgram
-        With unit rows.
-    minimiser : Iterate
-        As computed.
+    Of a program with unit rows.
     """
     p, y, force, active = program, minimiser.u, minimiser.force, minimiser.active
     gap = p.g - y[p.unknown]
@@ -274,94 +257,3 @@ class Anchor:
 
     stiffness: Array
     at: Array
-
-
-class LinearSystems(Protocol):
-    """The systems K y + R' force = b, R y = g on the active rows, force = 0 on the others.
-
-    Every solution starts from the one before. `solve` and `refine` may be called in any order.
-    """
-
-    @property
-    def program(self) -> QuadraticProgram:
-        """The program, n unknowns and m rows, of the last `restart`."""
-
-    @property
-    def factorizations(self) -> int:
-        """Factorisations since then."""
-
-    @property
-    def back_solves(self) -> int:
-        """Back-solves since then; V-cycles count as such."""
-
-    def restart(self, program: QuadraticProgram) -> None:
-        """Begin with another load, other values or bounds; what the matrix cost stays."""
-
-    def solve(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
-        """Solution (n,) and multipliers (m,) for the rows `active` (m,), to tell the next set.
-
-        Raises
-        ------
-        SingularError
-            The matrix is singular to working precision.
-        """
-
-    def refine(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
-        """Solution (n,), multipliers (m,) for `active` (m,) to round-off: little after `solve`."""
-
-    def stiffness(self) -> Array:
-        """Force per displacement at each row, (m,): an upper bound, infinite where unknown."""
-
-    def forget(self) -> None:
-        """Give memory back; what it held is made again when asked for."""
-
-
-@dataclass(eq=False)
-class Approximation:
-    """The last solution of a system, where the next one starts.
-
-    Attributes
-    ----------
-    program : QuadraticProgram
-        With n unknowns and m rows.
-    y : ndarray (n,)
-        Solution.
-    force : ndarray (m,)
-        Multipliers.
-    scale : float
-        Largest force that a system was to balance.
-    """
-
-    program: QuadraticProgram
-    y: Array
-    force: Array
-    scale: float = 0.0
-
-    def unbalanced(self, active: Mask, anchor: Anchor | None) -> Array:
-        """Unbalanced force b - K y - R' force, (n,), less that of the proximal terms.
-
-        The unit rows `active` (m,) first take as their force what is left at their unknowns.
-        """
-        p = self.program
-        residual = p.b - p.K @ self.y
-        if anchor is not None:
-            pins = p.null_space.pins
-            residual[pins] -= anchor.stiffness * (self.y[pins] - anchor.at)
-        if p.unit_rows:
-            self.force[:] = 0.0
-            self.force[active] = residual[p.unknown[active]]
-            residual[p.unknown[active]] = 0.0
-            return residual
-        return residual - p.R.T @ self.force
-
-    def copies(self) -> tuple[Array, Array]:
-        """Solution (n,) and multipliers (m,), that no later system changes."""
-        return self.y.copy(), self.force.copy()
-
-
-def first_approximation(program: QuadraticProgram, closed: Mask | None = None) -> Approximation:
-    """Prescribed values, and the bounds of the unit rows that are `closed` (m,)."""
-    y = np.where(program.fixed, program.values, 0.0)
-    if closed is not None and program.unit_rows:
-        y[program.unknown[closed]] = program.g[closed]
-    return Approximation(program=program, y=y, force=np.zeros(program.g.size))

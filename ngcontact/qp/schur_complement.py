@@ -11,29 +11,15 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Array, Factor, Index, Mask, Solve
-from .quadratic_program import (
-    REFINED,
-    ROUGH,
-    Anchor,
-    Approximation,
-    QuadraticProgram,
-    SingularError,
-    first_approximation,
-)
+from .quadratic_program import Anchor, QuadraticProgram, SingularError
 
+COARSE = 1e-11  # residual, relative to the largest met, of a system that tells the next active set
+FINE = 1e-14  # ... and of the last system
 BORDER = 16  # changed rows up to which a bordered solve is cheaper than a factorisation ...
-PATIENT = 4  # ... times this for every one before: the sets that follow change less and less
+BORDER_GROWTH = 4  # ... times this for every one before: the sets that follow change less and less
 DEPENDENT = 1e-14  # singular values of the border, relative to the largest, that are round-off
 UNSOLVED = 1e-6  # residual, relative to the first, above which the matrix is singular
-NOISE = 64 * np.finfo(float).eps  # ... unless it is round-off of values that balance each other
-
-
-def _row(C: sp.csr_array, i: int) -> Array:
-    """Row i of a sparse matrix, dense; what SciPy does for that takes as long as a back-solve."""
-    row = np.zeros(C.shape[1])
-    at = slice(C.indptr[i], C.indptr[i + 1])
-    row[C.indices[at]] = C.data[at]
-    return row
+ROUND_OFF = 64 * np.finfo(float).eps  # ... unless it is that of values that balance each other
 
 
 @dataclass(eq=False)
@@ -59,15 +45,6 @@ class Base:
     inverse: Solve
     known: Array
     place: dict[int, int] = field(default_factory=dict)
-
-    def columns(self, keys: list[int], V: sp.csr_array, back_solve: Solve) -> Index:
-        """Places (k,) in `known` for the columns of a border, the rows of `V` (k, n)."""
-        new = [i for i, key in enumerate(keys) if key not in self.place]
-        if new:
-            self.place.update({keys[i]: len(self.place) + k for k, i in enumerate(new)})
-            solutions = [back_solve(_row(V, i)) for i in new]
-            self.known = np.vstack([self.known, *solutions])
-        return np.array([self.place[key] for key in keys], dtype=np.intp)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,74 +85,13 @@ class Border:
     size: Array
     S: Array
 
-    def serves(self, active: Mask, anchor: Anchor | None) -> bool:
-        """Whether it is the system of the rows `active` (m,) and this anchor."""
-        return self.anchor is anchor and np.array_equal(self.active, active)
-
     def largest(self, residual: Array) -> float:
         """Largest unbalanced force of `residual` (n,) that the system is to remove."""
-        parts = residual[self.base.free], residual[self.at]
-        return float(max(np.abs(part).max(initial=0.0) for part in parts))
+        return max(_largest(residual[self.base.free]), _largest(residual[self.at]))
 
 
-def _without_border(base: Base, active: Mask, anchor: Anchor | None, none: Index) -> Border:
-    """The base itself as a system; `none` (0,) are the unknowns and rows of its border."""
-    V = np.zeros((0, 0))
-    return Border(base, active, anchor, none, none, none, none, V, V.diagonal(), V)
-
-
-def bordered(
-    p: QuadraticProgram, base: Base, active: Mask, anchor: Anchor | None, back_solve: Solve
-) -> Border:
-    """The system of an active set as a border of the base.
-
-    Parameters
-    ----------
-    p : QuadraticProgram
-    base : Base
-        Learns the columns that are new.
-    active : ndarray of bool (m,)
-    anchor : Anchor or None
-    back_solve : callable
-        K_0^-1 of the base, counted.
-    """
-    rows = np.flatnonzero(active & ~base.active)
-    at = p.null_space.pins
-    if p.unit_rows:
-        at = np.concatenate([p.unknown[base.active & ~active], at])
-    keys = np.concatenate([at, ~rows])
-    if keys.size == 0:
-        return _without_border(base, active, anchor, keys)
-    V = sp.vstack([p.K[at], p.R[rows]], format="csr")
-    column = base.columns(keys.tolist(), V, back_solve)
-    touched = np.unique(V.indices)  # few of the unknowns
-    dense = V[:, touched].toarray()
-    D = np.zeros((len(column), len(column)))
-    D[:, : at.size] = V[:, at].toarray()
-    D[: at.size] = D[:, : at.size].T
-    if anchor is not None:
-        pins = np.arange(at.size - p.null_space.pins.size, at.size)
-        D[pins, pins] += anchor.stiffness
-    S = dense @ base.known[np.ix_(column, touched)].T - D
-    size = np.sqrt(np.abs(np.diagonal(S)))
-    size = np.where(size > 0, size, 1.0)
-    return Border(
-        base=base,
-        active=active,
-        anchor=anchor,
-        at=at,
-        rows=rows,
-        column=column,
-        touched=touched,
-        V=dense,
-        size=size,
-        S=S / np.outer(size, size),
-    )
-
-
-@dataclass(eq=False)
 class BorderedSystems:
-    """The linear systems of one program for changing active sets; `bordered_systems` makes them.
+    """The systems K y + R' force = b, R y = g on the active rows, force = 0 on the others.
 
     One set, the base, is factorised with all pins of the null space held. Another set is reached
     by bordering that factor K_0 with one row and column for each row of R that changed state and
@@ -188,46 +104,63 @@ class BorderedSystems:
     3. y = x - K_0^-1 V z
 
     Every solution corrects the one before, which leaves no residual outside of the border: the
-    next one costs the back-solves of its new columns alone.
+    next one costs the back-solves of its new columns alone. `solve` and `refine` may be called in
+    any order.
+
+    Parameters
+    ----------
+    program : QuadraticProgram
+        With n unknowns and m rows.
+    factor : Factor
+        Factorises the matrix of the free unknowns (n,): answers a function that solves for right
+        sides (n,) which vanish at the others, as the solution does.
+    border : int
+        Changed rows up to which the first factorisation is bordered; a factorisation costs that
+        many back-solves.
 
     Attributes
     ----------
-    factor : Factor
-        Factorises the matrix of the free unknowns (n,).
-    border : int
-        Changed rows up to which the first factorisation is bordered.
-    approximation : Approximation
+    program : QuadraticProgram
+        That of the last `restart`.
+    y : ndarray (n,)
         The last solution.
-    base : Base or None
-        The factorisation, once there is one.
-    system : Border or None
-        The system of the last solution.
+    force : ndarray (m,)
+        Its multipliers.
+    scale : float
+        Largest force that a system was to balance.
     factorizations, back_solves : int
         Work since the last `restart`.
     """
 
-    factor: Factor
-    border: int
-    approximation: Approximation
-    base: Base | None = None
-    system: Border | None = None
-    factorizations: int = 0
-    back_solves: int = 0
+    program: QuadraticProgram
+    y: Array
+    force: Array
+    scale: float
+    factorizations: int
+    back_solves: int
 
-    @property
-    def program(self) -> QuadraticProgram:
-        """The program of the last `restart`."""
-        return self.approximation.program
+    def __init__(self, program: QuadraticProgram, factor: Factor, border: int = BORDER) -> None:
+        self.factor, self.border = factor, border
+        self.base: Base | None = None
+        self.system: Border | None = None
+        self.restart(program)
 
     def restart(self, program: QuadraticProgram) -> None:
         """Begin with another load, other values or bounds; a factorisation stays."""
-        closed = None if self.base is None else self.base.active
-        self.approximation = first_approximation(program, closed)
-        self.system = None
+        self.program, self.system = program, None
         self.factorizations = self.back_solves = 0
+        self._start(None if self.base is None else self.base.active)
+
+    def _start(self, closed: Mask | None) -> None:
+        """Start from prescribed values, and the bounds of the unit rows `closed` (m,)."""
+        p = self.program
+        self.y = np.where(p.fixed, p.values, 0.0)
+        if closed is not None and p.unit_rows:
+            self.y[p.unknown[closed]] = p.g[closed]
+        self.force, self.scale = np.zeros(p.g.size), 0.0
 
     def forget(self) -> None:
-        """Give the memory of the factorisation back."""
+        """Give the memory of the factorisation back; it is made again when asked for."""
         self.base = self.system = None
 
     def solve(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
@@ -240,11 +173,33 @@ class BorderedSystems:
         SingularError
             The matrix is singular to working precision.
         """
-        return self._settled(self._solved(active, anchor), ROUGH)
+        self._reach(active, anchor)
+        return self.y.copy(), self.force.copy()
 
     def refine(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
         """Minimiser (n,) and multipliers (m,) for `active` (m,), the residual at round-off."""
-        return self._settled(self._roughly_solved(active, anchor), REFINED)
+        system = self.system
+        if system is None or system.anchor is not anchor or (system.active != active).any():
+            system = self._reach(active, anchor)
+        self._improve(system, FINE)
+        return self.y.copy(), self.force.copy()
+
+    def unbalanced(self, active: Mask, anchor: Anchor | None = None) -> Array:
+        """Unbalanced force b - K y - R' force, (n,), less that of the proximal terms.
+
+        The unit rows `active` (m,) first take as their force what is left at their unknowns.
+        """
+        p = self.program
+        residual = p.b - p.K @ self.y
+        if anchor is not None:
+            pins = p.null_space.pins
+            residual[pins] -= anchor.stiffness * (self.y[pins] - anchor.at)
+        if p.unit_rows:
+            self.force[:] = 0.0
+            self.force[active] = residual[p.unknown[active]]
+            residual[p.unknown[active]] = 0.0
+            return residual
+        return residual - p.R.T @ self.force
 
     def stiffness(self) -> Array:
         """Force per displacement at each row, (m,): an upper bound, infinite where unknown."""
@@ -252,69 +207,85 @@ class BorderedSystems:
         if p.unit_rows:
             return p.diagonal[p.unknown]
         stiffness = np.full(p.g.size, np.inf)
-        for j in range(p.g.size):
-            if base is not None and ~j in base.place:
-                stiffness[j] = 1 / float((p.R[j : j + 1] @ base.known[base.place[~j]])[0])
+        if base is not None:
+            for j, place in ((~key, place) for key, place in base.place.items() if key < 0):
+                stiffness[j] = 1 / float((p.R[[j]] @ base.known[place])[0])
         return stiffness
+
+    def _reach(self, active: Mask, anchor: Anchor | None) -> Border:
+        """The system of an active set, solved."""
+        p, base = self.program, self._base_near(active)
+        self.system = system = self._bordered(base, active, anchor)
+        self.force[~active] = 0.0
+        if p.unit_rows:
+            held = base.active & active
+            self.y[p.unknown[held]] = p.g[held]
+        residual = self.unbalanced(active, anchor)
+        self.scale = max(self.scale, system.largest(residual))
+        self._correct(system, residual, COARSE)
+        self._improve(system, COARSE)
+        return system
 
     def _base_near(self, active: Mask) -> Base:
         """The base, or a new one where too many rows have changed."""
-        p = self.program
-        most = self.border * PATIENT ** max(self.factorizations - 1, 0)
-        if self.base is not None and not (
-            p.unit_rows and np.count_nonzero(active != self.base.active) > most
+        p, base = self.program, self.base
+        most = self.border * BORDER_GROWTH ** max(self.factorizations - 1, 0)
+        if base is not None and (
+            not p.unit_rows or np.count_nonzero(active != base.active) <= most
         ):
-            return self.base
+            return base
         self.forget()  # two factorisations at a time would double the memory
         free = ~p.fixed
         free[np.concatenate([p.null_space.held, p.null_space.pins])] = False
+        closed = active & p.unit_rows
         if p.unit_rows:
             free[p.unknown[active]] = False
-        self.base = Base(
-            active=active.copy() if p.unit_rows else np.zeros_like(active),
-            free=free,
-            inverse=self.factor(free),
-            known=np.zeros((0, p.b.size)),
-        )
+        self.base = Base(closed, free, self.factor(free), np.zeros((0, p.b.size)))
         self.factorizations += 1
-        self.approximation = first_approximation(p, self.base.active)
+        self._start(closed)
         return self.base
 
     def _back_solve(self, base: Base, right: Array) -> Array:
         self.back_solves += 1
         return base.inverse(np.where(base.free, right, 0.0))
 
-    def _solved(self, active: Mask, anchor: Anchor | None) -> Border:
-        """The system of an active set, its solution in `approximation`."""
-        p, base = self.program, self._base_near(active)
-        system = bordered(p, base, active, anchor, lambda right: self._back_solve(base, right))
-        self.system = system
-        now = self.approximation
-        now.force[~active] = 0.0
+    def _bordered(self, base: Base, active: Mask, anchor: Anchor | None) -> Border:
+        """The system of an active set as a border of the base, which learns its new columns."""
+        p = self.program
+        rows, at = np.flatnonzero(active & ~base.active), p.null_space.pins
         if p.unit_rows:
-            held = base.active & active
-            now.y[p.unknown[held]] = p.g[held]
-        residual = now.unbalanced(active, anchor)
-        now.scale = max(now.scale, system.largest(residual))
-        self._correct(system, residual, ROUGH)
-        return system
-
-    def _roughly_solved(self, active: Mask, anchor: Anchor | None) -> Border:
-        """The same, that of the last solution where it serves."""
-        if self.system is not None and self.system.serves(active, anchor):
-            return self.system
-        system = self._solved(active, anchor)
-        self._settled(system, ROUGH)
-        return system
+            at = np.concatenate([p.unknown[base.active & ~active], at])
+        keys = np.concatenate([at, ~rows]).tolist()
+        if not keys:
+            V = np.zeros((0, 0))
+            return Border(base, active, anchor, at, rows, rows, rows, V, V.diagonal(), V)
+        V = sp.vstack([p.K[at], p.R[rows]], format="csr")
+        new = [i for i, key in enumerate(keys) if key not in base.place]
+        base.place.update({keys[i]: len(base.place) + k for k, i in enumerate(new)})
+        solutions = [self._back_solve(base, right) for right in V[new].toarray()]
+        base.known = np.vstack([base.known, *solutions])
+        column = np.array([base.place[key] for key in keys], dtype=np.intp)
+        touched = np.unique(V.indices)  # few of the unknowns
+        dense = V[:, touched].toarray()
+        D = np.zeros((len(column), len(column)))
+        D[:, : at.size] = V[:, at].toarray()
+        D[: at.size] = D[:, : at.size].T
+        if anchor is not None:
+            pins = np.arange(at.size - p.null_space.pins.size, at.size)
+            D[pins, pins] += anchor.stiffness
+        S = dense @ base.known[np.ix_(column, touched)].T - D
+        size = np.sqrt(np.abs(np.diagonal(S)))
+        size = np.where(size > 0, size, 1.0)
+        S /= np.outer(size, size)
+        return Border(base, active, anchor, at, rows, column, touched, dense, size, S)
 
     def _correct(self, system: Border, residual: Array, tolerance: float) -> None:
         """Add the solution for a residual (n,), one back-solve unless it is small outside V."""
-        p, base, now = self.program, system.base, self.approximation
+        p, base, rows, at = self.program, system.base, system.rows, system.at
         x = np.zeros(p.b.size)
-        if np.abs(residual[base.free]).max(initial=0.0) > tolerance * now.scale:
+        if np.abs(residual[base.free]).max(initial=0.0) > tolerance * self.scale:
             x = self._back_solve(base, residual)  # step 1
-        rows, at = system.rows, system.at
-        below = np.concatenate([residual[at], p.g[rows] - p.R[rows] @ now.y])
+        below = np.concatenate([residual[at], p.g[rows] - p.R[rows] @ self.y])
         if below.size:
             right = (system.V @ x[system.touched] - below) / system.size
             z = np.linalg.lstsq(system.S, right, rcond=DEPENDENT)[0] / system.size  # step 2
@@ -322,55 +293,38 @@ class BorderedSystems:
             amounts[system.column] = z
             x -= amounts @ base.known  # step 3
             x[at] += z[: at.size]
-            now.force[rows] += z[at.size :]
-        now.y += x
+            self.force[rows] += z[at.size :]
+        self.y += x
         if p.unit_rows:
-            now.y[p.unknown[system.active]] = p.g[system.active]
+            self.y[p.unknown[system.active]] = p.g[system.active]
 
-    def _settled(self, system: Border, tolerance: float) -> tuple[Array, Array]:
-        """The solution, corrected once more if its residual asks for it."""
-        p, now = self.program, self.approximation
-        residual = now.unbalanced(system.active, system.anchor)
-        if system.largest(residual) > tolerance * now.scale:
+    def _improve(self, system: Border, tolerance: float) -> None:
+        """Correct the solution once more if its residual asks for it."""
+        p = self.program
+        residual = self.unbalanced(system.active, system.anchor)
+        if system.largest(residual) > tolerance * self.scale:
             self._correct(system, residual, tolerance)
-            residual = now.unbalanced(system.active, system.anchor)
+            residual = self.unbalanced(system.active, system.anchor)
         # Where bounds alone drive the solution, forces come from rows or from elasticity.
-        pull = now.force if p.unit_rows else p.R.T @ now.force
-        terms = (pull, (p.K @ now.y)[~p.fixed])
-        scale = max(now.scale, *(np.abs(x).max(initial=0.0) for x in terms))
+        pull = self.force if p.unit_rows else p.R.T @ self.force
+        scale = max(self.scale, _largest(pull), _largest((p.K @ self.y)[~p.fixed]))
         balanced = ~p.fixed
         if system.anchor is not None:  # its force may turn what the held unknowns hold
             balanced[p.null_space.held] = False
         left = np.abs(residual[balanced]).max(initial=0.0)
-        if not left <= UNSOLVED * scale and not left <= self._noise(balanced):
+        if not left <= UNSOLVED * scale and not left <= self._round_off(balanced):
             raise SingularError(
                 "the system for the current active set is singular to working precision: a body "
                 "can move without resistance from supports or active contact, or the moduli of "
                 "the bodies are too many powers of ten apart"
             )
-        return now.copies()
 
-    def _noise(self, balanced: Mask) -> float:
+    def _round_off(self, balanced: Mask) -> float:
         """Round-off of the forces of prescribed values on the unknowns `balanced` (n,)."""
         p = self.program
         given = abs(p.K) @ np.where(p.fixed, np.abs(p.values), 0.0)
-        return NOISE * float(given[balanced].max(initial=0.0))
+        return ROUND_OFF * _largest(given[balanced])
 
 
-def bordered_systems(
-    program: QuadraticProgram, factor: Factor, border: int = BORDER
-) -> BorderedSystems:
-    """The linear systems of a program, by few factorisations.
-
-    Parameters
-    ----------
-    program : QuadraticProgram
-        With n unknowns.
-    factor : Factor
-        Factorises the matrix of the free unknowns (n,): answers a function that solves for right
-        sides (n,) which vanish at the others, as the solution does.
-    border : int
-        Changed rows up to which the first factorisation is bordered; a factorisation costs that
-        many back-solves.
-    """
-    return BorderedSystems(factor=factor, border=border, approximation=first_approximation(program))
+def _largest(values: Array) -> float:
+    return float(np.abs(values).max(initial=0.0))

@@ -5,10 +5,10 @@ import logging
 import numpy as np
 import pytest
 
-from ngcontact.linalg.iterative import Limits, iterative_systems
+from ngcontact.linalg.iterative import IterativeSystems, Limits
 from ngcontact.linalg.multigrid import truncated_multigrid
 from ngcontact.linalg.sparse import cholesky, congruent
-from ngcontact.qp import Iterate, bordered_systems, minimise
+from ngcontact.qp import BorderedSystems, Iterate, minimise
 from tests.scenes import REFINED, discrete, steps_of
 
 
@@ -27,11 +27,11 @@ class Scene:
         self.made += 1
         return truncated_multigrid(self.matrix, steps_of(self.problem, 300), free)
 
-    def systems(self, limits: Limits | None = None):
-        return iterative_systems(self.program, self.factor, self.prepare, limits)
+    def systems(self, limits=None):
+        return IterativeSystems(self.program, self.factor, self.prepare, limits)
 
     def direct(self) -> Iterate:
-        return minimise(bordered_systems(self.program, self.factor))
+        return minimise(BorderedSystems(self.program, self.factor))
 
 
 def same(one: Iterate, other: Iterate) -> None:
@@ -52,7 +52,7 @@ def test_minimisers_are_those_of_a_factor(name: str):
     same(result, scene.direct())
 
 
-@pytest.mark.parametrize("limits", [Limits(most=1), Limits(restarts=0)])
+@pytest.mark.parametrize("limits", [Limits(cycles=1), Limits(restarts=0)])
 def test_systems_that_stall_are_factorised(caplog, limits: Limits):
     """In a Newton step, and in the last refinement."""
     scene = Scene("disc", 1, 3)
@@ -68,7 +68,7 @@ def test_systems_may_be_refined_in_any_order():
     scene = Scene("disc on block", 1, 2)
     m = len(scene.program.g)
     one, other = np.arange(m) < m // 2, np.arange(m) > m // 3
-    known, systems = bordered_systems(scene.program, scene.factor), scene.systems()
+    known, systems = BorderedSystems(scene.program, scene.factor), scene.systems()
     for active in (one, other, one):
         u, force = systems.refine(active)
         right, forces = known.refine(active)

@@ -10,6 +10,7 @@ ROOT = Path(__file__).parents[2]
 FILES = [*(ROOT / "ngcontact").rglob("*.py"), *(ROOT / "geometries").glob("*.py")]
 SOURCES = {path.resolve().relative_to(ROOT).as_posix(): path.read_text() for path in FILES}
 TREES = {path: ast.parse(source) for path, source in SOURCES.items()}
+CLASSES = [x for tree in TREES.values() for x in ast.walk(tree) if isinstance(x, ast.ClassDef)]
 
 
 def with_lines(pattern: str) -> set[str]:
@@ -29,11 +30,18 @@ def bound(function: ast.AST) -> set[str]:
     }
 
 
+def fields_of(cls: ast.ClassDef) -> set[str]:
+    """Names of the fields of a class and of those it derives from."""
+    bases = {ast.unparse(base) for base in cls.bases}
+    own = {ast.unparse(x.target) for x in cls.body if isinstance(x, ast.AnnAssign)}
+    return own.union(*(fields_of(c) for c in CLASSES if c.name in bases))
+
+
 def bound_late(tree: ast.AST) -> Iterator[str]:
     """Attributes that are no fields of a class and that another method than __init__ binds."""
     for cls in (node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)):
         methods = [node for node in cls.body if isinstance(node, ast.FunctionDef)]
-        known = {ast.unparse(x.target) for x in cls.body if isinstance(x, ast.AnnAssign)}
+        known = fields_of(cls)
         for method in methods:
             known |= bound(method) if method.name == "__init__" else set()
         for method in methods:

@@ -10,7 +10,7 @@ from drivers.stress.trials.algebra import CYCLES, dual
 from ngcontact.errors import ConvergenceError
 from ngcontact.qp.active_set import minimise
 from ngcontact.qp.quadratic_program import kkt_residuals, pinned_null_space
-from ngcontact.qp.schur_complement import bordered_systems
+from ngcontact.qp.schur_complement import BorderedSystems
 from tests.qp.programs import counting_factor, first_unknowns_bounded, inequalities, membrane
 
 
@@ -20,9 +20,9 @@ def test_plain_method_cycles():
     program = inequalities(*dual(np.array(S, float), np.array(d, float)))
     factor = counting_factor(program.K, [])
     with pytest.raises(ConvergenceError, match="did not settle") as failure:
-        minimise(bordered_systems(program, factor), patience=10**9)
+        minimise(BorderedSystems(program, factor), patience=10**9)
     assert failure.value.iterate.u.shape == (3,)
-    result = minimise(bordered_systems(program, factor))
+    result = minimise(BorderedSystems(program, factor))
     np.testing.assert_allclose(result.force, force, atol=1e-12)  # condition below 100
 
 
@@ -30,7 +30,7 @@ def test_a_singular_system_is_said():
     """Two springs of which nothing holds the second: never a number."""
     K = sp.csr_array(np.diag([1.0, 0.0]))
     program = first_unknowns_bounded(K, np.ones(2), np.ones(1))
-    systems = bordered_systems(program, lambda free: lambda right: right)
+    systems = BorderedSystems(program, lambda free: lambda right: right)
     with pytest.raises(ConvergenceError, match=r"Newton step 1: .*singular") as failure:
         minimise(systems)
     assert failure.value.iterate.steps == []
@@ -39,7 +39,7 @@ def test_a_singular_system_is_said():
 def test_residuals_name_what_is_violated():
     K, b, g = membrane()
     program = first_unknowns_bounded(K, -b, g)
-    result = minimise(bordered_systems(program, counting_factor(K, [])))
+    result = minimise(BorderedSystems(program, counting_factor(K, [])))
     assert max(kkt_residuals(program, result).values()) < 1e-13  # round-off
     contact, apart = np.flatnonzero(result.active)[0], np.flatnonzero(~result.active)[0]
     length, largest = np.abs(result.u).max(), result.force.max()
@@ -72,7 +72,7 @@ def test_contact_alone_holds_a_chain(start):
     load[-1] = 1.0
     program = chain(load, [0.3, 5.0])
     assert program.null_space.pins.size == 1
-    systems = bordered_systems(program, counting_factor(program.K, []))
+    systems = BorderedSystems(program, counting_factor(program.K, []))
     result = minimise(systems, np.full(2, start))
     np.testing.assert_allclose(result.u, 0.3 + np.arange(SPRINGS + 1), rtol=1e-12)
     np.testing.assert_allclose(result.force, [1, 0], atol=1e-12)  # condition of the chain: 50
@@ -90,5 +90,5 @@ def test_motions_that_nothing_resists_obey_their_conditions():
     load = np.zeros(n)
     load[[0, -1]] = -1.0, 1.0
     program = first_unknowns_bounded(sp.csr_array(D.T @ D), load, np.zeros(0), null_space)
-    result = minimise(bordered_systems(program, counting_factor(program.K, [])))
+    result = minimise(BorderedSystems(program, counting_factor(program.K, [])))
     np.testing.assert_allclose(result.u, np.arange(n) - SPRINGS / 2, atol=1e-13)

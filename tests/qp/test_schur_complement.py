@@ -7,7 +7,7 @@ import pytest
 import scipy.sparse as sp
 
 from ngcontact.qp.active_set import minimise, solve_qp
-from ngcontact.qp.schur_complement import bordered_systems
+from ngcontact.qp.schur_complement import BorderedSystems
 from tests.qp.programs import counting_factor, first_unknowns_bounded, membrane
 
 
@@ -21,7 +21,7 @@ def test_bordering_equals_refactorising(border):
     calls = []
     start = np.zeros(n, dtype=bool)
     start[::2] = True
-    result = minimise(bordered_systems(program, counting_factor(K, calls), border), start)
+    result = minimise(BorderedSystems(program, counting_factor(K, calls), border), start)
     reference = solve_qp(K, -b, flip, g)
     np.testing.assert_array_equal(result.active, reference.active)
     np.testing.assert_allclose(result.u, reference.u, rtol=1e-11)
@@ -46,7 +46,7 @@ def test_bordered_systems_do_not_depend_on_the_stiffness(stiffness):
         rows = sp.eye_array(n, format="csr")[:m]
         program = first_unknowns_bounded(stiffness * K, stiffness * b, g)
         result = minimise(
-            bordered_systems(program, counting_factor(program.K, [])), rng.random(m) < 0.5
+            BorderedSystems(program, counting_factor(program.K, [])), rng.random(m) < 0.5
         )
         reference = solve_qp(K, b, rows, g)
         np.testing.assert_array_equal(result.active, reference.active)
@@ -62,7 +62,7 @@ def random_bounds(seed):
 
 def test_another_load_costs_no_factorisation():
     program, calls = random_bounds(9), []
-    systems = bordered_systems(program, counting_factor(program.K, calls))
+    systems = BorderedSystems(program, counting_factor(program.K, calls))
     minimise(systems)
     assert systems.factorizations == len(calls) == 1
     other = replace(program, b=-program.b, g=0.5 * program.g)
@@ -70,7 +70,7 @@ def test_another_load_costs_no_factorisation():
     result = minimise(systems)
     assert (result.factorizations, len(calls)) == (0, 1)
     assert 0 < result.back_solves < 12
-    reference = minimise(bordered_systems(other, counting_factor(program.K, [])))
+    reference = minimise(BorderedSystems(other, counting_factor(program.K, [])))
     np.testing.assert_array_equal(result.active, reference.active)
     np.testing.assert_allclose(result.u, reference.u, rtol=0, atol=1e-11)  # condition up to 1e4
 
@@ -81,10 +81,10 @@ def test_systems_may_be_refined_in_any_order():
     one, other = np.arange(6) < 2, np.arange(6) > 3
     expected = {}
     for active in (one, other):
-        systems = bordered_systems(program, counting_factor(program.K, []))
+        systems = BorderedSystems(program, counting_factor(program.K, []))
         systems.solve(active)
         expected[active.tobytes()] = systems.refine(active)
-    systems = bordered_systems(program, counting_factor(program.K, []))
+    systems = BorderedSystems(program, counting_factor(program.K, []))
     for active in (one, other, other, one):
         for found, right in zip(systems.refine(active), expected[active.tobytes()], strict=True):
             # Condition of the matrix up to 1e4, entries of size 1.

@@ -25,7 +25,6 @@ from ...qp import (
     BorderedSystems,
     QuadraticProgram,
     SingularError,
-    bordered_systems,
     minimise,
     no_null_space,
     pinned_null_space,
@@ -69,7 +68,7 @@ class DualProgram:
         """Its linear systems; what is factorised is the matrix made definite."""
         lower = sp.tril(self.program.K, format="csr")
         lower.setdiag((1 + DEFINITE) * self.program.diagonal)
-        return bordered_systems(self.program, cholesky(handed_over(lower)))
+        return BorderedSystems(self.program, cholesky(handed_over(lower)))
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the factor, which is made again."""
@@ -147,7 +146,7 @@ class DualProgram:
         try:
             return self.systems.solve(active)[0]
         except SingularError:
-            return self.systems.approximation.y
+            return self.systems.y
 
     def _idle(self, load: Array) -> Array:
         """The part (d,) of a `load` (d,) that does work on motions which nothing resists.
