@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from typing import TypeAlias
 
 import ngsolve as ng
 import numpy as np
@@ -14,6 +15,8 @@ from .coarse_spaces import Coarsening
 from .smoothing import Smoother, fastest
 from .sparse import handed_over, inverse_of
 
+Maker: TypeAlias = Callable[[ng.BaseMatrix, Mask], Smoother]  # for free unknowns
+
 TRIAL = 25  # V-cycles after which is judged whether the target will be reached
 
 
@@ -21,7 +24,6 @@ class StalledError(ArithmeticError):
     """Conjugate gradients did not reach their target."""
 
 
-@dataclass(frozen=True, eq=False)
 class _Level:
     """One space of n unknowns that has a coarser one of k, and vectors of both to work with.
 
@@ -36,51 +38,23 @@ class _Level:
         Onto them.
     smoother : Smoother
         Of them.
-    residual : ng.BaseVector (n,)
-    right, solution : ng.BaseVector (k,)
     """
 
-    matrix: ng.BaseMatrix
-    P: ng.BaseMatrix
-    transposed: ng.BaseMatrix
     free: Mask
     projector: ng.BaseMatrix
-    smoother: Smoother
-    residual: ng.BaseVector
-    right: ng.BaseVector
-    solution: ng.BaseVector
 
-    def holding(self, free: Mask) -> _Level:
-        """The same with other free unknowns (n,); work vectors are shared."""
-        return replace(
-            self, free=free, projector=_projector(free), smoother=self.smoother.holding(free)
-        )
+    def __init__(self, matrix: ng.BaseMatrix, free: Mask, P: sp.csr_array, make: Maker) -> None:
+        self.matrix, self.P = matrix, handed_over(P)
+        self.transposed = self.P.CreateTranspose()
+        self.smoother = make(matrix, free)
+        self.free, self.projector = free, ng.Projector(ng.BitArray(free), True)
+        self.residual = matrix.CreateColVector()
+        self.right, self.solution = ng.BaseVector(P.shape[1]), ng.BaseVector(P.shape[1])
 
-
-def _projector(free: Mask) -> ng.BaseMatrix:
-    """Onto the `free` unknowns (n,)."""
-    return ng.Projector(ng.BitArray(free), True)
-
-
-def _level(
-    matrix: ng.BaseMatrix,
-    free: Mask,
-    step: Coarsening,
-    smoother: Callable[[ng.BaseMatrix, Mask], Smoother],
-) -> _Level:
-    """The space of `matrix` above that of a step."""
-    P = handed_over(step.P)
-    return _Level(
-        matrix=matrix,
-        P=P,
-        transposed=P.CreateTranspose(),
-        free=free,
-        projector=_projector(free),
-        smoother=smoother(matrix, free),
-        residual=matrix.CreateColVector(),
-        right=ng.BaseVector(step.kept.size),
-        solution=ng.BaseVector(step.kept.size),
-    )
+    def hold(self, free: Mask) -> None:
+        """Let `free` (n,) be the unknowns."""
+        self.free, self.projector = free, ng.Projector(ng.BitArray(free), True)
+        self.smoother.hold(free)
 
 
 def _galerkin(matrix: ng.BaseMatrix, P: sp.csr_array, free: Mask, coarse: Mask) -> ng.BaseMatrix:
@@ -111,7 +85,7 @@ class Multigrid:
 
     def hold(self, free: Mask) -> None:
         """Let `free` (n,) be the unknowns; coarser spaces change only in what they correct."""
-        self.levels[0] = self.levels[0].holding(free)
+        self.levels[0].hold(free)
 
     def largest(self, residual: Array) -> float:
         """Largest size of `residual` (n,) at the free unknowns."""
@@ -180,7 +154,7 @@ def truncated_multigrid(
     matrix: ng.BaseMatrix,
     steps: list[Coarsening],
     free: Mask,
-    smoother: Callable[[ng.BaseMatrix, Mask], Smoother] = fastest,
+    smoother: Maker = fastest,
 ) -> Multigrid:
     """Multigrid whose coarser functions vanish at the unknowns that are not free.
 
@@ -199,9 +173,8 @@ def truncated_multigrid(
     """
     levels: list[_Level] = []
     for step in steps:
-        levels.append(_level(matrix, free, step, smoother))
+        levels.append(_Level(matrix, free, step.P, smoother))
         coarse = free[step.kept]
         matrix = _galerkin(matrix, step.P, free, coarse)
         free = coarse
-    inverse = inverse_of(matrix, ng.BitArray(free))
-    return Multigrid(levels=levels, inverse=inverse)
+    return Multigrid(levels, inverse_of(matrix, ng.BitArray(free)))

@@ -1,35 +1,24 @@
-"""Smoothers of multigrid: Gauss-Seidel sweeps on one thread, Chebyshev polynomials on several."""
+"""Smoothers of multigrid: Gauss-Seidel sweeps on one thread, Chebyshev polynomials on several.
+
+Iterations for the free ones of n unknowns, before and after a coarser space corrects. The one after
+is the adjoint of the one before, so that a V-cycle is symmetric.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import TypeAlias
 
 import ngsolve as ng
 import numpy as np
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..arrays import Array, Mask
 from .sparse import shared
 
 DEGREE = 4  # of the polynomial: of 2 to 4 the fastest in whole solves of a million unknowns
-LANCZOS = 6  # steps for the largest eigenvalue; they find 0.9 of it and more
-ABOVE = 1.1  # what it is taken for, over what is found; 0.82 of it would do for convergence
-
-
-class Smoother(Protocol):
-    """Iterations for the free ones of n unknowns, before and after a coarser space corrects.
-
-    The one after is the adjoint of the one before, so that a V-cycle is symmetric.
-    """
-
-    def holding(self, free: Mask) -> Smoother:
-        """The same where other unknowns are `free` (n,)."""
-
-    def before(self, right: ng.BaseVector, solution: ng.BaseVector) -> None:
-        """Set `solution` (n,), starting from zero."""
-
-    def after(self, right: ng.BaseVector, solution: ng.BaseVector) -> None:
-        """Improve `solution` (n,)."""
+EIGENVALUE_ERROR = 0.1  # relative, of the largest eigenvalue
+LANCZOS_STEPS = 6  # before it is told whether that is met: it is
+SAFETY = 1.1  # what it is taken for, over what is found; 0.82 of it would do for convergence
 
 
 def fastest(matrix: ng.BaseMatrix, free: Mask) -> Smoother:
@@ -37,89 +26,66 @@ def fastest(matrix: ng.BaseMatrix, free: Mask) -> Smoother:
 
     A sweep runs on one thread; a polynomial takes more products with the matrix, which use all.
     """
-    return (gauss_seidel if ng.GetNumThreads() == 1 else chebyshev)(matrix, free)
+    return (GaussSeidel if ng.GetNumThreads() == 1 else Chebyshev)(matrix, free)
 
 
-def gauss_seidel(matrix: ng.BaseMatrix, free: Mask) -> GaussSeidel:
-    """Sweeps over the `free` (n,) unknowns of a symmetric positive semidefinite matrix (n, n)."""
-    return GaussSeidel(matrix, matrix.CreateSmoother(ng.BitArray(free)))
-
-
-def chebyshev(matrix: ng.BaseMatrix, free: Mask) -> Chebyshev:
-    """The polynomial for the `free` (n,) unknowns of a symmetric positive semidefinite matrix."""
-    diagonal = shared(matrix).diagonal()
-    residual, scaled, step = (matrix.CreateColVector() for _ in range(3))
-    return Chebyshev(
-        matrix=matrix,
-        diagonal=diagonal,
-        inverse=_inverse(diagonal, free),
-        largest=ABOVE * largest_eigenvalue(matrix, _inverse(diagonal, diagonal > 0)),
-        residual=residual,
-        scaled=scaled,
-        step=step,
-    )
-
-
-@dataclass(frozen=True, eq=False)
 class GaussSeidel:
-    """A sweep over all free unknowns, and the reverse one."""
+    """A sweep over all `free` (n,) unknowns of a semidefinite `matrix`, and the reverse one."""
 
-    matrix: ng.BaseMatrix
     sweeps: ng.BaseSmoother
 
-    def holding(self, free: Mask) -> GaussSeidel:
-        """The same where other unknowns are `free` (n,)."""
-        return gauss_seidel(self.matrix, free)
+    def __init__(self, matrix: ng.BaseMatrix, free: Mask) -> None:
+        self.matrix = matrix
+        self.hold(free)
+
+    def hold(self, free: Mask) -> None:
+        """Let `free` (n,) be the unknowns."""
+        self.sweeps = self.matrix.CreateSmoother(ng.BitArray(free))
 
     def before(self, right: ng.BaseVector, solution: ng.BaseVector) -> None:
-        """See `Smoother`."""
+        """Set `solution` (n,), starting from zero."""
         solution[:] = 0.0
         self.sweeps.Smooth(solution, right)
 
     def after(self, right: ng.BaseVector, solution: ng.BaseVector) -> None:
-        """See `Smoother`."""
+        """Improve `solution` (n,)."""
         self.sweeps.SmoothBack(solution, right)
 
 
-@dataclass(frozen=True, eq=False)
 class Chebyshev:
     """A polynomial of the matrix over its diagonal, Chebyshev's of the fourth kind.
 
-    The best one for V-cycles that does not ask where the low eigenvalues end (Lottes 2023, Numer.
-    Linear Algebra Appl. 30:e2518).
+    For the `free` (n,) unknowns of a semidefinite `matrix`. The best one for V-cycles that does not
+    ask where the low eigenvalues end (Lottes 2023, Numer. Linear Algebra Appl. 30:e2518).
 
     Attributes
     ----------
-    matrix : ng.BaseMatrix (n, n)
-    diagonal : ndarray (n,)
-    inverse : ng.BaseMatrix
-        Of the diagonal at free unknowns, zero at others.
     largest : float
         What the largest eigenvalue for all unknowns is taken for; that for free ones is below.
-    residual, scaled, step : ng.BaseVector (n,)
-        To work with.
     """
 
-    matrix: ng.BaseMatrix
-    diagonal: Array
     inverse: ng.BaseMatrix
-    largest: float
-    residual: ng.BaseVector
-    scaled: ng.BaseVector
-    step: ng.BaseVector
 
-    def holding(self, free: Mask) -> Chebyshev:
-        """The same where other unknowns are `free` (n,)."""
-        return replace(self, inverse=_inverse(self.diagonal, free))
+    def __init__(self, matrix: ng.BaseMatrix, free: Mask) -> None:
+        self.matrix, self.diagonal = matrix, shared(matrix).diagonal()
+        self.residual, self.scaled, self.step = (matrix.CreateColVector() for _ in range(3))
+        self.largest = SAFETY * largest_eigenvalue(matrix, self.diagonal)
+        self.hold(free)
+
+    def hold(self, free: Mask) -> None:
+        """Let `free` (n,) be the unknowns."""
+        values = ng.BaseVector(free.size)
+        values.FV().NumPy()[:] = np.divide(1.0, self.diagonal, np.zeros(free.size), where=free)
+        self.inverse = ng.DiagonalMatrix(values)
 
     def before(self, right: ng.BaseVector, solution: ng.BaseVector) -> None:
-        """See `Smoother`."""
+        """Set `solution` (n,), starting from zero."""
         solution[:] = 0.0
         self.residual.data = right
         self._improve(solution)
 
     def after(self, right: ng.BaseVector, solution: ng.BaseVector) -> None:
-        """See `Smoother`."""
+        """Improve `solution` (n,)."""
         self.residual.data = right - self.matrix * solution
         self._improve(solution)
 
@@ -137,35 +103,27 @@ class Chebyshev:
             solution += step
 
 
-def _inverse(diagonal: Array, free: Mask) -> ng.BaseMatrix:
-    """Inverse of a `diagonal` (n,) at `free` unknowns, zero at others."""
-    values = ng.BaseVector(diagonal.size)
-    values.FV().NumPy()[:] = np.divide(1.0, diagonal, out=np.zeros(diagonal.size), where=free)
-    return ng.DiagonalMatrix(values)
+Smoother: TypeAlias = GaussSeidel | Chebyshev
 
 
-def largest_eigenvalue(matrix: ng.BaseMatrix, inverse: ng.BaseMatrix) -> float:
-    """Largest eigenvalue of `inverse` times `matrix` (n, n), from below, by Lanczos' method.
+def largest_eigenvalue(matrix: ng.BaseMatrix, diagonal: Array) -> float:
+    """Largest eigenvalue of a `matrix` (n, n) over its `diagonal` (n,), from below, by Lanczos."""
+    x, y = matrix.CreateRowVector(), matrix.CreateColVector()
+    root = np.sqrt(np.divide(1.0, diagonal, np.zeros(diagonal.size), where=diagonal > 0))
 
-    As conjugate gradients find it (Golub and Van Loan, Matrix Computations, 10.2).
-    """
-    r, z, d, q = (matrix.CreateColVector() for _ in range(4))
-    r.FV().NumPy()[:] = np.random.default_rng(0).uniform(-1, 1, matrix.height)
-    z.data = inverse * r
-    r.data = matrix * z  # without a part where the matrix is singular
-    d[:] = 0.0
-    product, before = np.inf, 0.0
-    T = np.zeros((LANCZOS, LANCZOS))
-    for k in range(LANCZOS):
-        z.data = inverse * r
-        last, product = product, ng.InnerProduct(r, z)
-        share = product / last
-        d *= share
-        d.data += z
-        q.data = matrix * d
-        step = product / ng.InnerProduct(d, q)
-        r.data -= step * q
-        T[k, k] = 1 / step + share * before
-        T[k, k - 1 : k] = T[k - 1 : k, k] = np.sqrt(share) * before
-        before = 1 / step
-    return float(np.linalg.eigvalsh(T)[-1])
+    def product(v: Array) -> Array:
+        x.FV().NumPy()[:] = root * v.ravel()
+        y.data = matrix * x
+        return np.asarray(root * y.FV().NumPy())
+
+    start = product(np.random.default_rng(0).uniform(-1, 1, diagonal.size))
+    [value] = eigsh(
+        LinearOperator((diagonal.size,) * 2, matvec=product, dtype=float),
+        k=1,
+        which="LA",
+        ncv=min(LANCZOS_STEPS, diagonal.size),
+        tol=EIGENVALUE_ERROR,
+        v0=start,
+        return_eigenvectors=False,
+    )
+    return float(value)

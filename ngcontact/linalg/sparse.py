@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from pyngcore import Array_D_S, Array_I_S
 
-from ..arrays import Array, Factor, Index, Mask, Solve, from_triplets
+from ..arrays import Array, Factor, Mask, Solve, from_triplets
 
 # Unknowns up to which one thread factorises sooner than NGSolve has started others and they have
 # found their work: that takes 25 ms of processor time, 10 000 unknowns of order 3 on one thread 33.
@@ -67,15 +67,8 @@ def congruent(
     change = change_of_basis(A, T)
     if change.nnz == 0:
         return A, matrix
-    places = _places(A, change)
-    if places is None:
-        total = (matrix + handed_over(change)).CreateSparseMatrix()
-        return shared(total), total
-    total = matrix.CreateMatrix()
-    total.AsVector().data = matrix.AsVector()
-    K = shared(total)
-    K.data[places] += change.data
-    return K, total
+    total = (matrix + handed_over(change)).CreateSparseMatrix()
+    return shared(total), total
 
 
 def change_of_basis(A: sp.csr_array, T: sp.csr_array) -> sp.csr_array:
@@ -83,38 +76,16 @@ def change_of_basis(A: sp.csr_array, T: sp.csr_array) -> sp.csr_array:
 
     `T` (n, n) is the identity but for a few rows.
     """
-    changed = _unlike_identity(T)
+    same = np.diff(T.indptr) == 1
+    single = np.flatnonzero(same)
+    entry = T.indptr[single]
+    same[single] = (T.indices[entry] == single) & (T.data[entry] == 1.0)
+    changed = np.flatnonzero(~same)
     each = np.arange(changed.size)
     ones = from_triplets(np.ones(changed.size), each, changed, (changed.size, T.shape[0]))
     D = T[changed] - ones  # T = I + D, its rows
     rows = D.T @ A[changed]  # D'A: as A is symmetric, AD is its transpose
     return (rows + rows.T + rows[:, changed] @ D).tocsr()
-
-
-def _unlike_identity(T: sp.csr_array) -> Index:
-    """Rows (k,) of `T` (n, n) that are not those of the identity."""
-    same = np.diff(T.indptr) == 1
-    single = np.flatnonzero(same)
-    entry = T.indptr[single]
-    same[single] = (T.indices[entry] == single) & (T.data[entry] == 1.0)
-    return np.flatnonzero(~same)
-
-
-def _places(A: sp.csr_array, change: sp.csr_array) -> Index | None:
-    """Where among the entries of `A` (n, n) the k of `change` (n, n) stand; None if not all do.
-
-    All do where no two bodies are coupled.
-    """
-    n, rows = A.shape[1], np.flatnonzero(np.diff(change.indptr))
-    count, wanting = (np.diff(x.indptr)[rows].astype(np.intp) for x in (A, change))
-    if (count < wanting).any():
-        return None
-    before = np.cumsum(count) - count
-    at = np.arange(count.sum()) + np.repeat(A.indptr[rows] - before, count)  # of these rows
-    known = np.append(np.repeat(rows, count) * n + A.indices[at], -1)
-    wanted = np.repeat(rows, wanting) * n + change.indices
-    found = np.searchsorted(known[:-1], wanted)
-    return at[found] if np.array_equal(known[found], wanted) else None
 
 
 @contextmanager

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from ngcontact.linalg.multigrid import Multigrid, StalledError, truncated_multigrid
-from ngcontact.linalg.smoothing import chebyshev, gauss_seidel
+from ngcontact.linalg.smoothing import Chebyshev, GaussSeidel
 from ngcontact.linalg.sparse import congruent
 from tests.scenes import REFINED, discrete, steps_of
 
 
-def prepared(name: str, order: int, rounds: int, maxh: float = 0.5, smoother=gauss_seidel):
+def prepared(name: str, order: int, rounds: int, maxh: float = 0.5, smoother=GaussSeidel):
     """Matrix, multigrid and free unknowns, every second contact row active."""
     problem = discrete(REFINED[name], order, rounds, maxh)
     p = problem.program
@@ -38,13 +38,13 @@ def cycles(multigrid: Multigrid, size: int) -> np.ndarray:
     # Measured 30, 40, 52 and 61 at most for ten digits with sweeps, 13, 21, 28 and 38
     # with polynomials.
     [
-        *((gauss_seidel, *counts) for counts in ((1, 38), (2, 50), (3, 64), (4, 75))),
-        *((chebyshev, *counts) for counts in ((1, 16), (2, 26), (3, 35), (4, 47))),
+        *((GaussSeidel, *counts) for counts in ((1, 38), (2, 50), (3, 64), (4, 75))),
+        *((Chebyshev, *counts) for counts in ((1, 16), (2, 26), (3, 35), (4, 47))),
     ],
 )
 @pytest.mark.parametrize("name", REFINED)
 @pytest.mark.study(
-    witness=["disc-gauss_seidel-1-38", "disc-gauss_seidel-2-50", "disc-chebyshev-1-16"]
+    witness=["disc-GaussSeidel-1-38", "disc-GaussSeidel-2-50", "disc-Chebyshev-1-16"]
 )
 def test_cycles_do_not_grow_with_the_mesh(name: str, smoother, order: int, most: int):
     rng = np.random.default_rng(order)

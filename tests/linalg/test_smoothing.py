@@ -4,14 +4,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from ngcontact.linalg.smoothing import (
-    ABOVE,
-    DEGREE,
-    Chebyshev,
-    GaussSeidel,
-    chebyshev,
-    fastest,
-)
+from ngcontact.linalg.smoothing import DEGREE, SAFETY, Chebyshev, GaussSeidel, fastest
 from ngcontact.linalg.sparse import handed_over
 from tests.linalg.test_multigrid import prepared
 from tests.scenes import REFINED
@@ -48,7 +41,7 @@ def test_the_largest_eigenvalue_is_found(name: str, order: int):
     K, matrix, free = matrix_of(name, order)
     root = 1 / np.sqrt(K.diagonal())
     exact = np.linalg.eigvalsh(K * np.outer(root, root))[-1]
-    found = chebyshev(matrix, free).largest / ABOVE
+    found = Chebyshev(matrix, free).largest / SAFETY
     assert 0.9 * exact <= found <= exact * (1 + 1e-12)  # by Lanczos from below
 
 
@@ -56,7 +49,7 @@ def test_the_largest_eigenvalue_is_found(name: str, order: int):
 def test_the_polynomial_is_that_of_the_fourth_kind(name: str):
     """Of an eigenvector W(1 - 2 t) / (2 k + 1) is left; W(cos a) = sin((k + 1/2) a) / sin(a/2)."""
     K, matrix, free = matrix_of(name, 2)
-    smoother = chebyshev(matrix, free)
+    smoother = Chebyshev(matrix, free)
     inside = K[np.ix_(free, free)]
     root = 1 / np.sqrt(inside.diagonal())
     values, vectors = np.linalg.eigh(inside * np.outer(root, root))
