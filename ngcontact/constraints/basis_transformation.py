@@ -36,11 +36,11 @@ class BasisTransformation:
 
     Attributes
     ----------
-    T : sparse (dn, dn)
+    T : sparse (d * n, d * n)
         From the unknowns to x of all nodes, then y.
-    fixed : ndarray of bool (dn,)
+    fixed : ndarray of bool (d * n,)
         Prescribed unknowns.
-    values : ndarray (dn,)
+    values : ndarray (d * n,)
         Their values.
     unknown : ndarray of int (k,)
         Unknown that equals the left side of each kept row.
@@ -58,7 +58,7 @@ class BasisTransformation:
     local: Array
 
     def coordinates(self, values: Array, rows: Array) -> Array:
-        """Unknowns (dn, r) of node `values` (dn, r) with the values `rows` (k, r) of kept rows."""
+        """Unknowns (d * n, r) of node `values` (d * n, r), `rows` (k, r) on the kept rows."""
         n, d, _ = self.local.shape
         y = np.einsum("nij,jnr->inr", self.local, values.reshape(d, n, -1)).reshape(d * n, -1)
         y[self.unknown] = rows
@@ -141,7 +141,7 @@ def _preferred(rows: Rows, stiffness: Array) -> Index:
 def _hosts(preferred: Index, Bz: sp.csr_array, frames: _Frames) -> tuple[Index, Index]:
     """Node (m,) at which each row becomes an unknown, -1 where all of it is prescribed, and slot.
 
-    Of rows `Bz` (m, dn), without prescribed unknowns, with the nodes `preferred` (m,).
+    Of rows `Bz` (m, d * n), without prescribed unknowns, with the nodes `preferred` (m,).
     """
     n, d, _ = frames.columns.shape
     host, slot = preferred.copy(), np.full(len(preferred), -1)
@@ -165,7 +165,7 @@ def _hosts(preferred: Index, Bz: sp.csr_array, frames: _Frames) -> tuple[Index, 
 
 
 def _at_nodes(B: sp.csr_array, row: Index, node: Index, n: int) -> Array:
-    """Coefficients (k, d) of rows `row` (k,) of `B` (m, dn) at the nodes `node` (k,)."""
+    """Coefficients (k, d) of rows `row` (k,) of `B` (m, d * n) at the nodes `node` (k,)."""
     d = B.shape[1] // n
     if row.size == 0:  # SciPy answers an empty index with a sparse array
         return np.zeros((0, d))
@@ -177,8 +177,8 @@ def _check_prescribed(
 ) -> None:
     """Raise unless the `dropped` rows, of no free unknown, hold for the prescribed values.
 
-    `Bz` (m, dn) are the rows in the frames of the nodes, `fixed` (dn,) and `values` (dn,) the
-    prescribed unknowns there; gaps are known to the round-off of `length`.
+    `Bz` (m, d * n) are the rows in the frames of the nodes, `fixed` (d * n,) and `values` (d * n,)
+    the prescribed unknowns there; gaps are known to the round-off of `length`.
     """
     size = np.abs(values).max(initial=0.0)
     for j in dropped:
@@ -201,7 +201,7 @@ def _check_prescribed(
 
 
 def _blocks(blocks: Array) -> sp.csr_array:
-    """Matrix (dn, dn) of (n, d, d) node blocks in the numbering x first, then y."""
+    """Matrix (d * n, d * n) of (n, d, d) node blocks in the numbering x first, then y."""
     n, d, _ = blocks.shape
     columns = np.arange(n, dtype=np.int32)[:, None] + n * np.arange(d, dtype=np.int32)
     starts = np.arange(0, d * d * n + 1, d, dtype=np.int32)

@@ -63,7 +63,7 @@ class Rows:
 
     @cached_property
     def matrix(self) -> sp.csr_array:
-        """B (m, dn) on node values: x components first, then y."""
+        """B (m, d * n) on node values: x components first, then y."""
         (m, n), d = self.coupling.shape, self.direction.shape[1]
         c = self.coupling.tocoo()
         row = np.concatenate([np.arange(m), c.row])

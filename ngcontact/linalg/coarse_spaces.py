@@ -47,7 +47,7 @@ def coarsenings(
 
     Parameters
     ----------
-    T : sparse (dn, dn)
+    T : sparse (d * n, d * n)
         Node values and edge functions u = T y for the unknowns y: x of all nodes first, vertices
         before all others.
     parents : ndarray of int (nv, 2)

@@ -95,13 +95,13 @@ class IterativeSystems(BorderedSystems):
         self.multigrid = self.coarse = None
 
     def solve(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
-        """See `BorderedSystems`."""
+        """Minimiser (n,) and multipliers (m,) for `active` (m,), the residual at 1e-2."""
         if self._converges(anchor, lambda: self._iterate(active)):
             return self.y.copy(), self.force.copy()
         return super().solve(active, anchor)
 
     def refine(self, active: Mask, anchor: Anchor | None = None) -> tuple[Array, Array]:
-        """See `BorderedSystems`."""
+        """Minimiser (n,) and multipliers (m,) for `active` (m,), the residual at round-off."""
 
         def to_round_off() -> None:
             if self.solved is None or (self.solved != active).any():

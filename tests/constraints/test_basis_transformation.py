@@ -4,8 +4,6 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
-from hypothesis import strategies as st
 
 from ngcontact.arrays import from_triplets
 from ngcontact.constraints.basis_transformation import change_of_basis
@@ -178,37 +176,32 @@ def well_separated(given_, contact):
     )
 
 
-# Pivots of 0.05 and sines of 0.05, in chains of three bodies: four digits may go.
-SEPARATED = 1e-11
-
-
-@settings(max_examples=150, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.sampled_from([2, 3]))
-def test_random_pairs(seed, d):
+@pytest.mark.parametrize("d", [2, 3])
+def test_random_pairs(d):
     """Two bodies, supported inside, at the end of the zone or on one side of it."""
-    rng = np.random.default_rng(seed)
     secondary, primary, inner = np.arange(5), np.arange(5, 12), np.arange(12, 16)
-    ends = [[], secondary[:1], primary[:2]][rng.integers(3)]
-    contact = random_contact(rng, 16, secondary, primary, d)
-    given_ = random_conditions(rng, [*inner, *ends], d)
-    assume(well_separated(given_, contact))
-    basis = check(given_, contact, tolerance=SEPARATED)
-    assert basis.kept.tolist() == list(range(len(contact.g)))
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        ends = [[], secondary[:1], primary[:2]][rng.integers(3)]
+        contact = random_contact(rng, 16, secondary, primary, d)
+        given_ = random_conditions(rng, [*inner, *ends], d)
+        if well_separated(given_, contact):
+            basis = check(given_, contact)  # measured 4e-15
+            assert basis.kept.tolist() == list(range(len(contact.g)))
 
 
-@settings(max_examples=150, deadline=None)
-@given(st.integers(0, 2**32 - 1), st.sampled_from([2, 3]))
-def test_random_stacks(seed, d):
+@pytest.mark.parametrize("d", [2, 3])
+def test_random_stacks(d):
     """Three bodies: the middle one is primary to the first and secondary to the last."""
-    rng = np.random.default_rng(seed)
     top, middle, bottom = np.arange(4), np.arange(4, 10), np.arange(10, 15)
-    contact = concatenated(
-        [random_contact(rng, 15, top, middle, d), random_contact(rng, 15, middle[:4], bottom, d)]
-    )
-    given_ = random_conditions(rng, rng.choice(bottom, size=2, replace=False), d)
-    assume(well_separated(given_, contact))
-    basis = check(given_, contact, tolerance=SEPARATED)
-    assert basis.kept.tolist() == list(range(len(contact.g)))
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        pairs = (top, middle), (middle[:4], bottom)
+        contact = concatenated([random_contact(rng, 15, *pair, d) for pair in pairs])
+        given_ = random_conditions(rng, rng.choice(bottom, size=2, replace=False), d)
+        if well_separated(given_, contact):
+            basis = check(given_, contact)  # measured 2e-15
+            assert basis.kept.tolist() == list(range(len(contact.g)))
 
 
 def test_a_ring_of_independent_rows_is_solved():

@@ -43,7 +43,7 @@ def transformed(n, one, other, d):
 
 
 def space(order, rounds, d=2):
-    """T, parents and nodes of the two lines, and a linear displacement (dn,)."""
+    """T, parents and nodes of the two lines, and a linear displacement (d * n,)."""
     points, parents, both = facing_lines(rounds, d)
     segments = both.reshape(-1, 2)
     inner = len(points) + np.arange(len(segments) * (order - 1)).reshape(len(segments), -1)
