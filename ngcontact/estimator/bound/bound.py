@@ -24,13 +24,13 @@ from ...fem import BoundaryTrace
 from ...problem import Problem
 from ...quadrature import features_of, unresolved
 from .cells import Cells, cells_of
-from .elements import Element, by_triangle, elements_of, rigid_motions, stress_norms
+from .elements import Element, by_triangle, elements_of, rigid_motions
 from .facing import ENDS, cuts_of, facing_of, guides_of, held_motions, reach_of
 from .lifting import Asked, asked_on_supports, lifted
 from .missed import SETTLED, Level, data_norms, once_more, residuals
 from .parts import ForceRules, force_rules
 from .program import Balanced, DualProgram, dual_program
-from .tractions import Given, given_on, side_rule, tractions_of
+from .tractions import Given, given_on, side_rule
 
 NO_BOUND = "no guaranteed bound is known"
 BESIDE = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
@@ -81,7 +81,7 @@ class DualProblem:
         """
         cells, elements, lines = self.cells, self.elements, self.program.lines
         given = self.given.under(lines, found.pressure)
-        distance, largest = stress_norms(elements, found.coefficients)
+        distance, largest = found.s.norms()
         scale = max(largest, least)
         residual = float(residuals(cells, self.program.multipliers, found.left, scale).max())
         if not residual <= SETTLED:
@@ -91,11 +91,11 @@ class DualProblem:
             )
         rule = side_rule(cells, given.breaks, np.flatnonzero(~cells.inner))
         at = cells.owner[rule.side]
-        have = tractions_of(elements, found.coefficients, at, rule.x, rule.normal)
+        have = found.s.tractions(at, rule.x, rule.normal)
         missed = rule.missed(cells, given.asked(cells, rule, have) - have, scale)
         loads = data_norms(cells, elements, missed)
         if degree is not None:
-            level = Level(cells, elements, found.coefficients, self.rules, distance, loads)
+            level = Level(cells, found.s, self.rules, distance, loads)
             distance, loads = once_more(displacement, given, level, degree, scale)
         if not np.isfinite(loads).all():
             raise ValueError(

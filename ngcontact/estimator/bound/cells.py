@@ -72,6 +72,13 @@ class Cells:
         """Sides (e,) between two triangles."""
         return np.bincount(self.sides.ravel(), minlength=len(self.ends)) > 1
 
+    @cached_property
+    def on_axis(self) -> Mask:
+        """Triangles (n,) with a side on the axis."""
+        at_axis = np.asarray(self.trace.model.on_axis(self.vertices))
+        sides = np.asarray(at_axis[self.ends].all(axis=1))
+        return np.asarray(sides[self.sides].any(axis=1))
+
     @property
     def bodies(self) -> Index:
         """Numbers (n,) of the material regions."""

@@ -11,7 +11,7 @@ and the tractions of s are N'N mu + N'g + <s_p n, .>.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -66,6 +66,13 @@ class Element:
     beyond: Array  # (b,) squares of |C e(u_h) - s_p - T g|, which no coefficients reach
     dofs: Index  # (b, d) numbers of the multipliers
 
+    def among(self, at: Index) -> tuple[Index, Index]:
+        """Which of triangles `at` (k,) are its own, (r,), and their places among these, (r,)."""
+        own = self.places.at
+        some = np.minimum(np.searchsorted(own, at), len(own) - 1)
+        mine = np.flatnonzero(own[some] == at)
+        return mine, some[mine]
+
     def tractions(self, c: Array) -> Array:
         """Moments (b, d) of the tractions of s with the multipliers, by coefficients `c` (b, m)."""
         return np.asarray(self.own + (c[:, None] @ self.N)[:, 0])
@@ -107,36 +114,59 @@ class Element:
 
 
 @dataclass(frozen=True, eq=False)
+class Stress:
+    """A stress on all triangles."""
+
+    elements: Sequence[Element]
+    coefficients: Sequence[Array]  # (b, m) on the triangles of each element
+
+    def values(self, at: Index, x: Array) -> Array:
+        """Stresses (k, q, v) at `x` (k, q, 2) of triangles `at` (k,), without radial forces."""
+        found = np.empty((*x.shape[:2], self.elements[0].strain.shape[2]))
+        for e, c in zip(self.elements, self.coefficients, strict=True):
+            mine, some = e.among(at)
+            if mine.size:
+                found[mine] = e.stress(c, x[mine], some)
+        return found
+
+    def tractions(self, at: Index, x: Array, normal: Array) -> Array:
+        """Tractions s n (k, q, 2) there, with unit `normal` (k, q, 2)."""
+        s = self.values(at, x)
+        return np.asarray(s[..., [0, -1]] * normal[..., :1] + s[..., [-1, 1]] * normal[..., 1:])
+
+    def exerted(self) -> tuple[Array, float]:
+        """Moments (d,) of the tractions over all triangles, and the largest of one triangle."""
+        total, largest = np.zeros(1 + max(int(e.dofs.max()) for e in self.elements)), 0.0
+        for e, c in zip(self.elements, self.coefficients, strict=True):
+            own = e.tractions(c)
+            np.add.at(total, e.dofs, own)
+            largest = max(largest, float(np.abs(own).max(initial=0.0)))
+        return total, largest
+
+    def norms(self) -> tuple[Array, float]:
+        """|s - C e| (n,), roots of energies per thickness, and the largest component of s.
+
+        That is looked at in the middles of straight sides.
+        """
+        pairs = list(zip(self.elements, self.coefficients, strict=True))
+        squares = [((c - e.g) ** 2).sum(axis=1) + e.beyond for e, c in pairs]
+        middles = ((e.corners + np.roll(e.corners, 1, axis=1)) / 2 for e in self.elements)
+        sizes = [np.abs(e.stress(c, x)).max() for (e, c), x in zip(pairs, middles, strict=True)]
+        return np.sqrt(by_triangle(self.elements, squares)), float(max(sizes, default=0.0))
+
+
+@dataclass(frozen=True, eq=False)
 class Multipliers:
-    """Numbers of the multipliers: on each of e sides those of mu_x, then those of mu_y.
+    """Numbers of the multipliers: on each of e sides those of mu_x, then those of mu_y."""
 
-    `degree` (e,) is that of their polynomials, `traces`, and `start` (e + 1,) has the first of each
-    side, and their number.
-    """
-
-    degree: Index
-    start: Index
+    of_stress: Index  # (n,) degree of the stress in each triangle
+    degree: Index  # (e,) of their polynomials, `traces`
+    start: Index  # (e + 1,) the first of each side, and their number
 
     def of(self, side: int | Index) -> Index:
         """The k multipliers (..., k) of sides `side` (...,) of one degree."""
         k = 2 * (int(np.max(self.degree[side])) + 1)
         return np.add.outer(self.start[side], np.arange(k))
-
-
-def among(
-    elements: Sequence[Element], coefficients: Sequence[Array], at: Index
-) -> Iterator[tuple[Element, Array, Index, Index]]:
-    """The elements that have some of the triangles `at` (m,).
-
-    Each with its coefficients, one of `coefficients` (b, m), which of `at` it has, and their places
-    among its own, (k,) each.
-    """
-    for e, c in zip(elements, coefficients, strict=True):
-        own = e.places.at
-        some = np.minimum(np.searchsorted(own, at), len(own) - 1)
-        mine = np.flatnonzero(own[some] == at)
-        if mine.size:
-            yield e, c, mine, some[mine]
 
 
 def by_triangle(elements: Sequence[Element], values: Sequence[Array | Index]) -> Array:
@@ -147,24 +177,10 @@ def by_triangle(elements: Sequence[Element], values: Sequence[Array | Index]) ->
     return found
 
 
-def stress_norms(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple[Array, float]:
-    """|s - C e| (n,), roots of energies per thickness, and the largest component of s.
+def multipliers(problem: Problem, cells: Cells, degree: int) -> Multipliers:
+    """The multipliers for stresses of a `degree`.
 
-    That is looked at in the middles of straight sides; `coefficients` (b, m) are those on the
-    triangles of each element.
-    """
-    pairs = list(zip(elements, coefficients, strict=True))
-    square = by_triangle(elements, [((c - e.g) ** 2).sum(axis=1) + e.beyond for e, c in pairs])
-    middles = ((e.corners + np.roll(e.corners, 1, axis=1)) / 2 for e in elements)
-    sizes = [np.abs(e.stress(c, x)).max() for (e, c), x in zip(pairs, middles, strict=True)]
-    return np.sqrt(square), float(max(sizes, default=0.0))
-
-
-def multipliers(problem: Problem, cells: Cells, degree: int) -> tuple[Index, Multipliers]:
-    """Degree (n,) of the stress in each triangle, and the multipliers that it asks for.
-
-    It is `degree`, and higher at curved sides and beside contact along normals that are not those
-    of the mesh.
+    It is higher at curved sides and beside contact along normals that are not those of the mesh.
     """
     pairs = [pair for pair in problem.contact if pair.direction is None]
     names = [name for pair in pairs for name in (pair.secondary, pair.primary)]
@@ -175,7 +191,7 @@ def multipliers(problem: Problem, cells: Cells, degree: int) -> tuple[Index, Mul
     higher[cells.owner[side[np.linalg.norm(off, axis=1) > TURNED]]] = True
     own, of_side = degree + ON_CURVES * higher, np.zeros(len(cells.ends), dtype=np.intp)
     np.maximum.at(of_side, cells.sides, own[:, None])
-    return own, Multipliers(of_side, np.concatenate([[0], np.cumsum(2 * (of_side + 1))]))
+    return Multipliers(own, of_side, np.concatenate([[0], np.cumsum(2 * (of_side + 1))]))
 
 
 def rigid_motions(cells: Cells, mu: Multipliers, fixed: Mask) -> Array:
@@ -212,19 +228,16 @@ def elements_of(
 
     Stresses are of a `degree` on triangles with straight sides.
     """
-    own, mu = multipliers(problem, cells, degree)
-    at_axis = np.asarray(cells.trace.model.on_axis(cells.vertices))
-    on_axis = np.asarray(at_axis[cells.ends].all(axis=1))[cells.sides]
+    mu = multipliers(problem, cells, degree)
     key = np.column_stack(
-        [own, on_axis.any(axis=1), mu.degree[cells.sides], cells.curved, cells.bodies]
+        [mu.of_stress, cells.on_axis, mu.degree[cells.sides], cells.curved, cells.bodies]
     )
     kinds, number = np.unique(key, axis=0, return_inverse=True)
     found = []
-    for kind, (own_degree, axis, *_) in enumerate(kinds.tolist()):
+    for kind, own_degree in enumerate(kinds[:, 0]):
         every = np.flatnonzero(number.ravel() == kind)
         for at in np.array_split(every, 1 + len(every) * (own_degree + 2) ** 4 // ENTRIES):
-            kind_ = at, own_degree, bool(axis)
-            found.append(_element(problem, cells, displacement, mu, rules, *kind_))
+            found.append(_element(problem, cells, displacement, mu, rules, at))
     return mu, found
 
 
@@ -251,11 +264,13 @@ def _element(
     mu: Multipliers,
     rules: ForceRules,
     at: Index,
-    degree: int,
-    on_axis: bool,
 ) -> Element:
     """Triangles `at` (b,) of one kind, condensed."""
-    model = model_of(problem)
+    model, degree, on_axis = (
+        model_of(problem),
+        int(mu.of_stress[at[0]]),
+        bool(cells.on_axis[at[0]]),
+    )
     axial, curved = model.extent > 0, bool(cells.curved[at[0]])
     law = _of_body(problem.materials, cells, at)
     points = places(cells, at, 2 * degree + 4 * (curved or varies(law) or axial))
@@ -270,7 +285,7 @@ def _element(
     if source is not None:
         threshold = dict(zip(problem.force.values(), rules.thresholds, strict=True))[source]
         force, missed, size, pieces = projection(source, cells, at, n, rules, threshold)
-        missed[missed <= ROUND_OFF * size] = 0.0
+        missed = np.where(missed <= ROUND_OFF * size, 0.0, missed)
         if axial:
             force[..., 0] = 0.0
             hoop = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
@@ -289,12 +304,28 @@ def _element(
     g, beyond = _nearest(rows @ combined, rest)
     mandel = np.append(np.ones(compliance.shape[-1] - 1), 0.5**0.5)
     largest = np.linalg.eigvalsh(compliance * mandel * mandel[:, None])[..., -1].max(axis=1)
-    N, own = _moments(cells, mu, at, degree, columns)
-    dofs = np.concatenate([mu.of(side) for side in cells.sides[at].T], axis=1)
-    modulus = np.broadcast_to(1 / largest, len(at))
-    data = compliance, strain, source, force, pieces, missed, modulus
-    condensed = combined, combined.transpose(0, 2, 1) @ N, own, g, beyond, dofs
-    return Element(points, corners, degree, n, axial, on_axis, *data, *condensed)
+    N, own = _moments(cells, mu, at, columns)
+    return Element(
+        places=points,
+        corners=corners,
+        degree=degree,
+        force_degree=n,
+        axial=axial,
+        on_axis=on_axis,
+        compliance=compliance,
+        strain=strain,
+        source=source,
+        force=force,
+        pieces=pieces,
+        missed=missed,
+        modulus=np.broadcast_to(1 / largest, len(at)),
+        combined=combined,
+        N=combined.transpose(0, 2, 1) @ N,
+        own=own,
+        g=g,
+        beyond=beyond,
+        dofs=np.concatenate([mu.of(side) for side in cells.sides[at].T], axis=1),
+    )
 
 
 def _weighted(T: Array, weight: Array, compliance: Array, strain: Array) -> tuple[Array, Array]:
@@ -321,14 +352,13 @@ def _moments(
     cells: Cells,
     mu: Multipliers,
     at: Index,
-    degree: int,
     columns: Callable[[Array, Array], tuple[Array, Array]],
 ) -> tuple[Array, Array]:
     """Moments of tractions with the multipliers of triangles `at` (b,).
 
-    Those (b, n, d) of the first `columns` of stresses of a `degree`, and those (b, d) of the other.
+    Those (b, n, d) of the first `columns` of stresses, and those (b, d) of the other.
     """
-    found: list[Array] = []
+    found, degree = [], int(mu.of_stress[at[0]])
     axial, corners = cells.trace.model.extent > 0, cells.corners[at]
     for i in range(3):
         side, back = cells.sides[at, i], cells.backward[at, i]

@@ -193,7 +193,7 @@ def cuts_of(
             parts = divided(trace, line.contact, own, line.facing)
             k = np.append(k, np.tile(own[parts.local], 2))
             s = np.concatenate([s, parts.start, parts.stop])
-            s, there, t = _opposite(trace, reach.pair, k, s)
+            s, (there, t) = _opposite(trace, reach.pair, k, s)
             (away, here), (beyond, other) = nearest(k, s), nearest(there, t)
             faced, apart = there >= 0, np.maximum(away, beyond) > NEAR * np.minimum(here, other)
             found.append(np.column_stack([there, t])[faced & apart])
@@ -207,7 +207,7 @@ def cuts_of(
 
 def _opposite(
     trace: BoundaryTrace, pair: ContactState, k: Index, s: Array
-) -> tuple[Array, Index, Array]:
+) -> tuple[Array, tuple[Index, Array]]:
     """Places (r,) of segments `k` (r,), and segments (r,) and places (r,) opposite along d.
 
     Places `s` (r,) inside of segments are moved until a vertex lies opposite.
@@ -225,7 +225,7 @@ def _opposite(
         s[near] = (s[near] + step).clip(0, 1)
     exact = near[np.abs(t[near] - vertex) <= NEAR]
     t[exact] = np.round(t[exact])
-    return s, there, t
+    return s, (there, t)
 
 
 @dataclass(frozen=True, eq=False)

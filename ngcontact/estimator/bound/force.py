@@ -45,7 +45,8 @@ def force_bar(
     each = iter(directions)
     e = [np.zeros(2) if f.pair is None else next(each) for f in lines]
     found = [_excess(proof, G, *x) for x in zip(lines, e, strict=True)]
-    excess, c, least = zip(*found, strict=True)
+    excess, c = zip(*found, strict=True)
+    least = [_bare(proof, *x) for x in zip(lines, c, strict=True)]
     beside = [_beside(proof, displacement, G, *x) for x in zip(lines, e, strict=True)]
     kappa = max(*least, *beside)
     if not kappa < np.inf:
@@ -98,11 +99,10 @@ def _within(test: Proof, kappa: float, start: Balanced | None = None) -> tuple[B
     return found, ratio
 
 
-def _excess(proof: Proof, G: ng.GridFunction, f: Facing, e: Array) -> tuple[Array, Array, float]:
+def _excess(proof: Proof, G: ng.GridFunction, f: Facing, e: Array) -> tuple[Array, Array]:
     """[G] - d.e (k, j) on a line at Gauss points, 0 where it is round-off.
 
-    And Bernstein coefficients (k, degree + 1) near to it, one number at a vertex; the least kappa
-    with which nothing is left at vertices that no closed side shares.
+    And Bernstein coefficients (k, degree + 1) near to it, one number at a vertex.
     """
     cells, ends = proof.cells, proof.cells.ends[f.side]
     other, there = on_segments(cells, f.other, f.there)
@@ -115,10 +115,17 @@ def _excess(proof: Proof, G: ng.GridFunction, f: Facing, e: Array) -> tuple[Arra
     count, total = np.zeros((2, len(cells.vertices)))
     np.add.at(count, ends, 1.0)
     np.add.at(total, ends, c[:, [0, -1]])
-    at_ends = c[:, [0, -1]] = total[ends] / count[ends]
-    bare, room = ~np.isin(ends, ends[f.closed]) & (at_ends != 0), f.after[:, [0, -1]]
-    ratio = np.divide(np.abs(at_ends), room, out=np.full_like(room, np.inf), where=room > 0)
-    return excess, c, float(ratio[bare].max(initial=0.0))
+    c[:, [0, -1]] = total[ends] / count[ends]
+    return excess, c
+
+
+def _bare(proof: Proof, f: Facing, c: Array) -> float:
+    """The least kappa with which nothing of `c` is left at vertices that no closed side shares."""
+    ends, room = proof.cells.ends[f.side], f.after[:, [0, -1]]
+    bare = ~np.isin(ends, ends[f.closed]) & (c[:, [0, -1]] != 0)
+    size = np.abs(c[:, [0, -1]])
+    ratio = np.divide(size, room, out=np.full_like(room, np.inf), where=room > 0)
+    return float(ratio[bare].max(initial=0.0))
 
 
 def _beside(

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import ngsolve as ng
 import numpy as np
@@ -146,7 +147,7 @@ def lifting_of(
         both = np.concatenate([one.direction, one.amount[..., None] / unit], axis=2)
         degrees[one.side[(np.abs(both - lower @ both) > NOISE).any(axis=(1, 2))]] = DATA
     stiffness = list(_stiffness(problem, cells, layer, degrees, degree))
-    nodes = np.unique(np.concatenate([number.ravel() for _, number, _ in stiffness]))
+    nodes = np.unique(np.concatenate([part.nodes.ravel() for part in stiffness]))
     # Normal equations at each node: two directions, or one and the one across, which is free.
     conditions = []
     for one in asked:
@@ -171,11 +172,11 @@ def lifting_of(
         raise ContactError("conditions that meet at a vertex ask for different displacements")
     rim = _on_sides(cells, np.flatnonzero((count == 1) & fixed), degree)
     held[np.searchsorted(nodes, rim)] = True
-    dofs = [2 * np.searchsorted(nodes, number) for _, number, _ in stiffness]
+    dofs = [2 * np.searchsorted(nodes, part.nodes) for part in stiffness]
     dofs = [np.concatenate([x, x + 1], axis=1) for x in dofs]
     if not held.all():
         K = from_triplets(
-            np.concatenate([K.ravel() for _, _, K in stiffness]),
+            np.concatenate([part.K.ravel() for part in stiffness]),
             np.concatenate([np.repeat(x, x.shape[1], axis=1).ravel() for x in dofs]),
             np.concatenate([np.tile(x, (1, x.shape[1])).ravel() for x in dofs]),
             (w.size, w.size),
@@ -186,11 +187,12 @@ def lifting_of(
         y = cholesky(lower_half(A))(np.ones(A.shape[0], dtype=bool))(-(Z.T @ (K @ w.ravel())))
         w += (Z @ y).reshape(-1, 2)
     still = int(cells.trace.model.extent)  # translations from here on have no energy, but round-off
-    for (at, _, K), x in zip(stiffness, dofs, strict=True):
-        own = w.ravel()[x].reshape(len(at), 2, -1)
+    for part, x in zip(stiffness, dofs, strict=True):
+        own = w.ravel()[x].reshape(len(x), 2, -1)
         own[:, still:] -= own[:, still:, :1]
         own = own.reshape(x.shape)
-        norms[at] = np.sqrt(np.maximum(((K @ own[..., None])[..., 0] * own).sum(axis=1), 0.0))
+        square = ((part.K @ own[..., None])[..., 0] * own).sum(axis=1)
+        norms[part.at] = np.sqrt(np.maximum(square, 0.0))
     return norms
 
 
@@ -200,13 +202,18 @@ def _on_sides(cells: Cells, side: Index, n: int) -> Index:
     return np.concatenate([cells.ends[side, :1], inner, cells.ends[side, 1:]], axis=1)
 
 
+class Stiffness(NamedTuple):
+    """Stiffness of b triangles with m nodes each; x components come first."""
+
+    at: Index  # (b,) the triangles
+    nodes: Index  # (b, m)
+    K: Array  # (b, 2 m, 2 m)
+
+
 def _stiffness(
     problem: Problem, cells: Cells, layer: Index, degrees: Index, degree: int
-) -> Iterator[tuple[Index, Index, Array]]:
-    """Triangles `at` (b,) of a `layer` (k,), their m nodes (b, m), and stiffness (b, 2 m, 2 m).
-
-    Polynomials are of a `degree`, on the sides of `degrees` (e,); x components come first.
-    """
+) -> Iterator[Stiffness]:
+    """Triangles of a `layer` (k,), polynomials of a `degree`, on the sides of `degrees` (e,)."""
     key = np.column_stack([degrees[cells.sides], cells.curved, cells.bodies])[layer]
     kinds, kind = np.unique(key, axis=0, return_inverse=True)
     for k, (*own, bent, _) in enumerate(kinds.tolist()):
@@ -231,11 +238,8 @@ def _stiffness(
             inside = m - sum(own)
             first = len(cells.vertices) + (DATA - 1) * len(cells.ends)
             rest = first + inside * at[:, None] + np.arange(inside)
-            yield (
-                at,
-                np.hstack([cells.triangles[at], *on, rest]),
-                strain.transpose(0, 2, 1) @ stress,
-            )
+            number = np.hstack([cells.triangles[at], *on, rest])
+            yield Stiffness(at, number, strain.transpose(0, 2, 1) @ stress)
 
 
 @lru_cache

@@ -16,17 +16,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
 from .cells import Cells
-from .elements import Element, Multipliers, by_triangle, elements_of, stress_norms
+from .elements import Element, Multipliers, Stress, by_triangle, elements_of
 from .parts import LEAST, ForceRules
 from .polynomials import edges
-from .program import dual_program, exerted
-from .tractions import Given, side_rule, tractions_of
+from .program import dual_program
+from .tractions import Given, side_rule
 
 SETTLED = 1e-10  # residual of equilibrium, relative to the largest stress
 SEEN = 17  # points on each side
@@ -54,22 +55,28 @@ def data_norms(cells: Cells, elements: Sequence[Element], tractions: Array) -> A
     some = (forces > 0) | (tractions > 0).any(axis=1)
     for points in (2, SEEN):  # on straight sides extrema are at ends
         at = np.flatnonzero(some & (cells.curved == (points > 2)))
-        poincare, korn, trace, measure = _constants(cells, at, points)
-        if (measure <= 0).any():
+        known = _constants(cells, at, points)
+        if (known.measure <= 0).any():
             raise ValueError(
                 "no guaranteed bound is known for loads that are no polynomials at the axis; use "
                 "error_estimate"
             )
-        total = poincare * forces[at] + (np.sqrt(trace) * tractions[at]).sum(axis=1)
-        found[at] = korn * total / np.sqrt(least[at] * measure)
+        total = known.poincare * forces[at] + (known.trace * tractions[at]).sum(axis=1)
+        found[at] = known.korn * total / np.sqrt(least[at] * known.measure)
     return found
 
 
-def _constants(cells: Cells, at: Index, points: int) -> tuple[Array, Array, Array, Array]:
-    """Of Poincare and Korn (b,), of traces (b, 3), squares for |grad w| = 1; least measure (b,).
+class Constants(NamedTuple):
+    """Of b triangles, for |grad w| = 1."""
 
-    Sides are looked at in that many `points`.
-    """
+    poincare: Array  # (b,)
+    korn: Array  # (b,)
+    trace: Array  # (b, 3)
+    measure: Array  # (b,) the model's least
+
+
+def _constants(cells: Cells, at: Index, points: int) -> Constants:
+    """Constants of triangles `at` (b,), of which sides are looked at in that many `points`."""
     corners, t = cells.corners[at], np.linspace(0, 1, points)
     x, slope = cells.around(at[:, None], np.arange(3), t)
     normal = np.stack([slope[..., 1], -slope[..., 0]], axis=-1)
@@ -91,23 +98,19 @@ def _constants(cells: Cells, at: Index, points: int) -> tuple[Array, Array, Arra
     least = np.maximum((away * normal).sum(axis=-1).min(axis=-1), tiny)
     far, p = np.linalg.norm(away, axis=-1).max(axis=-1), poincare[:, None]
     measure = cells.trace.model.measure(x.reshape(-1, 2)).reshape(len(at), 3 * points).min(axis=1)
-    return poincare, np.sqrt(1 + 2 / beta**2), 2 * (p**2 + far * p) / least, measure
+    trace = np.sqrt(2 * (p**2 + far * p) / least)
+    return Constants(poincare, np.sqrt(1 + 2 / beta**2), trace, measure)
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """A stress on n triangles of cells, in equilibrium with what `rules` see of forces.
-
-    `distance` and `loads` (n,) are |s - sigma_h| and norms of what s misses of the data,
-    `coefficients` (b, m) those on the triangles of each element.
-    """
+    """A stress on n triangles of cells, in equilibrium with what `rules` see of forces."""
 
     cells: Cells
-    elements: list[Element]
-    coefficients: list[Array]
+    s: Stress
     rules: ForceRules
-    distance: Array
-    loads: Array
+    distance: Array  # (n,) |s - sigma_h|
+    loads: Array  # (n,) norms of what s misses of the data
 
 
 def once_more(
@@ -125,7 +128,7 @@ def once_more(
     """
     c, D, rules = level.distance.copy(), level.loads.copy(), level.rules
     limit = COUNTS * float(c @ c) if allowed is None else allowed
-    pieces = by_triangle(level.elements, [e.pieces for e in level.elements])
+    pieces = by_triangle(level.s.elements, [e.pieces for e in level.s.elements])
     for third in (None, False, True):  # whole triangles, their parts
         lost = (c + D) ** 2 - c**2
         order = np.argsort(lost)
@@ -139,18 +142,18 @@ def once_more(
             mu, elements = elements_of(given.problem, parts, displacement, own, finer)
             rule = side_rule(parts, given.breaks, np.flatnonzero(~parts.inner))
             owner = parts.owner[rule.side]
-            on = level.elements, level.coefficients, at[owner // k], rule.x, rule.normal
-            asked = given.asked(parts, rule, tractions_of(*on))
+            whole = level.s.tractions(at[owner // k], rule.x, rule.normal)
+            asked = given.asked(parts, rule, whole)
             moments = rule.moments(mu, asked)
             free, motions = np.zeros(len(moments), dtype=bool), np.zeros((len(moments), 0))
             program = dual_program(mu, elements, free, motions, [])
-            found = program.nearest(elements, moments).coefficients
-            left = residuals(parts, mu, moments - exerted(elements, found)[0], scale)
-            have = tractions_of(elements, found, owner, rule.x, rule.normal)
+            s = program.nearest(elements, moments).s
+            left = residuals(parts, mu, moments - s.exerted()[0], scale)
+            have = s.tractions(owner, rule.x, rule.normal)
             loads = data_norms(parts, elements, rule.missed(parts, asked - have, scale))
-            both = stress_norms(elements, found)[0], loads
+            both = s.norms()[0], loads
             if finer.levels and third is not None:
-                inner, share = Level(parts, elements, found, finer, *both), len(at) / len(counts)
+                inner, share = Level(parts, s, finer, *both), len(at) / len(counts)
                 both = once_more(displacement, given, inner, own, scale, limit * share)
             one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
             settled = left.reshape(-1, k).max(axis=1) <= SETTLED

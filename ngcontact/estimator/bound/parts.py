@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import ngsolve as ng
 import numpy as np
@@ -107,14 +108,19 @@ def force_rules(problem: Problem, cells: Cells, degree: int, least: Index) -> Fo
     return ForceRules(thresholds, n, LEVELS, 2 * max(degree, LEAST) + 2, most, least > 0)
 
 
+class Samples(NamedTuple):
+    """A force in k triangles or parts of such, q points in each."""
+
+    of: Index  # (k,) numbers of the triangles
+    x: Array  # (k, q, 2)
+    weight: Array  # (k, q)
+    values: Array  # (k, q, 2)
+
+
 def _samples(
     F: ng.CoefficientFunction, cells: Cells, at: Index, rules: ForceRules, threshold: float
-) -> Iterator[tuple[Index, Array, Array, Array]]:
-    """Points (k, q, 2), weights (k, q) and values (k, q, 2) of F in triangles `at` (b,) or parts.
-
-    The first are numbers (k,) among these triangles. A force with an infinite `threshold` is one of
-    numbers.
-    """
+) -> Iterator[Samples]:
+    """Samples in triangles `at` (b,), numbered from 0; an infinite `threshold` says: numbers."""
     axial = int(cells.trace.model.extent)
     for bent, third in np.ndindex(2, 2):
         own = np.flatnonzero((cells.curved[at] == bent) & (rules.thirds[at] == third))
@@ -129,13 +135,22 @@ def _samples(
             square = (weight * (rest**2).sum(axis=2)).sum(axis=1)
             rough = (square > threshold**2 * weight.sum(axis=1)) | (rules.least[at[own]] > 0)
         if not rough.all():
-            yield own[~rough], points.x[~rough], weight[~rough], values[~rough]
+            yield Samples(own[~rough], points.x[~rough], weight[~rough], values[~rough])
         if rough.any():
             parts, finer = rules.divided(cells, at[own[rough]], bool(third))
             every = np.arange(len(parts.triangles))
             whole = np.repeat(own[rough], len(every) // rough.sum())
-            for n, x, w, inner in _samples(F, parts, every, finer, threshold):
-                yield whole[n], x, w, inner
+            for inner in _samples(F, parts, every, finer, threshold):
+                yield inner._replace(of=whole[inner.of])
+
+
+class Projection(NamedTuple):
+    """Polynomials of m coefficients near to a force F in b triangles."""
+
+    coefficients: Array  # (b, m, 2) as of `scalars`
+    missed: Array  # (b,) L2 norms of what they miss, times the measure; axially about an axis
+    size: Array  # (b,) those of F
+    pieces: Index  # (b,) on how many parts F is integrated
 
 
 def projection(
@@ -145,33 +160,27 @@ def projection(
     degree: int,
     rules: ForceRules,
     threshold: float,
-) -> tuple[Array, Array, Array, Index]:
-    """Polynomials near to a force F in triangles `at` (b,), of a `degree`.
-
-    Coefficients (b, m, 2) as of `scalars`; L2 norms, (b,) each, of what they miss of F, about an
-    axis of its axial part, and of F, times the measure; on how many parts it is integrated, (b,).
-    """
+) -> Projection:
+    """Polynomials near to a force F in triangles `at` (b,), of a `degree`."""
     if len(at) > AT_ONCE and np.isfinite(threshold):
         some = np.array_split(at, 1 + len(at) // AT_ONCE)
-        parts = [projection(F, cells, x, degree, rules, threshold) for x in some]
-        coefficients, rest, size, parted = (np.concatenate(x) for x in zip(*parts, strict=True))
-        return coefficients, rest, size, parted
+        every = (projection(F, cells, x, degree, rules, threshold) for x in some)
+        return Projection(*map(np.concatenate, zip(*every, strict=True)))
     corners, b, m = cells.corners[at], len(at), (degree + 1) * (degree + 2) // 2
-    pieces = [
-        (n, scalars(degree, corners[n], x), w, values, w * cells.measure(x))
-        for n, x, w, values in _samples(F, cells, at, rules, threshold)
-    ]
+    samples = list(_samples(F, cells, at, rules, threshold))
+    bases = [scalars(degree, corners[s.of], s.x) for s in samples]
+    measures = [s.weight * cells.measure(s.x) for s in samples]
     mass, found, norms = np.zeros((b, m, m)), np.zeros((b, m, 2)), np.zeros((3, b))
-    for n, P, w, _, _ in pieces:
-        np.add.at(mass, n, (P.swapaxes(1, 2) * w[:, None]) @ P)
+    for s, P in zip(samples, bases, strict=True):
+        np.add.at(mass, s.of, (P.swapaxes(1, 2) * s.weight[:, None]) @ P)
     for turn in range(3):  # without a projection, with one, with that corrected for round-off
         right = np.zeros_like(found)
-        for n, P, w, values, squares in pieces:
-            rest = values - P @ found[n]
-            np.add.at(right, n, P.swapaxes(1, 2) @ (w[..., None] * rest))
+        for s, P, measure in zip(samples, bases, measures, strict=True):
+            rest = s.values - P @ found[s.of]
+            np.add.at(right, s.of, P.swapaxes(1, 2) @ (s.weight[..., None] * rest))
             axial = rest[..., int(cells.trace.model.extent) :]
-            np.add.at(norms[turn], n, (squares * (axial**2).sum(axis=2)).sum(axis=1))
+            np.add.at(norms[turn], s.of, (measure * (axial**2).sum(axis=2)).sum(axis=1))
         found = found + np.linalg.solve(mass, right) if turn < 2 else found
-    count = np.bincount(np.concatenate([n for n, *_ in pieces]), minlength=b)
+    count = np.bincount(np.concatenate([s.of for s in samples]), minlength=b)
     size, _, rest = np.sqrt(norms)
-    return found, rest, size, np.maximum(count, 1 + rules.least[at])
+    return Projection(found, rest, size, np.maximum(count, 1 + rules.least[at]))

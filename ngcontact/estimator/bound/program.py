@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -30,7 +30,7 @@ from ...qp import (
     pinned_null_space,
     vanishing_combinations,
 )
-from .elements import Element, Multipliers, traces
+from .elements import Element, Multipliers, Stress, traces
 from .facing import PLACES, Facing
 
 FALLING = 0.5  # ratio of two residuals from which more corrections take nothing off
@@ -47,7 +47,7 @@ DEFINITE = 1e-12  # of the diagonal, added to what is factorised: vertices where
 class Balanced:
     """A stress in equilibrium, and what acts on the lines."""
 
-    coefficients: list[Array]  # (b, m) each, of the stress on the triangles of an `Element`
+    s: Stress  # in equilibrium
     pressure: list[Array]  # (k, j) each, Bernstein coefficients of p*, per length (P1), eta (P2)
     left: Array  # (d,) moments of tractions that do not balance
     idle: float  # sum of the moments that hold motions which nothing resists, a force per thickness
@@ -91,8 +91,8 @@ class DualProgram:
         ContactError
             Loads on a body that moves freely are not in balance.
         """
-        p, coefficients = self.program, [e.g for e in elements]
-        alone, largest = exerted(elements, coefficients)
+        p, s = self.program, Stress(elements, [e.g for e in elements])
+        alone, largest = s.exerted()
         idle = self._idle(moments - alone)
         ratio = np.abs(idle).max() / (np.abs(moments - alone).max() or 1.0)
         if ratio > UNBALANCED:
@@ -108,7 +108,7 @@ class DualProgram:
             high = _joined([x.mass * limit for x, limit in zip(self.lines, limits, strict=True)])
             low, active = -high, high > 0
         if start is not None:
-            coefficients = start.coefficients
+            s = start.s
         elif limits is None and len(active):
             self.systems.restart(replace(p, b=self.T.T @ (moments - alone)))
             found = minimise(self.systems, active)
@@ -118,10 +118,9 @@ class DualProgram:
             # Stresses of stiff bodies are small differences of multipliers: tractions tell what is
             # left. Rows beyond their limits, as those that pull by round-off, stay at these.
             change = self.T @ y
-            coefficients = [
-                c + e.answer(change) for e, c in zip(elements, coefficients, strict=True)
-            ]
-            total, largest = exerted(elements, coefficients)
+            parts = zip(elements, s.coefficients, strict=True)
+            s = Stress(elements, [c + e.answer(change) for e, c in parts])
+            total, largest = s.exerted()
             left = moments - total
             left -= self._idle(left)
             force = np.where(active, (self.T.T @ left)[p.unknown], force)
@@ -136,9 +135,9 @@ class DualProgram:
             y = self._answer(right, active)
         mass = [x.mass for x in self.lines]
         ends = np.cumsum([m.size for m in mass])[:-1]
-        parts = zip(np.split(force, ends), mass, strict=bool(mass))
-        pressure = [f.reshape(m.shape) / m for f, m in parts]
-        return Balanced(coefficients, pressure, left, float(np.abs(idle).sum()))
+        each = zip(np.split(force, ends), mass, strict=bool(mass))
+        pressure = [f.reshape(m.shape) / m for f, m in each]
+        return Balanced(s, pressure, left, float(np.abs(idle).sum()))
 
     def _answer(self, load: Array, active: Mask) -> Array:
         """Unknowns (d,) under a `load` (d,), 0 at the rows `active` (m,); near to them at least."""
@@ -172,11 +171,12 @@ def dual_program(
     motions that supports leave free.
     """
     d = int(mu.start[-1])
-    R, T, unknown = _basis(mu, lines)
-    m, null_space = len(unknown), no_null_space(d)
-    dofs = [e.dofs.astype(np.int32) for e in elements]  # half of the memory, and of the time
+    firsts = [mu.start[line.side, None] + np.arange(line.psi.shape[1]) for line in lines]
+    unknown, null_space = _joined(firsts, np.intp), no_null_space(d)
+    R, T = _basis(mu, lines, unknown)
+    m, dofs = len(unknown), [e.dofs.astype(np.int32) for e in elements]  # half of the memory
     squares = [e.N.transpose(0, 2, 1) @ e.N for e in elements]
-    K = _of_blocks(list(zip(dofs, dofs, squares, strict=True)), d, d)
+    K = _summed([Block(at, at, x) for at, x in zip(dofs, squares, strict=True)], (d, d))
     if m:
         K = K + change_of_basis(K, T)
     idle = fixed | (K.diagonal() <= 0)  # on the axis there is no traction
@@ -204,23 +204,12 @@ def _joined(parts: Sequence[Any], kind: type = float) -> Any:
     return np.concatenate([np.zeros(0, kind), *map(np.ravel, parts)])
 
 
-def exerted(elements: Sequence[Element], coefficients: Sequence[Array]) -> tuple[Array, float]:
-    """Moments (d,) of the tractions of a stress over all triangles, and the largest of one.
-
-    By its `coefficients` (b, m) on the triangles of each element.
-    """
-    total, largest = np.zeros(1 + max(int(e.dofs.max()) for e in elements)), 0.0
-    for e, c in zip(elements, coefficients, strict=True):
-        own = e.tractions(c)
-        np.add.at(total, e.dofs, own)
-        largest = max(largest, float(np.abs(own).max(initial=0.0)))
-    return total, largest
-
-
-def _basis(mu: Multipliers, lines: Sequence[Facing]) -> tuple[sp.csr_array, sp.csr_array, Index]:
-    """`DualProgram.R` and `.T`, and the unknown of each row."""
-    d, own, across, solved, unknown = int(mu.start[-1]), [], [], [], [np.zeros(0, np.intp)]
-    plain, m = np.ones(d, dtype=bool), 0
+def _basis(
+    mu: Multipliers, lines: Sequence[Facing], unknown: Index
+) -> tuple[sp.csr_array, sp.csr_array]:
+    """`DualProgram.R` and `.T`, by the `unknown` (m,) of each row."""
+    d, m, own, across, solved = int(mu.start[-1]), 0, [], [], []
+    plain = np.ones(d, dtype=bool)
     for line in lines:
         means = line.psi.T * (line.weight[:, None] / line.mass[..., None])  # (k, n, j)
         for i, (side, other) in enumerate(zip(line.side, line.other, strict=True)):
@@ -229,24 +218,30 @@ def _basis(mu: Multipliers, lines: Sequence[Facing]) -> tuple[sp.csr_array, sp.c
             at, row = mu.of(side), np.arange(m, m + len(R))
             m += len(R)
             plain[at] = False
-            own.append((row, at, R))
-            unknown.append(at[: len(R)])
-            solved.append((at, at, np.linalg.inv(np.vstack([R, np.linalg.svd(R)[2][len(R) :]]))))
+            own.append(Block(row, at, R))
+            inverse = np.linalg.inv(np.vstack([R, np.linalg.svd(R)[2][len(R) :]]))
+            solved.append(Block(at, at, inverse))
             if other >= 0:
                 R = -(load @ traces(mu.degree[other], line.there[i])).reshape(len(load), -1)
-                across.append((row, mu.of(other), R))
-    rest, of_row = np.flatnonzero(plain), np.concatenate(unknown)
-    part = _of_blocks(solved, d, d) + from_triplets(np.ones(len(rest)), rest, rest, (d, d))
-    R = _of_blocks(across, m, d)
-    M, T = -part[:, of_row] @ R, part  # mu = part y + M mu, from the primary to the secondary
+                across.append(Block(row, mu.of(other), R))
+    part = _summed(solved, (d, d)) + sp.diags_array(plain.astype(float), format="csr")
+    R = _summed(across, (m, d))
+    M, T = -part[:, unknown] @ R, part  # mu = part y + M mu, from the primary to the secondary
     while (part := M @ part).nnz:  # as often as bodies stand in a row
         T = T + part
-    return _of_blocks(own, m, d) + R, T, of_row
+    return _summed(own, (m, d)) + R, T
 
 
-def _of_blocks(blocks: Sequence[tuple[Any, Any, Array]], height: int, width: int) -> sp.csr_array:
-    """Sparse sum of dense blocks, each at its rows and columns; or of several of one shape."""
-    values = _joined([block for _, _, block in blocks])
-    row = _joined([np.repeat(i, j.shape[-1], axis=-1) for i, j, _ in blocks], np.int32)
-    column = _joined([np.tile(j, i.shape[-1]) for i, j, _ in blocks], np.int32)
-    return from_triplets(values, row, column, (height, width))
+class Block(NamedTuple):
+    """Dense block (..., r, c), or several of one shape, in a sparse array."""
+
+    rows: np.ndarray  # (..., r)
+    columns: np.ndarray  # (..., c)
+    values: Array
+
+
+def _summed(blocks: Sequence[Block], shape: tuple[int, int]) -> sp.csr_array:
+    """Sparse sum of blocks."""
+    row = _joined([np.repeat(x.rows, x.columns.shape[-1], axis=-1) for x in blocks], np.int32)
+    column = _joined([np.tile(x.columns, x.rows.shape[-1]) for x in blocks], np.int32)
+    return from_triplets(_joined([x.values for x in blocks]), row, column, shape)

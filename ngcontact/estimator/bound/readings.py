@@ -17,7 +17,6 @@ from ...arrays import Array, Index
 from ...fem import LOAD_BONUS, load_vector, potential_energy
 from ..residual import Estimated
 from .bound import Proof, error_bound
-from .elements import among, stress_norms
 from .facing import ENDS, WEIGHTS, bernstein
 from .polynomials import scalars
 
@@ -140,11 +139,10 @@ class EquilibratedStress:
         share = np.linalg.solve(edges, (x[at] - corners[:, 0])[..., None])[..., 0]
         inside = np.minimum(share.min(axis=1), 1 - share.sum(axis=1))
         own = part[np.lexsort((-np.arange(len(at)), inside, at))[last - 1]]
-        found = np.empty((len(element), proof.elements[0].strain.shape[2]))
-        for e, c, at, some in among(proof.elements, proof.stress.coefficients, own):
-            found[at] = e.stress(c, x[at, None], some)[:, 0]
-            if found.shape[1] > 3:
-                found[at, 2] += e.radial_at(cells, own[at], reference[at])
+        found = proof.stress.s.values(own, x[:, None])[:, 0]
+        for e in proof.elements if found.shape[1] > 3 else ():
+            mine, _ = e.among(own)
+            found[mine, 2] += e.radial_at(cells, own[mine], reference[mine])
         return found
 
     def save(self, path: str | os.PathLike[str]) -> Path:
@@ -185,7 +183,7 @@ def _certificate(proof: Proof) -> dict[str, Any]:
     if any(found.values()):
         told = " and ".join(f"{n} {what}" for what, n in found.items() if n)
         raise ValueError(f"no certificate: {told}; tractions and p* are no polynomials there")
-    own, _ = stress_norms(proof.elements, stress.coefficients)
+    own, _ = stress.s.norms()
     replaced = np.flatnonzero(~np.isclose(stress.distance, own, rtol=SAME, atol=0))
     arrays: dict[str, Any] = {
         "axisymmetric": np.array(cells.trace.model.extent > 0),
@@ -204,7 +202,7 @@ def _certificate(proof: Proof) -> dict[str, Any]:
     share = np.column_stack([1 - lattice.sum(axis=1), lattice])
     x = np.einsum("qc,ncd->nqd", share, cells.corners)
     T, force, measure = np.zeros((*x.shape[:2], 3)), np.zeros(x.shape), cells.measure(x)[..., None]
-    for number, (e, c) in enumerate(zip(proof.elements, stress.coefficients, strict=True)):
+    for number, (e, c) in enumerate(zip(proof.elements, stress.s.coefficients, strict=True)):
         at = e.places.at
         T[at] = e.stress(c, x[at])[..., [0, 1, -1]]
         force[at] = scalars(e.force_degree, e.corners, x[at]) @ e.force

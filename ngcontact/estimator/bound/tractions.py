@@ -14,7 +14,7 @@ from ...lagrange import gauss_derivative, lagrange
 from ...problem import Problem
 from ...quadrature import known_rough_load, moment_degree, numbers
 from .cells import Cells
-from .elements import Element, Multipliers, among, traces
+from .elements import Multipliers, traces
 from .facing import DATA, LEGENDRE, PLACES, WEIGHTS, Facing, jump, on_segments
 from .parts import LEVELS, PARTS
 
@@ -180,17 +180,3 @@ def given_on(problem: Problem, cells: Cells) -> Given:
     none = np.zeros((len(cells.ends), len(PLACES), 2))
     rising = np.unique(np.concatenate(breaks), axis=0)
     return Given(problem, cells, held, loads, supports, rising, none)
-
-
-def tractions_of(
-    elements: Sequence[Element], coefficients: Sequence[Array], at: Index, x: Array, normal: Array
-) -> Array:
-    """Tractions s n (m, j, 2) of a stress at `x` (m, j, 2) of triangles `at` (m,).
-
-    By its `coefficients` (b, m) on the triangles of each element, and unit `normal` (m, j, 2).
-    """
-    values = np.empty_like(x)
-    for e, c, mine, some in among(elements, coefficients, at):
-        s, n = e.stress(c, x[mine], some), normal[mine]
-        values[mine] = s[..., [0, -1]] * n[..., :1] + s[..., [-1, 1]] * n[..., 1:]
-    return values
