@@ -130,7 +130,7 @@ class Stress:
         return found
 
     def tractions(self, at: Index, x: Array, normal: Array) -> Array:
-        """Tractions s n (k, q, 2) there, with unit `normal` (k, q, 2)."""
+        """Tractions s n (k, q, 2) at `x` (k, q, 2) of `at` (k,), with unit `normal` (k, q, 2)."""
         s = self.values(at, x)
         return np.asarray(s[..., [0, -1]] * normal[..., :1] + s[..., [-1, 1]] * normal[..., 1:])
 

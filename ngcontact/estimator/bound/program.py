@@ -237,7 +237,7 @@ class Block(NamedTuple):
 
     rows: np.ndarray  # (..., r)
     columns: np.ndarray  # (..., c)
-    values: Array
+    values: Array  # (..., r, c)
 
 
 def _summed(blocks: Sequence[Block], shape: tuple[int, int]) -> sp.csr_array:
