@@ -106,14 +106,15 @@ class DualProblem:
         for line, p in zip(lines, found.pressure, strict=True):
             work -= float((line.force(p) * line.gap).sum())
         return AdmissibleStress(
-            **vars(found), distance=distance, loads=loads, work=work, residual=residual
+            found.s, found.pressure, found.left, found.idle, distance, loads, work, residual
         )
 
 
 @dataclass(frozen=True, eq=False)
-class Proof(DualProblem):
+class Proof:
     """What a bound was made of."""
 
+    dual: DualProblem
     stress: AdmissibleStress  # the nearest one, and p* >= 0
     lifting: Array  # (n,) norms of w
     parts: dict[str, float]  # what B^2 is the sum of
@@ -214,7 +215,7 @@ def _bound(
     idle = stress.idle and stress.idle * largest(elements, cells, displacement)
     below = float(c @ c / 2 + D @ (c + D / 2 + 2 * w)) - stress.work + idle
     above = float((c + D + w / 2) @ w) + stress.work + closed + idle
-    return Proof(**vars(dual), stress=stress, lifting=w, parts=parts, below=below, above=above)
+    return Proof(dual, stress, lifting=w, parts=parts, below=below, above=above)
 
 
 def largest(elements: Sequence[Element], cells: Cells, function: ng.CoefficientFunction) -> float:

@@ -256,9 +256,21 @@ def joined(
     ends = (local[:, None] + [1, 2]) % 3
     span = barycentric[owner[:, None], ends, last[segment][:, None]]
     span = np.where((start > stop)[first, None], span[:, ::-1], span)
-    topology = both[first], sides.reshape(-1, 3), owner, local, segment, span
-    curved = bent[own[:, 0]], bent[segment]
-    return Cells(trace, vertices, triangles, parent, barycentric, *topology, *curved)
+    return Cells(
+        trace=trace,
+        vertices=vertices,
+        triangles=triangles,
+        parent=parent,
+        barycentric=barycentric,
+        ends=both[first],
+        sides=sides.reshape(-1, 3),
+        owner=owner,
+        local=local,
+        segment=segment,
+        span=span,
+        curved=bent[own[:, 0]],
+        bent=bent[segment],
+    )
 
 
 def _lengths(corners: Array) -> Array:

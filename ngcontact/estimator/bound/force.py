@@ -10,7 +10,8 @@ import numpy as np
 
 from ...arrays import Array
 from ...fem import model_of
-from .bound import Proof, largest
+from .bound import DualProblem, Proof, largest
+from .cells import Cells
 from .facing import PLACES, Facing, bernstein, fitted, jump, met, on_segments
 from .lifting import lifted
 from .program import Balanced
@@ -41,35 +42,36 @@ def force_bar(
     ValueError, ContactError
         No bar is proved.
     """
-    cells, B, lines, stress = proof.cells, proof.bound, proof.program.lines, proof.stress
-    each = iter(directions)
-    e = [np.zeros(2) if f.pair is None else next(each) for f in lines]
-    found = [_excess(proof, G, *x) for x in zip(lines, e, strict=True)]
-    excess, c = zip(*found, strict=True)
-    least = [_bare(proof, *x) for x in zip(lines, c, strict=True)]
-    beside = [_beside(proof, displacement, G, *x) for x in zip(lines, e, strict=True)]
-    kappa = max(*least, *beside)
+    dual, stress, B = proof.dual, proof.stress, proof.bound
+    cells, lines, each, kappa = dual.cells, dual.program.lines, iter(directions), 0.0
+    excess, c = [], []
+    for f in lines:
+        e = np.zeros(2) if f.pair is None else next(each)
+        values, coefficients = _excess(cells, G, f, e)
+        excess.append(values)
+        c.append(coefficients)
+        kappa = max(kappa, _bare(cells, f, c[-1]), _beside(cells, displacement, G, f, e))
     if not kappa < np.inf:
         raise ValueError(
             "no bar of the force is proved where supports end contact, or an open gap is 0"
         )
-    problem = proof.given.problem
+    problem = dual.given.problem
     strain = model_of(problem).strain(G)
-    elements = [e.of_strain(e.places.evaluate(cells, strain)) for e in proof.elements]
-    given, moments = replace(proof.given, loads={}), np.zeros_like(proof.moments)
-    test = replace(proof, given=given, elements=elements, moments=moments)
-    nearest, ratio = _within(test, np.inf)
+    elements = [e.of_strain(e.places.evaluate(cells, strain)) for e in dual.elements]
+    given, moments = replace(dual.given, loads={}), np.zeros_like(dual.moments)
+    test = replace(dual, given=given, elements=elements, moments=moments)
+    nearest, ratio = _within(test, stress.pressure, np.inf)
     t = test.admissible(displacement, nearest)
     costless = float(np.linalg.norm(t.distance + t.loads)) / B if B > 0 else 0.0
     limit = max(kappa, TWICE * costless)
     if ratio > limit:
-        nearest, ratio = _within(test, limit, nearest)
+        nearest, ratio = _within(test, stress.pressure, limit, nearest)
         t = test.admissible(displacement, nearest)
     kappa = max(kappa, costless, ratio)
     # What of [G] - d.e is more than kappa times the gap after its own lifting.
     kept = [np.clip(x, -kappa * f.after, kappa * f.after) for f, x in zip(lines, c, strict=True)]
     r = [x - y @ bernstein(y.shape[1] - 1, PLACES).T for x, y in zip(excess, kept, strict=True)]
-    held = [replace(one, amount=np.zeros_like(one.amount)) for one in proof.asked]
+    held = [replace(one, amount=np.zeros_like(one.amount)) for one in dual.asked]
     degree, lifts = max(cells.trace.order, LEAST), list(zip(lines, r, strict=True))
     w = lifted(problem, cells, held, lifts, degree, 1.0)
     M = float(np.linalg.norm(t.distance + t.loads + w))
@@ -82,12 +84,14 @@ def force_bar(
     return error + abs(t.work) + crossed + abs(opened) + idle
 
 
-def _within(test: Proof, kappa: float, start: Balanced | None = None) -> tuple[Balanced, float]:
+def _within(
+    test: DualProblem, pressure: Sequence[Array], kappa: float, start: Balanced | None = None
+) -> tuple[Balanced, float]:
     """The stress near to that of G with |q*| <= kappa p*, and the largest |q*| / p*.
 
-    Any q* where forces have any sign.
+    `pressure` (k, n) each is p*. Any q* where forces have any sign.
     """
-    lines, pressure = test.program.lines, test.stress.pressure
+    lines = test.program.lines
     limits = [
         np.full_like(p, np.inf) if f.equality else np.where(p > 0, kappa, 0) * p
         for f, p in zip(lines, pressure, strict=True)
@@ -99,12 +103,12 @@ def _within(test: Proof, kappa: float, start: Balanced | None = None) -> tuple[B
     return found, ratio
 
 
-def _excess(proof: Proof, G: ng.GridFunction, f: Facing, e: Array) -> tuple[Array, Array]:
+def _excess(cells: Cells, G: ng.GridFunction, f: Facing, e: Array) -> tuple[Array, Array]:
     """[G] - d.e (k, j) on a line at Gauss points, 0 where it is round-off.
 
     And Bernstein coefficients (k, degree + 1) near to it, one number at a vertex.
     """
-    cells, ends = proof.cells, proof.cells.ends[f.side]
+    ends = cells.ends[f.side]
     other, there = on_segments(cells, f.other, f.there)
     other = np.where(f.other >= 0, other, -1)[:, None].repeat(len(PLACES), 1)
     values, _ = jump(cells.trace, G, on_segments(cells, f.side, PLACES), (other, there))
@@ -119,9 +123,9 @@ def _excess(proof: Proof, G: ng.GridFunction, f: Facing, e: Array) -> tuple[Arra
     return excess, c
 
 
-def _bare(proof: Proof, f: Facing, c: Array) -> float:
+def _bare(cells: Cells, f: Facing, c: Array) -> float:
     """The least kappa with which nothing of `c` is left at vertices that no closed side shares."""
-    ends, room = proof.cells.ends[f.side], f.after[:, [0, -1]]
+    ends, room = cells.ends[f.side], f.after[:, [0, -1]]
     bare = ~np.isin(ends, ends[f.closed]) & (c[:, [0, -1]] != 0)
     size = np.abs(c[:, [0, -1]])
     ratio = np.divide(size, room, out=np.full_like(room, np.inf), where=room > 0)
@@ -129,14 +133,14 @@ def _bare(proof: Proof, f: Facing, c: Array) -> float:
 
 
 def _beside(
-    proof: Proof, displacement: ng.GridFunction, G: ng.GridFunction, f: Facing, e: Array
+    cells: Cells, displacement: ng.GridFunction, G: ng.GridFunction, f: Facing, e: Array
 ) -> float:
     """The largest ratio of [G] - d.e to the gap where p* does not act, at Gauss points."""
     if f.pair is None:
         return 0.0
-    trace, segment = proof.cells.trace, proof.cells.segment
+    trace, segment = cells.trace, cells.segment
     side = np.setdiff1d(np.flatnonzero(np.isin(segment, f.pair.line.segments)), f.side)
-    place = on_segments(proof.cells, side, PLACES)
+    place = on_segments(cells, side, PLACES)
     found = met(trace, displacement, f.pair, *place)
     values, _ = jump(trace, G, place, (found.segment, found.s))
     excess = np.abs(((values - e) * found.direction).sum(axis=2))

@@ -80,23 +80,23 @@ class EquilibratedStress:
     @property
     def degree(self) -> int:
         """Of its polynomials on triangles with straight sides; about an axis of r times it."""
-        return min(e.degree for e in self.proof.elements)
+        return min(e.degree for e in self.proof.dual.elements)
 
     @property
     def triangles(self) -> Array:
         """Corners (n, 3, 2) of the triangles, lengths."""
-        return self.proof.cells.corners
+        return self.proof.dual.cells.corners
 
     @property
     def element(self) -> Index:
         """Elements (n,) of the mesh that they are, or parts of."""
-        return self.proof.cells.parent
+        return self.proof.dual.cells.parent
 
     @property
     def pressure(self) -> list[ContactPressure]:
         """p* of each pair."""
-        cells, found = self.proof.cells, []
-        for line, p in zip(self.proof.program.lines, self.proof.stress.pressure, strict=True):
+        cells, found = self.proof.dual.cells, []
+        for line, p in zip(self.proof.dual.program.lines, self.proof.stress.pressure, strict=True):
             if line.pair is not None:
                 side = line.side
                 found.append(ContactPressure(cells.segment[side], cells.span[side], p))
@@ -109,7 +109,7 @@ class EquilibratedStress:
         The divergence holds by construction; what is left are jumps of tractions between triangles
         and from the given ones.
         """
-        lines = zip(self.proof.program.lines, self.proof.stress.pressure, strict=True)
+        lines = zip(self.proof.dual.program.lines, self.proof.stress.pressure, strict=True)
         least = [p.min(initial=0.0) for line, p in lines if not line.equality]
         return {
             "tractions": self.proof.stress.residual,
@@ -126,7 +126,7 @@ class EquilibratedStress:
         reference : ndarray (k, 2)
             Places in them, NGSolve's reference coordinates.
         """
-        proof, cells = self.proof, self.proof.cells
+        proof, cells = self.proof, self.proof.dual.cells
         first = np.argsort(cells.parent, kind="stable")
         count = np.bincount(cells.parent, minlength=int(element.max(initial=0)) + 1)
         start, many = (np.cumsum(count) - count)[element], count[element]
@@ -140,7 +140,7 @@ class EquilibratedStress:
         inside = np.minimum(share.min(axis=1), 1 - share.sum(axis=1))
         own = part[np.lexsort((-np.arange(len(at)), inside, at))[last - 1]]
         found = proof.stress.s.values(own, x[:, None])[:, 0]
-        for e in proof.elements if found.shape[1] > 3 else ():
+        for e in proof.dual.elements if found.shape[1] > 3 else ():
             mine, _ = e.among(own)
             found[mine, 2] += e.radial_at(cells, own[mine], reference[mine])
         return found
@@ -172,9 +172,9 @@ def _certificate(proof: Proof) -> dict[str, Any]:
         Where cells have curved sides, or normals of drawn curves turn along straight ones.
     """
     cells, mu, lines, stress = (
-        proof.cells,
-        proof.program.multipliers,
-        proof.program.lines,
+        proof.dual.cells,
+        proof.dual.program.multipliers,
+        proof.dual.program.lines,
         proof.stress,
     )
     turning = sum(int((np.ptp(f.direction, axis=1) > STRAIGHT).any(axis=1).sum()) for f in lines)
@@ -196,13 +196,13 @@ def _certificate(proof: Proof) -> dict[str, Any]:
         "bound": np.array(proof.bound),
     }
     # T and F, times the measure, at a lattice; by rules of quadrature e(u_h) and C^-1.
-    k = proof.elements[0].degree
+    k = proof.dual.elements[0].degree
     i, j = np.array([(i, j) for i in range(k + 1) for j in range(k + 1 - i)]).T
     lattice = (np.column_stack([i, j]) + INSET) / (k + 3 * INSET)
     share = np.column_stack([1 - lattice.sum(axis=1), lattice])
     x = np.einsum("qc,ncd->nqd", share, cells.corners)
     T, force, measure = np.zeros((*x.shape[:2], 3)), np.zeros(x.shape), cells.measure(x)[..., None]
-    for number, (e, c) in enumerate(zip(proof.elements, stress.s.coefficients, strict=True)):
+    for number, (e, c) in enumerate(zip(proof.dual.elements, stress.s.coefficients, strict=True)):
         at = e.places.at
         T[at] = e.stress(c, x[at])[..., [0, 1, -1]]
         force[at] = scalars(e.force_degree, e.corners, x[at]) @ e.force
@@ -219,7 +219,7 @@ def _certificate(proof: Proof) -> dict[str, Any]:
         }
     # The boundary: tractions in Legendre polynomials, per t of the side and times the measure.
     side = np.flatnonzero(~cells.inner)
-    traction = proof.moments[mu.of(side)].reshape(len(side), 2, -1)
+    traction = proof.dual.moments[mu.of(side)].reshape(len(side), 2, -1)
     position = np.full(len(cells.ends) + 1, -1)  # the last one where no side is faced
     position[side] = np.arange(len(side))
     return arrays | {
@@ -228,7 +228,7 @@ def _certificate(proof: Proof) -> dict[str, Any]:
         "stress": measure * T,
         "force": measure * force,
         "side_vertices": cells.ends[side],
-        "side_held": proof.given.held[side],
+        "side_held": proof.dual.given.held[side],
         "side_traction": traction * np.sqrt(2 * np.arange(traction.shape[2]) + 1),
         "contact_side": _joined([position[f.side] for f in lines], int),
         "contact_other": _joined([position[f.other] for f in lines], int),

@@ -161,7 +161,7 @@ def _approach(
 
 def _domain(proof: EquilibratedStress, boundary: BoundaryTrace) -> str:
     """What is to be said of curved boundaries: what is proved is proved on the mesh's domain."""
-    if not (proof.proof.cells.curved).any():
+    if not (proof.proof.dual.cells.curved).any():
         return ""
     return f"guaranteed on the domain of the mesh, of curves of degree {boundary.geometry_order}"
 

@@ -148,9 +148,9 @@ def pressed(kind):
 def test_sides_that_face_are_one_to_one(kind):
     """Each meets one side of the other body from end to end; jumps lie at places of the gap."""
     proof = pressed(kind).equilibrated.proof
-    cells = proof.cells
+    cells = proof.dual.cells
     consistent(cells)
-    (facing,) = (line for line in proof.program.lines if line.pair is not None)
+    (facing,) = (line for line in proof.dual.program.lines if line.pair is not None)
     assert len(facing.side) > 0
     assert len(np.unique(facing.other)) == len(facing.side)
     first, last = np.sort(facing.there[:, [0, -1]], axis=1).T
@@ -166,7 +166,7 @@ def test_sides_that_face_are_one_to_one(kind):
 
 def test_a_vertex_where_contact_ends():
     """Of Hertz contact, within a tenth of a segment of the exact end."""
-    cells = pressed("Hertz").equilibrated.proof.cells
+    cells = pressed("Hertz").equilibrated.proof.dual.cells
     cut = np.flatnonzero((cells.segment >= 0) & (np.abs(np.diff(cells.span, axis=1))[:, 0] < 1))
     ends = np.unique(np.abs(cells.vertices[cells.ends[cut]][:, :, 0]))
     length = 2 / len(cells.trace.segments("lower_contact"))

@@ -113,7 +113,7 @@ def opposite(gap, **changes):
 
 
 def facing_of(solution):
-    (line,) = (x for x in solution.equilibrated.proof.program.lines if x.pair is not None)
+    (line,) = (x for x in solution.equilibrated.proof.dual.program.lines if x.pair is not None)
     return line
 
 
@@ -121,7 +121,7 @@ def facing_of(solution):
 def test_the_gap_of_the_lifted_displacement(order):
     """Nowhere negative by its coefficients, the same number at vertices, 0 inside of contact."""
     solution = solve(opposite(0.05 * ng.x**2), maxh=0.3, order=order)
-    facing, cells = facing_of(solution), solution.equilibrated.proof.cells
+    facing, cells = facing_of(solution), solution.equilibrated.proof.dual.cells
     assert 0 < facing.closed.sum() < len(facing.side)
     size = 0.02  # of displacements
     assert facing.after.min() >= -1e-16 * size
