@@ -25,19 +25,19 @@ from ...problem import Problem
 from ...quadrature import features_of, unresolved
 from .cells import Cells, cells_of
 from .elements import Element, by_triangle, elements_of, rigid_motions
-from .facing import ENDS, cuts_of, facing_of, guides_of, held_motions, reach_of
-from .lifting import Asked, asked_on_supports, lifted
-from .missed import SETTLED, Level, data_norms, once_more, residuals
-from .parts import ForceRules, force_rules
+from .facing import TO_ENDS, facing_sides, guide_sides, held_motions, new_vertices, pressure_support
+from .force_quadrature import ForceQuadrature, force_quadrature
+from .lifting import Prescribed, lifted, prescribed_on_supports
+from .oscillation import EQUILIBRIUM, BalancedCells, balanced_again, oscillation_norms, residuals
 from .program import Balanced, DualProgram, dual_program
-from .tractions import Given, given_on, side_rule
+from .tractions import BoundaryData, boundary_data, side_rule
 
 NO_BOUND = "no guaranteed bound is known"
-BESIDE = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
-LIFTED = 3  # degrees by which w is above u_h
+BESIDE_VERTICES = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
+LIFTING_DEGREES = 3  # degrees by which w is above u_h
 # Part of modulus times displacement over size of an element: equilibrium is measured beside the
 # round-off of such stresses.
-FELT = 1e-4
+NOTICEABLE_STRAIN = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,10 +55,10 @@ class DualProblem:
     """Conditions on n cells, and their program for the strain of a displacement."""
 
     cells: Cells
-    given: Given
-    asked: list[Asked]  # u_D - u_h
+    given: BoundaryData
+    prescribed: list[Prescribed]  # u_D - u_h
     elements: list[Element]
-    rules: ForceRules  # how forces are integrated
+    rules: ForceQuadrature  # how forces are integrated
     moments: Array  # (d,) of the given tractions with the multipliers
     program: DualProgram
 
@@ -80,11 +80,11 @@ class DualProblem:
             It is not in equilibrium.
         """
         cells, elements, lines = self.cells, self.elements, self.program.lines
-        given = self.given.under(lines, found.pressure)
+        given = self.given.with_pressure(lines, found.pressure)
         distance, largest = found.s.norms()
         scale = max(largest, least)
-        residual = float(residuals(cells, self.program.multipliers, found.left, scale).max())
-        if not residual <= SETTLED:
+        residual = float(residuals(cells, self.program.multipliers, found.unbalanced, scale).max())
+        if not residual <= EQUILIBRIUM:
             raise ContactError(
                 f"no equilibrated stress was found: the residual relative to the largest stress is "
                 f"{residual:.1e}"
@@ -92,21 +92,28 @@ class DualProblem:
         rule = side_rule(cells, given.breaks, np.flatnonzero(~cells.inner))
         at = cells.owner[rule.side]
         have = found.s.tractions(at, rule.x, rule.normal)
-        missed = rule.missed(cells, given.asked(cells, rule, have) - have, scale)
-        loads = data_norms(cells, elements, missed)
+        missed = rule.missed(cells, given.tractions(cells, rule, have) - have, scale)
+        loads = oscillation_norms(cells, elements, missed)
         if degree is not None:
-            level = Level(cells, found.s, self.rules, distance, loads)
-            distance, loads = once_more(displacement, given, level, degree, scale)
+            level = BalancedCells(cells, found.s, self.rules, distance, loads)
+            distance, loads = balanced_again(displacement, given, level, degree, scale)
         if not np.isfinite(loads).all():
             raise ValueError(
                 "no guaranteed bound is known for loads that are no polynomials beside the axis; "
                 "use error_estimate"
             )
-        work = sum(rule.work(have, one.side, one.direction, one.amount) for one in self.asked)
+        work = sum(rule.work(have, one.side, one.direction, one.amount) for one in self.prescribed)
         for line, p in zip(lines, found.pressure, strict=True):
             work -= float((line.force(p) * line.gap).sum())
         return AdmissibleStress(
-            found.s, found.pressure, found.left, found.idle, distance, loads, work, residual
+            s=found.s,
+            pressure=found.pressure,
+            unbalanced=found.unbalanced,
+            free_force=found.free_force,
+            distance=distance,
+            loads=loads,
+            work=work,
+            residual=residual,
         )
 
 
@@ -151,7 +158,7 @@ def error_bound(
     try:
         return _bound(problem, trace, displacement, pairs, ())
     except ContactError:  # resultants that no polynomial pressure has, as of a body about to tilt
-        return _bound(problem, trace, displacement, pairs, BESIDE)
+        return _bound(problem, trace, displacement, pairs, BESIDE_VERTICES)
 
 
 def _bound(
@@ -166,41 +173,42 @@ def _bound(
     In the steps of docs/bounds.md.
     """
     p, extent = trace.order, trace.model.extent
-    degree, lift = max(p + 1, 2 + extent), p + LIFTED
+    degree, lift = max(p + 1, 2 + extent), p + LIFTING_DEGREES
     # 1. Cells.
     guided = trace.segments(None if problem.sliding is None else str(problem.sliding))
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
     loaded = np.append(trace.segments(*problem.traction, *touching), guided)
     whole = [name for name, values in problem.displacement.items() if None not in values]
-    reaches = [reach_of(trace, displacement, pair, lift) for pair in pairs]
-    cells = cells_of(trace, cuts_of(trace, reaches, beside), loaded, trace.segments(*whole))
+    reaches = [pressure_support(trace, displacement, pair, lift) for pair in pairs]
+    cells = cells_of(trace, new_vertices(trace, reaches, beside), loaded, trace.segments(*whole))
     # 2. Stresses.
-    given = given_on(problem, cells)
+    given = boundary_data(problem, cells)
     least = np.maximum(given.followed(), cells.curved)
-    rules = force_rules(problem, cells, degree, least)
+    rules = force_quadrature(problem, cells, degree, least)
     mu, elements = elements_of(problem, cells, displacement, degree, rules)
     # 3. The gap, on guides and on Gamma_K.
-    asked = asked_on_supports(cells, given, displacement)
+    prescribed = prescribed_on_supports(cells, given, displacement)
     lines, side = [], np.flatnonzero(np.isin(cells.segment, guided))
     for k in np.unique(mu.degree[side]).tolist():
         own = side[mu.degree[side] == k]
-        lines.append(guides_of(cells, displacement, own, (k - extent, lift)))
-    holding = [(x.side, x.direction[:, [0, -1]]) for x in asked]
-    held = held_motions(cells, holding + [(x.side, ENDS @ x.direction) for x in lines])
+        lines.append(guide_sides(cells, displacement, own, (k - extent, lift)))
+    holding = [(x.side, x.direction[:, [0, -1]]) for x in prescribed]
+    held = held_motions(cells, holding + [(x.side, TO_ENDS @ x.direction) for x in lines])
     moduli = by_triangle(elements, [e.modulus for e in elements])
     for reach in reaches:
-        lines.append(facing_of(cells, displacement, reach, (degree - extent, lift), held, moduli))
+        degrees = degree - extent, lift
+        lines.append(facing_sides(cells, displacement, reach, degrees, held, moduli))
     every = np.arange(len(trace.region))
     sizes = [trace.evaluate(displacement, every, np.zeros(len(every)))]
     size = max(float(np.abs(x).max(initial=0.0)) for x in sizes + [x.gap for x in lines])
     # 4. w, before a factor takes memory.
-    w = lifted(problem, cells, asked, [(line, line.lift) for line in lines], lift, size)
+    w = lifted(problem, cells, prescribed, [(line, line.lift) for line in lines], lift, size)
     # The dual problem: s and p*.
     moments, fixed = given.moments(mu)
     program = dual_program(mu, elements, fixed, rigid_motions(cells, mu, fixed), lines)
-    dual = DualProblem(cells, given, asked, elements, rules, moments, program)
+    dual = DualProblem(cells, given, prescribed, elements, rules, moments, program)
     stiffest = min(np.diagonal(e.compliance, axis1=-2, axis2=-1).min() for e in elements)
-    felt = FELT * size / float(stiffest * cells.diameters.min())
+    felt = NOTICEABLE_STRAIN * size / float(stiffest * cells.diameters.min())
     stress = dual.admissible(displacement, program.nearest(elements, moments), felt, degree)
     # The identity.
     c, D = stress.distance, stress.loads
@@ -212,7 +220,7 @@ def _bound(
         "loads": float(D @ (2 * c + D)),
     }
     # What holds free motions does work on u_h, of which L(u_h) does not tell.
-    idle = stress.idle and stress.idle * largest(elements, cells, displacement)
+    idle = stress.free_force and stress.free_force * largest(elements, cells, displacement)
     below = float(c @ c / 2 + D @ (c + D / 2 + 2 * w)) - stress.work + idle
     above = float((c + D + w / 2) @ w) + stress.work + closed + idle
     return Proof(dual, stress, lifting=w, parts=parts, below=below, above=above)

@@ -22,9 +22,9 @@ from ...lagrange import gauss
 from ...problem import MeshArrays
 
 NEWTON_STEPS = 8
-CLOSE = 1e-9  # of an element: the next step is round-off
-WIDE = 0.1  # twice the area over the square of the diameter, from which triangles are divided
-TURN = 0.5  # twice the sine of the angle between sides up to which they are on one line
+NEWTON_STEP = 1e-9  # of an element: the next step is round-off
+WIDE_TRIANGLE = 0.1  # twice the area over the squared diameter, from which triangles are divided
+SAME_LINE = 0.5  # twice the sine of the angle between sides up to which they are on one line
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,7 +199,7 @@ def places(cells: Cells, at: Index, order: int) -> Places:
         miss = x[bent].reshape(-1, 2) - cells.evaluate(ng.CF((ng.x, ng.y)), owner, flat)
         step = np.linalg.solve(slope, miss[:, :, None])[:, :, 0]
         flat += step
-        if np.abs(step).max() <= CLOSE:
+        if np.abs(step).max() <= NEWTON_STEP:
             break
     found[bent] = flat.reshape(-1, *x.shape[1:])
     return Places(at, local, x, slopes, area * weight * cells.measure(x), found)
@@ -362,10 +362,10 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
     for _ in range(2):  # take away the sides of one line
         one = np.zeros(len(at_two), dtype=complex)
         one[vertex[left]] = line[left]
-        left = left[np.abs(line[left] - one[vertex[left]]) > TURN]
+        left = left[np.abs(line[left] - one[vertex[left]]) > SAME_LINE]
     at_two[vertex[left]] = False
     x, widest = cells.corners, np.zeros(len(at_two))
     wide = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / cells.diameters**2
     np.maximum.at(widest, cells.triangles, wide[:, None])
-    enough = wide[:, None] >= np.minimum(WIDE, widest)[cells.triangles]
+    enough = wide[:, None] >= np.minimum(WIDE_TRIANGLE, widest)[cells.triangles]
     return np.flatnonzero((at_two[cells.triangles] & enough).any(axis=1))

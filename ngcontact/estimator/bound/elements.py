@@ -25,14 +25,14 @@ from ...lagrange import gauss
 from ...problem import MeshArrays, Problem, varies
 from ...qp import vanishing_combinations
 from .cells import Cells, Places, places
-from .parts import ForceRules, projection
+from .force_quadrature import ForceQuadrature, projection
 from .polynomials import CORNERS, balancing, coordinates, stresses
 
-TURNED = 1e-4  # sine of the angle between normals that are not one
-ON_CURVES = 4  # degrees by which stresses on triangles with a curved side are higher
+TURNED_NORMAL = 1e-4  # sine of the angle between normals that are not one
+CURVED_DEGREES = 4  # degrees by which stresses on triangles with a curved side are higher
 CLOCKWISE = np.array([[0.0, -1.0], [1.0, 0.0]])  # vectors, rows, turned by a right angle
-ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
-ENTRIES = 2**20  # of triangles at once, (degree + 2)^4 each: bounds the memory
+FORCE_ROUND_OFF = 1e-12  # of a force, below which nothing of it is missed
+BATCH_ENTRIES = 2**20  # of triangles at once, (degree + 2)^4 each: bounds the memory
 
 
 def traces(degree: int, t: Array) -> Array:
@@ -134,7 +134,7 @@ class Stress:
         s = self.values(at, x)
         return np.asarray(s[..., [0, -1]] * normal[..., :1] + s[..., [-1, 1]] * normal[..., 1:])
 
-    def exerted(self) -> tuple[Array, float]:
+    def traction_moments(self) -> tuple[Array, float]:
         """Moments (d,) of the tractions over all triangles, and the largest of one triangle."""
         total, largest = np.zeros(1 + max(int(e.dofs.max()) for e in self.elements)), 0.0
         for e, c in zip(self.elements, self.coefficients, strict=True):
@@ -188,8 +188,8 @@ def multipliers(problem: Problem, cells: Cells, degree: int) -> Multipliers:
     segment, s = cells.on_side(side, np.repeat([0.0, 1.0], len(side) // 2))
     off = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
     higher = cells.curved.copy()
-    higher[cells.owner[side[np.linalg.norm(off, axis=1) > TURNED]]] = True
-    own, of_side = degree + ON_CURVES * higher, np.zeros(len(cells.ends), dtype=np.intp)
+    higher[cells.owner[side[np.linalg.norm(off, axis=1) > TURNED_NORMAL]]] = True
+    own, of_side = degree + CURVED_DEGREES * higher, np.zeros(len(cells.ends), dtype=np.intp)
     np.maximum.at(of_side, cells.sides, own[:, None])
     return Multipliers(own, of_side, np.concatenate([[0], np.cumsum(2 * (of_side + 1))]))
 
@@ -222,7 +222,7 @@ def elements_of(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     degree: int,
-    rules: ForceRules,
+    rules: ForceQuadrature,
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, in groups of one kind, and their multipliers.
 
@@ -236,7 +236,7 @@ def elements_of(
     found = []
     for kind, own_degree in enumerate(kinds[:, 0]):
         every = np.flatnonzero(number.ravel() == kind)
-        for at in np.array_split(every, 1 + len(every) * (own_degree + 2) ** 4 // ENTRIES):
+        for at in np.array_split(every, 1 + len(every) * (own_degree + 2) ** 4 // BATCH_ENTRIES):
             found.append(_element(problem, cells, displacement, mu, rules, at))
     return mu, found
 
@@ -262,7 +262,7 @@ def _element(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     mu: Multipliers,
-    rules: ForceRules,
+    rules: ForceQuadrature,
     at: Index,
 ) -> Element:
     """Triangles `at` (b,) of one kind, condensed."""
@@ -285,7 +285,7 @@ def _element(
     if source is not None:
         threshold = dict(zip(problem.force.values(), rules.thresholds, strict=True))[source]
         force, missed, size, pieces = projection(source, cells, at, n, rules, threshold)
-        missed = np.where(missed <= ROUND_OFF * size, 0.0, missed)
+        missed = np.where(missed <= FORCE_ROUND_OFF * size, 0.0, missed)
         if axial:
             force[..., 0] = 0.0
             hoop = points.x[..., 0] * points.evaluate(cells, source)[..., 0]

@@ -19,23 +19,24 @@ from ...fem import BoundaryTrace
 from ...lagrange import gauss, lagrange
 from .cells import Cells
 
-NOISE = 1e-14  # of a gap, relative to the displacements on both sides
-INSIDE = 1e-14  # parameters of vertices, as seen from a side
-SAME = 1e-7  # parameters of a segment that are one place
-DATA = 16  # degree of the polynomials that stand for gaps and prescribed displacements on a side
-NEAR = 1e-6  # of the shorter segment: vertices that face each other up to that are one; at
+GAP_NOISE = 1e-14  # of a gap, relative to the displacements on both sides
+INSIDE_SIDE = 1e-14  # parameters of vertices, as seen from a side
+SAME_PLACE = 1e-7  # parameters of a segment that are one place
+DATA_DEGREE = 16  # of polynomials that stand for gaps and prescribed displacements on a side
+SAME_VERTEX = 1e-6  # of the shorter segment: vertices that face each other up to that are one; at
 # 1.5e-7 stresses of orders 3 and 4 lose all digits, at 6e-7 B is as at 1e-2 (1 % at order 1)
-OPPOSITE = 1e-9  # of a side, by which it may go beyond the one it faces; 1e-14 in 320 scenes
-MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
-APART = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
-NARROW = 0.1  # of the sides beside it, a side between them on which r does not change
-STIFF = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
-PLACES, WEIGHTS = gauss(2 * DATA)
-LEGENDRE = np.linalg.inv(legendre.legvander(2 * PLACES - 1, DATA))  # from values at `PLACES`
-THROUGH = np.linalg.inv(lagrange(DATA, PLACES))  # from values at `PLACES` to Gauss-Lobatto points
-ENDS = THROUGH[[0, -1]]
+SIDE_OVERHANG = 1e-9  # of a side, by which it may exceed the one it faces; 1e-14 in 320 scenes
+CONTACT_MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
+VERTEX_DISTANCE = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
+SLIVER = 0.1  # of the sides beside it, a side between them on which r does not change
+PARALLEL_MOTION = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
+POINTS, WEIGHTS = gauss(2 * DATA_DEGREE)
+# From values at `POINTS` to Legendre's coefficients, and to values at Gauss-Lobatto points.
+TO_LEGENDRE = np.linalg.inv(legendre.legvander(2 * POINTS - 1, DATA_DEGREE))
+TO_LOBATTO = np.linalg.inv(lagrange(DATA_DEGREE, POINTS))
+TO_ENDS = TO_LOBATTO[[0, -1]]
 NEWTON_STEPS = 12
-SAMPLES = 200  # places on a segment among which the last zero of the gap is sought
+ZERO_SAMPLES = 200  # places on a segment among which the last zero of the gap is sought
 
 
 def bernstein(degree: int, t: Array) -> Array:
@@ -76,7 +77,7 @@ def jump(
     return values, largest
 
 
-class Met(NamedTuple):
+class FacingPoints(NamedTuple):
     """What j places on each of k segments of a secondary meet.
 
     The `gap` (k, j) of u_h; d, the `direction` (k, j, 2); on the primary the `segment` (k, j), -1
@@ -90,13 +91,13 @@ class Met(NamedTuple):
     faces: Mask
 
 
-def met(
+def facing_points(
     trace: BoundaryTrace,
     displacement: ng.CoefficientFunction,
     pair: ContactState,
     segment: Index,
     s: Array,
-) -> Met:
+) -> FacingPoints:
     """What `s` (k, j) of the secondary's segments `segment` (k,) meet, with the gap of u_h."""
     contact, every, t = pair.line.contact, np.repeat(segment, s.shape[1]), s.ravel()
     x, d = trace.point(every, t), rays(trace, contact, every, t)
@@ -109,11 +110,11 @@ def met(
     opposite = other.reshape(s.shape), there.reshape(s.shape)
     u, size = jump(trace, displacement, (segment, s), opposite)
     gap = gap - (u.reshape(d.shape) * d).sum(axis=1)
-    gap[np.abs(gap) <= NOISE * size] = 0.0
-    return Met(gap.reshape(s.shape), d.reshape(u.shape), *opposite, faces.reshape(s.shape))
+    gap[np.abs(gap) <= GAP_NOISE * size] = 0.0
+    return FacingPoints(gap.reshape(s.shape), d.reshape(u.shape), *opposite, faces.reshape(s.shape))
 
 
-class Reach(NamedTuple):
+class PressureSupport(NamedTuple):
     """Where p* of a pair may act.
 
     On `segments` (k,) of the secondary: in contact, beside such, or where u_h goes through the
@@ -126,9 +127,9 @@ class Reach(NamedTuple):
     contact: Array
 
 
-def reach_of(
+def pressure_support(
     trace: BoundaryTrace, displacement: ng.CoefficientFunction, pair: ContactState, degree: int
-) -> Reach:
+) -> PressureSupport:
     """The reach of a pair: beyond it Bernstein polynomials of a `degree` show an open gap.
 
     On each part between vertices of both bodies. Of segments that face in part, as beside the end
@@ -136,7 +137,7 @@ def reach_of(
     """
     line, found = pair.line, np.zeros((0, 3))
     if line.contact.bilateral or not len(line.segments):
-        return Reach(pair, line.segments, found)
+        return PressureSupport(pair, line.segments, found)
     nodes, active = trace.nodes[line.segments][:, [0, -1]], np.append(pair.active, False)[line.rows]
     near = np.asarray(np.isin(nodes, nodes[active.any(axis=1)]).any(axis=1))
     if len(rest := np.flatnonzero(~near)):
@@ -147,8 +148,8 @@ def reach_of(
             local = np.append(local, parts.local)
             span = np.vstack([span, np.column_stack([parts.start, parts.stop])])
             smooth = np.append(smooth, parts.local >= 0)
-        s = span[:, :1] + np.diff(span, axis=1) * PLACES
-        there = met(trace, displacement, pair, line.segments[rest[local]], s)
+        s = span[:, :1] + np.diff(span, axis=1) * POINTS
+        there = facing_points(trace, displacement, pair, line.segments[rest[local]], s)
         overlap = np.asarray(((there.gap < 0) & there.faces).any(axis=1))
         smooth &= there.faces.all(axis=1)
         c, off = fitted(there.gap[smooth], degree)
@@ -158,17 +159,18 @@ def reach_of(
     for i in np.flatnonzero((turns != 0).any(axis=1) & line.faces):
         ends = [0.0] if active[i, 0] else []
         for j in np.flatnonzero(turns[i]):  # contact up to the last zero of the gap, and farther
-            s = np.linspace(places[i, j], places[i, j + 1], SAMPLES)
+            s = np.linspace(places[i, j], places[i, j + 1], ZERO_SAMPLES)
             s = s if active[i, j] else s[::-1]
-            below = s[met(trace, displacement, pair, line.segments[[i]], s[None]).gap[0] < 0]
-            ends.append(np.append(s[0], below)[-1] + MARGIN * np.sign(s[-1] - s[0]))
+            gap = facing_points(trace, displacement, pair, line.segments[[i]], s[None]).gap[0]
+            last = np.append(s[0], s[gap < 0])[-1]
+            ends.append(last + CONTACT_MARGIN * np.sign(s[-1] - s[0]))
         both = np.array([*ends, 1.0] if active[i, -1] else ends).reshape(-1, 2)
         found = np.append(found, np.insert(both, 0, line.segments[i], axis=1), axis=0)
-    return Reach(pair, line.segments[near], found)
+    return PressureSupport(pair, line.segments[near], found)
 
 
-def cuts_of(
-    trace: BoundaryTrace, reaches: Sequence[Reach], more: Sequence[float]
+def new_vertices(
+    trace: BoundaryTrace, reaches: Sequence[PressureSupport], more: Sequence[float]
 ) -> dict[int, Array]:
     """Rising places s, (j,), of vertices to come, by segment: ends of contact, opposite vertices.
 
@@ -186,7 +188,7 @@ def cuts_of(
     for reach in reaches:
         line, own = reach.pair.line, reach.segments
         k, s = np.repeat(reach.contact[:, 0].astype(np.intp), 2), reach.contact[:, 1:].ravel()
-        inner = (s > APART) & (s < 1 - APART)
+        inner = (s > VERTEX_DISTANCE) & (s < 1 - VERTEX_DISTANCE)
         k = np.append(k[inner], np.repeat(own, len(more)))
         s = np.append(s[inner], np.tile(more, len(own)))
         if line.contact.primary is not None and len(own):
@@ -195,13 +197,14 @@ def cuts_of(
             s = np.concatenate([s, parts.start, parts.stop])
             s, (there, t) = _opposite(trace, reach.pair, k, s)
             (away, here), (beyond, other) = nearest(k, s), nearest(there, t)
-            faced, apart = there >= 0, np.maximum(away, beyond) > NEAR * np.minimum(here, other)
+            faced = there >= 0
+            apart = np.maximum(away, beyond) > SAME_VERTEX * np.minimum(here, other)
             found.append(np.column_stack([there, t])[faced & apart])
             k, s = k[~faced | apart], s[~faced | apart]
         found.append(np.column_stack([k, s]))
     k, s = np.unique(np.concatenate(found), axis=0).T
-    k, s = (x[(s > SAME) & (s < 1 - SAME)] for x in (k, s))
-    new = np.append(True, (np.diff(k) > 0) | (np.diff(s) > SAME))[: len(k)]
+    k, s = (x[(s > SAME_PLACE) & (s < 1 - SAME_PLACE)] for x in (k, s))
+    new = np.append(True, (np.diff(k) > 0) | (np.diff(s) > SAME_PLACE))[: len(k)]
     return {int(i): s[new & (k == i)] for i in np.unique(k)}
 
 
@@ -213,26 +216,26 @@ def _opposite(
     Places `s` (r,) inside of segments are moved until a vertex lies opposite.
     """
     contact, facing = pair.line.contact, pair.line.facing
-    inner = (s > SAME) & (s < 1 - SAME)
+    inner = (s > SAME_PLACE) & (s < 1 - SAME_PLACE)
     for _ in range(NEWTON_STEPS):
         there, t, *_ = partners(trace, facing, k, trace.point(k, s), rays(trace, contact, k, s))
-        near = np.flatnonzero(inner & (there >= 0) & (np.minimum(t, 1 - t) < APART))
+        near = np.flatnonzero(inner & (there >= 0) & (np.minimum(t, 1 - t) < VERTEX_DISTANCE))
         vertex, along = np.round(t[near]), trace.derivative(k[near], s[near])
         away = trace.point(there[near], vertex) - trace.point(there[near], t[near])
         step = (away * along).sum(axis=1) / (along**2).sum(axis=1)
-        if not (np.abs(step) > INSIDE).any():
+        if not (np.abs(step) > INSIDE_SIDE).any():
             break
         s[near] = (s[near] + step).clip(0, 1)
-    exact = near[np.abs(t[near] - vertex) <= NEAR]
+    exact = near[np.abs(t[near] - vertex) <= SAME_VERTEX]
     t[exact] = np.round(t[exact])
     return s, (there, t)
 
 
 @dataclass(frozen=True, eq=False)
-class Facing:
+class FacingSides:
     """k sides on which the motion along d is bounded: by the other body, an obstacle, a guide.
 
-    Functions are given at the j Gauss points of `PLACES` on each side, t of the secondary's.
+    Functions are given at the j Gauss points of `POINTS` on each side, t of the secondary's.
     """
 
     pair: ContactState | None  # None for a guide
@@ -244,10 +247,10 @@ class Facing:
     psi: Array  # (j, n) Bernstein polynomials of p*
     gap: Array  # (k, j) of u_h, lengths
     lift: Array  # (k, j) r, what w adds to it
-    after: Array  # (k, n) Bernstein coefficients >= 0 of gap + r, or near to it where r is 0
+    lifted_gap: Array  # (k, n) Bernstein coefficients >= 0 of gap + r, or near to it where r is 0
     closed: Mask  # (k,) sides in contact as a whole
     share: Array  # (k, 2) of what w adds to the gap, that the secondary takes at t = 0 and t = 1
-    away: Index  # (r,) sides of the secondary of which nothing faces, as over a slot
+    slots: Index  # (r,) sides of the secondary of which nothing faces, as over a slot
 
     @property
     def equality(self) -> bool:
@@ -276,18 +279,18 @@ class Facing:
 
         `values` (k, j, c) are those opposite to the secondary's.
         """
-        across = np.linalg.solve(legendre.legvander(2 * self.there - 1, DATA), values)
-        return np.asarray(legendre.legvander(2 * PLACES - 1, DATA) @ across)
+        across = np.linalg.solve(legendre.legvander(2 * self.there - 1, DATA_DEGREE), values)
+        return np.asarray(legendre.legvander(2 * POINTS - 1, DATA_DEGREE) @ across)
 
 
-def facing_of(
+def facing_sides(
     cells: Cells,
     displacement: ng.CoefficientFunction,
-    reach: Reach,
+    reach: PressureSupport,
     degrees: tuple[int, int],
     held: Array,
     moduli: Array,
-) -> Facing:
+) -> FacingSides:
     """What of a pair's reach faces, and the gap after a lifting; `degrees` of p* and of that.
 
     Both bodies share the lifting by compliance, one over the `moduli` (n,) of the cells, but for
@@ -303,8 +306,8 @@ def facing_of(
     pair, trace, line = reach.pair, cells.trace, reach.pair.line
     contact, (of_pressure, degree) = line.contact, degrees
     every = np.flatnonzero(np.isin(cells.segment, reach.segments))
-    t = np.concatenate([[INSIDE], PLACES, [1 - INSIDE]])
-    found = met(trace, displacement, pair, *on_segments(cells, every, t))
+    t = np.concatenate([[INSIDE_SIDE], POINTS, [1 - INSIDE_SIDE]])
+    found = facing_points(trace, displacement, pair, *on_segments(cells, every, t))
     faces = found.faces[:, 1:-1]
     keep = np.asarray(faces.all(axis=1))
     if (found.gap[:, 1:-1][faces & ~keep[:, None]] < 0).any():
@@ -313,61 +316,63 @@ def facing_of(
     d, segments, place = found.direction[keep, 1:-1], found.segment[keep, 1:-1], found.s[keep, 1:-1]
     # As polynomials with their own values at vertices: those that Gauss points continue to there
     # are not the same on two sides of a narrow gap.
-    nodes = found.gap[keep, 1:-1] @ THROUGH.T
+    nodes = found.gap[keep, 1:-1] @ TO_LOBATTO.T
     nodes[:, [0, -1]] = np.where(found.faces[keep][:, [0, -1]], ends, nodes[:, [0, -1]])
-    gap = nodes @ lagrange(DATA, PLACES).T
+    gap = nodes @ lagrange(DATA_DEGREE, POINTS).T
     other, there = np.full(len(side), -1), np.zeros(gap.shape)
     if contact.primary is not None:
         middle = gap.shape[1] // 2
         other = cells.side_at(segments[:, middle], place[:, middle])
         there = cells.own_parameter(other, place)
-        ends = there @ ENDS.T
+        ends = there @ TO_ENDS.T
         beyond = np.abs(ends - (ends > 0.5)).max(axis=1)
         beyond[(segments != segments[:, [middle]]).any(axis=1)] = 1.0
-        if (beyond > OPPOSITE).any():
+        if (beyond > SIDE_OVERHANG).any():
             x, y = cells.vertices[cells.ends[side[beyond.argmax()]]].mean(axis=0)
             raise ValueError(
                 f'no guaranteed bound is known where vertices on "{contact.secondary}" and '
                 f'"{contact.primary}" face each other to within {beyond.max():.0e} of a side, as '
                 f"near ({x:.6g}, {y:.6g}): move them together or farther apart, or refine"
             )
-    segment, s = on_segments(cells, side, PLACES)
+    segment, s = on_segments(cells, side, POINTS)
     ds = at_places(partial(jacobian, trace, contact), segment, s)
     whole = np.append(pair.active, False)[line.rows].all(axis=1)
     number, start, stop = reach.contact.T
     low, high = np.sort(cells.span[side], axis=1).T[..., None]
-    inside = (segment[:, None] == number) & (low >= start - SAME) & (high <= stop + SAME)
+    inside = (
+        (segment[:, None] == number) & (low >= start - SAME_PLACE) & (high <= stop + SAME_PLACE)
+    )
     closed = np.isin(segment, line.segments[whole]) | inside.any(axis=1) | contact.bilateral
     # Shares: all where only one body can move, and one number at a vertex.
-    d_ends = np.einsum("ej,kjc->kec", ENDS, d)
+    d_ends = np.einsum("ej,kjc->kec", TO_ENDS, d)
     own, opposite = _moves(held[cells.ends[side]], d_ends), np.zeros((len(side), 2), dtype=bool)
     share = np.ones((len(side), 1))
     if contact.primary is not None:
-        at = (there @ ENDS.T > 0.5).astype(np.intp)
+        at = (there @ TO_ENDS.T > 0.5).astype(np.intp)
         opposite = _moves(held[cells.ends[other[:, None], at]], d_ends)
         stiff, beyond = (moduli[cells.owner[x], None] for x in (side, other))
         share = beyond / (stiff + beyond)
-    one, narrow = _across(cells, side, every[~keep])
+    one, narrow = _merged_vertices(cells, side, every[~keep])
     vertices, most = one[cells.ends[side]], np.zeros(len(one))
     np.maximum.at(most, vertices, np.where(own == opposite, share, own))
     if contact.bilateral:
         after, lift = np.zeros((len(side), degree + 1)), -gap
     else:
-        after, lift = _after(vertices, gap, closed, ~own & ~opposite, narrow, degree)
-    return Facing(
+        after, lift = _lifted_gap(vertices, gap, closed, ~own & ~opposite, narrow, degree)
+    return FacingSides(
         pair=pair,
         side=side,
         other=other,
         there=there,
         direction=d,
         weight=WEIGHTS * (high - low) * ds,
-        psi=bernstein(of_pressure, PLACES),
+        psi=bernstein(of_pressure, POINTS),
         gap=gap,
         lift=lift,
-        after=after,
+        lifted_gap=after,
         closed=closed,
         share=most[vertices],
-        away=away,
+        slots=away,
     )
 
 
@@ -379,16 +384,16 @@ def held_motions(cells: Cells, held: Sequence[tuple[Index, Array]]) -> Array:
     M = np.zeros((len(cells.vertices), 2, 2))
     for side, d in held:
         np.add.at(M, cells.ends[side], d[..., :, None] * d[..., None, :])
-    return np.asarray(M @ np.linalg.pinv(M, rcond=STIFF**2, hermitian=True))
+    return np.asarray(M @ np.linalg.pinv(M, rcond=PARALLEL_MOTION**2, hermitian=True))
 
 
 def _moves(held: Array, d: Array) -> Mask:
     """Whether vertices (k, 2) can move along `d` (k, 2, 2); `held` (k, 2, 2, 2) are projections."""
     rest = d - (held @ d[..., None])[..., 0]
-    return np.asarray(np.linalg.norm(rest, axis=2) > STIFF)
+    return np.asarray(np.linalg.norm(rest, axis=2) > PARALLEL_MOTION)
 
 
-def _across(cells: Cells, side: Index, slots: Index) -> tuple[Index, Mask]:
+def _merged_vertices(cells: Cells, side: Index, slots: Index) -> tuple[Index, Mask]:
     """A vertex for each (nv,): one for both ends of a `side` (k,) or slot far shorter than others.
 
     And whether sides are that short. `slots` (r,) are sides that do not face as a whole.
@@ -397,56 +402,56 @@ def _across(cells: Cells, side: Index, slots: Index) -> tuple[Index, Mask]:
     length = np.linalg.norm(np.diff(cells.vertices[cells.ends], axis=1)[:, 0], axis=1)
     beside = np.zeros(len(number))
     np.maximum.at(beside, cells.ends[side], length[side, None])
-    narrow = length[every] < NARROW * beside[cells.ends[every]].min(axis=1)
+    narrow = length[every] < SLIVER * beside[cells.ends[every]].min(axis=1)
     for a, b in cells.ends[every[narrow]]:
         number[number == number[b]] = number[a]
     return number, narrow[: len(side)]
 
 
-def guides_of(
+def guide_sides(
     cells: Cells, displacement: ng.CoefficientFunction, side: Index, degrees: tuple[int, int]
-) -> Facing:
+) -> FacingSides:
     """Sides `side` (k,) of Gamma_0, as bilateral contact with an obstacle without a gap.
 
     `degrees` are those of q* and of w.
     """
-    trace, (segment, s) = cells.trace, on_segments(cells, side, PLACES)
+    trace, (segment, s) = cells.trace, on_segments(cells, side, POINTS)
     d = at_places(trace.exact_normal, segment, s)
     gap = -(jump(trace, displacement, (segment, s))[0] * d).sum(axis=2)  # (3.8)
     ds = np.linalg.norm(at_places(trace.derivative, segment, s), axis=2)
     ds *= at_places(trace.measure, segment, s) * np.abs(np.diff(cells.span[side], axis=1))
-    return Facing(
+    return FacingSides(
         pair=None,
         side=side,
         other=np.full(len(side), -1),
         there=np.zeros(gap.shape),
         direction=d,
         weight=WEIGHTS * ds,
-        psi=bernstein(degrees[0], PLACES),
+        psi=bernstein(degrees[0], POINTS),
         gap=gap,
         lift=-gap,
-        after=np.zeros((len(side), degrees[1] + 1)),
+        lifted_gap=np.zeros((len(side), degrees[1] + 1)),
         closed=np.ones(len(side), dtype=bool),
         share=np.ones((len(side), 2)),
-        away=side[:0],
+        slots=side[:0],
     )
 
 
 def fitted(gap: Array, degree: int) -> tuple[Array, Array]:
     """Bernstein coefficients (k, degree + 1) near to a `gap` (k, j), the same at the ends.
 
-    And what the gaps, polynomials of degree `DATA`, differ from these at most (k,): no Legendre
-    polynomial is more than 1.
+    And what the gaps, polynomials of degree `DATA_DEGREE`, differ from these at most (k,): no
+    Legendre polynomial is more than 1.
     """
-    B, root = bernstein(degree, PLACES), np.sqrt(WEIGHTS)
+    B, root = bernstein(degree, POINTS), np.sqrt(WEIGHTS)
     c = np.empty((len(gap), degree + 1))
-    c[:, [0, -1]] = gap @ ENDS.T
+    c[:, [0, -1]] = gap @ TO_ENDS.T
     rest = root * (gap - c[:, [0, -1]] @ B[:, [0, -1]].T)
     c[:, 1:-1] = np.linalg.lstsq(root[:, None] * B[:, 1:-1], rest.T, rcond=None)[0].T
-    return c, np.abs((gap - c @ B.T) @ LEGENDRE.T).sum(axis=1)
+    return c, np.abs((gap - c @ B.T) @ TO_LEGENDRE.T).sum(axis=1)
 
 
-def _after(
+def _lifted_gap(
     ends: Index, gap: Array, closed: Mask, stiff: Mask, narrow: Mask, degree: int
 ) -> tuple[Array, Array]:
     """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
@@ -466,5 +471,5 @@ def _after(
     after[:, [0, -1]] = c[:, [0, -1]] + lift[ends]
     after[narrow] = c[narrow] + lift[ends[narrow, :1]]
     stays = ~closed & (c.min(axis=1) > off) & (lift[ends] == 0).all(axis=1)
-    r = after @ bernstein(degree, PLACES).T - gap
+    r = after @ bernstein(degree, POINTS).T - gap
     return after, np.where(stays[:, None], 0.0, r)

@@ -12,13 +12,13 @@ from ...arrays import Array
 from ...fem import model_of
 from .bound import DualProblem, Proof, largest
 from .cells import Cells
-from .facing import PLACES, Facing, bernstein, fitted, jump, met, on_segments
+from .facing import POINTS, FacingSides, bernstein, facing_points, fitted, jump, on_segments
 from .lifting import lifted
 from .program import Balanced
 
-NOISE = 1e-13  # of a jump, relative to the largest displacement
-LEAST = 3  # degree of w on these: higher ones take 2 % off the bar and twice the time
-TWICE = 2.0  # times the least M / B, up to which kappa may grow: the bar does by 5 / 4 at most
+JUMP_NOISE = 1e-13  # of a jump, relative to the largest displacement
+LIFTING_DEGREE = 3  # degree of w on these: higher ones take 2 % off the bar and twice the time
+KAPPA_GROWTH = 2.0  # times the least M / B, up to which kappa may grow: the bar does by 5 / 4
 
 
 def force_bar(
@@ -63,16 +63,18 @@ def force_bar(
     nearest, ratio = _within(test, stress.pressure, np.inf)
     t = test.admissible(displacement, nearest)
     costless = float(np.linalg.norm(t.distance + t.loads)) / B if B > 0 else 0.0
-    limit = max(kappa, TWICE * costless)
+    limit = max(kappa, KAPPA_GROWTH * costless)
     if ratio > limit:
         nearest, ratio = _within(test, stress.pressure, limit, nearest)
         t = test.admissible(displacement, nearest)
     kappa = max(kappa, costless, ratio)
     # What of [G] - d.e is more than kappa times the gap after its own lifting.
-    kept = [np.clip(x, -kappa * f.after, kappa * f.after) for f, x in zip(lines, c, strict=True)]
-    r = [x - y @ bernstein(y.shape[1] - 1, PLACES).T for x, y in zip(excess, kept, strict=True)]
-    held = [replace(one, amount=np.zeros_like(one.amount)) for one in dual.asked]
-    degree, lifts = max(cells.trace.order, LEAST), list(zip(lines, r, strict=True))
+    r = []
+    for f, x, y in zip(lines, excess, c, strict=True):
+        y = np.clip(y, -kappa * f.lifted_gap, kappa * f.lifted_gap)
+        r.append(x - y @ bernstein(y.shape[1] - 1, POINTS).T)
+    held = [replace(one, amount=np.zeros_like(one.amount)) for one in dual.prescribed]
+    degree, lifts = max(cells.trace.order, LIFTING_DEGREE), list(zip(lines, r, strict=True))
     w = lifted(problem, cells, held, lifts, degree, 1.0)
     M = float(np.linalg.norm(t.distance + t.loads + w))
     # The largest M e + kappa (X + Y) with e^2 + 2 X + 2 Y <= B^2.
@@ -80,8 +82,8 @@ def force_bar(
     pressed = zip(lines, stress.pressure, r, strict=True)
     opened = sum(float((f.force(p) * opening).sum()) for f, p, opening in pressed)
     crossed = float((stress.distance + stress.loads) @ w)
-    idle = stress.idle and stress.idle * largest(elements, cells, G)  # work on free motions
-    return error + abs(t.work) + crossed + abs(opened) + idle
+    on_motions = stress.free_force and stress.free_force * largest(elements, cells, G)
+    return error + abs(t.work) + crossed + abs(opened) + on_motions
 
 
 def _within(
@@ -103,19 +105,19 @@ def _within(
     return found, ratio
 
 
-def _excess(cells: Cells, G: ng.GridFunction, f: Facing, e: Array) -> tuple[Array, Array]:
+def _excess(cells: Cells, G: ng.GridFunction, f: FacingSides, e: Array) -> tuple[Array, Array]:
     """[G] - d.e (k, j) on a line at Gauss points, 0 where it is round-off.
 
     And Bernstein coefficients (k, degree + 1) near to it, one number at a vertex.
     """
     ends = cells.ends[f.side]
     other, there = on_segments(cells, f.other, f.there)
-    other = np.where(f.other >= 0, other, -1)[:, None].repeat(len(PLACES), 1)
-    values, _ = jump(cells.trace, G, on_segments(cells, f.side, PLACES), (other, there))
+    other = np.where(f.other >= 0, other, -1)[:, None].repeat(len(POINTS), 1)
+    values, _ = jump(cells.trace, G, on_segments(cells, f.side, POINTS), (other, there))
     excess = ((values - e) * f.direction).sum(axis=2)
-    excess[np.abs(excess) <= NOISE] = 0.0
-    c, _ = fitted(excess, f.after.shape[1] - 1)
-    c[np.abs(c) <= NOISE] = 0.0
+    excess[np.abs(excess) <= JUMP_NOISE] = 0.0
+    c, _ = fitted(excess, f.lifted_gap.shape[1] - 1)
+    c[np.abs(c) <= JUMP_NOISE] = 0.0
     count, total = np.zeros((2, len(cells.vertices)))
     np.add.at(count, ends, 1.0)
     np.add.at(total, ends, c[:, [0, -1]])
@@ -123,9 +125,9 @@ def _excess(cells: Cells, G: ng.GridFunction, f: Facing, e: Array) -> tuple[Arra
     return excess, c
 
 
-def _bare(cells: Cells, f: Facing, c: Array) -> float:
+def _bare(cells: Cells, f: FacingSides, c: Array) -> float:
     """The least kappa with which nothing of `c` is left at vertices that no closed side shares."""
-    ends, room = cells.ends[f.side], f.after[:, [0, -1]]
+    ends, room = cells.ends[f.side], f.lifted_gap[:, [0, -1]]
     bare = ~np.isin(ends, ends[f.closed]) & (c[:, [0, -1]] != 0)
     size = np.abs(c[:, [0, -1]])
     ratio = np.divide(size, room, out=np.full_like(room, np.inf), where=room > 0)
@@ -133,17 +135,17 @@ def _bare(cells: Cells, f: Facing, c: Array) -> float:
 
 
 def _beside(
-    cells: Cells, displacement: ng.GridFunction, G: ng.GridFunction, f: Facing, e: Array
+    cells: Cells, displacement: ng.GridFunction, G: ng.GridFunction, f: FacingSides, e: Array
 ) -> float:
     """The largest ratio of [G] - d.e to the gap where p* does not act, at Gauss points."""
     if f.pair is None:
         return 0.0
     trace, segment = cells.trace, cells.segment
     side = np.setdiff1d(np.flatnonzero(np.isin(segment, f.pair.line.segments)), f.side)
-    place = on_segments(cells, side, PLACES)
-    found = met(trace, displacement, f.pair, *place)
+    place = on_segments(cells, side, POINTS)
+    found = facing_points(trace, displacement, f.pair, *place)
     values, _ = jump(trace, G, place, (found.segment, found.s))
     excess = np.abs(((values - e) * found.direction).sum(axis=2))
-    some = found.faces & (excess > NOISE)
+    some = found.faces & (excess > JUMP_NOISE)
     room = np.maximum(found.gap[some], np.finfo(float).tiny)
     return float((excess[some] / room).max(initial=0.0))

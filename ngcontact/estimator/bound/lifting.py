@@ -3,7 +3,7 @@
 On sides d.w is asked for: u_D - u_h on Gamma_u, r shared by compliance between both bodies on
 Gamma_K, -u_h.d on guides. Other parts of Gamma_K stay where they are. On the triangles around these
 sides w is the displacement of least energy with the values asked for at nodes. It is of one degree,
-and of `DATA` on sides where what is asked for is no such polynomial.
+and of `DATA_DEGREE` on sides where what is asked for is no such polynomial.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from ...lagrange import gauss_lobatto, lagrange
 from ...linalg import cholesky, lower_half
 from ...problem import Problem
 from .cells import Cells, places
-from .elements import ENTRIES, compliance_at
-from .facing import DATA, PLACES, THROUGH, Facing
+from .elements import BATCH_ENTRIES, compliance_at
+from .facing import DATA_DEGREE, POINTS, TO_LOBATTO, FacingSides
 from .polynomials import CORNERS, DERIVATIVES, derivatives
-from .tractions import Given
+from .tractions import BoundaryData
 
-NOISE = 1e-13  # of what is asked for, relative to the displacement: round-off
-PARALLEL = 1e-8  # sine of the angle between directions at a vertex that are one
-INCONSISTENT = 1e-9  # of what is asked for at a vertex, relative to it
+LIFTING_NOISE = 1e-13  # of what is asked for, relative to the displacement: round-off
+SAME_DIRECTION = 1e-8  # sine of the angle between directions at a vertex that are one
+INCONSISTENT_AMOUNT = 1e-9  # of what is asked for at a vertex, relative to it
 
 
 @dataclass(frozen=True, eq=False)
-class Asked:
+class Prescribed:
     """Of d.w on k sides, `side` (k,), the `amount` (k, j), lengths, along d, `direction` (k, j, 2).
 
     At j Gauss-Lobatto points.
@@ -46,53 +46,53 @@ class Asked:
     amount: Array
 
 
-def asked_on_supports(
-    cells: Cells, given: Given, displacement: ng.CoefficientFunction
-) -> list[Asked]:
+def prescribed_on_supports(
+    cells: Cells, given: BoundaryData, displacement: ng.CoefficientFunction
+) -> list[Prescribed]:
     """u_D - u_h in each prescribed component; no radial motion on the axis."""
-    trace, found, j = cells.trace, [], DATA + 1
+    trace, found, j = cells.trace, [], DATA_DEGREE + 1
     axis = np.flatnonzero(trace.model.on_axis(cells.vertices)[cells.ends].all(axis=1))
     along = np.broadcast_to([1.0, 0.0], (len(axis), j, 2))
-    found.append(Asked(axis, along, np.zeros((len(axis), j))))
+    found.append(Prescribed(axis, along, np.zeros((len(axis), j))))
     for values, side in given.supports:
         k = len(side)
-        segment, s = cells.on_side(np.repeat(side, j), np.tile(gauss_lobatto(DATA), k))
+        segment, s = cells.on_side(np.repeat(side, j), np.tile(gauss_lobatto(DATA_DEGREE), k))
         u = trace.evaluate(displacement, segment, s)
         for c, value in enumerate(values):
             if value is not None:
                 rest = trace.evaluate(ng.CF(value), segment, s)[:, 0] - u[:, c]  # (3.6)
                 d = np.broadcast_to(np.eye(2)[c], (k, j, 2))
-                found.append(Asked(side, d, rest.reshape(k, j)))
+                found.append(Prescribed(side, d, rest.reshape(k, j)))
     return found
 
 
-def asked_on_line(facing: Facing, r: Array, alone: bool) -> list[Asked]:
+def prescribed_on_line(facing: FacingSides, r: Array, alone: bool) -> list[Prescribed]:
     """What opens the gap of a line by `r` (k, j), lengths at Gauss points.
 
     d.w = -r on the secondary and r on the primary by shares, or all on the secondary `alone`.
     """
     start, stop = np.ones((2, len(facing.side), 1)) if alone else facing.share.T[:, :, None]
-    share = start + (stop - start) * PLACES
-    d = np.einsum("ij,kjc->kic", THROUGH, facing.direction)
-    found = [Asked(facing.side, d, -(share * r) @ THROUGH.T)]
+    share = start + (stop - start) * POINTS
+    d = np.einsum("ij,kjc->kic", TO_LOBATTO, facing.direction)
+    found = [Prescribed(facing.side, d, -(share * r) @ TO_LOBATTO.T)]
     if (share < 1).any():
         both = np.concatenate([facing.direction, ((1 - share) * r)[..., None]], axis=2)
-        there = THROUGH @ facing.on_primary(both)
-        found.append(Asked(facing.other, there[..., :2], there[..., 2]))
+        there = TO_LOBATTO @ facing.on_primary(both)
+        found.append(Prescribed(facing.other, there[..., :2], there[..., 2]))
     return found
 
 
 def lifted(
     problem: Problem,
     cells: Cells,
-    asked: Sequence[Asked],
-    lines: Sequence[tuple[Facing, Array]],
+    prescribed: Sequence[Prescribed],
+    lines: Sequence[tuple[FacingSides, Array]],
     degree: int,
     extent: float,
 ) -> Array:
     """Norms (n,) of w, roots of energies per thickness, shared by both bodies of each line.
 
-    On secondaries alone where conditions at a vertex disagree. `asked` are those on supports,
+    On secondaries alone where conditions at a vertex disagree. `prescribed` are those on supports,
     `lines` (k, j) the facing sides with r, lengths at Gauss points; the rest is as of `lifting_of`.
 
     Raises
@@ -100,9 +100,9 @@ def lifted(
     ContactError
         Conditions disagree on secondaries alone, too.
     """
-    away = np.concatenate([np.zeros(0, dtype=np.intp), *(facing.away for facing, _ in lines)])
+    away = np.concatenate([np.zeros(0, dtype=np.intp), *(facing.slots for facing, _ in lines)])
     for alone in (False, True):
-        every = [*asked, *(one for line in lines for one in asked_on_line(*line, alone))]
+        every = [*prescribed, *(one for line in lines for one in prescribed_on_line(*line, alone))]
         try:
             return lifting_of(problem, cells, every, degree, extent, away)
         except ContactError as found:
@@ -113,12 +113,12 @@ def lifted(
 def lifting_of(
     problem: Problem,
     cells: Cells,
-    asked: Sequence[Asked],
+    prescribed: Sequence[Prescribed],
     degree: int,
     extent: float,
     away: Sequence[int] | Index = (),
 ) -> Array:
-    """Norms (n,) of w with all that is asked for, of a `degree`, of `DATA` where that has to be.
+    """Norms (n,) of w with all that is `prescribed`, of a `degree` or, where needed, `DATA_DEGREE`.
 
     What is less than round-off beside the `extent` of displacements and gaps, a length, is not
     lifted. Sides `away` (r,) of Gamma_K face nothing, and may move.
@@ -129,8 +129,9 @@ def lifting_of(
         Conditions at a vertex ask for different displacements.
     """
     norms, degrees = np.zeros(len(cells.triangles)), np.full(len(cells.ends), degree)
-    largest = [np.abs(one.amount).max(axis=1, initial=0.0) for one in asked]
-    needed = [one.side[size > NOISE * extent] for one, size in zip(asked, largest, strict=True)]
+    largest = [np.abs(one.amount).max(axis=1, initial=0.0) for one in prescribed]
+    least, each = LIFTING_NOISE * extent, zip(prescribed, largest, strict=True)
+    needed = [one.side[size > least] for one, size in each]
     if not sum(map(len, needed)):
         return norms
     touched = np.zeros(len(cells.vertices), dtype=bool)
@@ -140,20 +141,22 @@ def lifting_of(
     lines = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
     fixed = cells.inner | np.isin(cells.segment, cells.trace.segments(*lines))
     fixed[np.asarray(away, dtype=np.intp)] = False
-    lower = lagrange(degree, gauss_lobatto(DATA)) @ lagrange(DATA, gauss_lobatto(degree))
+    lower = lagrange(DATA_DEGREE, gauss_lobatto(degree))
+    lower = lagrange(degree, gauss_lobatto(DATA_DEGREE)) @ lower
     unit = np.concatenate(largest).max()
-    for one in asked:
+    for one in prescribed:
         fixed[one.side] = False
         both = np.concatenate([one.direction, one.amount[..., None] / unit], axis=2)
-        degrees[one.side[(np.abs(both - lower @ both) > NOISE).any(axis=(1, 2))]] = DATA
+        rough = (np.abs(both - lower @ both) > LIFTING_NOISE).any(axis=(1, 2))
+        degrees[one.side[rough]] = DATA_DEGREE
     stiffness = list(_stiffness(problem, cells, layer, degrees, degree))
     nodes = np.unique(np.concatenate([part.nodes.ravel() for part in stiffness]))
     # Normal equations at each node: two directions, or one and the one across, which is free.
     conditions = []
-    for one in asked:
-        for n in (degree, DATA):
+    for one in prescribed:
+        for n in (degree, DATA_DEGREE):
             some = (count[one.side] > 0) & (degrees[one.side] == n)
-            carry = lagrange(DATA, gauss_lobatto(n))
+            carry = lagrange(DATA_DEGREE, gauss_lobatto(n))
             d = (carry @ one.direction[some]).reshape(-1, 2)
             length = np.linalg.norm(d, axis=1, keepdims=True)
             number = np.searchsorted(nodes, _on_sides(cells, one.side[some], n)).ravel()
@@ -164,11 +167,11 @@ def lifting_of(
     np.add.at(M, number, d[:, :, None] * d[:, None])
     np.add.at(right, number, (d * amount[:, None])[..., None])
     size, V = np.linalg.eigh(M)
-    held = size > PARALLEL * size[:, 1:]
+    held = size > SAME_DIRECTION * size[:, 1:]
     parts = np.divide((V.transpose(0, 2, 1) @ right)[..., 0], size, out=0 * size, where=held)
     w = (V @ parts[..., None])[..., 0]
     missed = np.abs((w[number] * d).sum(axis=1) - amount).max()
-    if missed > max(INCONSISTENT * unit, 100 * NOISE * extent):
+    if missed > max(INCONSISTENT_AMOUNT * unit, 100 * LIFTING_NOISE * extent):
         raise ContactError("conditions that meet at a vertex ask for different displacements")
     rim = _on_sides(cells, np.flatnonzero((count == 1) & fixed), degree)
     held[np.searchsorted(nodes, rim)] = True
@@ -198,7 +201,7 @@ def lifting_of(
 
 def _on_sides(cells: Cells, side: Index, n: int) -> Index:
     """Nodes (k, n + 1) of degree n on sides (k,), from t = 0 to t = 1."""
-    inner = len(cells.vertices) + (DATA - 1) * side[:, None] + np.arange(n - 1)
+    inner = len(cells.vertices) + (DATA_DEGREE - 1) * side[:, None] + np.arange(n - 1)
     return np.concatenate([cells.ends[side, :1], inner, cells.ends[side, 1:]], axis=1)
 
 
@@ -219,7 +222,7 @@ def _stiffness(
     for k, (*own, bent, _) in enumerate(kinds.tolist()):
         every, (places_, inverse) = layer[kind.ravel() == k], _nodes(degree, *own)
         order, m = 2 * max(own) + 4 * bent, len(places_)
-        for at in np.array_split(every, 1 + len(every) * order**2 * m // ENTRIES):
+        for at in np.array_split(every, 1 + len(every) * order**2 * m // BATCH_ENTRIES):
             points = places(cells, at, order)
             f, *by = np.moveaxis(_functions(degree, own, points.local) @ inverse, 1, 0)
             into = np.linalg.inv(points.slopes)
@@ -236,7 +239,7 @@ def _stiffness(
             back = cells.backward[at]
             on = [np.where(back[:, i, None], x[:, ::-1], x) for i, x in enumerate(on)]
             inside = m - sum(own)
-            first = len(cells.vertices) + (DATA - 1) * len(cells.ends)
+            first = len(cells.vertices) + (DATA_DEGREE - 1) * len(cells.ends)
             rest = first + inside * at[:, None] + np.arange(inside)
             number = np.hstack([cells.triangles[at], *on, rest])
             yield Stiffness(at, number, strain.transpose(0, 2, 1) @ stress)

@@ -31,16 +31,16 @@ from ...qp import (
     vanishing_combinations,
 )
 from .elements import Element, Multipliers, Stress, traces
-from .facing import PLACES, Facing
+from .facing import POINTS, FacingSides
 
-FALLING = 0.5  # ratio of two residuals from which more corrections take nothing off
-ROUND_OFF = 1e-13  # of tractions, relative to the largest: nothing to correct
+FALLING_RATIO = 0.5  # ratio of two residuals from which more corrections take nothing off
+MOMENT_ROUND_OFF = 1e-13  # of tractions, relative to the largest: nothing to correct
 # Force that holds a motion which nothing resists, relative to the largest load. Balanced loads have
 # one on meshes of curves, whose middle is not that of the body: 2e-6 at most in 11 of 153 scenes,
 # all with discs of a weight, and less than 1e-13 in the others.
-UNBALANCED = 1e-5
-ROOM = 1.1  # ratio of a force to its limit up to which it stays as it is
-DEFINITE = 1e-12  # of the diagonal, added to what is factorised: vertices where tractions depend
+UNBALANCED_LOAD = 1e-5
+LIMIT_SLACK = 1.1  # ratio of a force to its limit up to which it stays as it is
+DIAGONAL_SHIFT = 1e-12  # of the diagonal, for vertices where tractions depend on each other
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,8 +49,8 @@ class Balanced:
 
     s: Stress  # in equilibrium
     pressure: list[Array]  # (k, j) each, Bernstein coefficients of p*, per length (P1), eta (P2)
-    left: Array  # (d,) moments of tractions that do not balance
-    idle: float  # sum of the moments that hold motions which nothing resists, a force per thickness
+    unbalanced: Array  # (d,) moments of tractions that do not balance
+    free_force: float  # sum of moments that hold free motions, a force per thickness
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,8 +58,8 @@ class DualProgram:
     """The matrix of d multipliers, factorised once, for several loads."""
 
     multipliers: Multipliers
-    lines: Sequence[Facing]  # contact and guides
-    R: sp.csr_array  # (m, d) all rows over their `Facing.mass`
+    lines: Sequence[FacingSides]  # contact and guides
+    R: sp.csr_array  # (m, d) all rows over their `FacingSides.mass`
     T: sp.csr_array  # (d, d) mu = T y: each row is an unknown of y
     program: QuadraticProgram  # of y, with the bounds of the lines
 
@@ -67,7 +67,7 @@ class DualProgram:
     def systems(self) -> BorderedSystems:
         """Its linear systems; what is factorised is the matrix made definite."""
         lower = sp.tril(self.program.K, format="csr")
-        lower.setdiag((1 + DEFINITE) * self.program.diagonal)
+        lower.setdiag((1 + DIAGONAL_SHIFT) * self.program.diagonal)
         return BorderedSystems(self.program, cholesky(handed_over(lower)))
 
     def __getstate__(self) -> dict[str, Any]:
@@ -84,7 +84,7 @@ class DualProgram:
         """The stress that minimises B^2 for given tractions, `moments` (d,), with p* >= 0.
 
         With `limits` (k, j) of each line, not negative: one near to the strain without a gap, whose
-        |p*| are at most `ROOM` times these, from another one, `start`, where there is one.
+        |p*| are at most `LIMIT_SLACK` times these, from another one, `start`, where there is one.
 
         Raises
         ------
@@ -92,10 +92,10 @@ class DualProgram:
             Loads on a body that moves freely are not in balance.
         """
         p, s = self.program, Stress(elements, [e.g for e in elements])
-        alone, largest = s.exerted()
-        idle = self._idle(moments - alone)
+        alone, largest = s.traction_moments()
+        idle = self._on_free_motions(moments - alone)
         ratio = np.abs(idle).max() / (np.abs(moments - alone).max() or 1.0)
-        if ratio > UNBALANCED:
+        if ratio > UNBALANCED_LOAD:
             raise ContactError(
                 "the loads on a body that moves freely are not in balance: their work on the "
                 f"motion is {ratio:.0e} of the largest; refine where they vary, or hold the body"
@@ -120,16 +120,17 @@ class DualProgram:
             change = self.T @ y
             parts = zip(elements, s.coefficients, strict=True)
             s = Stress(elements, [c + e.answer(change) for e, c in parts])
-            total, largest = s.exerted()
+            total, largest = s.traction_moments()
             left = moments - total
-            left -= self._idle(left)
+            left -= self._on_free_motions(left)
             force = np.where(active, (self.T.T @ left)[p.unknown], force)
-            beyond = active & ((force < ROOM * low) | (force > ROOM * high))
+            beyond = active & ((force < LIMIT_SLACK * low) | (force > LIMIT_SLACK * high))
             active, force = active & ~beyond, np.where(beyond, np.clip(force, low, high), force)
             left = np.where(p.fixed, 0.0, left - self.R.T @ force)
             right = np.where(p.fixed, 0.0, self.T.T @ left)
             size = float(np.abs(right).max(initial=0.0))
-            if not ROUND_OFF * largest < size < (np.inf if beyond.any() else FALLING * last):
+            most = np.inf if beyond.any() else FALLING_RATIO * last
+            if not MOMENT_ROUND_OFF * largest < size < most:
                 break
             last = size
             y = self._answer(right, active)
@@ -147,7 +148,7 @@ class DualProgram:
         except SingularError:
             return self.systems.y
 
-    def _idle(self, load: Array) -> Array:
+    def _on_free_motions(self, load: Array) -> Array:
         """The part (d,) of a `load` (d,) that does work on motions which nothing resists.
 
         A condition holds their mean, and takes it: s and sigma have it in common.
@@ -163,7 +164,7 @@ def dual_program(
     elements: Sequence[Element],
     fixed: Mask,
     motions: Array,
-    lines: Sequence[Facing],
+    lines: Sequence[FacingSides],
 ) -> DualProgram:
     """The program of the condensed triangles, with `lines` of contact and guides.
 
@@ -205,7 +206,7 @@ def _joined(parts: Sequence[Any], kind: type = float) -> Any:
 
 
 def _basis(
-    mu: Multipliers, lines: Sequence[Facing], unknown: Index
+    mu: Multipliers, lines: Sequence[FacingSides], unknown: Index
 ) -> tuple[sp.csr_array, sp.csr_array]:
     """`DualProgram.R` and `.T`, by the `unknown` (m,) of each row."""
     d, m, own, across, solved = int(mu.start[-1]), 0, [], [], []
@@ -214,7 +215,7 @@ def _basis(
         means = line.psi.T * (line.weight[:, None] / line.mass[..., None])  # (k, n, j)
         for i, (side, other) in enumerate(zip(line.side, line.other, strict=True)):
             load = means[i, :, None] * line.direction[i].T  # (n, 2, j)
-            R = (load @ traces(mu.degree[side], PLACES)).reshape(len(load), -1)
+            R = (load @ traces(mu.degree[side], POINTS)).reshape(len(load), -1)
             at, row = mu.of(side), np.arange(m, m + len(R))
             m += len(R)
             plain[at] = False

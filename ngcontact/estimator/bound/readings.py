@@ -17,15 +17,15 @@ from ...arrays import Array, Index
 from ...fem import LOAD_BONUS, load_vector, potential_energy
 from ..residual import Estimated
 from .bound import Proof, error_bound
-from .facing import ENDS, WEIGHTS, bernstein
+from .facing import TO_ENDS, WEIGHTS, bernstein
 from .polynomials import scalars
 
-ROUND_OFF = 64 * np.finfo(float).eps  # of an energy, relative to its terms
+ENERGY_ROUND_OFF = 64 * np.finfo(float).eps  # of an energy, relative to its terms
 FINE = 3 * LOAD_BONUS  # quadrature orders above the default for the work of loads
-INSIDE = 1e-9  # parameters nearer to an end are inside of the part that begins there
-INSET = 0.1  # of a step of the lattice: it keeps off an axis, where stresses are not defined
-SAME = 1e-12  # relative difference of norms that are one: processors differ
-STRAIGHT = 1e-12  # difference of unit vectors that are one: round-off
+INSIDE_PART = 1e-9  # parameters nearer to an end are inside of the part that begins there
+LATTICE_INSET = 0.1  # of a step of the lattice: it keeps off an axis, where s is not defined
+SAME_NORM = 1e-12  # relative difference of norms that are one: processors differ
+SAME_DIRECTION = 1e-12  # difference of unit vectors that are one: round-off
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,7 @@ class ContactPressure:
         At the end of two parts the one towards the middle of the segment.
         """
         low, high = np.sort(self.span, axis=1).T
-        order, inside = np.argsort(self.segments + low), np.clip(s, INSIDE, 1 - INSIDE)
+        order, inside = np.argsort(self.segments + low), np.clip(s, INSIDE_PART, 1 - INSIDE_PART)
         start = np.append(-np.inf, (self.segments + low)[order])
         part = np.append(-1, order)[np.searchsorted(start, segment + inside, side="right") - 1]
         on = (part >= 0) & (np.append(self.segments, -1)[part] == segment)
@@ -177,14 +177,15 @@ def _certificate(proof: Proof) -> dict[str, Any]:
         proof.dual.program.lines,
         proof.stress,
     )
-    turning = sum(int((np.ptp(f.direction, axis=1) > STRAIGHT).any(axis=1).sum()) for f in lines)
+    turns = [np.ptp(f.direction, axis=1).max(axis=1) > SAME_DIRECTION for f in lines]
+    turning = sum(int(x.sum()) for x in turns)
     found = {"cells have a curved side": int(cells.curved.sum())}
     found["sides have a direction of contact or guide that turns along them"] = turning
     if any(found.values()):
         told = " and ".join(f"{n} {what}" for what, n in found.items() if n)
         raise ValueError(f"no certificate: {told}; tractions and p* are no polynomials there")
     own, _ = stress.s.norms()
-    replaced = np.flatnonzero(~np.isclose(stress.distance, own, rtol=SAME, atol=0))
+    replaced = np.flatnonzero(~np.isclose(stress.distance, own, rtol=SAME_NORM, atol=0))
     arrays: dict[str, Any] = {
         "axisymmetric": np.array(cells.trace.model.extent > 0),
         "vertices": cells.vertices,
@@ -198,7 +199,7 @@ def _certificate(proof: Proof) -> dict[str, Any]:
     # T and F, times the measure, at a lattice; by rules of quadrature e(u_h) and C^-1.
     k = proof.dual.elements[0].degree
     i, j = np.array([(i, j) for i in range(k + 1) for j in range(k + 1 - i)]).T
-    lattice = (np.column_stack([i, j]) + INSET) / (k + 3 * INSET)
+    lattice = (np.column_stack([i, j]) + LATTICE_INSET) / (k + 3 * LATTICE_INSET)
     share = np.column_stack([1 - lattice.sum(axis=1), lattice])
     x = np.einsum("qc,ncd->nqd", share, cells.corners)
     T, force, measure = np.zeros((*x.shape[:2], 3)), np.zeros(x.shape), cells.measure(x)[..., None]
@@ -234,9 +235,9 @@ def _certificate(proof: Proof) -> dict[str, Any]:
         "contact_other": _joined([position[f.other] for f in lines], int),
         "contact_turned": _joined([f.there[:, -1] < f.there[:, 0] for f in lines], bool),
         "contact_direction": _joined([f.direction[:, 0] for f in lines]),
-        "contact_weight": _joined([f.weight / WEIGHTS @ ENDS.T for f in lines]),
+        "contact_weight": _joined([f.weight / WEIGHTS @ TO_ENDS.T for f in lines]),
         "contact_equality": _joined([np.full(len(f.side), f.equality) for f in lines], bool),
-        "contact_gap": _joined([f.after for f in lines]),
+        "contact_gap": _joined([f.lifted_gap for f in lines]),
         "contact_pressure": _joined(stress.pressure),
     }
 
@@ -298,7 +299,7 @@ class Guaranteed(Estimated):
             space.require_mesh()
             space = replace(space, f=load_vector(self.problem, space.V, FINE))
         energy = potential_energy(self.problem, space, u)
-        noise = ROUND_OFF * (self.energy_norm**2 + abs(energy))
+        noise = ENERGY_ROUND_OFF * (self.energy_norm**2 + abs(energy))
         return energy - self._bound.below - noise, energy + self._bound.above + noise
 
     @property

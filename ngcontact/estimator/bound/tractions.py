@@ -15,12 +15,12 @@ from ...problem import Problem
 from ...quadrature import known_rough_load, moment_degree, numbers
 from .cells import Cells
 from .elements import Multipliers, traces
-from .facing import DATA, LEGENDRE, PLACES, WEIGHTS, Facing, jump, on_segments
-from .parts import LEVELS, PARTS
+from .facing import DATA_DEGREE, POINTS, TO_LEGENDRE, WEIGHTS, FacingSides, jump, on_segments
+from .force_quadrature import DIVISIONS, PARTS_OF_A_SIDE
 
-FINEST = PARTS**LEVELS  # parts of a side
-SAME = 1e-10  # of a side: breaks nearer to its ends are these
-ROUND_OFF = 1e-10  # of tractions, relative to the largest stress: as equilibrium is accepted
+FINEST_PARTS = PARTS_OF_A_SIDE**DIVISIONS  # parts of a side
+SAME_BREAK = 1e-10  # of a side: breaks nearer to its ends are these
+TRACTION_ROUND_OFF = 1e-10  # relative to the largest stress: as equilibrium is accepted
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class SideRule:
         """
         order, at = np.argsort(side), np.flatnonzero(np.isin(self.side, side))
         own = order[np.searchsorted(side[order], self.side[at])]
-        basis = lagrange(DATA, self.t[at].ravel()).reshape(-1, len(PLACES), DATA + 1)
+        basis = lagrange(DATA_DEGREE, self.t[at].ravel()).reshape(-1, len(POINTS), DATA_DEGREE + 1)
         u = basis @ (amount[..., None] * direction)[own]
         return float(((self.weight * self.measure)[at, :, None] * values[at] * u).sum())
 
@@ -61,7 +61,7 @@ class SideRule:
         """
         owner, lost = cells.owner[self.side], values * self.measure[..., None]
         size = cells.measure(cells.corners[owner]).max(axis=1)  # stresses lose it at an axis
-        lost[np.abs(lost) <= ROUND_OFF * largest * size[:, None, None]] = 0.0
+        lost[np.abs(lost) <= TRACTION_ROUND_OFF * largest * size[:, None, None]] = 0.0
         squares = np.zeros((len(cells.triangles), 3))
         square = (self.weight[..., None] * lost**2).sum(axis=(1, 2))
         np.add.at(squares, (owner, cells.local[self.side]), square)
@@ -69,18 +69,18 @@ class SideRule:
 
 
 def side_rule(cells: Cells, breaks: Array, side: Index) -> SideRule:
-    """The rule on sides `side` (k,), which begins anew at `breaks` (r, 2) of `Given`."""
+    """The rule on sides `side` (k,), which begins anew at `breaks` (r, 2) of `BoundaryData`."""
     segment, s = breaks[:, 0].astype(np.intp), breaks[:, 1]
     at = cells.side_at(segment, s)
     some = (cells.segment[at] == segment) & np.isin(at, side)
     t = cells.own_parameter(at[some], s[some, None])[:, 0]
-    inside = (t > SAME) & (t < 1 - SAME)
+    inside = (t > SAME_BREAK) & (t < 1 - SAME_BREAK)
     every = np.concatenate([side, side, at[some][inside]])
     t = np.concatenate([np.zeros(len(side)), np.ones(len(side)), t[inside]])
     order = np.lexsort((t, every))
     one = np.diff(every[order]) == 0
     piece, start, stop = every[order][:-1][one], t[order][:-1][one], t[order][1:][one]
-    t = start[:, None] + (stop - start)[:, None] * PLACES
+    t = start[:, None] + (stop - start)[:, None] * POINTS
     x, dx = cells.points(piece, t)
     length = np.linalg.norm(dx, axis=2)
     normal = np.stack([dx[..., 1], -dx[..., 0]], axis=-1) / length[..., None]
@@ -90,7 +90,7 @@ def side_rule(cells: Cells, breaks: Array, side: Index) -> SideRule:
 
 
 @dataclass(frozen=True, eq=False)
-class Given:
+class BoundaryData:
     """Conditions on e sides."""
 
     problem: Problem
@@ -100,29 +100,31 @@ class Given:
     supports: list[tuple[Sequence[Any], Index]]  # u_D of `Problem.displacement`, with sides (k,)
     # (r, 2) segments and s, rising: where rules on the boundary begin anew to follow tractions
     breaks: Array
-    # (e, j, 2) what pressures of lines exert: forces per t, with the measure, at `PLACES`
+    # (e, j, 2) what pressures of lines exert: forces per t, with the measure, at `POINTS`
     pressed: Array
 
     def followed(self) -> Index:
-        """How often triangles (n,) are divided for tractions: `LEVELS` where these are rough."""
+        """How often triangles (n,) are divided for tractions: `DIVISIONS` where these are rough."""
         cells, found = self.cells, np.zeros(len(self.cells.triangles), dtype=np.intp)
         breaks = np.bincount(self.breaks[:, 0].astype(np.intp), minlength=len(cells.trace.region))
         count = np.append(breaks, 0)[cells.segment]  # none inside, -1
-        np.maximum.at(found, cells.owner, np.where(count >= FINEST, LEVELS, count > 0))
+        np.maximum.at(found, cells.owner, np.where(count >= FINEST_PARTS, DIVISIONS, count > 0))
         return found
 
-    def under(self, lines: Sequence[Facing], pressure: Sequence[Array]) -> Given:
+    def with_pressure(
+        self, lines: Sequence[FacingSides], pressure: Sequence[Array]
+    ) -> BoundaryData:
         """The same with pressures on lines: coefficients `pressure` (k, n) on each."""
         pressed = np.zeros_like(self.pressed)
         for f, p in zip(lines, pressure, strict=True):
             force = (f.force(p) / WEIGHTS)[..., None] * f.direction
             np.add.at(pressed, f.side, -force)
             if (f.other >= 0).any():
-                rate = np.abs(f.there @ gauss_derivative(2 * DATA).T)  # of t there by t
+                rate = np.abs(f.there @ gauss_derivative(2 * DATA_DEGREE).T)  # of t there by t
                 np.add.at(pressed, f.other, f.on_primary(force / rate[..., None]))
         return replace(self, pressed=pressed)
 
-    def asked(self, cells: Cells, rule: SideRule, own: Array) -> Array:
+    def tractions(self, cells: Cells, rule: SideRule, own: Array) -> Array:
         """Tractions (m, j, 2) on sides of `cells`, parts of these; `own` (m, j, 2) without any."""
         segment, s = on_segments(cells, rule.side, rule.t)
         on, asked = np.flatnonzero(segment >= 0), own.copy()
@@ -138,7 +140,8 @@ class Given:
             t = self.cells.own_parameter(side[at], s[at])
             x, dx = self.cells.points(side[at], t)
             ds = np.linalg.norm(dx, axis=2, keepdims=True) * cells.measure(x)[..., None]
-            force = legendre.legvander(2 * t - 1, DATA) @ (LEGENDRE @ self.pressed[side[at]])
+            force = TO_LEGENDRE @ self.pressed[side[at]]
+            force = legendre.legvander(2 * t - 1, DATA_DEGREE) @ force
             total[at] += np.divide(force, ds, out=np.zeros_like(force), where=ds > 0)
         asked[on] = np.where(self.held[side][:, None], own[on], total)
         return asked
@@ -149,12 +152,12 @@ class Given:
         Fixed are those of components with prescribed displacements.
         """
         rule = side_rule(self.cells, self.breaks, np.flatnonzero(~self.cells.inner))
-        values = self.asked(self.cells, rule, np.zeros(rule.x.shape))
+        values = self.tractions(self.cells, rule, np.zeros(rule.x.shape))
         fixed = np.repeat(self.held.ravel(), np.repeat(mu.degree + 1, 2))
         return rule.moments(mu, values), fixed  # (3.7)
 
 
-def given_on(problem: Problem, cells: Cells) -> Given:
+def boundary_data(problem: Problem, cells: Cells) -> BoundaryData:
     """The conditions of a problem."""
 
     def sides(pattern: str) -> Index:
@@ -169,14 +172,14 @@ def given_on(problem: Problem, cells: Cells) -> Given:
         data, load = problem.traction[name], problem.traction_vector(name)
         if numbers(data):
             continue
-        segment, s = on_segments(cells, side, np.arange(1, FINEST) / FINEST)
-        breaks.append(np.column_stack([np.repeat(segment, FINEST - 1), s.ravel()]))
+        segment, s = on_segments(cells, side, np.arange(1, FINEST_PARTS) / FINEST_PARTS)
+        breaks.append(np.column_stack([np.repeat(segment, FINEST_PARTS - 1), s.ravel()]))
         region = cells.trace.mesh.Boundaries(name)
         rough = known_rough_load(data, load, region, moment_degree(cells.trace.order))
         if rough is not None:  # NGSolve's segments run from s = 1 to s = 0
             start = rough.cells.origin[:, 0]
             for stop in (start, start + rough.cells.side[:, 0, 0]):
                 breaks.append(np.column_stack([rough.cells.element, 1 - stop]))
-    none = np.zeros((len(cells.ends), len(PLACES), 2))
+    none = np.zeros((len(cells.ends), len(POINTS), 2))
     rising = np.unique(np.concatenate(breaks), axis=0)
-    return Given(problem, cells, held, loads, supports, rising, none)
+    return BoundaryData(problem, cells, held, loads, supports, rising, none)

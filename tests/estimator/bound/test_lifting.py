@@ -12,8 +12,8 @@ from drivers.reference import cases
 from drivers.reference.westergaard import moduli
 from ngcontact import Contact, ContactError, Elastic, Problem, solve
 from ngcontact.estimator.bound.cells import cells_of
-from ngcontact.estimator.bound.facing import DATA
-from ngcontact.estimator.bound.lifting import Asked, lifting_of
+from ngcontact.estimator.bound.facing import DATA_DEGREE
+from ngcontact.estimator.bound.lifting import Prescribed, lifting_of
 from ngcontact.fem import boundary_trace
 from ngcontact.lagrange import gauss_lobatto
 from tests.estimator.bound.test_cells import square
@@ -21,7 +21,7 @@ from tests.estimator.bound.test_cells import square
 NONE = np.zeros(0, dtype=np.intp)
 LAW = Elastic(E=2.5, nu=0.3)
 SIDES = ("bottom", "right", "top", "left")
-T = gauss_lobatto(DATA)  # where amounts are given
+T = gauss_lobatto(DATA_DEGREE)  # where amounts are given
 
 
 def on_the_square(n=2):
@@ -37,7 +37,7 @@ def asked_of(cells, name, direction, amount):
     side = np.flatnonzero(np.isin(cells.segment, cells.trace.segments(name)))
     x, _ = cells.points(np.repeat(side, len(T)), np.tile(T, len(side)))
     d = np.broadcast_to(np.asarray(direction, dtype=float), (len(side), len(T), 2))
-    return Asked(side, d, amount(*x.T).reshape(len(side), len(T)))
+    return Prescribed(side, d, amount(*x.T).reshape(len(side), len(T)))
 
 
 def whole(cells, u, v):
@@ -112,7 +112,7 @@ def opposite(gap, **changes):
     return replace(problem, contact=[pair], displacement={"bottom": (0, 0), "top": (0, -0.02)})
 
 
-def facing_of(solution):
+def facing_sides(solution):
     (line,) = (x for x in solution.equilibrated.proof.dual.program.lines if x.pair is not None)
     return line
 
@@ -121,17 +121,17 @@ def facing_of(solution):
 def test_the_gap_of_the_lifted_displacement(order):
     """Nowhere negative by its coefficients, the same number at vertices, 0 inside of contact."""
     solution = solve(opposite(0.05 * ng.x**2), maxh=0.3, order=order)
-    facing, cells = facing_of(solution), solution.equilibrated.proof.dual.cells
+    facing, cells = facing_sides(solution), solution.equilibrated.proof.dual.cells
     assert 0 < facing.closed.sum() < len(facing.side)
     size = 0.02  # of displacements
-    assert facing.after.min() >= -1e-16 * size
-    assert np.abs(facing.after[facing.closed, 1:-1]).max(initial=0.0) <= 1e-12 * size
+    assert facing.lifted_gap.min() >= -1e-16 * size
+    assert np.abs(facing.lifted_gap[facing.closed, 1:-1]).max(initial=0.0) <= 1e-12 * size
     lifted = facing.gap + facing.lift
     assert lifted.min() >= -1e-12 * size
     ends = cells.ends[facing.side]
     lowest, highest = np.full(len(cells.vertices), np.inf), np.full(len(cells.vertices), -np.inf)
-    np.minimum.at(lowest, ends, facing.after[:, [0, -1]])
-    np.maximum.at(highest, ends, facing.after[:, [0, -1]])
+    np.minimum.at(lowest, ends, facing.lifted_gap[:, [0, -1]])
+    np.maximum.at(highest, ends, facing.lifted_gap[:, [0, -1]])
     at = np.unique(ends)
     np.testing.assert_allclose(lowest[at], highest[at], atol=1e-12 * size)
 

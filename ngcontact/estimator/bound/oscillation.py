@@ -24,22 +24,22 @@ import numpy as np
 from ...arrays import Array, Index
 from .cells import Cells
 from .elements import Element, Multipliers, Stress, by_triangle, elements_of
-from .parts import LEAST, ForceRules
+from .force_quadrature import LEAST_DEGREE, ForceQuadrature
 from .polynomials import edges
 from .program import dual_program
-from .tractions import Given, side_rule
+from .tractions import BoundaryData, side_rule
 
-SETTLED = 1e-10  # residual of equilibrium, relative to the largest stress
-SEEN = 17  # points on each side
+EQUILIBRIUM = 1e-10  # residual of equilibrium, relative to the largest stress
+POINTS_ON_SIDE = 17  # points on each side
 # Shares of corners in places at which the middle of both balls is sought, beside the incentre.
-INNER = np.array([(i, j, 8 - i - j) for i in range(1, 8) for j in range(1, 8 - i)]) / 8
-RAISED = 3  # degrees of stresses on whole triangles ...
-FEW = 24  # ... with so many parts, of which none is divided again
-COUNTS = 0.02  # of |s - sigma_h|^2, what may be added by data where nothing is balanced again
-AT_ONCE = 200  # triangles
+BALL_CENTRES = np.array([(i, j, 8 - i - j) for i in range(1, 8) for j in range(1, 8 - i)]) / 8
+RAISED_DEGREES = 3  # degrees of stresses on whole triangles ...
+FEW_PARTS = 24  # ... with so many parts, of which none is divided again
+NEGLIGIBLE_SHARE = 0.02  # of |s - sigma_h|^2: so much may be added by data not balanced again
+TRIANGLES_AT_ONCE = 200  # triangles
 
 
-def data_norms(cells: Cells, elements: Sequence[Element], tractions: Array) -> Array:
+def oscillation_norms(cells: Cells, elements: Sequence[Element], tractions: Array) -> Array:
     """Norm (n,) of a stress that does the work of what is missed of body forces and tractions.
 
     `tractions` (n, 3) are L2 norms on the sides, orthogonal to rigid motions, times the measure.
@@ -53,7 +53,7 @@ def data_norms(cells: Cells, elements: Sequence[Element], tractions: Array) -> A
     least = by_triangle(elements, [e.modulus for e in elements])
     found = np.zeros(len(forces))
     some = (forces > 0) | (tractions > 0).any(axis=1)
-    for points in (2, SEEN):  # on straight sides extrema are at ends
+    for points in (2, POINTS_ON_SIDE):  # on straight sides extrema are at ends
         at = np.flatnonzero(some & (cells.curved == (points > 2)))
         known = _constants(cells, at, points)
         if (known.measure <= 0).any():
@@ -83,7 +83,7 @@ def _constants(cells: Cells, at: Index, points: int) -> Constants:
     normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
     opposite = np.linalg.norm(np.roll(corners, -1, 1) - np.roll(corners, -2, 1), axis=2)
     ratio, tiny = np.zeros(len(at)), np.finfo(float).tiny
-    for share in [opposite / opposite.sum(axis=1, keepdims=True), *INNER]:
+    for share in [opposite / opposite.sum(axis=1, keepdims=True), *BALL_CENTRES]:
         away = x - (share[..., None] * corners).sum(axis=1)[:, None, None]
         rho = (away * normal).sum(axis=-1).min(axis=(1, 2))
         ratio = np.maximum(ratio, rho / np.linalg.norm(away, axis=-1).max(axis=(1, 2)))
@@ -103,60 +103,60 @@ def _constants(cells: Cells, at: Index, points: int) -> Constants:
 
 
 @dataclass(frozen=True, eq=False)
-class Level:
+class BalancedCells:
     """A stress on n triangles of cells, in equilibrium with what `rules` see of forces."""
 
     cells: Cells
     s: Stress
-    rules: ForceRules
+    rules: ForceQuadrature
     distance: Array  # (n,) |s - sigma_h|
     loads: Array  # (n,) norms of what s misses of the data
 
 
-def once_more(
+def balanced_again(
     displacement: ng.CoefficientFunction,
-    given: Given,
-    level: Level,
+    given: BoundaryData,
+    level: BalancedCells,
     degree: int,
     scale: float,
     allowed: float | None = None,
 ) -> tuple[Array, Array]:
-    """`Level.distance` and `.loads`, (n,) each, of the better of both stresses on each triangle.
+    """Distances and loads, (n,) each as of `level`, of the better stress on each triangle.
 
     Stresses are of a `degree` on straight triangles, equilibrium is measured beside the largest
     one, `scale`. What is `allowed` may be added to B^2; without it a share of |s - sigma_h|^2.
     """
     c, D, rules = level.distance.copy(), level.loads.copy(), level.rules
-    limit = COUNTS * float(c @ c) if allowed is None else allowed
+    limit = NEGLIGIBLE_SHARE * float(c @ c) if allowed is None else allowed
     pieces = by_triangle(level.s.elements, [e.pieces for e in level.s.elements])
     for third in (None, False, True):  # whole triangles, their parts
         lost = (c + D) ** 2 - c**2
         order = np.argsort(lost)
         counts = np.sort(order[np.cumsum(lost[order]) > limit])
-        fits = pieces <= FEW if third is None else (pieces > 1) & (rules.thirds == third)
+        fits = pieces <= FEW_PARTS if third is None else (pieces > 1) & (rules.thirds == third)
         some = counts[fits[counts]]
-        for at in np.array_split(some, -(-len(some) // AT_ONCE)) if len(some) else ():
+        for at in np.array_split(some, -(-len(some) // TRIANGLES_AT_ONCE)) if len(some) else ():
             parts, finer = rules.divided(level.cells, at, third)
-            own = degree + RAISED if third is None else max(degree, LEAST)
+            own = degree + RAISED_DEGREES if third is None else max(degree, LEAST_DEGREE)
             k = len(parts.triangles) // len(at)
             mu, elements = elements_of(given.problem, parts, displacement, own, finer)
             rule = side_rule(parts, given.breaks, np.flatnonzero(~parts.inner))
             owner = parts.owner[rule.side]
             whole = level.s.tractions(at[owner // k], rule.x, rule.normal)
-            asked = given.asked(parts, rule, whole)
-            moments = rule.moments(mu, asked)
+            wanted = given.tractions(parts, rule, whole)
+            moments = rule.moments(mu, wanted)
             free, motions = np.zeros(len(moments), dtype=bool), np.zeros((len(moments), 0))
             program = dual_program(mu, elements, free, motions, [])
             s = program.nearest(elements, moments).s
-            left = residuals(parts, mu, moments - s.exerted()[0], scale)
+            left = residuals(parts, mu, moments - s.traction_moments()[0], scale)
             have = s.tractions(owner, rule.x, rule.normal)
-            loads = data_norms(parts, elements, rule.missed(parts, asked - have, scale))
+            loads = oscillation_norms(parts, elements, rule.missed(parts, wanted - have, scale))
             both = s.norms()[0], loads
             if finer.levels and third is not None:
-                inner, share = Level(parts, s, finer, *both), len(at) / len(counts)
-                both = once_more(displacement, given, inner, own, scale, limit * share)
+                inner, share = BalancedCells(parts, s, finer, *both), len(at) / len(counts)
+                both = balanced_again(displacement, given, inner, own, scale, limit * share)
             one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
-            settled = left.reshape(-1, k).max(axis=1) <= SETTLED
+            settled = left.reshape(-1, k).max(axis=1) <= EQUILIBRIUM
             better = settled & (one + two < c[at] + D[at])
             c[at[better]], D[at[better]] = one[better], two[better]
     return c, D

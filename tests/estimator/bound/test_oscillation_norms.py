@@ -10,7 +10,7 @@ import pytest
 from scipy.linalg import eigh
 
 from ngcontact.estimator.bound.cells import cells_of, places
-from ngcontact.estimator.bound.missed import data_norms
+from ngcontact.estimator.bound.oscillation import oscillation_norms
 from ngcontact.fem import boundary_trace
 from ngcontact.lagrange import gauss
 from tests.estimator.bound.test_cells import ring
@@ -21,13 +21,13 @@ DEGREE = 7  # of displacements among which the worst one is sought
 
 
 def one_of(cells, at, force, sides):
-    """`data_norms` of triangle `at` with a norm of forces and norms on its sides; |C| = 1."""
+    """`oscillation_norms` of triangle `at` with norms of forces and on its sides; |C| = 1."""
     n = len(cells.triangles)
     forces, tractions = np.zeros(n), np.zeros((n, 3))
     forces[at], tractions[at] = force, sides
     points = SimpleNamespace(at=np.arange(n))
     element = SimpleNamespace(places=points, missed=forces, modulus=np.ones(n))
-    found = data_norms(cells, [element], tractions)
+    found = oscillation_norms(cells, [element], tractions)
     assert (np.delete(found, at) == 0).all()
     return found[at]
 

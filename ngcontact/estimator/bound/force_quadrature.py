@@ -17,13 +17,13 @@ from ...quadrature import View, features_of, numbers, touched
 from .cells import Cells, joined, places
 from .polynomials import projected, scalars
 
-PARTS = 4  # of each side
-LEVELS = 2  # how often triangles are divided
-SMOOTH = 1e-3  # of the largest force: what polynomials miss where triangles are not divided
-BENT = 2  # times the order of rules on curved triangles, for polynomials in x
-FINER = 4  # degrees by which rules on triangles are above those on their parts
-LEAST = 3  # degree of stresses on parts: lower ones do not meet all tractions
-AT_ONCE = 100  # triangles with forces that are no numbers
+PARTS_OF_A_SIDE = 4  # of each side
+DIVISIONS = 2  # how often triangles are divided
+SMOOTH_FORCE = 1e-3  # of the largest force: what polynomials miss where triangles are not divided
+CURVED_FACTOR = 2  # times the order of rules on curved triangles, for polynomials in x
+FINER_DEGREES = 4  # degrees by which rules on triangles are above those on their parts
+LEAST_DEGREE = 3  # degree of stresses on parts: lower ones do not meet all tractions
+FORCES_AT_ONCE = 100  # triangles with forces that are no numbers
 
 
 @lru_cache
@@ -33,10 +33,10 @@ def pattern(thirds: bool) -> tuple[Array, Index]:
     There given tractions may be those of no symmetric stress. Shares (p, 3) of the triangle's
     corners in the vertices, and vertices (k, 3) of each part, anticlockwise.
     """
-    at = [(i, j) for i in range(PARTS + 1) for j in range(PARTS + 1 - i)]
-    shares = np.array([(PARTS - i - j, i, j) for i, j in at]) / PARTS
-    up = [[(i, j), (i + 1, j), (i, j + 1)] for i, j in at if i + j < PARTS]
-    down = [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i, j in at if i + j < PARTS - 1]
+    at = [(i, j) for i in range(PARTS_OF_A_SIDE + 1) for j in range(PARTS_OF_A_SIDE + 1 - i)]
+    shares = np.array([(PARTS_OF_A_SIDE - i - j, i, j) for i, j in at]) / PARTS_OF_A_SIDE
+    up = [[(i, j), (i + 1, j), (i, j + 1)] for i, j in at if i + j < PARTS_OF_A_SIDE]
+    down = [[(i + 1, j), (i + 1, j + 1), (i, j + 1)] for i, j in at if i + j < PARTS_OF_A_SIDE - 1]
     corners = np.array([[at.index(v) for v in part] for part in up + down])
     if thirds:
         three, each = (shares[corners] == 1).any(axis=(1, 2)), np.arange(3)
@@ -48,7 +48,7 @@ def pattern(thirds: bool) -> tuple[Array, Index]:
 
 
 @dataclass(frozen=True, eq=False)
-class ForceRules:
+class ForceQuadrature:
     """How body forces are integrated on n triangles: where they are rough, on parts.
 
     They are rough where they are far from polynomials on a triangle. The rule on it is that on its
@@ -65,9 +65,11 @@ class ForceRules:
     @property
     def order(self) -> int:
         """Of the rules on triangles that are not divided."""
-        return self.lowest + FINER * self.levels
+        return self.lowest + FINER_DEGREES * self.levels
 
-    def divided(self, cells: Cells, at: Index, thirds: bool | None) -> tuple[Cells, ForceRules]:
+    def divided(
+        self, cells: Cells, at: Index, thirds: bool | None
+    ) -> tuple[Cells, ForceQuadrature]:
         """Triangles `at` (b,) of cells in the parts of `pattern`, each with vertices of its own.
 
         And the rules on the parts. Where `thirds` is None each triangle is its only part.
@@ -87,7 +89,7 @@ class ForceRules:
         return parts, replace(self, levels=levels, least=least, thirds=third)
 
 
-def force_rules(problem: Problem, cells: Cells, degree: int, least: Index) -> ForceRules:
+def force_quadrature(problem: Problem, cells: Cells, degree: int, least: Index) -> ForceQuadrature:
     """The rules for stresses of a `degree`; triangles are divided `least` (n,) times at least."""
     mesh, thresholds, most = cells.trace.mesh, [], least.copy()
     for pattern, F in problem.force.items():
@@ -95,17 +97,18 @@ def force_rules(problem: Problem, cells: Cells, degree: int, least: Index) -> Fo
         thresholds.append(np.inf)
         if not numbers(F):
             middles = cells.evaluate(F, at, np.full((len(at), 2), 1 / 3))
-            thresholds[-1] = SMOOTH * float(np.linalg.norm(middles, axis=1).max(initial=0.0))
+            thresholds[-1] = SMOOTH_FORCE * float(np.linalg.norm(middles, axis=1).max(initial=0.0))
     if not all(np.isinf(thresholds)):
         narrow = narrow_forces(problem, mesh, cells.trace.order)
         for one in features_of(problem, mesh):
             if one.kind == "force" and len(one.places):
                 view, spots = View(mesh, 2), np.column_stack([one.places, one.widths])
                 at, feature = touched(spots, view, np.arange(mesh.ne))
-                narrow[at[view.sizes[at] > PARTS * one.widths[feature]]] = True
-        most[narrow[cells.parent]] = LEVELS
+                narrow[at[view.sizes[at] > PARTS_OF_A_SIDE * one.widths[feature]]] = True
+        most[narrow[cells.parent]] = DIVISIONS
     n = max(0, degree - 1 - cells.trace.model.extent)
-    return ForceRules(thresholds, n, LEVELS, 2 * max(degree, LEAST) + 2, most, least > 0)
+    order = 2 * max(degree, LEAST_DEGREE) + 2
+    return ForceQuadrature(thresholds, n, DIVISIONS, order, most, least > 0)
 
 
 class Samples(NamedTuple):
@@ -118,7 +121,7 @@ class Samples(NamedTuple):
 
 
 def _samples(
-    F: ng.CoefficientFunction, cells: Cells, at: Index, rules: ForceRules, threshold: float
+    F: ng.CoefficientFunction, cells: Cells, at: Index, rules: ForceQuadrature, threshold: float
 ) -> Iterator[Samples]:
     """Samples in triangles `at` (b,), numbered from 0; an infinite `threshold` says: numbers."""
     axial = int(cells.trace.model.extent)
@@ -126,7 +129,7 @@ def _samples(
         own = np.flatnonzero((cells.curved[at] == bent) & (rules.thirds[at] == third))
         if own.size == 0:
             continue
-        points = places(cells, at[own], rules.order * (BENT if bent else 1))
+        points = places(cells, at[own], rules.order * (CURVED_FACTOR if bent else 1))
         weight, values = points.weight, points.evaluate(cells, F)
         rough = np.zeros(len(own), dtype=bool)
         if rules.levels and np.isfinite(threshold):
@@ -158,12 +161,12 @@ def projection(
     cells: Cells,
     at: Index,
     degree: int,
-    rules: ForceRules,
+    rules: ForceQuadrature,
     threshold: float,
 ) -> Projection:
     """Polynomials near to a force F in triangles `at` (b,), of a `degree`."""
-    if len(at) > AT_ONCE and np.isfinite(threshold):
-        some = np.array_split(at, 1 + len(at) // AT_ONCE)
+    if len(at) > FORCES_AT_ONCE and np.isfinite(threshold):
+        some = np.array_split(at, 1 + len(at) // FORCES_AT_ONCE)
         every = (projection(F, cells, x, degree, rules, threshold) for x in some)
         return Projection(*map(np.concatenate, zip(*every, strict=True)))
     corners, b, m = cells.corners[at], len(at), (degree + 1) * (degree + 2) // 2
