@@ -14,10 +14,11 @@ from scipy.optimize import linprog, nnls
 
 from ..arrays import Array, Mask
 from ..errors import NoEquilibriumError
-from ..fem import Space, loads_of, model_of
+from ..fem import Space, model_of
 from ..mesh import cad_edges
 from ..problem import Problem
 from ..qp import FREE, NullSpace, pinned_null_space, vanishing_combinations
+from ..quadrature import loads_of
 from .admissible_set import AdmissibleSet
 from .rigid_motions import FreeMotions, RigidMotion, free_motions, measured_work
 
@@ -235,10 +236,10 @@ def work_of_load(problem: Problem, mesh: ng.Mesh, motion: RigidMotion) -> float:
         z[name] = ng.CF((tx - turn * (ng.y - cy), ty + turn * (ng.x - cx)))
     moved = mesh.MaterialCF(z, default=ng.CF((0, 0)))
     work, model = 0.0, model_of(problem)
-    for _, load, region in loads_of(problem, mesh):
-        there = moved if region.VB() == ng.VOL else ng.BoundaryFromVolumeCF(moved)
-        power = model.weighted(ng.InnerProduct(load, there))
-        work += ng.Integrate(power, mesh, definedon=region, order=LOAD_ORDER)
+    for load in loads_of(problem, mesh):
+        there = moved if load.kind == "force" else ng.BoundaryFromVolumeCF(moved)
+        power = model.weighted(ng.InnerProduct(load.density, there))
+        work += ng.Integrate(power, mesh, definedon=load.region, order=LOAD_ORDER)
     return float(work)
 
 
@@ -260,8 +261,12 @@ def load_by_shape(problem: Problem, mesh: ng.Mesh) -> Array:
     meshes = (mesh, _curved(mesh))
     for own, finer in zip(*(loads_of(problem, m) for m in meshes), strict=True):
         coarse, fine = (
-            np.array(ng.Integrate(model.weighted(load), m, definedon=region, order=LOAD_ORDER))
-            for m, (_, load, region) in zip(meshes, (own, finer), strict=True)
+            np.array(
+                ng.Integrate(
+                    model.weighted(load.density), m, definedon=load.region, order=LOAD_ORDER
+                )
+            )
+            for m, load in zip(meshes, (own, finer), strict=True)
         )
         change += np.abs(model.resultant(fine - coarse))
     return change

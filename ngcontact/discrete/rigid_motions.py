@@ -18,11 +18,10 @@ from ..fem import (
     Space,
     body_of_unknown,
     connected_bodies,
-    loads_of,
 )
-from ..problem import MeshArrays, Problem
+from ..problem import MeshArrays, Problem, numbers
 from ..qp import FREE, vanishing_combinations
-from ..quadrature import View, integral_over, known_rough_load, moment_degree, numbers
+from ..quadrature import SampledElements, loads_of
 
 NOT_RIGID = 1e-9  # force of a rigid motion, relative to its terms, that shows it is not in V_h
 
@@ -246,26 +245,25 @@ def measured_work(problem: Problem, free: FreeMotions) -> tuple[Array, Array] | 
     """
     trace, bodies = free.space.trace, free.bodies
     mesh, model = trace.mesh, trace.model
-    loads, degree = loads_of(problem, mesh), moment_degree(free.space.V.globalorder)
-    if all(numbers(data) for data, _, _ in loads):
+    loads = loads_of(problem, mesh)
+    if all(numbers(load.data) for load in loads):
         return None
     work, error = np.zeros((2, free.combinations.shape[1]))
-    for data, load, region in loads:
-        view = View(mesh, 2 if region.VB() == ng.VOL else 1)
-        found = known_rough_load(data, load, region, degree)
+    for load in loads:
+        view, density = SampledElements(mesh, 2 if load.kind == "force" else 1), load.density
+        found = load.where_rough(free.space.V.globalorder)
         rough = None if found is None else found.rough
-        ends = view.arrays.elements if view.dim == 2 else view.arrays.facets
-        inside = view.inside(region)
+        inside = view.inside(load.region)
         for b, ((x, y), size) in enumerate(zip(bodies.middle, bodies.size, strict=True)):
             amounts = free.combinations[3 * b : 3 * b + 3]
             moving = np.flatnonzero(amounts.any(axis=0))
-            here = inside[bodies.of_vertex[ends[inside, 0]] == b]
+            here = inside[bodies.of_vertex[view.ends[inside, 0]] == b]
             if here.size and moving.size:
-                turn = ((ng.x - x) * load[1] - (ng.y - y) * load[0]) / size
+                turn = ((ng.x - x) * density[1] - (ng.y - y) * density[0]) / size
                 parts = amounts[:, moving].T.tolist()
-                powers = [r * load[0] + s * load[1] + t * turn for r, s, t in parts]
-                density = model.weighted(ng.CF(tuple(powers)))
-                done, missed = integral_over(density, view, here, rough)
+                powers = [r * density[0] + s * density[1] + t * turn for r, s, t in parts]
+                power = model.weighted(ng.CF(tuple(powers)))
+                done, missed = view.integral(power, here, rough)
                 work[moving] += done
                 error[moving] += missed
     return work, error

@@ -45,7 +45,7 @@ from ..arrays import Array, Index, root_of_squares
 from ..fem import NEARLY_INCOMPRESSIBLE, nearly_incompressible
 from ..lagrange import gauss, gauss_derivative
 from ..problem import varies
-from ..quadrature import known_rough_load, moment_degree, pieces, rough_segments
+from ..quadrature import loads_of, pieces, rough_segments
 from ..solved import Solved
 from .contact import between_nodes, closing_energy, on_contact, remaining
 from .pressure_correction import PressureCorrection, correcting_pressure
@@ -114,13 +114,11 @@ def _rough_tractions(
     There `residual` (k, 2) at `s` (k,) of segments (k,) is made that of the polynomials.
     """
     boundary, problem, squares = solution.boundary, solution.problem, []
-    for pattern, data in problem.traction.items():
-        load, region = problem.traction_vector(pattern), boundary.mesh.Boundaries(pattern)
-        found = known_rough_load(data, load, region, moment_degree(solution.order))
-        if found is None:
+    for load in loads_of(problem, boundary.mesh):
+        if load.kind != "traction" or not (found := load.where_rough(solution.order)):
             continue
         at = found.rough[segment]
-        change = found.projection - load
+        change = found.projection - load.density
         residual[at] += boundary.evaluate(change, segment[at], s[at]) / solution.unit
         element = boundary.element
         rest = solution.edge_weight[element] * (found.rest / solution.unit) ** 2
@@ -264,10 +262,12 @@ def _body_forces(
     if not problem.force:
         return None, []
     forces, squares, every = {}, [], np.arange(mesh.ne)
-    for body, F in problem.force.items():
-        found = known_rough_load(F, F, mesh.Materials(body), moment_degree(solution.order))
+    for load in loads_of(problem, mesh):
+        if load.kind != "force":
+            continue
+        body, F = load.name, load.data
         forces[body] = ng.CF(F) * (1 / solution.unit)
-        if found is not None:
+        if found := load.where_rough(solution.order):
             rough = ng.GridFunction(ng.L2(mesh, order=0))
             rough.vec.FV().NumPy()[:] = found.rough
             projection = found.projection * (1 / solution.unit)

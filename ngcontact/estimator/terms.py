@@ -10,11 +10,11 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two
-from ..fem import BoundaryTrace, Model, law_measures, normal_stress_of, rough_moduli, stiffnesses
+from ..fem import BoundaryTrace, Model, law_measures, normal_stress_of, stiffnesses
 from ..lagrange import gauss
 from ..linalg import cholesky, lower_half, shared
 from ..problem import MeshArrays, Problem, varies
-from ..quadrature import features_of
+from ..quadrature import features_of, rough_moduli
 from ..solved import Solved
 
 DATA_BONUS = 4  # quadrature order above that of the discrete terms, for the loads

@@ -16,7 +16,6 @@ from .moduli import bulk_moduli as bulk_moduli
 from .moduli import incompressibilities as incompressibilities
 from .moduli import law_measures as law_measures
 from .moduli import nearly_incompressible as nearly_incompressible
-from .moduli import rough_moduli as rough_moduli
 from .moduli import shear_moduli as shear_moduli
 from .moduli import stiffer_than as stiffer_than
 from .moduli import stiffnesses as stiffnesses
@@ -30,7 +29,6 @@ from .space import connected_bodies as connected_bodies
 from .space import energy_norm as energy_norm
 from .space import has_rough_loads as has_rough_loads
 from .space import load_vector as load_vector
-from .space import loads_of as loads_of
 from .space import narrow_forces as narrow_forces
 from .space import normal_stress_of as normal_stress_of
 from .space import potential_energy as potential_energy

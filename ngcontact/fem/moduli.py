@@ -12,15 +12,14 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..errors import warn
 from ..problem import Elastic, Hooke, MeshArrays, Problem, varies
-from ..quadrature import composite, on_lattice
+from ..quadrature import composite
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
 NEARLY_INCOMPRESSIBLE = 6.0
 # ... and from which order 1 locks: nu = 0.4545, where errors are 1.3 times those of nu = 0.3.
 LOCKING = 11.0
 
-ROUGH = 0.5  # change of a law inside an element over its least value from which it is rough
-ROUGH_PARTS = 8  # of the sides of such an element, each with a rule of its own
+ROUGH_PARTS = 8  # of the sides of an element in which a law is rough, each with a rule of its own
 MODULUS_BONUS = 4  # quadrature orders above the default: moduli may be as rough as r^(-1/2)
 CURVED = 2  # ... and for the map of a curved element
 
@@ -174,24 +173,6 @@ def incompressibilities(problem: Problem, mesh: ng.Mesh) -> Array:
     for at, C in _laws(problem, mesh):
         ratio[at] = 2 * _bulk(C[:, 0]) / _smallest(C[:, 0])
     return ratio
-
-
-def rough_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
-    """Elements (ne,) in which the law varies by more than a part of itself, or jumps."""
-    rough = np.zeros(mesh.ne, dtype=bool)
-    for pattern, law in problem.materials.items():
-        if not varies(law):
-            continue
-        region, diameter = MeshArrays(mesh).bodies, MeshArrays(mesh).diameters
-        at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
-        C = law.voigt(problem.model)
-        for here, points in on_lattice(mesh, at, diameter):
-            values = np.asarray(C(points.ravel())).reshape(*points.shape, -1)
-            size = round(math.sqrt(values.shape[-1]))
-            diagonal = values[..., :: size + 1].mean(axis=2)
-            change = np.ptp(values, axis=1).max(axis=1)
-            rough[here] = change > ROUGH * diagonal.min(axis=1)
-    return rough
 
 
 def law_measures(

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
 
 import ngsolve as ng
 import numpy as np
@@ -15,12 +13,10 @@ import scipy.sparse as sp
 from ..arrays import Array, Index, Mask, power_of_two
 from ..linalg import shared
 from ..problem import MeshArrays, Problem, varies
-from ..quadrature import keep_rough_load, known_rough_load, moment_degree
+from ..quadrature import loads_of, rough_moduli
 from .boundary import BoundaryTrace, node_basis, vector_space
 from .model import model_of
-from .moduli import constant_measures, law_measures, rough_moduli
-
-Load: TypeAlias = tuple[ng.CoefficientFunction, ng.CoefficientFunction, ng.Region]
+from .moduli import constant_measures, law_measures
 
 LOAD_BONUS = 6  # quadrature orders above the default: loads may be as rough as r^(-1/2)
 CANCELLED = 1e-6  # energy relative to its terms below which fewer than ten digits are left
@@ -82,16 +78,6 @@ class Space:
         return diagonal.reshape(2, -1).max(axis=0)
 
 
-def loads_of(problem: Problem, mesh: ng.Mesh) -> list[Load]:
-    """The data, the force per volume or area that they are, and the region of each load."""
-    forces = [(F, F, mesh.Materials(body)) for body, F in problem.force.items()]
-    tractions = [
-        (p, problem.traction_vector(boundary), mesh.Boundaries(boundary))
-        for boundary, p in problem.traction.items()
-    ]
-    return [*forces, *tractions]
-
-
 def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
     """f(v) of (3.2), (2N,), with quadrature `bonus` orders above the default.
 
@@ -99,47 +85,36 @@ def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
     """
     v, model, mesh = V.TestFunction(), model_of(problem), V.mesh
     f = ng.LinearForm(V)
-    for data, whole, region in loads_of(problem, mesh):
-        w = v if region.VB() == ng.VOL else v.Trace()
-        for load, dx in _smooth_and_rough(data, whole, region, V, bonus):
-            f += model.weighted(load * w) * dx  # (3.2)
+    for load in loads_of(problem, mesh):
+        measure, w = (ng.dx, v) if load.kind == "force" else (ng.ds, v.Trace())
+        found = load.where_rough(
+            V.globalorder, again=bonus == LOAD_BONUS
+        )  # a finer rule asks again
+        if found is None:
+            dx = measure(definedon=load.region, bonus_intorder=bonus)
+            f += model.weighted(load.density * w) * dx  # (3.2)
+            continue
+        for density, some in ((load.density, ~found.rough), (found.projection, found.rough)):
+            dx = measure(
+                definedon=load.region, definedonelements=ng.BitArray(some), bonus_intorder=bonus
+            )
+            f += model.weighted(density * w) * dx
     f.Assemble()
     return f.vec.FV().NumPy().copy()
 
 
 def has_rough_loads(problem: Problem, V: ng.FESpace) -> bool:
     """Whether quadrature of the usual order would miss a part of a load on the mesh of `V`."""
-    degree = moment_degree(V.globalorder)
-    return any(known_rough_load(*load, degree) is not None for load in loads_of(problem, V.mesh))
+    return any(load.where_rough(V.globalorder) for load in loads_of(problem, V.mesh))
 
 
 def narrow_forces(problem: Problem, mesh: ng.Mesh, order: int) -> Mask:
     """Elements (ne,) in which quadrature of the usual order would miss a part of a body force."""
     narrow = np.zeros(mesh.ne, dtype=bool)
-    for body, F in problem.force.items():
-        found = known_rough_load(F, F, mesh.Materials(body), moment_degree(order))
-        if found is not None:
+    for load in loads_of(problem, mesh):
+        if load.kind == "force" and (found := load.where_rough(order)):
             narrow |= found.rough
     return narrow
-
-
-def _smooth_and_rough(
-    data: ng.CoefficientFunction,
-    load: ng.CoefficientFunction,
-    region: ng.Region,
-    V: ng.FESpace,
-    bonus: int,
-) -> Iterator[tuple[ng.CoefficientFunction, ng.comp.DifferentialSymbol]]:
-    """A load where it is smooth, what stands for it where it is rough, and the measures of both."""
-    measure = ng.dx if region.VB() == ng.VOL else ng.ds
-    look = keep_rough_load if bonus == LOAD_BONUS else known_rough_load  # a finer rule asks again
-    found = look(data, load, region, moment_degree(V.globalorder))
-    if found is None:
-        yield load, measure(definedon=region, bonus_intorder=bonus)
-        return
-    smooth, rough = ng.BitArray(~found.rough), ng.BitArray(found.rough)
-    yield load, measure(definedon=region, definedonelements=smooth, bonus_intorder=bonus)
-    yield found.projection, measure(definedon=region, definedonelements=rough, bonus_intorder=bonus)
 
 
 def assemble(

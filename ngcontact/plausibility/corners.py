@@ -11,8 +11,8 @@ from ..arrays import Array, Index, Mask
 from ..errors import warn
 from ..fem import warn_of_locking
 from ..mesh import cad_edges
-from ..problem import Problem
-from ..quadrature import View, features_of, numbers, warn_of_data, warn_of_jumps
+from ..problem import Problem, numbers
+from ..quadrature import SampledElements, features_of, warn_of_data, warn_of_jumps
 
 APART = 1e-6  # values of two supports at one corner, relative to the largest, that are two values
 NOISE = 64 * np.finfo(float).eps  # ... and to the largest of all values: below it is round-off
@@ -55,7 +55,7 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
         for one in seen
         for *place, amount in one.jumps.tolist()
     ]
-    view = View(mesh, 1)
+    view = SampledElements(mesh, 1)
     shared = _shared(problem, view)
     known: dict[tuple[int, int], tuple[str, float]] = {}
     for pattern, components in problem.displacement.items() if shared.any() else ():
@@ -83,7 +83,7 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
     return [one for one in found if one.amount > NOISE * largest]
 
 
-def _shared(problem: Problem, view: View) -> Mask:
+def _shared(problem: Problem, view: SampledElements) -> Mask:
     """Vertices at which segments of several prescribed regions, or of guides, meet."""
     guides = [str(problem.sliding)] if problem.sliding is not None else []
     at = view.inside(view.mesh.Boundaries("|".join([*problem.displacement, *guides])))
@@ -94,7 +94,7 @@ def _shared(problem: Problem, view: View) -> Mask:
     return np.asarray(low < high)
 
 
-def _ends(view: View, pattern: str, shared: Mask) -> tuple[Index, Index, Array]:
+def _ends(view: SampledElements, pattern: str, shared: Mask) -> tuple[Index, Index, Array]:
     """The `shared` vertices (k,) of boundaries, once for each segment (k,) there.
 
     And the places (k, 1, 1) on these, as NGSolve's parameter runs.
@@ -106,7 +106,10 @@ def _ends(view: View, pattern: str, shared: Mask) -> tuple[Index, Index, Array]:
 
 
 def _across_guides(
-    guides: str, view: View, shared: Mask, known: dict[tuple[int, int], tuple[str, float]]
+    guides: str,
+    view: SampledElements,
+    shared: Mask,
+    known: dict[tuple[int, int], tuple[str, float]],
 ) -> list[Contradiction]:
     """Ends of `guides` at which `known` values, by vertex and axis, lead across them."""
     found = []

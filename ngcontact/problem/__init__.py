@@ -16,4 +16,5 @@ from .mesh_arrays import move_vertices as move_vertices
 from .problem import Problem as Problem
 from .values import body_mask as body_mask
 from .values import boundary_mask as boundary_mask
+from .values import numbers as numbers
 from .values import table as table

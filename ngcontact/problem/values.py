@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-import numbers
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from html import escape
+from numbers import Real
 from typing import Any, NoReturn, TypeAlias
+from weakref import WeakKeyDictionary
 
 import ngsolve as ng
 import numpy as np
@@ -44,7 +45,7 @@ def scalar_data(value: Any, what: str) -> float | ng.CoefficientFunction:
         if value.is_complex:
             raise TypeError(f"{what} is a complex CoefficientFunction: it must be real")
         return value
-    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+    if isinstance(value, bool) or not isinstance(value, Real):
         raise TypeError(f"{what} = {value!r}: give a real number or a scalar CoefficientFunction")
     if not math.isfinite(value):
         raise ValueError(f"{what} = {value}: give a finite number")
@@ -178,11 +179,34 @@ def unit_vector(value: Any, what: str) -> tuple[float, float]:
     return x / size / length, y / size / length
 
 
-# Lines of what NGSolve prints of numbers, alone or in vectors.
-_LEAF = re.compile(r"\s*coef (-?[0-9.e+-]+|-?inf|nan), real")
+LONG = 4000  # characters of what is printed; numbers are short
+KNOWN: WeakKeyDictionary[ng.CoefficientFunction, bool] = WeakKeyDictionary()  # numbers or not
+# Lines of what NGSolve prints of numbers, in vectors, times others and times the normal.
+_NUMBER = r"(?:[-+.\de]+|-?inf|nan)"
+_LEAF = re.compile(rf"\s*coef ({_NUMBER}), real")
 _AROUND = re.compile(
     r"\s*coef (unary operation ' '|VectorialCoefficientFunction), real(, dim=\d+)?"
 )
+_TIMES = re.compile(
+    rf"\s*({_NUMBER}\*\()?(coef (scale {_NUMBER}|scalar-vector multiply|normal vector|{_NUMBER}), "
+    r"real(, dim=\d+)?)?\s*\)?\s*"
+)
+
+
+def _lines(value: ng.CoefficientFunction) -> list[str]:
+    """What NGSolve prints of a function."""
+    text = str(value).replace("ZeroCF", "0")
+    if text.strip() == "ZeroCoefficientFunction":
+        return ["coef 0, real"] * int(value.dim)
+    return text.splitlines() if len(text) < LONG else [text]
+
+
+def numbers(data: ng.CoefficientFunction) -> bool:
+    """Whether data are made of numbers alone, perhaps times the normal. Looked at once."""
+    if data not in KNOWN:  # printing a long expression costs as much as evaluating it
+        parts = (_LEAF, _AROUND, _TIMES)
+        KNOWN[data] = all(any(part.fullmatch(line) for part in parts) for line in _lines(data))
+    return KNOWN[data]
 
 
 def told(value: Any) -> str:
@@ -192,10 +216,8 @@ def told(value: Any) -> str:
     if isinstance(value, tuple):
         return f"({', '.join(map(told, value))})"
     if not isinstance(value, ng.CoefficientFunction):
-        return f"{value:.6g}" if isinstance(value, numbers.Real) else "function"
-    lines = str(value).replace("ZeroCF", "0").splitlines()
-    if lines == ["ZeroCoefficientFunction"]:
-        lines = ["coef 0, real"] * int(value.dim)
+        return f"{value:.6g}" if isinstance(value, Real) else "function"
+    lines = _lines(value)
     leaves = [leaf.group(1) for line in lines if (leaf := _LEAF.fullmatch(line))]
     around = [line for line in lines if not _LEAF.fullmatch(line)]
     if len(leaves) != value.dim or not all(map(_AROUND.fullmatch, around)):

@@ -1,35 +1,31 @@
-"""Elements in equal parts, and parts that are halved where a function asks for it."""
+"""Elements in equal parts, and parts that are halved until a rule integrates a function on them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import ngsolve as ng
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Index, Mask
-from ..problem import MeshArrays
+from ..arrays import Array, Index, Mask, root_of_squares
 
-ORDER = {1: 7, 2: 4}  # of the rule on a part
-DEEPEST = {1: 40, 2: 10}  # halvings of the sides of a part
+DEEPEST = {1: 38, 2: 10}  # halvings of the sides: points beside corners of smaller parts are these
 MOST_CELLS = 20_000  # parts that are halved at a time: rougher functions are noise
-
-CORNER = 1e-4  # distance of the points at corners from these, relative to a part
+AT_CORNERS = 1e-4  # distance of the points at corners from these, relative to a part
 BEYOND = 0.05  # share of a part beyond the last point of the rule
-# Parts of the bodies' extent: a disc, or a length, of a hundredth of it contains a point.
-FINEST = {1: 256, 2: 116}
-# Of the side of an element: the polynomials of `View` miss a step at any of the points by 7 %.
-PARTS = {1: (16, 32, 128), 2: (2, 4, 8, 12, 16, 24, 32)}
 GOLDEN = (1 + 5**0.5) / 2  # takes points on a line out of step with waves
 
+# Orders of the rules on a part, and the degree of the polynomial through their points that tells
+# their corners: of loads, whose moments are taken again, and of integrals that are wanted as such.
+MOMENTS = {1: (7, 3), 2: (4, 2)}
+INTEGRALS = {1: (15, 6), 2: (10, 5)}
 
-def extent(mesh: ng.Mesh) -> float:
-    """Largest extent of the mesh along x or y, a length."""
-    return float(np.ptp(MeshArrays(mesh).vertices, axis=0).max())
+Integrand = Callable[[Index, Array], Array]
 
 
 @lru_cache
@@ -58,16 +54,6 @@ def lattice(dim: int, n: int) -> Array:
     return np.asarray(origin + side.sum(axis=1) / 3)
 
 
-@lru_cache
-def beside_edges(dim: int) -> Array:
-    """Points (m, dim) inside the unit segment or triangle, 1e-4 of it from its ends or edges."""
-    t = np.arange(8)[:, None] / 8
-    corners = np.vstack([np.zeros(dim), np.eye(dim)])
-    edges = [(1 - t) * a + t * b for a, b in zip(corners, np.roll(corners, 1, axis=0), strict=True)]
-    x = corners if dim == 1 else np.vstack(edges)
-    return np.asarray(x + 1e-4 * (1 / (dim + 1) - x))
-
-
 def monomials(x: Array, degree: int) -> Array:
     """Products of the coordinates up to a degree at points `x` (..., dim), (..., q)."""
     found = [np.ones(x.shape[:-1])]  # each by one product, in the order of degrees
@@ -77,11 +63,16 @@ def monomials(x: Array, degree: int) -> Array:
     return np.stack(found, axis=-1)
 
 
+def gauss_rule(dim: int, order: int) -> tuple[Array, Array]:
+    """Points (m, dim) and weights (m,) of NGSolve's rule on the unit segment or triangle."""
+    rule = ng.IntegrationRule(ng.SEGM if dim == 1 else ng.TRIG, order)
+    return np.array([p[:dim] for p in rule.points]).reshape(-1, dim), np.array(rule.weights)
+
+
 @lru_cache
 def composite(n: int, order: int) -> ng.IntegrationRule:
     """Rule of an order on each of n^2 equal parts of a triangle."""
-    rule = ng.IntegrationRule(ng.TRIG, order)
-    points, weights = np.array([p[:2] for p in rule.points]), np.array(rule.weights)
+    points, weights = gauss_rule(2, order)
     origin, side = parts(2, n)
     x = (origin[:, None] + points @ side).reshape(-1, 2)
     return ng.IntegrationRule(
@@ -89,31 +80,37 @@ def composite(n: int, order: int) -> ng.IntegrationRule:
     )
 
 
-def divisions(dim: int, sizes: Array, whole: float) -> Index:
-    """How many of `PARTS` the side of elements of `sizes` (k,) is divided into, (k,)."""
-    at = np.searchsorted(PARTS[dim], sizes * (FINEST[dim] / whole))
-    return np.array(PARTS[dim])[np.minimum(at, len(PARTS[dim]) - 1)]
+class Rule(NamedTuple):
+    """A rule on the unit simplex with its corners as last points, of weight 0.
 
-
-def on_lattice(mesh: ng.Mesh, elements: Index, sizes: Array) -> Iterator[tuple[Index, NDArray]]:
-    """Triangles (j,) of about one size, and mesh points (j, n) in them, until all have come.
-
-    No disc of a hundredth of the mesh's extent falls between the points.
-
-    Parameters
+    Attributes
     ----------
-    mesh : ng.Mesh
-        The mesh.
-    elements : ndarray of int (k,)
-        Numbers of triangles.
-    sizes : ndarray (ne,)
-        Diameters of all triangles, lengths.
+    points : ndarray (m, dim)
+        Corners at the end.
+    weights : ndarray (m,)
+        Of the points.
+    misses : ndarray (dim + 1, m)
+        From values to what a polynomial through the inner ones misses at the corners: steps beyond
+        the last point are seen there.
     """
-    count = divisions(2, sizes[elements], extent(mesh))
-    for n in np.unique(count).tolist():
-        here, reference = elements[count == n], lattice(2, n)
-        points = np.broadcast_to(reference, (len(here), *reference.shape))
-        yield here, mesh_points(mesh, here, points)
+
+    points: Array
+    weights: Array
+    misses: Array
+
+
+@lru_cache
+def rule_with_corners(dim: int, order: int, degree: int) -> Rule:
+    """NGSolve's rule of an order, with corners and polynomials of a degree."""
+    inner, weights = gauss_rule(dim, order)
+    corners = np.vstack([np.zeros(dim), np.eye(dim)])
+    corners = corners + AT_CORNERS * (1 / (dim + 1) - corners)
+    through = monomials(corners, degree) @ np.linalg.pinv(monomials(inner, degree))
+    return Rule(
+        np.vstack([inner, corners]),
+        np.append(weights, np.zeros(dim + 1)),
+        np.hstack([-through, np.eye(dim + 1)]),
+    )
 
 
 def mesh_points(mesh: ng.Mesh, elements: Index, reference: Array) -> NDArray:
@@ -125,34 +122,6 @@ def mesh_points(mesh: ng.Mesh, elements: Index, reference: Array) -> NDArray:
     for axis, name in zip(range(dim), "xy", strict=False):
         points[name] = reference[..., axis]
     return points
-
-
-Integrand = Callable[[Index, Array], Array]
-
-
-def with_corners(inner: Array, weights: Array, degree: int) -> tuple[Array, Array, Array]:
-    """A rule with points `inner` (m, dim) and `weights` (m,), and corners at its end.
-
-    Points (n, dim); weights (n,), 0 at the corners; a matrix (dim + 1, n) to what a polynomial of
-    a degree through the others misses at the corners. Steps beyond the last point are seen there.
-    """
-    dim = inner.shape[1]
-    corners = np.vstack([np.zeros(dim), np.eye(dim)])
-    corners = corners + CORNER * (1 / (dim + 1) - corners)
-    through = monomials(corners, degree) @ np.linalg.pinv(monomials(inner, degree))
-    return (
-        np.vstack([inner, corners]),
-        np.append(weights, np.zeros(dim + 1)),
-        np.hstack([-through, np.eye(dim + 1)]),
-    )
-
-
-@lru_cache
-def rule(dim: int) -> tuple[Array, Array, Array]:
-    """Points (m, dim), weights (m,) on the unit simplex, a matrix (dim + 1, m): `with_corners`."""
-    made = ng.IntegrationRule(ng.SEGM if dim == 1 else ng.TRIG, ORDER[dim])
-    inner = np.array([p[:dim] for p in made.points]).reshape(-1, dim)
-    return with_corners(inner, np.array(made.weights), {1: 3, 2: 2}[dim])
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,15 +142,33 @@ class Cells:
     origin: Array
     side: Array
 
-    @property
-    def points(self) -> Array:
-        """Points of the rule, (k, m, dim), in reference coordinates of the elements."""
-        return self.origin[:, None] + rule(self.origin.shape[1])[0] @ self.side
+    @staticmethod
+    def whole(dim: int, elements: Index) -> Cells:
+        """The `elements` (k,) themselves."""
+        size = len(elements)
+        return Cells(elements, np.zeros((size, dim)), np.tile(np.eye(dim), (size, 1, 1)))
+
+    @staticmethod
+    def joined(several: list[Cells]) -> Cells:
+        """All of several."""
+        return Cells(
+            np.concatenate([cells.element for cells in several]),
+            np.concatenate([cells.origin for cells in several]),
+            np.concatenate([cells.side for cells in several]),
+        )
 
     @property
-    def weights(self) -> Array:
-        """Weights of the rule, (k, m)."""
-        return np.abs(np.linalg.det(self.side))[:, None] * rule(self.origin.shape[1])[1]
+    def dim(self) -> int:
+        """Of the elements."""
+        return self.origin.shape[1]
+
+    def points(self, rule: Rule) -> Array:
+        """Points of a rule, (k, m, dim), in reference coordinates of the elements."""
+        return self.origin[:, None] + rule.points @ self.side
+
+    def weights(self, rule: Rule) -> Array:
+        """Weights of a rule, (k, m)."""
+        return np.abs(np.linalg.det(self.side))[:, None] * rule.weights
 
     def __getitem__(self, at: Mask | Index) -> Cells:
         """Those selected by `at` (k,), a mask or numbers."""
@@ -189,36 +176,73 @@ class Cells:
 
     def divided(self, n: int) -> Cells:
         """Each in n^dim equal parts, one after the other."""
-        origin, side = parts(self.origin.shape[1], n)
+        origin, side = parts(self.dim, n)
         return Cells(
             np.repeat(self.element, len(origin)),
             (self.origin[:, None] + origin @ self.side).reshape(-1, *origin.shape[1:]),
             (side @ self.side[:, None]).reshape(-1, *side.shape[1:]),
         )
 
+    def beside(self, some: Mask, corners: Array) -> Mask:
+        """The cells `some` (k,) and those that may touch one, (k,).
 
-def whole(dim: int, elements: Index) -> Cells:
-    """The `elements` (k,) themselves."""
-    size = len(elements)
-    return Cells(elements, np.zeros((size, dim)), np.tile(np.eye(dim), (size, 1, 1)))
+        `corners` (n, 3, 2) are those of all triangles, lengths.
+        """
+        of = corners[self.element]
+        sides = self.side @ (of[:, :2] - of[:, 2:])
+        origin = of[:, 2] + (self.origin[:, None] @ (of[:, :2] - of[:, 2:]))[:, 0]
+        middle = origin + sides.sum(axis=1) / 3
+        ends = np.concatenate([origin[:, None], origin[:, None] + sides], axis=1)
+        radius = np.linalg.norm(ends - middle[:, None], axis=2).max(axis=1)
+        apart, nearest = cKDTree(middle[some]).query(middle)
+        return np.asarray(apart <= radius + radius[some][nearest])
 
 
-def joined(several: list[Cells]) -> Cells:
-    """All of several."""
-    return Cells(*(np.concatenate(x) for x in zip(*map(_arrays, several), strict=True)))
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """Parts of elements on which a rule integrates a function of c components.
+
+    Attributes
+    ----------
+    cells : Cells
+        The k parts.
+    rule : Rule
+        The rule on each, of m points.
+    values : ndarray (k, m, c)
+        The function at its points.
+    missed : ndarray (k,)
+        Error of the integral over a part that is halved no more although it is too large, else 0.
+    error : ndarray (c,)
+        Of the whole integral: errors of smooth functions have one sign and add up, others any. It
+        is the sum of differences, which may vanish by chance, or the root of the sum of squares, or
+        what is allowed of a part if any was halved, as a jump may be missed in it.
+    """
+
+    cells: Cells
+    rule: Rule
+    values: Array
+    missed: Array
+    error: Array
+
+    @property
+    def integral(self) -> Array:
+        """Over all parts, (c,)."""
+        return np.einsum("km,kmc->c", self.cells.weights(self.rule), self.values)
 
 
-def _arrays(cells: Cells) -> tuple[Index, Array, Array]:
-    return cells.element, cells.origin, cells.side
+def refined(
+    integrand: Integrand,
+    cells: Cells,
+    rules: dict[int, tuple[int, int]],
+    share: float,
+    total: float | None = None,
+    corners: Array | None = None,
+) -> Refined:
+    """Parts of `cells` on which a rule integrates a function.
 
-
-def following(
-    integrand: Integrand, cells: Cells, allowed: float, corners: Array | None = None
-) -> tuple[Cells, Array, Array]:
-    """Parts of `cells` on which the rule integrates a function.
-
-    What is beside a part that is halved is halved, too, where `corners` tell: it may hold the rest
-    of what is there without any of the points.
+    Parts are halved until their integrals and those over their halves are the same. What is beside
+    one that is halved is halved, too, where `corners` tell: it may hold the rest of what is there
+    without any of the points.
 
     Parameters
     ----------
@@ -226,57 +250,54 @@ def following(
         Values (k, m, c) at points (k, m, dim) of elements (k,).
     cells : Cells
         To start from.
-    allowed : float
-        Difference of the integrals over a part and over its halves at which it is not halved again.
+    rules : dict
+        `MOMENTS` or `INTEGRALS`.
+    share, total : float
+        Error of the integral over a part, relative to a total, at which it is not halved again. The
+        total is the integral of the function's size by the first parts when left out.
     corners : ndarray (n, 3, 2), optional
         Of all triangles, lengths.
-
-    Returns
-    -------
-    Cells
-        The parts.
-    values : ndarray (k, m, c)
-        The function there.
-    missed : ndarray (k,)
-        That difference where a part is halved no more although it is larger, else 0.
     """
-    dim = cells.origin.shape[1]
-    found, kept, missed = [], [], []
+    dim = cells.dim
+    rule = rule_with_corners(dim, *rules[dim])
+    found, kept, missed, differences, errors = [], [], [], [], []
 
-    def integrals(cells: Cells) -> tuple[Array, Array, Array]:
-        values = integrand(cells.element, cells.points)
-        beyond = np.abs(rule(dim)[2] @ values).max(axis=(1, 2))
-        integral = (cells.weights[:, None] @ values)[:, 0]
-        return values, integral, BEYOND * beyond * cells.weights.sum(axis=1)
+    def integrals(cells: Cells) -> tuple[Array, Array]:
+        """Values (k, m, c), and integrals and what may lie beyond the points (k, 2, c)."""
+        values, weights = integrand(cells.element, cells.points(rule)), cells.weights(rule)
+        beyond = np.abs(rule.misses @ values).max(axis=1) * weights.sum(axis=1)[:, None]
+        return values, np.stack([(weights[:, None] @ values)[:, 0], BEYOND * beyond], axis=1)
 
-    _, coarse, beyond = integrals(cells)
+    values, coarse = integrals(cells)
+    if total is None:
+        total = float((cells.weights(rule) * np.abs(values).sum(axis=2)).sum())
+    allowed = share * total
     for depth in range(DEEPEST[dim]):
         halves = cells.divided(2)
-        values, fine, next_beyond = integrals(halves)
-        error = np.abs(fine.reshape(len(coarse), 2**dim, -1).sum(axis=1) - coarse).max(axis=1)
-        error = np.maximum(error, beyond)
+        values, fine = integrals(halves)
+        differs = fine[:, 0].reshape(len(coarse), 2**dim, -1).sum(axis=1) - coarse[:, 0]
+        sizes = np.maximum(np.abs(differs), coarse[:, 1])
+        error = sizes.max(axis=1)
         last = depth == DEEPEST[dim] - 1 or np.count_nonzero(error > allowed) > MOST_CELLS
         some = (error > allowed) & (not last)
         if corners is not None and some.any():
-            some = with_those_beside(some, cells, corners)
+            some = cells.beside(some, corners)
         again = np.repeat(some, 2**dim)
         found.append(halves[~again])
         kept.append(values[~again])
         over = np.where(error > allowed, error, 0.0) * last / 2**dim
         missed.append(np.repeat(over, 2**dim)[~again])
-        cells, coarse, beyond = halves[again], fine[again], next_beyond[again]
+        differences.append(differs[~some])
+        errors.append(sizes[~some])
+        cells, coarse = halves[again], fine[again]
         if not len(coarse):
             break
-    return joined(found), np.concatenate(kept), np.concatenate(missed)
-
-
-def with_those_beside(some: Mask, cells: Cells, corners: Array) -> Mask:
-    """The cells `some` (k,) and those that may touch one, (k,); `corners` (n, 3, 2) as above."""
-    of = corners[cells.element]
-    sides = cells.side @ (of[:, :2] - of[:, 2:])
-    origin = of[:, 2] + (cells.origin[:, None] @ (of[:, :2] - of[:, 2:]))[:, 0]
-    middle = origin + sides.sum(axis=1) / 3
-    ends = np.concatenate([origin[:, None], origin[:, None] + sides], axis=1)
-    radius = np.linalg.norm(ends - middle[:, None], axis=2).max(axis=1)
-    apart, nearest = cKDTree(middle[some]).query(middle)
-    return np.asarray(apart <= radius + radius[some][nearest])
+    sums = np.abs(np.concatenate(differences).sum(axis=0))
+    roots = np.array([root_of_squares(column) for column in np.concatenate(errors).T])
+    return Refined(
+        Cells.joined(found),
+        rule,
+        np.concatenate(kept),
+        np.concatenate(missed),
+        np.maximum(np.maximum(sums, roots), allowed if len(found) > 1 else 0.0),
+    )

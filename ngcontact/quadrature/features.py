@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 from weakref import WeakKeyDictionary
 
 import ngsolve as ng
@@ -23,10 +23,11 @@ from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask
-from ..problem import Problem, varies
-from .cells import Cells, joined, lattice
+from ..errors import warn
+from ..problem import Problem, numbers, varies
+from .cells import Cells, lattice
 from .jumps import steps_along
-from .view import View, looked, numbers
+from .sampling import SampledElements, looked
 
 ON_LINE = 2048  # samples of a boundary: none are further apart than 1 / 1365 of it
 IN_BODY = 5.2e-3  # between samples of a body, over its extent: discs of radius 3e-3 hold one
@@ -50,6 +51,11 @@ ACROSS = 16  # features of a body of which widths are measured ...
 WIDE = 8.0  # ... up to so many samples on either side ...
 CHORD = 20  # ... by so many points: to a quarter
 NARROWEST = 0.1  # samples: no feature is taken for narrower
+# Size of an element over the width of a feature in it, up to which it is resolved. Loads are
+# integrated on parts of elements, but stresses in equilibrium meet body forces on so many of them.
+RESOLVED = {"displacement": 2.0, "gap": 2.0, "materials": 2.0}
+IN_BOUNDS = RESOLVED | {"force": 32.0, "traction": 2.0}  # the last one on curves
+BENT = 1e-9  # of a segment, its distance from a chord
 
 Function: TypeAlias = ng.CoefficientFunction | Callable[[Array, Array], Array]
 
@@ -88,28 +94,44 @@ class Features:
     samples: int
     largest: float
 
+    @property
+    def spots(self) -> Array:
+        """Places and widths (k, 3), lengths."""
+        return np.column_stack([self.places, self.widths])
 
-# Places, widths, jumps, number of samples and largest size of a value, as above.
-Seen: TypeAlias = tuple[Array, Array, Array, int, float]
+
+Seen: TypeAlias = tuple[Array, Array, Array, int, float]  # the last five of these, of a part
 NOTHING: Seen = np.empty((0, 2)), np.empty(0), np.empty((0, 3)), 0, 0.0
 
-# By the object that holds a function, which lives as long as the problem; by kind, name and axis.
-FOUND: WeakKeyDictionary[Any, dict[tuple[str, str, int], Features]] = WeakKeyDictionary()
+
+class Datum(NamedTuple):
+    """A function among the data, or a law; the owner is the object that lives with the problem."""
+
+    kind: str
+    name: str
+    axis: int
+    owner: Any
+    function: Any
 
 
-def _functions(problem: Problem) -> Iterator[tuple[tuple[str, str, int], Any, Any]]:
-    """Kind, name and axis, owner and function, or law, of all data that are no numbers."""
-    data = [("force", name, 0, F, F) for name, F in problem.force.items()]
-    data += [("traction", name, 0, p, p) for name, p in problem.traction.items()]
+# By the owner of a function; by kind, name and axis.
+FOUND: WeakKeyDictionary[Any, dict[Any, Features]] = WeakKeyDictionary()
+
+
+def _functions(problem: Problem) -> Iterator[Datum]:
+    """All data that are no numbers."""
+    data = [Datum("force", name, 0, F, F) for name, F in problem.force.items()]
+    data += [Datum("traction", name, 0, p, p) for name, p in problem.traction.items()]
     for name, components in problem.displacement.items():
-        data += [("displacement", name, axis, u, u) for axis, u in enumerate(components)]
-    data += [("gap", pair.secondary, 0, pair, pair.gap) for pair in problem.contact]
-    for kind, name, axis, owner, f in data:
+        data += [Datum("displacement", name, axis, u, u) for axis, u in enumerate(components)]
+    data += [Datum("gap", pair.secondary, 0, pair, pair.gap) for pair in problem.contact]
+    for datum in data:
+        f = datum.function
         if callable(f) and not (isinstance(f, ng.CoefficientFunction) and numbers(f)):
-            yield (kind, name, axis), owner, f
+            yield datum
     for name, law in problem.materials.items():
         if varies(law):
-            yield ("materials", name, 0), law, law
+            yield Datum("materials", name, 0, law, law)
 
 
 def look(problem: Problem, mesh: ng.Mesh) -> None:
@@ -117,68 +139,58 @@ def look(problem: Problem, mesh: ng.Mesh) -> None:
 
     `features_of` knows them from now on.
     """
-    for key, owner, function in _functions(problem):
-        FOUND.setdefault(owner, {})[key] = _looked_at(problem, mesh, key, function)
+    for datum in _functions(problem):
+        FOUND.setdefault(datum.owner, {})[datum[:3]] = _looked_at(problem, mesh, datum)
 
 
 def features_of(problem: Problem, mesh: ng.Mesh) -> list[Features]:
     """What `look` found of the functions of a problem last; a look where there was none."""
     found = []
-    for key, owner, function in _functions(problem):
-        known = FOUND.setdefault(owner, {})
-        if key not in known:
-            known[key] = _looked_at(problem, mesh, key, function)
-        found.append(known[key])
+    for datum in _functions(problem):
+        known = FOUND.setdefault(datum.owner, {})
+        if datum[:3] not in known:
+            known[datum[:3]] = _looked_at(problem, mesh, datum)
+        found.append(known[datum[:3]])
     return found
 
 
 def features_in(load: object) -> Array:
     """Places and widths (k, 3) that `look` found of a load, on all boundaries or in all bodies."""
     found = FOUND.get(load, {}).values()
-    rows = [np.column_stack([one.places, one.widths]) for one in found]
-    return np.concatenate([np.empty((0, 3)), *rows])
+    return np.concatenate([np.empty((0, 3)), *(one.spots for one in found)])
 
 
-def _looked_at(
-    problem: Problem, mesh: ng.Mesh, key: tuple[str, str, int], function: Any
-) -> Features:
-    kind, name, _ = key
-    in_body = kind in IN_PLANE
-    view, look = View(mesh, 2 if in_body else 1), _in_body if in_body else _on_boundary
-    region = mesh.Materials(name) if in_body else mesh.Boundaries(name)
+def _looked_at(problem: Problem, mesh: ng.Mesh, datum: Datum) -> Features:
+    kind, name, function = datum.kind, datum.name, datum.function
+    view = SampledElements(mesh, 2 if kind in IN_PLANE else 1)
+    region = mesh.Materials(name) if view.dim == 2 else mesh.Boundaries(name)
+    names = mesh.GetMaterials() if view.dim == 2 else mesh.GetBoundaries()
+    number = view.arrays.bodies if view.dim == 2 else view.arrays.boundaries
     if kind == "materials":  # the diagonal of the law; compiled, as a modulus stands in each entry
         C = function.voigt(problem.model)
         function = ng.CF(tuple(C[k, k] for k in range(C.dims[0]))).Compile()
-    parts = [look(kind, function, view, elements) for elements in _parts(view, region)]
-    places, widths, jumps, samples, largest = zip(NOTHING, *parts, strict=True)
-    x, w, steps = (np.concatenate(some) for some in (places, widths, jumps))
-    return Features(*key, view.dim, x, w, steps, sum(samples), max(largest))
-
-
-def _parts(view: View, region: ng.Region) -> list[Index]:
-    """The elements of a region by the names of its boundaries or bodies."""
-    mesh, arrays = view.mesh, view.arrays
-    number = arrays.bodies if view.dim == 2 else arrays.boundaries
-    names = mesh.GetMaterials() if view.dim == 2 else mesh.GetBoundaries()
-    inside: dict[str, list[int]] = defaultdict(list)
+    parts: dict[str, list[int]] = defaultdict(list)  # regions of one name are one part
     for k in np.flatnonzero(np.array(region.Mask())).tolist():
-        inside[names[k]].append(k)
-    found = [np.flatnonzero(np.isin(number, some)) for some in inside.values()]
-    return [elements for elements in found if elements.size]
+        parts[names[k]].append(k)
+    seen = [NOTHING]
+    for some in parts.values():
+        elements = np.flatnonzero(np.isin(number, some))
+        if elements.size:
+            in_part = _in_body if view.dim == 2 else _on_boundary
+            seen.append(in_part(kind, function, view, elements))
+    places, widths, jumps, samples, largest = zip(*seen, strict=True)
+    x, w, steps = (np.concatenate(some) for some in (places, widths, jumps))
+    return Features(*datum[:3], view.dim, x, w, steps, sum(samples), max(largest))
 
 
-def _values(function: Function, view: View, elements: Index, reference: Array) -> Array:
+def _values(function: Function, view: SampledElements, elements: Index, reference: Array) -> Array:
     """Values (n, c) at a point `reference` (n, dim) of each of `elements` (n,), 0 if infinite."""
     if isinstance(function, ng.CoefficientFunction):
         values = view.look(function, elements, reference[:, None])[:, 0]
     else:
-        x, y = _positions(view, elements, reference).T
+        x, y = view.positions(elements, reference).T
         values = np.asarray(function(x, y), dtype=float)[:, None]
     return np.where(np.isfinite(values), values, 0.0)
-
-
-def _positions(view: View, elements: Index, reference: Array) -> Array:
-    return view.evaluate(ng.CF((ng.x, ng.y)), elements, reference[:, None])[:, 0]
 
 
 def _told(kind: str, values: Array) -> tuple[Array, float]:
@@ -218,7 +230,7 @@ class _Line:
     """A function along a chain of segments, some of which are run backwards."""
 
     function: Function
-    view: View
+    view: SampledElements
     segments: Index
     turned: Mask
 
@@ -240,7 +252,7 @@ class _Line:
 
     def places(self, t: Array) -> Array:
         """Points (n, 2) at the lengths `t` (n,)."""
-        return _positions(self.view, *self._at(t))
+        return self.view.positions(*self._at(t))
 
     def jumps(self, t: Array, known: Array) -> Array:
         """Places and sizes (j, 3) of jumps of a scalar, `known` (n,) at `t` (n,), at ends, too."""
@@ -252,7 +264,7 @@ class _Line:
         return np.column_stack([self.places(at), size])
 
 
-def _on_boundary(kind: str, function: Function, view: View, segments: Index) -> Seen:
+def _on_boundary(kind: str, function: Function, view: SampledElements, segments: Index) -> Seen:
     lines = [_Line(function, view, at, turned) for at, turned in _chains(view, segments)]
     whole = view.sizes[segments].sum()
     looked = []
@@ -322,7 +334,7 @@ def _departures(values: Array, limit: float) -> Array:
     return found
 
 
-def _chains(view: View, segments: Index) -> list[tuple[Index, Mask]]:
+def _chains(view: SampledElements, segments: Index) -> list[tuple[Index, Mask]]:
     """The `segments` (k,) one after the other, as chains, and whether each is run backwards."""
     ends = view.arrays.facets[segments, ::-1].tolist()  # as NGSolve's parameter runs
     at: dict[int, list[int]] = defaultdict(list)
@@ -343,7 +355,7 @@ def _chains(view: View, segments: Index) -> list[tuple[Index, Mask]]:
     return chains
 
 
-def _in_body(kind: str, function: Function, view: View, elements: Index) -> Seen:
+def _in_body(kind: str, function: Function, view: SampledElements, elements: Index) -> Seen:
     corners = view.arrays.corners[elements]
     spacing = IN_BODY * float(np.ptp(corners.reshape(-1, 2), axis=0).max())
     c, s = np.cos([TURN, TURN + np.pi / 3]), np.sin([TURN, TURN + np.pi / 3])
@@ -442,23 +454,25 @@ def _widths(
     return np.asarray(width[nearest])
 
 
-def towards(features: Array, cells: Cells, view: View) -> Cells:
+def towards(features: Array, cells: Cells, view: SampledElements) -> Cells:
     """The `cells`, halved at `features` (k, 3), places and widths, to the size of these."""
     done, tree = [], cKDTree(features[:, :2])
     middle = np.full((1, 1, view.dim), 1 / (view.dim + 1))
     while len(cells.element):
         at = cells.origin[:, None] + middle @ cells.side
-        x = _positions(view, cells.element, at[:, 0])
+        x = view.positions(cells.element, at[:, 0])
         size = view.sizes[cells.element] * np.abs(cells.side).sum(axis=2).max(axis=1)
         distance, nearest = tree.query(x)
         width = features[nearest, 2]
         near = (distance <= size + width) & (size > width)
         done.append(cells[~near])
         cells = cells[near].divided(2)
-    return joined(done)
+    return Cells.joined(done)
 
 
-def touched(features: Array, view: View, elements: Index) -> tuple[Index, Index]:
+def where_features_are(
+    features: Array, view: SampledElements, elements: Index
+) -> tuple[Index, Index]:
     """Elements (j,) of `elements` (k,) and features (j,) of `features` (n, 3) that meet.
 
     Features reach their width; in bodies the nearest stands for all.
@@ -466,7 +480,7 @@ def touched(features: Array, view: View, elements: Index) -> tuple[Index, Index]
     if not len(features):
         return elements[:0], elements[:0]
     middle = np.full((len(elements), view.dim), 1 / (view.dim + 1))
-    x, size = _positions(view, elements, middle), view.sizes[elements]
+    x, size = view.positions(elements, middle), view.sizes[elements]
     if view.dim == 2:
         distance, nearest = cKDTree(features[:, :2]).query(x)
         some = distance <= 0.6 * size + features[nearest, 2]
@@ -474,3 +488,75 @@ def touched(features: Array, view: View, elements: Index) -> tuple[Index, Index]
     distance = np.linalg.norm(x[:, None] - features[:, :2], axis=2)
     k, feature = np.nonzero(distance <= 0.5 * size[:, None] + features[:, 2])
     return elements[k], feature
+
+
+@dataclass(frozen=True, eq=False)
+class Unresolved:
+    """A function with features that are narrower than the elements they lie in.
+
+    Attributes
+    ----------
+    kind, name : str
+        As of `Features`.
+    place : ndarray (2,)
+        Of the feature that is narrowest beside its element, lengths.
+    width, size : float
+        Of this feature and its element, lengths.
+    elements : ndarray of bool (ne,)
+        All triangles that are too large.
+    """
+
+    kind: str
+    name: str
+    place: Array
+    width: float
+    size: float
+    elements: Mask
+
+    def __str__(self) -> str:
+        """What is told of it."""
+        x, y = self.place
+        return (
+            f'{self.kind} "{self.name}" has a feature {self.width:.2g} wide near '
+            f"({x:.4g}, {y:.4g}), in an element of size {self.size:.2g}"
+        )
+
+
+def unresolved(problem: Problem, mesh: ng.Mesh, *, in_bounds: bool = False) -> list[Unresolved]:
+    """Functions whose features are narrower than a mesh shows, or `in_bounds` of the error."""
+    limits, found = IN_BOUNDS if in_bounds else RESOLVED, []
+    for one in features_of(problem, mesh):
+        if one.kind not in limits or not len(one.places):
+            continue
+        view = SampledElements(mesh, one.dim)
+        if view.dim == 2:
+            at = mesh(one.places[:, 0].copy(), one.places[:, 1].copy())["nr"].astype(np.intp)
+            feature = np.flatnonzero(at >= 0)
+            at = at[feature]
+        else:
+            at, feature = where_features_are(
+                one.spots, view, view.inside(mesh.Boundaries(one.name))
+            )
+        ratio = view.sizes[at] / one.widths[feature]
+        large = ratio > limits[one.kind]
+        if one.kind == "traction":  # straight segments are cut at features
+            middle = view.positions(at, np.full((len(at), 1), 0.5))
+            off = np.linalg.norm(middle - view.arrays.vertices[view.ends[at]].mean(axis=1), axis=1)
+            large &= off > BENT * view.sizes[at]
+        if not large.any():
+            continue
+        elements = np.bincount(at[large], minlength=len(view.sizes)) > 0
+        if view.dim == 1:  # triangles at such segments
+            ends = np.isin(view.arrays.elements, view.ends[elements])
+            elements = np.asarray(ends.sum(axis=1) > 1)
+        worst = int(np.argmax(np.where(large, ratio, 0.0)))
+        k = feature[worst]
+        size = view.sizes[at[worst]]
+        found.append(Unresolved(one.kind, one.name, one.places[k], one.widths[k], size, elements))
+    return found
+
+
+def warn_of_unresolved(problem: Problem, mesh: ng.Mesh) -> None:
+    """Warn of functions with features that a mesh does not show."""
+    for one in unresolved(problem, mesh):
+        warn(f"{one}: the solution hardly knows of it; refine the mesh there, or take `adapt`")

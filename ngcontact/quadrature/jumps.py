@@ -1,9 +1,9 @@
-"""Jumps of moduli inside elements, of functions along lines, told from smooth variation."""
+"""Moduli that change or jump inside elements, and jumps of functions along lines."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import ngsolve as ng
 import numpy as np
@@ -11,10 +11,10 @@ import numpy as np
 from ..arrays import Array, Index, Mask
 from ..errors import warn
 from ..problem import MeshArrays, Problem, varies
-from .cells import mesh_points, on_lattice
-from .view import looked
+from .cells import lattice
+from .sampling import SampledElements
 
-JUMP = 0.5  # change of a law over its least value from which it is told
+CHANGE = 0.5  # of a law in an element over its least value, from which it is rough there, or jumps
 QUARTERS = np.linspace(0, 1, 5)
 STEPS = 18  # in which a part is quartered: what still changes across 1e-11 of it jumps
 KEPT = 0.9  # share of a change that the last half of the steps leave of a jump; of x^(1/10), 0.3
@@ -22,9 +22,43 @@ STEADY = 1e-9  # change across a part, relative to the largest value, that is no
 HALVINGS = 24  # of the distance between two points: what still changes across 1e-7 of it jumps
 
 
-@dataclass(frozen=True)
-class Jumps:
-    """Where a function jumps: at most one place in each element.
+def _limits(values: Array) -> Array:
+    """A share of the least mean diagonal (k,) of matrices `values` (k, n, q q)."""
+    step = round(values.shape[2] ** 0.5) + 1
+    return CHANGE * values[..., ::step].mean(axis=2).min(axis=1)
+
+
+def _rough(
+    C: ng.CoefficientFunction, view: SampledElements, elements: Index
+) -> Iterator[tuple[Index, Array]]:
+    """Those (k,) of `elements` (j,) in which a law changes by more, and its values (k, n, q q)."""
+    for here, values in view.samples(C, elements):
+        k = np.flatnonzero(np.ptp(values, axis=1).max(axis=1) > _limits(values))
+        if len(k):
+            yield here[k], values[k]
+
+
+def _varying(
+    problem: Problem, mesh: ng.Mesh
+) -> Iterator[tuple[str, tuple[ng.CoefficientFunction, SampledElements, Index]]]:
+    """Of each law that is a function its pattern, the law, and triangles (k,) with it."""
+    view = SampledElements(mesh, 2)
+    for pattern, law in problem.materials.items():
+        if varies(law):
+            yield pattern, (law.voigt(problem.model), view, view.inside(mesh.Materials(pattern)))
+
+
+def rough_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
+    """Elements (ne,) in which the law varies by more than half of itself, or jumps."""
+    rough = np.zeros(mesh.ne, dtype=bool)
+    for _, law in _varying(problem, mesh):
+        for elements, _ in _rough(*law):
+            rough[elements] = True
+    return rough
+
+
+class Jumps(NamedTuple):
+    """Where a law jumps, at most one place in each element.
 
     Attributes
     ----------
@@ -42,64 +76,27 @@ class Jumps:
     most: Array
 
 
-def _found(
-    function: ng.CoefficientFunction, mesh: ng.Mesh, elements: Index, sizes: Array, share: float
-) -> Jumps:
-    """Jumps inside elements by more than a `share` of the matrices' least diagonal.
+def _jumps(C: ng.CoefficientFunction, view: SampledElements, elements: Index) -> Jumps:
+    """Where a law jumps.
 
     From the points of a lattice at which a component is least and largest, the half of their
     distance across which it changes more is kept, again and again: a smooth change shrinks by that.
-
-    Parameters
-    ----------
-    function : ng.CoefficientFunction
-        Of square matrices.
-    mesh : ng.Mesh
-        The mesh.
-    elements : ndarray of int (k,)
-        Which.
-    sizes : ndarray (ne,)
-        Diameters of all triangles, lengths.
-    share : float
-        Positive.
     """
     found = [Jumps(np.empty(0, np.intp), np.empty((0, 2)), np.empty(0), np.empty(0))]
-    for here, points in on_lattice(mesh, elements, sizes):
-        values = looked(function, points)
-        step = round(values.shape[-1] ** 0.5) + 1
-        limit = share * values[..., ::step].mean(axis=2).min(axis=1)
-        change = np.ptp(values, axis=1)
-        k = np.flatnonzero(change.max(axis=1) > limit)
-        if not len(k):
-            continue
-        which, row = change[k].argmax(axis=1), np.arange(len(k))
-        of = values[k, :, which]  # the component (k, n) that changes most
+    for at, values in _rough(C, view, elements):
+        which, row = np.ptp(values, axis=1).argmax(axis=1), np.arange(len(at))
+        of = values[row, :, which]  # the component (k, n) that changes most
         ends = np.column_stack([of.argmin(axis=1), of.argmax(axis=1)])
-        x = np.stack([points[axis][k[:, None], ends] for axis in "xy"], axis=2)
-        u = np.take_along_axis(of, ends, axis=1)
+        x, u = lattice(2, round(of.shape[1] ** 0.5))[ends], of[row[:, None], ends]
         for _ in range(HALVINGS):
             middle = x.mean(axis=1)
-            at = mesh_points(mesh, here[k], middle[:, None])
-            v = looked(function, at)[row, 0, which]
+            v = view.look(C, at, middle[:, None])[row, 0, which]
             side = (np.abs(v - u[:, 0]) > np.abs(v - u[:, 1])).astype(int)  # which end to move
             x[row, side], u[row, side] = middle, v
-        kept = np.abs(u[:, 1] - u[:, 0]) > limit[k]
-        at = mesh_points(mesh, here[k][kept], x[kept, :1])
-        place = np.asarray(ng.CF((ng.x, ng.y))(at.ravel())).reshape(-1, 2)
-        found.append(Jumps(here[k][kept], place, u[kept].min(axis=1), u[kept].max(axis=1)))
-    parts = ("element", "place", "least", "most")
-    return Jumps(*(np.concatenate([getattr(jump, part) for jump in found]) for part in parts))
-
-
-def _jumps(problem: Problem, mesh: ng.Mesh) -> Iterator[tuple[str, Jumps]]:
-    """Where the laws that vary jump inside elements, by pattern of bodies."""
-    laws = [(pattern, law) for pattern, law in problem.materials.items() if varies(law)]
-    if not laws:
-        return
-    region, diameter = MeshArrays(mesh).bodies, MeshArrays(mesh).diameters
-    for pattern, law in laws:
-        at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[region])
-        yield pattern, _found(law.voigt(problem.model), mesh, at, diameter, JUMP)
+        kept = np.abs(u[:, 1] - u[:, 0]) > _limits(values)
+        place = view.positions(at[kept], x[kept, 0])
+        found.append(Jumps(at[kept], place, u[kept].min(axis=1), u[kept].max(axis=1)))
+    return Jumps(*map(np.concatenate, zip(*found, strict=True)))
 
 
 def jumping_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
@@ -109,14 +106,15 @@ def jumping_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
     """
     triangles = MeshArrays(mesh).elements
     touched = np.zeros(mesh.nv, dtype=bool)
-    for _, found in _jumps(problem, mesh):
-        touched[triangles[found.element]] = True
+    for _, law in _varying(problem, mesh):
+        touched[triangles[_jumps(*law).element]] = True
     return np.asarray(touched[triangles].any(axis=1))
 
 
 def warn_of_jumps(problem: Problem, mesh: ng.Mesh) -> None:
     """Warn of every law that jumps inside elements, where it jumps most."""
-    for pattern, found in _jumps(problem, mesh):
+    for pattern, law in _varying(problem, mesh):
+        found = _jumps(*law)
         if len(found.element):
             k = int(np.argmax(found.most - found.least))
             x, y = found.place[k]

@@ -1,30 +1,46 @@
-"""Loads that quadrature misses, as polynomials with the same moments."""
+"""Loads, and prescribed displacements, that quadrature of the usual order misses."""
 
 from __future__ import annotations
 
+import itertools
+import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, power_of_two
-from .cells import Cells, beside_edges, following, monomials
-from .features import features_in, touched, towards
-from .view import View, looked_at, numbers
+from ..errors import warn
+from ..problem import MeshArrays, Problem, numbers
+from .cells import (
+    AT_CORNERS,
+    MOMENTS,
+    Cells,
+    Refined,
+    gauss_rule,
+    monomials,
+    refined,
+    rule_with_corners,
+)
+from .features import features_in, features_of, towards, where_features_are
+from .sampling import SampledElements, divisions, missed_by_polynomials
 
-SHAPE = 0.05  # what they miss of a load at a point, relative to its largest value ...
-SHARE = {
-    1: 1e-4,
-    2: 2e-3,
-}  # ... or over an element, relative to its integral, at which it is rough there
+SHAPE = 0.05  # what polynomials miss of a load at a point, relative to its largest value ...
+SHARE = {1: 1e-4, 2: 2e-3}  # ... or over an element, relative to its integral: it is rough there
 STEP = 2  # times what values vary at the points: no others are further apart in smooth functions
-KEPT = "_ngcontact_loads"  # attribute of a mesh
 COARSE = 4  # elements in the width of a feature, from which it is looked at as all else is
 CURVED = 4  # quadrature orders for the maps of curved elements
 FINE = {1: 1e-6, 2: 3e-5}  # error of a part relative to that integral at which it is not halved
-
-
+KEPT = "_ngcontact_loads"  # attribute of a mesh: loads are assembled, then the estimate asks again
+LOST = 1e-3  # of a load that quadrature may miss without a word
 NO_FEATURES = np.empty((0, 3))
+
+FEWEST = 8  # points on a segment at least, which show any interpolation error
+RESOLVED = 0.1  # what polynomials miss of values, relative to what the mesh does: they are rough
+NOISE = 1e-10  # ... and relative to the values
+FOLLOWED = 1e-3  # error of the squares on a part, relative to all of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +74,61 @@ class RoughLoad:
     cells: Cells
 
 
-def moment_degree(order: int) -> int:
-    """Degree to which moments of a rough load are kept: displacements' times a radius."""
-    return max(order, 2) + 1
+@dataclass(frozen=True, eq=False)
+class Load:
+    """A force on bodies, or a traction on boundaries.
+
+    Attributes
+    ----------
+    kind, name : str
+        "force" or "traction", and the pattern.
+    data : ng.CoefficientFunction
+        As it is given, a pressure perhaps.
+    density : ng.CoefficientFunction
+        The force (2,) per volume or area that this is.
+    region : ng.Region
+        Where it acts.
+    """
+
+    kind: str
+    name: str
+    data: ng.CoefficientFunction
+    density: ng.CoefficientFunction
+    region: ng.Region
+
+    def where_rough(self, order: int, *, again: bool = False) -> RoughLoad | None:
+        """The load where it is rough for displacements of an order; None where it is nowhere.
+
+        As it was found last on this mesh, or is now if `again`. Numbers are nowhere rough.
+        """
+        if numbers(self.data):
+            return None
+        mesh, degree = self.region.mesh, max(order, 2) + 1  # displacements' times a radius
+        kept = getattr(mesh, KEPT, {})
+        key, what = (self.kind, self.name, degree), (self.data, mesh.GetNE(self.region.VB()))
+        known = kept.get(key)
+        if known is not None and known[0] != what:
+            known = None
+        if known is None or again:
+            before = None if known is None else known[1]
+            features = features_in(self.data)
+            known = kept[key] = (
+                what,
+                rough_load(self.density, self.region, degree, before, features),
+            )
+            setattr(mesh, KEPT, kept)
+        found: RoughLoad | None = known[1]
+        return found
+
+
+def loads_of(problem: Problem, mesh: ng.Mesh) -> list[Load]:
+    """All loads of a problem, forces first."""
+    forces = [Load("force", k, F, F, mesh.Materials(k)) for k, F in problem.force.items()]
+    tractions = [
+        Load("traction", k, p, problem.traction_vector(k), mesh.Boundaries(k))
+        for k, p in problem.traction.items()
+    ]
+    return [*forces, *tractions]
 
 
 def rough_load(
@@ -85,14 +153,27 @@ def rough_load(
     features : ndarray (k, 3)
         Places and widths of narrow features, lengths.
     """
-    view = View(region.mesh, 2 if region.VB() == ng.VOL else 1)
-    inside = view.inside(region)
-    rough, total, seen = _rough(load, view, inside)
-    near, feature = touched(features, view, inside)
-    rough[near[view.sizes[near] > features[feature, 2] / COARSE]] = True
-    seen = hash((seen, features.tobytes()))
-    if not rough.any() or (known is not None and known.seen == seen):
-        return known if rough.any() else None
+    view = SampledElements(region.mesh, 2 if region.VB() == ng.VOL else 1)
+    inside, sizes = view.inside(region), view.sizes
+    miss, largest, total, seen = np.zeros(len(sizes)), 0.0, 0.0, hash(features.tobytes())
+    least, most = np.zeros((2, len(sizes), load.dim))
+    for here, values in view.samples(load, inside):
+        miss[here] = missed_by_polynomials(values, view.dim)
+        seen = hash((seen, here.tobytes(), sizes[here].tobytes(), values.tobytes()))
+        size = np.abs(values).max(axis=2)  # no squares: they may leave the range of numbers
+        largest = max(largest, float(size.max(initial=0.0)))
+        total += float(size.mean(axis=1) @ sizes[here] ** view.dim) / view.dim
+        least[here], most[here] = values.min(axis=1), values.max(axis=1)
+    here, beyond = _steps(load, view, inside, least[inside], most[inside])
+    miss[here] = np.maximum(miss[here], beyond)
+    share = miss * sizes**view.dim / view.dim
+    rough = (miss > SHAPE * largest) | (share > SHARE[view.dim] * total)
+    near, feature = where_features_are(features, view, inside)
+    rough[near[sizes[near] > features[feature, 2] / COARSE]] = True
+    if not rough.any():
+        return None
+    if known is not None and known.seen == seen:
+        return known
     rough = view.with_neighbours(rough, inside)  # a part of a feature may have none of the points
     start = view.in_parts(np.flatnonzero(rough))
 
@@ -101,81 +182,27 @@ def rough_load(
         return np.asarray(values * view.evaluate(view.measure, elements, reference))
 
     if len(features):  # of which the points of the lattice may have seen nothing
-        start = towards(features, start, view)
-        size = np.abs(density(start.element, start.points)).max(axis=2)
-        total = max(total, float((size * start.weights).sum()))
-    corners = view.arrays.corners if view.dim == 2 else None
-    cells, values, over = following(density, start, FINE[view.dim] * total, corners)
-    missed = np.bincount(cells.element, over, len(rough)).astype(float)
-    order = np.argsort(cells.element, kind="stable")
-    projection, rest = _projected(values[order], view, cells[order], degree)
-    return RoughLoad(rough, projection, rest, missed, total, seen, cells)
-
-
-def known_rough_load(
-    data: ng.CoefficientFunction, load: ng.CoefficientFunction, region: ng.Region, degree: int
-) -> RoughLoad | None:
-    """What `rough_load` found last of the `data` a load is made of, on the same mesh.
-
-    A mesh keeps it as long as it lives: loads are assembled, then the estimate asks again.
-    """
-    if numbers(data):
-        return None
-    key = (id(data), str(region.VB()), bytes(np.array(region.Mask())), degree)
-    kept = getattr(region.mesh, KEPT, {})
-    count = region.mesh.GetNE(region.VB())
-    if key not in kept or kept[key][:2] != (data, count):
-        return keep_rough_load(data, load, region, degree)
-    found: RoughLoad | None = kept[key][2]
-    return found
-
-
-def keep_rough_load(
-    data: ng.CoefficientFunction, load: ng.CoefficientFunction, region: ng.Region, degree: int
-) -> RoughLoad | None:
-    """`rough_load`, kept for `known_rough_load`; numbers are nowhere rough."""
-    if numbers(data):
-        return None
-    key = (id(data), str(region.VB()), bytes(np.array(region.Mask())), degree)
-    kept, count = getattr(region.mesh, KEPT, {}), region.mesh.GetNE(region.VB())
-    before = kept[key][2] if key in kept and kept[key][:2] == (data, count) else None
-    found = rough_load(load, region, degree, before, features_in(data))
-    kept[key] = (data, count, found)
-    setattr(region.mesh, KEPT, kept)
-    return found
-
-
-def _rough(load: ng.CoefficientFunction, view: View, elements: Index) -> tuple[Mask, float, int]:
-    """Those (n,) of `elements` (k,) where a load is rough, the integral of its size, what is seen.
-
-    The last is a number that other values, or other elements, change.
-    """
-    sizes = view.sizes
-    miss, largest, total, seen = np.zeros(len(sizes)), 0.0, 0.0, 0
-    least, most = np.zeros((2, len(sizes), load.dim))
-    for here, values, left in looked_at(load, view, elements):
-        miss[here] = left
-        seen = hash((seen, here.tobytes(), sizes[here].tobytes(), values.tobytes()))
-        size = np.abs(values).max(axis=2)  # no squares: they may leave the range of numbers
-        largest = max(largest, float(size.max(initial=0.0)))
-        total += float(size.mean(axis=1) @ sizes[here] ** view.dim) / view.dim
-        least[here], most[here] = values.min(axis=1), values.max(axis=1)
-    here, beyond = _steps(load, view, elements, least[elements], most[elements])
-    miss[here] = np.maximum(miss[here], beyond)
-    share = miss * sizes**view.dim / view.dim
-    return (miss > SHAPE * largest) | (share > SHARE[view.dim] * total), total, seen
+        start, rule = (
+            towards(features, start, view),
+            rule_with_corners(view.dim, *MOMENTS[view.dim]),
+        )
+        size = np.abs(density(start.element, start.points(rule))).max(axis=2)
+        total = max(total, float((size * start.weights(rule)).sum()))
+    found = refined(density, start, MOMENTS, FINE[view.dim], total, view.corners)
+    projection, rest = _projected(found, view, degree)
+    missed = np.bincount(found.cells.element, found.missed, len(rough)).astype(float)
+    return RoughLoad(rough, projection, rest, missed, total, seen, found.cells)
 
 
 def _steps(
-    load: ng.CoefficientFunction, view: View, elements: Index, least: Array, most: Array
+    load: ng.CoefficientFunction, view: SampledElements, elements: Index, least: Array, most: Array
 ) -> tuple[Index, Array]:
     """Those (j,) of `elements` (k,) with steps beside the points looked at, and how large (j,).
 
     A step whose far side has none of the points leaves values of neighbours that do not meet: there
     it is looked for at the edges. `least` and `most` (k, c) are those at the points.
     """
-    ends = view.arrays.elements if view.dim == 2 else view.arrays.facets
-    at, shape, varies = ends[elements], (view.mesh.nv, load.dim), most - least
+    at, shape, varies = view.ends[elements], (view.mesh.nv, load.dim), most - least
     lowest, highest, most_varied = np.full(shape, np.inf), np.full(shape, -np.inf), np.zeros(shape)
     np.minimum.at(lowest, at, most[:, None])
     np.maximum.at(highest, at, least[:, None])
@@ -190,29 +217,113 @@ def _steps(
     return elements[some], np.asarray(beyond.max(axis=(1, 2), initial=0.0))
 
 
-def _projected(
-    values: Array, view: View, cells: Cells, degree: int
-) -> tuple[ng.GridFunction, Array]:
-    """Polynomials with the moments of a load on `cells`, sorted by element; squares (n,) left.
+@lru_cache
+def beside_edges(dim: int) -> Array:
+    """Points (m, dim) inside the unit segment or triangle, 1e-4 of it from its ends or edges."""
+    t = np.arange(8)[:, None] / 8
+    corners = np.vstack([np.zeros(dim), np.eye(dim)])
+    edges = [(1 - t) * a + t * b for a, b in zip(corners, np.roll(corners, 1, axis=0), strict=True)]
+    x = corners if dim == 1 else np.vstack(edges)
+    return np.asarray(x + AT_CORNERS * (1 / (dim + 1) - x))
 
-    `values` (k, m, c) are the load times the measure at the points of the k cells.
-    """
-    space, shapes = view.shapes(degree)
+
+def _projected(found: Refined, view: SampledElements, degree: int) -> tuple[ng.GridFunction, Array]:
+    """Polynomials with the moments of a load times the measure, and what they miss of it (n,)."""
+    order = np.argsort(found.cells.element, kind="stable")
+    cells, values, rule = found.cells[order], found.values[order], found.rule
+    points, weights, dim = cells.points(rule), cells.weights(rule), view.dim
     elements, first = np.unique(cells.element, return_index=True)
-    measure = view.evaluate(view.measure, cells.element, cells.points)
-    shape = monomials(2 * cells.points - 1, degree)
-    moments = np.swapaxes(cells.weights[..., None] * shape, 1, 2) @ values
+    moments = np.swapaxes(weights[..., None] * monomials(2 * points - 1, degree), 1, 2) @ values
     moments = np.add.reduceat(moments, first, axis=0)
-    moments = np.swapaxes(view.as_monomials(shapes, elements, degree), 1, 2) @ moments
-    density, values = cells.weights * measure[..., 0], values / measure
-    unit = power_of_two(values)
-    squares = np.add.reduceat((density * ((values / unit) ** 2).sum(axis=2)).sum(axis=1), first)
-    coefficients = np.linalg.solve(view.mass(shapes, elements, 2 * degree + CURVED), moments)
-    _, number, count = moments.shape
-    projection = ng.GridFunction(type(space)(view.mesh, order=degree, dim=count))
+    # The q functions of an element, one by one, and matrices (j, q, q) to them from monomials.
+    space, number = (ng.L2 if dim == 2 else ng.SurfaceL2), math.comb(degree + dim, dim)
+    functions = []
+    for j in range(number):
+        functions.append(ng.GridFunction(space(view.mesh, order=degree)))
+        functions[-1].vec.FV().NumPy()[j::number] = 1.0
+    shapes = ng.CF(tuple(functions))
+    nodes = [k for k in itertools.product(range(degree + 1), repeat=dim) if sum(k) <= degree]
+    x = np.array(nodes) / degree
+    change = np.linalg.solve(monomials(2 * x - 1, degree), view.evaluate(shapes, elements, x))
+    moments = np.swapaxes(change, 1, 2) @ moments
+    x, w = gauss_rule(dim, 2 * degree + CURVED)
+    shape = view.evaluate(shapes, elements, x)
+    mass = (
+        np.swapaxes(shape * (w[:, None] * view.evaluate(view.measure, elements, x)), 1, 2) @ shape
+    )
+    coefficients = np.linalg.solve(mass, moments)
+    count = moments.shape[2]
+    projection = ng.GridFunction(space(view.mesh, order=degree, dim=count))
     at = (elements[:, None] * number + np.arange(number)).ravel()
     projection.vec.FV().NumPy().reshape(-1, count)[at] = coefficients.reshape(-1, count)
-    rest = np.zeros(len(view.sizes))
+    measure = view.evaluate(view.measure, cells.element, points)
+    values = values / measure
+    unit = power_of_two(values)
+    squares = (weights * measure[..., 0] * ((values / unit) ** 2).sum(axis=2)).sum(axis=1)
+    squares = np.add.reduceat(squares, first)
     squares -= (coefficients / unit * (moments / unit)).sum(axis=(1, 2))
+    rest = np.zeros(len(view.sizes))
     rest[elements] = unit * np.sqrt(np.maximum(squares, 0.0))
     return projection, rest
+
+
+def warn_of_data(problem: Problem, mesh: ng.Mesh, order: int) -> None:
+    """Warn of loads that vanish wherever they are looked at or are finer than any quadrature."""
+    for one in features_of(problem, mesh):
+        if one.kind in ("force", "traction") and one.samples and not one.largest:
+            warn(
+                f'{one.kind} "{one.name}" is zero at all {one.samples} points at which it was '
+                "looked at: if it acts on a smaller part, make that a boundary or a body of its own"
+            )
+    for load in loads_of(problem, mesh):
+        found = load.where_rough(order)
+        if found is not None and found.missed.sum() > LOST * found.total:
+            warn(
+                f'{load.kind} "{load.name}" is finer than any quadrature: up to '
+                f"{found.missed.sum() / found.total:.1%} of it may be missed; give a smoother load"
+            )
+
+
+def rough_segments(
+    values: Sequence[ng.CoefficientFunction], mesh: ng.Mesh, segments: Index, missed: float
+) -> Mask:
+    """Which `segments` (k,) have values, scalars, that are not seen at a few points, (k,).
+
+    `missed` is how far a displacement is from them there. Numbers are nowhere rough.
+    """
+    if all(map(numbers, values)):
+        return np.zeros(len(segments), dtype=bool)
+    left, largest = np.zeros(mesh.GetNE(ng.BND)), 0.0
+    view = SampledElements(mesh, 1)
+    for here, found in view.samples(ng.CF(tuple(values)), segments, FEWEST):
+        left[here] = missed_by_polynomials(found, 1)
+        largest = max(largest, float(np.abs(found).max()))
+    return np.asarray(left[segments] > max(RESOLVED * missed, NOISE * largest))
+
+
+def pieces(
+    miss: Callable[[Index, Array], Array], mesh: ng.Mesh, sizes: Array, at: Index
+) -> tuple[Index, Array, Array]:
+    """Pieces on which Gauss points tell a function's squares.
+
+    Segment (n,), start (n,) and length (n,) of each, the latter in [0, 1].
+
+    Parameters
+    ----------
+    miss : function
+        Its values (k, m, c) at parameters (k, m) of segments (k,).
+    mesh : ng.Mesh
+        The mesh.
+    sizes : ndarray (q,)
+        Lengths of the segments.
+    at : ndarray of int (k,)
+        The segments to be taken to pieces.
+    """
+
+    def squares(segment: Index, s: Array) -> Array:
+        return np.asarray(sizes[segment, None, None] * miss(segment, s[..., 0]) ** 2)
+
+    n = max(FEWEST, int(divisions(1, sizes[at], MeshArrays(mesh).extent).max()))
+    cells = Cells.whole(1, at).divided(n)
+    cells = refined(squares, cells, MOMENTS, FOLLOWED).cells
+    return cells.element, cells.origin[:, 0], cells.side[:, 0, 0]

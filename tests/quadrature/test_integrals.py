@@ -6,7 +6,7 @@ import ngsolve as ng
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
-from ngcontact.quadrature import View, integral_over
+from ngcontact.quadrature import SampledElements
 
 MESH = MakeStructured2DMesh(quads=False, nx=5, ny=5)
 INSIDE = ng.IfPos(0.3**2 - (ng.x - 0.47) ** 2 - (ng.y - 0.51) ** 2, 1.0, 0.0)
@@ -14,9 +14,9 @@ FAR = ng.IfPos(ng.x - 0.41, (ng.x - 0.41) ** 2, 0.0)
 
 
 def over(mesh, function, dim):
-    view = View(mesh, dim)
+    view = SampledElements(mesh, dim)
     region = mesh.Materials(".*") if dim == 2 else mesh.Boundaries("bottom")
-    [value], [error] = integral_over(function, view, view.inside(region), None)
+    [value], [error] = view.integral(function, view.inside(region))
     return value, error
 
 

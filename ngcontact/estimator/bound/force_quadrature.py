@@ -12,8 +12,8 @@ import numpy as np
 
 from ...arrays import Array, Index, Mask
 from ...fem import narrow_forces
-from ...problem import Problem
-from ...quadrature import View, features_of, numbers, touched
+from ...problem import Problem, numbers
+from ...quadrature import SampledElements, features_of, where_features_are
 from .cells import Cells, joined, places
 from .polynomials import projected, scalars
 
@@ -102,8 +102,8 @@ def force_quadrature(problem: Problem, cells: Cells, degree: int, least: Index) 
         narrow = narrow_forces(problem, mesh, cells.trace.order)
         for one in features_of(problem, mesh):
             if one.kind == "force" and len(one.places):
-                view, spots = View(mesh, 2), np.column_stack([one.places, one.widths])
-                at, feature = touched(spots, view, np.arange(mesh.ne))
+                view = SampledElements(mesh, 2)
+                at, feature = where_features_are(one.spots, view, np.arange(mesh.ne))
                 narrow[at[view.sizes[at] > PARTS_OF_A_SIDE * one.widths[feature]]] = True
         most[narrow[cells.parent]] = DIVISIONS
     n = max(0, degree - 1 - cells.trace.model.extent)

@@ -11,8 +11,8 @@ from numpy.polynomial import legendre
 
 from ...arrays import Array, Index, Mask
 from ...lagrange import gauss_derivative, lagrange
-from ...problem import Problem
-from ...quadrature import known_rough_load, moment_degree, numbers
+from ...problem import Problem, numbers
+from ...quadrature import loads_of
 from .cells import Cells
 from .elements import Multipliers, traces
 from .facing import DATA_DEGREE, POINTS, TO_LEGENDRE, WEIGHTS, FacingSides, jump, on_segments
@@ -168,14 +168,14 @@ def boundary_data(problem: Problem, cells: Cells) -> BoundaryData:
     for values, at in supports:
         held[at] |= [value is not None for value in values]
     loads = {name: sides(name) for name in problem.traction}
-    for name, side in loads.items():  # ends of parts, and of those for quadrature of rough loads
-        data, load = problem.traction[name], problem.traction_vector(name)
-        if numbers(data):
+    # Ends of parts, and of those for quadrature of rough loads.
+    for load in loads_of(problem, cells.trace.mesh):
+        if load.kind != "traction" or numbers(load.data):
             continue
+        side = loads[load.name]
         segment, s = on_segments(cells, side, np.arange(1, FINEST_PARTS) / FINEST_PARTS)
         breaks.append(np.column_stack([np.repeat(segment, FINEST_PARTS - 1), s.ravel()]))
-        region = cells.trace.mesh.Boundaries(name)
-        rough = known_rough_load(data, load, region, moment_degree(cells.trace.order))
+        rough = load.where_rough(cells.trace.order)
         if rough is not None:  # NGSolve's segments run from s = 1 to s = 0
             start = rough.cells.origin[:, 0]
             for stop in (start, start + rough.cells.side[:, 0, 0]):
