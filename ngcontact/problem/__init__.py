@@ -1,7 +1,5 @@
 """The continuous contact problem of HH81 section 3: laws, pairs, supports, loads, checks."""
 
-from .axis import ON_AXIS as ON_AXIS
-from .axis import on_axis as on_axis
 from .checks import regions_of as regions_of
 from .contact import Contact as Contact
 from .contact import Gap as Gap
@@ -10,9 +8,11 @@ from .material import MODEL_NAMES as MODEL_NAMES
 from .material import Elastic as Elastic
 from .material import Hooke as Hooke
 from .material import varies as varies
+from .mesh_arrays import ON_AXIS as ON_AXIS
 from .mesh_arrays import MeshArrays as MeshArrays
 from .mesh_arrays import bisect as bisect
 from .mesh_arrays import move_vertices as move_vertices
+from .mesh_arrays import on_axis as on_axis
 from .problem import Problem as Problem
 from .values import body_mask as body_mask
 from .values import boundary_mask as boundary_mask

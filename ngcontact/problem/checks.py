@@ -8,45 +8,88 @@ from __future__ import annotations
 
 import difflib
 import itertools
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import ngsolve as ng
 import numpy as np
 
-from .contact import Contact
-from .material import Elastic, Hooke
-from .mesh_arrays import MeshArrays
+from ..arrays import Array, Index, Mask
+from .material import ABOUT_AN_AXIS
+from .mesh_arrays import MeshArrays, on_axis
 from .values import body_mask, boundary_mask, refuse_where
 
+if TYPE_CHECKING:
+    from .contact import Contact
+    from .problem import Problem
+
 # By 'argument "pattern"': which of the r boundaries or bodies of a mesh it selects, bool (r,).
-Masks = dict[str, np.ndarray]
+Masks: TypeAlias = dict[str, Mask]
 
-Places = tuple[
-    ng.comp.VorB, ng.IntegrationRule
-]  # points of every element at which data are looked at
-
-IN_BODIES: Places = (
-    ng.VOL,
-    ng.IntegrationRule([(1 / 6, 1 / 6, 0), (2 / 3, 1 / 6, 0), (1 / 6, 2 / 3, 0)], [1 / 6] * 3),
-)
-# Loads are integrated and may be singular at an end; prescribed values and gaps are interpolated
-# and must exist there.
-IN_SEGMENTS: Places = (ng.BND, ng.IntegrationRule(ng.SEGM, 3))
-AT_ENDS: Places = (
-    ng.BND,
-    ng.IntegrationRule([(0, 0, 0), (0.5, 0, 0), (1, 0, 0)], [1 / 6, 2 / 3, 1 / 6]),
-)
-
-_OTHER = {
-    True: "it is a boundary, and bodies are asked for; ",
-    False: "it is a body, and boundaries are asked for; ",
+# Where data are looked at in every element. Loads are integrated and may be singular at an end;
+# prescribed values and gaps are interpolated and must exist there.
+INSIDE = ng.IntegrationRule([(1 / 6, 1 / 6, 0), (2 / 3, 1 / 6, 0), (1 / 6, 2 / 3, 0)], [1 / 6] * 3)
+IN_SEGMENTS = ng.IntegrationRule(ng.SEGM, 3)
+AT_ENDS = ng.IntegrationRule([(0, 0, 0), (0.5, 0, 0), (1, 0, 0)], [1 / 6, 2 / 3, 1 / 6])
+# Vertices of elements and segments, in their order.
+CORNERS = {
+    2: ng.IntegrationRule([(1, 0, 0), (0, 1, 0), (0, 0, 0)], [1 / 6] * 3),
+    1: ng.IntegrationRule([(1, 0, 0), (0, 0, 0)], [1 / 2] * 2),
 }
 
 OVERLAP = 0.5  # of the smaller of two bodies, from which they lie on top of each other
 PLACES = 200  # of a connected piece that are looked for in another one
-
 FLAT = 16 * np.finfo(float).eps  # area of a triangle over its longest side squared, without height
+NO_RADIAL = 1e-9  # radial part on the axis, relative to the largest value, that is round-off
+
+
+def check_problem(problem: Problem, mesh: ng.Mesh) -> None:
+    """Refuse names and data of a problem that do not fit a mesh; see `Problem.check`."""
+    check_mesh(mesh)
+    view, names = MeshArrays(mesh), mesh.GetBoundaries()
+    materials = regions_of(mesh, "materials", problem.materials, body_mask)
+    force = regions_of(mesh, "force", problem.force, body_mask)
+    displacement = regions_of(mesh, "displacement", problem.displacement, boundary_mask)
+    traction = regions_of(mesh, "traction", problem.traction, boundary_mask)
+    slides = [problem.sliding] if isinstance(problem.sliding, str) else []
+    sliding = regions_of(mesh, "sliding", slides, boundary_mask)
+    contact = [_sides(mesh, f"contact[{j}]", pair) for j, pair in enumerate(problem.contact)]
+
+    _check_bodies(mesh, materials)
+    refuse_common(names, sliding, displacement, "keep one of the two")
+    refuse_common(names, traction, sliding, "keep one of the two")
+    prescribed = zip(displacement.items(), problem.displacement.values(), strict=True)
+    full = {key: mask for (key, mask), (x, y) in prescribed if not (x is None or y is None)}
+    refuse_common(names, traction, full, "keep one, or leave a component free by None")
+    others = displacement | traction | sliding
+    for sides in contact:
+        refuse_common(names, sides, others, "a contact boundary takes no other condition")
+    _check_overlaps(view)
+    inner = np.bincount(view.boundaries[view.inner_facets], minlength=len(names)) > 0
+    _check_pairs(view, contact, inner)
+    _check_pressures(names, traction, problem.traction.values(), inner)
+
+    def points(vb: ng.comp.VorB, mask: Mask, rule: ng.IntegrationRule) -> Array:
+        at = mask[view.bodies if vb == ng.VOL else view.boundaries]
+        found = mesh.MapToAllElements(rule, vb)
+        return found[at[found["nr"]]]
+
+    for (label, mask), law in zip(materials.items(), problem.materials.values(), strict=True):
+        law.check_at(points(ng.VOL, mask, INSIDE), label)  # (2.7)
+    for (label, mask), F in zip(force.items(), problem.force.values(), strict=True):
+        _check_finite(points(ng.VOL, mask, INSIDE), F, label)
+    for (label, mask), P in zip(traction.items(), problem.traction.values(), strict=True):
+        _check_finite(points(ng.BND, mask, IN_SEGMENTS), P, label)
+    for (label, mask), u in zip(displacement.items(), problem.displacement.values(), strict=True):
+        for component in u:
+            if component is not None:
+                _check_finite(points(ng.BND, mask, AT_ENDS), component, label)
+    for j, (sides, pair) in enumerate(zip(contact, problem.contact, strict=True)):
+        if pair.gap is not None:
+            at = points(ng.BND, next(iter(sides.values())), AT_ENDS)
+            _check_gap(at, pair.gap, f'contact[{j}].gap of "{pair.secondary}"')
+    if problem.model in ABOUT_AN_AXIS:
+        _check_about_axis(problem, view)
 
 
 def check_mesh(mesh: ng.Mesh) -> None:
@@ -95,7 +138,7 @@ def regions_of(
     mesh: ng.Mesh,
     argument: str,
     patterns: Iterable[str],
-    mask_of: Callable[[ng.Mesh, str], np.ndarray],
+    mask_of: Callable[[ng.Mesh, str], Mask],
 ) -> Masks:
     """Return the mask (r,) of every pattern: each selects something, and no region twice."""
     names = mesh.GetMaterials() if mask_of is body_mask else mesh.GetBoundaries()
@@ -107,8 +150,10 @@ def regions_of(
                 known = sorted(set(names))
                 close = difflib.get_close_matches(part, known, n=1)
                 hint = f'did you mean "{close[0]}"? ' if close else ""
-                if part in (mesh.GetBoundaries() if mask_of is body_mask else mesh.GetMaterials()):
-                    hint = _OTHER[mask_of is body_mask]
+                if mask_of is body_mask and part in mesh.GetBoundaries():
+                    hint = "it is a boundary, and bodies are asked for; "
+                if mask_of is boundary_mask and part in mesh.GetMaterials():
+                    hint = "it is a body, and boundaries are asked for; "
                 raise ValueError(f'{argument} "{part}" selects no region; {hint}there are {known}')
         label = f'{argument} "{pattern}"'
         mask = {label: mask_of(mesh, pattern)}
@@ -117,8 +162,8 @@ def regions_of(
     return masks
 
 
-def sides_of(mesh: ng.Mesh, argument: str, pair: Contact) -> Masks:
-    """Return the masks (r,) of the sides of a contact pair, the secondary first."""
+def _sides(mesh: ng.Mesh, argument: str, pair: Contact) -> Masks:
+    """The masks (r,) of the sides of a contact pair, the secondary first."""
     sides = regions_of(mesh, f"{argument}.secondary", [pair.secondary], boundary_mask)
     if pair.primary is not None:
         sides |= regions_of(mesh, f"{argument}.primary", [pair.primary], boundary_mask)
@@ -133,7 +178,7 @@ def refuse_common(names: Sequence[str], one: Masks, other: Masks, right: str) ->
             raise ValueError(f'"{"|".join(common)}" is both in {a} and in {b}: {right}')
 
 
-def check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
+def _check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
     """Refuse bodies without a name, and those in none of the masks (r,) of materials."""
     covered = np.logical_or.reduce(list(materials.values()))
     for number, name in enumerate(mesh.GetMaterials()):
@@ -143,45 +188,33 @@ def check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
             raise ValueError(f'body "{name}" has no material: add materials["{name}"]')
 
 
-def check_pairs(mesh: ng.Mesh, contact: Sequence[Masks]) -> None:
+def _check_pairs(view: MeshArrays, contact: Sequence[Masks], inner: Mask) -> None:
     """Refuse contact inside a body: on an interface, of a curve with itself, of a body with itself.
 
     A body is a connected piece of the mesh, whatever the names of its parts. `contact` are the
-    masks (r,) of the sides of each pair.
+    masks (r,) of the sides of each pair, `inner` (r,) boundaries between two triangles.
     """
-    if not contact:
-        return
-    names = mesh.GetBoundaries()
-    view = MeshArrays(mesh)
-    region, ends, body = view.boundaries, view.facets, view.pieces
-    inner = np.bincount(region[view.inner_facets], minlength=len(names)) > 0
+    names, region, ends = view.mesh.GetBoundaries(), view.boundaries, view.facets
     for sides in contact:
         right = "it lies inside one body; join bodies by Compound, not Glue"
         refuse_common(names, sides, {"the interfaces of the mesh": inner}, right)
         for (a, first), (b, second) in itertools.combinations(sides.items(), 2):
             refuse_common(names, {a: first}, {b: second}, "name two different boundaries")
-            if np.intersect1d(body[ends[first[region]]], body[ends[second[region]]]).size:
+            if set(view.pieces[ends[first[region]]].flat) & set(
+                view.pieces[ends[second[region]]].flat
+            ):
                 raise ValueError(
                     f"{a} and {b} lie on the same body: contact is between two bodies without a "
                     "common mesh vertex (join them by Compound, not Glue)"
                 )
 
 
-def check_pressures(
-    mesh: ng.Mesh, traction: Masks, loads: Iterable[ng.CoefficientFunction]
+def _check_pressures(
+    names: Sequence[str], traction: Masks, loads: Iterable[ng.CoefficientFunction], inner: Mask
 ) -> None:
     """Refuse pressures, one for each mask (r,), on lines inside a body: these have two normals."""
-    pressures = [
-        (label, mask)
-        for (label, mask), load in zip(traction.items(), loads, strict=True)
-        if load.dim == 1
-    ]
-    if not pressures:
-        return
-    view, names = MeshArrays(mesh), mesh.GetBoundaries()
-    inner = np.bincount(view.boundaries[view.inner_facets], minlength=len(names)) > 0
-    for label, mask in pressures:
-        if (mask & inner).any():
+    for (label, mask), load in zip(traction.items(), loads, strict=True):
+        if load.dim == 1 and (mask & inner).any():
             name = names[int(np.argmax(mask & inner))]
             raise ValueError(
                 f'{label} is a pressure, and "{name}" lies inside a body or between two that are '
@@ -190,13 +223,12 @@ def check_pressures(
             )
 
 
-def check_overlaps(mesh: ng.Mesh) -> None:
+def _check_overlaps(view: MeshArrays) -> None:
     """Refuse bodies drawn on top of each other, and a face drawn over a part of itself.
 
     An interference at a contact line is none. Of each two connected pieces whose boxes overlap by
     so much, places at equal steps of the smaller one's area are looked for in the larger one.
     """
-    view = MeshArrays(mesh)
     piece = view.pieces[view.elements[:, 0]]
     parts = [np.flatnonzero(piece == k) for k in range(piece.max(initial=0) + 1)]
     if len(parts) == 1:
@@ -214,7 +246,7 @@ def check_overlaps(mesh: ng.Mesh) -> None:
         middle = view.corners[parts[small][at]].mean(axis=1)
         share = float(_inside(middle, view, parts[large]).mean())
         if share > OVERLAP:
-            names = mesh.GetMaterials()
+            names = view.mesh.GetMaterials()
             name, beside = (names[view.bodies[parts[k][0]]] for k in (small, large))
             raise ValueError(
                 f'body "{name}" of area {size[small]:.4g} and body "{beside}" of area '
@@ -224,8 +256,8 @@ def check_overlaps(mesh: ng.Mesh) -> None:
             )
 
 
-def _inside(points: np.ndarray, view: MeshArrays, part: np.ndarray) -> np.ndarray:
-    """Return which points (k, 2) lie in the triangles `part` (n,) of a mesh, bool (k,).
+def _inside(points: Array, view: MeshArrays, part: Index) -> Mask:
+    """Which `points` (k, 2) lie in the triangles `part` (n,) of a mesh, (k,).
 
     Where a line to the right crosses their boundary, the sides of one triangle alone, an odd number
     of times.
@@ -239,44 +271,14 @@ def _inside(points: np.ndarray, view: MeshArrays, part: np.ndarray) -> np.ndarra
     return np.asarray((crossed & right).sum(axis=1) % 2 == 1)
 
 
-def check_laws(mesh: ng.Mesh, materials: Masks, laws: Iterable[Elastic | Hooke]) -> None:
-    """Refuse laws that are not elliptic in the bodies of their masks (r,), HH81 (2.7)."""
-    for (label, mask), law in zip(materials.items(), laws, strict=True):
-        law.check_at(_points(mesh, mask, IN_BODIES), label)  # (2.7)
+def _check_finite(points: Array, data: ng.CoefficientFunction, label: str) -> None:
+    """Refuse data that are not finite at one of mesh `points` (k,)."""
+    values = data(points).reshape(len(points), -1)
+    refuse_where(points, ~np.isfinite(values).all(axis=1), values, label, "must be finite")
 
 
-def check_data(mesh: ng.Mesh, masks: Masks, data: Iterable[Any], places: Places) -> None:
-    """Refuse loads or displacements that are not finite somewhere, one for each mask (r,)."""
-    for (label, mask), value in zip(masks.items(), data, strict=True):
-        _check_finite(_points(mesh, mask, places), value, label)
-
-
-def check_gaps(mesh: ng.Mesh, contact: Sequence[Masks], pairs: Sequence[Contact]) -> None:
-    """Refuse gaps that are not finite on the secondary, the first mask (r,) of each pair."""
-    for j, (sides, pair) in enumerate(zip(contact, pairs, strict=True)):
-        if pair.gap is not None:
-            points = _points(mesh, next(iter(sides.values())), AT_ENDS)
-            _check_gap(points, pair.gap, f'contact[{j}].gap of "{pair.secondary}"')
-
-
-def _points(mesh: ng.Mesh, mask: np.ndarray, places: Places) -> np.ndarray:
-    """Return NGSolve's mesh points of the places on every element of the selected regions."""
-    (vb, rule), view = places, MeshArrays(mesh)
-    regions = view.bodies if vb == ng.VOL else view.boundaries
-    points = mesh.MapToAllElements(rule, vb)
-    return points[mask[regions][points["nr"]]]
-
-
-def _check_finite(points: np.ndarray, data: Any, label: str) -> None:
-    """Refuse a CoefficientFunction, or a tuple of them and None, that is not finite somewhere."""
-    for part in data if isinstance(data, tuple) else (data,):
-        if part is not None:
-            values = part(points).reshape(len(points), -1)
-            refuse_where(points, ~np.isfinite(values).all(axis=1), values, label, "must be finite")
-
-
-def _check_gap(points: np.ndarray, gap: Any, label: str) -> None:
-    """Refuse a gap that is not finite somewhere; a function must return one number per point."""
+def _check_gap(points: Array, gap: Any, label: str) -> None:
+    """Refuse a gap that is not finite at one of mesh `points` (k,), or no number for each."""
     if not callable(gap) or isinstance(gap, ng.CoefficientFunction):
         _check_finite(points, ng.CF(gap), label)
         return
@@ -297,3 +299,58 @@ def _check_gap(points: np.ndarray, gap: Any, label: str) -> None:
             "return one value per point"
         )
     refuse_where(points, ~np.isfinite(values), values, label, "must be finite")
+
+
+def _check_about_axis(problem: Problem, view: MeshArrays) -> None:
+    """Refuse a body across the axis, conditions on the axis, and data that point sideways there.
+
+    A vector with a radial part on the axis is no field of revolution: what pushes a body sideways
+    is not axisymmetric.
+    """
+    mesh, axis = view.mesh, on_axis(view.vertices)
+    first = int(np.argmin(view.vertices[:, 0]))
+    x, y = view.vertices[first]
+    if x < 0 and not axis[first]:
+        raise ValueError(
+            f"the mesh reaches to x = {x:.6g} at y = {y:.6g}, across the axis x = 0: "
+            "an axisymmetric body is given by its half with x >= 0"
+        )
+    along: Mask = np.asarray(axis[view.facets].all(axis=1))
+
+    def refuse_along(what: str, pattern: str, right: str) -> None:
+        if along[boundary_mask(mesh, pattern)[view.boundaries]].any():
+            raise ValueError(f'{what} "{pattern}" is on the axis x = 0, which has no area: {right}')
+
+    for pair in problem.contact:
+        for side in (pair.secondary, pair.primary):
+            if side is not None:
+                refuse_along("contact", side, "name a boundary with x > 0")
+    vectors: list[tuple[str, str, Any]] = []
+    tractions: Mapping[str, Any] = problem.traction
+    forces: Mapping[str, Any] = problem.force
+    for pattern, load in tractions.items():
+        refuse_along("traction", pattern, "name a boundary with x > 0")
+        if load.dim == 2:
+            vectors.append(("traction", pattern, load[0]))
+    for pattern, (radial, axial) in problem.displacement.items():
+        if axial is not None:
+            refuse_along("displacement", pattern, "leave the second component free by None")
+        if radial is not None:
+            vectors.append(("displacement", pattern, radial))
+    vectors += [("force", pattern, F[0]) for pattern, F in forces.items()]
+    for what, pattern, radial in vectors:
+        if what == "force":
+            at, ends = body_mask(mesh, pattern)[view.bodies], view.elements
+            points = mesh.MapToAllElements(CORNERS[2], ng.VOL)
+        else:
+            at, ends = boundary_mask(mesh, pattern)[view.boundaries], view.facets
+            points = mesh.MapToAllElements(CORNERS[1], ng.BND)
+        values = np.asarray(radial(points[np.repeat(at, ends.shape[1])])).ravel()
+        size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+        bad = axis[ends[at]].ravel() & (np.abs(values) > NO_RADIAL * size)
+        if bad.any():
+            raise ValueError(
+                f'{what} "{pattern}" has the radial component {values[np.argmax(bad)]:.6g} on the '
+                "axis x = 0, sideways: it must vanish there, as around the axis every direction is "
+                "radial"
+            )

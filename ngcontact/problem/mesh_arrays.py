@@ -14,6 +14,8 @@ from ..arrays import Array, Index, Mask
 SIMPLICES = {2: (10, 12), 3: (20, 21)}  # Netgen's types of triangles and tetrahedra, by dimension
 SIDES = {2: [[0, 1], [1, 2], [2, 0]], 3: [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]}
 
+ON_AXIS = 1e-9  # radius, relative to the largest, up to which a point lies on the axis x = 0
+
 _RECORDS: dict[tuple[type, int], np.dtype] = {}  # Netgen's layouts, of kinds of so many bytes
 
 
@@ -165,3 +167,9 @@ def bisect(mesh: ng.Mesh, marked: Mask) -> None:
     """Refine the elements `marked` (ne,) of a mesh in place, which straightens it."""
     MeshArrays(mesh)._elements["refine"] = marked  # all of them: they are True by default
     mesh.Refine()
+
+
+def on_axis(points: Array) -> Mask:
+    """Which of `points` (k, 2), those of a mesh or of its whole boundary, have r = 0, (k,)."""
+    r = np.abs(points[:, 0])
+    return np.asarray(r <= ON_AXIS * r.max(initial=0.0))

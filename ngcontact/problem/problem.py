@@ -9,31 +9,12 @@ from typing import Any
 import ngsolve as ng
 from netgen.occ import OCCGeometry
 
-from .axis import check_about_axis
-from .checks import (
-    AT_ENDS,
-    IN_BODIES,
-    IN_SEGMENTS,
-    check_bodies,
-    check_data,
-    check_gaps,
-    check_laws,
-    check_mesh,
-    check_overlaps,
-    check_pairs,
-    check_pressures,
-    kind_of,
-    refuse_common,
-    regions_of,
-    sides_of,
-)
+from .checks import check_problem, kind_of
 from .contact import Contact
-from .material import ABOUT_AN_AXIS, Elastic, Hooke, require_model
+from .material import Elastic, Hooke, require_model
 from .values import (
     Scalar,
     Vector,
-    body_mask,
-    boundary_mask,
     by_region,
     displacement_components,
     region_pattern,
@@ -161,37 +142,7 @@ class Problem:
             meet on one boundary, a contact pair is impossible, or data are not finite or not
             elliptic.
         """
-        check_mesh(mesh)
-        names = mesh.GetBoundaries()
-        materials = regions_of(mesh, "materials", self.materials, body_mask)
-        force = regions_of(mesh, "force", self.force, body_mask)
-        displacement = regions_of(mesh, "displacement", self.displacement, boundary_mask)
-        traction = regions_of(mesh, "traction", self.traction, boundary_mask)
-        slides = [self.sliding] if isinstance(self.sliding, str) else []
-        sliding = regions_of(mesh, "sliding", slides, boundary_mask)
-        contact = [sides_of(mesh, f"contact[{j}]", pair) for j, pair in enumerate(self.contact)]
-
-        check_bodies(mesh, materials)
-        refuse_common(names, sliding, displacement, "keep one of the two")
-        refuse_common(names, traction, sliding, "keep one of the two")
-        prescribed = zip(displacement.items(), self.displacement.values(), strict=True)
-        full = {key: mask for (key, mask), (x, y) in prescribed if not (x is None or y is None)}
-        refuse_common(names, traction, full, "keep one, or leave a component free by None")
-        others = displacement | traction | sliding
-        for sides in contact:
-            refuse_common(names, sides, others, "a contact boundary takes no other condition")
-        check_overlaps(mesh)
-        check_pairs(mesh, contact)
-        check_pressures(mesh, traction, self.traction.values())
-
-        check_laws(mesh, materials, self.materials.values())
-        check_data(mesh, force, self.force.values(), IN_BODIES)
-        check_data(mesh, traction, self.traction.values(), IN_SEGMENTS)
-        check_data(mesh, displacement, self.displacement.values(), AT_ENDS)
-        check_gaps(mesh, contact, self.contact)
-        if self.model in ABOUT_AN_AXIS:
-            loads = (self.displacement, self.traction, self.force)
-            check_about_axis(mesh, *loads, self.contact)
+        check_problem(self, mesh)
 
 
 def _law(value: Any, what: str) -> Elastic | Hooke:
