@@ -42,7 +42,7 @@ NOTICEABLE_STRAIN = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class AdmissibleStress(Balanced):
-    """A stress s in equilibrium on n triangles, beside C e of a displacement u_h."""
+    """An admissible stress s on n triangles, compared with C e of a displacement u_h."""
 
     distance: Array  # (n,) |s - C e|, root of an energy per thickness
     loads: Array  # (n,) norms of what s misses of the data, the same
@@ -52,7 +52,7 @@ class AdmissibleStress(Balanced):
 
 @dataclass(frozen=True, eq=False)
 class DualProblem:
-    """Conditions on n cells, and their program for the strain of a displacement."""
+    """The dual contact problem on n cells, for the strain of a displacement."""
 
     cells: Cells
     given: BoundaryData
@@ -69,10 +69,10 @@ class DualProblem:
         least: float = 0.0,
         degree: int | None = None,
     ) -> AdmissibleStress:
-        """What a stress `found` proves of a displacement u_h, under the given loads.
+        """The stress `found` as an admissible one, with its distance from C e of u_h.
 
-        Equilibrium is measured beside the largest stress, `least` or more. Where s misses much of
-        the data, stresses above a `degree` are sought once more.
+        Residuals are relative to the largest stress, which counts as `least` at the least. Where s
+        misses much of the data, stresses of more than a `degree` are balanced again.
 
         Raises
         ------
@@ -119,7 +119,7 @@ class DualProblem:
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """What a bound was made of."""
+    """Everything that a bound was computed from."""
 
     dual: DualProblem
     stress: AdmissibleStress  # the nearest one, and p* >= 0
@@ -168,10 +168,7 @@ def _bound(
     pairs: Sequence[ContactState],
     beside: Sequence[float],
 ) -> Proof:
-    """The bound with a p* that is one polynomial between places `beside` ends of segments.
-
-    In the steps of docs/bounds.md.
-    """
+    """The bound in the steps of docs/bounds.md; p* also has breaks `beside` ends of segments."""
     p, extent = trace.order, trace.model.extent
     degree, lift = max(p + 1, 2 + extent), p + LIFTING_DEGREES
     # 1. Cells.

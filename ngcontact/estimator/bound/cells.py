@@ -279,9 +279,9 @@ def _lengths(corners: Array) -> Array:
 
 
 def _with_parts(cells: Cells, new: Array, of: Index, triangles: Index, places: Array) -> Cells:
-    """Triangles in parts: `triangles` (k, 3) of those that they are part `of` (k,).
+    """The cells with `triangles` (k, 3) in place of those that they are part `of` (k,).
 
-    `new` (r, 2) are more vertices, `places` (k, 3, 3) the barycentric coordinates of the corners.
+    `new` (r, 2) are added vertices, `places` (k, 3, 3) the barycentric coordinates of the corners.
     """
     rest = np.setdiff1d(np.arange(len(cells.triangles)), of)
     return joined(
@@ -294,7 +294,7 @@ def _with_parts(cells: Cells, new: Array, of: Index, triangles: Index, places: A
 
 
 def _fanned(cells: Cells, cuts: Mapping[int, Array]) -> Cells:
-    """Triangles with vertices to come on one side, as of `cells_of`, in fans about its opposite."""
+    """Cells with new vertices on one side, as of `cells_of`, divided from the opposite corner."""
     if not cuts:
         return cells
     segment = np.repeat(list(cuts), [len(s) for s in cuts.values()])
@@ -321,9 +321,9 @@ def _fanned(cells: Cells, cuts: Mapping[int, Array]) -> Cells:
 
 
 def _parted(cells: Cells, at: Index) -> Cells:
-    """Triangles `at` (k,) in three about the middles of their inscribed circles.
+    """Cells with triangles `at` (k,) divided in three about the centres of their inscribed circles.
 
-    Parts of thin triangles are thin with one short side, not flat. Behind a curved side about the
+    So parts of thin triangles are not flat. Triangles with a curved side are divided about the
     centre of gravity, which is farther from the longest side.
     """
     share = np.where(cells.curved[at, None], 1.0, _lengths(cells.corners[at]))
@@ -343,13 +343,12 @@ def _parted(cells: Cells, at: Index) -> Cells:
 
 
 def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
-    """Triangles (k,) at vertices where given tractions may be those of no symmetric stress.
+    """Triangles (k,) at vertices where no symmetric stress may have the given tractions.
 
-    Where n and m are the normals of two sides of a triangle, n.(s m) = m.(s n) at their vertex.
-    Around a vertex of the boundary all sides of which lie on two lines, as at a corner of one
-    triangle or between two on a straight boundary, these equations have a sum without tractions of
-    inner sides: a condition on those that are given. More triangles there take it away.
-    `loaded` and `held` (k,) are as of `cells_of`.
+    With the normals n and m of two sides of a triangle n.(s m) = m.(s n) at their vertex. If all
+    sides at a vertex of the boundary lie on two lines, the sum of these equations contains given
+    tractions alone. More triangles at that vertex remove this condition. `loaded` and `held` (k,)
+    are as of `cells_of`.
     """
     loads, supports = np.zeros((2, len(cells.vertices)), dtype=bool)
     loads[cells.ends[~cells.inner & np.isin(cells.segment, loaded)]] = True

@@ -329,9 +329,9 @@ def _element(
 
 
 def _weighted(T: Array, weight: Array, compliance: Array, strain: Array) -> tuple[Array, Array]:
-    """Rows (b, q v, n) of which products are those of stresses T (b, q, v, n) in the norm of C^-1.
+    """Stresses T (b, q, v, n) as rows (b, q v, n) whose products are those of the norm of C^-1.
 
-    And of a `strain` (b, q, v), (b, 1, q v). `weight` is (b, q), `compliance` C^-1 = L L'
+    And a `strain` (b, q, v) as one (b, 1, q v). `weight` is (b, q), `compliance` C^-1 = L L'
     (b, q, v, v) or (1, 1, v, v).
     """
     L, root = np.linalg.cholesky(compliance), np.sqrt(weight)[..., None, None]

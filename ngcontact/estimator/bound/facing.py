@@ -78,17 +78,13 @@ def jump(
 
 
 class FacingPoints(NamedTuple):
-    """What j places on each of k segments of a secondary meet.
+    """What faces j places on each of k segments of a secondary."""
 
-    The `gap` (k, j) of u_h; d, the `direction` (k, j, 2); on the primary the `segment` (k, j), -1
-    where none is met, and `s` (k, j); whether the place `faces` (k, j) the body or the obstacle.
-    """
-
-    gap: Array
-    direction: Array
-    segment: Index
-    s: Array
-    faces: Mask
+    gap: Array  # (k, j) of u_h
+    direction: Array  # (k, j, 2) d
+    segment: Index  # (k, j) of the primary, -1 where none is met
+    s: Array  # (k, j) parameters on these
+    faces: Mask  # (k, j) whether the place faces the body or the obstacle
 
 
 def facing_points(
@@ -98,7 +94,7 @@ def facing_points(
     segment: Index,
     s: Array,
 ) -> FacingPoints:
-    """What `s` (k, j) of the secondary's segments `segment` (k,) meet, with the gap of u_h."""
+    """What faces the places `s` (k, j) on segments `segment` (k,) of the secondary."""
     contact, every, t = pair.line.contact, np.repeat(segment, s.shape[1]), s.ravel()
     x, d = trace.point(every, t), rays(trace, contact, every, t)
     other, there, gap, _ = partners(trace, pair.line.facing, every, x, d)
@@ -115,25 +111,21 @@ def facing_points(
 
 
 class PressureSupport(NamedTuple):
-    """Where p* of a pair may act.
-
-    On `segments` (k,) of the secondary: in contact, beside such, or where u_h goes through the
-    other body. Of `contact` (r, 3) each row is a segment in which contact ends, and s where an
-    interval in contact begins and ends on it.
-    """
+    """Where p* of a pair may act."""
 
     pair: ContactState
+    # (k,) of the secondary: in contact, beside contact, or where u_h penetrates the other body
     segments: Index
-    contact: Array
+    contact: Array  # (r, 3) segments in which contact ends, with s where it begins and ends
 
 
 def pressure_support(
     trace: BoundaryTrace, displacement: ng.CoefficientFunction, pair: ContactState, degree: int
 ) -> PressureSupport:
-    """The reach of a pair: beyond it Bernstein polynomials of a `degree` show an open gap.
+    """The support of p*: elsewhere Bernstein polynomials of a `degree` show that the gap is open.
 
-    On each part between vertices of both bodies. Of segments that face in part, as beside the end
-    of a body, points are looked at.
+    They do on each part between vertices of both bodies. Segments that face in part, as beside the
+    end of a body, are examined in points.
     """
     line, found = pair.line, np.zeros((0, 3))
     if line.contact.bilateral or not len(line.segments):
@@ -172,9 +164,10 @@ def pressure_support(
 def new_vertices(
     trace: BoundaryTrace, reaches: Sequence[PressureSupport], more: Sequence[float]
 ) -> dict[int, Array]:
-    """Rising places s, (j,), of vertices to come, by segment: ends of contact, opposite vertices.
+    """Rising parameters s, (j,), of new vertices by segment: ends of contact, opposite vertices.
 
-    And `more` on each segment of a reach. Vertices that all but face each other are one.
+    Each segment where p* may act also gets vertices at the parameters `more`. Vertices that face
+    each other up to `SAME_VERTEX` get none.
     """
     length = trace.lengths(np.arange(len(trace.region)))
     size = np.full(trace.space.ndof, np.inf)  # shortest segment at each vertex
@@ -291,7 +284,7 @@ def facing_sides(
     held: Array,
     moduli: Array,
 ) -> FacingSides:
-    """What of a pair's reach faces, and the gap after a lifting; `degrees` of p* and of that.
+    """The sides on which p* of a pair acts, with the lifted gap; `degrees` are those of both.
 
     Both bodies share the lifting by compliance, one over the `moduli` (n,) of the cells, but for
     vertices that cannot move along d; `held` (nv, 2, 2) are the projections of `held_motions`.
@@ -394,9 +387,10 @@ def _moves(held: Array, d: Array) -> Mask:
 
 
 def _merged_vertices(cells: Cells, side: Index, slots: Index) -> tuple[Index, Mask]:
-    """A vertex for each (nv,): one for both ends of a `side` (k,) or slot far shorter than others.
+    """Numbers (nv,) of vertices, equal at both ends of slivers, and which sides (k,) are slivers.
 
-    And whether sides are that short. `slots` (r,) are sides that do not face as a whole.
+    A `side` (k,) or slot is one if it is far shorter than its neighbours; `slots` (r,) are sides
+    that do not face as a whole.
     """
     number, every = np.arange(len(cells.vertices)), np.append(side, slots)
     length = np.linalg.norm(np.diff(cells.vertices[cells.ends], axis=1)[:, 0], axis=1)
@@ -438,10 +432,10 @@ def guide_sides(
 
 
 def fitted(gap: Array, degree: int) -> tuple[Array, Array]:
-    """Bernstein coefficients (k, degree + 1) near to a `gap` (k, j), the same at the ends.
+    """Bernstein coefficients (k, degree + 1) near to a `gap` (k, j), equal to it at the ends.
 
-    And what the gaps, polynomials of degree `DATA_DEGREE`, differ from these at most (k,): no
-    Legendre polynomial is more than 1.
+    And bounds (k,) of the difference: gaps are polynomials of degree `DATA_DEGREE`, and no Legendre
+    polynomial exceeds 1.
     """
     B, root = bernstein(degree, POINTS), np.sqrt(WEIGHTS)
     c = np.empty((len(gap), degree + 1))
@@ -454,13 +448,11 @@ def fitted(gap: Array, degree: int) -> tuple[Array, Array]:
 def _lifted_gap(
     ends: Index, gap: Array, closed: Mask, stiff: Mask, narrow: Mask, degree: int
 ) -> tuple[Array, Array]:
-    """Bernstein coefficients (k, degree + 1) of gaps that are nowhere negative, near to `gap`.
+    """Bernstein coefficients (k, degree + 1) of a gap that is nowhere negative, near to `gap`.
 
-    And what is added to it, r (k, j): nothing where `gap` itself is not negative and may stay.
-
-    `ends` (k, 2) are the vertices of the sides, at which r is one number of all neighbours: that
-    closes the gap where they are `closed` (k,), but not at `stiff` ones (k, 2), which do not move.
-    On `narrow` sides (k,) r is that number, too.
+    And r (k, j), the difference: 0 where `gap` itself is not negative. At the vertices `ends`
+    (k, 2) r is the same for all sides: it closes the gap where sides are `closed` (k,), but not at
+    `stiff` vertices (k, 2), which do not move. On `narrow` sides (k,) r is constant.
     """
     c, off = fitted(gap, degree)
     lift = np.full(ends.max(initial=0) + 1, -np.inf)

@@ -28,10 +28,10 @@ FORCES_AT_ONCE = 100  # triangles with forces that are no numbers
 
 @lru_cache
 def pattern(thirds: bool) -> tuple[Array, Index]:
-    """The equal parts of a triangle; those at its corners in `thirds` about their middles.
+    """Vertices (p, 3) and corners (k, 3) of the equal parts of a triangle, anticlockwise.
 
-    There given tractions may be those of no symmetric stress. Shares (p, 3) of the triangle's
-    corners in the vertices, and vertices (k, 3) of each part, anticlockwise.
+    Vertices are barycentric. Parts at the triangle's corners are divided in `thirds` where given
+    tractions may be those of no symmetric stress.
     """
     at = [(i, j) for i in range(PARTS_OF_A_SIDE + 1) for j in range(PARTS_OF_A_SIDE + 1 - i)]
     shares = np.array([(PARTS_OF_A_SIDE - i - j, i, j) for i, j in at]) / PARTS_OF_A_SIDE
@@ -49,10 +49,9 @@ def pattern(thirds: bool) -> tuple[Array, Index]:
 
 @dataclass(frozen=True, eq=False)
 class ForceQuadrature:
-    """How body forces are integrated on n triangles: where they are rough, on parts.
+    """How body forces are integrated on n triangles: on parts where they are no polynomials.
 
-    They are rough where they are far from polynomials on a triangle. The rule on it is that on its
-    parts: resultants are the same.
+    The rule on a triangle is that on its parts, so that resultants are the same.
     """
 
     thresholds: list[float]  # for each of `Problem.force`, root mean square that may be missed

@@ -36,14 +36,11 @@ INCONSISTENT_AMOUNT = 1e-9  # of what is asked for at a vertex, relative to it
 
 @dataclass(frozen=True, eq=False)
 class Prescribed:
-    """Of d.w on k sides, `side` (k,), the `amount` (k, j), lengths, along d, `direction` (k, j, 2).
+    """Prescribed values of d.w at j Gauss-Lobatto points of k sides."""
 
-    At j Gauss-Lobatto points.
-    """
-
-    side: Index
-    direction: Array
-    amount: Array
+    side: Index  # (k,)
+    direction: Array  # (k, j, 2) d
+    amount: Array  # (k, j) lengths
 
 
 def prescribed_on_supports(
@@ -67,9 +64,9 @@ def prescribed_on_supports(
 
 
 def prescribed_on_line(facing: FacingSides, r: Array, alone: bool) -> list[Prescribed]:
-    """What opens the gap of a line by `r` (k, j), lengths at Gauss points.
+    """Values of d.w that open the gap of a line by `r` (k, j), lengths at Gauss points.
 
-    d.w = -r on the secondary and r on the primary by shares, or all on the secondary `alone`.
+    Both bodies take their shares of -r and r, or the secondary all `alone`.
     """
     start, stop = np.ones((2, len(facing.side), 1)) if alone else facing.share.T[:, :, None]
     share = start + (stop - start) * POINTS
@@ -90,10 +87,11 @@ def lifted(
     degree: int,
     extent: float,
 ) -> Array:
-    """Norms (n,) of w, roots of energies per thickness, shared by both bodies of each line.
+    """Norms (n,) of w, roots of energies per thickness, which both bodies of each line share.
 
-    On secondaries alone where conditions at a vertex disagree. `prescribed` are those on supports,
-    `lines` (k, j) the facing sides with r, lengths at Gauss points; the rest is as of `lifting_of`.
+    If conditions at a vertex disagree, only secondaries move. `prescribed` are the conditions on
+    supports, `lines` (k, j) the facing sides with r, lengths at Gauss points; the rest is as of
+    `lifting_of`.
 
     Raises
     ------
@@ -120,8 +118,8 @@ def lifting_of(
 ) -> Array:
     """Norms (n,) of w with all that is `prescribed`, of a `degree` or, where needed, `DATA_DEGREE`.
 
-    What is less than round-off beside the `extent` of displacements and gaps, a length, is not
-    lifted. Sides `away` (r,) of Gamma_K face nothing, and may move.
+    Amounts below round-off of the `extent` of displacements and gaps, a length, are not lifted.
+    Sides `away` (r,) of Gamma_K face nothing, and may move.
 
     Raises
     ------

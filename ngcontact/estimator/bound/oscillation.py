@@ -40,7 +40,7 @@ TRIANGLES_AT_ONCE = 200  # triangles
 
 
 def oscillation_norms(cells: Cells, elements: Sequence[Element], tractions: Array) -> Array:
-    """Norm (n,) of a stress that does the work of what is missed of body forces and tractions.
+    """Norms D_T (n,) of a stress that balances what s misses of body forces and tractions.
 
     `tractions` (n, 3) are L2 norms on the sides, orthogonal to rigid motions, times the measure.
 
@@ -123,8 +123,8 @@ def balanced_again(
 ) -> tuple[Array, Array]:
     """Distances and loads, (n,) each as of `level`, of the better stress on each triangle.
 
-    Stresses are of a `degree` on straight triangles, equilibrium is measured beside the largest
-    one, `scale`. What is `allowed` may be added to B^2; without it a share of |s - sigma_h|^2.
+    Stresses are of a `degree` on straight triangles; residuals are relative to the largest one,
+    `scale`. Data may add what is `allowed` to B^2; by default a share of |s - sigma_h|^2.
     """
     c, D, rules = level.distance.copy(), level.loads.copy(), level.rules
     limit = NEGLIGIBLE_SHARE * float(c @ c) if allowed is None else allowed
@@ -163,9 +163,9 @@ def balanced_again(
 
 
 def residuals(cells: Cells, mu: Multipliers, left: Array, largest: float) -> Array:
-    """Largest moment `left` (d,) without balance on the sides of each triangle, (n,).
+    """The largest unbalanced moment, of `left` (d,), on the sides of each triangle, (n,).
 
-    Dimensionless: over the diameter of the side's owner, the measure and the `largest` stress.
+    It is dimensionless: over the diameter of the side's owner, the measure, the `largest` stress.
     """
     middle = cells.vertices[cells.ends].mean(axis=1)
     size = cells.diameters[cells.owner] * cells.trace.model.measure(middle) * (largest or 1.0)

@@ -29,8 +29,8 @@ DERIVATIVES = (0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2)  # orders by (a, b)
 def products(degree: int) -> tuple[Index, Index]:
     """Degrees, (m,) each, in both coordinates of the products up to a total degree.
 
-    They rise in the first, along the base. Where that is short, second derivatives along it are
-    large: products of degree 0 and 1 have none, nor have their combinations with earlier ones.
+    They rise in the first one, along the base: where that is short, second derivatives along it
+    are large, and the first products have none.
     """
     i, j = np.array([(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]).T
     return i, j

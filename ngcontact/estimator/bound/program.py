@@ -45,7 +45,7 @@ DIAGONAL_SHIFT = 1e-12  # of the diagonal, for vertices where tractions depend o
 
 @dataclass(frozen=True, eq=False)
 class Balanced:
-    """A stress in equilibrium, and what acts on the lines."""
+    """A stress in equilibrium, with the pressures on the lines."""
 
     s: Stress  # in equilibrium
     pressure: list[Array]  # (k, j) each, Bernstein coefficients of p*, per length (P1), eta (P2)
@@ -55,7 +55,7 @@ class Balanced:
 
 @dataclass(frozen=True, eq=False)
 class DualProgram:
-    """The matrix of d multipliers, factorised once, for several loads."""
+    """The matrix of d multipliers, factorised once for all loads."""
 
     multipliers: Multipliers
     lines: Sequence[FacingSides]  # contact and guides
@@ -149,9 +149,9 @@ class DualProgram:
             return self.systems.y
 
     def _on_free_motions(self, load: Array) -> Array:
-        """The part (d,) of a `load` (d,) that does work on motions which nothing resists.
+        """The part (d,) of a `load` (d,) that does work on free motions.
 
-        A condition holds their mean, and takes it: s and sigma have it in common.
+        The condition on the mean of these motions balances it, for s as for sigma.
         """
         lineal = self.T @ self.program.null_space.lineal
         if lineal.shape[1] == 0:

@@ -44,9 +44,9 @@ class SideRule:
         return total
 
     def work(self, values: Array, side: Index, direction: Array, amount: Array) -> float:
-        """Work of tractions `values` (m, j, 2) on some displacement of sides `side` (k,).
+        """Work of tractions `values` (m, j, 2) on a displacement of sides `side` (k,).
 
-        At Gauss-Lobatto points of each side it is an `amount` (k, i) along a `direction` (k, i, 2).
+        It is an `amount` (k, i) along a `direction` (k, i, 2) at Gauss-Lobatto points of each side.
         """
         order, at = np.argsort(side), np.flatnonzero(np.isin(self.side, side))
         own = order[np.searchsorted(side[order], self.side[at])]
@@ -91,7 +91,7 @@ def side_rule(cells: Cells, breaks: Array, side: Index) -> SideRule:
 
 @dataclass(frozen=True, eq=False)
 class BoundaryData:
-    """Conditions on e sides."""
+    """Prescribed displacements and tractions on e sides."""
 
     problem: Problem
     cells: Cells
@@ -104,7 +104,7 @@ class BoundaryData:
     pressed: Array
 
     def followed(self) -> Index:
-        """How often triangles (n,) are divided for tractions: `DIVISIONS` where these are rough."""
+        """How often triangles (n,) are divided to follow tractions: `DIVISIONS` times at most."""
         cells, found = self.cells, np.zeros(len(self.cells.triangles), dtype=np.intp)
         breaks = np.bincount(self.breaks[:, 0].astype(np.intp), minlength=len(cells.trace.region))
         count = np.append(breaks, 0)[cells.segment]  # none inside, -1
@@ -125,7 +125,7 @@ class BoundaryData:
         return replace(self, pressed=pressed)
 
     def tractions(self, cells: Cells, rule: SideRule, own: Array) -> Array:
-        """Tractions (m, j, 2) on sides of `cells`, parts of these; `own` (m, j, 2) without any."""
+        """Given tractions (m, j, 2) on sides of `cells`, which are parts; else `own` (m, j, 2)."""
         segment, s = on_segments(cells, rule.side, rule.t)
         on, asked = np.flatnonzero(segment >= 0), own.copy()
         segment, s, total = segment[on], s[on], np.zeros((len(on), *own.shape[1:]))
