@@ -1,4 +1,4 @@
-"""Types of arrays, squares that stay in the range of numbers, sparse arrays from entries."""
+"""Types of arrays, squares that stay in the range of numbers, normals, sparse arrays."""
 
 from __future__ import annotations
 
@@ -49,6 +49,11 @@ def from_triplets(
     index = np.int32 if largest <= np.iinfo(np.int32).max else np.int64
     at = np.asarray(rows, dtype=index), np.asarray(columns, dtype=index)
     return sp.csr_array((values, at), shape=shape)
+
+
+def across(d: Array) -> Array:
+    """Vectors (..., 2) turned to the left of `d` (..., 2) by a right angle."""
+    return np.stack([-d[..., 1], d[..., 0]], axis=-1)
 
 
 def for_both_components(S: sp.csr_array) -> sp.csr_array:

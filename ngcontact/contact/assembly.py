@@ -12,8 +12,7 @@ from ..constraints import Rows, concatenated, no_rows
 from ..fem import BoundaryTrace
 from ..problem import Contact
 from .dual import with_dual_rows
-from .line import ContactLine, nodal_line, without
-from .state import by_line
+from .line import ContactLine, by_line, nodal_line, without
 
 ALIKE = 1e-9  # difference of unit directions up to which two points at a node are one
 UNLIKE = 0.05  # relative difference of two sides from which their roles are not alike

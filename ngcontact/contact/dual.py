@@ -23,16 +23,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Array, Index, Mask, from_triplets
+from ..arrays import Array, Index, Mask, across, from_triplets
 from ..fem import BoundaryTrace
 from ..lagrange import gauss, lagrange
 from ..problem import Contact
-from .line import ContactLine, jacobian, prescribed_gap, segment_weights
+from .line import ContactLine, jacobian, partners, prescribed_gap, rays, segment_weights
 from .projection import at, crossings, feet
-from .search import partners
 
 SLIVER = 1e-9  # share of a segment below which a piece of it is none
-LEAST = 0.1  # of the integral of phi over the whole segment, below which hats take its place
+MIN_COVERED = 0.1  # of the integral of phi over the whole segment, below which hats take its place
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,33 +57,6 @@ class Pieces:
     opposite: Array
 
 
-@dataclass(frozen=True, eq=False)
-class DualIntegrals:
-    """Integrals over the facing parts of k segments, in arc length (P1) or eta (P2).
-
-    Attributes
-    ----------
-    weight : ndarray (k, order + 1)
-        Of the basis functions: D_e.
-    gap : ndarray (k, order + 1)
-        Of psi times eps, areas.
-    coupling : sparse (k * order + k, n)
-        Of psi times the basis functions of n nodes: those of the primary, less those of the
-        secondary itself but for D_e.
-    """
-
-    weight: Array
-    gap: Array
-    coupling: sp.csr_array
-
-
-def rays(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
-    """Unit vectors (k, 2) to the primary from points at `s` (k,) of segments `segment` (k,)."""
-    if contact.direction is None:
-        return trace.exact_normal(segment, s)
-    return np.tile(contact.direction, (len(s), 1))
-
-
 def divided(trace: BoundaryTrace, contact: Contact, segments: Index, facing: Index) -> Pieces:
     """Divide `segments` (k,) where they pass vertices of the primary segments `facing` (q,)."""
     k, ends = len(segments), trace.nodes[facing][:, [0, -1]]
@@ -100,13 +72,16 @@ def divided(trace: BoundaryTrace, contact: Contact, segments: Index, facing: Ind
     local, start, stop = local[:-1][one], cut[:-1][one], cut[1:][one]
     segment, middle = segments[local], (start + stop) / 2
     d = rays(trace, contact, segment, middle)
-    met, there, *_ = partners(trace, facing, segment, trace.point(segment, middle), d)
-    on = met >= 0
-    return Pieces(local[on], start[on], stop[on], met[on], there[on])
+    met = partners(trace, facing, segment, trace.point(segment, middle), d)
+    on = met.segment >= 0
+    return Pieces(local[on], start[on], stop[on], met.segment[on], met.s[on])
 
 
-def _dual_basis(whole: Array, weight: Array, mass: Array, s: Array) -> tuple[Array, Array, Mask]:
-    """Dual bases of k segments over their facing parts.
+def _dual_basis(whole: Array, weight: Array, mass: Array, s: Array) -> tuple[Array, Mask]:
+    """Dual bases of k segments over their facing parts: psi = change phi, `change` (k, p+1, p+1).
+
+    And the segments (k,) on which psi are those of the hats of the ends, or one constant. There
+    D_e, the `weight` (k, p + 1) of the facing parts, is set to what the rows weigh, 0 for none.
 
     Parameters
     ----------
@@ -114,39 +89,35 @@ def _dual_basis(whole: Array, weight: Array, mass: Array, s: Array) -> tuple[Arr
         Integrals of phi over the segments and over their facing parts; parameters of the nodes.
     mass : ndarray (k, p + 1, p + 1)
         Integrals of phi_i phi_j over the facing parts.
-
-    Returns
-    -------
-    weight : ndarray (k, p + 1)
-        D_e; 0 for what carries no row.
-    change : ndarray (k, p + 1, p + 1)
-        psi = change phi.
-    hats : ndarray of bool (k,)
-        Segments on which psi are those of the hats of the ends, or one constant.
     """
     faces, order = (mass != 0).any(axis=(1, 2)), s.shape[1] - 1
-    sliver = faces & (weight.sum(axis=1) < LEAST * whole.sum(axis=1))  # one row, at the nearer end
-    hats = faces & ~sliver & (weight < LEAST * whole).any(axis=1) & (order > 1)
+    sliver = faces & (weight.sum(axis=1) < MIN_COVERED * whole.sum(axis=1))  # a row at one end
+    hats = faces & ~sliver & (weight < MIN_COVERED * whole).any(axis=1) & (order > 1)
     change = np.zeros_like(mass)
     full = faces & ~hats & ~sliver
     change[full] = weight[full][:, :, None] * np.linalg.inv(mass[full])
     hat = lagrange(1, s.ravel()).reshape(-1, order + 1, 2)  # values at the nodes of phi
     D = np.einsum("ki,kij->kj", weight, hat)
     ends, hat = (np.flatnonzero(hats)[:, None], np.array([[0, order]])), hat[hats]
-    across = hat.transpose(0, 2, 1)
-    change[ends] = D[hats][:, :, None] * (np.linalg.inv(across @ mass[hats] @ hat) @ across)
+    turned = hat.transpose(0, 2, 1)
+    change[ends] = D[hats][:, :, None] * (np.linalg.inv(turned @ mass[hats] @ hat) @ turned)
     share = weight[sliver].sum(axis=1)
-    end = np.flatnonzero(sliver), order * (D[sliver] @ [-1, 1] > SLIVER * share)
-    change[end] = 1.0
-    weight = np.where((hats | sliver)[:, None], 0.0, weight)
-    weight[ends], weight[end] = D[hats], share
-    return weight, change, hats | sliver
+    nearer = np.flatnonzero(sliver), order * (D[sliver] @ [-1, 1] > SLIVER * share)
+    change[nearer] = 1.0
+    weight[hats | sliver] = 0.0
+    weight[ends], weight[nearer] = D[hats], share
+    return change, hats | sliver
 
 
 def _integrals(
     trace: BoundaryTrace, contact: Contact, segments: Index, pieces: Pieces
-) -> DualIntegrals:
-    """Integrate over the pieces of `segments` (k,)."""
+) -> tuple[Array, Array, sp.csr_array]:
+    """Integrals over the facing parts of `segments` (k,), in arc length (P1) or eta (P2).
+
+    D_e (k, p + 1) of the basis functions; of psi times eps, (k, p + 1), areas; and of psi times the
+    basis functions of n nodes, (k * p + k, n): those of the primary, less those of the secondary
+    itself but for D_e.
+    """
     p, k, r = trace.order, len(segments), len(pieces.local)
     points, weights = gauss(2 * p + 2 * trace.geometry_order - 1)
     q, length = len(points), pieces.stop - pieces.start
@@ -155,20 +126,19 @@ def _integrals(
     segment, x = segments[local], trace.point(segments[local], s)
     w = (length[:, None] * weights).ravel() * jacobian(trace, contact, segment, s)
     d = rays(trace, contact, segment, s)
-    across = np.column_stack([-d[:, 1], d[:, 0]])
-    s_there = crossings(x, across, trace.curve, facing, np.repeat(pieces.opposite, q))
+    s_there = crossings(x, across(d), trace.curve, facing, np.repeat(pieces.opposite, q))
     eps = ((at(trace.curve, facing, s_there) - x) * d).sum(axis=1)
     if contact.gap is not None:
         eps = prescribed_gap(contact, trace, segment, s, x)
-    shapes = (trace.shapes(*place) for place in ((segment, s), (facing, s_there)))
-    phi, phi_there = (values.reshape(r, q, p + 1) for values in shapes)
+    phi = trace.shapes(segment, s).reshape(r, q, p + 1)
+    phi_there = trace.shapes(facing, s_there).reshape(r, q, p + 1)
     w, eps = w.reshape(r, q), eps.reshape(r, q)
     weight, gap, mass = np.zeros((k, p + 1)), np.zeros((k, p + 1)), np.zeros((k, p + 1, p + 1))
     np.add.at(weight, pieces.local, np.einsum("rg,rgi->ri", w, phi))
     np.add.at(gap, pieces.local, np.einsum("rg,rgi->ri", w * eps, phi))
     np.add.at(mass, pieces.local, np.einsum("rg,rgi,rgj->rij", w, phi, phi))
     whole = segment_weights(trace, contact, segments)
-    weight, change, hats = _dual_basis(whole, weight, mass, trace.places(segments))
+    change, hats = _dual_basis(whole, weight, mass, trace.places(segments))
     facing_part = change[pieces.local] @ np.einsum("rg,rgi,rgj->rij", w, phi, phi_there)
     own_part = change @ mass - weight[:, :, None] * np.eye(p + 1)
     first, last = (rays(trace, contact, segments, np.full(k, s)) for s in (0.0, 1.0))
@@ -180,7 +150,7 @@ def _integrals(
     row, column = np.broadcast_arrays(row[:, :, None], column[:, None, :])
     size = (k * (p + 1), trace.space.ndof)
     coupling = from_triplets(blocks.ravel(), row.ravel(), column.ravel(), size)
-    return DualIntegrals(weight, np.einsum("kij,kj->ki", change, gap), coupling)
+    return weight, np.einsum("kij,kj->ki", change, gap), coupling
 
 
 def end_to_end(trace: BoundaryTrace, line: ContactLine, facing: Mask) -> Index:
@@ -207,17 +177,9 @@ def with_dual_rows(
 ) -> tuple[ContactLine, Mask]:
     """The line with dual rows where nodes do not face nodes, and which points (m,) carry rows.
 
-    A point on segments of both kinds takes the mean of both rows, by their weights; one whose
+    The `line` has points at all nodes of the secondary, of which `facing` (m,) face the primary. A
+    point on segments of both kinds takes the mean of both rows, by their weights; one whose
     segments all match keeps the row at its node to the last bit.
-
-    Parameters
-    ----------
-    trace : BoundaryTrace
-        The boundary.
-    line : ContactLine
-        With points at all nodes of the secondary.
-    facing : ndarray of bool (m,)
-        Points that face the primary.
     """
     if len(line.facing) == 0:
         return line, facing
@@ -227,8 +189,8 @@ def with_dual_rows(
         return line, facing
     segments, rows, m = line.segments[chosen], line.rows[chosen], len(facing)
     pieces = divided(trace, line.contact, segments, line.facing)
-    parts = _integrals(trace, line.contact, segments, pieces)
-    here = (rows >= 0) & (parts.weight > 0)
+    D, gaps, coupling = _integrals(trace, line.contact, segments, pieces)
+    here = (rows >= 0) & (D > 0)
     point = rows[here]
     cosine = np.ones(len(point))
     if line.contact.direction is None:  # what counts where two sides share a point at a small turn
@@ -236,13 +198,13 @@ def with_dual_rows(
         cosine = (normal * line.direction[point]).sum(axis=1)
     nodal, dual, gap = np.zeros(m), np.zeros(m), np.zeros(m)
     np.add.at(nodal, line.rows[matched], line.shares[matched])
-    np.add.at(dual, point, parts.weight[here] * cosine)
-    np.add.at(gap, point, parts.gap[here] * cosine)
+    np.add.at(dual, point, D[here] * cosine)
+    np.add.at(gap, point, gaps[here] * cosine)
     at_nodes, carries = dual == 0, (dual > 0) | (facing & (nodal > 0))
     weight = np.where(at_nodes, 1.0, nodal + dual)
     share = np.where(at_nodes, 1.0, nodal / weight)  # of the row at the node
-    scale, shape = cosine / weight[point], (m, parts.coupling.shape[0])
-    means = from_triplets(scale, point, np.flatnonzero(here), shape) @ parts.coupling
+    scale, shape = cosine / weight[point], (m, coupling.shape[0])
+    means = from_triplets(scale, point, np.flatnonzero(here), shape) @ coupling
     covered = np.bincount(pieces.local, pieces.stop - pieces.start, minlength=len(chosen))
     faces = line.faces.copy()
     faces[chosen] = (covered > 1 - SLIVER) & here.all(axis=1)

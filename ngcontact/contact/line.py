@@ -1,94 +1,32 @@
-"""Contact points C_j on Gamma_K: directions, gaps eps(C_j), weights.
+"""Contact points C_j on Gamma_K: directions, partners, gaps eps(C_j), weights.
 
 HH81 (2.3), (2.5): on a bounded zone the direction is the outward normal of the secondary body
 and a corner of the contact line carries two points, one per side. HH81 (2.10): on an enlarging
 zone the direction is the fixed xi.
 
-A corner of Gamma_K carries two contact points, one for each side: HH81 (2.3). Both rows hold at one
-node. When it touches the corner, its force splits between the two normals, and where these are
-nearly parallel the split is no measure of the pressure: a part of the force across the corner
-weighs 1 / turn in it, and one of the two rows may even be open.
+Both rows of a corner hold at one node. When it touches the corner, its force splits between the two
+normals, and where these are nearly parallel the split is no measure of the pressure: a part of the
+force across the corner weighs 1 / turn in it, and one of the two rows may even be open.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Array, Index, Mask, from_triplets
+from ..arrays import Array, Index, Mask, across, from_triplets
 from ..fem import BoundaryTrace
 from ..lagrange import gauss, lagrange
 from ..problem import Contact
-from .projection import snap
-from .search import partners
+from .projection import Partners, cast, coincident, none_met, snap
 
 FACING = 1e-8  # cosine between normal and direction from which a point faces the other body
-ALIKE = np.sqrt(0.5)  # cosine of the turn up to which both sides of a corner have one pressure
-
-
-def twins(line: ContactLine) -> Index:
-    """Pairs (t, 2) of contact points that share a node."""
-    order = np.argsort(line.node, kind="stable")
-    node = line.node[order]
-    same = np.flatnonzero(node[1:] == node[:-1])
-    return np.column_stack([order[same], order[same + 1]])
-
-
-def in_contact(line: ContactLine, active: Mask) -> Mask:
-    """Points in contact (m,): the `active` (m,) and open ones at corners inside the contact.
-
-    The node touches the other side of the corner, and the next point on this side is active: one
-    of the two rows is released where the node would rather slide off the corner.
-    """
-    state = active.copy()
-    corners = twins(line)
-    for i in corners[active[corners].sum(axis=1) == 1].ravel():
-        if not active[i]:
-            first, last = line.rows[:, :-1], line.rows[:, 1:]
-            next_to = np.concatenate([last[first == i], first[last == i]])
-            state[i] = (next_to >= 0).all() and active[next_to].all()
-    return state
-
-
-def pressure_across_corners(line: ContactLine, force: Array, active: Mask) -> Array:
-    """Pressure (m,): force over weight, but at corners one value for both sides.
-
-    `Solution.pressure` is force over weight everywhere, which at corners of small turns splits the
-    node's force without a meaning. A stress that is continuous at a corner without friction has
-    both normals as eigenvectors, so that both pressures are equal unless the sides are
-    perpendicular. Up to a turn of 45 degrees they are told together, from the part of the node's
-    force along the sum of weight times normal: what a uniform pressure on both sides exerts.
-
-    Parameters
-    ----------
-    line : ContactLine
-        The pair.
-    force : ndarray (m,)
-        At its points, per unit thickness.
-    active : ndarray of bool (m,)
-        Points in contact.
-
-    Returns
-    -------
-    ndarray (m,)
-        Force per unit length (P1) or per unit eta (P2).
-    """
-    pressure = force / line.weight
-    corners = twins(line)
-    if corners.size == 0 or line.contact.direction is not None:
-        return pressure
-    inside = in_contact(line, active)[corners].all(axis=1)
-    normal = line.direction[corners]  # (t, 2, 2), row i the normal of side i
-    inside &= (normal[:, 0] * normal[:, 1]).sum(axis=1) >= ALIKE
-    corners, normal = corners[inside], normal[inside]
-    uniform = (line.weight[corners][:, :, None] * normal).sum(axis=1)
-    resultant = (force[corners][:, :, None] * normal).sum(axis=1)
-    shared = (resultant * uniform).sum(axis=1) / (uniform**2).sum(axis=1)
-    pressure[corners] = shared[:, None]
-    return pressure
+TOUCHING = 4 * np.finfo(float).eps  # round-off of a measured gap, relative to the coordinates
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +88,96 @@ class ContactLine:
     searches: int
 
 
+Values = TypeVar("Values", Array, Mask)
+
+
+def by_line(lines: Sequence[ContactLine], values: Values) -> list[Values]:
+    """Parts (m_i,) of `values` (m,) over the points of all lines in order, one for each line."""
+    stops = np.cumsum([len(line.node) for line in lines])
+    return np.split(values, stops[:-1]) if len(lines) else []
+
+
+def twins(line: ContactLine) -> Index:
+    """Pairs (t, 2) of contact points that share a node."""
+    order = np.argsort(line.node, kind="stable")
+    node = line.node[order]
+    same = np.flatnonzero(node[1:] == node[:-1])
+    return np.column_stack([order[same], order[same + 1]])
+
+
+def in_contact(line: ContactLine, active: Mask) -> Mask:
+    """Points in contact (m,): the `active` (m,) and open ones at corners inside the contact.
+
+    The node touches the other side of the corner, and the next point on this side is active: one
+    of the two rows is released where the node would rather slide off the corner.
+    """
+    state = active.copy()
+    corners = twins(line)
+    for i in corners[active[corners].sum(axis=1) == 1].ravel():
+        if not active[i]:
+            first, last = line.rows[:, :-1], line.rows[:, 1:]
+            next_to = np.concatenate([last[first == i], first[last == i]])
+            state[i] = (next_to >= 0).all() and active[next_to].all()
+    return state
+
+
+def rays(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
+    """Unit vectors (k, 2) to the primary from points at `s` (k,) of segments `segment` (k,)."""
+    if contact.direction is None:
+        return trace.exact_normal(segment, s)
+    return np.tile(contact.direction, (len(s), 1))
+
+
+def partners(
+    trace: BoundaryTrace,
+    facing: Index,
+    own: Index,
+    points: Array,
+    directions: Array,
+    *,
+    nodes: bool = True,
+) -> Partners:
+    """Points of the segments `facing` opposite to `points`: A_j and B_j of HH81 (2.10).
+
+    Parameters
+    ----------
+    trace : BoundaryTrace
+    facing : ndarray of int (q,)
+        Segments of the facing body; none for a rigid obstacle.
+    own : ndarray of int (k,)
+        Segments on which the points lie.
+    points, directions : ndarray (k, 2)
+        The points, and unit vectors towards the facing body.
+    nodes : bool
+        Whether they are nodes, some of which may lie at others.
+    """
+    curve, side = trace.curve[facing], trace.side[facing]
+    found = none_met(len(points))
+    if facing.size == 0:
+        return found
+    if nodes:
+        found = coincident(points, directions, curve, side, trace.places(facing))
+    rest = np.flatnonzero(found.segment < 0)
+    if rest.size:
+        other = cast(points[rest], directions[rest], curve, side)
+        own, points_, along = own[rest], points[rest], directions[rest]
+        # Overlap puts a partner behind the point, inside the own body; one that the backward ray
+        # meets only after it has left that body belongs to a far side.
+        behind = (other.segment >= 0) & (other.distance < 0)
+        for body in np.unique(trace.body[own[behind]]):
+            here = np.flatnonzero(behind & (trace.body[own] == body))
+            rim = np.flatnonzero(trace.body == body)
+            out = cast(points_[here], -along[here], trace.curve[rim], -trace.side[rim], ahead=True)
+            beyond = (out.segment >= 0) & (-other.distance[here] > out.distance)
+            other.segment[here[beyond]] = -1
+        found.segment[rest], found.s[rest] = other.segment, other.s
+        found.distance[rest] = other.distance
+    # Points that only round-off keeps apart touch: no load is too small to be felt.
+    found.distance[np.abs(found.distance) <= TOUCHING * np.abs(points).max(initial=0.0)] = 0.0
+    segment = np.where(found.segment < 0, -1, facing[found.segment])
+    return replace(found, segment=segment, searched=rest.size > 0)
+
+
 def prescribed_gap(
     contact: Contact, trace: BoundaryTrace, segment: Index, s: Array, position: Array
 ) -> Array:
@@ -172,8 +200,7 @@ def jacobian(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -
     derivative, measure = trace.derivative(segment, s), trace.measure(segment, s)
     if contact.direction is None:
         return np.linalg.norm(derivative, axis=1) * measure
-    dx, dy = contact.direction
-    return np.abs(derivative[:, 0] * -dy + derivative[:, 1] * dx) * measure
+    return np.abs(derivative @ across(np.array(contact.direction))) * measure
 
 
 def segment_weights(trace: BoundaryTrace, contact: Contact, segments: Index) -> Array:
@@ -188,23 +215,6 @@ def segment_weights(trace: BoundaryTrace, contact: Contact, segments: Index) -> 
     return weights
 
 
-def _numbered(
-    trace: BoundaryTrace, contact: Contact, segment: Index, node: Index, normal: Array
-) -> tuple[Index, Array]:
-    """Number (n,) of the contact point at each node of each segment, and directions (m, 2).
-
-    -1 where the `normal` (n, 2) there does not face the other body.
-    """
-    number = np.full(len(node), -1)
-    if contact.direction is None:
-        number[:], direction = trace.number_points(segment, node, normal)  # n^i in (2.3), (2.5)
-        return number, direction
-    xi = np.tile(contact.direction, (len(node), 1))  # (2.10): one point at a node
-    faces = normal @ np.array(contact.direction) > FACING
-    number[faces], direction = trace.number_points(segment[faces], node[faces], xi[faces])
-    return number, direction
-
-
 def _coupling(trace: BoundaryTrace, partner: Index, partner_s: Array) -> sp.csr_array:
     """Basis functions (m, n) of the facing nodes at the partner points; none of an obstacle."""
     if (partner < 0).all():
@@ -214,22 +224,6 @@ def _coupling(trace: BoundaryTrace, partner: Index, partner_s: Array) -> sp.csr_
     row, place = np.nonzero(share)
     facing = trace.nodes[partner[row], place]
     return from_triplets(share[row, place], row, facing, (len(share), trace.space.ndof))
-
-
-def _weights(shares: Array, rows: Index, kept: Mask) -> tuple[Array, Mask]:
-    """Weights (m,) of the points, and the segments (k,) that face the primary with all nodes.
-
-    `shares` (k, order + 1) are the integrals of the nodes' functions over each segment, `rows` the
-    points there; `kept` (m,) are the points that meet the primary.
-    """
-    weight = np.zeros(len(kept))
-    met = np.append(kept, False)[rows]
-    faces = met.all(axis=1)
-    np.add.at(weight, rows[faces], shares[faces])
-    # A point whose segments face the primary in part only has nothing better than those parts.
-    partly = met & (np.append(weight, 1.0)[rows] == 0)
-    np.add.at(weight, rows[partly], shares[partly])
-    return weight, np.asarray(faces)
 
 
 def nodal_line(
@@ -245,37 +239,49 @@ def nodal_line(
     segment, s = trace.at_nodes(segments)
     node = trace.nodes[segments].ravel()
     normal = trace.exact_normal(segment, s)
-    number, direction = _numbered(trace, contact, segment, node, normal)
+    if contact.direction is None:
+        number, direction = trace.number_points(segment, node, normal)  # n^i in (2.3), (2.5)
+    else:  # (2.10): one point at a node that faces the other body
+        number = np.full(len(node), -1)
+        xi = np.tile(np.array(contact.direction), (len(node), 1))
+        faces = (normal * xi).sum(axis=1) > FACING
+        number[faces], direction = trace.number_points(segment[faces], node[faces], xi[faces])
     rows = number.reshape(len(segments), trace.order + 1)
     _, first = np.unique(number, return_index=True)
     first = first[len(first) - len(direction) :]  # without -1
     position, at_end = trace.point(segment[first], s[first]), np.isin(s[first], (0.0, 1.0))
-    partner, partner_s, gap, searches = partners(trace, facing, segment[first], position, direction)
-    facing_points = (partner >= 0) | (contact.primary is None)
+    found = partners(trace, facing, segment[first], position, direction)
+    facing_points, gap = (found.segment >= 0) | (contact.primary is None), found.distance
     if contact.gap is not None:
         gap = prescribed_gap(contact, trace, segment[first], s[first], position)
     shares = segment_weights(trace, contact, segments)
     if contact.direction is None:  # what counts where two sides share a point at a small turn
         shares *= (normal * direction[number]).sum(axis=1).reshape(rows.shape)
-    weight, faces = _weights(shares, rows, facing_points)
+    weight = np.zeros(len(first))
+    met = np.append(facing_points, False)[rows]
+    faces = met.all(axis=1)
+    np.add.at(weight, rows[faces], shares[faces])
+    # A point whose segments face the primary in part only has nothing better than those parts.
+    partly = met & (np.append(weight, 1.0)[rows] == 0)
+    np.add.at(weight, rows[partly], shares[partly])
     line = ContactLine(
         contact=contact,
         segments=segments,
         facing=facing,
         rows=rows,
-        faces=faces,
+        faces=np.asarray(faces),
         node=node[first],
         position=position,
         direction=direction,
         gap=gap,  # eps(C_j) in (2.10)
         weight=weight,
-        partner=partner,
-        partner_s=partner_s,
-        coupling=_coupling(trace, partner, partner_s),
+        partner=found.segment,
+        partner_s=found.s,
+        coupling=_coupling(trace, found.segment, found.s),
         on_axis=np.where(s[first] < 0.5, -1, 1) * trace.axis[segment[first]] * at_end == 1,
-        means=np.zeros(len(partner), dtype=bool),
+        means=np.zeros(len(first), dtype=bool),
         shares=shares,
-        searches=searches,
+        searches=int(found.searched),
     )
     return line, facing_points
 
@@ -292,23 +298,3 @@ def without(line: ContactLine, dropped: Index) -> ContactLine:
     arrays = ("node", "position", "direction", "gap", "weight", "partner", "partner_s")
     kept = {name: getattr(line, name)[keep] for name in (*arrays, "coupling", "on_axis", "means")}
     return replace(line, rows=renumber[line.rows], **kept)
-
-
-def at_quadrature(
-    line: ContactLine, trace: BoundaryTrace, order: int
-) -> tuple[Index, Index, Array, Array]:
-    """Quadrature points on the segments of `line` that face the primary.
-
-    Returns
-    -------
-    local, segment : ndarray of int (k,)
-        Row of `line.rows` and segment number of each point.
-    s, weight : ndarray (k,)
-        Parameter, and quadrature weight in arc length (P1) or eta (P2).
-    """
-    s, w = gauss(order)
-    inside = np.flatnonzero(line.faces)
-    local = np.repeat(inside, len(s))
-    segment = line.segments[local]
-    s, w = np.tile(s, len(inside)), np.tile(w, len(inside))
-    return local, segment, s, w * jacobian(trace, line.contact, segment, s)

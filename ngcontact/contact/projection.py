@@ -10,8 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, across
 from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative, zeros
 
 MATCHED = 1e-9  # distance, relative to a segment's length, below which two points are one
@@ -21,7 +22,7 @@ NEWTON_STEPS = 20
 # its square. Below 1e-15, the round-off of places, no change falls, and all steps were taken.
 SETTLED = 1e-12
 LEBESGUE = 2.0  # bounds interpolation at Gauss-Lobatto points: 1.98 at degree 7
-PAIRS_AT_ONCE = 4_000_000  # of points and segments: bounds the memory of a search
+PAIRS_AT_ONCE = 4_000_000  # of points and segments that are looked at together: bounds memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,11 +37,14 @@ class Partners:
         Parameter on it.
     distance : ndarray (k,)
         Distance along the direction, a length; negative where the curves overlap, inf without one.
+    searched : bool
+        Whether there was something to search, which is not where all are nodes at the same place.
     """
 
     segment: Index
     s: Array
     distance: Array
+    searched: bool = False
 
 
 def at(curve: Array, segment: Index, s: Array) -> Array:
@@ -56,10 +60,9 @@ def _slope(curve: Array, segment: Index, s: Array) -> Array:
 def normals(curve: Array, side: Array, segment: Index, s: Array) -> Array:
     """Outward normals (k, 2), not normalised, at `s` (k,) of segments `segment` (k,).
 
-    `curve` (q, p + 1, 2) and `side` (q,) as in `cast`.
+    Of the facing segments `curve` (q, p + 1, 2), `side` (q,).
     """
-    tangent = _slope(curve, segment, s)
-    return np.column_stack([tangent[:, 1], -tangent[:, 0]]) * side[segment, None]
+    return -across(_slope(curve, segment, s)) * side[segment, None]
 
 
 def none_met(size: int) -> Partners:
@@ -74,27 +77,28 @@ def _bend(curve: Array) -> Array:
     return LEBESGUE * np.linalg.norm(curve - along, axis=2).max(axis=1)
 
 
-def _turning(curve: Array, across: Array) -> Mask:
-    """Whether segments (k, p + 1, 2) go back and forth along `across` (k, 2)."""
+def _turning(curve: Array, normal: Array) -> Mask:
+    """Whether segments (k, p + 1, 2) go back and forth along `normal` (k, 2)."""
     degree = curve.shape[1] - 1
     rates = lagrange_derivative(degree, gauss_lobatto(max(1, degree - 1)))
-    which, _ = zeros(max(1, degree - 1), np.einsum("ji,kid,kd->kj", rates, curve, across))
+    which, _ = zeros(max(1, degree - 1), np.einsum("ji,kid,kd->kj", rates, curve, normal))
     return np.isin(np.arange(len(curve)), which)
 
 
-def _candidates(
-    points: Array, across: Array, curve: Array, pairs_at_once: int
-) -> tuple[Index, Index, Array]:
-    """Pairs (point, segment) whose ray crosses it, once for each crossing, and where about."""
+def _candidates(points: Array, normal: Array, curve: Array) -> tuple[Array, Array]:
+    """Pairs (2, r) of point and segment whose lines cross it, once for each crossing, and s (r,).
+
+    Lines through `points` (k, 2) with the normals `normal` (k, 2).
+    """
     ends, degree = curve[:, [0, -1]], curve.shape[1] - 1
     slack = MATCHED * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     bend = _bend(curve)
     bend[bend <= slack] = 0.0  # straight
     reach = slack + bend
-    block = max(1, pairs_at_once // max(1, len(curve)))
-    pairs = []
+    block = max(1, PAIRS_AT_ONCE // max(1, len(curve)))
+    pairs, places = [], []
     for first in range(0, len(points), block):
-        t = across[first : first + block]
+        t = normal[first : first + block]
         here = (points[first : first + block] * t).sum(axis=1)
         h0 = t @ ends[:, 0].T - here[:, None]
         h1 = t @ ends[:, 1].T - here[:, None]
@@ -105,19 +109,20 @@ def _candidates(
         passes = np.minimum(a, b) <= slack[segment]
         passes &= np.maximum(a, b) >= -slack[segment]
         # Markov: what is no larger than the bend on [0, 1] has a slope up to 2 p^2 times that.
-        turns, bent = np.flatnonzero(np.abs(a - b) <= 2 * degree**2 * bend[segment]), []
+        turns = np.flatnonzero(np.abs(a - b) <= 2 * degree**2 * bend[segment])
         if len(turns):
             turns = turns[_turning(curve[segment[turns]], t[point[turns]])]
             height = np.einsum("kid,kd->ki", curve[segment[turns]], t[point[turns]])
             which, zero = zeros(degree, height - here[point[turns], None])
             passes[turns[which]] = False  # all their crossings are known
-            bent = [(point[turns[which]] + first, segment[turns[which]], zero)]
-        pairs += [(point[passes] + first, segment[passes], s[passes]), *bent]
-    point, segment, s = (np.concatenate(part) for part in zip(*pairs, strict=True))
-    return point, segment, s
+            pairs.append([point[turns[which]] + first, segment[turns[which]]])
+            places.append(zero)
+        pairs.append([point[passes] + first, segment[passes]])
+        places.append(s[passes])
+    return np.concatenate(pairs, axis=1), np.concatenate(places)
 
 
-def _settled(s: Array, step: Callable[[Array], Array], settled: float = SETTLED) -> Array:
+def _newton(s: Array, step: Callable[[Array], Array], settled: float = SETTLED) -> Array:
     """Parameters (k,) in [0, 1] after s - step(s) has been repeated until it stands still."""
     for _ in range(NEWTON_STEPS):
         new = np.clip(s - step(s), 0, 1)
@@ -130,13 +135,13 @@ def _settled(s: Array, step: Callable[[Array], Array], settled: float = SETTLED)
 
 def crossings(
     points: Array,
-    across: Array,
+    normal: Array,
     curve: Array,
     segment: Index,
     s: Array,
     settled: float = SETTLED,
 ) -> Array:
-    """Parameters (k,) of segments on lines through `points` (k, 2) normal to `across` (k, 2).
+    """Parameters (k,) of segments on lines through `points` (k, 2) with normals `normal` (k, 2).
 
     By Newton's method from `s` (k,) on `segment` (k,) of `curve` (q, p + 1, 2), until no step is
     larger than `settled`.
@@ -144,21 +149,15 @@ def crossings(
 
     def step(s: Array) -> Array:
         # (2.10): A_j and B_j on one perpendicular
-        miss = ((at(curve, segment, s) - points) * across).sum(axis=1)
-        rate = (_slope(curve, segment, s) * across).sum(axis=1)
+        miss = ((at(curve, segment, s) - points) * normal).sum(axis=1)
+        rate = (_slope(curve, segment, s) * normal).sum(axis=1)
         return np.divide(miss, rate, out=np.zeros_like(miss), where=rate != 0)
 
-    return _settled(s, step, settled)
+    return _newton(s, step, settled)
 
 
 def cast(
-    points: Array,
-    directions: Array,
-    curve: Array,
-    side: Array,
-    *,
-    ahead: bool = False,
-    pairs_at_once: int = PAIRS_AT_ONCE,
+    points: Array, directions: Array, curve: Array, side: Array, *, ahead: bool = False
 ) -> Partners:
     """Nearest points, along given directions, of a curve whose outward normal opposes them.
 
@@ -175,8 +174,6 @@ def cast(
         The facing segments.
     ahead : bool
         Only points in the sense of the direction.
-    pairs_at_once : int
-        Of points and segments that are looked at together; bounds the memory, changes no result.
 
     Returns
     -------
@@ -186,27 +183,73 @@ def cast(
     found = none_met(len(points))
     if len(curve) == 0 or len(points) == 0:
         return found
-    across = np.column_stack([-directions[:, 1], directions[:, 0]])
-    point, segment, s = _candidates(points, across, curve, pairs_at_once)
-    s = crossings(points[point], across[point], curve, segment, s)
+    t = across(directions)
+    (point, segment), s = _candidates(points, t, curve)
+    s = crossings(points[point], t[point], curve, segment, s)
     s = np.where(s < MATCHED, 0.0, np.where(s > 1 - MATCHED, 1.0, s))
     offset = at(curve, segment, s) - points[point]
-    miss = np.abs((offset * across[point]).sum(axis=1))
-    lengths = np.linalg.norm(curve[segment, -1] - curve[segment, 0], axis=1)
-    normal = normals(curve, side, segment, s)
-    # A ray along a straight boundary, such as a symmetry plane, does not meet it.
-    grazing = GRAZING * np.linalg.norm(normal, axis=1)
-    faces = (normal * directions[point]).sum(axis=1) < -grazing
-    faces &= miss <= 2 * MATCHED * lengths
+    length = MATCHED * np.linalg.norm(curve[segment, -1] - curve[segment, 0], axis=1)
     distance = (offset * directions[point]).sum(axis=1)
+    meets = _faces(curve, side, segment, s, directions[point])
+    meets &= np.abs((offset * t[point]).sum(axis=1)) <= 2 * length
     if ahead:
-        faces &= distance >= -MATCHED * lengths
-    point, segment, s, distance = point[faces], segment[faces], s[faces], distance[faces]
-    order = np.lexsort((np.abs(distance), point))  # by point, nearest first
-    point, first = np.unique(point[order], return_index=True)
+        meets &= distance >= -length
+    order = np.flatnonzero(meets)
+    order = order[np.lexsort((np.abs(distance[order]), point[order]))]  # by point, nearest first
+    _, first = np.unique(point[order], return_index=True)
     best = order[first]
-    found.segment[point], found.s[point] = segment[best], s[best]
-    found.distance[point] = distance[best]
+    found.segment[point[best]], found.s[point[best]] = segment[best], s[best]
+    found.distance[point[best]] = distance[best]
+    return found
+
+
+def _faces(curve: Array, side: Array, segment: Index, s: Array, directions: Array) -> Mask:
+    """Whether outward normals at `s` (k,) of segments `segment` (k,) oppose `directions` (k, 2).
+
+    A ray along a straight boundary, such as a symmetry plane, does not meet it.
+    """
+    normal = normals(curve, side, segment, s)
+    grazing = GRAZING * np.linalg.norm(normal, axis=1)  # round-off must not decide
+    return np.asarray((normal * directions).sum(axis=1) < -grazing)
+
+
+def coincident(
+    points: Array, directions: Array, curve: Array, side: Array, nodes: Array
+) -> Partners:
+    """Partners among the nodes of the facing segments that lie at the points themselves.
+
+    Parameters
+    ----------
+    points, directions : ndarray (k, 2)
+        Contact points and unit vectors towards the facing body.
+    curve, side : ndarray (q, degree + 1, 2), (q,)
+        The facing segments.
+    nodes : ndarray (q, order + 1)
+        Parameters of the nodes on them.
+
+    Returns
+    -------
+    Partners
+        Segment -1 where no node is within `MATCHED` of the point, or the curve does not face it.
+    """
+    found = none_met(len(points))
+    if len(curve) == 0 or len(points) == 0:
+        return found
+    shapes = lagrange(curve.shape[1] - 1, nodes.ravel()).reshape(*nodes.shape, -1)
+    places = np.einsum("qji,qid->qjd", shapes, curve)
+    reach = MATCHED * np.linalg.norm(curve[:, -1] - curve[:, 0], axis=1)
+    tree = cKDTree(places.reshape(-1, 2))
+    # A vertex belongs to two segments; the ray may face only one of them.
+    distances, numbers = tree.query(points, k=2, distance_upper_bound=reach.max())
+    for column in (1, 0):
+        near = np.flatnonzero(np.isfinite(distances[:, column]))
+        segment, local = np.divmod(numbers[near, column], nodes.shape[1])
+        meets = _faces(curve, side, segment, nodes[segment, local], directions[near])
+        meets &= distances[near, column] <= reach[segment]
+        near, segment, local = near[meets], segment[meets], local[meets]
+        found.segment[near], found.s[near] = segment, nodes[segment, local]
+        offset = places[segment, local] - points[near]
+        found.distance[near] = (offset * directions[near]).sum(axis=1)
     return found
 
 
@@ -216,15 +259,13 @@ def snap(s: Array, nodes: Array) -> Array:
     return np.where(np.abs(s - nearest) <= MATCHED, nearest, s)
 
 
-def feet(
-    points: Array, curve: Array, direction: Array | None, pairs_at_once: int = PAIRS_AT_ONCE
-) -> tuple[Index, Array]:
+def feet(points: Array, curve: Array, direction: Array | None) -> tuple[Index, Array]:
     """Where segments pass points: on the lines along `direction`, or on their own normals.
 
     Parameters
     ----------
     points, curve : ndarray (k, 2), (q, p + 1, 2)
-        Any points, and the segments; `pairs_at_once` as in `cast`.
+        Any points, and the segments.
     direction : ndarray (2,) or None for the normal of the segment at the foot.
 
     Returns
@@ -233,26 +274,25 @@ def feet(
         Segments that pass a point between their ends, once for each, and parameters.
     """
     if direction is not None:
-        across = np.tile([-direction[1], direction[0]], (len(points), 1))
-        point, segment, s = _candidates(points, across, curve, pairs_at_once)
-        return segment, crossings(points[point], across[point], curve, segment, s)
+        normal = np.tile(across(direction), (len(points), 1))
+        (point, segment), s = _candidates(points, normal, curve)
+        return segment, crossings(points[point], normal[point], curve, segment, s)
 
     def ahead(point: Index, segment: Index, s: Array) -> Array:
         return ((points[point] - at(curve, segment, s)) * _slope(curve, segment, s)).sum(axis=1)
 
-    block = max(1, pairs_at_once // max(1, curve.size))  # each pair holds its curve
-    found = []
+    block = max(1, PAIRS_AT_ONCE // max(1, curve.size))  # each pair holds its curve
+    found = [np.zeros((2, 0), dtype=np.intp)]
     for first in range(0, len(points), block):
-        point, segment = np.divmod(
-            np.arange(first * len(curve), min(first + block, len(points)) * len(curve)), len(curve)
-        )
-        none, one = np.zeros(len(point)), np.ones(len(point))
+        these = np.arange(first * len(curve), min(first + block, len(points)) * len(curve))
+        point, segment = np.divmod(these, len(curve))
+        starts, ends = np.zeros(len(these)), np.ones(len(these))
         # The nearest point of the segment, not the farthest.
-        passed = (ahead(point, segment, none) > 0) & (ahead(point, segment, one) < 0)
-        found.append((point[passed], segment[passed]))
-    point, segment = (np.concatenate(part) for part in zip(*found, strict=True))
+        passed = (ahead(point, segment, starts) > 0) & (ahead(point, segment, ends) < 0)
+        found.append(np.stack([point[passed], segment[passed]]))
+    point, segment = np.concatenate(found, axis=1)
 
     def step(s: Array) -> Array:  # of Gauss and Newton: at once where the point is on the segment
         return -ahead(point, segment, s) / (_slope(curve, segment, s) ** 2).sum(axis=1)
 
-    return segment, _settled(np.full(len(point), 0.5), step)
+    return segment, _newton(np.full(len(point), 0.5), step)

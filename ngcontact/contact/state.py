@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeVar
 
 import numpy as np
 from scipy.optimize import brentq
 
 from ..arrays import Array, Index, Mask
-from .line import ContactLine, in_contact, twins
+from .line import ContactLine, by_line, in_contact, twins
 
 # Stencil of the fit, by measurement on Hertz contact at orders 1 to 4: the two points next to the
 # contact carry the error of the element in which it ends.
@@ -155,8 +154,7 @@ def ending_segments(line: ContactLine, ends: Transitions) -> Index:
     return np.flatnonzero(at.any(axis=1))
 
 
-Values = TypeVar("Values", Array, Mask)
-
+SMALL_TURN = np.sqrt(0.5)  # cosine up to which both sides of a corner have one pressure
 CONTINUED = 1 / 3  # of the contact around an axis, to which its pressure is the continuation
 
 
@@ -226,10 +224,42 @@ def continued_to_axis(line: ContactLine, pressure: Array, active: Mask) -> Array
     return pressure
 
 
-def by_line(lines: Sequence[ContactLine], values: Values) -> list[Values]:
-    """Parts (m_i,) of an array over the points of all lines in order, one for each line."""
-    stops = np.cumsum([len(line.node) for line in lines])
-    return np.split(values, stops[:-1]) if len(lines) else []
+def pressure_across_corners(line: ContactLine, force: Array, active: Mask) -> Array:
+    """Pressure (m,): force over weight, but at corners one value for both sides.
+
+    `Solution.pressure` is force over weight everywhere, which at corners of small turns splits the
+    node's force without a meaning. A stress that is continuous at a corner without friction has
+    both normals as eigenvectors, so that both pressures are equal unless the sides are
+    perpendicular. Up to a turn of 45 degrees they are told together, from the part of the node's
+    force along the sum of weight times normal: what a uniform pressure on both sides exerts.
+
+    Parameters
+    ----------
+    line : ContactLine
+        The pair.
+    force : ndarray (m,)
+        At its points, per unit thickness.
+    active : ndarray of bool (m,)
+        Points in contact.
+
+    Returns
+    -------
+    ndarray (m,)
+        Force per unit length (P1) or per unit eta (P2).
+    """
+    pressure = force / line.weight
+    corners = twins(line)
+    if corners.size == 0 or line.contact.direction is not None:
+        return pressure
+    inside = in_contact(line, active)[corners].all(axis=1)
+    normal = line.direction[corners]  # (t, 2, 2), row i the normal of side i
+    inside &= (normal[:, 0] * normal[:, 1]).sum(axis=1) >= SMALL_TURN
+    corners, normal = corners[inside], normal[inside]
+    uniform = (line.weight[corners][:, :, None] * normal).sum(axis=1)
+    resultant = (force[corners][:, :, None] * normal).sum(axis=1)
+    shared = (resultant * uniform).sum(axis=1) / (uniform**2).sum(axis=1)
+    pressure[corners] = shared[:, None]
+    return pressure
 
 
 def contact_states(

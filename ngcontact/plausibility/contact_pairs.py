@@ -190,7 +190,8 @@ def penetration(
     x, d = trace.point(segment, s), trace.normal(segment, s)
     if line.contact.direction is not None:
         d = np.tile(line.contact.direction, (len(s), 1))
-    there, s_there, distance, _ = partners(trace, line.facing, segment, x, d, nodes=False)
+    opposite = partners(trace, line.facing, segment, x, d, nodes=False)
+    there, s_there, distance = opposite.segment, opposite.s, opposite.distance
     if line.contact.gap is not None:
         distance = prescribed_gap(line.contact, trace, segment, s, x)
     met = np.isfinite(distance) & ((there >= 0) | (line.contact.primary is None))

@@ -5,8 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from ngcontact.contact.projection import cast
-from ngcontact.contact.search import coincident
+from ngcontact.contact.projection import cast, coincident
 from ngcontact.lagrange import gauss_lobatto, lagrange
 from tests.contact.curves import DOWN, at, circle, graph, nodes_on, rays, upward
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from ngcontact import Contact
-from ngcontact.contact.line import in_contact, pressure_across_corners
-from ngcontact.contact.state import transitions_on
+from ngcontact.contact.line import in_contact
+from ngcontact.contact.state import pressure_across_corners, transitions_on
 
 
 def line(x, order=1, y=None):

@@ -78,7 +78,7 @@ def test_arrays_are_cut_into_pairs_in_one_module():
     without_pairs += ("ngcontact/estimator/bound/program.py",)
     cut = with_lines(r"np\.split\(|cumsum\(\[?len|cumsum\(\[0, \*\(len")
     assert {path for path in cut if not path.startswith(without_pairs)} == {
-        "ngcontact/contact/state.py"
+        "ngcontact/contact/line.py"
     }
 
 

@@ -97,17 +97,18 @@ def facing_points(
     """What faces the places `s` (k, j) on segments `segment` (k,) of the secondary."""
     contact, every, t = pair.line.contact, np.repeat(segment, s.shape[1]), s.ravel()
     x, d = trace.point(every, t), rays(trace, contact, every, t)
-    other, there, gap, _ = partners(trace, pair.line.facing, every, x, d)
+    opposite = partners(trace, pair.line.facing, every, x, d)
+    other, there, gap = opposite.segment, opposite.s, opposite.distance
     faces = other >= 0
     if contact.primary is None:
         faces = (trace.normal(every, t) * d).sum(axis=1) > FACING
     if contact.gap is not None:
         gap = prescribed_gap(contact, trace, every, t, x)
-    opposite = other.reshape(s.shape), there.reshape(s.shape)
-    u, size = jump(trace, displacement, (segment, s), opposite)
+    at = other.reshape(s.shape), there.reshape(s.shape)
+    u, size = jump(trace, displacement, (segment, s), at)
     gap = gap - (u.reshape(d.shape) * d).sum(axis=1)
     gap[np.abs(gap) <= GAP_NOISE * size] = 0.0
-    return FacingPoints(gap.reshape(s.shape), d.reshape(u.shape), *opposite, faces.reshape(s.shape))
+    return FacingPoints(gap.reshape(s.shape), d.reshape(u.shape), *at, faces.reshape(s.shape))
 
 
 class PressureSupport(NamedTuple):
@@ -211,7 +212,8 @@ def _opposite(
     contact, facing = pair.line.contact, pair.line.facing
     inner = (s > SAME_PLACE) & (s < 1 - SAME_PLACE)
     for _ in range(NEWTON_STEPS):
-        there, t, *_ = partners(trace, facing, k, trace.point(k, s), rays(trace, contact, k, s))
+        met = partners(trace, facing, k, trace.point(k, s), rays(trace, contact, k, s))
+        there, t = met.segment, met.s
         near = np.flatnonzero(inner & (there >= 0) & (np.minimum(t, 1 - t) < VERTEX_DISTANCE))
         vertex, along = np.round(t[near]), trace.derivative(k[near], s[near])
         away = trace.point(there[near], vertex) - trace.point(there[near], t[near])
