@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index
 from ..constraints import (
     BasisTransformation,
     Conditions,
+    Rows,
     change_of_basis,
     concatenated,
     no_conditions,
@@ -101,29 +101,23 @@ def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[
 
 @dataclass(frozen=True, eq=False)
 class AdmissibleSet:
-    """K_h of HH81 (2.3), (2.5), (2.10), on n node values for each component.
+    """K_h of HH81 (2.3), (2.5), (2.10).
 
     Attributes
     ----------
     lines : list of ContactLine
-        The contact pairs with the points that carry rows, m in all.
+        The contact pairs with the points that carry rows.
     conditions : Conditions
         Gamma_u and Gamma_0 at nodes.
-    B : sparse (m, 2n)
-        Contact rows on node values, all pairs in order; without a unit.
-    g : ndarray (m,)
-        Their bounds, lengths.
-    equality : ndarray of bool (m,)
-        Rows that hold with equality, Remark 3.3.
+    rows : Rows
+        Those of all pairs in order.
     basis : BasisTransformation
         Unknowns in which rows and prescribed values are single unknowns.
     """
 
     lines: list[ContactLine]
     conditions: Conditions
-    B: sp.csr_array
-    g: Array
-    equality: Mask
+    rows: Rows
     basis: BasisTransformation
 
 
@@ -141,12 +135,4 @@ def admissible_set(problem: Problem, space: Space, found: Sequence[ContactLine])
     length = float(np.abs(trace.curve).max())
     stiffness = space.stiffness() if rows.coupling.nnz else None  # else all rows have one host
     basis = change_of_basis(conditions, rows, length, stiffness)
-    rows = rows.select(basis.kept)
-    return AdmissibleSet(
-        lines=kept_lines(lines, basis.kept),
-        conditions=conditions,
-        B=rows.matrix,
-        g=rows.g,
-        equality=rows.equality,
-        basis=basis,
-    )
+    return AdmissibleSet(kept_lines(lines, basis.kept), conditions, rows.select(basis.kept), basis)

@@ -1,9 +1,10 @@
-"""The discrete problems (P_1h), (P_2h) of HH81 on one mesh: first active sets, solution."""
+"""The discrete problems (P_1h), (P_2h) of HH81 on one mesh: reuse, first active sets, solution."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from operator import attrgetter
 from typing import Any
 
 import ngsolve as ng
@@ -11,9 +12,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Index, Integers, Mask, from_triplets
+from ..arrays import Array, Mask, from_triplets
 from ..constraints import BasisTransformation, Conditions
-from ..contact import ContactLine, ContactState, by_line
+from ..contact import ContactLine, ContactState, by_line, contact_line
 from ..errors import ConvergenceError, NoEquilibriumError
 from ..fem import (
     LOAD_BONUS,
@@ -35,7 +36,7 @@ from ..linalg import (
     truncated_multigrid,
 )
 from ..mesh import vertex_parents
-from ..problem import Problem
+from ..problem import MeshArrays, Problem, varies
 from ..qp import (
     BorderedSystems,
     Iterate,
@@ -46,23 +47,13 @@ from ..qp import (
 )
 from .admissible_set import AdmissibleSet, admissible_set, conditioned_segments
 from .equilibrium import Rigid, equilibrium
-from .reuse import (
-    Reduced,
-    Reusable,
-    contact_lines,
-    same_basis,
-    same_mesh,
-    same_stiffness,
-)
 
 TOUCHING = 1e-12  # gap, relative to the zone, up to which points start active
 APART = 1e-6  # distance of the two points at a corner, by their directions, relative to the zone
 TIED = 1e-6  # difference of two distances, relative to them, that round-off may have made
-
-
 # Powers of ten between which sums of products keep their digits.
 LOWEST, HIGHEST = -306, 305
-FEWEST = 0.7  # share of the unknowns that must be gone in the coarsest space
+MIN_REFINED = 0.7  # share of the unknowns that must be gone in the coarsest space
 
 
 @dataclass
@@ -86,96 +77,27 @@ class MultigridUse:
 MULTIGRID = MultigridUse()  # may be set by who measures or tests
 
 
-def check_range(program: QuadraticProgram) -> None:
-    """Raise where double precision holds the data but neither the forces nor the displacements."""
-    p = program
-    stiffness, load = p.diagonal.max(initial=0.0), np.abs(p.b).max(initial=0.0)
-    given = max(np.abs(p.values).max(initial=0.0), -p.g.min(initial=0.0))
-    with np.errstate(divide="ignore"):
-        k, f, v = np.log10([stiffness, load, given])
-    for name, size in (("displacements", max(v, f - k)), ("forces", max(f, k + v))):
-        if not (size == -np.inf or LOWEST < size < HIGHEST):
-            raise ValueError(
-                f"moduli, loads and prescribed displacements make {name} of 1e{size:+.0f}, beyond "
-                f"the range of numbers (1e{LOWEST} to 1e+{HIGHEST}); choose other units"
-            )
-
-
 def linear_systems(
-    program: QuadraticProgram,
-    matrix: ng.BaseMatrix,
-    T: sp.csr_array,
-    parents: Integers,
-    nodes: Integers,
+    program: QuadraticProgram, matrix: ng.BaseMatrix, space: Space, basis: BasisTransformation
 ) -> BorderedSystems:
     """Systems of a discrete problem: by multigrid where it is large and has coarser spaces.
 
-    Parameters
-    ----------
-    program : QuadraticProgram
-    matrix : ng.BaseMatrix
-        Its matrix for NGSolve.
-    T : sparse (2n, 2n)
-    parents : ndarray of int (nv, 2)
-    nodes : ndarray of int (k, p + 1)
-        See `linalg.coarsenings`.
+    `matrix` is that of the `program` for NGSolve.
     """
-    factor, order = cholesky(matrix), nodes.shape[1] - 1
+    factor, trace = cholesky(matrix), space.trace
+    parents, nodes = vertex_parents(trace.mesh), trace.nodes[space.nodal]
     size = program.b.size
-    small = size < MULTIGRID.large.get(order, np.inf) or size <= MULTIGRID.coarsest
+    small = size < MULTIGRID.large.get(trace.order, np.inf) or size <= MULTIGRID.coarsest
     coarsest = 2 * np.count_nonzero(parents[:, 0] < 0)  # of the first mesh
     half = matrix.nze < program.K.nnz  # all that a factorisation reads
-    if small or half or coarsest > (1 - FEWEST) * size:
+    if small or half or coarsest > (1 - MIN_REFINED) * size:
         return BorderedSystems(program, factor)
 
     def prepare(free: Mask) -> Multigrid:
-        return truncated_multigrid(matrix, coarsenings(T, parents, nodes, MULTIGRID.coarsest), free)
+        steps = coarsenings(basis.T, parents, nodes, MULTIGRID.coarsest)
+        return truncated_multigrid(matrix, steps, free)
 
     return IterativeSystems(program, factor, prepare)
-
-
-@dataclass(frozen=True, eq=False)
-class Influence:
-    """The displacement of least energy with given jumps at active points, without loads.
-
-    Attributes
-    ----------
-    unknowns : ndarray (2n,)
-        Of the displacement, lengths where the jumps are lengths.
-    force : ndarray (m,)
-        Nodal contact forces, force per thickness.
-    factorizations, back_solves : int
-        Work done: one back-solve where there is a factorisation for the active set.
-    """
-
-    unknowns: Array
-    force: Array
-    factorizations: int
-    back_solves: int
-
-
-def influence(
-    program: QuadraticProgram, systems: BorderedSystems, active: Mask, jumps: Array
-) -> Influence:
-    """Move the `active` (m,) points by `jumps` (m,); supports rest, the other points are free.
-
-    Raises
-    ------
-    ConvergenceError
-        Active points and supports leave a rigid motion free.
-    """
-    null_space, zero = program.null_space, np.zeros_like(program.b)
-    if not null_space.resisted(program.unknown[active]):
-        raise ConvergenceError("contact leaves a rigid motion free")
-    systems.restart(replace(program, b=zero, g=jumps, values=zero))
-    try:
-        y, force = systems.solve(active)
-    except SingularError as singular:
-        raise ConvergenceError(str(singular)) from None
-    finally:
-        work = systems.factorizations, systems.back_solves
-        systems.restart(program)
-    return Influence(y, force, *work)
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,22 +140,110 @@ class DiscreteProblem:
     rigid: Rigid | None
     assembled: bool
 
-    def influence(self, active: Mask, jumps: Array) -> tuple[ng.GridFunction, Influence]:
-        """The displacement that moves the `active` (m,) points by `jumps` (m,), without loads.
+    def influence(self, active: Mask, jumps: Array) -> Iterate:
+        """The displacement of least energy that moves the `active` (m,) points by `jumps` (m,).
+
+        Supports rest, the other points are free, and there are no loads: one back-solve where there
+        is a factorisation for the active set.
 
         Raises
         ------
         ConvergenceError
             Active points and supports leave a rigid motion free.
         """
-        found = influence(self.program, self.systems, active, jumps)
-        return self.displacement(found.unknowns), found
+        p, systems = self.program, self.systems
+        if not p.null_space.resisted(p.unknown[active]):
+            raise ConvergenceError("contact leaves a rigid motion free")
+        zero = np.zeros_like(p.b)
+        systems.restart(replace(p, b=zero, g=jumps, values=zero))
+        try:
+            y, force = systems.solve(active)
+        except SingularError as singular:
+            raise ConvergenceError(str(singular)) from None
+        finally:
+            work = systems.factorizations, systems.back_solves
+            systems.restart(p)
+        return Iterate(
+            u=y, force=force, active=active, steps=[], factorizations=work[0], back_solves=work[1]
+        )
 
     def displacement(self, unknowns: Array) -> ng.GridFunction:
         """The displacement with the given `unknowns` (2n,)."""
         result = ng.GridFunction(self.space.V)
         result.vec.FV().NumPy()[:] = self.space.basis @ (self.basis.T @ unknowns)
         return result
+
+
+def same_mesh(trace: BoundaryTrace, space: Space) -> bool:
+    """Whether the mesh of `trace` is still as it was when `space` was made on it, in its model."""
+    old = space.trace
+    return (
+        trace.model is old.model
+        and np.array_equal(trace.nodes, old.nodes)
+        and np.array_equal(trace.curve, old.curve)
+        and np.array_equal(MeshArrays(trace.mesh).vertices, space.vertices)
+    )
+
+
+def same_stiffness(problem: Problem, other: Problem) -> bool:
+    """Whether two problems have the same elastic bodies; functions may have changed unseen."""
+    laws, others = problem.materials, other.materials
+    return (
+        problem.model == other.model
+        and laws.keys() == others.keys()
+        and not any(map(varies, [*laws.values(), *others.values()]))
+        and all(type(law) is type(others[body]) for body, law in laws.items())
+        and all(
+            np.array_equal(value, vars(others[body])[name])
+            for body, law in laws.items()
+            for name, value in vars(law).items()
+        )
+    )
+
+
+def same_basis(one: BasisTransformation, other: BasisTransformation) -> bool:
+    """Whether rows and supports make the same unknowns; bounds and values may differ."""
+    return (
+        np.array_equal(one.fixed, other.fixed)
+        and np.array_equal(one.unknown, other.unknown)
+        and one.T.shape == other.T.shape
+        and (one.T != other.T).nnz == 0
+    )
+
+
+def contact_lines(
+    problem: Problem, trace: BoundaryTrace, known: Sequence[ContactLine]
+) -> list[ContactLine]:
+    """The line of each pair, a known one where it is the same.
+
+    What an earlier pair of the same direction and gap covers is left to that one where both know
+    the facing segments.
+    """
+    alike, lines = attrgetter("direction", "bilateral", "rows", "roles"), list[ContactLine]()
+    for number, contact in enumerate(problem.contact):
+        taken, facing = [np.zeros(0, dtype=np.intp)], trace.segments(contact.primary)
+        for earlier, line in zip(problem.contact[:number], lines, strict=True):
+            if (alike(earlier), earlier.gap) != (alike(contact), contact.gap):
+                continue
+            if earlier.primary == contact.primary:
+                taken.append(line.segments)
+            elif np.intersect1d(line.facing, facing).size:
+                taken.append(line.segments[line.faces])
+        own = np.intersect1d(np.concatenate(taken), trace.segments(contact.secondary))
+        sides = contact.secondary, contact.primary
+        same = (
+            line
+            for line in known
+            if (line.contact.secondary, line.contact.primary) == sides
+            and alike(line.contact) == alike(contact)
+            and line.contact.gap is None  # functions may have changed unseen
+            and contact.gap is None
+        )
+        found = None if own.size else next(same, None)
+        lines.append(
+            contact_line(trace, contact, own) if found is None else replace(found, searches=0)
+        )
+    return lines
 
 
 def discretise(
@@ -258,88 +268,83 @@ def discretise(
     """
     trace = boundary_trace(mesh, order, model_of(problem))
     nodal = conditioned_segments(problem, trace)
-    known = _reusable(problem, trace, nodal, previous)
-    found = contact_lines(problem, trace, known.lines)  # Gamma_K, first: it may be refused
-    space = _space(problem, trace, element, nodal, known.space)  # V_h
-    admissible = admissible_set(problem, space, found)  # K_h
-    rigid, f = equilibrium(problem, space, admissible)  # Remark 3.7
+    if previous is not None and not same_mesh(trace, previous.space):
+        previous = None  # its mesh has been changed in place
+    known = [] if previous is None else previous.found
+    found = contact_lines(problem, trace, known)  # Gamma_K, first: it may be refused
+    if previous is not None and not same_stiffness(problem, previous.problem):
+        previous = None
+    if previous is None:
+        space = assemble(problem, trace, element, nodal)  # V_h
+    else:
+        V = previous.space.V
+        space = replace(
+            previous.space,
+            trace=trace,
+            nodal=nodal,
+            basis=node_basis(V, trace, nodal, element),
+            f=load_vector(problem, V, LOAD_BONUS),
+        )
+    admissible = admissible_set(problem, space, found)
+    basis, rows = admissible.basis, admissible.rows
+    rigid, f = equilibrium(problem, space, admissible.conditions, rows, basis)  # Remark 3.7
     space = replace(space, f=f)
-    program, systems = _program(space, admissible, rigid, known.reduced)
+    same_unknowns = previous is not None and same_basis(basis, previous.basis)
+    if previous is not None and same_unknowns and np.array_equal(nodal, previous.space.nodal):
+        program = _program(space, admissible, rigid, previous.program.K)
+        systems = previous.systems
+    else:
+        K, matrix = congruent(space.matrix, space.A, space.basis @ basis.T)
+        program = _program(space, admissible, rigid, K)
+        systems = linear_systems(program, matrix, space, basis)
     return DiscreteProblem(
         problem=problem,
         space=space,
         found=found,
         lines=admissible.lines,
         conditions=admissible.conditions,
-        B=admissible.B,
-        basis=admissible.basis,
+        B=rows.matrix,
+        basis=basis,
         program=program,
         systems=systems,
         rigid=rigid,
-        assembled=known.space is None,
+        assembled=previous is None,
     )
 
 
-def _reusable(
-    problem: Problem, trace: BoundaryTrace, nodal: Index, previous: DiscreteProblem | None
-) -> Reusable:
-    """What `previous` leaves to a problem with conditions at the nodes of the segments `nodal`."""
-    if previous is None or not same_mesh(trace, previous.space):
-        return Reusable()  # there is none, or its mesh has been changed in place
-    if not same_stiffness(problem, previous.problem):
-        return Reusable(previous.found)
-    if not np.array_equal(nodal, previous.space.nodal):
-        return Reusable(previous.found, previous.space)
-    reduced = Reduced(previous.basis, previous.program.K, previous.systems)
-    return Reusable(previous.found, previous.space, reduced)
-
-
-def _space(
-    problem: Problem, trace: BoundaryTrace, element: str, nodal: Index, known: Space | None
-) -> Space:
-    """V_h with its forms; the stiffness is that of `known` if given."""
-    if known is None:
-        return assemble(problem, trace, element, nodal)
-    basis = node_basis(known.V, trace, nodal, element)
-    f = load_vector(problem, known.V, LOAD_BONUS)
-    return replace(known, trace=trace, nodal=nodal, basis=basis, f=f)
-
-
 def _program(
-    space: Space, admissible: AdmissibleSet, rigid: Rigid | None, known: Reduced | None
-) -> tuple[QuadraticProgram, BorderedSystems]:
-    """L over K_h in the unknowns of rows and supports, and its linear systems.
+    space: Space, admissible: AdmissibleSet, rigid: Rigid | None, K: sp.csr_array
+) -> QuadraticProgram:
+    """L over K_h in the unknowns of rows and supports, with the stiffness `K` of these.
 
     Raises
     ------
     ValueError
-        Forces or displacements beyond the range of numbers.
+        Double precision holds the data but neither the forces nor the displacements.
     """
-    basis = admissible.basis
-    T, m = space.basis @ basis.T, len(basis.unknown)
-
-    def program(K: sp.csr_array) -> QuadraticProgram:
-        result = QuadraticProgram(  # (2.6)
-            K=K,
-            b=T.T @ space.f,
-            R=from_triplets(np.ones(m), np.arange(m), basis.unknown, (m, K.shape[0])),
-            g=admissible.g,
-            equality=admissible.equality,
-            fixed=basis.fixed,
-            values=basis.values,
-            unknown=basis.unknown,
-            null_space=no_null_space(K.shape[0]) if rigid is None else rigid.null_space,
-        )
-        check_range(result)
-        return result
-
-    if known is not None and same_basis(basis, known.basis):
-        return program(known.K), known.systems
-    K, matrix = congruent(space.matrix, space.A, T)
-    reduced, trace = program(K), space.trace
-    nodes = trace.nodes[space.nodal]
-    systems = linear_systems(reduced, matrix, basis.T, vertex_parents(trace.mesh), nodes)
-    return reduced, systems
+    basis, m = admissible.basis, len(admissible.basis.unknown)
+    p = QuadraticProgram(  # (2.6)
+        K=K,
+        b=basis.T.T @ (space.basis.T @ space.f),
+        R=from_triplets(np.ones(m), np.arange(m), basis.unknown, (m, K.shape[0])),
+        g=admissible.rows.g,
+        equality=admissible.rows.equality,
+        fixed=basis.fixed,
+        values=basis.values,
+        unknown=basis.unknown,
+        null_space=no_null_space(K.shape[0]) if rigid is None else rigid.null_space,
+    )
+    stiffness, load = p.diagonal.max(initial=0.0), np.abs(p.b).max(initial=0.0)
+    given = max(np.abs(p.values).max(initial=0.0), -p.g.min(initial=0.0))
+    with np.errstate(divide="ignore"):
+        k, f, v = np.log10([stiffness, load, given])
+    for name, size in (("displacements", max(v, f - k)), ("forces", max(f, k + v))):
+        if not (size == -np.inf or LOWEST < size < HIGHEST):
+            raise ValueError(
+                f"moduli, loads and prescribed displacements make {name} of 1e{size:+.0f}, beyond "
+                f"the range of numbers (1e{LOWEST} to 1e+{HIGHEST}); choose other units"
+            )
+    return p
 
 
 def reassembled(
@@ -356,10 +361,10 @@ def reassembled(
     arrays : dict
         All other fields but the linear systems, `rigid` without its space.
     """
-    basis, trace, rigid = arrays["basis"], space.trace, arrays["rigid"]
+    basis, rigid = arrays["basis"], arrays["rigid"]
     K, matrix = congruent(space.matrix, space.A, space.basis @ basis.T)
-    again, nodes = QuadraticProgram(K=K, **program), trace.nodes[space.nodal]
-    systems = linear_systems(again, matrix, basis.T, vertex_parents(trace.mesh), nodes)
+    again = QuadraticProgram(K=K, **program)
+    systems = linear_systems(again, matrix, space, basis)
     kept = arrays | {"rigid": rigid and rigid.on(space)}
     return DiscreteProblem(problem=problem, space=space, program=again, systems=systems, **kept)
 

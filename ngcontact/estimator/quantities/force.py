@@ -48,7 +48,8 @@ def _component(solution: Guaranteed, pair: int, e: Array) -> float:
     directions = [e if number == pair else 0 * e for number in range(len(states))]
     jumps = [s.line.direction @ d for s, d in zip(states, directions, strict=True)]
     jump = np.where(solution.active, np.concatenate(jumps), 0.0)
-    G, found = solution.discrete.influence(solution.active, jump)
+    found = solution.discrete.influence(solution.active, jump)
+    G = solution.discrete.displacement(found.u)
     solution.work["factorizations"] += found.factorizations
     solution.work["back_solves"] += found.back_solves
     solution.work["equilibrations"] += 1
