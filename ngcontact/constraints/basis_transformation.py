@@ -32,30 +32,14 @@ CONTRAST = 1e3  # stiffness of the secondary over that facing it above which the
 
 @dataclass(frozen=True, eq=False)
 class BasisTransformation:
-    """Node values u = T y in unknowns of which some are prescribed and one is each row's value.
+    """Node values u = T y in unknowns of which some are prescribed and one is each row's value."""
 
-    Attributes
-    ----------
-    T : sparse (d * n, d * n)
-        From the unknowns to x of all nodes, then y.
-    fixed : ndarray of bool (d * n,)
-        Prescribed unknowns.
-    values : ndarray (d * n,)
-        Their values.
-    unknown : ndarray of int (k,)
-        Unknown that equals the left side of each kept row.
-    kept : ndarray of int (k,)
-        Kept rows; the others are prescribed altogether and satisfied.
-    local : ndarray (n, d, d)
-        From the values of a node to its unknowns, but for the rows.
-    """
-
-    T: sp.csr_array
-    fixed: Mask
-    values: Array
-    unknown: Index
-    kept: Index
-    local: Array
+    T: sp.csr_array  # (d * n, d * n) from the unknowns to x of all nodes, then y
+    fixed: Mask  # (d * n,) prescribed unknowns
+    values: Array  # (d * n,) their values
+    unknown: Index  # (k,) unknown that equals the left side of each kept row
+    kept: Index  # (k,) kept rows; the others are prescribed altogether and satisfied
+    local: Array  # (n, d, d) from the values of a node to its unknowns, but for the rows
 
     def coordinates(self, values: Array, rows: Array) -> Array:
         """Unknowns (d * n, r) of node `values` (d * n, r), `rows` (k, r) on the kept rows."""
@@ -68,17 +52,10 @@ class BasisTransformation:
 
 @dataclass(frozen=True, eq=False)
 class _Frames:
-    """Orthonormal frames at n nodes; the first columns span the conditions met so far.
+    """Orthonormal frames at n nodes; the first columns span the conditions met so far."""
 
-    Attributes
-    ----------
-    columns : ndarray (n, d, d)
-    used : ndarray of int (n,)
-        How many columns that are.
-    """
-
-    columns: Array
-    used: Index
+    columns: Array  # (n, d, d)
+    used: Index  # (n,) how many columns that are
 
     def take(self, node: Index, a: Array) -> Index:
         """Turn the frames so that a column more of each `node` (k,) spans its vector `a` (k, d).

@@ -17,21 +17,11 @@ REPEATED = 1e-9  # difference of coefficients, each at most 1, below which two r
 
 @dataclass(frozen=True, eq=False)
 class Conditions:
-    """Conditions a.u(x_i) = value at nodes, those of Gamma_u before those of Gamma_0.
+    """Conditions a.u(x_i) = value at nodes, those of Gamma_u before those of Gamma_0."""
 
-    Attributes
-    ----------
-    node : ndarray of int (k,)
-        Numbers i of the nodes.
-    direction : ndarray (k, d)
-        Unit vectors a.
-    value : ndarray (k,)
-        Prescribed displacements along them, in units of length.
-    """
-
-    node: Index
-    direction: Array
-    value: Array
+    node: Index  # (k,) numbers i of the nodes
+    direction: Array  # (k, d) unit vectors a
+    value: Array  # (k,) prescribed displacements along them, in units of length
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,26 +30,14 @@ class Rows:
 
     The sum is the displacement that faces node j: the trace of the facing body at one point for
     rows at nodes, a mean of it for others.
-
-    Attributes
-    ----------
-    node : ndarray of int (m,)
-        Node j of the secondary.
-    direction : ndarray (m, d)
-        Unit vectors.
-    coupling : sparse (m, n)
-        Weights c of the nodes of the facing body; an empty row for a rigid obstacle.
-    g : ndarray (m,)
-        Bounds, in units of length.
-    equality : ndarray of bool (m,)
-        Rows that hold with equality, Remark 3.3.
     """
 
-    node: Index
-    direction: Array
+    node: Index  # (m,) node j of the secondary
+    direction: Array  # (m, d) unit vectors
+    # (m, n) weights c of the nodes of the facing body; an empty row for a rigid obstacle
     coupling: sp.csr_array
-    g: Array
-    equality: Mask
+    g: Array  # (m,) bounds, in units of length
+    equality: Mask  # (m,) rows that hold with equality, Remark 3.3
 
     @cached_property
     def matrix(self) -> sp.csr_array:

@@ -36,25 +36,13 @@ MIN_COVERED = 0.1  # of the integral of phi over the whole segment, below which 
 
 @dataclass(frozen=True, eq=False)
 class Pieces:
-    """Parts of secondary segments that face one primary segment each.
+    """Parts of secondary segments that face one primary segment each."""
 
-    Attributes
-    ----------
-    local : ndarray of int (r,)
-        Number of the segment among those divided.
-    start, stop : ndarray (r,)
-        Its interval of the parameter.
-    facing : ndarray of int (r,)
-        Segment of the primary that it faces.
-    opposite : ndarray (r,)
-        Parameter on it that its middle faces.
-    """
-
-    local: Index
-    start: Array
-    stop: Array
-    facing: Index
-    opposite: Array
+    local: Index  # (r,) number of the segment among those divided
+    start: Array  # (r,) where its interval of the parameter begins
+    stop: Array  # (r,) and ends
+    facing: Index  # (r,) segment of the primary that it faces
+    opposite: Array  # (r,) parameter on it that its middle faces
 
 
 def divided(trace: BoundaryTrace, contact: Contact, segments: Index, facing: Index) -> Pieces:

@@ -31,61 +31,25 @@ TOUCHING = 4 * np.finfo(float).eps  # round-off of a measured gap, relative to t
 
 @dataclass(frozen=True, eq=False)
 class ContactLine:
-    """The secondary side of one pair and its m contact points.
-
-    Attributes
-    ----------
-    contact : Contact
-        The pair.
-    segments : ndarray of int (k,)
-        Segments of the secondary boundary.
-    facing : ndarray of int (q,)
-        Segments of the primary boundary.
-    rows : ndarray of int (k, order + 1)
-        Contact point at each node of each segment, -1 where none is.
-    faces : ndarray of bool (k,)
-        Segments that face the primary with all their nodes.
-    node : ndarray of int (m,)
-        Node of the secondary.
-    position, direction : ndarray (m, 2)
-        Contact points, and unit vectors towards the facing body.
-    gap : ndarray (m,)
-        Distance eps(C_j) along the direction before deformation.
-    weight : ndarray (m,)
-        Integral of the point's basis function over s (P1) or eta (P2), one-sided at corners.
-    partner : ndarray of int (m,)
-        Segment of the primary, -1 for a rigid obstacle.
-    partner_s : ndarray (m,)
-        Parameter on it.
-    coupling : sparse (m, n)
-        Weights of the n nodes in the displacement that faces each point; empty rows of an obstacle.
-    on_axis : ndarray of bool (m,)
-        Points on the axis of a body of revolution.
-    means : ndarray of bool (m,)
-        Points whose row is a mean over facing segments, not one at the node.
-    shares : ndarray (k, order + 1)
-        What each segment contributes to the weights of its points.
-    searches : int
-        1 if partner points had to be searched, 0 if all of them are nodes at the same place.
-    """
+    """The secondary side of one pair and its m contact points."""
 
     contact: Contact
-    segments: Index
-    facing: Index
-    rows: Index
-    faces: Mask
-    node: Index
-    position: Array
-    direction: Array
-    gap: Array
-    weight: Array
-    partner: Index
-    partner_s: Array
-    coupling: sp.csr_array
-    on_axis: Mask
-    means: Mask
-    shares: Array
-    searches: int
+    segments: Index  # (k,) segments of the secondary boundary
+    facing: Index  # (q,) segments of the primary boundary
+    rows: Index  # (k, order + 1) contact point at each node of each segment, -1 where none is
+    faces: Mask  # (k,) segments that face the primary with all their nodes
+    node: Index  # (m,) node of the secondary
+    position: Array  # (m, 2)
+    direction: Array  # (m, 2) unit vectors towards the facing body
+    gap: Array  # (m,) distance eps(C_j) along the direction before deformation
+    weight: Array  # (m,) integral of the basis function over s or eta, one-sided at corners
+    partner: Index  # (m,) segment of the primary, -1 for a rigid obstacle
+    partner_s: Array  # (m,) parameter on it
+    coupling: sp.csr_array  # (m, n) weights of the n nodes in the displacement that faces points
+    on_axis: Mask  # (m,) points on the axis of a body of revolution
+    means: Mask  # (m,) points whose row is a mean over facing segments, not one at the node
+    shares: Array  # (k, order + 1) what each segment contributes to the weights of its points
+    searches: int  # 1 if partners had to be searched, 0 if all are nodes at the same place
 
 
 Values = TypeVar("Values", Array, Mask)

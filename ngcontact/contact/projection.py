@@ -27,24 +27,12 @@ PAIRS_AT_ONCE = 4_000_000  # of points and segments that are looked at together:
 
 @dataclass(frozen=True, eq=False)
 class Partners:
-    """Partner points of k contact points.
+    """Partner points of k contact points."""
 
-    Attributes
-    ----------
-    segment : ndarray of int (k,)
-        Facing segment, -1 where none is met.
-    s : ndarray (k,)
-        Parameter on it.
-    distance : ndarray (k,)
-        Distance along the direction, a length; negative where the curves overlap, inf without one.
-    searched : bool
-        Whether there was something to search, which is not where all are nodes at the same place.
-    """
-
-    segment: Index
-    s: Array
-    distance: Array
-    searched: bool = False
+    segment: Index  # (k,) facing segment, -1 where none is met
+    s: Array  # (k,) parameter on it
+    distance: Array  # (k,) along the direction; negative where curves overlap, inf without one
+    searched: bool = False  # False where all are nodes at the same place
 
 
 def at(curve: Array, segment: Index, s: Array) -> Array:

@@ -67,27 +67,15 @@ def _closing_point(distance: Array, gap: Array, order: int) -> float | None:
 
 @dataclass(frozen=True, eq=False)
 class Transitions:
-    """Places where contact of one pair turns from binding to non-binding, k of them.
+    """Places where contact of one pair turns from binding to non-binding, k of them."""
 
-    Attributes
-    ----------
-    inner, outer : ndarray of int (k,)
-        The last active and the first open contact point; at a corner the next but one.
-    position : ndarray (k, 2)
-        The transition itself.
-    beyond : ndarray (k,)
-        How far it lies from the last active point, along the line, outwards; a length.
-    closed, opened : list
-        By end the points (q,) from the last active one inwards, and from the first open one
-        outwards, in the order of the line, as far as contact is closed or open.
-    """
-
-    inner: Index
-    outer: Index
-    position: Array
-    beyond: Array
-    closed: list[Index]
-    opened: list[Index]
+    inner: Index  # (k,) the last active contact point
+    outer: Index  # (k,) the first open one; at a corner the next but one
+    position: Array  # (k, 2) the transition itself
+    beyond: Array  # (k,) its distance from the last active point along the line, outwards
+    # By end, in the order of the line, as far as contact is closed or open:
+    closed: list[Index]  # the points (q,) from the last active one inwards
+    opened: list[Index]  # and those (q,) from the first open one outwards
 
 
 def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:

@@ -101,24 +101,12 @@ def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[
 
 @dataclass(frozen=True, eq=False)
 class AdmissibleSet:
-    """K_h of HH81 (2.3), (2.5), (2.10).
+    """K_h of HH81 (2.3), (2.5), (2.10)."""
 
-    Attributes
-    ----------
-    lines : list of ContactLine
-        The contact pairs with the points that carry rows.
-    conditions : Conditions
-        Gamma_u and Gamma_0 at nodes.
-    rows : Rows
-        Those of all pairs in order.
-    basis : BasisTransformation
-        Unknowns in which rows and prescribed values are single unknowns.
-    """
-
-    lines: list[ContactLine]
-    conditions: Conditions
-    rows: Rows
-    basis: BasisTransformation
+    lines: list[ContactLine]  # the contact pairs with the points that carry rows
+    conditions: Conditions  # Gamma_u and Gamma_0 at nodes
+    rows: Rows  # those of all pairs in order
+    basis: BasisTransformation  # unknowns in which rows and prescribed values are single unknowns
 
 
 def admissible_set(problem: Problem, space: Space, found: Sequence[ContactLine]) -> AdmissibleSet:

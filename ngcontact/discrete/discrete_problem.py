@@ -102,43 +102,19 @@ def linear_systems(
 
 @dataclass(frozen=True, eq=False)
 class DiscreteProblem:
-    """One discrete problem.
-
-    Attributes
-    ----------
-    problem : Problem
-    space : Space
-    found : list of ContactLine
-        One for each contact pair.
-    lines : list of ContactLine
-        The same with the points that carry rows.
-    conditions : Conditions
-        Gamma_u and Gamma_0 at nodes.
-    B : sparse (m, 2n)
-        Contact rows on node values, all pairs in order.
-    basis : BasisTransformation
-        Unknowns in which rows and prescribed values are single unknowns.
-    program : QuadraticProgram
-        The quadratic program in those unknowns.
-    systems : BorderedSystems
-        Its linear systems, with the factorisation once there is one.
-    rigid : Rigid or None
-        Rigid motions that supports leave free, if there are any.
-    assembled : bool
-        False where the stiffness is that of an earlier problem.
-    """
+    """One discrete problem."""
 
     problem: Problem
     space: Space
-    found: list[ContactLine]
-    lines: list[ContactLine]
-    conditions: Conditions
-    B: sp.csr_array
-    basis: BasisTransformation
-    program: QuadraticProgram
-    systems: BorderedSystems
-    rigid: Rigid | None
-    assembled: bool
+    found: list[ContactLine]  # one for each contact pair
+    lines: list[ContactLine]  # the same with the points that carry rows
+    conditions: Conditions  # Gamma_u and Gamma_0 at nodes
+    B: sp.csr_array  # (m, 2n) contact rows on node values, all pairs in order
+    basis: BasisTransformation  # unknowns in which rows and prescribed values are single unknowns
+    program: QuadraticProgram  # in those unknowns
+    systems: BorderedSystems  # its linear systems, with the factorisation once there is one
+    rigid: Rigid | None  # rigid motions that supports leave free, if there are any
+    assembled: bool  # False where the stiffness is that of an earlier problem
 
     def influence(self, active: Mask, jumps: Array) -> Iterate:
         """The displacement of least energy that moves the `active` (m,) points by `jumps` (m,).

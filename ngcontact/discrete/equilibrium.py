@@ -74,27 +74,13 @@ class RigidMotion:
 
 @dataclass(frozen=True, eq=False)
 class FreeMotions:
-    """The r rigid motions that supports leave free, as functions of V_h.
+    """The r rigid motions that supports leave free, as functions of V_h."""
 
-    Attributes
-    ----------
-    space : Space
-        V_h.
-    bodies : Bodies
-        What moves.
-    combinations : ndarray (3 * b, r)
-        Of the translations and the rotation of each of b bodies.
-    nodal : ndarray (2n, r)
-        Node values, lengths.
-    values : ndarray (2N, r)
-        Unknowns of V_h.
-    """
-
-    space: Space
-    bodies: Bodies
-    combinations: Array
-    nodal: Array
-    values: Array
+    space: Space  # V_h
+    bodies: Bodies  # what moves
+    combinations: Array  # (3 * b, r) of the translations and the rotation of each of b bodies
+    nodal: Array  # (2n, r) node values, lengths
+    values: Array  # (2N, r) unknowns of V_h
 
     @property
     def of_bodies(self) -> Array:
@@ -203,33 +189,15 @@ def _node_values(space: Space, bodies: Bodies) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Rigid:
-    """The r rigid motions that supports leave free, the load and the contact rows on them.
-
-    Attributes
-    ----------
-    free : FreeMotions
-        The motions.
-    rows : ndarray (m, r)
-        Left sides of the contact rows, lengths.
-    work : ndarray (r,)
-        Of the load, before what quadrature left of it was taken out.
-    motions : ndarray (2n, r)
-        In the unknowns of the program.
-    null_space : NullSpace
-        Their part that no row resists, and the rest.
-    placing : ndarray (r,)
-        Amounts by which the load moves the bodies until contact stops them, were they rigid.
-    carries : ndarray of bool (m,)
-        Rows that would carry the load there.
-    """
+    """The r rigid motions that supports leave free, the load and the contact rows on them."""
 
     free: FreeMotions
-    rows: Array
-    work: Array
-    motions: Array
-    null_space: NullSpace
-    placing: Array
-    carries: Mask
+    rows: Array  # (m, r) left sides of the contact rows, lengths
+    work: Array  # (r,) of the load, before what quadrature left of it was taken out
+    motions: Array  # (2n, r) in the unknowns of the program
+    null_space: NullSpace  # their part that no row resists, and the rest
+    placing: Array  # (r,) amounts by which the load moves rigid bodies until contact stops them
+    carries: Mask  # (m,) rows that would carry the load there
 
     def left_free(self, active: Mask) -> list[RigidMotion]:
         """Motions that the rows `active` (m,) do not resist either, Remark 3.7."""

@@ -26,18 +26,10 @@ class RingError(ArithmeticError):
 
 @dataclass(frozen=True, eq=False)
 class Coarsening:
-    """The step to a coarser space.
+    """The step to a coarser space."""
 
-    Attributes
-    ----------
-    P : sparse (n, k)
-        From the k unknowns of the coarser space to the n of the finer one.
-    kept : ndarray of int (k,)
-        Unknowns of the finer space that mean the same.
-    """
-
-    P: sp.csr_array
-    kept: Integers
+    P: sp.csr_array  # (n, k) from the k unknowns of the coarser space to the n of the finer one
+    kept: Integers  # (k,) unknowns of the finer space that mean the same
 
 
 def coarsenings(

@@ -20,21 +20,13 @@ log = logging.getLogger("ngcontact")
 
 @dataclass(frozen=True)
 class Limits:
-    """What the iterations may cost.
+    """What the iterations may cost."""
 
-    Attributes
-    ----------
-    renewal : int
-        V-cycles for a system that tells an active set, with the coarse matrices of another one:
-        the price of new ones.
-    cycles : int
-        V-cycles for a system, two to three times those of nu = 0.3; then the matrix is factorised.
-    restarts : int
-        Solutions from the residual itself, which the iteration's own drifts from; likewise.
-    """
-
-    renewal: int = 20
+    # V-cycles for a system that tells an active set, with coarse matrices of another one:
+    renewal: int = 20  # the price of new ones
+    # V-cycles for a system, two to three times those of nu = 0.3; then the matrix is factorised:
     cycles: int = 100
+    # Solutions from the residual itself, which the iteration's own drifts from; likewise:
     restarts: int = 3
 
 

@@ -71,17 +71,10 @@ class Multigrid:
 
     A smoother before a coarser space corrects, its adjoint after it, and a Cholesky factor of the
     coarsest space: a symmetric positive definite preconditioner. `truncated_multigrid` makes it.
-
-    Attributes
-    ----------
-    levels : list of _Level
-        Spaces that have a coarser one, finest first; the first one has n unknowns.
-    inverse : ng.BaseMatrix
-        Inverse of the matrix of the coarsest space.
     """
 
-    levels: list[_Level]
-    inverse: ng.BaseMatrix
+    levels: list[_Level]  # spaces that have a coarser one, finest first, of n unknowns
+    inverse: ng.BaseMatrix  # inverse of the matrix of the coarsest space
 
     def hold(self, free: Mask) -> None:
         """Let `free` (n,) be the unknowns; coarser spaces change only in what they correct."""

@@ -44,34 +44,16 @@ MAX_PROXIMAL = 100  # proximal steps; most problems need less than five
 
 @dataclass(eq=False)
 class ActiveSetIteration:
-    """The iterate of one quadratic program.
+    """The iterate of one quadratic program."""
 
-    Attributes
-    ----------
-    systems : BorderedSystems
-        Of the program with n unknowns and m rows; its solution is that of the last system.
-    active : ndarray of bool (m,)
-        Current active set.
-    size : ndarray (m,)
-        Sums of the sizes of the rows' coefficients.
-    patience : int
-        See `minimise`.
-    y, force : ndarray (n,), (m,)
-        Solution of the last linear system and its multipliers.
-    steps : list of int
-        Changes of the active set after each linear system.
-    extent : float
-        Largest displacement met so far.
-    """
-
-    systems: BorderedSystems
-    active: Mask
-    size: Array
-    patience: int
-    y: Array
-    force: Array
-    steps: list[int] = field(default_factory=list)
-    extent: float = 0.0
+    systems: BorderedSystems  # of n unknowns and m rows
+    active: Mask  # (m,) current active set
+    size: Array  # (m,) sums of the sizes of the rows' coefficients
+    patience: int  # see `minimise`
+    y: Array  # (n,) solution of the last linear system
+    force: Array  # (m,) its multipliers
+    steps: list[int] = field(default_factory=list)  # changes after each linear system
+    extent: float = 0.0  # largest displacement met so far
 
     def resisted(self) -> bool:
         """Whether the active rows resist all motions they can."""

@@ -46,27 +46,13 @@ def echelon(vectors: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class NullSpace:
-    """Rigid motions in the unknowns of a quadratic program.
+    """Rigid motions in the unknowns of a quadratic program."""
 
-    Attributes
-    ----------
-    lineal : ndarray (n, l)
-        Motions that no row resists.
-    others : ndarray (n, q)
-        The rest of the null space, zero at `held`.
-    held : ndarray of int (l,)
-        Unknowns that fix the first.
-    pins : ndarray of int (q,)
-        Unknowns that fix the others.
-    conditions : ndarray (l, n)
-        Functionals that vanish at the result, the identity on `lineal`.
-    """
-
-    lineal: Array
-    others: Array
-    held: Index
-    pins: Index
-    conditions: Array
+    lineal: Array  # (n, l) motions that no row resists
+    others: Array  # (n, q) the rest of the null space, zero at `held`
+    held: Index  # (l,) unknowns that fix the first
+    pins: Index  # (q,) unknowns that fix the others
+    conditions: Array  # (l, n) functionals that vanish at the result, the identity on `lineal`
 
     def resisted(self, rows: Index) -> bool:
         """Whether rows with the unknowns `rows` (k,) resist all motions that are not lineal."""
@@ -127,39 +113,19 @@ def _separated(vectors: Array, places: Index) -> Index:
 
 @dataclass(frozen=True, eq=False)
 class QuadraticProgram:
-    """Minimise 1/2 y'Ky - b'y subject to R y <= g and given values of some unknowns.
+    """Minimise 1/2 y'Ky - b'y subject to R y <= g and given values of some unknowns."""
 
-    Attributes
-    ----------
-    K : sparse (n, n)
-        Symmetric; on the unknowns that are not `fixed` positive definite but for `null_space`.
-    b : ndarray (n,)
-        Load.
-    R : sparse (m, n)
-        Rows, linearly independent on the unknowns that are not `fixed`.
-    g : ndarray (m,)
-        Bounds.
-    equality : ndarray of bool (m,)
-        Rows that hold with equality, R y = g.
-    fixed : ndarray of bool (n,)
-        Unknowns with given values.
-    values : ndarray (n,)
-        The given values; only those of `fixed` unknowns are read.
-    unknown : ndarray of int (m,), optional
-        Given when row j is the unit vector of unknown `unknown[j]`: an active row is then an
-        unknown that leaves the system, and every factorised matrix is a principal submatrix.
-    null_space : NullSpace, optional
-        Null space of K, only with unit rows.
-    """
-
-    K: sp.csr_array
-    b: Array
-    R: sp.csr_array
-    g: Array
-    equality: Mask
-    fixed: Mask
-    values: Array
+    K: sp.csr_array  # (n, n) symmetric, but for `null_space` definite where not `fixed`
+    b: Array  # (n,) load
+    R: sp.csr_array  # (m, n) linearly independent on the unknowns that are not `fixed`
+    g: Array  # (m,) bounds
+    equality: Mask  # (m,) rows that hold with equality, R y = g
+    fixed: Mask  # (n,) unknowns with given values
+    values: Array  # (n,) the given values; only those of `fixed` unknowns are read
+    # (m,) given when row j is the unit vector of unknown `unknown[j]`: an active row is then an
+    # unknown that leaves the system, and every factorised matrix is a principal submatrix.
     unknown: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    # Of K, only with unit rows:
     null_space: NullSpace = field(default_factory=lambda: no_null_space(0))
 
     @cached_property
@@ -245,15 +211,7 @@ class SingularError(ArithmeticError):
 
 @dataclass(frozen=True, eq=False)
 class Anchor:
-    """Proximal terms stiffness / 2 (y - at)^2 on the q pins, which make every system definite.
+    """Proximal terms stiffness / 2 (y - at)^2 on the q pins, which make every system definite."""
 
-    Attributes
-    ----------
-    stiffness : ndarray (q,)
-        Force per displacement.
-    at : ndarray (q,)
-        Values of the pins from which they pull.
-    """
-
-    stiffness: Array
-    at: Array
+    stiffness: Array  # (q,) force per displacement
+    at: Array  # (q,) values of the pins from which they pull

@@ -24,65 +24,31 @@ ROUND_OFF = 64 * np.finfo(float).eps  # ... unless it is that of values that bal
 
 @dataclass(eq=False)
 class Base:
-    """The factorised system K_0: that of one active set, with all pins held.
+    """The factorised system K_0: that of one active set, with all pins held."""
 
-    Attributes
-    ----------
-    active : ndarray of bool (m,)
-        Its active rows, none where rows are not unit rows.
-    free : ndarray of bool (n,)
-        Its unknowns.
-    inverse : callable
-        K_0^-1.
-    known : ndarray (k, n)
-        Solutions K_0^-1 v of the columns v that borders have had so far.
-    place : dict of int to int
-        Which of them belongs to an unknown, or to row j by the key ~j.
-    """
-
-    active: Mask
-    free: Mask
-    inverse: Solve
-    known: Array
+    active: Mask  # (m,) its active rows, none where rows are not unit rows
+    free: Mask  # (n,) its unknowns
+    inverse: Solve  # K_0^-1
+    known: Array  # (k, n) solutions K_0^-1 v of the columns v that borders have had so far
+    # Which of them belongs to an unknown, or to row j by the key ~j:
     place: dict[int, int] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
 class Border:
-    """One system: the base with k columns V and rows V', D below; S = V' K_0^-1 V - D.
-
-    Attributes
-    ----------
-    base : Base
-    active : ndarray of bool (m,)
-    anchor : Anchor or None
-        The system.
-    at : ndarray of int (r,)
-        Unknowns that the base holds and the system does not: released ones, and the pins.
-    rows : ndarray of int (k - r,)
-        Rows that only the system holds.
-    column : ndarray of int (k,)
-        Places of K_0^-1 V among the known solutions of the base.
-    touched : ndarray of int (t,)
-        Unknowns where V is not zero.
-    V : ndarray (k, t)
-        Its transpose there.
-    size : ndarray (k,)
-        Roots of the diagonal of S.
-    S : ndarray (k, k)
-        The Schur complement, over these: only so can small pivots be told, as forces stand
-        beside displacements.
-    """
+    """One system: the base with k columns V and rows V', D below; S = V' K_0^-1 V - D."""
 
     base: Base
-    active: Mask
+    active: Mask  # (m,)
     anchor: Anchor | None
-    at: Index
-    rows: Index
-    column: Index
-    touched: Index
-    V: Array
-    size: Array
+    at: Index  # (r,) unknowns that the base alone holds: released ones, and the pins
+    rows: Index  # (k - r,) rows that only the system holds
+    column: Index  # (k,) places of K_0^-1 V among the known solutions of the base
+    touched: Index  # (t,) unknowns where V is not zero
+    V: Array  # (k, t) its transpose there
+    size: Array  # (k,) roots of the diagonal of S
+    # (k, k) the Schur complement, over these: only so can small pivots be told, as forces stand
+    # beside displacements.
     S: Array
 
     def largest(self, residual: Array) -> float:
