@@ -19,22 +19,12 @@ HALVINGS = 54  # of [-1, 1], to the last bit
 
 @lru_cache
 def gauss_lobatto(order: int, axis: int = 0) -> Array:
-    """Gauss-Lobatto points of degree `order` on [0, 1], ends included.
+    """Gauss-Lobatto points (order + 1,) of a degree `order` from 1 on [0, 1], ends included.
 
-    Parameters
-    ----------
-    order : int
-        Polynomial degree, at least 1.
-    axis : int
-        End at which the weight vanishes, see above.
-
-    Returns
-    -------
-    ndarray (order + 1,)
-        0, the zeros of the derivative of the Legendre polynomial of that degree, 1; of the weight s
-        the zeros of the Jacobi polynomial (1, 2) of one degree less. The integrals of the weight
-        times the Lagrange polynomials are positive at every degree, and by them polynomials of
-        degree 2 order - 1 are integrated exactly.
+    Inside lie the zeros of the derivative of Legendre's polynomial of that degree, of the weight s
+    those of the Jacobi polynomial (1, 2) of one degree less. The integrals of the weight times the
+    Lagrange polynomials are positive at every degree, and by them polynomials of degree 2 order - 1
+    are integrated exactly.
     """
     if axis and order > 1:
         inner = (1 + np.sort(roots_jacobi(order - 1, 1, 2)[0])) / 2
@@ -65,29 +55,10 @@ def _coefficients(order: int, axis: int = 0) -> Array:
     return np.asarray(np.linalg.inv(_legendre(2 * gauss_lobatto(order, axis) - 1, order)))
 
 
-@lru_cache
-def _slopes(order: int) -> Array:
-    """The same of their derivatives with respect to s."""
-    return np.asarray(2 * legendre.legder(_coefficients(order)))
-
-
 def lagrange(order: int, s: Array, axis: int = 0) -> Array:
-    """Values of the Lagrange polynomials at the Gauss-Lobatto points of degree `order`.
+    """Values (k, order + 1) at `s` (k,) of the polynomials that are 1 at one Gauss-Lobatto point.
 
-    Parameters
-    ----------
-    order : int
-        Polynomial degree.
-    s : ndarray (k,)
-        Parameters in [0, 1].
-    axis : int
-        Which points, see `gauss_lobatto`.
-
-    Returns
-    -------
-    ndarray (k, order + 1)
-        Column i is the polynomial that is 1 at point i and 0 at the others. At those points
-        the rows are unit vectors exactly.
+    Column i is 1 at point i and 0 at the others. At those points the rows are unit vectors exactly.
     """
     s = np.atleast_1d(s)
     values: Array = _legendre(2 * s - 1, order) @ _coefficients(order, axis)
@@ -102,23 +73,18 @@ def lagrange_derivative(order: int, s: Array) -> Array:
     return np.asarray(_legendre(2 * np.atleast_1d(s) - 1, order - 1) @ _slopes(order))
 
 
+@lru_cache
+def _slopes(order: int) -> Array:
+    """Coefficients of these derivatives in Legendre's polynomials, as columns."""
+    return np.asarray(2 * legendre.legder(_coefficients(order)))
+
+
 def zeros(order: int, values: Array) -> tuple[Index, Array]:
-    """All places in [0, 1] where polynomials change their sign.
+    """All places in [0, 1] where polynomials change their sign: numbers (r,), parameters (r,).
 
-    Between the zeros of its derivative a polynomial is monotone, so that halving finds them all,
-    from the linear derivative upwards.
-
-    Parameters
-    ----------
-    order : int
-        Polynomial degree, at least 1.
-    values : ndarray (k, order + 1)
-        The polynomials at the Gauss-Lobatto points of that degree.
-
-    Returns
-    -------
-    number, s : ndarray (r,), (r,)
-        Polynomial and parameter of each.
+    Of degree `order` from 1, by their `values` (k, order + 1) at its Gauss-Lobatto points. Between
+    the zeros of its derivative a polynomial is monotone, so that halving finds them all, from the
+    linear derivative upwards.
     """
     powers = np.vander(2 * gauss_lobatto(order) - 1, increasing=True)
     coefficients = np.linalg.solve(powers, values.T).T
@@ -147,7 +113,6 @@ def gauss_derivative(order: int) -> Array:
     """
     points = 2 * gauss(order)[0] - 1
     degree = len(points) - 1
-    values, slopes = legendre.legvander(points, degree), np.zeros((degree + 1, degree + 1))
-    for j in range(1, degree + 1):
-        slopes[:, j] = 2 * legendre.legval(points, legendre.legder(np.eye(degree + 1)[j]))
-    return np.asarray(np.linalg.solve(values.T, slopes.T).T)
+    derivatives = 2 * legendre.legder(np.eye(degree + 1))  # of Legendre's polynomials
+    slopes = _legendre(points, max(degree - 1, 0)) @ derivatives
+    return np.asarray(slopes @ np.linalg.inv(_legendre(points, degree)))

@@ -18,35 +18,36 @@ ALIKE = 1e-9  # difference of unit directions up to which two points at a node a
 UNLIKE = 0.05  # relative difference of two sides from which their roles are not alike
 
 
-def _covered(trace: BoundaryTrace, contact: Contact) -> float:
-    """Share of the secondary's length that faces the primary, by segments that wholly do."""
-    line, _ = nodal_line(trace, contact)
-    length = trace.lengths(line.segments)
-    return float(length[line.faces].sum() / length.sum())
-
-
-def _bulge(trace: BoundaryTrace, pattern: str) -> float:
-    """How far the middles of segments lie outside their chords, relative; > 0 of a convex side."""
-    segments = trace.segments(pattern)
-    normal = trace.exact_normal(*trace.at_nodes(segments)).reshape(len(segments), -1, 2)
-    along = trace.curve[segments, -1] - trace.curve[segments, 0]
-    turn = ((normal[:, -1] - normal[:, 0]) * along).sum(axis=1)
-    return float(turn.sum() / trace.lengths(segments).sum())
-
-
 def with_roles(trace: BoundaryTrace, contact: Contact) -> Contact:
     """The pair with `roles` decided: the covered side is secondary, else the finer, else convex."""
     if contact.roles == "given" or contact.primary is None:
         return contact
+
+    def covered(pair: Contact) -> float:
+        """Share of the secondary's length that faces the primary, by segments that wholly do."""
+        line, _ = nodal_line(trace, pair)
+        length = trace.lengths(line.segments)
+        return float(length[line.faces].sum() / length.sum())
+
+    def length(pair: Contact) -> float:
+        return float(trace.lengths(trace.segments(pair.secondary)).mean())
+
+    def bulge(pair: Contact) -> float:
+        """How far the middles of segments lie outside their chords, relative."""
+        segments = trace.segments(pair.secondary)
+        normal = trace.exact_normal(*trace.at_nodes(segments)).reshape(len(segments), -1, 2)
+        along = trace.curve[segments, -1] - trace.curve[segments, 0]
+        turn = ((normal[:, -1] - normal[:, 0]) * along).sum(axis=1)
+        return float(turn.sum() / trace.lengths(segments).sum())
+
     one, other = replace(contact, roles="given"), replace(contact, roles="given").swapped()
-    covered = [_covered(trace, pair) for pair in (one, other)]
-    if abs(covered[0] - covered[1]) > UNLIKE:
-        return one if covered[0] > covered[1] else other
-    length = [trace.lengths(trace.segments(pair.secondary)).mean() for pair in (one, other)]
-    if abs(length[0] - length[1]) > UNLIKE * max(length):
-        return one if length[0] < length[1] else other
-    bulge = [_bulge(trace, pair.secondary) for pair in (one, other)]
-    return other if bulge[1] > bulge[0] + UNLIKE else one
+    a, b = covered(one), covered(other)
+    if abs(a - b) > UNLIKE:
+        return one if a > b else other
+    a, b = length(one), length(other)
+    if abs(a - b) > UNLIKE * max(a, b):
+        return one if a < b else other
+    return other if bulge(other) > bulge(one) + UNLIKE else one
 
 
 def contact_line(trace: BoundaryTrace, contact: Contact, taken: Index | None = None) -> ContactLine:
@@ -64,43 +65,39 @@ def contact_line(trace: BoundaryTrace, contact: Contact, taken: Index | None = N
     if contact.primary is not None and contact.rows != "nodal":
         line, facing = with_dual_rows(trace, line, facing)
     if len(line.segments) and not facing.any():
-        raise ValueError(
-            f'no point of the secondary "{contact.secondary}" faces the primary '
-            f'"{contact.primary}" {_along(contact)}'
-        )
-    return without(line, np.flatnonzero(~facing))
-
-
-def _along(contact: Contact) -> str:
-    """Along what nothing faces, and what would be right."""
-    if contact.direction is None:
-        return (
+        along = (
             "along its outward normals: choose boundaries that look at each other, or give the "
             "direction from the secondary body to the primary one"
         )
-    x, y = contact.direction
-    return (
-        f"along direction=({x:.6g}, {y:.6g}): the direction points from the secondary body to the "
-        "primary one"
-    )
-
-
-def _rows(line: ContactLine) -> Rows:
-    """Rows of one contact line."""
-    return Rows(
-        node=line.node,
-        direction=line.direction,
-        coupling=line.coupling,
-        g=line.gap,  # (2.10): eps(C_j); (2.3), (2.5): 0 where the bodies touch
-        equality=np.full(len(line.node), line.contact.bilateral),
-    )
+        if contact.direction is not None:
+            x, y = contact.direction
+            along = (
+                f"along direction=({x:.6g}, {y:.6g}): the direction points from the secondary body "
+                "to the primary one"
+            )
+        raise ValueError(
+            f'no point of the secondary "{contact.secondary}" faces the primary '
+            f'"{contact.primary}" {along}'
+        )
+    return without(line, np.flatnonzero(~facing))
 
 
 def joined(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:
     """Rows of all lines, in order, on the nodes of the trace's space."""
     if not lines:
         return no_rows(trace.space.ndof)
-    return concatenated([_rows(line) for line in lines])
+    return concatenated(
+        [
+            Rows(
+                node=line.node,
+                direction=line.direction,
+                coupling=line.coupling,
+                g=line.gap,  # (2.10): eps(C_j); (2.3), (2.5): 0 where the bodies touch
+                equality=np.full(len(line.node), line.contact.bilateral),
+            )
+            for line in lines
+        ]
+    )
 
 
 def kept_lines(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
@@ -163,25 +160,19 @@ def _share_primary(one: ContactLine, other: ContactLine) -> bool:
     return bool(np.intersect1d(one.facing, other.facing).size)
 
 
-def _averaged(rows: Rows, number: Index, averaged: Mask, weight: Array) -> Rows:
-    """Rows whose first one of a point is the mean by `weight` (m,) of those `averaged` (m,)."""
-    every = np.arange(len(number))
-    total = np.bincount(number, weight * averaged)
-    share = np.where(averaged, weight / np.where(averaged, total[number], 1.0), 1.0)
-    mean = from_triplets(share, np.where(averaged, number, every), every, (len(every),) * 2)
-    return replace(rows, coupling=(mean @ rows.coupling).tocsr(), g=mean @ rows.g)
-
-
 def merged(lines: list[ContactLine], rows: Rows) -> tuple[list[ContactLine], Rows]:
     """Lines and rows with one row for each point: of those that repeat a left side the tightest."""
     number, averaged = _same_point(lines, rows)
-    first = np.unique(number)
+    first, every = np.unique(number), np.arange(len(number))
     if len(first) == len(number):
         return lines, rows
     weight = _own_weights(lines, number, np.concatenate([line.weight for line in lines]))
-    repeated = number != np.arange(len(number))
-    if averaged.any():
-        rows = _averaged(rows, number, averaged, weight)
+    repeated = number != every
+    if averaged.any():  # the first row of a point is the mean by weights
+        total = np.bincount(number, weight * averaged)
+        share = np.where(averaged, weight / np.where(averaged, total[number], 1.0), 1.0)
+        mean = from_triplets(share, np.where(averaged, number, every), every, (len(every),) * 2)
+        rows = replace(rows, coupling=(mean @ rows.coupling).tocsr(), g=mean @ rows.g)
     g, equality = rows.g.copy(), np.zeros(len(number), dtype=bool)
     np.logical_or.at(equality, number, rows.equality)
     # An equality is the tightest; what another pair at that node asks for follows or is refused.
@@ -192,18 +183,14 @@ def merged(lines: list[ContactLine], rows: Rows) -> tuple[list[ContactLine], Row
     np.add.at(weight, number[repeated], weight[repeated])
     parts = zip(lines, by_line(lines, weight), strict=True)
     lines = [replace(line, weight=part) for line, part in parts]
-    kept = kept_lines(lines, first)
-    kept = [_left(lines[:k], line, kept[k]) for k, line in enumerate(lines)]
+    kept = []
+    for k, line in enumerate(kept_lines(lines, first)):
+        # Without segments of which earlier lines have all points it had. Where these face another
+        # primary the segment faces both of them in part, and stays.
+        had = (lines[k].rows >= 0).any(axis=1)
+        earlier = [one.segments for one in lines[:k] if _share_primary(one, lines[k])]
+        taken = np.isin(line.segments, np.concatenate([np.zeros(0, np.intp), *earlier]))
+        left = (line.rows >= 0).any(axis=1) | ~had | ~taken
+        names = ("segments", "rows", "faces", "shares")
+        kept.append(replace(line, **{name: getattr(line, name)[left] for name in names}))
     return kept, replace(rows, g=g, equality=equality).select(first)
-
-
-def _left(earlier: list[ContactLine], before: ContactLine, line: ContactLine) -> ContactLine:
-    """The `line` without segments of which `earlier` ones have all points it had `before`.
-
-    Where these face another primary the segment faces both of them in part, and stays.
-    """
-    others = [one.segments for one in earlier if _share_primary(one, before)]
-    taken = np.isin(line.segments, np.concatenate([np.zeros(0, np.intp), *others]))
-    left = (line.rows >= 0).any(axis=1) | (before.rows < 0).all(axis=1) | ~taken
-    parts = {name: getattr(line, name)[left] for name in ("segments", "rows", "faces", "shares")}
-    return replace(line, **parts)
