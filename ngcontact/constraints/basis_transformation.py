@@ -215,18 +215,10 @@ def change_of_basis(
     length: float = 0.0,
     stiffness: Array | None = None,
 ) -> BasisTransformation:
-    """Basis in which prescribed conditions and contact rows are single unknowns.
+    """Basis in which prescribed conditions and contact rows on n nodes are single unknowns.
 
-    Parameters
-    ----------
-    conditions : Conditions
-        Gamma_u and Gamma_0.
-    rows : Rows
-        Gamma_K, on the n nodes of all bodies.
-    length : float
-        Largest coordinate, to whose round-off the gaps are known.
-    stiffness : ndarray (n,), optional
-        Force per displacement at the nodes, by its order of magnitude; alike when left out.
+    The `length` is the largest coordinate, to whose round-off the gaps are known; `stiffness` (n,)
+    the force per displacement at the nodes, by its order of magnitude, alike when left out.
 
     Raises
     ------

@@ -69,14 +69,9 @@ def _dual_basis(whole: Array, weight: Array, mass: Array, s: Array) -> tuple[Arr
     """Dual bases of k segments over their facing parts: psi = change phi, `change` (k, p+1, p+1).
 
     And the segments (k,) on which psi are those of the hats of the ends, or one constant. There
-    D_e, the `weight` (k, p + 1) of the facing parts, is set to what the rows weigh, 0 for none.
-
-    Parameters
-    ----------
-    whole, weight, s : ndarray (k, p + 1)
-        Integrals of phi over the segments and over their facing parts; parameters of the nodes.
-    mass : ndarray (k, p + 1, p + 1)
-        Integrals of phi_i phi_j over the facing parts.
+    D_e, the integrals `weight` (k, p + 1) of phi over the facing parts, are set to what the rows
+    weigh, 0 for none. `whole` (k, p + 1) are those over the segments, `mass` (k, p + 1, p + 1) the
+    integrals of phi_i phi_j over the facing parts, and `s` (k, p + 1) the parameters of the nodes.
     """
     faces, order = (mass != 0).any(axis=(1, 2)), s.shape[1] - 1
     sliver = faces & (weight.sum(axis=1) < MIN_COVERED * whole.sum(axis=1))  # a row at one end

@@ -101,19 +101,10 @@ def partners(
     *,
     nodes: bool = True,
 ) -> Partners:
-    """Points of the segments `facing` opposite to `points`: A_j and B_j of HH81 (2.10).
+    """Points of segments `facing` (q,) opposite to `points` (k, 2): A_j and B_j of HH81 (2.10).
 
-    Parameters
-    ----------
-    trace : BoundaryTrace
-    facing : ndarray of int (q,)
-        Segments of the facing body; none for a rigid obstacle.
-    own : ndarray of int (k,)
-        Segments on which the points lie.
-    points, directions : ndarray (k, 2)
-        The points, and unit vectors towards the facing body.
-    nodes : bool
-        Whether they are nodes, some of which may lie at others.
+    The points lie on the segments `own` (k,); `directions` (k, 2) are unit vectors towards the
+    facing body. Some `nodes` may lie at others. None is met on a rigid obstacle.
     """
     curve, side = trace.curve[facing], trace.side[facing]
     found = none_met(len(points))

@@ -150,23 +150,10 @@ def cast(
     """Nearest points, along given directions, of a curve whose outward normal opposes them.
 
     The scalar equation (x(s) - x) x d = 0 is solved by Newton's method at every crossing of ray
-    and segment, HH81 (2.10): A_j and B_j on one perpendicular.
-
-    Parameters
-    ----------
-    points : ndarray (k, 2)
-        Where the rays pass; both senses count, so overlapping bodies give negative distances.
-    directions : ndarray (k, 2)
-        Unit vectors towards the facing body.
-    curve, side : ndarray (q, degree + 1, 2), (q,)
-        The facing segments.
-    ahead : bool
-        Only points in the sense of the direction.
-
-    Returns
-    -------
-    Partners
-        Of least absolute distance; parameters within `MATCHED` of an end are that end.
+    and segment, HH81 (2.10): A_j and B_j on one perpendicular. Rays pass `points` (k, 2) along the
+    unit vectors `directions` (k, 2) towards segments `curve` (q, p + 1, 2), `side` (q,). Both
+    senses count unless only points `ahead` do, so that overlapping bodies give negative distances;
+    parameters within `MATCHED` of an end are that end.
     """
     found = none_met(len(points))
     if len(curve) == 0 or len(points) == 0:
@@ -206,19 +193,9 @@ def coincident(
 ) -> Partners:
     """Partners among the nodes of the facing segments that lie at the points themselves.
 
-    Parameters
-    ----------
-    points, directions : ndarray (k, 2)
-        Contact points and unit vectors towards the facing body.
-    curve, side : ndarray (q, degree + 1, 2), (q,)
-        The facing segments.
-    nodes : ndarray (q, order + 1)
-        Parameters of the nodes on them.
-
-    Returns
-    -------
-    Partners
-        Segment -1 where no node is within `MATCHED` of the point, or the curve does not face it.
+    Of contact `points` (k, 2) with unit vectors `directions` (k, 2) towards segments `curve`
+    (q, p + 1, 2), `side` (q,), with nodes at the parameters `nodes` (q, order + 1); none where no
+    node is within `MATCHED` of the point, or the curve does not face it.
     """
     found = none_met(len(points))
     if len(curve) == 0 or len(points) == 0:
@@ -250,16 +227,9 @@ def snap(s: Array, nodes: Array) -> Array:
 def feet(points: Array, curve: Array, direction: Array | None) -> tuple[Index, Array]:
     """Where segments pass points: on the lines along `direction`, or on their own normals.
 
-    Parameters
-    ----------
-    points, curve : ndarray (k, 2), (q, p + 1, 2)
-        Any points, and the segments.
-    direction : ndarray (2,) or None for the normal of the segment at the foot.
-
-    Returns
-    -------
-    segment, s : ndarray (r,), (r,)
-        Segments that pass a point between their ends, once for each, and parameters.
+    For `points` (k, 2) and segments `curve` (q, p + 1, 2); without a `direction` (2,) on their
+    normals at the foot. Segments (r,) that pass a point between their ends, once for each, and
+    parameters (r,).
     """
     if direction is not None:
         normal = np.tile(across(direction), (len(points), 1))

@@ -85,16 +85,8 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
     gap^(2/3) is a smooth function of it with a simple zero at the transition. That zero is found
     from a cubic fitted to the open points near by, the nearest ones left out. Without enough of
     them - contact that opens at a few points only - it is the middle between the two points.
-    Between the two points at a corner it is the corner.
-
-    Parameters
-    ----------
-    line : ContactLine
-        The pair.
-    gap : ndarray (m,)
-        At its points after deformation, lengths.
-    active : ndarray of bool (m,)
-        Points in contact.
+    Between the two points at a corner it is the corner. The `gap` (m,) is that after deformation,
+    points in contact are `active` (m,).
     """
     neighbours, links = _neighbours(line)
     active = in_contact(line, active)
@@ -180,21 +172,12 @@ class ContactState:
 
 
 def continued_to_axis(line: ContactLine, pressure: Array, active: Mask) -> Array:
-    """Pressure (m,) whose value on an axis of revolution is the even one of the points beside it.
+    """Values (m,) of the `pressure` (m,), on an axis of revolution the even one of those beside.
 
     At orders 1 and 2 the point on the axis, of the least weight, has an error of the size of the
     element's: on balls at 5000 unknowns 6.5 and 1.3 %, of the continuation 0.3 %. It is the
-    fit of c0 + c1 r^2, by weights, to the nearer third of the contact around the axis, of which it
-    misses 3e-4 on balls; with fewer than two points beside it the value is as it is.
-
-    Parameters
-    ----------
-    line : ContactLine
-        The pair.
-    pressure : ndarray (m,)
-        Force over weight.
-    active : ndarray of bool (m,)
-        Points in contact.
+    fit of c0 + c1 r^2, by weights, to the nearer third of the contact around the axis, `active`
+    (m,), of which it misses 3e-4 on balls; with fewer than two points there the value is as it is.
     """
     if line.rows.shape[1] > 3 or not line.on_axis.any():
         return pressure

@@ -69,16 +69,9 @@ def conditioned_segments(problem: Problem, trace: BoundaryTrace) -> Index:
 
 
 def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[str, Array]:
-    """Sums (2,) of forces on nodes, by boundary of Gamma_u and Gamma_0.
+    """Sums (2,) of the forces `reaction` (n, 2) of supports, by boundary of Gamma_u and Gamma_0.
 
-    Parameters
-    ----------
-    problem : Problem
-        What names these boundaries.
-    trace : BoundaryTrace
-        The boundary.
-    reaction : ndarray (n, 2)
-        Forces of the supports on its nodes and all others, per unit thickness.
+    Per unit thickness, on the nodes of the boundary and all others.
     """
     mesh = trace.mesh
     names = np.array(mesh.GetBoundaries())

@@ -328,14 +328,8 @@ def reassembled(
 ) -> DiscreteProblem:
     """A discrete problem of a space that is assembled again and of arrays that were kept.
 
-    Parameters
-    ----------
-    problem : Problem
-    space : Space
-    program : dict
-        Fields of its quadratic program but the matrix.
-    arrays : dict
-        All other fields but the linear systems, `rigid` without its space.
+    `program` has the fields of its quadratic program but the matrix, `arrays` all other fields but
+    the linear systems, `rigid` without its space.
     """
     basis, rigid = arrays["basis"], arrays["rigid"]
     K, matrix = congruent(space.matrix, space.A, space.basis @ basis.T)

@@ -37,19 +37,10 @@ def coarsenings(
 ) -> list[Coarsening]:
     """Coarser spaces, finest first, until one has `coarsest` unknowns or the first mesh is met.
 
-    Parameters
-    ----------
-    T : sparse (d * n, d * n)
-        Node values and edge functions u = T y for the unknowns y: x of all nodes first, vertices
-        before all others.
-    parents : ndarray of int (nv, 2)
-        Ends of the edges halved by refinement, of lower number; -1 for vertices of the first mesh.
-    nodes : ndarray of int (k, p + 1)
-        Nodes of the segments where unknowns are node values.
-    coarsest : int
-        A space of fewer unknowns has no coarser one.
-    d : int
-        Unknowns of a node.
+    Node values and edge functions are u = T y of the unknowns y, d of each node, with `T`
+    (d * n, d * n): x of all nodes first, vertices before all others. `parents` (nv, 2) are the ends
+    of the edges that refinement halved, -1 for vertices of the first mesh; `nodes` (k, p + 1) those
+    of the segments where unknowns are node values.
 
     Raises
     ------

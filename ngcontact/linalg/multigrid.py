@@ -103,14 +103,7 @@ class Multigrid:
     def solve(self, right: Array, target: float, most: int) -> tuple[Array, int]:
         """Solution (n,), its largest residual at most `target`, and the number of V-cycles.
 
-        Parameters
-        ----------
-        right : ndarray (n,)
-            Read where unknowns are free.
-        target : float
-            In the units of `right`.
-        most : int
-            V-cycles allowed.
+        Of `right` (n,), which is read where unknowns are free; `most` V-cycles are allowed.
 
         Raises
         ------
@@ -151,18 +144,8 @@ def truncated_multigrid(
 ) -> Multigrid:
     """Multigrid whose coarser functions vanish at the unknowns that are not free.
 
-    As in truncated monotone multigrid (Kornhuber 1994, Numer. Math. 69:167).
-
-    Parameters
-    ----------
-    matrix : ng.BaseMatrix (n, n)
-        Both halves of it.
-    steps : list of Coarsening
-        At least one, finest first.
-    free : ndarray of bool (n,)
-        Unknowns of the systems.
-    smoother : callable
-        Makes that of a matrix and its free unknowns.
+    As in truncated monotone multigrid (Kornhuber 1994, Numer. Math. 69:167). Both halves of the
+    `matrix` (n, n) are there, at least one of the `steps`, finest first, and `free` (n,) unknowns.
     """
     levels: list[_Level] = []
     for step in steps:

@@ -158,22 +158,11 @@ class ActiveSetIteration:
 def minimise(
     systems: BorderedSystems, active: Mask | None = None, patience: int = PATIENCE
 ) -> Iterate:
-    """Solve a quadratic program by semismooth Newton steps.
+    """Solve the quadratic program of `systems` by semismooth Newton steps.
 
-    Parameters
-    ----------
-    systems : BorderedSystems
-        The program, with its factorisation where there is one already.
-    active : ndarray of bool (m,), optional
-        First active set; the equalities alone when left out.
-    patience : int
-        Full switches of the active set allowed without fewer violated rows.
-
-    Returns
-    -------
-    Iterate
-        With `u` (n,) all unknowns and `force` (m,) the multipliers of all rows, equalities
-        included.
+    They begin with the first active set `active` (m,), the equalities alone when left out, and may
+    switch all of the wrong rows `patience` times without fewer of them. The result has the
+    multipliers of all rows, equalities included.
 
     Raises
     ------

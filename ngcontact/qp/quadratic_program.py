@@ -68,20 +68,10 @@ def no_null_space(n: int) -> NullSpace:
 def pinned_null_space(
     motions: Array, combinations: Array, functionals: Array, rows: Index, fixed: Mask
 ) -> NullSpace:
-    """Null space with well separated pins.
+    """Null space, by a basis `motions` (n, r) of size 1, with well separated pins.
 
-    Parameters
-    ----------
-    motions : ndarray (n, r)
-        Basis of the null space, of size 1, zero at `fixed`.
-    combinations : ndarray (r, l)
-        Of them that no row resists.
-    functionals : ndarray (l, n)
-        Conditions that determine those.
-    rows : ndarray of int (m,)
-        Unknowns that are the values of contact rows.
-    fixed : ndarray of bool (n,)
-        Unknowns with given values.
+    `combinations` (r, l) of the motions no row resists; `functionals` (l, n) determine these. The
+    unknowns `rows` (m,) are the values of contact rows, those that are `fixed` (n,) are given.
     """
     free = ~fixed
     free[rows] = False
