@@ -170,8 +170,7 @@ def warn_of_doubts(solution: Solution, told: set[object], *, last: bool) -> None
 
     What a finer mesh mends is left out unless none follows: the mesh is the `last`.
     """
-    space, displacement = solution.discrete.space, solution.displacement
-    found = doubts(solution.problem, space, displacement, solution.pairs, last=last)
+    found = doubts(solution, last=last)
     for doubt, message in found.items():
         if doubt not in told:
             warn(message)

@@ -9,19 +9,16 @@ from __future__ import annotations
 import difflib
 import itertools
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask
-from .material import ABOUT_AN_AXIS
+from .contact import Contact
+from .material import Elastic, Hooke
 from .mesh_arrays import MeshArrays, on_axis
 from .values import body_mask, boundary_mask, refuse_where
-
-if TYPE_CHECKING:
-    from .contact import Contact
-    from .problem import Problem
 
 # By 'argument "pattern"': which of the r boundaries or bodies of a mesh it selects, bool (r,).
 Masks: TypeAlias = dict[str, Mask]
@@ -41,55 +38,6 @@ OVERLAP = 0.5  # of the smaller of two bodies, from which they lie on top of eac
 PLACES = 200  # of a connected piece that are looked for in another one
 FLAT = 16 * np.finfo(float).eps  # area of a triangle over its longest side squared, without height
 NO_RADIAL = 1e-9  # radial part on the axis, relative to the largest value, that is round-off
-
-
-def check_problem(problem: Problem, mesh: ng.Mesh) -> None:
-    """Refuse names and data of a problem that do not fit a mesh; see `Problem.check`."""
-    check_mesh(mesh)
-    view, names = MeshArrays(mesh), mesh.GetBoundaries()
-    materials = regions_of(mesh, "materials", problem.materials, body_mask)
-    force = regions_of(mesh, "force", problem.force, body_mask)
-    displacement = regions_of(mesh, "displacement", problem.displacement, boundary_mask)
-    traction = regions_of(mesh, "traction", problem.traction, boundary_mask)
-    slides = [problem.sliding] if isinstance(problem.sliding, str) else []
-    sliding = regions_of(mesh, "sliding", slides, boundary_mask)
-    contact = [_sides(mesh, f"contact[{j}]", pair) for j, pair in enumerate(problem.contact)]
-
-    _check_bodies(mesh, materials)
-    refuse_common(names, sliding, displacement, "keep one of the two")
-    refuse_common(names, traction, sliding, "keep one of the two")
-    prescribed = zip(displacement.items(), problem.displacement.values(), strict=True)
-    full = {key: mask for (key, mask), (x, y) in prescribed if not (x is None or y is None)}
-    refuse_common(names, traction, full, "keep one, or leave a component free by None")
-    others = displacement | traction | sliding
-    for sides in contact:
-        refuse_common(names, sides, others, "a contact boundary takes no other condition")
-    _check_overlaps(view)
-    inner = np.bincount(view.boundaries[view.inner_facets], minlength=len(names)) > 0
-    _check_pairs(view, contact, inner)
-    _check_pressures(names, traction, problem.traction.values(), inner)
-
-    def points(vb: ng.comp.VorB, mask: Mask, rule: ng.IntegrationRule) -> Array:
-        at = mask[view.bodies if vb == ng.VOL else view.boundaries]
-        found = mesh.MapToAllElements(rule, vb)
-        return found[at[found["nr"]]]
-
-    for (label, mask), law in zip(materials.items(), problem.materials.values(), strict=True):
-        law.check_at(points(ng.VOL, mask, INSIDE), label)  # (2.7)
-    for (label, mask), F in zip(force.items(), problem.force.values(), strict=True):
-        _check_finite(points(ng.VOL, mask, INSIDE), F, label)
-    for (label, mask), P in zip(traction.items(), problem.traction.values(), strict=True):
-        _check_finite(points(ng.BND, mask, IN_SEGMENTS), P, label)
-    for (label, mask), u in zip(displacement.items(), problem.displacement.values(), strict=True):
-        for component in u:
-            if component is not None:
-                _check_finite(points(ng.BND, mask, AT_ENDS), component, label)
-    for j, (sides, pair) in enumerate(zip(contact, problem.contact, strict=True)):
-        if pair.gap is not None:
-            at = points(ng.BND, next(iter(sides.values())), AT_ENDS)
-            _check_gap(at, pair.gap, f'contact[{j}].gap of "{pair.secondary}"')
-    if problem.model in ABOUT_AN_AXIS:
-        _check_about_axis(problem, view)
 
 
 def check_mesh(mesh: ng.Mesh) -> None:
@@ -162,7 +110,7 @@ def regions_of(
     return masks
 
 
-def _sides(mesh: ng.Mesh, argument: str, pair: Contact) -> Masks:
+def sides_of(mesh: ng.Mesh, argument: str, pair: Contact) -> Masks:
     """The masks (r,) of the sides of a contact pair, the secondary first."""
     sides = regions_of(mesh, f"{argument}.secondary", [pair.secondary], boundary_mask)
     if pair.primary is not None:
@@ -178,7 +126,7 @@ def refuse_common(names: Sequence[str], one: Masks, other: Masks, right: str) ->
             raise ValueError(f'"{"|".join(common)}" is both in {a} and in {b}: {right}')
 
 
-def _check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
+def check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
     """Refuse bodies without a name, and those in none of the masks (r,) of materials."""
     covered = np.logical_or.reduce(list(materials.values()))
     for number, name in enumerate(mesh.GetMaterials()):
@@ -188,7 +136,7 @@ def _check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
             raise ValueError(f'body "{name}" has no material: add materials["{name}"]')
 
 
-def _check_pairs(view: MeshArrays, contact: Sequence[Masks], inner: Mask) -> None:
+def check_pairs(view: MeshArrays, contact: Sequence[Masks], inner: Mask) -> None:
     """Refuse contact inside a body: on an interface, of a curve with itself, of a body with itself.
 
     A body is a connected piece of the mesh, whatever the names of its parts. `contact` are the
@@ -209,7 +157,7 @@ def _check_pairs(view: MeshArrays, contact: Sequence[Masks], inner: Mask) -> Non
                 )
 
 
-def _check_pressures(
+def check_pressures(
     names: Sequence[str], traction: Masks, loads: Iterable[ng.CoefficientFunction], inner: Mask
 ) -> None:
     """Refuse pressures, one for each mask (r,), on lines inside a body: these have two normals."""
@@ -223,7 +171,7 @@ def _check_pressures(
             )
 
 
-def _check_overlaps(view: MeshArrays) -> None:
+def check_overlaps(view: MeshArrays) -> None:
     """Refuse bodies drawn on top of each other, and a face drawn over a part of itself.
 
     An interference at a contact line is none. Of each two connected pieces whose boxes overlap by
@@ -271,6 +219,38 @@ def _inside(points: Array, view: MeshArrays, part: Index) -> Mask:
     return np.asarray((crossed & right).sum(axis=1) % 2 == 1)
 
 
+def check_values(
+    view: MeshArrays, masks: Masks, data: Iterable[Any], rule: ng.IntegrationRule, vb: ng.comp.VorB
+) -> None:
+    """Refuse data, one for each mask (r,), that are not finite, or laws that are not elliptic.
+
+    A law, a function, or a tuple of these and None, looked at in all elements at points of a rule.
+    """
+    for (label, mask), value in zip(masks.items(), data, strict=True):
+        points = _points(view, mask, rule, vb)
+        if isinstance(value, Elastic | Hooke):
+            value.check_at(points, label)  # (2.7)
+            continue
+        for part in value if isinstance(value, tuple) else (value,):
+            if part is not None:
+                _check_finite(points, part, label)
+
+
+def check_gaps(view: MeshArrays, contact: Sequence[Masks], pairs: Sequence[Contact]) -> None:
+    """Refuse gaps that are not finite on the secondary, the first mask (r,) of each pair."""
+    for j, (sides, pair) in enumerate(zip(contact, pairs, strict=True)):
+        if pair.gap is not None:
+            points = _points(view, next(iter(sides.values())), AT_ENDS, ng.BND)
+            _check_gap(points, pair.gap, f'contact[{j}].gap of "{pair.secondary}"')
+
+
+def _points(view: MeshArrays, mask: Mask, rule: ng.IntegrationRule, vb: ng.comp.VorB) -> Array:
+    """NGSolve's points (k,) of a rule in all elements of the selected regions (r,)."""
+    at = mask[view.bodies if vb == ng.VOL else view.boundaries]
+    points = view.mesh.MapToAllElements(rule, vb)
+    return np.asarray(points[at[points["nr"]]])
+
+
 def _check_finite(points: Array, data: ng.CoefficientFunction, label: str) -> None:
     """Refuse data that are not finite at one of mesh `points` (k,)."""
     values = data(points).reshape(len(points), -1)
@@ -301,7 +281,13 @@ def _check_gap(points: Array, gap: Any, label: str) -> None:
     refuse_where(points, ~np.isfinite(values), values, label, "must be finite")
 
 
-def _check_about_axis(problem: Problem, view: MeshArrays) -> None:
+def check_about_axis(
+    view: MeshArrays,
+    displacement: Mapping[str, Any],
+    traction: Mapping[str, Any],
+    force: Mapping[str, Any],
+    contact: Sequence[Contact],
+) -> None:
     """Refuse a body across the axis, conditions on the axis, and data that point sideways there.
 
     A vector with a radial part on the axis is no field of revolution: what pushes a body sideways
@@ -321,23 +307,21 @@ def _check_about_axis(problem: Problem, view: MeshArrays) -> None:
         if along[boundary_mask(mesh, pattern)[view.boundaries]].any():
             raise ValueError(f'{what} "{pattern}" is on the axis x = 0, which has no area: {right}')
 
-    for pair in problem.contact:
+    for pair in contact:
         for side in (pair.secondary, pair.primary):
             if side is not None:
                 refuse_along("contact", side, "name a boundary with x > 0")
     vectors: list[tuple[str, str, Any]] = []
-    tractions: Mapping[str, Any] = problem.traction
-    forces: Mapping[str, Any] = problem.force
-    for pattern, load in tractions.items():
+    for pattern, load in traction.items():
         refuse_along("traction", pattern, "name a boundary with x > 0")
         if load.dim == 2:
             vectors.append(("traction", pattern, load[0]))
-    for pattern, (radial, axial) in problem.displacement.items():
+    for pattern, (radial, axial) in displacement.items():
         if axial is not None:
             refuse_along("displacement", pattern, "leave the second component free by None")
         if radial is not None:
             vectors.append(("displacement", pattern, radial))
-    vectors += [("force", pattern, F[0]) for pattern, F in forces.items()]
+    vectors += [("force", pattern, F[0]) for pattern, F in force.items()]
     for what, pattern, radial in vectors:
         if what == "force":
             at, ends = body_mask(mesh, pattern)[view.bodies], view.elements

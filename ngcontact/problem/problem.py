@@ -7,14 +7,34 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import ngsolve as ng
+import numpy as np
 from netgen.occ import OCCGeometry
 
-from .checks import check_problem, kind_of
+from .checks import (
+    AT_ENDS,
+    IN_SEGMENTS,
+    INSIDE,
+    check_about_axis,
+    check_bodies,
+    check_gaps,
+    check_mesh,
+    check_overlaps,
+    check_pairs,
+    check_pressures,
+    check_values,
+    kind_of,
+    refuse_common,
+    regions_of,
+    sides_of,
+)
 from .contact import Contact
-from .material import Elastic, Hooke, require_model
+from .material import ABOUT_AN_AXIS, Elastic, Hooke, require_model
+from .mesh_arrays import MeshArrays
 from .values import (
     Scalar,
     Vector,
+    body_mask,
+    boundary_mask,
     by_region,
     displacement_components,
     region_pattern,
@@ -142,7 +162,37 @@ class Problem:
             meet on one boundary, a contact pair is impossible, or data are not finite or not
             elliptic.
         """
-        check_problem(self, mesh)
+        check_mesh(mesh)
+        view, names = MeshArrays(mesh), mesh.GetBoundaries()
+        materials = regions_of(mesh, "materials", self.materials, body_mask)
+        force = regions_of(mesh, "force", self.force, body_mask)
+        displacement = regions_of(mesh, "displacement", self.displacement, boundary_mask)
+        traction = regions_of(mesh, "traction", self.traction, boundary_mask)
+        slides = [self.sliding] if isinstance(self.sliding, str) else []
+        sliding = regions_of(mesh, "sliding", slides, boundary_mask)
+        contact = [sides_of(mesh, f"contact[{j}]", pair) for j, pair in enumerate(self.contact)]
+
+        check_bodies(mesh, materials)
+        refuse_common(names, sliding, displacement, "keep one of the two")
+        refuse_common(names, traction, sliding, "keep one of the two")
+        prescribed = zip(displacement.items(), self.displacement.values(), strict=True)
+        full = {key: mask for (key, mask), (x, y) in prescribed if not (x is None or y is None)}
+        refuse_common(names, traction, full, "keep one, or leave a component free by None")
+        others = displacement | traction | sliding
+        for sides in contact:
+            refuse_common(names, sides, others, "a contact boundary takes no other condition")
+        check_overlaps(view)
+        inner = np.bincount(view.boundaries[view.inner_facets], minlength=len(names)) > 0
+        check_pairs(view, contact, inner)
+        check_pressures(names, traction, self.traction.values(), inner)
+
+        check_values(view, materials, self.materials.values(), INSIDE, ng.VOL)
+        check_values(view, force, self.force.values(), INSIDE, ng.VOL)
+        check_values(view, traction, self.traction.values(), IN_SEGMENTS, ng.BND)
+        check_values(view, displacement, self.displacement.values(), AT_ENDS, ng.BND)
+        check_gaps(view, contact, self.contact)
+        if self.model in ABOUT_AN_AXIS:
+            check_about_axis(view, self.displacement, self.traction, self.force, self.contact)
 
 
 def _law(value: Any, what: str) -> Elastic | Hooke:

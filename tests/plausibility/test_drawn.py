@@ -9,7 +9,7 @@ from netgen.occ import Axis, Z
 from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.geometries import disc_on_disc, rings
 from ngcontact.geometries.region import compound
-from ngcontact.plausibility.drawn import FAR, way_and_error
+from ngcontact.plausibility.pairs import PEAK_ERROR, way_and_error
 from tests.plausibility.messages import only, quiet, told
 
 APART, CONTRADICTED = "bodies are drawn", "the drawing has them"
@@ -38,7 +38,7 @@ def measured(problem, exact):
     messages = told(lambda: solutions.extend(adapt(problem, order=3, tolerance=1e-2)))
     [pair] = solutions[-1].pairs
     way, error = way_and_error(solutions[-1].discrete.space.trace, pair)
-    assert any(APART in message for message in messages) == (error > FAR)
+    assert any(APART in message for message in messages) == (error > PEAK_ERROR)
     peak = exact(2 * np.hypot(*solutions[-1].contact_force()))
     return solutions[-1].pressure.max() / peak - 1, way, error
 
@@ -59,7 +59,7 @@ def test_peaks_are_wrong_by_what_is_said(radii):
     "problem",
     [
         discs(0.0),
-        discs(FAR / 2),
+        discs(PEAK_ERROR / 2),
         discs(0.04, Contact("upper_arc", "lower_arc", direction=(0, -1))),
         discs(0.04, radii=(5.0, 1.0)),
         discs(0.04, Contact("lower_arc", "upper_arc"), radii=(1.0, 5.0)),

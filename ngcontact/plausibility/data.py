@@ -1,4 +1,4 @@
-"""What is looked at before the first solve: corners at which supports contradict each other."""
+"""What is looked at before the first solve: loads, laws, corners at which supports contradict."""
 
 from __future__ import annotations
 
@@ -44,39 +44,32 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
     """All of Gamma_u with itself, within a boundary, too, and with guides, by component."""
     if not problem.displacement:
         return []
+    found = []
     seen = [one for one in features_of(problem, mesh) if one.kind == "displacement"]
-    found = [
-        Contradiction(
-            (one.name, one.name),
-            np.array(place),
-            f'displacement "{one.name}" jumps by {amount:.6g} along {"xy"[one.axis]}',
-            amount,
-        )
-        for one in seen
-        for *place, amount in one.jumps.tolist()
-    ]
+    for one in seen:
+        for *place, amount in one.jumps.tolist():
+            message = f'displacement "{one.name}" jumps by {amount:.6g} along {"xy"[one.axis]}'
+            found.append(Contradiction((one.name, one.name), np.array(place), message, amount))
     view = SampledElements(mesh, 1)
     shared = _shared(problem, view)
-    known: dict[tuple[int, int], tuple[str, float]] = {}
+    known: dict[tuple[int, int], tuple[str, float]] = {}  # support and value by vertex and axis
     for pattern, components in problem.displacement.items() if shared.any() else ():
-        vertices, segments, s = _ends(view, pattern, shared)
+        segments, end = _ends(view, pattern, shared)
+        vertices = view.ends[segments, end]
         for axis, value in enumerate(components):
             if value is None or not len(vertices):
                 continue
             look = view.evaluate if numbers(value) else view.look
-            values = look(value, segments, s).ravel().tolist()
+            values = look(value, segments, _at_ends(end)).ravel().tolist()
             for vertex, u in zip(vertices.tolist(), values, strict=True):
                 name, other = known.setdefault((vertex, axis), (pattern, u))
                 if abs(u - other) > APART * max(abs(other), abs(u)):
-                    found.append(
-                        Contradiction(
-                            (name, pattern),
-                            view.arrays.vertices[vertex],
-                            f'displacement "{name}" and "{pattern}" prescribe {other:.6g} and '
-                            f"{u:.6g} along {'xy'[axis]}",
-                            abs(u - other),
-                        )
+                    message = (
+                        f'displacement "{name}" and "{pattern}" prescribe {other:.6g} and {u:.6g} '
+                        f"along {'xy'[axis]}"
                     )
+                    place, amount = view.arrays.vertices[vertex], abs(u - other)
+                    found.append(Contradiction((name, pattern), place, message, amount))
     if problem.sliding is not None and known:
         found += _across_guides(str(problem.sliding), view, shared, known)
     largest = max((one.largest for one in seen), default=0.0)
@@ -87,22 +80,23 @@ def _shared(problem: Problem, view: SampledElements) -> Mask:
     """Vertices at which segments of several prescribed regions, or of guides, meet."""
     guides = [str(problem.sliding)] if problem.sliding is not None else []
     at = view.inside(view.mesh.Boundaries("|".join([*problem.displacement, *guides])))
-    vertex, region = view.arrays.facets[at], view.arrays.boundaries[at]
+    vertex, region = view.ends[at], view.arrays.boundaries[at]
     low, high = np.full(view.mesh.nv, len(view.mesh.GetBoundaries())), np.full(view.mesh.nv, -1)
     np.minimum.at(low, vertex, region[:, None])
     np.maximum.at(high, vertex, region[:, None])
     return np.asarray(low < high)
 
 
-def _ends(view: SampledElements, pattern: str, shared: Mask) -> tuple[Index, Index, Array]:
-    """The `shared` vertices (k,) of boundaries, once for each segment (k,) there.
-
-    And the places (k, 1, 1) on these, as NGSolve's parameter runs.
-    """
+def _ends(view: SampledElements, pattern: str, shared: Mask) -> tuple[Index, Index]:
+    """Segments (k,) of boundaries with `shared` vertices, and which end (k,) each of these is."""
     segments = view.inside(view.mesh.Boundaries(pattern))
-    vertices = view.arrays.facets[segments]
-    k, end = np.nonzero(shared[vertices])
-    return vertices[k, end], segments[k], np.asarray(1.0 - end[:, None, None])
+    k, end = np.nonzero(shared[view.ends[segments]])
+    return segments[k], end
+
+
+def _at_ends(end: Index) -> Array:
+    """Places (k, 1, 1) of ends (k,) of segments, as NGSolve's parameter runs."""
+    return np.asarray(1.0 - end[:, None, None], dtype=float)
 
 
 def _across_guides(
@@ -113,9 +107,10 @@ def _across_guides(
 ) -> list[Contradiction]:
     """Ends of `guides` at which `known` values, by vertex and axis, lead across them."""
     found = []
-    vertices, segments, s = _ends(view, guides, shared)
+    segments, end = _ends(view, guides, shared)
+    vertices = view.ends[segments, end]
     places, edges = view.arrays.vertices[vertices], cad_edges(view.mesh)
-    normals = view.evaluate(ng.specialcf.normal(2), segments, s)[:, 0]
+    normals = view.evaluate(ng.specialcf.normal(2), segments, _at_ends(end))[:, 0]
     for k, vertex in enumerate(vertices.tolist()):
         normal = normals[k]
         if edges is not None:
@@ -132,30 +127,21 @@ def _across_guides(
     return found
 
 
-def warn_of_contradictions(problem: Problem, mesh: ng.Mesh) -> None:
-    """Warn of the first corner of each two supports."""
+def warn_of_implausible(problem: Problem, mesh: ng.Mesh, order: int) -> None:
+    """Warn of elements that lock, loads that are nowhere, supports that contradict, laws that jump.
+
+    Once, of the first mesh; of supports at the first corner of each two.
+    """
+    warn_of_locking(problem, mesh, order)
+    warn_of_data(problem, mesh, order)
     told: set[tuple[str, str]] = set()
     for one in contradictions(problem, mesh):
         if one.supports not in told:
             told.add(one.supports)
+            where = "a point" if one.supports[0] == one.supports[1] else "their corner"
             x, y = one.place
             warn(
-                f"{one.message} at {_place(one)} ({x:.6g}, {y:.6g}): the energy is infinite and no "
+                f"{one.message} at {where} ({x:.6g}, {y:.6g}): the energy is infinite and no "
                 "mesh resolves it; make them equal there"
             )
-
-
-def _place(one: Contradiction) -> str:
-    """What is at the place of a contradiction."""
-    return "a point" if one.supports[0] == one.supports[1] else "their corner"
-
-
-def warn_of_implausible(problem: Problem, mesh: ng.Mesh, order: int) -> None:
-    """Warn of elements that lock, loads that are nowhere, supports that contradict, laws that jump.
-
-    Once, of the first mesh.
-    """
-    warn_of_locking(problem, mesh, order)
-    warn_of_data(problem, mesh, order)
-    warn_of_contradictions(problem, mesh)
     warn_of_jumps(problem, mesh)

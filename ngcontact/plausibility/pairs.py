@@ -1,0 +1,428 @@
+"""What may be wrong with pairs in contact: directions, gaps, penetration, large strains.
+
+Along a fixed direction xi the tangential part of the jump does not enter (2.10), and forces act
+along xi. That is right to first order where one of the two surfaces lies across xi: points of the
+other one, wherever they slide, meet the same line. Where both are inclined by an angle, as the two
+sides of a groove are, forces that should act along the normals are wrong by its cosine.
+
+Without a direction the gap is measured along the normals of the secondary as it is drawn (2.3).
+On the way g over which a translation closes it, points slide by g theta where their normals are
+turned by theta; there the gap has changed by its slope times that way. Between circles of radii R
+and S (negative in a hole) the curvature of the gap, on which Hertz's formulas rest, comes out too
+large by 2 g / R + g**2 / (R (R + S)), and the peak of the pressure by half of that: by g / R
+between discs, by g / (2 R) for a pin that was drawn in the middle of its hole; too small by that
+where the hole is the secondary.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from ..arrays import Array, Index, Mask
+from ..contact import ContactState, in_contact, partners, prescribed_gap, twins
+from ..fem import BoundaryTrace, bulk_moduli, shear_moduli, stiffer_than
+from ..lagrange import gauss_lobatto, lagrange_derivative
+from ..problem import Problem
+from ..solved import Solved
+from .refinement import moves_rigidly
+
+# Share of a pair's force below which a part of its zone does not matter.
+FORCE_SHARE = 0.01
+# Intervals between nodes, for each end at open points, from which a zone in contact is resolved:
+# half a zone has one end, as its pressure has the peak in the middle. On 153 coarse meshes (discs,
+# blocks with Hertz's gap, pins in holes, orders 1 to 4) the peak was wrong by more than 10 % in 30
+# of 55 zones below, in 1 of 98 above (12 %), by more than 20 % in 24 and none. Three segments at
+# all orders told 93, of which 30 were wrong by 10 %.
+RESOLVED = 2
+# Contact forces of this size, relative to the largest term of a force, are round-off.
+FORCE_ROUND_OFF = 100 * np.finfo(float).eps
+# Share of the peak of the pressure from which it matters that bodies pass through each other. They
+# do by up to 0.12 beside a single point in contact, measured at orders 1 to 4; where curves touch
+# between points by 0.42 and more, with forces wrong by a third or not there.
+MISSING_PRESSURE = 0.25
+# Mean pressure of a zone over the modulus of confined compression from which a result means
+# nothing: a layer would be pressed to no thickness, Hertz's zone be over two radii wide. Wrong
+# signs and units lie beyond by orders of magnitude, examples with loads in units of E do not. The
+# mean of a zone stays finite at the corners of a punch, where the peak does not; confined bodies
+# that are nearly incompressible bear pressures far above E at small strains.
+LARGE_PRESSURE = 1.0
+PLACES = (np.arange(4) + 0.5) / 4  # on a segment; what lies between them is 1 / 16 of its sagitta
+MOST_SEGMENTS = 32  # of a pair that are looked at for penetration
+LENGTH_ROUND_OFF = 100 * np.finfo(float).eps  # of lengths and displacements
+INCLINED = np.deg2rad(15)  # from which forces along the direction are wrong by 1 - cos = 3.4 %
+CORNER = np.cos(INCLINED / 2)  # mean of two unit normals at a vertex, below which it is a corner
+# Error of the peak from which a way is told. Between two discs whose radii are 1 and 1, 1 and 3, 3
+# and 1 peaks were wrong by 0.93 to 1.05 times what is said here, measured at ways of 0.01 to 0.16;
+# of pins with a clearance of 2 to 25 % of their radius by 0.93 to 0.96 times that, of holes as
+# secondary, 5 to 25 %, by -1.02 to -1.06 times, at 2 % by half.
+PEAK_ERROR = 0.02
+# Share of a given gap of one sign from which a drawn one of the other sign contradicts it.
+OTHERWISE = 0.5
+
+Doubts = dict[tuple[str, int], str]  # messages by what is doubted and the number of the pair
+
+
+def doubts(solution: Solved, *, last: bool) -> Doubts:
+    """What may be wrong with a solution, pair by pair.
+
+    Fixed directions far from the normals, bodies that are drawn far apart or otherwise than their
+    gap is given, and strains that are not small, which no mesh mends; of the `last` mesh also zones
+    in contact that are too short for it, and bodies that pass through each other between contact
+    points. Of all pairs together, bodies that nothing resists.
+    """
+    problem, pairs, space = solution.problem, solution.pairs, solution.discrete.space
+    found: Doubts = {}
+    trace, u = space.trace, solution.displacement.vec.FV().NumPy()
+    largest = [np.abs(state.force).max(initial=0.0) for state in pairs]
+    noise = FORCE_ROUND_OFF * np.abs(space.diagonal * u).max(initial=0.0)
+    noise = max(noise, FORCE_ROUND_OFF * max(largest, default=0.0))
+    peak = max((state.pressure.max(initial=0.0) for state in pairs), default=0.0)
+    for number, (state, force) in enumerate(zip(pairs, largest, strict=True)):
+        messages = {}
+        if force > noise:
+            zones = zones_of(state)
+            messages["strain"] = _large_strains(problem, trace, state, zones)
+            if not messages["strain"]:  # which leaves nothing else to believe
+                messages["direction"] = _inclined(trace, state) or _drawn_apart(trace, state)
+                messages["gap"] = _contradicted(trace, state)
+                messages["zone"] = _short_zone(state, zones) if last else ""
+        if last and not messages.get("strain"):  # with forces or without
+            messages["penetration"] = _penetration(solution, state, peak)
+        name = f"contact {number} of {state.line.contact.named()}"
+        found |= {(what, number): f"{name}: {text}" for what, text in messages.items() if text}
+    touching = any(state.active.any() for state in pairs)
+    if max(largest, default=0.0) <= noise and touching and u.any():
+        if moves_rigidly(problem, space, solution.displacement):
+            found["rigid", 0] = (
+                "nothing deforms: bodies in contact move rigidly, as nothing resists them, and all "
+                "contact forces are round-off; relative errors mean nothing here. Hold the body "
+                "that is pushed by a support or a load if it should resist"
+            )
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class ContactZones:
+    """The k connected zones of one pair in which its bodies touch.
+
+    Attributes
+    ----------
+    force, weight : ndarray (k,)
+        Sums over the points of each zone: a force per unit thickness, a length.
+    segments : ndarray (k,)
+        Length in segments: half of the interval between two nodes in which it ends counts.
+    ends : ndarray of int (k,)
+        Transitions to open points.
+    """
+
+    force: Array
+    weight: Array
+    segments: Array
+    ends: Index
+
+
+def _neighbours(state: ContactState) -> Index:
+    """Pairs (l, 2) of neighbouring points on one segment."""
+    one, other = state.line.rows[:, :-1].ravel(), state.line.rows[:, 1:].ravel()
+    both = np.flatnonzero((one >= 0) & (other >= 0))
+    return np.array([one[both], other[both]]).T
+
+
+def zones_of(state: ContactState) -> ContactZones:
+    """The zones of one pair."""
+    line, along, across = state.line, _neighbours(state), twins(state.line)
+    closed = in_contact(line, state.active) if len(across) else state.active
+    both = np.concatenate([along, across])
+    touching = closed[both].sum(axis=1)
+    inside = both[touching == 2]
+    graph = sp.coo_array((np.ones(len(inside)), inside.T), shape=2 * (len(closed),))
+    label = connected_components(graph, directed=False)[1]
+    zones, number = np.unique(label[closed], return_inverse=True)
+    zone, k = np.full(len(closed), -1), len(zones)
+    zone[closed] = number
+    ending = both[touching == 1]
+    ends = np.bincount(zone[ending[closed[ending]]], minlength=k)
+    whole = np.bincount(zone[along[touching[: len(along)] == 2, 0]], minlength=k)
+    return ContactZones(
+        force=np.asarray(np.bincount(number, state.force[closed], minlength=k), dtype=float),
+        weight=np.asarray(np.bincount(number, line.weight[closed], minlength=k), dtype=float),
+        segments=(whole + ends / 2) / (line.rows.shape[1] - 1),
+        ends=ends,
+    )
+
+
+def _large_strains(
+    problem: Problem, trace: BoundaryTrace, state: ContactState, zones: ContactZones
+) -> str:
+    """Message where strains are far from small, or nothing."""
+    pressure = float((np.abs(zones.force) / zones.weight).max(initial=0.0))
+    if stiffer_than(problem, trace.mesh, pressure / LARGE_PRESSURE):
+        return ""
+
+    def confined(problem: Problem, mesh: ng.Mesh, asked: Mask) -> Array:
+        return bulk_moduli(problem, mesh, asked) + shear_moduli(problem, mesh, asked)
+
+    modulus = _softer(confined, problem, trace, state)
+    if pressure <= LARGE_PRESSURE * modulus:
+        return ""
+    return (
+        f"the mean pressure in contact, {pressure:.3g}, is {pressure / modulus:.2g} times the "
+        f"modulus {modulus:.3g} of the softer body in confined compression: strains are not small; "
+        "check the sign of gap (positive where bodies are apart) and the units of E, loads, lengths"
+    )
+
+
+def _softer(
+    moduli: Callable[[Problem, ng.Mesh, Mask], Array],
+    problem: Problem,
+    trace: BoundaryTrace,
+    state: ContactState,
+) -> float:
+    """Mean of the `moduli` along each side, of the two the smaller one; a stress."""
+    sides = [trace.element[state.line.segments], trace.element[state.line.facing]]
+    asked = np.zeros(trace.mesh.ne, dtype=bool)
+    asked[np.concatenate(sides)] = True
+    values = moduli(problem, trace.mesh, asked)
+    return float(min(values[side].mean() for side in sides if len(side)))
+
+
+def _short_zone(state: ContactState, zones: ContactZones) -> str:
+    """Message where zones in contact are too short for the mesh, or nothing.
+
+    Below `RESOLVED` the peak of Hertz's pressure is wrong by up to 70, 59, 64, 79 % at orders 1 to
+    4. Contact of a whole line is resolved whatever its segments.
+    """
+    cut = (zones.ends > 0) & (np.abs(zones.force) > FORCE_SHARE * np.abs(state.force).sum())
+    needed = RESOLVED * zones.ends / (state.line.rows.shape[1] - 1)
+    short = np.flatnonzero(cut & (zones.segments < needed))
+    if state.line.contact.bilateral or not short.size:
+        return ""
+    worst = short[np.argmin(zones.segments[short] / needed[short])]
+    return (
+        f"a zone in contact is {zones.segments[worst]:.2g} segments long, shorter than "
+        f"{needed[worst]:.2g}: the force is better than the pressure, whose peak may be wrong by "
+        "half; use adapt, or a smaller maxh"
+    )
+
+
+def _penetration(solution: Solved, state: ContactState, peak: float) -> str:
+    """Message where bodies pass through each other between contact points, or nothing.
+
+    On the curves of the mesh, where the gap may be negative between nodes: not where all are in
+    contact, nor where it is wide beside its change on the segment and its neighbours. `peak` is the
+    largest pressure of all pairs.
+    """
+    line, trace, gap = state.line, solution.discrete.space.trace, np.maximum(state.gap, 0.0)
+    contact = line.contact
+    if contact.bilateral or state.active.all():
+        return ""
+    whole = np.flatnonzero((line.rows >= 0).all(axis=1))
+    rows, high = line.rows[whole], np.zeros(len(gap))
+    np.maximum.at(high, rows, np.broadcast_to(gap[rows].max(axis=1)[:, None], rows.shape))
+    least, most = gap[rows].min(axis=1), high[rows].max(axis=1)
+    near = np.flatnonzero((2 * least < most) & ~state.active[rows].all(axis=1))
+    local = whole[near[np.argsort(least[near], kind="stable")[:MOST_SEGMENTS]]]
+    if not len(local):
+        return ""
+    segment, s = np.repeat(line.segments[local], len(PLACES)), np.tile(PLACES, len(local))
+    x, d = trace.point(segment, s), trace.normal(segment, s)
+    if contact.direction is not None:
+        d = np.tile(contact.direction, (len(s), 1))
+    opposite = partners(trace, line.facing, segment, x, d, nodes=False)
+    there, s_there, distance = opposite.segment, opposite.s, opposite.distance
+    if contact.gap is not None:
+        distance = prescribed_gap(contact, trace, segment, s, x)
+    met = np.isfinite(distance) & ((there >= 0) | (contact.primary is None))
+    if not met.any():
+        return ""
+    u = trace.evaluate(solution.displacement, segment[met], s[met])
+    noise = LENGTH_ROUND_OFF * (np.abs(u).max() + np.abs(x[met]).max())
+    if contact.primary is not None:
+        u = u - trace.evaluate(solution.displacement, there[met], s_there[met])
+    left = distance[met] - (u * d[met]).sum(axis=1)  # (2.10)
+    deepest = int(np.argmin(left))
+    depth = -float(left[deepest])
+    if depth <= noise:
+        return ""
+    [length] = trace.lengths(segment[met][[deepest]])
+    missing = _softer(shear_moduli, solution.problem, trace, state) * depth / float(length)
+    if missing <= MISSING_PRESSURE * peak:
+        return ""
+    x, y = x[met][deepest]
+    return (
+        f"bodies pass through each other between contact points, by {depth:.3g} near "
+        f"({x:.4g}, {y:.4g}), where no point lies: pressures of about {missing:.2g} are not seen; "
+        "give the mesh a node there, or use adapt, or a smaller maxh"
+    )
+
+
+def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
+    """Message where surfaces that carry force are inclined to the fixed direction, or nothing."""
+    line = state.line
+    if line.contact.direction is None or not state.active.any():
+        return ""
+    xi = np.array(line.contact.direction)
+    touching = np.append(state.active, False)[line.rows].any(axis=1)
+    segments = line.segments[touching]
+    if trace.edges and all(trace.edges[k].straight for k in set(trace.region[segments].tolist())):
+        chord = trace.curve[segments, -1] - trace.curve[segments, 0]
+        if (np.abs(chord @ xi) <= np.sin(INCLINED) * trace.lengths(segments)).all():
+            return ""
+    angle, force = inclinations(trace, state), np.abs(state.force)
+    if force[angle > INCLINED].sum() <= FORCE_SHARE * force.sum():
+        return ""
+    told = ", ".join(f"{component:.3g}" for component in xi)
+    return (
+        f"surfaces in contact are inclined to direction=({told}) by up to "
+        f"{np.rad2deg(angle.max()):.0f} degrees, so that forces do not act along their normals; "
+        "leave the direction out (direction=None), or give each flank a pair of its own direction"
+    )
+
+
+def inclinations(trace: BoundaryTrace, state: ContactState) -> Array:
+    """Angles (m,) in radians between a pair's fixed direction and the surfaces; 0 where open.
+
+    The smaller one of both surfaces; ends of their lines and corners have no normal of their own
+    and count only where neither surface has.
+    """
+    line, xi = state.line, np.array(state.line.contact.direction)
+    touching = np.flatnonzero(np.append(state.active, False)[line.rows].any(axis=1))
+    point = line.rows[touching].ravel()
+    segment, s = trace.at_nodes(line.segments[touching])
+    normal, has = trace.exact_normal(segment, s), point >= 0
+    ends = np.isin(s[has], (0.0, 1.0))
+    cosine, smooth = _at_vertices(point[has], ends, normal[has], xi, len(state.active))
+    cosine[~state.active] = 1.0
+    steep = np.flatnonzero(cosine < np.cos(INCLINED))
+    if len(steep):
+        of_other = _of_obstacle if line.contact.primary is None else _of_primary
+        other, plain = of_other(trace, state, steep, xi)
+        mine = np.where(smooth[steep] | ~plain, cosine[steep], -1.0)
+        cosine[steep] = np.maximum(mine, np.where(plain | ~smooth[steep], other, -1.0))
+    return np.arccos(np.clip(cosine, -1.0, 1.0))
+
+
+def _at_vertices(
+    point: Index, at_end: Mask, normal: Array, xi: Array, count: int
+) -> tuple[Array, Mask]:
+    """Cosine (count,) of the normal nearest to `xi` at each point, and where the curve is smooth.
+
+    `point` (k,) numbers those of the unit normals `normal` (k, 2), `at_end` (k,) tells which are
+    one-sided at an end of a segment: at ends of the line and at corners no mean is a unit vector.
+    """
+    cosine, mean = np.full(count, -1.0), np.zeros((count, 2))
+    np.maximum.at(cosine, point, normal @ xi)
+    np.add.at(mean, point, np.where(at_end, 0.5, 1.0)[:, None] * normal)
+    return cosine, np.linalg.norm(mean, axis=1) > CORNER
+
+
+def _of_primary(
+    trace: BoundaryTrace, state: ContactState, points: Index, xi: Array
+) -> tuple[Array, Mask]:
+    """The same of the primary, where it is met from the `points` (k,) of the secondary."""
+    line = state.line
+    segment, s = line.partner[points], line.partner_s[points]
+    point, end = np.arange(len(points)), np.isin(s, (0.0, 1.0))
+    vertex = trace.nodes[segment, np.where(s < 0.5, 0, -1)]
+    # Both segments at a vertex: all that end there.
+    ends = trace.nodes[line.facing][:, [0, -1]]
+    which, local, side = np.nonzero(vertex[end, None, None] == ends)
+    point = np.concatenate([point[~end], point[end][which]])
+    at_end = np.concatenate([np.zeros(np.count_nonzero(~end), bool), np.ones(len(which), bool)])
+    segment = np.concatenate([segment[~end], line.facing[local]])
+    s = np.concatenate([s[~end], side.astype(float)])
+    return _at_vertices(point, at_end, -trace.exact_normal(segment, s), xi, len(points))
+
+
+def _of_obstacle(
+    trace: BoundaryTrace, state: ContactState, points: Index, xi: Array
+) -> tuple[Array, Mask]:
+    """The same of a rigid obstacle, whose curve is that of the secondary moved by the gap."""
+    line = state.line
+    order = line.rows.shape[1] - 1
+    whole = line.rows[(line.rows >= 0).all(axis=1)]
+    curve = (line.position + line.gap[:, None] * xi)[whole]
+    slope = np.einsum("ni,kid->knd", lagrange_derivative(order, gauss_lobatto(order)), curve)
+    tangent = slope / np.linalg.norm(slope, axis=2)[:, :, None]
+    cosine = np.full(len(line.node), -1.0)
+    np.maximum.at(cosine, whole, np.abs(tangent[:, :, 0] * xi[1] - tangent[:, :, 1] * xi[0]))
+    return cosine[points], np.ones(len(points), dtype=bool)
+
+
+def _drawn_apart(trace: BoundaryTrace, state: ContactState) -> str:
+    """Message where normals turn while bodies that are drawn apart come together, or nothing."""
+    if state.line.contact.direction is not None:
+        return ""
+    way, error = way_and_error(trace, state)
+    if error <= PEAK_ERROR:
+        return ""
+    return (
+        f"bodies are drawn {way:.3g} apart, and the normals along which the gap is measured are "
+        f"not followed on the way: the peak of the pressure is wrong by about {error:.2g} of it; "
+        "draw the bodies touching, or give the common normal as direction"
+    )
+
+
+def way_and_error(trace: BoundaryTrace, state: ContactState) -> tuple[float, float]:
+    """Way that closes the gap, a length, and the share by which the peak of pressure is wrong.
+
+    Both in the mean by force; 0 where normals do not turn or the bodies are drawn touching. An
+    error of `PEAK_ERROR` or less is a bound of what it is.
+    """
+    line, force, along = state.line, np.abs(state.force), _neighbours(state)
+    weight = force[along].sum(axis=1)
+    if not weight.any():
+        return 0.0, 0.0
+
+    def curvatures(points: Array, normals: Array) -> Array:  # between neighbours, 1 / length
+        chord, turn = (np.diff(values[along], axis=1)[:, 0] for values in (points, normals))
+        length = (chord * chord).sum(axis=1)
+        bend = (turn * chord).sum(axis=1)
+        return np.divide(bend, length, out=np.zeros(len(along)), where=length > 0)
+
+    way = float(np.average(np.maximum(line.gap, 0.0)[along].mean(axis=1), weights=weight))
+    mine = curvatures(line.position, line.direction)
+    curvature = float(np.average(np.abs(mine), weights=weight))
+    if way * curvature <= PEAK_ERROR or line.contact.primary is None:
+        return way, way * curvature
+    meets = line.partner >= 0
+    facing, normal = np.zeros_like(line.position), np.zeros_like(line.position)
+    at = line.partner[meets], line.partner_s[meets]
+    facing[meets], normal[meets] = trace.point(*at), trace.exact_normal(*at)
+    both = weight * meets[along].all(axis=1)
+    theirs = np.sign(mine) * curvatures(facing, normal)
+    other = float(np.average(theirs, weights=both)) if both.any() else 0.0
+    # 1 / (R + S); a hole of the same radius, drawn so beside a given gap, counts as one about it.
+    together = curvature + other
+    middle = -1 / way if together <= 0 else max(curvature * other / together, -1 / way)
+    return way, way * curvature * (1 + way * middle / 2)
+
+
+def _contradicted(trace: BoundaryTrace, state: ContactState) -> str:
+    """Message where the given gap has the other sign than the one that is drawn, or nothing."""
+    line, contact = state.line, state.line.contact
+    if contact.gap is None or contact.primary is None:
+        return ""
+    sign = np.sign(line.gap[0])
+    least = (sign * line.gap).min()
+    if not least > 0:
+        return ""
+    meets = np.flatnonzero(line.partner >= 0)
+    facing = trace.point(line.partner[meets], line.partner_s[meets])
+    drawn = ((facing - line.position[meets]) * line.direction[meets]).sum(axis=1)
+    other = (-sign * drawn).min(initial=np.inf)
+    if not OTHERWISE * least <= other < np.inf:
+        return ""
+    words = ("apart", "into each other")
+    says, draws = words if sign > 0 else words[::-1]
+    return (
+        f"gap says that bodies are {least:.3g} {says} or more, the drawing has them {other:.3g} "
+        f"{draws}: gap counts; it is positive where bodies are apart, and without it the drawing "
+        "counts"
+    )
