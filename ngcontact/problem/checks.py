@@ -160,7 +160,10 @@ def check_pairs(view: MeshArrays, contact: Sequence[Masks], inner: Mask) -> None
 def check_pressures(
     names: Sequence[str], traction: Masks, loads: Iterable[ng.CoefficientFunction], inner: Mask
 ) -> None:
-    """Refuse pressures, one for each mask (r,), on lines inside a body: these have two normals."""
+    """Refuse pressures, one for each mask (r,), on lines inside a body, which have two normals.
+
+    `inner` (r,) are boundaries between two triangles.
+    """
     for (label, mask), load in zip(traction.items(), loads, strict=True):
         if load.dim == 1 and (mask & inner).any():
             name = names[int(np.argmax(mask & inner))]
