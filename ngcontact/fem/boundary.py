@@ -130,12 +130,7 @@ def _physical_basis(V: ng.FESpace, trace: BoundaryTrace) -> sp.csr_array:
     bary = np.column_stack([1 - bary.sum(axis=1), bary[..., 0]])
     # (2.4): the linear function of x at the edge's node, less the mean of its two ends.
     value = bary - np.where((triangles[:, :, None] == trace.nodes[:, None, :]).any(axis=2), 0.5, 0)
-    numbers = np.array(
-        [
-            V.GetDofNrs(el.edges[0])[0] if V.GetDofNrs(el.edges[0]) else -1
-            for el in mesh.Elements(ng.BND)
-        ]
-    )
+    numbers = np.array([[*V.GetDofNrs(el.edges[0]), -1][0] for el in mesh.Elements(ng.BND)])
     on = numbers >= 0
     bubble = 1 / edge_bubbles(ng.H1(mesh, order=2))[0, 0]
     rows = np.repeat(numbers[on], 3)
@@ -169,56 +164,23 @@ class BoundaryTrace:
     """Segments of the whole boundary, k of them, each from s = 0 to s = 1.
 
     Methods take places as numbers of segments and parameters s on them.
-
-    Attributes
-    ----------
-    mesh : ng.Mesh
-        The (curved) mesh.
-    space : ng.FESpace
-        Scalar H1 space whose unknowns number the nodes.
-    order : int
-        Degree of the displacement on a segment.
-    geometry_order : int
-        Degree of the curve of a segment.
-    region : ndarray of int (k,)
-        Boundary region number.
-    nodes : ndarray of int (k, order + 1)
-        Node numbers from s = 0 to s = 1: scalar unknowns of the space.
-    element : ndarray of int (k,)
-        Volume element the segment belongs to.
-    body : ndarray of int (k,)
-        Material region number of that element.
-    inner : ndarray of bool (k,)
-        Segments between two elements: lines inside a body.
-    curve : ndarray (k, geometry_order + 1, 2)
-        The curve at its Gauss-Lobatto points.
-    side : ndarray (k,)
-        +1 where the outward normal lies to the right of the direction of s, else -1.
-    edges : list of CadEdge or None
-        CAD edges by region number.
-    model : Model
-        What lengths of segments stand for.
-    axis : ndarray of int (k,)
-        -1 or 1 where s = 0 or s = 1 alone lies on the axis of a body of revolution, else 0.
-    on_axis : ndarray of bool (k,)
-        Segments that lie on it.
     """
 
     mesh: ng.Mesh
-    space: ng.FESpace
-    order: int
-    geometry_order: int
-    region: Index
-    nodes: Index
-    element: Index
-    body: Index
-    inner: Mask
-    curve: Array
-    side: Array
-    edges: list[CadEdge] | None
-    model: Model
-    axis: Index
-    on_axis: Mask
+    space: ng.FESpace  # scalar H1, whose unknowns number the nodes
+    order: int  # degree of the displacement on a segment
+    geometry_order: int  # degree of the curve of a segment
+    region: Index  # (k,), boundary region number
+    nodes: Index  # (k, order + 1), numbers from s = 0 to s = 1
+    element: Index  # (k,), the triangle that the segment belongs to
+    body: Index  # (k,), material region number of that
+    inner: Mask  # (k,), between two triangles: lines inside a body
+    curve: Array  # (k, geometry_order + 1, 2), at its Gauss-Lobatto points
+    side: Array  # (k,), +1 where the outward normal lies right of the direction of s, else -1
+    edges: list[CadEdge] | None  # by region number
+    model: Model  # what lengths of segments stand for
+    axis: Index  # (k,), -1 or 1 where s = 0 or s = 1 alone lies on the axis of revolution, else 0
+    on_axis: Mask  # (k,), segments that lie on it
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Made again from the mesh: lines of a drawing cannot be pickled."""
@@ -238,10 +200,7 @@ class BoundaryTrace:
         return rightward(self.derivative(segment, s)) * self.side[segment, None]
 
     def exact_normal(self, segment: Index, s: Array) -> Array:
-        """Outward unit normals (k, 2) of the CAD edges at `s` (k,) of segments `segment` (k,).
-
-        Those of the mesh where there are no CAD edges.
-        """
+        """The same of the CAD edges, at `s` (k,) of segments `segment` (k,), (k, 2), if any."""
         normals = self.normal(segment, s)
         if self.edges is not None:
             points = self.point(segment, s)
@@ -276,10 +235,7 @@ class BoundaryTrace:
         return np.linalg.norm(self.curve[segments, -1] - self.curve[segments, 0], axis=1)
 
     def lies_on(self, segment: Index, *patterns: str | None) -> Mask:
-        """Whether each `segment` (k,) is of a boundary that one of the patterns selects, (k,).
-
-        Patterns are names or NGSolve patterns, as in `Problem`; None selects nothing.
-        """
+        """Which of `segment` (k,) are of boundaries that patterns select, (k,); None does not."""
         regions = np.zeros(len(self.mesh.GetBoundaries()), dtype=bool)
         for pattern in patterns:
             if pattern is not None:
@@ -308,37 +264,21 @@ class BoundaryTrace:
         return np.asarray(np.isin(view.keys(view.sides), view.keys(view.facets[bent])).any(axis=1))
 
     @cached_property
-    def _mesh_points(self) -> NDArray:
+    def _middles(self) -> NDArray:
         return self.mesh.MapToAllElements(ng.IntegrationRule([(0.5, 0, 0)], [1]), ng.BND)
-
-    def mesh_points(self, segment: Index, s: Array) -> NDArray:
-        """NGSolve boundary points (k,) at parameters `s` (k,) of segments `segment` (k,)."""
-        points = self._mesh_points[segment].copy()
-        points["x"] = 1 - s  # NGSolve's segment runs from the second vertex to the first
-        return points
 
     def evaluate(self, function: ng.CoefficientFunction, segment: Index, s: Array) -> Array:
         """Values (k, dim) of a CoefficientFunction at `s` (k,) of segments `segment` (k,)."""
-        values = np.asarray(function(self.mesh_points(segment, s)))
-        return values.reshape(len(segment), function.dim)
+        points = self._middles[segment].copy()
+        points["x"] = 1 - s  # NGSolve's segment runs from the second vertex to the first
+        return np.asarray(function(points)).reshape(len(segment), function.dim)
 
     def number_points(self, segment: Index, node: Index, vector: Array) -> tuple[Index, Array]:
         """Number the nodes of several segments: once each, twice at a corner.
 
-        Parameters
-        ----------
-        segment, node : ndarray of int (k,)
-            Nodes segment by segment; shared ones occur twice.
-        vector : ndarray (k, 2)
-            Unit vector belonging to the node on that segment, such as the normal.
-
-        Returns
-        -------
-        number : ndarray of int (k,)
-            Point of each entry.
-        vector : ndarray (m, 2)
-            Unit vector of each point, the mean of those of its entries by segment length: the
-            forces of a uniform pressure on both segments add up along it.
+        Points (k,) of `node` (k,) on `segment` (k,), where shared nodes occur twice; and a unit
+        vector (m, 2) of each point, the mean by segment length of `vector` (k, 2), such as the
+        normal there: the forces of a uniform pressure on both segments add up along it.
         """
         _, number = np.unique(node, return_inverse=True)
         order = np.argsort(number, kind="stable")

@@ -1,9 +1,9 @@
-"""Sizes and moduli of elements, nearly incompressible bodies, units for squares."""
+"""Moduli of elements, integrals of laws that vary, nearly incompressible bodies."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from weakref import WeakKeyDictionary
 
 import ngsolve as ng
@@ -23,8 +23,8 @@ ROUGH_PARTS = 8  # of the sides of an element in which a law is rough, each with
 MODULUS_BONUS = 4  # quadrature orders above the default: moduli may be as rough as r^(-1/2)
 CURVED = 2  # ... and for the map of a curved element
 
+# Laws (q, q) of numbers, and their bulk and shear moduli, by the model.
 CONSTANT: WeakKeyDictionary[Elastic | Hooke, dict[str, Array]] = WeakKeyDictionary()
-# Bulk and shear modulus of laws of numbers, by the model.
 NUMBERS: WeakKeyDictionary[Elastic | Hooke, dict[str, tuple[float, float]]] = WeakKeyDictionary()
 
 # Voigt strains of a unit of volume, without change of volume, and of shear, as rows.
@@ -39,41 +39,28 @@ SAMPLES = ng.IntegrationRule(
 )
 
 
-def _laws(
-    problem: Problem, mesh: ng.Mesh, asked: Mask | None = None
-) -> Iterator[tuple[Mask, Array]]:
-    """Elements (ne,) of a law C, and C (k, 4, q, q) at their `SAMPLES`; (1, 1, q, q) of numbers.
+def _sampled(
+    problem: Problem, mesh: ng.Mesh, *measures: Callable[[Array], Array], asked: Mask | None = None
+) -> Array:
+    """Measures (m, ne, 4) at `SAMPLES` of each element, (k, 4) of laws C (k, 4, q, q).
 
-    Voigt components q, the shear last. Only elements `asked` (ne,) for are met.
+    Voigt components q, the shear last. Only of elements `asked` (ne,) for, 0 in others.
     """
-    region, samples = MeshArrays(mesh).bodies, len(SAMPLES)
+    values = np.zeros((len(measures), mesh.ne, len(SAMPLES)))
+    region = MeshArrays(mesh).bodies
     for pattern, law in problem.materials.items():
-        inside = np.array(mesh.Materials(pattern).Mask())[region]
-        at = inside if asked is None else inside & asked
+        at = np.array(mesh.Materials(pattern).Mask())[region]
+        at = at if asked is None else at & asked
         if not at.any():
             continue
-        if varies(law):
-            points = mesh.MapToAllElements(SAMPLES, ng.VOL).reshape(-1, samples)[at]
+        C = _constant(law, problem.model, mesh)[None, None] if not varies(law) else None
+        if C is None:
+            points = mesh.MapToAllElements(SAMPLES, ng.VOL).reshape(-1, len(SAMPLES))[at]
             C = np.asarray(law.voigt(problem.model)(points.ravel()))
             size = round(math.sqrt(C.shape[1]))
-            yield at, C.reshape(-1, samples, size, size)
-        else:
-            yield at, _constant(law, problem.model, mesh)[None, None]
-
-
-def _of_elements(
-    problem: Problem,
-    mesh: ng.Mesh,
-    modulus: Callable[[Array], Array],
-    asked: Mask | None = None,
-) -> Array:
-    """modulus(C) (ne, 4) at `SAMPLES` of each element, of laws C (..., q, q).
-
-    0 in elements that are not `asked` (ne,) for.
-    """
-    values = np.zeros((mesh.ne, len(SAMPLES)))
-    for at, C in _laws(problem, mesh, asked):
-        values[at] = modulus(C)
+            C = C.reshape(-1, len(SAMPLES), size, size)
+        for value, measure in zip(values, measures, strict=True):
+            value[at] = measure(C)
     return values
 
 
@@ -133,7 +120,8 @@ def shear_moduli(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> 
     That of C on strains, in Mandel's scaling: mu of isotropic laws with nu >= 0, and kappa below.
     Of elements `asked` (ne,) for, 0 elsewhere; of all when left out.
     """
-    return _of_elements(problem, mesh, _smallest, asked).min(axis=1) / 2
+    [smallest] = _sampled(problem, mesh, _smallest, asked=asked)
+    return np.asarray(smallest.min(axis=1) / 2)
 
 
 def bulk_moduli(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Array:
@@ -142,37 +130,26 @@ def bulk_moduli(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> A
     A stress, lambda + mu of isotropic laws in plane strain, lambda + 2 mu / 3 about an axis. Of
     elements `asked` (ne,) for, 0 elsewhere; of all when left out.
     """
-    return _of_elements(problem, mesh, _bulk, asked)[:, 0]
+    [bulk] = _sampled(problem, mesh, _bulk, asked=asked)
+    return np.asarray(bulk[:, 0])
 
 
-def stiffnesses(problem: Problem, mesh: ng.Mesh) -> tuple[Array, Array, Array]:
-    """What the estimate asks of the law in each element.
+def stiffnesses(problem: Problem, mesh: ng.Mesh) -> Array:
+    """What the estimate asks of the law in each element, rows (3, ne).
 
-    Returns
-    -------
-    mu : ndarray (ne,)
-        As in `shear_moduli`.
-    rigidity : ndarray (ne,)
-        Half the largest eigenvalue of C less its bulk modulus, the largest in the element, a
-        stress, mu of isotropic laws: boundary values w store at most 2 mu |w|^2 in H^(1/2).
-    ratio : ndarray (ne,)
-        Bulk modulus over half the smallest eigenvalue, in the middle.
+    The shear modulus as in `shear_moduli`; the rigidity, half the largest eigenvalue of C less its
+    bulk modulus, the largest in the element: a stress, mu of isotropic laws, boundary values w
+    store at most 2 mu |w|^2 in H^(1/2); and the ratio of `incompressibilities`.
     """
-    mu, rigidity, ratio = np.zeros((3, mesh.ne))
-    for at, C in _laws(problem, mesh):
-        least = _smallest(C)
-        mu[at] = least.min(axis=-1) / 2
-        rigidity[at] = _rigidity(C).max(axis=-1) / 2
-        ratio[at] = 2 * _bulk(C[:, 0]) / least[:, 0]
-    return mu, rigidity, ratio
+    smallest, bulk, rigidity = _sampled(problem, mesh, _smallest, _bulk, _rigidity)
+    ratio = 2 * bulk[:, 0] / smallest[:, 0]
+    return np.array([smallest.min(axis=1) / 2, rigidity.max(axis=1) / 2, ratio])
 
 
 def incompressibilities(problem: Problem, mesh: ng.Mesh) -> Array:
     """Bulk modulus over half the smallest eigenvalue in the middle of each element, (ne,)."""
-    ratio = np.zeros(mesh.ne)
-    for at, C in _laws(problem, mesh):
-        ratio[at] = 2 * _bulk(C[:, 0]) / _smallest(C[:, 0])
-    return ratio
+    smallest, bulk = _sampled(problem, mesh, _smallest, _bulk)
+    return np.asarray(2 * bulk[:, 0] / smallest[:, 0])
 
 
 def law_measures(
@@ -198,10 +175,8 @@ def constant_measures(
 ) -> list[ng.comp.DifferentialSymbol]:
     """Integrals over a body whose law is constant, the last one over its elements `curved` (ne,).
 
-    Of quadrature `bonus` orders above the default.
-
     There the derivatives of mapped functions are no polynomials: the default rule changes u_h by up
-    to 15 % of its error at order 2, this one by 0.05 %.
+    to 15 % of its error at order 2, this one by 0.05 %. All are `bonus` orders above the default.
     """
     where = mesh.Materials(body)
     if not curved.any():
@@ -216,12 +191,8 @@ def constant_measures(
 def nearly_incompressible(
     problem: Problem, mesh: ng.Mesh, limit: float, ratio: Array | None = None
 ) -> dict[str, float]:
-    """Largest kappa / mu of each body where it exceeds `limit`.
-
-    `ratio` (ne,) is that of each element, where it is known.
-    """
-    if ratio is None:
-        ratio = incompressibilities(problem, mesh)
+    """Largest kappa / mu of each body where it exceeds `limit`; `ratio` (ne,) where it is known."""
+    ratio = incompressibilities(problem, mesh) if ratio is None else ratio
     if not (ratio > limit).any():
         return {}
     region = MeshArrays(mesh).bodies
@@ -233,10 +204,10 @@ def nearly_incompressible(
 
 def _of_laws(problem: Problem, mesh: ng.Mesh) -> list[tuple[float, float]] | None:
     """Bulk and shear modulus of each law, wherever it applies; None where one of them varies."""
-    laws, found = problem.materials.values(), []
-    if any(map(varies, laws)):
-        return None
-    for law in laws:
+    found = []
+    for law in problem.materials.values():
+        if varies(law):
+            return None
         kept = NUMBERS.setdefault(law, {})
         if problem.model not in kept:
             C = _constant(law, problem.model, mesh)

@@ -24,36 +24,17 @@ CANCELLED = 1e-6  # energy relative to its terms below which fewer than ten digi
 
 @dataclass(frozen=True, eq=False)
 class Space:
-    """V_h with the assembled forms (3.1), (3.2).
-
-    Attributes
-    ----------
-    V : ng.FESpace
-        Vector space of N unknowns for each component.
-    trace : BoundaryTrace
-        Its boundary nodes.
-    nodal : ndarray of int (k,)
-        Segments of the trace on which conditions are posed at nodes.
-    basis : sparse (2N, 2n)
-        From n node values there (and unknowns elsewhere) for each component to the unknowns of V.
-    A : sparse (2N, 2N)
-        Stiffness.
-    matrix : ng.BaseMatrix
-        The same for NGSolve, in the same memory.
-    f : ndarray (2N,)
-        Load.
-    vertices : ndarray (nv, 2)
-        Where the vertices of the mesh were.
-    """
+    """V_h with the assembled forms (3.1), (3.2): N unknowns for each component."""
 
     V: ng.FESpace
-    trace: BoundaryTrace
-    nodal: Index
+    trace: BoundaryTrace  # boundary nodes
+    nodal: Index  # (k,), segments of the trace on which conditions are posed at nodes
+    # (2N, 2n) from n node values there, and unknowns elsewhere, to the unknowns of V.
     basis: sp.csr_array
-    A: sp.csr_array
-    matrix: ng.BaseMatrix
-    f: Array
-    vertices: Array
+    A: sp.csr_array  # (2N, 2N), stiffness
+    matrix: ng.BaseMatrix  # the same for NGSolve, in the same memory
+    f: Array  # (2N,), load
+    vertices: Array  # (nv, 2), where those of the mesh were
 
     @cached_property
     def diagonal(self) -> Array:
@@ -64,9 +45,8 @@ class Space:
         """Raise a RuntimeError where the mesh was changed in place, so that no data fit it."""
         here = MeshArrays(self.V.mesh).vertices
         if not np.array_equal(here, self.vertices):
-            moved = (
-                "other places of them" if len(here) == len(self.vertices) else f"{len(here)} now"
-            )
+            same = len(here) == len(self.vertices)
+            moved = "other places of them" if same else f"{len(here)} now"
             raise RuntimeError(
                 f"the mesh was changed after solving: {len(self.vertices)} vertices then, {moved}; "
                 "solve again, or refine a copy, ngsolve.Mesh(mesh.ngmesh.Copy())"
@@ -153,25 +133,13 @@ def assemble(
 
 @dataclass(frozen=True, eq=False)
 class Bodies:
-    """The connected bodies, b of them.
+    """The connected bodies, b of them."""
 
-    Attributes
-    ----------
-    names : list of str
-        The material region of each.
-    middle : ndarray (b, 2)
-        Of its boundary.
-    size : ndarray (b,)
-        Half its extent, a length.
-    of_segment, of_vertex : ndarray of int (q,), (nv,)
-        The body of each segment of the boundary and of each vertex of the mesh.
-    """
-
-    names: list[str]
-    middle: Array
-    size: Array
-    of_segment: Index
-    of_vertex: Index
+    names: list[str]  # the material region of each
+    middle: Array  # (b, 2), of its boundary
+    size: Array  # (b,), half its extent, a length
+    of_segment: Index  # (q,), the body of each segment of the boundary
+    of_vertex: Index  # (nv,), the body of each vertex of the mesh
 
 
 def connected_bodies(trace: BoundaryTrace) -> Bodies:

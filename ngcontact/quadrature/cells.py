@@ -25,7 +25,7 @@ GOLDEN = (1 + 5**0.5) / 2  # takes points on a line out of step with waves
 MOMENTS = {1: (7, 3), 2: (4, 2)}
 INTEGRALS = {1: (15, 6), 2: (10, 5)}
 
-Integrand = Callable[[Index, Array], Array]
+Integrand = Callable[[Index, Array], Array]  # values (k, m, c) at (k, m, dim) of elements (k,)
 
 
 @lru_cache
@@ -81,21 +81,12 @@ def composite(n: int, order: int) -> ng.IntegrationRule:
 
 
 class Rule(NamedTuple):
-    """A rule on the unit simplex with its corners as last points, of weight 0.
+    """A rule on the unit simplex with its corners as last points, of weight 0."""
 
-    Attributes
-    ----------
-    points : ndarray (m, dim)
-        Corners at the end.
-    weights : ndarray (m,)
-        Of the points.
-    misses : ndarray (dim + 1, m)
-        From values to what a polynomial through the inner ones misses at the corners: steps beyond
-        the last point are seen there.
-    """
-
-    points: Array
-    weights: Array
+    points: Array  # (m, dim)
+    weights: Array  # (m,)
+    # (dim + 1, m) from values to what a polynomial through the inner points misses at the corners:
+    # steps beyond the last point are seen there.
     misses: Array
 
 
@@ -126,21 +117,11 @@ def mesh_points(mesh: ng.Mesh, elements: Index, reference: Array) -> NDArray:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Parts of elements, k of them.
+    """Parts of elements, k of them."""
 
-    Attributes
-    ----------
-    element : ndarray of int (k,)
-        The element of each.
-    origin : ndarray (k, dim)
-        Reference coordinates of a corner.
-    side : ndarray (k, dim, dim)
-        Sides from there, as rows.
-    """
-
-    element: Index
-    origin: Array
-    side: Array
+    element: Index  # (k,), the element of each
+    origin: Array  # (k, dim), reference coordinates of a corner
+    side: Array  # (k, dim, dim), sides from there, as rows
 
     @staticmethod
     def whole(dim: int, elements: Index) -> Cells:
@@ -151,11 +132,8 @@ class Cells:
     @staticmethod
     def joined(several: list[Cells]) -> Cells:
         """All of several."""
-        return Cells(
-            np.concatenate([cells.element for cells in several]),
-            np.concatenate([cells.origin for cells in several]),
-            np.concatenate([cells.side for cells in several]),
-        )
+        parts = ([getattr(cells, name) for cells in several] for name in vars(several[0]))
+        return Cells(*map(np.concatenate, parts))
 
     @property
     def dim(self) -> int:
@@ -184,10 +162,7 @@ class Cells:
         )
 
     def beside(self, some: Mask, corners: Array) -> Mask:
-        """The cells `some` (k,) and those that may touch one, (k,).
-
-        `corners` (n, 3, 2) are those of all triangles, lengths.
-        """
+        """The cells `some` (k,) and those that may touch one, (k,); `corners` (n, 3, 2) of all."""
         of = corners[self.element]
         sides = self.side @ (of[:, :2] - of[:, 2:])
         origin = of[:, 2] + (self.origin[:, None] @ (of[:, :2] - of[:, 2:]))[:, 0]
@@ -200,28 +175,15 @@ class Cells:
 
 @dataclass(frozen=True, eq=False)
 class Refined:
-    """Parts of elements on which a rule integrates a function of c components.
-
-    Attributes
-    ----------
-    cells : Cells
-        The k parts.
-    rule : Rule
-        The rule on each, of m points.
-    values : ndarray (k, m, c)
-        The function at its points.
-    missed : ndarray (k,)
-        Error of the integral over a part that is halved no more although it is too large, else 0.
-    error : ndarray (c,)
-        Of the whole integral: errors of smooth functions have one sign and add up, others any. It
-        is the sum of differences, which may vanish by chance, or the root of the sum of squares, or
-        what is allowed of a part if any was halved, as a jump may be missed in it.
-    """
+    """Parts of elements, k of them, on which a rule integrates a function of c components."""
 
     cells: Cells
-    rule: Rule
-    values: Array
-    missed: Array
+    rule: Rule  # of m points on each
+    values: Array  # (k, m, c), the function at its points
+    missed: Array  # (k,), error over a part that is halved no more although it is too large, else 0
+    # (c,) of the whole integral: errors of smooth functions have one sign and add up, others any.
+    # The sum of differences, which may vanish by chance, or the root of the sum of squares, or what
+    # is allowed of a part if any was halved, as a jump may be missed in it.
     error: Array
 
     @property
@@ -238,25 +200,12 @@ def refined(
     total: float | None = None,
     corners: Array | None = None,
 ) -> Refined:
-    """Parts of `cells` on which a rule integrates a function.
+    """Parts of `cells` on which a rule, of `MOMENTS` or `INTEGRALS`, integrates a function.
 
-    Parts are halved until their integrals and those over their halves are the same. What is beside
-    one that is halved is halved, too, where `corners` tell: it may hold the rest of what is there
-    without any of the points.
-
-    Parameters
-    ----------
-    integrand : function
-        Values (k, m, c) at points (k, m, dim) of elements (k,).
-    cells : Cells
-        To start from.
-    rules : dict
-        `MOMENTS` or `INTEGRALS`.
-    share, total : float
-        Error of the integral over a part, relative to a total, at which it is not halved again. The
-        total is the integral of the function's size by the first parts when left out.
-    corners : ndarray (n, 3, 2), optional
-        Of all triangles, lengths.
+    Parts are halved until their integrals and those over their halves differ by no more than a
+    share of the total, that of the function's size by the first parts when left out. What is beside
+    one that is halved is halved, too, where the `corners` (n, 3, 2) of all triangles tell: it may
+    hold the rest of what is there without any of the points.
     """
     dim = cells.dim
     rule = rule_with_corners(dim, *rules[dim])

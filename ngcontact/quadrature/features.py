@@ -62,37 +62,17 @@ Function: TypeAlias = ng.CoefficientFunction | Callable[[Array, Array], Array]
 
 @dataclass(frozen=True, eq=False)
 class Features:
-    """Narrow features of a function on a boundary, or in a body, and its jumps.
+    """Narrow features of a function on a boundary, or in a body, and its jumps."""
 
-    Attributes
-    ----------
-    kind, name : str
-        What the function is, as "gap", and where.
-    axis : int
-        Of displacements, their component.
-    dim : int
-        1 on boundaries, 2 in bodies.
-    places : ndarray (k, 2)
-        Lengths.
-    widths : ndarray (k,)
-        Lengths.
-    jumps : ndarray (j, 3)
-        Of displacements: a place, and by how much; lengths.
-    samples : int
-        At which it was looked at.
-    largest : float
-        Largest size of a value there.
-    """
-
-    kind: str
-    name: str
-    axis: int
-    dim: int
-    places: Array
-    widths: Array
-    jumps: Array
-    samples: int
-    largest: float
+    kind: str  # what the function is, as "gap"
+    name: str  # and where
+    axis: int  # of displacements, their component
+    dim: int  # 1 on boundaries, 2 in bodies
+    places: Array  # (k, 2), lengths
+    widths: Array  # (k,), lengths
+    jumps: Array  # (j, 3) of displacements: a place, and by how much; lengths
+    samples: int  # at which it was looked at
+    largest: float  # size of a value there
 
     @property
     def spots(self) -> Array:
@@ -205,11 +185,11 @@ def _told(kind: str, values: Array) -> tuple[Array, float]:
 
 
 def _lost(values: Array, window: int, inside: Mask | None = None) -> Array:
-    """What the opening of `values` in a window of so many samples has lost: of peaks.
+    """What the opening of `values` along all axes, in a window of so many samples, lost of peaks.
 
-    Along all axes. On a line windows do not reach beyond its ends; in a plane they do not beyond
-    the samples `inside`, and nothing is lost beside values that are kept, as windows do not fit
-    into convex corners.
+    On a line windows do not reach beyond its ends; in a plane they do not beyond the samples
+    `inside`, and nothing is lost beside values that are kept, as windows do not fit into convex
+    corners.
     """
     least, again = values, window if inside is None else window + BESIDE
     if inside is not None:
@@ -492,26 +472,14 @@ def where_features_are(
 
 @dataclass(frozen=True, eq=False)
 class Unresolved:
-    """A function with features that are narrower than the elements they lie in.
+    """A function with features that are narrower than the elements they lie in."""
 
-    Attributes
-    ----------
-    kind, name : str
-        As of `Features`.
-    place : ndarray (2,)
-        Of the feature that is narrowest beside its element, lengths.
-    width, size : float
-        Of this feature and its element, lengths.
-    elements : ndarray of bool (ne,)
-        All triangles that are too large.
-    """
-
-    kind: str
+    kind: str  # as of `Features`
     name: str
-    place: Array
-    width: float
-    size: float
-    elements: Mask
+    place: Array  # (2,) of the feature that is narrowest beside its element, lengths
+    width: float  # of this feature, a length
+    size: float  # of its element, a length
+    elements: Mask  # (ne,), all triangles that are too large
 
     def __str__(self) -> str:
         """What is told of it."""

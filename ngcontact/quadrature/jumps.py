@@ -58,22 +58,12 @@ def rough_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
 
 
 class Jumps(NamedTuple):
-    """Where a law jumps, at most one place in each element.
+    """Where a law jumps, at most one place in each element."""
 
-    Attributes
-    ----------
-    element : ndarray of int (k,)
-        Numbers of elements.
-    place : ndarray (k, 2)
-        A place of each jump, a length.
-    least, most : ndarray (k,)
-        Values on both sides of the component that jumps.
-    """
-
-    element: Index
-    place: Array
-    least: Array
-    most: Array
+    element: Index  # (k,)
+    place: Array  # (k, 2), lengths
+    least: Array  # (k,), the value on one side of the component that jumps
+    most: Array  # (k,), and on the other
 
 
 def _jumps(C: ng.CoefficientFunction, view: SampledElements, elements: Index) -> Jumps:
@@ -132,16 +122,8 @@ def steps_along(values: Callable[[Array], Array], t: Array, known: Array) -> tup
     Looked into are parts whose slope is not between those of their neighbours, as where a smooth
     function does not bend from one side to the other. Of their quarters the one is kept whose
     change differs most from that of the others, again and again: a smooth change shrinks by that,
-    that of a jump does not.
-
-    Parameters
-    ----------
-    values : callable
-        The function (k,) at any lengths (k,).
-    t : ndarray (n,)
-        Lengths, at least four, ascending.
-    known : ndarray (n,)
-        The function there.
+    that of a jump does not. `values` are (k,) at any lengths (k,), `known` (n,) those at `t` (n,),
+    at least four, ascending.
     """
     size, change, noise = np.diff(t), np.diff(known), STEADY * float(np.abs(known).max())
     part = np.flatnonzero(_odd(change / size, noise / float(np.median(size))))

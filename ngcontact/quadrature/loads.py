@@ -45,55 +45,25 @@ FOLLOWED = 1e-3  # error of the squares on a part, relative to all of them
 
 @dataclass(frozen=True, eq=False)
 class RoughLoad:
-    """A load on elements in which quadrature of the usual order misses a part of it.
+    """A load where quadrature of the usual order misses a part of it, of n elements or segments."""
 
-    Attributes
-    ----------
-    rough : ndarray of bool (n,)
-        Those of all n elements, or segments of the boundary.
-    projection : ng.GridFunction
-        There the polynomial, discontinuous, with the load's moments.
-    rest : ndarray (n,)
-        Root of the integral of the square of what it misses of the load.
-    missed : ndarray (n,)
-        Error of the integral of the load, a force.
-    total : float
-        Integral of the load's size, a force.
-    seen : int
-        Tells the values from which it was found rough.
-    cells : Cells
-        Parts of the rough elements on which a rule integrates the load.
-    """
-
-    rough: Mask
-    projection: ng.GridFunction
-    rest: Array
-    missed: Array
-    total: float
-    seen: int
-    cells: Cells
+    rough: Mask  # (n,), where that is
+    projection: ng.GridFunction  # there the polynomial, discontinuous, with the load's moments
+    rest: Array  # (n,), root of the integral of the square of what it misses of the load
+    missed: Array  # (n,), error of the integral of the load, a force
+    total: float  # integral of the load's size, a force
+    seen: int  # tells the values from which it was found rough
+    cells: Cells  # parts of the rough elements on which a rule integrates the load
 
 
 @dataclass(frozen=True, eq=False)
 class Load:
-    """A force on bodies, or a traction on boundaries.
+    """A force on bodies, or a traction on boundaries."""
 
-    Attributes
-    ----------
-    kind, name : str
-        "force" or "traction", and the pattern.
-    data : ng.CoefficientFunction
-        As it is given, a pressure perhaps.
-    density : ng.CoefficientFunction
-        The force (2,) per volume or area that this is.
-    region : ng.Region
-        Where it acts.
-    """
-
-    kind: str
-    name: str
-    data: ng.CoefficientFunction
-    density: ng.CoefficientFunction
+    kind: str  # "force" or "traction"
+    name: str  # the pattern
+    data: ng.CoefficientFunction  # as it is given, a pressure perhaps
+    density: ng.CoefficientFunction  # the force (2,) per volume or area that this is
     region: ng.Region
 
     def where_rough(self, order: int, *, again: bool = False) -> RoughLoad | None:
@@ -140,18 +110,8 @@ def rough_load(
 ) -> RoughLoad | None:
     """A load on a region, bodies or boundaries, where it is rough; None where it is nowhere.
 
-    Parameters
-    ----------
-    load : ng.CoefficientFunction
-        A force per volume or area, of any dimension.
-    region : ng.Region
-        Where it acts.
-    degree : int
-        Of the polynomials with the same moments.
-    known : RoughLoad, optional
-        What was found of it before, returned where nothing has changed.
-    features : ndarray (k, 3)
-        Places and widths of narrow features, lengths.
+    Polynomials of a degree have the same moments. What is `known` from before is returned where
+    nothing has changed; `features` (k, 3) are places and widths of narrow ones, lengths.
     """
     view = SampledElements(region.mesh, 2 if region.VB() == ng.VOL else 1)
     inside, sizes = view.inside(region), view.sizes
@@ -304,20 +264,10 @@ def rough_segments(
 def pieces(
     miss: Callable[[Index, Array], Array], mesh: ng.Mesh, sizes: Array, at: Index
 ) -> tuple[Index, Array, Array]:
-    """Pieces on which Gauss points tell a function's squares.
+    """Pieces of segments `at` (k,) on which Gauss points tell the squares of what is missed.
 
-    Segment (n,), start (n,) and length (n,) of each, the latter in [0, 1].
-
-    Parameters
-    ----------
-    miss : function
-        Its values (k, m, c) at parameters (k, m) of segments (k,).
-    mesh : ng.Mesh
-        The mesh.
-    sizes : ndarray (q,)
-        Lengths of the segments.
-    at : ndarray of int (k,)
-        The segments to be taken to pieces.
+    Segment (n,), start (n,) and length (n,) of each, the latter in [0, 1]. `miss` has values
+    (k, m, c) at parameters (k, m) of segments (k,), whose lengths are `sizes` (q,).
     """
 
     def squares(segment: Index, s: Array) -> Array:
