@@ -77,8 +77,8 @@ def doubts(solution: Solved, *, last: bool) -> Doubts:
     points. Of all pairs together, bodies that nothing resists.
     """
     problem, pairs, space = solution.problem, solution.pairs, solution.discrete.space
-    found: Doubts = {}
     trace, u = space.trace, solution.displacement.vec.FV().NumPy()
+    found: Doubts = {}
     largest = [np.abs(state.force).max(initial=0.0) for state in pairs]
     noise = FORCE_ROUND_OFF * np.abs(space.diagonal * u).max(initial=0.0)
     noise = max(noise, FORCE_ROUND_OFF * max(largest, default=0.0))
@@ -96,15 +96,23 @@ def doubts(solution: Solved, *, last: bool) -> Doubts:
             messages["penetration"] = _penetration(solution, state, peak)
         name = f"contact {number} of {state.line.contact.named()}"
         found |= {(what, number): f"{name}: {text}" for what, text in messages.items() if text}
-    touching = any(state.active.any() for state in pairs)
-    if max(largest, default=0.0) <= noise and touching and u.any():
-        if moves_rigidly(problem, space, solution.displacement):
-            found["rigid", 0] = (
-                "nothing deforms: bodies in contact move rigidly, as nothing resists them, and all "
-                "contact forces are round-off; relative errors mean nothing here. Hold the body "
-                "that is pushed by a support or a load if it should resist"
-            )
+    if max(largest, default=0.0) <= noise and (text := _unresisted(solution)):
+        found["rigid", 0] = text
     return found
+
+
+def _unresisted(solution: Solved) -> str:
+    """Message where bodies in contact move without any deformation, or nothing."""
+    u = solution.displacement
+    if not any(state.active.any() for state in solution.pairs) or not u.vec.FV().NumPy().any():
+        return ""
+    if not moves_rigidly(solution.problem, solution.discrete.space, u):
+        return ""
+    return (
+        "nothing deforms: bodies in contact move rigidly, as nothing resists them, and all contact "
+        "forces are round-off; relative errors mean nothing here. Hold the body that is pushed by "
+        "a support or a load if it should resist"
+    )
 
 
 @dataclass(frozen=True, eq=False)
