@@ -85,31 +85,25 @@ def spaced(t: Array, x: Array, y: Array, maxh: float, places: Array) -> Array:
 
 @dataclass(eq=False)
 class Edge:
-    """A CAD edge with the nodes that contact asks for.
+    """A CAD edge with the nodes that contact asks for."""
 
-    Attributes
-    ----------
-    shape : occ.TopoDS_Shape
-        The edge of the geometry.
-    curve : CadEdge
-        The same as a curve.
-    maxh : float
-        Largest element size along it, a length.
-    runs : list of ndarray (j,)
-        Parameters of the nodes on each part that faces another line; first those of parts with a
-        narrowest place, whose nodes stay.
-    """
-
-    shape: occ.TopoDS_Shape
-    curve: CadEdge
-    maxh: float
+    shape: occ.TopoDS_Shape  # the edge of the geometry
+    curve: CadEdge  # the same as a curve
+    maxh: float  # largest element size along it, a length
+    # Parameters (j,) of the nodes on each part that faces another line; first those of parts with a
+    # narrowest place, whose nodes stay.
     runs: list[Array] = field(default_factory=list)
 
     def partition(self) -> list[float]:
         """Interior nodes as fractions of the parameter interval, between runs filled up evenly."""
         start, stop = self.curve.start, self.curve.stop
         runs = [(nodes - start) / (stop - start) for nodes in self.runs]
-        nodes = np.sort(_apart([np.array([0.0, 1.0]), *runs]))
+        nodes = np.array([0.0, 1.0])
+        for run in runs:  # without nodes of later ones that would leave slivers of an edge
+            spacing = np.diff(np.sort(run)).min(initial=1.0)
+            distance = np.abs(run[:, None] - nodes).min(axis=1)
+            nodes = np.concatenate([nodes, run[distance > CLOSE * spacing]])
+        nodes = np.sort(nodes)
         inside = nodes[(nodes > APART) & (nodes < 1 - APART)]
         inside = inside[np.diff(inside, prepend=-1.0) > APART]
         result = inside.tolist()
@@ -125,26 +119,9 @@ class Edge:
         return sorted(result)
 
 
-def _apart(runs: list[Array]) -> Array:
-    """Nodes of all runs, without those of later ones that would leave slivers of an edge."""
-    nodes = runs[0]
-    for run in runs[1:]:
-        spacing = np.diff(np.sort(run)).min(initial=1.0)
-        distance = np.abs(run[:, None] - nodes).min(axis=1)
-        nodes = np.concatenate([nodes, run[distance > CLOSE * spacing]])
-    return nodes
-
-
 def _named(edges: list[Edge], pattern: str) -> list[Edge]:
     """Edges whose name matches."""
     return [edge for edge in edges if re.fullmatch(pattern, edge.curve.name)]
-
-
-def _bounded_zones(edges: list[Edge], problem: Problem) -> list[Edge]:
-    """Edges of bounded zones, which touch all along and may come apart anywhere."""
-    pairs = [pair for pair in problem.contact if pair.direction is None and not pair.bilateral]
-    lines = {line for pair in pairs for line in (pair.secondary, pair.primary) if line}
-    return [edge for edge in edges if any(_named([edge], line) for line in lines)]
 
 
 def _facing_runs(faces: NDArray[np.bool_], stops: NDArray[np.intp]) -> Iterator[slice]:
@@ -206,17 +183,6 @@ def _opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple
     return t, other.point(np.where(np.isnan(t), other.start, t))
 
 
-def _signed_gap(contact: Contact, curve: CadEdge, t: Array, other: CadEdge) -> Array:
-    """Distances (k,) from `t` (k,) on `curve` to the points opposite, NaN where there are none.
-
-    Along the direction; without one along the normals, and of either sign.
-    """
-    x, slope = curve.point(t), curve.derivative(t)
-    there, y = _opposite(contact, x, slope, other)
-    along = rightward(slope) if contact.direction is None else np.array(contact.direction)
-    return np.where(np.isnan(there), np.nan, ((y - x) * along).sum(axis=1))
-
-
 def _behind(contact: Contact, x: Array, y: Array, edges: list[Edge]) -> NDArray[np.bool_]:
     """Whether another point of `edges` lies between `x` (k, 2) and the points `y` they see.
 
@@ -272,7 +238,11 @@ def _divide(
             faces &= np.abs(across) >= STEEPEST * np.linalg.norm(tangent, axis=1)
 
     def gap(t: Array) -> Array:
-        return _signed_gap(contact, secondary.curve, t, primary.curve)
+        """Signed distances (k,) to the points opposite to `t` (k,), NaN where there are none."""
+        x, slope = secondary.curve.point(t), secondary.curve.derivative(t)
+        there, y = _opposite(contact, x, slope, primary.curve)
+        along = rightward(slope) if contact.direction is None else np.array(contact.direction)
+        return np.where(np.isnan(there), np.nan, ((y - x) * along).sum(axis=1))
 
     maxh = min(secondary.maxh, primary.maxh)
     sliver = CLOSE * min(maxh, secondary.curve.size, primary.curve.size)
@@ -296,8 +266,11 @@ def divided(problem: Problem, shape: occ.TopoDS_Shape, maxh: float, finer: float
         for edge in shape.edges
         if edge.partition is None
     ]
-    for edge in _bounded_zones(edges, problem):
-        edge.maxh = min(edge.maxh, finer)
+    for contact in problem.contact:
+        if contact.direction is None and not contact.bilateral:  # may come apart anywhere
+            for line in filter(None, (contact.secondary, contact.primary)):
+                for edge in _named(edges, line):
+                    edge.maxh = min(edge.maxh, finer)
     for contact in problem.contact:
         if contact.primary is not None:
             sides = _named(edges, contact.secondary)

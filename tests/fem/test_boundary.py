@@ -47,10 +47,6 @@ def everywhere(trace, count=5):
     return np.repeat(np.arange(len(trace.region)), count), s
 
 
-def named(trace, name):
-    return trace.segments(name)
-
-
 MESHES = {
     "blocks": lambda order: meshed(blocks(line=LINE), order),
     "rings": lambda order: meshed(rings(), order),
@@ -79,7 +75,7 @@ def test_nodal_basis_reproduces_node_values(make, order):
 
 
 @every_mesh
-def test_point_evaluation_agrees_with_ngsolve(make):
+def test_points_derivatives_and_normals_agree_with_ngsolve(make):
     for order in ORDERS:
         trace = boundary_trace(make(order), 1)
         assert trace.geometry_order == trace.mesh.GetCurveOrder()
@@ -90,15 +86,8 @@ def test_point_evaluation_agrees_with_ngsolve(make):
         near = np.clip(s, step, 1 - step)
         numeric = (trace.point(segment, near + step) - trace.point(segment, near - step)) / step / 2
         np.testing.assert_allclose(trace.derivative(segment, near), numeric, atol=1e-8)
-
-
-@every_mesh
-def test_normals_agree_with_ngsolve(make):
-    for order in ORDERS:
-        trace = boundary_trace(make(order), 1)
-        segment, s = everywhere(trace)
         # Between two materials either normal is an outward one.
-        outside = ~np.isin(segment, named(trace, "between"))
+        outside = ~np.isin(segment, trace.segments("between"))
         segment, s = segment[outside], s[outside]
         expected = trace.evaluate(ng.specialcf.normal(2), segment, s)
         np.testing.assert_allclose(trace.normal(segment, s), expected, atol=1e-12)
@@ -118,7 +107,7 @@ def numbered(trace, segments):
 @pytest.mark.parametrize("order", ORDERS)
 def test_two_points_at_corners_of_the_geometry(order):
     trace = boundary_trace(meshed(blocks(line=LINE), maxh=0.3), order)
-    segments = named(trace, "upper_contact")
+    segments = trace.segments("upper_contact")
     number, vector, at = numbered(trace, segments)
     nodes = np.unique(trace.nodes[segments])
     assert len(vector) == len(nodes) + 2

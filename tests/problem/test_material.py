@@ -34,14 +34,16 @@ def orthotropic():
 
 
 @pytest.mark.parametrize("nu", [-0.5, 0.0, 0.3, 0.4999])
-@pytest.mark.parametrize("model", PLANE)
+@pytest.mark.parametrize("model", VOIGT)
 def test_isotropic_law_inverts_the_compliance(mesh, model, nu):
     E = 7.0
-    modulus, ratio = (E, nu) if model == "plane stress" else (E / (1 - nu**2), nu / (1 - nu))
-    compliance = np.array([[1, -ratio, 0], [-ratio, 1, 0], [0, 0, 2 * (1 + ratio)]])
+    modulus, ratio = (E / (1 - nu**2), nu / (1 - nu)) if model == "plane strain" else (E, nu)
+    size = len(VOIGT[model])
+    compliance = np.diag([1 + ratio] * (size - 1) + [2 * (1 + ratio)])
+    compliance[: size - 1, : size - 1] -= ratio
     product = matrix_of(Elastic(E, nu), model, mesh) @ (compliance / modulus)
     # Round-off grows with the condition number, 1e4 at nu = 0.4999.
-    assert np.abs(product - np.eye(3)).max() < ROUND_OFF / (1 - 2 * nu)
+    assert np.abs(product - np.eye(size)).max() < ROUND_OFF / (1 - 2 * nu)
 
 
 def test_hooke_is_used_as_it_is(mesh):
@@ -53,15 +55,6 @@ def test_hooke_is_used_as_it_is(mesh):
     varying = Hooke((1 + ng.x) * law.voigt("plane strain"))
     found = matrix_of(varying, "plane strain", mesh, at=(0.5, 0.5))
     assert np.abs(found - 1.5 * given).max() < ROUND_OFF * given.max()
-
-
-@pytest.mark.parametrize("nu", [-0.5, 0.0, 0.3, 0.4999])
-def test_isotropic_law_about_an_axis_inverts_the_compliance(mesh, nu):
-    E = 7.0
-    compliance = np.diag([1 + nu] * 3 + [2 * (1 + nu)])
-    compliance[:3, :3] -= nu
-    product = matrix_of(Elastic(E, nu), "axisymmetric", mesh) @ (compliance / E)
-    assert np.abs(product - np.eye(4)).max() < ROUND_OFF / (1 - 2 * nu)
 
 
 @pytest.mark.parametrize(

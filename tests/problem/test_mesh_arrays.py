@@ -3,13 +3,10 @@
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import OCCGeometry
 from ngsolve.meshes import MakeStructured3DMesh
 
 from ngcontact.geometries import disc_on_block
-from ngcontact.geometries.region import body, polygon
 from ngcontact.problem import MeshArrays, bisect
-from ngcontact.problem.checks import _inside
 
 
 @pytest.fixture(params=[1, 3], ids=["straight", "curved"])
@@ -58,12 +55,3 @@ def test_only_marked_elements_are_bisected(mesh):
     assert 0 < once < old / 2
     bisect(mesh, np.zeros(mesh.ne, dtype=bool))
     assert mesh.ne == old + once
-
-
-def test_places_inside_a_body_are_told_beside_slanted_sides():
-    corners = [(1, 0), (0, 1), (-1, 0), (0, -1)]
-    geometry = OCCGeometry(body("diamond", polygon(corners, ["free"] * 4)), dim=2)
-    view = MeshArrays(ng.Mesh(geometry.GenerateMesh(maxh=0.4)))
-    x = np.random.default_rng(0).uniform(-1.2, 1.2, (200, 2))
-    found = _inside(x, view, np.arange(len(view.elements)))
-    np.testing.assert_array_equal(found, np.abs(x).sum(axis=1) < 1)

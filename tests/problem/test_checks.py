@@ -1,9 +1,14 @@
-"""Bodies of revolution: what is refused about their axis, before any work."""
+"""Checks about the axis of bodies of revolution, and of places inside others."""
 
+import ngsolve as ng
+import numpy as np
 import pytest
+from netgen.occ import OCCGeometry
 
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.problem import MeshArrays
+from ngcontact.problem.checks import _inside
 
 SOFT = Elastic(E=1.0, nu=0.3)
 
@@ -48,3 +53,12 @@ def problem(**changes):
 def test_what_is_refused(changes, message, size):
     with pytest.raises(ValueError, match=message):
         solve(problem(size=size, **changes), maxh=size / 2)
+
+
+def test_places_inside_a_body_are_told_beside_slanted_sides():
+    corners = [(1, 0), (0, 1), (-1, 0), (0, -1)]
+    geometry = OCCGeometry(body("diamond", polygon(corners, ["free"] * 4)), dim=2)
+    view = MeshArrays(ng.Mesh(geometry.GenerateMesh(maxh=0.4)))
+    x = np.random.default_rng(0).uniform(-1.2, 1.2, (200, 2))
+    found = _inside(x, view, np.arange(len(view.elements)))
+    np.testing.assert_array_equal(found, np.abs(x).sum(axis=1) < 1)
