@@ -37,6 +37,14 @@ def test_estimates_of_data_that_hurt(seed):
     assert data.outcome(seed).passed
 
 
+def test_waves_that_no_bound_is_known_for():
+    """A displacement with twenty waves on elements of 0.14: a warning, and a refused bound."""
+    found = data.outcome(12)
+    assert found.passed
+    assert found.warned
+    assert found.refused
+
+
 @pytest.mark.parametrize("name", ["error_estimate", "error_bound"])
 def test_an_estimate_or_bound_below_the_error_fails(monkeypatch, name):
     monkeypatch.setattr(Solution, name, property(lambda solution: 1e-6))

@@ -7,6 +7,7 @@ against an adaptive solution of order 4.
 
 from __future__ import annotations
 
+import contextlib
 import math
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -47,11 +48,12 @@ class Drawn:
 
 @dataclass(frozen=True)
 class DataOutcome(Outcome):
-    """The line of one scene: its kind, estimate over error, and whether there was a warning."""
+    """The line of one scene: its kind, estimate over error, and what was told."""
 
     kind: str
     effectivity: float
     warned: bool
+    refused: bool  # no bound
 
 
 def _square(*strip: float) -> OCCGeometry:
@@ -217,14 +219,17 @@ def outcome(seed: int) -> DataOutcome:
         warnings.simplefilter("ignore", ContactWarning)
         reference = finest(drawn.resolved or drawn.problem, estimate)
     error = Overkill(reference).relative_error(solution) * reference.energy_norm
-    ratio, bound = estimate / error, solution.error_bound / error
+    ratio, bound = estimate / error, math.inf
+    with contextlib.suppress(ValueError):  # refused by name where the mesh does not resolve data
+        bound = solution.error_bound / error
     lack = max(LEAST / ratio, LEAST / bound)
     if drawn.load is not None:
         force = solution.reactions["bottom"]
         lack = max(lack, math.hypot(*(force + np.array(drawn.load))) / LOST)
     return DataOutcome(
         f"{kind.__name__}, order {order}, seed {seed}",
-        f"estimate / error {ratio:.2f}, bound {bound:.2f}{', warned' if warned else ''}",
+        f"estimate / error {ratio:.2f}, bound "
+        f"{f'{bound:.2f}' if bound < math.inf else 'refused'}{', warned' if warned else ''}",
         steps=len(solution.steps),
         residual=max(solution.residuals.values()),
         error=lack,
@@ -232,6 +237,7 @@ def outcome(seed: int) -> DataOutcome:
         kind=kind.__name__,
         effectivity=ratio,
         warned=warned,
+        refused=bound == math.inf,
     )
 
 
@@ -243,8 +249,9 @@ def summary(found: Sequence[Outcome]) -> Iterator[str]:
         if mine:
             ratio = np.array([o.effectivity for o in mine])
             figures = (f"{f(ratio):.2f}" for f in (np.min, np.median, np.max))
-            rows.append((kind.__name__, len(mine), sum(o.warned for o in mine), *figures))
-    yield table(("data", "scenes", "warned", "least", "median", "largest"), rows)
+            told = sum(o.warned for o in mine), sum(o.refused for o in mine)
+            rows.append((kind.__name__, len(mine), *told, *figures))
+    yield table(("data", "scenes", "warned", "refused", "least", "median", "largest"), rows)
 
 
 def outcomes(seed: int = 0, count: int = 66) -> Iterator[DataOutcome]:
