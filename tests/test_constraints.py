@@ -1,4 +1,4 @@
-"""Rows and prescribed conditions as single unknowns: exact algebra of the change of basis."""
+"""Rows and conditions as arrays, and as single unknowns: exact algebra of the change of basis."""
 
 from itertools import combinations
 
@@ -6,10 +6,109 @@ import numpy as np
 import pytest
 
 from ngcontact.arrays import from_triplets
-from ngcontact.constraints.basis_transformation import change_of_basis
-from ngcontact.constraints.rows import Conditions, Rows, concatenated
+from ngcontact.constraints import (
+    CONTRAST,
+    Conditions,
+    Rows,
+    change_of_basis,
+    concatenated,
+    no_conditions,
+    no_rows,
+)
 from ngcontact.lagrange import lagrange
-from tests.constraints.given import X, Y, clamped, conditions, rows, unit
+
+X, Y = (1.0, 0.0), (0.0, 1.0)
+
+
+def unit(angle):
+    return np.array([np.cos(angle), np.sin(angle)])
+
+
+def conditions(*entries):
+    """Conditions from (node, direction, value)."""
+    if not entries:
+        return no_conditions()
+    node, direction, value = zip(*entries, strict=True)
+    return Conditions(np.array(node), np.array(direction, dtype=float), np.array(value, float))
+
+
+def clamped(node, ux=0.0, uy=0.0):
+    return (node, X, ux), (node, Y, uy)
+
+
+def rows(n, *entries, g=None):
+    """Rows on n nodes from (node, direction, {facing node: weight})."""
+    m = len(entries)
+    shares = [(j, k, c) for j, (_, _, facing) in enumerate(entries) for k, c in facing.items()]
+    row, column, weight = np.array(shares).reshape(-1, 3).T
+    return Rows(
+        node=np.array([e[0] for e in entries], dtype=int),
+        direction=np.array([e[1] for e in entries], dtype=float).reshape(m, 2),
+        coupling=from_triplets(weight, row, column, (m, n)),
+        g=np.zeros(m) if g is None else np.array(g, dtype=float),
+        equality=np.zeros(m, dtype=bool),
+    )
+
+
+def test_matrix_of_rows():
+    contact = rows(4, (0, (0.6, 0.8), {2: 0.25, 3: 0.75}), (1, X, {}))
+    B = contact.matrix
+    expected = [
+        [0.6, 0, -0.15, -0.45, 0.8, 0, -0.2, -0.6],
+        [0, 1, 0, 0, 0, 0, 0, 0],
+    ]
+    np.testing.assert_allclose(B.toarray(), expected, atol=1e-16)
+    assert B.nnz == 7  # nothing stored where the partner has no share
+    assert rows(3).matrix.shape == (0, 6)
+
+
+def test_rows_concatenated_and_selected_are_the_same():
+    entries = (0, unit(0.1), {2: 1.0}), (1, unit(0.2), {}), (2, unit(0.3), {3: 0.25, 4: 0.75})
+    whole = rows(5, *entries, g=[0.1, 0.2, 0.3])
+    parts = [rows(5, entry, g=[gap]) for entry, gap in zip(entries, whole.g, strict=True)]
+    joined = concatenated([no_rows(5), *parts])
+    for one, other in (
+        (joined, whole),
+        (whole.select(np.array([2, 0])), concatenated(parts[::-2])),
+    ):
+        assert (one.matrix != other.matrix).nnz == 0
+        np.testing.assert_array_equal(one.node, other.node)
+        np.testing.assert_array_equal(one.g, other.g)
+        np.testing.assert_array_equal(one.equality, other.equality)
+    assert no_rows(5).matrix.shape == (0, 10)
+
+
+def test_repeated_rows_have_the_number_of_the_first():
+    d = unit(0.7)
+    alike = (1, d, {3: 0.5, 4: 0.5}), (1, d + 1e-12, {3: 0.5, 4: 0.5}), (1, d, {3: 0.4, 4: 0.6})
+    contact = rows(5, (0, d, {3: 1.0}), *alike, (2, d, {4: 1.0}))
+    assert contact.repeated().tolist() == [0, 1, 1, 3, 4]
+
+
+def hosts(contact, given=None, stiffness=None):
+    """Host node of each row, (m,)."""
+    basis = change_of_basis(given or conditions(), contact, stiffness=stiffness)
+    return (basis.unknown % contact.coupling.shape[1]).tolist()
+
+
+def test_the_secondary_hosts_between_bodies_alike():
+    contact = rows(3, (0, Y, {1: 0.4, 2: 0.6}))
+    assert hosts(contact) == [0]
+    assert hosts(contact, stiffness=np.array([0.9 * CONTRAST, 1.0, 1.0])) == [0]
+
+
+@pytest.mark.parametrize("weights", [(0.4, 0.6), (1.1, -0.1), (0.0, 1.0)])
+def test_the_nearest_node_of_a_much_softer_body_hosts(weights):
+    contact = rows(4, (0, Y, dict(zip((1, 2), weights, strict=True))), (3, Y, {}))
+    stiffness = np.array([1.1 * CONTRAST, 1.0, 1.0, 1.1 * CONTRAST])
+    assert hosts(contact, stiffness=stiffness) == [1 + int(np.argmax(np.abs(weights))), 3]
+
+
+def test_a_much_softer_node_that_is_held_does_not_host():
+    contact = rows(3, (0, Y, {1: 0.4, 2: 0.6}))
+    stiffness = np.array([1.1 * CONTRAST, 1.0, 1.0])
+    assert hosts(contact, conditions(*clamped(2)), stiffness) == [0]
+    assert hosts(contact, conditions(*clamped(0), *clamped(2)), stiffness) == [1]
 
 
 def check(given_, contact, tolerance=1e-13, **options):
