@@ -1,9 +1,8 @@
-from .assembly import contact_line as contact_line
 from .assembly import joined as joined
 from .assembly import kept_lines as kept_lines
 from .assembly import merged as merged
-from .assembly import with_roles as with_roles
 from .dual import Pieces as Pieces
+from .dual import contact_line as contact_line
 from .dual import divided as divided
 from .dual import end_to_end as end_to_end
 from .line import FACING as FACING
@@ -17,6 +16,7 @@ from .line import partners as partners
 from .line import prescribed_gap as prescribed_gap
 from .line import rays as rays
 from .line import twins as twins
+from .line import with_roles as with_roles
 from .projection import MATCHED as MATCHED
 from .projection import at as at
 from .projection import crossings as crossings

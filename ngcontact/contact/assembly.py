@@ -10,76 +10,9 @@ import numpy as np
 from ..arrays import Array, Index, Mask, from_triplets
 from ..constraints import Rows, concatenated, no_rows
 from ..fem import BoundaryTrace
-from ..problem import Contact
-from .dual import with_dual_rows
-from .line import ContactLine, by_line, nodal_line, without
+from .line import ContactLine, by_line, without
 
 ALIKE = 1e-9  # difference of unit directions up to which two points at a node are one
-UNLIKE = 0.05  # relative difference of two sides from which their roles are not alike
-
-
-def with_roles(trace: BoundaryTrace, contact: Contact) -> Contact:
-    """The pair with `roles` decided: the covered side is secondary, else the finer, else convex."""
-    if contact.roles == "given" or contact.primary is None:
-        return contact
-
-    def covered(pair: Contact) -> float:
-        """Share of the secondary's length that faces the primary, by segments that wholly do."""
-        line, _ = nodal_line(trace, pair)
-        length = trace.lengths(line.segments)
-        return float(length[line.faces].sum() / length.sum())
-
-    def length(pair: Contact) -> float:
-        return float(trace.lengths(trace.segments(pair.secondary)).mean())
-
-    def bulge(pair: Contact) -> float:
-        """How far the middles of segments lie outside their chords, relative."""
-        segments = trace.segments(pair.secondary)
-        normal = trace.exact_normal(*trace.at_nodes(segments)).reshape(len(segments), -1, 2)
-        along = trace.curve[segments, -1] - trace.curve[segments, 0]
-        turn = ((normal[:, -1] - normal[:, 0]) * along).sum(axis=1)
-        return float(turn.sum() / trace.lengths(segments).sum())
-
-    one, other = replace(contact, roles="given"), replace(contact, roles="given").swapped()
-    a, b = covered(one), covered(other)
-    if abs(a - b) > UNLIKE:
-        return one if a > b else other
-    a, b = length(one), length(other)
-    if abs(a - b) > UNLIKE * max(a, b):
-        return one if a < b else other
-    return other if bulge(other) > bulge(one) + UNLIKE else one
-
-
-def contact_line(trace: BoundaryTrace, contact: Contact, taken: Index | None = None) -> ContactLine:
-    """Contact points of one pair: at nodes where nodes face nodes, with dual rows elsewhere.
-
-    Segments `taken` (j,) of its secondary belong to other pairs.
-
-    Raises
-    ------
-    ValueError
-        No point of the secondary faces the primary.
-    """
-    contact = with_roles(trace, contact)
-    line, facing = nodal_line(trace, contact, taken)
-    if contact.primary is not None and contact.rows != "nodal":
-        line, facing = with_dual_rows(trace, line, facing)
-    if len(line.segments) and not facing.any():
-        along = (
-            "along its outward normals: choose boundaries that look at each other, or give the "
-            "direction from the secondary body to the primary one"
-        )
-        if contact.direction is not None:
-            x, y = contact.direction
-            along = (
-                f"along direction=({x:.6g}, {y:.6g}): the direction points from the secondary body "
-                "to the primary one"
-            )
-        raise ValueError(
-            f'no point of the secondary "{contact.secondary}" faces the primary '
-            f'"{contact.primary}" {along}'
-        )
-    return without(line, np.flatnonzero(~facing))
 
 
 def joined(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:

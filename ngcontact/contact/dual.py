@@ -1,4 +1,4 @@
-"""Contact rows where nodes do not face nodes: means over the parts of segments that face.
+"""Contact line of a pair: where nodes do not face nodes, rows are means over facing parts.
 
 On a segment e of the secondary, restricted to its part that faces the primary, let D_e be the
 diagonal of the integrals of the basis functions phi, M_e their mass matrix, and psi = D_e M_e^-1
@@ -27,7 +27,17 @@ from ..arrays import Array, Index, Mask, across, from_triplets
 from ..fem import BoundaryTrace
 from ..lagrange import gauss, lagrange
 from ..problem import Contact
-from .line import ContactLine, jacobian, partners, prescribed_gap, rays, segment_weights
+from .line import (
+    ContactLine,
+    jacobian,
+    nodal_line,
+    partners,
+    prescribed_gap,
+    rays,
+    segment_weights,
+    with_roles,
+    without,
+)
 from .projection import at, crossings, feet
 
 SLIVER = 1e-9  # share of a segment below which a piece of it is none
@@ -202,3 +212,35 @@ def with_dual_rows(
         searches=1,
     )
     return line, carries
+
+
+def contact_line(trace: BoundaryTrace, contact: Contact, taken: Index | None = None) -> ContactLine:
+    """Contact points of one pair: at nodes where nodes face nodes, with dual rows elsewhere.
+
+    Segments `taken` (j,) of its secondary belong to other pairs.
+
+    Raises
+    ------
+    ValueError
+        No point of the secondary faces the primary.
+    """
+    contact = with_roles(trace, contact)
+    line, facing = nodal_line(trace, contact, taken)
+    if contact.primary is not None and contact.rows != "nodal":
+        line, facing = with_dual_rows(trace, line, facing)
+    if len(line.segments) and not facing.any():
+        along = (
+            "along its outward normals: choose boundaries that look at each other, or give the "
+            "direction from the secondary body to the primary one"
+        )
+        if contact.direction is not None:
+            x, y = contact.direction
+            along = (
+                f"along direction=({x:.6g}, {y:.6g}): the direction points from the secondary body "
+                "to the primary one"
+            )
+        raise ValueError(
+            f'no point of the secondary "{contact.secondary}" faces the primary '
+            f'"{contact.primary}" {along}'
+        )
+    return without(line, np.flatnonzero(~facing))

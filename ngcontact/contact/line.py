@@ -26,6 +26,7 @@ from ..problem import Contact
 from .projection import Partners, cast, coincident, none_met, snap
 
 FACING = 1e-8  # cosine between normal and direction from which a point faces the other body
+UNLIKE = 0.05  # relative difference of two sides from which their roles are not alike
 TOUCHING = 4 * np.finfo(float).eps  # round-off of a measured gap, relative to the coordinates
 
 
@@ -253,3 +254,35 @@ def without(line: ContactLine, dropped: Index) -> ContactLine:
     arrays = ("node", "position", "direction", "gap", "weight", "partner", "partner_s")
     kept = {name: getattr(line, name)[keep] for name in (*arrays, "coupling", "on_axis", "means")}
     return replace(line, rows=renumber[line.rows], **kept)
+
+
+def with_roles(trace: BoundaryTrace, contact: Contact) -> Contact:
+    """The pair with `roles` decided: the covered side is secondary, else the finer, else convex."""
+    if contact.roles == "given" or contact.primary is None:
+        return contact
+
+    def covered(pair: Contact) -> float:
+        """Share of the secondary's length that faces the primary, by segments that wholly do."""
+        line, _ = nodal_line(trace, pair)
+        length = trace.lengths(line.segments)
+        return float(length[line.faces].sum() / length.sum())
+
+    def length(pair: Contact) -> float:
+        return float(trace.lengths(trace.segments(pair.secondary)).mean())
+
+    def bulge(pair: Contact) -> float:
+        """How far the middles of segments lie outside their chords, relative."""
+        segments = trace.segments(pair.secondary)
+        normal = trace.exact_normal(*trace.at_nodes(segments)).reshape(len(segments), -1, 2)
+        along = trace.curve[segments, -1] - trace.curve[segments, 0]
+        turn = ((normal[:, -1] - normal[:, 0]) * along).sum(axis=1)
+        return float(turn.sum() / trace.lengths(segments).sum())
+
+    one, other = replace(contact, roles="given"), replace(contact, roles="given").swapped()
+    a, b = covered(one), covered(other)
+    if abs(a - b) > UNLIKE:
+        return one if a > b else other
+    a, b = length(one), length(other)
+    if abs(a - b) > UNLIKE * max(a, b):
+        return one if a < b else other
+    return other if bulge(other) > bulge(one) + UNLIKE else one

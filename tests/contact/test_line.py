@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from ngcontact import Contact
-from ngcontact.contact.assembly import contact_line
+from ngcontact.contact.dual import contact_line
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc, disc_on_block
 
