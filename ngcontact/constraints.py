@@ -209,14 +209,16 @@ def _preferred(rows: Rows, stiffness: Array) -> Index:
     return np.where(softer, facing, rows.node)
 
 
-def _hosts(preferred: Index, Bz: sp.csr_array, frames: _Frames) -> tuple[Index, Index]:
+def _hosts(
+    preferred: Index, local: Array, Bz: sp.csr_array, frames: _Frames
+) -> tuple[Index, Index]:
     """Node (m,) at which each row becomes an unknown, -1 where all of it is prescribed, and slot.
 
-    Of rows `Bz` (m, d * n), without prescribed unknowns, with the nodes `preferred` (m,).
+    Of rows `Bz` (m, d * n), without prescribed unknowns, with the nodes `preferred` (m,); `local`
+    (m, d), the coefficients there, become those at the host.
     """
     n, d, _ = frames.columns.shape
     host, slot = preferred.copy(), np.full(len(preferred), -1)
-    local = _at_nodes(Bz, np.arange(len(host)), host, n)
     single = np.bincount(host, minlength=n)[host] == 1
     regular = np.flatnonzero(single & (np.linalg.norm(local, axis=1) > PIVOT))
     slot[regular] = frames.take(host[regular], local[regular])
@@ -230,17 +232,9 @@ def _hosts(preferred: Index, Bz: sp.csr_array, frames: _Frames) -> tuple[Index, 
         for i in (i for least in (PIVOT, INDEPENDENT) for i in ranked if size[i] > least):
             slot[j] = frames.take(np.array([i]), entries[:, i][None])[0]
             if slot[j] >= 0:
-                host[j] = i
+                host[j], local[j] = i, entries[:, i]
                 break
     return host, slot
-
-
-def _at_nodes(B: sp.csr_array, row: Index, node: Index, n: int) -> Array:
-    """Coefficients (k, d) of rows `row` (k,) of `B` (m, d * n) at the nodes `node` (k,)."""
-    d = B.shape[1] // n
-    if row.size == 0:  # SciPy answers an empty index with a sparse array
-        return np.zeros((0, d))
-    return np.column_stack([B[row, node + i * n] for i in range(d)])
 
 
 def _check_prescribed(
@@ -325,16 +319,21 @@ def change_of_basis(
     flat_fixed, flat_values = fixed.T.ravel(), values.T.ravel()
     R = _blocks(frame)
     Bz = (rows.matrix @ R).tocsr()
-    free = Bz @ sp.diags_array(1.0 - flat_fixed)
+    free = Bz.copy()
+    free.data[flat_fixed[free.indices]] = 0.0
     taken = _axes(n, d, supported.used.copy())
     preferred = _preferred(rows, np.ones(n) if stiffness is None else stiffness)
-    host, slot = _hosts(preferred, free, taken)
+    local, every = np.zeros((len(preferred), d)), np.arange(len(preferred))
+    for i in range(d) if every.size else ():  # SciPy answers an empty index with a sparse array
+        local[:, i] = free[every, preferred + i * n]
+    host, slot = _hosts(preferred, local, free, taken)
     _check_prescribed(rows, Bz, flat_fixed, flat_values, np.flatnonzero(host < 0), length)
     kept = np.flatnonzero(host >= 0)
-    host, slot, Bz, free = host[kept], slot[kept], Bz[kept], free[kept]
+    if len(kept) < len(host):
+        host, slot, local, Bz = host[kept], slot[kept], local[kept], Bz[kept]
     unknown = host + n * slot
     M = taken.columns.transpose(0, 2, 1).copy()
-    M[host, slot] = _at_nodes(free, np.arange(len(host)), host, n)
+    M[host, slot] = local
     inverse = np.tile(np.eye(d), (n, 1, 1))
     inverse[host] = np.linalg.inv(M[host])
     T = _blocks(frame @ inverse)
