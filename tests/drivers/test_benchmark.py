@@ -262,7 +262,7 @@ def test_every_stage_of_a_level_is_found():
     """Stages name functions of the package, which may move."""
     defined = {
         (path.stem, node.name)
-        for path in Path(ngcontact.__file__).parent.glob("*/*.py")
+        for path in Path(ngcontact.__file__).parent.rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.FunctionDef)
     }

@@ -19,8 +19,8 @@ ORDER = 2
 STAGES = {  # cumulative seconds of these functions; none calls another
     "assembly": [("space", "assemble")],
     "rows": [
-        ("assembly", "contact_line"),
-        ("basis_transformation", "change_of_basis"),
+        ("dual", "contact_line"),
+        ("constraints", "change_of_basis"),
         ("boundary", "boundary_trace"),
     ],
     "rigid motions": [("equilibrium", "equilibrium")],
