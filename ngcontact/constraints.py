@@ -26,13 +26,13 @@ from scipy.sparse.csgraph import connected_components
 
 from .arrays import Array, Index, Mask, from_triplets
 
-REPEATED = 1e-9  # difference of coefficients, each at most 1, below which two rows are one
+ROW_DIFFERENCE = 1e-9  # difference of coefficients, each at most 1, below which two rows are one
 RING_CONDITION = 1e6  # condition number from which rows that refer to each other are dependent
-PIVOT = 0.05  # least share of a row at the node whose unknown it becomes, if another is possible
-INDEPENDENT = 1e-6  # sine below which two conditions at one node are the same
-INTERPOLATED = 1e-8  # error of prescribed values, relative to the largest, that is no interference
-MEASURED = 1e-13  # error of gaps, relative to the largest coordinate, that is none either
-CONTRAST = 1e3  # stiffness of the secondary over that facing it above which the latter hosts
+MIN_PIVOT = 0.05  # least share of a row at the node whose unknown it becomes, if others have more
+MIN_SINE = 1e-6  # sine below which two conditions at one node are the same
+INTERPOLATION_ERROR = 1e-8  # of prescribed values, relative to the largest: no interference
+COORDINATE_ERROR = 1e-13  # of gaps, relative to the largest coordinate: none either
+STIFFNESS_CONTRAST = 1e3  # of the secondary and what faces it, above which the latter hosts
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ class Rows:
             return number
         B = self.matrix
         for first, second in zip(order[:-1][alike], order[1:][alike], strict=True):
-            if abs(B[first : first + 1] - B[second : second + 1]).max() <= REPEATED:
+            if abs(B[first : first + 1] - B[second : second + 1]).max() <= ROW_DIFFERENCE:
                 number[second] = number[first]
         return number
 
@@ -164,7 +164,7 @@ class _Frames:
             parts = np.einsum("kij,ki->kj", self.columns[node[at]], a[at])
             parts[np.arange(a.shape[1]) < self.used[node[at], None]] = 0.0
             size = np.linalg.norm(parts, axis=1)
-            new = size > INDEPENDENT * np.linalg.norm(a[at], axis=1)
+            new = size > MIN_SINE * np.linalg.norm(a[at], axis=1)
             at, q = at[new], parts[new] / size[new, None]
             # Householder's reflection of the next axis to q, or to -q
             i, k, each = node[at], self.used[node[at]], np.arange(len(at))
@@ -205,7 +205,7 @@ def _preferred(rows: Rows, stiffness: Array) -> Index:
     rising = np.argsort(np.abs(coupling.data), kind="stable")
     facing = rows.node.copy()  # where nothing does
     facing[coupling.row[rising]] = coupling.col[rising]  # the largest comes last
-    softer = CONTRAST * stiffness[facing] < stiffness[rows.node]
+    softer = STIFFNESS_CONTRAST * stiffness[facing] < stiffness[rows.node]
     return np.where(softer, facing, rows.node)
 
 
@@ -220,7 +220,7 @@ def _hosts(
     n, d, _ = frames.columns.shape
     host, slot = preferred.copy(), np.full(len(preferred), -1)
     single = np.bincount(host, minlength=n)[host] == 1
-    regular = np.flatnonzero(single & (np.linalg.norm(local, axis=1) > PIVOT))
+    regular = np.flatnonzero(single & (np.linalg.norm(local, axis=1) > MIN_PIVOT))
     slot[regular] = frames.take(host[regular], local[regular])
     for j in np.flatnonzero(slot < 0):
         row = Bz[j : j + 1]
@@ -229,7 +229,7 @@ def _hosts(
         others = np.setdiff1d(row.indices % n, preferred[j])
         ranked = [preferred[j], *others[np.lexsort((-others, -size[others]))]]
         host[j] = -1
-        for i in (i for least in (PIVOT, INDEPENDENT) for i in ranked if size[i] > least):
+        for i in (i for least in (MIN_PIVOT, MIN_SINE) for i in ranked if size[i] > least):
             slot[j] = frames.take(np.array([i]), entries[:, i][None])[0]
             if slot[j] >= 0:
                 host[j], local[j] = i, entries[:, i]
@@ -249,13 +249,13 @@ def _check_prescribed(
     for j in dropped:
         columns, entries = Bz[j : j + 1].indices, Bz[j : j + 1].data
         where = f"the contact row at node {rows.node[j]} with direction {rows.direction[j]}"
-        if (np.abs(entries[~fixed[columns]]) > INDEPENDENT).any():
+        if (np.abs(entries[~fixed[columns]]) > MIN_SINE).any():
             raise ValueError(
                 f"{where} depends on other contact rows there; leave one of the pairs out, or end "
                 "one of the contact boundaries before that point"
             )
         value = float(entries @ values[columns])
-        allowed = INTERPOLATED * max(size, abs(rows.g[j])) + MEASURED * length
+        allowed = INTERPOLATION_ERROR * max(size, abs(rows.g[j])) + COORDINATE_ERROR * length
         excess = value - rows.g[j]
         if (abs(excess) if rows.equality[j] else excess) > allowed:
             raise ValueError(

@@ -1,12 +1,12 @@
 from .assembly import joined as joined
 from .assembly import kept_lines as kept_lines
 from .assembly import merged as merged
-from .dual import Pieces as Pieces
+from .dual import FacingPieces as FacingPieces
 from .dual import contact_line as contact_line
 from .dual import divided as divided
 from .dual import end_to_end as end_to_end
-from .line import FACING as FACING
-from .line import TOUCHING as TOUCHING
+from .line import FACING_COSINE as FACING_COSINE
+from .line import GAP_ROUND_OFF as GAP_ROUND_OFF
 from .line import ContactLine as ContactLine
 from .line import by_line as by_line
 from .line import in_contact as in_contact
@@ -17,7 +17,7 @@ from .line import prescribed_gap as prescribed_gap
 from .line import rays as rays
 from .line import twins as twins
 from .line import with_roles as with_roles
-from .projection import MATCHED as MATCHED
+from .projection import MATCHING_DISTANCE as MATCHING_DISTANCE
 from .projection import at as at
 from .projection import crossings as crossings
 from .state import ContactState as ContactState

@@ -12,7 +12,7 @@ from ..constraints import Rows, concatenated, no_rows
 from ..fem import BoundaryTrace
 from .line import ContactLine, by_line, without
 
-ALIKE = 1e-9  # difference of unit directions up to which two points at a node are one
+DIRECTION_DIFFERENCE = 1e-9  # of unit vectors, up to which two points at a node are one
 
 
 def joined(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:
@@ -53,7 +53,7 @@ def _same_point(lines: list[ContactLine], rows: Rows) -> tuple[Index, Mask]:
     x, y = np.round(rows.direction.T, 6)  # neighbours in this order, the first pair's row first
     order = np.lexsort((y, x, rows.node))
     for a, b in pairwise(order) if means.any() else ():
-        alike = np.abs(rows.direction[a] - rows.direction[b]).max() <= ALIKE
+        alike = np.abs(rows.direction[a] - rows.direction[b]).max() <= DIRECTION_DIFFERENCE
         apart = number[a] != number[b]
         if rows.node[a] == rows.node[b] and apart and alike and (means[a] or means[b]):
             number[b] = number[a]

@@ -45,7 +45,7 @@ MIN_COVERED = 0.1  # of the integral of phi over the whole segment, below which 
 
 
 @dataclass(frozen=True, eq=False)
-class Pieces:
+class FacingPieces:
     """Parts of secondary segments that face one primary segment each."""
 
     local: Index  # (r,) number of the segment among those divided
@@ -55,7 +55,7 @@ class Pieces:
     opposite: Array  # (r,) parameter on it that its middle faces
 
 
-def divided(trace: BoundaryTrace, contact: Contact, segments: Index, facing: Index) -> Pieces:
+def divided(trace: BoundaryTrace, contact: Contact, segments: Index, facing: Index) -> FacingPieces:
     """Divide `segments` (k,) where they pass vertices of the primary segments `facing` (q,)."""
     k, ends = len(segments), trace.nodes[facing][:, [0, -1]]
     _, first = np.unique(ends, return_index=True)
@@ -72,7 +72,7 @@ def divided(trace: BoundaryTrace, contact: Contact, segments: Index, facing: Ind
     d = rays(trace, contact, segment, middle)
     met = partners(trace, facing, segment, trace.point(segment, middle), d)
     on = met.segment >= 0
-    return Pieces(local[on], start[on], stop[on], met.segment[on], met.s[on])
+    return FacingPieces(local[on], start[on], stop[on], met.segment[on], met.s[on])
 
 
 def _dual_basis(whole: Array, weight: Array, mass: Array, s: Array) -> tuple[Array, Mask]:
@@ -103,7 +103,7 @@ def _dual_basis(whole: Array, weight: Array, mass: Array, s: Array) -> tuple[Arr
 
 
 def _integrals(
-    trace: BoundaryTrace, contact: Contact, segments: Index, pieces: Pieces
+    trace: BoundaryTrace, contact: Contact, segments: Index, pieces: FacingPieces
 ) -> tuple[Array, Array, sp.csr_array]:
     """Integrals over the facing parts of `segments` (k,), in arc length (P1) or eta (P2).
 

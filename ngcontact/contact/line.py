@@ -25,9 +25,9 @@ from ..lagrange import gauss, lagrange
 from ..problem import Contact
 from .projection import Partners, cast, coincident, none_met, snap
 
-FACING = 1e-8  # cosine between normal and direction from which a point faces the other body
-UNLIKE = 0.05  # relative difference of two sides from which their roles are not alike
-TOUCHING = 4 * np.finfo(float).eps  # round-off of a measured gap, relative to the coordinates
+FACING_COSINE = 1e-8  # cosine between normal and direction from which a point faces the other body
+SIDE_DIFFERENCE = 0.05  # relative difference of two sides from which their roles are not alike
+GAP_ROUND_OFF = 4 * np.finfo(float).eps  # round-off of a measured gap, relative to the coordinates
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +129,7 @@ def partners(
         found.segment[rest], found.s[rest] = other.segment, other.s
         found.distance[rest] = other.distance
     # Points that only round-off keeps apart touch: no load is too small to be felt.
-    found.distance[np.abs(found.distance) <= TOUCHING * np.abs(points).max(initial=0.0)] = 0.0
+    found.distance[np.abs(found.distance) <= GAP_ROUND_OFF * np.abs(points).max(initial=0.0)] = 0.0
     segment = np.where(found.segment < 0, -1, facing[found.segment])
     return replace(found, segment=segment, searched=rest.size > 0)
 
@@ -200,7 +200,7 @@ def nodal_line(
     else:  # (2.10): one point at a node that faces the other body
         number = np.full(len(node), -1)
         xi = np.tile(np.array(contact.direction), (len(node), 1))
-        faces = (normal * xi).sum(axis=1) > FACING
+        faces = (normal * xi).sum(axis=1) > FACING_COSINE
         number[faces], direction = trace.number_points(segment[faces], node[faces], xi[faces])
     rows = number.reshape(len(segments), trace.order + 1)
     _, first = np.unique(number, return_index=True)
@@ -280,9 +280,9 @@ def with_roles(trace: BoundaryTrace, contact: Contact) -> Contact:
 
     one, other = replace(contact, roles="given"), replace(contact, roles="given").swapped()
     a, b = covered(one), covered(other)
-    if abs(a - b) > UNLIKE:
+    if abs(a - b) > SIDE_DIFFERENCE:
         return one if a > b else other
     a, b = length(one), length(other)
-    if abs(a - b) > UNLIKE * max(a, b):
+    if abs(a - b) > SIDE_DIFFERENCE * max(a, b):
         return one if a < b else other
-    return other if bulge(other) > bulge(one) + UNLIKE else one
+    return other if bulge(other) > bulge(one) + SIDE_DIFFERENCE else one

@@ -15,13 +15,13 @@ from scipy.spatial import cKDTree
 from ..arrays import Array, Index, Mask, across
 from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative, zeros
 
-MATCHED = 1e-9  # distance, relative to a segment's length, below which two points are one
-GRAZING = 1e-9  # cosine between ray and normal up to which the ray does not meet the curve
+MATCHING_DISTANCE = 1e-9  # distance, relative to a segment's length, below which two points are one
+GRAZING_COSINE = 1e-9  # cosine between ray and normal up to which the ray does not meet the curve
 NEWTON_STEPS = 20
 # Change of a parameter in [0, 1] at which Newton's method has arrived: the next one would be of
 # its square. Below 1e-15, the round-off of places, no change falls, and all steps were taken.
-SETTLED = 1e-12
-LEBESGUE = 2.0  # bounds interpolation at Gauss-Lobatto points: 1.98 at degree 7
+NEWTON_TOLERANCE = 1e-12
+LEBESGUE_CONSTANT = 2.0  # bounds interpolation at Gauss-Lobatto points: 1.98 at degree 7
 PAIRS_AT_ONCE = 4_000_000  # of points and segments that are looked at together: bounds memory
 
 
@@ -62,7 +62,7 @@ def _bend(curve: Array) -> Array:
     """Bound (q,) of how far segments leave the uniform motion along their chords, lengths."""
     ends = lagrange(1, gauss_lobatto(curve.shape[1] - 1))
     along = np.einsum("ji,qid->qjd", ends, curve[:, [0, -1]])
-    return LEBESGUE * np.linalg.norm(curve - along, axis=2).max(axis=1)
+    return LEBESGUE_CONSTANT * np.linalg.norm(curve - along, axis=2).max(axis=1)
 
 
 def _turning(curve: Array, normal: Array) -> Mask:
@@ -79,7 +79,7 @@ def _candidates(points: Array, normal: Array, curve: Array) -> tuple[Array, Arra
     Lines through `points` (k, 2) with the normals `normal` (k, 2).
     """
     ends, degree = curve[:, [0, -1]], curve.shape[1] - 1
-    slack = MATCHED * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    slack = MATCHING_DISTANCE * np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     bend = _bend(curve)
     bend[bend <= slack] = 0.0  # straight
     reach = slack + bend
@@ -110,7 +110,7 @@ def _candidates(points: Array, normal: Array, curve: Array) -> tuple[Array, Arra
     return np.concatenate(pairs, axis=1), np.concatenate(places)
 
 
-def _newton(s: Array, step: Callable[[Array], Array], settled: float = SETTLED) -> Array:
+def _newton(s: Array, step: Callable[[Array], Array], settled: float = NEWTON_TOLERANCE) -> Array:
     """Parameters (k,) in [0, 1] after s - step(s) has been repeated until it stands still."""
     for _ in range(NEWTON_STEPS):
         new = np.clip(s - step(s), 0, 1)
@@ -127,7 +127,7 @@ def crossings(
     curve: Array,
     segment: Index,
     s: Array,
-    settled: float = SETTLED,
+    settled: float = NEWTON_TOLERANCE,
 ) -> Array:
     """Parameters (k,) of segments on lines through `points` (k, 2) with normals `normal` (k, 2).
 
@@ -153,7 +153,7 @@ def cast(
     and segment, HH81 (2.10): A_j and B_j on one perpendicular. Rays pass `points` (k, 2) along the
     unit vectors `directions` (k, 2) towards segments `curve` (q, p + 1, 2), `side` (q,). Both
     senses count unless only points `ahead` do, so that overlapping bodies give negative distances;
-    parameters within `MATCHED` of an end are that end.
+    parameters within `MATCHING_DISTANCE` of an end are that end.
     """
     found = none_met(len(points))
     if len(curve) == 0 or len(points) == 0:
@@ -161,9 +161,9 @@ def cast(
     t = across(directions)
     (point, segment), s = _candidates(points, t, curve)
     s = crossings(points[point], t[point], curve, segment, s)
-    s = np.where(s < MATCHED, 0.0, np.where(s > 1 - MATCHED, 1.0, s))
+    s = np.where(s < MATCHING_DISTANCE, 0.0, np.where(s > 1 - MATCHING_DISTANCE, 1.0, s))
     offset = at(curve, segment, s) - points[point]
-    length = MATCHED * np.linalg.norm(curve[segment, -1] - curve[segment, 0], axis=1)
+    length = MATCHING_DISTANCE * np.linalg.norm(curve[segment, -1] - curve[segment, 0], axis=1)
     distance = (offset * directions[point]).sum(axis=1)
     meets = _faces(curve, side, segment, s, directions[point])
     meets &= np.abs((offset * t[point]).sum(axis=1)) <= 2 * length
@@ -184,7 +184,7 @@ def _faces(curve: Array, side: Array, segment: Index, s: Array, directions: Arra
     A ray along a straight boundary, such as a symmetry plane, does not meet it.
     """
     normal = normals(curve, side, segment, s)
-    grazing = GRAZING * np.linalg.norm(normal, axis=1)  # round-off must not decide
+    grazing = GRAZING_COSINE * np.linalg.norm(normal, axis=1)  # round-off must not decide
     return np.asarray((normal * directions).sum(axis=1) < -grazing)
 
 
@@ -195,14 +195,14 @@ def coincident(
 
     Of contact `points` (k, 2) with unit vectors `directions` (k, 2) towards segments `curve`
     (q, p + 1, 2), `side` (q,), with nodes at the parameters `nodes` (q, order + 1); none where no
-    node is within `MATCHED` of the point, or the curve does not face it.
+    node is within `MATCHING_DISTANCE` of the point, or the curve does not face it.
     """
     found = none_met(len(points))
     if len(curve) == 0 or len(points) == 0:
         return found
     shapes = lagrange(curve.shape[1] - 1, nodes.ravel()).reshape(*nodes.shape, -1)
     places = np.einsum("qji,qid->qjd", shapes, curve)
-    reach = MATCHED * np.linalg.norm(curve[:, -1] - curve[:, 0], axis=1)
+    reach = MATCHING_DISTANCE * np.linalg.norm(curve[:, -1] - curve[:, 0], axis=1)
     tree = cKDTree(places.reshape(-1, 2))
     # A vertex belongs to two segments; the ray may face only one of them.
     distances, numbers = tree.query(points, k=2, distance_upper_bound=reach.max())
@@ -221,7 +221,7 @@ def coincident(
 def snap(s: Array, nodes: Array) -> Array:
     """Parameters `s` (k,) moved to those of the `nodes` (k, p + 1) that they match, (k,)."""
     nearest = nodes[np.arange(len(s)), np.abs(s[:, None] - nodes).argmin(axis=1)]
-    return np.where(np.abs(s - nearest) <= MATCHED, nearest, s)
+    return np.where(np.abs(s - nearest) <= MATCHING_DISTANCE, nearest, s)
 
 
 def feet(points: Array, curve: Array, direction: Array | None) -> tuple[Index, Array]:

@@ -14,10 +14,10 @@ from .line import ContactLine, by_line, in_contact, twins
 
 # Stencil of the fit, by measurement on Hertz contact at orders 1 to 4: the two points next to the
 # contact carry the error of the element in which it ends.
-SKIPPED = 2
-FEWEST = 8  # points of the fit, or three per order and two if that is more
-DEGREE = 3  # of the fit, 2 at order 1
-SAMPLES = 65  # places at which the fit is evaluated to bracket its zero
+SKIPPED_POINTS = 2
+FIT_POINTS = 8  # points of the fit, or three per order and two if that is more
+FIT_DEGREE = 3  # of the fit, 2 at order 1
+FIT_SAMPLES = 65  # places at which the fit is evaluated to bracket its zero
 
 
 def _neighbours(line: ContactLine) -> tuple[dict[int, list[int]], Index]:
@@ -50,16 +50,16 @@ def _closing_point(distance: Array, gap: Array, order: int) -> float | None:
 
     `distance` (k,) grows away from the contact, whose last point has distance 0.
     """
-    chosen = slice(SKIPPED, SKIPPED + max(FEWEST, 3 * order + 2))
+    chosen = slice(SKIPPED_POINTS, SKIPPED_POINTS + max(FIT_POINTS, 3 * order + 2))
     x, y = distance[chosen], np.maximum(gap[chosen], 0.0) ** (2 / 3)
     if len(x) < 2 or y[-1] <= 0:
         return None
-    fit = np.polynomial.Polynomial.fit(x, y, min(DEGREE, order + 1, len(x) - 1))
+    fit = np.polynomial.Polynomial.fit(x, y, min(FIT_DEGREE, order + 1, len(x) - 1))
     # The last active point may lie on the open side by the error of one element. The zero is
     # bracketed: the roots of a companion matrix are lost where leading coefficients are round-off.
-    places, step = np.linspace(-distance[0], x[0], SAMPLES, retstep=True)
+    places, step = np.linspace(-distance[0], x[0], FIT_SAMPLES, retstep=True)
     below = np.flatnonzero(fit(places) <= 0)
-    if len(below) == 0 or below[-1] == SAMPLES - 1:
+    if len(below) == 0 or below[-1] == FIT_SAMPLES - 1:
         return None
     low = places[below[-1]]
     return float(low + step * brentq(lambda t: fit(low + step * t), 0, 1, xtol=1e-15))
@@ -134,8 +134,8 @@ def ending_segments(line: ContactLine, ends: Transitions) -> Index:
     return np.flatnonzero(at.any(axis=1))
 
 
-SMALL_TURN = np.sqrt(0.5)  # cosine up to which both sides of a corner have one pressure
-CONTINUED = 1 / 3  # of the contact around an axis, to which its pressure is the continuation
+TURN_COSINE = np.sqrt(0.5)  # cosine up to which both sides of a corner have one pressure
+AXIS_SHARE = 1 / 3  # of the contact around an axis, to which its pressure is the continuation
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +186,7 @@ def continued_to_axis(line: ContactLine, pressure: Array, active: Mask) -> Array
         square = ((line.position - line.position[i]) ** 2).sum(axis=1)
         near = np.argsort(square, kind="stable")
         closed = np.append(np.flatnonzero(~active[near]), len(near))[0]
-        near = near[:closed][square[near[:closed]] <= CONTINUED**2 * square[near[closed - 1]]]
+        near = near[:closed][square[near[:closed]] <= AXIS_SHARE**2 * square[near[closed - 1]]]
         if len(near) > 2:
             root = np.sqrt(line.weight[near])
             powers = np.column_stack([np.ones(len(near)), square[near] / square[near[-1]]])
@@ -224,7 +224,7 @@ def pressure_across_corners(line: ContactLine, force: Array, active: Mask) -> Ar
         return pressure
     inside = in_contact(line, active)[corners].all(axis=1)
     normal = line.direction[corners]  # (t, 2, 2), row i the normal of side i
-    inside &= (normal[:, 0] * normal[:, 1]).sum(axis=1) >= SMALL_TURN
+    inside &= (normal[:, 0] * normal[:, 1]).sum(axis=1) >= TURN_COSINE
     corners, normal = corners[inside], normal[inside]
     uniform = (line.weight[corners][:, :, None] * normal).sum(axis=1)
     resultant = (force[corners][:, :, None] * normal).sum(axis=1)

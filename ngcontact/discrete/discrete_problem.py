@@ -48,11 +48,11 @@ from ..qp import (
 from .admissible_set import AdmissibleSet, admissible_set, conditioned_segments
 from .equilibrium import Rigid, equilibrium
 
-TOUCHING = 1e-12  # gap, relative to the zone, up to which points start active
-APART = 1e-6  # distance of the two points at a corner, by their directions, relative to the zone
-TIED = 1e-6  # difference of two distances, relative to them, that round-off may have made
+TOUCHING_GAP = 1e-12  # gap, relative to the zone, up to which points start active
+CORNER_DISTANCE = 1e-6  # of its two points, by their directions, relative to the zone
+DISTANCE_ROUND_OFF = 1e-6  # difference of two distances, relative to them, that it may have made
 # Powers of ten between which sums of products keep their digits.
-LOWEST, HIGHEST = -306, 305
+MIN_EXPONENT, MAX_EXPONENT = -306, 305
 MIN_REFINED = 0.7  # share of the unknowns that must be gone in the coarsest space
 
 
@@ -315,10 +315,10 @@ def _program(
     with np.errstate(divide="ignore"):
         k, f, v = np.log10([stiffness, load, given])
     for name, size in (("displacements", max(v, f - k)), ("forces", max(f, k + v))):
-        if not (size == -np.inf or LOWEST < size < HIGHEST):
+        if not (size == -np.inf or MIN_EXPONENT < size < MAX_EXPONENT):
             raise ValueError(
                 f"moduli, loads and prescribed displacements make {name} of 1e{size:+.0f}, beyond "
-                f"the range of numbers (1e{LOWEST} to 1e+{HIGHEST}); choose other units"
+                f"the range of numbers (1e{MIN_EXPONENT} to 1e+{MAX_EXPONENT}); choose other units"
             )
     return p
 
@@ -391,7 +391,7 @@ def first_active_set(discrete: DiscreteProblem) -> Mask:
     active = [np.zeros(0, dtype=bool)]
     for line, distance in zip(discrete.lines, by_line(discrete.lines, gap), strict=True):
         size = np.ptp(line.position, axis=0).max() if len(line.node) else 0.0
-        active.append(distance <= TOUCHING * size)
+        active.append(distance <= TOUCHING_GAP * size)
     return np.concatenate(active) | carries
 
 
@@ -411,13 +411,13 @@ def _carried(new: ContactLine, old: ContactState) -> Mask:
     if known.node.size == 0 or new.node.size == 0:
         return np.zeros(new.node.size, dtype=bool)
     # Two points at a corner are told apart by their directions.
-    size = APART * np.ptp(known.position, axis=0).max(initial=0.0)
+    size = CORNER_DISTANCE * np.ptp(known.position, axis=0).max(initial=0.0)
     tree = cKDTree(np.column_stack([known.position, size * known.direction]))
     places = np.column_stack([new.position, size * new.direction])
     distance, near = tree.query(places, k=[1, min(2, known.node.size)])
     away, nearest = distance[:, 0], near[:, 0]
     # A new point in the middle of two: active if one of them is, whatever round-off says.
-    tied = distance[:, 1] <= (1 + TIED) * away
+    tied = distance[:, 1] <= (1 + DISTANCE_ROUND_OFF) * away
     active: Mask = old.active[nearest] | (tied & old.active[near[:, 1]])
     order = known.rows.shape[1] - 1
     if order > 1 and away.max() > size:  # not the same points

@@ -22,17 +22,19 @@ from ..fem import Bodies, Space, body_of_unknown, connected_bodies, model_of
 from ..linalg import shared
 from ..mesh import cad_edges
 from ..problem import MeshArrays, Problem, numbers
-from ..qp import FREE, NullSpace, pinned_null_space, vanishing_combinations
+from ..qp import NULL_SPACE_TOLERANCE, NullSpace, pinned_null_space, vanishing_combinations
 from ..quadrature import SampledElements, loads_of
 
-NOT_RIGID = 1e-9  # force of a rigid motion, relative to its terms, that shows it is not in V_h
+STRAIN_FORCE = 1e-9  # force of a rigid motion, relative to its terms, that shows it is not in V_h
 LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
 ADDED_DEGREES = 2  # of the mesh's curved sides, to see their error
-QUADRATURE = 3.0  # times the error that is measured of the load's work is none; measured: up to .21
+QUADRATURE_ERRORS = (
+    3.0  # of the load's work, as it is measured, that are allowed; measured: up to .21
+)
 WORK_NOISE = 1e-10  # ... and this, relative to the sum of its terms, round-off
-BALANCED = 1e-13  # of all contact forces: what their least squares leave, measured 2e-14
-HARDLY = 1e-2  # of a motion, that closes or opens no gap more: contact hardly resists it
-NO_WORK = 1e-14  # work, relative to the sum of its terms, that is none
+FORCE_ROUND_OFF = 1e-13  # of all contact forces: what their least squares leave, measured 2e-14
+MIN_RESISTANCE = 1e-2  # of a motion, that closes or opens no gap more: contact hardly resists it
+WORK_ROUND_OFF = 1e-14  # work, relative to the sum of its terms, that is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +113,7 @@ class FreeMotions:
     def motion(self, amounts: Array, multiplier: float = 0.0) -> RigidMotion:
         """One of the motions, by its `amounts` (r,)."""
         parts = (self.combinations @ amounts).reshape(-1, 3)
-        parts[np.abs(parts) <= FREE * np.abs(parts).max()] = 0.0
+        parts[np.abs(parts) <= NULL_SPACE_TOLERANCE * np.abs(parts).max()] = 0.0
         size = np.abs(parts).max(axis=1)
         moving = [int(b) for b in np.argsort(-size, kind="stable") if size[b] > 0]
         return RigidMotion(
@@ -152,7 +154,7 @@ def free_motions(
     nodal = _node_values(space, bodies) @ combinations
     values = space.basis @ nodal
     terms = (space.diagonal[:, None] * np.abs(values)).max(axis=0)
-    if (np.abs(space.A @ values).max(axis=0) > NOT_RIGID * terms).any():
+    if (np.abs(space.A @ values).max(axis=0) > STRAIN_FORCE * terms).any():
         raise ValueError(
             "curved superparametric elements do not contain the rotation of a body that its "
             'supports leave free; use element="isoparametric"'
@@ -218,7 +220,7 @@ class Rigid:
         for part in (free.combinations, *free.of_bodies):
             mine = np.where(part.any(axis=0), amounts, 0.0)
             size, seen = (np.abs(x @ mine).max(initial=0.0) for x in (part, self.rows))
-            if size > HARDLY * extent and seen < HARDLY * size:
+            if size > MIN_RESISTANCE * extent and seen < MIN_RESISTANCE * size:
                 motion, work = free.motion(mine / size), float(mine @ self.work)
                 return NoEquilibriumError(
                     f"contact hardly holds a rigid {motion}: by {size:.3g} it opens or closes gaps "
@@ -255,7 +257,7 @@ def equilibrium(
         return None, space.f
     f, work, left_sides = space.f, free.values.T @ space.f, np.asarray(rows.matrix @ free.nodal)
     terms = np.abs(free.values).T @ np.abs(f)
-    noise = np.where(np.abs(work) <= NO_WORK * terms, work, 0.0)
+    noise = np.where(np.abs(work) <= WORK_ROUND_OFF * terms, work, 0.0)
     unbalanced = _unbalanced(left_sides, rows.equality, work - noise)
     if not unbalanced.is_within(WORK_NOISE * terms):
         _check_work(problem, free, left_sides, rows.equality, work - noise, WORK_NOISE * terms)
@@ -296,7 +298,7 @@ def _placing(rows: Array, work: Array, g: Array, equality: Mask) -> tuple[Array,
         return stay
     carries = np.zeros(len(g), dtype=bool)
     if free.any():
-        carries[free] = result.ineqlin.marginals < -FREE
+        carries[free] = result.ineqlin.marginals < -NULL_SPACE_TOLERANCE
     return scale * result.x, carries
 
 
@@ -322,7 +324,7 @@ class _Unbalanced:
 
     def is_within(self, error: Array, beside: float = 0.0) -> bool:
         """Whether errors (r,) of the work, round-off and work `beside` may have made it."""
-        allowed = float(np.abs(self.motion) @ error) + BALANCED * self.forces
+        allowed = float(np.abs(self.motion) @ error) + FORCE_ROUND_OFF * self.forces
         return self.done <= allowed + beside
 
 
@@ -346,7 +348,7 @@ def _check_work(
     """
     measured = _measured_work(problem, free)
     if measured is not None:
-        work, noise = measured[0], noise + QUADRATURE * measured[1]
+        work, noise = measured[0], noise + QUADRATURE_ERRORS * measured[1]
     left = _unbalanced(rows, equality, work)
     if left.is_within(noise):
         return
@@ -354,7 +356,7 @@ def _check_work(
     of_shape = 0.0
     if len(set(motion.bodies)) == len(motion.bodies):  # regions tell them
         of_shape = abs(float(_change_by_shape(problem, mesh, motion).sum()))
-    if not left.is_within(noise, QUADRATURE * of_shape):
+    if not left.is_within(noise, QUADRATURE_ERRORS * of_shape):
         raise NoEquilibriumError(
             f"no equilibrium: the load does the work {left.done:.6g} on a rigid {motion}, which "
             "neither supports nor contact resist; hold that body by `displacement`, `sliding` or "

@@ -11,12 +11,12 @@ from numpy.polynomial.legendre import legvander
 
 from ..arrays import Array, Index, Mask
 from ..contact import (
-    FACING,
-    MATCHED,
-    TOUCHING,
+    FACING_COSINE,
+    GAP_ROUND_OFF,
+    MATCHING_DISTANCE,
     ContactLine,
     ContactState,
-    Pieces,
+    FacingPieces,
     at,
     crossings,
     divided,
@@ -48,19 +48,21 @@ DIVISIONS = 4  # of a piece on which the gap is no polynomial
 MAX_PIECES = 100_000  # pieces looked at, from which no more are divided
 
 
-def _select(pieces: Pieces, at: Index) -> Pieces:
+def _select(pieces: FacingPieces, at: Index) -> FacingPieces:
     """Pieces of the numbers `at` (n,)."""
-    return Pieces(**{name: values[at] for name, values in vars(pieces).items()})
+    return FacingPieces(**{name: values[at] for name, values in vars(pieces).items()})
 
 
-def _joined(parts: Sequence[Pieces]) -> Pieces:
+def _joined(parts: Sequence[FacingPieces]) -> FacingPieces:
     """All pieces, one after the other."""
-    return Pieces(
+    return FacingPieces(
         **{name: np.concatenate([vars(x)[name] for x in parts]) for name in vars(parts[0])}
     )
 
 
-def facing_pieces(boundary: BoundaryTrace, line: ContactLine, carrying: Mask) -> tuple[Pieces, int]:
+def facing_pieces(
+    boundary: BoundaryTrace, line: ContactLine, carrying: Mask
+) -> tuple[FacingPieces, int]:
     """Parts of the secondary that face one segment of the primary each, or the obstacle.
 
     On segments that wholly face, and on those `carrying` (k,) contact points, of any pair. So many
@@ -72,7 +74,7 @@ def facing_pieces(boundary: BoundaryTrace, line: ContactLine, carrying: Mask) ->
         facing = _opposite_segments(boundary, line, carrying)
         whole = np.flatnonzero(facing >= 0)
     ends = np.zeros(len(whole)), np.ones(len(whole))
-    pieces = Pieces(whole, *ends, facing[whole], np.full(len(whole), 0.5))
+    pieces = FacingPieces(whole, *ends, facing[whole], np.full(len(whole), 0.5))
     rest = np.flatnonzero((facing < 0) & (line.faces | carrying))
     if line.contact.primary is not None and len(rest):
         parts = _divided(boundary, line, rest)
@@ -96,14 +98,14 @@ def _opposite_segments(boundary: BoundaryTrace, line: ContactLine, carrying: Mas
         nearest = apart.argmin(axis=1)
         rows = line.rows.copy()
         rows[local, -end] = len(faces) + np.arange(len(local))
-        faces = np.append(faces, apart.min(axis=1) <= MATCHED * boundary.lengths(segment))
+        faces = np.append(faces, apart.min(axis=1) <= MATCHING_DISTANCE * boundary.lengths(segment))
         partner = np.append(line.partner, line.facing[nearest // 2])
         partner_s = np.append(line.partner_s, nearest % 2)
         line = replace(line, rows=rows, partner=partner, partner_s=partner_s)
     return end_to_end(boundary, line, faces)
 
 
-def _divided(boundary: BoundaryTrace, line: ContactLine, rest: Index) -> Pieces:
+def _divided(boundary: BoundaryTrace, line: ContactLine, rest: Index) -> FacingPieces:
     """Pieces of the segments `rest` (j,), by their numbers there.
 
     Looked for beside the partners of their points; elsewhere where those do not cover them.
@@ -120,7 +122,9 @@ def _divided(boundary: BoundaryTrace, line: ContactLine, rest: Index) -> Pieces:
     return divided(boundary, line.contact, segments, line.facing)
 
 
-def covered_parts(boundary: BoundaryTrace, line: ContactLine, pieces: Pieces, whole: int) -> Parts:
+def covered_parts(
+    boundary: BoundaryTrace, line: ContactLine, pieces: FacingPieces, whole: int
+) -> Parts:
     """Parts of both bodies' boundaries that face each other, two of every piece.
 
     The first `whole` ones are segments whose ends face the ends of another.
@@ -166,7 +170,9 @@ def remaining(inner: Mask, covered: list[Parts]) -> Parts:
     return Parts(number, low[left] - 2 * number, high[left] - 2 * number)
 
 
-def followed_gap(boundary: BoundaryTrace, line: ContactLine, pieces: Pieces, order: int) -> Pieces:
+def followed_gap(
+    boundary: BoundaryTrace, line: ContactLine, pieces: FacingPieces, order: int
+) -> FacingPieces:
     """Pieces divided until `gap` data are polynomials on each, by its Gauss points of `order`.
 
     Or until there are `MAX_PIECES`. Gaps between measured curves are resolved by those.
@@ -252,7 +258,7 @@ class FacingPoints:
 
 
 def facing_points(
-    boundary: BoundaryTrace, line: ContactLine, pieces: Pieces, order: int
+    boundary: BoundaryTrace, line: ContactLine, pieces: FacingPieces, order: int
 ) -> FacingPoints:
     """Gauss points of degree `order` on the pieces of a line, and what is opposite to them."""
     parts = Parts(line.segments[pieces.local], pieces.start, pieces.stop)
@@ -262,7 +268,8 @@ def facing_points(
     x, slope = boundary.point(segment, s), boundary.derivative(segment, s)
     speed = jacobian(boundary, line.contact, segment, s)
     length = np.linalg.norm(slope, axis=1) * boundary.measure(segment, s)
-    along = speed <= FACING * length  # the direction touches a curve: nothing is per eta there
+    # Where the direction touches a curve nothing is per eta.
+    along = speed <= FACING_COSINE * length
     weight, speed = weight * speed, np.where(along, length, speed)
     stretch = np.ones((2, len(s)))
     stretch[0] = length / speed
@@ -272,11 +279,11 @@ def facing_points(
         s_there = _opposite(boundary, x, d, facing, pieces.opposite[part])
         offset = at(boundary.curve, facing, s_there) - x
         distance = (offset * d).sum(axis=1)
-        distance[np.abs(distance) <= TOUCHING * np.abs(x).max(initial=0.0)] = 0.0
+        distance[np.abs(distance) <= GAP_ROUND_OFF * np.abs(x).max(initial=0.0)] = 0.0
         # Of (y(t) - x(s)) x d(s) = 0: dt / ds = (x' x d - (y - x) x d') / (y' x d).
         there = boundary.derivative(facing, s_there)
         across, size = _cross(there, d), np.linalg.norm(there, axis=1)
-        along |= np.abs(across) <= FACING * size
+        along |= np.abs(across) <= FACING_COSINE * size
         across = np.where(along, size, across)
         rate = (_cross(slope, d) - _cross(offset, turn)) / across
         length = size * boundary.measure(facing, s_there)

@@ -16,7 +16,7 @@ from ..lagrange import gauss_lobatto
 
 COARSEST = 10_000  # unknowns below which a factor costs less than what coarser spaces save
 VERTEX_RATIO = 0.5  # of the vertices that the next coarser space has at most
-CANCELLED = 1e-14  # entries of products of changes of basis, of size 1, that are zero in truth
+PRODUCT_ROUND_OFF = 1e-14  # of products of changes of basis, whose entries are of size 1
 MAX_LINKS = 10  # bodies whose contact lines share nodes; more only in rings
 
 
@@ -122,7 +122,7 @@ def _inverse(T: sp.csr_array, d: int) -> sp.csr_array:
     G = from_triplets(blocks.ravel(), rows.ravel(), columns.ravel(), T.shape)
     G.eliminate_zeros()
     rest = sp.eye_array(d * n, format="csr") - G @ T
-    rest.data[np.abs(rest.data) < CANCELLED] = 0.0
+    rest.data[np.abs(rest.data) < PRODUCT_ROUND_OFF] = 0.0
     rest.eliminate_zeros()
     inverse, term = G, rest @ G
     for _ in range(MAX_LINKS):

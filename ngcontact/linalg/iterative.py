@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..arrays import Array, Factor, Mask
-from ..qp import COARSE, FINE, Anchor, BorderedSystems, QuadraticProgram, terms
+from ..qp import COARSE_RESIDUAL, FINE_RESIDUAL, Anchor, BorderedSystems, QuadraticProgram, terms
 from .multigrid import Multigrid, StalledError
 
-LOOSE = 1e-2  # residual, relative to the one a system starts from, that tells its active set
-FLOOR = 4 * np.finfo(float).eps  # round-off of the residual, relative to its terms
+LOOSE_RESIDUAL = 1e-2  # relative to the one a system starts from, that tells its active set
+TERM_ROUND_OFF = 4 * np.finfo(float).eps  # round-off of the residual, relative to its terms
 
 log = logging.getLogger("ngcontact")
 
@@ -140,7 +140,9 @@ class IterativeSystems(BorderedSystems):
         residual = self.unbalanced(active)
         size = multigrid.largest(residual)
         self.scale = max(self.scale, size)
-        count = self._add(multigrid, residual, max(LOOSE * size, COARSE * self.scale))
+        count = self._add(
+            multigrid, residual, max(LOOSE_RESIDUAL * size, COARSE_RESIDUAL * self.scale)
+        )
         self.unbalanced(active)  # sets the forces
         if count > self.limits.renewal and (active != self.coarse).any():
             self.multigrid = self.coarse = None
@@ -155,13 +157,13 @@ class IterativeSystems(BorderedSystems):
     def _refine(self, active: Mask) -> None:
         """Reduce the residual of the last solution to round-off."""
         multigrid = self.multigrid or self._held(active)
-        floor = FLOOR * float(terms(self.program.K, self.y).max(initial=0.0))
-        target = max(FINE * self.scale, floor)
+        floor = TERM_ROUND_OFF * float(terms(self.program.K, self.y).max(initial=0.0))
+        target = max(FINE_RESIDUAL * self.scale, floor)
         residual = self.unbalanced(active)
         for _ in range(self.limits.restarts):
             if multigrid.largest(residual) <= target:
                 return
             self._add(multigrid, residual, target)
             residual = self.unbalanced(active)
-        if not multigrid.largest(residual) <= COARSE * self.scale:
+        if not multigrid.largest(residual) <= COARSE_RESIDUAL * self.scale:
             raise StalledError(f"{self.limits.restarts} solutions left more than {target:.1e}")

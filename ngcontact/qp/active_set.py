@@ -22,7 +22,13 @@ from scipy.sparse.linalg import splu
 
 from ..arrays import Array, Factor, Mask, Solve
 from ..errors import ConvergenceError
-from .quadratic_program import FREE, Anchor, Iterate, QuadraticProgram, SingularError
+from .quadratic_program import (
+    NULL_SPACE_TOLERANCE,
+    Anchor,
+    Iterate,
+    QuadraticProgram,
+    SingularError,
+)
 from .schur_complement import BorderedSystems
 
 Matrix: TypeAlias = sp.sparray | sp.spmatrix | ArrayLike  # a dense one may be a list of rows
@@ -31,14 +37,14 @@ log = logging.getLogger("ngcontact")
 
 SYMMETRIC = 1e-10  # difference of A and its transpose, relative to the largest entry
 TIE = 1e-13  # relative size below which a force or a slack keeps its state
-CLEAR = 1e-9  # ... below which it is judged by the refined solution only
+CLEAR_TIE = 1e-9  # ... below which it is judged by the refined solution only
 WIDEST_TIE = 1e-9  # ... and to which that grows, tenfold, each time an active set comes back
 PATIENCE = 10  # full switches allowed without fewer violated rows: p of Judice and Pires
 
 PROXIMAL = 1e-3  # of the stiffness at the pins, where contact leaves rigid motions free
-WEAKEST = 1e-6  # of that, to which it falls, tenfold at each proximal step
-AT_REST = 1e-14  # force of the proximal term, relative to stiffness times displacement
-STEADY = 0.9  # ratio of that force to the last from which a motion is steady, not slowing down
+MIN_PROXIMAL = 1e-6  # of that, to which it falls, tenfold at each proximal step
+REST_FORCE = 1e-14  # force of the proximal term, relative to stiffness times displacement
+STEADY_RATIO = 0.9  # of that force to the last, from which a motion is not slowing down
 MAX_PROXIMAL = 100  # proximal steps; most problems need less than five
 
 
@@ -83,7 +89,7 @@ class ActiveSetIteration:
         null_space = p.null_space
         motion = null_space.others @ np.linalg.solve(null_space.others[null_space.pins], moved)
         approach = np.where(self.active, 0.0, motion[p.unknown])
-        meets = approach > FREE * np.abs(moved).max()
+        meets = approach > NULL_SPACE_TOLERANCE * np.abs(moved).max()
         if not meets.any():
             return 0.0
         slack = p.g - self.y[p.unknown]
@@ -129,7 +135,7 @@ class ActiveSetIteration:
         """Solve the system of the active set; answer the rows (m,) that are on the wrong side."""
         try:
             self.y, self.force = self.systems.solve(self.active, anchor)  # (iii)
-            wrong = self._violated(CLEAR)
+            wrong = self._violated(CLEAR_TIE)
             if not wrong.any():
                 self.y, self.force = self.systems.refine(self.active, anchor)
                 wrong = self._violated(tie)
@@ -193,13 +199,13 @@ def minimise(
         at = current.y[pins]
         moved = at - anchor.at
         force = anchor.stiffness * np.abs(moved)
-        if (force <= AT_REST * hardness * current.extent).all():
+        if (force <= REST_FORCE * hardness * current.extent).all():
             return current.result()
         # A steady motion: go where it leads.
-        if force.max() > STEADY * last and not current.resisted():
+        if force.max() > STEADY_RATIO * last and not current.resisted():
             at = at + current.advance(moved) * moved
         last = force.max()
-        share = max(share / 10, WEAKEST * PROXIMAL)
+        share = max(share / 10, MIN_PROXIMAL * PROXIMAL)
         anchor = Anchor(share * hardness, at)
     raise ConvergenceError(
         f"the rigid motions did not settle in {MAX_PROXIMAL} proximal steps",

@@ -17,8 +17,8 @@ from scipy.linalg import qr
 
 from ..arrays import Array, Index, Mask
 
-FREE = 1e-8  # singular value, relative to motions of size 1, below which nothing resists
-IN_CACHE = 1 << 14  # rows that are copied at a time: the copy stays in the cache
+NULL_SPACE_TOLERANCE = 1e-8  # singular value, of motions of size 1, below which nothing resists
+CACHE_ROWS = 1 << 14  # rows that are copied at a time: the copy stays in the cache
 
 
 def vanishing_combinations(resisted: Array) -> Array:
@@ -29,7 +29,7 @@ def vanishing_combinations(resisted: Array) -> Array:
     if r == 0:
         return np.zeros((0, 0))
     _, singular, directions = np.linalg.svd(resisted, full_matrices=False)
-    return echelon(directions[singular <= FREE * np.sqrt(len(resisted))].T)
+    return echelon(directions[singular <= NULL_SPACE_TOLERANCE * np.sqrt(len(resisted))].T)
 
 
 def echelon(vectors: Array) -> Array:
@@ -40,7 +40,7 @@ def echelon(vectors: Array) -> Array:
     pivots.sort()
     result = vectors @ np.linalg.inv(vectors[pivots])
     result[pivots] = np.eye(len(pivots))
-    result[np.abs(result) <= FREE] = 0.0
+    result[np.abs(result) <= NULL_SPACE_TOLERANCE] = 0.0
     return result
 
 
@@ -160,7 +160,7 @@ class Iterate:
     back_solves: int = 0
 
 
-def terms(A: sp.csr_array, x: Array, rows: int = IN_CACHE) -> Array:
+def terms(A: sp.csr_array, x: Array, rows: int = CACHE_ROWS) -> Array:
     """|A| |x| (m,), the size of the terms of A x for `x` (n,), by as many `rows` at a time.
 
     A second matrix of the size of `A` (m, n) is not made.

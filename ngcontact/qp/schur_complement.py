@@ -13,12 +13,12 @@ import scipy.sparse as sp
 from ..arrays import Array, Factor, Index, Mask, Solve
 from .quadratic_program import Anchor, QuadraticProgram, SingularError
 
-COARSE = 1e-11  # residual, relative to the largest met, of a system that tells the next active set
-FINE = 1e-14  # ... and of the last system
+COARSE_RESIDUAL = 1e-11  # relative to the largest met, of a system that tells the next active set
+FINE_RESIDUAL = 1e-14  # ... and of the last system
 BORDER = 16  # changed rows up to which a bordered solve is cheaper than a factorisation ...
 BORDER_GROWTH = 4  # ... times this for every one before: the sets that follow change less and less
-DEPENDENT = 1e-14  # singular values of the border, relative to the largest, that are round-off
-UNSOLVED = 1e-6  # residual, relative to the first, above which the matrix is singular
+BORDER_ROUND_OFF = 1e-14  # of its singular values, relative to the largest
+SINGULAR_RESIDUAL = 1e-6  # residual, relative to the first, above which the matrix is singular
 ROUND_OFF = 64 * np.finfo(float).eps  # ... unless it is that of values that balance each other
 
 
@@ -147,7 +147,7 @@ class BorderedSystems:
         system = self.system
         if system is None or system.anchor is not anchor or (system.active != active).any():
             system = self._reach(active, anchor)
-        self._improve(system, FINE)
+        self._improve(system, FINE_RESIDUAL)
         return self.y.copy(), self.force.copy()
 
     def unbalanced(self, active: Mask, anchor: Anchor | None = None) -> Array:
@@ -188,8 +188,8 @@ class BorderedSystems:
             self.y[p.unknown[held]] = p.g[held]
         residual = self.unbalanced(active, anchor)
         self.scale = max(self.scale, system.largest(residual))
-        self._correct(system, residual, COARSE)
-        self._improve(system, COARSE)
+        self._correct(system, residual, COARSE_RESIDUAL)
+        self._improve(system, COARSE_RESIDUAL)
         return system
 
     def _base_near(self, active: Mask) -> Base:
@@ -254,7 +254,7 @@ class BorderedSystems:
         below = np.concatenate([residual[at], p.g[rows] - p.R[rows] @ self.y])
         if below.size:
             right = (system.V @ x[system.touched] - below) / system.size
-            z = np.linalg.lstsq(system.S, right, rcond=DEPENDENT)[0] / system.size  # step 2
+            z = np.linalg.lstsq(system.S, right, rcond=BORDER_ROUND_OFF)[0] / system.size  # step 2
             amounts = np.zeros(len(base.known))
             amounts[system.column] = z
             x -= amounts @ base.known  # step 3
@@ -278,7 +278,7 @@ class BorderedSystems:
         if system.anchor is not None:  # its force may turn what the held unknowns hold
             balanced[p.null_space.held] = False
         left = np.abs(residual[balanced]).max(initial=0.0)
-        if not left <= UNSOLVED * scale and not left <= self._round_off(balanced):
+        if not left <= SINGULAR_RESIDUAL * scale and not left <= self._round_off(balanced):
             raise SingularError(
                 "the system for the current active set is singular to working precision: a body "
                 "can move without resistance from supports or active contact, or the moduli of "

@@ -13,7 +13,15 @@ from numpy.polynomial import legendre
 from scipy.special import comb
 
 from ...arrays import Array, Index, Mask
-from ...contact import FACING, ContactState, divided, jacobian, partners, prescribed_gap, rays
+from ...contact import (
+    FACING_COSINE,
+    ContactState,
+    divided,
+    jacobian,
+    partners,
+    prescribed_gap,
+    rays,
+)
 from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...lagrange import gauss, lagrange
@@ -101,7 +109,7 @@ def facing_points(
     other, there, gap = opposite.segment, opposite.s, opposite.distance
     faces = other >= 0
     if contact.primary is None:
-        faces = (trace.normal(every, t) * d).sum(axis=1) > FACING
+        faces = (trace.normal(every, t) * d).sum(axis=1) > FACING_COSINE
     if contact.gap is not None:
         gap = prescribed_gap(contact, trace, every, t, x)
     at = other.reshape(s.shape), there.reshape(s.shape)
