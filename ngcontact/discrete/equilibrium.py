@@ -28,9 +28,7 @@ from ..quadrature import SampledElements, loads_of
 STRAIN_FORCE = 1e-9  # force of a rigid motion, relative to its terms, that shows it is not in V_h
 LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
 ADDED_DEGREES = 2  # of the mesh's curved sides, to see their error
-QUADRATURE_ERRORS = (
-    3.0  # of the load's work, as it is measured, that are allowed; measured: up to .21
-)
+QUADRATURE_ERRORS = 3.0  # of the load's work, measured, that are allowed; up to .21 were met
 WORK_NOISE = 1e-10  # ... and this, relative to the sum of its terms, round-off
 FORCE_ROUND_OFF = 1e-13  # of all contact forces: what their least squares leave, measured 2e-14
 MIN_RESISTANCE = 1e-2  # of a motion, that closes or opens no gap more: contact hardly resists it

@@ -55,12 +55,13 @@ def test_rings_converge_at_the_best_rates(order):
 
 
 def parts(counts):
-    """Two blocks whose upper contact line is made of the edges a, b, c."""
+    """Two blocks whose contact lines are made of the edges a, b, c and d, e, f."""
     line = ((-1.0, 0.0), (-0.4, 0.0), (0.3, 0.0), (1.0, 0.0))
     shape = blocks(line=line).shape
-    upper = sorted((e for e in shape.edges if e.name == "upper_contact"), key=lambda e: e.center.x)
-    for edge, name in zip(upper, "abc", strict=True):
-        edge.name = name
+    for side, names in (("upper_contact", "abc"), ("lower_contact", "def")):
+        edges = sorted((e for e in shape.edges if e.name == side), key=lambda e: e.center.x)
+        for edge, name in zip(edges, names, strict=True):
+            edge.name = name
     return divided(OCCGeometry(shape, dim=2), counts)
 
 
@@ -71,12 +72,7 @@ def parts(counts):
 def test_overlapping_pairs_of_other_primaries_are_one(change, matched, order):
     """Weights of points that two pairs share count once; measured: 2e-11 and less."""
     case = cases.pressure_patch()
-    counts = {"a": 3, "b": 3, "c": 3, "d": 3, "e": 3, "f": 3}
-    geometry = parts(counts if matched else counts | {"a": 2, "b": 4, "d": 4})
-    lower = [e for e in geometry.shape.edges if e.name == "lower_contact"]
-    for edge, name in zip(sorted(lower, key=lambda e: e.center.x), "def", strict=True):
-        edge.name = name
-    geometry = divided(geometry, counts if matched else counts | {"a": 2, "b": 4, "d": 4})
+    geometry = parts(dict.fromkeys("abcdef", 3) | ({} if matched else {"a": 2, "b": 4, "d": 4}))
     whole, part = Contact("a|b|c", "d|e|f"), Contact("b", "e", **change)
     for pairs in ((whole, part), (part, whole)):
         problem = replace(case.problem, geometry=geometry, contact=pairs)

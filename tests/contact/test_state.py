@@ -1,13 +1,165 @@
-"""One value for each contact pair, cut from arrays over all of them."""
+"""Pressure on an axis and at corners, and ends of the contact zone: exact on model data."""
 
+import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from drivers.reference import axisymmetric_cases as cases_about_an_axis
-from ngcontact import solve
-from ngcontact.contact.state import continued_to_axis
+from ngcontact import Contact, solve
+from ngcontact.contact.line import in_contact
+from ngcontact.contact.state import (
+    continued_to_axis,
+    pressure_across_corners,
+    transitions_on,
+)
+
+
+def line(x, order=1, y=None):
+    """Contact points on a polygon through (x, y), `order` + 1 of them on each segment."""
+    position = np.column_stack([x, np.zeros(len(x)) if y is None else y])
+    first = np.arange(0, len(x) - 1, order)[:, None]
+    return SimpleNamespace(
+        position=position, rows=first + np.arange(order + 1), node=np.arange(len(x))
+    )
+
+
+def opening(distance):
+    """Gap distance^(3/2) outside of the contact zone, and where there is contact."""
+    return np.maximum(distance, 0) ** 1.5, distance < 0
+
+
+# gap^(2/3) is linear in the data, and so is every fit: exact up to the round-off of the fit.
+EXACT = 1e-12
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+@pytest.mark.parametrize("end", [0.31, 0.4999, 0.5001, 0.6])
+def test_the_model_end_is_found_exactly(end, order):
+    x = np.linspace(0, 1, 13) ** 1.3
+    found = transitions_on(line(x, order), *opening(x - end))
+    assert found.position == pytest.approx(np.array([[end, 0.0]]), abs=EXACT)
+    [inner], [outer] = found.inner, found.outer
+    assert x[inner] < end < x[outer]
+    assert outer == inner + 1
+
+
+def test_two_zones_have_four_ends():
+    x = np.linspace(0, 4, 161)
+    # Contact in |x - 1| < 0.43 and |x - 3| < 0.43; between them each end has its half.
+    found = transitions_on(line(x), *opening(np.abs(np.abs(x - 2) - 1) - 0.43))
+    expected = [0.57, 1.43, 2.57, 3.43]
+    assert np.sort(found.position[:, 0]) == pytest.approx(expected, abs=EXACT)
+
+
+def test_a_closed_line_has_no_first_point():
+    count, end = 60, 0.733
+    angle = np.linspace(0, 2 * math.pi, count, endpoint=False)
+    ring = SimpleNamespace(
+        position=np.column_stack([np.cos(angle), np.sin(angle)]),
+        rows=np.column_stack([np.arange(count), np.roll(np.arange(count), -1)]),
+        node=np.arange(count),
+    )
+    from_zero = np.abs((angle + math.pi) % (2 * math.pi) - math.pi)
+    found = transitions_on(ring, *opening(from_zero - end)).position
+    # Distances are chords, shorter than arcs by h^2 / 24 of them; the end is on a chord of
+    # the circle, h^2 / 8 inside.
+    h = 2 * math.pi / count
+    expected = np.array([[math.cos(end), -math.sin(end)], [math.cos(end), math.sin(end)]])
+    assert found[found[:, 1].argsort()] == pytest.approx(expected, abs=h**2 / 8)
+
+
+def at_a_corner(x, corner, order=1):
+    """Points on a line that turns at x[corner], which carries two of them: the right one last."""
+    nodes = np.append(np.arange(len(x)), corner)
+    rows = np.arange(0, len(x) - 1, order)[:, None] + np.arange(order + 1)
+    rows[rows[:, 0] == corner, 0] = len(x)
+    position = np.column_stack([x, -0.3 * np.maximum(x - x[corner], 0)])[nodes]
+    return SimpleNamespace(position=position, rows=rows, node=nodes)
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+def test_contact_that_ends_at_a_corner(order):
+    # Active left of the corner and there on its left side, open on its right side.
+    x, corner = np.linspace(0, 1, 13), 4
+    lines = at_a_corner(x, corner, order)
+    active = np.append(x < x[corner] + 1e-9, False)
+    gap = np.where(active, 0.0, 1e-3 + lines.position[:, 0] - x[corner])
+    for state, outer in ((active, corner + 1), (np.append(x > x[corner] + 1e-9, True), corner - 1)):
+        found = transitions_on(lines, np.where(state, 0.0, gap + 1e-3), state)
+        assert found.position.tolist() == [[x[corner], 0.0]]
+        # The warm start takes the way from `inner` to `outer` for the direction of the contact.
+        assert found.outer.tolist() == [outer]
+        assert lines.node[found.inner].tolist() == [corner]
+
+
+def test_no_end_at_a_corner_inside_the_contact():
+    x, corner = np.linspace(0, 1, 9), 4
+    lines = at_a_corner(x, corner)
+    active = np.ones(10, dtype=bool)
+    for i in (corner, 9):  # the node has slid off one side of the corner
+        one_side = active.copy()
+        one_side[i] = False
+        assert len(transitions_on(lines, ~one_side * 1e-6, one_side).position) == 0
+
+
+TURN = 0.3
+
+
+def bent(turn=TURN, lengths=(1.0, 0.5)):
+    """Two segments that meet at node 1, where the points 1 and 2 are; weights of order 1."""
+    first, second = lengths
+    normals = np.array([[-math.sin(turn / 2), -1], [math.sin(turn / 2), -1]])
+    normals[:, 1] *= math.cos(turn / 2)
+    return SimpleNamespace(
+        contact=Contact("secondary", "primary"),
+        node=np.array([0, 1, 1, 2]),
+        rows=np.array([[0, 1], [2, 3]]),
+        direction=normals[[0, 0, 1, 1]],
+        weight=np.array([first, first, second, second]) / 2,
+    )
+
+
+def mask(text):
+    return np.array([c == "x" for c in text])
+
+
+@pytest.mark.parametrize(
+    ("active", "expected"),
+    [
+        ("xx.x", "xxxx"),  # slid off one side of the corner, inside the contact
+        ("x.xx", "xxxx"),
+        ("xx..", "xx.."),  # the contact ends at the corner
+        ("..xx", "..xx"),
+        ("x..x", "x..x"),  # the corner itself is apart
+        ("xxxx", "xxxx"),
+        ("....", "...."),
+    ],
+)
+def test_a_point_that_touches_one_side_inside_the_contact(active, expected):
+    given = mask(active)
+    assert in_contact(bent(), given).tolist() == mask(expected).tolist()
+    assert given.tolist() == mask(active).tolist()  # the argument stays
+
+
+@pytest.mark.parametrize("turn", [1e-3, 0.3, -0.3])
+def test_a_uniform_pressure_is_told_whatever_the_split(turn):
+    line = bent(turn)
+    force = 2.0 * line.weight
+    assert pressure_across_corners(line, force, mask("xxxx")) == pytest.approx(
+        [2, 2, 2, 2], rel=1e-14
+    )
+    # The same force across the corner on one side more, on the other less: only its part along
+    # the sum of both weighted normals counts.
+    n, w = line.direction[[1, 2]], line.weight[[1, 2]]
+    along = w @ n
+    across = np.array([-along[1], along[0]])
+    force[[1, 2]] += np.linalg.solve(n.T, 0.01 * across * math.sin(abs(turn)))
+    told = pressure_across_corners(line, force, mask("xxxx"))
+    assert told == pytest.approx([2, 2, 2, 2], rel=1e-12)
+    assert np.abs(force / line.weight - 2).max() > 1e-3
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

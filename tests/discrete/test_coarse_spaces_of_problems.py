@@ -65,14 +65,7 @@ def test_spaces_shrink_geometrically(local: bool):
     for _ in range(6 if local else 3):
         mesh = refined(REFINED["block"], mesh, near_origin(mesh, 0.3) if local else None)
     problem = discretise(REFINED["block"], mesh, 1, "isoparametric")
-    sizes = [step.P.shape for step in steps_of(problem, 4 * first.nv)]
+    sizes = [step.P.shape for step in steps_of(problem, 0)]
     assert all(k <= n / 2 for n, k in sizes)
     assert sizes[0][0] == 2 * mesh.nv
-    assert sizes[-1][1] <= 4 * first.nv
-
-
-def test_the_first_mesh_is_the_coarsest():
-    first = first_mesh(REFINED["disc"], 0.3)
-    mesh = refined(REFINED["disc"], first)
-    steps = steps_of(discretise(REFINED["disc"], mesh, 1, "isoparametric"), 0)
-    assert [step.P.shape for step in steps] == [(2 * mesh.nv, 2 * first.nv)]
+    assert 2 * first.nv <= sizes[-1][1] <= (4 if local else 2) * first.nv  # the first mesh at last

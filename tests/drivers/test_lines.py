@@ -1,6 +1,6 @@
 """Contact lines: corners, where they end, and how often contact begins and ends on them.
 
-What happens at corners where contact ends is in tests/contact/test_transitions.py.
+What happens at corners where contact ends is in tests/contact/test_state.py.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ def test_bordering_equals_refactorising(border):
     assert abs(contact[-1] / (n + 1) - 0.8) <= 1 / (n + 1)
 
 
-@pytest.mark.parametrize("stiffness", [1e-9, 1.0, 2.1e11])
+@pytest.mark.parametrize("stiffness", [1e-9, 2.1e11])
 def test_bordered_systems_do_not_depend_on_the_stiffness(stiffness):
     """Added rows border with compliances, released rows with stiffnesses: both must count."""
     rng = np.random.default_rng(5)
