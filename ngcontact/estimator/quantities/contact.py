@@ -5,18 +5,16 @@ from __future__ import annotations
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Index, Mask
+from ...arrays import Array, Index
 from ...contact import ContactState, in_contact
 from ...fem import Bodies, BoundaryTrace, connected_bodies
 from ...lagrange import gauss
 from ...solved import Solved
-from ..bound import ContactPressure
+from ..bound import ContactPressure, Guaranteed
 from .stresses import Singular
 from .table import Quantity, error_of_largest, unknown
 
-NONE = 1e-9  # part of the largest load that is none
-
-
+NO_LOAD = 1e-9  # part of the largest load that is none
 # Error of pressures over the largest difference on a segment to p*, and to the discrete stress:
 # chosen on 113 random scenes, orders 1 to 4.
 OFF_STAR, OFF_STRESS, OFF_ALONE = 2.0, 1.0, 2.0  # the last where there is no p*
@@ -26,64 +24,52 @@ OF_STEP = 0.3  # of the distance of points, part of the bar of an end: chosen on
 BENT = {1: (0.18, 2), 2: (0.055, 4), 3: (0.016, 4), 4: (0.0035, 6)}
 LEFT_OUT = 1.5  # of the pressure beside: measured 0.98 to 1.05 at a clamped end
 SAMPLES = np.linspace(0, 1, 17)  # where pressures are looked at on a segment
+BESIDE = 0.05  # of a line's extent, how far from it corners count
 
 
 def peak_of(
-    pair: ContactState,
-    boundary: BoundaryTrace,
-    stress: ng.CoefficientFunction,
-    star: ContactPressure | None,
-    corners: Singular,
-    relative: float,
+    solution: Guaranteed, pair: ContactState, star: ContactPressure | None, corners: Singular
 ) -> Quantity:
-    """The largest pressure, away from corners at which it is infinite.
-
-    `star` is p*, if there is one; `relative` the estimated error of the displacement.
-    """
-    line, pressure = pair.line, pair.pressure
-    infinite = corners.places[corners.pressed & _beside(corners.places, line.position)]
-    infinite = np.unique(infinite, axis=0)
+    """The largest pressure, away from corners at which it is infinite; `star` is p*, if any."""
+    name, line, pressure = "peak pressure", pair.line, pair.pressure
+    boundary, rows = solution.discrete.space.trace, line.rows
+    infinite = np.unique(_pressed_corners(corners, line.position), axis=0)
     away = ~corners.near(line.position, pressed=True)
     if not (pair.active & away).any():
-        return unknown("peak pressure", 0.0 if not pair.active.any() else np.nan, infinite=infinite)
+        return unknown(name, np.nan if pair.active.any() else 0.0, infinite=infinite)
     at = int(np.where(away, pressure, -np.inf).argmax())
     peak, place = float(pressure[at]), line.position[at]
-    if relative > 1:
-        return unknown("peak pressure", peak, place, infinite)
-    off = (OFF_ALONE if star is None else OFF_STRESS) * _off_stress(pair, boundary, stress)
+    if solution.relative_error_estimate > 1:
+        return unknown(name, peak, place, infinite)
+    off = (OFF_ALONE if star is None else OFF_STRESS) * _off_stress(pair, boundary, solution.stress)
     if star is not None:
         off = np.maximum(off, OFF_STAR * _off_star(pair, boundary, star))
     segment, s = np.repeat(line.segments, len(SAMPLES)), np.tile(SAMPLES, len(line.segments))
-    rows = np.repeat(line.rows, len(SAMPLES), axis=0)
-    samples = (np.append(pressure, 0.0)[rows] * boundary.shapes(segment, s)).sum(axis=1)
-    errors = np.append(off, 0.0)[rows].max(axis=1)
-    counts = ~corners.near(boundary.point(segment, s), pressed=True)
-    counts &= np.repeat(_near_contact(pair), len(SAMPLES))
-    error = error_of_largest(peak, samples[counts], errors[counts])
-    return Quantity("peak pressure", peak, error, "estimated", place, infinite=infinite)
-
-
-def _near_contact(pair: ContactState) -> Mask:
-    """Segments (k,) of the line with a point in contact, or beside such: there the peak is."""
-    rows = pair.line.rows
+    every = np.repeat(rows, len(SAMPLES), axis=0)
+    samples = (np.append(pressure, 0.0)[every] * boundary.shapes(segment, s)).sum(axis=1)
+    errors = np.append(off, 0.0)[every].max(axis=1)
+    # The peak is on segments with a point in contact, or beside such.
     touched = rows[np.append(pair.active, False)[rows].any(axis=1)]
-    return np.asarray(np.isin(rows, touched[touched >= 0]).any(axis=1))
+    near = np.isin(rows, touched[touched >= 0]).any(axis=1)
+    counts = ~corners.near(boundary.point(segment, s), pressed=True)
+    counts &= np.repeat(near, len(SAMPLES))
+    error = error_of_largest(peak, samples[counts], errors[counts])
+    return Quantity(name, peak, error, "estimated", place, infinite=infinite)
 
 
-def _beside(places: Array, points: Array) -> Mask:
-    """Which of the `places` (k, 2) are nearer to one of the `points` (m, 2) than these are far."""
-    if not len(points):
-        return np.zeros(len(places), dtype=bool)
+def _pressed_corners(corners: Singular, points: Array) -> Array:
+    """Corners (j, 2) at which bodies press on each other, on the line through `points` (m, 2)."""
+    places = corners.places[corners.pressed]
+    if not len(points) or not len(places):
+        return places[:0]
     away = np.linalg.norm(places[:, None] - points, axis=2).min(axis=1)
-    return np.asarray(away <= 0.05 * np.ptp(points, axis=0).max())
+    return places[away <= BESIDE * np.ptp(points, axis=0).max()]
 
 
 def _off_star(pair: ContactState, boundary: BoundaryTrace, star: ContactPressure) -> Array:
     """Differences (m,) of pressures to p* at contact points, the larger of two."""
-    rows, line = pair.line.rows, pair.line
-    result = np.zeros(len(pair.force) + 1)
-    segment = np.repeat(line.segments, rows.shape[1])
-    values = star.values(segment, boundary.places(line.segments).ravel()).reshape(rows.shape)
+    rows, result = pair.line.rows, np.zeros(len(pair.force) + 1)
+    values = star.values(*boundary.at_nodes(pair.line.segments)).reshape(rows.shape)
     np.maximum.at(result, rows, np.abs(values - np.append(pair.pressure, 0.0)[rows]))
     return result[:-1]
 
@@ -92,11 +78,9 @@ def _off_stress(
     pair: ContactState, boundary: BoundaryTrace, stress: ng.CoefficientFunction
 ) -> Array:
     """Differences (m,) of pressures to the discrete stress of the secondary, the larger of two."""
-    rows = pair.line.rows
-    s = boundary.places(pair.line.segments).ravel()
-    point, segment = rows.ravel(), np.repeat(pair.line.segments, rows.shape[1])
-    s, segment, point = s[point >= 0], segment[point >= 0], point[point >= 0]
-    result = np.zeros(len(pair.force))
+    point, result = pair.line.rows.ravel(), np.zeros(len(pair.force))
+    segment, s = boundary.at_nodes(pair.line.segments)
+    segment, s, point = segment[point >= 0], s[point >= 0], point[point >= 0]
     if len(point):
         traction = boundary.evaluate(ng.BoundaryFromVolumeCF(stress), segment, s)
         sigma, normal = traction.reshape(-1, 2, 2), boundary.normal(segment, s)
@@ -112,19 +96,12 @@ def ends_of(pair: ContactState) -> list[Quantity]:
     The bar is a length along the line of contact: of either coordinate, too.
     """
     line, ends = pair.line, pair.transitions
-    if len(ends.position) == 0:
-        return []
     axis = int(np.ptp(line.position[pair.active], axis=0).argmax()) if pair.active.any() else 0
     name = f"end of contact, {'xy'[axis]}"
     return [
-        Quantity(name, float(x[axis]), error, "estimated", x)
-        for x, error in zip(ends.position, _errors_of_ends(pair).tolist(), strict=True)
+        Quantity(name, float(x[axis]), _error_of_end(pair, k), "estimated", x)
+        for k, x in enumerate(ends.position)
     ]
-
-
-def _errors_of_ends(pair: ContactState) -> Array:
-    """Bars (k,) of the ends, lengths."""
-    return np.array([_error_of_end(pair, k) for k in range(len(pair.transitions.position))])
 
 
 def _error_of_end(pair: ContactState, number: int) -> float:
@@ -168,22 +145,29 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
         return 0.0, 0.0
     closed = np.append(in_contact(line, pair.active), False)[line.rows] & (line.rows >= 0)
     places, (t, w) = boundary.places(line.segments), gauss(boundary.geometry_order + 2)
-    start, width = places[:, :-1], np.diff(places, axis=1)
-    s = start[:, :, None] + width[:, :, None] * t
-    at = np.repeat(line.segments, s[0].size)
-    ds = np.linalg.norm(boundary.derivative(at, s.ravel()), axis=1) * boundary.measure(
-        at, s.ravel()
-    )
+    width = np.diff(places, axis=1)
+    s = places[:, :-1, None] + width[:, :, None] * t
+    ds = _line_element(boundary, np.repeat(line.segments, s[0].size), s.ravel())
     sizes = width * (ds.reshape(s.shape) @ w)
     whole = closed[:, :-1] & closed[:, 1:]
     alone = (closed[:, :-1] & (line.rows[:, 1:] < 0)) | (closed[:, 1:] & (line.rows[:, :-1] < 0))
     half = 0.5 * float(sizes[alone].sum())
     area, error = float(sizes[whole].sum()) + half, half
-    if len(ends.position):
+    if count := len(ends.position):
         measure = boundary.model.measure(ends.position)
+        errors = np.array([_error_of_end(pair, k) for k in range(count)])
         area += float((ends.beyond * measure).sum())
-        error += float((_errors_of_ends(pair) * measure).sum())
-    return max(area, 0.0), error + float((sizes.sum(axis=1) * _bent(boundary, line.segments)).sum())
+        error += float((errors * measure).sum())
+    normals = [boundary.exact_normal(line.segments, np.full(len(sizes), end)) for end in (0.0, 1.0)]
+    factor, power = BENT[boundary.geometry_order]
+    bent = factor * (np.linalg.norm(normals[1] - normals[0], axis=1) / 2) ** power
+    return max(area, 0.0), error + float((sizes.sum(axis=1) * bent).sum())
+
+
+def _line_element(boundary: BoundaryTrace, segment: Index, s: Array) -> Array:
+    """Ds (k,) over the parameter, as the model weighs lengths."""
+    ds = np.linalg.norm(boundary.derivative(segment, s), axis=1)
+    return np.asarray(ds * boundary.measure(segment, s))
 
 
 def left_out(pair: ContactState, boundary: BoundaryTrace) -> float:
@@ -200,21 +184,12 @@ def left_out(pair: ContactState, boundary: BoundaryTrace) -> float:
         return 0.0
     t, w = gauss(boundary.order + boundary.geometry_order + 1)
     segment, s = np.repeat(line.segments[some], len(t)), np.tile(t, len(some))
-    ds = np.linalg.norm(boundary.derivative(segment, s), axis=1) * boundary.measure(segment, s)
-    share = (boundary.shapes(segment, s) * ds[:, None]).reshape(len(some), len(t), -1)
-    share = np.abs(np.einsum("kgi,g->ki", share, w))
+    share = boundary.shapes(segment, s) * _line_element(boundary, segment, s)[:, None]
+    share = np.abs(np.einsum("kgi,g->ki", share.reshape(len(some), len(t), -1), w))
     return LEFT_OUT * float(((share * held[some]).sum(axis=1) * beside[some]).sum())
 
 
-def _bent(boundary: BoundaryTrace, segments: Index) -> Array:
-    """Relative errors (k,) of the lengths of curved segments, by the turn of their normals."""
-    ends = [boundary.exact_normal(segments, np.full(len(segments), s)) for s in (0.0, 1.0)]
-    half = np.linalg.norm(ends[1] - ends[0], axis=1) / 2
-    factor, power = BENT[boundary.geometry_order]
-    return np.asarray(factor * half**power)
-
-
-def direction_of(solution: Solved, pair: int, state: ContactState) -> tuple[Array, str]:
+def direction_of(solution: Solved, pair: int) -> tuple[Array, str]:
     """Unit vector (2,) along which the force of a pair is told, and what it is.
 
     The axis of revolution; the pair's direction; that of the loads on the secondary's body, or of
@@ -222,23 +197,24 @@ def direction_of(solution: Solved, pair: int, state: ContactState) -> tuple[Arra
     of the force itself. On a part of a symmetric model the force also has a component that a guide
     takes: a direction across the force, or nearly so, is passed by.
     """
-    force = solution.contact_force(pair)
+    space, force, line = (
+        solution.discrete.space,
+        solution.contact_force(pair),
+        solution.pairs[pair].line,
+    )
     size = float(np.linalg.norm(force))
-    candidates = [(np.array([0.0, 1.0]), "the axis")] * solution.discrete.space.trace.model.extent
-    if state.line.contact.direction is not None:
-        candidates.append((np.array(state.line.contact.direction), "the pair's direction"))
-    bodies = connected_bodies(solution.discrete.space.trace)
-    sides = _sides(state, bodies)
-    vertices = len(bodies.of_vertex)
-    loads = solution.discrete.space.f.reshape(2, -1)[:, :vertices]
-    largest = float(np.abs(loads).sum())
-    for body in sides:
+    candidates = [(np.array([0.0, 1.0]), "the axis")] * space.trace.model.extent
+    if line.contact.direction is not None:
+        candidates.append((np.array(line.contact.direction), "the pair's direction"))
+    bodies = connected_bodies(space.trace)
+    loads = space.f.reshape(2, -1)[:, : len(bodies.of_vertex)]
+    moved = np.zeros(2)
+    for sign, body in _sides(solution.pairs[pair], bodies):
         load = loads[:, bodies.of_vertex == body].sum(axis=1)
-        if np.linalg.norm(load) > NONE * largest:
+        if np.linalg.norm(load) > NO_LOAD * float(np.abs(loads).sum()):
             candidates.append((load, "the load"))
-    moved = [_held(solution, bodies, body) for body in sides]
-    relative = np.nan_to_num(moved[0]) - (np.nan_to_num(moved[1]) if len(moved) > 1 else 0.0)
-    candidates.append((relative, "the prescribed displacement"))
+        moved += sign * np.nan_to_num(_held(solution, bodies, body))
+    candidates.append((moved, "the prescribed displacement"))
     for vector, name in candidates:
         length = float(np.linalg.norm(vector))
         if length > 0 and abs(vector @ force) >= 0.5 * length * size:
@@ -253,20 +229,21 @@ def approach_of(solution: Solved, state: ContactState) -> tuple[Array, Array]:
     Each body moves by the mean of what its supports prescribe, or, where none does, by the
     mean of its displacement; a rigid obstacle stays.
     """
-    bodies = connected_bodies(solution.discrete.space.trace)
-    total, free = np.zeros(2), np.zeros(2)
-    for sign, body in zip((1.0, -1.0), _sides(state, bodies), strict=False):
+    trace = solution.discrete.space.trace
+    bodies, total, free = connected_bodies(trace), np.zeros(2), np.zeros(2)
+    for sign, body in _sides(state, bodies):
         held = _held(solution, bodies, body)
-        mean = _mean(solution, bodies, body)
+        outer = np.flatnonzero((bodies.of_segment == body) & ~trace.inner)
+        mean = _boundary_mean(solution, outer)
         total += sign * np.where(np.isnan(held), mean, held)
         free += np.where(np.isnan(held), np.abs(mean), 0.0)
     return total, free
 
 
-def _sides(state: ContactState, bodies: Bodies) -> list[int]:
-    """Numbers of the bodies of the secondary and, if there is one, of the primary."""
-    chosen = [state.line.segments, state.line.facing]
-    return [int(bodies.of_segment[s[0]]) for s in chosen if len(s)]
+def _sides(state: ContactState, bodies: Bodies) -> list[tuple[float, int]]:
+    """Sign 1 and the body of the secondary, -1 and that of the primary if there is one."""
+    chosen = ((1.0, state.line.segments), (-1.0, state.line.facing))
+    return [(sign, int(bodies.of_segment[s[0]])) for sign, s in chosen if len(s)]
 
 
 def _held(solution: Solved, bodies: Bodies, body: int) -> Array:
@@ -282,18 +259,10 @@ def _held(solution: Solved, bodies: Bodies, body: int) -> Array:
     return result
 
 
-def _mean(solution: Solved, bodies: Bodies, body: int) -> Array:
-    """Mean displacement (2,) of a body's boundary."""
-    inner = solution.discrete.space.trace.inner
-    return _boundary_mean(solution, np.flatnonzero((bodies.of_segment == body) & ~inner))
-
-
 def _boundary_mean(solution: Solved, segments: Index) -> Array:
     """Mean displacement (2,) on `segments` (k,), weighted as the model weighs lengths."""
     trace = solution.discrete.space.trace
     t, w = gauss(trace.order + 2 * trace.geometry_order)
     at, s = np.repeat(segments, len(t)), np.tile(t, len(segments))
-    size = np.linalg.norm(trace.derivative(at, s), axis=1) * trace.measure(at, s)
-    u = trace.evaluate(solution.displacement, at, s)
-    weights = size * np.tile(w, len(segments))
-    return np.asarray((weights @ u) / weights.sum())
+    weights = _line_element(trace, at, s) * np.tile(w, len(segments))
+    return np.asarray((weights @ trace.evaluate(solution.displacement, at, s)) / weights.sum())

@@ -25,23 +25,27 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import cached_property
 
+import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array
 from ...contact import ContactState, state_of
 from ...discrete import load_by_shape
 from ...errors import ContactError, warn
-from ...fem import BoundaryTrace
-from ..bound import EquilibratedStress, Guaranteed
+from ...fem import BoundaryTrace, has_rough_loads, load_vector, stress_of
+from ...problem import varies
+from ..bound import FINE, EquilibratedStress, Guaranteed, force_bar
 from .contact import approach_of, area_in_contact, direction_of, ends_of, left_out, peak_of
-from .force import proved_force_errors
 from .stresses import largest_von_mises, singular_corners
 from .table import Quantities, Quantity, unknown
 
 # Relative errors over the square of the relative estimate, measured on random scenes of all orders.
 FORCE = {1: 0.3, 2: 0.3, 3: 0.3, 4: 1.5}  # by order: 96 % of 118 are at most that, most of Hertz
 APPROACH = 2.0  # 97 % of 187 are at most that
-ROUND_OFF = 64 * np.finfo(float).eps  # of what is prescribed
+ROUND_OFF = 64 * np.finfo(float).eps  # of what is prescribed, of forces relative to their terms
+ON_AXIS = 1e-14  # coordinate over the bodies' extent that is 0
+DX_ORDER = 5  # degree of NGSolve's quadrature with dx, without a bonus
+STRAIGHT = 1e-12  # difference of directions that are one: round-off
 
 
 class Measured(Guaranteed):
@@ -56,8 +60,8 @@ class Measured(Guaranteed):
             return None, f"nothing is guaranteed: {error}"
 
     @cached_property
-    def _force_errors(self) -> dict[int, tuple[float, float, str]]:
-        """By pair what is proved of the force, infinite where nothing is, and why."""
+    def _force_errors(self) -> dict[int, tuple[Array, str]]:
+        """By pair what is proved of the force, (2,), infinite where nothing is, and why."""
         return {}
 
     def contact_area(self, pair: int = 0) -> float:
@@ -75,59 +79,48 @@ class Measured(Guaranteed):
         `ContactWarning` and a note below the table say why. Where corners make a stress infinite
         the row names them; its value is the largest farther away.
         """
-        state = state_of(self.pairs, pair)
+        state, boundary = state_of(self.pairs, pair), self.discrete.space.trace
         known = "_proved" in self.__dict__
         proof, reason = self._proved
         if proof is None and not known:
             warn(f"{reason}; all errors of quantities() are estimates")
-        relative = self.relative_error_estimate
         star = None if proof is None else proof.pressure[pair]
-        boundary = self.discrete.space.trace
         corners = singular_corners(self.problem, boundary, self.pairs)
-        e, along = direction_of(self, pair, state)
+        e, along = direction_of(self, pair)
         e = e + 0.0  # no -0
         largest = max(abs(float(one.force.sum())) for one in self.pairs)
-        sum_error = FORCE[self.order] * relative**2 * largest + left_out(state, boundary)
+        of_order = FORCE[self.order] * self.relative_error_estimate**2 * largest
+        sum_error = of_order + left_out(state, boundary)
         of_shape = float(np.linalg.norm(load_by_shape(self.problem, self.mesh)))
-        forces = _forces(self.contact_force(pair), e, sum_error)
+        force = self.contact_force(pair)
+        told = {"force": e @ force, "force, x": force[0] + 0.0, "force, y": force[1] + 0.0}
+        forces = [Quantity(k, float(value), sum_error, "estimated") for k, value in told.items()]
         if proof is not None:
-            *errors, reason = _force_error(self, pair, e)
-            forces = _with_proofs(forces, e, *errors)
+            proved, reason = _proved_force_errors(self, pair, e)
+            if np.isfinite(proved).all():
+                forces = [x.with_proof(bar) for x, bar in zip(forces, proved.tolist(), strict=True)]
         if of_shape > ROUND_OFF * largest:
             forces = [replace(x, error=x.error + of_shape, kind="estimated") for x in forces]
-        stresses = self.stress, self.out_of_plane_stress
         rows = [
             *forces,
             *_means(state, boundary, sum_error + of_shape),
-            peak_of(state, boundary, self.stress, star, corners, relative),
+            peak_of(self, state, star, corners),
             *ends_of(state),
-            _approach(self, state, e, relative, forces[0].error if along == "itself" else 0.0),
+            _approach(self, state, e, forces[0].error if along == "itself" else 0.0),
             _energy(self, proof is not None),
-            largest_von_mises(boundary.mesh, self.order, stresses, proof, corners, relative),
+            largest_von_mises(self, proof, corners),
         ]
-        size = float(np.abs(boundary.curve).max())
-        told = f"force along {along}, ({e[0]:.4g}, {e[1]:.4g})" if along != "itself" else ""
-        notes = [told, reason, "" if proof is None else _domain(proof, boundary)]
-        note = "; ".join(text for text in notes if text)
-        return Quantities(tuple(_without_round_off(row, size) for row in rows), note)
-
-
-def _forces(force: Array, e: Array, error: float) -> list[Quantity]:
-    """The force (2,) along `e` (2,) and its components; each within the `error` of the sum."""
-    return [
-        Quantity(name, float(value), error, "estimated")
-        for name, value in zip(
-            ("force", "force, x", "force, y"), (e @ force, *(force + 0.0)), strict=True
-        )
-    ]
-
-
-def _with_proofs(rows: list[Quantity], e: Array, along: float, across: float) -> list[Quantity]:
-    """With what is proved `along` and `across` e (2,), where anything is."""
-    if not along < np.inf:
-        return rows
-    proved = [along, *(np.abs(e) * along + np.abs(e[::-1]) * across)]
-    return [row.with_proof(float(bar)) for row, bar in zip(rows, proved, strict=True)]
+        size, notes = float(np.abs(boundary.curve).max()), [reason]
+        if along != "itself":
+            notes.insert(0, f"force along {along}, ({e[0]:.4g}, {e[1]:.4g})")
+        if proof is not None and proof.proof.dual.cells.curved.any():
+            degree = boundary.geometry_order
+            notes.append(f"guaranteed on the domain of the mesh, of curves of degree {degree}")
+        for k, row in enumerate(rows):
+            if row.place is not None:
+                off_axis = np.abs(row.place) >= ON_AXIS * size
+                rows[k] = replace(row, place=np.where(off_axis, row.place, 0.0))
+        return Quantities(tuple(rows), "; ".join(text for text in notes if text))
 
 
 def _means(state: ContactState, boundary: BoundaryTrace, error: float) -> list[Quantity]:
@@ -143,45 +136,18 @@ def _means(state: ContactState, boundary: BoundaryTrace, error: float) -> list[Q
     ]
 
 
-def _approach(
-    solution: Measured, state: ContactState, e: Array, relative: float, turning: float
-) -> Quantity:
+def _approach(solution: Measured, state: ContactState, e: Array, turning: float) -> Quantity:
     """The approach along `e` (2,); what is prescribed has an error of round-off alone.
 
     And that of e, where that is the direction of the force itself, with an error `turning`.
     """
     moved, free = approach_of(solution, state)
-    value = abs(float(moved @ e))
+    value, relative = abs(float(moved @ e)), solution.relative_error_estimate
     size = float(np.linalg.norm(state.line.direction.T @ state.force))
     turn = turning / size if size > 0 else 0.0
     error = APPROACH * relative**2 * float(free @ np.abs(e)) + ROUND_OFF * value
     error += turn * float(np.linalg.norm(moved))
     return Quantity("approach", value, error, "estimated")
-
-
-def _domain(proof: EquilibratedStress, boundary: BoundaryTrace) -> str:
-    """What is to be said of curved boundaries: what is proved is proved on the mesh's domain."""
-    if not (proof.proof.dual.cells.curved).any():
-        return ""
-    return f"guaranteed on the domain of the mesh, of curves of degree {boundary.geometry_order}"
-
-
-def _without_round_off(row: Quantity, size: float) -> Quantity:
-    """The row with 0 for coordinates of its place that are round-off of bodies of extent `size`."""
-    if row.place is None:
-        return row
-    return replace(row, place=np.where(np.abs(row.place) < 1e-14 * size, 0.0, row.place))
-
-
-def _force_error(solution: Measured, pair: int, e: Array) -> tuple[float, float, str]:
-    """What is proved of a pair's force along `e` (2,) and across it, infinite where nothing is."""
-    known = solution._force_errors
-    if pair not in known:
-        try:
-            known[pair] = *proved_force_errors(solution, pair, e), ""
-        except (ContactError, ValueError) as error:
-            known[pair] = np.inf, np.inf, f"no error of the force is proved: {error}"
-    return known[pair]
 
 
 def _energy(solution: Measured, proved: bool) -> Quantity:
@@ -191,3 +157,71 @@ def _energy(solution: Measured, proved: bool) -> Quantity:
         return Quantity("energy", value, solution.error_estimate**2, "estimated")
     low, high = solution.energy_bounds
     return Quantity("energy", value, float(max(high - value, value - low)), "guaranteed")
+
+
+def _proved_force_errors(solution: Measured, pair: int, e: Array) -> tuple[Array, str]:
+    """What is proved of a pair's force along `e` (2,) and of its components, (3,), or why nothing.
+
+    Infinite where nothing is proved, or more than the force itself.
+    """
+    known = solution._force_errors
+    if pair not in known:
+        try:
+            known[pair] = _force_errors(solution, pair, e), ""
+        except (ContactError, ValueError) as error:
+            known[pair] = np.full(2, np.inf), f"no error of the force is proved: {error}"
+    (along, across), reason = known[pair]
+    if np.isinf(along):
+        return np.full(3, np.inf), reason
+    return np.append(along, np.abs(e) * along + np.abs(e[::-1]) * across), reason
+
+
+def _force_errors(solution: Guaranteed, pair: int, e: Array) -> Array:
+    """How far a pair's contact force is from the true one at most, along `e` (2,) and across it."""
+    if not solution.problem.model.startswith("plane"):
+        raise ValueError(f'no bar of the force is proved for "{solution.problem.model}"')
+    if len(solution.pairs[pair].line.node) == 0:
+        raise ValueError("the points of this pair belong to other pairs, which have its force")
+    if has_rough_loads(solution.problem, solution.discrete.space.V):
+        raise ValueError("loads that are rougher than the mesh count as they are integrated")
+    d, across = solution.pairs[pair].line.direction, np.array([-e[1], e[0]])
+    if np.ptp(d, axis=0).max() <= STRAIGHT:  # the force is one number times d
+        one = _component_error(solution, pair, d[0])
+        along, other = (one * abs(float(d[0] @ x)) for x in (e, across))
+        other = other if other > STRAIGHT * along else 0.0
+    else:
+        along, other = (_component_error(solution, pair, x) for x in (e, across))
+    size = float(np.linalg.norm(solution.contact_force(pair)))
+    if max(along, other) > size > 0:
+        raise ValueError(f"what is proved, {max(along, other):.2g}, is more than the force itself")
+    return np.array([along, other])
+
+
+def _component_error(solution: Guaranteed, pair: int, e: Array) -> float:
+    """How far the force's component along `e` (2,) is from the true one, by a dual problem."""
+    states, space, u = solution.pairs, solution.discrete.space, solution.displacement
+    directions = [e if number == pair else 0 * e for number in range(len(states))]
+    jumps = [s.line.direction @ d for s, d in zip(states, directions, strict=True)]
+    jump = np.where(solution.active, np.concatenate(jumps), 0.0)
+    found = solution.discrete.influence(solution.active, jump)
+    G = solution.discrete.displacement(found.u)
+    solution.work["factorizations"] += found.factorizations
+    solution.work["back_solves"] += found.back_solves
+    solution.work["equilibrations"] += 1
+    error = force_bar(solution.equilibrated.proof, u, G, directions)
+    a, b = (x.vec.FV().NumPy() for x in (u, G))
+    noise = ROUND_OFF * float(np.sqrt((space.diagonal @ a**2) * (space.diagonal @ b**2)))
+    # What quadrature of stiffness and loads misses of A(u_h, G) - l(G).
+    problem, missed = solution.problem, 0.0
+    if problem.force or problem.traction:
+        missed -= float((load_vector(problem, space.V, FINE) - space.f) @ b)
+    inexact = space.trace.curved_elements | any(map(varies, problem.materials.values()))
+    if inexact.any():
+        p, geometry = space.trace.order, space.trace.geometry_order
+        work = ng.InnerProduct(stress_of(problem, u), ng.Sym(ng.Grad(G)))
+        fine, mesh = 2 * p * geometry + 2 * geometry + 8, space.trace.mesh
+        for some, order in ((inexact, fine), (~inexact, 2 * p)):
+            dx = ng.dx(bonus_intorder=order - DX_ORDER, definedonelements=ng.BitArray(some))
+            missed += float(ng.Integrate(work * dx, mesh))
+        missed -= float(a @ (space.A @ b))
+    return error + noise + abs(missed)

@@ -19,35 +19,28 @@ from ...arrays import Array, Index, Mask
 from ...contact import ContactState, in_contact
 from ...fem import BoundaryTrace, von_mises
 from ...problem import Elastic, MeshArrays, Problem, body_mask
-from ..bound import EquilibratedStress
+from ..bound import EquilibratedStress, Guaranteed
 from .table import Quantity, error_of_largest, unknown
 
 SAME = 1e-9  # distance, relative to an element, at which points of two elements are one
-
-
 FREE, GUIDED, HELD, PRESSED = range(4)  # what is on a side of a corner
 SMOOTH = 0.05  # turn, radians, below which an angle is one of 180 degrees
 NEAR = 0.1  # of the way to the next corner, how far from a corner its stress counts
 MEETING = 1e-6  # of a segment, distance at which two corners meet
+# Error over the largest difference in an element to the equilibrated stress, and over that between
+# elements, a part of which counts: chosen on 113 random scenes, orders 1 to 4.
+MISES, OF_JUMP = 1.1, 0.5
+HALF = 0.5  # of the largest stress: elements with less do not hold the true largest one
+DIVISIONS, CONSTANT = 6, 3  # of sides, where stresses are looked at; those of order 1 are constant
 
 
 @dataclass(frozen=True, eq=False)
 class Singular:
-    """Corners of infinite stress.
+    """Corners of infinite stress."""
 
-    Attributes
-    ----------
-    places : ndarray (k, 2)
-        Lengths.
-    reach : ndarray (k,)
-        How far from each of them the stress is its own, or not resolved by an element, lengths.
-    pressed : ndarray of bool (k,)
-        Corners at which bodies press on each other.
-    """
-
-    places: Array
-    reach: Array
-    pressed: Mask
+    places: Array  # (k, 2), lengths
+    reach: Array  # (k,), how far from each the stress is its own, or not resolved, lengths
+    pressed: Mask  # (k,), corners at which bodies press on each other
 
     @property
     def distinct(self) -> Array:
@@ -67,11 +60,26 @@ def singular_corners(
     problem: Problem, trace: BoundaryTrace, pairs: Sequence[ContactState]
 ) -> Singular:
     """Corners of all bodies at which the stress is infinite, by angles and conditions."""
-    vertex, first, second = _vertices(trace)
-    angle, kind = _angles(trace, vertex, first, second), _conditions(problem, trace)
-    drawn = (np.abs(angle - np.pi) > SMOOTH) | (kind[first] != kind[second])
-    vertex, first, second, angle = vertex[drawn], first[drawn], second[drawn], angle[drawn]
-    place = MeshArrays(trace.mesh).vertices[vertex]
+    mesh, kind = MeshArrays(trace.mesh), _conditions(problem, trace)
+    # Vertices of the boundary, and the two segments that meet at each.
+    outer = np.flatnonzero(~trace.inner)
+    ends = mesh.facets[outer].ravel()
+    order = np.argsort(ends, kind="stable")
+    vertex, start, count = np.unique(ends[order], return_index=True, return_counts=True)
+    start, vertex = start[count == 2], vertex[count == 2]
+    segment = np.repeat(outer, 2)[order]
+    first, second = segment[start], segment[start + 1]
+    # Angles of the body, by the normals of the geometry.
+    one, other = (
+        trace.exact_normal(at, (mesh.facets[at, 1] == vertex).astype(float))
+        for at in (first, second)
+    )
+    turn = np.arccos(np.clip((one * other).sum(axis=1), -1, 1))
+    angle = np.pi + np.where(mesh.angles[vertex] > np.pi, turn, -turn)
+    corner = (np.abs(angle - np.pi) > SMOOTH) | (kind[first] != kind[second])
+    vertex, first, second, angle = vertex[corner], first[corner], second[corner], angle[corner]
+
+    place, body = mesh.vertices[vertex], trace.body[first]
     h = np.maximum(trace.lengths(first), trace.lengths(second))
     closed, rigid = _closed(pairs, place, h)
     sides = np.sort([kind[first], kind[second]], axis=0)
@@ -80,11 +88,15 @@ def singular_corners(
     critical = np.full(len(vertex), np.pi)
     critical[(high == GUIDED) | ((low == GUIDED) & (high == HELD))] = np.pi / 2
     clamped = (low == FREE) & (high == HELD)
-    critical[clamped] = _critical(problem, trace)[trace.body[first[clamped]]]
-    facing = _facing(place, angle, h, trace.body[first], rigid)
+    critical[clamped] = _clamped_angles(problem, trace)[body[clamped]]
+    # Angle of what faces each corner: 180 degrees of a line, 90 stand for a rigid one.
+    facing = np.where(rigid, np.pi / 2, np.pi)
+    for i in range(len(place)):
+        met = np.linalg.norm(place - place[i], axis=1) <= MEETING * h[i]
+        facing[i] = next(iter(angle[met & (body != body[i])]), facing[i])
     edge = (high == PRESSED) & ((low == FREE) | ((low == PRESSED) & (facing == np.pi)))
     critical[edge] = (np.pi - facing)[edge]
-    uneven = edge & ~rigid & _turned_apart(problem, trace, place, angle, facing, trace.body[first])
+    uneven = edge & ~rigid & _turned_apart(problem, trace, place, body, np.array([angle, facing]))
     straight = (low == high) & (np.abs(angle - np.pi) <= SMOOTH)  # nothing changes
     found = ~straight & ((angle > critical + SMOOTH) | uneven)
     size, reach = float(np.ptp(trace.curve, axis=(0, 1)).max()), []
@@ -92,28 +104,6 @@ def singular_corners(
         away = np.linalg.norm(place - x, axis=1)
         reach.append(max(NEAR * float(away[away > MEETING * size].min(initial=size)), least))
     return Singular(place[found] + 0.0, np.array(reach), (high == PRESSED)[found])
-
-
-def _vertices(trace: BoundaryTrace) -> tuple[Index, Index, Index]:
-    """Vertices (v,) of the boundary, and the two segments (v,) that meet at each."""
-    outer = np.flatnonzero(~trace.inner)
-    ends = MeshArrays(trace.mesh).facets[outer].ravel()
-    order = np.argsort(ends, kind="stable")
-    vertex, start, count = np.unique(ends[order], return_index=True, return_counts=True)
-    start, vertex = start[count == 2], vertex[count == 2]
-    segment = np.repeat(outer, 2)[order]
-    return vertex, segment[start], segment[start + 1]
-
-
-def _angles(trace: BoundaryTrace, vertex: Index, first: Index, second: Index) -> Array:
-    """Angle (v,) of the body at each vertex, by the normals of the geometry."""
-    normals = []
-    for segment in (first, second):
-        s = (MeshArrays(trace.mesh).facets[segment, 1] == vertex).astype(float)
-        normals.append(trace.exact_normal(segment, s))
-    turn = np.arccos(np.clip((normals[0] * normals[1]).sum(axis=1), -1, 1))
-    inwards = MeshArrays(trace.mesh).angles[vertex] > np.pi
-    return np.asarray(np.pi + np.where(inwards, turn, -turn))
 
 
 def _conditions(problem: Problem, trace: BoundaryTrace) -> Index:
@@ -124,7 +114,7 @@ def _conditions(problem: Problem, trace: BoundaryTrace) -> Index:
         kind[trace.lies_on(segments, pair.secondary, pair.primary)] = PRESSED
     guided = trace.lies_on(segments, None if problem.sliding is None else str(problem.sliding))
     components = [
-        trace.lies_on(segments, *(b for b, u in problem.displacement.items() if u[i] is not None))
+        trace.lies_on(segments, *[b for b, u in problem.displacement.items() if u[i] is not None])
         for i in (0, 1)
     ]
     kind[guided | components[0] | components[1] | trace.on_axis] = GUIDED
@@ -142,58 +132,44 @@ def _closed(pairs: Sequence[ContactState], place: Array, h: Array) -> tuple[Mask
         facing = line.position + line.gap[:, None] * line.direction
         for points in (line.position, facing):
             away = np.linalg.norm(place[:, None] - points, axis=2)
-            at = away.argmin(axis=1)
-            met = active[at] & (away.min(axis=1) <= h)
+            met = active[away.argmin(axis=1)] & (away.min(axis=1) <= h)
             closed |= met
             rigid |= met & (line.contact.primary is None)
     return closed, rigid
 
 
-def _facing(place: Array, angle: Array, h: Array, body: Index, rigid: Mask) -> Array:
-    """Angle (v,) of what faces each corner: 180 degrees of a line, 90 stand for a rigid one."""
-    facing = np.where(rigid, np.pi / 2, np.pi)
-    for i in range(len(place)):
-        away = np.linalg.norm(place - place[i], axis=1)
-        met = (body != body[i]) & (away <= MEETING * h[i])
-        if met.any():
-            facing[i] = angle[met][0]
-    return facing
-
-
 def _turned_apart(
-    problem: Problem, trace: BoundaryTrace, place: Array, angle: Array, facing: Array, body: Index
+    problem: Problem, trace: BoundaryTrace, place: Array, body: Index, angles: Array
 ) -> Mask:
     """Where a uniform pressure would turn both wedges (v,) at an end of contact apart.
 
     It turns a wedge of angle a with one free side by log r / (E (tan a - a)), E that of the model;
-    where the sum of both is negative the pressure is infinite (Dundurs and Lee 1972).
+    where the sum of both is negative the pressure is infinite (Dundurs and Lee 1972). `angles`
+    (2, v) are those of both.
     """
     outer = np.flatnonzero(~trace.inner)
     middle = trace.point(outer, np.full(len(outer), 0.5))
-    compliance = _compliances(problem, trace)
+    # 1 / E of each body, (1 - nu^2) / E in plane strain; 1 of all where one is no such number.
+    compliance = np.full(len(trace.mesh.GetMaterials()), np.nan)
+    for name, law in problem.materials.items():
+        if isinstance(law, Elastic) and isinstance(law.E, float | int):
+            nu = law.nu if isinstance(law.nu, float | int) else np.nan
+            square = 0.0 if problem.model == "plane stress" else nu**2
+            compliance[body_mask(trace.mesh, name)] = (1 - square) / law.E
+    if not np.isfinite(compliance).all():
+        compliance[:] = 1.0
     result = np.zeros(len(place), dtype=bool)
-    for i, (x, a, b) in enumerate(zip(place, angle, facing, strict=True)):
-        others = outer[trace.body[outer] != body[i]]
-        if len(others) and a < np.pi and b <= np.pi:
-            away = np.linalg.norm(middle[trace.body[outer] != body[i]] - x, axis=1)
-            one, two = compliance[body[i]], compliance[trace.body[others[away.argmin()]]]
+    for i, (x, (a, b)) in enumerate(zip(place, angles.T, strict=True)):
+        others = trace.body[outer] != body[i]
+        if others.any() and a < np.pi and b <= np.pi:
+            nearest = np.linalg.norm(middle[others] - x, axis=1).argmin()
+            one, two = compliance[body[i]], compliance[trace.body[outer[others][nearest]]]
             turn = one / (np.tan(a) - a) + two / (np.tan(b) - b)
             result[i] = turn < -SMOOTH / 2 * (one + two)
     return result
 
 
-def _compliances(problem: Problem, trace: BoundaryTrace) -> Array:
-    """1 / E of each body, (1 - nu^2) / E in plane strain; 1 of all where one is no such number."""
-    found = np.full(len(trace.mesh.GetMaterials()), np.nan)
-    for name, law in problem.materials.items():
-        if isinstance(law, Elastic) and isinstance(law.E, float | int):
-            nu = law.nu if isinstance(law.nu, float | int) else np.nan
-            square = 0.0 if problem.model == "plane stress" else nu**2
-            found[body_mask(trace.mesh, name)] = (1 - square) / law.E
-    return found if np.isfinite(found).all() else np.ones(len(found))
-
-
-def _critical(problem: Problem, trace: BoundaryTrace) -> Array:
+def _clamped_angles(problem: Problem, trace: BoundaryTrace) -> Array:
     """Angle by body beyond which one held and one free side make the stress infinite."""
     critical = np.full(len(trace.mesh.GetMaterials()), np.pi / 4)  # the least, of nu = 1 / 2
     for name, law in problem.materials.items():
@@ -204,47 +180,28 @@ def _critical(problem: Problem, trace: BoundaryTrace) -> Array:
     return critical
 
 
-# Error over the largest difference in an element to the equilibrated stress, and over that between
-# elements, a part of which counts: chosen on 113 random scenes, orders 1 to 4.
-MISES, OF_JUMP = 1.1, 0.5
-HALF = 0.5  # of the largest stress: elements with less do not hold the true largest one
-
-PARTS, CONSTANT = 6, 3  # of sides, where stresses are looked at; those of order 1 are constant
-
-
-def lattice(order: int) -> Array:
-    """Places (n, 2) in the unit triangle for stresses of displacements of an `order`."""
-    m = CONSTANT if order == 1 else PARTS
-    steps = [(i / m, j / m) for i in range(m + 1) for j in range(m + 1 - i) if 3 * i != m or i != j]
-    return np.array([(1 / 3, 1 / 3), *steps])
-
-
 def largest_von_mises(
-    mesh: ng.Mesh,
-    order: int,
-    stresses: tuple[ng.CoefficientFunction, ng.CoefficientFunction],
-    equilibrated: EquilibratedStress | None,
-    corners: Singular,
-    relative: float,
+    solution: Guaranteed, equilibrated: EquilibratedStress | None, corners: Singular
 ) -> Quantity:
-    """The largest one on a lattice over all elements, away from corners of infinite stress.
-
-    `stresses` are that in the plane, (2, 2), and that normal to it; `relative` is the estimated
-    error of the displacement.
-    """
-    places = lattice(order)
+    """The largest one on a lattice over all elements, away from corners of infinite stress."""
+    name, mesh, infinite = "von Mises", solution.mesh, corners.distinct
+    m = CONSTANT if solution.order == 1 else DIVISIONS
+    steps = [(i / m, j / m) for i in range(m + 1) for j in range(m + 1 - i) if 3 * i != m or i != j]
+    places = np.array([(1 / 3, 1 / 3), *steps])
     n = len(places)
     rule = ng.IntegrationRule([(x, y, 0) for x, y in places.tolist()], [1 / n] * n)
     points = mesh.MapToAllElements(rule, ng.VOL)
-    s, normal, xy = (np.asarray(f(points)) for f in (*stresses, ng.CF((ng.x, ng.y))))
+    read = solution.stress, solution.out_of_plane_stress, ng.CF((ng.x, ng.y))
+    s, normal, xy = (np.asarray(f(points)) for f in read)
     stress = np.hstack([s.reshape(-1, 4)[:, [0, 3, 1]], normal.reshape(-1, 1)])
     mises, away = von_mises(stress), ~corners.near(xy)
     if not away.any():
-        return unknown("von Mises", np.nan, infinite=corners.distinct)
+        return unknown(name, np.nan, infinite=infinite)
     at = int(np.where(away, mises, -np.inf).argmax())
     value, place = float(mises[at]), xy[at]
-    if relative > 1 or (equilibrated is None and mesh.ne == 1):  # nothing to compare with
-        return unknown("von Mises", value, place, corners.distinct)
+    alone = equilibrated is None and mesh.ne == 1  # nothing to compare with
+    if solution.relative_error_estimate > 1 or alone:
+        return unknown(name, value, place, infinite)
     high = np.asarray(np.where(away, mises, 0.0).reshape(-1, n).max(axis=1) >= HALF * value)
     some = np.repeat(high, n)
     off = _jumps(mesh, xy, mises, n)[some]
@@ -263,7 +220,7 @@ def largest_von_mises(
         off = np.maximum(OF_JUMP * off, apart)
     off = MISES * np.repeat(off.reshape(-1, n).max(axis=1), n)
     error = error_of_largest(value, mises[some & away], off[away[some]])
-    return Quantity("von Mises", value, error, "estimated", place, infinite=corners.distinct)
+    return Quantity(name, value, error, "estimated", place, infinite=infinite)
 
 
 def _jumps(mesh: ng.Mesh, points: Array, mises: Array, n: int) -> Array:

@@ -12,33 +12,19 @@ from ...arrays import Array
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """One figure and its bar.
+    """One figure and its bar, in the units of the data; forces and energies per unit thickness.
 
-    Attributes
-    ----------
-    name : str
-        What it is.
-    value : float
-        In the units of the data, forces and energies per unit thickness.
-    error : float
-        At most or about so far from the truth, in the same unit; see `kind`.
-    kind : str
-        "guaranteed": the true value of the problem lies within `error` of `value`; "estimated": as
-        a rule it does; "none": nothing is known of the error, which is NaN.
-    place : ndarray (2,) or None
-        Where it is.
-    proved : float or None
-        The proved error beside an estimated one; None where none is proved.
-    infinite : ndarray (k, 2) or None
-        Corners at which the true one is infinite; the value is the largest away from them.
+    `kind` is "guaranteed" where the true value of the problem lies within `error` of `value`,
+    "estimated" where as a rule it does, "none" where nothing is known of the error, which is NaN.
     """
 
     name: str
     value: float
     error: float
     kind: Literal["guaranteed", "estimated", "none"]
-    place: Array | None = None
-    proved: float | None = None
+    place: Array | None = None  # (2,), where it is
+    proved: float | None = None  # the proved error beside an estimated one
+    # (k, 2), corners at which the true one is infinite; the value is the largest away from them
     infinite: Array | None = None
 
     @property
@@ -87,18 +73,10 @@ def _point(x: Array) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Quantities:
-    """The quantities of one pair; printed as a table, found by name.
-
-    Attributes
-    ----------
-    rows : tuple of Quantity
-        In order.
-    note : str
-        What is to be said of all: why nothing is guaranteed, along what the force is told.
-    """
+    """The quantities of one pair; printed as a table, found by name."""
 
     rows: tuple[Quantity, ...]
-    note: str = ""
+    note: str = ""  # of all: why nothing is guaranteed, along what the force is told
 
     def __iter__(self) -> Iterator[Quantity]:
         """Rows in order."""
