@@ -1,4 +1,3 @@
-from .adaptive import adapt as adapt
 from .errors import ContactError as ContactError
 from .errors import ContactWarning as ContactWarning
 from .errors import ConvergenceError as ConvergenceError
@@ -13,6 +12,7 @@ from .problem import Problem as Problem
 from .qp import solve_qp as solve_qp
 from .solution import Solution as Solution
 from .solution import load as load
+from .solving import adapt as adapt
 from .solving import solve as solve
 
 __version__: str

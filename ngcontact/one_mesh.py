@@ -8,7 +8,6 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 
-from .arrays import Mask
 from .contact import with_roles
 from .discrete import (
     DiscreteProblem,
@@ -20,42 +19,13 @@ from .discrete import (
 )
 from .errors import ContactError, ConvergenceError, NoEquilibriumError, warn
 from .fem import boundary_trace, model_of
-from .mesh import check_curves, curve, same_geometry
+from .mesh import check_curves, curve
 from .plausibility import doubt_of_refinement, doubts, estimates_rise
 from .problem import Contact, Problem
 from .quadrature import evaluations, unresolved, warn_of_unresolved
 from .solution import Solution
 
 ALIKE = 0.1  # relative difference of energies up to which two coarse solutions are one
-
-
-def check_start(problem: Problem, start: object) -> None:
-    """Raise unless `start` is a solution of as many pairs as the problem has."""
-    if not isinstance(start, Solution):
-        raise TypeError(f"start is a {type(start).__name__}: give a Solution")
-    if len(start.discrete.lines) != len(problem.contact):
-        raise ValueError(
-            f"start has {len(start.discrete.lines)} contact pairs, the problem "
-            f"{len(problem.contact)}; a warm start needs the same pairs"
-        )
-
-
-def check_continuation(problem: Problem, start: Solution, order: int, element: str) -> None:
-    """Raise unless meshes of `start` serve the problem, and its indicators such elements."""
-    check_start(problem, start)
-    if (start.order, start.element) != (order, element):
-        raise ValueError(
-            f"start has order={start.order} and element={start.element!r}, not order={order} and "
-            f"element={element!r}: give the same, its indicators tell nothing of others"
-        )
-    here, there = ([(c.secondary, c.primary) for c in p.contact] for p in (problem, start.problem))
-    if [set(pair) for pair in here] != [set(pair) for pair in there]:  # roles may be exchanged
-        raise ValueError(f"the contact pairs of start are {there}, not {here}: keep them")
-    if not same_geometry(problem.geometry, start.problem.geometry):
-        raise ValueError(
-            "the geometry is not the one of start: bodies, edges and names must be the same; leave "
-            "start out, or change loads, supports, materials or gaps alone"
-        )
 
 
 def solve_on(
@@ -77,7 +47,11 @@ def solve_on(
     def attempt(problem: Problem, known: DiscreteProblem | None) -> Solution:
         discrete = discretise(problem, *here, known)
         tried.append(discrete)
-        minimiser = minimise_energy(discrete, _first_active_set(discrete, start))
+        if start is None:
+            active = first_active_set(discrete)
+        else:
+            active = carried_active_set(discrete.lines, start.pairs)
+        minimiser = minimise_energy(discrete, active)
         return Solution(
             problem=problem,
             mesh=mesh,
@@ -123,13 +97,6 @@ def solve_on(
     if first is None or abs(first.energy - second.energy) > ALIKE * abs(second.energy):
         raise doubt
     return first  # so are the bodies made, not the rows
-
-
-def _first_active_set(discrete: DiscreteProblem, start: Solution | None) -> Mask:
-    """Cold (m,), or warm from a solution."""
-    if start is None:
-        return first_active_set(discrete)
-    return carried_active_set(discrete.lines, start.pairs)
 
 
 def _doubted(

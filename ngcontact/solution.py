@@ -13,7 +13,7 @@ import ngsolve as ng
 import numpy as np
 
 from . import __version__
-from .adaptivity import Descent
+from .adaptivity import RefinementTree
 from .estimator import Measured
 from .output import Profile, Unit, plot_solution, write_revolved, write_solution
 from .results import (
@@ -63,13 +63,13 @@ class Solution(Measured):
         Levels of the coarse adaptive run that told `solve` the first active set of a large mesh.
     adaptive : bool
         Whether it is a level of `adapt`, whose estimate is needed anyway.
-    descent : Descent or None
+    tree : RefinementTree or None
         Of a level of `adapt`: the first mesh, and which of its elements those of `mesh` are parts
         of.
     """
 
     coarse_levels: int = 0
-    descent: Descent | None = None
+    tree: RefinementTree | None = None
 
     def at(self, points: Any, *, body: str | None = None, outside: str = "error") -> Values:
         """Displacement, stress, von Mises and principal stresses at points, any consistent units.

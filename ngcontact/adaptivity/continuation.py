@@ -5,67 +5,89 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, root_of_squares
+from ..estimator import Estimated
+from ..fem import unknowns
+from ..mesh import curve
 from ..problem import MeshArrays, Problem
 from .marking import doerfler
-from .refinement import Aim, Forecast, areas, depths, planned, touching
-from .singularities import at_limit
+from .planning import Aim, Forecast, Plan, Refinement, areas, depths, planned, touching
+from .refinement import RefinementTree, Refining
+from .singularities import at_limit, ends_of_contact, settled
+
+HALF = 0.5  # of the unknowns that the tolerance asks for: a first level that knows another load
 
 
-@dataclass(frozen=True, eq=False)
-class Descent:
-    """The first mesh of a sequence, and where the elements of a later one come from.
+def continued(
+    problem: Problem, start: Estimated, first: Plan, refinement: Refinement, goal: float | None
+) -> Plan:
+    """The first level of a `problem` that is near the one of `start`.
 
-    Attributes
-    ----------
-    mesh : ng.Mesh
-        The first one.
-    element : ndarray of int (ne,)
-        Its element of which each of the later ones is a part.
+    It has half the unknowns that the `goal` asks for, a relative estimate, or that of `start`,
+    which is not round-off: it will tell where contact ends now, and the level after it can be the
+    last one. `first` is the plan of the first mesh, with the tree of the elements of `start`.
     """
+    small = settled(start.mesh, first.corners.unresolvable)
+    rest = start.indicators if small.all() else np.where(small, 0.0, start.indicators)
+    order, element, error = refinement.order, refinement.element, root_of_squares(rest)
+    known = Forecast(
+        corners=MeshArrays(start.mesh).corners,
+        squares=(rest / error) ** 2,
+        order=order,
+        singular=first.corners.joined(ends_of_contact(start.pairs)),
+    )
+    now = start.relative_error_estimate * error / root_of_squares(start.indicators)
+    share = (goal or now) / now * HALF ** (-order / 2)  # unknowns ~ error^(-2/p)
+    most = refinement.growth**2 * unknowns(start.mesh, order, element)
+    aim = Aim(most, refinement.max_dofs, share, refinement.theta, refinement.ending, np.inf)
+    refining = rebuilt(problem, first.tree, known, aim, element)
+    finer = refining.mesh.ne > refining.given.ne
+    mesh, _ = curve(refining.finished() if finer else refining.given, order, element)
+    tree = RefinementTree(refining.given, refining.origin)
+    if unknowns(mesh, order, element) > refinement.max_dofs:
+        mesh, tree = first.mesh, RefinementTree.root(first.mesh)
+    return replace(first, mesh=mesh, tree=tree)
 
-    mesh: ng.Mesh
-    element: Index
 
-    @staticmethod
-    def first(mesh: ng.Mesh) -> Descent:
-        """Of a mesh that begins a sequence."""
-        return Descent(mesh, np.arange(mesh.ne))
+def rebuilt(
+    problem: Problem, tree: RefinementTree, known: Forecast, aim: Aim, element: str
+) -> Refining:
+    """The mesh of which a solution's `known` squares forecast the aim's error.
 
-    def of_parts(self, parent: Index) -> Descent:
-        """Of a mesh whose elements are parts of the `parent` (k,) elements."""
-        return Descent(self.mesh, self.element[parent])
+    Made from the first mesh of its `tree`: what was refined for another load is not, if this one
+    does not need it.
+    """
+    refining, corners = Refining(problem, tree.mesh), MeshArrays(tree.mesh).corners
+    squares = transferred(known, tree.element, corners)
+    guess = TransferredForecast(
+        corners, squares, known.order, known.singular, known, tree.element, aim.error
+    )
+    limit = at_limit(tree.mesh, tree.mesh.GetCurveOrder())
+    marked = guess.marked(aim.theta, aim.ending) & ~limit
+    if guess.error > aim.error and marked.any():
+        refining, _ = planned(refining, marked, guess, aim, element)
+    return refining
 
 
 @dataclass(frozen=True, eq=False)
-class Recalled(Forecast):
+class TransferredForecast(Forecast):
     """Squared indicators on coarser elements, or others, from those of a mesh that was solved on.
 
     The indicators of known elements in one element make a mean of |D^(p+1) u|^2, or at a singular
     point its coefficient; both tell the element's indicator by the powers of `Forecast`.
-
-    Attributes
-    ----------
-    known : Forecast
-        Of the mesh that was solved on, n elements.
-    inside : ndarray of int (n,)
-        The element in which the centre of each of these lies.
-    aim : float
-        Error over the known one that is asked for.
     """
 
-    known: Forecast
-    inside: Index
-    aim: float
+    known: Forecast  # of the mesh that was solved on, n elements
+    inside: Index  # (n,), the element in which the centre of each of these lies
+    aim: float  # error over the known one that is asked for
 
-    def after(self, corners: Array, parent: Index) -> Recalled:
+    def after(self, corners: Array, parent: Index) -> TransferredForecast:
         """On elements with `corners` (k, 3, 2), each of them a part of a `parent` (k,)."""
         inherited = super().after(corners, parent).squares
         inside = _inside(self.known.corners.mean(axis=1), self.inside, corners, parent)
-        squares = recalled(self.known, inside, corners)
+        squares = transferred(self.known, inside, corners)
         squares = np.where(np.isnan(squares), inherited, squares)
         return replace(self, corners=corners, squares=squares, inside=inside)
 
@@ -95,7 +117,7 @@ def _inside(places: Array, inside: Index, corners: Array, parent: Index) -> Inde
     return found
 
 
-def recalled(known: Forecast, inside: Index, corners: Array) -> Array:
+def transferred(known: Forecast, inside: Index, corners: Array) -> Array:
     """Squared indicators (k,) of elements with `corners` (k, 3, 2); NaN where nothing is known.
 
     `known` are those of n other elements, `inside` (n,) the elements in which they lie.
@@ -116,24 +138,3 @@ def recalled(known: Forecast, inside: Index, corners: Array) -> Array:
         with_it = at[:, number] & seen
         smooth[with_it] = np.minimum(smooth[with_it], (coefficient * area**power)[with_it])
     return smooth
-
-
-def rebuilt(
-    problem: Problem, descent: Descent, known: Forecast, aim: Aim, element: str
-) -> tuple[ng.Mesh, Descent]:
-    """The mesh, straight-sided, of which a solution's `known` squares forecast the aim's error.
-
-    Made from the first mesh of its `descent`: what was refined for another load is not, if this
-    one does not need it.
-    """
-    mesh = descent.mesh
-    corners = MeshArrays(mesh).corners
-    squares = recalled(known, descent.element, corners)
-    guess = Recalled(
-        corners, squares, known.order, known.singular, known, descent.element, aim.error
-    )
-    marked = guess.marked(aim.theta, aim.ending) & ~at_limit(mesh, mesh.GetCurveOrder())
-    if guess.error <= aim.error or not marked.any():
-        return mesh, Descent.first(mesh)
-    mesh, _, parent = planned(problem, mesh, marked, guess, aim, element)
-    return mesh, Descent.first(descent.mesh).of_parts(parent)

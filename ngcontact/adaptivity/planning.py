@@ -8,19 +8,19 @@ from numbers import Real
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Mask, root_of_squares
+from ..arrays import Array, Index, Mask, root_of_squares
 from ..estimator import Estimated
-from ..fem import ORDERS, BoundaryTrace, check_element, unknowns
+from ..fem import ORDERS, check_element, unknowns
 from ..mesh import curve, unresolved
-from ..problem import MeshArrays, Problem
+from ..problem import MeshArrays
 from ..quadrature import jumping_moduli
-from .continuation import Descent, rebuilt
 from .marking import doerfler, together
-from .refinement import Aim, Forecast, planned
+from .refinement import RefinementTree, Refining
 from .singularities import Singularities, at_ends, at_limit, ends_of_contact, settled
 
+BESIDE = 0.1  # barycentric coordinate: a point so far outside of an element still touches it
+MARKINGS = 8  # most that one estimate is good for
 WRONG = 2.0  # estimate over its forecast from which it is planned half as far; measured .2 to 1.4
-HALF = 0.5  # of the unknowns that the tolerance asks for: a first level that knows another load
 FIRST = 3  # order that is chosen at least: a first level of order 2 costs as much, and sees less
 GROWTH = 2.0  # of the unknowns up to which the next level is planned at first
 
@@ -42,7 +42,7 @@ def best_order(error: float) -> int:
     return next((p for p in ORDERS[:-1] if error > (p / (p + 1)) ** (p * (p + 1))), ORDERS[-1])
 
 
-def truth(name: str, value: object) -> None:
+def check_bool(name: str, value: object) -> None:
     """Raise a TypeError unless `value` is True or False."""
     if not isinstance(value, bool):
         raise TypeError(f"{name}={value!r}: give True or False")
@@ -90,7 +90,7 @@ class Refinement:
             )
         if not _number("max_dofs", self.max_dofs) > 0:
             raise ValueError(f"max_dofs={self.max_dofs} must be positive, like 100_000")
-        truth("guaranteed", self.guaranteed)
+        check_bool("guaranteed", self.guaranteed)
         if self.guaranteed and self.tolerance is None:
             raise ValueError("guaranteed=True with tolerance=None: give a tolerance, like 1e-3")
 
@@ -114,55 +114,33 @@ class Refinement:
 
 @dataclass(frozen=True)
 class Plan:
-    """A level before it is solved.
+    """A level before it is solved."""
 
-    Attributes
-    ----------
-    mesh : ng.Mesh
-        Curved.
-    order : int
-        Degree of the displacement.
-    corners : Singularities
-        Of the domain, the same on all levels.
-    error : float
-        Root of the sum of squared indicators that is forecast.
-    growth : float
-        Of the unknowns up to which it was planned.
-    descent : Descent
-        Where the elements come from.
-    stuck, ends : bool
-        Whether elements at the geometry kernel's limit are left alone, and whether it cannot be.
-    """
-
-    mesh: ng.Mesh
-    order: int
-    corners: Singularities
-    error: float
-    growth: float
-    descent: Descent
-    stuck: bool = False
-    ends: bool = False
+    mesh: ng.Mesh  # curved
+    order: int  # of the displacement
+    corners: Singularities  # of the domain, the same on all levels
+    error: float  # root of the sum of squared indicators that is forecast
+    growth: float  # of the unknowns up to which it was planned
+    tree: RefinementTree
+    stuck: bool = False  # whether elements at the geometry kernel's limit are left alone
+    ends: bool = False  # whether it cannot be
 
 
 def next_plan(
-    solution: Estimated,
-    trace: BoundaryTrace,
-    refinement: Refinement,
-    last: Plan,
-    indicators: Array,
-    share: float,
-    narrow: Mask,
+    solution: Estimated, refinement: Refinement, last: Plan, share: float, narrow: Mask
 ) -> Plan:
     """The level after `solution`, planned until a `share` of its error is left.
 
-    By its `indicators` (ne,), but for those that no mesh makes less. Marked are Doerfler's
-    elements and those in which contact ends, known to the square of their size as the energy is to
-    that of the relative error. Elements in which moduli jump are refined together, and nothing is
-    forecast. `trace` is that of the mesh; in elements `narrow` (ne,) data are narrower than these.
+    By its indicators, but for those that no mesh makes less. Marked are Doerfler's elements and
+    those in which contact ends, known to the square of their size as the energy is to that of the
+    relative error. Elements in which moduli jump are refined together, and nothing is forecast. In
+    elements `narrow` (ne,) data are narrower than these.
     """
+    problem, mesh, theta = solution.problem, solution.mesh, refinement.theta
+    small = settled(mesh, last.corners.unresolvable)
+    indicators = np.where(small, 0.0, solution.indicators)
     if not indicators.any():
         indicators = solution.indicators
-    problem, mesh, theta = solution.problem, solution.mesh, refinement.theta
     order = refinement.next_order(last.order, solution.relative_error_estimate)
     size = refinement.ending * solution.relative_error_estimate
     jumping, limit = jumping_moduli(problem, mesh), at_limit(mesh, mesh.GetCurveOrder())
@@ -170,7 +148,7 @@ def next_plan(
     if (marked & limit).any():  # for ever: the others are refined instead
         marked |= doerfler(np.where(limit, 0.0, indicators), theta)
     marked = together(marked, jumping, MeshArrays(mesh).diameters)
-    marked |= at_ends(trace, solution.pairs, size) | narrow
+    marked |= at_ends(solution.discrete.space.trace, solution.pairs, size) | narrow
     stuck, marked = bool((marked & limit).any()), marked & ~limit
     if not marked.any():
         return replace(last, ends=True)
@@ -189,36 +167,120 @@ def next_plan(
     )
     growth = 1.0 if jumping.any() else growth
     aim = Aim(now * growth, refinement.max_dofs, share, theta, size)
-    mesh, share, parent = planned(problem, mesh, marked, forecast, aim, refinement.element)
-    mesh, _ = curve(mesh, order, refinement.element)
-    descent = last.descent.of_parts(parent)
-    return Plan(mesh, order, last.corners, share * error, growth, descent, stuck, unresolved(mesh))
+    refining, share = planned(Refining(problem, mesh), marked, forecast, aim, refinement.element)
+    mesh, _ = curve(refining.finished(), order, refinement.element)
+    tree = last.tree.of_parts(refining.origin)
+    return Plan(mesh, order, last.corners, share * error, growth, tree, stuck, unresolved(mesh))
 
 
-def continued(
-    problem: Problem, start: Estimated, first: Plan, refinement: Refinement, goal: float | None
-) -> Plan:
-    """The first level of a `problem` that is near the one of `start`.
+@dataclass(frozen=True)
+class Aim:
+    """How far a level is planned: until it has so many `unknowns`, or so small an `error`.
 
-    It has half the unknowns that the `goal` asks for, a relative estimate, or that of `start`,
-    which is not round-off: it will tell where contact ends now, and the level after it can be the
-    last one. `first` is the plan of the first mesh, with the descent of the elements of `start`.
+    With at most the unknowns `most`, and so many `markings` as the forecast is good for.
     """
-    small = settled(start.mesh, first.corners.unresolvable)
-    rest = start.indicators if small.all() else np.where(small, 0.0, start.indicators)
-    order, element, error = refinement.order, refinement.element, root_of_squares(rest)
-    known = Forecast(
-        corners=MeshArrays(start.mesh).corners,
-        squares=(rest / error) ** 2,
-        order=order,
-        singular=first.corners.joined(ends_of_contact(start.pairs)),
-    )
-    now = start.relative_error_estimate * error / root_of_squares(start.indicators)
-    share = (goal or now) / now * HALF ** (-order / 2)  # unknowns ~ error^(-2/p)
-    most = refinement.growth**2 * unknowns(start.mesh, order, element)
-    aim = Aim(most, refinement.max_dofs, share, refinement.theta, refinement.ending, np.inf)
-    mesh, descent = rebuilt(problem, first.descent, known, aim, element)
-    mesh, _ = curve(mesh, order, element)
-    if unknowns(mesh, order, element) > refinement.max_dofs:
-        mesh, descent = first.mesh, Descent.first(first.mesh)
-    return replace(first, mesh=mesh, descent=descent)
+
+    unknowns: float
+    most: float
+    error: float  # over the one that was estimated
+    theta: float  # Doerfler's share
+    ending: float  # size of elements at ends of contact over their line, per error
+    markings: float = MARKINGS
+
+
+def planned(
+    refining: Refining, marked: Mask, forecast: Forecast, aim: Aim, element: str
+) -> tuple[Refining, float]:
+    """The next level's mesh, refined but not finished, and the error that is forecast on it.
+
+    The elements `marked` (ne,) are refined, then again and again those that the forecast marks.
+    Elements at unresolvable corners count no more once they are small, as in `settled`.
+    """
+    problem, given, marks, forecasts = refining.problem, refining.given, [marked], [forecast]
+    while True:
+        parent = refining.bisect(marks[-1])
+        forecast = forecasts[-1].after(MeshArrays(refining.mesh).corners, parent)
+        small = settled(refining.mesh, forecast.singular.unresolvable)
+        forecasts.append(replace(forecast, squares=np.where(small, 0.0, forecast.squares)))
+        unknowns, error = refining.unknowns(forecast.order, element), forecasts[-1].error
+        if unknowns > aim.most and len(marks) > 1:  # one too many: again without it
+            refining = Refining(problem, given)
+            for again in marks[:-1]:
+                refining.bisect(again)
+            return refining, forecasts[-2].error
+        if unknowns >= aim.unknowns or error <= aim.error or len(marks) >= aim.markings:
+            return refining, error
+        limit = at_limit(refining.mesh, given.GetCurveOrder())
+        marks.append(forecasts[-1].marked(aim.theta, aim.ending * error) & ~limit)
+        if not marks[-1].any():
+            return refining, error
+
+
+def areas(corners: Array) -> Array:
+    """Areas (k,) of triangles with the `corners` (k, 3, 2)."""
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    return np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2
+
+
+def depths(corners: Array, places: Array) -> Array:
+    """Least barycentric coordinate (n,) of `places` (n, 2) in triangles, negative outside.
+
+    Of triangles with `corners` (n, 3, 2), or (n, k) of `places` (k, 2) and (n, 1, 3, 2).
+    """
+    origin = corners[..., 0, :]
+    first, second, to = corners[..., 1, :] - origin, corners[..., 2, :] - origin, places - origin
+    whole = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
+    along = (to[..., 0] * second[..., 1] - to[..., 1] * second[..., 0]) / whole
+    across = (first[..., 0] * to[..., 1] - first[..., 1] * to[..., 0]) / whole
+    return np.asarray(np.minimum(np.minimum(along, across), 1 - along - across))
+
+
+def touching(corners: Array, places: Array) -> Mask:
+    """Whether triangles with `corners` (n, 3, 2) touch points `places` (k, 2), (n, k)."""
+    return depths(corners[:, None], places) >= -BESIDE
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """Squared indicators of a mesh that has not been solved on.
+
+    On an element of area a on which the solution is smooth, eta_T^2 ~ a^(p+1): the square of
+    |D^(p+1) u| times h^(2p) times the area. On one that touches a singular point it falls by that
+    point's power of the area. Parts of an element share its square by that.
+    """
+
+    corners: Array  # (ne, 3, 2), of the elements, lengths
+    squares: Array  # (ne,), in shares of the sum of those that were estimated
+    order: int  # p, of the displacement
+    singular: Singularities  # where the solution is not smooth
+
+    @property
+    def error(self) -> float:
+        """The error, over the one that was estimated."""
+        return float(np.sqrt(self.squares.sum()))
+
+    def after(self, corners: Array, parent: Index) -> Forecast:
+        """On elements with `corners` (k, 3, 2), each of them a part of a `parent` (k,)."""
+        area = areas(corners)
+        share = np.minimum(area / areas(self.corners)[parent], 1.0)
+        power = np.full(len(parent), self.order + 1.0)
+        new = np.flatnonzero(share < 1)
+        at = touching(corners[new], self.singular.places)
+        powers = np.where(at, self.singular.powers, np.inf).min(axis=1, initial=np.inf)
+        power[new] = np.minimum(powers, self.order + 1)
+        squares = self.squares[parent] * share**power
+        return replace(self, corners=corners, squares=squares)
+
+    def marked(self, theta: float, share: float) -> Mask:
+        """Elements (ne,) to refine: Doerfler's, and those in which contact ends.
+
+        Of these the ones larger than the `share` of their contact line, as by `at_ends`.
+        """
+        marked = doerfler(np.sqrt(self.squares), theta)
+        ends = np.isfinite(self.singular.extents)
+        sizes = np.sqrt(2 * areas(self.corners))  # the legs, if two are equal at a right angle
+        large = np.flatnonzero(sizes > share * self.singular.extents[ends].min(initial=np.inf))
+        at = touching(self.corners[large], self.singular.places[ends])
+        limits = share * self.singular.extents[ends]
+        marked[large] |= (at & (sizes[large, None] > limits)).any(axis=1)
+        return marked

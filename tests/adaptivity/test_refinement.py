@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ngcontact.adaptivity import Refining, refined
-from ngcontact.adaptivity.refinement import touching
+from ngcontact.adaptivity.planning import touching
 from ngcontact.fem import boundary_trace
 from ngcontact.mesh import curve, first_mesh
 from ngcontact.problem import MeshArrays

@@ -157,7 +157,7 @@ SOLUTION = {  # every attribute and method of `Solution` by the dimension of wha
     "any": "quantities contact_area at along record",
 }
 # ... and those that are no quantities: objects, names, numbers of things, truth values, files.
-PLAIN = """problem mesh order element discrete minimiser work coarse_levels descent adaptive pair
+PLAIN = """problem mesh order element discrete minimiser work coarse_levels tree adaptive pair
 active steps free_motions estimated bounded pairs write revolved plot draw save"""
 
 
