@@ -1,6 +1,3 @@
-from .assembly import joined as joined
-from .assembly import kept_lines as kept_lines
-from .assembly import merged as merged
 from .dual import FacingPieces as FacingPieces
 from .dual import contact_line as contact_line
 from .dual import divided as divided
@@ -17,6 +14,7 @@ from .line import prescribed_gap as prescribed_gap
 from .line import rays as rays
 from .line import twins as twins
 from .line import with_roles as with_roles
+from .line import without as without
 from .projection import MATCHING_DISTANCE as MATCHING_DISTANCE
 from .projection import at as at
 from .projection import crossings as crossings

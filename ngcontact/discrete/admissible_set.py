@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from ..arrays import Array, Index
+from ..arrays import Array, Index, Mask, from_triplets
 from ..constraints import (
     BasisTransformation,
     Conditions,
@@ -15,10 +16,13 @@ from ..constraints import (
     change_of_basis,
     concatenated,
     no_conditions,
+    no_rows,
 )
-from ..contact import ContactLine, joined, kept_lines, merged
+from ..contact import ContactLine, by_line, without
 from ..fem import BoundaryTrace, Space
 from ..problem import Problem, boundary_mask
+
+DIRECTION_DIFFERENCE = 1e-9  # of unit vectors, up to which two points at a node are one
 
 
 def _prescribed(problem: Problem, trace: BoundaryTrace) -> Conditions:
@@ -90,6 +94,120 @@ def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[
             counted[nodes] = True
             result[str(name)] = trace.model.resultant(reaction[nodes].sum(axis=0))
     return result
+
+
+def joined(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:
+    """Rows of all lines, in order, on the nodes of the trace's space."""
+    if not lines:
+        return no_rows(trace.space.ndof)
+    return concatenated(
+        [
+            Rows(
+                node=line.node,
+                direction=line.direction,
+                coupling=line.coupling,
+                g=line.gap,  # (2.10): eps(C_j); (2.3), (2.5): 0 where the bodies touch
+                equality=np.full(len(line.node), line.contact.bilateral),
+            )
+            for line in lines
+        ]
+    )
+
+
+def kept_lines(lines: list[ContactLine], kept: Index) -> list[ContactLine]:
+    """The lines with the points that carry the rows `kept` (k,) of all lines together."""
+    dropped = np.ones(sum(len(line.node) for line in lines), dtype=bool)
+    dropped[kept] = False
+    parts = zip(lines, by_line(lines, dropped), strict=True)
+    return [without(line, np.flatnonzero(part)) for line, part in parts]
+
+
+def _same_point(lines: list[ContactLine], rows: Rows) -> tuple[Index, Mask]:
+    """Number (m,) of an earlier row of the same point, or the row's own; and rows to be averaged.
+
+    Rows are of one point if their left sides are the same, or if one of two at a node and along a
+    direction is a mean over segments: then both are, over the segments of different pairs.
+    """
+    number = rows.repeated()
+    means = np.concatenate([np.zeros(0, dtype=bool), *(line.means for line in lines)])
+    averaged = np.zeros(len(number), dtype=bool)
+    x, y = np.round(rows.direction.T, 6)  # neighbours in this order, the first pair's row first
+    order = np.lexsort((y, x, rows.node))
+    for a, b in pairwise(order) if means.any() else ():
+        alike = np.abs(rows.direction[a] - rows.direction[b]).max() <= DIRECTION_DIFFERENCE
+        apart = number[a] != number[b]
+        if rows.node[a] == rows.node[b] and apart and alike and (means[a] or means[b]):
+            number[b] = number[a]
+            averaged[[a, b]] = True
+    return number, averaged
+
+
+def _own_weights(lines: list[ContactLine], number: Index, weight: Array) -> Array:
+    """Weights (m,) of rows without what others of the same point count on the same segments.
+
+    Of rows of one point, `number` (m,), on one segment the one of the largest `weight` (m,) keeps
+    it; pairs of other primaries face another part of the segment, which counts, too.
+    """
+    start, found = 0, []
+    for line in lines:
+        at, place = np.nonzero(line.rows >= 0)
+        primary = next(j for j, one in enumerate(lines) if _share_primary(one, line))
+        group = np.full(len(at), primary)
+        row = start + line.rows[at, place]
+        found.append((row, line.segments[at], group, line.shares[at, place]))
+        start += len(line.node)
+    row, segment, group, share = (np.concatenate(x) for x in zip(*found, strict=True))
+    order = np.lexsort((row, -weight[row], group, segment, number[row]))
+    keys = np.column_stack([number[row], segment, group])[order]
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = (keys[1:] != keys[:-1]).any(axis=1)
+    kept = np.zeros(len(order), dtype=bool)
+    kept[order] = first
+    whole, own = (np.bincount(row, share * part, len(weight)) for part in (1.0, kept))
+    return np.asarray(weight * np.where(whole > 0, own / np.where(whole > 0, whole, 1.0), 1.0))
+
+
+def _share_primary(one: ContactLine, other: ContactLine) -> bool:
+    """Whether two lines face segments in common, or an obstacle both."""
+    if len(one.facing) == 0 or len(other.facing) == 0:
+        return len(one.facing) == len(other.facing)
+    return bool(np.intersect1d(one.facing, other.facing).size)
+
+
+def merged(lines: list[ContactLine], rows: Rows) -> tuple[list[ContactLine], Rows]:
+    """Lines and rows with one row for each point: of those that repeat a left side the tightest."""
+    number, averaged = _same_point(lines, rows)
+    first, every = np.unique(number), np.arange(len(number))
+    if len(first) == len(number):
+        return lines, rows
+    weight = _own_weights(lines, number, np.concatenate([line.weight for line in lines]))
+    repeated = number != every
+    if averaged.any():  # the first row of a point is the mean by weights
+        total = np.bincount(number, weight * averaged)
+        share = np.where(averaged, weight / np.where(averaged, total[number], 1.0), 1.0)
+        mean = from_triplets(share, np.where(averaged, number, every), every, (len(every),) * 2)
+        rows = replace(rows, coupling=(mean @ rows.coupling).tocsr(), g=mean @ rows.g)
+    g, equality = rows.g.copy(), np.zeros(len(number), dtype=bool)
+    np.logical_or.at(equality, number, rows.equality)
+    # An equality is the tightest; what another pair at that node asks for follows or is refused.
+    tight = np.where(rows.equality | averaged | ~equality[number], rows.g, np.inf)
+    tight[averaged & repeated] = np.inf  # in the mean already
+    g[first] = np.inf
+    np.minimum.at(g, number, tight)
+    np.add.at(weight, number[repeated], weight[repeated])
+    parts = zip(lines, by_line(lines, weight), strict=True)
+    lines = [replace(line, weight=part) for line, part in parts]
+    kept = []
+    for k, line in enumerate(kept_lines(lines, first)):
+        # Without segments of which earlier lines have all points it had. Where these face another
+        # primary the segment faces both of them in part, and stays.
+        had = (lines[k].rows >= 0).any(axis=1)
+        earlier = [one.segments for one in lines[:k] if _share_primary(one, lines[k])]
+        taken = np.isin(line.segments, np.concatenate([np.zeros(0, np.intp), *earlier]))
+        left = (line.rows >= 0).any(axis=1) | ~had | ~taken
+        names = ("segments", "rows", "faces", "shares")
+        kept.append(replace(line, **{name: getattr(line, name)[left] for name in names}))
+    return kept, replace(rows, g=g, equality=equality).select(first)
 
 
 @dataclass(frozen=True, eq=False)
