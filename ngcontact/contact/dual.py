@@ -186,7 +186,7 @@ def with_dual_rows(
     here = (rows >= 0) & (D > 0)
     point = rows[here]
     cosine = np.ones(len(point))
-    if line.contact.direction is None:  # what counts where two sides share a point at a small turn
+    if line.contact.direction is None:  # of normals, where two sides share a point
         normal = trace.exact_normal(*trace.at_nodes(segments))[here.ravel()]
         cosine = (normal * line.direction[point]).sum(axis=1)
     nodal, dual, gap = np.zeros(m), np.zeros(m), np.zeros(m)
@@ -204,7 +204,7 @@ def with_dual_rows(
     line = replace(
         line,
         gap=share * np.where(share > 0, line.gap, 0.0) + gap / weight,
-        # Not of segments whose ends alone face, as of one over a slot at order 1.
+        # By matched segments, without one of which the ends alone face, over a slot at order 1.
         weight=np.where(at_nodes, np.where(nodal > 0, nodal, line.weight), nodal + dual),
         coupling=(sp.diags_array(share) @ line.coupling + means).tocsr(),
         means=~at_nodes,

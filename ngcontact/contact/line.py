@@ -211,13 +211,13 @@ def nodal_line(
     if contact.gap is not None:
         gap = prescribed_gap(contact, trace, segment[first], s[first], position)
     shares = segment_weights(trace, contact, segments)
-    if contact.direction is None:  # what counts where two sides share a point at a small turn
+    if contact.direction is None:  # their components, where two sides share a point
         shares *= (normal * direction[number]).sum(axis=1).reshape(rows.shape)
     weight = np.zeros(len(first))
     met = np.append(facing_points, False)[rows]
     faces = met.all(axis=1)
     np.add.at(weight, rows[faces], shares[faces])
-    # A point whose segments face the primary in part only has nothing better than those parts.
+    # Points all of whose segments face the primary in part take the weights of these.
     partly = met & (np.append(weight, 1.0)[rows] == 0)
     np.add.at(weight, rows[partly], shares[partly])
     line = ContactLine(

@@ -74,7 +74,7 @@ class MultigridUse:
     coarsest: int = COARSEST
 
 
-MULTIGRID = MultigridUse()  # may be set by who measures or tests
+MULTIGRID = MultigridUse()  # measurements and tests change it
 
 
 def linear_systems(
@@ -366,7 +366,7 @@ def minimise_energy(discrete: DiscreteProblem, active: Mask) -> Iterate:
 
 
 def hardly_held(discrete: DiscreteProblem, found: Iterate) -> NoEquilibriumError | None:
-    """What is to be said of a body that contact hardly holds, None without one; see `Rigid`."""
+    """The error of a body that contact hardly holds, None without one; see `Rigid`."""
     if discrete.rigid is None:
         return None
     return discrete.rigid.hardly_held(discrete.basis.T @ found.u)

@@ -205,7 +205,7 @@ class Rigid:
         return [free.motion(x, float(x @ self.work / (x @ free.gram @ x))) for x in found]
 
     def hardly_held(self, values: Array) -> NoEquilibriumError | None:
-        """What is to be said of a large motion that contact rows hardly see, None without one.
+        """The error of a large motion that hardly changes any gap, None without one.
 
         Of one body or all, in the displacement of node `values` (2n,). A wrong moment, as of a
         hole's normals at points of a pin that lies elsewhere in it, drives it as far as round-off
@@ -339,10 +339,9 @@ def _unbalanced(rows: Array, equality: Mask, work: Array) -> _Unbalanced:
 def _check_work(
     problem: Problem, free: FreeMotions, rows: Array, equality: Mask, work: Array, noise: Array
 ) -> None:
-    """Raise unless the work (r,) that cannot be balanced is quadrature, round-off or of the shape.
+    """Raise unless quadrature, round-off or the mesh's shape made the unbalanced `work` (r,).
 
-    Loads that are not numbers are integrated again: their own work decides, to the error that is
-    measured of it, not what the rules of V_h made of it.
+    Loads that are not numbers are integrated again, with a measured error.
     """
     measured = _measured_work(problem, free)
     if measured is not None:

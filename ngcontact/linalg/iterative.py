@@ -12,7 +12,7 @@ from ..arrays import Array, Factor, Mask
 from ..qp import COARSE_RESIDUAL, FINE_RESIDUAL, Anchor, BorderedSystems, QuadraticProgram, terms
 from .multigrid import Multigrid, StalledError
 
-LOOSE_RESIDUAL = 1e-2  # relative to the one a system starts from, that tells its active set
+LOOSE_RESIDUAL = 1e-2  # relative to the first one, at which the next active set is chosen
 TERM_ROUND_OFF = 4 * np.finfo(float).eps  # round-off of the residual, relative to its terms
 
 log = logging.getLogger("ngcontact")
@@ -22,8 +22,8 @@ log = logging.getLogger("ngcontact")
 class Limits:
     """What the iterations may cost."""
 
-    # V-cycles for a system that tells an active set, with coarse matrices of another one:
-    renewal: int = 20  # the price of new ones
+    # V-cycles with coarse matrices of another active set, from which new ones are cheaper:
+    renewal: int = 20
     # V-cycles for a system, two to three times those of nu = 0.3; then the matrix is factorised:
     cycles: int = 100
     # Solutions from the residual itself, which the iteration's own drifts from; likewise:

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from ..arrays import Array, Factor, Index, Mask, Solve
 from .quadratic_program import Anchor, QuadraticProgram, SingularError
 
-COARSE_RESIDUAL = 1e-11  # relative to the largest met, of a system that tells the next active set
+COARSE_RESIDUAL = 1e-11  # relative to the largest met, at which the next active set is chosen
 FINE_RESIDUAL = 1e-14  # ... and of the last system
 BORDER = 16  # changed rows up to which a bordered solve is cheaper than a factorisation ...
 BORDER_GROWTH = 4  # ... times this for every one before: the sets that follow change less and less
