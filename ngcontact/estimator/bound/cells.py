@@ -24,7 +24,11 @@ from ...problem import MeshArrays
 NEWTON_STEPS = 8
 NEWTON_STEP = 1e-9  # of an element: the next step is round-off
 WIDE_TRIANGLE = 0.1  # twice the area over the squared diameter, from which triangles are divided
-SAME_LINE = 0.5  # twice the sine of the angle between sides up to which they are on one line
+# Twice the sine of the angle between sides that are on one line: where loads may contradict each
+# other; but for round-off; nearly, so that tractions are more than 1e5 times what they balance.
+SAME_LINE = 0.5
+ONE_LINE = 1e-12
+NEARLY_ONE_LINE = 1e-5
 
 
 @dataclass(frozen=True, eq=False)
@@ -346,23 +350,28 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
     """Triangles (k,) at vertices where no symmetric stress may have the given tractions.
 
     With the normals n and m of two sides of a triangle n.(s m) = m.(s n) at their vertex. If all
-    sides at a vertex of the boundary lie on two lines, the sum of these equations contains given
-    tractions alone. More triangles at that vertex remove this condition. `loaded` and `held` (k,)
-    are as of `cells_of`.
+    sides at a vertex lie on two lines, the sum of these equations contains given tractions alone:
+    they may contradict it on `loaded` sides. Where sides lie on two lines only nearly, as at some
+    vertices of a mesh that is nearly symmetric, inner tractions would be round-off times a large
+    number. More triangles at the vertex remove this condition. `loaded` and `held` (k,) are as of
+    `cells_of`.
     """
     loads, supports = np.zeros((2, len(cells.vertices)), dtype=bool)
     loads[cells.ends[~cells.inner & np.isin(cells.segment, loaded)]] = True
     supports[cells.ends[~cells.inner & np.isin(cells.segment, held)]] = True
-    side, end = np.nonzero((loads & ~supports)[cells.ends])
-    vertex = cells.ends[side, end]
+    side, end = np.repeat(np.arange(len(cells.ends)), 2), np.tile([0, 1], len(cells.ends))
+    vertex = cells.ends.ravel()
     line = cells.points(side, end.astype(float))[1] @ np.array([1.0, 1j])
     line = line**2 / np.abs(line) ** 2  # one number for both senses
-    at_two, left = loads & ~supports, np.arange(len(vertex))
+    off, left = np.zeros(len(loads)), np.arange(len(vertex))
     for _ in range(2):  # take away the sides of one line
-        one = np.zeros(len(at_two), dtype=complex)
+        one = np.zeros(len(loads), dtype=complex)
         one[vertex[left]] = line[left]
-        left = left[np.abs(line[left] - one[vertex[left]]) > SAME_LINE]
-    at_two[vertex[left]] = False
+        apart = np.abs(line[left] - one[vertex[left]])
+        np.maximum.at(off, vertex[left], np.where(apart > SAME_LINE, 0.0, apart))
+        left = left[apart > SAME_LINE]
+    off[vertex[left]] = np.inf
+    at_two = ~supports & ((loads & (off < np.inf)) | ((off > ONE_LINE) & (off < NEARLY_ONE_LINE)))
     x, widest = cells.corners, np.zeros(len(at_two))
     wide = np.abs(np.linalg.det(x[:, 1:] - x[:, :1])) / cells.diameters**2
     np.maximum.at(widest, cells.triangles, wide[:, None])
