@@ -41,6 +41,6 @@ def test_lines_that_nearly_cross_at_a_vertex():
     case = pressed_fibres(1e4, 0.0)
     *_, solution = levels_of(case.problem, "uniform", 1, 400, 0.4)
     error, _ = energy_error(solution, case.exact)
-    assert 0.99 * error <= solution.error_bound <= 1.1 * error  # measured 1.01
+    assert error <= solution.error_bound <= 1.4 * error  # measured 1.31
     # Tractions are as far out of balance as in blocks without such a vertex, 1e-13; 2e-10 before.
     assert solution.equilibrated.certificate["tractions"] <= 1e-12
