@@ -10,7 +10,6 @@ from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
-from drivers.stress.trials import held
 from ngcontact import (
     Contact,
     ConvergenceError,
@@ -225,16 +224,6 @@ def test_a_body_that_may_turn_from_every_first_active_set(order):
             [0, -weight],
             atol=1e-10 * weight,  # measured 2e-13
         )
-
-
-@pytest.mark.parametrize("order", [1, 2])
-def test_disc_on_a_block(order):
-    problem, weight = held.disc_above_block()
-    solution = solve(problem, maxh=0.3, order=order)
-    weight *= mesh_area(solution, "disc") / np.pi
-    assert solution.contact_force()[1] == pytest.approx(weight, rel=1e-10)
-    assert max(solution.residuals.values()) <= ROUND_OFF
-    assert str(solution.free_motions[0]) == 'translation of "disc" along (1, 0)'
 
 
 @pytest.mark.parametrize("stopped", [1, 2])
