@@ -78,8 +78,9 @@ def knows_meshes() -> dict[str, bool]:
 
 def summary(room: str) -> str:
     """First line of the docstring of a room."""
-    path = ROOT / "ngcontact" / room
-    source = path / "__init__.py" if path.is_dir() else path.with_suffix(".py")
+    source = ROOT / "ngcontact" / room / "__init__.py"
+    if not source.exists():
+        source = source.parent.with_suffix(".py")
     docstring = ast.get_docstring(ast.parse(source.read_text())) or ""
     return docstring.split("\n")[0]
 
@@ -88,7 +89,7 @@ def ground(edges: Imports) -> set[str]:
     """Modules on the lowest floors that import nothing else: any room may use them."""
     found: set[str] = set()
     for floor in reversed(floors()):
-        modules = {room for room in floor if not (ROOT / "ngcontact" / room).is_dir()}
+        modules = {x for x in floor if (ROOT / "ngcontact" / x).with_suffix(".py").exists()}
         found |= {room for room in modules if edges[room] <= found}
     return found
 

@@ -48,17 +48,6 @@ class IterativeSystems(BorderedSystems):
         Makes multigrid for the unknowns (n,) that are free.
     limits : Limits, optional
         What the iterations may cost.
-
-    Attributes
-    ----------
-    multigrid : Multigrid or None
-        The solver, once there is one.
-    coarse : ndarray of bool (m,) or None
-        The active set of its coarse matrices.
-    solved : ndarray of bool (m,) or None
-        That of the last solution.
-    stalled : bool
-        Whether the matrix is factorised.
     """
 
     def __init__(
@@ -69,9 +58,9 @@ class IterativeSystems(BorderedSystems):
         limits: Limits | None = None,
     ) -> None:
         self.prepare, self.limits, self.stalled = prepare, limits or Limits(), False
-        self.multigrid: Multigrid | None = None
-        self.coarse: Mask | None = None
-        self.solved: Mask | None = None
+        self.multigrid: Multigrid | None = None  # the solver, once there is one
+        self.coarse: Mask | None = None  # (m,) the active set of its coarse matrices
+        self.solved: Mask | None = None  # (m,) that of the last solution
         super().__init__(program, factor)
 
     def restart(self, program: QuadraticProgram) -> None:

@@ -83,27 +83,14 @@ class BorderedSystems:
     border : int
         Changed rows up to which the first factorisation is bordered; a factorisation costs that
         many back-solves.
-
-    Attributes
-    ----------
-    program : QuadraticProgram
-        That of the last `restart`.
-    y : ndarray (n,)
-        The last solution.
-    force : ndarray (m,)
-        Its multipliers.
-    scale : float
-        Largest force that a system was to balance.
-    factorizations, back_solves : int
-        Work since the last `restart`.
     """
 
-    program: QuadraticProgram
-    y: Array
-    force: Array
-    scale: float
-    factorizations: int
-    back_solves: int
+    program: QuadraticProgram  # that of the last `restart`
+    y: Array  # (n,) the last solution
+    force: Array  # (m,) its multipliers
+    scale: float  # largest force that a system was to balance
+    factorizations: int  # since the last `restart`
+    back_solves: int  # likewise; V-cycles count as such
 
     def __init__(self, program: QuadraticProgram, factor: Factor, border: int = BORDER) -> None:
         self.factor, self.border = factor, border
