@@ -41,11 +41,17 @@ from functools import cached_property
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, root_of_squares
-from ..fem import NEARLY_INCOMPRESSIBLE, nearly_incompressible
+from ..arrays import Array, Index, Mask, power_of_two, root_of_squares
+from ..fem import (
+    NEARLY_INCOMPRESSIBLE,
+    law_measures,
+    nearly_incompressible,
+    stiffnesses,
+)
 from ..lagrange import gauss, gauss_derivative
-from ..problem import varies
-from ..quadrature import loads_of, pieces, rough_segments
+from ..linalg import cholesky, lower_half, shared
+from ..problem import MeshArrays, varies
+from ..quadrature import features_of, loads_of, pieces, rough_moduli, rough_segments
 from ..solved import Solved
 from .contact import between_nodes, closing_energy, on_contact, remaining
 from .pressure_correction import PressureCorrection, correcting_pressure
@@ -58,14 +64,82 @@ from .terms import (
     PressureShare,
     ScaledSolution,
     Squares,
+    components,
     divergence_and_jump,
     edge_integral,
     element_integral,
     oscillation,
-    scaled,
 )
 
 GUIDE_NOISE = 4e-15  # of displacements along the normal of a guide, relative to the largest
+
+
+def scaled(solved: Solved) -> ScaledSolution:
+    """A solution in units of its own."""
+    problem, stress, boundary = solved.problem, solved.stress, solved.discrete.space.trace
+    mesh = boundary.mesh
+    mu, rigidity, ratio = stiffnesses(problem, mesh)
+    modulus = power_of_two(mu)
+    # sigma_h as polynomials, to be differentiated: right for any modulus and curved elements; its
+    # jumps cost a fifth of those of the stress.
+    any_varies = any(map(varies, problem.materials.values()))
+    exact = mesh.GetCurveOrder() == 1 and not any_varies and boundary.model.polynomial
+    degree = boundary.order - 1 if exact else boundary.order
+    projected = ng.GridFunction(ng.L2(mesh, order=degree, dim=3))
+    # The points of NGSolve's rule of order 2 lie on edges, along which moduli may jump.
+    bonus = 1 if boundary.order == 1 and any_varies else 0
+    projected.Set(components(stress).Compile(), bonus_intorder=bonus)
+    coefficients = projected.vec.FV().NumPy()
+    rough = rough_moduli(problem, mesh)
+    if rough.any():
+        _project_by_compliance(solved, projected, modulus, rough)
+    unit = power_of_two(coefficients)
+    # Displacements that nodes hardly know of, as narrow ones, may be the largest by far.
+    seen = [x.largest for x in features_of(problem, mesh) if x.kind == "displacement"]
+    if seen:
+        strain = power_of_two(np.array(seen)) / power_of_two(np.ptp(boundary.curve, axis=(0, 1)))
+        unit = max(unit, modulus * strain)
+    coefficients /= unit
+    return ScaledSolution(
+        problem=problem,
+        boundary=boundary,
+        displacement=solved.displacement,
+        stress=stress * (1 / unit),
+        projected=projected,
+        unit=unit,
+        modulus=modulus,
+        mu=mu / modulus,
+        rigidity=rigidity / modulus,
+        incompressibility=ratio,
+        rough=rough,
+        diameter=MeshArrays(mesh).diameters,
+    )
+
+
+def _project_by_compliance(
+    solved: Solved, projected: ng.GridFunction, modulus: float, rough: Mask
+) -> None:
+    """Replace a projection by that in the norm of C^-1 on the elements `rough` (ne,).
+
+    Where moduli jump inside an element its soft part tells what the stress is, not the mean.
+    """
+    problem, model = solved.problem, solved.discrete.space.trace.model
+    mesh, order = projected.space.mesh, projected.space.globalorder
+    space = ng.L2(mesh, order=order) ** 3
+    s, t = ng.CF(space.TrialFunction()), ng.CF(space.TestFunction())
+    a, f = ng.BilinearForm(space, symmetric=True), ng.LinearForm(space)
+    for body, law in problem.materials.items():
+        if varies(law):
+            compliance = model.compliance(law.voigt(problem.model) / modulus)
+            *_, dx = law_measures(mesh, body, 2 * order, rough)
+            a += model.weighted(ng.InnerProduct(compliance * s, t)) * dx
+            stress = components(solved.stress)
+            f += model.weighted(ng.InnerProduct(compliance * stress, t)) * dx
+    a.Assemble()
+    f.Assemble()
+    free = np.repeat(rough, space.ndof // (3 * mesh.ne))
+    values = cholesky(lower_half(shared(a.mat)))(np.tile(free, 3))(f.vec.FV().NumPy().copy())
+    projected.vec.FV().NumPy().reshape(-1, 3)[free] = values.reshape(3, -1).T[free]
 
 
 def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTerms:
@@ -81,9 +155,9 @@ def on_supports_and_loads(solution: ScaledSolution, parts: Parts) -> BoundaryTer
         residual[at] += boundary.evaluate(load, segment[at], s[at]) / solution.unit
     factor = -boundary.normal(segment, s)  # of a pressure in the residual
     squares = _rough_tractions(solution, segment, s, residual)
-    for pattern, components in problem.displacement.items():  # (3.6)
+    for pattern, data in problem.displacement.items():  # (3.6)
         at = boundary.lies_on(segment, pattern)
-        given = {axis: value for axis, value in enumerate(components) if value is not None}
+        given = {axis: value for axis, value in enumerate(data) if value is not None}
         for axis in given:
             residual[at, axis] = factor[at, axis] = 0.0
         squares.append(_displacement(solution, boundary.segments(pattern), given))
@@ -191,10 +265,17 @@ def _off_guide(solution: ScaledSolution, points: BoundaryPoints, normal: Array) 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Error indicators of the elements."""
+    """Error indicators of the ne elements.
 
-    indicators: Array  # (ne,), eta_T, an energy norm: the root of an energy per unit thickness
-    # (ne,) each, squared contributions by name: energies, 0 or inf out of a float's range
+    Attributes
+    ----------
+    indicators : ndarray (ne,)
+        eta_T, an energy norm: the root of an energy per unit thickness.
+    parts : dict of ndarray (ne,)
+        Squared contributions by name: energies, 0 or inf where these are out of a float's range.
+    """
+
+    indicators: Array
     parts: dict[str, Array]
 
 

@@ -9,13 +9,10 @@ from typing import NamedTuple
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask, power_of_two
-from ..fem import BoundaryTrace, Model, law_measures, normal_stress_of, stiffnesses
+from ..arrays import Array, Index, Mask
+from ..fem import BoundaryTrace, Model, law_measures, normal_stress_of
 from ..lagrange import gauss
-from ..linalg import cholesky, lower_half, shared
 from ..problem import MeshArrays, Problem, varies
-from ..quadrature import features_of, rough_moduli
-from ..solved import Solved
 
 DATA_BONUS = 4  # quadrature order above that of the discrete terms, for the loads
 
@@ -165,78 +162,10 @@ class ScaledSolution:
         return np.einsum("kij,kj->ki", values, self.boundary.normal(segment, s))
 
 
-def scaled(solved: Solved) -> ScaledSolution:
-    """A solution in units of its own."""
-    problem, stress, boundary = solved.problem, solved.stress, solved.discrete.space.trace
-    mesh = boundary.mesh
-    mu, rigidity, ratio = stiffnesses(problem, mesh)
-    modulus = power_of_two(mu)
-    # sigma_h as polynomials, to be differentiated: right for any modulus and curved elements; its
-    # jumps cost a fifth of those of the stress.
-    any_varies = any(map(varies, problem.materials.values()))
-    exact = mesh.GetCurveOrder() == 1 and not any_varies and boundary.model.polynomial
-    degree = boundary.order - 1 if exact else boundary.order
-    projected = ng.GridFunction(ng.L2(mesh, order=degree, dim=3))
-    # The points of NGSolve's rule of order 2 lie on edges, along which moduli may jump.
-    bonus = 1 if boundary.order == 1 and any_varies else 0
-    projected.Set(_components(stress).Compile(), bonus_intorder=bonus)
-    coefficients = projected.vec.FV().NumPy()
-    rough = rough_moduli(problem, mesh)
-    if rough.any():
-        _project_by_compliance(solved, projected, modulus, rough)
-    unit = power_of_two(coefficients)
-    # Displacements that nodes hardly know of, as narrow ones, may be the largest by far.
-    seen = [x.largest for x in features_of(problem, mesh) if x.kind == "displacement"]
-    if seen:
-        strain = power_of_two(np.array(seen)) / power_of_two(np.ptp(boundary.curve, axis=(0, 1)))
-        unit = max(unit, modulus * strain)
-    coefficients /= unit
-    return ScaledSolution(
-        problem=problem,
-        boundary=boundary,
-        displacement=solved.displacement,
-        stress=stress * (1 / unit),
-        projected=projected,
-        unit=unit,
-        modulus=modulus,
-        mu=mu / modulus,
-        rigidity=rigidity / modulus,
-        incompressibility=ratio,
-        rough=rough,
-        diameter=MeshArrays(mesh).diameters,
-    )
-
-
-def _components(stress: ng.CoefficientFunction) -> ng.CoefficientFunction:
+def components(stress: ng.CoefficientFunction) -> ng.CoefficientFunction:
     """(xx, yy, xy) of a stress (2, 2)."""
     xx, xy, _, yy = stress
     return ng.CF((xx, yy, xy))
-
-
-def _project_by_compliance(
-    solved: Solved, projected: ng.GridFunction, modulus: float, rough: Mask
-) -> None:
-    """Replace a projection by that in the norm of C^-1 on the elements `rough` (ne,).
-
-    Where moduli jump inside an element its soft part tells what the stress is, not the mean.
-    """
-    problem, model = solved.problem, solved.discrete.space.trace.model
-    mesh, order = projected.space.mesh, projected.space.globalorder
-    space = ng.L2(mesh, order=order) ** 3
-    s, t = ng.CF(space.TrialFunction()), ng.CF(space.TestFunction())
-    a, f = ng.BilinearForm(space, symmetric=True), ng.LinearForm(space)
-    for body, law in problem.materials.items():
-        if varies(law):
-            compliance = model.compliance(law.voigt(problem.model) / modulus)
-            *_, dx = law_measures(mesh, body, 2 * order, rough)
-            a += model.weighted(ng.InnerProduct(compliance * s, t)) * dx
-            stress = _components(solved.stress)
-            f += model.weighted(ng.InnerProduct(compliance * stress, t)) * dx
-    a.Assemble()
-    f.Assemble()
-    free = np.repeat(rough, space.ndof // (3 * mesh.ne))
-    values = cholesky(lower_half(shared(a.mat)))(np.tile(free, 3))(f.vec.FV().NumPy().copy())
-    projected.vec.FV().NumPy().reshape(-1, 3)[free] = values.reshape(3, -1).T[free]
 
 
 def oscillation(solution: ScaledSolution) -> Array:
@@ -246,7 +175,7 @@ def oscillation(solution: ScaledSolution) -> Array:
     f = ng.LinearForm(v.space)
     for body, law in problem.materials.items():
         if varies(law):
-            miss = _components(solution.stress) - projected
+            miss = components(solution.stress) - projected
             compliance = solution.model.compliance(law.voigt(problem.model) / solution.modulus)
             density = solution.model.weighted(ng.InnerProduct(compliance * miss, miss))
             for dx in law_measures(mesh, body, 2 * projected.space.globalorder, solution.rough):

@@ -1,14 +1,14 @@
 """What a solution is asked for: values where one wants them, tables, files that outlive it."""
 
-from .progress import with_progress as with_progress
+from .archive import read as read
+from .archive import restored as restored
+from .archive import save as save
+from .archive import state_of as state_of
 from .record import Number as Number
 from .record import html_of as html_of
 from .record import line_of as line_of
-from .record import read as read
 from .record import record_of as record_of
-from .record import restored as restored
-from .record import save as save
-from .record import state_of as state_of
+from .record import with_progress as with_progress
 from .values import Location as Location
 from .values import Values as Values
 from .values import locate as locate

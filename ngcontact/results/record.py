@@ -1,40 +1,26 @@
-"""A solution as a row of a table, in one line, in a notebook, and in a file that survives.
-
-Kept are the data, the mesh, the displacement and all arrays of contact; the stiffness is assembled
-again, and factorised when it is next needed.
-"""
+"""A solution as a row of a table, in one line and in a notebook; the progress of a run."""
 
 from __future__ import annotations
 
-import gzip
 import math
-import os
-import pickle
-from collections.abc import Iterator
-from dataclasses import fields, replace
-from pathlib import Path
-from typing import Any
+import sys
+import time
+from collections.abc import Generator, Iterator
+from typing import Any, TypeVar
 
-import ngsolve as ng
 import numpy as np
 
-from ..discrete import reassembled
-from ..estimator import Measured
-from ..fem import assemble, boundary_trace, model_of
-from ..mesh import keep_parents, vertex_parents
-from ..output import check_path, replacing
-from ..problem import Problem, table
-from ..solved import Solved
+from ..estimator import Guaranteed
+from ..problem import table
 
-SUFFIX = ".ngcontact"
-FORMAT = 1  # of the files
-MADE = ("_estimate", "_bound")  # members that cost much, kept where they have been made
-
+HEAD = ("level", "unknowns", "estimate", "seconds")
+BAR_WIDTH = 20  # characters
 
 Number = int | float
+Level = TypeVar("Level", bound=Guaranteed)
 
 
-def record_of(solution: Measured) -> dict[str, Number]:
+def record_of(solution: Guaranteed) -> dict[str, Number]:
     """A flat dict of numbers; see `Solution.record`."""
     solution.discrete.space.require_mesh()
     estimated = solution.estimated or solution.adaptive
@@ -72,26 +58,12 @@ def record_of(solution: Measured) -> dict[str, Number]:
     return row | {f"work_{name}": int(count) for name, count in solution.work.items()}
 
 
-def line_of(solution: Measured) -> str:
+def line_of(solution: Guaranteed) -> str:
     """Unknowns, active points, steps, forces of all pairs; estimate and bound where known."""
     return ", ".join(f"{name} {value}" if name else value for name, value in facts(solution))
 
 
-def forces(solution: Measured) -> str:
-    """Sizes of the forces of all pairs, with the names of the secondaries if there are several."""
-    contact = solution.problem.contact
-    sizes = [_six_digits(np.hypot(*solution.contact_force(k))) for k in range(len(contact))]
-    if len(contact) < 2:
-        return "".join(sizes)
-    return ", ".join(f"{pair.secondary} {size}" for pair, size in zip(contact, sizes, strict=True))
-
-
-def _six_digits(size: float) -> str:
-    """Always so many, that columns of neighbouring lines agree."""
-    return f"{size:#.6g}".rstrip(".")
-
-
-def facts(solution: Measured) -> list[tuple[str, str]]:
+def facts(solution: Guaranteed) -> list[tuple[str, str]]:
     """What is worth a word, by name; of one width in all lines of a run but for the last ones."""
     active = f"{np.count_nonzero(solution.active)}/{solution.active.size}"
     told = [
@@ -104,16 +76,28 @@ def facts(solution: Measured) -> list[tuple[str, str]]:
         told.append(("estimate", f"{solution.relative_error_estimate:.2e}"))
     if solution.bounded:
         told.append(("bound", f"{solution.relative_error_bound:.2e}"))
-    if solution.problem.contact:
-        told.append(("force", forces(solution)))
+    contact = solution.problem.contact
+    # Always six digits, that columns of neighbouring lines agree.
+    sizes = [
+        f"{np.hypot(*solution.contact_force(k)):#.6g}".rstrip(".") for k in range(len(contact))
+    ]
+    if len(contact) > 1:
+        sizes = [f"{pair.secondary} {size}" for pair, size in zip(contact, sizes, strict=True)]
+    if sizes:
+        told.append(("force", ", ".join(sizes)))
     if solution.free_motions:
         told.append(("free:", "; ".join(map(str, solution.free_motions))))
     return told
 
 
-def html_of(solution: Measured) -> str:
+def html_of(solution: Guaranteed) -> str:
     """What a notebook shows: facts, then a line for each pair."""
-    rows = [(name, value.strip()) for name, value in _named(solution)]
+    rows = []
+    for name, value in facts(solution):
+        if not name:  # as "12 steps"
+            value, name = value.strip().split(" ", 1)
+        if name != "force":
+            rows.append((name.rstrip(":"), value.strip()))
     about = table(("", ""), rows)
     if not solution.problem.contact:
         return about
@@ -129,108 +113,61 @@ def html_of(solution: Measured) -> str:
     return about + table(("contact", "of", "force", "peak pressure", "active"), lines)
 
 
-def _named(solution: Measured) -> list[tuple[str, str]]:
-    """Facts with a name each, without those of pairs."""
-    words = (
-        (name, value) if name else tuple(reversed(value.strip().split(" ", 1)))
-        for name, value in facts(solution)
-        if name != "force"
-    )
-    return [(name.rstrip(":"), value) for name, value in words]
+def with_progress(
+    solutions: Iterator[Level], tolerance: float | None, max_dofs: float
+) -> Generator[Level]:
+    """The same levels, each told when it is done.
+
+    A line of `sys.stderr` each, or one table in a notebook that grows; with a bar that is full at
+    the tolerance, or at `max_dofs` where there is none.
+    """
+    rows: list[tuple[str, ...]] = []
+    show = _notebook() or _terminal
+    first = math.nan
+    started = time.perf_counter()
+    for solution in solutions:
+        unknowns, error = solution.displacement.space.ndof, solution.relative_error_estimate
+        if solution.bounded:
+            error = solution.relative_error_bound
+        first = first if rows else error
+        now = time.perf_counter()
+        row = (str(len(rows)), str(unknowns), f"{error:.2e}", f"{now - started:.2f}")
+        rows.append(row)
+        show(rows, _share(unknowns / max_dofs, first, error, tolerance))
+        yield solution
+        started = time.perf_counter()  # what the caller does in between does not count
 
 
-def state_of(solution: Solved) -> dict[str, Any]:
-    """What a solution is made of again by `restored`, all of it fit to be pickled."""
-    discrete, plain = solution.discrete, {"discrete", "displacement"}
-    discrete.space.require_mesh()
-    own = {name: getattr(solution, name) for name in _names(solution) if name not in plain}
-    own |= {name: vars(solution)[name] for name in MADE if name in vars(solution)}
-    arrays = {name: getattr(discrete, name) for name in _names(discrete)}
-    for name in ("problem", "space", "program", "systems"):
-        del arrays[name]
-    if discrete.rigid is not None:
-        arrays["rigid"] = discrete.rigid.on(None)
-    program = {name: getattr(discrete.program, name) for name in _names(discrete.program)}
-    del program["K"]
-    return {
-        "own": own,
-        "arrays": arrays,
-        "program": program,
-        "nodal": discrete.space.nodal,
-        "load": discrete.space.f,
-        "parents": vertex_parents(solution.mesh),
-        "displacement": solution.displacement.vec.FV().NumPy().copy(),
-    }
+def _share(used: float, first: float, error: float, tolerance: float | None) -> float:
+    """How much of the way is done, in [0, 1]: of the digits asked for, or of the unknowns."""
+    if tolerance is None:
+        return min(used, 1.0)
+    if not error > tolerance:
+        return 1.0
+    return min(max(math.log(first / error) / math.log(first / tolerance), 0.0), 1.0)
 
 
-def restored(state: dict[str, Any]) -> dict[str, Any]:
-    """Members of a solution, from its `state_of`."""
-    own = state["own"]
-    problem, mesh, order = own["problem"], own["mesh"], own["order"]
-    keep_parents(mesh, state["parents"])
-    trace = boundary_trace(mesh, order, model_of(problem))
-    space = replace(assemble(problem, trace, own["element"], state["nodal"]), f=state["load"])
-    discrete = reassembled(problem, space, state["program"], state["arrays"])
-    displacement = ng.GridFunction(space.V)
-    displacement.vec.FV().NumPy()[:] = state["displacement"]
-    return own | {"discrete": discrete, "displacement": displacement}
+def _terminal(rows: list[tuple[str, ...]], share: float) -> None:
+    """The last of the rows as a line, after a head."""
+    done = round(BAR_WIDTH * share)
+    lines = [HEAD] if len(rows) == 1 else []
+    for row in [*lines, rows[-1]]:
+        bar = "" if row is HEAD else "#" * done + "." * (BAR_WIDTH - done)
+        sys.stderr.write("{:>5s} {:>9s} {:>9s} {:>8s}  {}\n".format(*row, bar))
+    sys.stderr.flush()
 
 
-def _names(data: Any) -> list[str]:
-    """Names of the fields of a dataclass."""
-    return [field.name for field in fields(data)]
+def _notebook() -> Any:
+    """What shows rows in the notebook that runs this, or None."""
+    shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
+    if type(shell).__name__ != "ZMQInteractiveShell":
+        return None
+    from IPython.display import HTML, display
 
+    handle = display(HTML(""), display_id=True)
 
-def save(solution: Solved, path: str | os.PathLike[str], version: str) -> Path:
-    """Write a solution to `path`; see `Solution.save`."""
-    target = check_path(path, SUFFIX)
-    solution.discrete.space.require_mesh()
-    try:
-        data = pickle.dumps(solution)
-    except Exception as error:
-        for what, value in _parts(solution.problem):
-            try:
-                pickle.dumps(value)
-            except Exception as cause:
-                raise TypeError(
-                    f"{what} cannot be saved ({cause}): give numbers, CoefficientFunctions of "
-                    "coordinates, or a function defined at the top of a module"
-                ) from cause
-        raise TypeError(f"the solution cannot be saved: {error}") from error
-    header = {"ngcontact": version, "format": FORMAT}
-    with replacing(target) as (draft,), gzip.open(draft, "wb", compresslevel=4) as file:
-        file.write(pickle.dumps(header))
-        file.write(data)
-    return target
+    def show(rows: list[tuple[str, ...]], share: float) -> None:
+        bar = f'<progress value="{share:.3f}" max="1"></progress>'
+        handle.update(HTML(table(HEAD, rows) + bar))
 
-
-def _parts(problem: Problem) -> Iterator[tuple[str, Any]]:
-    """The data one by one, with their names."""
-    yield "geometry", problem.geometry
-    for argument in ("materials", "displacement", "traction", "force"):
-        for name, value in getattr(problem, argument).items():
-            yield f'{argument} "{name}"', value
-    for number, pair in enumerate(problem.contact):
-        yield f'contact[{number}].gap of "{pair.secondary}"', pair.gap
-
-
-def read(path: str | os.PathLike[str], version: str) -> Any:
-    """What `save` wrote to `path`."""
-    source = Path(path)
-    try:
-        with gzip.open(source, "rb") as file:
-            header = pickle.load(file)
-            if not isinstance(header, dict) or header.get("format") != FORMAT:
-                raise ValueError(f"{str(source)!r} is of another format: {header!r:.80}")
-            try:
-                return pickle.load(file)
-            except (AttributeError, ImportError, TypeError, KeyError) as error:
-                raise ValueError(
-                    f"{str(source)!r} was written by ngcontact {header.get('ngcontact')} and "
-                    f"cannot be read by {version}, or needs a module that is missing here: {error}"
-                ) from error
-    except (gzip.BadGzipFile, EOFError, pickle.UnpicklingError) as error:
-        raise ValueError(
-            f"{str(source)!r} is no complete result of ngcontact ({error}): give a file written "
-            "by Solution.save"
-        ) from error
+    return show

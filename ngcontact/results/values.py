@@ -27,19 +27,11 @@ CHUNK = 20_000  # points at a time
 
 @dataclass(frozen=True, eq=False)
 class Location:
-    """Elements that contain points: q incidences, in the order of the points.
+    """Elements that contain points, in the order of the points; one on a side lies in both."""
 
-    Attributes
-    ----------
-    point, element : ndarray of int (q,)
-        Which point lies in which element. One on a side lies in both.
-    reference : ndarray (q, 2)
-        Where, in NGSolve's reference triangle.
-    """
-
-    point: Index
-    element: Index
-    reference: Array
+    point: Index  # (q,)
+    element: Index  # (q,)
+    reference: Array  # (q, 2), in NGSolve's reference triangle
 
     def of(self, kept: Mask) -> Location:
         """The incidences `kept` (q,)."""
@@ -53,12 +45,8 @@ def locate(trace: BoundaryTrace, points: Array) -> Location:
     """
     finder = _Finder(trace)
     chunks = np.array_split(np.arange(len(points)), max(1, -(-len(points) // CHUNK)))
-    parts = [finder.find(points, at) for at in chunks]
-    return Location(
-        np.concatenate([part.point for part in parts]),
-        np.concatenate([part.element for part in parts]),
-        np.concatenate([part.reference for part in parts]),
-    )
+    parts = [vars(finder.find(points, at)) for at in chunks]
+    return Location(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
 
 
 class _Finder:
@@ -76,16 +64,12 @@ class _Finder:
         octave = np.frexp(radius)[1]
         groups = [np.flatnonzero(octave == k) for k in np.unique(octave)]
         self.groups = [(at, KDTree(middle[at]), float(radius[at].max())) for at in groups]
-        self.segment = self._segments(view)
-
-    def _segments(self, view: MeshArrays) -> Index:
-        """Boundary segment (ne, 3) opposite to each vertex of an element; -1 inside."""
-        keys = view.keys(view.sides)
-        known = view.keys(view.facets)
+        # Boundary segment (ne, 3) opposite to each vertex of an element; -1 inside.
+        keys, known = view.keys(view.sides), view.keys(view.facets)
         order = np.argsort(known)
         at = np.minimum(np.searchsorted(known[order], keys), len(known) - 1)
         found = np.where(known[order][at] == keys, order[at], -1)
-        return found[:, [1, 2, 0]]  # sides 01, 12, 20 lie opposite to 2, 0, 1
+        self.segment = found[:, [1, 2, 0]]  # sides 01, 12, 20 lie opposite to 2, 0, 1
 
     def find(self, points: Array, at: Index) -> Location:
         """Elements of the points numbered `at` (j,) among `points` (k, 2)."""
@@ -192,7 +176,10 @@ class Values:
         """Von Mises stress (...,)."""
         components = [self.stress[..., i, j] for i, j in ((0, 0), (1, 1), (0, 1))]
         stress = np.stack([*components, self.out_of_plane_stress], axis=-1)
-        return _nowhere_nan(von_mises, stress.reshape(-1, 4)).reshape(self.body.shape)
+        known = np.isfinite(stress).all(axis=-1)
+        result = np.full(self.body.shape, np.nan)
+        result[known] = von_mises(stress[known])
+        return result
 
     @property
     def principal_stresses(self) -> Array:
@@ -221,14 +208,6 @@ class Values:
             "von_mises": self.von_mises.ravel(),
             **{f"principal_{k + 1}": three[:, k] for k in range(3)},
         }
-
-
-def _nowhere_nan(function: Any, stress: Array) -> Array:
-    """A function of stresses (k, 4), and NaN where they are."""
-    known = np.isfinite(stress).all(axis=1)
-    result = np.full(len(stress), np.nan)
-    result[known] = function(stress[known])
-    return result
 
 
 def values_at(

@@ -11,8 +11,7 @@ from ...fem import Bodies, BoundaryTrace, connected_bodies
 from ...lagrange import gauss
 from ...solved import Solved
 from ..bound import ContactPressure, Guaranteed
-from .stresses import Singular
-from .table import Quantity, error_of_largest, unknown
+from .table import Quantity, Singular, error_of_largest, unknown
 
 NO_LOAD = 1e-9  # part of the largest load that is none
 # Error of pressures over the largest difference on a segment to p*, and to the discrete stress:

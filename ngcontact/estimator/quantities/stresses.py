@@ -10,7 +10,6 @@ on a line is one of 270 degrees in all. Of other moduli it is infinite at smalle
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
@@ -20,7 +19,7 @@ from ...contact import ContactState, in_contact
 from ...fem import BoundaryTrace, von_mises
 from ...problem import Elastic, MeshArrays, Problem, body_mask
 from ..bound import EquilibratedStress, Guaranteed
-from .table import Quantity, error_of_largest, unknown
+from .table import Quantity, Singular, error_of_largest, unknown
 
 SAME = 1e-9  # distance, relative to an element, at which points of two elements are one
 FREE, GUIDED, HELD, PRESSED = range(4)  # what is on a side of a corner
@@ -32,28 +31,6 @@ MEETING = 1e-6  # of a segment, distance at which two corners meet
 MISES, OF_JUMP = 1.1, 0.5
 HALF = 0.5  # of the largest stress: elements with less do not hold the true largest one
 DIVISIONS, CONSTANT = 6, 3  # of sides, where stresses are looked at; those of order 1 are constant
-
-
-@dataclass(frozen=True, eq=False)
-class Singular:
-    """Corners of infinite stress."""
-
-    places: Array  # (k, 2), lengths
-    reach: Array  # (k,), how far from each the stress is its own, or not resolved, lengths
-    pressed: Mask  # (k,), corners at which bodies press on each other
-
-    @property
-    def distinct(self) -> Array:
-        """Places (j, 2), each once where several bodies meet."""
-        return np.unique(self.places, axis=0)
-
-    def near(self, points: Array, pressed: bool = False) -> Mask:
-        """Which of the `points` (m, 2) lie within the reach of a corner, (m,)."""
-        result = np.zeros(len(points), dtype=bool)
-        for place, r, of_contact in zip(self.places, self.reach, self.pressed, strict=True):
-            if of_contact or not pressed:
-                result |= np.linalg.norm(points - place, axis=1) <= r
-        return result
 
 
 def singular_corners(

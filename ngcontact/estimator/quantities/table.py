@@ -1,4 +1,4 @@
-"""A figure with a bar of its error, and tables of them."""
+"""A figure with a bar of its error, tables of them, and corners where figures are infinite."""
 
 from __future__ import annotations
 
@@ -7,24 +7,40 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from ...arrays import Array
+import numpy as np
+
+from ...arrays import Array, Mask
 
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
-    """One figure and its bar, in the units of the data; forces and energies per unit thickness.
+    """One figure and its bar.
 
-    `kind` is "guaranteed" where the true value of the problem lies within `error` of `value`,
-    "estimated" where as a rule it does, "none" where nothing is known of the error, which is NaN.
+    Attributes
+    ----------
+    name : str
+        What it is.
+    value : float
+        In the units of the data, forces and energies per unit thickness.
+    error : float
+        At most or about so far from the truth, in the same unit; see `kind`.
+    kind : str
+        "guaranteed": the true value of the problem lies within `error` of `value`; "estimated": as
+        a rule it does; "none": nothing is known of the error, which is NaN.
+    place : ndarray (2,) or None
+        Where it is.
+    proved : float or None
+        The proved error beside an estimated one; None where none is proved.
+    infinite : ndarray (k, 2) or None
+        Corners at which the true one is infinite; the value is the largest away from them.
     """
 
     name: str
     value: float
     error: float
     kind: Literal["guaranteed", "estimated", "none"]
-    place: Array | None = None  # (2,), where it is
-    proved: float | None = None  # the proved error beside an estimated one
-    # (k, 2), corners at which the true one is infinite; the value is the largest away from them
+    place: Array | None = None
+    proved: float | None = None
     infinite: Array | None = None
 
     @property
@@ -50,6 +66,28 @@ class Quantity:
         return f"{self.name:22s} {self.value:14.7g} {bar}  {self.kind:10s}{at}".rstrip()
 
 
+@dataclass(frozen=True, eq=False)
+class Singular:
+    """Corners of infinite stress."""
+
+    places: Array  # (k, 2), lengths
+    reach: Array  # (k,), how far from each the stress is its own, or not resolved, lengths
+    pressed: Mask  # (k,), corners at which bodies press on each other
+
+    @property
+    def distinct(self) -> Array:
+        """Places (j, 2), each once where several bodies meet."""
+        return np.unique(self.places, axis=0)
+
+    def near(self, points: Array, pressed: bool = False) -> Mask:
+        """Which of the `points` (m, 2) lie within the reach of a corner, (m,)."""
+        result = np.zeros(len(points), dtype=bool)
+        for place, r, of_contact in zip(self.places, self.reach, self.pressed, strict=True):
+            if of_contact or not pressed:
+                result |= np.linalg.norm(points - place, axis=1) <= r
+        return result
+
+
 def unknown(
     name: str, value: float, place: Array | None = None, infinite: Array | None = None
 ) -> Quantity:
@@ -73,10 +111,18 @@ def _point(x: Array) -> str:
 
 @dataclass(frozen=True, eq=False)
 class Quantities:
-    """The quantities of one pair; printed as a table, found by name."""
+    """The quantities of one pair; printed as a table, found by name.
+
+    Attributes
+    ----------
+    rows : tuple of Quantity
+        In order.
+    note : str
+        What is to be said of all: why nothing is guaranteed, along what the force is told.
+    """
 
     rows: tuple[Quantity, ...]
-    note: str = ""  # of all: why nothing is guaranteed, along what the force is told
+    note: str = ""
 
     def __iter__(self) -> Iterator[Quantity]:
         """Rows in order."""

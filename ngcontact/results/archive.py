@@ -1,0 +1,125 @@
+"""A solution in a file that survives the process.
+
+Kept are the data, the mesh, the displacement and all arrays of contact; the stiffness is assembled
+again, and factorised when it is next needed.
+"""
+
+from __future__ import annotations
+
+import gzip
+import os
+import pickle
+from collections.abc import Iterator
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import ngsolve as ng
+
+from ..discrete import reassembled
+from ..fem import assemble, boundary_trace, model_of
+from ..mesh import keep_parents, vertex_parents
+from ..output import check_path, replacing
+from ..problem import Problem
+from ..solved import Solved
+
+SUFFIX = ".ngcontact"
+FORMAT = 1  # of the files
+MADE = ("_estimate", "_bound")  # members that cost much, kept where they have been made
+
+
+def state_of(solution: Solved) -> dict[str, Any]:
+    """What a solution is made of again by `restored`, all of it fit to be pickled."""
+    discrete, plain = solution.discrete, {"discrete", "displacement"}
+    discrete.space.require_mesh()
+    own = {name: getattr(solution, name) for name in _names(solution) if name not in plain}
+    own |= {name: vars(solution)[name] for name in MADE if name in vars(solution)}
+    arrays = {name: getattr(discrete, name) for name in _names(discrete)}
+    for name in ("problem", "space", "program", "systems"):
+        del arrays[name]
+    if discrete.rigid is not None:
+        arrays["rigid"] = discrete.rigid.on(None)
+    program = {name: getattr(discrete.program, name) for name in _names(discrete.program)}
+    del program["K"]
+    return {
+        "own": own,
+        "arrays": arrays,
+        "program": program,
+        "nodal": discrete.space.nodal,
+        "load": discrete.space.f,
+        "parents": vertex_parents(solution.mesh),
+        "displacement": solution.displacement.vec.FV().NumPy().copy(),
+    }
+
+
+def restored(state: dict[str, Any]) -> dict[str, Any]:
+    """Members of a solution, from its `state_of`."""
+    own = state["own"]
+    problem, mesh, order = own["problem"], own["mesh"], own["order"]
+    keep_parents(mesh, state["parents"])
+    trace = boundary_trace(mesh, order, model_of(problem))
+    space = replace(assemble(problem, trace, own["element"], state["nodal"]), f=state["load"])
+    discrete = reassembled(problem, space, state["program"], state["arrays"])
+    displacement = ng.GridFunction(space.V)
+    displacement.vec.FV().NumPy()[:] = state["displacement"]
+    return own | {"discrete": discrete, "displacement": displacement}
+
+
+def _names(data: Any) -> list[str]:
+    """Names of the fields of a dataclass."""
+    return [field.name for field in fields(data)]
+
+
+def save(solution: Solved, path: str | os.PathLike[str], version: str) -> Path:
+    """Write a solution to `path`; see `Solution.save`."""
+    target = check_path(path, SUFFIX)
+    solution.discrete.space.require_mesh()
+    try:
+        data = pickle.dumps(solution)
+    except Exception as error:
+        for what, value in _parts(solution.problem):
+            try:
+                pickle.dumps(value)
+            except Exception as cause:
+                raise TypeError(
+                    f"{what} cannot be saved ({cause}): give numbers, CoefficientFunctions of "
+                    "coordinates, or a function defined at the top of a module"
+                ) from cause
+        raise TypeError(f"the solution cannot be saved: {error}") from error
+    header = {"ngcontact": version, "format": FORMAT}
+    with replacing(target) as (draft,), gzip.open(draft, "wb", compresslevel=4) as file:
+        file.write(pickle.dumps(header))
+        file.write(data)
+    return target
+
+
+def _parts(problem: Problem) -> Iterator[tuple[str, Any]]:
+    """The data one by one, with their names."""
+    yield "geometry", problem.geometry
+    for argument in ("materials", "displacement", "traction", "force"):
+        for name, value in getattr(problem, argument).items():
+            yield f'{argument} "{name}"', value
+    for number, pair in enumerate(problem.contact):
+        yield f'contact[{number}].gap of "{pair.secondary}"', pair.gap
+
+
+def read(path: str | os.PathLike[str], version: str) -> Any:
+    """What `save` wrote to `path`."""
+    source = Path(path)
+    try:
+        with gzip.open(source, "rb") as file:
+            header = pickle.load(file)
+            if not isinstance(header, dict) or header.get("format") != FORMAT:
+                raise ValueError(f"{str(source)!r} is of another format: {header!r:.80}")
+            try:
+                return pickle.load(file)
+            except (AttributeError, ImportError, TypeError, KeyError) as error:
+                raise ValueError(
+                    f"{str(source)!r} was written by ngcontact {header.get('ngcontact')} and "
+                    f"cannot be read by {version}, or needs a module that is missing here: {error}"
+                ) from error
+    except (gzip.BadGzipFile, EOFError, pickle.UnpicklingError) as error:
+        raise ValueError(
+            f"{str(source)!r} is no complete result of ngcontact ({error}): give a file written "
+            "by Solution.save"
+        ) from error
