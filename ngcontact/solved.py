@@ -18,19 +18,7 @@ from .qp import Iterate, kkt_residuals
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """What `Solution` is made of, and what all rooms read; its fields are explained there.
-
-    Attributes
-    ----------
-    problem : Problem
-    mesh : ng.Mesh
-    order : int
-    element : str
-    displacement : ng.GridFunction
-    discrete : DiscreteProblem
-    minimiser : Iterate
-    work : dict
-    """
+    """What `Solution` is made of, and what all rooms read; its fields are explained there."""
 
     problem: Problem
     mesh: ng.Mesh

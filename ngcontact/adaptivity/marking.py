@@ -16,17 +16,8 @@ def doerfler(indicators: Array, theta: float) -> Mask:
     Of equal ones the first are marked, also where round-off makes a difference: elements that are
     mirror images of each other, or parts of one, have the same indicators on any machine.
 
-    Parameters
-    ----------
-    indicators : ndarray (ne,)
-        Local error indicators, not negative.
-    theta : float
-        Share in (0, 1].
-
-    Returns
-    -------
-    ndarray of bool (ne,)
-        The marked elements; none where all indicators vanish.
+    Of `indicators` (ne,), not negative, with `theta` in (0, 1], a mask (ne,); none where all
+    indicators vanish.
 
     Examples
     --------
@@ -48,22 +39,9 @@ def doerfler(indicators: Array, theta: float) -> Mask:
 def together(marked: Mask, alike: Mask, sizes: Array) -> Mask:
     """The marked elements, and all `alike` ones that are as large as the smallest marked of these.
 
-    Where one of many elements stands out by chance, as by how a line cuts it, Doerfler's marking
-    takes one after the other, a level each.
-
-    Parameters
-    ----------
-    marked : ndarray of bool (ne,)
-        Elements.
-    alike : ndarray of bool (ne,)
-        Elements.
-    sizes : ndarray (ne,)
-        Diameters, lengths.
-
-    Returns
-    -------
-    ndarray of bool (ne,)
-        The elements to refine.
+    Of masks `marked` (ne,) and `alike` (ne,), with diameters `sizes` (ne,), a mask (ne,). Where one
+    of many elements stands out by chance, as by how a line cuts it, Doerfler's marking takes one
+    after the other, a level each.
 
     Examples
     --------

@@ -76,21 +76,11 @@ def settled(mesh: ng.Mesh, places: Array) -> Mask:
 
 @dataclass(frozen=True, eq=False)
 class Singularities:
-    """Points, and how the squared error of an element there falls with its area.
+    """Points, and how the squared error of an element there falls with its area."""
 
-    Attributes
-    ----------
-    places : ndarray (k, 2)
-        Lengths.
-    powers : ndarray (k,)
-        Of the area.
-    extents : ndarray (k,)
-        Lengths of the contact lines that end there, infinite elsewhere.
-    """
-
-    places: Array
-    powers: Array
-    extents: Array
+    places: Array  # (k, 2), lengths
+    powers: Array  # (k,), of the area
+    extents: Array  # (k,), lengths of the contact lines that end there, infinite elsewhere
 
     @property
     def unresolvable(self) -> Array:

@@ -24,18 +24,9 @@ Run = Sequence[Guaranteed] | tuple[Any, Any]
 
 
 def slope_triangle(axes: Axes, x: Array, y: Array, rate: float, above: bool = False) -> None:
-    """A triangle at the end of a curve in logarithmic axes, of the slope -`rate`.
+    """A triangle of the slope -`rate` at the end of a curve `x`, `y` (k,) in logarithmic axes.
 
-    Parameters
-    ----------
-    axes : Axes
-        With logarithmic scales.
-    x, y : ndarray (k,)
-        The curve.
-    rate : float
-        Exponent: y falls like x to the power -`rate`.
-    above : bool
-        Whether the triangle lies above the curve and not below.
+    It lies below the curve, or `above`.
     """
     corners = _triangle(x, y, rate, above)
     axes.plot(*corners.T, color="0.4", lw=0.8)

@@ -151,14 +151,11 @@ def fields(solution: Solved) -> dict[str, tuple[str, str, Evaluated]]:
 
 @dataclass(frozen=True, eq=False)
 class Field:
-    """A scalar field of a picture, with `values` (k,) at its nodes, and the label of its scale.
-
-    The kind is "stress", "length", or "" where that is not known.
-    """
+    """A scalar field of a picture; its kind is "stress", "length", or "" where it is not known."""
 
     label: str
     kind: str
-    values: Array
+    values: Array  # (k,), at the nodes of the picture
 
 
 def _shown(solution: Solved, nodes: Nodes, field: str | ng.CoefficientFunction) -> Field:
@@ -172,14 +169,11 @@ def _shown(solution: Solved, nodes: Nodes, field: str | ng.CoefficientFunction) 
 
 
 class ContactPath(NamedTuple):
-    """Contact points in order along a line.
-
-    `rows` (k,) are their numbers in ``solution.points``, the coordinate `s` (k,) is a length.
-    """
+    """Contact points in order along a line."""
 
     pair: int
-    rows: Index
-    s: Array
+    rows: Index  # (k,), numbers in ``solution.points``
+    s: Array  # (k,), coordinate, a length
 
 
 def contact_lines(solution: Solved) -> list[ContactPath]:
@@ -241,14 +235,11 @@ def zones_of(solution: Solved, lines: Sequence[ContactPath]) -> list[ContactPath
 
 @dataclass(frozen=True, eq=False)
 class SymmetryLine:
-    """A straight line through `point` (2,) with the unit vector `normal` (2,).
+    """A straight line."""
 
-    Points lie on it up to a distance `slack`, a length.
-    """
-
-    point: Array
-    normal: Array
-    slack: float
+    point: Array  # (2,)
+    normal: Array  # (2,), unit vector
+    slack: float  # distance up to which points lie on it, a length
 
     def distance(self, x: Array) -> Array:
         """Signed distances (k,) of points `x` (k, 2)."""
@@ -296,36 +287,16 @@ def symmetry_line(mesh: ng.Mesh, displacement: ng.GridFunction, pattern: str) ->
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is drawn of the bodies: triangles and lines that follow the curved elements.
-
-    Attributes
-    ----------
-    solution : Solved
-    style : Style
-    moved : ndarray (k, 2)
-        Nodes after `scale` times the displacement, lengths.
-    shown : Field
-        What colours show there.
-    triangles : ndarray of int (t, 3)
-        Nodes of each triangle.
-    edges : ndarray of int (e, order + 1)
-        Nodes of each element edge.
-    outline : ndarray of bool (e,)
-        Edges that bound a body.
-    zones : list of ndarray (c, 2)
-        Points of each zone in contact, moved as the nodes are, those of the largest force first.
-    scale : float
-        Factor of the displacement.
-    """
+    """What is drawn of the bodies: triangles and lines that follow the curved elements."""
 
     solution: Solved
     style: Style
-    moved: Array
-    shown: Field
-    triangles: Index
-    edges: Index
-    outline: Mask
-    zones: list[Array]
+    moved: Array  # (k, 2), nodes after `scale` times the displacement, lengths
+    shown: Field  # what colours show there
+    triangles: Index  # (t, 3), nodes
+    edges: Index  # (e, order + 1), nodes of each element edge
+    outline: Mask  # (e,), edges that bound a body
+    zones: list[Array]  # (c, 2) each, points in contact, moved; those of the largest force first
     scale: float
 
     def areas(self) -> Array:

@@ -37,24 +37,12 @@ SECTION_ANGLE = 6.0  # degrees between two sections of a body of revolution, at 
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Lagrange nodes of a triangle mesh, shared inside a body and never between bodies.
+    """Lagrange nodes of a triangle mesh, shared inside a body and never between bodies."""
 
-    Attributes
-    ----------
-    cells : ndarray of int (ne, n)
-        Nodes of each triangle in VTK's order, n = (order + 1) (order + 2) / 2 of them.
-    body : ndarray of int (ne,)
-        Position of the element's region in `names`.
-    names : tuple of str
-        The material regions.
-    at : ndarray (k,)
-        The same nodes as NGSolve mesh points, element after element: k = ne n.
-    """
-
-    cells: Index
-    body: Index
-    names: tuple[str, ...]
-    at: NDArray[Any]
+    cells: Index  # (ne, n) in VTK's order, n = (order + 1) (order + 2) / 2
+    body: Index  # (ne,), position of the element's region in `names`
+    names: tuple[str, ...]  # the material regions
+    at: NDArray[Any]  # (k,), the same nodes as mesh points, element after element: k = ne n
 
     def values(self, function: ng.CoefficientFunction) -> Array:
         """Nodal values (k, dim) at all k nodes: the mean over the triangles that meet there."""
