@@ -68,20 +68,23 @@ class Features:
     name: str  # and where
     axis: int  # of displacements, their component
     dim: int  # 1 on boundaries, 2 in bodies
-    places: Array  # (k, 2), lengths
-    widths: Array  # (k,), lengths
+    spots: Array  # (k, 3), places and widths, lengths
     jumps: Array  # (j, 3) of displacements: a place, and by how much; lengths
     samples: int  # at which it was looked at
     largest: float  # size of a value there
 
     @property
-    def spots(self) -> Array:
-        """Places and widths (k, 3), lengths."""
-        return np.column_stack([self.places, self.widths])
+    def places(self) -> Array:
+        """Where the features are, (k, 2), lengths."""
+        return self.spots[:, :2]
+
+    @property
+    def widths(self) -> Array:
+        """How wide they are, (k,), lengths."""
+        return self.spots[:, 2]
 
 
-Seen: TypeAlias = tuple[Array, Array, Array, int, float]  # the last five of these, of a part
-NOTHING: Seen = np.empty((0, 2)), np.empty(0), np.empty((0, 3)), 0, 0.0
+NONE = np.empty((0, 3))
 
 
 class Datum(NamedTuple):
@@ -136,8 +139,7 @@ def features_of(problem: Problem, mesh: ng.Mesh) -> list[Features]:
 
 def features_in(load: object) -> Array:
     """Places and widths (k, 3) that `look` found of a load, on all boundaries or in all bodies."""
-    found = FOUND.get(load, {}).values()
-    return np.concatenate([np.empty((0, 3)), *(one.spots for one in found)])
+    return np.concatenate([NONE, *(one.spots for one in FOUND.get(load, {}).values())])
 
 
 def _looked_at(problem: Problem, mesh: ng.Mesh, datum: Datum) -> Features:
@@ -152,15 +154,23 @@ def _looked_at(problem: Problem, mesh: ng.Mesh, datum: Datum) -> Features:
     parts: dict[str, list[int]] = defaultdict(list)  # regions of one name are one part
     for k in np.flatnonzero(np.array(region.Mask())).tolist():
         parts[names[k]].append(k)
-    seen = [NOTHING]
+    spots, jumps, samples, largest = [NONE], [NONE], 0, 0.0
     for some in parts.values():
         elements = np.flatnonzero(np.isin(number, some))
-        if elements.size:
-            in_part = _in_body if view.dim == 2 else _on_boundary
-            seen.append(in_part(kind, function, view, elements))
-    places, widths, jumps, samples, largest = zip(*seen, strict=True)
-    x, w, steps = (np.concatenate(some) for some in (places, widths, jumps))
-    return Features(*datum[:3], view.dim, x, w, steps, sum(samples), max(largest))
+        if not elements.size:
+            continue
+        if view.dim == 2:
+            found, values = _in_body(kind, function, view, elements)
+        else:
+            spacing = float(view.sizes[elements].sum() / ON_LINE)
+            chains = _chains(view, elements)
+            lines = [_Line(function, view, *chain, spacing) for chain in chains]
+            found, values = _on_lines(kind, lines)
+            jumps += [line.jumps() for line in lines if kind == "displacement"]
+        spots.append(found)
+        samples, largest = samples + len(values), max(largest, float(np.abs(values).max(initial=0)))
+    every = np.concatenate(spots), np.concatenate(jumps)
+    return Features(*datum[:3], view.dim, *every, samples, largest)
 
 
 def _values(function: Function, view: SampledElements, elements: Index, reference: Array) -> Array:
@@ -213,6 +223,18 @@ class _Line:
     view: SampledElements
     segments: Index
     turned: Mask
+    spacing: float  # of samples, a length
+
+    @cached_property
+    def t(self) -> Array:
+        """Lengths (n,) from the start to the samples."""
+        n = round(self.ends[-1] / self.spacing)
+        return self.ends[-1] * lattice(1, max(n, len(self.segments), WINDOWS[0]))[:, 0]
+
+    @cached_property
+    def sampled(self) -> Array:
+        """Values (n, c) at the samples."""
+        return self.values(self.t)
 
     @cached_property
     def ends(self) -> Array:
@@ -234,47 +256,38 @@ class _Line:
         """Points (n, 2) at the lengths `t` (n,)."""
         return self.view.positions(*self._at(t))
 
-    def jumps(self, t: Array, known: Array) -> Array:
-        """Places and sizes (j, 3) of jumps of a scalar, `known` (n,) at `t` (n,), at ends, too."""
-        t = np.concatenate([[0.0], t, self.ends[-1:]])
+    def jumps(self) -> Array:
+        """Places and sizes (j, 3) of jumps of a scalar between its samples, at ends, too."""
+        t = np.concatenate([[0.0], self.t, self.ends[-1:]])
         first, last = self.values(t[[0, -1]])
-        at, size = steps_along(
-            lambda t: self.values(t)[:, 0], t, np.concatenate([first, known, last])
-        )
+        known = np.concatenate([first, self.sampled[:, 0], last])
+        at, size = steps_along(lambda t: self.values(t)[:, 0], t, known)
         return np.column_stack([self.places(at), size])
 
 
-def _on_boundary(kind: str, function: Function, view: SampledElements, segments: Index) -> Seen:
-    lines = [_Line(function, view, at, turned) for at, turned in _chains(view, segments)]
-    whole = view.sizes[segments].sum()
-    looked = []
+def _on_lines(kind: str, lines: list[_Line]) -> tuple[Array, Array]:
+    """Features (k, 3) of a function along all `lines` of a boundary, and all its samples (n, c)."""
+    sampled = np.concatenate([line.sampled for line in lines])
+    _, limit = _told(kind, sampled)
+    found = [NONE]
     for line in lines:
-        n = round(ON_LINE * line.ends[-1] / whole)
-        t = line.ends[-1] * lattice(1, max(n, len(line.segments), WINDOWS[0]))[:, 0]
-        looked.append((line, t, line.values(t)))
-    sampled = np.concatenate([values for *_, values in looked])
-    largest, (_, limit) = float(np.abs(sampled).max()), _told(kind, sampled)
-    found = [NOTHING[:3]]
-    for line, t, values in looked:
-        for component in np.hstack([values, -values]).T:
-            runs = _runs(departure := _departures(component, limit))
+        for component in np.hstack([line.sampled, -line.sampled]).T:
+            departure = _departures(component, limit)
+            changes = np.diff(np.concatenate([[0], (departure > 0).astype(int), [0]]))
+            runs = np.flatnonzero(changes).reshape(-1, 2).tolist()
             if len(runs) <= FEATURES:  # else no features but roughness, which the estimate tells
-                seen = [_feature(line, t, departure, a, b, whole / ON_LINE) for a, b in runs]
+                seen = [_feature(line, departure, first, last) for first, last in runs]
                 at, widths = np.reshape(seen, (-1, 2)).T
-                found.append((line.places(at), widths, NOTHING[2]))
-        if kind == "displacement":
-            found.append((*NOTHING[:2], line.jumps(t, values[:, 0])))
-    places, widths, jumps = map(np.concatenate, zip(*found, strict=True))
-    return places, widths, jumps, len(sampled), largest
+                found.append(np.column_stack([line.places(at), widths]))
+    return np.concatenate(found), sampled
 
 
-def _feature(
-    line: _Line, t: Array, departure: Array, first: int, last: int, spacing: float
-) -> tuple[float, float]:
+def _feature(line: _Line, departure: Array, first: int, last: int) -> tuple[float, float]:
     """Length along a line to the middle of a feature, and its width.
 
-    From `first` to before `last` the samples at `t` (n,) depart from what is around them.
+    From `first` to before `last` the samples (n,) depart from what is around them.
     """
+    t = line.t
     low = t[first - 1] if first else 0.0
     high = t[last] if last < len(t) else line.ends[-1]
     fine, away = t[first:last], departure[first:last]
@@ -287,13 +300,7 @@ def _feature(
     most = away > away.max() / 2
     width = np.count_nonzero(most) / len(most) * (high - low)
     middle = np.median(fine[most]) if most.any() else (low + high) / 2
-    return float(middle), max(width, NARROWEST * spacing)
-
-
-def _runs(departure: Array) -> list[list[int]]:
-    """Where each run of departures (n,) begins, and where the rest begins again."""
-    changes = np.diff(np.concatenate([[0], (departure > 0).astype(int), [0]]))
-    return np.flatnonzero(changes).reshape(-1, 2).tolist()
+    return float(middle), max(width, NARROWEST * line.spacing)
 
 
 def _departures(values: Array, limit: float) -> Array:
@@ -335,7 +342,10 @@ def _chains(view: SampledElements, segments: Index) -> list[tuple[Index, Mask]]:
     return chains
 
 
-def _in_body(kind: str, function: Function, view: SampledElements, elements: Index) -> Seen:
+def _in_body(
+    kind: str, function: Function, view: SampledElements, elements: Index
+) -> tuple[Array, Array]:
+    """Features (k, 3) of a function in a body, and all its samples (n, c)."""
     corners = view.arrays.corners[elements]
     spacing = IN_BODY * float(np.ptp(corners.reshape(-1, 2), axis=0).max())
     c, s = np.cos([TURN, TURN + np.pi / 3]), np.sin([TURN, TURN + np.pi / 3])
@@ -374,8 +384,7 @@ def _in_body(kind: str, function: Function, view: SampledElements, elements: Ind
             around = [uniform_filter(x, 2 * window + 1, mode="constant") for x in (now, then)]
             flagged[part] |= (now > limit) & (around[1] < SATURATED * around[0])
     x = (np.argwhere(flagged) + origin) @ sides
-    widths = _widths(kind, function, view.mesh, x, spacing)
-    return x, widths, NOTHING[2], len(values), float(np.abs(values).max(initial=0.0))
+    return np.column_stack([x, _widths(kind, function, view.mesh, x, spacing)]), values
 
 
 def _nodes_in(corners: Array) -> tuple[Index, Index, Index]:

@@ -24,7 +24,7 @@ from .cells import (
     refined,
     rule_with_corners,
 )
-from .features import features_in, features_of, towards, where_features_are
+from .features import NONE, features_in, features_of, towards, where_features_are
 from .sampling import SampledElements, divisions, missed_by_polynomials
 
 SHAPE = 0.05  # what polynomials miss of a load at a point, relative to its largest value ...
@@ -35,7 +35,6 @@ CURVED = 4  # quadrature orders for the maps of curved elements
 FINE = {1: 1e-6, 2: 3e-5}  # error of a part relative to that integral at which it is not halved
 KEPT = "_ngcontact_loads"  # attribute of a mesh: loads are assembled, then the estimate asks again
 LOST = 1e-3  # of a load that quadrature may miss without a word
-NO_FEATURES = np.empty((0, 3))
 
 FEWEST = 8  # points on a segment at least, which show any interpolation error
 RESOLVED = 0.1  # what polynomials miss of values, relative to what the mesh does: they are rough
@@ -106,7 +105,7 @@ def rough_load(
     region: ng.Region,
     degree: int,
     known: RoughLoad | None = None,
-    features: Array = NO_FEATURES,
+    features: Array = NONE,
 ) -> RoughLoad | None:
     """A load on a region, bodies or boundaries, where it is rough; None where it is nowhere.
 
