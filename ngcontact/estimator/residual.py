@@ -223,10 +223,9 @@ def _displacement(
     rough = rough_segments([*data.values()], mesh, segments, solution.strain * np.abs(w).max())
     if rough.any():
         found = pieces(miss, mesh, boundary.lengths(segments), np.flatnonzero(rough))
-        number, start, length = (
-            np.concatenate([x[~rough], y])
-            for x, y in zip((number, start, length), found, strict=True)
-        )
+        number = np.concatenate([number[~rough], found.element])
+        start = np.concatenate([start[~rough], found.origin[:, 0]])
+        length = np.concatenate([length[~rough], found.side[:, 0, 0]])
         w = miss(number, start[:, None] + length[:, None] * points)
     s = start[:, None] + length[:, None] * points
     every = np.repeat(segments[number], len(points))

@@ -162,10 +162,10 @@ class CadEdge:
         across = np.column_stack([-normals[:, 1], normals[:, 0]])
         return self.level(across, (points * across).sum(axis=1), points)
 
-    def samples(self, count: int = SAMPLES) -> tuple[Array, Array, Array]:
-        """Parameters (n,), points (n, 2) and derivatives (n, 2) along the edge, n = `count`."""
-        t = np.linspace(self.start, self.stop, count)
-        return t, self.point(t), self.derivative(t)
+    @property
+    def samples(self) -> Array:
+        """Points (n, 2) along the edge."""
+        return self._x
 
 
 @lru_cache(maxsize=1)  # for all meshes of one adaptive run
@@ -198,6 +198,6 @@ def same_geometry(one: OCCGeometry | ng.Mesh, other: OCCGeometry | ng.Mesh) -> b
     edges, others = _edges(one), _edges(other)
     if names[0] != names[1] or [edge.name for edge in edges] != [edge.name for edge in others]:
         return False
-    points, other_points = (np.array([e.samples()[1] for e in each]) for each in (edges, others))
+    points, other_points = (np.array([edge.samples for edge in each]) for each in (edges, others))
     size = np.ptp(points.reshape(-1, 2), axis=0).max()
     return bool(np.abs(points - other_points).max() <= MISSED * size)

@@ -107,7 +107,8 @@ class Edge:
         inside = nodes[(nodes > APART) & (nodes < 1 - APART)]
         inside = inside[np.diff(inside, prepend=-1.0) > APART]
         result = inside.tolist()
-        t, x, _ = self.curve.samples(FINE)
+        t = np.linspace(start, stop, FINE)
+        x = self.curve.point(t)
         arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
         grid = (t - start) / (stop - start)
         for low, high in pairwise([0.0, *inside.tolist(), 1.0]):
@@ -177,8 +178,7 @@ def _opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple
     else:
         dx, dy = contact.direction
         across = np.array([-dy, dx])
-        _, samples, _ = other.samples()
-        near = _nearest_crossing(samples, x, across, np.array([dx, dy]))
+        near = _nearest_crossing(other.samples, x, across, np.array([dx, dy]))
         t = other.level(across, x @ across, near)  # (2.10): A_j and B_j at the same C_j
     return t, other.point(np.where(np.isnan(t), other.start, t))
 
@@ -195,8 +195,7 @@ def _behind(contact: Contact, x: Array, y: Array, edges: list[Edge]) -> NDArray[
     across, along = np.array([-dy, dx]), np.array([dx, dy])
     distance = np.abs((y - x) @ along)
     for edge in edges:
-        _, samples, _ = edge.curve.samples()
-        nearest = _nearest_crossing(samples, y, across, along)
+        nearest = _nearest_crossing(edge.curve.samples, y, across, along)
         close = NEARER * edge.curve.size
         met = np.abs((nearest - y) @ across) <= close
         behind |= met & (np.abs((y - nearest) @ along) < distance - close)
@@ -221,7 +220,7 @@ def _divide(
 
     `beside` and `facing` are all edges of the secondary and of the primary, these two included.
     """
-    t, _, _ = secondary.curve.samples(FINE)
+    t = np.linspace(secondary.curve.start, secondary.curve.stop, FINE)
     ends = _ends_between(contact, secondary.curve, primary.curve)
     apart = np.abs(t[:, None] - ends).min(axis=1, initial=np.inf)
     t = np.sort(np.concatenate([t[apart > (t[1] - t[0]) / 2], ends]))

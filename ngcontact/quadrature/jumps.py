@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import ngsolve as ng
@@ -22,41 +23,6 @@ STEADY = 1e-9  # change across a part, relative to the largest value, that is no
 HALVINGS = 24  # of the distance between two points: what still changes across 1e-7 of it jumps
 
 
-def _limits(values: Array) -> Array:
-    """A share of the least mean diagonal (k,) of matrices `values` (k, n, q q)."""
-    step = round(values.shape[2] ** 0.5) + 1
-    return CHANGE * values[..., ::step].mean(axis=2).min(axis=1)
-
-
-def _rough(
-    C: ng.CoefficientFunction, view: SampledElements, elements: Index
-) -> Iterator[tuple[Index, Array]]:
-    """Those (k,) of `elements` (j,) in which a law changes by more, and its values (k, n, q q)."""
-    for here, values in view.samples(C, elements):
-        k = np.flatnonzero(np.ptp(values, axis=1).max(axis=1) > _limits(values))
-        if len(k):
-            yield here[k], values[k]
-
-
-def _varying(
-    problem: Problem, mesh: ng.Mesh
-) -> Iterator[tuple[str, tuple[ng.CoefficientFunction, SampledElements, Index]]]:
-    """Of each law that is a function its pattern, the law, and triangles (k,) with it."""
-    view = SampledElements(mesh, 2)
-    for pattern, law in problem.materials.items():
-        if varies(law):
-            yield pattern, (law.voigt(problem.model), view, view.inside(mesh.Materials(pattern)))
-
-
-def rough_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
-    """Elements (ne,) in which the law varies by more than half of itself, or jumps."""
-    rough = np.zeros(mesh.ne, dtype=bool)
-    for _, law in _varying(problem, mesh):
-        for elements, _ in _rough(*law):
-            rough[elements] = True
-    return rough
-
-
 class Jumps(NamedTuple):
     """Where a law jumps, at most one place in each element."""
 
@@ -66,27 +32,66 @@ class Jumps(NamedTuple):
     most: Array  # (k,), and on the other
 
 
-def _jumps(C: ng.CoefficientFunction, view: SampledElements, elements: Index) -> Jumps:
-    """Where a law jumps.
+@dataclass(frozen=True, eq=False)
+class VaryingLaw:
+    """A law C (q, q) that is a function, and the triangles that it is the law of."""
 
-    From the points of a lattice at which a component is least and largest, the half of their
-    distance across which it changes more is kept, again and again: a smooth change shrinks by that.
-    """
-    found = [Jumps(np.empty(0, np.intp), np.empty((0, 2)), np.empty(0), np.empty(0))]
-    for at, values in _rough(C, view, elements):
-        which, row = np.ptp(values, axis=1).argmax(axis=1), np.arange(len(at))
-        of = values[row, :, which]  # the component (k, n) that changes most
-        ends = np.column_stack([of.argmin(axis=1), of.argmax(axis=1)])
-        x, u = lattice(2, round(of.shape[1] ** 0.5))[ends], of[row[:, None], ends]
-        for _ in range(HALVINGS):
-            middle = x.mean(axis=1)
-            v = view.look(C, at, middle[:, None])[row, 0, which]
-            side = (np.abs(v - u[:, 0]) > np.abs(v - u[:, 1])).astype(int)  # which end to move
-            x[row, side], u[row, side] = middle, v
-        kept = np.abs(u[:, 1] - u[:, 0]) > _limits(values)
-        place = view.positions(at[kept], x[kept, 0])
-        found.append(Jumps(at[kept], place, u[kept].min(axis=1), u[kept].max(axis=1)))
-    return Jumps(*map(np.concatenate, zip(*found, strict=True)))
+    pattern: str
+    C: ng.CoefficientFunction
+    view: SampledElements
+    elements: Index  # (j,)
+
+    def rough(self) -> Iterator[tuple[Index, Array]]:
+        """Elements (k,) in which it changes by more than a share of itself, values (k, n, q q)."""
+        for here, values in self.view.samples(self.C, self.elements):
+            k = np.flatnonzero(np.ptp(values, axis=1).max(axis=1) > self._limits(values))
+            if len(k):
+                yield here[k], values[k]
+
+    def _limits(self, values: Array) -> Array:
+        diagonal = values[..., :: self.C.dims[0] + 1]
+        return CHANGE * diagonal.mean(axis=2).min(axis=1)
+
+    def jumps(self) -> Jumps:
+        """Where it jumps.
+
+        From the points of a lattice at which a component is least and largest, the half of their
+        distance across which it changes more is kept, again and again: a smooth change shrinks by
+        that.
+        """
+        found = [Jumps(np.empty(0, np.intp), np.empty((0, 2)), np.empty(0), np.empty(0))]
+        for at, values in self.rough():
+            which, row = np.ptp(values, axis=1).argmax(axis=1), np.arange(len(at))
+            of = values[row, :, which]  # the component (k, n) that changes most
+            ends = np.column_stack([of.argmin(axis=1), of.argmax(axis=1)])
+            x, u = lattice(2, round(of.shape[1] ** 0.5))[ends], of[row[:, None], ends]
+            for _ in range(HALVINGS):
+                middle = x.mean(axis=1)
+                v = self.view.look(self.C, at, middle[:, None])[row, 0, which]
+                side = (np.abs(v - u[:, 0]) > np.abs(v - u[:, 1])).astype(int)  # which end to move
+                x[row, side], u[row, side] = middle, v
+            kept = np.abs(u[:, 1] - u[:, 0]) > self._limits(values)
+            place = self.view.positions(at[kept], x[kept, 0])
+            found.append(Jumps(at[kept], place, u[kept].min(axis=1), u[kept].max(axis=1)))
+        return Jumps(*map(np.concatenate, zip(*found, strict=True)))
+
+
+def _varying(problem: Problem, mesh: ng.Mesh) -> Iterator[VaryingLaw]:
+    """All laws that are functions."""
+    view = SampledElements(mesh, 2)
+    for pattern, law in problem.materials.items():
+        if varies(law):
+            inside = view.inside(mesh.Materials(pattern))
+            yield VaryingLaw(pattern, law.voigt(problem.model), view, inside)
+
+
+def rough_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
+    """Elements (ne,) in which the law varies by more than half of itself, or jumps."""
+    rough = np.zeros(mesh.ne, dtype=bool)
+    for law in _varying(problem, mesh):
+        for elements, _ in law.rough():
+            rough[elements] = True
+    return rough
 
 
 def jumping_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
@@ -96,20 +101,20 @@ def jumping_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
     """
     triangles = MeshArrays(mesh).elements
     touched = np.zeros(mesh.nv, dtype=bool)
-    for _, law in _varying(problem, mesh):
-        touched[triangles[_jumps(*law).element]] = True
+    for law in _varying(problem, mesh):
+        touched[triangles[law.jumps().element]] = True
     return np.asarray(touched[triangles].any(axis=1))
 
 
 def warn_of_jumps(problem: Problem, mesh: ng.Mesh) -> None:
     """Warn of every law that jumps inside elements, where it jumps most."""
-    for pattern, law in _varying(problem, mesh):
-        found = _jumps(*law)
+    for law in _varying(problem, mesh):
+        found = law.jumps()
         if len(found.element):
             k = int(np.argmax(found.most - found.least))
             x, y = found.place[k]
             warn(
-                f'materials "{pattern}" jump inside {len(found.element)} elements, most near '
+                f'materials "{law.pattern}" jump inside {len(found.element)} elements, most near '
                 f"({x:.4g}, {y:.4g}): a stiffness from {found.least[k]:.3g} to "
                 f"{found.most[k]:.3g}. No order converges fast there; make the line an edge of the "
                 "geometry, with a body of its own on either side"

@@ -260,13 +260,10 @@ def rough_segments(
     return np.asarray(left[segments] > max(RESOLVED * missed, NOISE * largest))
 
 
-def pieces(
-    miss: Callable[[Index, Array], Array], mesh: ng.Mesh, sizes: Array, at: Index
-) -> tuple[Index, Array, Array]:
+def pieces(miss: Callable[[Index, Array], Array], mesh: ng.Mesh, sizes: Array, at: Index) -> Cells:
     """Pieces of segments `at` (k,) on which Gauss points tell the squares of what is missed.
 
-    Segment (n,), start (n,) and length (n,) of each, the latter in [0, 1]. `miss` has values
-    (k, m, c) at parameters (k, m) of segments (k,), whose lengths are `sizes` (q,).
+    `miss` has values (k, m, c) at parameters (k, m) of segments (k,) of lengths `sizes` (q,).
     """
 
     def squares(segment: Index, s: Array) -> Array:
@@ -274,5 +271,4 @@ def pieces(
 
     n = max(FEWEST, int(divisions(1, sizes[at], MeshArrays(mesh).extent).max()))
     cells = Cells.whole(1, at).divided(n)
-    cells = refined(squares, cells, MOMENTS, FOLLOWED).cells
-    return cells.element, cells.origin[:, 0], cells.side[:, 0, 0]
+    return refined(squares, cells, MOMENTS, FOLLOWED).cells
