@@ -42,7 +42,7 @@ class VaryingLaw:
     elements: Index  # (j,)
 
     def rough(self) -> Iterator[tuple[Index, Array]]:
-        """Elements (k,) in which it changes by more than a share of itself, values (k, n, q q)."""
+        """Elements (k,) in which it changes by a share of itself, and values (k, n, c), c = q q."""
         for here, values in self.view.samples(self.C, self.elements):
             k = np.flatnonzero(np.ptp(values, axis=1).max(axis=1) > self._limits(values))
             if len(k):
