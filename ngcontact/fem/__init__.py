@@ -10,7 +10,6 @@ from .boundary import unknowns as unknowns
 from .boundary import unknowns_of as unknowns_of
 from .model import MODELS as MODELS
 from .model import Model as Model
-from .model import model_of as model_of
 from .moduli import NEARLY_INCOMPRESSIBLE as NEARLY_INCOMPRESSIBLE
 from .moduli import bulk_moduli as bulk_moduli
 from .moduli import incompressibilities as incompressibilities
@@ -29,6 +28,7 @@ from .space import connected_bodies as connected_bodies
 from .space import energy_norm as energy_norm
 from .space import has_rough_loads as has_rough_loads
 from .space import load_vector as load_vector
+from .space import model_of as model_of
 from .space import narrow_forces as narrow_forces
 from .space import normal_stress_of as normal_stress_of
 from .space import potential_energy as potential_energy

@@ -13,7 +13,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..problem import ON_AXIS, Elastic, Hooke, MeshArrays, Problem, on_axis
+from ..problem import ON_AXIS, Elastic, Hooke, MeshArrays, on_axis
 
 CF: TypeAlias = ng.CoefficientFunction
 Laws: TypeAlias = Mapping[str, Elastic | Hooke]
@@ -185,8 +185,3 @@ MODELS: dict[str, Model] = {
     "plane stress": _PlaneStress(),
     "axisymmetric": _Axisymmetric(),
 }
-
-
-def model_of(problem: Problem) -> Model:
-    """The model of a problem."""
-    return MODELS[problem.model]

@@ -15,7 +15,7 @@ from ..linalg import shared
 from ..problem import MeshArrays, Problem, varies
 from ..quadrature import loads_of, rough_moduli
 from .boundary import BoundaryTrace, node_basis, vector_space
-from .model import model_of
+from .model import MODELS, Model
 from .moduli import constant_measures, law_measures
 
 LOAD_BONUS = 6  # quadrature orders above the default: loads may be as rough as r^(-1/2)
@@ -56,6 +56,11 @@ class Space:
         """Force per displacement of the nodes, (n,), by its order of magnitude."""
         diagonal = self.basis.power(2).T @ self.diagonal
         return diagonal.reshape(2, -1).max(axis=0)
+
+
+def model_of(problem: Problem) -> Model:
+    """The model of a problem."""
+    return MODELS[problem.model]
 
 
 def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:

@@ -23,8 +23,8 @@ FINER = 2  # ... and that many times more on a bounded zone: contact may end any
 FARTHEST = 5e8  # from the origin
 SMALLEST = 1e-6  # extent
 
-SHARED = threading.Lock()
-KEPT = "_ngcontact_parents"  # attribute of a mesh: it lives as long as the mesh
+MESHING = threading.Lock()
+PARENTS = "_ngcontact_parents"  # attribute of a mesh: it lives as long as the mesh
 # OCC's projections know absolute lengths: points within 1e-7 of the end of an arc go to that end,
 # on other curves 1e-10 over the speed counts as met. On edges of extent SMALL_EDGE that changes no
 # more than 1e-8 of it as long as elements keep their shape.
@@ -39,7 +39,7 @@ def vertex_parents(mesh: ng.Mesh) -> Integers:
 
     Both have lower numbers than the vertex itself.
     """
-    kept: Integers = getattr(mesh, KEPT, np.zeros((0, 2), dtype=np.int32))
+    kept: Integers = getattr(mesh, PARENTS, np.zeros((0, 2), dtype=np.int32))
     known = len(kept)
     if known > mesh.nv:  # another mesh has been loaded into this one
         known, kept = 0, kept[:0]
@@ -60,7 +60,7 @@ def copied(mesh: ng.Mesh) -> ng.Mesh:
 
 def keep_parents(mesh: ng.Mesh, parents: Integers) -> None:
     """Let `vertex_parents` of a mesh that forgot them be `parents` (nv, 2)."""
-    setattr(mesh, KEPT, parents)
+    setattr(mesh, PARENTS, parents)
 
 
 def _require_complete(mesh: ng.Mesh, problem: Problem) -> None:
@@ -135,7 +135,7 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
     maxh = float(maxh)
     if not (np.isfinite(maxh) and maxh > 0):
         raise ValueError(f"maxh={maxh} must be positive and finite, like {extent / COARSE:g}")
-    with SHARED:  # sizes and divisions are told to Netgen on the shape, which others may mesh, too
+    with MESHING:  # sizes and divisions are told to Netgen on the shape, which others may mesh, too
         edges = divided(problem, shape, maxh, maxh / finer)
         mesh = _generated(shape, edges, maxh)
     _require_complete(mesh, problem)

@@ -184,12 +184,11 @@ KNOWN: WeakKeyDictionary[ng.CoefficientFunction, bool] = WeakKeyDictionary()  # 
 # Lines of what NGSolve prints of numbers, in vectors, times others and times the normal.
 _NUMBER = r"(?:[-+.\de]+|-?inf|nan)"
 _LEAF = re.compile(rf"\s*coef ({_NUMBER}), real")
-_AROUND = re.compile(
-    r"\s*coef (unary operation ' '|VectorialCoefficientFunction), real(, dim=\d+)?"
-)
-_TIMES = re.compile(
-    rf"\s*({_NUMBER}\*\()?(coef (scale {_NUMBER}|scalar-vector multiply|normal vector|{_NUMBER}), "
-    r"real(, dim=\d+)?)?\s*\)?\s*"
+_VECTOR = r"unary operation ' '|VectorialCoefficientFunction"
+_AROUND = re.compile(rf"\s*coef ({_VECTOR}), real(, dim=\d+)?")
+_TIMES = rf"(scale )?{_NUMBER}|scalar-vector multiply|normal vector"
+_OF_NUMBERS = re.compile(
+    rf"\s*({_NUMBER}\*\()?(coef ({_VECTOR}|{_TIMES}), real(, dim=\d+)?)?\s*\)?\s*"
 )
 
 
@@ -204,8 +203,7 @@ def _lines(value: ng.CoefficientFunction) -> list[str]:
 def numbers(data: ng.CoefficientFunction) -> bool:
     """Whether data are made of numbers alone, perhaps times the normal. Looked at once."""
     if data not in KNOWN:  # printing a long expression costs as much as evaluating it
-        parts = (_LEAF, _AROUND, _TIMES)
-        KNOWN[data] = all(any(part.fullmatch(line) for part in parts) for line in _lines(data))
+        KNOWN[data] = all(map(_OF_NUMBERS.fullmatch, _lines(data)))
     return KNOWN[data]
 
 

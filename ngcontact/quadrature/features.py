@@ -1,4 +1,4 @@
-"""Narrow features of data: places where functions depart from what is around them.
+"""Narrow features of data, where functions depart from what is around them, and jumps on lines.
 
 Every function is looked at once per run, at samples that no mesh decides: a strip of a thousandth
 of a boundary holds one, and so does a box of 6e-3 of a body's extent. The opening of a function,
@@ -26,7 +26,6 @@ from ..arrays import Array, Index, Mask
 from ..errors import warn
 from ..problem import Problem, numbers, varies
 from .cells import Cells, lattice
-from .jumps import steps_along
 from .sampling import SampledElements, looked
 
 ON_LINE = 2048  # samples of a boundary: none are further apart than 1 / 1365 of it
@@ -51,6 +50,12 @@ ACROSS = 16  # features of a body of which widths are measured ...
 WIDE = 8.0  # ... up to so many samples on either side ...
 CHORD = 20  # ... by so many points: to a quarter
 NARROWEST = 0.1  # samples: no feature is taken for narrower
+QUARTERS = np.linspace(0, 1, 5)
+QUARTERINGS = 18  # in which a part is quartered: what still changes across 1e-11 of it jumps
+KEPT_CHANGE = (
+    0.9  # share of a change that the last half of the steps leave of a jump; of x^(1/10), 0.3
+)
+STEADY_CHANGE = 1e-9  # change across a part, relative to the largest value, that is not looked into
 # Size of an element over the width of a feature in it, up to which it is resolved. Loads are
 # integrated on parts of elements, but stresses in equilibrium meet body forces on so many of them.
 RESOLVED = {"displacement": 2.0, "gap": 2.0, "materials": 2.0}
@@ -477,6 +482,43 @@ def where_features_are(
     distance = np.linalg.norm(x[:, None] - features[:, :2], axis=2)
     k, feature = np.nonzero(distance <= 0.5 * size[:, None] + features[:, 2])
     return elements[k], feature
+
+
+def steps_along(values: Callable[[Array], Array], t: Array, known: Array) -> tuple[Array, Array]:
+    """Where a function jumps along a line (j,), and by how much (j,).
+
+    Looked into are parts whose slope is not between those of their neighbours, as where a smooth
+    function does not bend from one side to the other. Of their quarters the one is kept whose
+    change differs most from that of the others, again and again: a smooth change shrinks by that,
+    that of a jump does not. `values` are (k,) at any lengths (k,), `known` (n,) those at `t` (n,),
+    at least four, ascending.
+    """
+    size, change, noise = np.diff(t), np.diff(known), STEADY_CHANGE * float(np.abs(known).max())
+    part = np.flatnonzero(_odd(change / size, noise / float(np.median(size))))
+    low, high, every = t[part], t[part + 1], np.arange(len(part))
+    change = before = np.abs(change[part])
+    for number in range(QUARTERINGS if len(part) else 0):
+        places = low[:, None] * (1 - QUARTERS) + high[:, None] * QUARTERS  # exact at both ends
+        steps = np.diff(values(places.ravel()).reshape(places.shape), axis=1)
+        odd = np.abs(steps - np.median(steps, axis=1, keepdims=True)).argmax(axis=1)
+        low, high = places[every, odd], places[every, odd + 1]
+        change = np.abs(steps[every, odd])
+        if number == QUARTERINGS // 2:
+            before = change
+    jumps = (change >= KEPT_CHANGE * before) & (change > noise)
+    return low[jumps], change[jumps]
+
+
+def _odd(slope: Array, noise: float) -> Mask:
+    """Which slopes (n,) are not between those of their neighbours, by more than `noise`.
+
+    At ends not between that of the neighbour and one that goes on as the next two do, twice as far.
+    """
+    left = np.append(slope[1], slope[:-1])
+    right = np.append(slope[1:], 3 * slope[-2] - 2 * slope[-3])
+    right[0], left[0] = slope[1], 3 * slope[1] - 2 * slope[2]
+    low, high = np.minimum(left, right), np.maximum(left, right)
+    return np.asarray((slope < low - noise) | (slope > high + noise))
 
 
 @dataclass(frozen=True, eq=False)

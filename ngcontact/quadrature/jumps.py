@@ -1,8 +1,8 @@
-"""Moduli that change or jump inside elements, and jumps of functions along lines."""
+"""Moduli that change or jump inside elements."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,10 +16,6 @@ from .cells import lattice
 from .sampling import SampledElements
 
 CHANGE = 0.5  # of a law in an element over its least value, from which it is rough there, or jumps
-QUARTERS = np.linspace(0, 1, 5)
-STEPS = 18  # in which a part is quartered: what still changes across 1e-11 of it jumps
-KEPT = 0.9  # share of a change that the last half of the steps leave of a jump; of x^(1/10), 0.3
-STEADY = 1e-9  # change across a part, relative to the largest value, that is not looked into
 HALVINGS = 24  # of the distance between two points: what still changes across 1e-7 of it jumps
 
 
@@ -119,40 +115,3 @@ def warn_of_jumps(problem: Problem, mesh: ng.Mesh) -> None:
                 f"{found.most[k]:.3g}. No order converges fast there; make the line an edge of the "
                 "geometry, with a body of its own on either side"
             )
-
-
-def steps_along(values: Callable[[Array], Array], t: Array, known: Array) -> tuple[Array, Array]:
-    """Where a function jumps along a line (j,), and by how much (j,).
-
-    Looked into are parts whose slope is not between those of their neighbours, as where a smooth
-    function does not bend from one side to the other. Of their quarters the one is kept whose
-    change differs most from that of the others, again and again: a smooth change shrinks by that,
-    that of a jump does not. `values` are (k,) at any lengths (k,), `known` (n,) those at `t` (n,),
-    at least four, ascending.
-    """
-    size, change, noise = np.diff(t), np.diff(known), STEADY * float(np.abs(known).max())
-    part = np.flatnonzero(_odd(change / size, noise / float(np.median(size))))
-    low, high, every = t[part], t[part + 1], np.arange(len(part))
-    change = before = np.abs(change[part])
-    for number in range(STEPS if len(part) else 0):
-        places = low[:, None] * (1 - QUARTERS) + high[:, None] * QUARTERS  # exact at both ends
-        steps = np.diff(values(places.ravel()).reshape(places.shape), axis=1)
-        odd = np.abs(steps - np.median(steps, axis=1, keepdims=True)).argmax(axis=1)
-        low, high = places[every, odd], places[every, odd + 1]
-        change = np.abs(steps[every, odd])
-        if number == STEPS // 2:
-            before = change
-    jumps = (change >= KEPT * before) & (change > noise)
-    return low[jumps], change[jumps]
-
-
-def _odd(slope: Array, noise: float) -> Mask:
-    """Which slopes (n,) are not between those of their neighbours, by more than `noise`.
-
-    At ends not between that of the neighbour and one that goes on as the next two do, twice as far.
-    """
-    left = np.append(slope[1], slope[:-1])
-    right = np.append(slope[1:], 3 * slope[-2] - 2 * slope[-3])
-    right[0], left[0] = slope[1], 3 * slope[1] - 2 * slope[2]
-    low, high = np.minimum(left, right), np.maximum(left, right)
-    return np.asarray((slope < low - noise) | (slope > high + noise))

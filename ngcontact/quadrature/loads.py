@@ -33,7 +33,9 @@ STEP = 2  # times what values vary at the points: no others are further apart in
 COARSE = 4  # elements in the width of a feature, from which it is looked at as all else is
 CURVED = 4  # quadrature orders for the maps of curved elements
 FINE = {1: 1e-6, 2: 3e-5}  # error of a part relative to that integral at which it is not halved
-KEPT = "_ngcontact_loads"  # attribute of a mesh: loads are assembled, then the estimate asks again
+ROUGH_LOADS = (
+    "_ngcontact_loads"  # attribute of a mesh: loads are assembled, then the estimate asks again
+)
 LOST = 1e-3  # of a load that quadrature may miss without a word
 
 FEWEST = 8  # points on a segment at least, which show any interpolation error
@@ -73,7 +75,7 @@ class Load:
         if numbers(self.data):
             return None
         mesh, degree = self.region.mesh, max(order, 2) + 1  # displacements' times a radius
-        kept = getattr(mesh, KEPT, {})
+        kept = getattr(mesh, ROUGH_LOADS, {})
         key, what = (self.kind, self.name, degree), (self.data, mesh.GetNE(self.region.VB()))
         known = kept.get(key)
         if known is not None and known[0] != what:
@@ -85,7 +87,7 @@ class Load:
                 what,
                 rough_load(self.density, self.region, degree, before, features),
             )
-            setattr(mesh, KEPT, kept)
+            setattr(mesh, ROUGH_LOADS, kept)
         found: RoughLoad | None = known[1]
         return found
 

@@ -11,7 +11,7 @@ from netgen.occ import Box, Compound, Glue, OCCGeometry, Pnt, WorkPlane, X, Y
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.geometries import blocks
-from ngcontact.problem import MeshArrays
+from ngcontact.problem import MeshArrays, numbers
 from ngcontact.problem.contact import Contact
 from ngcontact.problem.material import Elastic, Hooke
 from ngcontact.problem.problem import Problem
@@ -280,3 +280,17 @@ def test_data_cannot_be_changed_in_place(argument):
     assert dict(data) == before
     assert type(data | {}) is dict  # and what is made of it is the caller's
     assert copy.deepcopy(data).keys() == before.keys()
+
+
+NORMAL = ng.specialcf.normal(2)
+OF_NUMBERS = [
+    *(ng.CF(1.5), ng.CF(-1e30), ng.CF(0), ng.CF((0, 0)), ng.CF((1, -2e-9)), 2 * ng.CF((0, 1))),
+    *(NORMAL, -3 * NORMAL, ng.CF(2.0) * NORMAL, ng.CF((1.0, 2.0))[0]),
+]
+FUNCTIONS = [ng.x, ng.CF((1, ng.x)), ng.Parameter(2.0), ng.Parameter(2.0) * NORMAL, ng.exp(-ng.y)]
+
+
+def test_data_of_numbers_alone_are_told_from_functions():
+    """The former are nowhere looked at; taking a function for numbers would miss what it does."""
+    assert all(map(numbers, OF_NUMBERS))
+    assert not any(map(numbers, FUNCTIONS))

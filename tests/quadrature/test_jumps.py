@@ -11,7 +11,7 @@ from ngcontact import ContactWarning, Elastic, Hooke, Problem, adapt
 from ngcontact.mesh import first_mesh
 from ngcontact.quadrature import warn_of_jumps
 from ngcontact.quadrature.cells import lattice
-from ngcontact.quadrature.jumps import steps_along
+from ngcontact.quadrature.features import steps_along
 from tests.quadrature.test_loads import square
 
 BODIES = ("upper", "lower")
