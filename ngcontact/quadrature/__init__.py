@@ -1,7 +1,6 @@
 """Quadrature that follows the data: where functions are rough, and rules that resolve them."""
 
 from .cells import composite as composite
-from .cells import mesh_points as mesh_points
 from .features import Unresolved as Unresolved
 from .features import features_of as features_of
 from .features import look as look

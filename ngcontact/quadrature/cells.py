@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import ngsolve as ng
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask, root_of_squares
@@ -102,17 +101,6 @@ def rule_with_corners(dim: int, order: int, degree: int) -> Rule:
         np.append(weights, np.zeros(dim + 1)),
         np.hstack([-through, np.eye(dim + 1)]),
     )
-
-
-def mesh_points(mesh: ng.Mesh, elements: Index, reference: Array) -> NDArray:
-    """NGSolve's points (j, n) of `elements` (j,) at `reference` (j, n, dim)."""
-    dim = reference.shape[-1]
-    middle = ng.IntegrationRule([(1 / 3, 1 / 3 if dim == 2 else 0.0, 0.0)], [1])
-    template = mesh.MapToAllElements(middle, ng.VOL if dim == 2 else ng.BND)
-    points = template[np.repeat(elements, reference.shape[1])].reshape(reference.shape[:2])
-    for axis, name in zip(range(dim), "xy", strict=False):
-        points[name] = reference[..., axis]
-    return points
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask
 from ..problem import MeshArrays
-from .cells import INTEGRALS, Cells, lattice, mesh_points, monomials, refined
+from .cells import INTEGRALS, Cells, lattice, monomials, refined
 
 # Parts of the bodies' extent: a disc, or a length, of a hundredth of it contains a point.
 FINEST = {1: 256, 2: 116}
@@ -96,10 +96,19 @@ class SampledElements:
         result[inside] |= touched[self.ends[inside]].any(axis=1)
         return result
 
+    @cached_property
+    def _middles(self) -> NDArray:
+        rule = ng.IntegrationRule([(1 / 3, 1 / 3 if self.dim == 2 else 0.0, 0.0)], [1])
+        return self.mesh.MapToAllElements(rule, ng.VOL if self.dim == 2 else ng.BND)
+
     def points(self, elements: Index, reference: Array) -> NDArray:
         """NGSolve's points (j, n) at `reference` (j, n, dim), or (n, dim), of `elements` (j,)."""
         reference = np.broadcast_to(reference, (len(elements), *reference.shape[-2:]))
-        return mesh_points(self.mesh, elements, reference)
+        points = self._middles[np.repeat(elements, reference.shape[1])]
+        points = points.reshape(reference.shape[:2])
+        for axis in range(self.dim):
+            points["xy"[axis]] = reference[..., axis]
+        return points
 
     def evaluate(
         self, function: ng.CoefficientFunction, elements: Index, reference: Array

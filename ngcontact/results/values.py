@@ -14,7 +14,7 @@ from ..arrays import Array, Index, Mask
 from ..fem import BoundaryTrace, von_mises
 from ..output import full_stress
 from ..problem import MeshArrays, body_mask, regions_of
-from ..quadrature import mesh_points
+from ..quadrature import SampledElements
 from ..solved import Solved
 
 OUTSIDE = ("error", "nan")
@@ -108,11 +108,11 @@ class _Finder:
         near = np.flatnonzero(((reference > -2) & (reference < 3)).all(axis=1))
         reference[np.setdiff1d(np.arange(len(reference)), near)] = np.nan
         mapped = ng.CF((ng.x, ng.y, ng.specialcf.JacobianMatrix(2, 2)))
+        triangles = SampledElements(self.mesh, 2)
         for _ in range(STEPS):
             if not len(near):
                 break
-            at = mesh_points(self.mesh, element[near], reference[near, None])
-            values = np.asarray(mapped(at.ravel())).reshape(-1, 6)
+            values = triangles.evaluate(mapped, element[near], reference[near, None])[:, 0]
             miss = points[near] - values[:, :2]
             with np.errstate(all="ignore"):
                 step = _solved(values[:, 2:].reshape(-1, 2, 2), miss)
@@ -220,7 +220,7 @@ def values_at(
     flat = where.reshape(-1, 2)
     mesh, trace = solution.mesh, solution.discrete.space.trace
     found = _in_bodies(trace, flat, body, outside)
-    at = mesh_points(mesh, found.element, found.reference[:, None]).ravel()
+    at = SampledElements(mesh, 2).points(found.element, found.reference[:, None]).ravel()
     u = solution.displacement
     read = ng.CF((u[0], u[1], stress))
     known = np.asarray(read(at)).reshape(-1, 6) if len(at) else np.zeros((0, 6))
