@@ -1,9 +1,11 @@
 """The finite element spaces V_h: elements, boundary nodes, forms, energies."""
 
 from .boundary import ORDERS as ORDERS
+from .boundary import Bodies as Bodies
 from .boundary import BoundaryTrace as BoundaryTrace
 from .boundary import boundary_trace as boundary_trace
 from .boundary import check_element as check_element
+from .boundary import connected_bodies as connected_bodies
 from .boundary import edge_bubbles as edge_bubbles
 from .boundary import node_basis as node_basis
 from .boundary import unknowns as unknowns
@@ -20,16 +22,12 @@ from .moduli import stiffer_than as stiffer_than
 from .moduli import stiffnesses as stiffnesses
 from .moduli import warn_of_locking as warn_of_locking
 from .space import LOAD_BONUS as LOAD_BONUS
-from .space import Bodies as Bodies
 from .space import Space as Space
 from .space import assemble as assemble
 from .space import body_of_unknown as body_of_unknown
-from .space import connected_bodies as connected_bodies
 from .space import energy_norm as energy_norm
-from .space import has_rough_loads as has_rough_loads
 from .space import load_vector as load_vector
 from .space import model_of as model_of
-from .space import narrow_forces as narrow_forces
 from .space import normal_stress_of as normal_stress_of
 from .space import potential_energy as potential_energy
 from .space import stress_of as stress_of

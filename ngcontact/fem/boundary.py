@@ -339,3 +339,30 @@ def boundary_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryT
         axis=axis[:, -1].astype(np.intp) - axis[:, 0],
         on_axis=np.asarray(axis.all(axis=1)),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """The connected bodies, b of them."""
+
+    names: list[str]  # the material region of each
+    middle: Array  # (b, 2), of its boundary
+    size: Array  # (b,), half its extent, a length
+    of_segment: Index  # (q,), the body of each segment of the boundary
+    of_vertex: Index  # (nv,), the body of each vertex of the mesh
+
+
+def connected_bodies(trace: BoundaryTrace) -> Bodies:
+    """The connected pieces of the mesh of `trace`."""
+    piece = MeshArrays(trace.mesh).pieces
+    pieces, number = np.unique(piece[trace.nodes[:, 0]], return_inverse=True)
+    materials = trace.mesh.GetMaterials()
+    names = {int(b): materials[m] for b, m in zip(number, trace.body, strict=True)}
+    ends = [trace.curve[number == b].reshape(-1, 2) for b in range(len(names))]
+    return Bodies(
+        names=[names[b] for b in range(len(names))],
+        middle=np.array([(x.min(axis=0) + x.max(axis=0)) / 2 for x in ends]),
+        size=np.array([np.ptp(x, axis=0).max() / 2 for x in ends]),
+        of_segment=number,
+        of_vertex=np.searchsorted(pieces, piece),
+    )

@@ -1,4 +1,4 @@
-"""The space V_h of HH81 (2.2), (2.4), (2.9): stiffness A, load f, stresses, energies, bodies."""
+"""The space V_h of HH81 (2.2), (2.4), (2.9): stiffness A, load f, stresses, energies."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Array, Index, Mask, power_of_two
+from ..arrays import Array, Index, power_of_two
 from ..linalg import shared
 from ..problem import MeshArrays, Problem, varies
 from ..quadrature import loads_of, rough_moduli
-from .boundary import BoundaryTrace, node_basis, vector_space
+from .boundary import Bodies, BoundaryTrace, node_basis, vector_space
 from .model import MODELS, Model
 from .moduli import constant_measures, law_measures
 
@@ -88,20 +88,6 @@ def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
     return f.vec.FV().NumPy().copy()
 
 
-def has_rough_loads(problem: Problem, V: ng.FESpace) -> bool:
-    """Whether quadrature of the usual order would miss a part of a load on the mesh of `V`."""
-    return any(load.where_rough(V.globalorder) for load in loads_of(problem, V.mesh))
-
-
-def narrow_forces(problem: Problem, mesh: ng.Mesh, order: int) -> Mask:
-    """Elements (ne,) in which quadrature of the usual order would miss a part of a body force."""
-    narrow = np.zeros(mesh.ne, dtype=bool)
-    for load in loads_of(problem, mesh):
-        if load.kind == "force" and (found := load.where_rough(order)):
-            narrow |= found.rough
-    return narrow
-
-
 def assemble(
     problem: Problem, trace: BoundaryTrace, element: str, nodal: Index | None = None
 ) -> Space:
@@ -133,33 +119,6 @@ def assemble(
         matrix=a.mat,
         f=load_vector(problem, V, LOAD_BONUS),
         vertices=MeshArrays(mesh).vertices,
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class Bodies:
-    """The connected bodies, b of them."""
-
-    names: list[str]  # the material region of each
-    middle: Array  # (b, 2), of its boundary
-    size: Array  # (b,), half its extent, a length
-    of_segment: Index  # (q,), the body of each segment of the boundary
-    of_vertex: Index  # (nv,), the body of each vertex of the mesh
-
-
-def connected_bodies(trace: BoundaryTrace) -> Bodies:
-    """The connected pieces of the mesh of `trace`."""
-    piece = MeshArrays(trace.mesh).pieces
-    pieces, number = np.unique(piece[trace.nodes[:, 0]], return_inverse=True)
-    materials = trace.mesh.GetMaterials()
-    names = {int(b): materials[m] for b, m in zip(number, trace.body, strict=True)}
-    ends = [trace.curve[number == b].reshape(-1, 2) for b in range(len(names))]
-    return Bodies(
-        names=[names[b] for b in range(len(names))],
-        middle=np.array([(x.min(axis=0) + x.max(axis=0)) / 2 for x in ends]),
-        size=np.array([np.ptp(x, axis=0).max() / 2 for x in ends]),
-        of_segment=number,
-        of_vertex=np.searchsorted(pieces, piece),
     )
 
 

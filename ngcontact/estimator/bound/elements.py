@@ -20,7 +20,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from ...arrays import Array, Index, Mask
-from ...fem import connected_bodies, model_of
+from ...fem import connected_bodies
 from ...lagrange import gauss
 from ...problem import MeshArrays, Problem, varies
 from ...qp import vanishing_combinations
@@ -267,7 +267,7 @@ def _element(
 ) -> Element:
     """Triangles `at` (b,) of one kind, condensed."""
     model, degree, on_axis = (
-        model_of(problem),
+        cells.trace.model,
         int(mu.of_stress[at[0]]),
         bool(cells.on_axis[at[0]]),
     )

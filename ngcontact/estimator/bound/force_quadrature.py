@@ -11,9 +11,8 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index, Mask
-from ...fem import narrow_forces
 from ...problem import Problem, numbers
-from ...quadrature import SampledElements, features_of, where_features_are
+from ...quadrature import SampledElements, features_of, narrow_forces, where_features_are
 from .cells import Cells, joined, places
 from .polynomials import projected, scalars
 

@@ -32,8 +32,9 @@ from ...arrays import Array
 from ...contact import ContactState, state_of
 from ...discrete import load_by_shape
 from ...errors import ContactError, warn
-from ...fem import BoundaryTrace, has_rough_loads, load_vector, stress_of
+from ...fem import BoundaryTrace, load_vector, stress_of
 from ...problem import varies
+from ...quadrature import has_rough_loads
 from ..bound import FINE, EquilibratedStress, Guaranteed, force_bar
 from .contact import approach_of, area_in_contact, direction_of, ends_of, left_out, peak_of
 from .stresses import largest_von_mises, singular_corners
@@ -182,7 +183,7 @@ def _force_errors(solution: Guaranteed, pair: int, e: Array) -> Array:
         raise ValueError(f'no bar of the force is proved for "{solution.problem.model}"')
     if len(solution.pairs[pair].line.node) == 0:
         raise ValueError("the points of this pair belong to other pairs, which have its force")
-    if has_rough_loads(solution.problem, solution.discrete.space.V):
+    if has_rough_loads(solution.problem, solution.mesh, solution.order):
         raise ValueError("loads that are rougher than the mesh count as they are integrated")
     d, across = solution.pairs[pair].line.direction, np.array([-e[1], e[0]])
     if np.ptp(d, axis=0).max() <= STRAIGHT:  # the force is one number times d
