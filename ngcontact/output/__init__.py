@@ -4,11 +4,11 @@ from .convergence import plot_convergence as plot_convergence
 from .convergence import slope_triangle as slope_triangle
 from .files import check_path as check_path
 from .files import replacing as replacing
+from .nodes import full_stress as full_stress
 from .pictures import plot_solution as plot_solution
 from .pictures import write_film as write_film
 from .scene import Profile as Profile
 from .scene import Unit as Unit
-from .vtk import full_stress as full_stress
 from .vtk import write_revolved as write_revolved
 from .vtk import write_series as write_series
 from .vtk import write_solution as write_solution

@@ -16,7 +16,7 @@ from ..arrays import Array, Index, Mask
 from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS
 from ..solved import Solved
-from .vtk import Nodes, full_stress, neighbour_tree, nodes_of, subdivision
+from .nodes import Nodes, full_stress, neighbour_tree, nodes_of, subdivision
 
 MAX_TRIANGLES = 200_000  # of a picture: more cannot be seen
 NEAR = 0.25  # of a zone's size: distance to a line of symmetry up to which both halves are one zone

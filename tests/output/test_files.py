@@ -14,7 +14,7 @@ from ngcontact import plot_convergence, write_film
 from ngcontact.fem import von_mises
 from ngcontact.output import slope_triangle
 from ngcontact.output.files import check_path, replacing
-from ngcontact.output.vtk import lattice
+from ngcontact.output.nodes import lattice
 from tests.output.stubs import stub
 
 
