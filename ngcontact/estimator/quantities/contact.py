@@ -10,7 +10,7 @@ from ...contact import ContactState, in_contact
 from ...fem import Bodies, BoundaryTrace, connected_bodies
 from ...lagrange import gauss
 from ...solved import Solved
-from ..bound import ContactPressure, Guaranteed
+from ..residual import Estimated
 from .table import Quantity, Singular, error_of_largest, unknown
 
 NO_LOAD = 1e-9  # part of the largest load that is none
@@ -27,9 +27,12 @@ BESIDE = 0.05  # of a line's extent, how far from it corners count
 
 
 def peak_of(
-    solution: Guaranteed, pair: ContactState, star: ContactPressure | None, corners: Singular
+    solution: Estimated, pair: ContactState, star: Array | None, corners: Singular
 ) -> Quantity:
-    """The largest pressure, away from corners at which it is infinite; `star` is p*, if any."""
+    """The largest pressure, away from corners at which it is infinite.
+
+    `star` are values of p* at the nodes of the pair's segments, if there are any.
+    """
     name, line, pressure = "peak pressure", pair.line, pair.pressure
     boundary, rows = solution.discrete.space.trace, line.rows
     infinite = np.unique(_pressed_corners(corners, line.position), axis=0)
@@ -42,7 +45,7 @@ def peak_of(
         return unknown(name, peak, place, infinite)
     off = (OFF_ALONE if star is None else OFF_STRESS) * _off_stress(pair, boundary, solution.stress)
     if star is not None:
-        off = np.maximum(off, OFF_STAR * _off_star(pair, boundary, star))
+        off = np.maximum(off, OFF_STAR * _off_star(pair, star))
     segment, s = np.repeat(line.segments, len(SAMPLES)), np.tile(SAMPLES, len(line.segments))
     every = np.repeat(rows, len(SAMPLES), axis=0)
     samples = (np.append(pressure, 0.0)[every] * boundary.shapes(segment, s)).sum(axis=1)
@@ -65,11 +68,11 @@ def _pressed_corners(corners: Singular, points: Array) -> Array:
     return places[away <= BESIDE * np.ptp(points, axis=0).max()]
 
 
-def _off_star(pair: ContactState, boundary: BoundaryTrace, star: ContactPressure) -> Array:
+def _off_star(pair: ContactState, star: Array) -> Array:
     """Differences (m,) of pressures to p* at contact points, the larger of two."""
     rows, result = pair.line.rows, np.zeros(len(pair.force) + 1)
-    values = star.values(*boundary.at_nodes(pair.line.segments)).reshape(rows.shape)
-    np.maximum.at(result, rows, np.abs(values - np.append(pair.pressure, 0.0)[rows]))
+    off = star.reshape(rows.shape) - np.append(pair.pressure, 0.0)[rows]
+    np.maximum.at(result, rows, np.abs(off))
     return result[:-1]
 
 

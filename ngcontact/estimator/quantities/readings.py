@@ -85,7 +85,10 @@ class Measured(Guaranteed):
         proof, reason = self._proved
         if proof is None and not known:
             warn(f"{reason}; all errors of quantities() are estimates")
-        star = None if proof is None else proof.pressure[pair]
+        star = equilibrated = None
+        if proof is not None:
+            star = proof.pressure[pair].values(*boundary.at_nodes(state.line.segments))
+            equilibrated = proof.values
         corners = singular_corners(self.problem, boundary, self.pairs)
         e, along = direction_of(self, pair)
         e = e + 0.0  # no -0
@@ -109,7 +112,7 @@ class Measured(Guaranteed):
             *ends_of(state),
             _approach(self, state, e, forces[0].error if along == "itself" else 0.0),
             _energy(self, proof is not None),
-            largest_von_mises(self, proof, corners),
+            largest_von_mises(self, equilibrated, corners),
         ]
         size, notes = float(np.abs(boundary.curve).max()), [reason]
         if along != "itself":

@@ -9,7 +9,7 @@ on a line is one of 270 degrees in all. Of other moduli it is infinite at smalle
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import ngsolve as ng
 import numpy as np
@@ -18,7 +18,7 @@ from ...arrays import Array, Index, Mask
 from ...contact import ContactState, in_contact
 from ...fem import BoundaryTrace, von_mises
 from ...problem import Elastic, MeshArrays, Problem, body_mask
-from ..bound import EquilibratedStress, Guaranteed
+from ..residual import Estimated
 from .table import Quantity, Singular, error_of_largest, unknown
 
 SAME = 1e-9  # distance, relative to an element, at which points of two elements are one
@@ -158,9 +158,13 @@ def _clamped_angles(problem: Problem, trace: BoundaryTrace) -> Array:
 
 
 def largest_von_mises(
-    solution: Guaranteed, equilibrated: EquilibratedStress | None, corners: Singular
+    solution: Estimated, equilibrated: Callable[[Index, Array], Array] | None, corners: Singular
 ) -> Quantity:
-    """The largest one on a lattice over all elements, away from corners of infinite stress."""
+    """The largest one on a lattice over all elements, away from corners of infinite stress.
+
+    `equilibrated` has the values of the equilibrated stress, if there is one, at places (k, 2) of
+    elements (k,).
+    """
     name, mesh, infinite = "von Mises", solution.mesh, corners.distinct
     m = CONSTANT if solution.order == 1 else DIVISIONS
     steps = [(i / m, j / m) for i in range(m + 1) for j in range(m + 1 - i) if 3 * i != m or i != j]
@@ -184,7 +188,7 @@ def largest_von_mises(
     off = _jumps(mesh, xy, mises, n)[some]
     if equilibrated is not None:
         element = np.flatnonzero(high)
-        whole = equilibrated.values(np.repeat(element, n), np.tile(places, (len(element), 1)))
+        whole = equilibrated(np.repeat(element, n), np.tile(places, (len(element), 1)))
         known = np.asarray(np.isfinite(whole).all(axis=1))  # it divides by r, 0 on the axis
         whole = np.where(known[:, None], whole, 0.0)
         other, own = whole[:, [0, 1, -1, 2]], stress[some]
