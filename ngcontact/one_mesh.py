@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 from dataclasses import replace
+from typing import TypeVar
 
 import ngsolve as ng
 import numpy as np
@@ -18,23 +19,27 @@ from .discrete import (
     minimise_energy,
 )
 from .errors import ContactError, ConvergenceError, NoEquilibriumError, warn
+from .estimator import Estimated
 from .fem import boundary_trace, model_of
 from .mesh import check_curves, curve
 from .plausibility import doubt_of_refinement, doubts, estimates_rise
 from .problem import Contact, Problem
 from .quadrature import evaluations, unresolved, warn_of_unresolved
-from .solution import Solution
+from .solved import Solved
+
+S = TypeVar("S", bound=Solved)
+E = TypeVar("E", bound=Estimated)
 
 ALIKE = 0.1  # relative difference of energies up to which two coarse solutions are one
 
 
 def solve_on(
-    problem: Problem, mesh: ng.Mesh, order: int, element: str, start: Solution | None
-) -> Solution:
-    """Solution on one mesh, of which names and values are known to be right.
+    kind: type[S], problem: Problem, mesh: ng.Mesh, order: int, element: str, start: Solved | None
+) -> S:
+    """Solution, of a `kind`, on one mesh, of which names and values are known to be right.
 
     Roles of pairs that fail, or that leave a body all but free, are tried the other way round,
-    once; `Solution.problem` has the pairs as they were solved.
+    once; `Solved.problem` has the pairs as they were solved.
     """
     before = evaluations()
     mesh, curved = curve(mesh, order, element)
@@ -44,7 +49,7 @@ def solve_on(
     same = start is not None and (start.mesh, start.order, start.element) == here
     tried: list[DiscreteProblem] = []
 
-    def attempt(problem: Problem, known: DiscreteProblem | None) -> Solution:
+    def attempt(problem: Problem, known: DiscreteProblem | None) -> S:
         discrete = discretise(problem, *here, known)
         tried.append(discrete)
         if start is None:
@@ -52,7 +57,7 @@ def solve_on(
         else:
             active = carried_active_set(discrete.lines, start.pairs)
         minimiser = minimise_energy(discrete, active)
-        return Solution(
+        return kind(
             problem=problem,
             mesh=mesh,
             order=order,
@@ -132,7 +137,7 @@ def _told(exchanged: list[Contact]) -> str:
     )
 
 
-def warn_of_doubts(solution: Solution, told: set[object], *, last: bool) -> None:
+def warn_of_doubts(solution: Solved, told: set[object], *, last: bool) -> None:
     """Warn of what may be wrong but was not `told` before, and add it there.
 
     What a finer mesh mends is left out unless none follows: the mesh is the `last`.
@@ -146,7 +151,7 @@ def warn_of_doubts(solution: Solution, told: set[object], *, last: bool) -> None
         warn_of_unresolved(solution.problem, solution.mesh)
 
 
-def with_warnings(solutions: Iterator[Solution]) -> Generator[Solution]:
+def with_warnings(solutions: Iterator[E]) -> Generator[E]:
     """The levels of a run, with a warning of whatever may be wrong, once.
 
     What no mesh mends is said at the first level that shows it, what refinement mends at the last.

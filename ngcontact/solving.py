@@ -109,7 +109,7 @@ def solve(
         coarse = _coarse_run(problem, mesh, order, element)
     if coarse:  # with roles that can be solved
         problem, start = coarse[-1].problem, coarse[-1]
-    solution = solve_on(problem, mesh, order, element, start)
+    solution = solve_on(Solution, problem, mesh, order, element, start)
     solution = replace(solution, coarse_levels=len(coarse))
     solution.work["evaluations"] = evaluations() - before
     log.info("%s", solution)
@@ -340,7 +340,7 @@ def levels(
     while unknowns(plan.mesh, plan.order, element) <= refinement.max_dofs:
         if solution is not None:  # its factorisation is of no use to the next one
             solution.discrete.systems.forget()
-        solution = solve_on(problem, plan.mesh, plan.order, element, solution or start)
+        solution = solve_on(Solution, problem, plan.mesh, plan.order, element, solution or start)
         problem = solution.problem  # roles that fail are exchanged once
         solution = replace(solution, adaptive=True, tree=plan.tree)
         narrow = unresolved(problem, solution.mesh, in_bounds=guaranteed)
