@@ -60,17 +60,14 @@ def check_mesh(mesh: ng.Mesh) -> None:
     view = MeshArrays(mesh)
     if others := view.without_simplices():
         raise ValueError(f"mesh has {others} quadrilaterals: it must be a triangulation")
-    vertex = view.corners
-    edge = np.roll(vertex, -1, axis=1) - vertex
-    area = (edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0]) / 2
-    longest = np.square(edge).sum(axis=2).max(axis=1)
-    bad = ~(area > FLAT * longest)  # so a NaN is bad
+    area = view.measures
+    bad = ~(area > FLAT * view.diameters**2)  # so a NaN is bad
     if bad.any():
         first = int(np.argmax(bad))
         raise ValueError(
             f"mesh has {np.count_nonzero(bad)} inverted or degenerate triangles: number {first} "
-            f"with the vertices {vertex[first].tolist()} has the signed area {area[first]:.3g}, "
-            "which must be positive (vertices counterclockwise)"
+            f"with the vertices {view.corners[first].tolist()} has the signed area "
+            f"{area[first]:.3g}, which must be positive (vertices counterclockwise)"
         )
 
 
@@ -112,9 +109,9 @@ def regions_of(
 
 def sides_of(mesh: ng.Mesh, argument: str, pair: Contact) -> Masks:
     """The masks (r,) of the sides of a contact pair, the secondary first."""
-    sides = regions_of(mesh, f"{argument}.secondary", [pair.secondary], boundary_mask)
-    if pair.primary is not None:
-        sides |= regions_of(mesh, f"{argument}.primary", [pair.primary], boundary_mask)
+    sides: Masks = {}
+    for what, name in (("secondary", pair.secondary), ("primary", pair.primary)):
+        sides |= regions_of(mesh, f"{argument}.{what}", [name] if name else [], boundary_mask)
     return sides
 
 
@@ -184,8 +181,7 @@ def check_overlaps(view: MeshArrays) -> None:
     parts = [np.flatnonzero(piece == k) for k in range(piece.max(initial=0) + 1)]
     if len(parts) == 1:
         return
-    edge = view.corners[:, 1:] - view.corners[:, :1]
-    area = (edge[:, 0, 0] * edge[:, 1, 1] - edge[:, 0, 1] * edge[:, 1, 0]) / 2
+    area = view.measures
     size = np.array([area[part].sum() for part in parts])
     box = np.array([[view.corners[p].min((0, 1)), view.corners[p].max((0, 1))] for p in parts])
     for small, large in itertools.combinations(np.argsort(size, kind="stable").tolist(), 2):
@@ -223,48 +219,33 @@ def _inside(points: Array, view: MeshArrays, part: Index) -> Mask:
 
 
 def check_values(
-    view: MeshArrays, masks: Masks, data: Iterable[Any], rule: ng.IntegrationRule, vb: ng.comp.VorB
+    view: MeshArrays, masks: Masks, data: Iterable[Any], rule: ng.IntegrationRule
 ) -> None:
     """Refuse data, one for each mask (r,), that are not finite, or laws that are not elliptic.
 
-    A law, a function, or a tuple of these and None, looked at in all elements at points of a rule.
+    A law, a number, a function of a mesh point or of x and y, or a tuple of these and None, looked
+    at in the selected elements at points of a rule, which is `INSIDE` for bodies.
     """
+    vb, region = (ng.VOL, view.bodies) if rule is INSIDE else (ng.BND, view.boundaries)
+    everywhere = view.mesh.MapToAllElements(rule, vb)
     for (label, mask), value in zip(masks.items(), data, strict=True):
-        points = _points(view, mask, rule, vb)
+        points = np.asarray(everywhere[mask[region][everywhere["nr"]]])
         if isinstance(value, Elastic | Hooke):
             value.check_at(points, label)  # (2.7)
             continue
         for part in value if isinstance(value, tuple) else (value,):
-            if part is not None:
-                _check_finite(points, part, label)
+            if part is None:
+                continue
+            if callable(part) and not isinstance(part, ng.CoefficientFunction):
+                values = _of_coordinates(points, part, label)
+            else:
+                values = ng.CF(part)(points).reshape(len(points), -1)
+            bad = ~np.isfinite(values.reshape(len(points), -1))
+            refuse_where(points, np.asarray(bad.any(axis=1)), values, label, "must be finite")
 
 
-def check_gaps(view: MeshArrays, contact: Sequence[Masks], pairs: Sequence[Contact]) -> None:
-    """Refuse gaps that are not finite on the secondary, the first mask (r,) of each pair."""
-    for j, (sides, pair) in enumerate(zip(contact, pairs, strict=True)):
-        if pair.gap is not None:
-            points = _points(view, next(iter(sides.values())), AT_ENDS, ng.BND)
-            _check_gap(points, pair.gap, f'contact[{j}].gap of "{pair.secondary}"')
-
-
-def _points(view: MeshArrays, mask: Mask, rule: ng.IntegrationRule, vb: ng.comp.VorB) -> Array:
-    """NGSolve's points (k,) of a rule in all elements of the selected regions (r,)."""
-    at = mask[view.bodies if vb == ng.VOL else view.boundaries]
-    points = view.mesh.MapToAllElements(rule, vb)
-    return np.asarray(points[at[points["nr"]]])
-
-
-def _check_finite(points: Array, data: ng.CoefficientFunction, label: str) -> None:
-    """Refuse data that are not finite at one of mesh `points` (k,)."""
-    values = data(points).reshape(len(points), -1)
-    refuse_where(points, ~np.isfinite(values).all(axis=1), values, label, "must be finite")
-
-
-def _check_gap(points: Array, gap: Any, label: str) -> None:
-    """Refuse a gap that is not finite at one of mesh `points` (k,), or no number for each."""
-    if not callable(gap) or isinstance(gap, ng.CoefficientFunction):
-        _check_finite(points, ng.CF(gap), label)
-        return
+def _of_coordinates(points: Array, gap: Callable[..., Any], label: str) -> Array:
+    """Values (k,) of a function of x and y at mesh `points` (k,), refused if no number for each."""
     x, y = ng.CF((ng.x, ng.y))(points).T.copy()
     try:
         values = np.asarray(gap(x, y))
@@ -281,7 +262,7 @@ def _check_gap(points: Array, gap: Any, label: str) -> None:
             f"{label} returns shape {values.shape} for x and y of shape {x.shape}: "
             "return one value per point"
         )
-    refuse_where(points, ~np.isfinite(values), values, label, "must be finite")
+    return values
 
 
 def check_about_axis(
@@ -304,40 +285,29 @@ def check_about_axis(
             f"the mesh reaches to x = {x:.6g} at y = {y:.6g}, across the axis x = 0: "
             "an axisymmetric body is given by its half with x >= 0"
         )
-    along: Mask = np.asarray(axis[view.facets].all(axis=1))
-
-    def refuse_along(what: str, pattern: str, right: str) -> None:
-        if along[boundary_mask(mesh, pattern)[view.boundaries]].any():
-            raise ValueError(f'{what} "{pattern}" is on the axis x = 0, which has no area: {right}')
-
-    for pair in contact:
-        for side in (pair.secondary, pair.primary):
-            if side is not None:
-                refuse_along("contact", side, "name a boundary with x > 0")
-    vectors: list[tuple[str, str, Any]] = []
-    for pattern, load in traction.items():
-        refuse_along("traction", pattern, "name a boundary with x > 0")
-        if load.dim == 2:
-            vectors.append(("traction", pattern, load[0]))
-    for pattern, (radial, axial) in displacement.items():
-        if axial is not None:
-            refuse_along("displacement", pattern, "leave the second component free by None")
-        if radial is not None:
-            vectors.append(("displacement", pattern, radial))
-    vectors += [("force", pattern, F[0]) for pattern, F in force.items()]
-    for what, pattern, radial in vectors:
+    other, free = "name a boundary with x > 0", "leave the second component free by None"
+    sides = [side for pair in contact for side in (pair.secondary, pair.primary) if side]
+    acting = [("contact", side, other) for side in sides]
+    acting += [("traction", name, other) for name in traction]
+    acting += [("displacement", k, free) for k, u in displacement.items() if u[1] is not None]
+    for what, name, right in acting:
+        if axis[view.facets[boundary_mask(mesh, name)[view.boundaries]]].all(axis=1).any():
+            raise ValueError(f'{what} "{name}" is on the axis x = 0, which has no area: {right}')
+    radials = [("traction", name, p[0]) for name, p in traction.items() if p.dim == 2]
+    radials += [("displacement", k, u[0]) for k, u in displacement.items() if u[0] is not None]
+    radials += [("force", name, F[0]) for name, F in force.items()]
+    for what, name, radial in radials:
         if what == "force":
-            at, ends = body_mask(mesh, pattern)[view.bodies], view.elements
-            points = mesh.MapToAllElements(CORNERS[2], ng.VOL)
+            at, ends, vb = body_mask(mesh, name)[view.bodies], view.elements, ng.VOL
         else:
-            at, ends = boundary_mask(mesh, pattern)[view.boundaries], view.facets
-            points = mesh.MapToAllElements(CORNERS[1], ng.BND)
+            at, ends, vb = boundary_mask(mesh, name)[view.boundaries], view.facets, ng.BND
+        points = mesh.MapToAllElements(CORNERS[ends.shape[1] - 1], vb)
         values = np.asarray(radial(points[np.repeat(at, ends.shape[1])])).ravel()
         size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
         bad = axis[ends[at]].ravel() & (np.abs(values) > NO_RADIAL * size)
         if bad.any():
             raise ValueError(
-                f'{what} "{pattern}" has the radial component {values[np.argmax(bad)]:.6g} on the '
+                f'{what} "{name}" has the radial component {values[np.argmax(bad)]:.6g} on the '
                 "axis x = 0, sideways: it must vanish there, as around the axis every direction is "
                 "radial"
             )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -88,6 +89,12 @@ class MeshArrays:
         if self.dim == 3:
             edges = np.hstack([edges, corners[:, :2] - corners[:, 2:]])
         return np.linalg.norm(edges, axis=2).max(axis=1)
+
+    @property
+    def measures(self) -> Array:
+        """Signed area (ne,) of each triangle, or volume of each tetrahedron."""
+        corners = self.corners
+        return np.linalg.det(corners[:, 1:] - corners[:, :1]) / math.factorial(self.dim)
 
     @cached_property
     def extent(self) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,23 +10,7 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry
 
-from .checks import (
-    AT_ENDS,
-    IN_SEGMENTS,
-    INSIDE,
-    check_about_axis,
-    check_bodies,
-    check_gaps,
-    check_mesh,
-    check_overlaps,
-    check_pairs,
-    check_pressures,
-    check_values,
-    kind_of,
-    refuse_common,
-    regions_of,
-    sides_of,
-)
+from . import checks
 from .contact import Contact
 from .material import ABOUT_AN_AXIS, Elastic, Hooke, require_model
 from .mesh_arrays import MeshArrays
@@ -99,7 +83,7 @@ class Problem:
         """Validate types and numbers; names and CoefficientFunctions wait for `check`."""
         if not isinstance(self.geometry, OCCGeometry | ng.Mesh):
             raise TypeError(
-                f"geometry is {kind_of(self.geometry)}: give an OCCGeometry or ngsolve.Mesh"
+                f"geometry is {checks.kind_of(self.geometry)}: give an OCCGeometry or ngsolve.Mesh"
             )
         require_model(self.model)
         materials = by_region(self.materials, "materials", _law)
@@ -162,37 +146,50 @@ class Problem:
             meet on one boundary, a contact pair is impossible, or data are not finite or not
             elliptic.
         """
-        check_mesh(mesh)
+        checks.check_mesh(mesh)
         view, names = MeshArrays(mesh), mesh.GetBoundaries()
-        materials = regions_of(mesh, "materials", self.materials, body_mask)
-        force = regions_of(mesh, "force", self.force, body_mask)
-        displacement = regions_of(mesh, "displacement", self.displacement, boundary_mask)
-        traction = regions_of(mesh, "traction", self.traction, boundary_mask)
-        slides = [self.sliding] if isinstance(self.sliding, str) else []
-        sliding = regions_of(mesh, "sliding", slides, boundary_mask)
-        contact = [sides_of(mesh, f"contact[{j}]", pair) for j, pair in enumerate(self.contact)]
 
-        check_bodies(mesh, materials)
-        refuse_common(names, sliding, displacement, "keep one of the two")
-        refuse_common(names, traction, sliding, "keep one of the two")
+        def regions(argument: str, patterns: Iterable[str]) -> checks.Masks:
+            mask_of = body_mask if argument in ("materials", "force") else boundary_mask
+            return checks.regions_of(mesh, argument, patterns, mask_of)
+
+        materials, force = regions("materials", self.materials), regions("force", self.force)
+        displacement = regions("displacement", self.displacement)
+        traction = regions("traction", self.traction)
+        sliding = regions("sliding", [self.sliding] if isinstance(self.sliding, str) else [])
+        pairs = [checks.sides_of(mesh, f"contact[{j}]", p) for j, p in enumerate(self.contact)]
+
+        checks.check_bodies(mesh, materials)
         prescribed = zip(displacement.items(), self.displacement.values(), strict=True)
         full = {key: mask for (key, mask), (x, y) in prescribed if not (x is None or y is None)}
-        refuse_common(names, traction, full, "keep one, or leave a component free by None")
-        others = displacement | traction | sliding
-        for sides in contact:
-            refuse_common(names, sides, others, "a contact boundary takes no other condition")
-        check_overlaps(view)
+        others, only = displacement | traction | sliding, "a contact boundary takes no other"
+        for one, other, right in (
+            (sliding, displacement, "keep one of the two"),
+            (traction, sliding, "keep one of the two"),
+            (traction, full, "keep one, or leave a component free by None"),
+            *((sides, others, f"{only} condition") for sides in pairs),
+        ):
+            checks.refuse_common(names, one, other, right)
+        checks.check_overlaps(view)
         inner = np.bincount(view.boundaries[view.inner_facets], minlength=len(names)) > 0
-        check_pairs(view, contact, inner)
-        check_pressures(names, traction, self.traction.values(), inner)
-
-        check_values(view, materials, self.materials.values(), INSIDE, ng.VOL)
-        check_values(view, force, self.force.values(), INSIDE, ng.VOL)
-        check_values(view, traction, self.traction.values(), IN_SEGMENTS, ng.BND)
-        check_values(view, displacement, self.displacement.values(), AT_ENDS, ng.BND)
-        check_gaps(view, contact, self.contact)
+        checks.check_pairs(view, pairs, inner)
+        checks.check_pressures(names, traction, self.traction.values(), inner)
+        gaps = {
+            f'contact[{j}].gap of "{pair.secondary}"': next(iter(sides.values()))
+            for j, (sides, pair) in enumerate(zip(pairs, self.contact, strict=True))
+        }
+        for masks, data, rule in (
+            (materials, self.materials.values(), checks.INSIDE),
+            (force, self.force.values(), checks.INSIDE),
+            (traction, self.traction.values(), checks.IN_SEGMENTS),
+            (displacement, self.displacement.values(), checks.AT_ENDS),
+            (gaps, [pair.gap for pair in self.contact], checks.AT_ENDS),
+        ):
+            checks.check_values(view, masks, data, rule)
         if self.model in ABOUT_AN_AXIS:
-            check_about_axis(view, self.displacement, self.traction, self.force, self.contact)
+            checks.check_about_axis(
+                view, self.displacement, self.traction, self.force, self.contact
+            )
 
 
 def _law(value: Any, what: str) -> Elastic | Hooke:

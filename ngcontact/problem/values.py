@@ -81,23 +81,14 @@ class Regions(dict[str, Any]):
         super().__init__(data)
         self.what = what
 
-    def _refuse(self, change: str, right: str) -> NoReturn:
+    def _refuse(self, *_: Any, **__: Any) -> NoReturn:
         raise TypeError(
-            f"problem.{self.what}{change}: the data of a Problem cannot be changed; make another "
-            f"by dataclasses.replace(problem, {self.what}={right})"
+            f"problem.{self.what}: the data of a Problem cannot be changed; make another by "
+            f"dataclasses.replace(problem, {self.what}=problem.{self.what} | {{...}})"
         )
 
-    def __setitem__(self, name: str, value: Any) -> NoReturn:
-        new = f'{{"{name}": {value!r:.60}}}'
-        self._refuse(f'["{name}"] = {value!r:.60}', f"problem.{self.what} | {new}")
-
-    def __delitem__(self, name: str) -> NoReturn:
-        self._refuse(f' without "{name}"', "{...}")
-
-    def _changed(self, *_: Any, **__: Any) -> NoReturn:
-        self._refuse(" in place", f"problem.{self.what} | {{...}}")
-
-    update = pop = popitem = clear = setdefault = __ior__ = _changed
+    __setitem__ = __delitem__ = __ior__ = _refuse
+    update = pop = popitem = clear = setdefault = _refuse
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Made again from a plain dict where it is copied or pickled."""
