@@ -72,9 +72,7 @@ def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
     f = ng.LinearForm(V)
     for load in loads_of(problem, mesh):
         measure, w = (ng.dx, v) if load.kind == "force" else (ng.ds, v.Trace())
-        found = load.where_rough(
-            V.globalorder, again=bonus == LOAD_BONUS
-        )  # a finer rule asks again
+        found = load.where_rough(V.globalorder)
         if found is None:
             dx = measure(definedon=load.region, bonus_intorder=bonus)
             f += model.weighted(load.density * w) * dx  # (3.2)

@@ -1,9 +1,10 @@
 """Quadrature that follows the data: where functions are rough, and rules that resolve them."""
 
+from .cells import SampledElements as SampledElements
 from .cells import composite as composite
+from .cells import evaluations as evaluations
 from .features import Unresolved as Unresolved
 from .features import features_of as features_of
-from .features import look as look
 from .features import unresolved as unresolved
 from .features import warn_of_unresolved as warn_of_unresolved
 from .features import where_features_are as where_features_are
@@ -13,10 +14,9 @@ from .jumps import warn_of_jumps as warn_of_jumps
 from .loads import Load as Load
 from .loads import has_rough_loads as has_rough_loads
 from .loads import loads_of as loads_of
+from .loads import look as look
 from .loads import narrow_forces as narrow_forces
 from .loads import pieces as pieces
 from .loads import rough_load as rough_load
 from .loads import rough_segments as rough_segments
 from .loads import warn_of_data as warn_of_data
-from .sampling import SampledElements as SampledElements
-from .sampling import evaluations as evaluations

@@ -19,14 +19,14 @@ from weakref import WeakKeyDictionary
 
 import ngsolve as ng
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask
 from ..errors import warn
 from ..problem import Problem, numbers, varies
-from .cells import Cells, lattice
-from .sampling import SampledElements, looked
+from .cells import Cells, SampledElements, lattice, looked
 
 ON_LINE = 2048  # samples of a boundary: none are further apart than 1 / 1365 of it
 IN_BODY = 5.2e-3  # between samples of a body, over its extent: discs of radius 3e-3 hold one
@@ -122,48 +122,36 @@ def _functions(problem: Problem) -> Iterator[Datum]:
             yield Datum("materials", name, 0, law, law)
 
 
-def look(problem: Problem, mesh: ng.Mesh) -> None:
-    """Look at all functions of a problem anew, as each run does: parameters may have changed.
+def features_of(problem: Problem, mesh: ng.Mesh, *, again: bool = False) -> list[Features]:
+    """What was found of all functions of a problem when they were looked at last, if ever.
 
-    `features_of` knows them from now on.
+    Each run looks at them `again`: parameters may have changed.
     """
-    for datum in _functions(problem):
-        FOUND.setdefault(datum.owner, {})[datum[:3]] = _looked_at(problem, mesh, datum)
-
-
-def features_of(problem: Problem, mesh: ng.Mesh) -> list[Features]:
-    """What `look` found of the functions of a problem last; a look where there was none."""
     found = []
     for datum in _functions(problem):
         known = FOUND.setdefault(datum.owner, {})
-        if datum[:3] not in known:
+        if again or datum[:3] not in known:
             known[datum[:3]] = _looked_at(problem, mesh, datum)
         found.append(known[datum[:3]])
     return found
 
 
 def features_in(load: object) -> Array:
-    """Places and widths (k, 3) that `look` found of a load, on all boundaries or in all bodies."""
+    """Places and widths (k, 3) that were found of a load, on all boundaries or in all bodies."""
     return np.concatenate([NONE, *(one.spots for one in FOUND.get(load, {}).values())])
 
 
 def _looked_at(problem: Problem, mesh: ng.Mesh, datum: Datum) -> Features:
     kind, name, function = datum.kind, datum.name, datum.function
     view = SampledElements(mesh, 2 if kind in IN_PLANE else 1)
-    region = mesh.Materials(name) if view.dim == 2 else mesh.Boundaries(name)
-    names = mesh.GetMaterials() if view.dim == 2 else mesh.GetBoundaries()
-    number = view.arrays.bodies if view.dim == 2 else view.arrays.boundaries
+    inside = view.inside(mesh.Materials(name) if view.dim == 2 else mesh.Boundaries(name))
     if kind == "materials":  # the diagonal of the law; compiled, as a modulus stands in each entry
         C = function.voigt(problem.model)
         function = ng.CF(tuple(C[k, k] for k in range(C.dims[0]))).Compile()
-    parts: dict[str, list[int]] = defaultdict(list)  # regions of one name are one part
-    for k in np.flatnonzero(np.array(region.Mask())).tolist():
-        parts[names[k]].append(k)
     spots, jumps, samples, largest = [NONE], [NONE], 0, 0.0
-    for some in parts.values():
-        elements = np.flatnonzero(np.isin(number, some))
-        if not elements.size:
-            continue
+    names = view.names[inside]
+    for part in dict.fromkeys(names.tolist()):  # regions of one name are one part
+        elements = inside[names == part]
         if view.dim == 2:
             found, values = _in_body(kind, function, view, elements)
         else:
@@ -174,16 +162,16 @@ def _looked_at(problem: Problem, mesh: ng.Mesh, datum: Datum) -> Features:
             jumps += [line.jumps() for line in lines if kind == "displacement"]
         spots.append(found)
         samples, largest = samples + len(values), max(largest, float(np.abs(values).max(initial=0)))
-    every = np.concatenate(spots), np.concatenate(jumps)
-    return Features(*datum[:3], view.dim, *every, samples, largest)
+    every, jumping = np.concatenate(spots), np.concatenate(jumps)
+    return Features(kind, name, datum.axis, view.dim, every, jumping, samples, largest)
 
 
-def _values(function: Function, view: SampledElements, elements: Index, reference: Array) -> Array:
-    """Values (n, c) at a point `reference` (n, dim) of each of `elements` (n,), 0 if infinite."""
+def _values(function: Function, points: NDArray) -> Array:
+    """Values (n, c) at NGSolve's `points` (n,), 0 where infinite."""
     if isinstance(function, ng.CoefficientFunction):
-        values = view.look(function, elements, reference[:, None])[:, 0]
+        values = looked(function, points)
     else:
-        x, y = view.positions(elements, reference).T
+        x, y = ng.CF((ng.x, ng.y))(points).T.copy()
         values = np.asarray(function(x, y), dtype=float)[:, None]
     return np.where(np.isfinite(values), values, 0.0)
 
@@ -255,7 +243,8 @@ class _Line:
 
     def values(self, t: Array) -> Array:
         """Of the function (n, c) at the lengths `t` (n,)."""
-        return _values(self.function, self.view, *self._at(t))
+        segments, s = self._at(t)
+        return _values(self.function, self.view.points(segments, s[:, None])[:, 0])
 
     def places(self, t: Array) -> Array:
         """Points (n, 2) at the lengths `t` (n,)."""
@@ -351,27 +340,21 @@ def _in_body(
     kind: str, function: Function, view: SampledElements, elements: Index
 ) -> tuple[Array, Array]:
     """Features (k, 3) of a function in a body, and all its samples (n, c)."""
-    corners = view.arrays.corners[elements]
-    spacing = IN_BODY * float(np.ptp(corners.reshape(-1, 2), axis=0).max())
+    corners = view.arrays.corners[elements].reshape(-1, 2)
+    spacing = IN_BODY * float(np.ptp(corners, axis=0).max())
     c, s = np.cos([TURN, TURN + np.pi / 3]), np.sin([TURN, TURN + np.pi / 3])
     sides = spacing * np.column_stack([c, s])  # of the lattice's cells, as rows
     corners = corners @ np.linalg.inv(sides)
-    origin = np.floor(corners.min(axis=(0, 1)))
-    corners -= origin
-    shape = tuple(np.ceil(corners.max(axis=(0, 1))).astype(int) + 1)
-    element, i, j = _nodes_in(corners)
-    inverse = np.linalg.inv(corners[:, :2] - corners[:, 2:])
-    reference = np.column_stack([i, j]) - corners[element, 2]
-    reference = np.einsum("ki,kij->kj", reference, inverse[element])
-    values = _values(function, view, elements[element], reference)
+    origin = np.floor(corners.min(axis=0))
+    shape = tuple(np.ceil(corners.max(axis=0) - origin).astype(int) + 1)
+    places = (np.moveaxis(np.indices(shape), 0, -1) + origin) @ sides
+    inside, values = _inside(function, view, elements, places)
     told, limit = _told(kind, values)
-    inside = np.zeros(shape, dtype=bool)
-    inside[i, j] = True
     flagged, windows = np.zeros(shape, dtype=bool), IN_PLANE[kind]
     wide = windows[-1]
     for component in told.T:
         array = np.full(shape, np.nan)
-        array[i, j] = component
+        array[inside] = component
         some = np.zeros(shape, dtype=bool)  # a feature is left within half of the smaller window
         for axis in (0, 1):
             step = np.abs(np.diff(array, axis=axis, append=np.nan)) > limit / windows[0]
@@ -388,34 +371,24 @@ def _in_body(
         for window, (now, then) in zip(windows[1:], pairwise(lost), strict=True):
             around = [uniform_filter(x, 2 * window + 1, mode="constant") for x in (now, then)]
             flagged[part] |= (now > limit) & (around[1] < SATURATED * around[0])
-    x = (np.argwhere(flagged) + origin) @ sides
-    return np.column_stack([x, _widths(kind, function, view.mesh, x, spacing)]), values
+    x = places[flagged]
+    return np.column_stack([x, _widths(kind, function, view, x, spacing)]), values
 
 
-def _nodes_in(corners: Array) -> tuple[Index, Index, Index]:
-    """Triangle, and both numbers (n,), of each node (i, j) of a lattice in triangles (k, 3, 2)."""
-    y = corners[..., 1]
-    low, high = np.ceil(y.min(axis=1)).astype(int), np.floor(y.max(axis=1)).astype(int)
-    count = np.maximum(high - low + 1, 0)
-    of = np.repeat(np.arange(len(corners)), count)
-    row = np.arange(len(of)) - np.repeat(np.cumsum(count) - count, count) + low[of]
-    a, b = corners[of], np.roll(corners, -1, axis=1)[of]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = (row[:, None] - a[..., 1]) / (b[..., 1] - a[..., 1])
-        crossing = a[..., 0] + share * (b[..., 0] - a[..., 0])
-    met = (share >= 0) & (share <= 1)
-    first = np.ceil(np.where(met, crossing, np.inf).min(axis=1))
-    last = np.floor(np.where(met, crossing, -np.inf).max(axis=1))
-    some = last >= first
-    of, row, first = of[some], row[some], first[some].astype(int)
-    count = last[some].astype(int) - first + 1
-    k = np.repeat(np.arange(len(of)), count)
-    i = np.arange(len(k)) - np.repeat(np.cumsum(count) - count, count) + first[k]
-    return of[k], i, row[k]
+def _inside(
+    function: Function, view: SampledElements, elements: Index, places: Array
+) -> tuple[Mask, Array]:
+    """Which `places` (..., 2) are in `elements` (k,), (...,), and values (n, c) at these."""
+    x = places.reshape(-1, 2).T.copy()
+    points = view.mesh(x[0], x[1])
+    marked = np.zeros(len(view.sizes) + 1, dtype=bool)  # the last one for places outside
+    marked[elements] = True
+    inside = marked[points["nr"]]
+    return inside.reshape(places.shape[:-1]), _values(function, points[inside])
 
 
 def _widths(
-    kind: str, function: ng.CoefficientFunction, mesh: ng.Mesh, places: Array, spacing: float
+    kind: str, function: Function, view: SampledElements, places: Array, spacing: float
 ) -> Array:
     """Widths (k,) of features at `places` (k, 2): the least chord at the nearest of some of them.
 
@@ -426,16 +399,14 @@ def _widths(
     some = places[np.linspace(0, len(places) - 1, min(len(places), ACROSS)).astype(int)]
     t = spacing * np.geomspace(NARROWEST, WIDE, CHORD)
     t = np.concatenate([-t[::-1], [0.0], t])
-    angle = TURN / 2 + np.pi / 3 * np.arange(3)
+    angle, middle = TURN / 2 + np.pi / 3 * np.arange(3), CHORD
     steps = t[:, None, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    x = (some[:, None, None] + steps).reshape(-1, 2)
-    points = mesh(x[:, 0].copy(), x[:, 1].copy())
-    known, middle = points["nr"] >= 0, len(t) // 2
-    found = _told(kind, looked(function, points[known]))[0]
-    told = np.zeros((len(some), len(t), len(angle), found.shape[1]))
-    told.reshape(len(x), -1)[known] = found
-    away = np.abs(told - told[:, middle, None]).max(axis=3)
-    away[~known.reshape(away.shape)] = 0.0
+    x = some[:, None, None] + steps
+    known, values = _inside(function, view, np.arange(len(view.sizes)), x)
+    found = _told(kind, values)[0]
+    told = np.zeros((*known.shape, found.shape[1]))
+    told[known] = found
+    away = np.where(known, np.abs(told - told[:, middle, None]).max(axis=3), 0.0)
     same = away <= away.max(axis=1, keepdims=True) / 2
     up = np.cumprod(same[:, middle:], axis=1).sum(axis=1)
     down = np.cumprod(same[:, middle::-1], axis=1).sum(axis=1)
@@ -443,9 +414,7 @@ def _widths(
     width = np.maximum(width, NARROWEST * spacing)
     apart = np.linalg.norm(some[:, None] - some, axis=2)
     width = np.where(apart <= width, width, 0.0).max(axis=1)  # chords near corners are shorter
-    squares = np.vstack([-2 * some.T, (some**2).sum(axis=1)])  # of distances, but for |place|^2
-    nearest = (np.column_stack([places, np.ones(len(places))]) @ squares).argmin(axis=1)
-    return np.asarray(width[nearest])
+    return np.asarray(width[cKDTree(some).query(places)[1]])
 
 
 def towards(features: Array, cells: Cells, view: SampledElements) -> Cells:

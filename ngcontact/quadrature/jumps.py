@@ -11,82 +11,72 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask
 from ..errors import warn
-from ..problem import MeshArrays, Problem, varies
-from .cells import lattice
-from .sampling import SampledElements
+from ..problem import Problem, varies
+from .cells import SampledElements, lattice
 
 CHANGE = 0.5  # of a law in an element over its least value, from which it is rough there, or jumps
 HALVINGS = 24  # of the distance between two points: what still changes across 1e-7 of it jumps
 
 
-class Jumps(NamedTuple):
-    """Where a law jumps, at most one place in each element."""
+class Jump(NamedTuple):
+    """Where a law jumps in one element."""
 
-    element: Index  # (k,)
-    place: Array  # (k, 2), lengths
-    least: Array  # (k,), the value on one side of the component that jumps
-    most: Array  # (k,), and on the other
+    place: tuple[float, float]  # lengths
+    least: float  # the value on one side of the component that jumps
+    most: float  # and on the other
 
 
 @dataclass(frozen=True, eq=False)
-class VaryingLaw:
-    """A law C (q, q) that is a function, and the triangles that it is the law of."""
+class RoughElements:
+    """Elements of about one size in which a law changes by a share of itself, k of them."""
 
-    pattern: str
-    C: ng.CoefficientFunction
     view: SampledElements
-    elements: Index  # (j,)
+    C: ng.CoefficientFunction  # (q, q)
+    at: Index  # (k,)
+    values: Array  # (k, n, q q), at the points of a lattice
+    limit: Array  # (k,), of a change
 
-    def rough(self) -> Iterator[tuple[Index, Array]]:
-        """Elements (k,) in which it changes by a share of itself, and values (k, n, c), c = q q."""
-        for here, values in self.view.samples(self.C, self.elements):
-            k = np.flatnonzero(np.ptp(values, axis=1).max(axis=1) > self._limits(values))
-            if len(k):
-                yield here[k], values[k]
-
-    def _limits(self, values: Array) -> Array:
-        diagonal = values[..., :: self.C.dims[0] + 1]
-        return CHANGE * diagonal.mean(axis=2).min(axis=1)
-
-    def jumps(self) -> Jumps:
-        """Where it jumps.
+    def jumps(self) -> dict[int, Jump]:
+        """Where the law jumps, at most one place in each element, by its number.
 
         From the points of a lattice at which a component is least and largest, the half of their
         distance across which it changes more is kept, again and again: a smooth change shrinks by
         that.
         """
-        found = [Jumps(np.empty(0, np.intp), np.empty((0, 2)), np.empty(0), np.empty(0))]
-        for at, values in self.rough():
-            which, row = np.ptp(values, axis=1).argmax(axis=1), np.arange(len(at))
-            of = values[row, :, which]  # the component (k, n) that changes most
-            ends = np.column_stack([of.argmin(axis=1), of.argmax(axis=1)])
-            x, u = lattice(2, round(of.shape[1] ** 0.5))[ends], of[row[:, None], ends]
-            for _ in range(HALVINGS):
-                middle = x.mean(axis=1)
-                v = self.view.look(self.C, at, middle[:, None])[row, 0, which]
-                side = (np.abs(v - u[:, 0]) > np.abs(v - u[:, 1])).astype(int)  # which end to move
-                x[row, side], u[row, side] = middle, v
-            kept = np.abs(u[:, 1] - u[:, 0]) > self._limits(values)
-            place = self.view.positions(at[kept], x[kept, 0])
-            found.append(Jumps(at[kept], place, u[kept].min(axis=1), u[kept].max(axis=1)))
-        return Jumps(*map(np.concatenate, zip(*found, strict=True)))
+        which, row = np.ptp(self.values, axis=1).argmax(axis=1), np.arange(len(self.at))
+        of = self.values[row, :, which]  # the component (k, n) that changes most
+        ends = np.column_stack([of.argmin(axis=1), of.argmax(axis=1)])
+        x, u = lattice(2, round(of.shape[1] ** 0.5))[ends], of[row[:, None], ends]
+        for _ in range(HALVINGS):
+            middle = x.mean(axis=1)
+            v = self.view.look(self.C, self.at, middle[:, None])[row, 0, which]
+            side = (np.abs(v - u[:, 0]) > np.abs(v - u[:, 1])).astype(int)  # which end to move
+            x[row, side], u[row, side] = middle, v
+        kept = np.ptp(u, axis=1) > self.limit
+        places, u = self.view.positions(self.at[kept], x[kept, 0]), np.sort(u[kept], axis=1)
+        found = zip(places.tolist(), *u.T.tolist(), strict=True)
+        return {k: Jump((x, y), *of) for k, ((x, y), *of) in zip(self.at[kept], found, strict=True)}
 
 
-def _varying(problem: Problem, mesh: ng.Mesh) -> Iterator[VaryingLaw]:
-    """All laws that are functions."""
+def _rough(problem: Problem, mesh: ng.Mesh) -> Iterator[tuple[str, RoughElements]]:
+    """Where laws are rough, and whose they are."""
     view = SampledElements(mesh, 2)
     for pattern, law in problem.materials.items():
-        if varies(law):
-            inside = view.inside(mesh.Materials(pattern))
-            yield VaryingLaw(pattern, law.voigt(problem.model), view, inside)
+        if not varies(law):
+            continue
+        C = law.voigt(problem.model)
+        for here, values in view.samples(C, view.inside(mesh.Materials(pattern))):
+            limit = CHANGE * values[..., :: C.dims[0] + 1].mean(axis=2).min(axis=1)
+            k = np.flatnonzero(np.ptp(values, axis=1).max(axis=1) > limit)
+            if len(k):
+                yield pattern, RoughElements(view, C, here[k], values[k], limit[k])
 
 
 def rough_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
     """Elements (ne,) in which the law varies by more than half of itself, or jumps."""
     rough = np.zeros(mesh.ne, dtype=bool)
-    for law in _varying(problem, mesh):
-        for elements, _ in law.rough():
-            rough[elements] = True
+    for _, elements in _rough(problem, mesh):
+        rough[elements.at] = True
     return rough
 
 
@@ -95,23 +85,23 @@ def jumping_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
 
     A line may cut off a corner that no point of a small element shows.
     """
-    triangles = MeshArrays(mesh).elements
-    touched = np.zeros(mesh.nv, dtype=bool)
-    for law in _varying(problem, mesh):
-        touched[triangles[law.jumps().element]] = True
-    return np.asarray(touched[triangles].any(axis=1))
+    view, jumps = SampledElements(mesh, 2), np.zeros(mesh.ne, dtype=bool)
+    for _, elements in _rough(problem, mesh):
+        jumps[[*elements.jumps()]] = True
+    return view.with_neighbours(jumps, np.arange(mesh.ne))
 
 
 def warn_of_jumps(problem: Problem, mesh: ng.Mesh) -> None:
     """Warn of every law that jumps inside elements, where it jumps most."""
-    for law in _varying(problem, mesh):
-        found = law.jumps()
-        if len(found.element):
-            k = int(np.argmax(found.most - found.least))
-            x, y = found.place[k]
+    jumps: dict[str, list[Jump]] = {}
+    for pattern, elements in _rough(problem, mesh):
+        jumps.setdefault(pattern, []).extend(elements.jumps().values())
+    for pattern, found in jumps.items():
+        if found:
+            (x, y), least, most = max(found, key=lambda jump: jump.most - jump.least)
             warn(
-                f'materials "{law.pattern}" jump inside {len(found.element)} elements, most near '
-                f"({x:.4g}, {y:.4g}): a stiffness from {found.least[k]:.3g} to "
-                f"{found.most[k]:.3g}. No order converges fast there; make the line an edge of the "
-                "geometry, with a body of its own on either side"
+                f'materials "{pattern}" jump inside {len(found)} elements, most near '
+                f"({x:.4g}, {y:.4g}): a stiffness from {least:.3g} to {most:.3g}. No order "
+                "converges fast there; make the line an edge of the geometry, with a body of its "
+                "own on either side"
             )

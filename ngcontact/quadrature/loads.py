@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
@@ -15,17 +16,19 @@ from ..arrays import Array, Index, Mask, power_of_two
 from ..errors import warn
 from ..problem import MeshArrays, Problem, numbers
 from .cells import (
-    AT_CORNERS,
     MOMENTS,
     Cells,
     Refined,
+    Rule,
+    SampledElements,
+    divisions,
     gauss_rule,
+    inward,
+    missed_by_polynomials,
     monomials,
     refined,
-    rule_with_corners,
 )
 from .features import NONE, features_in, features_of, towards, where_features_are
-from .sampling import SampledElements, divisions, missed_by_polynomials
 
 SHAPE = 0.05  # what polynomials miss of a load at a point, relative to its largest value ...
 SHARE = {1: 1e-4, 2: 2e-3}  # ... or over an element, relative to its integral: it is rough there
@@ -33,9 +36,7 @@ STEP = 2  # times what values vary at the points: no others are further apart in
 COARSE = 4  # elements in the width of a feature, from which it is looked at as all else is
 CURVED = 4  # quadrature orders for the maps of curved elements
 FINE = {1: 1e-6, 2: 3e-5}  # error of a part relative to that integral at which it is not halved
-ROUGH_LOADS = (
-    "_ngcontact_loads"  # attribute of a mesh: loads are assembled, then the estimate asks again
-)
+ROUGH_LOADS = "_ngcontact_loads"  # attribute of a mesh: the estimate asks what assembly asked
 LOST = 1e-3  # of a load that quadrature may miss without a word
 
 FEWEST = 8  # points on a segment at least, which show any interpolation error
@@ -53,7 +54,6 @@ class RoughLoad:
     rest: Array  # (n,), root of the integral of the square of what it misses of the load
     missed: Array  # (n,), error of the integral of the load, a force
     total: float  # integral of the load's size, a force
-    seen: int  # tells the values from which it was found rough
     cells: Cells  # parts of the rough elements on which a rule integrates the load
 
 
@@ -67,29 +67,28 @@ class Load:
     density: ng.CoefficientFunction  # the force (2,) per volume or area that this is
     region: ng.Region
 
-    def where_rough(self, order: int, *, again: bool = False) -> RoughLoad | None:
+    def where_rough(self, order: int) -> RoughLoad | None:
         """The load where it is rough for displacements of an order; None where it is nowhere.
 
-        As it was found last on this mesh, or is now if `again`. Numbers are nowhere rough.
+        Known from its first time in a run on this mesh. Numbers are nowhere rough.
         """
         if numbers(self.data):
             return None
         mesh, degree = self.region.mesh, max(order, 2) + 1  # displacements' times a radius
-        kept = getattr(mesh, ROUGH_LOADS, {})
-        key, what = (self.kind, self.name, degree), (self.data, mesh.GetNE(self.region.VB()))
-        known = kept.get(key)
-        if known is not None and known[0] != what:
-            known = None
-        if known is None or again:
-            before = None if known is None else known[1]
-            features = features_in(self.data)
-            known = kept[key] = (
-                what,
-                rough_load(self.density, self.region, degree, before, features),
-            )
-            setattr(mesh, ROUGH_LOADS, kept)
-        found: RoughLoad | None = known[1]
+        kept: dict[Any, tuple[ng.CoefficientFunction, RoughLoad | None]]
+        kept = mesh.__dict__.setdefault(ROUGH_LOADS, {})
+        key = self.kind, self.name, degree, mesh.GetNE(self.region.VB())
+        data, found = kept.get(key, (None, None))
+        if data != self.data:
+            found = rough_load(self.density, self.region, degree, features_in(self.data))
+            kept[key] = self.data, found
         return found
+
+
+def look(problem: Problem, mesh: ng.Mesh) -> None:
+    """Look at all functions of a problem anew, as each run does: parameters may have changed."""
+    features_of(problem, mesh, again=True)
+    mesh.__dict__.pop(ROUGH_LOADS, None)
 
 
 def loads_of(problem: Problem, mesh: ng.Mesh) -> list[Load]:
@@ -117,24 +116,19 @@ def narrow_forces(problem: Problem, mesh: ng.Mesh, order: int) -> Mask:
 
 
 def rough_load(
-    load: ng.CoefficientFunction,
-    region: ng.Region,
-    degree: int,
-    known: RoughLoad | None = None,
-    features: Array = NONE,
+    load: ng.CoefficientFunction, region: ng.Region, degree: int, features: Array = NONE
 ) -> RoughLoad | None:
     """A load on a region, bodies or boundaries, where it is rough; None where it is nowhere.
 
-    Polynomials of a degree have the same moments. What is `known` from before is returned where
-    nothing has changed; `features` (k, 3) are places and widths of narrow ones, lengths.
+    Polynomials of a degree have the same moments; `features` (k, 3) are places and widths of narrow
+    ones, lengths.
     """
     view = SampledElements(region.mesh, 2 if region.VB() == ng.VOL else 1)
     inside, sizes = view.inside(region), view.sizes
-    miss, largest, total, seen = np.zeros(len(sizes)), 0.0, 0.0, hash(features.tobytes())
+    miss, largest, total = np.zeros(len(sizes)), 0.0, 0.0
     least, most = np.zeros((2, len(sizes), load.dim))
     for here, values in view.samples(load, inside):
         miss[here] = missed_by_polynomials(values, view.dim)
-        seen = hash((seen, here.tobytes(), sizes[here].tobytes(), values.tobytes()))
         size = np.abs(values).max(axis=2)  # no squares: they may leave the range of numbers
         largest = max(largest, float(size.max(initial=0.0)))
         total += float(size.mean(axis=1) @ sizes[here] ** view.dim) / view.dim
@@ -147,8 +141,6 @@ def rough_load(
     rough[near[sizes[near] > features[feature, 2] / COARSE]] = True
     if not rough.any():
         return None
-    if known is not None and known.seen == seen:
-        return known
     rough = view.with_neighbours(rough, inside)  # a part of a feature may have none of the points
     start = view.in_parts(np.flatnonzero(rough))
 
@@ -157,16 +149,13 @@ def rough_load(
         return np.asarray(values * view.evaluate(view.measure, elements, reference))
 
     if len(features):  # of which the points of the lattice may have seen nothing
-        start, rule = (
-            towards(features, start, view),
-            rule_with_corners(view.dim, *MOMENTS[view.dim]),
-        )
+        start, rule = towards(features, start, view), Rule.of(view.dim, *MOMENTS[view.dim])
         size = np.abs(density(start.element, start.points(rule))).max(axis=2)
         total = max(total, float((size * start.weights(rule)).sum()))
     found = refined(density, start, MOMENTS, FINE[view.dim], total, view.corners)
     projection, rest = _projected(found, view, degree)
     missed = np.bincount(found.cells.element, found.missed, len(rough)).astype(float)
-    return RoughLoad(rough, projection, rest, missed, total, seen, found.cells)
+    return RoughLoad(rough, projection, rest, missed, total, found.cells)
 
 
 def _steps(
@@ -198,8 +187,7 @@ def beside_edges(dim: int) -> Array:
     t = np.arange(8)[:, None] / 8
     corners = np.vstack([np.zeros(dim), np.eye(dim)])
     edges = [(1 - t) * a + t * b for a, b in zip(corners, np.roll(corners, 1, axis=0), strict=True)]
-    x = corners if dim == 1 else np.vstack(edges)
-    return np.asarray(x + AT_CORNERS * (1 / (dim + 1) - x))
+    return inward(corners if dim == 1 else np.vstack(edges))
 
 
 def _projected(found: Refined, view: SampledElements, degree: int) -> tuple[ng.GridFunction, Array]:

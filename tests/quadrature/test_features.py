@@ -11,8 +11,7 @@ import pytest
 from ngcontact import Contact, ContactWarning, Elastic, adapt, solve
 from ngcontact.adaptivity import refined
 from ngcontact.mesh import first_mesh
-from ngcontact.quadrature import look, unresolved
-from ngcontact.quadrature.features import features_of
+from ngcontact.quadrature import features_of, look, unresolved
 from tests.quadrature.test_loads import box, loaded
 
 PLACES = [0.0, 0.123456, 0.5, 0.6180339]
