@@ -31,24 +31,12 @@ def slope_triangle(axes: Axes, x: Array, y: Array, rate: float, above: bool = Fa
     corners = _triangle(x, y, rate, above)
     axes.plot(*corners.T, color="0.4", lw=0.8)
     (left, start), (_, end), corner, _ = corners
-    sideways, up = (3, 2) if above else (-3, -2)
+    upright, level = (corner[0], np.sqrt(end * start)), (np.sqrt(left * float(x[-1])), corner[1])
+    one, other = ((3, 0), (0, 2)) if above else ((-3, 0), (0, -2))
     beside: dict[str, Any] = {"textcoords": "offset points", "fontsize": 8, "color": "0.3"}
-    axes.annotate(
-        f"{rate:g}",
-        (corner[0], np.sqrt(end * start)),
-        xytext=(sideways, 0),
-        ha="left" if above else "right",
-        va="center",
-        **beside,
-    )
-    axes.annotate(
-        "1",
-        (np.sqrt(left * float(x[-1])), corner[1]),
-        xytext=(0, up),
-        ha="center",
-        va="bottom" if above else "top",
-        **beside,
-    )
+    side, va = ("left", "bottom") if above else ("right", "top")
+    axes.annotate(f"{rate:g}", upright, xytext=one, ha=side, va="center", **beside)
+    axes.annotate("1", level, xytext=other, ha="center", va=va, **beside)
 
 
 def _triangle(x: Array, y: Array, rate: float, above: bool) -> Array:
@@ -100,48 +88,38 @@ def plot_convergence(
     ValueError, OSError
         An empty run, a rate without a run, a path that cannot be written.
     """
-    named: dict[str, Run]
     named = {str(k): run for k, run in runs.items()} if isinstance(runs, Mapping) else {"": runs}
     if unknown := set(rates or {}) - set(named):
         raise ValueError(f"rates: no run is called {', '.join(sorted(unknown))}")
+    curves = {}
     for label, run in named.items():
-        if len(run) == 0 or (isinstance(run, tuple) and len(run[0]) == 0):
+        if isinstance(run, tuple):
+            curves[label] = x, _ = np.asarray(run[0], float), np.asarray(run[1], float)
+        else:
+            x = np.array([float(level.displacement.space.ndof) for level in run])
+            curves[label] = x, np.array([level.relative_error_estimate for level in run])
+        if len(x) == 0:
             raise ValueError(f'run "{label}" is empty')
     target = None if path is None else check_path(path, ".png")
     figure = new_figure(target, figsize=(6.5, 5))
-    _draw(figure.subplots(), named, rates or {})
-    show(figure, target)
-    return figure
-
-
-def _draw(axes: Axes, runs: Mapping[str, Run], rates: Mapping[str, float]) -> None:
-    """All curves with their triangles."""
-    curves: dict[str, tuple[Array, Array]] = {}
-    for label, run in runs.items():
-        if isinstance(run, tuple):
-            x, y = (np.asarray(values, dtype=float) for values in run)
-        else:
-            x = np.array([level.displacement.space.ndof for level in run], dtype=float)
-            y = np.array([level.relative_error_estimate for level in run])
-        curves[label] = x, y
-    for k, (label, run) in enumerate(runs.items()):
-        (x, y), rate, name = curves[label], rates.get(label), label
+    axes = figure.subplots()
+    for k, (label, run) in enumerate(named.items()):
+        (x, y), rate, name = curves[label], (rates or {}).get(label), label
         style: dict[str, Any] = {
             "color": COLOURS[k % len(COLOURS)],
             "marker": MARKS[k % len(MARKS)],
-            "ms": 4,
         }
         known = []
         if not isinstance(run, tuple):
             order = run[-1].order
-            name, rate = label or f"estimate, order {order}", rates.get(label, order / 2)
+            name, rate = label or f"estimate, order {order}", order / 2 if rate is None else rate
             known = [level for level in run if level.bounded]
-        axes.plot(x, y, label=name, **style)
+        axes.plot(x, y, label=name, ms=4, **style)
         if known:
             size = [float(level.displacement.space.ndof) for level in known]
             bound = [level.relative_error_bound for level in known]
             name = f"{label}, bound".lstrip(", ")
-            axes.plot(size, bound, ls="--", mfc="w", label=name, **style)
+            axes.plot(size, bound, ls="--", mfc="w", label=name, ms=4, **style)
         if rate is not None:
             others = [curve for other, curve in curves.items() if other != label]
             places = [_triangle(x, y, rate, above) for above in (False, True)]
@@ -150,3 +128,5 @@ def _draw(axes: Axes, runs: Mapping[str, Run], rates: Mapping[str, float]) -> No
     axes.set(xscale="log", yscale="log", xlabel="unknowns", ylabel="relative error, energy norm")
     axes.grid(which="major", alpha=0.3)
     axes.legend()
+    show(figure, target)
+    return figure

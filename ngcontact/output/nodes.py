@@ -92,6 +92,13 @@ def full_stress(solution: Solved) -> ng.CoefficientFunction:
     return ng.CF((stress[0, 0], stress[1, 1], stress[0, 1], solution.out_of_plane_stress))
 
 
+def principal_stresses(stress: Array) -> Array:
+    """Principal stresses (k, 3), the largest first, of xx, yy, xy, zz in `stress` (k, 4)."""
+    xx, yy, xy, zz = stress.T
+    mean, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
+    return np.asarray(-np.sort(-np.stack([mean + radius, mean - radius, zz], axis=1), axis=1))
+
+
 def neighbour_tree(points: Array) -> csr_array:
     """Neighbours (m, m) along the curves through `points` (m, 2): tree of least total distance."""
     near = list(range(1, min(len(points), 9) + 1))

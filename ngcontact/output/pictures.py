@@ -18,7 +18,6 @@ from .scene import Scene, Style, contact_lines, coordinates, picture, zones_of
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.ticker import ScalarFormatter
     from PIL.Image import Image
 
 # Colours of Okabe and Ito, told apart with any colour vision, and marks for those who print grey.
@@ -26,7 +25,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#0
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 RISING, SIGNED = "viridis", "RdBu_r"  # colour maps, told apart with any colour vision
 HEIGHT = 5.0  # of a picture, inches
-POWERS = -3, 4  # of ten, from which numbers on a scale are given with one for all
+# Powers of ten from which numbers on a scale are given with one for all.
+POWERS: dict[str, Any] = {"scilimits": (-3, 4), "useMathText": True}
 PROFILE_SAMPLES = 400  # of a function that is drawn over the pressure
 
 MAX_CLOSE_UPS = 4
@@ -52,27 +52,18 @@ def plot_solution(
     scale: float | None = None,
     **options: Any,
 ) -> Figure:
-    """Picture of the deformed bodies with a field, and of the contact pressure.
+    """Picture of the deformed bodies and the contact pressure; see `Solution.plot`.
 
-    Close-ups of small zones in contact stand between the two. The pressure is drawn over eta (P2)
-    or the arc position (P1). Lengths and stresses in the consistent units of the data. With a
-    `path` (``.png``) the picture is written there without any window, otherwise it is shown on the
-    screen. `scale` multiplies the displacement; None chooses a factor that lets the deformation be
-    seen, but not so large that bodies seem to run into each other. `options` are those of `Style`.
-
-    Raises ``ValueError`` or ``TypeError`` where an option is none, and as `check_path` does, before
-    any work.
+    `options` are those of `Style`. With a `path` nothing is shown on a screen. Returns the figure.
     """
     style = Style(scale, **options)
     target = None if path is None else check_path(path, ".png")
-    style.check_field(solution)
-    figure = new_figure(target)
     scene = picture(solution, style)
+    figure = new_figure(target)
     windows = close_ups([scene])
     draw_scene(figure, scene, windows, style.limits or colour_range(scene, windows))
-    if (engine := figure.get_layout_engine()) is not None:
-        for _ in range(2):  # labels move with the ticks that a first layout leaves
-            engine.execute(figure)
+    for _ in range(2):  # labels move with the ticks that a first layout leaves
+        figure.draw_without_rendering()
     show(figure, target, bbox_inches="tight", pad_inches=0.05)
     return figure
 
@@ -145,53 +136,49 @@ def write_film(
     if not (np.isfinite(seconds) and seconds > 0):
         raise ValueError(f"seconds = {seconds}: give a positive time")
     target = check_path(path, ".gif")
-    style.check_field(frames[0])
     scenes = [picture(solution, style) for solution in frames]
     scale = min(scene.scale for scene in scenes)  # one for all, the most careful one
     for k, scene in enumerate(scenes):
         if scene.scale != scale:
             scenes[k] = picture(frames[k], replace(style, scale=scale))
-    names = titles or [
+    titles = titles or [
         f"{k + 1} of {len(frames)}: {s.displacement.space.ndof} unknowns"
         for k, s in enumerate(frames)
     ]
-    images = _images(scenes, style, names)
+    images = _images(scenes, titles)
     times = [round(1000 * seconds)] * (len(images) - 1) + [round(3000 * seconds)]
+    options = {"save_all": True, "append_images": images[1:], "duration": times, "loop": 0}
     with replacing(target) as (draft,):
-        images[0].save(
-            draft, format="GIF", save_all=True, append_images=images[1:], duration=times, loop=0
-        )
+        images[0].save(draft, format="GIF", **options)
     return target
 
 
-def _images(scenes: Sequence[Scene], style: Style, names: Sequence[str]) -> list[Image]:
+def _images(scenes: Sequence[Scene], titles: Sequence[str]) -> list[Image]:
     """The frames, drawn with one scale for all."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from PIL import Image
 
-    windows = close_ups(scenes)
+    style, frames, windows = scenes[0].style, [s.solution for s in scenes], close_ups(scenes)
     ranges = [style.limits or colour_range(scene, windows) for scene in scenes]
     limits = min(low for low, _ in ranges), max(high for _, high in ranges)
     if style.limits is None and limits[0] < 0:
         limits = -max(-limits[0], limits[1]), max(-limits[0], limits[1])
-    frames = [scene.solution for scene in scenes]
     tops = [cut_pressure(s) or HEADROOM * float(s.pressure.max(initial=0.0)) for s in frames]
     top = max(tops) / style.unit("stress")[1]
     low, high = (corner / style.unit("length")[1] for corner in _corners(scenes))
     margin = 0.03 * (high - low).max()
-    ends = np.array([part for part in map(shown_part, frames) if part is not None])
-    along = [np.array([ends.min(), ends.max()])] if len(ends) else [np.zeros(2)]
+    ends = [part for part in map(shown_part, frames) if part is not None] or [np.zeros(2)]
+    along = [np.array([np.min(ends), np.max(ends)])]
     images = []
-    for scene, name in zip(scenes, names, strict=True):
+    for scene, title in zip(scenes, titles, strict=True):
         figure = Figure(layout="constrained")
         [profile] = draw_scene(figure, scene, windows, limits, along)
-        figure.axes[0].set(
-            xlim=(low[0] - margin, high[0] + margin), ylim=(low[1] - margin, high[1] + margin)
-        )
+        xlim, ylim = np.transpose([low - margin, high + margin]).tolist()
+        figure.axes[0].set(xlim=xlim, ylim=ylim)
         if top > 0:
             profile.set_ylim(min(profile.get_ylim()[0], -0.02 * top), top)
-        figure.suptitle(name)
+        figure.suptitle(title)
         canvas = FigureCanvasAgg(figure)
         figure.set_dpi(FILM_DPI)
         canvas.draw()
@@ -233,16 +220,16 @@ def close_ups(scenes: Sequence[Scene]) -> list[Window]:
     """
     low, high = _corners(scenes)
     groups: list[Array] = []
+
+    def overlap(zone: Array, other: Array) -> bool:
+        (a, b), (c, d) = _window(zone, low, high), _window(other, low, high)
+        return bool((a < d).all() and (c < b).all())
+
     for zone in [zone for scene in scenes[::-1] for zone in scene.zones]:
         joined = zone
-        while True:
-            first, last = _window(joined, low, high)
-            windows = [_window(group, low, high) for group in groups]
-            met = [k for k, (a, b) in enumerate(windows) if (first < b).all() and (a < last).all()]
-            if not met:
-                break
+        while met := [k for k, group in enumerate(groups) if overlap(group, joined)]:
             joined = np.concatenate([*(groups[k] for k in met), joined])
-            groups = [g for k, g in enumerate(groups) if k not in met]
+            groups = [group for k, group in enumerate(groups) if k not in met]
         groups.append(joined)
     windows = [_window(group, low, high) for group in groups]
     size = (high - low).max()
@@ -263,7 +250,7 @@ def colour_range(scene: Scene, windows: Sequence[Window]) -> tuple[float, float]
     stresses at corners and at ends of supports, which grow on every finer mesh. Where both signs
     occur colours are symmetric about 0.
     """
-    values, areas = np.abs(scene.shown.values), scene.areas()
+    values, areas = np.abs(scene.values), scene.areas()
     mean, middle = values[scene.triangles].mean(axis=1), scene.moved[scene.triangles].mean(axis=1)
     top = _typical(mean, areas)
     for low, high in windows:
@@ -273,7 +260,7 @@ def colour_range(scene: Scene, windows: Sequence[Window]) -> tuple[float, float]
     largest = float(values.max(initial=0.0))
     top = largest if largest <= CUT_OFF * top else top
     top = top or 1.0
-    return (-top, top) if scene.shown.values.min(initial=0.0) < 0 else (0.0, top)
+    return (-top, top) if scene.values.min(initial=0.0) < 0 else (0.0, top)
 
 
 def draw_scene(
@@ -322,7 +309,7 @@ def _draw_bodies(axes: Axes, scene: Scene, limits: tuple[float, float]) -> Any:
     signed = limits[0] < 0 < limits[1]
     shading = axes.tripcolor(
         triangles,
-        scene.shown.values / unit,
+        scene.values / unit,
         shading="gouraud",
         vmin=limits[0] / unit,
         vmax=limits[1] / unit,
@@ -336,23 +323,8 @@ def _draw_bodies(axes: Axes, scene: Scene, limits: tuple[float, float]) -> Any:
     x, y = coordinates(scene.solution)
     axes.set(aspect="equal", xlabel=style.title(x, "length"), ylabel=style.title(y, "length"))
     axes.locator_params(nbins=5)
-    _format(axes)
+    axes.ticklabel_format(**POWERS)
     return shading
-
-
-def _powers() -> ScalarFormatter:
-    """Numbers of a scale, with one power of ten for all where they are large or small."""
-    from matplotlib.ticker import ScalarFormatter
-
-    formatter = ScalarFormatter(useMathText=True)
-    formatter.set_powerlimits(POWERS)
-    return formatter
-
-
-def _format(axes: Axes) -> None:
-    """The same on both axes."""
-    axes.xaxis.set_major_formatter(_powers())
-    axes.yaxis.set_major_formatter(_powers())
 
 
 def _draw_windows(
@@ -364,53 +336,41 @@ def _draw_windows(
     several = len(windows) > 1
     for k, (axes, window) in enumerate(zip(close, windows, strict=True)):
         low, high = (corner / unit for corner in window)
-        frame = Rectangle((low[0], low[1]), *(high - low), fill=False, color="crimson", lw=1.2)
-        bodies.add_patch(frame)
+        bodies.add_patch(Rectangle(low, *(high - low), fill=False, color="crimson", lw=1.2))
         name = f"zone {k + 1}" if several else "zone in contact"
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=name)
         axes.locator_params(nbins=3 if several else 5)
         axes.spines[:].set_color("crimson")
         if several:
-            bodies.annotate(
-                str(k + 1),
-                (high[0], high[1]),
-                xytext=(2, 2),
-                textcoords="offset points",
-                color="crimson",
-                weight="bold",
-            )
+            corner = {"xytext": (2, 2), "textcoords": "offset points"}
+            bodies.annotate(str(k + 1), high, **corner, color="crimson", weight="bold")
 
 
 def _colour_bar(
     figure: Figure, shading: Any, axes: list[Axes], scene: Scene, limits: tuple[float, float]
 ) -> None:
     """Scale of colours; an arrow and a number say what lies beyond its ends."""
-    values, (low, high) = scene.shown.values, limits
-    _, unit = scene.style.unit(scene.shown.kind)
-    least, most = float(values.min()), float(values.max())
+    least, most, (low, high) = float(scene.values.min()), float(scene.values.max()), limits
+    label, kind, _ = scene.shown
     below, above = least < low, most > high
     extend = {(True, True): "both", (True, False): "min", (False, True): "max"}
     bar = figure.colorbar(
         shading,
         ax=axes,
-        label=scene.style.title(scene.shown.label, scene.shown.kind),
+        label=scene.style.title(label, kind),
         extend=extend.get((below, above), "neither"),
-        format=_powers(),
     )
+    bar.ax.ticklabel_format(axis="y", **POWERS)
     bar.formatter.set_locs(bar.get_ticks().tolist())
     power = 16 if bar.formatter.get_offset() else 0  # which stands above the bar
-    for beyond, value, y, offset in ((above, most, 1.0, 14 + power), (below, least, 0.0, -14)):
+    for beyond, value, word, y, offset, va in (
+        (above, most, "largest", 1.0, 14 + power, "bottom"),
+        (below, least, "least", 0.0, -14, "top"),
+    ):
         if beyond:
-            bar.ax.annotate(
-                f"{'largest' if offset > 0 else 'least'} {value / unit:.3g}",
-                (0.5, y),
-                xycoords="axes fraction",
-                xytext=(0, offset),
-                textcoords="offset points",
-                ha="center",
-                va="bottom" if offset > 0 else "top",
-                fontsize=8,
-            )
+            text = f"{word} {value / scene.style.unit(kind)[1]:.3g}"
+            at = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center"}
+            bar.ax.annotate(text, (0.5, y), xytext=(0, offset), va=va, fontsize=8, **at)
 
 
 def shown_part(solution: Solved) -> Array | None:
@@ -509,11 +469,9 @@ def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> N
         for state, fill, name in ((active, colour, "in contact"), (~active, "w", "open")):
             label = name if state.any() and not several and k == 0 else None
             axes.plot(at[state], p[state], mark, ms=size, mec=colour, mfc=fill, label=label)
-    for state, fill, name in (
-        (solution.active, "0.4", "in contact"),
-        (~solution.active, "w", "open"),
-    ):
-        if several and state.any():
+    states = (solution.active, "0.4", "in contact"), (~solution.active, "w", "open")
+    for state, fill, name in states if several else ():
+        if state.any():
             axes.plot([], [], "o", ms=4, mec="0.4", mfc=fill, label=name)
     if np.ptp(part) > 0:
         axes.set_xlim(*part / length)
@@ -538,5 +496,5 @@ def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> N
         ylabel=style.title("contact pressure", "stress"),
         title="contact pressure",
     )
-    _format(axes)
+    axes.ticklabel_format(**POWERS)
     axes.grid(alpha=0.3)

@@ -12,11 +12,18 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, across
 from ..fem import von_mises
-from ..problem import ABOUT_AN_AXIS
+from ..problem import ABOUT_AN_AXIS, MeshArrays
 from ..solved import Solved
-from .nodes import Nodes, full_stress, neighbour_tree, nodes_of, subdivision
+from .nodes import (
+    Nodes,
+    full_stress,
+    neighbour_tree,
+    nodes_of,
+    principal_stresses,
+    subdivision,
+)
 
 MAX_TRIANGLES = 200_000  # of a picture: more cannot be seen
 NEAR = 0.25  # of a zone's size: distance to a line of symmetry up to which both halves are one zone
@@ -26,7 +33,6 @@ UNITS = ("length", "stress")  # what has a unit
 
 Unit = str | tuple[str, float]
 Profile = Callable[[Array], Any] | tuple[Any, Any]
-Evaluated = Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,9 +54,7 @@ class Style:
                 f"scale = {self.scale}: give a finite factor, or None to have one chosen"
             )
         if self.limits is not None and not (
-            len(self.limits) == 2
-            and np.isfinite(self.limits).all()
-            and self.limits[0] < self.limits[1]
+            len(self.limits) == 2 and -np.inf < self.limits[0] < self.limits[1] < np.inf
         ):
             raise ValueError(f"limits = {self.limits}: give two finite numbers, the smaller first")
         for kind in self.units:
@@ -63,7 +67,14 @@ class Style:
                     'the unit of the data, as ("MPa", 1e6)'
                 )
         for label, profile in self.profile.items():
-            if not callable(profile) and not _two_arrays(profile):
+            if callable(profile):
+                continue
+            try:
+                one, other = (np.asarray(values, dtype=float) for values in profile)
+                fits = one.ndim == 1 and one.shape == other.shape
+            except (TypeError, ValueError):
+                fits = False
+            if not fits:
                 raise TypeError(
                     f'profile["{label}"]: give a function of the coordinate, or two arrays of one '
                     "length, coordinates and pressures"
@@ -79,29 +90,29 @@ class Style:
         name, _ = self.unit(kind)
         return f"{text} [{name}]" if name else text
 
-    def check_field(self, solution: Solved) -> None:
-        """Raise ``ValueError`` or ``TypeError`` unless the field can be shown."""
-        if isinstance(self.field, ng.CoefficientFunction):
-            if self.field.dim != 1 or self.field.is_complex:
+    def shown(self, solution: Solved) -> Field:
+        """The field; raises ``ValueError`` or ``TypeError`` where it is none that can be shown."""
+        field, known = self.field, fields(solution)
+        if isinstance(field, ng.CoefficientFunction):
+            if field.dim != 1 or field.is_complex:
                 raise ValueError(
-                    f"field: a function of {self.field.dim} components; give one real number"
+                    f"field: a function of {field.dim} components; give one real number"
                 )
-            return
-        known = fields(solution)
+            return Field("field", "", lambda nodes: nodes.values(field)[:, 0])
         choice = f"give a CoefficientFunction or one of {', '.join(known)}"
-        if not isinstance(self.field, str):
-            raise TypeError(f"field = {self.field!r}: {choice}")
-        if self.field not in known:
-            raise ValueError(f'field = "{self.field}": {choice}')
+        if not isinstance(field, str):
+            raise TypeError(f"field = {field!r}: {choice}")
+        if field not in known:
+            raise ValueError(f'field = "{field}": {choice}')
+        return known[field]
 
 
-def _two_arrays(profile: Any) -> bool:
-    """Whether it is a pair of arrays (k,)."""
-    try:
-        one, other = (np.asarray(values, dtype=float) for values in profile)
-    except (TypeError, ValueError):
-        return False
-    return one.ndim == 1 and one.shape == other.shape
+class Field(NamedTuple):
+    """A scalar field; its kind, by which it has a unit, is one of `UNITS`, or "" if not known."""
+
+    label: str
+    kind: str
+    values: Callable[[Nodes], Array]  # (k,), at the nodes of a picture
 
 
 def coordinates(solution: Solved) -> tuple[str, str]:
@@ -109,63 +120,39 @@ def coordinates(solution: Solved) -> tuple[str, str]:
     return ("r", "z") if solution.problem.model in ABOUT_AN_AXIS else ("x", "y")
 
 
-def fields(solution: Solved) -> dict[str, tuple[str, str, Evaluated]]:
-    """Label, kind and function of every field by name.
-
-    Kinds are those of `UNITS`, or "" where none is known; functions map stresses xx, yy, xy, zz
-    (4, k) and displacements (2, k) to values (k,).
-    """
+def fields(solution: Solved) -> dict[str, Field]:
+    """Every field by name."""
     x, y = coordinates(solution)
-    normal = "hoop" if solution.problem.model in ABOUT_AN_AXIS else "zz"
+    names = (f"{x}{x}", f"{y}{y}", f"{x}{y}", "zz" if x == "x" else "hoop")
 
-    def component(number: int) -> Evaluated:
-        return lambda stress, _: stress[number]
+    def stress(label: str, of: Callable[[Array], Array]) -> Field:
+        """Of the components xx, yy, xy, zz (k, 4)."""
+        return Field(label, "stress", lambda nodes: of(nodes.values(full_stress(solution))))
 
-    def principal(stress: Array, sign: int) -> Array:
-        xx, yy, xy, zz = stress
-        in_plane = (xx + yy) / 2 + sign * np.hypot((xx - yy) / 2, xy)
-        return np.asarray(sign * np.maximum(sign * in_plane, sign * zz))
+    def displacement(label: str, of: Callable[[Array], Array]) -> Field:
+        """Of the components (k, 2)."""
+        move = ng.CF(tuple(solution.displacement))
+        return Field(f"displacement{label}", "length", lambda nodes: of(nodes.values(move)))
+
+    def component(number: int) -> Callable[[Array], Array]:
+        return lambda values: np.asarray(values[:, number])
 
     return {
-        "von_mises": ("von Mises stress", "stress", lambda s, _: von_mises(s.T)),
-        **{
-            f"stress_{name}": (f"stress {name}", "stress", component(k))
-            for k, name in enumerate((f"{x}{x}", f"{y}{y}", f"{x}{y}", normal))
-        },
-        "largest_principal": ("largest principal stress", "stress", lambda s, _: principal(s, 1)),
-        "smallest_principal": (
-            "smallest principal stress",
-            "stress",
-            lambda s, _: principal(s, -1),
+        "von_mises": stress("von Mises stress", von_mises),
+        **{f"stress_{a}": stress(f"stress {a}", component(k)) for k, a in enumerate(names)},
+        "largest_principal": stress(
+            "largest principal stress", lambda s: principal_stresses(s)[:, 0]
         ),
-        "mean_pressure": (
-            "mean pressure, −tr σ/3",
-            "stress",
-            lambda s, _: -(s[0] + s[1] + s[3]) / 3,
+        "smallest_principal": stress(
+            "smallest principal stress", lambda s: principal_stresses(s)[:, 2]
         ),
-        "displacement": ("displacement, absolute value", "length", lambda _, u: np.hypot(*u)),
-        f"displacement_{x}": (f"displacement along {x}", "length", lambda _, u: u[0]),
-        f"displacement_{y}": (f"displacement along {y}", "length", lambda _, u: u[1]),
+        "mean_pressure": stress(
+            "mean pressure, −tr σ/3", lambda s: -s[:, [0, 1, 3]].sum(axis=1) / 3
+        ),
+        "displacement": displacement(", absolute value", lambda u: np.hypot(*u.T)),
+        f"displacement_{x}": displacement(f" along {x}", component(0)),
+        f"displacement_{y}": displacement(f" along {y}", component(1)),
     }
-
-
-@dataclass(frozen=True, eq=False)
-class Field:
-    """A scalar field of a picture; its kind is "stress", "length", or "" where it is not known."""
-
-    label: str
-    kind: str
-    values: Array  # (k,), at the nodes of the picture
-
-
-def _shown(solution: Solved, nodes: Nodes, field: str | ng.CoefficientFunction) -> Field:
-    """The chosen `field` at the nodes."""
-    if not isinstance(field, str):
-        return Field("field", "", nodes.values(field)[:, 0])
-    label, kind, function = fields(solution)[field]
-    u = solution.displacement
-    values = nodes.values(ng.CF((full_stress(solution), u[0], u[1]))).T
-    return Field(label, kind, function(values[:4], values[4:]))
 
 
 class ContactPath(NamedTuple):
@@ -192,9 +179,8 @@ def contact_lines(solution: Solved) -> list[ContactPath]:
         if direction is None:
             lines += [ContactPath(pair, rows[order], s) for order, s in _arcs(points)]
         else:
-            dx, dy = np.asarray(direction, dtype=float) / np.hypot(*direction)
-            across = np.array([-dy, dx])
-            eta = points @ (_rising(across) * across)
+            axis = across(np.array(direction))
+            eta = points @ (_rising(axis) * axis)
             order = np.argsort(eta, kind="stable")
             lines.append(ContactPath(pair, rows[order], eta[order]))
     return lines
@@ -208,10 +194,10 @@ def _rising(along: Array) -> float:
 def _arcs(points: Array) -> list[tuple[Index, Array]]:
     """Order and arc position of points on curves: walks along the tree of neighbours."""
     tree = neighbour_tree(points)
-    count, piece = connected_components(tree, directed=False)
+    _, piece = connected_components(tree, directed=False)
     arcs: list[tuple[Index, Array]] = []
     start = 0.0
-    for k in range(count):
+    for k in np.unique(piece):
         members = np.flatnonzero(piece == k)
         s = dijkstra(tree, directed=False, indices=members[0])[members]
         s = dijkstra(tree, directed=False, indices=members[np.argmax(s)])[members]
@@ -242,12 +228,8 @@ class SymmetryLine:
     slack: float  # distance up to which points lie on it, a length
 
     def distance(self, x: Array) -> Array:
-        """Signed distances (k,) of points `x` (k, 2)."""
+        """Signed distances (...,) of points `x` (..., 2)."""
         return np.asarray((x - self.point) @ self.normal)
-
-    def holds(self, x: Array) -> Mask:
-        """Which of the points `x` (k, 2) lie on it, (k,)."""
-        return np.asarray(np.abs(self.distance(x)) <= self.slack)
 
     def reflected(self, x: Array) -> Array:
         """Mirror images (k, 2) of points `x` (k, 2)."""
@@ -265,19 +247,19 @@ def symmetry_line(mesh: ng.Mesh, displacement: ng.GridFunction, pattern: str) ->
         names = sorted(set(mesh.GetBoundaries()))
         raise ValueError(f'mirror = "{pattern}" is no boundary; there are {", ".join(names)}')
     rule = ng.IntegrationRule([(0.0, 0, 0), (0.5, 0, 0), (1.0, 0, 0)], [0.0] * 3)
-    at = mesh.MapToAllElements(rule, region)
-    x = np.asarray(ng.CF((ng.x, ng.y))(at), dtype=float).reshape(-1, 2)
-    u = np.asarray(ng.CF(tuple(displacement))(at), dtype=float).reshape(-1, 2)
+    read = ng.CF((ng.x, ng.y, *displacement))(mesh.MapToAllElements(rule, region))
+    found = np.asarray(read, dtype=float).reshape(-1, 4)
+    x, u = found[:, :2], found[:, 2:]
     middle = x.mean(axis=0)
     _, _, axes = np.linalg.svd(x - middle, full_matrices=False)
-    vertices = np.array([v.point for v in mesh.vertices])
+    vertices = MeshArrays(mesh).vertices
     line = SymmetryLine(middle, axes[1], STRAIGHT * float(np.ptp(vertices, axis=0).max()))
-    if not line.holds(x).all():
+    if (np.abs(line.distance(x)) > line.slack).any():
         raise ValueError(f'mirror = "{pattern}" is not straight: give a boundary on one line')
-    across = np.abs(u @ line.normal).max()
-    if across > ACROSS * np.abs(displacement.vec.FV().NumPy()).max():
+    away = np.abs(u @ line.normal).max()
+    if away > ACROSS * np.abs(displacement.vec.FV().NumPy()).max():
         raise ValueError(
-            f'mirror = "{pattern}" moves across its line by {across:.3g}: it is no line of symmetry'
+            f'mirror = "{pattern}" moves across its line by {away:.3g}: it is no line of symmetry'
         )
     sides = line.distance(vertices)
     if (sides > line.slack).any() and (sides < -line.slack).any():
@@ -292,7 +274,8 @@ class Scene:
     solution: Solved
     style: Style
     moved: Array  # (k, 2), nodes after `scale` times the displacement, lengths
-    shown: Field  # what colours show there
+    shown: Field  # what colours show
+    values: Array  # (k,), of that at the nodes
     triangles: Index  # (t, 3), nodes
     edges: Index  # (e, order + 1), nodes of each element edge
     outline: Mask  # (e,), edges that bound a body
@@ -308,6 +291,7 @@ class Scene:
 
 def picture(solution: Solved, style: Style) -> Scene:
     """Evaluate a solution for the picture."""
+    shown = style.shown(solution)
     _ = solution.stress  # refuses a mesh that was changed, whatever field is shown
     mesh, u, scale = solution.mesh, solution.displacement, style.scale
     order = max(mesh.GetCurveOrder(), solution.order)
@@ -318,8 +302,8 @@ def picture(solution: Solved, style: Style) -> Scene:
     edges = nodes.cells[:, sides].reshape(-1, order + 1)
     ends = np.sort(edges[:, [0, -1]], axis=1)
     _, first, count = np.unique(ends, axis=0, return_index=True, return_counts=True)
-    place = nodes.values(ng.CF((ng.x, ng.y)))
-    move = nodes.values(ng.CF((u[0], u[1])))
+    found = nodes.values(ng.CF((ng.x, ng.y, *u)))
+    place, move = found[:, :2], found[:, 2:]
     if scale is None:
         body = np.empty(len(place), dtype=np.intp)
         body[nodes.cells] = nodes.body[:, None]
@@ -332,7 +316,8 @@ def picture(solution: Solved, style: Style) -> Scene:
         solution=solution,
         style=style,
         moved=place + scale * move,
-        shown=_shown(solution, nodes, style.field),
+        shown=shown,
+        values=shown.values(nodes),
         triangles=nodes.cells[:, triangles].reshape(-1, 3),
         edges=edges[first],
         outline=count == 1,
@@ -349,7 +334,7 @@ def picture(solution: Solved, style: Style) -> Scene:
 
 def _mirrored(scene: Scene, line: SymmetryLine, place: Array) -> Scene:
     """A scene on both sides of a line of symmetry; `place` (k, 2) are its nodes before."""
-    inside = line.holds(place)[scene.edges].all(axis=1)
+    inside = (np.abs(line.distance(place)) <= line.slack)[scene.edges].all(axis=1)
     count = len(scene.moved)
     zones = []
     for zone in scene.zones:
@@ -358,7 +343,7 @@ def _mirrored(scene: Scene, line: SymmetryLine, place: Array) -> Scene:
     return replace(
         scene,
         moved=np.concatenate([scene.moved, line.reflected(scene.moved)]),
-        shown=replace(scene.shown, values=np.tile(scene.shown.values, 2)),
+        values=np.tile(scene.values, 2),
         triangles=np.concatenate([scene.triangles, scene.triangles[:, ::-1] + count]),
         edges=np.concatenate([scene.edges, scene.edges + count]),
         outline=np.tile(scene.outline & ~inside, 2),

@@ -5,9 +5,10 @@ from __future__ import annotations
 import math
 import os
 import xml.etree.ElementTree as ET
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import ngsolve as ng
 import numpy as np
@@ -18,7 +19,7 @@ from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS
 from ..solved import Solved
 from .files import check_path, replacing
-from .nodes import Nodes, full_stress, neighbour_tree, nodes_of, subdivision
+from .nodes import full_stress, neighbour_tree, nodes_of, subdivision
 
 if TYPE_CHECKING:
     import pyvista
@@ -31,7 +32,24 @@ VTK_WEDGE = 13
 SECTION_ANGLE = 6.0  # degrees between two sections of a body of revolution, at most
 
 
-def write_solution(path: str | os.PathLike[str], solution: Estimated) -> Path:
+@dataclass(frozen=True, eq=False)
+class Sections:
+    """Meridian sections of a body of revolution, and the steps between them."""
+
+    angles: Array  # (t,), radians
+    first: Index  # (q,), number of the section at which a step begins
+    second: Index  # (q,), and ends
+
+    def turned(self, vectors: Array) -> Array:
+        """Vectors (r, z) (k, 2) about z by all angles: (t k, 3)."""
+        r, z = vectors.T
+        x, y = np.outer(np.cos(self.angles), r), np.outer(np.sin(self.angles), r)
+        return np.stack([x, y, np.broadcast_to(z, x.shape)], axis=2).reshape(-1, 3)
+
+
+def write_solution(
+    path: str | os.PathLike[str], solution: Estimated, sections: Sections | None = None
+) -> Path:
     """Bodies of a solution as ``.vtu``, contact points beside it as ``<stem>_contact.vtp``.
 
     The cells are Lagrange triangles of the order of the geometry or of the displacement,
@@ -44,12 +62,33 @@ def write_solution(path: str | os.PathLike[str], solution: Estimated) -> Path:
     the secondary, a vector. Field data of both files: the names by number of the pair in
     ``pair_names``, ``secondary_names``, ``primary_names``. Any consistent units. Returns the path.
     A file appears complete or not at all. Raises ``ValueError`` and ``OSError`` as `check_path`
-    does, before any work.
+    does, before any work. Of the `sections` of a body of revolution see `write_revolved`.
     """
-    return _write_both(path, lambda: (_bodies(solution), _contact_points(solution)))
+    target = check_path(path, ".vtu")
+    beside = check_path(target.with_name(f"{target.stem}_contact.vtp"), ".vtp")
+    from vtkmodules.vtkCommonCore import vtkObject
+    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
+
+    writers = vtkXMLUnstructuredGridWriter(), vtkXMLPolyDataWriter()
+    made = _bodies(solution, sections), _contact(solution, sections)
+    with replacing(target, beside) as drafts:
+        for writer, data, draft in zip(writers, made, drafts, strict=True):
+            writer.SetFileName(str(draft))
+            writer.SetInputData(data)
+            display = vtkObject.GetGlobalWarningDisplay()  # VTK raises nothing, and prints
+            vtkObject.SetGlobalWarningDisplay(0)
+            try:
+                written = writer.Write()
+            finally:
+                vtkObject.SetGlobalWarningDisplay(display)
+            # Before VTK 9.7 a full disk shows in the code alone, a file that cannot be opened in
+            # neither.
+            if not written or writer.GetErrorCode() or not draft.exists():
+                raise OSError(f"VTK could not write {str(draft)!r} (disk full?)")
+    return target
 
 
-def write_revolved(path: str | os.PathLike[str], solution: Solved, angle: float = 270.0) -> Path:
+def write_revolved(path: str | os.PathLike[str], solution: Estimated, angle: float = 270.0) -> Path:
     """Bodies of revolution as ``.vtu``, the surface of contact beside it: ``<stem>_contact.vtp``.
 
     The meridian section is turned by `angle` degrees about z.
@@ -70,27 +109,9 @@ def write_revolved(path: str | os.PathLike[str], solution: Solved, angle: float 
     if not 0 < angle <= 360:
         raise ValueError(f"angle = {angle}: give degrees above 0, at most 360")
     steps = max(3, math.ceil(angle / SECTION_ANGLE))
-    count = steps if angle == 360 else steps + 1
-    turns = np.deg2rad(float(angle)) / steps * np.arange(count)
-    between = np.arange(steps), (np.arange(steps) + 1) % count
-    return _write_both(
-        path, lambda: (_wedges(solution, turns, between), _surface(solution, turns, between))
-    )
-
-
-def _write_both(
-    path: str | os.PathLike[str], made: Callable[[], tuple[pyvista.DataSet, pyvista.DataSet]]
-) -> Path:
-    """Write bodies and contact, `made` once the paths are known to be writable."""
-    target = check_path(path, ".vtu")
-    beside = check_path(target.with_name(f"{target.stem}_contact.vtp"), ".vtp")
-    from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
-
-    with replacing(target, beside) as drafts:
-        writers = vtkXMLUnstructuredGridWriter(), vtkXMLPolyDataWriter()
-        for writer, data, draft in zip(writers, made(), drafts, strict=True):
-            _write_data(writer, data, draft)
-    return target
+    angles = np.deg2rad(float(angle)) / steps * np.arange(steps if angle == 360 else steps + 1)
+    first = np.arange(steps)
+    return write_solution(path, solution, Sections(angles, first, (first + 1) % len(angles)))
 
 
 def write_series(
@@ -141,131 +162,82 @@ def _increasing(times: Iterable[float]) -> list[float]:
     return [float(time) for time in values]
 
 
-def _nodal_values(solution: Solved) -> tuple[int, Nodes, Array]:
-    """Order and nodes of the cells; place, displacement and stress there, (k, 2 + 2 + 4)."""
-    order = max(solution.mesh.GetCurveOrder(), solution.order)
-    nodes, u = nodes_of(solution.mesh, order), solution.displacement
-    return order, nodes, nodes.values(ng.CF((ng.x, ng.y, u[0], u[1], full_stress(solution))))
-
-
-def _bodies(solution: Estimated) -> pyvista.UnstructuredGrid:
-    """Both bodies with their fields as a VTK grid."""
-    import pyvista
-
-    order, nodes, values = _nodal_values(solution)
-    count, size = nodes.cells.shape
-    cells = np.column_stack([np.full(count, size), nodes.cells]).ravel()
-    kinds = np.full(count, VTK_CELL.get(order, VTK_LAGRANGE_TRIANGLE), dtype=np.uint8)
-    grid = pyvista.UnstructuredGrid(cells, kinds, _in_space(values[:, :2]))
-    grid.point_data["displacement"] = _in_space(values[:, 2:4])
-    about_an_axis = solution.problem.model in ABOUT_AN_AXIS
-    _add_stress(grid, values[:, 4:], MERIDIAN if about_an_axis else PLANE)
-    if about_an_axis:
-        grid.point_data["hoop_stress"] = values[:, 7]
-    grid.point_data["von_mises"] = von_mises(values[:, 4:])
-    grid.cell_data["body"] = nodes.body
-    grid.field_data["body_names"] = list(nodes.names)
-    _name_pairs(grid, solution)
-    if solution.estimated:
-        grid.cell_data["indicators"] = np.asarray(solution.indicators, dtype=float)
-    return grid
-
-
-def _wedges(
-    solution: Solved, turns: Array, between: tuple[Index, Index]
-) -> pyvista.UnstructuredGrid:
-    """Bodies turned by the angles `turns` (t,), with wedges `between` sections of two numbers."""
-    import pyvista
-
-    order, nodes, values = _nodal_values(solution)
-    triangles = nodes.cells[:, subdivision(order)[0]].reshape(-1, 3)
-    first, second = (len(values) * at[:, None, None] + triangles for at in between)
-    wedges: Index = np.concatenate([second, first], axis=2).reshape(-1, 6)
-    cells = np.column_stack([np.full(len(wedges), 6), wedges]).ravel()
-    kinds = np.full(len(wedges), VTK_WEDGE, dtype=np.uint8)
-    grid = pyvista.UnstructuredGrid(cells, kinds, _turned(values[:, :2], turns))
-    grid.point_data["displacement"] = _turned(values[:, 2:4], turns)
-    rr, zz, rz, hoop = values[:, 4:].T
-    stress = np.tile(np.column_stack([rr, zz, hoop, rz]), (len(turns), 1))
-    _add_stress(grid, stress, ("rr", "zz", "hoop", "rz"))
-    grid.point_data["von_mises"] = np.tile(von_mises(values[:, 4:]), len(turns))
-    grid.cell_data["body"] = np.tile(np.repeat(nodes.body, order**2), len(between[0]))
-    grid.field_data["body_names"] = list(nodes.names)
-    return grid
-
-
-def _add_stress(grid: pyvista.UnstructuredGrid, stress: Array, names: tuple[str, ...]) -> None:
-    """Point data ``stress`` (k, 4) with the `names` of its components."""
-    grid.point_data["stress"] = stress
-    for k, component in enumerate(names):
-        grid.GetPointData().GetAbstractArray("stress").SetComponentName(k, component)
-
-
 def _in_space(vectors: Array) -> Array:
     """Vectors (k, 2) with a third component 0."""
     return np.column_stack([vectors, np.zeros(len(vectors))])
 
 
-def _turned(vectors: Array, turns: Array) -> Array:
-    """Vectors (r, z) (k, 2) about z by the angles `turns` (t,) in radians: (t k, 3)."""
-    r, z = vectors.T
-    x, y = np.outer(np.cos(turns), r), np.outer(np.sin(turns), r)
-    return np.stack([x, y, np.tile(z, (len(turns), 1))], axis=2).reshape(-1, 3)
+def _sized(cells: Index) -> Index:
+    """Cells (k, n) as VTK reads them: n before the nodes of each, (k (n + 1),)."""
+    return np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
 
 
-def _neighbours(solution: Solved) -> Index:
-    """Numbers (l, 2) of contact points that are neighbours in a pair."""
-    links = [np.zeros((0, 2), dtype=np.intp)]
+def _bodies(solution: Estimated, sections: Sections | None = None) -> pyvista.UnstructuredGrid:
+    """Bodies with their fields: curved triangles, or wedges between `sections`."""
+    import pyvista
+
+    order, u = max(solution.mesh.GetCurveOrder(), solution.order), solution.displacement
+    nodes = nodes_of(solution.mesh, order)
+    values = nodes.values(ng.CF((ng.x, ng.y, u[0], u[1], full_stress(solution))))
+    about_an_axis = solution.problem.model in ABOUT_AN_AXIS
+    components, names = [0, 1, 2, 3], MERIDIAN if about_an_axis else PLANE
+    cells, kind, body = nodes.cells, VTK_CELL.get(order, VTK_LAGRANGE_TRIANGLE), nodes.body
+    lifted, times = _in_space, 1
+    if sections is not None:
+        triangles = nodes.cells[:, subdivision(order)[0]].reshape(-1, 3)
+        ends = sections.second, sections.first
+        wedges = [len(values) * at[:, None, None] + triangles for at in ends]
+        cells, kind = np.concatenate(wedges, axis=2).reshape(-1, 6), VTK_WEDGE
+        body = np.tile(np.repeat(nodes.body, order**2), len(sections.first))
+        components, names = [0, 1, 3, 2], ("rr", "zz", "hoop", "rz")
+        lifted, times = sections.turned, len(sections.angles)
+    kinds = np.full(len(cells), kind, dtype=np.uint8)
+    grid = pyvista.UnstructuredGrid(_sized(cells), kinds, lifted(values[:, :2]))
+    stress = values[:, 4:]
+    grid.point_data["displacement"] = lifted(values[:, 2:4])
+    grid.point_data["stress"] = np.tile(stress[:, components], (times, 1))
+    for k, name in enumerate(names):
+        grid.GetPointData().GetAbstractArray("stress").SetComponentName(k, name)
+    if about_an_axis and sections is None:
+        grid.point_data["hoop_stress"] = stress[:, 3]
+    grid.point_data["von_mises"] = np.tile(von_mises(stress), times)
+    grid.cell_data["body"] = body
+    grid.field_data["body_names"] = list(nodes.names)
+    if sections is None:
+        _name_pairs(grid, solution)
+        if solution.estimated:
+            grid.cell_data["indicators"] = np.asarray(solution.indicators, dtype=float)
+    return grid
+
+
+def _contact(solution: Solved, sections: Sections | None = None) -> pyvista.PolyData:
+    """Contact points and lines between neighbours of a pair, or its surface on `sections`."""
+    import pyvista
+
+    points, data = solution.points, pyvista.PolyData()
+    links: Index = np.zeros((0, 2), dtype=np.intp)
     for pair in np.unique(solution.pair):
         rows = np.flatnonzero(solution.pair == pair)
-        tree = neighbour_tree(solution.points[rows]).tocoo()
-        links.append(np.column_stack([rows[tree.row], rows[tree.col]]))
-    return np.concatenate(links)
-
-
-def _contact_points(solution: Solved) -> pyvista.PolyData:
-    """Contact points as VTK vertices, neighbours of a pair joined by lines."""
-    import pyvista
-
-    points, data = solution.points, pyvista.PolyData()
-    if len(points):
-        links = _neighbours(solution)
-        data = pyvista.PolyData(
-            _in_space(points),
-            verts=np.column_stack([np.ones(len(points), int), np.arange(len(points))]).ravel(),
-            lines=np.column_stack([np.full(len(links), 2), links]).ravel(),
-        )
-        _add_contact(data, solution, ("pressure", "gap", "force", "active", "pair"))
-        traction = -solution.pressure[:, None] * solution.direction
-        data.point_data["traction"] = _in_space(traction)
+        tree = neighbour_tree(points[rows]).tocoo()
+        links = np.concatenate([links, rows[np.column_stack([tree.row, tree.col])]])
+    names, lifted, times = ["pressure", "gap", "active", "pair"], _in_space, 1
+    if sections is None and len(points):
+        single = np.arange(len(points))[:, None]
+        data = pyvista.PolyData(_in_space(points), verts=_sized(single), lines=_sized(links))
+        names.append("force")
+    elif sections is not None and len(links):
+        first, second = (len(points) * at[:, None] for at in (sections.first, sections.second))
+        quads = [first + links[:, 0], first + links[:, 1], second + links[:, 1]]
+        faces = np.stack([*quads, second + links[:, 0]], axis=2).reshape(-1, 4)
+        lifted, times = sections.turned, len(sections.angles)
+        data = pyvista.PolyData(lifted(points), faces=_sized(faces))
+    if data.n_points:
+        for name in names:
+            kind = np.int32 if name in ("active", "pair") else float
+            data.point_data[name] = np.tile(np.asarray(getattr(solution, name), kind), times)
+        data.point_data["traction"] = lifted(-solution.pressure[:, None] * solution.direction)
     _name_pairs(data, solution)
     return data
-
-
-def _surface(solution: Solved, turns: Array, between: tuple[Index, Index]) -> pyvista.PolyData:
-    """Quadrilaterals between neighbouring contact points of each pair, turned."""
-    import pyvista
-
-    points, data = solution.points, pyvista.PolyData()
-    (i, j), (first, last) = _neighbours(solution).T, (len(points) * at[:, None] for at in between)
-    quads = np.stack([first + i, first + j, last + j, last + i], axis=2).reshape(-1, 4)
-    if len(quads):
-        faces = np.column_stack([np.full(len(quads), 4), quads]).ravel()
-        data = pyvista.PolyData(_turned(points, turns), faces=faces)
-        _add_contact(data, solution, ("pressure", "gap", "active", "pair"), len(turns))
-        traction = -solution.pressure[:, None] * solution.direction
-        data.point_data["traction"] = _turned(traction, turns)
-    _name_pairs(data, solution)
-    return data
-
-
-def _add_contact(
-    data: pyvista.PolyData, solution: Solved, names: tuple[str, ...], times: int = 1
-) -> None:
-    """Members of a solution at its contact points, so many `times`."""
-    for name in names:
-        kind = np.int32 if name in ("active", "pair") else float
-        data.point_data[name] = np.tile(np.asarray(getattr(solution, name), kind), times)
 
 
 def _name_pairs(data: pyvista.DataSet, solution: Solved) -> None:
@@ -276,20 +248,3 @@ def _name_pairs(data: pyvista.DataSet, solution: Solved) -> None:
         data.field_data["pair_names"] = [" with ".join(names) for names in sides]
         data.field_data["secondary_names"] = [secondary for secondary, _ in sides]
         data.field_data["primary_names"] = [primary for _, primary in sides]
-
-
-def _write_data(writer: Any, data: pyvista.DataSet, path: Path) -> None:
-    """Write a data set with a VTK XML writer; VTK raises nothing, and prints in colours."""
-    from vtkmodules.vtkCommonCore import vtkObject
-
-    writer.SetFileName(str(path))
-    writer.SetInputData(data)
-    display = vtkObject.GetGlobalWarningDisplay()
-    vtkObject.SetGlobalWarningDisplay(0)
-    try:
-        written = writer.Write()
-    finally:
-        vtkObject.SetGlobalWarningDisplay(display)
-    # Before VTK 9.7 a full disk shows in the code alone, a file that cannot be opened in neither.
-    if not written or writer.GetErrorCode() or not path.exists():
-        raise OSError(f"VTK could not write {str(path)!r} (disk full?)")

@@ -37,9 +37,9 @@ def uniform():
     ],
 )
 def test_fields_of_a_uniform_stress(uniform, field, value):
-    shown = picture(uniform, Style(field=field)).shown
-    np.testing.assert_allclose(shown.values, value, rtol=1e-12)  # round-off
-    assert shown.kind == "stress"
+    scene = picture(uniform, Style(field=field))
+    np.testing.assert_allclose(scene.values, value, rtol=1e-12)  # round-off
+    assert scene.shown.kind == "stress"
 
 
 @pytest.mark.parametrize(
@@ -95,7 +95,7 @@ def test_a_singular_corner_leaves_the_colours(tmp_path, uniform):
     # of triangles blur that.
     assert low == 0
     assert 1.8 < high < 2.8
-    assert scene.shown.values.max() > 900
+    assert scene.values.max() > 900
     figure = plot_solution(uniform, tmp_path / "a.png", field=r**-0.5)
     [text] = [t.get_text() for axes in figure.axes for t in axes.texts if "largest" in t.get_text()]
     assert float(text.split()[1]) == pytest.approx(1000, rel=0.01)
