@@ -236,11 +236,12 @@ def close_ups(scenes: Sequence[Scene]) -> list[Window]:
     return [w for w in windows if (w[1] - w[0]).max() < 2 * SMALL * size][:MAX_CLOSE_UPS]
 
 
-def _typical(values: Array, areas: Array) -> float:
-    """Value that all but `PEAK_AREA` of the area (t,) keeps below."""
-    order = np.argsort(values)
-    share = np.cumsum(areas[order]) / areas.sum()
-    return float(values[order][np.searchsorted(share, 1 - PEAK_AREA).clip(0, len(order) - 1)])
+def _all_but(share: float, values: Array, weights: Array) -> float:
+    """Value that all but a `share` of the `weights` (t,), areas or lengths, keeps below."""
+    order = np.argsort(values, kind="stable")
+    sums = np.cumsum(weights[order])
+    last = np.searchsorted(sums, (1 - share) * sums[-1])
+    return float(values[order][min(last, len(order) - 1)])
 
 
 def colour_range(scene: Scene, windows: Sequence[Window]) -> tuple[float, float]:
@@ -252,11 +253,11 @@ def colour_range(scene: Scene, windows: Sequence[Window]) -> tuple[float, float]
     """
     values, areas = np.abs(scene.values), scene.areas()
     mean, middle = values[scene.triangles].mean(axis=1), scene.moved[scene.triangles].mean(axis=1)
-    top = _typical(mean, areas)
+    top = _all_but(PEAK_AREA, mean, areas)
     for low, high in windows:
         seen = np.all((middle >= low) & (middle <= high), axis=1)
         if seen.any():
-            top = max(top, _typical(mean[seen], areas[seen]))
+            top = max(top, _all_but(PEAK_AREA, mean[seen], areas[seen]))
     largest = float(values.max(initial=0.0))
     top = largest if largest <= CUT_OFF * top else top
     top = top or 1.0
@@ -286,7 +287,7 @@ def draw_scene(
     bodies = figure.add_subplot(grid[:, 0])
     close = [figure.add_subplot(grid[k % tall, 1 + k // tall]) for k in range(len(windows))]
     beside = grid[:, -1].subgridspec(1, len(parts), wspace=0.05)
-    pressures = [figure.add_subplot(beside[k]) for k in range(len(parts))]
+    pressures = list(beside.subplots(sharey=True, squeeze=False)[0])
     shading, *_ = [_draw_bodies(axes, scene, limits) for axes in (bodies, *close)]
     space = " " if width / height > 0.9 else "\n"
     bodies.set_title(f"deformed bodies,{space}displacement × {scene.scale:g}")
@@ -416,11 +417,8 @@ def cut_pressure(solution: Solved) -> float | None:
     """
     typical = 0.0
     for _, rows, s in zones_of(solution, contact_lines(solution)):
-        p = solution.pressure[rows]
-        order = np.argsort(p, kind="stable")
-        share = np.cumsum(np.gradient(s)[order]) if len(s) > 1 else np.ones(1)
-        last = int(np.searchsorted(share, (1 - SINGLE) * share[-1]))
-        typical = max(typical, float(p[order][min(last, len(p) - 1)]))
+        lengths = np.gradient(s) if len(s) > 1 else np.ones(1)
+        typical = max(typical, _all_but(SINGLE, solution.pressure[rows], lengths))
     largest = float(solution.pressure.max(initial=0.0))
     return SPARE / 2 * typical if largest > SPARE * typical > 0 else None
 
@@ -432,26 +430,17 @@ def _draw_pressures(
     (_, stress), top = style.unit("stress"), cut_pressure(solution)
     for axes, part in zip(several, parts, strict=True):
         _draw_pressure(axes, solution, style, part)
-    first, *others = several
+    first, last = several[0], several[-1]
     if top is not None:
         first.set_ylim(-0.03 * top / stress, top / stress)
         text = f"↑ largest {solution.pressure.max() / stress:.3g}"
         first.annotate(text, (0.5, 0.98), xycoords="axes fraction", ha="center", va="top")
-    if others:
-        low = min(axes.get_ylim()[0] for axes in several)
-        first.set_ylim(low, max(axes.get_ylim()[1] for axes in several))
-        for axes in others:
-            axes.sharey(first)
-            axes.set(ylabel="", title="")
-            axes.tick_params(labelleft=False)
-            axes.yaxis.get_offset_text().set_visible(False)
-        for axes in several[:-1]:
-            if (legend := axes.get_legend()) is not None:
-                legend.remove()
-        if others[-1].get_legend() is not None:
-            # Above its panel, which has no title: inside it would cover points.
-            above = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.3}
-            others[-1].legend(fontsize="small", ncols=2, **above)
+    for axes in several[1:]:
+        axes.set(ylabel="", title="")
+    if len(solution.problem.contact) > 1 or style.profile or not solution.active.all():
+        # Above the last of several panels, which has no title: inside it would cover points.
+        above = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.3}
+        last.legend(**above, fontsize="small", ncols=2) if last is not first else last.legend()
 
 
 def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> None:
@@ -484,17 +473,11 @@ def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> N
             s, p = (np.asarray(values, dtype=float) for values in profile)
         stroke = strokes[k % len(strokes)]
         axes.plot(s / length, p / stress, stroke, color="k", lw=1.2, label=label, zorder=3)
-    if several or style.profile or not solution.active.all():
-        axes.legend()
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
-    names = {
-        "arc position" if pair.direction is None else "η, along the contact line"
-        for pair in contact
-    }
-    axes.set(
-        xlabel=style.title(" or ".join(sorted(names)), "length"),
-        ylabel=style.title("contact pressure", "stress"),
-        title="contact pressure",
-    )
+    arcs = [pair.direction is None for pair in contact]
+    names = ["arc position"] * any(arcs) + ["η, along the contact line"] * (not all(arcs))
+    title = "contact pressure"
+    axes.set(xlabel=style.title(" or ".join(names), "length"), title=title)
+    axes.set_ylabel(style.title(title, "stress"))
     axes.ticklabel_format(**POWERS)
     axes.grid(alpha=0.3)
