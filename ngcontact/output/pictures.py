@@ -336,15 +336,16 @@ def _draw_windows(
 
     several = len(windows) > 1
     for k, (axes, window) in enumerate(zip(close, windows, strict=True)):
-        low, high = (corner / unit for corner in window)
-        bodies.add_patch(Rectangle(low, *(high - low), fill=False, color="crimson", lw=1.2))
+        (x, y), (right, top) = (corner / unit for corner in window)
+        frame = Rectangle((x, y), right - x, top - y, fill=False, color="crimson", lw=1.2)
+        bodies.add_patch(frame)
         name = f"zone {k + 1}" if several else "zone in contact"
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), title=name)
+        axes.set(xlim=(x, right), ylim=(y, top), title=name)
         axes.locator_params(nbins=3 if several else 5)
         axes.spines[:].set_color("crimson")
         if several:
-            corner = {"xytext": (2, 2), "textcoords": "offset points"}
-            bodies.annotate(str(k + 1), high, **corner, color="crimson", weight="bold")
+            at: dict[str, Any] = {"xytext": (2, 2), "textcoords": "offset points"}
+            bodies.annotate(str(k + 1), (right, top), **at, color="crimson", weight="bold")
 
 
 def _colour_bar(
@@ -370,8 +371,9 @@ def _colour_bar(
     ):
         if beyond:
             text = f"{word} {value / scene.style.unit(kind)[1]:.3g}"
-            at = {"xycoords": "axes fraction", "textcoords": "offset points", "ha": "center"}
-            bar.ax.annotate(text, (0.5, y), xytext=(0, offset), va=va, fontsize=8, **at)
+            at: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
+            style: dict[str, Any] = {"ha": "center", "va": va, "fontsize": 8}
+            bar.ax.annotate(text, (0.5, y), xytext=(0, offset), **at, **style)
 
 
 def shown_part(solution: Solved) -> Array | None:
