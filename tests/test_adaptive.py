@@ -146,6 +146,7 @@ BAD = [
     ("order", True, TypeError),
     ("element", "curved", ValueError),
     ("maxh", 0, ValueError),
+    ("maxh", float("nan"), ValueError),
     ("maxh", "0.1", TypeError),
 ]
 

@@ -83,6 +83,7 @@ def cornered() -> Scene:
         geometry=blocks(line=cases.LINE),
         materials=cases.BLOCKS,
         displacement={"top": (0.01, -0.02 + 0.015 * ng.x), "bottom": (0, 0)},
+        sliding="lower_left",
         contact=[Contact(secondary="upper_contact", primary="lower_contact")],
     )
     return replace(
@@ -212,6 +213,10 @@ def differences(first, other, motion, vertex, triangle) -> dict[str, float]:
         "gap": off(other.gap[number] / size, first.gap[same], max(u, first.gap.max())),
         "force": off(
             sign * other.contact_force() / force, pushed @ motion.turn.T, np.linalg.norm(pushed)
+        ),
+        "reactions": max(
+            off(other.reactions[name] / force, value @ motion.turn.T, np.linalg.norm(pushed))
+            for name, value in first.reactions.items()
         ),
         "energy": 0.0 if other.energy == scaled else off(other.energy / scaled, 1.0, 1.0),
         "estimate": abs(other.error_estimate / (root * size) / first.error_estimate - 1),

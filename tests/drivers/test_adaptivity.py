@@ -12,7 +12,6 @@ import pytest
 from drivers.adaptive_study.__main__ import main
 from drivers.adaptive_study.runs import STUDIES, Name, error_measure, rate, run_of, share_near
 from drivers.reference import cases
-from ngcontact import adapt
 
 
 @lru_cache(maxsize=4)  # of some 50 MB each
@@ -31,12 +30,6 @@ def test_optimal_rates(name, order, unknowns):
     # N^(-p/2), over the last factor 10 in N, which must not reach back to the first meshes of 2000
     # unknowns at order 3. Order 4 needs 50k unknowns and stays in the driver.
     assert abs(rate(rows) / (-order / 2) - 1) < 0.1
-
-
-def test_uniform_refinement_is_slower_at_order_2():
-    """At a transition u ~ r^(3/2): N^-3/4 however smooth the rest is."""
-    _, rows = levels("one transition", "uniform", 2, 12_000)
-    assert abs(rate(rows) + 0.75) < 0.05
 
 
 @pytest.mark.parametrize("name", ["one transition", "hertz a=0.3", "hertz a=0.05"])
@@ -108,12 +101,6 @@ def test_punch_regains_the_rate():
     assert abs(rates["adaptive"] + 0.5) < 0.075
 
 
-@pytest.mark.parametrize("name", ["one transition", "hertz a=0.05"])
-def test_meshes_stay_shape_regular(name):
-    _, rows = levels(name, "adaptive", 2, 12_000)
-    assert all(row.angle > 20 for row in rows)  # Netgen starts at 34 degrees, measured 27
-
-
 def test_elements_follow_the_optimal_density():
     """An optimal mesh of order 2 has its elements in the density |D^2 sigma|^(2/3).
 
@@ -143,17 +130,6 @@ def test_driver_writes_rows_and_pictures(tmp_path):
     page = (tmp_path / "adaptive_study.md").read_text(encoding="utf-8")
     line = f"| disc on rigid plane | 2 | {rates['uniform']:.2f} | {rates['adaptive']:.2f} | -1.0 |"
     assert line in page
-
-
-def test_problem_a_references():
-    """Disc on a rigid plane: the reference figures of the case."""
-    *_, solution = adapt(cases.disc_on_rigid_plane(), order=4, max_dofs=7000)
-    half_width = solution.transitions()[0, 0]
-    # The figures are known to (force) 4e-7, (pressure) 2e-5, (half-width) 2e-4, (energy) 2e-7.
-    assert abs(2 * solution.contact_force()[1] / 0.4465326 - 1) < 2e-6
-    assert abs(solution.pressure.max() / 5.5919 - 1) < 2e-4
-    assert abs(half_width / 0.05082 - 1) < 1e-3
-    assert abs(solution.energy / 5.221032e-4 - 1) < 2e-6
 
 
 @pytest.mark.study

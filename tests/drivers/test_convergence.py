@@ -115,19 +115,6 @@ def test_tension_on_the_bilateral_part_only():
     assert np.abs(error[middle]).max() < 0.2  # of pressures from -1 to 1; measured 0.154
 
 
-@pytest.mark.study
-def test_zone_that_parts_on_a_circle():
-    """Two ends of contact and the pressure of a unilateral zone that K_h does not lie in."""
-    case = paper.opening_ring()
-    solutions, _ = rows_of(case, order=1, element="physical", maxh=0.24, levels=4)
-    solution = solutions[-1]
-    assert len(solution.transitions()) == 2
-    assert solution.pressure.min() >= 0
-    angle = np.arctan2(solution.points[:, 1], solution.points[:, 0])
-    error = np.abs(solution.pressure - case.exact.pressure(angle)).max()
-    assert error < 0.05 * case.exact.pressure(0.0)
-
-
 def test_zlamals_and_the_isoparametric_element_differ():
     """Uniform stress across a circle: straight triangles have it exactly, (2.8) only nearly.
 

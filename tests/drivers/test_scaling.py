@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
 import signal
 import subprocess
 import sys
@@ -13,7 +12,6 @@ from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
-import ngsolve as ng
 import numpy as np
 import pytest
 import pyvista
@@ -21,15 +19,12 @@ import pyvista
 from drivers.stress.motion import Motion
 from drivers.stress.scenes.drawing import rotation
 from ngcontact import (
-    Contact,
     ConvergenceError,
     Elastic,
-    Hooke,
     Solution,
     adapt,
     solve,
 )
-from ngcontact.fem import von_mises
 from ngcontact.fem.boundary import boundary_trace
 from tests.drivers.similarities import (
     AS_IT_IS,
@@ -146,63 +141,6 @@ def test_forces_beyond_the_range_of_numbers_are_refused(load, modulus):
         solve(posed(held, AS_IT_IS)[0])
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
-def test_what_is_not_finite_is_refused_by_name(value):
-    """In every argument, as a number or at some points only, before any assembly."""
-    problem, *_ = posed(parting(), AS_IT_IS)
-    top, law = {"top": (0, 0)}, Elastic(1.0, 0.3)
-
-    def numbers(value):
-        return {
-            "displacement": {"displacement": {"top": (0.0, value)}},
-            "traction": {"traction": {"upper_right": value}, "displacement": top},
-            "force": {"force": {"lower": (value, 0.0)}},
-        }
-
-    here = ng.IfPos(ng.x - 0.5, ng.CF(value), ng.CF(0.0))
-    pair = Contact("upper_contact", "lower_contact", gap=lambda x, y: np.where(x > 0.5, value, 0.0))
-    functions = numbers(here) | {
-        "gap": {"contact": [replace(pair, gap=here)]},
-        "contact[0].gap": {"contact": [pair]},
-        '"upper".E': {"materials": {"upper": Elastic(here, 0.3), "lower": law}},
-        '"upper".nu': {"materials": {"upper": Elastic(1.0, here), "lower": law}},
-    }
-    mesh = posed(parting(), AS_IT_IS)[0].geometry
-    mesh.ngmesh.Coordinates()[0, 0] = value
-    calls = [
-        (name, lambda new=new: replace(problem, **new)) for name, new in numbers(value).items()
-    ]
-    calls += [
-        (name, lambda new=new: solve(replace(problem, **new))) for name, new in functions.items()
-    ]
-    calls += [
-        ("E", lambda: Elastic(value, 0.3)),
-        ("nu", lambda: Elastic(1.0, value)),
-        ("C", lambda: Hooke(np.diag([1.0, 1.0, value]))),
-        ("gap", lambda: Contact("a", gap=value)),
-        ("direction", lambda: Contact("a", "b", (value, 1.0))),
-        ("maxh", lambda: solve(problem, maxh=value)),
-        ("mesh", lambda: solve(problem, mesh)),
-    ]
-    for name, call in calls:
-        with pytest.raises(ValueError, match=re.escape(name)):
-            call()
-
-
-def test_voigt_matrix_of_a_body():
-    C = Elastic(E=2.0, nu=0.25).voigt()
-    problem, *_ = posed(parting(), AS_IT_IS)
-    value = np.array(C(problem.geometry(0.5, 0.5))).reshape(3, 3)
-    # E (1 - nu) / (1 + nu)(1 - 2 nu) = 2.4, E nu / ... = 0.8, E / 2 (1 + nu) = 0.8, to round-off
-    np.testing.assert_allclose(value, [[2.4, 0.8, 0], [0.8, 2.4, 0], [0, 0, 0.8]], rtol=1e-15)
-
-
-@pytest.mark.parametrize("size", [1e-200, 1.0, 1e200])
-def test_von_mises_stress_of_any_size(size):
-    assert von_mises(size * np.array([[1.0, 0, 0, 0]]))[0] == pytest.approx(size, rel=1e-15)
-    assert von_mises(np.zeros((2, 4))).tolist() == [0, 0]
-
-
 @pytest.mark.parametrize(
     "make", [parting, hertz_scene, disc_scene, unmatched_disc, graph_scene, cornered]
 )
@@ -276,38 +214,6 @@ def test_interrupted_writing_leaves_the_old_files(name, tmp_path):
         Solution.write(Failing(second, name), tmp_path / "hertz.vtu")
     assert len(before) == 2
     assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
-
-
-@pytest.mark.study
-@pytest.mark.parametrize("share", np.linspace(0.05, 0.95, 7).round(2).tolist())
-def test_a_timer_interrupts_a_run(share):
-    """What was given stays as it is, wherever the signal comes.
-
-    NGSolve's `CF` of a tuple loses an exception raised by a signal, or makes it a RuntimeError:
-    then the run goes on, or ends with that.
-    """
-    problem, *_ = posed(hertz_scene(), AS_IT_IS)
-    started = time.perf_counter()
-    right = list(adapt(problem, order=2, max_dofs=3000))
-    seconds, given, fired = share * (time.perf_counter() - started), [], []
-
-    def interrupt(number, frame):
-        fired.append(number)
-        raise KeyboardInterrupt
-
-    before = signal.signal(signal.SIGALRM, interrupt)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
-    try:
-        given.extend(adapt(problem, order=2, max_dofs=3000))
-    except (KeyboardInterrupt, RuntimeError):
-        assert fired
-    finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
-    for solution, whole in zip(given, right, strict=False):
-        for name in ("pressure", "gap", "force", "indicators"):
-            value, expected = getattr(solution, name), getattr(whole, name)
-            np.testing.assert_allclose(value, expected, atol=1e-12 * np.abs(expected).max())
 
 
 SCRIPT = """

@@ -159,18 +159,6 @@ def test_anisotropic_bar(model):
     np.testing.assert_allclose(solution.stress(solution.mesh(0.6, 0.7)), [1, 0, 0, 0], atol=1e-13)
 
 
-def test_pressure_and_traction_loads():
-    """A number is a pressure against the outward normal: the total of -p n over an arc."""
-    mesh = mesh_of(disc(symmetric=False), maxh=0.4)
-    for order in ORDERS:
-        space = space_of(mesh, "isoparametric", order, traction={"arc": 0.3})
-        n = space.trace.space.ndof
-        u = np.zeros(2 * n)
-        u[n : n + mesh.nv] = 1
-        # The vertex functions add up to one: a translation. The ends of the arc are exact.
-        assert u @ space.f == pytest.approx(0.3 * 2.0, rel=1e-12)
-
-
 def test_only_elements_with_curved_sides_are_curved():
     mesh, _ = curve(first_mesh(cases.ring_in_ring().problem, 0.3), 2, "isoparametric")
     trace = boundary_trace(mesh, 2)

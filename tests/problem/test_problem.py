@@ -144,6 +144,7 @@ def test_bodies_are_the_connected_pieces(mesh):
         ({"primary": None}, ValueError, '"a" has primary=None and gap=None: .* needs gap'),
         ({"direction": (0, 0)}, ValueError, r"direction = \(0\.0, 0\.0\): give a vector from"),
         ({"direction": (1, 0, 0)}, ValueError, "has length 3: give a pair"),
+        ({"direction": (math.inf, 1)}, ValueError, "direction = inf: give a finite"),
         ({"direction": (ng.x, 1)}, TypeError, r"direction = \(.*: give a pair of numbers"),
         ({"gap": math.nan}, ValueError, "gap = nan: give a finite number"),
         ({"gap": ng.CF((1, 2))}, ValueError, "gap is a CoefficientFunction of dim 2: give a sca"),
@@ -212,6 +213,7 @@ OBSTACLE = {"secondary": "punch_bottom", "direction": (0, -1)}
             {"materials": {".*": Hooke(ng.x * ng.CF((1, 2, 0, 2, 1, 0, 0, 0, 1), dims=(3, 3)))}},
             r'".\*"\.C = .* at \(.*\): .*positive definite',
         ),
+        ({"materials": {".*": Elastic(NAN, 0.3)}}, r'".\*"\.E = -?nan at'),
         ({"force": {"punch": (0, NAN)}}, r'force "punch" = \[0\.0, -?nan\] at \(.*, 1\..*must be '),
         ({"traction": {"top": NAN}}, r'traction "top" = \[-?nan\] at \(.*, 2\): must be finite'),
         ({"displacement": {"bottom": (0, 1 / ng.x)}}, r'"bottom" = \[.*inf\] at \(0, 0\): must be'),
@@ -236,6 +238,12 @@ def solid():
     return ng.Mesh(OCCGeometry(Box(Pnt(0, 0, 0), Pnt(1, 1, 1))).GenerateMesh(maxh=1))
 
 
+def astray():
+    mesh = ng.Mesh(blocks().GenerateMesh(maxh=1))
+    mesh.ngmesh.Coordinates()[0, 0] = math.inf
+    return mesh
+
+
 def quadrilaterals():
     return MakeStructured2DMesh(quads=True, nx=2, ny=1)
 
@@ -246,6 +254,7 @@ def quadrilaterals():
         (lambda: "mesh", TypeError, "mesh is a str: give an ngsolve.Mesh"),
         (empty, ValueError, "mesh has 0 elements: generate it"),
         (solid, ValueError, r"mesh has dimension 3.*make it with OCCGeometry\(shape, dim=2\)"),
+        (astray, ValueError, "mesh"),
         (quadrilaterals, ValueError, "mesh has 2 quadrilaterals: it must be a triangulation"),
     ],
 )
