@@ -1,5 +1,6 @@
 """Bodies held by contact alone: HH81 Remark 3.7."""
 
+import math
 from dataclasses import replace
 
 import netgen.occ as occ
@@ -20,7 +21,7 @@ from ngcontact import (
 )
 from ngcontact.discrete.discrete_problem import discretise, minimise_energy
 from ngcontact.geometries import blocks
-from ngcontact.geometries.region import body, compound, quarter_arc
+from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh import first_mesh
 from ngcontact.qp import BorderedSystems
 from ngcontact.qp.quadratic_program import SingularError
@@ -224,6 +225,54 @@ def test_a_body_that_may_turn_from_every_first_active_set(order):
             [0, -weight],
             atol=1e-10 * weight,  # measured 2e-13
         )
+
+
+def resting(gap=None):
+    """A disc that far above a clamped block, or in a notch of 90 degrees whose faces it touches."""
+    deep, wide, names = math.sqrt(2), 1.5 * math.sqrt(2), ["side", "bottom", "side"]
+    if gap is None:
+        base = [
+            (0, -deep),
+            (-wide, deep / 2),
+            (-wide, -2 * deep),
+            (wide, -2 * deep),
+            (wide, deep / 2),
+        ]
+        names = ["left_face", *names, "right_face"]
+        pairs = [Contact(f"{s}_arc", f"{s}_face", (x, -1)) for s, x in (("left", -1), ("right", 1))]
+    else:
+        top = -1 - gap
+        base = [(2, top), (-2, top), (-2, top - 1), (2, top - 1)]
+        names = ["block_top", *names]
+        pairs = [Contact("left_arc|right_arc", "block_top", direction=(0, -1))]
+    around = ("over", "over", "left_arc", "right_arc")
+    disc = [(name, quarter_arc((0, 0), 1.0, k, (k + 1) % 4)) for k, name in enumerate(around)]
+    return Problem(
+        geometry=compound(body("disc", disc), body("base", polygon(base, names))),
+        materials={"disc|base": STEEL},
+        displacement={"bottom": (0, 0)},
+        force={"disc": (0, -WEIGHT)},
+        contact=pairs,
+    )
+
+
+@pytest.mark.study(witness=["0.05-1"])
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("gap", [0.0, 1e-12, 0.05, 10.0, None])
+def test_contact_forces_are_the_weight_above(gap, order):
+    solution = solve(resting(gap), maxh=0.25, order=order)
+    disc = WEIGHT * mesh_area(solution, "disc")
+    shares = [[0.5, 0.5], [-0.5, 0.5]] if gap is None else [[0, 1]]
+    forces = np.array([solution.contact_force(k) for k in range(len(shares))])
+    # Symmetric within what the mesh, which is not, leaves of the moment.
+    assert np.abs(forces - disc * np.array(shares)).max() <= 1e-10 * disc
+
+
+def test_contact_may_open_completely():
+    pulled = pressed_blocks(0.0)
+    pulled = replace(pulled, traction={}, displacement={"top": (0, 0.01), "bottom": (0, 0)})
+    solution = solve(pulled, maxh=0.2, order=2)
+    assert np.abs(solution.gap - 0.01).max() <= 0.01 * ROUND_OFF
 
 
 @pytest.mark.parametrize("stopped", [1, 2])

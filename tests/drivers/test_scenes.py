@@ -9,15 +9,12 @@ import numpy as np
 import pytest
 
 from drivers.stress.motion import Motion
-from drivers.stress.scenes.checks.balance import penetration, residual, unbalanced
-from drivers.stress.scenes.checks.judging import BALANCED, FACTOR, SAME, judged, named
-from drivers.stress.scenes.checks.measures import differences, measured
-from drivers.stress.scenes.checks.reference import reference
 from drivers.stress.scenes.drawing import KINDS, rotation, scene_of
+from drivers.stress.scenes.judging import BALANCED, FACTOR, SAME, judged, named, outcome_of, summary
+from drivers.stress.scenes.measures import differences, measured, penetration, residual, unbalanced
 from drivers.stress.scenes.posing import answer
-from drivers.stress.scenes.scene import Body, Pair, Scene
-from drivers.stress.scenes.sides import Side, scalar, vector
-from drivers.stress.trials.scenes import outcome_of, summary
+from drivers.stress.scenes.reference import reference
+from drivers.stress.scenes.scene import Body, Pair, Scene, Side, scalar, vector
 
 SEEDS = (11, 12, 13, 25, 59, 38, 6, 29, 63, 31, 43)  # every kind and check, soon done
 WHOLE = 8  # a seed whose scene is solved, has a pair on each flank and opens in part

@@ -6,18 +6,24 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from drivers.stress.trials.algebra import CYCLES, dual
 from ngcontact.errors import ConvergenceError
 from ngcontact.qp.active_set import minimise
 from ngcontact.qp.quadratic_program import kkt_residuals, pinned_null_space
 from ngcontact.qp.schur_complement import BorderedSystems
-from tests.qp.programs import counting_factor, first_unknowns_bounded, inequalities, membrane
+from tests.qp.programs import (
+    CYCLES,
+    counting_factor,
+    dual,
+    first_unknowns_bounded,
+    inequalities,
+    membrane,
+)
 
 
 def test_plain_method_cycles():
     """The safeguard is what ends it: with endless patience the plain method cycles."""
     S, d, force = CYCLES["T-cyc-1 moved"]
-    program = inequalities(*dual(np.array(S, float), np.array(d, float)))
+    program = inequalities(*dual(S, d))
     factor = counting_factor(program.K, [])
     with pytest.raises(ConvergenceError, match="did not settle") as failure:
         minimise(BorderedSystems(program, factor), patience=10**9)

@@ -1,21 +1,38 @@
 """Quadratic programs of users: brute force, another solver, known cycles, ties, bad input."""
 
+from itertools import product
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.stress.trials.algebra import (
+from ngcontact.qp.active_set import solve_qp
+from tests.qp.programs import (
+    CYCLES,
     ROUND_OFF,
     brute_force,
     condition,
+    dual,
     kkt_residual,
     random_program,
     tied_program,
 )
-from ngcontact.qp.active_set import solve_qp
 
 SIZES_AND_SEEDS = st.integers(1, 40), st.integers(0, 2**32 - 1)
+
+
+@pytest.mark.parametrize("name", CYCLES)
+def test_known_cycles_end_in_every_unit(name):
+    """From all first active sets."""
+    S, d, force = CYCLES[name]
+    for unit, *first in product([1e-150, 1.0, 1e150], *[[False, True]] * 3):
+        program = dual(S, unit * np.array(d))
+        result = solve_qp(*program, active=np.array(first))
+        allowed = ROUND_OFF * condition(program)
+        assert kkt_residual(program, result) <= allowed
+        np.testing.assert_allclose(result.force / unit, force, atol=allowed * max(*force, 1))
+        assert result.steps[-1] == 0
 
 
 @pytest.mark.parametrize("m", range(1, 9))

@@ -1,5 +1,6 @@
-"""Random scenes of bodies in contact.
+"""Random scenes of bodies in contact, and checks that share no code with the package.
 
-`sides` and `scene` are a scene as plain data, `blocks` and `discs` draw some, `drawing` one for
-every seed, `posing` hands it to the package; `checks` say whether what comes back is right.
+`scene` is a scene as plain data, `drawing` draws one for every seed, `posing` hands it to the
+package. `measures` reads a solution, `reference` knows what is right from the scene's data alone,
+`judging` compares.
 """

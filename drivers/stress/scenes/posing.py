@@ -10,8 +10,7 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import ArcOfCircle, Edge, Face, OCCGeometry, Pnt
 
-from drivers.stress.scenes.scene import Pair, Scene
-from drivers.stress.scenes.sides import Affine, Array, Side
+from drivers.stress.scenes.scene import Affine, Array, Pair, Scene, Side
 from ngcontact import Contact, ContactWarning, Elastic, Problem, Solution, adapt, solve
 from ngcontact.geometries.region import body, compound, segment
 

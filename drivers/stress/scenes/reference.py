@@ -17,11 +17,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from drivers.stress.scenes.checks.balance import opposite
-from drivers.stress.scenes.checks.measures import Measures, law
+from drivers.stress.scenes.measures import Measures, law, opposite
 from drivers.stress.scenes.posing import netgen_mesh
-from drivers.stress.scenes.scene import Pair, Scene
-from drivers.stress.scenes.sides import Array, Index, Side
+from drivers.stress.scenes.scene import Array, Index, Pair, Scene, Side
 
 PIECES = 8  # of a segment in integrals along lines, with two Gauss points each
 LEAST = 1e-3  # share of a hat that must face the primary for a row
