@@ -24,7 +24,7 @@ from drivers.command_line import Count, printed_in, run
 from drivers.reference import cases, paper
 from drivers.reference.cases import Case
 from drivers.reference.curved import Rings
-from drivers.reference.norms import relative_h1_error
+from drivers.reference.overkill import relative_h1_error
 from drivers.reference.straight import Exact, relative_energy_error
 from drivers.tables import Columns, printed
 from ngcontact import Solution, solve

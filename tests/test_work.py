@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from drivers.benchmark.studies.linear import uniform_mesh
-from drivers.benchmark.studies.skip import two_blocks
+from drivers.benchmark.studies.overhead import two_blocks
 from drivers.reference import cases
 from ngcontact import solve
 

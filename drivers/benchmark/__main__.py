@@ -21,7 +21,7 @@ from cyclopts import Parameter
 from cyclopts.validators import Number
 
 from drivers.benchmark.scenes.problems import Name
-from drivers.benchmark.studies import Extent, accuracy, overhead, processes, skip, stages
+from drivers.benchmark.studies import Extent, accuracy, overhead, processes
 from drivers.command_line import Count, run
 
 Size: TypeAlias = Annotated[Count, Parameter(validator=Number(gte=10_000))]
@@ -50,8 +50,8 @@ PARTS: dict[Part, Callable[[Extent], tuple[list[Any], str]]] = {
     "growth": processes.growth,
     "large": processes.large,
     "accuracy": accuracy.accuracy,
-    "skip": skip.scenes,
-    "stages": stages.all_stages,
+    "skip": overhead.scenes,
+    "stages": overhead.all_stages,
 }
 
 

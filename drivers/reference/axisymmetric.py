@@ -15,20 +15,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import ngsolve as ng
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from drivers.reference.straight import NO_FORCE, Exact, Profile, compiled
 from drivers.reference.straight import energy_error as energy_error
 from drivers.reference.straight import relative_energy_error as relative_energy_error
 from drivers.reference.westergaard import CF, SIDES, depth, effective_modulus, moduli
-from ngcontact.problem import Elastic
-
-if TYPE_CHECKING:
-    from numpy.typing import ArrayLike, NDArray
-
+from ngcontact import Elastic
 
 PUNCHES = 24  # Gauss points of the sum of punches that is a cone: round-off at a distance
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import ngsolve as ng
 import numpy as np
@@ -18,9 +17,7 @@ from numpy.typing import NDArray
 from drivers.reference.manufactured import equilibrated
 from drivers.reference.straight import NO_FORCE, Exact, Profile, compiled
 from drivers.reference.westergaard import CF, moduli
-
-if TYPE_CHECKING:
-    from ngcontact.problem import Elastic
+from ngcontact import Elastic
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

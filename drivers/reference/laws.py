@@ -17,8 +17,8 @@ from netgen.occ import Compound, Face, Glue, OCCGeometry
 from numpy.typing import NDArray
 
 from drivers.reference.cases import Case
-from drivers.reference.manufactured import gradient
-from drivers.reference.straight import Exact, compiled
+from drivers.reference.manufactured import equilibrated
+from drivers.reference.straight import Exact
 from drivers.reference.westergaard import CF
 from ngcontact import Contact, Elastic, Hooke, Problem
 from ngcontact.geometries.region import Point, body, compound, polygon
@@ -41,19 +41,7 @@ def fibres(stiffness: float, angle: float, shear: float = 0.4) -> Hooke:
 
 def _exact(displacement: dict[str, CF], laws: dict[str, Law], p: float) -> Exact:
     """Displacements by region with their stresses and body forces; contact under p all along."""
-    stress, force = {}, {}
-    for region, u in displacement.items():
-        grad = gradient(u)
-        xx, yy, xy = laws[region].voigt() * ng.CF((grad[0, 0], grad[1, 1], grad[0, 1] + grad[1, 0]))
-        s = stress[region] = ng.CF((xx, xy, xy, yy), dims=(2, 2))
-        force[region] = -(s.Diff(ng.x)[0, :] + s.Diff(ng.y)[1, :])
-    displacement, stress, force = map(compiled, (displacement, stress, force))
-    return Exact(
-        displacement,
-        stress,
-        force,
-        pressure=lambda x: np.full(np.shape(x), p),
-    )
+    return Exact(*equilibrated(displacement, laws), pressure=lambda x: np.full(np.shape(x), p))
 
 
 def bent_fibres(stiffness: float, angle: float) -> Case:

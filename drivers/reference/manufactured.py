@@ -1,27 +1,29 @@
-"""Manufactured contact solutions on bounded zones: a polygonal line and a circle.
+"""Manufactured contact solutions: a polygonal line, a circle, and singular ones.
 
 Plane strain, any consistent units. The displacement next to the zone is linear in the distance
 from it, with the coefficients that the contact conditions HH81 (3.9)-(3.12) ask for; a cut-off
 takes it to nothing away from the zone. Stress is Hooke's law of it, the body force is F =
 -div(stress). Pressure and gap meet as t^2 and t^3 at the ends of contact, so that F is bounded.
+
+HH81 Theorems 3.2 and 3.5 claim convergence without regularity, and no rate: the displacements of
+`slits` and `with_end_of_guide` grow as r^(1/2) at a point of the boundary. They lie in H^s for
+s < 3/2 only, which gives h^(1/2) at every order.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeAlias
 
 import ngsolve as ng
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from drivers.reference.straight import Exact, compiled, shrinkage
-from drivers.reference.westergaard import CF, hooke, moduli
-
-if TYPE_CHECKING:
-    from ngcontact.problem import Elastic
+from drivers.reference.straight import Exact, compiled, equilibrium_fields, shrinkage
+from drivers.reference.westergaard import CF, Potential, depth, half_plane, hooke, moduli
+from ngcontact import Elastic, Hooke
 
 Point: TypeAlias = tuple[float, float]
 Fields: TypeAlias = tuple[dict[str, CF], dict[str, CF], dict[str, CF]]
@@ -61,11 +63,14 @@ def gradient(u: CF) -> CF:
     return ng.CF((columns[0][0], columns[1][0], columns[0][1], columns[1][1]), dims=(2, 2))
 
 
-def equilibrated(
-    displacement: dict[str, CF], materials: dict[str, Elastic]
-) -> tuple[dict[str, CF], dict[str, CF], dict[str, CF]]:
+def equilibrated(displacement: dict[str, CF], materials: Mapping[str, Elastic | Hooke]) -> Fields:
     """Displacement, its stress and the body force that balances it: the first three of `Exact`."""
-    stress = {body: hooke(materials[body], gradient(u)) for body, u in displacement.items()}
+    stress = {}
+    for body, u in displacement.items():
+        grad = gradient(u)
+        strain = ng.CF((grad[0, 0], grad[1, 1], grad[0, 1] + grad[1, 0]))
+        xx, yy, xy = materials[body].voigt() * strain
+        stress[body] = ng.CF((xx, xy, xy, yy), dims=(2, 2))
     force = {body: -(s.Diff(ng.x)[0, :] + s.Diff(ng.y)[1, :]) for body, s in stress.items()}
     return compiled(displacement), compiled(stress), compiled(force)
 
@@ -301,3 +306,72 @@ def circular(
         gap=lambda t: opening * np.maximum(turn - np.cos(4 * np.asarray(t)), 0) ** 3,
         ends=(end, math.pi / 2 - end),
     )
+
+
+def slits(upper: Elastic, lower: Elastic, *, half_width: float, force: float = 1.0) -> Exact:
+    """Two half-planes that touch for |x| < a between slits with free faces, pressed by `force`.
+
+    Z = -i P / (pi sqrt(z^2 - a^2)): p = P / (pi sqrt(a^2 - x^2)), the pressure under a rigid flat
+    punch (K. L. Johnson, Contact Mechanics, 1985, section 2.8), here of two elastic bodies, as
+    u_y = 0 for |x| < a in both. The slits are taken as wide enough to stay open.
+    """
+    materials = {"upper": upper, "lower": lower}
+    a = half_width
+    k = force / math.pi
+    fields = {
+        body: half_plane(_slit_potential(k, a, body), material, body)
+        for body, material in materials.items()
+    }
+    return Exact(
+        *equilibrium_fields(fields, materials),
+        pressure=lambda x: k / np.sqrt(a**2 - np.asarray(x, float) ** 2),
+    )
+
+
+def _slit_potential(k: float, a: float, body: str) -> Potential:
+    """Z = -i k / w, w = sqrt(z^2 - a^2) as in `hertz_potential`, W = -i k log((z + w) / a)."""
+    x, Y = ng.x, depth(body)
+    r1, r2 = (ng.sqrt((x - s) * (x - s) + Y * Y) for s in (a, -a))
+    t1, t2 = (ng.atan2(Y, x - s) for s in (a, -a))
+    half = (t1 + t2) / 2
+    rho, square = ng.sqrt(r1 * r2), r1 * r2
+    cos, sin, cos3, sin3 = ng.cos(half), ng.sin(half), ng.cos(3 * half), ng.sin(3 * half)
+    slope = ng.sqrt(ng.sin(t1) * ng.sin(t2))  # Y / rho
+    wr, wi = rho * cos, rho * sin
+    modulus = 0.5 * ng.log(((x + wr) * (x + wr) + (Y + wi) * (Y + wi)) / a**2)
+    argument = ng.atan2(Y + wi, x + wr)
+    turned = k * slope / square
+    return Potential(
+        Z=(-k * sin / rho, -k * cos / rho),
+        YdZ=(turned * (x * sin3 - Y * cos3), turned * (x * cos3 + Y * sin3)),
+        W=(k * argument, -k * modulus),
+        YZ=(-k * slope * sin, -k * slope * cos),
+    )
+
+
+def with_end_of_guide(
+    exact: Exact, materials: dict[str, Elastic], *, at: float, c: float, reach: float
+) -> Exact:
+    """`exact` plus a field r^(1/2) where Gamma_0 ends on the bottom y = -1 of the body "lower".
+
+    The field is that of Z = c z^(-1/2) about (`at`, -1): guided for x > `at`, free of traction for
+    x < `at`, which is a crack's by symmetry; times the cut-off (1 - (r / reach)^2)^3, which leaves
+    both conditions as they are, but for tractions on the free part. The body must be guided there
+    by `exact`. Units: c stress times square root of length.
+    """
+    m = moduli(materials["lower"])
+    X, Y = ng.x - at, ng.y + 1
+    r, t = ng.sqrt(X * X + Y * Y), math.pi / 2 - ng.atan2(X, Y)  # no branch near y = -1
+    root, cos, sin = c * ng.sqrt(r), ng.cos(t / 2), ng.sin(t / 2)
+    deep = root * ng.sin(t)
+    plus, minus = (m.kappa + 1) / 2, (m.kappa - 1) / 2
+    crack = ng.CF((2 * minus * root * cos + deep * sin, 2 * plus * root * sin - deep * cos))
+    window = 1 - (X * X + Y * Y) / reach**2
+    window = ng.IfPos(window, window, 0.0)
+    window = window * window * window
+    added = equilibrated({"lower": window * crack / (2 * m.mu)}, materials)
+    displacement, stress, force = (
+        compiled(whole | {"lower": whole["lower"] + part["lower"]})
+        for whole, part in zip((exact.displacement, exact.stress, exact.force), added, strict=True)
+    )
+    return replace(exact, displacement=displacement, stress=stress, force=force)

@@ -19,8 +19,7 @@ from drivers.reference.cases import (
     Case,
     touching_blocks,
 )
-from drivers.reference.manufactured import Bump, circular, polygonal
-from drivers.reference.singular import slits, with_end_of_guide
+from drivers.reference.manufactured import Bump, circular, polygonal, slits, with_end_of_guide
 from drivers.reference.straight import Exact, hertz, uniform_pressure
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.geometries import rings as ring_geometry

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TypeAlias
 
 import ngsolve as ng
 import numpy as np
@@ -28,10 +28,7 @@ from drivers.reference.westergaard import (
     moduli,
     root_potential,
 )
-from ngcontact.problem import Elastic, Hooke
-
-if TYPE_CHECKING:
-    from ngcontact.solution import Solution
+from ngcontact import Elastic, Hooke, Solution
 
 Profile: TypeAlias = Callable[[ArrayLike], NDArray[np.float64]]
 

@@ -18,12 +18,11 @@ always that of the body asked for. Any consistent units.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import NamedTuple, TypeAlias
 
 import ngsolve as ng
 
-if TYPE_CHECKING:
-    from ngcontact.problem import Elastic
+from ngcontact import Elastic
 
 CF: TypeAlias = ng.CoefficientFunction
 

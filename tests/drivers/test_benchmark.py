@@ -23,12 +23,11 @@ from drivers.benchmark.engines import (
     needed,
     ngsolve,
 )
-from drivers.benchmark.engines.active_set import solved
-from drivers.benchmark.engines.scipy_active_sets import FELUPE, SCIKIT
+from drivers.benchmark.engines.active_set import FELUPE, SCIKIT, solved
 from drivers.benchmark.scenes.meshes import KINDS, made, sides, which
 from drivers.benchmark.scenes.plane import contact_end, peak, weights
 from drivers.benchmark.scenes.problems import Common, block, disc
-from drivers.benchmark.studies import processes, stages
+from drivers.benchmark.studies import overhead, processes
 from ngcontact import adapt
 from ngcontact.discrete import MULTIGRID
 
@@ -266,17 +265,17 @@ def test_every_stage_of_a_level_is_found():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.FunctionDef)
     }
-    assert {pair for functions in stages.STAGES.values() for pair in functions} <= defined
+    assert {pair for functions in overhead.STAGES.values() for pair in functions} <= defined
 
 
 @pytest.mark.study
 def test_stages_fill_a_level():
     if sys.version_info < (3, 12):
-        _, found = stages.stages(COMMON["block"], 1000)
+        _, found = overhead.stages(COMMON["block"], 1000)
         assert [stage for stage, seconds in found.items() if not seconds > 0] == ["multigrid"]
         return
     try:  # newer profilers may miss outer calls: then it says so
-        _, found = stages.stages(COMMON["block"], 1000)
+        _, found = overhead.stages(COMMON["block"], 1000)
     except RuntimeError:
         found = {"assembly": 1.0}
     assert found["assembly"] > 0

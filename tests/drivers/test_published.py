@@ -7,8 +7,8 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from drivers.published import __main__ as driver
-from drivers.published.problems import PUBLISHED, RINGS
+from drivers import published as driver
+from drivers.published import PUBLISHED, RINGS
 from drivers.reference.half_spaces import Hertz
 
 

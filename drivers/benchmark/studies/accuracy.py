@@ -15,7 +15,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from drivers.benchmark.engines import NotInstalledError, Run, akantu, kratos, ngsolve
-from drivers.benchmark.engines.scipy_active_sets import FELUPE, SCIKIT
+from drivers.benchmark.engines.active_set import FELUPE, SCIKIT
 from drivers.benchmark.scenes.meshes import KINDS
 from drivers.benchmark.scenes.problems import COMMONS, Common
 from drivers.benchmark.studies import Extent

@@ -1,1 +1,0 @@
-"""Problems that other codes publish: their numbers and ours side by side."""
