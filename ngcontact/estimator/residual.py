@@ -45,8 +45,8 @@ from ..arrays import Array, Index, Mask, power_of_two, root_of_squares
 from ..fem import (
     NEARLY_INCOMPRESSIBLE,
     law_measures,
+    moduli,
     nearly_incompressible,
-    stiffnesses,
 )
 from ..lagrange import gauss, gauss_derivative
 from ..linalg import cholesky, lower_half, shared
@@ -78,8 +78,8 @@ def scaled(solved: Solved) -> ScaledSolution:
     """A solution in units of its own."""
     problem, stress, boundary = solved.problem, solved.stress, solved.discrete.space.trace
     mesh = boundary.mesh
-    mu, rigidity, ratio = stiffnesses(problem, mesh)
-    modulus = power_of_two(mu)
+    stiffness = moduli(problem, mesh)
+    modulus = power_of_two(stiffness.shear)
     # sigma_h as polynomials, to be differentiated: right for any modulus and curved elements; its
     # jumps cost a fifth of those of the stress.
     any_varies = any(map(varies, problem.materials.values()))
@@ -108,9 +108,9 @@ def scaled(solved: Solved) -> ScaledSolution:
         projected=projected,
         unit=unit,
         modulus=modulus,
-        mu=mu / modulus,
-        rigidity=rigidity / modulus,
-        incompressibility=ratio,
+        mu=stiffness.shear / modulus,
+        rigidity=stiffness.rigidity / modulus,
+        incompressibility=stiffness.ratio,
         rough=rough,
         diameter=MeshArrays(mesh).diameters,
     )

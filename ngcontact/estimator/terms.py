@@ -102,7 +102,7 @@ class ScaledSolution:
     projected: ng.GridFunction  # the same as (xx, yy, xy), polynomials on each element
     unit: float
     modulus: float
-    mu: Array  # (ne,), the smallest stiffness, see `fem.stiffnesses`
+    mu: Array  # (ne,), the smallest stiffness, see `fem.Moduli`
     rigidity: Array  # (ne,), the largest one
     incompressibility: Array  # (ne,), bulk modulus over mu
     rough: Mask  # (ne,), elements in which the law varies by more than a part of itself

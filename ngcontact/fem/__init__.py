@@ -13,13 +13,10 @@ from .boundary import unknowns_of as unknowns_of
 from .model import MODELS as MODELS
 from .model import Model as Model
 from .moduli import NEARLY_INCOMPRESSIBLE as NEARLY_INCOMPRESSIBLE
-from .moduli import bulk_moduli as bulk_moduli
-from .moduli import incompressibilities as incompressibilities
+from .moduli import Moduli as Moduli
 from .moduli import law_measures as law_measures
+from .moduli import moduli as moduli
 from .moduli import nearly_incompressible as nearly_incompressible
-from .moduli import shear_moduli as shear_moduli
-from .moduli import stiffer_than as stiffer_than
-from .moduli import stiffnesses as stiffnesses
 from .moduli import warn_of_locking as warn_of_locking
 from .space import LOAD_BONUS as LOAD_BONUS
 from .space import Space as Space

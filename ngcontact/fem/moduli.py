@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import ngsolve as ng
@@ -23,9 +23,8 @@ ROUGH_PARTS = 8  # of the sides of an element in which a law is rough, each with
 MODULUS_BONUS = 4  # quadrature orders above the default: moduli may be as rough as r^(-1/2)
 CURVED = 2  # ... and for the map of a curved element
 
-# Laws (q, q) of numbers, and their bulk and shear moduli, by the model.
+# Laws (q, q) of numbers, by the model.
 CONSTANT: WeakKeyDictionary[Elastic | Hooke, dict[str, Array]] = WeakKeyDictionary()
-NUMBERS: WeakKeyDictionary[Elastic | Hooke, dict[str, tuple[float, float]]] = WeakKeyDictionary()
 
 # Voigt strains of a unit of volume, without change of volume, and of shear, as rows.
 VOLUMETRIC = {
@@ -39,29 +38,47 @@ SAMPLES = ng.IntegrationRule(
 )
 
 
-def _sampled(
-    problem: Problem, mesh: ng.Mesh, *measures: Callable[[Array], Array], asked: Mask | None = None
-) -> Array:
-    """Measures (m, ne, 4) at `SAMPLES` of each element, (k, 4) of laws C (k, 4, q, q).
+@dataclass(frozen=True, eq=False)
+class Moduli:
+    """What is asked of the law in each element, stresses (ne,); 0 where nothing was asked."""
 
-    Voigt components q, the shear last. Only of elements `asked` (ne,) for, 0 in others.
-    """
-    values = np.zeros((len(measures), mesh.ne, len(SAMPLES)))
+    # Half the smallest eigenvalue of C on strains, c_0 / 2 in HH81 (2.7), the least in the element:
+    # mu of isotropic laws with nu >= 0, and kappa below.
+    shear: Array
+    # Largest kappa <= e : C e / (tr e)^2, in the middle: lambda + mu of isotropic laws in plane
+    # strain, lambda + 2 mu / 3 about an axis.
+    bulk: Array
+    # Half the largest eigenvalue of C less kappa (tr e)^2, the largest in the element: mu of
+    # isotropic laws. Boundary values w in a half-plane store at most 2 mu |w|^2 in H^(1/2), as the
+    # field without divergence among those with these values does.
+    rigidity: Array
+    ratio: Array  # of the bulk modulus and half the smallest eigenvalue, in the middle
+
+
+def moduli(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Moduli:
+    """Moduli of elements `asked` (ne,) for, of all when left out."""
+    shear, bulk, rigidity, ratio = np.zeros((4, mesh.ne))
     region = MeshArrays(mesh).bodies
     for pattern, law in problem.materials.items():
         at = np.array(mesh.Materials(pattern).Mask())[region]
         at = at if asked is None else at & asked
         if not at.any():
             continue
-        C = _constant(law, problem.model, mesh)[None, None] if not varies(law) else None
-        if C is None:
+        if varies(law):
             points = mesh.MapToAllElements(SAMPLES, ng.VOL).reshape(-1, len(SAMPLES))[at]
-            C = np.asarray(law.voigt(problem.model)(points.ravel()))
-            size = round(math.sqrt(C.shape[1]))
-            C = C.reshape(-1, len(SAMPLES), size, size)
-        for value, measure in zip(values, measures, strict=True):
-            value[at] = measure(C)
-    return values
+            law_there = law.voigt(problem.model)
+            C = np.asarray(law_there(points.ravel()))
+            C = C.reshape(-1, len(SAMPLES), *law_there.dims)
+        else:
+            C = _constant(law, problem.model, mesh)[None, None]
+        strains, kappa = mandel(C), _bulk(C)
+        smallest = np.linalg.eigvalsh(strains)[..., 0]  # (2.7)
+        dilatation = np.append(np.ones(C.shape[-1] - 1), 0.0)
+        rest = strains - kappa[..., None, None] * np.outer(dilatation, dilatation)
+        shear[at], bulk[at] = smallest.min(axis=1) / 2, kappa[:, 0]
+        rigidity[at] = np.linalg.eigvalsh(rest)[..., -1].max(axis=1) / 2
+        ratio[at] = 2 * kappa[:, 0] / smallest[:, 0]
+    return Moduli(shear, bulk, rigidity, ratio)
 
 
 def _constant(law: Elastic | Hooke, model: str, mesh: ng.Mesh) -> Array:
@@ -85,11 +102,6 @@ def mandel(C: Array) -> Array:
     return C * scale * scale[:, None]
 
 
-def _smallest(C: Array) -> Array:
-    """The best c_0 (...) in HH81 (2.7): the smallest eigenvalue of the laws (..., q, q)."""
-    return np.asarray(np.linalg.eigvalsh(mandel(C))[..., 0])
-
-
 def _bulk(C: Array) -> Array:
     """The largest kappa (...) <= e : C e / (tr e)^2 of laws (..., q, q).
 
@@ -101,55 +113,6 @@ def _bulk(C: Array) -> Array:
     D = T @ (C / size[..., None, None]) @ T.T
     bend = np.linalg.solve(D[..., 1:, 1:], D[..., 1:, :1])
     return np.asarray(size * (D[..., 0, 0] - (D[..., :1, 1:] @ bend)[..., 0, 0]))
-
-
-def _rigidity(C: Array) -> Array:
-    """Largest eigenvalue (...) of laws (..., q, q) less kappa (tr e)^2, of a strain without it.
-
-    The energy |w|^2 of boundary values in a half-plane is at most this times their square in
-    H^(1/2), as that of the field without divergence among those with these values.
-    """
-    dilatation = np.append(np.ones(C.shape[-1] - 1), 0.0)
-    rest = mandel(C) - _bulk(C)[..., None, None] * np.outer(dilatation, dilatation)
-    return np.asarray(np.linalg.eigvalsh(rest)[..., -1])
-
-
-def shear_moduli(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Array:
-    """Half the smallest eigenvalue (ne,) of the law, the least in each element, a stress.
-
-    That of C on strains, in Mandel's scaling: mu of isotropic laws with nu >= 0, and kappa below.
-    Of elements `asked` (ne,) for, 0 elsewhere; of all when left out.
-    """
-    [smallest] = _sampled(problem, mesh, _smallest, asked=asked)
-    return np.asarray(smallest.min(axis=1) / 2)
-
-
-def bulk_moduli(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Array:
-    """Bulk modulus (ne,) in the middle of each element: the largest kappa <= e : C e / (tr e)^2.
-
-    A stress, lambda + mu of isotropic laws in plane strain, lambda + 2 mu / 3 about an axis. Of
-    elements `asked` (ne,) for, 0 elsewhere; of all when left out.
-    """
-    [bulk] = _sampled(problem, mesh, _bulk, asked=asked)
-    return np.asarray(bulk[:, 0])
-
-
-def stiffnesses(problem: Problem, mesh: ng.Mesh) -> Array:
-    """What the estimate asks of the law in each element, rows (3, ne).
-
-    The shear modulus as in `shear_moduli`; the rigidity, half the largest eigenvalue of C less its
-    bulk modulus, the largest in the element: a stress, mu of isotropic laws, boundary values w
-    store at most 2 mu |w|^2 in H^(1/2); and the ratio of `incompressibilities`.
-    """
-    smallest, bulk, rigidity = _sampled(problem, mesh, _smallest, _bulk, _rigidity)
-    ratio = 2 * bulk[:, 0] / smallest[:, 0]
-    return np.array([smallest.min(axis=1) / 2, rigidity.max(axis=1) / 2, ratio])
-
-
-def incompressibilities(problem: Problem, mesh: ng.Mesh) -> Array:
-    """Bulk modulus over half the smallest eigenvalue in the middle of each element, (ne,)."""
-    smallest, bulk = _sampled(problem, mesh, _smallest, _bulk)
-    return np.asarray(2 * bulk[:, 0] / smallest[:, 0])
 
 
 def law_measures(
@@ -192,7 +155,7 @@ def nearly_incompressible(
     problem: Problem, mesh: ng.Mesh, limit: float, ratio: Array | None = None
 ) -> dict[str, float]:
     """Largest kappa / mu of each body where it exceeds `limit`; `ratio` (ne,) where it is known."""
-    ratio = incompressibilities(problem, mesh) if ratio is None else ratio
+    ratio = moduli(problem, mesh).ratio if ratio is None else ratio
     if not (ratio > limit).any():
         return {}
     region = MeshArrays(mesh).bodies
@@ -202,33 +165,9 @@ def nearly_incompressible(
     return {name: value for name, value in most.items() if value > limit}
 
 
-def _of_laws(problem: Problem, mesh: ng.Mesh) -> list[tuple[float, float]] | None:
-    """Bulk and shear modulus of each law, wherever it applies; None where one of them varies."""
-    found = []
-    for law in problem.materials.values():
-        if varies(law):
-            return None
-        kept = NUMBERS.setdefault(law, {})
-        if problem.model not in kept:
-            C = _constant(law, problem.model, mesh)
-            kept[problem.model] = float(_bulk(C)), float(_smallest(C)) / 2
-        found.append(kept[problem.model])
-    return found
-
-
-def stiffer_than(problem: Problem, mesh: ng.Mesh, pressure: float) -> bool:
-    """Whether no body, as far as is known without a look at elements, is softer than a pressure.
-
-    In confined compression, kappa + mu.
-    """
-    moduli = _of_laws(problem, mesh)
-    return moduli is not None and all(pressure <= kappa + mu for kappa, mu in moduli)
-
-
 def warn_of_locking(problem: Problem, mesh: ng.Mesh, order: int) -> None:
     """Warn of every body that elements of order 1 are too stiff for."""
-    moduli = _of_laws(problem, mesh) if order == 1 else []
-    if moduli is not None and all(kappa <= LOCKING * mu for kappa, mu in moduli):
+    if order > 1:
         return
     for name, ratio in nearly_incompressible(problem, mesh, LOCKING).items():
         warn(

@@ -19,14 +19,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Array, Index, Mask
 from ..contact import ContactState, in_contact, partners, prescribed_gap, twins
-from ..fem import BoundaryTrace, bulk_moduli, shear_moduli, stiffer_than
+from ..fem import BoundaryTrace, Moduli, moduli
 from ..lagrange import gauss_lobatto, lagrange_derivative
 from ..problem import Problem
 from ..solved import Solved
@@ -170,13 +169,7 @@ def _large_strains(
 ) -> str:
     """Message where strains are far from small, or nothing."""
     pressure = float((np.abs(zones.force) / zones.weight).max(initial=0.0))
-    if stiffer_than(problem, trace.mesh, pressure / LARGE_PRESSURE):
-        return ""
-
-    def confined(problem: Problem, mesh: ng.Mesh, asked: Mask) -> Array:
-        return bulk_moduli(problem, mesh, asked) + shear_moduli(problem, mesh, asked)
-
-    modulus = _softer(confined, problem, trace, state)
+    modulus = _softer(lambda law: law.bulk + law.shear, problem, trace, state)
     if pressure <= LARGE_PRESSURE * modulus:
         return ""
     return (
@@ -187,16 +180,13 @@ def _large_strains(
 
 
 def _softer(
-    moduli: Callable[[Problem, ng.Mesh, Mask], Array],
-    problem: Problem,
-    trace: BoundaryTrace,
-    state: ContactState,
+    modulus: Callable[[Moduli], Array], problem: Problem, trace: BoundaryTrace, state: ContactState
 ) -> float:
-    """Mean of the `moduli` along each side, of the two the smaller one; a stress."""
+    """Mean of a modulus along each side, of the two the smaller one; a stress."""
     sides = [trace.element[state.line.segments], trace.element[state.line.facing]]
     asked = np.zeros(trace.mesh.ne, dtype=bool)
     asked[np.concatenate(sides)] = True
-    values = moduli(problem, trace.mesh, asked)
+    values = modulus(moduli(problem, trace.mesh, asked))
     return float(min(values[side].mean() for side in sides if len(side)))
 
 
@@ -259,7 +249,7 @@ def _penetration(solution: Solved, state: ContactState, peak: float) -> str:
     if depth <= noise:
         return ""
     [length] = trace.lengths(segment[met][[deepest]])
-    missing = _softer(shear_moduli, solution.problem, trace, state) * depth / float(length)
+    missing = _softer(lambda law: law.shear, solution.problem, trace, state) * depth / float(length)
     if missing <= MISSING_PRESSURE * peak:
         return ""
     x, y = x[met][deepest]
