@@ -22,27 +22,13 @@ MERIDIAN = (0, 1, 3)  # components of rr, zz, hoop, rz without the hoop
 
 
 class Model:
-    """What the program asks a model; by itself plane strain, a slice of unit thickness: xx, yy, xy.
+    """What the program asks a model; by itself plane strain: xx, yy, xy of unit thickness."""
 
-    Attributes
-    ----------
-    dim : int
-        Components of a displacement.
-    motions : tuple of bool (3,)
-        Which of the translations along x and y and the rotation of a body cause no strain.
-    bonus : int
-        Quadrature orders above the default that its forms need.
-    polynomial : bool
-        Whether the stress of a polynomial displacement is one of one degree less.
-    extent : int
-        Powers of a length in `measure`.
-    """
-
-    dim = 2
-    motions = (True, True, True)
-    bonus = 0
-    polynomial = True
-    extent = 0
+    dim = 2  # components of a displacement
+    motions = (True, True, True)  # which translations and rotations of a body cause no strain
+    bonus = 0  # quadrature orders above the default that its forms need
+    polynomial = True  # whether the stress of a polynomial displacement is one of one degree less
+    extent = 0  # powers of a length in `measure`
 
     def strain(self, u: CF) -> CF:
         """Voigt strain (q,) of a displacement or trial function, e_ij in HH81 (2.6)."""

@@ -13,7 +13,7 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry, TopoDS_Shape
 
-from ..arrays import Array
+from ..arrays import Array, across
 
 SAMPLES = 65  # points of an edge from which a projection starts
 NEWTON_STEPS = 30
@@ -27,31 +27,20 @@ SETTLED = 1e-15  # relative change of a parameter at which Newton's method has a
 
 def rightward(vectors: Array) -> Array:
     """Unit vectors (k, 2) to the right of `vectors` (k, 2)."""
-    right = np.column_stack([vectors[:, 1], -vectors[:, 0]])
-    return right / np.linalg.norm(right, axis=1)[:, None]
+    return across(vectors) / -np.linalg.norm(vectors, axis=1)[:, None]
 
 
 class CadEdge:
-    """One CAD edge as a parametrised plane curve.
-
-    Attributes
-    ----------
-    start, stop : float
-        Parameter interval.
-    straight : bool
-        Whether the edge is a straight segment with a constant derivative.
-    closed : bool
-        Whether the edge ends where it starts.
-    """
+    """One CAD edge as a parametrised plane curve."""
 
     def __init__(self, edge: TopoDS_Shape) -> None:
         self._edge = edge
         self.start, self.stop = edge.parameter_interval
         self._t = np.linspace(self.start, self.stop, SAMPLES)
-        self.straight = False  # as far as is known
+        self.straight = False  # a straight segment with a constant derivative, as far as is known
         self._axes: Array | None = None
         self._x = self.point(self._t)
-        self.size = float(np.abs(np.ptp(self._x, axis=0)).max())
+        self.size = float(np.abs(np.ptp(self._x, axis=0)).max())  # its extent, a length
         chord = self._x[0] + np.linspace(0, 1, SAMPLES)[:, None] * (self._x[-1] - self._x[0])
         self.straight = bool(np.abs(self._x - chord).max() <= STRAIGHT * self.size)
         self.closed = bool(np.abs(self._x[-1] - self._x[0]).max() <= MISSED * self.size)
@@ -133,8 +122,7 @@ class CadEdge:
 
     def normal(self, points: Array) -> Array:
         """Unit normals (k, 2) at the projections of `points` (k, 2), right of the tangent."""
-        t = np.full(len(points), self.start) if self.straight else self.project(points)
-        return rightward(self.derivative(t))
+        return rightward(self.derivative(self.project(points)))
 
     def level(self, axis: Array, values: Array, near: Array) -> Array:
         """Parameters (k,) where coordinates along `axis` (2,), or (k, 2), take `values` (k,).
@@ -159,8 +147,8 @@ class CadEdge:
 
         The one near the closest point of the edge; NaN where there is none.
         """
-        across = np.column_stack([-normals[:, 1], normals[:, 0]])
-        return self.level(across, (points * across).sum(axis=1), points)
+        beside = across(normals)
+        return self.level(beside, (points * beside).sum(axis=1), points)
 
     @property
     def samples(self) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..arrays import Array, Integers
 from ..problem import MeshArrays, Problem
-from .cad import cad_edges
+from .cad import CadEdge, cad_edges
 from .matching import Edge, divided
 
 COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given ...
@@ -145,15 +145,17 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
 def resolved_lengths(mesh: ng.Mesh) -> Array:
     """Length (k,) of each boundary segment over the least on its curve; inf on straight edges."""
     view = MeshArrays(mesh)
-    ends = view.vertices[view.facets]
-    least = [
-        0.0 if edge.straight else SHORTEST_ON_SMALL if edge.size < SMALL_EDGE else SHORTEST
-        for edge in cad_edges(mesh) or []
-    ]
-    if not least:
+    ends, edges = view.vertices[view.facets], cad_edges(mesh)
+    if not edges:
         return np.full(len(ends), np.inf)
+    least = np.array([0.0 if edge.straight else _shortest(edge) for edge in edges])
     with np.errstate(divide="ignore"):
-        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / np.array(least)[view.boundaries]
+        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / least[view.boundaries]
+
+
+def _shortest(edge: CadEdge) -> float:
+    """Length from which OCC curves the elements at a segment of an edge."""
+    return SHORTEST_ON_SMALL if edge.size < SMALL_EDGE else SHORTEST
 
 
 def unresolved(mesh: ng.Mesh) -> bool:
@@ -162,32 +164,18 @@ def unresolved(mesh: ng.Mesh) -> bool:
 
 
 def check_curves(mesh: ng.Mesh) -> None:
-    """Raise if curved edges are too small for OCC to curve the elements beside them.
-
-    Raises
-    ------
-    ValueError
-        Names the edge and its length; another unit of length mends it.
-    """
+    """Raise a `ValueError` if curved edges are too small for OCC to curve elements beside them."""
     boundaries, length = MeshArrays(mesh).boundaries, resolved_lengths(mesh)
     for number, edge in enumerate(cad_edges(mesh) or []):
-        if edge.straight:
-            continue
-        small = edge.size < SMALL_EDGE
-        limit = SHORTEST_ON_SMALL if small else SHORTEST
         shortest = float(length[boundaries == number].min(initial=np.inf))
-        if shortest < 1 or (small and not edge.uniform):
+        small = edge.size < SMALL_EDGE and not (edge.straight or edge.uniform)
+        if shortest < 1 or small:
             raise ValueError(
                 f'the curved edge "{edge.name}" has the extent {edge.size:g} and segments of '
-                f"{shortest * limit:g}, on which the geometry kernel loses digits; choose a "
-                f"smaller unit of length: curved edges of {SMALL_EDGE:g} and more may have "
-                f"segments down to {SHORTEST:g}"
+                f"{shortest * _shortest(edge):g}, on which the geometry kernel loses digits; "
+                f"choose a smaller unit of length: curved edges of {SMALL_EDGE:g} and more may "
+                f"have segments down to {SHORTEST:g}"
             )
-
-
-def geometry_order(order: int, element: str) -> int:
-    """Degree of the curved elements: Zlamal's (2.8) maps P_order by geometry one degree up."""
-    return order if element == "isoparametric" else order + 1  # (2.8)
 
 
 def _straightened(mesh: ng.Mesh) -> bool:
@@ -204,7 +192,7 @@ def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
     A mesh without an OCC geometry, without curved edges, or curved to that degree already is
     used as it is; otherwise, also after `Refine` has straightened it, the result is a copy.
     """
-    degree = geometry_order(order, element)
+    degree = order if element == "isoparametric" else order + 1  # (2.8)
     edges = cad_edges(mesh)
     if edges is None:
         return mesh, 0

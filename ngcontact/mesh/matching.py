@@ -9,9 +9,8 @@ from itertools import pairwise, product
 
 import netgen.occ as occ
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arrays import Array
+from ..arrays import Array, Index, Mask, across
 from ..problem import Contact, Problem
 from .cad import CadEdge, rightward
 
@@ -125,7 +124,7 @@ def _named(edges: list[Edge], pattern: str) -> list[Edge]:
     return [edge for edge in edges if re.fullmatch(pattern, edge.curve.name)]
 
 
-def _facing_runs(faces: NDArray[np.bool_], stops: NDArray[np.intp]) -> Iterator[slice]:
+def _facing_runs(faces: Mask, stops: Index) -> Iterator[slice]:
     """Longest runs of neighbouring samples that face the other curve, cut at `stops`."""
     bounds = np.flatnonzero(np.diff(np.concatenate([[False], faces, [False]]).astype(int)))
     for first, last in bounds.reshape(-1, 2):
@@ -135,9 +134,9 @@ def _facing_runs(faces: NDArray[np.bool_], stops: NDArray[np.intp]) -> Iterator[
                 yield slice(start, stop + 1)
 
 
-def _nearest_crossing(samples: Array, x: Array, across: Array, along: Array) -> Array:
-    """Points (k, 2) where a polyline crosses the lines through `x` (k, 2), the nearest of each."""
-    height = samples @ across - (x @ across)[:, None]
+def _nearest_crossing(samples: Array, x: Array, along: Array) -> Array:
+    """Points (k, 2) where a polyline meets lines `along` (2,) through `x` (k, 2), the nearest."""
+    height = samples @ across(along) - (x @ across(along))[:, None]
     low, high = height[:, :-1], height[:, 1:]
     share = np.clip(np.divide(low, low - high, out=np.zeros_like(low), where=low != high), 0, 1)
     points = samples[:-1] + share[..., None] * np.diff(samples, axis=0)
@@ -148,7 +147,7 @@ def _nearest_crossing(samples: Array, x: Array, across: Array, along: Array) -> 
     return points[np.arange(len(x)), best]
 
 
-def _nearest_of(x: Array, edge: CadEdge, others: list[Edge]) -> NDArray[np.bool_]:
+def _nearest_of(x: Array, edge: CadEdge, others: list[Edge]) -> Mask:
     """Whether no other edge is nearer to the points `x` (k, 2) than `edge`."""
 
     def distance(to: CadEdge) -> Array:
@@ -176,14 +175,13 @@ def _opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple
         else:
             t[apart] = np.nan  # (2.3): common nodes
     else:
-        dx, dy = contact.direction
-        across = np.array([-dy, dx])
-        near = _nearest_crossing(other.samples, x, across, np.array([dx, dy]))
-        t = other.level(across, x @ across, near)  # (2.10): A_j and B_j at the same C_j
+        along = np.array(contact.direction)
+        near, eta = _nearest_crossing(other.samples, x, along), across(along)
+        t = other.level(eta, x @ eta, near)  # (2.10): A_j and B_j at the same C_j
     return t, other.point(np.where(np.isnan(t), other.start, t))
 
 
-def _behind(contact: Contact, x: Array, y: Array, edges: list[Edge]) -> NDArray[np.bool_]:
+def _behind(contact: Contact, x: Array, y: Array, edges: list[Edge]) -> Mask:
     """Whether another point of `edges` lies between `x` (k, 2) and the points `y` they see.
 
     On a far side of the own body, as behind the middle of a disc.
@@ -191,13 +189,11 @@ def _behind(contact: Contact, x: Array, y: Array, edges: list[Edge]) -> NDArray[
     behind = np.zeros(len(x), dtype=bool)
     if contact.direction is None:
         return behind
-    dx, dy = contact.direction
-    across, along = np.array([-dy, dx]), np.array([dx, dy])
+    along = np.array(contact.direction)
     distance = np.abs((y - x) @ along)
     for edge in edges:
-        nearest = _nearest_crossing(edge.curve.samples, y, across, along)
-        close = NEARER * edge.curve.size
-        met = np.abs((nearest - y) @ across) <= close
+        nearest, close = _nearest_crossing(edge.curve.samples, y, along), NEARER * edge.curve.size
+        met = np.abs((nearest - y) @ across(along)) <= close
         behind |= met & (np.abs((y - nearest) @ along) < distance - close)
     return behind
 
@@ -233,8 +229,8 @@ def _divide(
     if contact.direction is not None:
         slope_there = primary.curve.derivative(np.where(faces, other, primary.curve.start))
         for tangent in (slope, slope_there):
-            across = tangent @ np.array([-contact.direction[1], contact.direction[0]])
-            faces &= np.abs(across) >= STEEPEST * np.linalg.norm(tangent, axis=1)
+            cosine = np.abs(tangent @ across(np.array(contact.direction)))
+            faces &= cosine >= STEEPEST * np.linalg.norm(tangent, axis=1)
 
     def gap(t: Array) -> Array:
         """Signed distances (k,) to the points opposite to `t` (k,), NaN where there are none."""

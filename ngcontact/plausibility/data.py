@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Mask
 from ..errors import warn
 from ..fem import warn_of_locking
 from ..mesh import cad_edges
@@ -20,30 +21,16 @@ NOISE = 64 * np.finfo(float).eps  # ... and to the largest of all values: below 
 
 @dataclass(frozen=True)
 class Contradiction:
-    """Two supports and a corner of theirs.
+    """Two supports and a corner of theirs."""
 
-    Attributes
-    ----------
-    supports : tuple of str
-        Names.
-    place : ndarray (2,)
-        The corner, a length.
-    message : str
-        What they say there.
-    amount : float
-        By how much they differ, a length.
-    """
-
-    supports: tuple[str, str]
-    place: Array
-    message: str
-    amount: float
+    supports: tuple[str, str]  # names
+    place: Array  # (2,), the corner, a length
+    message: str  # what they say there
+    amount: float  # by how much they differ, a length
 
 
 def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
     """All of Gamma_u with itself, within a boundary, too, and with guides, by component."""
-    if not problem.displacement:
-        return []
     found = []
     seen = [one for one in features_of(problem, mesh) if one.kind == "displacement"]
     for one in seen:
@@ -53,15 +40,13 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
     view = SampledElements(mesh, 1)
     shared = _shared(problem, view)
     known: dict[tuple[int, int], tuple[str, float]] = {}  # support and value by vertex and axis
-    for pattern, components in problem.displacement.items() if shared.any() else ():
-        segments, end = _ends(view, pattern, shared)
-        vertices = view.ends[segments, end]
+    for pattern, components in problem.displacement.items():
+        ends = _Ends(view, pattern, shared)
         for axis, value in enumerate(components):
-            if value is None or not len(vertices):
+            if value is None or not len(ends.vertices):
                 continue
-            look = view.evaluate if numbers(value) else view.look
-            values = look(value, segments, _at_ends(end)).ravel().tolist()
-            for vertex, u in zip(vertices.tolist(), values, strict=True):
+            values = ends.values(value, view.evaluate if numbers(value) else view.look)
+            for vertex, u in zip(ends.vertices.tolist(), values[:, 0].tolist(), strict=True):
                 name, other = known.setdefault((vertex, axis), (pattern, u))
                 if abs(u - other) > APART * max(abs(other), abs(u)):
                     message = (
@@ -87,16 +72,19 @@ def _shared(problem: Problem, view: SampledElements) -> Mask:
     return np.asarray(low < high)
 
 
-def _ends(view: SampledElements, pattern: str, shared: Mask) -> tuple[Index, Index]:
-    """Segments (k,) of boundaries with `shared` vertices, and which end (k,) each of these is."""
-    segments = view.inside(view.mesh.Boundaries(pattern))
-    k, end = np.nonzero(shared[view.ends[segments]])
-    return segments[k], end
+class _Ends:
+    """Ends of segments of a boundary at `shared` vertices (nv,), k of them."""
 
+    def __init__(self, view: SampledElements, pattern: str, shared: Mask) -> None:
+        segments = view.inside(view.mesh.Boundaries(pattern))
+        at, end = np.nonzero(shared[view.ends[segments]])
+        self.segments = segments[at]  # (k,)
+        self.vertices = view.ends[self.segments, end]  # (k,)
+        self._places = np.asarray(1.0 - end[:, None, None], dtype=float)  # as NGSolve runs
 
-def _at_ends(end: Index) -> Array:
-    """Places (k, 1, 1) of ends (k,) of segments, as NGSolve's parameter runs."""
-    return np.asarray(1.0 - end[:, None, None], dtype=float)
+    def values(self, function: ng.CoefficientFunction, evaluate: Callable[..., Array]) -> Array:
+        """Of a function there, (k, c)."""
+        return evaluate(function, self.segments, self._places)[:, 0]
 
 
 def _across_guides(
@@ -107,14 +95,13 @@ def _across_guides(
 ) -> list[Contradiction]:
     """Ends of `guides` at which `known` values, by vertex and axis, lead across them."""
     found = []
-    segments, end = _ends(view, guides, shared)
-    vertices = view.ends[segments, end]
-    places, edges = view.arrays.vertices[vertices], cad_edges(view.mesh)
-    normals = view.evaluate(ng.specialcf.normal(2), segments, _at_ends(end))[:, 0]
-    for k, vertex in enumerate(vertices.tolist()):
+    ends, edges = _Ends(view, guides, shared), cad_edges(view.mesh)
+    places = view.arrays.vertices[ends.vertices]
+    normals = ends.values(ng.specialcf.normal(2), view.evaluate)
+    for k, vertex in enumerate(ends.vertices.tolist()):
         normal = normals[k]
         if edges is not None:
-            [exact] = edges[view.arrays.boundaries[segments[k]]].normal(places[k : k + 1])
+            [exact] = edges[view.arrays.boundaries[ends.segments[k]]].normal(places[k : k + 1])
             normal = exact if exact @ normal > 0 else -exact
         needed = [axis for axis in (0, 1) if abs(normal[axis]) > APART]
         if all((vertex, axis) in known for axis in needed):

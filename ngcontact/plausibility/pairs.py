@@ -116,22 +116,12 @@ def _unresisted(solution: Solved) -> str:
 
 @dataclass(frozen=True, eq=False)
 class ContactZones:
-    """The k connected zones of one pair in which its bodies touch.
+    """The k connected zones of one pair in which its bodies touch."""
 
-    Attributes
-    ----------
-    force, weight : ndarray (k,)
-        Sums over the points of each zone: a force per unit thickness, a length.
-    segments : ndarray (k,)
-        Length in segments: half of the interval between two nodes in which it ends counts.
-    ends : ndarray of int (k,)
-        Transitions to open points.
-    """
-
-    force: Array
-    weight: Array
-    segments: Array
-    ends: Index
+    force: Array  # (k,), sums over the points of each zone, a force per unit thickness
+    weight: Array  # (k,), a length
+    segments: Array  # (k,), length in segments: of the interval in which it ends a half counts
+    ends: Index  # (k,), transitions to open points
 
 
 def _neighbours(state: ContactState) -> Index:
@@ -266,12 +256,6 @@ def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
     if line.contact.direction is None or not state.active.any():
         return ""
     xi = np.array(line.contact.direction)
-    touching = np.append(state.active, False)[line.rows].any(axis=1)
-    segments = line.segments[touching]
-    if trace.edges and all(trace.edges[k].straight for k in set(trace.region[segments].tolist())):
-        chord = trace.curve[segments, -1] - trace.curve[segments, 0]
-        if (np.abs(chord @ xi) <= np.sin(INCLINED) * trace.lengths(segments)).all():
-            return ""
     angle, force = inclinations(trace, state), np.abs(state.force)
     if force[angle > INCLINED].sum() <= FORCE_SHARE * force.sum():
         return ""
