@@ -23,7 +23,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Array, from_triplets
-from ..fem import moduli
+from ..fem import moduli_of
 from ..linalg import cholesky, lower_half, shared
 from ..problem import MeshArrays
 from .terms import BoundaryResidual, PressureShare, ScaledSolution
@@ -114,7 +114,7 @@ class _Forms:
         self.element = constant(solution.element_weight)
         self.edge = constant(solution.edge_weight)
         self.mu = constant(solution.mu)
-        self.kappa = constant(moduli(solution.problem, mesh).bulk / solution.modulus)
+        self.kappa = constant(moduli_of(solution.problem, mesh).bulk / solution.modulus)
 
     def inside(
         self, divergence: ng.CoefficientFunction, jump: ng.CoefficientFunction

@@ -45,7 +45,7 @@ from ..arrays import Array, Index, Mask, power_of_two, root_of_squares
 from ..fem import (
     NEARLY_INCOMPRESSIBLE,
     law_measures,
-    moduli,
+    moduli_of,
     nearly_incompressible,
 )
 from ..lagrange import gauss, gauss_derivative
@@ -78,7 +78,7 @@ def scaled(solved: Solved) -> ScaledSolution:
     """A solution in units of its own."""
     problem, stress, boundary = solved.problem, solved.stress, solved.discrete.space.trace
     mesh = boundary.mesh
-    stiffness = moduli(problem, mesh)
+    stiffness = moduli_of(problem, mesh)
     modulus = power_of_two(stiffness.shear)
     # sigma_h as polynomials, to be differentiated: right for any modulus and curved elements; its
     # jumps cost a fifth of those of the stress.

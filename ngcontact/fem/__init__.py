@@ -14,8 +14,7 @@ from .model import MODELS as MODELS
 from .model import Model as Model
 from .moduli import NEARLY_INCOMPRESSIBLE as NEARLY_INCOMPRESSIBLE
 from .moduli import Moduli as Moduli
-from .moduli import law_measures as law_measures
-from .moduli import moduli as moduli
+from .moduli import moduli_of as moduli_of
 from .moduli import nearly_incompressible as nearly_incompressible
 from .moduli import warn_of_locking as warn_of_locking
 from .space import LOAD_BONUS as LOAD_BONUS
@@ -23,6 +22,7 @@ from .space import Space as Space
 from .space import assemble as assemble
 from .space import body_of_unknown as body_of_unknown
 from .space import energy_norm as energy_norm
+from .space import law_measures as law_measures
 from .space import load_vector as load_vector
 from .space import model_of as model_of
 from .space import normal_stress_of as normal_stress_of

@@ -1,4 +1,4 @@
-"""Moduli of elements, integrals of laws that vary, nearly incompressible bodies."""
+"""Moduli of elements, nearly incompressible bodies."""
 
 from __future__ import annotations
 
@@ -12,16 +12,11 @@ import numpy as np
 from ..arrays import Array, Mask
 from ..errors import warn
 from ..problem import Elastic, Hooke, MeshArrays, Problem, varies
-from ..quadrature import composite
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
 NEARLY_INCOMPRESSIBLE = 6.0
 # ... and from which order 1 locks: nu = 0.4545, where errors are 1.3 times those of nu = 0.3.
 LOCKING = 11.0
-
-ROUGH_PARTS = 8  # of the sides of an element in which a law is rough, each with a rule of its own
-MODULUS_BONUS = 4  # quadrature orders above the default: moduli may be as rough as r^(-1/2)
-CURVED = 2  # ... and for the map of a curved element
 
 # Laws (q, q) of numbers, by the model.
 CONSTANT: WeakKeyDictionary[Elastic | Hooke, dict[str, Array]] = WeakKeyDictionary()
@@ -55,7 +50,7 @@ class Moduli:
     ratio: Array  # of the bulk modulus and half the smallest eigenvalue, in the middle
 
 
-def moduli(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Moduli:
+def moduli_of(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Moduli:
     """Moduli of elements `asked` (ne,) for, of all when left out."""
     shear, bulk, rigidity, ratio = np.zeros((4, mesh.ne))
     region = MeshArrays(mesh).bodies
@@ -115,47 +110,11 @@ def _bulk(C: Array) -> Array:
     return np.asarray(size * (D[..., 0, 0] - (D[..., :1, 1:] @ bend)[..., 0, 0]))
 
 
-def law_measures(
-    mesh: ng.Mesh, body: str, order: int, rough: Mask
-) -> list[ng.comp.DifferentialSymbol]:
-    """Integrals over a body whose law varies, the last one over its elements `rough` (ne,).
-
-    Of a polynomial of degree `order`, which is that of the form without the law, times the law.
-    """
-    where = mesh.Materials(body)
-    if not rough.any():
-        return [ng.dx(definedon=where, bonus_intorder=MODULUS_BONUS)]
-    smooth, rest = ng.BitArray(~rough), ng.BitArray(rough)
-    rule = {ng.TRIG: composite(ROUGH_PARTS, order + CURVED)}
-    return [
-        ng.dx(definedon=where, definedonelements=smooth, bonus_intorder=MODULUS_BONUS),
-        ng.dx(definedon=where, definedonelements=rest, intrules=rule),
-    ]
-
-
-def constant_measures(
-    mesh: ng.Mesh, body: str, curved: Mask, bonus: int = 0
-) -> list[ng.comp.DifferentialSymbol]:
-    """Integrals over a body whose law is constant, the last one over its elements `curved` (ne,).
-
-    There the derivatives of mapped functions are no polynomials: the default rule changes u_h by up
-    to 15 % of its error at order 2, this one by 0.05 %. All are `bonus` orders above the default.
-    """
-    where = mesh.Materials(body)
-    if not curved.any():
-        return [ng.dx(definedon=where, bonus_intorder=bonus)]
-    straight, rest = ng.BitArray(~curved), ng.BitArray(curved)
-    return [
-        ng.dx(definedon=where, definedonelements=straight, bonus_intorder=bonus),
-        ng.dx(definedon=where, definedonelements=rest, bonus_intorder=CURVED + bonus),
-    ]
-
-
 def nearly_incompressible(
     problem: Problem, mesh: ng.Mesh, limit: float, ratio: Array | None = None
 ) -> dict[str, float]:
     """Largest kappa / mu of each body where it exceeds `limit`; `ratio` (ne,) where it is known."""
-    ratio = moduli(problem, mesh).ratio if ratio is None else ratio
+    ratio = moduli_of(problem, mesh).ratio if ratio is None else ratio
     if not (ratio > limit).any():
         return {}
     region = MeshArrays(mesh).bodies

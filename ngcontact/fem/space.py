@@ -10,16 +10,18 @@ import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Array, Index, power_of_two
+from ..arrays import Array, Index, Mask, power_of_two
 from ..linalg import shared
 from ..problem import MeshArrays, Problem, varies
-from ..quadrature import loads_of, rough_moduli
+from ..quadrature import composite, loads_of, rough_moduli
 from .boundary import Bodies, BoundaryTrace, node_basis, vector_space
 from .model import MODELS, Model
-from .moduli import constant_measures, law_measures
 
 LOAD_BONUS = 6  # quadrature orders above the default: loads may be as rough as r^(-1/2)
 CANCELLED = 1e-6  # energy relative to its terms below which fewer than ten digits are left
+ROUGH_PARTS = 8  # of the sides of an element in which a law is rough, each with a rule of its own
+MODULUS_BONUS = 4  # quadrature orders above the default: moduli may be as rough as r^(-1/2)
+CURVED = 2  # ... and for the map of a curved element
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,6 +86,42 @@ def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
             f += model.weighted(density * w) * dx
     f.Assemble()
     return f.vec.FV().NumPy().copy()
+
+
+def law_measures(
+    mesh: ng.Mesh, body: str, order: int, rough: Mask
+) -> list[ng.comp.DifferentialSymbol]:
+    """Integrals over a body whose law varies, the last one over its elements `rough` (ne,).
+
+    Of a polynomial of degree `order`, which is that of the form without the law, times the law.
+    """
+    where = mesh.Materials(body)
+    if not rough.any():
+        return [ng.dx(definedon=where, bonus_intorder=MODULUS_BONUS)]
+    smooth, rest = ng.BitArray(~rough), ng.BitArray(rough)
+    rule = {ng.TRIG: composite(ROUGH_PARTS, order + CURVED)}
+    return [
+        ng.dx(definedon=where, definedonelements=smooth, bonus_intorder=MODULUS_BONUS),
+        ng.dx(definedon=where, definedonelements=rest, intrules=rule),
+    ]
+
+
+def constant_measures(
+    mesh: ng.Mesh, body: str, curved: Mask, bonus: int = 0
+) -> list[ng.comp.DifferentialSymbol]:
+    """Integrals over a body whose law is constant, the last one over its elements `curved` (ne,).
+
+    There the derivatives of mapped functions are no polynomials: the default rule changes u_h by up
+    to 15 % of its error at order 2, this one by 0.05 %. All are `bonus` orders above the default.
+    """
+    where = mesh.Materials(body)
+    if not curved.any():
+        return [ng.dx(definedon=where, bonus_intorder=bonus)]
+    straight, rest = ng.BitArray(~curved), ng.BitArray(curved)
+    return [
+        ng.dx(definedon=where, definedonelements=straight, bonus_intorder=bonus),
+        ng.dx(definedon=where, definedonelements=rest, bonus_intorder=CURVED + bonus),
+    ]
 
 
 def assemble(

@@ -1,18 +1,21 @@
-"""First meshes whose nodes on facing lines match, HH81 (2.3), (2.10); their curves and parents."""
+"""First meshes, with nodes at common points {C_j} of facing contact lines, HH81 (2.3), (2.10)."""
 
 from __future__ import annotations
 
+import re
 import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from itertools import pairwise, product
 from numbers import Real
 
 import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Integers
-from ..problem import MeshArrays, Problem
-from .cad import CadEdge, cad_edges
-from .matching import Edge, divided
+from ..arrays import Array, Index, Mask, across
+from ..problem import Contact, MeshArrays, Problem
+from .cad import CadEdge, rightward
 
 COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given ...
 FINER = 2  # ... and that many times more on a bounded zone: contact may end anywhere on it
@@ -24,43 +27,266 @@ FARTHEST = 5e8  # from the origin
 SMALLEST = 1e-6  # extent
 
 MESHING = threading.Lock()
-PARENTS = "_ngcontact_parents"  # attribute of a mesh: it lives as long as the mesh
-# OCC's projections know absolute lengths: points within 1e-7 of the end of an arc go to that end,
-# on other curves 1e-10 over the speed counts as met. On edges of extent SMALL_EDGE that changes no
-# more than 1e-8 of it as long as elements keep their shape.
-SMALL_EDGE = 1e-2  # extent of an edge; measured: all but arcs of circles are wrong from 2e-3
-SHORTEST = 1e-6  # a segment of a curved edge; measured: elements of order 4 turn over at 5e-7
-SHORTEST_ON_SMALL = 1e-5  # ... of a smaller arc; measured: middles displaced from 5e-6, order 4
-ON_CURVE = 1e-12  # distance, relative to the geometry's size, at which an element misses its curve
+
+STEEPEST = 0.5  # cosine between a curve's normal and the direction below which nodes go unmatched
+NEARER = 0.01  # of an edge: what a polygon of its samples tells apart
+COINCIDENT = 1e-6  # distance, relative to an edge, up to which two edges are one contact line
+CLOSE = 0.1  # share of the spacing, or of a segment, within which a node yields to one beside it
+FINE = 513  # samples on which a division is laid out
+APART = 1e-9  # share of an edge up to which two nodes are one
+TURN = 0.5  # largest turn (radians) of a curve along one contact segment
+SPARE = 1e-9  # share by which a run of elements may exceed their size, not to gain one by round-off
+NARROW = 0.1  # of the size of a segment: gaps that contact may close
+CONSTANT = 1e-6  # of the size of a segment: change within half of it up to which a gap has no least
+THERE = 1e-6  # of a segment: distance up to which a node lies at a place
+CLOSER = 2**-6  # of a sample's distance: from its error of 1e-5 to one of 1e-9, above round-off
 
 
-def vertex_parents(mesh: ng.Mesh) -> Integers:
-    """Ends of the edges that refinement halved, (nv, 2); -1 for vertices of the first mesh.
+def _segments(x: Array, y: Array, maxh: float) -> Array:
+    """How many segments reach up to each of the points `x`, `y` (k, 2) of facing curves, (k,)."""
+    density = np.zeros(len(x) - 1)
+    for points in (x, y):
+        steps = np.diff(points, axis=0)
+        angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+        turn = np.abs(np.gradient(angle)) if len(angle) > 1 else np.zeros(1)
+        density = np.maximum(density, np.linalg.norm(steps, axis=1) / maxh)
+        density = np.maximum(density, turn / TURN)
+    return np.concatenate([[0.0], np.cumsum(density)])
 
-    Both have lower numbers than the vertex itself.
+
+def narrowest(t: Array, x: Array, y: Array, maxh: float, gap: Callable[[Array], Array]) -> Array:
+    """Parameters (j,) between samples at `t` (k,) at which a narrow gap is least, or largest.
+
+    `x`, `y` (k, 2) and `maxh` as in `spaced`; `gap` maps (n,) to signed distances (n,) whose
+    sense is not known: bodies apart and bodies that overlap first touch at one or the other.
     """
-    kept: Integers = getattr(mesh, PARENTS, np.zeros((0, 2), dtype=np.int32))
-    known = len(kept)
-    if known > mesh.nv:  # another mesh has been loaded into this one
-        known, kept = 0, kept[:0]
-    if known < mesh.nv and mesh.GetParentVertices(mesh.nv - 1)[0] < 0:  # nothing was refined here
-        new = np.full((mesh.nv - known, 2), -1, dtype=np.int32)
+    before, here, after = (values := gap(t))[:-2], values[1:-1], values[2:]
+    bend = before - 2 * here + after
+    step = np.diff(_segments(x, y, maxh))
+    change = np.abs(bend) / 8 / np.maximum(step[:-1], step[1:]) ** 2  # within half a segment
+    turns = (np.abs(here) <= NARROW * maxh) & ((before - here) * (after - here) >= 0)
+    place = t[1:-1][turns & (change > CONSTANT * maxh)]
+    apart = (t[-1] - t[0]) / (len(t) - 1)
+    for width in (apart, CLOSER * apart) if len(place) else ():  # vertices of parabolas
+        before, here, after = (gap(place + side * width) for side in (-1, 0, 1))
+        place = place + width / 2 * (before - after) / (before - 2 * here + after)
+    return np.unique(place[(place > t[0]) & (place < t[-1])])
+
+
+def spaced(t: Array, x: Array, y: Array, maxh: float, places: Array) -> Array:
+    """Parameters (n,) of nodes between samples at `t` (k,), the first and the last included.
+
+    `x` and `y` (k, 2) are the points there, and those that they see on the other curve; segments
+    are no longer than `maxh` on either and turn by `TURN` at most. Nodes lie at the parameters
+    `places` (j,), but for those beside an end or another one.
+    """
+    total = _segments(x, y, maxh)
+
+    def even(start: float, stop: float) -> Array:
+        count = max(1, int(np.ceil((stop - start) * (1 - SPARE))))
+        return np.linspace(start, stop, count + 1)
+
+    marks = even(0, total[-1])
+    stops = np.interp(places, t, total)
+    stops = stops[(stops > CLOSE) & (stops < total[-1] - CLOSE)]
+    stops = stops[np.diff(stops, prepend=0.0) > CLOSE]
+    if (np.abs(stops[:, None] - marks).min(axis=1) > THERE).any():
+        bounds = [0.0, *stops.tolist(), total[-1]]
+        marks = np.unique(np.concatenate([even(*part) for part in pairwise(bounds)]))
+    return np.interp(marks, total, t)
+
+
+@dataclass(eq=False)
+class Edge:
+    """A CAD edge with the nodes that contact asks for."""
+
+    shape: occ.TopoDS_Shape  # the edge of the geometry
+    curve: CadEdge  # the same as a curve
+    maxh: float  # largest element size along it, a length
+    # Parameters (j,) of the nodes on each part that faces another line; first those of parts with a
+    # narrowest place, whose nodes stay.
+    runs: list[Array] = field(default_factory=list)
+
+    def partition(self) -> list[float]:
+        """Interior nodes as fractions of the parameter interval, between runs filled up evenly."""
+        start, stop = self.curve.start, self.curve.stop
+        runs = [(nodes - start) / (stop - start) for nodes in self.runs]
+        nodes = np.array([0.0, 1.0])
+        for run in runs:  # without nodes of later ones that would leave slivers of an edge
+            spacing = np.diff(np.sort(run)).min(initial=1.0)
+            distance = np.abs(run[:, None] - nodes).min(axis=1)
+            nodes = np.concatenate([nodes, run[distance > CLOSE * spacing]])
+        nodes = np.sort(nodes)
+        inside = nodes[(nodes > APART) & (nodes < 1 - APART)]
+        inside = inside[np.diff(inside, prepend=-1.0) > APART]
+        result = inside.tolist()
+        t = np.linspace(start, stop, FINE)
+        x = self.curve.point(t)
+        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
+        grid = (t - start) / (stop - start)
+        for low, high in pairwise([0.0, *inside.tolist(), 1.0]):
+            if not any(run.min() < (low + high) / 2 < run.max() for run in runs):
+                s0, s1 = np.interp([low, high], grid, arc)
+                count = int(np.ceil((s1 - s0) / self.maxh * (1 - SPARE)))
+                fill = np.interp(np.linspace(s0, s1, count + 1)[1:-1], arc, grid)
+                result.extend(fill.tolist())
+        return sorted(result)
+
+
+def _named(edges: list[Edge], pattern: str) -> list[Edge]:
+    """Edges whose name matches."""
+    return [edge for edge in edges if re.fullmatch(pattern, edge.curve.name)]
+
+
+def _facing_runs(faces: Mask, stops: Index) -> Iterator[slice]:
+    """Longest runs of neighbouring samples that face the other curve, cut at `stops`."""
+    bounds = np.flatnonzero(np.diff(np.concatenate([[False], faces, [False]]).astype(int)))
+    for first, last in bounds.reshape(-1, 2):
+        inside = stops[(stops > first) & (stops < last - 1)]
+        for start, stop in pairwise([first, *inside.tolist(), last - 1]):
+            if stop > start:
+                yield slice(start, stop + 1)
+
+
+def _nearest_crossing(samples: Array, x: Array, along: Array) -> Array:
+    """Points (k, 2) where a polyline meets lines `along` (2,) through `x` (k, 2), the nearest."""
+    height = samples @ across(along) - (x @ across(along))[:, None]
+    low, high = height[:, :-1], height[:, 1:]
+    share = np.clip(np.divide(low, low - high, out=np.zeros_like(low), where=low != high), 0, 1)
+    points = samples[:-1] + share[..., None] * np.diff(samples, axis=0)
+    distance = np.abs((points - x[:, None]) @ along)
+    # Lines that the polyline just misses are left to Newton's method from its nearest end.
+    miss = np.where(low * high <= 0, 0.0, np.minimum(np.abs(low), np.abs(high)))
+    best = np.lexsort((distance, miss), axis=1)[:, 0]
+    return points[np.arange(len(x)), best]
+
+
+def _nearest_of(x: Array, edge: CadEdge, others: list[Edge]) -> Mask:
+    """Whether no other edge is nearer to the points `x` (k, 2) than `edge`."""
+
+    def distance(to: CadEdge) -> Array:
+        return np.linalg.norm(to.point(to.project(x)) - x, axis=1)
+
+    own = distance(edge)
+    slack = COINCIDENT * edge.size
+    nearest = np.ones(len(x), dtype=bool)
+    for other in others:
+        if other.curve is not edge:
+            nearest &= own <= distance(other.curve) + slack
+    return nearest
+
+
+def _opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple[Array, Array]:
+    """Parameters on `other` opposite to points `x` (NaN where there are none), and the points.
+
+    Without a direction on the normals of the curve through `x`, whose tangents are `slope` (k, 2).
+    """
+    if contact.direction is None:
+        t = other.project(x)
+        apart = np.linalg.norm(other.point(t) - x, axis=1) > COINCIDENT * other.size
+        if contact.gap is None and apart.any():  # clearance or interference: along the normals
+            t[apart] = other.opposite(x[apart], rightward(slope[apart]))
+        else:
+            t[apart] = np.nan  # (2.3): common nodes
     else:
-        pairs = [mesh.GetParentVertices(v) for v in range(known, mesh.nv)]
-        new = np.array(pairs, dtype=np.int32).reshape(-1, 2)
-    return np.concatenate([kept, new])
+        along = np.array(contact.direction)
+        near, eta = _nearest_crossing(other.samples, x, along), across(along)
+        t = other.level(eta, x @ eta, near)  # (2.10): A_j and B_j at the same C_j
+    return t, other.point(np.where(np.isnan(t), other.start, t))
 
 
-def copied(mesh: ng.Mesh) -> ng.Mesh:
-    """Copy that keeps the names, the geometry and the parents; not curved."""
-    copy = ng.Mesh(mesh.ngmesh.Copy())
-    keep_parents(copy, vertex_parents(mesh))
-    return copy
+def _behind(contact: Contact, x: Array, y: Array, edges: list[Edge]) -> Mask:
+    """Whether another point of `edges` lies between `x` (k, 2) and the points `y` they see.
+
+    On a far side of the own body, as behind the middle of a disc.
+    """
+    behind = np.zeros(len(x), dtype=bool)
+    if contact.direction is None:
+        return behind
+    along = np.array(contact.direction)
+    distance = np.abs((y - x) @ along)
+    for edge in edges:
+        nearest, close = _nearest_crossing(edge.curve.samples, y, along), NEARER * edge.curve.size
+        met = np.abs((nearest - y) @ across(along)) <= close
+        behind |= met & (np.abs((y - nearest) @ along) < distance - close)
+    return behind
 
 
-def keep_parents(mesh: ng.Mesh, parents: Integers) -> None:
-    """Let `vertex_parents` of a mesh that forgot them be `parents` (nv, 2)."""
-    setattr(mesh, PARENTS, parents)
+def _ends_between(contact: Contact, secondary: CadEdge, primary: CadEdge) -> Array:
+    """Parameters on the secondary at which parts end that face the primary."""
+    at = np.array([primary.start, primary.stop])
+    x = primary.point(at)
+    ends, _ = _opposite(contact, x, primary.derivative(at), secondary)
+    met = ~np.isnan(ends)
+    if contact.direction is None and met.any():
+        ends[met] = secondary.project(x[met])  # its normal there passes the end of the primary
+    return np.unique(ends[met])  # both are one point of a closed curve
+
+
+def _divide(
+    contact: Contact, secondary: Edge, primary: Edge, beside: list[Edge], facing: list[Edge]
+) -> None:
+    """Lay a common division {C_j} on the parts of two edges that face each other.
+
+    `beside` and `facing` are all edges of the secondary and of the primary, these two included.
+    """
+    t = np.linspace(secondary.curve.start, secondary.curve.stop, FINE)
+    ends = _ends_between(contact, secondary.curve, primary.curve)
+    apart = np.abs(t[:, None] - ends).min(axis=1, initial=np.inf)
+    t = np.sort(np.concatenate([t[apart > (t[1] - t[0]) / 2], ends]))
+    x, slope = secondary.curve.point(t), secondary.curve.derivative(t)
+    other, y = _opposite(contact, x, slope, primary.curve)
+    faces = ~np.isnan(other)
+    if contact.direction is None and len(facing) > 1:
+        faces &= _nearest_of(x, primary.curve, facing)
+    faces &= ~_behind(contact, x, y, beside)
+    if contact.direction is not None:
+        slope_there = primary.curve.derivative(np.where(faces, other, primary.curve.start))
+        for tangent in (slope, slope_there):
+            cosine = np.abs(tangent @ across(np.array(contact.direction)))
+            faces &= cosine >= STEEPEST * np.linalg.norm(tangent, axis=1)
+
+    def gap(t: Array) -> Array:
+        """Signed distances (k,) to the points opposite to `t` (k,), NaN where there are none."""
+        x, slope = secondary.curve.point(t), secondary.curve.derivative(t)
+        there, y = _opposite(contact, x, slope, primary.curve)
+        along = rightward(slope) if contact.direction is None else np.array(contact.direction)
+        return np.where(np.isnan(there), np.nan, ((y - x) * along).sum(axis=1))
+
+    maxh = min(secondary.maxh, primary.maxh)
+    sliver = CLOSE * min(maxh, secondary.curve.size, primary.curve.size)
+    for run in _facing_runs(faces, np.searchsorted(t, np.sort(ends))):
+        if np.linalg.norm(np.diff(x[run], axis=0), axis=1).sum() < sliver:
+            continue  # beside the vertex of one edge, which faces near that of another
+        places = narrowest(t[run], x[run], y[run], maxh, gap)
+        nodes = spaced(t[run], x[run], y[run], maxh, places)
+        at_nodes = secondary.curve.point(nodes), secondary.curve.derivative(nodes)
+        there, _ = _opposite(contact, *at_nodes, primary.curve)
+        met = ~np.isnan(there)
+        if met.any():
+            for edge, found in ((secondary, nodes[met]), (primary, there[met])):
+                edge.runs.insert(0 if places.size else len(edge.runs), found)
+
+
+def divided(problem: Problem, shape: occ.TopoDS_Shape, maxh: float, finer: float) -> list[Edge]:
+    """Edges whose division the user has not fixed, with their sizes and the nodes of contact."""
+    edges = [
+        Edge(edge, CadEdge(edge), min(maxh, edge.maxh))
+        for edge in shape.edges
+        if edge.partition is None
+    ]
+    for contact in problem.contact:
+        if contact.direction is None and not contact.bilateral:  # may come apart anywhere
+            for line in filter(None, (contact.secondary, contact.primary)):
+                for edge in _named(edges, line):
+                    edge.maxh = min(edge.maxh, finer)
+    for contact in problem.contact:
+        if contact.primary is not None:
+            sides = _named(edges, contact.secondary)
+            facing = _named(edges, contact.primary)
+            for secondary, primary in product(sides, facing):
+                _divide(contact, secondary, primary, sides, facing)
+    return edges
 
 
 def _require_complete(mesh: ng.Mesh, problem: Problem) -> None:
@@ -140,66 +366,3 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
         mesh = _generated(shape, edges, maxh)
     _require_complete(mesh, problem)
     return mesh
-
-
-def resolved_lengths(mesh: ng.Mesh) -> Array:
-    """Length (k,) of each boundary segment over the least on its curve; inf on straight edges."""
-    view = MeshArrays(mesh)
-    ends, edges = view.vertices[view.facets], cad_edges(mesh)
-    if not edges:
-        return np.full(len(ends), np.inf)
-    least = np.array([0.0 if edge.straight else _shortest(edge) for edge in edges])
-    with np.errstate(divide="ignore"):
-        return np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) / least[view.boundaries]
-
-
-def _shortest(edge: CadEdge) -> float:
-    """Length from which OCC curves the elements at a segment of an edge."""
-    return SHORTEST_ON_SMALL if edge.size < SMALL_EDGE else SHORTEST
-
-
-def unresolved(mesh: ng.Mesh) -> bool:
-    """Whether segments of curved elements are too short for OCC."""
-    return mesh.GetCurveOrder() > 1 and bool((resolved_lengths(mesh) < 1).any())
-
-
-def check_curves(mesh: ng.Mesh) -> None:
-    """Raise a `ValueError` if curved edges are too small for OCC to curve elements beside them."""
-    boundaries, length = MeshArrays(mesh).boundaries, resolved_lengths(mesh)
-    for number, edge in enumerate(cad_edges(mesh) or []):
-        shortest = float(length[boundaries == number].min(initial=np.inf))
-        small = edge.size < SMALL_EDGE and not (edge.straight or edge.uniform)
-        if shortest < 1 or small:
-            raise ValueError(
-                f'the curved edge "{edge.name}" has the extent {edge.size:g} and segments of '
-                f"{shortest * _shortest(edge):g}, on which the geometry kernel loses digits; "
-                f"choose a smaller unit of length: curved edges of {SMALL_EDGE:g} and more may "
-                f"have segments down to {SHORTEST:g}"
-            )
-
-
-def _straightened(mesh: ng.Mesh) -> bool:
-    """Whether elements miss their own curved boundary, as after NGSolve's `Refine`."""
-    position = ng.CF((ng.x, ng.y))
-    off = ng.BoundaryFromVolumeCF(position) - position
-    missed, size = (ng.Integrate(ng.InnerProduct(x, x), mesh, ng.BND) for x in (off, position))
-    return bool(missed > ON_CURVE**2 * size)
-
-
-def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
-    """Mesh curved to the element's degree, and the number of elements at curved edges.
-
-    A mesh without an OCC geometry, without curved edges, or curved to that degree already is
-    used as it is; otherwise, also after `Refine` has straightened it, the result is a copy.
-    """
-    degree = order if element == "isoparametric" else order + 1  # (2.8)
-    edges = cad_edges(mesh)
-    if edges is None:
-        return mesh, 0
-    curved = np.array([not edge.straight for edge in edges])[MeshArrays(mesh).boundaries]
-    count = int(np.count_nonzero(curved))
-    if count == 0 or (mesh.GetCurveOrder() == degree and not _straightened(mesh)):
-        return mesh, count
-    copy = copied(mesh)
-    copy.Curve(degree)
-    return copy, count

@@ -25,7 +25,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Array, Index, Mask
 from ..contact import ContactState, in_contact, partners, prescribed_gap, twins
-from ..fem import BoundaryTrace, Moduli, moduli
+from ..fem import BoundaryTrace, Moduli, moduli_of
 from ..lagrange import gauss_lobatto, lagrange_derivative
 from ..problem import Problem
 from ..solved import Solved
@@ -176,7 +176,7 @@ def _softer(
     sides = [trace.element[state.line.segments], trace.element[state.line.facing]]
     asked = np.zeros(trace.mesh.ne, dtype=bool)
     asked[np.concatenate(sides)] = True
-    values = modulus(moduli(problem, trace.mesh, asked))
+    values = modulus(moduli_of(problem, trace.mesh, asked))
     return float(min(values[side].mean() for side in sides if len(side)))
 
 

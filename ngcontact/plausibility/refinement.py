@@ -9,7 +9,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, power_of_two, root_of_squares
-from ..fem import Space, energy_norm, moduli
+from ..fem import Space, energy_norm, moduli_of
 from ..problem import MeshArrays, Problem
 
 LEVELS = 2  # after the best one: at twice the unknowns each no mesh is still too coarse
@@ -33,7 +33,7 @@ def at_round_off(
         return False
     if estimate <= RIGID * terms and moves_rigidly(problem, space, displacement):
         return True  # nothing deforms, and the rest is the round-off of gaps
-    ratio = float(moduli(problem, space.trace.mesh).ratio.max())
+    ratio = float(moduli_of(problem, space.trace.mesh).ratio.max())
     return estimate <= max(EXACT, STRESS_NOISE * math.sqrt(ratio)) * terms
 
 

@@ -15,8 +15,6 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask
-from .contact import Contact
-from .material import Elastic, Hooke
 from .mesh_arrays import MeshArrays, on_axis
 from .values import body_mask, boundary_mask, refuse_where
 
@@ -105,14 +103,6 @@ def regions_of(
         refuse_common(names, masks, mask, "give every region once")
         masks |= mask
     return masks
-
-
-def sides_of(mesh: ng.Mesh, argument: str, pair: Contact) -> Masks:
-    """The masks (r,) of the sides of a contact pair, the secondary first."""
-    sides: Masks = {}
-    for what, name in (("secondary", pair.secondary), ("primary", pair.primary)):
-        sides |= regions_of(mesh, f"{argument}.{what}", [name] if name else [], boundary_mask)
-    return sides
 
 
 def refuse_common(names: Sequence[str], one: Masks, other: Masks, right: str) -> None:
@@ -230,7 +220,7 @@ def check_values(
     everywhere = view.mesh.MapToAllElements(rule, vb)
     for (label, mask), value in zip(masks.items(), data, strict=True):
         points = np.asarray(everywhere[mask[region][everywhere["nr"]]])
-        if isinstance(value, Elastic | Hooke):
+        if hasattr(value, "check_at"):
             value.check_at(points, label)  # (2.7)
             continue
         for part in value if isinstance(value, tuple) else (value,):
@@ -270,7 +260,7 @@ def check_about_axis(
     displacement: Mapping[str, Any],
     traction: Mapping[str, Any],
     force: Mapping[str, Any],
-    contact: Sequence[Contact],
+    sides: Iterable[str],
 ) -> None:
     """Refuse a body across the axis, conditions on the axis, and data that point sideways there.
 
@@ -286,7 +276,6 @@ def check_about_axis(
             "an axisymmetric body is given by its half with x >= 0"
         )
     other, free = "name a boundary with x > 0", "leave the second component free by None"
-    sides = [side for pair in contact for side in (pair.secondary, pair.primary) if side]
     acting = [("contact", side, other) for side in sides]
     acting += [("traction", name, other) for name in traction]
     acting += [("displacement", k, free) for k, u in displacement.items() if u[1] is not None]

@@ -89,6 +89,11 @@ class Contact:
                 f'{who}roles = "auto" with primary=None: a rigid obstacle has no other side'
             )
 
+    @property
+    def sides(self) -> list[str]:
+        """Its boundaries, the secondary first."""
+        return [self.secondary] if self.primary is None else [self.secondary, self.primary]
+
     def named(self) -> str:
         """Both sides, as a user knows them."""
         other = "a rigid obstacle" if self.primary is None else f'"{self.primary}"'

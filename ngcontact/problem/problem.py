@@ -157,7 +157,14 @@ class Problem:
         displacement = regions("displacement", self.displacement)
         traction = regions("traction", self.traction)
         sliding = regions("sliding", [self.sliding] if isinstance(self.sliding, str) else [])
-        pairs = [checks.sides_of(mesh, f"contact[{j}]", p) for j, p in enumerate(self.contact)]
+        pairs = [
+            {
+                label: mask
+                for what, side in zip(("secondary", "primary"), pair.sides, strict=False)
+                for label, mask in regions(f"contact[{j}].{what}", [side]).items()
+            }
+            for j, pair in enumerate(self.contact)
+        ]
 
         checks.check_bodies(mesh, materials)
         prescribed = zip(displacement.items(), self.displacement.values(), strict=True)
@@ -187,9 +194,8 @@ class Problem:
         ):
             checks.check_values(view, masks, data, rule)
         if self.model in ABOUT_AN_AXIS:
-            checks.check_about_axis(
-                view, self.displacement, self.traction, self.force, self.contact
-            )
+            sides = [side for pair in self.contact for side in pair.sides]
+            checks.check_about_axis(view, self.displacement, self.traction, self.force, sides)
 
 
 def _law(value: Any, what: str) -> Elastic | Hooke:

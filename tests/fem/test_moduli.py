@@ -9,7 +9,7 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import ContactWarning, Elastic
-from ngcontact.fem.moduli import moduli, warn_of_locking
+from ngcontact.fem.moduli import moduli_of, warn_of_locking
 from ngcontact.mesh import first_mesh
 
 BODIES = ("upper", "lower")
@@ -31,7 +31,7 @@ def test_bulk_modulus_of_an_isotropic_law(mesh, nu):
     mu, lam = E / (2 * (1 + nu)), E * nu / ((1 + nu) * (1 - 2 * nu))
     # C holds lambda + 2 mu and lambda to round-off: mu is their difference.
     tolerance = 1e-15 * (2 + lam / mu) + 1e-12
-    found = moduli(made_of(Elastic(E, nu)), mesh)
+    found = moduli_of(made_of(Elastic(E, nu)), mesh)
     assert found.bulk == pytest.approx(lam + mu, rel=tolerance)
     least = min(mu, lam + mu)  # eigenvalues of C on strains: 2 mu, 2 mu, 2 (lambda + mu)
     assert found.shear == pytest.approx(least, rel=tolerance)
@@ -64,7 +64,7 @@ def test_moduli_of_chosen_elements_are_those_of_all(mesh):
     region = mesh.ngmesh.Elements2D().NumPy()["index"]
     chosen = (np.arange(mesh.ne) % 3 == 0) & (region == region[0])
     for modulus in ("shear", "bulk", "rigidity", "ratio"):
-        found = getattr(moduli(made_of(somewhere), mesh, chosen), modulus)
-        every = getattr(moduli(made_of(somewhere), mesh), modulus)
+        found = getattr(moduli_of(made_of(somewhere), mesh, chosen), modulus)
+        every = getattr(moduli_of(made_of(somewhere), mesh), modulus)
         assert found[chosen] == pytest.approx(every[chosen], rel=1e-14)
         assert (found[~chosen] == 0).all()

@@ -10,7 +10,8 @@ from ngsolve.meshes import MakeStructured2DMesh
 from drivers.reference import cases
 from ngcontact.adaptivity import refined
 from ngcontact.geometries import blocks, disc
-from ngcontact.mesh.generation import copied, curve, first_mesh, vertex_parents
+from ngcontact.mesh.curving import copied, curve, vertex_parents
+from ngcontact.mesh.generation import first_mesh
 from ngcontact.problem import MeshArrays
 from tests.scenes import coordinates, near_origin
 
