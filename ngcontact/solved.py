@@ -15,6 +15,8 @@ from .fem import energy_norm, model_of, normal_stress_of, potential_energy, stre
 from .problem import Problem
 from .qp import Iterate, kkt_residuals
 
+STRESS_FREE = 1e-12  # norm of a stress, relative to the terms that cancel in it: round-off
+
 
 @dataclass(frozen=True, eq=False)
 class Solved:
@@ -48,8 +50,8 @@ class Solved:
     def out_of_plane_stress(self) -> ng.CoefficientFunction:
         """Stress normal to the plane, a scalar CoefficientFunction, in units of stress.
 
-        nu (xx + yy) in plane strain, 0 where a general `Hooke` law does not tell it and in plane
-        stress, the hoop stress about an axis.
+        nu (xx + yy) in plane strain, less E e0_zz with an initial strain, 0 where a general `Hooke`
+        law does not tell it and in plane stress, the hoop stress about an axis.
         """
         return normal_stress_of(self.problem, self.displacement)
 
@@ -118,7 +120,7 @@ class Solved:
     def nodal_reaction(self) -> Array:
         """Forces (n, 2) of the supports on the nodes, force per thickness, A u - f + B' force."""
         d = self.discrete
-        residual = d.space.A @ self.displacement.vec.FV().NumPy() - d.space.f
+        residual = d.space.A @ self.displacement.vec.FV().NumPy() - d.space.right_side
         return (d.space.basis.T @ residual + d.B.T @ self.force).reshape(2, -1).T
 
     @cached_property
@@ -149,13 +151,26 @@ class Solved:
 
     @cached_property
     def energy(self) -> float:
-        """Total potential energy L(u_h) of HH81 (2.6), per unit thickness."""
+        """Total potential energy L(u_h) of HH81 (2.6), per unit thickness.
+
+        With initial strains what the stress stores, less the work of the loads; in plane strain
+        without what is stored by parts normal to the plane alone, E e0_zz^2 / 2.
+        """
         return potential_energy(self.problem, self.discrete.space, self.displacement)
 
     @cached_property
     def energy_norm(self) -> float:
-        """A(u_h, u_h)^(1/2), root of an energy per unit thickness."""
+        """A(u_h, u_h)^(1/2), root of an energy per unit thickness.
+
+        Of e(u_h) - e0 with initial strains: the norm of the stress, whatever the bodies expand.
+        """
         return energy_norm(self.problem, self.discrete.space, self.displacement)
+
+    @property
+    def stress_free(self) -> bool:
+        """Whether bodies take their initial strains freely, and all stress is round-off."""
+        free = STRESS_FREE * self.discrete.space.terms(self.displacement)
+        return bool(self.problem.strain) and self.energy_norm <= free
 
     @cached_property
     def residuals(self) -> dict[str, float]:

@@ -22,6 +22,7 @@ from ..fem import (
     Space,
     assemble,
     boundary_trace,
+    initial_load,
     load_vector,
     model_of,
     node_basis,
@@ -260,6 +261,7 @@ def discretise(
             nodal=nodal,
             basis=node_basis(V, trace, nodal, element),
             f=load_vector(problem, V, LOAD_BONUS),
+            initial=initial_load(problem, V, trace),
         )
     admissible = admissible_set(problem, space, found)
     basis, rows = admissible.basis, admissible.rows
@@ -301,7 +303,7 @@ def _program(
     basis, m = admissible.basis, len(admissible.basis.unknown)
     p = QuadraticProgram(  # (2.6)
         K=K,
-        b=basis.T.T @ (space.basis.T @ space.f),
+        b=basis.T.T @ (space.basis.T @ space.right_side),
         R=from_triplets(np.ones(m), np.arange(m), basis.unknown, (m, K.shape[0])),
         g=admissible.rows.g,
         equality=admissible.rows.equality,

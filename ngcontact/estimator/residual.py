@@ -6,7 +6,8 @@ shear modulus mu, degree p:
 
 * element: (h/p)^2 / 2mu |F + div sigma_h|^2 over T
 * jump: half of (h/p) / 2mu |[sigma_h n]|^2 over the edges inside a body
-* oscillation: |sigma_h - Pi sigma_h|^2 in the norm of C^-1 over T, where moduli vary; there
+* oscillation: |sigma_h - Pi sigma_h|^2 in the norm of C^-1 over T, where moduli or initial strains
+  vary; there
   Pi sigma_h, polynomials, stands for sigma_h in the parts before
 * traction: (h/p) / 2mu |P - sigma_h n|^2 over Gamma_tau and all free boundary
 * sliding: (h/p) / 2mu |sigma_t|^2 over Gamma_0
@@ -50,7 +51,7 @@ from ..fem import (
 )
 from ..lagrange import gauss, gauss_derivative
 from ..linalg import cholesky, lower_half, shared
-from ..problem import MeshArrays, varies
+from ..problem import MeshArrays
 from ..quadrature import features_of, loads_of, pieces, rough_moduli, rough_segments
 from ..solved import Solved
 from .contact import between_nodes, closing_energy, on_contact, remaining
@@ -82,7 +83,7 @@ def scaled(solved: Solved) -> ScaledSolution:
     modulus = power_of_two(stiffness.shear)
     # sigma_h as polynomials, to be differentiated: right for any modulus and curved elements; its
     # jumps cost a fifth of those of the stress.
-    any_varies = any(map(varies, problem.materials.values()))
+    any_varies = bool(problem.varying)
     exact = mesh.GetCurveOrder() == 1 and not any_varies and boundary.model.polynomial
     degree = boundary.order - 1 if exact else boundary.order
     projected = ng.GridFunction(ng.L2(mesh, order=degree, dim=3))
@@ -128,13 +129,12 @@ def _project_by_compliance(
     space = ng.L2(mesh, order=order) ** 3
     s, t = ng.CF(space.TrialFunction()), ng.CF(space.TestFunction())
     a, f = ng.BilinearForm(space, symmetric=True), ng.LinearForm(space)
-    for body, law in problem.materials.items():
-        if varies(law):
-            compliance = model.compliance(law.voigt(problem.model) / modulus)
-            *_, dx = law_measures(mesh, body, 2 * order, rough)
-            a += model.weighted(ng.InnerProduct(compliance * s, t)) * dx
-            stress = components(solved.stress)
-            f += model.weighted(ng.InnerProduct(compliance * stress, t)) * dx
+    for body, law in problem.varying.items():
+        compliance = model.compliance(law.voigt(problem.model) / modulus)
+        *_, dx = law_measures(mesh, body, 2 * order, rough)
+        a += model.weighted(ng.InnerProduct(compliance * s, t)) * dx
+        stress = components(solved.stress)
+        f += model.weighted(ng.InnerProduct(compliance * stress, t)) * dx
     a.Assemble()
     f.Assemble()
     free = np.repeat(rough, space.ndof // (3 * mesh.ne))
@@ -305,7 +305,7 @@ def _squares(
     def add(name: str, element: Index, values: Array) -> None:
         np.add.at(parts.setdefault(name, np.zeros(solution.mesh.ne)), element, values)
 
-    if any(map(varies, solution.problem.materials.values())):
+    if solution.problem.varying:
         parts["oscillation"] = oscillation(solution)
     force, of_loads = _body_forces(solution)
     for squares in [x for term in terms for x in term.squares] + of_loads:
@@ -407,7 +407,10 @@ class Estimated(Solved):
 
     @property
     def relative_error_estimate(self) -> float:
-        """Estimated error over the energy norm of u_h, dimensionless; 0 where both vanish."""
-        if self.error_estimate == 0:
+        """Estimated error over the energy norm of u_h, dimensionless; 0 where both vanish.
+
+        With initial strains over the norm of the stress, of e(u_h) - e0.
+        """
+        if self.error_estimate == 0 or self.stress_free:
             return 0.0
         return self.error_estimate / self.energy_norm if self.energy_norm > 0 else float("inf")

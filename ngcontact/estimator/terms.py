@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays import Array, Index, Mask
 from ..fem import BoundaryTrace, Model, law_measures, normal_stress_of
 from ..lagrange import gauss
-from ..problem import MeshArrays, Problem, varies
+from ..problem import MeshArrays, Problem
 
 DATA_BONUS = 4  # quadrature order above that of the discrete terms, for the loads
 
@@ -169,17 +169,16 @@ def components(stress: ng.CoefficientFunction) -> ng.CoefficientFunction:
 
 
 def oscillation(solution: ScaledSolution) -> Array:
-    """Squares (ne,) of |sigma_h - Pi sigma_h| in the norm of C^-1, where moduli vary."""
+    """Squares (ne,) of |sigma_h - Pi sigma_h| in the norm of C^-1, where data in the body vary."""
     problem, mesh, projected = solution.problem, solution.mesh, solution.projected
     v = ng.L2(mesh, order=0).TestFunction()
     f = ng.LinearForm(v.space)
-    for body, law in problem.materials.items():
-        if varies(law):
-            miss = components(solution.stress) - projected
-            compliance = solution.model.compliance(law.voigt(problem.model) / solution.modulus)
-            density = solution.model.weighted(ng.InnerProduct(compliance * miss, miss))
-            for dx in law_measures(mesh, body, 2 * projected.space.globalorder, solution.rough):
-                f += density * v * dx
+    for body, law in problem.varying.items():
+        miss = components(solution.stress) - projected
+        compliance = solution.model.compliance(law.voigt(problem.model) / solution.modulus)
+        density = solution.model.weighted(ng.InnerProduct(compliance * miss, miss))
+        for dx in law_measures(mesh, body, 2 * projected.space.globalorder, solution.rough):
+            f += density * v * dx
     f.Assemble()
     return np.array(f.vec.FV().NumPy())
 

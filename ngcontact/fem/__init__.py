@@ -21,7 +21,9 @@ from .space import LOAD_BONUS as LOAD_BONUS
 from .space import Space as Space
 from .space import assemble as assemble
 from .space import body_of_unknown as body_of_unknown
+from .space import elastic_strain as elastic_strain
 from .space import energy_norm as energy_norm
+from .space import initial_load as initial_load
 from .space import law_measures as law_measures
 from .space import load_vector as load_vector
 from .space import model_of as model_of

@@ -13,10 +13,11 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..problem import ON_AXIS, Elastic, Hooke, MeshArrays, on_axis
+from ..problem import ON_AXIS, Elastic, Hooke, InitialStrain, MeshArrays, on_axis
 
 CF: TypeAlias = ng.CoefficientFunction
 Laws: TypeAlias = Mapping[str, Elastic | Hooke]
+Strains: TypeAlias = Mapping[str, tuple[Elastic | Hooke, InitialStrain]]
 
 MERIDIAN = (0, 1, 3)  # components of rr, zz, hoop, rz without the hoop
 
@@ -34,6 +35,15 @@ class Model:
         """Voigt strain (q,) of a displacement or trial function, e_ij in HH81 (2.6)."""
         grad = ng.Grad(u)
         return ng.CF((grad[0, 0], grad[1, 1], grad[0, 1] + grad[1, 0]))  # (2.6)
+
+    def initial_strain(self, law: Elastic | Hooke, e: InitialStrain) -> CF:
+        """Voigt strain (q,) that leaves a body of initial strain `e` without stress in the plane.
+
+        The normal part, which has no way out in plane strain, bulges the plane by nu times itself.
+        """
+        if isinstance(law, Hooke):  # which has no normal part, as `Problem.check` sees to
+            return ng.CF((e.xx, e.yy, e.shear))
+        return ng.CF((e.xx + law.nu * e.normal, e.yy + law.nu * e.normal, e.shear))
 
     def stress(self, C: CF, e: CF) -> CF:
         """Voigt stress (q,) of a strain `e` (q,) by the law `C` (q, q), tau_ij in HH81 (2.6)."""
@@ -77,13 +87,15 @@ class Model:
         xx, yy, xy = voigt
         return ng.CF((xx, xy, xy, yy), dims=(2, 2))
 
-    def out_of_plane(self, materials: Laws, mesh: ng.Mesh, voigt: list[CF]) -> CF:
+    def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: list[CF]) -> CF:
         """Stress normal to the plane, a scalar, by the q Voigt components of the stress.
 
         A general law does not say what it is in plane strain: 0 is taken there.
         """
         nu = {body: law.nu for body, law in materials.items() if isinstance(law, Elastic)}
-        return mesh.MaterialCF(nu, default=0) * (voigt[0] + voigt[1])
+        normal = mesh.MaterialCF(nu, default=0) * (voigt[0] + voigt[1])
+        held = {k: law.E * e.normal for k, (law, e) in strains.items() if isinstance(law, Elastic)}
+        return normal - mesh.MaterialCF(held, default=0) if held else normal
 
     def hoop(self, normal: CF) -> CF:
         """The hoop stress, `normal` to the plane; a `ValueError` without an axis."""
@@ -97,7 +109,10 @@ class Model:
 class _PlaneStress(Model):
     """A thin sheet, free to change its thickness."""
 
-    def out_of_plane(self, materials: Laws, mesh: ng.Mesh, voigt: list[CF]) -> CF:
+    def initial_strain(self, law: Elastic | Hooke, e: InitialStrain) -> CF:
+        return ng.CF((e.xx, e.yy, e.shear))
+
+    def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: list[CF]) -> CF:
         return ng.CF(0.0)
 
 
@@ -116,6 +131,9 @@ class _Axisymmetric(Model):
             tiny = ON_AXIS * float(MeshArrays(u.space.mesh).vertices[:, 0].max())
             hoop = ng.IfPos(ng.x - tiny, hoop, rr)
         return ng.CF((rr, zz, hoop, rz))  # (2.6)
+
+    def initial_strain(self, law: Elastic | Hooke, e: InitialStrain) -> CF:
+        return ng.CF((e.xx, e.yy, e.normal, e.shear))
 
     def work(self, C: CF, u: CF, v: CF) -> list[CF]:
         # Of gradients, with hoop strains, of these alone: half the time of all at once.
@@ -154,7 +172,7 @@ class _Axisymmetric(Model):
         rr, zz, _, rz = voigt
         return ng.CF((rr, rz, rz, zz), dims=(2, 2))
 
-    def out_of_plane(self, materials: Laws, mesh: ng.Mesh, voigt: list[CF]) -> CF:
+    def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: list[CF]) -> CF:
         return voigt[2]
 
     def hoop(self, normal: CF) -> CF:

@@ -36,12 +36,24 @@ class Space:
     A: sp.csr_array  # (2N, 2N), stiffness
     matrix: ng.BaseMatrix  # the same for NGSolve, in the same memory
     f: Array  # (2N,), load
+    initial: Array | None  # (2N,), what initial strains add to that, if there are any
     vertices: Array  # (nv, 2), where those of the mesh were
+
+    @property
+    def right_side(self) -> Array:
+        """Load with initial strains, (2N,): A u is this where nothing is held."""
+        return self.f if self.initial is None else self.f + self.initial
 
     @cached_property
     def diagonal(self) -> Array:
         """Diagonal of A, (2N,), force per displacement and unit thickness."""
         return np.asarray(self.A.diagonal())
+
+    def terms(self, displacement: ng.GridFunction) -> float:
+        """Root of the sum of squares whose differences the energy of a displacement is."""
+        u = displacement.vec.FV().NumPy()
+        size = power_of_two(u)  # squares must stay in range
+        return size * float(np.sqrt(self.diagonal @ (u / size) ** 2))
 
     def require_mesh(self) -> None:
         """Raise a RuntimeError where the mesh was changed in place, so that no data fit it."""
@@ -124,6 +136,34 @@ def constant_measures(
     ]
 
 
+def initial_load(problem: Problem, V: ng.FESpace, trace: BoundaryTrace) -> Array | None:
+    """The integral of C e0 : e(v), (2N,), for initial strains e0; None without.
+
+    By the rule of the stiffness: u_h with e(u_h) = e0 is then without stress to round-off.
+    """
+    e0 = initial_strain(problem, V.mesh)
+    if e0 is None:
+        return None
+    model, v, f = model_of(problem), V.TestFunction(), ng.LinearForm(V)
+    rough = rough_moduli(problem, V.mesh)
+    for body, law in problem.materials.items():
+        stress = model.stress(law.voigt(problem.model), e0)
+        density = model.weighted(ng.InnerProduct(stress, model.strain(v))).Compile()
+        for dx in _measures(trace, body, body in problem.varying, rough):
+            f += density * dx
+    f.Assemble()
+    return f.vec.FV().NumPy().copy()
+
+
+def _measures(
+    trace: BoundaryTrace, body: str, varying: bool, rough: Mask
+) -> list[ng.comp.DifferentialSymbol]:
+    """Integrals over a body of the forms of stiffness, and of others that are to match it."""
+    if varying:
+        return law_measures(trace.mesh, body, 2 * trace.order, rough)
+    return constant_measures(trace.mesh, body, trace.curved_elements, trace.model.bonus)
+
+
 def assemble(
     problem: Problem, trace: BoundaryTrace, element: str, nodal: Index | None = None
 ) -> Space:
@@ -139,9 +179,7 @@ def assemble(
     a = ng.BilinearForm(V, symmetric=True)
     rough = rough_moduli(problem, mesh)
     for body, law in problem.materials.items():
-        measures = constant_measures(mesh, body, trace.curved_elements, model.bonus)
-        if varies(law):
-            measures = law_measures(mesh, body, 2 * trace.order, rough)
+        measures = _measures(trace, body, varies(law), rough)
         for work in model.work(law.voigt(problem.model), u, v):  # (3.1)
             for dx in measures:
                 a += work * dx
@@ -154,6 +192,7 @@ def assemble(
         A=shared(a.mat),
         matrix=a.mat,
         f=load_vector(problem, V, LOAD_BONUS),
+        initial=initial_load(problem, V, trace),
         vertices=MeshArrays(mesh).vertices,
     )
 
@@ -165,14 +204,21 @@ def body_of_unknown(space: Space, bodies: Bodies) -> Index:
 
 
 def potential_energy(problem: Problem, space: Space, displacement: ng.GridFunction) -> float:
-    """L(u_h) of HH81 (2.6), per unit thickness."""
+    """L(u_h) of HH81 (2.6), per unit thickness.
+
+    With initial strains what the stress stores, half of (e - e0) : C (e - e0), less the work of
+    the loads; in plane strain without E e0_zz^2 / 2, a constant that bars normal to the plane hold.
+    """
     size, energy = _scaled_energy(problem, space, displacement)
     work = float(space.f / size @ (displacement.vec.FV().NumPy() / size))
     return (energy / 2 - work) * size * size  # (2.6)
 
 
 def energy_norm(problem: Problem, space: Space, displacement: ng.GridFunction) -> float:
-    """A(u_h, u_h)^(1/2), root of an energy per unit thickness."""
+    """A(u_h, u_h)^(1/2), root of an energy per unit thickness; of e(u_h) - e0 with initial strains.
+
+    So it is the norm of the stress.
+    """
     size, energy = _scaled_energy(problem, space, displacement)
     return math.sqrt(energy) * size
 
@@ -182,27 +228,44 @@ def _scaled_energy(
 ) -> tuple[float, float]:
     """A size s of the displacement, whose squares may leave the range, and A(u_h / s, u_h / s).
 
-    From the strains where large rigid motions would cancel.
+    From the strains where large rigid motions would cancel, and where there are initial ones.
     """
     u, mesh, order = displacement.vec.FV().NumPy(), space.trace.mesh, space.trace.order
     size = power_of_two(u)
-    u = u / size
-    energy = float(u @ (space.A @ u))
-    if energy <= CANCELLED * float(space.diagonal @ u**2):
-        space.require_mesh()
-        model = model_of(problem)
-        e, energy = model.strain(displacement) / size, 0.0
-        for body, law in problem.materials.items():
-            stress = model.stress(law.voigt(problem.model), e)
-            density = model.weighted(ng.InnerProduct(stress, e)).Compile()
-            energy += ng.Integrate(density, mesh.Materials(body), order=2 * order + 2)
+    if space.initial is None:
+        energy = float(u / size @ (space.A @ (u / size)))
+        if energy > CANCELLED * float(space.diagonal @ (u / size) ** 2):
+            return size, energy
+    space.require_mesh()
+    model, energy = model_of(problem), 0.0
+    e = elastic_strain(problem, displacement) / size
+    for body, law in problem.materials.items():
+        stress = model.stress(law.voigt(problem.model), e)
+        density = model.weighted(ng.InnerProduct(stress, e)).Compile()
+        bonus = MODULUS_BONUS if body in problem.varying else 0
+        energy += ng.Integrate(density, mesh.Materials(body), order=2 * order + 2 + bonus)
     return size, energy
+
+
+def initial_strain(problem: Problem, mesh: ng.Mesh) -> ng.CoefficientFunction | None:
+    """The Voigt strain e0 (q,) of bodies that are without stress; None where there is none."""
+    if not problem.strain:
+        return None
+    model = model_of(problem)
+    by_body = {k: model.initial_strain(*x) for k, x in problem.initial_strains(mesh).items()}
+    return mesh.MaterialCF(by_body, default=0 * next(iter(by_body.values())))
+
+
+def elastic_strain(problem: Problem, displacement: ng.GridFunction) -> ng.CoefficientFunction:
+    """What the law makes the stress of, e(u) - e0, Voigt (q,)."""
+    e, e0 = model_of(problem).strain(displacement), initial_strain(problem, displacement.space.mesh)
+    return e if e0 is None else e - e0
 
 
 def voigt_stress(problem: Problem, displacement: ng.GridFunction) -> list[ng.CoefficientFunction]:
     """The q Voigt components of the stress of a displacement, in the units of the moduli."""
     model, mesh = model_of(problem), displacement.space.mesh
-    e = model.strain(displacement)
+    e = elastic_strain(problem, displacement)
     by_body = {
         body: model.stress(law.voigt(problem.model), e) for body, law in problem.materials.items()
     }
@@ -217,7 +280,8 @@ def stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.Coefficient
 def normal_stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.CoefficientFunction:
     """Stress normal to the plane of a displacement, a scalar, in the units of the moduli."""
     voigt, mesh = voigt_stress(problem, displacement), displacement.space.mesh
-    return model_of(problem).out_of_plane(problem.materials, mesh, voigt)
+    strains = problem.initial_strains(mesh) if problem.strain else {}
+    return model_of(problem).out_of_plane(problem.materials, strains, mesh, voigt)
 
 
 def von_mises(stress: Array) -> Array:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, power_of_two, root_of_squares
+from ..arrays import Array, root_of_squares
 from ..fem import Space, energy_norm, moduli_of
 from ..problem import MeshArrays, Problem
 
@@ -28,7 +28,7 @@ def at_round_off(
     Where div u cancels the terms of the stress are of size kappa |grad u|. The estimate divides
     them by the root of mu, their energy by the root of kappa only.
     """
-    terms = _terms(space, displacement)
+    terms = space.terms(displacement)
     if estimate > BEYOND_NOISE * terms:  # as nearly always
         return False
     if estimate <= RIGID * terms and moves_rigidly(problem, space, displacement):
@@ -37,16 +37,9 @@ def at_round_off(
     return estimate <= max(EXACT, STRESS_NOISE * math.sqrt(ratio)) * terms
 
 
-def _terms(space: Space, displacement: ng.GridFunction) -> float:
-    """Root of the sum of squares whose differences the energy of a displacement is."""
-    u = displacement.vec.FV().NumPy()
-    size = power_of_two(u)  # squares must stay in range
-    return size * float(np.sqrt(space.diagonal @ (u / size) ** 2))
-
-
 def moves_rigidly(problem: Problem, space: Space, displacement: ng.GridFunction) -> bool:
     """Whether the energy of a displacement is round-off: no body deforms."""
-    return energy_norm(problem, space, displacement) <= EXACT * _terms(space, displacement)
+    return energy_norm(problem, space, displacement) <= EXACT * space.terms(displacement)
 
 
 def estimates_rise(estimates: Sequence[float]) -> bool:

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask
 from .mesh_arrays import MeshArrays, on_axis
+from .strain import components
 from .values import body_mask, boundary_mask, refuse_where
 
 # By 'argument "pattern"': which of the r boundaries or bodies of a mesh it selects, bool (r,).
@@ -261,11 +262,12 @@ def check_about_axis(
     traction: Mapping[str, Any],
     force: Mapping[str, Any],
     sides: Iterable[str],
+    strain: Mapping[str, Any],
 ) -> None:
     """Refuse a body across the axis, conditions on the axis, and data that point sideways there.
 
     A vector with a radial part on the axis is no field of revolution: what pushes a body sideways
-    is not axisymmetric.
+    is not axisymmetric. Nor is a strain that is not alike in all directions across the axis.
     """
     mesh, axis = view.mesh, on_axis(view.vertices)
     first = int(np.argmin(view.vertices[:, 0]))
@@ -285,18 +287,22 @@ def check_about_axis(
     radials = [("traction", name, p[0]) for name, p in traction.items() if p.dim == 2]
     radials += [("displacement", k, u[0]) for k, u in displacement.items() if u[0] is not None]
     radials += [("force", name, F[0]) for name, F in force.items()]
+    for name, e in zip(strain, map(components, strain.values()), strict=True):
+        sizes = e.xx, e.normal
+        radials += [("strain", name, ng.CF((x, *sizes))) for x in (e.xx - e.normal, e.shear / 2)]
     for what, name, radial in radials:
-        if what == "force":
+        if what in ("force", "strain"):
             at, ends, vb = body_mask(mesh, name)[view.bodies], view.elements, ng.VOL
         else:
             at, ends, vb = boundary_mask(mesh, name)[view.boundaries], view.facets, ng.BND
         points = mesh.MapToAllElements(CORNERS[ends.shape[1] - 1], vb)
-        values = np.asarray(radial(points[np.repeat(at, ends.shape[1])])).ravel()
-        size = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+        found = np.asarray(radial(points[np.repeat(at, ends.shape[1])])).reshape(-1, radial.dim)
+        size, values = np.abs(found[np.isfinite(found)]).max(initial=0.0), found[:, 0]
         bad = axis[ends[at]].ravel() & (np.abs(values) > NO_RADIAL * size)
         if bad.any():
+            part = "rr - hoop or rz =" if what == "strain" else "the radial component"
             raise ValueError(
-                f'{what} "{name}" has the radial component {values[np.argmax(bad)]:.6g} on the '
+                f'{what} "{name}" has {part} {values[np.argmax(bad)]:.6g} on the '
                 "axis x = 0, sideways: it must vanish there, as around the axis every direction is "
                 "radial"
             )

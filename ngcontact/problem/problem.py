@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,8 +13,9 @@ from netgen.occ import OCCGeometry
 
 from . import checks
 from .contact import Contact
-from .material import ABOUT_AN_AXIS, Elastic, Hooke, require_model
+from .material import ABOUT_AN_AXIS, Elastic, Hooke, require_model, varies
 from .mesh_arrays import MeshArrays
+from .strain import InitialStrain, check_strains, components, strain_data
 from .values import (
     Scalar,
     Vector,
@@ -21,6 +23,7 @@ from .values import (
     boundary_mask,
     by_region,
     displacement_components,
+    numbers,
     region_pattern,
     table,
     told,
@@ -61,6 +64,11 @@ class Problem:
         "plane strain", "plane stress" or "axisymmetric": a body of revolution about x = 0 by its
         meridian section, x = r >= 0 and y = z; loads are per area and volume of the body, forces
         those of the whole body.
+    strain
+        Initial strain e0 per body, dimensionless, as alpha dT of a body that is heated: the stress
+        is C (e(u) - e0). A number acts in all three directions; a pair is (xx, yy), with none
+        normal to the plane; a triple (xx, yy, zz), about an axis (rr, zz, hoop); or a symmetric
+        matrix (2, 2) in the plane. Numbers or CoefficientFunctions. Kept as CoefficientFunction.
 
     Raises
     ------
@@ -78,6 +86,7 @@ class Problem:
     force: Mapping[str, Vector] = field(default_factory=dict)
     contact: Sequence[Contact] = ()
     model: str = "plane strain"
+    strain: Mapping[str, Scalar | Vector | Sequence[Vector]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Validate types and numbers; names and CoefficientFunctions wait for `check`."""
@@ -99,6 +108,7 @@ class Problem:
             "traction": by_region(self.traction, "traction", traction_data),
             "force": by_region(self.force, "force", vector_data),
             "contact": _contacts(self.contact),
+            "strain": by_region(self.strain, "strain", strain_data),
         }.items():
             object.__setattr__(self, name, value)
 
@@ -112,14 +122,15 @@ class Problem:
         rows = [("model", "", self.model)]
         for name, law in self.materials.items():
             rows.append(("material", name, law.told()))
-        for name, components in self.displacement.items():
-            rows.append(("displacement", name, told(components)))
+        for name, values in self.displacement.items():
+            rows.append(("displacement", name, told(values)))
         if self.sliding is not None:
             rows.append(("sliding", str(self.sliding), "no normal displacement, no shear"))
         for name, load in self.traction.items():
             kind = "pressure " if ng.CF(load).dim == 1 else ""
             rows.append(("traction", name, kind + told(load)))
         rows += [("force", name, told(load)) for name, load in self.force.items()]
+        rows += [("strain", name, told(strain)) for name, strain in self.strain.items()]
         for number, pair in enumerate(self.contact):
             rows.append((f"contact {number}", pair.named(), pair.told()))
         return table(("", "where", "what"), rows)
@@ -133,6 +144,26 @@ class Problem:
         if load.dim > 1:
             return load  # P in (3.7)
         return -load * ng.BoundaryFromVolumeCF(ng.specialcf.normal(2))
+
+    def initial_strains(self, mesh: ng.Mesh) -> dict[str, tuple[Elastic | Hooke, InitialStrain]]:
+        """Law and initial strain of each body of `mesh` that has one, by its own name."""
+        found: dict[str, tuple[Elastic | Hooke, InitialStrain]] = {}
+        for pattern, data in self.strain.items():
+            mine = body_mask(mesh, pattern)
+            for key, law in self.materials.items():
+                at = np.flatnonzero(mine & body_mask(mesh, key))
+                names = [mesh.GetMaterials()[k] for k in at]
+                found |= {re.escape(name): (law, components(data)) for name in names}
+        return found
+
+    @property
+    def varying(self) -> dict[str, Elastic | Hooke]:
+        """Laws, by keys of `materials`, whose stress need be no polynomial where e(u) is one.
+
+        Laws that are functions; all, where an initial strain is one.
+        """
+        every = not all(map(numbers, self.strain.values()))
+        return {key: law for key, law in self.materials.items() if every or varies(law)}
 
     def check(self, mesh: ng.Mesh) -> None:
         """Refuse names and data that do not fit a mesh.
@@ -150,10 +181,12 @@ class Problem:
         view, names = MeshArrays(mesh), mesh.GetBoundaries()
 
         def regions(argument: str, patterns: Iterable[str]) -> checks.Masks:
-            mask_of = body_mask if argument in ("materials", "force") else boundary_mask
+            bodies = argument in ("materials", "force", "strain")
+            mask_of = body_mask if bodies else boundary_mask
             return checks.regions_of(mesh, argument, patterns, mask_of)
 
         materials, force = regions("materials", self.materials), regions("force", self.force)
+        strain = regions("strain", self.strain)
         displacement = regions("displacement", self.displacement)
         traction = regions("traction", self.traction)
         sliding = regions("sliding", [self.sliding] if isinstance(self.sliding, str) else [])
@@ -188,14 +221,18 @@ class Problem:
         for masks, data, rule in (
             (materials, self.materials.values(), checks.INSIDE),
             (force, self.force.values(), checks.INSIDE),
+            (strain, self.strain.values(), checks.INSIDE),
             (traction, self.traction.values(), checks.IN_SEGMENTS),
             (displacement, self.displacement.values(), checks.AT_ENDS),
             (gaps, [pair.gap for pair in self.contact], checks.AT_ENDS),
         ):
             checks.check_values(view, masks, data, rule)
+        laws = zip(materials.items(), self.materials.values(), strict=True)
+        check_strains(view, strain, self.strain.values(), laws, self.model, checks.INSIDE)
         if self.model in ABOUT_AN_AXIS:
             sides = [side for pair in self.contact for side in pair.sides]
-            checks.check_about_axis(view, self.displacement, self.traction, self.force, sides)
+            vectors = self.displacement, self.traction, self.force
+            checks.check_about_axis(view, *vectors, sides, self.strain)
 
 
 def _law(value: Any, what: str) -> Elastic | Hooke:

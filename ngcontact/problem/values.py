@@ -175,12 +175,11 @@ KNOWN: WeakKeyDictionary[ng.CoefficientFunction, bool] = WeakKeyDictionary()  # 
 # Lines of what NGSolve prints of numbers, in vectors, times others and times the normal.
 _NUMBER = r"(?:[-+.\de]+|-?inf|nan)"
 _LEAF = re.compile(rf"\s*coef ({_NUMBER}), real")
-_VECTOR = r"unary operation ' '|VectorialCoefficientFunction"
-_AROUND = re.compile(rf"\s*coef ({_VECTOR}), real(, dim=\d+)?")
+_VECTOR = r"unary operation ' '|VectorialCoefficientFunction|reshape"
+_DIM = r"(, dim=\d+|, dims = \d+ x \d+)?"
+_AROUND = re.compile(rf"\s*coef ({_VECTOR}), real{_DIM}")
 _TIMES = rf"(scale )?{_NUMBER}|scalar-vector multiply|normal vector"
-_OF_NUMBERS = re.compile(
-    rf"\s*({_NUMBER}\*\()?(coef ({_VECTOR}|{_TIMES}), real(, dim=\d+)?)?\s*\)?\s*"
-)
+_OF_NUMBERS = re.compile(rf"\s*({_NUMBER}\*\()?(coef ({_VECTOR}|{_TIMES}), real{_DIM})?\s*\)?\s*")
 
 
 def _lines(value: ng.CoefficientFunction) -> list[str]:

@@ -36,12 +36,13 @@ STEEP = 0.5  # of the change in a window, what is lost there of a feature
 AT_ENDS = 31  # of these, for features at ends of lines, where the end of a wave looks like one ...
 BESIDE_ENDS = 4  # ... but changes far more within so many windows
 # The same in bodies; laws are not integrated on parts of elements that follow them.
-IN_PLANE = {"force": (5, 11), "materials": (5, 11, 23, 47)}
+IN_PLANE = {"force": (5, 11), "materials": (5, 11, 23, 47), "strain": (5, 11, 23, 47)}
 BESIDE = 4  # samples, half of them on each side
 SATURATED = 1.5  # times what a window loses, from which the next one loses more than a feature
 # Departures that count: of loads relative to their mean size, of laws in their logarithm, of
 # displacements and gaps relative to their range.
 SHARE = {"traction": 0.1, "force": 0.1, "materials": 0.1, "displacement": 1e-5, "gap": 1e-5}
+SHARE["strain"] = 0.1  # ... as of loads
 ROUND_OFF = 1e-10  # of values, relative to the largest
 FEW = 6  # samples in a feature up to which what is between them is looked at
 MEASURED = 65  # points across a feature, to tell its width
@@ -58,7 +59,7 @@ KEPT_CHANGE = (
 STEADY_CHANGE = 1e-9  # change across a part, relative to the largest value, that is not looked into
 # Size of an element over the width of a feature in it, up to which it is resolved. Loads are
 # integrated on parts of elements, but stresses in equilibrium meet body forces on so many of them.
-RESOLVED = {"displacement": 2.0, "gap": 2.0, "materials": 2.0}
+RESOLVED = {"displacement": 2.0, "gap": 2.0, "materials": 2.0, "strain": 2.0}
 IN_BOUNDS = RESOLVED | {"force": 32.0, "traction": 2.0}  # the last one on curves
 BENT = 1e-9  # of a segment, its distance from a chord
 
@@ -90,6 +91,7 @@ class Features:
 
 
 NONE = np.empty((0, 3))
+LOADS = ("traction", "force", "strain")
 
 
 class Datum(NamedTuple):
@@ -110,6 +112,7 @@ def _functions(problem: Problem) -> Iterator[Datum]:
     """All data that are no numbers."""
     data = [Datum("force", name, 0, F, F) for name, F in problem.force.items()]
     data += [Datum("traction", name, 0, p, p) for name, p in problem.traction.items()]
+    data += [Datum("strain", name, 0, e, e) for name, e in problem.strain.items()]
     for name, components in problem.displacement.items():
         data += [Datum("displacement", name, axis, u, u) for axis, u in enumerate(components)]
     data += [Datum("gap", pair.secondary, 0, pair, pair.gap) for pair in problem.contact]
@@ -182,7 +185,7 @@ def _told(kind: str, values: Array) -> tuple[Array, float]:
         stiffness = np.log(np.maximum(np.abs(values), np.finfo(float).tiny))
         return stiffness.mean(axis=1, keepdims=True), SHARE[kind]
     size = float(np.abs(values).max(initial=0.0))
-    unit = float(np.abs(values).max(axis=1).mean()) if kind in ("traction", "force") else 0.0
+    unit = float(np.abs(values).max(axis=1).mean()) if kind in LOADS else 0.0
     unit = unit or float(np.ptp(values, axis=0).max(initial=0.0))
     return values, max(SHARE[kind] * unit, ROUND_OFF * size)
 

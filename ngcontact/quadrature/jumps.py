@@ -1,4 +1,4 @@
-"""Moduli that change or jump inside elements."""
+"""Moduli, and initial strains, that change or jump inside elements."""
 
 from __future__ import annotations
 
@@ -11,10 +11,13 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask
 from ..errors import warn
-from ..problem import Problem, varies
+from ..problem import Problem, numbers, varies
 from .cells import SampledElements, lattice
+from .features import features_of
 
-CHANGE = 0.5  # of a law in an element over its least value, from which it is rough there, or jumps
+# Change of a law in an element over its least value there, of an initial strain over its largest in
+# the body, from which it is rough there, or jumps.
+CHANGE = 0.5
 HALVINGS = 24  # of the distance between two points: what still changes across 1e-7 of it jumps
 
 
@@ -28,16 +31,16 @@ class Jump(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class RoughElements:
-    """Elements of about one size in which a law changes by a share of itself, k of them."""
+    """Elements of about one size in which a law, or a strain, changes by a share of itself, k."""
 
     view: SampledElements
-    C: ng.CoefficientFunction  # (q, q)
+    C: ng.CoefficientFunction  # (q, q), or a strain of c components
     at: Index  # (k,)
-    values: Array  # (k, n, q q), at the points of a lattice
+    values: Array  # (k, n, q q), or (k, n, c), at the points of a lattice
     limit: Array  # (k,), of a change
 
     def jumps(self) -> dict[int, Jump]:
-        """Where the law jumps, at most one place in each element, by its number.
+        """Where it jumps, at most one place in each element, by its number.
 
         From the points of a lattice at which a component is least and largest, the half of their
         distance across which it changes more is kept, again and again: a smooth change shrinks by
@@ -59,7 +62,7 @@ class RoughElements:
 
 
 def _rough(problem: Problem, mesh: ng.Mesh) -> Iterator[tuple[str, RoughElements]]:
-    """Where laws are rough, and whose they are."""
+    """Where laws are rough, then initial strains, and whose they are."""
     view = SampledElements(mesh, 2)
     for pattern, law in problem.materials.items():
         if not varies(law):
@@ -69,11 +72,23 @@ def _rough(problem: Problem, mesh: ng.Mesh) -> Iterator[tuple[str, RoughElements
             limit = CHANGE * values[..., :: C.dims[0] + 1].mean(axis=2).min(axis=1)
             k = np.flatnonzero(np.ptp(values, axis=1).max(axis=1) > limit)
             if len(k):
-                yield pattern, RoughElements(view, C, here[k], values[k], limit[k])
+                yield f'materials "{pattern}"', RoughElements(view, C, here[k], values[k], limit[k])
+    if all(map(numbers, problem.strain.values())):
+        return
+    for one in features_of(problem, mesh):
+        if one.kind != "strain":
+            continue
+        e0, limit = problem.strain[one.name], CHANGE * one.largest
+        for here, values in view.samples(e0, view.inside(mesh.Materials(one.name))):
+            k = np.flatnonzero(np.ptp(values, axis=1).max(axis=1) > limit)
+            if len(k):
+                limits = np.full(len(k), limit)
+                found = RoughElements(view, e0, here[k], values[k], limits)
+                yield f'initial strains of "{one.name}"', found
 
 
 def rough_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
-    """Elements (ne,) in which the law varies by more than half of itself, or jumps."""
+    """Elements (ne,) in which the law, or an initial strain, varies by half of itself, or jumps."""
     rough = np.zeros(mesh.ne, dtype=bool)
     for _, elements in _rough(problem, mesh):
         rough[elements.at] = True
@@ -92,7 +107,7 @@ def jumping_moduli(problem: Problem, mesh: ng.Mesh) -> Mask:
 
 
 def warn_of_jumps(problem: Problem, mesh: ng.Mesh) -> None:
-    """Warn of every law that jumps inside elements, where it jumps most."""
+    """Warn of every law, or strain, that jumps inside elements, where it jumps most."""
     jumps: dict[str, list[Jump]] = {}
     for pattern, elements in _rough(problem, mesh):
         jumps.setdefault(pattern, []).extend(elements.jumps().values())
@@ -100,8 +115,8 @@ def warn_of_jumps(problem: Problem, mesh: ng.Mesh) -> None:
         if found:
             (x, y), least, most = max(found, key=lambda jump: jump.most - jump.least)
             warn(
-                f'materials "{pattern}" jump inside {len(found)} elements, most near '
-                f"({x:.4g}, {y:.4g}): a stiffness from {least:.3g} to {most:.3g}. No order "
+                f"{pattern} jump inside {len(found)} elements, most near "
+                f"({x:.4g}, {y:.4g}): a component from {least:.3g} to {most:.3g}. No order "
                 "converges fast there; make the line an edge of the geometry, with a body of its "
                 "own on either side"
             )

@@ -28,7 +28,7 @@ from .cells import (
     monomials,
     refined,
 )
-from .features import NONE, features_in, features_of, towards, where_features_are
+from .features import LOADS, NONE, features_in, features_of, towards, where_features_are
 
 SHAPE = 0.05  # what polynomials miss of a load at a point, relative to its largest value ...
 SHARE = {1: 1e-4, 2: 2e-3}  # ... or over an element, relative to its integral: it is rough there
@@ -233,7 +233,7 @@ def _projected(found: Refined, view: SampledElements, degree: int) -> tuple[ng.G
 def warn_of_data(problem: Problem, mesh: ng.Mesh, order: int) -> None:
     """Warn of loads that vanish wherever they are looked at or are finer than any quadrature."""
     for one in features_of(problem, mesh):
-        if one.kind in ("force", "traction") and one.samples and not one.largest:
+        if one.kind in LOADS and one.samples and not one.largest:
             warn(
                 f'{one.kind} "{one.name}" is zero at all {one.samples} points at which it was '
                 "looked at: if it acts on a smaller part, make that a boundary or a body of its own"

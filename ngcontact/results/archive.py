@@ -96,7 +96,7 @@ def save(solution: Solved, path: str | os.PathLike[str], version: str) -> Path:
 def _parts(problem: Problem) -> Iterator[tuple[str, Any]]:
     """The data one by one, with their names."""
     yield "geometry", problem.geometry
-    for argument in ("materials", "displacement", "traction", "force"):
+    for argument in ("materials", "displacement", "traction", "force", "strain"):
         for name, value in getattr(problem, argument).items():
             yield f'{argument} "{name}"', value
     for number, pair in enumerate(problem.contact):

@@ -158,7 +158,7 @@ SOLUTION = {  # every attribute and method of `Solution` by the dimension of wha
 }
 # ... and those that are no quantities: objects, names, numbers of things, truth values, files.
 PLAIN = """problem mesh order element discrete minimiser work coarse_levels tree adaptive pair
-active steps free_motions estimated bounded pairs write revolved plot draw save"""
+active steps free_motions stress_free estimated bounded pairs write revolved plot draw save"""
 
 
 def has_unit(text, *dimensions):

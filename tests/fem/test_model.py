@@ -44,7 +44,7 @@ def test_rigid_motions_are_those_without_strain(mesh, model):
 )
 def test_stress_out_of_the_plane(mesh, model, law, expected):
     stress = [ng.CF(3.0), ng.CF(4.0), ng.CF(1.0)]
-    found = MODELS[model].out_of_plane({"upper|lower": law}, mesh, stress)
+    found = MODELS[model].out_of_plane({"upper|lower": law}, {}, mesh, stress)
     assert found(mesh(0.5, 0.5)) == pytest.approx(expected, abs=ROUND_OFF)
 
 

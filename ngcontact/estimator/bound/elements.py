@@ -20,7 +20,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from ...arrays import Array, Index, Mask
-from ...fem import connected_bodies
+from ...fem import connected_bodies, elastic_strain
 from ...lagrange import gauss
 from ...problem import MeshArrays, Problem, varies
 from ...qp import vanishing_combinations
@@ -52,7 +52,7 @@ class Element:
     axial: bool  # whether the model is axisymmetric
     on_axis: bool  # whether a side of each lies on the axis
     compliance: Array  # (b, q, v, v) C^-1, or (1, 1, v, v) where it is one matrix for all
-    strain: Array  # (b, q, v) e(u_h), Voigt
+    strain: Array  # (b, q, v) e(u_h), less initial strains, Voigt
     source: ng.CoefficientFunction | None  # the body force
     force: Array  # (b, j, 2) coefficients, as of `scalars`, of the body force that s_p balances
     # (b,) parts of each triangle on which forces are integrated, two at least where tractions are
@@ -273,11 +273,12 @@ def _element(
     )
     axial, curved = model.extent > 0, bool(cells.curved[at[0]])
     law = _of_body(problem.materials, cells, at)
-    points = places(cells, at, 2 * degree + 4 * (curved or varies(law) or axial))
+    rational = curved or axial or law in problem.varying.values()
+    points = places(cells, at, 2 * degree + 4 * rational)
     corners = cells.corners[at]
     local = coordinates(corners, points.x) if curved else points.local
     compliance = compliance_at(problem, cells, points)
-    strain = points.evaluate(cells, model.strain(displacement))
+    strain = points.evaluate(cells, elastic_strain(problem, displacement))
     source = _of_body(problem.force, cells, at)
     n = min(max(0, degree - 1 - axial), rules.order // 2)
     force, missed = np.zeros((len(at), (n + 1) * (n + 2) // 2, 2)), np.zeros(len(at))

@@ -277,8 +277,13 @@ class Guaranteed(Estimated):
 
     @property
     def relative_error_bound(self) -> float:
-        """`error_bound` over the energy norm of u_h, dimensionless; 0 where both vanish."""
+        """`error_bound` over the energy norm of u_h, dimensionless; 0 where both vanish.
+
+        With initial strains over the norm of the stress, of e(u_h) - e0.
+        """
         bound, size = self._bound.bound, self.energy_norm
+        if self.stress_free:
+            return 0.0
         return bound / size if size > 0 else math.inf if bound > 0 else 0.0
 
     @property

@@ -33,7 +33,6 @@ from ...contact import ContactState, state_of
 from ...discrete import load_by_shape
 from ...errors import ContactError, warn
 from ...fem import BoundaryTrace, load_vector, stress_of
-from ...problem import varies
 from ...quadrature import has_rough_loads
 from ..bound import FINE, EquilibratedStress, Guaranteed, force_bar
 from .contact import approach_of, area_in_contact, direction_of, ends_of, left_out, peak_of
@@ -219,7 +218,7 @@ def _component_error(solution: Guaranteed, pair: int, e: Array) -> float:
     problem, missed = solution.problem, 0.0
     if problem.force or problem.traction:
         missed -= float((load_vector(problem, space.V, FINE) - space.f) @ b)
-    inexact = space.trace.curved_elements | any(map(varies, problem.materials.values()))
+    inexact = space.trace.curved_elements | bool(problem.varying)
     if inexact.any():
         p, geometry = space.trace.order, space.trace.geometry_order
         work = ng.InnerProduct(stress_of(problem, u), ng.Sym(ng.Grad(G)))
@@ -227,5 +226,5 @@ def _component_error(solution: Guaranteed, pair: int, e: Array) -> float:
         for some, order in ((inexact, fine), (~inexact, 2 * p)):
             dx = ng.dx(bonus_intorder=order - DX_ORDER, definedonelements=ng.BitArray(some))
             missed += float(ng.Integrate(work * dx, mesh))
-        missed -= float(a @ (space.A @ b))
+        missed -= float(a @ (space.A @ b)) - (0.0 if space.initial is None else space.initial @ b)
     return error + noise + abs(missed)
