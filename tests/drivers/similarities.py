@@ -1,7 +1,5 @@
 """Contact problems carried along by similarities of the plane: what must not change, does not."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 

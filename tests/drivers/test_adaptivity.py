@@ -1,7 +1,5 @@
 """What adaptivity must show, smaller versions of ``drivers.adaptive_study``."""
 
-from __future__ import annotations
-
 import csv
 from functools import lru_cache
 from typing import get_args

@@ -1,7 +1,5 @@
 """Bodies of revolution against exact solutions: patches, Huber, Boussinesq, Sneddon, Lame."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import ngsolve as ng

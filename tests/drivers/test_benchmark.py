@@ -1,7 +1,5 @@
 """The other codes of `drivers.benchmark` on small meshes, against the references."""
 
-from __future__ import annotations
-
 import ast
 import sys
 from dataclasses import astuple, replace

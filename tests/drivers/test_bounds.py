@@ -1,7 +1,5 @@
 """The driver of bounds: what it measures, and what it writes."""
 
-from __future__ import annotations
-
 import csv
 
 import pytest

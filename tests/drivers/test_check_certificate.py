@@ -1,7 +1,5 @@
 """Certificates of bounds are checked with NumPy alone; tampered ones fail."""
 
-from __future__ import annotations
-
 import ast
 import copy
 import pickle

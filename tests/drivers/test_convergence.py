@@ -1,7 +1,5 @@
 """Rates and errors against exact solutions: smaller versions of ``drivers.convergence``."""
 
-from __future__ import annotations
-
 from typing import get_args
 
 import ngsolve as ng

@@ -1,7 +1,5 @@
 """Exact solutions: Hooke's law, equilibrium, contact conditions and known values."""
 
-from __future__ import annotations
-
 import functools
 import math
 from types import SimpleNamespace

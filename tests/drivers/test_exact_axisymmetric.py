@@ -1,7 +1,5 @@
 """Exact solutions about an axis: Hooke's law, equilibrium, contact conditions, known values."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The main job: ``drivers.hertz``."""
 
-from __future__ import annotations
-
 import pytest
 import pyvista
 

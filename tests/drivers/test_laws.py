@@ -1,7 +1,5 @@
 """Exact solutions of any law, and the study of estimates with them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ nu = 0.3 at the same number of unknowns N. What the estimate says of these probl
 tests/estimator.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 

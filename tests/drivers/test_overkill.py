@@ -1,7 +1,5 @@
 """Errors against a finer solution: as against the exact one, on curved meshes as well."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

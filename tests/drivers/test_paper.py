@@ -1,7 +1,5 @@
 """Exact solutions of single theorems and remarks: elasticity, contact conditions, boundary data."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

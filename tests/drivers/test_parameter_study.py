@@ -1,7 +1,5 @@
 """Many solves: the same rows by every engine, on one and on two processes, close to Hertz."""
 
-from __future__ import annotations
-
 import csv
 import math
 

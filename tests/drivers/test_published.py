@@ -1,7 +1,5 @@
 """Problems that other codes publish: statements, closed forms, and small runs."""
 
-from __future__ import annotations
-
 from typing import get_args
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Units, loads, symmetries and interruptions: what must not change, does not."""
 
-from __future__ import annotations
-
 import math
 import signal
 import subprocess

@@ -1,7 +1,5 @@
 """Random scenes of `python -m drivers.stress scenes`, and that their checks can fail."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

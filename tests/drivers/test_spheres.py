@@ -1,7 +1,5 @@
 """Full bodies against Hertz: two balls, a ball on a block, on a rigid plane; the driver."""
 
-from __future__ import annotations
-
 import math
 
 import ngsolve as ng

@@ -1,7 +1,5 @@
 """The table of `python -m drivers.stress`: nothing in it may fail."""
 
-from __future__ import annotations
-
 import math
 from typing import get_args
 

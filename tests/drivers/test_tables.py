@@ -1,7 +1,5 @@
 """What the demonstrations print."""
 
-from __future__ import annotations
-
 from drivers.tables import last_level, table
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.geometries import blocks

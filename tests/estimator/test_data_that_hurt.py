@@ -4,8 +4,6 @@ The examples they vary are those of test_oscillation, test_facing and quadrature
 solutions have edges where data jump, so that they do not depend on the quadrature that is tried.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Coarser spaces of two lines that face each other, halved again and again: arrays only."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
