@@ -15,6 +15,7 @@ from ngcontact.geometries import blocks
 from ngcontact.lagrange import gauss, lagrange
 from ngcontact.linalg import coarsenings
 from ngcontact.mesh import curve, first_mesh, vertex_parents
+from ngcontact.problem import MeshArrays
 
 REPRODUCED = {  # cases whose solution lies in the space, at the orders of conftest.ORDERS
     "constant pressure": cases.pressure_patch,
@@ -54,8 +55,7 @@ def vertices(mesh, pattern):
 
 def near_origin(mesh, radius=0.7):
     """Elements with centres that near, (ne,)."""
-    triangles = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
-    return np.linalg.norm(coordinates(mesh)[triangles].mean(axis=1), axis=1) < radius
+    return np.linalg.norm(MeshArrays(mesh).corners.mean(axis=1), axis=1) < radius
 
 
 def discrete(problem, order, rounds, maxh=0.5):

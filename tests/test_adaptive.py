@@ -1,5 +1,6 @@
 """The adaptive loop and its entry points: validity of levels, stopping, budgets, bad arguments."""
 
+import re
 from dataclasses import replace
 from functools import partial
 
@@ -10,10 +11,7 @@ import pytest
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
 from ngcontact import (
-    Contact,
     ContactWarning,
-    Elastic,
-    Problem,
     adapt,
     solve,
     solving,
@@ -22,19 +20,13 @@ from ngcontact.adaptivity import Refinement
 from ngcontact.geometries import disc as quarter_disc
 from ngcontact.geometries import disc_on_block
 from ngcontact.mesh import first_mesh
+from ngcontact.problem import MeshArrays
 
-SOFT = Elastic(E=1.0, nu=0.3)
 
-
-def disc() -> Problem:
+def disc():
     """Disc pressed on a block, an enlarging zone with curved edges."""
-    return Problem(
-        geometry=disc_on_block(),
-        materials={"disc": SOFT, "block": SOFT},
-        displacement={"block_bottom": (0, 0), "disc_top": (0, -0.02)},
-        sliding="axis",
-        contact=[Contact("disc_arc", "block_top", direction=(0, -1))],
-    )
+    down = {"block_bottom": (0, 0), "disc_top": (0, -0.02)}
+    return replace(cases.pressed_disc(), displacement=down)
 
 
 def unknowns(solution):
@@ -259,3 +251,72 @@ def test_a_tolerance_out_of_reach_is_told_by_the_bound():
     ):
         *_, last = adapt(problem, order=2, max_dofs=800, tolerance=1e-6, guaranteed=True)
     assert last.bounded
+
+
+def pressed(way):
+    """Problem A, pressed so far; 0.005 is the benchmark's."""
+    return replace(cases.disc_on_rigid_plane(), displacement={"top": (None, -way)})
+
+
+def size_at(solution, place):
+    """Diameter of the element whose centre is nearest to a place."""
+    centres = MeshArrays(solution.mesh).corners.mean(axis=1)
+    return MeshArrays(solution.mesh).diameters[np.linalg.norm(centres - place, axis=1).argmin()]
+
+
+@pytest.fixture(scope="module")
+def sequence():
+    """Deeper and back: all levels of each load."""
+    loads = [list(adapt(pressed(0.002), tolerance=1e-3))]
+    for way in (0.005, 0.008, 0.005, 0.002):
+        loads.append(list(adapt(pressed(way), tolerance=1e-3, start=loads[-1][-1])))
+    return loads
+
+
+def test_each_load_takes_two_levels_of_less_than_twice_the_unknowns(sequence):
+    for levels in sequence[1:]:
+        assert len(levels) == 2
+        assert levels[-1].relative_error_estimate <= 1e-3
+        assert sum(map(unknowns, levels)) < 2 * unknowns(levels[-1])
+        assert levels[0].work["factorizations"] <= 2
+        assert levels[1].work["factorizations"] == 1
+        assert len(levels[1].steps) <= 2
+
+
+def test_loads_have_the_forces_of_a_run_of_their_own(sequence):
+    # Of an error of 1e-3 in the energy norm, forces have about the square.
+    assert 2 * sequence[1][-1].contact_force()[1] == pytest.approx(0.4465326527, rel=1e-5)
+    forces = [levels[-1].contact_force()[1] for levels in sequence]
+    assert forces[:2] == pytest.approx(forces[:2:-1], rel=1e-5)
+    assert forces[0] < 0.3 * forces[2]
+
+
+def test_meshes_do_not_grow_with_the_sequence(sequence):
+    *_, alone = adapt(pressed(0.002), tolerance=1e-3)
+    assert unknowns(sequence[-1][-1]) <= 1.3 * unknowns(alone)  # measured 1.0
+    # Where contact ended under the largest load, elements are large again.
+    [end] = sequence[2][-1].transitions()
+    assert size_at(sequence[4][-1], end) > 4 * size_at(sequence[2][-1], end)
+
+
+@pytest.mark.usefixtures("no_work")
+def test_what_cannot_be_continued_is_refused(sequence):
+    start, problem = sequence[0][0], pressed(0.005)
+    other = replace(problem, geometry=disc_on_block())
+
+    def refused(error, words, problem=problem, **options):
+        with pytest.raises(error, match=re.escape(words)):
+            adapt(problem, **({"start": start} | options))
+
+    refused(TypeError, "start is a list: give a Solution", start=[start])
+    refused(ValueError, "start has order=4", order=3)
+    refused(ValueError, "element='superparametric'", element="superparametric")
+    refused(ValueError, "maxh=0.1 has no effect", maxh=0.1)
+    refused(ValueError, "start has 1 contact pairs, the problem 0", replace(problem, contact=[]))
+    renamed = [replace(problem.contact[0], secondary="top")]
+    refused(ValueError, "('arc', None)", replace(problem, contact=renamed))
+    refused(ValueError, "the geometry is not the one of start", other)
+    refused(
+        ValueError, "the geometry is not the one of start", replace(problem, geometry=start.mesh)
+    )
+    refused(ValueError, "more than max_dofs=100", max_dofs=100)

@@ -1,10 +1,15 @@
-"""Squares that stay in the range of numbers, and sparse arrays from entries."""
+"""Squares that stay in the range of numbers, sparse arrays from entries, lines of warnings."""
+
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from ngcontact import ContactWarning, errors
 from ngcontact.arrays import from_triplets, power_of_two, root_of_squares
+from ngcontact.errors import warn
 
 
 @pytest.mark.parametrize("size", [1e-300, 1e-170, 1.0, 1e170, 1e300])
@@ -39,3 +44,19 @@ def test_all_matrices_of_a_problem_have_short_indices(order):
     for matrix in (d.space.A, d.space.basis, d.basis.T, d.B, d.program.K, d.program.R):
         assert isinstance(matrix, sp.csr_array)
         assert matrix.indices.dtype == matrix.indptr.dtype == np.int32
+
+
+def test_a_warning_names_the_line_outside_of_the_package():
+    with pytest.warns(ContactWarning, match="may be wrong") as caught:
+        warn("this may be wrong")
+    assert Path(caught[0].filename) == Path(__file__)
+
+
+def test_a_generator_warns_at_the_line_that_asks_for_its_next_value():
+    source = "def levels():\n    warn('of a level')\n    yield 1\n"
+    room: dict[str, Any] = {"warn": warn}
+    exec(compile(source, errors.PACKAGE + "adaptive.py", "exec"), room)
+    levels = room["levels"]()
+    with pytest.warns(ContactWarning) as caught:
+        next(levels)
+    assert Path(caught[0].filename) == Path(__file__)

@@ -9,7 +9,7 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, adapt, solve
-from ngcontact.geometries import blocks, disc_on_block, rings
+from ngcontact.geometries import blocks, rings
 from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.problem.values import boundary_mask
 
@@ -31,27 +31,12 @@ def two_blocks(**data) -> Problem:
     return Problem(**(given | data))
 
 
-def partly_open() -> Problem:
-    """Problem B: a block on a block, pressed on half of its top; the other half lifts off."""
-    steel = Elastic(E=1000.0, nu=0.3)
-    return Problem(
-        geometry=blocks(line=((0, 0), (2, 0))),
-        materials={"upper": steel, "lower": steel},
-        displacement={"bottom": (0, 0), "upper_left|lower_left": (0, None)},
-        traction={"top": ng.IfPos(1 - ng.x, 1.0, 0.0)},
-        contact=[LINE],
-    )
-
-
 def pressed_disc() -> Problem:
-    return Problem(
-        geometry=disc_on_block(),
-        materials={"disc": SOFT, "block": STIFF},
+    return replace(
+        cases.pressed_disc(),
         displacement={"block_bottom": (0, 0), "disc_top": (0, -0.02)},
-        sliding="axis",
         traction={"side": (0.001, -0.002)},
         force={"block": (0.0, -0.001), "disc": (0.002, 0.003)},
-        contact=[Contact("disc_arc", "block_top", direction=(0, -1))],
     )
 
 
@@ -84,7 +69,7 @@ PROBLEMS = {
     "S8": lambda: cases.curved_lines().problem,
     "S9": lambda: cases.ring_in_ring().problem,
     "polygon": lambda: cases.polygonal_patch().problem,
-    "B": partly_open,
+    "B": cases.partly_opening_block,
     "disc": pressed_disc,
     "stack": stack,
 }

@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 from netgen.occ import Compound, OCCGeometry, WorkPlane, Y
 
-from drivers.reference import cases
-from drivers.reference.straight import relative_energy_error
 from ngcontact import (
     Contact,
     ContactError,
@@ -33,7 +31,6 @@ from ngcontact.geometries.region import (
     quarter_arc,
 )
 from ngcontact.mesh import first_mesh
-from tests.given_meshes import two_blocks
 from tests.scenes import distance, solved_with_load
 
 EXACT = 1e-10  # round-off times the condition of small meshes
@@ -81,48 +78,6 @@ def test_a_slot_of_any_width_leaves_pressures_right(order, swap, primaries):
         weight = np.concatenate([line.weight for line in d.lines])
         np.testing.assert_allclose(result.force / weight, 1.0, rtol=EXACT)
         assert distance(d, result, UNIFORM) < EXACT
-
-
-def spread(count, seed):
-    """Nodes of so many segments on -1 < x < 1, the inner ones moved by up to a third."""
-    x = np.linspace(-1, 1, count + 1)
-    x[1:-1] += np.random.default_rng(seed).uniform(-0.33, 0.33, count - 1) * 2 / count
-    return x
-
-
-LINES = {  # nodes of the upper and of the lower line
-    "any": (spread(5, 1), spread(17, 2)),
-    "only the lower one refined": (np.linspace(-1, 1, 5), np.linspace(-1, 1, 9)),
-    "refined in one place": (np.linspace(-1, 1, 5), np.insert(np.linspace(-1, 1, 5), 2, -0.25)),
-    "nearly the same": (
-        np.linspace(-1, 1, 7),
-        np.linspace(-1, 1, 7) + 1e-6 * (spread(6, 3) ** 2 - 1),
-    ),
-}
-
-
-@pytest.mark.parametrize("order", [1, 2, 3, 4])
-@pytest.mark.parametrize("swap", [False, True])
-@pytest.mark.parametrize("lines", LINES)
-@pytest.mark.study(
-    witness=[
-        "refined in one place-False-1",
-        "refined in one place-True-1",
-        "only the lower one refined-True-1",
-    ]
-)
-def test_meshes_as_given_are_exact(lines, swap, order):
-    """Pressures of degree p - 1, whichever side has more nodes."""
-    case = cases.pressure_patch(p1=0.0 if order == 1 else 0.5)
-    [pair] = case.problem.contact
-    pair = pair.swapped() if swap else pair
-    solution = solve(
-        replace(case.problem, geometry=two_blocks(*LINES[lines]), contact=[pair]), order=order
-    )
-    assert relative_energy_error(solution, case.exact) < EXACT
-    pressure = case.exact.pressure(solution.points[:, 0])
-    np.testing.assert_allclose(solution.pressure, pressure, rtol=EXACT)
-    assert abs(np.linalg.norm(solution.contact_force()) / 2 - 1) < EXACT
 
 
 def pin_at_the_bottom(*pairs):

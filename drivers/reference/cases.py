@@ -63,10 +63,10 @@ def touching_blocks(displacement: dict[str, Any], **others: Any) -> Problem:
     return Problem(displacement=displacement, **whole)
 
 
-def one_transition() -> Case:
+def one_transition(upper: Elastic = FIRST, lower: Elastic = SECOND) -> Case:
     """S1: blocks that part at the origin, pressure (-x)^(1/2), gap x^(3/2); bounded zone."""
-    exact = transition(FIRST, SECOND)
-    return Case(touching_blocks(_on_outside(exact)), exact)
+    exact, laws = transition(upper, lower), {"upper": upper, "lower": lower}
+    return Case(touching_blocks(_on_outside(exact), materials=laws), exact)
 
 
 def hertz_contact(radius: float = 5.0, half_width: float = 0.3) -> Case:

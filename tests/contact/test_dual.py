@@ -10,19 +10,51 @@ from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
 from ngcontact import Contact, solve
 from ngcontact.geometries import blocks
+from tests.given_meshes import two_blocks
 from tests.scenes import divided, pressed
 
 EXACT = 1e-10  # round-off times the condition of small meshes; measured below 2e-12
-RATIOS = [(4, 6), (5, 37), (10, 73), (4, 8)]
+
+
+def spread(count, seed):
+    """Nodes of so many segments on -1 < x < 1, the inner ones moved by up to a third."""
+    x = np.linspace(-1, 1, count + 1)
+    x[1:-1] += np.random.default_rng(seed).uniform(-0.33, 0.33, count - 1) * 2 / count
+    return x
+
+
+FIVE, SEVEN = np.linspace(-1, 1, 5), np.linspace(-1, 1, 7)
+GIVEN = {  # nodes of the upper and of the lower line
+    "any": (spread(5, 1), spread(17, 2)),
+    "only the lower one refined": (FIVE, np.linspace(-1, 1, 9)),
+    "refined in one place": (FIVE, np.insert(FIVE, 2, -0.25)),
+    "nearly the same": (SEVEN, SEVEN + 1e-6 * (spread(6, 3) ** 2 - 1)),
+}
+DIVIDED = {f"{m}:{n}": (m, n) for m, n in ((4, 6), (5, 37), (10, 73), (4, 8))}
 
 
 @pytest.mark.parametrize("swap", [False, True])
-@pytest.mark.parametrize("ratio", RATIOS)
-@pytest.mark.parametrize(("slope", "order"), [(0.0, 1), *((0.5, p) for p in (2, 3, 4))])
-@pytest.mark.study(witness=["0.0-1-ratio3-True", "0.0-1-ratio0-False", "0.0-1-ratio3-False"])
-def test_pressures_of_degree_p_minus_1_are_exact(slope, order, ratio, swap):
-    case = cases.pressure_patch(p1=min(slope, 0.5))
-    solution = solve(pressed(case, ratio, swap), maxh=0.5, order=order)
+@pytest.mark.parametrize("lines", [*DIVIDED, *GIVEN])
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+@pytest.mark.study(
+    witness=[
+        "1-4:8-True",
+        "1-4:6-False",
+        "1-4:8-False",
+        "1-any-True",
+        "1-refined in one place-True",
+    ]
+)
+def test_pressures_of_degree_p_minus_1_are_exact(order, lines, swap):
+    """Whichever side has more nodes, on meshes that are made and on given ones."""
+    case = cases.pressure_patch(p1=0.0 if order == 1 else 0.5)
+    if lines in DIVIDED:
+        solution = solve(pressed(case, DIVIDED[lines], swap), maxh=0.5, order=order)
+    else:
+        [pair] = case.problem.contact
+        pair = pair.swapped() if swap else pair
+        problem = replace(case.problem, geometry=two_blocks(*GIVEN[lines]), contact=[pair])
+        solution = solve(problem, order=order)
     assert relative_energy_error(solution, case.exact) < EXACT
     pressure = case.exact.pressure(solution.points[:, 0])
     np.testing.assert_allclose(solution.pressure, pressure, rtol=EXACT)

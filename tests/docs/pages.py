@@ -4,7 +4,10 @@ import re
 import textwrap
 from collections.abc import Iterator
 from dataclasses import dataclass
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
+from typing import get_type_hints
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -59,4 +62,19 @@ def reached(page: Path) -> set[Path]:
     while fresh:
         found |= fresh
         fresh = set().union(*map(listed, fresh)) - found
+    return found
+
+
+def resolved(name: str) -> object:
+    """Module, function, class or attribute of `ngcontact` by its dotted name below it."""
+    found: object = import_module("ngcontact")
+    for part in name.split("."):
+        if isinstance(found, property):
+            found = get_type_hints(found.fget)["return"]
+        module = f"{getattr(found, '__name__', '')}.{part}"
+        if hasattr(found, "__path__") and find_spec(module):
+            found = import_module(module)
+        else:
+            fields = getattr(found, "__dataclass_fields__", {})
+            found = fields[part] if part in fields else getattr(found, part)
     return found

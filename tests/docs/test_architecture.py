@@ -1,17 +1,18 @@
-"""The picture of the house shows today's imports, and both walks go the way that the code goes."""
+"""Pages made from the source are of today: rooms, their walks, equations at lines of the code."""
 
 import inspect
 import re
 import sys
 from contextlib import contextmanager
 from itertools import islice
+from pathlib import Path
 
 import pytest
 from PIL import Image
 
 from drivers.reference import cases
 from ngcontact import adapt, solve
-from tests.docs.names import resolved
+from tests.docs.pages import resolved
 
 NEW = "run python docs/developers/architecture.py"
 
@@ -77,3 +78,27 @@ def test_walk_goes_the_way_of_the_code(architecture, name):
     way = iter(calls)
     met = [step for step in steps if inspect.unwrap(resolved(step)).__code__ in way]
     assert met == steps
+
+
+THEORY = (Path(__file__).parents[2] / "docs" / "theory.md").read_text()
+
+
+@pytest.fixture
+def equations(script):
+    return script("equations")
+
+
+def test_every_equation_of_the_theory_is_in_the_code(equations):
+    named = equations.named(THEORY)
+    assert len(named) > 15
+    missing = sorted(named - equations.places().keys())
+    assert not missing, f"no line of ngcontact has a comment that names {', '.join(missing)}"
+
+
+def test_comments_name_equations_of_the_paper(equations):
+    unknown = {n: p for n, p in equations.places().items() if n not in equations.STATED}
+    assert not unknown, "not among docs/developers/equations.py: STATED"
+
+
+def test_index_is_of_today(equations):
+    assert equations.PAGE.read_text() == equations.page(), "run python docs/developers/equations.py"

@@ -7,8 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import ngcontact.discrete.discrete_problem as discrete_problem
-
 PAGE = (Path(__file__).parents[2] / "docs" / "mistakes.md").read_text()
 ROWS = re.findall(r"^\| `(.+?)` \| (.+?) \| (.+?) \|$", PAGE, re.MULTILINE)
 
@@ -21,21 +19,14 @@ def names():
     return found
 
 
-@pytest.fixture
-def no_work(monkeypatch):
-    def work(*_, **__):
-        pytest.fail("something was assembled")
-
-    monkeypatch.setattr(discrete_problem, "assemble", work)
-
-
 def test_at_least_twenty_are_listed():
     assert len(ROWS) >= 20
     assert len({code for code, _, _ in ROWS}) == len(ROWS)
 
 
+@pytest.mark.usefixtures("no_work")
 @pytest.mark.parametrize(("code", "message"), [row[:2] for row in ROWS], ids=[r[0] for r in ROWS])
-def test_each_is_refused_before_any_work(code, message, names, no_work):
+def test_each_is_refused_before_any_work(code, message, names):
     with pytest.raises((ValueError, TypeError)) as refused:
         exec(code, dict(names))
     assert message in str(refused.value)

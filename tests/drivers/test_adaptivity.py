@@ -1,4 +1,4 @@
-"""What adaptivity must show, smaller versions of ``drivers.adaptive_study``."""
+"""What adaptivity and bounds must show, smaller versions of the drivers."""
 
 import csv
 from functools import lru_cache
@@ -7,6 +7,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
+from drivers import bounds
 from drivers.adaptive_study.__main__ import main
 from drivers.adaptive_study.runs import STUDIES, Name, error_measure, rate, run_of, share_near
 from drivers.reference import cases
@@ -145,3 +146,17 @@ def test_effectivity_on_curves():
 
 def test_every_study_has_its_name():
     assert get_args(Name) == tuple(STUDIES)
+
+
+@pytest.mark.study
+def test_bounds_are_measured_and_drawn(tmp_path, capsys):
+    rows = bounds.main(["one transition"], orders=[2], max_dofs=1500, out=tmp_path)
+    said = capsys.readouterr().out.splitlines()
+    assert len(said) == 1 + len(rows)
+    for row in rows:
+        assert 1 <= row.bound <= 1.15 < 3 < row.estimate
+        assert 0 < row.width <= 1.5
+        assert min(row.run, row.bounding, row.quantities) > 0
+    with (tmp_path / "bounds.csv").open(encoding="utf-8") as file:
+        assert [int(row["unknowns"]) for row in csv.DictReader(file)] == [r.unknowns for r in rows]
+    assert (tmp_path / "bounds.png").read_bytes()[:4] == b"\x89PNG"

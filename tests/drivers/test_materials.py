@@ -13,26 +13,14 @@ import pytest
 
 from drivers.adaptive_study.runs import uniform
 from drivers.reference import cases
-from drivers.reference.cases import Case
 from drivers.reference.curved import rings
-from drivers.reference.straight import relative_energy_error, transition
+from drivers.reference.straight import relative_energy_error
 from drivers.stress import RESIDUAL
 from ngcontact import Elastic, adapt, solve
 from ngcontact.geometries import punch
 
 FIRST = Elastic(E=1.0, nu=0.3)
 TOWARDS_HALF = (0.3, 0.49, 0.499, 0.4999)
-
-
-def one_transition(upper: Elastic, lower: Elastic) -> Case:
-    """S1 of these materials."""
-    exact = transition(upper, lower)
-    problem = replace(
-        cases.one_transition().problem,
-        materials={"upper": upper, "lower": lower},
-        displacement={cases.OUTSIDE[body]: u for body, u in exact.displacement.items()},
-    )
-    return Case(problem, exact)
 
 
 @pytest.mark.study
@@ -49,7 +37,7 @@ def test_rate_and_constant_stay_towards_incompressibility(levels_of, rate, value
     """S1, both bodies of one nu: the rate in N, and the constant of nu = 0.3 nearly."""
     constants = []
     for nu in values:
-        case, found = one_transition(Elastic(E=1.0, nu=nu), Elastic(E=3.0, nu=nu)), []
+        case, found = cases.one_transition(Elastic(E=1.0, nu=nu), Elastic(E=3.0, nu=nu)), []
         for solution in levels_of(case.problem):
             error = relative_energy_error(solution, case.exact)
             found.append((solution.displacement.space.ndof, error))
@@ -65,9 +53,9 @@ def test_rate_and_constant_stay_towards_incompressibility(levels_of, rate, value
 @pytest.mark.parametrize("contrast", [1e-6, 1e-3, 1e3, 1e6])
 def test_errors_do_not_depend_on_the_contrast(contrast):
     """The error of S1 and the pressure of S9, whatever E''/E'."""
-    like, second = one_transition(FIRST, FIRST), Elastic(E=contrast, nu=0.3)
+    like, second = cases.one_transition(FIRST, FIRST), Elastic(E=contrast, nu=0.3)
     alike = solve(like.problem, maxh=0.07, order=2)
-    case = one_transition(FIRST, second)
+    case = cases.one_transition(FIRST, second)
     errors = [
         relative_energy_error(solve(x.problem, alike.mesh, order=2), x.exact) for x in (case, like)
     ]
@@ -103,7 +91,7 @@ def test_pressure_of_a_stiff_flat_punch(stiffness):
 @pytest.mark.parametrize("contrast", [1e-12, 1e12])
 def test_bodies_of_any_contrast_part(contrast):
     """S1 of order 2; like bodies reach 4.7e-3 on this mesh."""
-    case = one_transition(FIRST, Elastic(E=contrast, nu=0.3))
+    case = cases.one_transition(FIRST, Elastic(E=contrast, nu=0.3))
     solution = solve(case.problem, maxh=0.14, order=2)
     assert relative_energy_error(solution, case.exact) <= 6e-3
     assert max(solution.residuals.values()) <= RESIDUAL

@@ -1,11 +1,20 @@
-"""Moduli that vary: the estimate depends on the law alone, and sees what the mesh does not."""
+"""Estimates under any law: stiff fibres, moduli that vary, near incompressibility."""
+
+import math
+from types import SimpleNamespace
 
 import ngsolve as ng
 import numpy as np
 import pytest
+from netgen.occ import OCCGeometry, Rectangle
 from ngsolve.meshes import MakeStructured2DMesh
 
+from drivers.adaptive_study.runs import uniform
+from drivers.reference import cases
+from drivers.reference.laws import graded, pressed_fibres, stiff_and_soft
+from drivers.reference.straight import energy_error, relative_energy_error
 from ngcontact import Elastic, Hooke, Problem, solve
+from ngcontact.estimator import estimate
 
 SQUARE = MakeStructured2DMesh(quads=False, nx=8, ny=8)
 [BODY] = SQUARE.GetMaterials()
@@ -52,3 +61,126 @@ def test_moduli_that_jump_along_edges(order):
     per_element.Set(E)  # at the middle of each element
     constant = solve(pressed(Elastic(per_element, 0.3), mesh), order=order)
     assert jumping.error_estimate == pytest.approx(constant.error_estimate, rel=1e-9)
+
+
+# Manufactured strains are as large as they come; contact may be a few segments long.
+pytestmark = pytest.mark.filterwarnings("ignore::ngcontact.ContactWarning")
+
+
+def levels(case, order, unknowns):
+    """Of uniform meshes: errors, estimates over errors, the last solution, the last rate in h."""
+    found = list(uniform(case.problem, order, unknowns, 0.4))
+    errors = np.array([relative_energy_error(s, case.exact) for s in found])
+    estimates = np.array([s.relative_error_estimate for s in found]) / errors
+    return errors, estimates, found[-1], math.log2(errors[-2] / errors[-1])
+
+
+# Required: effectivity in [1, 10], optimal rates. Measured 5.0 to 9.8. Rates come from below until
+# the layers are resolved in which a soft layer meets one 1e6 times stiffer: .82, 1.86, 3.84 here,
+# and .576 on the first two meshes of all.
+@pytest.mark.parametrize(
+    ("make", "contrast", "order", "unknowns", "rate"),
+    [
+        (stiff_and_soft, 1e2, 1, 400, 0.55),
+        (stiff_and_soft, 1e2, 1, 4000, 0.95),
+        (stiff_and_soft, 1e6, 1, 4000, 0.8),
+        (stiff_and_soft, 1e6, 2, 13_500, 1.8),
+        (stiff_and_soft, 1e6, 4, 13_500, 3.8),
+        (graded, 1e2, 1, 1200, 0.95),
+        (graded, 1e6, 2, 5000, 1.9),
+    ],
+)
+@pytest.mark.study(witness=["stiff_and_soft-100.0-1-400-0.55"])
+def test_moduli_that_vary_along_the_mesh(make, contrast, order, unknowns, rate):
+    errors, estimates, finest, last = levels(make(contrast), order, unknowns)
+    assert estimates.min() >= 1
+    assert estimates.max() <= 10
+    assert last >= rate
+    if make is stiff_and_soft:
+        # Measured 1.07 to 1.27.
+        assert 1 <= finest.relative_error_bound / errors[-1] <= 1.5
+
+
+@pytest.mark.parametrize(
+    ("order", "unknowns", "stiffness", "angle"),
+    [(1, 1200, 1e2, 30), (1, 1200, 1e4, 71), (2, 5000, 1e2, 0), (2, 5000, 1e4, 30)],
+)
+@pytest.mark.study(witness=["1-1200-100.0-30"])
+def test_stiff_fibres(order, unknowns, stiffness, angle):
+    case = pressed_fibres(stiffness, math.radians(angle))
+    errors, estimates, finest, rate = levels(case, order, unknowns)
+    assert rate == pytest.approx(order, rel=0.06)  # measured .95 to 1.053 of it
+    # Weights are those of the softest strain: the root of the stiffness. Measured .70 to 1.13
+    # of it, times the 5.2 of the isotropic law.
+    assert estimates.min() >= 1
+    assert estimates.max() <= 1.2 * math.sqrt(stiffness) * 5.2
+    # The bound's patches feel it, too, but less: 2.9 to 3.5 and 27 to 34.
+    assert 1 <= finest.relative_error_bound / errors[-1] <= estimates[-1] / 10
+
+
+TOWARDS_INCOMPRESSIBILITY = [
+    (nu, order)
+    for nu in (0.4, 0.45, 0.49, 0.4999, 0.499999)
+    for order in (1, 2, 3, 4)
+    if order > 1 or nu <= 0.49  # locks beyond: see test_locking_is_not_underestimated
+]
+
+# Measured from 1.1, where order 1 locks, to 4.4; without the correction up to 1600.
+
+
+@pytest.mark.parametrize(("nu", "order"), TOWARDS_INCOMPRESSIBILITY)
+@pytest.mark.study(witness=["0.4-4", "0.4-3"])
+def test_effectivity_towards_incompressibility(nu, order):
+    case = cases.one_transition(Elastic(E=1.0, nu=nu), Elastic(E=3.0, nu=nu))
+    solution = solve(case.problem, maxh=0.14 if order < 3 else 0.28, order=order)
+    # Locking makes the norms of u and u_h differ.
+    assert 1 <= solution.error_estimate / energy_error(solution, case.exact)[0] <= 6
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("n", [4, 8])
+@pytest.mark.study(witness=["4-1", "4-3"])
+def test_locking_is_seen(order, n):
+    """A clamped square, u = curl of (sin pi x sin pi y)^2: order 1 does not move at all."""
+    x, y, law = ng.x, ng.y, Elastic(E=1.0, nu=0.499999)
+    psi = (ng.sin(math.pi * x) * ng.sin(math.pi * y)) ** 2
+    u, v = psi.Diff(y), -psi.Diff(x)
+    mu = 1 / (2 * 1.499999)
+    force = ng.CF(tuple(-mu * (w.Diff(x).Diff(x) + w.Diff(y).Diff(y)) for w in (u, v)))
+    square = OCCGeometry(Rectangle(1, 1).Face(), dim=2)
+    square.shape.faces.name = "square"
+    problem = Problem(
+        geometry=OCCGeometry(square.shape, dim=2),
+        materials={"square": law},
+        displacement={".*": (0, 0)},
+        force={"square": force},
+    )
+    solution = solve(problem, maxh=1 / (2 * n), order=order)
+    stress = mu * ng.CF(
+        (2 * u.Diff(x), u.Diff(y) + v.Diff(x), u.Diff(y) + v.Diff(x), 2 * v.Diff(y))
+    )
+    exact = ng.CF(tuple(stress[i] for i in range(4)), dims=(2, 2))
+    error, _ = energy_error(solution, SimpleNamespace(stress={"square": exact}))
+    assert 1 <= solution.error_estimate / error <= 6
+
+
+def test_the_correction_is_a_minimum():
+    # delta = 0 is among the pressures: without correction the estimate is no smaller.
+    case = cases.one_transition(Elastic(E=1.0, nu=0.42), Elastic(E=3.0, nu=0.42))
+    corrected = solve(case.problem, maxh=0.28, order=2)
+    assert "incompressibility" in corrected.estimate_parts
+    plain = estimate(corrected, corrected_from=math.inf)
+    assert "incompressibility" not in plain.parts
+    error = np.linalg.norm(plain.indicators)
+    assert 0.4 * error < corrected.error_estimate < error
+
+
+def test_ordinary_bodies_pay_nothing():
+    solution = solve(cases.one_transition().problem, maxh=0.5, order=2)
+    assert "incompressibility" not in solution.estimate_parts
+    materials = {"upper": Elastic(E=1.0, nu=0.4999), "lower": Elastic(E=3.0, nu=0.2)}
+    mixed = solve(cases.one_transition(**materials).problem, maxh=0.5, order=2)
+    lower = mixed.mesh.ngmesh.Elements2D().NumPy()["index"] == 2
+    part = mixed.estimate_parts["incompressibility"]
+    assert part[lower].max() == 0
+    assert part[~lower].min() > 0

@@ -8,7 +8,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from ngcontact import geometries
+from ngcontact import Contact, Elastic, Problem, geometries, solve
 from ngcontact.geometries import (
     ball_in_socket,
     blocks,
@@ -192,9 +192,37 @@ def test_contact_edges_end_at_the_same_points(geometry, first, second):
         (graphs, {"upper": flat, "lower": flat, "samples": 3}, ValueError, "at least 16"),
         (graphs, {"upper": parabola, "lower": flat, "height": 0.5}, ValueError, "upper: values"),
         (graphs, {"upper": abs, "lower": flat}, ValueError, "the edge misses the graph by 1.3e-03"),
+        (ball_in_socket, {"clearance": 0}, ValueError, "clearance = 0: expected a positive length"),
+        (cone_on_block, {"slope": 90}, ValueError, "slope = 90: expected degrees between 0 and 90"),
+        (cone_on_block, {"height": 0.1}, ValueError, "expected more than that of the cone"),
+        (rounded_punch, {"height": 0.1}, ValueError, "height = 0.1: expected more than rounding"),
+        (sleeve_on_shaft, {"interference": -1}, ValueError, "outer = 1.6: expected more than ra"),
+        (ring_in_groove, {"depth": 1.0}, ValueError, "depth = 1.0: expected less than 2 section"),
+        (ring_in_groove, {"radius": 1.5}, ValueError, "radius = 1.5: expected more than half"),
         (punch, {"width": 0.5}, ValueError, "width = 0.5: expected more than half_width = 0.5"),
     ],
 )
 def test_bad_parameters_are_refused(make, options, error, message):
     with pytest.raises(error, match=re.escape(message)):
         make(**options)
+
+
+SOFT = Elastic(E=1.0, nu=0.3)
+
+
+def test_a_pressed_on_sleeve_presses_all_along():
+    """Lame's pressure in the middle of a long sleeve on a long shaft, more at its ends."""
+    problem = Problem(
+        geometry=sleeve_on_shaft(interference=0.001, length=4.0),
+        materials={"shaft": SOFT, "sleeve": SOFT},
+        displacement={"shaft_ends": (None, 0)},
+        contact=[Contact("sleeve_contact", "shaft_contact")],
+        model="axisymmetric",
+    )
+    solution = solve(problem, maxh=0.2, order=2)
+    assert solution.active.all()
+    middle = abs(solution.points[:, 1]) < 0.3
+    expected = 0.001 * SOFT.E / 2 * (1 - 1 / 1.6**2)  # one material, solid shaft, plane stress
+    assert solution.pressure[middle] == pytest.approx(expected, rel=0.06)
+    ends = abs(solution.points[:, 1]) > 1.99
+    assert (solution.pressure[ends] > 1.2 * expected).all()

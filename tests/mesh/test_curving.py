@@ -1,18 +1,27 @@
-"""Curved elements: when a mesh has to be curved; parents of refined vertices."""
+"""Curved elements: when a mesh has to be curved; parents of vertices; exact boundary curves."""
 
 import math
+from functools import partial
 
 import ngsolve as ng
 import numpy as np
 import pytest
+from netgen.occ import (
+    Axis,
+    Glue,
+    OCCGeometry,
+    WorkPlane,
+)
 from ngsolve.meshes import MakeStructured2DMesh
 
 from drivers.reference import cases
 from ngcontact.adaptivity import refined
 from ngcontact.geometries import blocks, disc
+from ngcontact.mesh.cad import CadEdge, cad_edges
 from ngcontact.mesh.curving import copied, curve, vertex_parents
 from ngcontact.mesh.generation import first_mesh
 from ngcontact.problem import MeshArrays
+from tests.geometries.test_geometries import CASES
 from tests.scenes import coordinates, near_origin
 
 
@@ -88,3 +97,89 @@ def test_what_refinement_in_place_knows_is_kept():
     copy.Refine()
     check_midpoints(copy, old)
     check_midpoints(refined(BLOCK, copy), old)
+
+
+RNG = np.random.default_rng(3)
+CENTRES = [(0.0, 0.0, 1.0), (0.3, 0.7, 0.1), (100.0, -50.0, 2.0)]
+
+
+def circle(x=0.0, y=0.0, radius=1.0):
+    """A whole circle, counterclockwise from its rightmost point."""
+    [edge] = WorkPlane().Circle(x, y, radius).Face().edges
+    return CadEdge(edge)
+
+
+def angles(theta):
+    return np.column_stack([np.cos(theta), np.sin(theta)])
+
+
+@pytest.mark.parametrize(("x", "y", "radius"), CENTRES)
+def test_circle_normals_are_radial_also_at_the_seam(x, y, radius):
+    edge = circle(x, y, radius)
+    assert edge.closed
+    assert not edge.straight
+    theta = np.concatenate([RNG.uniform(0, 2 * math.pi, 200), RNG.uniform(-0.05, 0.05, 200)])
+    radial = angles(theta)
+    scale = np.abs([x, y]).max() / radius + 1  # of round-off in the coordinates
+    for r in (radius, 1.01 * radius, 0.97 * radius):
+        points = [x, y] + r * radial
+        np.testing.assert_allclose(edge.normal(points), radial, atol=1e-15 * scale)
+        foot = edge.point(edge.project(points))
+        np.testing.assert_allclose(foot, [x, y] + radius * radial, atol=1e-15 * scale * radius)
+
+
+def glued():
+    """A square with a disc inside, one geometry with an inner boundary and a closed edge."""
+    square = WorkPlane().Rectangle(2, 2).Face()
+    disc = WorkPlane().MoveTo(1, 1).Circle(0.4).Face()
+    square.edges.name, disc.edges.name = "side", "inner"
+    square.faces.name, disc.faces.name = "square", "disc"
+    return OCCGeometry(Glue([square - disc, disc]), dim=2)
+
+
+def nameless():
+    """Two bodies whose boundaries have no names, one with a hole."""
+    ring = WorkPlane().Circle(3, 0, 1).Face() - WorkPlane().Circle(3, 0, 0.5).Face()
+    return OCCGeometry(Glue([ring, WorkPlane().Rectangle(1, 1).Face()]), dim=2)
+
+
+@pytest.mark.parametrize(
+    "make", [glued, nameless, *(partial(make, **options) for make, options, _ in CASES)]
+)
+def test_segments_lie_on_the_edge_of_their_region(make):
+    mesh = ng.Mesh(make().GenerateMesh(maxh=0.6))
+    mesh.Refine()
+    edges = cad_edges(mesh)
+    assert edges is not None
+    assert [edge.name or "default" for edge in edges] == [
+        n or "default" for n in mesh.GetBoundaries()
+    ]
+    vertices = np.array(mesh.ngmesh.Coordinates())[:, :2]
+    segments = mesh.ngmesh.Elements1D().NumPy()
+    met = set()
+    for region, edge in enumerate(edges):
+        ends = segments["nodes"][segments["index"] == region + 1][:, :2].astype(int) - 1
+        assert len(ends) > 0
+        points = vertices[np.unique(ends)]
+        foot = edge.point(edge.project(points))
+        # Netgen stores coordinates of the curve itself; 1e-12 allows for OCC's own round-off.
+        np.testing.assert_allclose(foot, points, atol=1e-12)
+        met.add(region)
+    assert len(met) == len(mesh.GetBoundaries())
+
+
+@pytest.mark.parametrize("angle", [10.0, 70.0, 250.0])
+@pytest.mark.parametrize("turned", [0.0, 33.0])
+def test_arcs_are_those_of_the_geometry_kernel(angle, turned):
+    """Also where no formula is fitted, as on the arc of 10 degrees."""
+    face = WorkPlane().Arc(2.0, angle).LineTo(0.3, 5.0).Close().Face()
+    [arc] = [
+        edge
+        for edge in face.Rotate(Axis((1, 2, 0), (0, 0, 1)), turned).edges
+        if not CadEdge(edge).straight
+    ]
+    edge = CadEdge(arc)
+    t = np.linspace(edge.start, edge.stop, 37)
+    for found, exact in ((edge.point(t), arc.Value), (edge.derivative(t), arc.Tangent)):
+        expected = np.array([(v.x, v.y) for v in map(exact, t.tolist())])
+        np.testing.assert_allclose(found, expected, rtol=0, atol=8e-15)  # 8 eps of a size of 4

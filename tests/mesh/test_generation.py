@@ -1,4 +1,4 @@
-"""First meshes: matched nodes on facing lines, sizes, and the user's geometry left alone."""
+"""First meshes: matched nodes on facing lines, sizes, a node where the gap is least."""
 
 import math
 from dataclasses import replace

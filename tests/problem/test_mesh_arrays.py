@@ -1,12 +1,16 @@
-"""NGSolve's mesh as arrays: against NGSolve's own elements."""
+"""NGSolve's mesh as arrays, places inside others, and checks about the axis of revolution."""
 
 import ngsolve as ng
 import numpy as np
 import pytest
+from netgen.occ import OCCGeometry
 from ngsolve.meshes import MakeStructured3DMesh
 
+from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.geometries import disc_on_block
+from ngcontact.geometries.region import body, compound, polygon
 from ngcontact.problem import MeshArrays, bisect
+from ngcontact.problem.checks import _inside
 
 
 @pytest.fixture(params=[1, 3], ids=["straight", "curved"])
@@ -55,3 +59,57 @@ def test_only_marked_elements_are_bisected(mesh):
     assert 0 < once < old / 2
     bisect(mesh, np.zeros(mesh.ne, dtype=bool))
     assert mesh.ne == old + once
+
+
+SOFT = Elastic(E=1.0, nu=0.3)
+
+
+def cylinder(left=0.0, size=1.0):
+    """Cylinder left < x < 1, 0 < y < 1, times `size`."""
+    corners = [(size * x, size * y) for x, y in [(left, 0), (1, 0), (1, 1), (left, 1)]]
+    return compound(body("body", polygon(corners, ["bottom", "side", "top", "axis"])))
+
+
+def problem(**changes):
+    left, size = changes.pop("left", 0.0), changes.pop("size", 1.0)
+    data = {"displacement": {"bottom": (None, 0)}, "traction": {"top": 1.0}}
+    return Problem(
+        geometry=cylinder(left, size),
+        materials={"body": SOFT},
+        model="axisymmetric",
+        **data | changes,
+    )
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e6])
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"left": -0.2}, r"reaches to x = -.* across the axis x = 0: .* half with x >= 0"),
+        ({"left": -2.0, "traction": {}}, r"across the axis"),
+        ({"traction": {"axis": 1.0}}, 'traction "axis" is on the axis x = 0, which has no area'),
+        ({"traction": {"top": (1.0, 0)}}, 'traction "top" has the radial component 1 .* sideways'),
+        ({"force": {"body": (2.0, 0)}}, 'force "body" has the radial component 2 .* sideways'),
+        (
+            {"displacement": {"bottom": (0.5, 0)}},
+            'displacement "bottom" has the radial component 0.5 .* sideways',
+        ),
+        ({"displacement": {"axis": (0, 0)}}, 'displacement "axis" is on the axis .* by None'),
+        (
+            {"contact": [Contact("axis", direction=(-1, 0), gap=0.1)]},
+            'contact "axis" is on the axis x = 0, which has no area: name a boundary with x > 0',
+        ),
+    ],
+)
+def test_what_is_refused(changes, message, size):
+    with pytest.raises(ValueError, match=message):
+        solve(problem(size=size, **changes), maxh=size / 2)
+
+
+def test_places_inside_a_body_are_told_beside_slanted_sides():
+    corners = [(1, 0), (0, 1), (-1, 0), (0, -1)]
+    geometry = OCCGeometry(body("diamond", polygon(corners, ["free"] * 4)), dim=2)
+    view = MeshArrays(ng.Mesh(geometry.GenerateMesh(maxh=0.4)))
+    x = np.random.default_rng(0).uniform(-1.2, 1.2, (200, 2))
+    found = _inside(x, view, np.arange(len(view.elements)))
+    np.testing.assert_array_equal(found, np.abs(x).sum(axis=1) < 1)

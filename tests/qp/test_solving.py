@@ -1,20 +1,29 @@
-"""Quadratic programs of users: brute force, another solver, known cycles, ties, bad input."""
+"""Active sets: brute force, another solver, known cycles, ties, rigid motions, bad input."""
 
+from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ngcontact.qp.active_set import solve_qp
+from ngcontact.errors import ConvergenceError
+from ngcontact.qp.active_set import minimise, solve_qp
+from ngcontact.qp.quadratic_program import kkt_residuals, pinned_null_space
+from ngcontact.qp.schur_complement import BorderedSystems
 from tests.qp.programs import (
     CYCLES,
     ROUND_OFF,
     brute_force,
     condition,
+    counting_factor,
     dual,
+    first_unknowns_bounded,
+    inequalities,
     kkt_residual,
+    membrane,
     random_program,
     tied_program,
 )
@@ -92,3 +101,83 @@ def test_bad_input(change, message):
     data = {"A": np.eye(2), "f": [1.0, 1.0], "B": [[1.0, 0.0]], "g": [1.0]} | change
     with pytest.raises(ValueError, match=message):
         solve_qp(**data)
+
+
+def test_plain_method_cycles():
+    """The safeguard is what ends it: with endless patience the plain method cycles."""
+    S, d, force = CYCLES["T-cyc-1 moved"]
+    program = inequalities(*dual(S, d))
+    factor = counting_factor(program.K, [])
+    with pytest.raises(ConvergenceError, match="did not settle") as failure:
+        minimise(BorderedSystems(program, factor), patience=10**9)
+    assert failure.value.iterate.u.shape == (3,)
+    result = minimise(BorderedSystems(program, factor))
+    np.testing.assert_allclose(result.force, force, atol=1e-12)  # condition below 100
+
+
+def test_a_singular_system_is_said():
+    """Two springs of which nothing holds the second: never a number."""
+    K = sp.csr_array(np.diag([1.0, 0.0]))
+    program = first_unknowns_bounded(K, np.ones(2), np.ones(1))
+    systems = BorderedSystems(program, lambda free: lambda right: right)
+    with pytest.raises(ConvergenceError, match=r"Newton step 1: .*singular") as failure:
+        minimise(systems)
+    assert failure.value.iterate.steps == []
+
+
+def test_residuals_name_what_is_violated():
+    K, b, g = membrane()
+    program = first_unknowns_bounded(K, -b, g)
+    result = minimise(BorderedSystems(program, counting_factor(K, [])))
+    assert max(kkt_residuals(program, result).values()) < 1e-13  # round-off
+    contact, apart = np.flatnonzero(result.active)[0], np.flatnonzero(~result.active)[0]
+    length, largest = np.abs(result.u).max(), result.force.max()
+    u, force = result.u.copy(), result.force.copy()
+    u[contact] += 0.1 * length
+    force[apart] -= 0.2 * largest
+    wrong = kkt_residuals(program, replace(result, u=u, force=force))
+    assert wrong["penetration"] == pytest.approx(0.1 / 1.1, rel=1e-9)
+    assert wrong["tension"] == pytest.approx(0.2, rel=1e-12)
+    assert min(wrong["equilibrium"], wrong["complementarity"]) > 1e-3
+
+
+SPRINGS = 6
+
+
+def chain(load, g):
+    """Springs in a row that nothing holds but bounds at their first two joints."""
+    n = SPRINGS + 1
+    D = np.diff(np.eye(n), axis=0)
+    fixed = np.zeros(n, dtype=bool)
+    rows = np.arange(len(g))
+    null_space = pinned_null_space(np.ones((n, 1)), np.zeros((1, 0)), np.zeros((0, n)), rows, fixed)
+    return first_unknowns_bounded(sp.csr_array(D.T @ D), load, np.array(g), null_space)
+
+
+@pytest.mark.parametrize("start", [False, True])
+def test_contact_alone_holds_a_chain(start):
+    """Pushed at its far end it moves until the first joint meets its bound: no spring is left."""
+    load = np.zeros(SPRINGS + 1)
+    load[-1] = 1.0
+    program = chain(load, [0.3, 5.0])
+    assert program.null_space.pins.size == 1
+    systems = BorderedSystems(program, counting_factor(program.K, []))
+    result = minimise(systems, np.full(2, start))
+    np.testing.assert_allclose(result.u, 0.3 + np.arange(SPRINGS + 1), rtol=1e-12)
+    np.testing.assert_allclose(result.force, [1, 0], atol=1e-12)  # condition of the chain: 50
+    assert result.active.tolist() == [True, False]
+    assert systems.factorizations == 1
+
+
+def test_motions_that_nothing_resists_obey_their_conditions():
+    """No bounds at all, a load in equilibrium: the mean of the displacement is zero."""
+    n = SPRINGS + 1
+    D = np.diff(np.eye(n), axis=0)
+    ones, none = np.ones((n, 1)), np.zeros(0, dtype=np.intp)
+    null_space = pinned_null_space(ones, np.eye(1), ones.T / n, none, np.zeros(n, dtype=bool))
+    assert (null_space.held.size, null_space.pins.size) == (1, 0)
+    load = np.zeros(n)
+    load[[0, -1]] = -1.0, 1.0
+    program = first_unknowns_bounded(sp.csr_array(D.T @ D), load, np.zeros(0), null_space)
+    result = minimise(BorderedSystems(program, counting_factor(program.K, [])))
+    np.testing.assert_allclose(result.u, np.arange(n) - SPRINGS / 2, atol=1e-13)

@@ -1,0 +1,247 @@
+"""Pictures of a solution: panels, fields, units, curves, mirror images, labels seen whole."""
+
+from types import SimpleNamespace
+
+import matplotlib
+import ngsolve as ng
+import numpy as np
+import pytest
+from matplotlib import pyplot
+
+from drivers.reference import cases
+from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact.output import plot_solution
+from ngcontact.output.pictures import colour_range, cut_pressure
+from ngcontact.output.scene import Style, contact_lines, picture
+from tests.output.stubs import stub, two_bodies
+
+
+@pytest.fixture
+def solution():
+    """A stub with 201 points on -1 < x < 1, none of them in contact."""
+    made = stub(2)
+    count = 201
+    made.points = np.column_stack([np.linspace(-1, 1, count), np.zeros(count)])
+    made.problem.contact = [Contact("disc_arc", "block_top", direction=(0, -1))]
+    made.__post_init__()
+    made.active[:] = False
+    made.pressure[:], made.gap[:] = 0.0, 0.0
+    return made
+
+
+def touch(solution, places, width, pressure=lambda t: np.sqrt(1 - t**2)):
+    """Zones of that half-width about the `places`, with that pressure over -1 < t < 1."""
+    for place in places:
+        t = (solution.points[:, 0] - place) / width
+        inside = np.abs(t) < 1
+        solution.active[inside] = True
+        solution.pressure[inside] = pressure(t[inside])
+    return solution
+
+
+@pytest.mark.parametrize("factor", [1.0, 1e9, 1e-7])
+def test_labels_lie_inside_and_apart(monkeypatch, solution, factor):
+    """As drawn on the screen, where nothing is cut to fit."""
+    monkeypatch.setattr(pyplot, "show", lambda: None)
+    peak = ((ng.x + 2) ** 2 + (ng.y + 1) ** 2 + 1e-12) ** -0.25
+    figure = plot_solution(touch(solution, [0.0], 0.5), field=factor * peak)
+    figure.draw_without_rendering()
+    bars = [axes for axes in figure.axes if axes.get_label() == "<colorbar>"]
+    [note] = bars[0].texts
+    assert "largest" in note.get_text()
+    offset = bars[0].yaxis.get_offset_text()
+    assert bool(offset.get_text()) == (factor != 1.0)
+    labels = [a.yaxis.label for a in figure.axes] + [a.xaxis.label for a in figure.axes]
+    for text in [note, offset, *labels, *(axes.title for axes in figure.axes)]:
+        if text.get_text():
+            box = text.get_window_extent()
+            assert box.x0 >= 0
+            assert box.y0 >= 0
+            assert box.x1 <= figure.bbox.x1
+            assert box.y1 <= figure.bbox.y1
+    if offset.get_text():
+        assert not note.get_window_extent().overlaps(offset.get_window_extent())
+    pyplot.close(figure)
+
+
+def test_singular_ends_are_cut_and_marked(tmp_path, solution):
+    """(1 - t**2)**-1/2 with ends of a thousand: all but a tenth lie below 2.3."""
+    touch(solution, [0.0], 0.9, lambda t: (1 - t**2) ** -0.5)
+    solution.pressure[solution.active.nonzero()[0][[0, -1]]] = 1e3
+    top = cut_pressure(solution)
+    assert top == pytest.approx(2 * 2.3, rel=0.1)
+    figure = plot_solution(solution, tmp_path / "a.png", units={"stress": ("kPa", 10.0)})
+    [axes] = [a for a in figure.axes if a.get_title() == "contact pressure"]
+    assert axes.get_ylim()[1] == pytest.approx(top / 10)
+    assert any("largest 100" in text.get_text() for text in axes.texts)
+
+
+@pytest.mark.parametrize(
+    "pressure", [lambda t: np.sqrt(1 - t**2), lambda t: 1 + t, lambda t: 1 + 1.5 * t**8]
+)
+def test_other_peaks_are_not_cut(solution, pressure):
+    """Hertz's, a linear one, that of a punch with rounded corners."""
+    assert cut_pressure(touch(solution, [0.0], 0.9, pressure)) is None
+
+
+def lines_of(points, direction=None, pair=None):
+    contact = [SimpleNamespace(direction=direction)] * 2
+    pair = np.zeros(len(points), dtype=int) if pair is None else pair
+    solution = SimpleNamespace(points=points, pair=pair, problem=SimpleNamespace(contact=contact))
+    return contact_lines(solution)
+
+
+def test_contact_line_follows_an_arc_in_any_numbering():
+    angle = np.sort(np.random.default_rng(1).uniform(0, 5.5, 60))
+    shuffle = np.random.default_rng(2).permutation(60)
+    points = np.column_stack([np.cos(angle), np.sin(angle)])[shuffle]
+    [(pair, rows, s)] = lines_of(points)
+    along = angle[shuffle][rows]
+    assert pair == 0
+    assert np.all(np.diff(along) > 0) or np.all(np.diff(along) < 0)
+    chords = 2 * np.sin(np.abs(np.diff(along)) / 2)
+    np.testing.assert_allclose(np.diff(s), chords, rtol=1e-12)
+    assert s[0] == 0
+
+
+def test_contact_line_keeps_both_rows_of_a_corner():
+    points = np.array([[0, 0], [1, 0], [2, 0], [2, 0], [2, 1], [2, 2.0]])
+    [(_, rows, s)] = lines_of(points)
+    assert rows.tolist() == [0, 1, 2, 3, 4, 5]
+    assert s.tolist() == [0, 1, 2, 2, 3, 4]
+
+
+@pytest.fixture(scope="module")
+def hertz():
+    steel = Elastic(E=100.0, nu=0.3)
+    problem = Problem(
+        geometry=two_bodies(),
+        materials={"disc": steel, "block": steel},
+        displacement={"block_bottom": (0, 0), "disc_top": (0, -0.02)},
+        contact=[Contact("disc_arc", "block_top", direction=(0, -1))],
+    )
+    return solve(problem, maxh=0.3, order=2)
+
+
+def test_picture_shows_bodies_and_pressure(tmp_path, hertz):
+    figure = plot_solution(hertz, tmp_path / "a.png")
+    assert [file.name for file in tmp_path.iterdir()] == ["a.png"]
+    bodies, close, profile = figure.axes[:3]
+    image = matplotlib.image.imread(tmp_path / "a.png")[:, :, :3]
+    height, width = image.shape[:2]
+    for axes in (bodies, close, profile):  # each panel has dark and bright pixels
+        (x0, y0), (x1, y1) = axes.get_position().get_points()
+        rows = slice(int((1 - y1) * height), int((1 - y0) * height))
+        panel = image[rows, int(x0 * width) : int(x1 * width)]
+        assert panel.std() > 0.03  # a blank panel: 0; measured: 0.1 and more
+    assert (
+        bodies.get_title() == "deformed bodies, displacement × 1"
+    )  # contact closes a gap: true to scale
+    assert close.get_xlim()[0] < 0 < close.get_xlim()[1]
+    drawn = {line.get_label(): line.get_xydata() for line in profile.lines}
+    points = np.column_stack([hertz.points[:, 0], hertz.pressure])
+    for label, state in (("in contact", hertz.active), ("open", ~hertz.active)):
+        expected = points[state][np.argsort(points[state][:, 0])]
+        np.testing.assert_allclose(drawn[label], expected, atol=1e-12)
+
+
+def test_bad_scale_and_suffix_are_refused(tmp_path):
+    with pytest.raises(ValueError, match="scale = nan"):
+        plot_solution(object(), tmp_path / "a.png", scale=float("nan"))
+    with pytest.raises(ValueError, match=r"must end in '\.png'"):
+        plot_solution(object(), tmp_path / "a.pdf")
+
+
+ACROSS = 0.5  # normal to the plane
+
+
+@pytest.fixture(scope="module")
+def uniform():
+    """A stub with one stress everywhere."""
+    solution = stub(2)
+    solution.stress = ng.CF((3.0, 1.0, 1.0, -2.0), dims=(2, 2))
+    solution.out_of_plane_stress = ng.CF(ACROSS)
+    return solution
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [
+        ("stress_xx", 3.0),
+        ("stress_yy", -2.0),
+        ("stress_xy", 1.0),
+        ("stress_zz", ACROSS),
+        ("largest_principal", 0.5 + np.sqrt(2.5**2 + 1)),
+        ("smallest_principal", 0.5 - np.sqrt(2.5**2 + 1)),
+        ("mean_pressure", -(3.0 - 2.0 + 0.5) / 3),
+        ("von_mises", np.sqrt((25 + 2.5**2 + 2.5**2) / 2 + 3)),
+    ],
+)
+def test_fields_of_a_uniform_stress(uniform, field, value):
+    scene = picture(uniform, Style(field=field))
+    np.testing.assert_allclose(scene.values, value, rtol=1e-12)  # round-off
+    assert scene.shown.kind == "stress"
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "text"),
+    [
+        ({"field": "stress"}, ValueError, 'field = "stress"'),
+        ({"field": "stress_hoop"}, ValueError, "stress_zz"),  # a plane model
+        ({"field": 3}, TypeError, "field = 3"),
+        ({"field": ng.CF((1, 2))}, ValueError, "2 components"),
+        ({"limits": (2.0, 1.0)}, ValueError, "the smaller first"),
+        ({"units": {"force": "N"}}, ValueError, '"force" is none of'),
+        ({"units": {"stress": ("MPa", 0.0)}}, ValueError, "its size"),
+        ({"profile": {"a": ([1, 2], [3])}}, TypeError, 'profile\\["a"\\]'),
+    ],
+)
+def test_options_that_are_none_are_refused(tmp_path, uniform, options, error, text):
+    with pytest.raises(error, match=text):
+        plot_solution(uniform, tmp_path / "a.png", **options)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_symmetric_half_is_mirrored(pressed_half):
+    half = picture(pressed_half, Style(scale=1.0))
+    whole = picture(pressed_half, Style(scale=1.0, mirror="axis"))
+    count = len(half.moved)
+    np.testing.assert_allclose(whole.moved[count:], half.moved * (-1, 1), atol=1e-12)
+    assert whole.areas().sum() == pytest.approx(2 * half.areas().sum())
+    inside = np.abs(whole.moved[whole.edges][..., 0]).max(axis=1) < 1e-9
+    assert inside.any()
+    assert not whole.outline[inside].any()  # no line along the middle
+
+
+@pytest.mark.parametrize(
+    ("mirror", "text"),
+    [
+        ("axes", "is no boundary"),
+        ("disc_arc", "is not straight"),
+        ("disc_top", "moves across its line"),
+        ("block_top", "moves across its line"),
+    ],
+)
+def test_only_lines_of_symmetry_mirror(tmp_path, pressed_half, mirror, text):
+    with pytest.raises(ValueError, match=text):
+        plot_solution(pressed_half, tmp_path / "a.png", mirror=mirror)
+
+
+def test_a_singular_corner_leaves_the_colours(tmp_path, uniform):
+    """A peak r^(-1/2) at one point: colours end where all but 0.5 % of the area lie below."""
+    r = ng.sqrt((ng.x + 2) ** 2 + (ng.y + 1) ** 2 + 1e-12)
+    scene = picture(uniform, Style(scale=0.0, field=r**-0.5))
+    low, high = colour_range(scene, [])
+    # Area pi r^2 / 4 beyond the value r^(-1/2): 0.5 % of 4 + pi / 2 are r = 0.188, value 2.3; means
+    # of triangles blur that.
+    assert low == 0
+    assert 1.8 < high < 2.8
+    assert scene.values.max() > 900
+    figure = plot_solution(uniform, tmp_path / "a.png", field=r**-0.5)
+    [text] = [t.get_text() for axes in figure.axes for t in axes.texts if "largest" in t.get_text()]
+    assert float(text.split()[1]) == pytest.approx(1000, rel=0.01)
+
+
+@pytest.fixture(scope="module")
+def pressed_half():
+    return solve(cases.pressed_disc(), maxh=0.4, order=2)
