@@ -1,3 +1,4 @@
+from .contact import find_contacts as find_contacts
 from .errors import ContactError as ContactError
 from .errors import ContactWarning as ContactWarning
 from .errors import ConvergenceError as ConvergenceError

@@ -18,6 +18,8 @@ from .line import without as without
 from .projection import MATCHING_DISTANCE as MATCHING_DISTANCE
 from .projection import at as at
 from .projection import crossings as crossings
+from .search import FoundContact as FoundContact
+from .search import find_contacts as find_contacts
 from .state import ContactState as ContactState
 from .state import Transitions as Transitions
 from .state import contact_states as contact_states

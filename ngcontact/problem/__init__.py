@@ -1,5 +1,6 @@
 """The continuous contact problem of HH81 section 3: laws, pairs, supports, loads, checks."""
 
+from .checks import check_mesh as check_mesh
 from .checks import regions_of as regions_of
 from .contact import Contact as Contact
 from .contact import Gap as Gap
@@ -18,4 +19,5 @@ from .strain import InitialStrain as InitialStrain
 from .values import body_mask as body_mask
 from .values import boundary_mask as boundary_mask
 from .values import numbers as numbers
+from .values import scalar_data as scalar_data
 from .values import table as table

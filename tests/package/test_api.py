@@ -14,7 +14,8 @@ from ngcontact import geometries
 
 ROOT = Path(__file__).parents[2]
 PUBLIC = """Contact ContactError ContactWarning ConvergenceError Elastic Hooke NoEquilibriumError
-Problem Solution adapt load plot_convergence solve solve_qp write_film write_series""".split()
+Problem Solution adapt find_contacts load plot_convergence solve solve_qp write_film
+write_series""".split()
 SIGNATURES = {
     "Contact": "(secondary, primary=None, direction=None, gap=None, bilateral=False, rows='auto', "
     "roles='given')",
@@ -22,6 +23,7 @@ SIGNATURES = {
     "adapt": "(problem, *, maxh=None, order=4, element='isoparametric', theta=0.5, tolerance=None, "
     "max_dofs=100000, guaranteed=False, start=None, progress=False)",
     "solve_qp": "(A, f, B, g, E=None, e=None, active=None)",
+    "find_contacts": "(geometry, *, within)",
     "load": "(path)",
     "write_series": "(path, solutions, times=None)",
     "write_film": "(path, solutions, *, seconds=0.6, titles=None, **options)",
