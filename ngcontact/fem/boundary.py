@@ -286,19 +286,18 @@ class BoundaryTrace:
         shared = number[first] == number[second]
         first, second = first[shared], second[shared]
         turn = np.linalg.norm(vector[first] - vector[second], axis=1)
-        second = second[self._corner(segment[first], segment[second], turn)]
+        # Corners: of the geometry where there is one.
+        if self.edges is not None:
+            corner = turn > CORNER
+        else:
+            names = np.array(self.mesh.GetBoundaries())[self.region[segment]]
+            named = names[first] != names[second]
+            corner = (turn > CORNER_WITHOUT_CAD) | (named & (turn > CORNER))
+        second = second[corner]
         number[second] = number.max(initial=-1) + 1 + np.arange(second.size)
         mean = np.zeros((number.max(initial=-1) + 1, 2))
         np.add.at(mean, number, vector * self.lengths(segment)[:, None])
         return number, mean / np.linalg.norm(mean, axis=1)[:, None]
-
-    def _corner(self, first: Index, second: Index, turn: Array) -> Mask:
-        """Whether pairs of adjacent segments, whose normals differ by `turn`, form corners."""
-        if self.edges is not None:
-            return turn > CORNER
-        names = np.array(self.mesh.GetBoundaries())
-        named = names[self.region[first]] != names[self.region[second]]
-        return (turn > CORNER_WITHOUT_CAD) | (named & (turn > CORNER))
 
 
 def boundary_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTrace:
