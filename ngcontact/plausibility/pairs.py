@@ -23,10 +23,9 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, across
 from ..contact import ContactState, in_contact, partners, prescribed_gap, twins
 from ..fem import BoundaryTrace, Moduli, moduli_of
-from ..lagrange import gauss_lobatto, lagrange_derivative
 from ..problem import Problem
 from ..solved import Solved
 from .refinement import moves_rigidly
@@ -55,7 +54,7 @@ PLACES = (np.arange(4) + 0.5) / 4  # on a segment; what lies between them is 1 /
 MOST_SEGMENTS = 32  # of a pair that are looked at for penetration
 LENGTH_ROUND_OFF = 100 * np.finfo(float).eps  # of lengths and displacements
 INCLINED = np.deg2rad(15)  # from which forces along the direction are wrong by 1 - cos = 3.4 %
-CORNER = np.cos(INCLINED / 2)  # mean of two unit normals at a vertex, below which it is a corner
+BESIDE_ENDS = 0.01  # of a segment
 # Error of the peak from which a way is told. Between two discs whose radii are 1 and 1, 1 and 3, 3
 # and 1 peaks were wrong by 0.93 to 1.05 times what is said here, measured at ways of 0.01 to 0.16;
 # of pins with a clearance of 2 to 25 % of their radius by 0.93 to 0.96 times that, of holes as
@@ -256,7 +255,7 @@ def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
     if line.contact.direction is None or not state.active.any():
         return ""
     xi = np.array(line.contact.direction)
-    angle, force = inclinations(trace, state), np.abs(state.force)
+    angle, force = _inclinations(trace, state, xi)
     if force[angle > INCLINED].sum() <= FORCE_SHARE * force.sum():
         return ""
     told = ", ".join(f"{component:.3g}" for component in xi)
@@ -267,74 +266,33 @@ def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
     )
 
 
-def inclinations(trace: BoundaryTrace, state: ContactState) -> Array:
-    """Angles (m,) in radians between a pair's fixed direction and the surfaces; 0 where open.
+def _inclinations(trace: BoundaryTrace, state: ContactState, xi: Array) -> tuple[Array, Array]:
+    """Angles (k,) in radians between `xi` and the surfaces on segments in contact, and forces (k,).
 
-    The smaller one of both surfaces; ends of their lines and corners have no normal of their own
-    and count only where neither surface has.
+    The smaller one of both surfaces, where the force on a segment acts, but beside its ends, as
+    corners have no normal.
     """
-    line, xi = state.line, np.array(state.line.contact.direction)
-    touching = np.flatnonzero(np.append(state.active, False)[line.rows].any(axis=1))
-    point = line.rows[touching].ravel()
-    segment, s = trace.at_nodes(line.segments[touching])
-    normal, has = trace.exact_normal(segment, s), point >= 0
-    ends = np.isin(s[has], (0.0, 1.0))
-    cosine, smooth = _at_vertices(point[has], ends, normal[has], xi, len(state.active))
-    cosine[~state.active] = 1.0
+    line, facing = state.line, state.line.contact.primary is not None
+    share = np.append(np.abs(state.force), 0.0)[line.rows]
+    touching = np.flatnonzero(share.any(axis=1))
+    share, segment, rows = share[touching], line.segments[touching], line.rows[touching]
+    s = (share * trace.places(segment)).sum(axis=1) / share.sum(axis=1)
+    s = np.clip(s, BESIDE_ENDS, 1 - BESIDE_ENDS)
+    cosine = trace.exact_normal(segment, s) @ xi
     steep = np.flatnonzero(cosine < np.cos(INCLINED))
-    if len(steep):
-        of_other = _of_obstacle if line.contact.primary is None else _of_primary
-        other, plain = of_other(trace, state, steep, xi)
-        mine = np.where(smooth[steep] | ~plain, cosine[steep], -1.0)
-        cosine[steep] = np.maximum(mine, np.where(plain | ~smooth[steep], other, -1.0))
-    return np.arccos(np.clip(cosine, -1.0, 1.0))
-
-
-def _at_vertices(
-    point: Index, at_end: Mask, normal: Array, xi: Array, count: int
-) -> tuple[Array, Mask]:
-    """Cosine (count,) of the normal nearest to `xi` at each point, and where the curve is smooth.
-
-    `point` (k,) numbers those of the unit normals `normal` (k, 2), `at_end` (k,) tells which are
-    one-sided at an end of a segment: at ends of the line and at corners no mean is a unit vector.
-    """
-    cosine, mean = np.full(count, -1.0), np.zeros((count, 2))
-    np.maximum.at(cosine, point, normal @ xi)
-    np.add.at(mean, point, np.where(at_end, 0.5, 1.0)[:, None] * normal)
-    return cosine, np.linalg.norm(mean, axis=1) > CORNER
-
-
-def _of_primary(
-    trace: BoundaryTrace, state: ContactState, points: Index, xi: Array
-) -> tuple[Array, Mask]:
-    """The same of the primary, where it is met from the `points` (k,) of the secondary."""
-    line = state.line
-    segment, s = line.partner[points], line.partner_s[points]
-    point, end = np.arange(len(points)), np.isin(s, (0.0, 1.0))
-    vertex = trace.nodes[segment, np.where(s < 0.5, 0, -1)]
-    # Both segments at a vertex: all that end there.
-    ends = trace.nodes[line.facing][:, [0, -1]]
-    which, local, side = np.nonzero(vertex[end, None, None] == ends)
-    point = np.concatenate([point[~end], point[end][which]])
-    at_end = np.concatenate([np.zeros(np.count_nonzero(~end), bool), np.ones(len(which), bool)])
-    segment = np.concatenate([segment[~end], line.facing[local]])
-    s = np.concatenate([s[~end], side.astype(float)])
-    return _at_vertices(point, at_end, -trace.exact_normal(segment, s), xi, len(points))
-
-
-def _of_obstacle(
-    trace: BoundaryTrace, state: ContactState, points: Index, xi: Array
-) -> tuple[Array, Mask]:
-    """The same of a rigid obstacle, whose curve is that of the secondary moved by the gap."""
-    line = state.line
-    order = line.rows.shape[1] - 1
-    whole = line.rows[(line.rows >= 0).all(axis=1)]
-    curve = (line.position + line.gap[:, None] * xi)[whole]
-    slope = np.einsum("ni,kid->knd", lagrange_derivative(order, gauss_lobatto(order)), curve)
-    tangent = slope / np.linalg.norm(slope, axis=2)[:, :, None]
-    cosine = np.full(len(line.node), -1.0)
-    np.maximum.at(cosine, whole, np.abs(tangent[:, :, 0] * xi[1] - tangent[:, :, 1] * xi[0]))
-    return cosine[points], np.ones(len(points), dtype=bool)
+    other = np.full(len(steep), -1.0)
+    if len(steep) and facing:
+        x, d = trace.point(segment[steep], s[steep]), np.tile(xi, (len(steep), 1))
+        there = partners(trace, line.facing, segment[steep], x, d, nodes=False)
+        met = there.segment >= 0
+        other[met] = -trace.exact_normal(there.segment[met], there.s[met]) @ xi
+    elif len(steep):  # the curve of a rigid obstacle is that of the secondary moved by the gap
+        ends = rows[steep][:, [0, -1]]
+        chord = np.diff((line.position + line.gap[:, None] * xi)[ends], axis=1)[:, 0]
+        cross = np.abs(across(chord) @ xi) / np.linalg.norm(chord, axis=1)
+        other = np.where((ends >= 0).all(axis=1), cross, -1.0)
+    cosine[steep] = np.maximum(cosine[steep], other)
+    return np.arccos(np.clip(cosine, -1.0, 1.0)), share.sum(axis=1)
 
 
 def _drawn_apart(trace: BoundaryTrace, state: ContactState) -> str:

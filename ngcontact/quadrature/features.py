@@ -520,14 +520,8 @@ def unresolved(problem: Problem, mesh: ng.Mesh, *, in_bounds: bool = False) -> l
         if one.kind not in limits or not len(one.places):
             continue
         view = SampledElements(mesh, one.dim)
-        if view.dim == 2:
-            at = mesh(one.places[:, 0].copy(), one.places[:, 1].copy())["nr"].astype(np.intp)
-            feature = np.flatnonzero(at >= 0)
-            at = at[feature]
-        else:
-            at, feature = where_features_are(
-                one.spots, view, view.inside(mesh.Boundaries(one.name))
-            )
+        region = mesh.Materials(one.name) if one.dim == 2 else mesh.Boundaries(one.name)
+        at, feature = where_features_are(one.spots, view, view.inside(region))
         ratio = view.sizes[at] / one.widths[feature]
         large = ratio > limits[one.kind]
         if one.kind == "traction":  # straight segments are cut at features
