@@ -382,12 +382,14 @@ def _inside(
     function: Function, view: SampledElements, elements: Index, places: Array
 ) -> tuple[Mask, Array]:
     """Which `places` (..., 2) are in `elements` (k,), (...,), and values (n, c) at these."""
-    x = places.reshape(-1, 2).T.copy()
-    points = view.mesh(x[0], x[1])
+    of, x = view.arrays.corners[elements], places.reshape(-1, 2)
+    near = ((x >= of.min(axis=(0, 1))) & (x <= of.max(axis=(0, 1)))).all(axis=1)
+    points = view.mesh(*x[near].T.copy())
     marked = np.zeros(len(view.sizes) + 1, dtype=bool)  # the last one for places outside
     marked[elements] = True
-    inside = marked[points["nr"]]
-    return inside.reshape(places.shape[:-1]), _values(function, points[inside])
+    inside = np.zeros(len(x), dtype=bool)
+    inside[near] = met = marked[points["nr"]]
+    return inside.reshape(places.shape[:-1]), _values(function, points[met])
 
 
 def _widths(
