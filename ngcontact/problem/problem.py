@@ -191,23 +191,20 @@ class Problem:
         traction = regions("traction", self.traction)
         sliding = regions("sliding", [self.sliding] if isinstance(self.sliding, str) else [])
         pairs = [
-            {
-                label: mask
-                for what, side in zip(("secondary", "primary"), pair.sides, strict=False)
-                for label, mask in regions(f"contact[{j}].{what}", [side]).items()
-            }
+            regions(f"contact[{j}].secondary", pair.sides[:1])
+            | regions(f"contact[{j}].primary", pair.sides[1:])
             for j, pair in enumerate(self.contact)
         ]
 
         checks.check_bodies(mesh, materials)
         prescribed = zip(displacement.items(), self.displacement.values(), strict=True)
         full = {key: mask for (key, mask), (x, y) in prescribed if not (x is None or y is None)}
-        others, only = displacement | traction | sliding, "a contact boundary takes no other"
+        others = displacement | traction | sliding
         for one, other, right in (
             (sliding, displacement, "keep one of the two"),
             (traction, sliding, "keep one of the two"),
             (traction, full, "keep one, or leave a component free by None"),
-            *((sides, others, f"{only} condition") for sides in pairs),
+            *((sides, others, "a contact boundary takes no other condition") for sides in pairs),
         ):
             checks.refuse_common(names, one, other, right)
         checks.check_overlaps(view)

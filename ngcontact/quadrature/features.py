@@ -53,9 +53,7 @@ CHORD = 20  # ... by so many points: to a quarter
 NARROWEST = 0.1  # samples: no feature is taken for narrower
 QUARTERS = np.linspace(0, 1, 5)
 QUARTERINGS = 18  # in which a part is quartered: what still changes across 1e-11 of it jumps
-KEPT_CHANGE = (
-    0.9  # share of a change that the last half of the steps leave of a jump; of x^(1/10), 0.3
-)
+KEPT_CHANGE = 0.9  # what the last half of the steps leave of a jump; of x^(1/10) they leave 0.3
 STEADY_CHANGE = 1e-9  # change across a part, relative to the largest value, that is not looked into
 # Size of an element over the width of a feature in it, up to which it is resolved. Loads are
 # integrated on parts of elements, but stresses in equilibrium meet body forces on so many of them.

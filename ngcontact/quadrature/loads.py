@@ -211,9 +211,8 @@ def _projected(found: Refined, view: SampledElements, degree: int) -> tuple[ng.G
     moments = np.swapaxes(change, 1, 2) @ moments
     x, w = gauss_rule(dim, 2 * degree + CURVED)
     shape = view.evaluate(shapes, elements, x)
-    mass = (
-        np.swapaxes(shape * (w[:, None] * view.evaluate(view.measure, elements, x)), 1, 2) @ shape
-    )
+    weight = w[:, None] * view.evaluate(view.measure, elements, x)
+    mass = np.swapaxes(shape * weight, 1, 2) @ shape
     coefficients = np.linalg.solve(mass, moments)
     count = moments.shape[2]
     projection = ng.GridFunction(space(view.mesh, order=degree, dim=count))
