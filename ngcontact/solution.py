@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -59,17 +59,16 @@ class Solution(Measured):
         were looked at for warnings, jumps and roughness, in `adapt` by the level itself; beside
         those are checks that data are finite, interpolation and quadrature. 0 where all data are
         numbers.
-    coarse_levels : int
-        Levels of the coarse adaptive run that told `solve` the first active set of a large mesh.
     adaptive : bool
         Whether it is a level of `adapt`, whose estimate is needed anyway.
-    tree : RefinementTree or None
-        Of a level of `adapt`: the first mesh, and which of its elements those of `mesh` are parts
-        of.
+    tree : RefinementTree
+        The first mesh of a run, and which of its elements those of `mesh` are parts of.
+    coarse_levels : int
+        Levels of the coarse adaptive run that told `solve` the first active set of a large mesh.
     """
 
+    tree: RefinementTree = field(kw_only=True)
     coarse_levels: int = 0
-    tree: RefinementTree | None = None
 
     def at(self, points: Any, *, body: str | None = None, outside: str = "error") -> Values:
         """Displacement, stress, von Mises and principal stresses at points, any consistent units.
@@ -228,17 +227,8 @@ class Solution(Measured):
             An option that is none, a path that cannot be written: before any work. A boundary
             `mirror` that is no line of symmetry.
         """
-        plot_solution(
-            self,
-            path,
-            scale,
-            field=field,
-            limits=limits,
-            units=units or {},
-            profile=profile or {},
-            mesh=mesh,
-            mirror=mirror,
-        )
+        options = {"units": units or {}, "profile": profile or {}, "mesh": mesh, "mirror": mirror}
+        plot_solution(self, path, scale, field=field, limits=limits, **options)
 
     __repr__ = __str__  # instead of all arrays
 

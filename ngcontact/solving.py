@@ -24,14 +24,30 @@ from .adaptivity import (
     warn_of_limit,
 )
 from .arrays import root_of_squares
-from .errors import ContactError, ConvergenceError, warn
+from .contact import with_roles
+from .discrete import (
+    DiscreteProblem,
+    carried_active_set,
+    discretise,
+    first_active_set,
+    hardly_held,
+    minimise_energy,
+)
+from .errors import ContactError, ConvergenceError, NoEquilibriumError, warn
 from .estimator import refuse_bound
-from .fem import boundary_trace, check_element, unknowns
-from .mesh import curve, first_mesh, same_geometry
-from .one_mesh import solve_on, warn_of_doubts, with_warnings
-from .plausibility import EXACT, at_round_off, contradictions, warn_of_implausible
-from .problem import MeshArrays, Problem
-from .quadrature import evaluations, look, unresolved
+from .fem import boundary_trace, check_element, model_of, unknowns
+from .mesh import check_curves, curve, first_mesh, same_geometry
+from .plausibility import (
+    EXACT,
+    at_round_off,
+    contradictions,
+    doubt_of_refinement,
+    doubts,
+    estimates_rise,
+    warn_of_implausible,
+)
+from .problem import Contact, MeshArrays, Problem
+from .quadrature import evaluations, look, unresolved, warn_of_unresolved
 from .results import with_progress
 from .solution import Solution
 
@@ -41,6 +57,7 @@ COARSE_ELEMENTS = 4  # of that run along the largest extent
 COARSE_ORDER = 3
 COARSE_DOFS = 1500  # its unknowns, which resolve the ends of a zone or two
 COARSE_SHARE = 1 / 40  # ... or, where that is more, their share: waves in contact have many ends
+ALIKE = 0.1  # relative difference of energies up to which two coarse solutions are one
 BOUND_RATIO = 0.2  # bound over estimate that is hoped for at first; measured: 0.17 to 1
 
 ONE_PER_LEVEL = (
@@ -109,7 +126,7 @@ def solve(
         coarse = _coarse_run(problem, mesh, order, element)
     if coarse:  # with roles that can be solved
         problem, start = coarse[-1].problem, coarse[-1]
-    solution = solve_on(Solution, problem, mesh, order, element, start)
+    solution = solve_on(problem, mesh, order, element, start)
     solution = replace(solution, coarse_levels=len(coarse))
     solution.work["evaluations"] = evaluations() - before
     log.info("%s", solution)
@@ -146,6 +163,107 @@ def _check_start(problem: Problem, start: object) -> None:
             f"start has {len(start.discrete.lines)} contact pairs, the problem "
             f"{len(problem.contact)}; a warm start needs the same pairs"
         )
+
+
+def solve_on(
+    problem: Problem, mesh: ng.Mesh, order: int, element: str, start: Solution | None
+) -> Solution:
+    """Solution on one mesh, of which names and values are known to be right.
+
+    Roles of pairs that fail, or that leave a body all but free, are tried the other way round,
+    once; `Solution.problem` has the pairs as they were solved.
+    """
+    before = evaluations()
+    mesh, curved = curve(mesh, order, element)
+    if curved and mesh.GetCurveOrder() > 1:  # straight sides have no middles to place
+        check_curves(mesh)
+    here = (mesh, order, element)
+    same = start is not None and (start.mesh, start.order, start.element) == here
+    tried: list[DiscreteProblem] = []
+
+    def attempt(problem: Problem, known: DiscreteProblem | None) -> Solution:
+        discrete = discretise(problem, *here, known)
+        tried.append(discrete)
+        if start is None:
+            active = first_active_set(discrete)
+        else:
+            active = carried_active_set(discrete.lines, start.pairs)
+        minimiser = minimise_energy(discrete, active)
+        return Solution(
+            problem=problem,
+            mesh=mesh,
+            order=order,
+            element=element,
+            displacement=discrete.displacement(minimiser.u),
+            discrete=discrete,
+            minimiser=minimiser,
+            work={
+                "assemblies": sum(one.assembled for one in tried),
+                "factorizations": minimiser.factorizations,
+                "back_solves": minimiser.back_solves,
+                "gap_searches": sum(line.searches for one in tried for line in one.lines),
+                "curved_elements": curved,
+                "estimates": 0,
+                "equilibrations": 0,
+                "evaluations": evaluations() - before,
+            },
+            tree=RefinementTree.root(mesh),
+        )
+
+    first = None
+    try:
+        first = attempt(problem, start.discrete if start is not None and same else None)
+        doubt: ContactError | None = hardly_held(first.discrete, first.minimiser)
+        if doubt is None:
+            return first
+    except (ConvergenceError, NoEquilibriumError) as error:
+        doubt = error
+    doubted = _doubted(problem, mesh, order, doubt, tried)
+    if first is not None and not doubted:
+        return first
+    exchanged = {i: pair.swapped() for i, pair in doubted.items() if pair.gap is None}
+    if not exchanged:
+        raise doubt
+    pairs = [exchanged.get(i, contact) for i, contact in enumerate(problem.contact)]
+    try:
+        second = attempt(replace(problem, contact=pairs), tried[0] if tried else None)
+    except (ContactError, ValueError):
+        raise doubt from None
+    if hardly_held(second.discrete, second.minimiser) is None:
+        names = ", ".join(f'Contact("{c.primary}", "{c.secondary}")' for c in exchanged.values())
+        secondaries = ", ".join(f'"{c.secondary}"' for c in exchanged.values())
+        warn(
+            f"no solution was found with the roles given in {names}, and was found with roles "
+            f"exchanged: {secondaries} carries the contact points, and contact_force acts on its "
+            'body. Exchange the names, or give roles="auto", which mostly chooses the body without '
+            "support"
+        )
+        return second
+    if first is None or abs(first.energy - second.energy) > ALIKE * abs(second.energy):
+        raise doubt
+    return first  # so are the bodies made, not the rows
+
+
+def _doubted(
+    problem: Problem, mesh: ng.Mesh, order: int, error: ContactError, tried: list[DiscreteProblem]
+) -> dict[int, Contact]:
+    """Pairs by number, with roles decided, whose primary is of a body that supports leave free.
+
+    Normals of a hole, at points of a pin that lies elsewhere in it, all but resist the turning of
+    the pin, with forces that are not there; its own normals leave it free.
+    """
+    if isinstance(error, NoEquilibriumError):
+        bodies = error.motion.bodies
+    else:
+        bodies = [name for one in tried if one.rigid for name in one.rigid.free.names]
+    trace, names = boundary_trace(mesh, order, model_of(problem)), mesh.GetMaterials()
+    decided = [with_roles(trace, contact) for contact in problem.contact]
+    primaries = [trace.body[trace.segments(pair.primary)] for pair in decided]
+    return {
+        number: pair
+        for number, (pair, body) in enumerate(zip(decided, primaries, strict=True))
+        if pair.primary is not None and any(names[i] in bodies for i in np.unique(body))
+    }
 
 
 def adapt(
@@ -259,7 +377,7 @@ def _first_level(
         raise ValueError(f"maxh={maxh} has no effect on the mesh of start; give one of them")
     else:
         _check_continuation(problem, start, order, element)
-        mesh = _tree(start).mesh
+        mesh = start.tree.mesh
     problem.check(mesh)
     mesh, _ = curve(mesh, order, element)
     if unknowns(mesh, order, element) > max_dofs:
@@ -288,11 +406,6 @@ def _check_continuation(problem: Problem, start: Solution, order: int, element: 
         )
 
 
-def _tree(start: Solution) -> RefinementTree:
-    """Of the elements of `start`; its own mesh is the first one of a sequence that starts there."""
-    return start.tree or RefinementTree.root(start.mesh)
-
-
 def _first_plan(
     problem: Problem, mesh: ng.Mesh, refinement: Refinement, start: Solution | None
 ) -> Plan:
@@ -306,7 +419,7 @@ def _first_plan(
     goal = refinement.tolerance
     if refinement.guaranteed and goal is not None:
         goal /= _bound_ratio(start) if start.bounded else BOUND_RATIO
-    return continued(problem, start, replace(plan, tree=_tree(start)), refinement, goal)
+    return continued(problem, start, replace(plan, tree=start.tree), refinement, goal)
 
 
 def _is_exact(solution: Solution) -> bool:
@@ -329,30 +442,23 @@ def levels(
     The mesh is curved as the element asks, and the first of the sequence of `start`, a solution
     for another load.
     """
-    element, goal, guaranteed = (
-        refinement.element,
-        refinement.tolerance or 0.0,
-        refinement.guaranteed,
-    )
-    solution: Solution | None = None
+    goal, guaranteed = refinement.tolerance or 0.0, refinement.guaranteed
+    element, solution = refinement.element, None
     # Bound over estimate, by the last bound that was made.
     ratio, warned, plan = BOUND_RATIO, False, _first_plan(problem, mesh, refinement, start)
     while unknowns(plan.mesh, plan.order, element) <= refinement.max_dofs:
         if solution is not None:  # its factorisation is of no use to the next one
             solution.discrete.systems.forget()
-        solution = solve_on(Solution, problem, plan.mesh, plan.order, element, solution or start)
+        solution = solve_on(problem, plan.mesh, plan.order, element, solution or start)
         problem = solution.problem  # roles that fail are exchanged once
         solution = replace(solution, adaptive=True, tree=plan.tree)
         narrow = unresolved(problem, solution.mesh, in_bounds=guaranteed)
         error = math.inf
         if guaranteed:
             refuse_bound(problem, solution.discrete.space.trace, solution.pairs)
-            if not narrow and (
-                solution.bounded or ratio * solution.relative_error_estimate <= goal
-            ):
-                error = solution.relative_error_bound
-                if solution.relative_error_estimate > 0:
-                    ratio = _bound_ratio(solution)
+            hoped = ratio * solution.relative_error_estimate
+            if not narrow and (solution.bounded or hoped <= goal):
+                error, ratio = solution.relative_error_bound, _bound_ratio(solution)
         yield solution
         estimate = solution.relative_error_estimate
         if not np.isfinite(solution.error_estimate):  # it would mark nothing, for ever
@@ -377,24 +483,48 @@ def levels(
             warn_of_limit(solution.discrete.space.trace, ends=plan.ends)
         if plan.ends:
             return
-    if solution is not None and not narrow:  # of which there is a warning
-        _warn_of_missed(solution, refinement, error, outside=bool(small.any()))
-
-
-def _warn_of_missed(
-    solution: Solution, refinement: Refinement, error: float, *, outside: bool
-) -> None:
-    """Warn where `max_dofs` keeps the last solution out of the tolerance.
-
-    By its `error` estimate, `outside` of the corners of contradictory supports, or by its bound.
-    """
-    if refinement.guaranteed:
-        error = solution.relative_error_bound
-    if refinement.tolerance is not None and error > refinement.tolerance:
-        what = "bound" if refinement.guaranteed else "estimate"
-        what += " outside of the corners of contradictory supports" if outside else ""
+    if solution is None or narrow or goal == 0.0:  # of narrow data there is a warning
+        return
+    error = solution.relative_error_bound if guaranteed else error
+    if error > goal:
+        what = "bound" if guaranteed else "estimate"
+        what += " outside of the corners of contradictory supports" if small.any() else ""
         warn(
-            f"the {what} is {error:.2e}, more than tolerance={refinement.tolerance:g}: the next "
-            f"level would exceed max_dofs={refinement.max_dofs:g}; give a larger max_dofs or "
-            "tolerance"
+            f"the {what} is {error:.2e}, more than tolerance={goal:g}: the next level would exceed "
+            f"max_dofs={refinement.max_dofs:g}; give a larger max_dofs or tolerance"
         )
+
+
+def warn_of_doubts(solution: Solution, told: set[object], *, last: bool) -> None:
+    """Warn of what may be wrong but was not `told` before, and add it there.
+
+    What a finer mesh mends is left out unless none follows: the mesh is the `last`.
+    """
+    found = doubts(solution, last=last)
+    for doubt, message in found.items():
+        if doubt not in told:
+            warn(message)
+    told.update(found)
+    if last:
+        warn_of_unresolved(solution.problem, solution.mesh)
+
+
+def with_warnings(solutions: Iterator[Solution]) -> Generator[Solution]:
+    """The levels of a run, with a warning of whatever may be wrong, once.
+
+    What no mesh mends is said at the first level that shows it, what refinement mends at the last.
+    """
+    told: set[object] = set()
+    estimates: list[float] = []
+    solution = None
+    for solution in solutions:
+        warn_of_doubts(solution, told, last=False)
+        yield solution
+        if unresolved(solution.problem, solution.mesh):  # estimates rise when data are seen
+            estimates.clear()
+        estimates.append(solution.relative_error_estimate)
+        if "estimates" not in told and estimates_rise(estimates):
+            told.add("estimates")
+            warn(doubt_of_refinement(solution.mesh, solution.indicators, estimates))
+    if solution is not None:
+        warn_of_doubts(solution, told, last=True)

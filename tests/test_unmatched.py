@@ -16,8 +16,8 @@ from ngcontact import (
     ConvergenceError,
     Elastic,
     Problem,
-    one_mesh,
     solve,
+    solving,
 )
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries.region import (
@@ -102,14 +102,14 @@ def pin_at_the_bottom(*pairs):
 def test_roles_that_fail_are_exchanged_with_a_warning(monkeypatch):
     """What is solved is the problem with roles the other way round, on the same mesh."""
     given = pin_at_the_bottom(("hole", "pin"))
-    mesh, solved = first_mesh(given, 0.35), one_mesh.minimise_energy
+    mesh, solved = first_mesh(given, 0.35), solving.minimise_energy
 
     def fails_with_the_hole(discrete, active):
         if discrete.problem.contact[0].secondary == "hole":
             raise ConvergenceError("the active set did not settle")
         return solved(discrete, active)
 
-    monkeypatch.setattr(one_mesh, "minimise_energy", fails_with_the_hole)
+    monkeypatch.setattr(solving, "minimise_energy", fails_with_the_hole)
     with pytest.warns(ContactWarning, match=r'given in Contact\("hole", "pin"\).*roles="auto"'):
         solution = solve(given, mesh, order=2)
     assert [(c.secondary, c.primary) for c in solution.problem.contact] == [("pin", "hole")]
@@ -220,7 +220,7 @@ def test_other_roles_are_not_tried_where_the_gap_is_given(monkeypatch):
         calls.append(discrete.problem.contact)
         raise ConvergenceError(f"attempt {len(calls)}")
 
-    monkeypatch.setattr(one_mesh, "minimise_energy", fail)
+    monkeypatch.setattr(solving, "minimise_energy", fail)
     mesh = first_mesh(problem, 0.5)
     with pytest.raises(ConvergenceError, match="attempt 1"):
         solve(problem, mesh, order=2)
