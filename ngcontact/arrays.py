@@ -1,10 +1,11 @@
-"""Types of arrays, squares that stay in the range of numbers, normals, sparse arrays."""
+"""Types of arrays, rows of records, squares in the range of numbers, normals, sparse arrays."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any, TypeAlias
+from collections.abc import Callable, Sequence
+from dataclasses import fields
+from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,6 +17,7 @@ Mask: TypeAlias = NDArray[np.bool_]
 Integers: TypeAlias = NDArray[np.integer]
 
 
+Record = TypeVar("Record")  # a dataclass of arrays that have a row for each of the same things
 Solve = Callable[[Array], Array]
 Factor = Callable[[Mask], Solve]
 
@@ -49,6 +51,27 @@ def from_triplets(
     index = np.int32 if largest <= np.iinfo(np.int32).max else np.int64
     at = np.asarray(rows, dtype=index), np.asarray(columns, dtype=index)
     return sp.csr_array((values, at), shape=shape)
+
+
+def field_names(record: Any) -> list[str]:
+    """Names of the fields of a dataclass, or of one of its objects."""
+    return [field.name for field in fields(record)]
+
+
+def rows_of(record: Record, at: Index | Mask) -> Record:
+    """The rows `at` (k,), numbers or a mask, of all arrays of a record."""
+    return type(record)(*(getattr(record, name)[at] for name in field_names(record)))
+
+
+def joined(records: Sequence[Record]) -> Record:
+    """The rows of all `records`, one after the other; there is at least one record."""
+    kind = type(records[0])
+
+    def stacked(name: str) -> Any:
+        arrays = [getattr(record, name) for record in records]
+        return sp.vstack(arrays, format="csr") if sp.issparse(arrays[0]) else np.concatenate(arrays)
+
+    return kind(*map(stacked, field_names(kind)))
 
 
 def across(d: Array) -> Array:

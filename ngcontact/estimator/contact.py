@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.polynomial.legendre import legvander
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, across, joined, rows_of
 from ..contact import (
     FACING_COSINE,
     GAP_ROUND_OFF,
@@ -48,18 +48,6 @@ DIVISIONS = 4  # of a piece on which the gap is no polynomial
 MAX_PIECES = 100_000  # pieces looked at, from which no more are divided
 
 
-def _select(pieces: FacingPieces, at: Index) -> FacingPieces:
-    """Pieces of the numbers `at` (n,)."""
-    return FacingPieces(**{name: values[at] for name, values in vars(pieces).items()})
-
-
-def _joined(parts: Sequence[FacingPieces]) -> FacingPieces:
-    """All pieces, one after the other."""
-    return FacingPieces(
-        **{name: np.concatenate([vars(x)[name] for x in parts]) for name in vars(parts[0])}
-    )
-
-
 def facing_pieces(
     boundary: BoundaryTrace, line: ContactLine, carrying: Mask
 ) -> tuple[FacingPieces, int]:
@@ -73,12 +61,12 @@ def facing_pieces(
     else:
         facing = _opposite_segments(boundary, line, carrying)
         whole = np.flatnonzero(facing >= 0)
-    ends = np.zeros(len(whole)), np.ones(len(whole))
-    pieces = FacingPieces(whole, *ends, facing[whole], np.full(len(whole), 0.5))
+    zero = np.zeros(len(whole))
+    pieces = FacingPieces(whole, zero, zero + 1, facing[whole], zero + 0.5)
     rest = np.flatnonzero((facing < 0) & (line.faces | carrying))
     if line.contact.primary is not None and len(rest):
         parts = _divided(boundary, line, rest)
-        pieces = _joined([pieces, replace(parts, local=rest[parts.local])])
+        pieces = joined([pieces, replace(parts, local=rest[parts.local])])
     return pieces, len(whole)
 
 
@@ -135,12 +123,12 @@ def covered_parts(
         return own
     low, high = np.zeros(len(segment)), np.ones(len(segment))
     if whole < len(segment):
-        rest = _select(pieces, np.arange(whole, len(segment)))
+        rest = rows_of(pieces, np.arange(whole, len(segment)))
         s = np.concatenate([rest.start, rest.stop])
-        twice = _joined([rest, rest])
+        twice = joined([rest, rest])
         d, _ = directions(boundary, line, twice.local, s)
         x = boundary.point(line.segments[twice.local], s)
-        t = _opposite(boundary, x, d, twice.facing, twice.opposite)
+        t = crossings(x, across(d), boundary.curve, twice.facing, twice.opposite, ARRIVED)
         inside = (s > 0) & (s < 1)  # where a vertex of the primary is passed
         ends = np.where(inside, np.round(t), t).reshape(2, -1)
         low[whole:], high[whole:] = np.sort(ends, axis=0)
@@ -199,15 +187,15 @@ def followed_gap(
         allowed = UNRESOLVED * np.ptp(at_rule, axis=1) + NO_GAP * np.abs(at_rule).max()
         rough = np.abs(at_between - at_rule @ follow.T).max(axis=1) > allowed
         rough &= number < MAX_PIECES
-        done.append(_select(pieces, np.flatnonzero(~rough)))
-        pieces = _select(pieces, np.repeat(np.flatnonzero(rough), DIVISIONS))
+        done.append(rows_of(pieces, np.flatnonzero(~rough)))
+        pieces = rows_of(pieces, np.repeat(np.flatnonzero(rough), DIVISIONS))
         step = (pieces.stop - pieces.start) / DIVISIONS
         start = pieces.start + step * np.tile(np.arange(DIVISIONS), rough.sum())
         pieces = replace(pieces, start=start, stop=start + step)
     if len(done) == 1:
         return done[0]
-    found = _joined(done)
-    return _select(found, np.lexsort((found.start, found.local)))
+    found = joined(done)
+    return rows_of(found, np.lexsort((found.start, found.local)))
 
 
 def directions(
@@ -276,16 +264,17 @@ def facing_points(
     if line.contact.primary is None:
         s_there, distance = np.zeros(len(s)), np.zeros(len(s))
     else:
-        s_there = _opposite(boundary, x, d, facing, pieces.opposite[part])
+        near = pieces.opposite[part]
+        s_there = crossings(x, across(d), boundary.curve, facing, near, ARRIVED)
         offset = at(boundary.curve, facing, s_there) - x
         distance = (offset * d).sum(axis=1)
         distance[np.abs(distance) <= GAP_ROUND_OFF * np.abs(x).max(initial=0.0)] = 0.0
         # Of (y(t) - x(s)) x d(s) = 0: dt / ds = (x' x d - (y - x) x d') / (y' x d).
         there = boundary.derivative(facing, s_there)
-        across, size = _cross(there, d), np.linalg.norm(there, axis=1)
-        along |= np.abs(across) <= FACING_COSINE * size
-        across = np.where(along, size, across)
-        rate = (_cross(slope, d) - _cross(offset, turn)) / across
+        turning, size = (there * across(d)).sum(axis=1), np.linalg.norm(there, axis=1)
+        along |= np.abs(turning) <= FACING_COSINE * size
+        turning = np.where(along, size, turning)
+        rate = ((slope * across(d)).sum(axis=1) - (offset * across(turn)).sum(axis=1)) / turning
         length = size * boundary.measure(facing, s_there)
         stretch[1] = np.abs(rate) * length / speed
     weight[along], stretch[:, along] = 0.0, 1.0
@@ -293,20 +282,6 @@ def facing_points(
         distance = prescribed_gap(line.contact, boundary, segment, s, x)
     own, other = BoundaryPoints(segment, s, weight), BoundaryPoints(facing, s_there, weight)
     return FacingPoints(local, own, other, d, distance, stretch)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """A x b (k,) of vectors (k, 2)."""
-    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-
-
-def _opposite(boundary: BoundaryTrace, x: Array, d: Array, facing: Index, near: Array) -> Array:
-    """Parameters (k,) on segments `facing` (k,) on the rays from `x` (k, 2) along `d` (k, 2).
-
-    Those that Newton's method reaches from `near` (k,).
-    """
-    across = np.column_stack([-d[:, 1], d[:, 0]])
-    return crossings(x, across, boundary.curve, facing, near, ARRIVED)
 
 
 def closing_energy(
@@ -359,8 +334,9 @@ def on_contact(
     boundary, line = solution.boundary, pair.line
     nodal, active = at_nodes(boundary, pair, pairs)
     pieces, whole = facing_pieces(boundary, line, np.asarray(np.isfinite(nodal).any(axis=1)))
+    covered = covered_parts(boundary, line, pieces, whole)
     if len(pieces.local) == 0:
-        return BoundaryTerms()
+        return BoundaryTerms([], [], covered)
     order = 2 * solution.order + DATA_BONUS
     points = facing_points(boundary, line, followed_gap(boundary, line, pieces, order), order)
     nodal = _pressure_on_segments(nodal, boundary.places(line.segments))
@@ -369,23 +345,20 @@ def on_contact(
     sides = [_side(solution, points, pressure, own=True)]
     if line.contact.primary is not None:
         sides.append(_side(solution, points, -pressure, own=False))
-    residuals = []
-    for side in sides:  # (3.11), (3.11'): no friction
-        segment, s, _ = side.points
-        share = PressureShare(np.arange(len(s)), segment, s, side.across[..., 1])
-        tangential = side.across[..., 0]
-        term = BoundaryResidual("tangential", side.element, side.weight, tangential, [share])
-        residuals.append(term)
+    residuals, every = [], np.arange(len(pressure))
+    for x in sides:  # (3.11), (3.11'): no friction
+        share = PressureShare(every, x.points.segment, x.points.s, x.across[..., 1])
+        terms = BoundaryResidual("tangential", x.element, x.weight, x.across[..., 0], [share])
+        residuals.append(terms)
     residuals += _normal(sides, pressure, full, line.contact.bilateral)  # (3.10), (3.10')
     # Where both bodies meet the softer gives way to a depth.
     stiffness = np.min([side.stiffness for side in sides], axis=0)
     closed, depth = _gap_squares(solution, line, points, pressure, full, stiffness)
-    squares = []
+    squares, weight = [], points.own.weight / len(sides)
     for side in sides:
-        share_of_side = points.own.weight / len(sides)
-        for name, values in (("complementarity", closed), ("penetration", depth)):
-            squares.append(Squares(name, side.element, share_of_side * values))
-    return BoundaryTerms(residuals, squares, covered_parts(boundary, line, pieces, whole))
+        squares.append(Squares("complementarity", side.element, weight * closed))
+        squares.append(Squares("penetration", side.element, weight * depth))
+    return BoundaryTerms(residuals, squares, covered)
 
 
 def at_nodes(

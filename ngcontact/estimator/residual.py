@@ -55,7 +55,7 @@ from ..problem import MeshArrays
 from ..quadrature import features_of, loads_of, pieces, rough_moduli, rough_segments
 from ..solved import Solved
 from .contact import between_nodes, closing_energy, on_contact, remaining
-from .pressure_correction import PressureCorrection, correcting_pressure
+from .pressure_correction import correcting_pressure
 from .terms import (
     DATA_BONUS,
     BoundaryPoints,
@@ -300,32 +300,36 @@ def _squares(
     solution: ScaledSolution, terms: Sequence[BoundaryTerms], corrected_from: float
 ) -> dict[str, Array]:
     """Squared contributions (ne,) by name, after the pressure has been corrected where needed."""
-    parts = {"element": np.zeros(solution.mesh.ne)}
+    problem, mesh, order = solution.problem, solution.mesh, solution.order
+    parts = {"element": np.zeros(mesh.ne)}
 
     def add(name: str, element: Index, values: Array) -> None:
-        np.add.at(parts.setdefault(name, np.zeros(solution.mesh.ne)), element, values)
+        np.add.at(parts.setdefault(name, np.zeros(mesh.ne)), element, values)
 
-    if solution.problem.varying:
+    if problem.varying:
         parts["oscillation"] = oscillation(solution)
     force, of_loads = _body_forces(solution)
     for squares in [x for term in terms for x in term.squares] + of_loads:
-        add(squares.name, squares.element, squares.values)
+        add(*squares)
     residuals = [x for term in terms for x in term.residuals]
     divergence, jump = divergence_and_jump(solution.projected)
     divergence = solution.model.divergence(divergence, solution.stress, solution.normal_stress)
     if force is not None:
         divergence += force  # (3.5)
-    names = nearly_incompressible(
-        solution.problem, solution.mesh, corrected_from, solution.incompressibility
-    )
-    correction = None
+    degree, correction = solution.projected.space.globalorder, None
+    names = nearly_incompressible(problem, mesh, corrected_from, solution.incompressibility)
     if names:
         correction = correcting_pressure(solution, list(names), (divergence, jump), residuals)
         parts["incompressibility"] = correction.squares()
         of_pressure = correction.divergence_and_jump()
         divergence += of_pressure[0]
         jump += of_pressure[1]
-    parts |= _inside(solution, divergence, jump, correction)
+        degree = order
+    data = DATA_BONUS if problem.force else 0
+    if degree or data:  # else there is no divergence
+        inside = element_integral(solution, divergence, 2 * degree + data)
+        parts["element"] = solution.element_weight * inside
+    parts["jump"] = solution.edge_weight / 2 * edge_integral(solution, jump, 2 * degree)
     for term in residuals:
         residual = term.residual.copy()
         if correction is not None:
@@ -355,23 +359,6 @@ def _body_forces(
             rest = solution.element_weight * (found.rest / solution.unit) ** 2 * solution.measure
             squares += [Squares("element", every, rest), solution.missed(every, found.missed)]
     return mesh.MaterialCF(forces, default=ng.CF((0, 0))), squares
-
-
-def _inside(
-    solution: ScaledSolution,
-    divergence: ng.CoefficientFunction,
-    jump: ng.CoefficientFunction,
-    correction: PressureCorrection | None,
-) -> dict[str, Array]:
-    """Squared residuals (ne,) in the elements and on the edges between them."""
-    data = DATA_BONUS if solution.problem.force else 0
-    degree = solution.order if correction else solution.projected.space.globalorder
-    element = np.zeros(solution.mesh.ne)
-    if degree or data:  # else there is no divergence
-        squares = element_integral(solution, divergence, 2 * degree + data)
-        element = solution.element_weight * squares
-    edges = edge_integral(solution, jump, 2 * degree)
-    return {"element": element, "jump": solution.edge_weight / 2 * edges}
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
@@ -33,11 +33,6 @@ class Parts:
     start: Array  # (r,), an interval of its parameter
     stop: Array  # (r,)
 
-    @classmethod
-    def none(cls) -> Parts:
-        """No parts."""
-        return cls(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))
-
     def points(self, order: int) -> tuple[Index, BoundaryPoints]:
         """Number of its part (k,) and place of each Gauss point exact to a degree, weights in s."""
         rule, weight = gauss(order)
@@ -48,8 +43,7 @@ class Parts:
         return part, BoundaryPoints(self.segment[part], s, weights)
 
 
-@dataclass(frozen=True, eq=False)
-class PressureShare:
+class PressureShare(NamedTuple):
     """What a corrected pressure delta at points of the boundary adds to residuals."""
 
     at: Index  # (n,), numbers of the residuals
@@ -58,8 +52,7 @@ class PressureShare:
     factor: Array  # (n, c) of delta, without a unit
 
 
-@dataclass(frozen=True, eq=False)
-class BoundaryResidual:
+class BoundaryResidual(NamedTuple):
     """Residuals of the stress at k points of the boundary, in a part `name` of the estimate."""
 
     name: str
@@ -69,8 +62,7 @@ class BoundaryResidual:
     shares: list[PressureShare]
 
 
-@dataclass(frozen=True, eq=False)
-class Squares:
+class Squares(NamedTuple):
     """Squared residuals of the displacement, which no pressure changes."""
 
     name: str
@@ -78,13 +70,12 @@ class Squares:
     values: Array  # (k,), with their weights
 
 
-@dataclass(frozen=True, eq=False)
-class BoundaryTerms:
+class BoundaryTerms(NamedTuple):
     """What the `covered` parts of the boundary contribute."""
 
-    residuals: list[BoundaryResidual] = field(default_factory=list)
-    squares: list[Squares] = field(default_factory=list)
-    covered: Parts = field(default_factory=Parts.none)
+    residuals: list[BoundaryResidual]
+    squares: list[Squares]
+    covered: Parts
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,15 +163,13 @@ def oscillation(solution: ScaledSolution) -> Array:
     """Squares (ne,) of |sigma_h - Pi sigma_h| in the norm of C^-1, where data in the body vary."""
     problem, mesh, projected = solution.problem, solution.mesh, solution.projected
     v = ng.L2(mesh, order=0).TestFunction()
-    f = ng.LinearForm(v.space)
+    forms, miss = [], components(solution.stress) - projected
     for body, law in problem.varying.items():
-        miss = components(solution.stress) - projected
         compliance = solution.model.compliance(law.voigt(problem.model) / solution.modulus)
         density = solution.model.weighted(ng.InnerProduct(compliance * miss, miss))
-        for dx in law_measures(mesh, body, 2 * projected.space.globalorder, solution.rough):
-            f += density * v * dx
-    f.Assemble()
-    return np.array(f.vec.FV().NumPy())
+        measures = law_measures(mesh, body, 2 * projected.space.globalorder, solution.rough)
+        forms += [density * v * dx for dx in measures]
+    return _assembled(v, *forms)
 
 
 def divergence_and_jump(
@@ -226,9 +215,10 @@ def edge_integral(solution: ScaledSolution, jump: ng.CoefficientFunction, order:
     return mu * _assembled(v, least * squares * dx)
 
 
-def _assembled(v: ng.comp.ProxyFunction, form: ng.comp.SumOfIntegrals) -> Array:
-    """Values (ne,) of a form linear in the function v, constant on each element."""
+def _assembled(v: ng.comp.ProxyFunction, *forms: ng.comp.SumOfIntegrals) -> Array:
+    """Values (ne,) of the sum of forms linear in the function v, constant on each element."""
     f = ng.LinearForm(v.space)
-    f += form
+    for form in forms:
+        f += form
     f.Assemble()
     return np.array(f.vec.FV().NumPy())

@@ -10,12 +10,13 @@ import gzip
 import os
 import pickle
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import ngsolve as ng
 
+from ..arrays import field_names
 from ..discrete import reassembled
 from ..fem import assemble, boundary_trace, model_of
 from ..mesh import keep_parents, vertex_parents
@@ -32,14 +33,14 @@ def state_of(solution: Solved) -> dict[str, Any]:
     """What a solution is made of again by `restored`, all of it fit to be pickled."""
     discrete, plain = solution.discrete, {"discrete", "displacement"}
     discrete.space.require_mesh()
-    own = {name: getattr(solution, name) for name in _names(solution) if name not in plain}
+    own = {name: getattr(solution, name) for name in field_names(solution) if name not in plain}
     own |= {name: vars(solution)[name] for name in MADE if name in vars(solution)}
-    arrays = {name: getattr(discrete, name) for name in _names(discrete)}
+    arrays = {name: getattr(discrete, name) for name in field_names(discrete)}
     for name in ("problem", "space", "program", "systems"):
         del arrays[name]
     if discrete.rigid is not None:
         arrays["rigid"] = discrete.rigid.on(None)
-    program = {name: getattr(discrete.program, name) for name in _names(discrete.program)}
+    program = {name: getattr(discrete.program, name) for name in field_names(discrete.program)}
     del program["K"]
     return {
         "own": own,
@@ -63,11 +64,6 @@ def restored(state: dict[str, Any]) -> dict[str, Any]:
     displacement = ng.GridFunction(space.V)
     displacement.vec.FV().NumPy()[:] = state["displacement"]
     return own | {"discrete": discrete, "displacement": displacement}
-
-
-def _names(data: Any) -> list[str]:
-    """Names of the fields of a dataclass."""
-    return [field.name for field in fields(data)]
 
 
 def save(solution: Solved, path: str | os.PathLike[str], version: str) -> Path:

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, joined, rows_of
 from ..fem import BoundaryTrace, von_mises
-from ..output import full_stress
+from ..output import full_stress, principal_stresses
 from ..problem import MeshArrays, body_mask, regions_of
 from ..quadrature import SampledElements
 from ..solved import Solved
@@ -33,10 +33,6 @@ class Location:
     element: Index  # (q,)
     reference: Array  # (q, 2), in NGSolve's reference triangle
 
-    def of(self, kept: Mask) -> Location:
-        """The incidences `kept` (q,)."""
-        return Location(self.point[kept], self.element[kept], self.reference[kept])
-
 
 def locate(trace: BoundaryTrace, points: Array) -> Location:
     """Elements of the mesh of `trace` that contain the `points` (k, 2), lengths.
@@ -45,8 +41,7 @@ def locate(trace: BoundaryTrace, points: Array) -> Location:
     """
     finder = _Finder(trace)
     chunks = np.array_split(np.arange(len(points)), max(1, -(-len(points) // CHUNK)))
-    parts = [vars(finder.find(points, at)) for at in chunks]
-    return Location(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+    return joined([finder.find(points, at) for at in chunks])
 
 
 class _Finder:
@@ -114,8 +109,13 @@ class _Finder:
                 break
             values = triangles.evaluate(mapped, element[near], reference[near, None])[:, 0]
             miss = points[near] - values[:, :2]
+            (p, q, r, t), (mx, my) = (
+                values[:, 2:].T,
+                miss.T,
+            )  # the Jacobian matrix, by Cramer's rule
             with np.errstate(all="ignore"):
-                step = _solved(values[:, 2:].reshape(-1, 2, 2), miss)
+                step = np.stack([t * mx - q * my, p * my - r * mx], axis=1)
+                step /= (p * t - q * r)[:, None]
             step = np.clip(np.nan_to_num(step), -0.5, 0.5)
             reference[near] = np.clip(reference[near] + step, -2, 3)
             near = near[np.abs(step).max(axis=1) > INSIDE / 100]
@@ -138,13 +138,6 @@ class _Finder:
             scale = np.abs(points[at]).max(axis=1)
             within[at] = off <= INSIDE * trace.lengths(segment[at]) + ROUND_OFF * scale
         return within
-
-
-def _solved(matrices: Array, right: Array) -> Array:
-    """Solutions (q, 2) of systems with `matrices` (q, 2, 2) and `right` (q, 2) sides."""
-    (a, b), (c, d) = np.moveaxis(matrices, 0, 2)
-    x, y = right.T
-    return np.stack([d * x - b * y, a * y - c * x], axis=1) / (a * d - b * c)[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,23 +165,23 @@ class Values:
     out_of_plane_stress: Array
 
     @property
+    def _components(self) -> Array:
+        """Stresses xx, yy, xy, zz (k, 4)."""
+        (xx, xy), (_, yy) = np.moveaxis(self.stress.reshape(-1, 2, 2), 0, 2)
+        return np.stack([xx, yy, xy, self.out_of_plane_stress.ravel()], axis=1)
+
+    @property
     def von_mises(self) -> Array:
         """Von Mises stress (...,)."""
-        components = [self.stress[..., i, j] for i, j in ((0, 0), (1, 1), (0, 1))]
-        stress = np.stack([*components, self.out_of_plane_stress], axis=-1)
-        known = np.isfinite(stress).all(axis=-1)
-        result = np.full(self.body.shape, np.nan)
-        result[known] = von_mises(stress[known])
-        return result
+        known = self.body.ravel() != ""
+        result = np.full(known.shape, np.nan)
+        result[known] = von_mises(self._components[known])
+        return result.reshape(self.body.shape)
 
     @property
     def principal_stresses(self) -> Array:
         """The three principal stresses (..., 3), the largest first."""
-        half = (self.stress[..., 0, 0] - self.stress[..., 1, 1]) / 2
-        mean = (self.stress[..., 0, 0] + self.stress[..., 1, 1]) / 2
-        radius = np.hypot(half, self.stress[..., 0, 1])
-        three = np.stack([mean + radius, mean - radius, self.out_of_plane_stress], axis=-1)
-        return np.asarray(-np.sort(-three, axis=-1))
+        return principal_stresses(self._components).reshape(*self.body.shape, 3)
 
     @property
     def distance(self) -> Array:
@@ -198,16 +191,13 @@ class Values:
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """A table by columns (k,), one row a point, as data frames and files are made from."""
-        s, three = self.stress.reshape(-1, 2, 2), self.principal_stresses.reshape(-1, 3)
         x, u = self.points.reshape(-1, 2), self.displacement.reshape(-1, 2)
-        return {
-            **{"x": x[:, 0], "y": x[:, 1], "body": self.body.ravel()},
-            **{"ux": u[:, 0], "uy": u[:, 1]},
-            **{"sxx": s[:, 0, 0], "syy": s[:, 1, 1], "sxy": s[:, 0, 1]},
-            "szz": self.out_of_plane_stress.ravel(),
-            "von_mises": self.von_mises.ravel(),
-            **{f"principal_{k + 1}": three[:, k] for k in range(3)},
-        }
+        columns: dict[str, NDArray[Any]] = {"x": x[:, 0], "y": x[:, 1], "body": self.body.ravel()}
+        columns |= {"ux": u[:, 0], "uy": u[:, 1]}
+        columns |= dict(zip(("sxx", "syy", "sxy", "szz"), self._components.T, strict=True))
+        columns["von_mises"] = self.von_mises.ravel()
+        three = self.principal_stresses.reshape(-1, 3)
+        return columns | {f"principal_{k + 1}": three[:, k] for k in range(3)}
 
 
 def values_at(
@@ -256,46 +246,32 @@ def _points(points: Any) -> Array:
 
 def _in_bodies(trace: BoundaryTrace, points: Array, body: str | None, outside: str) -> Location:
     """Elements of each of `points` (k, 2), all of one body."""
-    mesh, found = trace.mesh, locate(trace, points)
-    names, region = mesh.GetMaterials(), MeshArrays(mesh).bodies
+    mesh, view, kept = trace.mesh, MeshArrays(trace.mesh), (found := locate(trace, points))
+    names = np.array(mesh.GetMaterials())
     if body is not None:
         [chosen] = regions_of(mesh, "body", [body], body_mask).values()
-        kept = found.of(chosen[region[found.element]])
-    else:
-        kept = found
+        kept = rows_of(found, chosen[view.bodies[found.element]])
     missing = np.setdiff1d(np.arange(len(points)), kept.point)
     if len(missing) and outside == "error":
         x, y = points[missing[0]]
-        others = {names[region[k]] for k in found.element[found.point == missing[0]]}
-        what = f'body "{body}"' if others else "all bodies"
-        where = f', but in "{"|".join(sorted(others))}"' if others else ""
+        others = np.unique(names[view.bodies[found.element[found.point == missing[0]]]])
+        what = f'body "{body}"' if len(others) else "all bodies"
+        where = f', but in "{"|".join(others)}"' if len(others) else ""
         raise ValueError(
             f"{len(missing)} of {len(points)} points lie outside of {what}, the first at "
             f'({x:.9g}, {y:.9g}){where}: leave them out, or give outside="nan"'
         )
-    _refuse_ambiguous(mesh, points, kept, [names[k] for k in region[kept.element]])
+    # Successive incidences of one point in bodies of different names, or without a connection.
+    name, piece = names[view.bodies[kept.element]], view.pieces[view.elements[kept.element, 0]]
+    two = (name[1:] != name[:-1]) | (piece[1:] != piece[:-1])
+    two &= kept.point[1:] == kept.point[:-1]
+    if two.any():
+        first = kept.point[1:][two][0]
+        (x, y), which = points[first], np.unique(name[kept.point == first]).tolist()
+        cure = (
+            f'choose one of them by body="{which[0]}"'
+            if len(which) > 1
+            else "give the bodies different names, to choose one of them by body="
+        )
+        raise ValueError(f"the point ({x:.9g}, {y:.9g}) lies in several bodies, {which}: {cure}")
     return kept
-
-
-def _refuse_ambiguous(mesh: ng.Mesh, points: Array, found: Location, names: list[str]) -> None:
-    """Refuse points in several bodies, by `names` of each incidence or by connection."""
-    view = MeshArrays(mesh)
-    piece = view.pieces[view.elements[found.element, 0]]
-    _, name = np.unique(names, return_inverse=True)
-    two = _differ(found.point, name) | _differ(found.point, piece)
-    if not two.any():
-        return
-    first = found.point[1:][two][0]
-    x, y = points[first]
-    which = sorted({names[k] for k in np.flatnonzero(found.point == first)})
-    cure = (
-        f'choose one of them by body="{which[0]}"'
-        if len(which) > 1
-        else "give the bodies different names, to choose one of them by body="
-    )
-    raise ValueError(f"the point ({x:.9g}, {y:.9g}) lies in several bodies, {which}: {cure}")
-
-
-def _differ(point: Index, label: Index) -> Mask:
-    """Where successive incidences of one point (q,) have different labels (q,), (q - 1,)."""
-    return np.asarray((np.diff(point) == 0) & (np.diff(label) != 0))
