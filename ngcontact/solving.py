@@ -23,7 +23,7 @@ from .adaptivity import (
     unresolvable,
     warn_of_limit,
 )
-from .arrays import root_of_squares
+from .arrays import joined, root_of_squares
 from .contact import with_roles
 from .discrete import (
     DiscreteProblem,
@@ -410,8 +410,8 @@ def _first_plan(
     problem: Problem, mesh: ng.Mesh, refinement: Refinement, start: Solution | None
 ) -> Plan:
     """The first level, of which nothing is forecast but by `start`."""
-    found = corners(problem, boundary_trace(mesh, 1))
-    found = found.joined(unresolvable([one.place for one in contradictions(problem, mesh)]))
+    places = unresolvable([one.place for one in contradictions(problem, mesh)])
+    found = joined([corners(problem, boundary_trace(mesh, 1)), places])
     tree = RefinementTree.root(mesh)
     plan = Plan(mesh, refinement.order, found, math.inf, refinement.growth, tree)
     if start is None or _is_exact(start):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Array, Index, Mask, root_of_squares
+from ..arrays import Array, Index, Mask, joined, root_of_squares
 from ..estimator import Estimated
 from ..fem import unknowns
 from ..mesh import curve
@@ -36,7 +36,7 @@ def continued(
         corners=MeshArrays(start.mesh).corners,
         squares=(rest / error) ** 2,
         order=order,
-        singular=first.corners.joined(ends_of_contact(start.pairs)),
+        singular=joined([first.corners, ends_of_contact(start.pairs)]),
     )
     now = start.relative_error_estimate * error / root_of_squares(start.indicators)
     share = (goal or now) / now * HALF ** (-order / 2)  # unknowns ~ error^(-2/p)

@@ -8,7 +8,7 @@ from numbers import Real
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask, root_of_squares
+from ..arrays import Array, Index, Mask, across, joined, root_of_squares
 from ..estimator import Estimated
 from ..fem import ORDERS, check_element, unknowns
 from ..mesh import curve, unresolved
@@ -23,13 +23,6 @@ MARKINGS = 8  # most that one estimate is good for
 WRONG = 2.0  # estimate over its forecast from which it is planned half as far; measured .2 to 1.4
 FIRST = 3  # order that is chosen at least: a first level of order 2 costs as much, and sees less
 GROWTH = 2.0  # of the unknowns up to which the next level is planned at first
-
-
-def _number(name: str, value: object) -> float:
-    """`value`, or a TypeError unless it is a real number."""
-    if isinstance(value, bool) or not isinstance(value, Real):
-        raise TypeError(f"{name}={value!r} is not a number")
-    return float(value)
 
 
 def best_order(error: float) -> int:
@@ -81,14 +74,18 @@ class Refinement:
     def __post_init__(self) -> None:
         """Validate."""
         object.__setattr__(self, "order", check_element(self.order, self.element))
-        if not 0 < _number("theta", self.theta) <= 1:
+        for name in ("theta", "max_dofs", *(["tolerance"] if self.tolerance is not None else [])):
+            value = getattr(self, name)
+            if isinstance(value, bool) or not isinstance(value, Real):
+                raise TypeError(f"{name}={value!r} is not a number")
+        if not 0 < self.theta <= 1:
             raise ValueError(f"theta={self.theta} must lie in (0, 1]; 0.5 is usual")
-        if self.tolerance is not None and not 0 < _number("tolerance", self.tolerance) < 1:
+        if self.tolerance is not None and not 0 < self.tolerance < 1:
             raise ValueError(
                 f"tolerance={self.tolerance} is the error in the energy norm relative to that norm "
                 "and must lie between 0 and 1, like 1e-3 (0.1 %); or None"
             )
-        if not _number("max_dofs", self.max_dofs) > 0:
+        if not self.max_dofs > 0:
             raise ValueError(f"max_dofs={self.max_dofs} must be positive, like 100_000")
         check_bool("guaranteed", self.guaranteed)
         if self.guaranteed and self.tolerance is None:
@@ -163,13 +160,13 @@ def next_plan(
         corners=MeshArrays(mesh).corners,
         squares=(scale * indicators / error) ** 2,
         order=order,
-        singular=last.corners.joined(ends_of_contact(solution.pairs)),
+        singular=joined([last.corners, ends_of_contact(solution.pairs)]),
     )
     growth = 1.0 if jumping.any() else growth
     aim = Aim(now * growth, refinement.max_dofs, share, theta, size)
     refining, share = planned(Refining(problem, mesh), marked, forecast, aim, refinement.element)
     mesh, _ = curve(refining.finished(), order, refinement.element)
-    tree = last.tree.of_parts(refining.origin)
+    tree = replace(last.tree, element=last.tree.element[refining.origin])
     return Plan(mesh, order, last.corners, share * error, growth, tree, stuck, unresolved(mesh))
 
 
@@ -219,7 +216,7 @@ def planned(
 def areas(corners: Array) -> Array:
     """Areas (k,) of triangles with the `corners` (k, 3, 2)."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    return np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]) / 2
+    return np.asarray(np.abs((across(first) * second).sum(axis=1)) / 2)
 
 
 def depths(corners: Array, places: Array) -> Array:
@@ -229,10 +226,10 @@ def depths(corners: Array, places: Array) -> Array:
     """
     origin = corners[..., 0, :]
     first, second, to = corners[..., 1, :] - origin, corners[..., 2, :] - origin, places - origin
-    whole = first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-    along = (to[..., 0] * second[..., 1] - to[..., 1] * second[..., 0]) / whole
-    across = (first[..., 0] * to[..., 1] - first[..., 1] * to[..., 0]) / whole
-    return np.asarray(np.minimum(np.minimum(along, across), 1 - along - across))
+    whole = (across(first) * second).sum(axis=-1)
+    along = (across(to) * second).sum(axis=-1) / whole
+    beside = (across(first) * to).sum(axis=-1) / whole
+    return np.asarray(np.minimum(np.minimum(along, beside), 1 - along - beside))
 
 
 def touching(corners: Array, places: Array) -> Mask:

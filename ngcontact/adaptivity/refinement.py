@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, across
 from ..contact import nodal_line
 from ..fem import BoundaryTrace, boundary_trace, unknowns_of
 from ..mesh import CadEdge, copied
@@ -29,10 +29,6 @@ class RefinementTree:
     def root(mesh: ng.Mesh) -> RefinementTree:
         """Of a mesh that begins a sequence."""
         return RefinementTree(mesh, np.arange(mesh.ne))
-
-    def of_parts(self, parent: Index) -> RefinementTree:
-        """Of a mesh whose elements are parts of the `parent` (k,) elements."""
-        return RefinementTree(self.mesh, self.element[parent])
 
 
 def matched_vertices(trace: BoundaryTrace, contact: Contact) -> dict[int, int]:
@@ -119,11 +115,11 @@ def _move_to_partners(
         normal = np.zeros((len(pairs), 2))
         for edge, at in _by_edge(trace, pairs[:, 0]):
             normal[at] = edge.normal(xy[pairs[at, 0]])
-        axis = np.column_stack([-normal[:, 1], normal[:, 0]])
+        axis = across(normal)
         level = (xy[pairs[:, 0]] * axis).sum(axis=1)
         moving: tuple[int, ...] = (1,)
     else:
-        axis = np.array([-contact.direction[1], contact.direction[0]])
+        axis = across(np.array(contact.direction))
         level = (xy[pairs] @ axis).mean(axis=1)  # C_j of (2.10)
         moving = (0, 1)
     moved = xy.copy()
@@ -140,9 +136,8 @@ def _without_inversion(mesh: ng.Mesh, old: Array, new: Array) -> Array:
     """The new positions, but the old ones at triangles they would turn over."""
     triangles = MeshArrays(mesh).elements
     while True:
-        a, b, c = (new[triangles[:, i]] for i in range(3))
-        area = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
-        turned = np.unique(triangles[area <= 0])
+        a, b, c = np.moveaxis(new[triangles], 1, 0)
+        turned = np.unique(triangles[(across(b - a) * (c - a)).sum(axis=1) <= 0])
         if not (new[turned] != old[turned]).any():
             return new
         new = new.copy()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, joined
 from ..contact import ContactState, ending_segments
 from ..errors import warn
 from ..fem import BoundaryTrace
@@ -87,14 +87,6 @@ class Singularities:
         """Places (j, 2) of infinite energy, lengths."""
         return self.places[self.powers == 0]
 
-    def joined(self, other: Singularities) -> Singularities:
-        """Those of both."""
-        return Singularities(
-            np.concatenate([self.places, other.places]),
-            np.concatenate([self.powers, other.powers]),
-            np.concatenate([self.extents, other.extents]),
-        )
-
 
 def unresolvable(places: Sequence[Array]) -> Singularities:
     """Those at `places` (k, 2) at which supports contradict each other."""
@@ -109,19 +101,19 @@ def _at(places: Array, power: float, extents: Array | float = np.inf) -> Singula
 
 def ends_of_contact(pairs: Sequence[ContactState]) -> Singularities:
     """Where contact turns from binding to non-binding, on both bodies."""
-    found = _at(np.empty((0, 2)), AT_ENDS)
+    found = [_at(np.empty((0, 2)), AT_ENDS)]
     for pair in pairs:
         line, ends = pair.line, pair.transitions
         extent = float(np.linalg.norm(np.ptp(line.position, axis=0))) if line.node.size else 0.0
-        found = found.joined(_at(ends.position, AT_ENDS, extent))
+        found.append(_at(ends.position, AT_ENDS, extent))
         if line.contact.primary is not None:
             inner, outer = line.position[ends.inner], line.position[ends.outer]
             apart = np.linalg.norm(outer - inner, axis=1)
             s = np.linalg.norm(ends.position - inner, axis=1) / np.where(apart > 0, apart, np.inf)
             gap = (1 - s) * line.gap[ends.inner] + s * line.gap[ends.outer]
             facing = ends.position + gap[:, None] * line.direction[ends.inner]
-            found = found.joined(_at(facing, AT_ENDS, extent))
-    return found
+            found.append(_at(facing, AT_ENDS, extent))
+    return joined(found)
 
 
 def _conditions(problem: Problem, trace: BoundaryTrace) -> Index:
@@ -165,5 +157,5 @@ def corners(problem: Problem, trace: BoundaryTrace) -> Singularities:
     np.minimum.at(least, ends, kind)
     np.maximum.at(most, ends, kind)
     changing, inwards = np.flatnonzero(least < most), _reentrant(trace)
-    found = _at(view.vertices[np.setdiff1d(changing, inwards)], AT_CHANGES)
-    return found.joined(_at(view.vertices[inwards], AT_CORNERS))
+    turning = view.vertices[np.setdiff1d(changing, inwards)]
+    return joined([_at(turning, AT_CHANGES), _at(view.vertices[inwards], AT_CORNERS)])
