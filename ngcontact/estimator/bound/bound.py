@@ -180,8 +180,7 @@ def _bound(
     cells = cells_of(trace, new_vertices(trace, reaches, beside), loaded, trace.segments(*whole))
     # 2. Stresses.
     given = boundary_data(problem, cells)
-    least = np.maximum(given.followed(), cells.curved)
-    rules = force_quadrature(problem, cells, degree, least)
+    rules = force_quadrature(problem, cells, degree, np.maximum(given.followed(), cells.curved))
     mu, elements = elements_of(problem, cells, displacement, degree, rules)
     # 3. The gap, on guides and on Gamma_K.
     prescribed = prescribed_on_supports(cells, given, displacement)

@@ -173,10 +173,11 @@ class Places:
         return cells.evaluate(function, np.repeat(self.at, q), flat).reshape(b, q, -1)
 
 
-def places(cells: Cells, at: Index, order: int) -> Places:
+def places(cells: Cells, at: Index, order: int, along: int | None = None) -> Places:
     """Quadrature of degree `order` in triangles `at` (b,), all straight or all with a curved base.
 
-    On curved ones in the distance from the apex and the parameter of the base.
+    On curved ones in the distance from the apex, and in the parameter of the base, there of the
+    degree `along`, by default the same.
 
     Raises
     ------
@@ -184,9 +185,9 @@ def places(cells: Cells, at: Index, order: int) -> Places:
         A curved side goes beyond the middle of its element.
     """
     if len(at) and cells.curved[at[0]]:
-        g, w = gauss(order)
-        sigma, t = (z.ravel() for z in np.meshgrid(g, g, indexing="ij"))
-        local, weight = np.column_stack([sigma * t, 1 - sigma]), np.outer(w * g, w).ravel()
+        (g, w), (h, v) = gauss(order), gauss(order if along is None else along)
+        sigma, t = (z.ravel() for z in np.meshgrid(g, h, indexing="ij"))
+        local, weight = np.column_stack([sigma * t, 1 - sigma]), np.outer(w * g, v).ravel()
     else:
         rule = ng.IntegrationRule(ng.TRIG, order)
         local, weight = np.array(rule.points)[:, :2], np.array(rule.weights)

@@ -282,7 +282,7 @@ def _element(
     source = _of_body(problem.force, cells, at)
     n = min(max(0, degree - 1 - axial), rules.order // 2)
     force, missed = np.zeros((len(at), (n + 1) * (n + 2) // 2, 2)), np.zeros(len(at))
-    pieces, hoop = 1 + rules.least[at], np.zeros(points.weight.shape)
+    pieces, hoop = np.ones(len(at), dtype=np.intp), np.zeros(points.weight.shape)
     if source is not None:
         threshold = dict(zip(problem.force.values(), rules.thresholds, strict=True))[source]
         force, missed, size, pieces = projection(source, cells, at, n, rules, threshold)
@@ -317,7 +317,7 @@ def _element(
         strain=strain,
         source=source,
         force=force,
-        pieces=pieces,
+        pieces=np.maximum(pieces, 1 + rules.followed[at]),
         missed=missed,
         modulus=np.broadcast_to(1 / largest, len(at)),
         combined=combined,

@@ -19,8 +19,10 @@ from .polynomials import projected, scalars
 PARTS_OF_A_SIDE = 4  # of each side
 DIVISIONS = 2  # how often triangles are divided
 SMOOTH_FORCE = 1e-3  # of the largest force: what polynomials miss where triangles are not divided
-CURVED_FACTOR = 2  # times the order of rules on curved triangles, for polynomials in x
-FINER_DEGREES = 4  # degrees by which rules on triangles are above those on their parts
+POLYNOMIAL_FORCE = 1e-8  # of that: what is missed of polynomials by round-off
+SMOOTH_DEGREES = 3  # degrees by which these are above those that stresses balance
+CURVED_FACTOR = 2  # times the order of rules along curves, for polynomials in x
+FINER_DEGREES = 2  # degrees by which rules on triangles are above those on their parts
 LEAST_DEGREE = 3  # degree of stresses on parts: lower ones do not meet all tractions
 FORCES_AT_ONCE = 100  # triangles with forces that are no numbers
 
@@ -57,7 +59,10 @@ class ForceQuadrature:
     degree: int  # of the polynomials that miss it
     levels: int  # how often triangles may be divided
     lowest: int  # order of rules where they may not
-    least: Index  # (n,) how often they are at least
+    least: Index  # (n,) how often they are at least, to see narrow forces
+    # (n,) how often they are balanced in parts to follow tractions and curves, whose resultants
+    # have to be those on the whole: forces that are no polynomials are integrated on parts
+    followed: Index
     thirds: Mask  # (n,) whether parts at corners are in thirds, as of `pattern`
 
     @property
@@ -82,14 +87,18 @@ class ForceQuadrature:
             (shares @ cells.barycentric[at])[:, corners].reshape(-1, 3, 3),
             np.repeat(cells.parent[at], k),
         )
-        least = np.repeat(np.maximum(self.least[at] - (not whole), 0), k)
+        least, followed = (
+            np.repeat(np.maximum(x[at] - (not whole), 0), k) for x in (self.least, self.followed)
+        )
         third, levels = np.repeat(self.thirds[at], k), self.levels - (not whole)
-        return parts, replace(self, levels=levels, least=least, thirds=third)
+        return parts, replace(self, levels=levels, least=least, followed=followed, thirds=third)
 
 
-def force_quadrature(problem: Problem, cells: Cells, degree: int, least: Index) -> ForceQuadrature:
-    """The rules for stresses of a `degree`; triangles are divided `least` (n,) times at least."""
-    mesh, thresholds, most = cells.trace.mesh, [], least.copy()
+def force_quadrature(
+    problem: Problem, cells: Cells, degree: int, followed: Index
+) -> ForceQuadrature:
+    """The rules for stresses of a `degree`; `followed` (n,) as of `ForceQuadrature`."""
+    mesh, thresholds, least = cells.trace.mesh, [], np.zeros(len(cells.triangles), dtype=np.intp)
     for pattern, F in problem.force.items():
         at = np.flatnonzero(np.array(mesh.Materials(pattern).Mask())[cells.bodies])
         thresholds.append(np.inf)
@@ -97,16 +106,17 @@ def force_quadrature(problem: Problem, cells: Cells, degree: int, least: Index) 
             middles = cells.evaluate(F, at, np.full((len(at), 2), 1 / 3))
             thresholds[-1] = SMOOTH_FORCE * float(np.linalg.norm(middles, axis=1).max(initial=0.0))
     if not all(np.isinf(thresholds)):
-        narrow = narrow_forces(problem, mesh, cells.trace.order)
+        least[narrow_forces(problem, mesh, cells.trace.order)[cells.parent]] = 1
+        narrow = np.zeros(mesh.ne, dtype=bool)
         for one in features_of(problem, mesh):
             if one.kind == "force" and len(one.places):
                 view = SampledElements(mesh, 2)
                 at, feature = where_features_are(one.spots, view, np.arange(mesh.ne))
                 narrow[at[view.sizes[at] > PARTS_OF_A_SIDE * one.widths[feature]]] = True
-        most[narrow[cells.parent]] = DIVISIONS
-    n = max(0, degree - 1 - cells.trace.model.extent)
+        least[narrow[cells.parent]] = DIVISIONS
+    n = max(0, degree - 1 - cells.trace.model.extent) + SMOOTH_DEGREES
     order = 2 * max(degree, LEAST_DEGREE) + 2
-    return ForceQuadrature(thresholds, n, DIVISIONS, order, most, least > 0)
+    return ForceQuadrature(thresholds, n, DIVISIONS, order, least, followed, followed > 0)
 
 
 class Samples(NamedTuple):
@@ -127,14 +137,15 @@ def _samples(
         own = np.flatnonzero((cells.curved[at] == bent) & (rules.thirds[at] == third))
         if own.size == 0:
             continue
-        points = places(cells, at[own], rules.order * (CURVED_FACTOR if bent else 1))
+        points = places(cells, at[own], rules.order + bent, CURVED_FACTOR * rules.order)
         weight, values = points.weight, points.evaluate(cells, F)
         rough = np.zeros(len(own), dtype=bool)
         if rules.levels and np.isfinite(threshold):
             P = scalars(rules.degree, cells.corners[at[own]], points.x)
             rest = (values - P @ projected(P, weight, values))[..., axial:]
             square = (weight * (rest**2).sum(axis=2)).sum(axis=1)
-            rough = (square > threshold**2 * weight.sum(axis=1)) | (rules.least[at[own]] > 0)
+            limit = np.where(rules.followed[at[own]] > 0, POLYNOMIAL_FORCE, 1.0) * threshold
+            rough = (square > limit**2 * weight.sum(axis=1)) | (rules.least[at[own]] > 0)
         if not rough.all():
             yield Samples(own[~rough], points.x[~rough], weight[~rough], values[~rough])
         if rough.any():
@@ -184,4 +195,4 @@ def projection(
         found = found + np.linalg.solve(mass, right) if turn < 2 else found
     count = np.bincount(np.concatenate([s.of for s in samples]), minlength=b)
     size, _, rest = np.sqrt(norms)
-    return Projection(found, rest, size, np.maximum(count, 1 + rules.least[at]))
+    return Projection(found, rest, size, count)

@@ -3,7 +3,7 @@
 On sides d.w is asked for: u_D - u_h on Gamma_u, r shared by compliance between both bodies on
 Gamma_K, -u_h.d on guides. Other parts of Gamma_K stay where they are. On the triangles around these
 sides w is the displacement of least energy with the values asked for at nodes. It is of one degree,
-and of `DATA_DEGREE` on sides where what is asked for is no such polynomial.
+and of a higher one, up to `DATA_DEGREE`, on sides where what is asked for is no such polynomial.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ from .facing import DATA_DEGREE, POINTS, TO_LOBATTO, FacingSides
 from .polynomials import CORNERS, DERIVATIVES, derivatives
 from .tractions import BoundaryData
 
+SIDE_DEGREES = 3  # steps from `DATA_DEGREE` down, by which degrees on sides may differ
+AMOUNT_ERROR = 1e-10  # of the largest amount, and of d: by so much polynomials on sides may miss
 LIFTING_NOISE = 1e-13  # of what is asked for, relative to the displacement: round-off
 SAME_DIRECTION = 1e-8  # sine of the angle between directions at a vertex that are one
 INCONSISTENT_AMOUNT = 1e-9  # of what is asked for at a vertex, relative to it
@@ -116,7 +118,7 @@ def lifting_of(
     extent: float,
     away: Sequence[int] | Index = (),
 ) -> Array:
-    """Norms (n,) of w with all that is `prescribed`, of a `degree` or, where needed, `DATA_DEGREE`.
+    """Norms (n,) of w with all that is `prescribed`, of a `degree`, or more on sides that need it.
 
     Amounts below round-off of the `extent` of displacements and gaps, a length, are not lifted.
     Sides `away` (r,) of Gamma_K face nothing, and may move.
@@ -139,20 +141,22 @@ def lifting_of(
     lines = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
     fixed = cells.inner | np.isin(cells.segment, cells.trace.segments(*lines))
     fixed[np.asarray(away, dtype=np.intp)] = False
-    lower = lagrange(DATA_DEGREE, gauss_lobatto(degree))
-    lower = lagrange(degree, gauss_lobatto(DATA_DEGREE)) @ lower
     unit = np.concatenate(largest).max()
     for one in prescribed:
         fixed[one.side] = False
         both = np.concatenate([one.direction, one.amount[..., None] / unit], axis=2)
-        rough = (np.abs(both - lower @ both) > LIFTING_NOISE).any(axis=(1, 2))
-        degrees[one.side[rough]] = DATA_DEGREE
+        asked = np.full(len(both), DATA_DEGREE)
+        for n in (*range(DATA_DEGREE - SIDE_DEGREES, degree, -SIDE_DEGREES), degree):
+            carry = lagrange(DATA_DEGREE, gauss_lobatto(n))
+            lower = lagrange(n, gauss_lobatto(DATA_DEGREE)) @ carry
+            asked[(np.abs(both - lower @ both) <= AMOUNT_ERROR).all(axis=(1, 2))] = n
+        degrees[one.side] = np.maximum(degrees[one.side], asked)
     stiffness = list(_stiffness(problem, cells, layer, degrees, degree))
     nodes = np.unique(np.concatenate([part.nodes.ravel() for part in stiffness]))
     # Normal equations at each node: two directions, or one and the one across, which is free.
     conditions = []
     for one in prescribed:
-        for n in (degree, DATA_DEGREE):
+        for n in np.unique(degrees[one.side]).tolist():
             some = (count[one.side] > 0) & (degrees[one.side] == n)
             carry = lagrange(DATA_DEGREE, gauss_lobatto(n))
             d = (carry @ one.direction[some]).reshape(-1, 2)

@@ -24,7 +24,7 @@ import numpy as np
 from ...arrays import Array, Index
 from .cells import Cells
 from .elements import Element, Multipliers, Stress, by_triangle, elements_of
-from .force_quadrature import LEAST_DEGREE, ForceQuadrature
+from .force_quadrature import LEAST_DEGREE, PARTS_OF_A_SIDE, ForceQuadrature
 from .polynomials import edges
 from .program import dual_program
 from .tractions import BoundaryData, side_rule
@@ -33,8 +33,7 @@ EQUILIBRIUM = 1e-10  # residual of equilibrium, relative to the largest stress
 POINTS_ON_SIDE = 17  # points on each side
 # Shares of corners in places at which the middle of both balls is sought, beside the incentre.
 BALL_CENTRES = np.array([(i, j, 8 - i - j) for i in range(1, 8) for j in range(1, 8 - i)]) / 8
-RAISED_DEGREES = 3  # degrees of stresses on whole triangles ...
-FEW_PARTS = 24  # ... with so many parts, of which none is divided again
+RAISED_DEGREES = 3  # degrees of stresses on whole triangles, as long as forces are smooth there
 NEGLIGIBLE_SHARE = 0.02  # of |s - sigma_h|^2: so much may be added by data not balanced again
 TRIANGLES_AT_ONCE = 200  # triangles
 
@@ -133,7 +132,8 @@ def balanced_again(
         lost = (c + D) ** 2 - c**2
         order = np.argsort(lost)
         counts = np.sort(order[np.cumsum(lost[order]) > limit])
-        fits = pieces <= FEW_PARTS if third is None else (pieces > 1) & (rules.thirds == third)
+        smooth, divided = pieces < PARTS_OF_A_SIDE**2, (pieces > 1) & (rules.thirds == third)
+        fits = smooth if third is None else divided
         some = counts[fits[counts]]
         for at in np.array_split(some, -(-len(some) // TRIANGLES_AT_ONCE)) if len(some) else ():
             parts, finer = rules.divided(level.cells, at, third)

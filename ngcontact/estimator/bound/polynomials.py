@@ -91,21 +91,21 @@ def stresses(
         airy /= np.linalg.det(E)[:, None, None] ** 2
         psi = derivatives(degree + 2, local, DERIVATIVES[:2:-1], 2)
         return np.asarray(airy[:, None] @ psi)
-    (a_r, a_z), (b_r, b_z) = np.linalg.inv(E).transpose(1, 2, 0)
-    rates = np.zeros((len(corners), 1, 4, 6))  # from `DERIVATIVES` to values, by r, z, and zz
-    rates[..., 0, 0] = 1.0
-    rates[:, 0, 1:3, 1:3] = np.array([[a_r, b_r], [a_z, b_z]]).transpose(2, 0, 1)
-    rates[:, 0, 3, 3:] = np.stack([a_z**2, 2 * a_z * b_z, b_z**2], axis=1)
+    (a_r, a_z), (b_r, b_z) = np.linalg.inv(E).transpose(1, 2, 0)[..., None, None]
     r = (corners[:, 1:2, 0] + (local @ edges(corners)[:, 0, :, None])[..., 0]) / size[:, 0]
-    k = int(on_axis)  # T_rr = r^k f, chi = r^(2 k) g
-    f, g = np.zeros((2, *r.shape, 4, 4))
-    f[..., 0, 0], f[..., 2, 0], f[..., 2, 1] = r ** (k - 1), k, r**k
-    g[..., 1, 0], g[..., 1, 1] = -2 * k * r ** (2 * k - 2), -(r ** (2 * k - 1))
-    g[..., 2, 3], g[..., 3, 2] = r ** (2 * k), r ** (2 * k - 1)
-    parts = (f, degree - k, 0), (g, degree + 1 - 2 * k, 1 - k)
-    tables = (derivatives(n, local, DERIVATIVES, least) for _, n, least in parts)
-    both = zip(parts, tables, strict=True)
-    return np.concatenate([(c @ rates) @ table for (c, *_), table in both], axis=-1)
+    k, r = int(on_axis), r[..., None]  # T_rr = r^k f, chi = r^(2 k) g
+    f, f_a, f_b = np.moveaxis(derivatives(degree - k, local, DERIVATIVES[:3]), -2, 0)
+    table = derivatives(degree + 1 - 2 * k, local, DERIVATIVES, 1 - k)
+    g, g_a, g_b, g_aa, g_ab, g_bb = np.moveaxis(table, -2, 0)
+    n, found = f.shape[-1], np.zeros((*r.shape[:2], 4, f.shape[-1] + g.shape[-1]))
+    found[:, :, 0, :n] = r ** (k - 1) * f
+    found[:, :, 2, :n] = k * f + r**k * (a_r * f_a + b_r * f_b)
+    found[:, :, 1, n:] = -(r ** (2 * k - 1)) * (a_r * g_a + b_r * g_b)
+    if k:
+        found[:, :, 1, n:] -= 2 * g
+    found[:, :, 2, n:] = r ** (2 * k) * (a_z**2 * g_aa + 2 * a_z * b_z * g_ab + b_z**2 * g_bb)
+    found[:, :, 3, n:] = r ** (2 * k - 1) * (a_z * g_a + b_z * g_b)
+    return found
 
 
 def scalars(degree: int, corners: Array, x: Array) -> Array:
