@@ -16,7 +16,6 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask
 from .mesh_arrays import MeshArrays, on_axis
-from .strain import components
 from .values import body_mask, boundary_mask, refuse_where
 
 # By 'argument "pattern"': which of the r boundaries or bodies of a mesh it selects, bool (r,).
@@ -287,7 +286,7 @@ def check_about_axis(
     radials = [("traction", name, p[0]) for name, p in traction.items() if p.dim == 2]
     radials += [("displacement", k, u[0]) for k, u in displacement.items() if u[0] is not None]
     radials += [("force", name, F[0]) for name, F in force.items()]
-    for name, e in zip(strain, map(components, strain.values()), strict=True):
+    for name, e in strain.items():
         sizes = e.xx, e.normal
         radials += [("strain", name, ng.CF((x, *sizes))) for x in (e.xx - e.normal, e.shear / 2)]
     for what, name, radial in radials:

@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import ngsolve as ng
 import numpy as np
 
-from .values import refuse_where, scalar_data, told
+from .values import SYMMETRIC, refuse_where, scalar_data, told
 
 VOIGT = {  # components of stress and strain in each model, the shear strain an engineering one
     "plane strain": ("xx", "yy", "xy"),
@@ -20,7 +20,6 @@ VOIGT = {  # components of stress and strain in each model, the shear strain an 
 MODEL_NAMES = tuple(VOIGT)
 ABOUT_AN_AXIS = ("axisymmetric",)
 
-SYMMETRIC = 1e-12  # difference of entries, relative to the largest: input has that many digits
 DEFINITE = 16 * np.finfo(float).eps  # a pivot, relative to where it starts: round-off of zero
 
 _RIGHT_E = "Young's modulus must be positive and finite"

@@ -225,11 +225,14 @@ class Problem:
         ):
             checks.check_values(view, masks, data, rule)
         laws = zip(materials.items(), self.materials.values(), strict=True)
-        check_strains(view, strain, self.strain.values(), laws, self.model, checks.INSIDE)
+        general = [item for item, law in laws if isinstance(law, Hooke)]
+        plane = dict(general if self.model == "plane strain" else [])
+        check_strains(view, strain, self.strain.values(), plane, checks.INSIDE)
         if self.model in ABOUT_AN_AXIS:
             sides = [side for pair in self.contact for side in pair.sides]
             vectors = self.displacement, self.traction, self.force
-            checks.check_about_axis(view, *vectors, sides, self.strain)
+            e0 = {name: components(data) for name, data in self.strain.items()}
+            checks.check_about_axis(view, *vectors, sides, e0)
 
 
 def _law(value: Any, what: str) -> Elastic | Hooke:

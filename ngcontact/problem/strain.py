@@ -9,9 +9,8 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Mask
-from .material import SYMMETRIC, Elastic, Hooke
 from .mesh_arrays import MeshArrays
-from .values import refuse_where, scalar_data
+from .values import SYMMETRIC, refuse_where, scalar_data
 
 RIGHT = (
     "give a number, which acts in all three directions, a pair (xx, yy), a triple (xx, yy, zz), "
@@ -60,17 +59,15 @@ def check_strains(
     view: MeshArrays,
     masks: Mapping[str, Mask],
     strains: Iterable[ng.CoefficientFunction],
-    laws: Iterable[tuple[tuple[str, Mask], Elastic | Hooke]],
-    model: str,
+    plane: Mapping[str, Mask],
     rule: ng.IntegrationRule,
 ) -> None:
     """Refuse strains that are not symmetric, or of which a law does not tell what they do.
 
-    A general law in the plane does not say how strains normal to it act in plane strain. `masks`
-    (r,) are those of `strains`, as of `strain_data`; `laws` have masks (r,) of their own. All
+    A general law in the plane does not say how strains normal to it act in plane strain: `plane`
+    are the masks (r,) of such laws, `masks` (r,) those of `strains`, as of `strain_data`. All
     elements are looked at at points of a `rule`.
     """
-    laws = list(laws)
     for (label, mask), data in zip(masks.items(), strains, strict=True):
         if data.dim == 4:
             every = view.mesh.MapToAllElements(rule, ng.VOL)
@@ -78,8 +75,8 @@ def check_strains(
             values = data(points)
             bad = np.abs(values[:, 1] - values[:, 2]) > SYMMETRIC * np.abs(values).max(initial=0.0)
             refuse_where(points, bad, values, label, "a strain is symmetric, xy = yx")
-        for (body, where), law in laws if model == "plane strain" and data.dim in (1, 3) else ():
-            if isinstance(law, Hooke) and (mask & where).any():
+        for body, where in plane.items() if data.dim in (1, 3) else ():
+            if (mask & where).any():
                 raise ValueError(
                     f"{label} has a part normal to the plane, and the 3x3 law of {body} does not "
                     "tell what that does in plane strain: give the pair (xx, yy) of strains in the "

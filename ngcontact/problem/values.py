@@ -13,6 +13,8 @@ from weakref import WeakKeyDictionary
 import ngsolve as ng
 import numpy as np
 
+SYMMETRIC = 1e-12  # difference of entries, relative to the largest: input has that many digits
+
 Scalar: TypeAlias = float | ng.CoefficientFunction
 Vector: TypeAlias = Sequence[Scalar] | ng.CoefficientFunction
 
