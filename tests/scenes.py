@@ -12,6 +12,7 @@ from ngcontact.adaptivity import refined
 from ngcontact.discrete import discretise, first_active_set, minimise_energy
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks
+from ngcontact.geometries.region import body, polygon
 from ngcontact.lagrange import gauss, lagrange
 from ngcontact.linalg import coarsenings
 from ngcontact.mesh import curve, first_mesh, vertex_parents
@@ -39,6 +40,12 @@ def unmatched_blocks():
         if edge.name == "upper_contact":
             edge.partition = [0.13, 0.31, 0.77]
     return OCCGeometry(shape, dim=2)
+
+
+def rectangle(name, x, y, sides):
+    """Body between x[0] and x[1], y[0] and y[1]; names of its bottom, right, top and left."""
+    (a, b), (c, d) = x, y
+    return body(name, polygon([(a, c), (b, c), (b, d), (a, d)], sides))
 
 
 def coordinates(mesh):

@@ -275,31 +275,29 @@ def well_separated(given_, contact):
     )
 
 
-@pytest.mark.parametrize("d", [2, 3])
-def test_random_pairs(d):
-    """Two bodies, supported inside, at the end of the zone or on one side of it."""
+def two_bodies(rng, d):
+    """Supported inside, at the end of the zone or on one side of it."""
     secondary, primary, inner = np.arange(5), np.arange(5, 12), np.arange(12, 16)
+    ends = [[], secondary[:1], primary[:2]][rng.integers(3)]
+    contact = random_contact(rng, 16, secondary, primary, d)
+    return random_conditions(rng, [*inner, *ends], d), contact
+
+
+def three_bodies(rng, d):
+    """The middle one is primary to the first and secondary to the last."""
+    top, middle, bottom = np.arange(4), np.arange(4, 10), np.arange(10, 15)
+    pairs = (top, middle), (middle[:4], bottom)
+    contact = concatenated([random_contact(rng, 15, *pair, d) for pair in pairs])
+    return random_conditions(rng, rng.choice(bottom, size=2, replace=False), d), contact
+
+
+@pytest.mark.parametrize("d", [2, 3])
+@pytest.mark.parametrize("draw", [two_bodies, three_bodies])
+def test_random_bodies(draw, d):
     for seed in range(150):
-        rng = np.random.default_rng(seed)
-        ends = [[], secondary[:1], primary[:2]][rng.integers(3)]
-        contact = random_contact(rng, 16, secondary, primary, d)
-        given_ = random_conditions(rng, [*inner, *ends], d)
+        given_, contact = draw(np.random.default_rng(seed), d)
         if well_separated(given_, contact):
             basis = check(given_, contact)  # measured 4e-15
-            assert basis.kept.tolist() == list(range(len(contact.g)))
-
-
-@pytest.mark.parametrize("d", [2, 3])
-def test_random_stacks(d):
-    """Three bodies: the middle one is primary to the first and secondary to the last."""
-    top, middle, bottom = np.arange(4), np.arange(4, 10), np.arange(10, 15)
-    for seed in range(150):
-        rng = np.random.default_rng(seed)
-        pairs = (top, middle), (middle[:4], bottom)
-        contact = concatenated([random_contact(rng, 15, *pair, d) for pair in pairs])
-        given_ = random_conditions(rng, rng.choice(bottom, size=2, replace=False), d)
-        if well_separated(given_, contact):
-            basis = check(given_, contact)  # measured 2e-15
             assert basis.kept.tolist() == list(range(len(contact.g)))
 
 

@@ -9,9 +9,10 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, adapt, solve
-from ngcontact.geometries import blocks, rings
-from ngcontact.geometries.region import body, compound, polygon
+from ngcontact.geometries import rings
+from ngcontact.geometries.region import compound
 from ngcontact.problem.values import boundary_mask
+from tests.scenes import rectangle
 
 SOFT = Elastic(E=1.0, nu=0.3)
 STIFF = Elastic(E=3.0, nu=0.2)
@@ -20,15 +21,9 @@ EXACT = 1e-10
 LINE = Contact("upper_contact", "lower_contact")
 
 
-def two_blocks(**data) -> Problem:
+def two_blocks(displacement=None, **data):
     """Blocks that touch along y = 0; the lower one is clamped, the upper one held along x."""
-    given = {
-        "geometry": blocks(),
-        "materials": {"upper": SOFT, "lower": STIFF},
-        "displacement": {"bottom": (0, 0), "top": (0, None)},
-        "contact": [LINE],
-    }
-    return Problem(**(given | data))
+    return cases.touching_blocks(displacement or {"bottom": (0, 0), "top": (0, None)}, **data)
 
 
 def pressed_disc() -> Problem:
@@ -44,9 +39,8 @@ def stack() -> Problem:
     """Three blocks: a on a support, b on a, c on b; c is pressed off its middle."""
 
     def block(name, low, high):
-        corners = [(-1.0, low), (1.0, low), (1.0, high), (-1.0, high)]
-        sides = ["below", "right", "above", "left"]
-        return body(name, polygon(corners, [f"{name}_{side}" for side in sides]))
+        sides = [f"{name}_{side}" for side in ("below", "right", "above", "left")]
+        return rectangle(name, (-1.0, 1.0), (low, high), sides)
 
     return Problem(
         geometry=compound(block("a", 0, 1), block("b", 1, 1.5), block("c", 1.5, 2.5)),

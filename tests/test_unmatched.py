@@ -7,7 +7,7 @@ from dataclasses import replace
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Compound, OCCGeometry, WorkPlane, Y
+from netgen.occ import Compound, OCCGeometry, WorkPlane
 
 from ngcontact import (
     Contact,
@@ -31,29 +31,23 @@ from ngcontact.geometries.region import (
     quarter_arc,
 )
 from ngcontact.mesh import first_mesh
-from tests.scenes import distance, solved_with_load
+from tests.scenes import distance, rectangle, solved_with_load
 
 EXACT = 1e-10  # round-off times the condition of small meshes
 LAW = Elastic(E=1.0, nu=0.3)
 UNIFORM = (0.3 * 1.3 * ng.x, -(1 - 0.3**2) * ng.y)  # plane strain under -1 along y
 
 
-def rectangle(name, x, y):
-    """A body between x[0], x[1] and y[0], y[1]; its boundaries are name_top, _bottom, _side."""
-    face = WorkPlane().MoveTo(x[0], y[0]).Rectangle(x[1] - x[0], y[1] - y[0]).Face()
-    face.faces.name = name
-    face.edges.name = f"{name}_side"
-    face.edges.Max(Y).name, face.edges.Min(Y).name = f"{name}_top", f"{name}_bottom"
-    return face
-
-
 def over_a_slot(width, middle, pairs):
     """A plate on two blocks, 0 < x < 1, with a slot between them; uniform pressure 1."""
     slot = middle - width / 2, middle + width / 2
+    places = {"plate": (0, 1), "a": (0, slot[0]), "b": (slot[1], 1)}
     bodies = [
-        rectangle("plate", (0, 1), (0, 0.5)),
-        rectangle("a", (0, slot[0]), (-0.5, 0)),
-        rectangle("b", (slot[1], 1), (-0.5, 0)),
+        rectangle(
+            *(name, x, (0, 0.5) if name == "plate" else (-0.5, 0)),
+            [f"{name}_{side}" for side in ("bottom", "side", "top", "side")],
+        )
+        for name, x in places.items()
     ]
     problem = Problem(
         geometry=OCCGeometry(Compound(bodies), dim=2),

@@ -20,7 +20,6 @@ from ngcontact import (
     solve,
 )
 from ngcontact.discrete.discrete_problem import discretise, minimise_energy
-from ngcontact.geometries import blocks
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh import first_mesh
 from ngcontact.qp import BorderedSystems
@@ -32,12 +31,11 @@ ROUND_OFF = 1e-12  # of sums of forces and moments: the figure asked for; measur
 
 
 def pressed_blocks(load=1.0, **more):
-    return Problem(
-        geometry=blocks(),
+    return cases.touching_blocks(
+        {"bottom": (0, 0)},
         materials={"upper|lower": STEEL},
-        displacement={"bottom": (0, 0)},
         traction={"top": load},
-        contact=[Contact("upper_contact", "lower_contact", **more)],
+        contact=[replace(cases.TOUCHING, **more)],
     )
 
 

@@ -90,7 +90,6 @@ def test_a_stiff_punch_held_by_contact_alone_is_right_or_refused() -> None:
         solve(pressed(1e12, **loads), maxh=2.0, order=2)
 
 
-LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))  # a convex and a re-entrant corner
 SOFT, HARD = Elastic(E=1.0, nu=0.3), Elastic(E=3.0, nu=0.2)
 
 
@@ -117,12 +116,8 @@ def penetration(solution, samples=20):
 @pytest.mark.parametrize("maxh", [0.6, 0.2])
 def test_polygonal_zones_are_free_of_penetration_everywhere(tilt, maxh):
     """Lemma 2.1 of HH81: the nodal conditions hold between the nodes, K_h lies in K."""
-    problem = Problem(
-        geometry=blocks(line=LINE),
-        materials={"upper": SOFT, "lower": HARD},
-        displacement={"top": ng.CF((0.02, -0.01 + tilt * ng.x)), "bottom": (0, 0)},
-        contact=[Contact("upper_contact", "lower_contact")],
-    )
+    down = {"top": ng.CF((0.02, -0.01 + tilt * ng.x)), "bottom": (0, 0)}
+    problem = cases.touching_blocks(down, geometry=blocks(line=cases.LINE))
     solution = solve(problem, maxh=maxh)
     closed = penetration(solution)
     assert closed.max() <= 1e-15  # round-off of displacements of size 0.1

@@ -77,13 +77,8 @@ def graph_scene() -> Scene:
 
 def cornered() -> Scene:
     """Contact along a line with corners both ways, in part, under all kinds of load."""
-    problem = Problem(
-        geometry=blocks(line=cases.LINE),
-        materials=cases.BLOCKS,
-        displacement={"top": (0.01, -0.02 + 0.015 * ng.x), "bottom": (0, 0)},
-        sliding="lower_left",
-        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
-    )
+    down = {"top": (0.01, -0.02 + 0.015 * ng.x), "bottom": (0, 0)}
+    problem = cases.touching_blocks(down, geometry=blocks(line=cases.LINE), sliding="lower_left")
     return replace(
         on_its_mesh(problem, 0.25),
         pressure={"upper_left|upper_right": 0.01},

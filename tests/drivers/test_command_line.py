@@ -18,9 +18,9 @@ from drivers import hertz
 from drivers.__main__ import drivers
 from drivers.__main__ import main as listed
 from drivers.command_line import Count, Positive, run
+from drivers.reference.cases import touching_blocks
 from drivers.tables import last_level, table
-from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.geometries import blocks
+from ngcontact import solve
 
 ROOT = Path(__file__).parents[2]
 
@@ -208,12 +208,7 @@ def test_bad_input_found_by_main_is_a_message(monkeypatch, capsys):
 
 
 def test_levels_are_printed_as_they_are_and_the_last_one_is_returned(capsys):
-    problem = Problem(
-        geometry=blocks(),
-        materials={"upper|lower": Elastic(E=1.0, nu=0.3)},
-        displacement={"bottom": (0, 0), "top": (0, -0.01)},
-        contact=[Contact(secondary="upper_contact", primary="lower_contact")],
-    )
+    problem = touching_blocks({"bottom": (0, 0), "top": (0, -0.01)})
     levels = [solve(problem, maxh=h) for h in (1.0, 0.5)]
     columns = {" force": lambda force: f"{force:.3f}", "in mN": lambda force: f"{1e3 * force:.0f}"}
     last, force = last_level(levels, lambda level: level.contact_force()[1], columns)

@@ -18,7 +18,7 @@ from drivers.reference.curved import rings as ring_solution
 from drivers.reference.overkill import Overkill
 from drivers.reference.straight import energy_error
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
-from ngcontact.geometries import blocks, rings
+from ngcontact.geometries import rings
 from ngcontact.geometries.region import body, compound, polygon
 from tests.quadrature.test_loads import box, loaded, square
 
@@ -71,11 +71,10 @@ GAPS = {
 @pytest.mark.study(witness=["a kink-1"])
 def test_bilateral_gaps(name, order):
     gap, stiffness = GAPS[name]
-    problem = Problem(
-        geometry=blocks(),
+    problem = cases.touching_blocks(
+        {"bottom": (0, 0), "top": (0, -0.05)},
         materials={"upper": Elastic(1.0, 0.3), "lower": Elastic(stiffness, 0.2)},
-        displacement={"bottom": (0, 0), "top": (0, -0.05)},
-        contact=[Contact("upper_contact", "lower_contact", gap=gap, bilateral=True)],
+        contact=[replace(cases.TOUCHING, gap=gap, bilateral=True)],
     )
     # Measured 2.4 to 5.4.
     found, _ = of_levels(problem, order)

@@ -5,11 +5,11 @@ import math
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Glue, OCCGeometry, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.fem.boundary import boundary_trace, nodal_basis
 from ngcontact.geometries import blocks, disc_on_block, graphs, rings
+from tests.mesh.test_curving import glued
 
 ORDERS = [1, 2, 3, 4]
 LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
@@ -32,15 +32,6 @@ def refined_in_place(order):
     return mesh
 
 
-def glued(order):
-    """A disc in a square: a boundary between two materials."""
-    square = WorkPlane().Rectangle(2, 2).Face()
-    disc = WorkPlane().MoveTo(1, 1).Circle(0.4).Face()
-    square.edges.name, disc.edges.name = "side", "between"
-    square.faces.name, disc.faces.name = "square", "disc"
-    return meshed(OCCGeometry(Glue([square - disc, disc]), dim=2), order)
-
-
 def everywhere(trace, count=5):
     """Segments and parameters inside all of them."""
     s = np.random.default_rng(1).random(count * len(trace.region))
@@ -54,7 +45,7 @@ MESHES = {
         graphs(lambda x: 0.2 * math.sin(4 * x), lambda x: x**2 / 2 - 0.8), order
     ),
     "refined": refined_in_place,
-    "glued": glued,
+    "glued": lambda order: meshed(glued(), order),
     "no CAD": lambda order: MakeStructured2DMesh(quads=False, nx=3, ny=2),
 }
 every_mesh = pytest.mark.parametrize("make", MESHES.values(), ids=list(MESHES))
@@ -87,7 +78,7 @@ def test_points_derivatives_and_normals_agree_with_ngsolve(make):
         numeric = (trace.point(segment, near + step) - trace.point(segment, near - step)) / step / 2
         np.testing.assert_allclose(trace.derivative(segment, near), numeric, atol=1e-8)
         # Between two materials either normal is an outward one.
-        outside = ~np.isin(segment, trace.segments("between"))
+        outside = ~np.isin(segment, trace.segments("inner"))
         segment, s = segment[outside], s[outside]
         expected = trace.evaluate(ng.specialcf.normal(2), segment, s)
         np.testing.assert_allclose(trace.normal(segment, s), expected, atol=1e-12)

@@ -134,15 +134,10 @@ def test_a_gap_of_the_wrong_sign_is_told(unit, modulus):
 PUSHED = "nothing deforms"
 
 
-def pushed(**data):
+def pushed():
     """A block without support, pushed down by 0.1 by another one that is displaced."""
-    given = {
-        "geometry": blocks(),
-        "materials": {"upper": SOFT, "lower": SOFT},
-        "displacement": {"top": (0, -0.1)},
-        "contact": [Contact("lower_contact", "upper_contact")],
-    }
-    return Problem(**(given | data))
+    pair = Contact("lower_contact", "upper_contact")
+    return cases.touching_blocks({"top": (0, -0.1)}, contact=[pair])
 
 
 @pytest.mark.parametrize("order", [1, 2])

@@ -14,8 +14,7 @@ import pytest
 
 import ngcontact
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
-from ngcontact.geometries import blocks
+from ngcontact import Contact, Elastic, Hooke, adapt, solve
 from tests.scenes import unmatched_blocks
 
 ROOT = Path(__file__).parents[2]
@@ -28,14 +27,8 @@ def rising(x, y):
     return 0.01 + 0.02 * x + 0 * y
 
 
-def two_blocks(**data):
-    given = {
-        "geometry": blocks(),
-        "materials": {"upper": SOFT, "lower": SOFT},
-        "displacement": {"bottom": (0, 0), "top": (0, -0.1)},
-        "contact": [LINE],
-    }
-    return Problem(**(given | data))
+def two_blocks(displacement=None, **data):
+    return cases.touching_blocks(displacement or {"bottom": (0, 0), "top": (0, -0.1)}, **data)
 
 
 def varying():

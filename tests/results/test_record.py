@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
-from ngcontact.geometries import blocks
+from ngcontact import Contact, Elastic, Hooke, adapt, solve
 from ngcontact.problem.values import told
 from ngcontact.results import with_progress
+from tests.results.test_values import two_blocks
 
 
 def test_a_record_holds_plain_numbers():
@@ -111,10 +111,9 @@ def cells(html):
 
 
 def problem():
-    return Problem(
-        geometry=blocks(),
+    return cases.touching_blocks(
+        {"bottom": (0, 0), "top": (None, -0.1)},
         materials={"upper": Elastic(1.0, 0.3), "lower": Hooke(np.diag([2.0, 2.0, 0.5]))},
-        displacement={"bottom": (0, 0), "top": (None, -0.1)},
         sliding="upper_left",
         force={"upper": (0, ng.x)},
         traction={"lower_left": 0.5, "upper_right": (1.0, 0.0)},
@@ -136,16 +135,7 @@ def test_a_problem_shows_all_of_its_data():
 
 
 def test_a_solution_shows_every_pair():
-    solution = solve(
-        Problem(
-            geometry=blocks(),
-            materials={".*": Elastic(1.0, 0.3)},
-            displacement={"bottom": (0, 0), "top": (0, -0.1)},
-            contact=[Contact("upper_contact", "lower_contact")],
-        ),
-        maxh=1.0,
-        order=2,
-    )
+    solution = solve(two_blocks(), maxh=1.0, order=2)
     shown = cells(solution._repr_html_())
     assert str(solution.displacement.space.ndof) in shown
     x, y = solution.contact_force() + 0.0
@@ -217,7 +207,6 @@ def test_problem_and_solution_are_tables(outputs):
 
 def test_without_the_extra_draw_says_what_to_install(monkeypatch):
     from ngcontact import solve
-    from tests.results.test_values import two_blocks
 
     solution = solve(two_blocks(), maxh=1.0)
     find = importlib.util.find_spec

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Problem, solve
-from ngcontact.geometries import blocks, disc
+from ngcontact import Elastic, Problem, solve
+from ngcontact.geometries import disc
 
 EXACT = 1e-10  # identities of affine and quadratic fields; measured 1e-13 and less
 STRAIN = np.array([[2e-3, 1e-3], [-4e-4, -3e-3]])
@@ -82,14 +82,8 @@ def test_fields_of_two_bodies_that_share_a_line():
         solution.at((0.1, 0.0))
 
 
-def two_blocks(**materials):
-    law = Elastic(E=1.0, nu=0.3)
-    return Problem(
-        geometry=blocks(),
-        materials=materials or {"upper": law, "lower": law},
-        displacement={"bottom": (0, 0), "top": (0, -0.01)},
-        contact=[Contact("upper_contact", "lower_contact")],
-    )
+def two_blocks():
+    return cases.touching_blocks({"bottom": (0, 0), "top": (0, -0.01)})
 
 
 def test_refusals_name_the_first_point():
