@@ -207,7 +207,7 @@ def solve_on(
                 "equilibrations": 0,
                 "evaluations": evaluations() - before,
             },
-            tree=RefinementTree.root(mesh),
+            tree=RefinementTree(mesh, np.arange(mesh.ne)),
         )
 
     first = None
@@ -412,7 +412,7 @@ def _first_plan(
     """The first level, of which nothing is forecast but by `start`."""
     places = unresolvable([one.place for one in contradictions(problem, mesh)])
     found = joined([corners(problem, boundary_trace(mesh, 1)), places])
-    tree = RefinementTree.root(mesh)
+    tree = RefinementTree(mesh, np.arange(mesh.ne))
     plan = Plan(mesh, refinement.order, found, math.inf, refinement.growth, tree)
     if start is None or _is_exact(start):
         return plan

@@ -47,7 +47,7 @@ def continued(
     mesh, _ = curve(refining.finished() if finer else refining.given, order, element)
     tree = RefinementTree(refining.given, refining.origin)
     if unknowns(mesh, order, element) > refinement.max_dofs:
-        mesh, tree = first.mesh, RefinementTree.root(first.mesh)
+        mesh, tree = first.mesh, RefinementTree(first.mesh, np.arange(first.mesh.ne))
     return replace(first, mesh=mesh, tree=tree)
 
 

@@ -20,15 +20,13 @@ ROUNDS = 12  # refinements after which a facing segment that still lags takes du
 
 @dataclass(frozen=True, eq=False)
 class RefinementTree:
-    """The first mesh of a sequence, and the elements that those of a later one are parts of."""
+    """The first mesh of a sequence, and the elements that those of a later one are parts of.
+
+    Those of the first one are parts of themselves.
+    """
 
     mesh: ng.Mesh
     element: Index  # (ne,), an element of it for each of the later ones
-
-    @staticmethod
-    def root(mesh: ng.Mesh) -> RefinementTree:
-        """Of a mesh that begins a sequence."""
-        return RefinementTree(mesh, np.arange(mesh.ne))
 
 
 def matched_vertices(trace: BoundaryTrace, contact: Contact) -> dict[int, int]:
