@@ -16,7 +16,7 @@ the stiff one would drown.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -45,6 +45,15 @@ class Conditions:
 
 
 @dataclass(frozen=True, eq=False)
+class Entries:
+    """The k nodes that rows concern."""
+
+    row: Index  # (k,) number of the row, rising
+    node: Index  # (k,) number of the node
+    coefficient: Array  # (k, d) of its values
+
+
+@dataclass(frozen=True, eq=False)
 class Rows:
     """Contact rows d_j.(u(x_j) - sum_k c_jk u(x_k)) <= g_j, m of them, on n nodes.
 
@@ -60,19 +69,34 @@ class Rows:
     equality: Mask  # (m,) rows that hold with equality, Remark 3.3
 
     @cached_property
+    def entries(self) -> Entries:
+        """Coefficients of the node values in each row, in the order of rows and nodes."""
+        c, (m, n) = self.coupling, self.coupling.shape
+        row = np.concatenate([np.arange(m), np.repeat(np.arange(m), np.diff(c.indptr))])
+        weight = np.concatenate([np.ones(m), -c.data])
+        place, same = np.unique(
+            row * n + np.concatenate([self.node, c.indices]), return_inverse=True
+        )
+        # (2.3), (2.5): n.(v' - v''); (2.10): v''_xi - v'_xi
+        weight = np.bincount(same, weight, len(place))
+        row, node = np.divmod(place, max(n, 1))
+        return Entries(row, node, weight[:, None] * self.direction[row])
+
+    @cached_property
     def matrix(self) -> sp.csr_array:
         """B (m, d * n) on node values: x components first, then y."""
-        (m, n), d = self.coupling.shape, self.direction.shape[1]
-        c = self.coupling.tocoo()
-        row = np.concatenate([np.arange(m), c.row])
-        column = np.concatenate([self.node, c.col])
-        weight = np.concatenate([np.ones(m), -c.data])
-        # (2.3), (2.5): n.(v' - v''); (2.10): v''_xi - v'_xi
-        values = (weight[:, None] * self.direction[row]).T
-        columns = np.concatenate([column + i * n for i in range(d)])
-        B = from_triplets(values.ravel(), np.tile(row, d), columns, (m, d * n))
+        (m, n), d, e = self.coupling.shape, self.direction.shape[1], self.entries
+        columns = np.concatenate([e.node + i * n for i in range(d)])
+        B = from_triplets(e.coefficient.T.ravel(), np.tile(e.row, d), columns, (m, d * n))
         B.eliminate_zeros()
         return B
+
+    def left_sides(self, values: Array) -> Array:
+        """Left sides (m, r) of node `values` (d * n, r): x components first, then y."""
+        e, result = self.entries, np.zeros((len(self.node), values.shape[1]))
+        at = values.reshape(self.direction.shape[1], -1, values.shape[1])[:, e.node]
+        np.add.at(result, e.row, np.einsum("ki,ikr->kr", e.coefficient, at))
+        return result
 
     def select(self, rows: Index) -> Rows:
         """Some of the rows, by their numbers `rows` (k,)."""
@@ -90,9 +114,12 @@ class Rows:
         alike = self.node[order][1:] == self.node[order][:-1]
         if not alike.any():
             return number
-        B = self.matrix
+        e, n = self.entries, self.coupling.shape[1]
         for first, second in zip(order[:-1][alike], order[1:][alike], strict=True):
-            if abs(B[first : first + 1] - B[second : second + 1]).max() <= ROW_DIFFERENCE:
+            difference = np.zeros((n, self.direction.shape[1]))
+            for row, sign in ((first, 1), (second, -1)):
+                difference[e.node[e.row == row]] += sign * e.coefficient[e.row == row]
+            if np.abs(difference).max() <= ROW_DIFFERENCE:
                 number[second] = number[first]
         return number
 
@@ -178,23 +205,31 @@ class _Frames:
         return column
 
 
-def _axes(n: int, d: int, used: Index) -> _Frames:
-    """The axes as frames of n nodes, `used` (n,) of them."""
-    return _Frames(np.tile(np.eye(d), (n, 1, 1)), used)
+@dataclass(frozen=True, eq=False)
+class _Supported:
+    """Supports at n nodes."""
+
+    frames: _Frames  # whose first columns are the supported directions
+    values: Array  # (n, d) prescribed along the columns
+
+    @property
+    def fixed(self) -> Mask:
+        """Which components in the frames are prescribed, (n, d)."""
+        return np.arange(self.values.shape[1]) < self.frames.used[:, None]
 
 
-def _supported(n: int, c: Conditions) -> tuple[_Frames, Array]:
-    """Frames whose first columns are the supported directions, and the values (n, d) along them."""
+def _supported(n: int, c: Conditions) -> _Supported:
+    """The supports at n nodes that the conditions `c` make."""
     d = c.direction.shape[1]
-    frames, values = _axes(n, d, np.zeros(n, dtype=np.intp)), np.zeros((n, d))
-    slot = frames.take(c.node, c.direction)
+    frames = _Frames(np.tile(np.eye(d), (n, 1, 1)), np.zeros(n, dtype=np.intp))
+    values, slot = np.zeros((n, d)), frames.take(c.node, c.direction)
     for k in range(d):  # values along the columns before are known
         at = slot == k
         i = c.node[at]
         parts = np.einsum("kij,ki->kj", frames.columns[i], c.direction[at])
         before = (parts[:, :k] * values[i, :k]).sum(axis=1)
         values[i, k] = (c.value[at] - before) / parts[:, k]
-    return frames, values
+    return _Supported(frames, values)
 
 
 def _preferred(rows: Rows, stiffness: Array) -> Index:
@@ -209,52 +244,51 @@ def _preferred(rows: Rows, stiffness: Array) -> Index:
     return np.where(softer, facing, rows.node)
 
 
-def _hosts(
-    preferred: Index, local: Array, Bz: sp.csr_array, frames: _Frames
-) -> tuple[Index, Index]:
-    """Node (m,) at which each row becomes an unknown, -1 where all of it is prescribed, and slot.
+def _hosts(preferred: Index, entries: Entries, frames: _Frames) -> tuple[Index, Index, Array]:
+    """Node (m,) at which each row becomes an unknown, -1 where all of it is prescribed.
 
-    Of rows `Bz` (m, d * n), without prescribed unknowns, with the nodes `preferred` (m,); `local`
-    (m, d), the coefficients there, become those at the host.
+    And the slot (m,) and the coefficients (m, d) there. Of rows with the nodes `preferred` (m,) and
+    the `entries`, without prescribed unknowns.
     """
-    n, d, _ = frames.columns.shape
-    host, slot = preferred.copy(), np.full(len(preferred), -1)
+    n, m = len(frames.used), len(preferred)
+    host, slot = preferred.copy(), np.full(m, -1)
+    place = np.searchsorted(entries.row * n + entries.node, np.arange(m) * n + preferred)
+    local = entries.coefficient[place]
     single = np.bincount(host, minlength=n)[host] == 1
-    regular = np.flatnonzero(single & (np.linalg.norm(local, axis=1) > MIN_PIVOT))
+    regular = (single & (np.linalg.norm(local, axis=1) > MIN_PIVOT)).nonzero()[0]
     slot[regular] = frames.take(host[regular], local[regular])
-    for j in np.flatnonzero(slot < 0):
-        row = Bz[j : j + 1]
-        entries = row.toarray().reshape(d, n)
-        size = np.linalg.norm(entries, axis=0)
-        others = np.setdiff1d(row.indices % n, preferred[j])
-        ranked = [preferred[j], *others[np.lexsort((-others, -size[others]))]]
+    for j in (slot < 0).nonzero()[0]:
+        here = slice(*np.searchsorted(entries.row, [j, j + 1]))
+        nodes, size = entries.node[here], np.linalg.norm(entries.coefficient[here], axis=1)
+        ranked = np.lexsort((-nodes, -size, nodes != preferred[j]))
         host[j] = -1
         for i in (i for least in (MIN_PIVOT, MIN_SINE) for i in ranked if size[i] > least):
-            slot[j] = frames.take(np.array([i]), entries[:, i][None])[0]
+            coefficient = entries.coefficient[here][i]
+            slot[j] = frames.take(nodes[[i]], coefficient[None])[0]
             if slot[j] >= 0:
-                host[j], local[j] = i, entries[:, i]
+                host[j], local[j] = nodes[i], coefficient
                 break
-    return host, slot
+    return host, slot, local
 
 
 def _check_prescribed(
-    rows: Rows, Bz: sp.csr_array, fixed: Mask, values: Array, dropped: Index, length: float
+    rows: Rows, entries: Entries, supported: _Supported, dropped: Index, length: float
 ) -> None:
     """Raise unless the `dropped` rows, of no free unknown, hold for the prescribed values.
 
-    `Bz` (m, d * n) are the rows in the frames of the nodes, `fixed` (d * n,) and `values` (d * n,)
-    the prescribed unknowns there; gaps are known to the round-off of `length`.
+    The `entries` are those in the frames of the nodes; gaps are known to the round-off of `length`.
     """
-    size = np.abs(values).max(initial=0.0)
+    size = np.abs(supported.values).max(initial=0.0)
     for j in dropped:
-        columns, entries = Bz[j : j + 1].indices, Bz[j : j + 1].data
+        here = entries.row == j
+        node, coefficient = entries.node[here], entries.coefficient[here]
         where = f"the contact row at node {rows.node[j]} with direction {rows.direction[j]}"
-        if (np.abs(entries[~fixed[columns]]) > MIN_SINE).any():
+        if (np.abs(coefficient[~supported.fixed[node]]) > MIN_SINE).any():
             raise ValueError(
                 f"{where} depends on other contact rows there; leave one of the pairs out, or end "
                 "one of the contact boundaries before that point"
             )
-        value = float(entries @ values[columns])
+        value = float((coefficient * supported.values[node]).sum())
         allowed = INTERPOLATION_ERROR * max(size, abs(rows.g[j])) + COORDINATE_ERROR * length
         excess = value - rows.g[j]
         if (abs(excess) if rows.equality[j] else excess) > allowed:
@@ -265,25 +299,12 @@ def _check_prescribed(
             )
 
 
-def _blocks(blocks: Array) -> sp.csr_array:
-    """Matrix (d * n, d * n) of (n, d, d) node blocks in the numbering x first, then y."""
-    n, d, _ = blocks.shape
-    columns = np.arange(n, dtype=np.int32)[:, None] + n * np.arange(d, dtype=np.int32)
-    starts = np.arange(0, d * d * n + 1, d, dtype=np.int32)
-    values = blocks.transpose(1, 0, 2).flatten()  # a copy, which loses its zeros
-    matrix = sp.csr_array((values, np.tile(columns, (d, 1)).ravel(), starts), (d * n, d * n))
-    matrix.eliminate_zeros()
-    return matrix
-
-
 def _without_links(C: sp.csr_array, right: sp.csr_array) -> sp.csr_array:
     """Solution Y of (I + C) Y = `right`: rows that contain the unknowns of other rows.
 
     Few do, where contact lines of several bodies share nodes.
     """
     linked, alone = np.flatnonzero(np.diff(C.indptr)), np.diff(C.indptr) == 0
-    if linked.size == 0:
-        return right
     block = np.eye(linked.size) + C[linked][:, linked].toarray()
     _, group = connected_components(block, connection="strong")
     ring = np.flatnonzero(np.bincount(group)[group] > 1)
@@ -314,43 +335,48 @@ def change_of_basis(
         Prescribed displacements on both sides violate a row, or rows depend on each other.
     """
     n, d = rows.coupling.shape[1], rows.direction.shape[1]
-    supported, values = _supported(n, conditions)
-    frame, fixed = supported.columns, np.arange(d) < supported.used[:, None]
-    flat_fixed, flat_values = fixed.T.ravel(), values.T.ravel()
-    R = _blocks(frame)
-    Bz = (rows.matrix @ R).tocsr()
-    free = Bz.copy()
-    free.data[flat_fixed[free.indices]] = 0.0
-    taken = _axes(n, d, supported.used.copy())
+    supported = _supported(n, conditions)
+    frame, fixed, e = supported.frames.columns, supported.fixed, rows.entries
+    e = replace(e, coefficient=np.einsum("ki,kij->kj", e.coefficient, frame[e.node]))
+    free = replace(e, coefficient=np.where(fixed[e.node], 0.0, e.coefficient))
+    taken = _Frames(np.tile(np.eye(d), (n, 1, 1)), supported.frames.used.copy())
     preferred = _preferred(rows, np.ones(n) if stiffness is None else stiffness)
-    local, every = np.zeros((len(preferred), d)), np.arange(len(preferred))
-    for i in range(d) if every.size else ():  # SciPy answers an empty index with a sparse array
-        local[:, i] = free[every, preferred + i * n]
-    host, slot = _hosts(preferred, local, free, taken)
-    _check_prescribed(rows, Bz, flat_fixed, flat_values, np.flatnonzero(host < 0), length)
-    kept = np.flatnonzero(host >= 0)
-    if len(kept) < len(host):
-        host, slot, local, Bz = host[kept], slot[kept], local[kept], Bz[kept]
-    unknown = host + n * slot
+    host, slot, local = _hosts(preferred, free, taken)
+    kept = (host >= 0).nonzero()[0]
+    _check_prescribed(rows, e, supported, (host < 0).nonzero()[0], length)
     M = taken.columns.transpose(0, 2, 1).copy()
-    M[host, slot] = local
+    M[host[kept], slot[kept]] = local[kept]
     inverse = np.tile(np.eye(d), (n, 1, 1))
-    inverse[host] = np.linalg.inv(M[host])
-    T = _blocks(frame @ inverse)
+    inverse[host[kept]] = np.linalg.inv(M[host[kept]])
+    blocks = frame @ inverse
     # What rows contain beside the free values of their hosts moves to the right.
-    row = np.repeat(np.arange(len(host)), np.diff(Bz.indptr))
-    other = (Bz.indices % n != host[row]) | flat_fixed[Bz.indices]
-    other &= Bz.data != 0
-    if other.any():
-        rest = from_triplets(Bz.data[other], row[other], Bz.indices[other], Bz.shape)
-        G = _blocks(inverse)
-        A = G[:, unknown]
-        T = T - R @ (A @ _without_links((rest @ A).tocsr(), rest @ G))
+    own = (e.node == host[e.row])[:, None] & ~fixed[e.node]
+    rest = np.einsum("ki,kij->kj", np.where(own, 0.0, e.coefficient), inverse[e.node])
+    at, component = (rest * (host[e.row] >= 0)[:, None]).nonzero()
+    row, column, value = e.row[at], e.node[at] + n * component, rest[at, component]
+    unknown = host + n * slot
+    of_row = np.full(d * n, -1)
+    of_row[unknown[kept]] = kept
+    if (of_row[column] >= 0).any():  # unknowns of other rows
+        right = from_triplets(value, row, column, (len(host), d * n))
+        own_unknown = np.where(host >= 0, unknown, 0)
+        Y = _without_links(right[:, own_unknown].tocsr(), right).tocoo()
+        row, column, value = Y.row, Y.col, Y.data
+    of_node, i, j = blocks.nonzero()
+    values = [blocks[of_node, i, j]]
+    places = [of_node + n * i]
+    columns = [of_node + n * j]
+    for i in range(d):
+        values.append(-blocks[host[row], i, slot[row]] * value)
+        places.append(host[row] + n * i)
+        columns.append(column)
+    at = tuple(np.concatenate(x) for x in (values, places, columns))
+    T = from_triplets(*at, (d * n, d * n))
     return BasisTransformation(
-        T=T.tocsr(),
-        fixed=flat_fixed,
-        values=flat_values,
-        unknown=unknown,
+        T=T,
+        fixed=fixed.T.ravel(),
+        values=supported.values.T.ravel(),
+        unknown=unknown[kept],
         kept=kept,
         local=M @ frame.transpose(0, 2, 1),
     )

@@ -13,7 +13,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Mask, from_triplets
-from ..constraints import BasisTransformation, Conditions
+from ..constraints import BasisTransformation, Conditions, Rows
 from ..contact import ContactLine, ContactState, by_line, contact_line
 from ..errors import ConvergenceError, NoEquilibriumError
 from ..fem import (
@@ -110,12 +110,17 @@ class DiscreteProblem:
     found: list[ContactLine]  # one for each contact pair
     lines: list[ContactLine]  # the same with the points that carry rows
     conditions: Conditions  # Gamma_u and Gamma_0 at nodes
-    B: sp.csr_array  # (m, 2n) contact rows on node values, all pairs in order
+    rows: Rows  # the contact rows of all pairs in order
     basis: BasisTransformation  # unknowns in which rows and prescribed values are single unknowns
     program: QuadraticProgram  # in those unknowns
     systems: BorderedSystems  # its linear systems, with the factorisation once there is one
     rigid: Rigid | None  # rigid motions that supports leave free, if there are any
     assembled: bool  # False where the stiffness is that of an earlier problem
+
+    @property
+    def B(self) -> sp.csr_array:
+        """Contact rows (m, 2n) on node values, all pairs in order."""
+        return self.rows.matrix
 
     def influence(self, active: Mask, jumps: Array) -> Iterate:
         """The displacement of least energy that moves the `active` (m,) points by `jumps` (m,).
@@ -281,7 +286,7 @@ def discretise(
         found=found,
         lines=admissible.lines,
         conditions=admissible.conditions,
-        B=rows.matrix,
+        rows=rows,
         basis=basis,
         program=program,
         systems=systems,

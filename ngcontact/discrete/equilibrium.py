@@ -253,7 +253,7 @@ def equilibrium(
     free = free_motions(space, conditions, model_of(problem).motions)
     if free is None:
         return None, space.f
-    f, work, left_sides = space.f, free.values.T @ space.f, np.asarray(rows.matrix @ free.nodal)
+    f, work, left_sides = space.f, free.values.T @ space.f, rows.left_sides(free.nodal)
     terms = np.abs(free.values).T @ np.abs(f)
     noise = np.where(np.abs(work) <= WORK_ROUND_OFF * terms, work, 0.0)
     unbalanced = _unbalanced(left_sides, rows.equality, work - noise)
