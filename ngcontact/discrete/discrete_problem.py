@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Mask, from_triplets
+from ..arrays import Array, Mask
 from ..constraints import BasisTransformation, Conditions, Rows
 from ..contact import ContactLine, ContactState, by_line, contact_line
 from ..errors import ConvergenceError, NoEquilibriumError
@@ -305,11 +305,10 @@ def _program(
     ValueError
         Double precision holds the data but neither the forces nor the displacements.
     """
-    basis, m = admissible.basis, len(admissible.basis.unknown)
+    basis = admissible.basis
     p = QuadraticProgram(  # (2.6)
         K=K,
         b=basis.T.T @ (space.basis.T @ space.right_side),
-        R=from_triplets(np.ones(m), np.arange(m), basis.unknown, (m, K.shape[0])),
         g=admissible.rows.g,
         equality=admissible.rows.equality,
         fixed=basis.fixed,

@@ -153,7 +153,7 @@ class ActiveSetIteration:
             reached = np.nanmax(np.abs(self.force) / stiffness, initial=0.0)
         self.extent = max(self.extent, np.abs(self.y).max(initial=0.0), reached)
         length = tie * self.size * self.extent
-        slack = p.g - p.R @ self.y
+        slack = p.g - p.left_sides(self.y)
         # Ties keep their state: hysteresis against cycling on round-off.
         with np.errstate(invalid="ignore"):
             pulling = self.force < -length * np.where(self.active, stiffness, 0.0)
@@ -180,7 +180,7 @@ def minimise(
     current = ActiveSetIteration(  # (i)
         systems=systems,
         active=p.equality.copy() if active is None else p.equality | active,
-        size=np.asarray(abs(p.R).sum(axis=1)).ravel(),
+        size=np.ones(p.g.size) if p.R is None else np.asarray(abs(p.R).sum(axis=1)).ravel(),
         patience=patience,
         y=np.where(p.fixed, p.values, 0.0),
         force=np.zeros(p.g.size),

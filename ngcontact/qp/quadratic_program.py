@@ -107,14 +107,15 @@ class QuadraticProgram:
 
     K: sp.csr_array  # (n, n) symmetric, but for `null_space` definite where not `fixed`
     b: Array  # (n,) load
-    R: sp.csr_array  # (m, n) linearly independent on the unknowns that are not `fixed`
     g: Array  # (m,) bounds
     equality: Mask  # (m,) rows that hold with equality, R y = g
     fixed: Mask  # (n,) unknowns with given values
     values: Array  # (n,) the given values; only those of `fixed` unknowns are read
-    # (m,) given when row j is the unit vector of unknown `unknown[j]`: an active row is then an
-    # unknown that leaves the system, and every factorised matrix is a principal submatrix.
-    unknown: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    # (m, n) linearly independent on the unknowns that are not `fixed`. None where row j is the unit
+    # vector of unknown `unknown[j]`: an active row is then an unknown that leaves the system, and
+    # every factorised matrix is a principal submatrix.
+    R: sp.csr_array | None = None
+    unknown: Index = field(default_factory=lambda: np.zeros(0, dtype=np.intp))  # (m,)
     # Of K, only with unit rows:
     null_space: NullSpace = field(default_factory=lambda: no_null_space(0))
 
@@ -126,7 +127,17 @@ class QuadraticProgram:
     @property
     def unit_rows(self) -> bool:
         """Whether every row is a single unknown."""
-        return len(self.unknown) == len(self.g)
+        return self.R is None
+
+    def left_sides(self, y: Array) -> Array:
+        """R y, (m,), for `y` (n,)."""
+        return y[self.unknown] if self.R is None else np.asarray(self.R @ y)
+
+    def pull(self, force: Array) -> Array:
+        """R' force, (n,), for `force` (m,)."""
+        if self.R is not None:
+            return np.asarray(self.R.T @ force)
+        return np.bincount(self.unknown, force, len(self.b))
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +188,7 @@ def kkt_residuals(program: QuadraticProgram, minimiser: Iterate) -> dict[str, fl
     """
     p, y, force, active = program, minimiser.u, minimiser.force, minimiser.active
     gap = p.g - y[p.unknown]
-    residual = p.b - p.K @ y - p.R.T @ force
+    residual = p.b - p.K @ y - p.pull(force)
     sizes = (p.b, terms(p.K, y), force)
     load = max(np.abs(x).max(initial=0.0) for x in sizes)
     length = max(np.abs(y).max(initial=0.0), np.abs(p.g[active]).max(initial=0.0))

@@ -88,6 +88,7 @@ class BorderedSystems:
     program: QuadraticProgram  # that of the last `restart`
     y: Array  # (n,) the last solution
     force: Array  # (m,) its multipliers
+    internal: Array  # (n,) K y of the last solution of which `unbalanced` was asked
     scale: float  # largest force that a system was to balance
     factorizations: int  # since the last `restart`
     back_solves: int  # likewise; V-cycles count as such
@@ -110,7 +111,7 @@ class BorderedSystems:
         self.y = np.where(p.fixed, p.values, 0.0)
         if closed is not None and p.unit_rows:
             self.y[p.unknown[closed]] = p.g[closed]
-        self.force, self.scale = np.zeros(p.g.size), 0.0
+        self.force, self.internal, self.scale = np.zeros(p.g.size), np.zeros(p.b.size), 0.0
 
     def forget(self) -> None:
         """Give the memory of the factorisation back; it is made again when asked for."""
@@ -143,7 +144,8 @@ class BorderedSystems:
         The unit rows `active` (m,) first take as their force what is left at their unknowns.
         """
         p = self.program
-        residual = p.b - p.K @ self.y
+        self.internal = p.K @ self.y
+        residual = p.b - self.internal
         if anchor is not None:
             pins = p.null_space.pins
             residual[pins] -= anchor.stiffness * (self.y[pins] - anchor.at)
@@ -152,7 +154,7 @@ class BorderedSystems:
             self.force[active] = residual[p.unknown[active]]
             residual[p.unknown[active]] = 0.0
             return residual
-        return residual - p.R.T @ self.force
+        return residual - p.pull(self.force)
 
     def stiffness(self) -> Array:
         """Force per displacement at each row, (m,): an upper bound, infinite where unknown."""
@@ -160,9 +162,9 @@ class BorderedSystems:
         if p.unit_rows:
             return p.diagonal[p.unknown]
         stiffness = np.full(p.g.size, np.inf)
-        if base is not None:
-            for j, place in ((~key, place) for key, place in base.place.items() if key < 0):
-                stiffness[j] = 1 / float((p.R[[j]] @ base.known[place])[0])
+        for key, place in base.place.items() if base is not None else ():
+            if key < 0:
+                stiffness[~key] = 1 / p.left_sides(base.known[place])[~key]
         return stiffness
 
     def _reach(self, active: Mask, anchor: Anchor | None) -> Border:
@@ -212,16 +214,23 @@ class BorderedSystems:
         if not keys:
             V = np.zeros((0, 0))
             return Border(base, active, anchor, at, rows, rows, rows, V, V.diagonal(), V)
-        V = sp.vstack([p.K[at], p.R[rows]], format="csr")
+        columns = [_row(p.K, i) for i in at]
+        if p.R is None:
+            columns += [(p.unknown[[j]], np.ones(1)) for j in rows]
+        else:
+            columns += [_row(p.R, j) for j in rows]
         new = [i for i, key in enumerate(keys) if key not in base.place]
         base.place.update({keys[i]: len(base.place) + k for k, i in enumerate(new)})
-        solutions = [self._back_solve(base, right) for right in V[new].toarray()]
-        base.known = np.vstack([base.known, *solutions])
+        V = np.zeros((len(new), p.b.size))
+        for right, i in zip(V, new, strict=True):
+            right[columns[i][0]] = columns[i][1]
+        base.known = np.vstack([base.known, *(self._back_solve(base, right) for right in V)])
         column = np.array([base.place[key] for key in keys], dtype=np.intp)
-        touched = np.unique(V.indices)  # few of the unknowns
-        dense = V[:, touched].toarray()
-        D = np.zeros((len(column), len(column)))
-        D[:, : at.size] = V[:, at].toarray()
+        indices, values = (np.concatenate(x) for x in zip(*columns, strict=True))
+        touched, place = np.unique(indices, return_inverse=True)  # few of the unknowns
+        dense, D = np.zeros((len(keys), len(touched))), np.zeros((len(keys), len(keys)))
+        dense[np.repeat(np.arange(len(keys)), [len(x) for x, _ in columns]), place] = values
+        D[:, : at.size] = dense[:, np.searchsorted(touched, at)]
         D[: at.size] = D[:, : at.size].T
         if anchor is not None:
             pins = np.arange(at.size - p.null_space.pins.size, at.size)
@@ -238,13 +247,11 @@ class BorderedSystems:
         x = np.zeros(p.b.size)
         if np.abs(residual[base.free]).max(initial=0.0) > tolerance * self.scale:
             x = self._back_solve(base, residual)  # step 1
-        below = np.concatenate([residual[at], p.g[rows] - p.R[rows] @ self.y])
+        below = np.concatenate([residual[at], (p.g - p.left_sides(self.y))[rows]])
         if below.size:
             right = (system.V @ x[system.touched] - below) / system.size
             z = np.linalg.lstsq(system.S, right, rcond=BORDER_ROUND_OFF)[0] / system.size  # step 2
-            amounts = np.zeros(len(base.known))
-            amounts[system.column] = z
-            x -= amounts @ base.known  # step 3
+            x -= z @ base.known[system.column]  # step 3
             x[at] += z[: at.size]
             self.force[rows] += z[at.size :]
         self.y += x
@@ -259,8 +266,7 @@ class BorderedSystems:
             self._correct(system, residual, tolerance)
             residual = self.unbalanced(system.active, system.anchor)
         # Where bounds alone drive the solution, forces come from rows or from elasticity.
-        pull = self.force if p.unit_rows else p.R.T @ self.force
-        scale = max(self.scale, _largest(pull), _largest((p.K @ self.y)[~p.fixed]))
+        scale = max(self.scale, _largest(p.pull(self.force)), _largest(self.internal[~p.fixed]))
         balanced = ~p.fixed
         if system.anchor is not None:  # its force may turn what the held unknowns hold
             balanced[p.null_space.held] = False
@@ -277,6 +283,12 @@ class BorderedSystems:
         p = self.program
         given = abs(p.K) @ np.where(p.fixed, np.abs(p.values), 0.0)
         return ROUND_OFF * _largest(given[balanced])
+
+
+def _row(C: sp.csr_array, i: int) -> tuple[Index, Array]:
+    """Columns and values of row i; what SciPy does for that takes as long as a back-solve."""
+    at = slice(C.indptr[i], C.indptr[i + 1])
+    return C.indices[at], C.data[at]
 
 
 def _largest(values: Array) -> float:

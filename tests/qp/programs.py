@@ -21,7 +21,6 @@ def first_unknowns_bounded(K, b, g, null_space=None):
     return QuadraticProgram(
         K=K,
         b=b,
-        R=sp.eye_array(n, format="csr")[:m],
         g=g,
         equality=np.zeros(m, dtype=bool),
         fixed=np.zeros(n, dtype=bool),

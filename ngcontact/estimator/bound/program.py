@@ -192,7 +192,6 @@ def dual_program(
     program = QuadraticProgram(
         K=K,
         b=np.zeros(d),
-        R=from_triplets(np.ones(m), np.arange(m), unknown, (m, d)),
         g=_joined([x.bound / x.mass for x in lines]),
         equality=_joined([np.full(x.mass.size, x.equality) for x in lines], bool),
         fixed=idle,
