@@ -34,6 +34,7 @@ from ..linalg import (
     cholesky,
     coarsenings,
     congruent,
+    handed_over,
     truncated_multigrid,
 )
 from ..mesh import vertex_parents
@@ -90,9 +91,10 @@ def linear_systems(
     size = program.b.size
     small = size < MULTIGRID.large.get(trace.order, np.inf) or size <= MULTIGRID.coarsest
     coarsest = 2 * np.count_nonzero(parents[:, 0] < 0)  # of the first mesh
-    half = matrix.nze < program.K.nnz  # all that a factorisation reads
-    if small or half or coarsest > (1 - MIN_REFINED) * size:
+    if small or coarsest > (1 - MIN_REFINED) * size:
         return BorderedSystems(program, factor)
+    if matrix.nze < program.K.nnz:  # half of it, all that a factorisation reads
+        matrix = handed_over(program.K)
 
     def prepare(free: Mask) -> Multigrid:
         steps = coarsenings(basis.T, parents, nodes, MULTIGRID.coarsest)

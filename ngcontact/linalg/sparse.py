@@ -12,11 +12,13 @@ import numpy as np
 import scipy.sparse as sp
 from pyngcore import Array_D_S, Array_I_S
 
-from ..arrays import Array, Factor, Mask, Solve, from_triplets
+from ..arrays import Array, Factor, Index, Mask, Solve, from_triplets
 
 # Unknowns up to which one thread factorises sooner than NGSolve has started others and they have
 # found their work: that takes 25 ms of processor time, 10 000 unknowns of order 3 on one thread 33.
 ONE_THREAD = 10_000
+# Entries of a matrix up to which T'AT is cheaper than the change to it: measured 170 000.
+MULTIPLIED_ENTRIES = 100_000
 
 _COUNT = threading.Lock()  # of the threads of managers to come, one number for the whole process
 
@@ -37,20 +39,32 @@ def shared(matrix: ng.BaseMatrix) -> sp.csr_array:
     return sp.csr_array((values, columns, starts), (matrix.height, matrix.width))
 
 
-def handed_over(K: sp.sparray) -> ng.BaseMatrix:
-    """A copy for NGSolve of the SciPy matrix `K` (m, n)."""
-    K = K.tocoo(copy=False)
+def _from_entries(row: Index, column: Index, values: Array, shape: tuple[int, int]) -> Any:
+    """NGSolve's matrix (m, n), its `shape`, of `values` (k,) at `row` and `column` (k,), summed."""
     entries = []
     # NumPy arrays as arguments would be converted entry by entry, at ten times the price.
-    for kind, values in ((Array_I_S, K.row), (Array_I_S, K.col), (Array_D_S, K.data)):
-        entries.append(kind(len(values)))
-        entries[-1].NumPy()[:] = values
-    return ng.la.SparseMatrixd.CreateFromCOO(*entries, *K.shape)
+    for kind, x in ((Array_I_S, row), (Array_I_S, column), (Array_D_S, values)):
+        entries.append(kind(len(x)))
+        entries[-1].NumPy()[:] = x
+    return ng.la.SparseMatrixd.CreateFromCOO(*entries, *shape)
+
+
+def _rows(K: sp.csr_array) -> Index:
+    """Row (k,) of each entry."""
+    return np.repeat(np.arange(K.shape[0]), np.diff(K.indptr))
+
+
+def handed_over(K: sp.sparray) -> ng.BaseMatrix:
+    """A copy for NGSolve of the SciPy matrix `K` (m, n)."""
+    K = K.tocsr()
+    return _from_entries(_rows(K), K.indices, K.data, K.shape)
 
 
 def lower_half(K: sp.csr_array) -> ng.BaseMatrix:
     """Lower half of the symmetric `K` (n, n) for NGSolve: what its Cholesky factorisation reads."""
-    return handed_over(sp.tril(K))
+    row = _rows(K)
+    lower = K.indices <= row
+    return _from_entries(row[lower], K.indices[lower], K.data[lower], K.shape)
 
 
 def congruent(
@@ -58,11 +72,12 @@ def congruent(
 ) -> tuple[sp.csr_array, ng.BaseMatrix]:
     """Matrix T'AT (k, k) of the unknowns y of u = T y, for SciPy; its lower half for NGSolve.
 
-    `A` (n, n) is `matrix` for SciPy. `T` (n, k) is the identity but for nodes on the boundary: only
-    the change is multiplied and handed over entry by entry, a small part of the price of the whole.
+    `A` (n, n) is `matrix` for SciPy. `T` (n, k) is the identity but for nodes on the boundary: of a
+    large matrix only the change is multiplied and handed over, a small part of the whole.
     """
-    if T.shape[0] != T.shape[1]:  # fewer node values than edge unknowns: element="physical"
-        K = (T.T @ A @ T).tocsr()
+    # element="physical" has fewer node values than edge unknowns
+    if A.nnz <= MULTIPLIED_ENTRIES or T.shape[0] != T.shape[1]:
+        K = (T.T @ (A @ T)).T.tocsr()  # symmetric: the transpose has its rows at once
         return K, lower_half(K)
     change = change_of_basis(A, T)
     if change.nnz == 0:
