@@ -362,16 +362,14 @@ def change_of_basis(
         own_unknown = np.where(host >= 0, unknown, 0)
         Y = _without_links(right[:, own_unknown].tocsr(), right).tocoo()
         row, column, value = Y.row, Y.col, Y.data
-    of_node, i, j = blocks.nonzero()
-    values = [blocks[of_node, i, j]]
-    places = [of_node + n * i]
-    columns = [of_node + n * j]
-    for i in range(d):
-        values.append(-blocks[host[row], i, slot[row]] * value)
-        places.append(host[row] + n * i)
-        columns.append(column)
-    at = tuple(np.concatenate(x) for x in (values, places, columns))
-    T = from_triplets(*at, (d * n, d * n))
+    node, i, j = blocks.nonzero()
+    k = np.arange(d)[:, None]
+    T = from_triplets(
+        np.append(blocks[node, i, j], -blocks[host[row], k, slot[row]] * value),
+        np.append(node + n * i, host[row] + n * k),
+        np.append(node + n * j, np.tile(column, d)),
+        (d * n, d * n),
+    )
     return BasisTransformation(
         T=T,
         fixed=fixed.T.ravel(),

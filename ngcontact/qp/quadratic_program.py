@@ -137,7 +137,7 @@ class QuadraticProgram:
         """R' force, (n,), for `force` (m,)."""
         if self.R is not None:
             return np.asarray(self.R.T @ force)
-        return np.bincount(self.unknown, force, len(self.b))
+        return np.asarray(np.bincount(self.unknown, force, len(self.b)), dtype=float)
 
 
 @dataclass(frozen=True, eq=False)

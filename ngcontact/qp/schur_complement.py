@@ -162,9 +162,9 @@ class BorderedSystems:
         if p.unit_rows:
             return p.diagonal[p.unknown]
         stiffness = np.full(p.g.size, np.inf)
-        for key, place in base.place.items() if base is not None else ():
-            if key < 0:
-                stiffness[~key] = 1 / p.left_sides(base.known[place])[~key]
+        if base is not None:
+            for j, place in ((~key, place) for key, place in base.place.items() if key < 0):
+                stiffness[j] = 1 / p.left_sides(base.known[place])[j]
         return stiffness
 
     def _reach(self, active: Mask, anchor: Anchor | None) -> Border:
@@ -214,11 +214,11 @@ class BorderedSystems:
         if not keys:
             V = np.zeros((0, 0))
             return Border(base, active, anchor, at, rows, rows, rows, V, V.diagonal(), V)
-        columns = [_row(p.K, i) for i in at]
+        columns = [_row(p.K, i) for i in at.tolist()]
         if p.R is None:
             columns += [(p.unknown[[j]], np.ones(1)) for j in rows]
         else:
-            columns += [_row(p.R, j) for j in rows]
+            columns += [_row(p.R, j) for j in rows.tolist()]
         new = [i for i, key in enumerate(keys) if key not in base.place]
         base.place.update({keys[i]: len(base.place) + k for k, i in enumerate(new)})
         V = np.zeros((len(new), p.b.size))
