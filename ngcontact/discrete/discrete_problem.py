@@ -34,7 +34,6 @@ from ..linalg import (
     cholesky,
     coarsenings,
     congruent,
-    handed_over,
     truncated_multigrid,
 )
 from ..mesh import vertex_parents
@@ -93,8 +92,6 @@ def linear_systems(
     coarsest = 2 * np.count_nonzero(parents[:, 0] < 0)  # of the first mesh
     if small or coarsest > (1 - MIN_REFINED) * size:
         return BorderedSystems(program, factor)
-    if matrix.nze < program.K.nnz:  # half of it, all that a factorisation reads
-        matrix = handed_over(program.K)
 
     def prepare(free: Mask) -> Multigrid:
         steps = coarsenings(basis.T, parents, nodes, MULTIGRID.coarsest)

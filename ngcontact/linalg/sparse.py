@@ -17,8 +17,7 @@ from ..arrays import Array, Factor, Index, Mask, Solve, from_triplets
 # Unknowns up to which one thread factorises sooner than NGSolve has started others and they have
 # found their work: that takes 25 ms of processor time, 10 000 unknowns of order 3 on one thread 33.
 ONE_THREAD = 10_000
-# Entries of a matrix up to which T'AT is cheaper than the change to it: measured 170 000.
-MULTIPLIED_ENTRIES = 100_000
+MULTIPLIED_ENTRIES = 200_000  # of a matrix, up to which T'AT costs no more than the change to it
 
 _COUNT = threading.Lock()  # of the threads of managers to come, one number for the whole process
 
@@ -70,15 +69,16 @@ def lower_half(K: sp.csr_array) -> ng.BaseMatrix:
 def congruent(
     matrix: ng.BaseMatrix, A: sp.csr_array, T: sp.csr_array
 ) -> tuple[sp.csr_array, ng.BaseMatrix]:
-    """Matrix T'AT (k, k) of the unknowns y of u = T y, for SciPy; its lower half for NGSolve.
+    """Matrix T'AT (k, k) of the unknowns y of u = T y, for SciPy and for NGSolve.
 
     `A` (n, n) is `matrix` for SciPy. `T` (n, k) is the identity but for nodes on the boundary: of a
     large matrix only the change is multiplied and handed over, a small part of the whole.
     """
     # element="physical" has fewer node values than edge unknowns
     if A.nnz <= MULTIPLIED_ENTRIES or T.shape[0] != T.shape[1]:
-        K = (T.T @ (A @ T)).T.tocsr()  # symmetric: the transpose has its rows at once
-        return K, lower_half(K)
+        right = handed_over(T)
+        product = right.CreateTranspose() @ (matrix @ right)
+        return shared(product), product
     change = change_of_basis(A, T)
     if change.nnz == 0:
         return A, matrix
