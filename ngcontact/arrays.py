@@ -11,6 +11,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike, NDArray
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
 Array: TypeAlias = NDArray[np.float64]
 Index: TypeAlias = NDArray[np.intp]
 Mask: TypeAlias = NDArray[np.bool_]
@@ -58,9 +61,11 @@ def field_names(record: Any) -> list[str]:
     return [field.name for field in fields(record)]
 
 
-def rows_of(record: Record, at: Index | Mask) -> Record:
-    """The rows `at` (k,), numbers or a mask, of all arrays of a record."""
-    return type(record)(*(getattr(record, name)[at] for name in field_names(record)))
+def rows_of(record: Record, at: Index | Mask, *names: str) -> Record:
+    """The rows `at` (k,), numbers or a mask, of arrays of a record: all, or the `names` alone."""
+    arrays = {name: getattr(record, name) for name in field_names(record)}
+    chosen = {name: arrays[name][at] for name in names or arrays}
+    return type(record)(**arrays | chosen)
 
 
 def joined(records: Sequence[Record]) -> Record:
@@ -76,7 +81,19 @@ def joined(records: Sequence[Record]) -> Record:
 
 def across(d: Array) -> Array:
     """Vectors (..., 2) turned to the left of `d` (..., 2) by a right angle."""
-    return np.stack([-d[..., 1], d[..., 0]], axis=-1)
+    turned = np.empty(d.shape, d.dtype)
+    turned[..., 0], turned[..., 1] = -d[..., 1], d[..., 0]
+    return turned
+
+
+def rightward(*slopes: Array) -> Array:
+    """Unit normals (..., d) of what d - 1 `slopes`, (..., d) each, span.
+
+    To the right of a vector in the plane, along the cross product of two in space: before the
+    slopes they make a positively oriented basis.
+    """
+    normal = -across(*slopes) if len(slopes) == 1 else np.cross(*slopes)
+    return np.asarray(normal / np.sqrt((normal**2).sum(axis=-1, keepdims=True)))
 
 
 def for_both_components(S: sp.csr_array) -> sp.csr_array:

@@ -15,16 +15,14 @@ the stiff one would drown.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, TypeVar
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from .arrays import Array, Index, Mask, from_triplets
+from .arrays import Array, Index, Mask, from_triplets, rows_of
 
 ROW_DIFFERENCE = 1e-9  # difference of coefficients, each at most 1, below which two rows are one
 RING_CONDITION = 1e6  # condition number from which rows that refer to each other are dependent
@@ -102,7 +100,7 @@ class Rows:
         """Some of the rows, by their numbers `rows` (k,)."""
         if np.array_equal(rows, np.arange(len(self.node))):
             return self
-        return Rows(*(getattr(self, x.name)[rows] for x in fields(Rows)))
+        return rows_of(self, rows)
 
     def repeated(self) -> Index:
         """Number (m,) of an earlier row with the same left side, or the row's own number.
@@ -133,22 +131,6 @@ def no_rows(n: int, d: int = 2) -> Rows:
 def no_conditions(d: int = 2) -> Conditions:
     """The conditions of a problem without supports."""
     return Conditions(np.zeros(0, dtype=np.intp), np.zeros((0, d)), np.zeros(0))
-
-
-Part = TypeVar("Part", Conditions, Rows)
-
-
-def concatenated(parts: Sequence[Part]) -> Part:
-    """Conditions, or rows, of all parts in order; there is at least one part."""
-    if len(parts) == 1:
-        return parts[0]
-    kind = type(parts[0])
-
-    def stacked(name: str) -> Any:
-        arrays = [getattr(part, name) for part in parts]
-        return sp.vstack(arrays, format="csr") if sp.issparse(arrays[0]) else np.concatenate(arrays)
-
-    return kind(*(stacked(x.name) for x in fields(kind)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,8 +42,8 @@ def gauss(order: int) -> tuple[Array, Array]:
 
 def _legendre(x: Array, degree: int) -> Array:
     """Values (k, degree + 1) of Legendre's polynomials at `x` (k,), without checks of input."""
-    values = np.ones((degree + 1, len(x)))
-    values[1:2] = x
+    values = np.empty((degree + 1, len(x)))
+    values[0], values[1:2] = 1.0, x
     for n in range(2, degree + 1):
         values[n] = (values[n - 1] * x * (2 * n - 1) - values[n - 2] * (n - 1)) / n
     return values.T
@@ -60,17 +60,30 @@ def lagrange(order: int, s: Array, axis: int = 0) -> Array:
 
     Column i is 1 at point i and 0 at the others. At those points the rows are unit vectors exactly.
     """
-    s = np.atleast_1d(s)
+    s = np.array(s, ndmin=1)
     values: Array = _legendre(2 * s - 1, order) @ _coefficients(order, axis)
-    at, node = np.nonzero(s[:, None] == gauss_lobatto(order, axis))
-    values[at] = 0.0
-    values[at, node] = 1.0
+    place, node = (s[:, None] == gauss_lobatto(order, axis)).nonzero()
+    values[place] = 0.0
+    values[place, node] = 1.0
     return values
 
 
 def lagrange_derivative(order: int, s: Array) -> Array:
     """Derivatives (k, order + 1) of the polynomials of `lagrange` at parameters `s` (k,)."""
-    return np.asarray(_legendre(2 * np.atleast_1d(s) - 1, order - 1) @ _slopes(order))
+    return np.asarray(_legendre(2 * np.array(s, ndmin=1) - 1, order - 1) @ _slopes(order))
+
+
+def at(curve: Array, segment: Index, s: Array) -> Array:
+    """Points (k, 2) at `s` (k,) of segments `segment` (k,) of `curve` (q, p + 1, 2).
+
+    That is given by its points at the Gauss-Lobatto parameters.
+    """
+    return (lagrange(curve.shape[1] - 1, s)[:, None] @ curve[segment])[:, 0]
+
+
+def slope(curve: Array, segment: Index, s: Array) -> Array:
+    """Derivatives (k, 2) of the same with respect to s."""
+    return (lagrange_derivative(curve.shape[1] - 1, s)[:, None] @ curve[segment])[:, 0]
 
 
 @lru_cache

@@ -1,4 +1,4 @@
-"""Squares that stay in the range of numbers, sparse arrays from entries, lines of warnings."""
+"""Squares that stay in the range of numbers, normals, sparse arrays from entries, lines of warnings."""
 
 from pathlib import Path
 from typing import Any
@@ -8,7 +8,7 @@ import pytest
 import scipy.sparse as sp
 
 from ngcontact import ContactWarning, errors
-from ngcontact.arrays import from_triplets, power_of_two, root_of_squares
+from ngcontact.arrays import across, from_triplets, power_of_two, rightward, root_of_squares
 from ngcontact.errors import warn
 
 
@@ -23,6 +23,19 @@ def test_root_of_squares_that_are_out_of_range(size):
 def test_root_of_squares_of_nothing():
     assert root_of_squares(np.zeros(3)) == 0.0
     assert root_of_squares(np.zeros(0)) == 0.0
+
+
+@pytest.mark.parametrize("d", [2, 3])
+def test_normals_stand_before_slopes_in_a_positive_basis(d):
+    slopes = np.random.default_rng(d).normal(size=(d - 1, 20, d))
+    normal = rightward(*slopes)
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), 1, rtol=1e-15)
+    np.testing.assert_allclose(np.einsum("ski,ki->sk", slopes, normal), 0, atol=1e-15 * 10)
+    assert (np.linalg.det(np.stack([normal, *slopes], axis=1)) > 0).all()
+    if d == 2:
+        np.testing.assert_array_equal(
+            across(normal) * np.linalg.norm(slopes[0], axis=1)[:, None] > 0, slopes[0] > 0
+        )
 
 
 @pytest.mark.parametrize("index", [np.int32, np.int64, np.uint64])

@@ -5,13 +5,12 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from ngcontact.arrays import from_triplets
+from ngcontact.arrays import joined, from_triplets
 from ngcontact.constraints import (
     STIFFNESS_CONTRAST,
     Conditions,
     Rows,
     change_of_basis,
-    concatenated,
     no_conditions,
     no_rows,
 )
@@ -62,14 +61,14 @@ def test_matrix_of_rows():
     assert rows(3).matrix.shape == (0, 6)
 
 
-def test_rows_concatenated_and_selected_are_the_same():
+def test_rows_joined_and_selected_are_the_same():
     entries = (0, unit(0.1), {2: 1.0}), (1, unit(0.2), {}), (2, unit(0.3), {3: 0.25, 4: 0.75})
     whole = rows(5, *entries, g=[0.1, 0.2, 0.3])
     parts = [rows(5, entry, g=[gap]) for entry, gap in zip(entries, whole.g, strict=True)]
-    joined = concatenated([no_rows(5), *parts])
+    joined = joined([no_rows(5), *parts])
     for one, other in (
         (joined, whole),
-        (whole.select(np.array([2, 0])), concatenated(parts[::-2])),
+        (whole.select(np.array([2, 0])), joined(parts[::-2])),
     ):
         assert (one.matrix != other.matrix).nnz == 0
         np.testing.assert_array_equal(one.node, other.node)

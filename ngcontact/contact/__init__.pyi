@@ -16,7 +16,6 @@ from .line import twins as twins
 from .line import with_roles as with_roles
 from .line import without as without
 from .projection import MATCHING_DISTANCE as MATCHING_DISTANCE
-from .projection import at as at
 from .projection import crossings as crossings
 from .search import FoundContact as FoundContact
 from .search import find_contacts as find_contacts

@@ -25,7 +25,7 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Index, Mask, across, from_triplets
 from ..fem import BoundaryTrace
-from ..lagrange import gauss, lagrange
+from ..lagrange import at, gauss, lagrange
 from ..problem import Contact
 from .line import (
     ContactLine,
@@ -38,7 +38,7 @@ from .line import (
     with_roles,
     without,
 )
-from .projection import at, crossings, feet
+from .projection import crossings, feet
 
 SLIVER = 1e-9  # share of a segment below which a piece of it is none
 MIN_COVERED = 0.1  # of the integral of phi over the whole segment, below which hats take its place

@@ -13,13 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import accumulate, pairwise
 from typing import TypeVar
 
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 
-from ..arrays import Array, Index, Mask, across, from_triplets
+from ..arrays import Array, Index, Mask, across, from_triplets, rows_of
 from ..fem import BoundaryTrace
 from ..lagrange import gauss, lagrange
 from ..problem import Contact
@@ -58,8 +59,8 @@ Values = TypeVar("Values", Array, Mask)
 
 def by_line(lines: Sequence[ContactLine], values: Values) -> list[Values]:
     """Parts (m_i,) of `values` (m,) over the points of all lines in order, one for each line."""
-    stops = np.cumsum([len(line.node) for line in lines])
-    return np.split(values, stops[:-1]) if len(lines) else []
+    stops = list(accumulate((len(line.node) for line in lines), initial=0))
+    return [values[first:last] for first, last in pairwise(stops)]
 
 
 def twins(line: ContactLine) -> Index:
@@ -251,9 +252,9 @@ def without(line: ContactLine, dropped: Index) -> ContactLine:
     keep[dropped] = False
     renumber = np.full(m + 1, -1)
     renumber[:-1][keep] = np.arange(np.count_nonzero(keep))
-    arrays = ("node", "position", "direction", "gap", "weight", "partner", "partner_s")
-    kept = {name: getattr(line, name)[keep] for name in (*arrays, "coupling", "on_axis", "means")}
-    return replace(line, rows=renumber[line.rows], **kept)
+    names = ("node", "position", "direction", "gap", "weight", "partner", "partner_s")
+    kept = rows_of(line, keep, *names, "coupling", "on_axis", "means")
+    return replace(kept, rows=renumber[line.rows])
 
 
 def with_roles(trace: BoundaryTrace, contact: Contact) -> Contact:

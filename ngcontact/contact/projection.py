@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask, across
-from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative, zeros
+from ..lagrange import at, gauss_lobatto, lagrange, lagrange_derivative, slope, zeros
 
 MATCHING_DISTANCE = 1e-9  # distance, relative to a segment's length, below which two points are one
 GRAZING_COSINE = 1e-9  # cosine between ray and normal up to which the ray does not meet the curve
@@ -35,22 +35,12 @@ class Partners:
     searched: bool = False  # False where all are nodes at the same place
 
 
-def at(curve: Array, segment: Index, s: Array) -> Array:
-    """Points (k, 2) of segments `curve` (q, p + 1, 2) at `segment` (k,) and `s` (k,)."""
-    return np.einsum("ki,kid->kd", lagrange(curve.shape[1] - 1, s), curve[segment])
-
-
-def _slope(curve: Array, segment: Index, s: Array) -> Array:
-    """Derivatives (k, 2) of the segments with respect to s."""
-    return np.einsum("ki,kid->kd", lagrange_derivative(curve.shape[1] - 1, s), curve[segment])
-
-
 def normals(curve: Array, side: Array, segment: Index, s: Array) -> Array:
     """Outward normals (k, 2), not normalised, at `s` (k,) of segments `segment` (k,).
 
     Of the facing segments `curve` (q, p + 1, 2), `side` (q,).
     """
-    return -across(_slope(curve, segment, s)) * side[segment, None]
+    return -across(slope(curve, segment, s)) * side[segment, None]
 
 
 def none_met(size: int) -> Partners:
@@ -138,7 +128,7 @@ def crossings(
     def step(s: Array) -> Array:
         # (2.10): A_j and B_j on one perpendicular
         miss = ((at(curve, segment, s) - points) * normal).sum(axis=1)
-        rate = (_slope(curve, segment, s) * normal).sum(axis=1)
+        rate = (slope(curve, segment, s) * normal).sum(axis=1)
         return np.divide(miss, rate, out=np.zeros_like(miss), where=rate != 0)
 
     return _newton(s, step, settled)
@@ -237,7 +227,7 @@ def feet(points: Array, curve: Array, direction: Array | None) -> tuple[Index, A
         return segment, crossings(points[point], normal[point], curve, segment, s)
 
     def ahead(point: Index, segment: Index, s: Array) -> Array:
-        return ((points[point] - at(curve, segment, s)) * _slope(curve, segment, s)).sum(axis=1)
+        return ((points[point] - at(curve, segment, s)) * slope(curve, segment, s)).sum(axis=1)
 
     block = max(1, PAIRS_AT_ONCE // max(1, curve.size))  # each pair holds its curve
     found = [np.zeros((2, 0), dtype=np.intp)]
@@ -251,6 +241,6 @@ def feet(points: Array, curve: Array, direction: Array | None) -> tuple[Index, A
     point, segment = np.concatenate(found, axis=1)
 
     def step(s: Array) -> Array:  # of Gauss and Newton: at once where the point is on the segment
-        return -ahead(point, segment, s) / (_slope(curve, segment, s) ** 2).sum(axis=1)
+        return -ahead(point, segment, s) / (slope(curve, segment, s) ** 2).sum(axis=1)
 
     return segment, _newton(np.full(len(point), 0.5), step)

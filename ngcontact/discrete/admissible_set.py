@@ -8,13 +8,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..arrays import Array, Index, Mask, from_triplets
+from ..arrays import Array, Index, Mask, joined, from_triplets, rows_of
 from ..constraints import (
     BasisTransformation,
     Conditions,
     Rows,
     change_of_basis,
-    concatenated,
     no_conditions,
     no_rows,
 )
@@ -61,7 +60,7 @@ def _on_axis(trace: BoundaryTrace) -> Conditions:
 
 def support_conditions(problem: Problem, trace: BoundaryTrace) -> Conditions:
     """Gamma_u and Gamma_0, to which the axis of a body of revolution belongs."""
-    return concatenated([_prescribed(problem, trace), _guided(problem, trace), _on_axis(trace)])
+    return joined([_prescribed(problem, trace), _guided(problem, trace), _on_axis(trace)])
 
 
 def conditioned_segments(problem: Problem, trace: BoundaryTrace) -> Index:
@@ -96,11 +95,11 @@ def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[
     return result
 
 
-def joined(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:
+def contact_rows(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:
     """Rows of all lines, in order, on the nodes of the trace's space."""
     if not lines:
         return no_rows(trace.space.ndof)
-    return concatenated(
+    return joined(
         [
             Rows(
                 node=line.node,
@@ -205,8 +204,7 @@ def merged(lines: list[ContactLine], rows: Rows) -> tuple[list[ContactLine], Row
         earlier = [one.segments for one in lines[:k] if _share_primary(one, lines[k])]
         taken = np.isin(line.segments, np.concatenate([np.zeros(0, np.intp), *earlier]))
         left = (line.rows >= 0).any(axis=1) | ~had | ~taken
-        names = ("segments", "rows", "faces", "shares")
-        kept.append(replace(line, **{name: getattr(line, name)[left] for name in names}))
+        kept.append(rows_of(line, left, "segments", "rows", "faces", "shares"))
     return kept, replace(rows, g=g, equality=equality).select(first)
 
 
@@ -230,7 +228,7 @@ def admissible_set(problem: Problem, space: Space, found: Sequence[ContactLine])
     """
     trace = space.trace
     conditions = support_conditions(problem, trace)  # (3.6), (3.8)
-    lines, rows = merged(list(found), joined(list(found), trace))  # (2.3), (2.5), (2.10)
+    lines, rows = merged(list(found), contact_rows(list(found), trace))  # (2.3), (2.5), (2.10)
     length = float(np.abs(trace.curve).max())
     stiffness = space.stiffness() if rows.coupling.nnz else None  # else all rows have one host
     basis = change_of_basis(conditions, rows, length, stiffness)

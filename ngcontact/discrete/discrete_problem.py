@@ -271,13 +271,14 @@ def discretise(
     basis, rows = admissible.basis, admissible.rows
     rigid, f = equilibrium(problem, space, admissible.conditions, rows, basis)  # Remark 3.7
     space = replace(space, f=f)
+    T = space.basis @ basis.T
     same_unknowns = previous is not None and same_basis(basis, previous.basis)
     if previous is not None and same_unknowns and np.array_equal(nodal, previous.space.nodal):
-        program = _program(space, admissible, rigid, previous.program.K)
+        program = _program(T.T @ space.right_side, admissible, rigid, previous.program.K)
         systems = previous.systems
     else:
-        K, matrix = congruent(space.matrix, space.A, space.basis @ basis.T)
-        program = _program(space, admissible, rigid, K)
+        K, matrix = congruent(space.matrix, space.A, T)
+        program = _program(T.T @ space.right_side, admissible, rigid, K)
         systems = linear_systems(program, matrix, space, basis)
     return DiscreteProblem(
         problem=problem,
@@ -295,9 +296,9 @@ def discretise(
 
 
 def _program(
-    space: Space, admissible: AdmissibleSet, rigid: Rigid | None, K: sp.csr_array
+    b: Array, admissible: AdmissibleSet, rigid: Rigid | None, K: sp.csr_array
 ) -> QuadraticProgram:
-    """L over K_h in the unknowns of rows and supports, with the stiffness `K` of these.
+    """L over K_h in the unknowns of rows and supports, with the load `b` and stiffness `K`.
 
     Raises
     ------
@@ -307,7 +308,7 @@ def _program(
     basis = admissible.basis
     p = QuadraticProgram(  # (2.6)
         K=K,
-        b=basis.T.T @ (space.basis.T @ space.right_side),
+        b=b,
         g=admissible.rows.g,
         equality=admissible.rows.equality,
         fixed=basis.fixed,

@@ -17,7 +17,6 @@ from ..contact import (
     ContactLine,
     ContactState,
     FacingPieces,
-    at,
     crossings,
     divided,
     end_to_end,
@@ -25,7 +24,7 @@ from ..contact import (
     prescribed_gap,
 )
 from ..fem import BoundaryTrace
-from ..lagrange import gauss, gauss_lobatto, lagrange, lagrange_derivative
+from ..lagrange import at, gauss, gauss_lobatto, lagrange, lagrange_derivative
 from .terms import (
     DATA_BONUS,
     BoundaryPoints,

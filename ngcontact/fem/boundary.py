@@ -17,9 +17,9 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..arrays import Array, Index, Mask, for_both_components, from_triplets
-from ..lagrange import gauss_lobatto, lagrange, lagrange_derivative
-from ..mesh import CadEdge, cad_edges, rightward
+from ..arrays import Array, Index, Mask, for_both_components, from_triplets, rightward
+from ..lagrange import at, gauss_lobatto, lagrange, slope
+from ..mesh import CadEdge, cad_edges
 from ..problem import MeshArrays, boundary_mask
 from .model import PLANE, Model
 
@@ -188,12 +188,11 @@ class BoundaryTrace:
 
     def point(self, segment: Index, s: Array) -> Array:
         """Points (k, 2) of the mesh's curves at parameters `s` (k,) of segments `segment` (k,)."""
-        return np.einsum("ki,kid->kd", lagrange(self.geometry_order, s), self.curve[segment])
+        return at(self.curve, segment, s)
 
     def derivative(self, segment: Index, s: Array) -> Array:
         """Derivatives (k, 2) with respect to s, at `s` (k,) of segments `segment` (k,)."""
-        weights = lagrange_derivative(self.geometry_order, s)
-        return np.einsum("ki,kid->kd", weights, self.curve[segment])
+        return slope(self.curve, segment, s)
 
     def normal(self, segment: Index, s: Array) -> Array:
         """Outward unit normals (k, 2) of the mesh at `s` (k,) of segments `segment` (k,)."""
@@ -201,14 +200,14 @@ class BoundaryTrace:
 
     def exact_normal(self, segment: Index, s: Array) -> Array:
         """The same of the CAD edges, at `s` (k,) of segments `segment` (k,), (k, 2), if any."""
-        normals = self.normal(segment, s)
+        normals, regions = self.normal(segment, s), self.region[segment]
         if self.edges is not None:
             points = self.point(segment, s)
-            for region in np.unique(self.region[segment]):
-                at = self.region[segment] == region
-                exact = self.edges[region].normal(points[at])
-                sign = np.where((exact * normals[at]).sum(axis=1) < 0, -1.0, 1.0)
-                normals[at] = exact * sign[:, None]
+            for region in set(regions.tolist()):
+                here = regions == region
+                exact = self.edges[region].normal(points[here])
+                outward = (exact * normals[here]).sum(axis=1) >= 0
+                normals[here] = np.where(outward[:, None], exact, -exact)
         return normals
 
     def at_nodes(self, segments: Index) -> tuple[Index, Array]:
@@ -222,7 +221,7 @@ class BoundaryTrace:
     def shapes(self, segment: Index, s: Array) -> Array:
         """Basis functions (k, order + 1) of the nodes, at `s` (k,) of segments `segment` (k,)."""
         values, axis = lagrange(self.order, s), self.axis[segment]
-        for end in (-1, 1):
+        for end in (-1, 1) if axis.any() else ():
             values[axis == end] = lagrange(self.order, s[axis == end], end)
         return values
 
@@ -244,7 +243,7 @@ class BoundaryTrace:
 
     def segments(self, *patterns: str | None) -> Index:
         """Segments (j,) of the boundaries that the patterns select, as in `lies_on`."""
-        return np.flatnonzero(self.lies_on(np.arange(len(self.region)), *patterns))
+        return self.lies_on(np.arange(len(self.region)), *patterns).nonzero()[0]
 
     @cached_property
     def curved_segments(self) -> Mask:

@@ -2,7 +2,6 @@
 
 from .cad import CadEdge as CadEdge
 from .cad import cad_edges as cad_edges
-from .cad import rightward as rightward
 from .cad import same_geometry as same_geometry
 from .curving import check_curves as check_curves
 from .curving import copied as copied

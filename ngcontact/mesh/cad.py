@@ -13,7 +13,7 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import OCCGeometry, TopoDS_Shape
 
-from ..arrays import Array, across
+from ..arrays import Array, across, rightward
 
 SAMPLES = 65  # points of an edge from which a projection starts
 NEWTON_STEPS = 30
@@ -23,11 +23,6 @@ STRAIGHT = 1e-12  # distance from the chord, relative to the edge; OCC keeps abo
 LONG_ARC = 0.5  # parameters, angles on arcs of circles, from which the arc is fitted
 EXACT = 8 * np.finfo(float).eps  # distance, relative to the edge, at which a formula is its curve
 SETTLED = 1e-15  # relative change of a parameter at which Newton's method has arrived
-
-
-def rightward(vectors: Array) -> Array:
-    """Unit vectors (k, 2) to the right of `vectors` (k, 2)."""
-    return across(vectors) / -np.linalg.norm(vectors, axis=1)[:, None]
 
 
 class CadEdge:

@@ -13,9 +13,9 @@ import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask, across
+from ..arrays import Array, Index, Mask, across, rightward
 from ..problem import Contact, MeshArrays, Problem
-from .cad import CadEdge, rightward
+from .cad import CadEdge
 
 COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given ...
 FINER = 2  # ... and that many times more on a bounded zone: contact may end anywhere on it

@@ -9,6 +9,7 @@ from ngcontact.arrays import from_triplets
 from ngcontact.constraints import Conditions, Rows, change_of_basis
 from ngcontact.lagrange import gauss_lobatto
 from ngcontact.linalg.coarse_spaces import COARSEST, RingError, coarsenings
+from ngcontact.linalg import sparse
 from ngcontact.linalg.sparse import cholesky, congruent, lower_half, shared
 
 FIRST = 4  # vertices of each line at first
@@ -127,8 +128,11 @@ def for_ngsolve(K):
 
 @pytest.mark.parametrize("full", [False, True])
 @pytest.mark.parametrize("changed", [0, 1, SIZE])
-def test_congruent_matrices(changed, full):
-    """T differs from the identity in that many rows; a full A has places for all that changes."""
+def test_congruent_matrices(changed, full, monkeypatch):
+    """T differs from the identity in that many rows; a full A has places for all that changes.
+
+    A large matrix is changed, of a small one the product is made.
+    """
     rng = np.random.default_rng(changed)
     given = definite(rng)
     if full:
@@ -137,10 +141,13 @@ def test_congruent_matrices(changed, full):
     A = for_ngsolve(given)
     T = np.eye(SIZE)
     T[rng.permutation(SIZE)[:changed]] += rng.normal(size=(changed, SIZE))
-    K, total = congruent(A, shared(A), sp.csr_matrix(T))
+    small, _ = congruent(A, shared(A), sp.csr_array(T))
+    monkeypatch.setattr(sparse, "MULTIPLIED_ENTRIES", 0)
+    K, total = congruent(A, shared(A), sp.csr_array(T))
     expected = T.T @ shared(A).toarray() @ T
     # Sums of at most SIZE^2 terms: 1e-13 is round-off.
-    np.testing.assert_allclose(K.toarray(), expected, atol=1e-13 * np.abs(expected).max())
+    for one in (K, small):
+        np.testing.assert_allclose(one.toarray(), expected, atol=1e-13 * np.abs(expected).max())
     assert np.shares_memory(K.data, np.asarray(total.CSR()[0]))
     np.testing.assert_array_equal(shared(A).toarray(), given.toarray())  # as it was
     right, product = total.CreateRowVector(), total.CreateColVector()

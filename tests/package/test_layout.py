@@ -76,7 +76,7 @@ def test_arrays_are_cut_into_pairs_in_one_module():
     """Rooms that know of no pairs split other things; the dual program splits by its lines."""
     without_pairs = ("ngcontact/qp/", "ngcontact/linalg/", "ngcontact/constraints/")
     without_pairs += ("ngcontact/estimator/bound/program.py",)
-    cut = with_lines(r"np\.split\(|cumsum\(\[?len|cumsum\(\[0, \*\(len")
+    cut = with_lines(r"np\.split\(|(cumsum|accumulate)\(\(?\[?(0, \*\()?len")
     assert {path for path in cut if not path.startswith(without_pairs)} == {
         "ngcontact/contact/line.py"
     }
@@ -98,3 +98,50 @@ def test_no_module_bears_the_name_of_what_its_package_exports():
     assert {face: exported(face) & names for face, names in modules.items()} == {
         face: set() for face in faces
     }
+
+
+def package_imports() -> dict[str, set[str]]:
+    """Modules that each module of the package imports; names of faces stand for their modules."""
+    arrows: dict[str, dict[str, str]] = {}  # by module, the full name of each name imported
+    for path in (ROOT / "ngcontact").rglob("*.py"):
+        stub = path.with_suffix(".pyi")  # of a face that is read lazily
+        module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        package = module.rpartition(".")[0]
+        found = arrows.setdefault(module.removesuffix(".__init__"), {})
+        for node in ast.walk(ast.parse((stub if stub.exists() else path).read_text())):
+            if isinstance(node, ast.ImportFrom) and node.level:
+                base = package.split(".")[: package.count(".") + 2 - node.level]
+                base += [node.module] if node.module else []
+                for name in node.names:
+                    found[f"{name.asname or name.name}"] = ".".join([*base, name.name])
+
+    def defined(name: str) -> str:
+        """The module in which an imported name is defined."""
+        if name in arrows:
+            return name
+        module, _, name = name.rpartition(".")
+        return defined(arrows[module][name]) if name in arrows.get(module, ()) else module
+
+    faces = {name.rpartition(".")[0] for name in arrows}
+    return {
+        module: {defined(name) for name in names.values()} - faces - {module}
+        for module, names in arrows.items()
+        if module not in faces
+    }
+
+
+def test_chains_of_imports_are_short():
+    """A reader has at most so many modules between what is asked and the arrays it is made of."""
+    imports, longest = package_imports(), dict[str, int]()
+
+    def chain(module: str) -> int:
+        if module not in longest:
+            longest[module] = 1 + max((chain(name) for name in imports[module]), default=0)
+        return longest[module]
+
+    assert imports["ngcontact.linalg.iterative"] >= {
+        "ngcontact.arrays",
+        "ngcontact.linalg.multigrid",
+        "ngcontact.qp.schur_complement",  # by the face of its room
+    }
+    assert max(chain(module) for module in imports) <= 15
