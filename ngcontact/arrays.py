@@ -70,6 +70,8 @@ def rows_of(record: Record, at: Index | Mask, *names: str) -> Record:
 
 def joined(records: Sequence[Record]) -> Record:
     """The rows of all `records`, one after the other; there is at least one record."""
+    if len(records) == 1:
+        return records[0]
     kind = type(records[0])
 
     def stacked(name: str) -> Any:
@@ -86,13 +88,13 @@ def across(d: Array) -> Array:
     return turned
 
 
-def rightward(*slopes: Array) -> Array:
-    """Unit normals (..., d) of what d - 1 `slopes`, (..., d) each, span.
+def rightward(slope: Array, other: Array | None = None) -> Array:
+    """Unit normals (..., d) of the d - 1 slopes (..., d) of a curve or a surface.
 
     To the right of a vector in the plane, along the cross product of two in space: before the
     slopes they make a positively oriented basis.
     """
-    normal = -across(*slopes) if len(slopes) == 1 else np.cross(*slopes)
+    normal = -across(slope) if other is None else np.cross(slope, other)
     return np.asarray(normal / np.sqrt((normal**2).sum(axis=-1, keepdims=True)))
 
 

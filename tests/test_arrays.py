@@ -1,4 +1,4 @@
-"""Squares that stay in the range of numbers, normals, sparse arrays from entries, lines of warnings."""
+"""Squares in the range of numbers, normals, sparse arrays from entries, lines of warnings."""
 
 from pathlib import Path
 from typing import Any

@@ -65,9 +65,9 @@ def test_rows_joined_and_selected_are_the_same():
     entries = (0, unit(0.1), {2: 1.0}), (1, unit(0.2), {}), (2, unit(0.3), {3: 0.25, 4: 0.75})
     whole = rows(5, *entries, g=[0.1, 0.2, 0.3])
     parts = [rows(5, entry, g=[gap]) for entry, gap in zip(entries, whole.g, strict=True)]
-    joined = joined([no_rows(5), *parts])
+    together = joined([no_rows(5), *parts])
     for one, other in (
-        (joined, whole),
+        (together, whole),
         (whole.select(np.array([2, 0])), joined(parts[::-2])),
     ):
         assert (one.matrix != other.matrix).nnz == 0

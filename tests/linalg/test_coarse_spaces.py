@@ -8,8 +8,8 @@ import scipy.sparse as sp
 from ngcontact.arrays import from_triplets
 from ngcontact.constraints import Conditions, Rows, change_of_basis
 from ngcontact.lagrange import gauss_lobatto
-from ngcontact.linalg.coarse_spaces import COARSEST, RingError, coarsenings
 from ngcontact.linalg import sparse
+from ngcontact.linalg.coarse_spaces import COARSEST, RingError, coarsenings
 from ngcontact.linalg.sparse import cholesky, congruent, lower_half, shared
 
 FIRST = 4  # vertices of each line at first
