@@ -5,7 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from ngcontact.arrays import joined, from_triplets
+from ngcontact.arrays import from_triplets, joined
 from ngcontact.constraints import (
     STIFFNESS_CONTRAST,
     Conditions,

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..arrays import Array, Index, Mask, joined, from_triplets, rows_of
+from ..arrays import Array, Index, Mask, from_triplets, joined, rows_of
 from ..constraints import (
     BasisTransformation,
     Conditions,
