@@ -286,7 +286,7 @@ def three_bodies(rng, d):
     """The middle one is primary to the first and secondary to the last."""
     top, middle, bottom = np.arange(4), np.arange(4, 10), np.arange(10, 15)
     pairs = (top, middle), (middle[:4], bottom)
-    contact = concatenated([random_contact(rng, 15, *pair, d) for pair in pairs])
+    contact = joined([random_contact(rng, 15, *pair, d) for pair in pairs])
     return random_conditions(rng, rng.choice(bottom, size=2, replace=False), d), contact
 
 
