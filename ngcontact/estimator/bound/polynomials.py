@@ -55,15 +55,18 @@ def derivatives(
     Of the m `products` of a total degree of `least` or more.
     """
     i, j = (x[np.add(*products(degree)) >= least] for x in products(degree))
-    found = []
-    for order in orders:
-        values = [
-            legendre.legvander(2 * local[..., c] - 1, max(degree - n, 0))
-            @ legendre.legder(np.eye(degree + 1), n)
-            for c, n in enumerate(order)
-        ]
-        found.append(values[0][..., i] * values[1][..., j])
-    return np.stack(found, axis=-2)
+    values = []  # by coordinate and order
+    for x, numbers in ((2 * local[..., 0] - 1, i), (2 * local[..., 1] - 1, j)):
+        P = legendre.legvander(x, degree)
+        own = (P[..., : max(degree - n, 0) + 1] @ _slopes(degree, n) for n in range(3))
+        values.append([f[..., numbers] for f in own])
+    return np.stack([values[0][n] * values[1][m] for n, m in orders], axis=-2)
+
+
+@lru_cache
+def _slopes(degree: int, n: int) -> Array:
+    """Legendre's coefficients (k, degree + 1) of n-th derivatives of Legendre's polynomials."""
+    return np.asarray(legendre.legder(np.eye(degree + 1), n))
 
 
 def scales(corners: Array) -> tuple[Array, Array]:
