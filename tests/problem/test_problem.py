@@ -254,7 +254,7 @@ def quadrilaterals():
         (lambda: "mesh", TypeError, "mesh is a str: give an ngsolve.Mesh"),
         (empty, ValueError, "mesh has 0 elements: generate it"),
         (solid, ValueError, r"mesh has dimension 3.*make it with OCCGeometry\(shape, dim=2\)"),
-        (astray, ValueError, "mesh"),
+        (astray, ValueError, "inverted or degenerate .* signed area"),
         (quadrilaterals, ValueError, "mesh has 2 quadrilaterals: it must be a triangulation"),
     ],
 )
