@@ -35,19 +35,19 @@ SAMPLES = ng.IntegrationRule(
 
 @dataclass(frozen=True, eq=False)
 class Moduli:
-    """What is asked of the law in each element, stresses (ne,); 0 where nothing was asked."""
+    """What is asked of the law in each element, stresses; 0 where nothing was asked."""
 
-    # Half the smallest eigenvalue of C on strains, c_0 / 2 in HH81 (2.7), the least in the element:
-    # mu of isotropic laws with nu >= 0, and kappa below.
-    shear: Array
+    # Half the smallest eigenvalue of C on strains, c_0 / 2 in HH81 (2.7), the least in the
+    # element: mu of isotropic laws with nu >= 0, and kappa below.
+    shear: Array  # (ne,)
     # Largest kappa <= e : C e / (tr e)^2, in the middle: lambda + mu of isotropic laws in plane
     # strain, lambda + 2 mu / 3 about an axis.
-    bulk: Array
+    bulk: Array  # (ne,)
     # Half the largest eigenvalue of C less kappa (tr e)^2, the largest in the element: mu of
     # isotropic laws. Boundary values w in a half-plane store at most 2 mu |w|^2 in H^(1/2), as the
     # field without divergence among those with these values does.
-    rigidity: Array
-    ratio: Array  # of the bulk modulus and half the smallest eigenvalue, in the middle
+    rigidity: Array  # (ne,)
+    ratio: Array  # (ne,), of the bulk modulus and half the smallest eigenvalue, in the middle
 
 
 def moduli_of(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Moduli:
@@ -117,10 +117,9 @@ def nearly_incompressible(
     ratio = moduli_of(problem, mesh).ratio if ratio is None else ratio
     if not (ratio > limit).any():
         return {}
-    region = MeshArrays(mesh).bodies
-    most = dict.fromkeys(mesh.GetMaterials(), 0.0)
-    for number, name in enumerate(mesh.GetMaterials()):
-        most[name] = max(most[name], float(ratio[region == number].max(initial=0.0)))
+    bodies = mesh.GetMaterials()
+    names = np.array(bodies)[MeshArrays(mesh).bodies]
+    most = {name: float(ratio[names == name].max(initial=0.0)) for name in dict.fromkeys(bodies)}
     return {name: value for name, value in most.items() if value > limit}
 
 

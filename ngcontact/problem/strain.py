@@ -65,7 +65,7 @@ def check_strains(
     """Refuse strains that are not symmetric, or of which a law does not tell what they do.
 
     A general law in the plane does not say how strains normal to it act in plane strain: `plane`
-    are the masks (r,) of such laws, `masks` (r,) those of `strains`, as of `strain_data`. All
+    (r,) are the masks of such laws, `masks` (r,) those of `strains`, as of `strain_data`. All
     elements are looked at at points of a `rule`.
     """
     for (label, mask), data in zip(masks.items(), strains, strict=True):

@@ -78,7 +78,7 @@ def gauss_rule(dim: int, order: int) -> tuple[Array, Array]:
 
 
 def inward(points: Array) -> Array:
-    """Points (m, dim) of the unit segment or triangle, `AT_CORNERS` of the way to its middle."""
+    """Places (m, dim), by `AT_CORNERS` of the way to the middle inside of `points` (m, dim)."""
     return points + AT_CORNERS * (1 / (points.shape[1] + 1) - points)
 
 
