@@ -95,14 +95,24 @@ def rightward(slope: Array, other: Array | None = None) -> Array:
     return np.asarray(normal / np.sqrt((normal**2).sum(axis=-1, keepdims=True)))
 
 
-def for_both_components(S: sp.csr_array) -> sp.csr_array:
-    """Sparse array (2m, 2n) that acts as `S` (m, n) on x components and on y components."""
+def rotations(x: Array) -> Array:
+    """Displacements (n, d, r) of points `x` (n, d) in the r unit rotations about the origin.
+
+    Anticlockwise in the plane; about the axes x, y and z in space.
+    """
+    if x.shape[-1] == 2:
+        return across(x)[..., None]
+    return np.stack([np.cross(axis, x) for axis in np.eye(3)], axis=-1)
+
+
+def for_components(S: sp.csr_array, d: int) -> sp.csr_array:
+    """Sparse array (d * m, d * n) that acts as `S` (m, n) on each of d components."""
     m, n = S.shape
     return sp.csr_array(
         (
-            np.concatenate([S.data, S.data]),
-            np.concatenate([S.indices, S.indices + n]),
-            np.concatenate([S.indptr, S.indptr[1:] + S.nnz]),
+            np.tile(S.data, d),
+            np.concatenate([S.indices + i * n for i in range(d)]),
+            np.concatenate([S.indptr[:1], *(S.indptr[1:] + i * S.nnz for i in range(d))]),
         ),
-        shape=(2 * m, 2 * n),
+        shape=(d * m, d * n),
     )

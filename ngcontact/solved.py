@@ -33,7 +33,7 @@ class Solved:
 
     @property
     def stress(self) -> ng.CoefficientFunction:
-        """In-plane stress, a (2, 2) CoefficientFunction, in units of stress.
+        """Stress, a (3, 3) CoefficientFunction, (2, 2) in the plane, in units of stress.
 
         What is computed on first use and looks at the mesh asks for it: estimate, bound, values at
         points, files and pictures.
@@ -69,8 +69,9 @@ class Solved:
 
     @cached_property
     def points(self) -> Array:
-        """Contact points C_j on the secondary before deformation, (m, 2), a length."""
-        return np.concatenate([np.zeros((0, 2)), *(pair.line.position for pair in self.pairs)])
+        """Contact points C_j on the secondary before deformation, (m, d), a length."""
+        none = np.zeros((0, self.problem.dim))
+        return np.concatenate([none, *(pair.line.position for pair in self.pairs)])
 
     @cached_property
     def pair(self) -> Index:
@@ -79,11 +80,12 @@ class Solved:
 
     @property
     def direction(self) -> Array:
-        """Unit direction d (m, 2) of each point, from the secondary to the primary, dimensionless.
+        """Unit direction (m, d) of each point, from the secondary to the primary, dimensionless.
 
         The traction on the secondary is -pressure d, the force of a point on it -force d.
         """
-        return np.concatenate([np.zeros((0, 2)), *(pair.line.direction for pair in self.pairs)])
+        none = np.zeros((0, self.problem.dim))
+        return np.concatenate([none, *(pair.line.direction for pair in self.pairs)])
 
     @cached_property
     def gap(self) -> Array:
@@ -111,21 +113,21 @@ class Solved:
         return self.minimiser.steps
 
     def contact_force(self, pair: int = 0) -> Array:
-        """Resultant (2,) of a pair's contact forces on its secondary, force per thickness."""
+        """Resultant (d,) of a pair's contact forces on its secondary, force per thickness."""
         state = state_of(self.pairs, pair)
         forces = -(state.force[:, None] * state.line.direction).sum(axis=0)
         return model_of(self.problem).resultant(forces)
 
     @cached_property
     def nodal_reaction(self) -> Array:
-        """Forces (n, 2) of the supports on the nodes, force per thickness, A u - f + B' force."""
+        """Forces (n, d) of the supports on the nodes, force per thickness, A u - f + B' force."""
         d = self.discrete
         residual = d.space.A @ self.displacement.vec.FV().NumPy() - d.space.right_side
-        return (d.space.basis.T @ residual + d.B.T @ self.force).reshape(2, -1).T
+        return (d.space.basis.T @ residual + d.B.T @ self.force).reshape(self.problem.dim, -1).T
 
     @cached_property
     def reactions(self) -> dict[str, Array]:
-        """Resultant (2,) of every boundary of Gamma_u, Gamma_0 on its body, force per thickness.
+        """Resultant (d,) of every boundary of Gamma_u, Gamma_0 on its body, force per thickness.
 
         A node shared by several of them counts for the last entry of `displacement`, then for
         `sliding`; a name that several bodies share gives the sum over them.
@@ -147,6 +149,7 @@ class Solved:
 
         None, k = 0, where all of the pair is in contact, or nothing.
         """
+        self.problem.refuse_solids("transitions")
         return state_of(self.pairs, pair).transitions.position
 
     @cached_property

@@ -43,6 +43,7 @@ from .plausibility import (
     contradictions,
     doubt_of_refinement,
     doubts,
+    doubts_of_surfaces,
     estimates_rise,
     warn_of_implausible,
 )
@@ -73,7 +74,7 @@ def solve(
     mesh: ng.Mesh | None = None,
     *,
     maxh: float | None = None,
-    order: int = 1,
+    order: int | None = None,
     element: str = "isoparametric",
     start: Solution | None = None,
 ) -> Solution:
@@ -87,8 +88,8 @@ def solve(
         The mesh; made from the geometry, with matched nodes on facing lines, when left out.
     maxh : float, optional
         Largest element size for making the mesh, a length; only without `mesh`.
-    order : int
-        Polynomial degree, 1 to 4.
+    order : int, optional
+        Polynomial degree, 1 to 4, of solids 1 to 3; when left out 1, of solids 2.
     element : str
         "isoparametric": geometry of degree `order`. "superparametric": Zlamal's (2.8), geometry
         of degree `order` + 1. "physical": (2.4), linear in physical coordinates on curved
@@ -111,7 +112,8 @@ def solve(
     NoEquilibriumError
         The load drives a rigid motion that supports and contact do not resist, or hardly.
     """
-    order = check_element(order, element)
+    usual = 1 if problem.dim == 2 else 2
+    order = check_element(usual if order is None else order, element, problem.dim)
     if mesh is not None and maxh is not None:
         raise ValueError(f"maxh={maxh} has no effect on a given mesh; give one of mesh and maxh")
     if start is not None:
@@ -142,7 +144,7 @@ def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> li
     given = isinstance(problem.geometry, ng.Mesh)
     searched = any(not contact.bilateral for contact in problem.contact)
     size = unknowns(mesh, order, element)
-    if given or not searched or size < COARSE_RUN_FROM:
+    if given or not searched or size < COARSE_RUN_FROM or problem.dim == 3:
         return []
     maxh = MeshArrays(mesh).extent / COARSE_ELEMENTS
     most = max(COARSE_DOFS, round(COARSE_SHARE * size))
@@ -321,6 +323,7 @@ def adapt(
     ConvergenceError
         The active set of a level did not settle.
     """
+    problem.refuse_solids("adapt")
     degree = 1 if order is None else order
     refinement = Refinement(degree, element, theta, tolerance, max_dofs, guaranteed)
     if order is None:
@@ -500,7 +503,8 @@ def warn_of_doubts(solution: Solution, told: set[object], *, last: bool) -> None
 
     What a finer mesh mends is left out unless none follows: the mesh is the `last`.
     """
-    found = doubts(solution, last=last)
+    plane = solution.problem.dim == 2
+    found = doubts(solution, last=last) if plane else doubts_of_surfaces(solution)
     for doubt, message in found.items():
         if doubt not in told:
             warn(message)

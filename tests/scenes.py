@@ -76,8 +76,8 @@ def discrete(problem, order, rounds, maxh=0.5):
 def steps_of(problem, coarsest=100):
     """Coarser spaces of a discrete problem."""
     trace = problem.space.trace
-    nodes = trace.nodes[problem.space.nodal]
-    return coarsenings(problem.basis.T, vertex_parents(trace.mesh), nodes, coarsest)
+    linear = trace.linear(problem.space.nodal)
+    return coarsenings(problem.basis.T, vertex_parents(trace.mesh), linear, coarsest)
 
 
 def divided(geometry, counts):

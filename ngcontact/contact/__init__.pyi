@@ -26,3 +26,6 @@ from .state import ending_segments as ending_segments
 from .state import pressure_across_corners as pressure_across_corners
 from .state import state_of as state_of
 from .state import transitions_on as transitions_on
+from .zone import ContactZone as ContactZone
+from .zone import contact_points as contact_points
+from .zone import for_partial_cover as for_partial_cover

@@ -29,7 +29,9 @@ from ..lagrange import at, gauss, lagrange
 from ..problem import Contact
 from .line import (
     ContactLine,
+    Line,
     jacobian,
+    no_point_faces,
     nodal_line,
     partners,
     prescribed_gap,
@@ -180,9 +182,33 @@ def with_dual_rows(
     chosen = np.flatnonzero(~matched)
     if len(chosen) == 0:
         return line, facing
-    segments, rows, m = line.segments[chosen], line.rows[chosen], len(facing)
+    segments = line.segments[chosen]
     pieces = divided(trace, line.contact, segments, line.facing)
     D, gaps, coupling = _integrals(trace, line.contact, segments, pieces)
+    covered = np.bincount(pieces.local, pieces.stop - pieces.start, minlength=len(chosen))
+    whole = covered > 1 - SLIVER
+    return with_means(trace, line, facing, matched, FacingMeans(D, gaps, coupling, whole))
+
+
+@dataclass(frozen=True, eq=False)
+class FacingMeans:
+    """Integrals over the facing parts of k segments, of q nodes each."""
+
+    D: Array  # (k, q) of the basis functions
+    gaps: Array  # (k, q) of psi times eps
+    coupling: sp.csr_array  # (k * q, n) of psi times the basis functions of the primary
+    whole: Mask  # (k,) segments that face it wholly
+
+
+def with_means(
+    trace: BoundaryTrace, line: Line, facing: Mask, matched: Mask, found: FacingMeans
+) -> tuple[Line, Mask]:
+    """The line with the means `found` on segments not `matched` (k,), and who carries rows (m,).
+
+    Of its points `facing` (m,) face the primary.
+    """
+    chosen, D, gaps, coupling = np.flatnonzero(~matched), found.D, found.gaps, found.coupling
+    segments, rows, m = line.segments[chosen], line.rows[chosen], len(facing)
     here = (rows >= 0) & (D > 0)
     point = rows[here]
     cosine = np.ones(len(point))
@@ -198,9 +224,8 @@ def with_dual_rows(
     share = np.where(at_nodes, 1.0, nodal / weight)  # of the row at the node
     scale, shape = cosine / weight[point], (m, coupling.shape[0])
     means = from_triplets(scale, point, np.flatnonzero(here), shape) @ coupling
-    covered = np.bincount(pieces.local, pieces.stop - pieces.start, minlength=len(chosen))
     faces = line.faces.copy()
-    faces[chosen] = (covered > 1 - SLIVER) & here.all(axis=1)
+    faces[chosen] = found.whole & here.all(axis=1)
     line = replace(
         line,
         gap=share * np.where(share > 0, line.gap, 0.0) + gap / weight,
@@ -229,18 +254,5 @@ def contact_line(trace: BoundaryTrace, contact: Contact, taken: Index | None = N
     if contact.primary is not None and contact.rows != "nodal":
         line, facing = with_dual_rows(trace, line, facing)
     if len(line.segments) and not facing.any():
-        along = (
-            "along its outward normals: choose boundaries that look at each other, or give the "
-            "direction from the secondary body to the primary one"
-        )
-        if contact.direction is not None:
-            x, y = contact.direction
-            along = (
-                f"along direction=({x:.6g}, {y:.6g}): the direction points from the secondary body "
-                "to the primary one"
-            )
-        raise ValueError(
-            f'no point of the secondary "{contact.secondary}" faces the primary '
-            f'"{contact.primary}" {along}'
-        )
+        raise ValueError(no_point_faces(contact))
     return without(line, np.flatnonzero(~facing))

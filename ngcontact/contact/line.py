@@ -53,8 +53,14 @@ class ContactLine:
     shares: Array  # (k, order + 1) what each segment contributes to the weights of its points
     searches: int  # 1 if partners had to be searched, 0 if all are nodes at the same place
 
+    @property
+    def dim(self) -> int:
+        """Of the bodies."""
+        return 2
+
 
 Values = TypeVar("Values", Array, Mask)
+Line = TypeVar("Line", bound=ContactLine)
 
 
 def by_line(lines: Sequence[ContactLine], values: Values) -> list[Values]:
@@ -135,6 +141,24 @@ def partners(
     return replace(found, segment=segment, searched=rest.size > 0)
 
 
+def no_point_faces(contact: Contact) -> str:
+    """What is said of a pair of which no point faces."""
+    along = (
+        "along its outward normals: choose boundaries that look at each other, or give the "
+        "direction from the secondary body to the primary one"
+    )
+    if contact.direction is not None:
+        xi = ", ".join(f"{x:.6g}" for x in contact.direction)
+        along = (
+            f"along direction=({xi}): the direction points from the secondary body to the primary "
+            "one"
+        )
+    return (
+        f'no point of the secondary "{contact.secondary}" faces the primary '
+        f'"{contact.primary}" {along}'
+    )
+
+
 def prescribed_gap(
     contact: Contact, trace: BoundaryTrace, segment: Index, s: Array, position: Array
 ) -> Array:
@@ -145,7 +169,7 @@ def prescribed_gap(
     if isinstance(contact.gap, ng.CoefficientFunction):
         return trace.evaluate(contact.gap, segment, s)[:, 0]
     if callable(contact.gap):
-        return np.asarray(contact.gap(position[:, 0], position[:, 1]), dtype=float)
+        return np.asarray(contact.gap(*position.T), dtype=float)
     return np.full(len(s), contact.gap, dtype=float)
 
 
@@ -243,7 +267,7 @@ def nodal_line(
     return line, facing_points
 
 
-def without(line: ContactLine, dropped: Index) -> ContactLine:
+def without(line: Line, dropped: Index) -> Line:
     """The line without its points `dropped` (j,); the segments still face the primary."""
     if dropped.size == 0:
         return line

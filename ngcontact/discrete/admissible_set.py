@@ -26,26 +26,29 @@ DIRECTION_DIFFERENCE = 1e-9  # of unit vectors, up to which two points at a node
 
 def _prescribed(problem: Problem, trace: BoundaryTrace) -> Conditions:
     """Gamma_u, (3.6): interpolated displacement components at the nodes."""
-    n = trace.space.ndof
-    given = np.zeros((2, n), dtype=bool)
-    value = np.zeros((2, n))
+    n, d = trace.space.ndof, trace.model.dim
+    given = np.zeros((d, n), dtype=bool)
+    value = np.zeros((d, n))
     for pattern, components in problem.displacement.items():
-        segment, s = trace.at_nodes(trace.segments(pattern))
-        node = trace.nodes[segment[:: trace.order + 1]].ravel()
+        segments = trace.segments(pattern)
+        segment, s = trace.at_nodes(segments)
+        node = trace.nodes[segments]
         for axis, function in enumerate(components):
             if function is not None:
                 given[axis, node] = True
-                value[axis, node] = trace.evaluate(function, segment, s)[:, 0]  # (3.6)
+                values = trace.evaluate(function, segment, s).reshape(node.shape)  # (3.6)
+                value[axis, node] = trace.unknowns_of_values(segments, values)
     axes, nodes = np.nonzero(given)
-    return Conditions(node=nodes, direction=np.eye(2)[axes], value=value[axes, nodes])
+    return Conditions(node=nodes, direction=np.eye(d)[axes], value=value[axes, nodes])
 
 
 def _guided(problem: Problem, trace: BoundaryTrace) -> Conditions:
     """Gamma_0, (3.8): zero normal displacement at the nodes, with the exact normals."""
     if problem.sliding is None:
-        return no_conditions()
-    segment, s = trace.at_nodes(trace.segments(str(problem.sliding)))
-    node = trace.nodes[segment[:: trace.order + 1]].ravel()
+        return no_conditions(trace.model.dim)
+    segments = trace.segments(str(problem.sliding))
+    segment, s = trace.at_nodes(segments)
+    node = trace.nodes[segments].ravel()
     number, normal = trace.number_points(segment, node, trace.exact_normal(segment, s))
     _, first = np.unique(number, return_index=True)
     return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))  # (3.8)
@@ -55,7 +58,8 @@ def _on_axis(trace: BoundaryTrace) -> Conditions:
     """No radial displacement on the axis of a body of revolution."""
     ends = [trace.nodes[trace.axis == end, place] for end, place in ((-1, 0), (1, -1))]
     node = np.unique(np.concatenate([trace.nodes[trace.on_axis].ravel(), *ends]))
-    return Conditions(node, np.tile([1.0, 0.0], (len(node), 1)), np.zeros(len(node)))
+    radial = np.eye(trace.model.dim)[:1]
+    return Conditions(node, np.tile(radial, (len(node), 1)), np.zeros(len(node)))
 
 
 def support_conditions(problem: Problem, trace: BoundaryTrace) -> Conditions:
@@ -72,7 +76,7 @@ def conditioned_segments(problem: Problem, trace: BoundaryTrace) -> Index:
 
 
 def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[str, Array]:
-    """Sums (2,) of the forces `reaction` (n, 2) of supports, by boundary of Gamma_u and Gamma_0.
+    """Sums (d,) of the forces `reaction` (n, d) of supports, by boundary of Gamma_u and Gamma_0.
 
     Per unit thickness, on the nodes of the boundary and all others.
     """
@@ -98,7 +102,7 @@ def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[
 def contact_rows(lines: list[ContactLine], trace: BoundaryTrace) -> Rows:
     """Rows of all lines, in order, on the nodes of the trace's space."""
     if not lines:
-        return no_rows(trace.space.ndof)
+        return no_rows(trace.space.ndof, trace.model.dim)
     return joined(
         [
             Rows(
@@ -130,8 +134,8 @@ def _same_point(lines: list[ContactLine], rows: Rows) -> tuple[Index, Mask]:
     number = rows.repeated()
     means = np.concatenate([np.zeros(0, dtype=bool), *(line.means for line in lines)])
     averaged = np.zeros(len(number), dtype=bool)
-    x, y = np.round(rows.direction.T, 6)  # neighbours in this order, the first pair's row first
-    order = np.lexsort((y, x, rows.node))
+    x = np.round(rows.direction.T, 6)  # neighbours in this order, the first pair's row first
+    order = np.lexsort((*x[::-1], rows.node))
     for a, b in pairwise(order) if means.any() else ():
         alike = np.abs(rows.direction[a] - rows.direction[b]).max() <= DIRECTION_DIFFERENCE
         apart = number[a] != number[b]

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Array, Mask
 from ..constraints import BasisTransformation, Conditions, Rows
-from ..contact import ContactLine, ContactState, by_line, contact_line
+from ..contact import ContactLine, ContactState, by_line, contact_points, for_partial_cover
 from ..errors import ConvergenceError, NoEquilibriumError
 from ..fem import (
     LOAD_BONUS,
@@ -86,15 +86,17 @@ def linear_systems(
     `matrix` is that of the `program` for NGSolve.
     """
     factor, trace = cholesky(matrix), space.trace
-    parents, nodes = vertex_parents(trace.mesh), trace.nodes[space.nodal]
+    parents = vertex_parents(trace.mesh)
     size = program.b.size
     small = size < MULTIGRID.large.get(trace.order, np.inf) or size <= MULTIGRID.coarsest
-    coarsest = 2 * np.count_nonzero(parents[:, 0] < 0)  # of the first mesh
+    d = trace.model.dim
+    coarsest = d * np.count_nonzero(parents[:, 0] < 0)  # of the first mesh
     if small or coarsest > (1 - MIN_REFINED) * size:
         return BorderedSystems(program, factor)
 
     def prepare(free: Mask) -> Multigrid:
-        steps = coarsenings(basis.T, parents, nodes, MULTIGRID.coarsest)
+        linear = trace.linear(space.nodal)
+        steps = coarsenings(basis.T, parents, linear, MULTIGRID.coarsest, d)
         return truncated_multigrid(matrix, steps, free)
 
     return IterativeSystems(program, factor, prepare)
@@ -160,7 +162,7 @@ def same_mesh(trace: BoundaryTrace, space: Space) -> bool:
     old = space.trace
     return (
         trace.model is old.model
-        and np.array_equal(trace.nodes, old.nodes)
+        and trace.same_nodes(old)
         and np.array_equal(trace.curve, old.curve)
         and np.array_equal(MeshArrays(trace.mesh).vertices, space.vertices)
     )
@@ -222,7 +224,7 @@ def contact_lines(
         )
         found = None if own.size else next(same, None)
         lines.append(
-            contact_line(trace, contact, own) if found is None else replace(found, searches=0)
+            contact_points(trace, contact, own) if found is None else replace(found, searches=0)
         )
     return lines
 
@@ -248,6 +250,7 @@ def discretise(
         The load does work on a rigid motion that supports and contact admit.
     """
     trace = boundary_trace(mesh, order, model_of(problem))
+    trace = for_partial_cover(trace, problem.contact)
     nodal = conditioned_segments(problem, trace)
     if previous is not None and not same_mesh(trace, previous.space):
         previous = None  # its mesh has been changed in place
@@ -426,7 +429,7 @@ def _carried(new: ContactLine, old: ContactState) -> Mask:
     tied = distance[:, 1] <= (1 + DISTANCE_ROUND_OFF) * away
     active: Mask = old.active[nearest] | (tied & old.active[near[:, 1]])
     order = known.rows.shape[1] - 1
-    if order > 1 and away.max() > size:  # not the same points
+    if order > 1 and known.dim == 2 and away.max() > size:  # not the same points
         ends = old.transitions
         for inner, outer, place in zip(ends.inner, ends.outer, ends.position, strict=True):
             around = (nearest == inner) | (nearest == outer)

@@ -6,24 +6,25 @@ supports and contact admit.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import ngsolve as ng
 import numpy as np
+from netgen.occ import OCCGeometry
 from scipy.linalg import block_diag
 from scipy.optimize import linprog, nnls
 
-from ..arrays import Array, Mask, across
+from ..arrays import Array, Mask, across, rotations
 from ..constraints import BasisTransformation, Conditions, Rows
 from ..errors import NoEquilibriumError
 from ..fem import Bodies, Space, body_of_unknown, connected_bodies, model_of
 from ..linalg import shared
-from ..mesh import cad_edges
 from ..problem import MeshArrays, Problem, numbers
 from ..qp import NULL_SPACE_TOLERANCE, NullSpace, pinned_null_space, vanishing_combinations
-from ..quadrature import SampledElements, loads_of
+from ..quadrature import Load, SampledElements, loads_of
 
 STRAIN_FORCE = 1e-9  # force of a rigid motion, relative to its terms, that shows it is not in V_h
 LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
@@ -32,7 +33,7 @@ QUADRATURE_ERRORS = 3.0  # of the load's work, measured, that are allowed; up to
 WORK_NOISE = 1e-10  # ... and this, relative to the sum of its terms, round-off
 FORCE_ROUND_OFF = 1e-13  # of all contact forces: what their least squares leave, measured 2e-14
 MIN_RESISTANCE = 1e-2  # of a motion, that closes or opens no gap more: contact hardly resists it
-WORK_ROUND_OFF = 1e-14  # work, relative to the sum of its terms, that is none
+WORK_ROUND_OFF = 1e-14  # work, relative to the most that the load could do, that is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,11 +44,11 @@ class RigidMotion:
     ----------
     bodies : tuple of str
         What moves, the body that moves most first.
-    translation : ndarray (k, 2)
+    translation : ndarray (k, d)
         Of the middle of each of them, a length.
-    rotation : ndarray (k,)
-        Angle, anticlockwise, about the middle.
-    middle : ndarray (k, 2)
+    rotation : ndarray (k, r)
+        About the middle: the angle, anticlockwise, in the plane, r = 1; in space about x, y and z.
+    middle : ndarray (k, d)
         Places, lengths.
     multiplier : float
         Of the condition that the integral of v.z ds over the boundary of the bodies vanishes, for
@@ -63,13 +64,32 @@ class RigidMotion:
     def __str__(self) -> str:
         """What the first body does."""
         t, turn, centre = self.translation[0], self.rotation[0], self.middle[0]
-        if turn == 0.0:
-            x, y = t / np.abs(t).max() + 0.0
-            words = f'translation of "{self.bodies[0]}" along ({x:.3g}, {y:.3g})'
+        first = f'of "{self.bodies[0]}"'
+        if not turn.any():
+            words = f"translation {first} along {_told(t / np.abs(t).max())}"
+        elif len(turn) == 1:
+            words = f"rotation {first} about {_told(centre + across(t) / turn)}"
         else:
-            x, y = centre + across(t) / turn + 0.0
-            words = f'rotation of "{self.bodies[0]}" about ({x:.3g}, {y:.3g})'
+            pitch = turn @ t / (turn @ turn) * turn  # along the axis
+            at = centre + np.cross(turn, t) / (turn @ turn)
+            kind = "screw" if np.abs(pitch).max() > NULL_SPACE_TOLERANCE * np.abs(t).max() else ""
+            along = _told(turn / np.abs(turn).max())
+            words = f"{kind or 'rotation'} {first} about the axis along {along} through {_told(at)}"
         return words + "".join(f' with "{name}"' for name in self.bodies[1:])
+
+    def field(self, body: int) -> ng.CoefficientFunction:
+        """The displacement (d,) of one of the bodies, by its number among them."""
+        d = self.middle.shape[1]
+        arm = [x - float(c) for x, c in zip((ng.x, ng.y, ng.z), self.middle[body], strict=False)]
+        t, turn = self.translation[body].tolist(), self.rotation[body].tolist()
+        if d == 2:
+            return ng.CF((t[0] - turn[0] * arm[1], t[1] + turn[0] * arm[0]))
+        return ng.CF(tuple(t)) + ng.Cross(ng.CF(tuple(turn)), ng.CF(tuple(arm)))
+
+
+def _told(x: Array) -> str:
+    """A vector in a few characters."""
+    return f"({', '.join(f'{value:.3g}' for value in x + 0.0)})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,20 +98,27 @@ class FreeMotions:
 
     space: Space  # V_h
     bodies: Bodies  # what moves
-    combinations: Array  # (3 * b, r) of the translations and the rotation of each of b bodies
-    nodal: Array  # (2n, r) node values, lengths
-    values: Array  # (2N, r) unknowns of V_h
+    # (m * b, r), of the translations and rotations, m = 3 or 6 in space, of each of b bodies
+    combinations: Array
+    nodal: Array  # (d * n, r) node values, lengths
+    values: Array  # (d * N, r) unknowns of V_h
 
     @property
     def of_bodies(self) -> Array:
-        """The combinations of each body, (b, 3, r)."""
-        return self.combinations.reshape(len(self.bodies.names), 3, -1)
+        """The combinations of each body, (b, m, r)."""
+        return self.combinations.reshape(len(self.bodies.names), -1, self.combinations.shape[1])
 
     @property
     def names(self) -> list[str]:
         """Of the bodies that can move."""
         both = zip(self.bodies.names, self.of_bodies, strict=True)
         return [name for name, part in both if part.any()]
+
+    def most_work(self, f: Array) -> Array:
+        """Work (r,) that a load `f` (d * N,) would do if all of it acted along the motions."""
+        size = np.bincount(body_of_unknown(self.space, self.bodies), np.abs(f))
+        body = self.of_bodies.any(axis=1).argmax(axis=0)  # each moves one body
+        return np.asarray(np.abs(self.values).max(axis=0) * size[body])
 
     @cached_property
     def means(self) -> Array:
@@ -110,14 +137,15 @@ class FreeMotions:
 
     def motion(self, amounts: Array, multiplier: float = 0.0) -> RigidMotion:
         """One of the motions, by its `amounts` (r,)."""
-        parts = (self.combinations @ amounts).reshape(-1, 3)
+        parts = (self.combinations @ amounts).reshape(len(self.bodies.names), -1)
         parts[np.abs(parts) <= NULL_SPACE_TOLERANCE * np.abs(parts).max()] = 0.0
         size = np.abs(parts).max(axis=1)
         moving = [int(b) for b in np.argsort(-size, kind="stable") if size[b] > 0]
+        d = self.bodies.middle.shape[1]
         return RigidMotion(
             bodies=tuple(self.bodies.names[b] for b in moving),
-            translation=parts[moving, :2],
-            rotation=parts[moving, 2] / self.bodies.size[moving],
+            translation=parts[moving, :d],
+            rotation=parts[moving, d:] / self.bodies.size[moving, None],
             middle=self.bodies.middle[moving],
             multiplier=multiplier,
         )
@@ -128,7 +156,7 @@ def free_motions(
 ) -> FreeMotions | None:
     """The rigid motions that the supports `conditions` leave free, None if there are none.
 
-    Of those that are rigid in the model: `motions` (3,), see `Model`.
+    Of those that are rigid in the model: `motions` (m,), see `Model`.
 
     Raises
     ------
@@ -137,18 +165,18 @@ def free_motions(
     """
     trace = space.trace
     bodies, rigid = connected_bodies(trace), np.flatnonzero(motions)
-    position = np.zeros((trace.space.ndof, 2))
+    position = np.zeros((trace.space.ndof, trace.model.dim))
     body = np.zeros(trace.space.ndof, dtype=np.intp)
-    position[trace.nodes.ravel()] = trace.point(*trace.at_nodes(np.arange(len(trace.region))))
-    body[trace.nodes.ravel()] = np.repeat(bodies.of_segment, trace.order + 1)
+    position[trace.nodes] = trace.positions(np.arange(len(trace.region)))
+    body[trace.nodes] = bodies.of_segment[:, None]
     at = body[conditions.node]
     arm = (position[conditions.node] - bodies.middle[at]) / bodies.size[at, None]
-    turn = (across(arm) * conditions.direction).sum(axis=1)
+    turn = np.einsum("kir,ki->kr", rotations(arm), conditions.direction)
     resisted = np.column_stack([conditions.direction, turn])[:, rigid]
     free = [vanishing_combinations(resisted[at == b]) for b in range(len(bodies.names))]
     if not any(x.shape[1] for x in free):
         return None
-    combinations = block_diag(*(np.eye(3)[:, rigid] @ x for x in free))
+    combinations = block_diag(*(np.eye(len(motions))[:, rigid] @ x for x in free))
     nodal = _node_values(space, bodies) @ combinations
     values = space.basis @ nodal
     terms = (space.diagonal[:, None] * np.abs(values)).max(axis=0)
@@ -161,30 +189,31 @@ def free_motions(
 
 
 def _node_values(space: Space, bodies: Bodies) -> Array:
-    """Translations and rotation of each body, (2n, 3b), as values of nodes and unknowns.
+    """Translations and rotations of each body, (d * n, m * b), as values of nodes and unknowns.
 
     Translations are 1, rotations 1 at half the body's size.
     """
-    trace = space.trace
-    n = space.basis.shape[1] // 2
-    place, one = np.zeros((n, 2)), np.zeros(n)
+    trace, d = space.trace, space.trace.model.dim
+    n = space.basis.shape[1] // d
+    place, one = np.zeros((n, d)), np.zeros(n)
     one[: trace.mesh.nv] = 1.0
     if trace.geometry_order == 1:  # edge and inner functions have no part in straight elements
         place[: trace.mesh.nv] = MeshArrays(trace.mesh).vertices
     else:
         field = ng.GridFunction(trace.space)
-        for axis, x in enumerate((ng.x, ng.y)):
+        for axis, x in enumerate((ng.x, ng.y, ng.z)[:d]):
             field.Set(x)
             place[:, axis] = field.vec.FV().NumPy()
-    nodes = trace.nodes[space.nodal].ravel()
-    place[nodes], one[nodes] = trace.point(*trace.at_nodes(space.nodal)), 1.0
-    values, of_node = np.zeros((2 * n, 3 * len(bodies.names))), body_of_unknown(space, bodies)[:n]
+    nodes = trace.nodes[space.nodal]
+    place[nodes], one[nodes] = trace.positions(space.nodal), 1.0
+    of_node, values = body_of_unknown(space, bodies)[:n], []
     for b, (middle, size) in enumerate(zip(bodies.middle, bodies.size, strict=True)):
-        at = np.flatnonzero(of_node == b)
-        values[at, 3 * b] = values[at + n, 3 * b + 1] = one[at]
-        turn = across(place[at] - one[at, None] * middle) / size
-        values[at, 3 * b + 2], values[at + n, 3 * b + 2] = turn.T
-    return values
+        here = (of_node == b)[:, None, None]
+        moves = one[:, None, None] * np.eye(d)
+        turns = rotations(place - one[:, None] * middle) / size
+        both = np.concatenate([moves, turns], axis=2) * here
+        values.append(both.transpose(1, 0, 2).reshape(d * n, -1))
+    return np.concatenate(values, axis=1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -255,7 +284,7 @@ def equilibrium(
         return None, space.f
     f, work, left_sides = space.f, free.values.T @ space.f, rows.left_sides(free.nodal)
     terms = np.abs(free.values).T @ np.abs(f)
-    noise = np.where(np.abs(work) <= WORK_ROUND_OFF * terms, work, 0.0)
+    noise = np.where(np.abs(work) <= WORK_ROUND_OFF * free.most_work(f), work, 0.0)
     unbalanced = _unbalanced(left_sides, rows.equality, work - noise)
     if not unbalanced.is_within(WORK_NOISE * terms):
         _check_work(problem, free, left_sides, rows.equality, work - noise, WORK_NOISE * terms)
@@ -374,6 +403,8 @@ def _measured_work(problem: Problem, free: FreeMotions) -> tuple[Array, Array] |
     loads = loads_of(problem, mesh)
     if all(numbers(load.data) for load in loads):
         return None
+    if model.dim == 3:
+        return _integrated_work(loads, free)
     work, error = np.zeros((2, free.combinations.shape[1]))
     for load in loads:
         view, density = SampledElements(mesh, 2 if load.kind == "force" else 1), load.density
@@ -395,37 +426,55 @@ def _measured_work(problem: Problem, free: FreeMotions) -> tuple[Array, Array] |
     return work, error
 
 
+def _integrated_work(loads: Sequence[Load], free: FreeMotions) -> tuple[Array, Array]:
+    """The same of solids: what two rules of quadrature differ by is the error."""
+    space, bodies = free.space, free.bodies
+    mesh, count = space.trace.mesh, len(free.combinations[0])
+    found = np.zeros((2, count))
+    body = {ng.VOL: bodies.of_vertex[MeshArrays(mesh).elements[:, 0]], ng.BND: bodies.of_segment}
+    for load in loads:
+        of = body[load.region.VB()]
+        for r, b in itertools.product(range(count), range(len(bodies.names))):
+            if not free.of_bodies[b, :, r].any():
+                continue
+            motion = free.motion(np.eye(count)[r])
+            power = load.density * motion.field(motion.bodies.index(bodies.names[b]))
+            for rule, order in enumerate((LOAD_ORDER, LOAD_ORDER + ADDED_DEGREES)):
+                parts = ng.Integrate(
+                    power, mesh, definedon=load.region, order=order, element_wise=True
+                )
+                found[rule, r] += np.asarray(parts)[of == b].sum()
+    return found[1], np.abs(found[1] - found[0])
+
+
 def _change_by_shape(problem: Problem, mesh: ng.Mesh, motion: RigidMotion | None = None) -> Array:
     """What curved sides change of the work of each load on a rigid motion, (k, 1).
 
-    Of bodies with names of their own; on both translations of all, (k, 2), without a motion. The
+    Of bodies with names of their own; on the d translations of all, (k, d), without a motion. The
     centre of a disc is not that of its mesh.
     """
     finer, model, work = ng.Mesh(mesh.ngmesh.Copy()), model_of(problem), []
     finer.Curve(mesh.GetCurveOrder() + ADDED_DEGREES)
-    for m in (mesh, finer) if cad_edges(mesh) is not None else ():
-        fields = [ng.CF((1, 0)), ng.CF((0, 1))]
+    axes = np.eye(model.dim).tolist()
+    for m in (mesh, finer) if isinstance(mesh.ngmesh.GetGeometry(), OCCGeometry) else ():
+        fields = [ng.CF(tuple(axis)) for axis in axes]
         if motion is not None:
-            t, middle = motion.translation, motion.middle
-            turned = zip(motion.bodies, t, motion.rotation, middle, strict=True)
-            z = {
-                name: ng.CF((tx - turn * (ng.y - cy), ty + turn * (ng.x - cx)))
-                for name, (tx, ty), turn, (cx, cy) in turned
-            }
-            fields = [m.MaterialCF(z, default=ng.CF((0, 0)))]
+            z = {name: motion.field(b) for b, name in enumerate(motion.bodies)}
+            fields = [m.MaterialCF(z, default=ng.CF((0,) * model.dim))]
         for load in loads_of(problem, m):
             inside = load.kind == "force"
             there = [z if inside else ng.BoundaryFromVolumeCF(z) for z in fields]
             power = model.weighted(ng.CF(tuple(ng.InnerProduct(load.density, z) for z in there)))
             work.append(ng.Integrate(power, m, definedon=load.region, order=LOAD_ORDER))
-    coarse, fine = np.reshape(work, (2, len(work) // 2, -1)) if work else np.zeros((2, 0, 2))
+    none = np.zeros((2, 0, model.dim))
+    coarse, fine = np.reshape(work, (2, len(work) // 2, -1)) if work else none
     return np.asarray(fine - coarse)
 
 
 def load_by_shape(problem: Problem, mesh: ng.Mesh) -> Array:
-    """What curved sides change of all loads at most, forces (2,) per thickness.
+    """What curved sides change of all loads at most, forces (d,) per thickness.
 
     A disc weighs more than its mesh, and pressure acts on more than the mesh of an arc.
     """
     resultant, changes = model_of(problem).resultant, _change_by_shape(problem, mesh)
-    return np.abs([resultant(x) for x in changes]).reshape(-1, 2).sum(axis=0)
+    return np.abs([resultant(x) for x in changes]).reshape(-1, changes.shape[1]).sum(axis=0)

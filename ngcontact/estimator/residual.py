@@ -369,6 +369,7 @@ class Estimated(Solved):
 
     @cached_property
     def _estimate(self) -> Estimate:
+        self.problem.refuse_solids("the error estimate")
         self.work["estimates"] += 1
         return estimate(self)
 

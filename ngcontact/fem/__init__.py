@@ -3,13 +3,14 @@
 from .boundary import ORDERS as ORDERS
 from .boundary import Bodies as Bodies
 from .boundary import BoundaryTrace as BoundaryTrace
-from .boundary import boundary_trace as boundary_trace
 from .boundary import check_element as check_element
 from .boundary import connected_bodies as connected_bodies
 from .boundary import edge_bubbles as edge_bubbles
 from .boundary import node_basis as node_basis
 from .boundary import unknowns as unknowns
 from .boundary import unknowns_of as unknowns_of
+from .facets import FacetTrace as FacetTrace
+from .facets import boundary_trace as boundary_trace
 from .model import MODELS as MODELS
 from .model import Model as Model
 from .moduli import NEARLY_INCOMPRESSIBLE as NEARLY_INCOMPRESSIBLE

@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..arrays import Array, Index, Mask, for_both_components, from_triplets, rightward
+from ..arrays import Array, Index, Mask, for_components, from_triplets, rightward
 from ..lagrange import at, gauss_lobatto, lagrange, slope
 from ..mesh import CadEdge, cad_edges
 from ..problem import MeshArrays, boundary_mask
@@ -28,6 +28,7 @@ CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two r
 BENT = 1e-12  # distance of a segment from its chord, relative to it, from which it is curved
 CORNER_WITHOUT_CAD = np.deg2rad(30)  # ... and two segments of one name on a mesh without CAD
 ORDERS = (1, 2, 3, 4)
+ORDERS_OF_SOLIDS = (1, 2, 3)
 ELEMENTS = ("isoparametric", "superparametric", "physical")
 
 
@@ -84,6 +85,9 @@ def nodal_basis(trace: BoundaryTrace, segments: Index) -> sp.csr_array:
 
 def unknowns(mesh: ng.Mesh, order: int, element: str) -> int:
     """Number of unknowns of the displacement on a mesh that is curved to the element's degree."""
+    if mesh.dim == 3:
+        faces = (order - 1) * (order - 2) // 2 * mesh.nface
+        return 3 * (mesh.nv + (order - 1) * mesh.nedge + faces)
     # Functions linear in physical coordinates are kept in a space with boundary edge functions.
     edges = mesh.GetNE(ng.BND) if element == "physical" and mesh.GetCurveOrder() > 1 else 0
     return unknowns_of(order, mesh.nv + edges, mesh.nedge, mesh.ne)
@@ -95,8 +99,13 @@ def unknowns_of(order: int, vertices: int, edges: int, elements: int) -> int:
     return 2 * (vertices + (order - 1) * edges + inner * elements)
 
 
-def check_element(order: int, element: str) -> int:
+def check_element(order: int, element: str, dim: int = 2) -> int:
     """The order; raise unless the element is one of `ELEMENTS` with an order it is available in."""
+    if dim == 3:
+        if element != "isoparametric":
+            raise ValueError(f"element={element!r} is for plane bodies: leave it out with solids")
+        if order not in ORDERS_OF_SOLIDS:
+            raise ValueError(f"order={order!r} is not available; solids have {ORDERS_OF_SOLIDS}")
     if element not in ELEMENTS:
         raise ValueError(f"element={element!r} is not available; choose one of {ELEMENTS}")
     orders = (1,) if element == "physical" else ORDERS
@@ -155,8 +164,8 @@ def vector_space(mesh: ng.Mesh, order: int, element: str) -> ng.FESpace:
 
 def node_basis(V: ng.FESpace, trace: BoundaryTrace, nodal: Index, element: str) -> sp.csr_array:
     """`Space.basis` (2N, 2n) for node values on the segments `nodal` (k,)."""
-    scalar = _physical_basis(V, trace) if element == "physical" else nodal_basis(trace, nodal)
-    return for_both_components(scalar)
+    scalar = _physical_basis(V, trace) if element == "physical" else trace.nodal_basis(nodal)
+    return for_components(scalar, trace.model.dim)
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,7 +193,7 @@ class BoundaryTrace:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Made again from the mesh: lines of a drawing cannot be pickled."""
-        return boundary_trace, (self.mesh, self.order, self.model)
+        return segment_trace, (self.mesh, self.order, self.model)
 
     def point(self, segment: Index, s: Array) -> Array:
         """Points (k, 2) of the mesh's curves at parameters `s` (k,) of segments `segment` (k,)."""
@@ -232,6 +241,46 @@ class BoundaryTrace:
     def lengths(self, segments: Index) -> Array:
         """Lengths (k,) of the chords of `segments` (k,)."""
         return np.linalg.norm(self.curve[segments, -1] - self.curve[segments, 0], axis=1)
+
+    def nodal_basis(self, segments: Index) -> sp.csr_array:
+        """Matrix (n, n) from node values on `segments` (k,) and other unknowns to NGSolve's."""
+        return nodal_basis(self, segments)
+
+    def same_nodes(self, other: BoundaryTrace) -> bool:
+        """Whether the nodes are those of another trace, with the same unknowns."""
+        return np.array_equal(self.nodes, other.nodes)
+
+    def linear(self, segments: Index) -> sp.csr_array:
+        """Functions of degree 1, (n, nv), by the nodes of `segments` (k,) and edge functions.
+
+        These add to them.
+        """
+        n, vertices = self.space.ndof, self.mesh.nv
+        size = self.model.dim
+        corners = [0, -1] if size == 2 else [0, 1, 2]
+        shares = self.unknowns_of_values(segments, self.barycentric(segments))
+        inner = self.nodes[segments] >= vertices
+        rows, first = np.unique(self.nodes[segments][inner], return_index=True)
+        rows = np.concatenate([np.arange(vertices), np.repeat(rows, size)])
+        ends = np.repeat(self.nodes[segments][:, corners], inner.sum(axis=1), axis=0)[first]
+        columns = np.concatenate([np.arange(vertices), ends.ravel()])
+        values = np.concatenate([np.ones(vertices), shares[inner][first].ravel()])
+        return from_triplets(values, rows, columns, (n, vertices))
+
+    def barycentric(self, segments: Index) -> Array:
+        """Barycentric coordinates (k, order + 1, 2) of the nodes of `segments` (k,)."""
+        s = self.places(segments)
+        return np.stack([1 - s, s], axis=-1)
+
+    def positions(self, segments: Index) -> Array:
+        """The position as a function, (k, q, d): its unknowns at the q nodes of `segments` (k,)."""
+        points = self.point(*self.at_nodes(segments))
+        points = points.reshape(*self.nodes[segments].shape, points.shape[1])
+        return self.unknowns_of_values(segments, points)
+
+    def unknowns_of_values(self, segments: Index, values: Array) -> Array:
+        """Unknowns (k, q, ...) of functions of `values` (k, q, ...) at nodes of `segments` (k,)."""
+        return values
 
     def lies_on(self, segment: Index, *patterns: str | None) -> Mask:
         """Which of `segment` (k,) are of boundaries that patterns select, (k,); None does not."""
@@ -299,8 +348,8 @@ class BoundaryTrace:
         return number, mean / np.linalg.norm(mean, axis=1)[:, None]
 
 
-def boundary_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTrace:
-    """Trace of the displacements of degree `order` on the boundary of `mesh`, in a model."""
+def segment_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTrace:
+    """Trace of the displacements of degree `order` on the boundary of a plane mesh, in a model."""
     view = MeshArrays(mesh)
     nodes = ends = view.facets
     space = ng.H1(mesh, order=order)
@@ -344,7 +393,7 @@ class Bodies:
     """The connected bodies, b of them."""
 
     names: list[str]  # the material region of each
-    middle: Array  # (b, 2), of its boundary
+    middle: Array  # (b, d), of its boundary
     size: Array  # (b,), half its extent, a length
     of_segment: Index  # (q,), the body of each segment of the boundary
     of_vertex: Index  # (nv,), the body of each vertex of the mesh
@@ -356,7 +405,8 @@ def connected_bodies(trace: BoundaryTrace) -> Bodies:
     pieces, number = np.unique(piece[trace.nodes[:, 0]], return_inverse=True)
     materials = trace.mesh.GetMaterials()
     names = {int(b): materials[m] for b, m in zip(number, trace.body, strict=True)}
-    ends = [trace.curve[number == b].reshape(-1, 2) for b in range(len(names))]
+    d = trace.model.dim
+    ends = [trace.curve[number == b].reshape(-1, d) for b in range(len(names))]
     return Bodies(
         names=[names[b] for b in range(len(names))],
         middle=np.array([(x.min(axis=0) + x.max(axis=0)) / 2 for x in ends]),

@@ -26,7 +26,8 @@ class Model:
     """What the program asks a model; by itself plane strain: xx, yy, xy of unit thickness."""
 
     dim = 2  # components of a displacement
-    motions = (True, True, True)  # which translations and rotations of a body cause no strain
+    # Which translations and rotations of a body cause no strain.
+    motions: tuple[bool, ...] = (True, True, True)
     bonus = 0  # quadrature orders above the default that its forms need
     polynomial = True  # whether the stress of a polynomial displacement is one of one degree less
     extent = 0  # powers of a length in `measure`

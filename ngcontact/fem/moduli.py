@@ -8,6 +8,7 @@ from weakref import WeakKeyDictionary
 
 import ngsolve as ng
 import numpy as np
+from scipy.linalg import block_diag
 
 from ..arrays import Array, Mask
 from ..errors import warn
@@ -26,11 +27,18 @@ VOLUMETRIC = {
     3: np.array([[0.5, 0.5, 0.0], [0.5, -0.5, 0.0], [0.0, 0.0, 1.0]]),
     4: np.array([[1 / 3, 1 / 3, 1 / 3, 0], [0.5, -0.5, 0, 0], [0.5, 0.5, -1, 0], [0, 0, 0, 1.0]]),
 }
+VOLUMETRIC[6] = block_diag(VOLUMETRIC[4][:3, :3], np.eye(3))
+SHEARS = {3: 1, 4: 1, 6: 3}  # how many of the last components are shear
 
 # Where a law that varies is looked at in each element: its middle and towards its corners.
-SAMPLES = ng.IntegrationRule(
-    [(1 / 3, 1 / 3, 0), (0.1, 0.1, 0), (0.8, 0.1, 0), (0.1, 0.8, 0)], [1 / 8] * 4
-)
+SAMPLES = {
+    2: ng.IntegrationRule(
+        [(1 / 3, 1 / 3, 0), (0.1, 0.1, 0), (0.8, 0.1, 0), (0.1, 0.8, 0)], [1 / 8] * 4
+    ),
+    3: ng.IntegrationRule(
+        [(0.25, 0.25, 0.25), *(tuple(0.1 + 0.6 * np.eye(4)[i, :3]) for i in range(4))], [1 / 30] * 5
+    ),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,15 +68,17 @@ def moduli_of(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Mod
         if not at.any():
             continue
         if varies(law):
-            points = mesh.MapToAllElements(SAMPLES, ng.VOL).reshape(-1, len(SAMPLES))[at]
+            rule = SAMPLES[mesh.dim]
+            points = mesh.MapToAllElements(rule, ng.VOL).reshape(-1, len(rule))[at]
             law_there = law.voigt(problem.model)
             C = np.asarray(law_there(points.ravel()))
-            C = C.reshape(-1, len(SAMPLES), *law_there.dims)
+            C = C.reshape(-1, len(rule), *law_there.dims)
         else:
             C = _constant(law, problem.model, mesh)[None, None]
         strains, kappa = mandel(C), _bulk(C)
         smallest = np.linalg.eigvalsh(strains)[..., 0]  # (2.7)
-        dilatation = np.append(np.ones(C.shape[-1] - 1), 0.0)
+        dilatation = np.ones(C.shape[-1])
+        dilatation[-SHEARS[C.shape[-1]] :] = 0.0
         rest = strains - kappa[..., None, None] * np.outer(dilatation, dilatation)
         shear[at], bulk[at] = smallest.min(axis=1) / 2, kappa[:, 0]
         rigidity[at] = np.linalg.eigvalsh(rest)[..., -1].max(axis=1) / 2
@@ -93,7 +103,7 @@ def mandel(C: Array) -> Array:
     Shear strain is counted twice in e : e, so it is scaled by the root of 2.
     """
     scale = np.ones(C.shape[-1])
-    scale[-1] = math.sqrt(2.0)
+    scale[-SHEARS[C.shape[-1]] :] = math.sqrt(2.0)
     return C * scale * scale[:, None]
 
 

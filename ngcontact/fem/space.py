@@ -17,6 +17,7 @@ from ..problem import MeshArrays, Problem, varies
 from ..quadrature import composite, loads_of, rough_moduli
 from .boundary import Bodies, BoundaryTrace, node_basis, vector_space
 from .model import MODELS, Model
+from .solid import SOLID_MODEL
 
 LOAD_BONUS = 6  # quadrature orders above the default: loads may be as rough as r^(-1/2)
 CANCELLED = 1e-6  # energy relative to its terms below which fewer than ten digits are left
@@ -72,12 +73,12 @@ class Space:
     def stiffness(self) -> Array:
         """Force per displacement of the nodes, (n,), by its order of magnitude."""
         diagonal = self.basis.power(2).T @ self.diagonal
-        return diagonal.reshape(2, -1).max(axis=0)
+        return diagonal.reshape(self.trace.model.dim, -1).max(axis=0)
 
 
 def model_of(problem: Problem) -> Model:
     """The model of a problem."""
-    return MODELS[problem.model]
+    return MODELS.get(problem.model, SOLID_MODEL)
 
 
 def load_vector(problem: Problem, V: ng.FESpace, bonus: int) -> Array:
@@ -261,7 +262,7 @@ def voigt_stress(problem: Problem, displacement: ng.GridFunction) -> list[ng.Coe
 
 
 def stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.CoefficientFunction:
-    """Stress (2, 2) in the plane of a displacement, sigma_h, in the units of the moduli."""
+    """Stress (d, d) of a displacement, in the plane (2, 2), sigma_h, in units of the moduli."""
     return model_of(problem).in_plane(voigt_stress(problem, displacement))
 
 

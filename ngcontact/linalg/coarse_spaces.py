@@ -12,7 +12,6 @@ import numpy as np
 import scipy.sparse as sp
 
 from ..arrays import Integers, from_triplets
-from ..lagrange import gauss_lobatto
 
 COARSEST = 10_000  # unknowns below which a factor costs less than what coarser spaces save
 VERTEX_RATIO = 0.5  # of the vertices that the next coarser space has at most
@@ -33,14 +32,14 @@ class Coarsening:
 
 
 def coarsenings(
-    T: sp.csr_array, parents: Integers, nodes: Integers, coarsest: int = COARSEST, d: int = 2
+    T: sp.csr_array, parents: Integers, linear: sp.csr_array, coarsest: int = COARSEST, d: int = 2
 ) -> list[Coarsening]:
     """Coarser spaces, finest first, until one has `coarsest` unknowns or the first mesh is met.
 
     Node values and edge functions are u = T y of the unknowns y, d of each node, with `T`
     (d * n, d * n): x of all nodes first, vertices before all others. `parents` (nv, 2) are the ends
-    of the edges that refinement halved, -1 for vertices of the first mesh; `nodes` (k, p + 1) those
-    of the segments where unknowns are node values.
+    of the edges that refinement halved, -1 for vertices of the first mesh; `linear` (n, nv) the
+    functions of degree 1 in nodes and edge functions.
 
     Raises
     ------
@@ -48,7 +47,7 @@ def coarsenings(
         Contact rows refer to each other in a ring.
     """
     n, vertices = T.shape[0] // d, len(parents)
-    steps = [(_linear(n, vertices, nodes), np.arange(vertices))] if nodes.shape[1] > 2 else []
+    steps = [(linear, np.arange(vertices))] if n > vertices else []
     found = []
     for P, kept in steps + _vertex_steps(parents, coarsest // d):
         every = np.concatenate([kept + i * P.shape[0] for i in range(d)])
@@ -98,18 +97,6 @@ def _vertex_steps(parents: Integers, most: int) -> list[tuple[sp.csr_array, Inte
         parents = np.where(parents[kept] < 0, -1, number[parents[kept]])
         depth, counts = depth[kept], counts[: last + 1]
     return steps
-
-
-def _linear(n: int, vertices: int, nodes: Integers) -> sp.csr_array:
-    """Functions of degree 1 among those of degree p, (n, nv): edge functions add to them."""
-    s = gauss_lobatto(nodes.shape[1] - 1)[1:-1]
-    _, first = np.unique(nodes[:, 1], return_index=True)  # segments between bodies occur twice
-    inner = nodes[first, 1:-1].ravel()
-    start, stop = np.repeat(nodes[first][:, [0, -1]], s.size, axis=0).T
-    rows = np.concatenate([np.arange(vertices), inner, inner])
-    columns = np.concatenate([np.arange(vertices), start, stop])
-    values = np.concatenate([np.ones(vertices), np.tile(1 - s, first.size), np.tile(s, first.size)])
-    return from_triplets(values, rows, columns, (n, vertices))
 
 
 def _inverse(T: sp.csr_array, d: int) -> sp.csr_array:

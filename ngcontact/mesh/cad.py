@@ -158,9 +158,9 @@ def _edges(geometry: OCCGeometry) -> list[CadEdge]:
 
 
 def cad_edges(mesh: ng.Mesh) -> list[CadEdge] | None:
-    """CAD edges by boundary region number, or None for a mesh without an OCC geometry."""
+    """CAD edges by boundary region number, or None for solids and without an OCC geometry."""
     geometry = mesh.ngmesh.GetGeometry()
-    if not isinstance(geometry, OCCGeometry):
+    if not isinstance(geometry, OCCGeometry) or mesh.dim != 2:
         return None
     edges, names = _edges(geometry), mesh.GetBoundaries()
     if [edge.name or "default" for edge in edges] != [name or "default" for name in names]:

@@ -5,9 +5,10 @@ from __future__ import annotations
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Integers
+from ..arrays import Array, Integers, Mask
 from ..problem import MeshArrays
 from .cad import CadEdge, cad_edges
+from .faces import curved_facets
 
 PARENTS = "_ngcontact_parents"  # attribute of a mesh: it lives as long as the mesh
 # OCC's projections know absolute lengths: points within 1e-7 of the end of an arc go to that end,
@@ -86,23 +87,30 @@ def check_curves(mesh: ng.Mesh) -> None:
 
 def _straightened(mesh: ng.Mesh) -> bool:
     """Whether elements miss their own curved boundary, as after NGSolve's `Refine`."""
-    position = ng.CF((ng.x, ng.y))
+    position = ng.CF((ng.x, ng.y, ng.z))
     off = ng.BoundaryFromVolumeCF(position) - position
     missed, size = (ng.Integrate(ng.InnerProduct(x, x), mesh, ng.BND) for x in (off, position))
     return bool(missed > ON_CURVE**2 * size)
 
 
-def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
-    """Mesh curved to the element's degree, and the number of elements at curved edges.
+def _on_curves(mesh: ng.Mesh) -> Mask | None:
+    """Segments (k,) of curved CAD edges; None without CAD."""
+    if (edges := cad_edges(mesh)) is None:
+        return None
+    curved = np.array([not edge.straight for edge in edges])[MeshArrays(mesh).boundaries]
+    return np.asarray(curved)
 
-    A mesh without an OCC geometry, without curved edges, or curved to that degree already is
+
+def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
+    """Mesh curved to the element's degree, and the number of elements at curved edges or faces.
+
+    A mesh without an OCC geometry, without curved ones, or curved to that degree already is
     used as it is; otherwise, also after `Refine` has straightened it, the result is a copy.
     """
     degree = order if element == "isoparametric" else order + 1  # (2.8)
-    edges = cad_edges(mesh)
-    if edges is None:
+    curved = _on_curves(mesh) if mesh.dim == 2 else curved_facets(mesh)
+    if curved is None:
         return mesh, 0
-    curved = np.array([not edge.straight for edge in edges])[MeshArrays(mesh).boundaries]
     count = int(np.count_nonzero(curved))
     if count == 0 or (mesh.GetCurveOrder() == degree and not _straightened(mesh)):
         return mesh, count

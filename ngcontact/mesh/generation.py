@@ -16,6 +16,7 @@ import numpy as np
 from ..arrays import Array, Index, Mask, across, rightward
 from ..problem import Contact, MeshArrays, Problem
 from .cad import CadEdge
+from .identified import identify_coinciding_faces
 
 COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given ...
 FINER = 2  # ... and that many times more on a bounded zone: contact may end anywhere on it
@@ -321,7 +322,7 @@ def _generated(shape: occ.TopoDS_Shape, edges: list[Edge], maxh: float) -> ng.Me
 
 
 def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
-    """Mesh of the problem's geometry with matching nodes on facing contact lines.
+    """Mesh of the problem's geometry with matching nodes on facing lines, or coinciding faces.
 
     Parameters
     ----------
@@ -335,19 +336,15 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
     ------
     ValueError, TypeError
         `maxh` is not a positive finite number, or given for a geometry that is a Mesh; the geometry
-        contains solids, or has lengths beyond what the kernel and Netgen mesh; Netgen failed to
-        fill a body.
+        has lengths beyond what the kernel and Netgen mesh; Netgen failed to fill a body.
     """
     if isinstance(problem.geometry, ng.Mesh):
         if maxh is not None:
             raise ValueError(f"maxh={maxh} has no effect: the geometry is a Mesh; leave maxh out")
         return problem.geometry
     shape = problem.geometry.shape
-    if shape.solids:
-        raise ValueError("the geometry contains solids; bodies are faces in the plane z = 0")
-    low, high = shape.bounding_box
-    extent = max(high.x - low.x, high.y - low.y)
-    far = max(abs(low.x), abs(low.y), abs(high.x), abs(high.y))
+    low, high = (np.array([x.x, x.y, x.z]) for x in shape.bounding_box)
+    extent, far = float((high - low).max()), float(np.abs([low, high]).max())
     if not (extent >= SMALLEST and far <= FARTHEST):
         raise ValueError(
             f"the geometry has the extent {extent:g} and reaches {far:g} from the origin: the "
@@ -361,6 +358,12 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
     maxh = float(maxh)
     if not (np.isfinite(maxh) and maxh > 0):
         raise ValueError(f"maxh={maxh} must be positive and finite, like {extent / COARSE:g}")
+    if problem.dim == 3:
+        with MESHING:
+            identify_coinciding_faces(problem, shape)
+            mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(maxh=maxh))
+        _require_complete(mesh, problem)
+        return mesh
     with MESHING:  # sizes and divisions are told to Netgen on the shape, which others may mesh, too
         edges = divided(problem, shape, maxh, maxh / finer)
         mesh = _generated(shape, edges, maxh)

@@ -57,6 +57,7 @@ def plot_solution(
     `options` are those of `Style`. With a `path` nothing is shown on a screen. Returns the figure.
     """
     style = Style(scale, **options)
+    solution.problem.refuse_solids("plot")
     target = None if path is None else check_path(path, ".png")
     scene = picture(solution, style)
     figure = new_figure(target)

@@ -64,6 +64,7 @@ def write_solution(
     A file appears complete or not at all. Raises ``ValueError`` and ``OSError`` as `check_path`
     does, before any work. Of the `sections` of a body of revolution see `write_revolved`.
     """
+    solution.problem.refuse_solids("write")
     target = check_path(path, ".vtu")
     beside = check_path(target.with_name(f"{target.stem}_contact.vtp"), ".vtp")
     from vtkmodules.vtkCommonCore import vtkObject

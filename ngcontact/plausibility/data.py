@@ -31,6 +31,8 @@ class Contradiction:
 
 def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
     """All of Gamma_u with itself, within a boundary, too, and with guides, by component."""
+    if problem.dim == 3:  # edges and lines of solids are not looked at
+        return []
     found = []
     seen = [one for one in features_of(problem, mesh) if one.kind == "displacement"]
     for one in seen:

@@ -26,7 +26,7 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import Array, Index, across
 from ..contact import ContactState, in_contact, partners, prescribed_gap, twins
 from ..fem import BoundaryTrace, Moduli, moduli_of
-from ..problem import Problem
+from ..problem import Contact, Problem
 from ..solved import Solved
 from .refinement import moves_rigidly
 
@@ -88,7 +88,7 @@ def doubts(solution: Solved, *, last: bool) -> Doubts:
             messages["strain"] = _large_strains(problem, trace, state, zones)
             if not messages["strain"]:  # which leaves nothing else to believe
                 messages["direction"] = _inclined(trace, state) or _drawn_apart(trace, state)
-                messages["gap"] = _contradicted(trace, state)
+                messages["gap"] = contradicted(trace, state)
                 messages["zone"] = _short_zone(state, zones) if last else ""
         if last and not messages.get("strain"):  # with forces or without
             messages["penetration"] = _penetration(solution, state, peak)
@@ -158,9 +158,17 @@ def _large_strains(
 ) -> str:
     """Message where strains are far from small, or nothing."""
     pressure = float((np.abs(zones.force) / zones.weight).max(initial=0.0))
-    modulus = _softer(lambda law: law.bulk + law.shear, problem, trace, state)
-    if pressure <= LARGE_PRESSURE * modulus:
-        return ""
+    modulus = softer_in_compression(problem, trace, state)
+    return large_strain_message(pressure, modulus) if pressure > LARGE_PRESSURE * modulus else ""
+
+
+def softer_in_compression(problem: Problem, trace: BoundaryTrace, state: ContactState) -> float:
+    """Modulus of confined compression of the softer of both sides, a stress."""
+    return _softer(lambda law: law.bulk + law.shear, problem, trace, state)
+
+
+def large_strain_message(pressure: float, modulus: float) -> str:
+    """What is said of a mean pressure that is larger than the modulus."""
     return (
         f"the mean pressure in contact, {pressure:.3g}, is {pressure / modulus:.2g} times the "
         f"modulus {modulus:.3g} of the softer body in confined compression: strains are not small; "
@@ -258,7 +266,12 @@ def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
     angle, force = _inclinations(trace, state, xi)
     if force[angle > INCLINED].sum() <= FORCE_SHARE * force.sum():
         return ""
-    told = ", ".join(f"{component:.3g}" for component in xi)
+    return inclined_message(line.contact, angle)
+
+
+def inclined_message(contact: Contact, angle: Array) -> str:
+    """What is said of surfaces inclined to a fixed direction by an `angle` (m,) each."""
+    told = ", ".join(f"{component:.3g}" for component in contact.direction or ())
     return (
         f"surfaces in contact are inclined to direction=({told}) by up to "
         f"{np.rad2deg(angle.max()):.0f} degrees, so that forces do not act along their normals; "
@@ -344,7 +357,7 @@ def way_and_error(trace: BoundaryTrace, state: ContactState) -> tuple[float, flo
     return way, way * curvature * (1 + way * middle / 2)
 
 
-def _contradicted(trace: BoundaryTrace, state: ContactState) -> str:
+def contradicted(trace: BoundaryTrace, state: ContactState) -> str:
     """Message where the given gap has the other sign than the one that is drawn, or nothing."""
     line, contact = state.line, state.line.contact
     if contact.gap is None or contact.primary is None:

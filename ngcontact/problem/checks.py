@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import difflib
 import itertools
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeAlias
 
 import ngsolve as ng
 import numpy as np
+from netgen.occ import OCCGeometry
 
 from ..arrays import Array, Index, Mask
 from .mesh_arrays import MeshArrays, on_axis
@@ -23,23 +25,55 @@ Masks: TypeAlias = dict[str, Mask]
 
 # Where data are looked at in every element. Loads are integrated and may be singular at an end;
 # prescribed values and gaps are interpolated and must exist there.
-INSIDE = ng.IntegrationRule([(1 / 6, 1 / 6, 0), (2 / 3, 1 / 6, 0), (1 / 6, 2 / 3, 0)], [1 / 6] * 3)
-IN_SEGMENTS = ng.IntegrationRule(ng.SEGM, 3)
-AT_ENDS = ng.IntegrationRule([(0, 0, 0), (0.5, 0, 0), (1, 0, 0)], [1 / 6, 2 / 3, 1 / 6])
-# Vertices of elements and segments, in their order.
+# By the dimension of the bodies.
+INSIDE = {
+    2: ng.IntegrationRule([(1 / 6, 1 / 6, 0), (2 / 3, 1 / 6, 0), (1 / 6, 2 / 3, 0)], [1 / 6] * 3),
+    3: ng.IntegrationRule(ng.TET, 2),
+}
+IN_FACETS = {2: ng.IntegrationRule(ng.SEGM, 3), 3: ng.IntegrationRule(ng.TRIG, 3)}
+AT_ENDS = {
+    2: ng.IntegrationRule([(0, 0, 0), (0.5, 0, 0), (1, 0, 0)], [1 / 6, 2 / 3, 1 / 6]),
+    3: ng.IntegrationRule([(1, 0, 0), (0, 1, 0), (0, 0, 0), (1 / 3, 1 / 3, 0)], [1 / 8] * 4),
+}
+# Vertices of simplices, in their order, by dimension.
 CORNERS = {
+    3: ng.IntegrationRule([(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)], [1 / 24] * 4),
     2: ng.IntegrationRule([(1, 0, 0), (0, 1, 0), (0, 0, 0)], [1 / 6] * 3),
     1: ng.IntegrationRule([(1, 0, 0), (0, 0, 0)], [1 / 2] * 2),
 }
+# What messages call the elements, others that are refused, and faces of bodies, by dimension.
+ELEMENTS = {2: ("triangles", "quadrilaterals"), 3: ("tetrahedra", "hexahedra, prisms or pyramids")}
 
 OVERLAP = 0.5  # of the smaller of two bodies, from which they lie on top of each other
 PLACES = 200  # of a connected piece that are looked for in another one
-FLAT = 16 * np.finfo(float).eps  # area of a triangle over its longest side squared, without height
+FLAT = 16 * np.finfo(float).eps  # measure of an element over its longest edge^d, without height
 NO_RADIAL = 1e-9  # radial part on the axis, relative to the largest value, that is round-off
 
 
-def check_mesh(mesh: ng.Mesh) -> None:
-    """Refuse anything but a plane mesh of positively oriented, non-degenerate triangles."""
+def dimension_of(geometry: OCCGeometry | ng.Mesh) -> int:
+    """The dimension of bodies; refuse solids beside plane faces, and those with a common face."""
+    if isinstance(geometry, ng.Mesh):
+        return int(geometry.dim)
+    solids = geometry.shape.solids
+    if not solids:
+        return 2
+    faces = Counter(face for solid in solids for face in solid.faces)
+    if len(faces) < len(set(geometry.shape.faces)):
+        raise ValueError(
+            "the geometry has solids and faces that bound none of them: bodies are either solids "
+            "or faces in the plane z = 0"
+        )
+    if any(count > 1 for count in faces.values()):
+        name = next(face.name for face, count in faces.items() if count > 1)
+        raise ValueError(
+            f'the face "{name}" bounds two solids, so that nothing can come apart there: join '
+            "bodies by Compound, not Glue"
+        )
+    return 3
+
+
+def check_mesh(mesh: ng.Mesh, dim: int = 2) -> None:
+    """Refuse anything but positively oriented, non-degenerate triangles, of solids tetrahedra."""
     if not isinstance(mesh, ng.Mesh):
         raise TypeError(f"mesh is {kind_of(mesh)}: give an ngsolve.Mesh")
     if mesh.deformation is not None:
@@ -47,7 +81,9 @@ def check_mesh(mesh: ng.Mesh) -> None:
             "mesh has a deformation set, which would move contact and normals unseen: call "
             "mesh.UnsetDeformation() first"
         )
-    if mesh.dim != 2:
+    if mesh.dim != dim and dim == 3:
+        raise ValueError(f"mesh has dimension {mesh.dim}, and the bodies are solids")
+    if mesh.dim != dim:
         raise ValueError(
             f"mesh has dimension {mesh.dim}, and bodies lie in the plane: make it with "
             "OCCGeometry(shape, dim=2); a file of Gmsh has to hold triangles of first order "
@@ -57,15 +93,22 @@ def check_mesh(mesh: ng.Mesh) -> None:
         raise ValueError("mesh has 0 elements: generate it first")
     view = MeshArrays(mesh)
     if others := view.without_simplices():
-        raise ValueError(f"mesh has {others} quadrilaterals: it must be a triangulation")
-    area = view.measures
-    bad = ~(area > FLAT * view.diameters**2)  # so a NaN is bad
+        right = "it must be a triangulation" if dim == 2 else "it must consist of tetrahedra"
+        raise ValueError(f"mesh has {others} {ELEMENTS[dim][1]}: {right}")
+    size = view.measures
+    bad = ~(size > FLAT * view.diameters**dim)  # so a NaN is bad
     if bad.any():
         first = int(np.argmax(bad))
+        what, order = ("area", " (vertices counterclockwise)") if dim == 2 else ("volume", "")
         raise ValueError(
-            f"mesh has {np.count_nonzero(bad)} inverted or degenerate triangles: number {first} "
-            f"with the vertices {view.corners[first].tolist()} has the signed area "
-            f"{area[first]:.3g}, which must be positive (vertices counterclockwise)"
+            f"mesh has {np.count_nonzero(bad)} inverted or degenerate {ELEMENTS[dim][0]}: number "
+            f"{first} with the vertices {view.corners[first].tolist()} has the signed {what} "
+            f"{size[first]:.3g}, which must be positive{order}"
+        )
+    if dim == 3 and mesh.GetCurveOrder() > 1 and mesh.ngmesh.GetGeometry() is None:
+        raise ValueError(
+            "the mesh is curved without a geometry, and normals of its facets are none of the "
+            "body's: give the OCC geometry, or a mesh of first order"
         )
 
 
@@ -118,7 +161,8 @@ def check_bodies(mesh: ng.Mesh, materials: Masks) -> None:
     covered = np.logical_or.reduce(list(materials.values()))
     for number, name in enumerate(mesh.GetMaterials()):
         if not name:
-            raise ValueError(f'material region {number} has the name "": give every face a name')
+            what = "face" if mesh.dim == 2 else "solid"
+            raise ValueError(f'material region {number} has the name "": give every {what} a name')
         if not covered[number]:
             raise ValueError(f'body "{name}" has no material: add materials["{name}"]')
 
@@ -167,6 +211,8 @@ def check_overlaps(view: MeshArrays) -> None:
     An interference at a contact line is none. Of each two connected pieces whose boxes overlap by
     so much, places at equal steps of the smaller one's area are looked for in the larger one.
     """
+    if view.dim == 3:  # boxes and triangles of the plane, see below
+        return
     piece = view.pieces[view.elements[:, 0]]
     parts = [np.flatnonzero(piece == k) for k in range(piece.max(initial=0) + 1)]
     if len(parts) == 1:
@@ -209,15 +255,15 @@ def _inside(points: Array, view: MeshArrays, part: Index) -> Mask:
 
 
 def check_values(
-    view: MeshArrays, masks: Masks, data: Iterable[Any], rule: ng.IntegrationRule
+    view: MeshArrays, masks: Masks, data: Iterable[Any], rule: Mapping[int, ng.IntegrationRule]
 ) -> None:
     """Refuse data, one for each mask (r,), that are not finite, or laws that are not elliptic.
 
-    A law, a number, a function of a mesh point or of x and y, or a tuple of these and None, looked
-    at in the selected elements at points of a rule, which is `INSIDE` for bodies.
+    A law, a number, a function of a mesh point or of coordinates, or a tuple of these and None,
+    looked at in the selected elements at points of a rule, by dimension, `INSIDE` for bodies.
     """
     vb, region = (ng.VOL, view.bodies) if rule is INSIDE else (ng.BND, view.boundaries)
-    everywhere = view.mesh.MapToAllElements(rule, vb)
+    everywhere = view.mesh.MapToAllElements(rule[view.dim], vb)
     for (label, mask), value in zip(masks.items(), data, strict=True):
         points = np.asarray(everywhere[mask[region][everywhere["nr"]]])
         if hasattr(value, "check_at"):
@@ -227,29 +273,31 @@ def check_values(
             if part is None:
                 continue
             if callable(part) and not isinstance(part, ng.CoefficientFunction):
-                values = _of_coordinates(points, part, label)
+                values = _of_coordinates(points, part, label, view.dim)
             else:
                 values = ng.CF(part)(points).reshape(len(points), -1)
             bad = ~np.isfinite(values.reshape(len(points), -1))
             refuse_where(points, np.asarray(bad.any(axis=1)), values, label, "must be finite")
 
 
-def _of_coordinates(points: Array, gap: Callable[..., Any], label: str) -> Array:
-    """Values (k,) of a function of x and y at mesh `points` (k,), refused if no number for each."""
-    x, y = ng.CF((ng.x, ng.y))(points).T.copy()
+def _of_coordinates(points: Array, gap: Callable[..., Any], label: str, dim: int) -> Array:
+    """Values (k,) of a function of coordinates at mesh `points` (k,), refused if no number each."""
+    x = ng.CF((ng.x, ng.y, ng.z))(points).T[:dim].copy()
+    names, count = (("x, y", "two"), ("x, y, z", "three"))[dim - 2]
     try:
-        values = np.asarray(gap(x, y))
+        values = np.asarray(gap(*x))
     except Exception as error:
         kind = TypeError if isinstance(error, TypeError) else ValueError
         raise kind(
-            f"{label} failed on arrays x, y of shape {x.shape} ({error}): it must take two arrays "
-            "and return one, with np.where(x > 0, a, b) in place of a if x > 0 else b"
+            f"{label} failed on arrays {names} of shape {x[0].shape} ({error}): it must take "
+            f"{count} arrays and return one, with np.where(x > 0, a, b) in place of a if x > 0 "
+            "else b"
         ) from error
     if values.dtype.kind not in "iuf":
         raise TypeError(f"{label} returns values of type {values.dtype}: return real numbers")
-    if values.shape != x.shape:
+    if values.shape != x[0].shape:
         raise ValueError(
-            f"{label} returns shape {values.shape} for x and y of shape {x.shape}: "
+            f"{label} returns shape {values.shape} for coordinates of shape {x[0].shape}: "
             "return one value per point"
         )
     return values

@@ -12,7 +12,7 @@ import numpy as np
 
 from .values import region_name, scalar_data, told, unit_vector
 
-Gap: TypeAlias = float | ng.CoefficientFunction | Callable[[np.ndarray, np.ndarray], np.ndarray]
+Gap: TypeAlias = float | ng.CoefficientFunction | Callable[..., np.ndarray]
 
 NO_FRICTION = (
     "contact is frictionless, so that Contact takes no friction={!r}: leave it out; "
@@ -35,10 +35,11 @@ class Contact:
     direction
         None: d is the outward normal of the secondary at each point, the bounded zone HH81 (3.9).
         A pair: the fixed direction xi from the secondary body to the primary one, the enlarging
-        zone HH81 (3.9'); kept as a unit vector.
+        zone HH81 (3.9'); kept as a unit vector. A triple for solids.
     gap
         None: measured from the geometry along d. A number, a scalar CoefficientFunction or a
-        function of the coordinate arrays x, y (n,) that returns (n,) overrides it; a length.
+        function of the coordinate arrays x, y (n,), of solids x, y, z, that returns (n,)
+        overrides it; a length.
     bilateral
         Equality in place of the inequality, HH81 Remark 3.3.
     rows
@@ -110,7 +111,7 @@ class Contact:
         """The pair with its roles exchanged; a gap stays where it is measured or given."""
         if self.primary is None:
             raise ValueError("a rigid obstacle (primary=None) cannot be the secondary")
-        back = None if self.direction is None else (-self.direction[0], -self.direction[1])
+        back = None if self.direction is None else tuple(-x for x in self.direction)
         return replace(self, secondary=self.primary, primary=self.secondary, direction=back)
 
 

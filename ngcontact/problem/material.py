@@ -16,33 +16,50 @@ VOIGT = {  # components of stress and strain in each model, the shear strain an 
     "plane strain": ("xx", "yy", "xy"),
     "plane stress": ("xx", "yy", "xy"),
     "axisymmetric": ("rr", "zz", "hoop", "rz"),
+    "solid": ("xx", "yy", "zz", "yz", "xz", "xy"),
 }
-MODEL_NAMES = tuple(VOIGT)
+SOLID = "solid"  # the model of bodies in space, the only one
+MODEL_NAMES = tuple(name for name in VOIGT if name != SOLID)
 ABOUT_AN_AXIS = ("axisymmetric",)
 
 DEFINITE = 16 * np.finfo(float).eps  # a pivot, relative to where it starts: round-off of zero
 
 _RIGHT_E = "Young's modulus must be positive and finite"
 _RIGHT_NU = "Poisson's ratio must lie in -1 < nu < 1/2"
-_RIGHT_SHAPE = "a Voigt matrix has (3, 3), of a body of revolution (4, 4)"
+_RIGHT_SHAPE = "a Voigt matrix has (3, 3), of a body of revolution (4, 4), of a solid (6, 6)"
 SHAPES = {(len(names), len(names)) for names in VOIGT.values()}
 
 Value: TypeAlias = float | ng.CoefficientFunction
 
 
 def require_model(model: str) -> str:
-    """Return a name of `MODEL_NAMES`; anything else is a `TypeError` or a `ValueError`."""
+    """Return a key of `VOIGT`; anything else is a `TypeError` or a `ValueError`."""
     if not isinstance(model, str):
         raise TypeError(f"model = {model!r}: give one of the strings {MODEL_NAMES}")
-    if model not in MODEL_NAMES:
+    if model not in VOIGT:
         raise ValueError(f'model "{model}" is unknown: choose one of {MODEL_NAMES}')
     return model
+
+
+def model_for(dim: int, model: str | None) -> str:
+    """Return the model of bodies of dimension `dim`: the one that was given, or the usual one."""
+    if dim == 3:
+        if model not in (None, SOLID):
+            raise ValueError(f"model = {model!r} is for plane bodies: leave it out with solids")
+        return SOLID
+    if model == SOLID:
+        raise ValueError(f"model = {model!r} is for solids: choose one of {MODEL_NAMES}")
+    return MODEL_NAMES[0] if model is None else require_model(model)
 
 
 def _isotropic(normal: Value, cross: Value, shear: Value, size: int) -> ng.CoefficientFunction:
     """Return a law, dims (size, size), by its entries on the diagonal, beside it, and of shear."""
     # NGSolve takes numbers in a tuple slowly, and loses an interruption that comes meanwhile.
     n, c, s, zero = (ng.CF(value) for value in (normal, cross, shear, 0.0))
+    if size == 6:
+        at = [[n if i == j else c for j in range(3)] + [zero] * 3 for i in range(3)]
+        at += [[zero] * 3 + [s if i == j else zero for j in range(3)] for i in range(3)]
+        return ng.CF(tuple(entry for row in at for entry in row), dims=(6, 6))
     if size == 4:
         rows = (n, c, c, zero, c, n, c, zero, c, c, n, zero, zero, zero, zero, s)
         return ng.CF(rows, dims=(4, 4))
@@ -86,7 +103,8 @@ class Elastic:
     def voigt(self, model: str = "plane strain") -> ng.CoefficientFunction:
         """Return the law of a model, dims (q, q): stress from strain by the components `VOIGT`.
 
-        In the plane (xx, yy, xy) from (xx, yy, gamma_xy); about an axis (rr, zz, hoop, rz).
+        In the plane (xx, yy, xy) from (xx, yy, gamma_xy); about an axis (rr, zz, hoop, rz); of
+        solids (xx, yy, zz, yz, xz, xy).
         """
         E, nu = (v if isinstance(v, float) else _kept(v) for v in (self.E, self.nu))
         if require_model(model) != "plane stress":
@@ -115,7 +133,7 @@ class Elastic:
 
 @dataclass(frozen=True, eq=False)
 class Hooke:
-    """General linear elasticity in the plane, or of a body of revolution.
+    """General linear elasticity in the plane, of a body of revolution, or of a solid.
 
     Parameters
     ----------
@@ -124,7 +142,8 @@ class Hooke:
         gamma_xy = 2 eps_xy, any consistent unit of stress: nested numbers (kept as a read-only
         copy) or a CoefficientFunction of dims (3, 3). It is the in-plane law of the chosen model
         already and is used as it is. For the model "axisymmetric" a 4x4 matrix, or dims (4, 4), in
-        the order rr, zz, hoop, rz.
+        the order rr, zz, hoop, rz. For solids a 6x6 matrix, or dims (6, 6), in the order xx, yy,
+        zz, yz, xz, xy.
 
     Raises
     ------
@@ -202,7 +221,8 @@ def _kept(modulus: ng.CoefficientFunction) -> ng.CoefficientFunction:
 def _real_matrix(data: Any) -> np.ndarray:
     """Return a float copy of a shape in `SHAPES`."""
     right = (
-        "give a 3x3 matrix (4x4 of a body of revolution) of real numbers or a CoefficientFunction"
+        "give a 3x3 matrix (4x4 of a body of revolution, 6x6 of a solid) of real numbers or a "
+        "CoefficientFunction"
     )
     try:
         matrix = np.array(data)

@@ -15,6 +15,8 @@ from ..arrays import Array, Index, Mask
 SIMPLICES = {2: (10, 12), 3: (20, 21)}  # Netgen's types of triangles and tetrahedra, by dimension
 SIDES = {2: [[0, 1], [1, 2], [2, 0]], 3: [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2, 3]]}
 
+PARAMETERS = 32  # bytes of Netgen's triangles before those of their corners' surface parameters
+
 ON_AXIS = 1e-9  # radius, relative to the largest, up to which a point lies on the axis x = 0
 
 _RECORDS: dict[tuple[type, int], np.dtype] = {}  # Netgen's layouts, of kinds of so many bytes
@@ -72,6 +74,26 @@ class MeshArrays:
         return self._facets["index"].astype(np.intp) - 1
 
     @property
+    def surface_parameters(self) -> Array:
+        """Parameters (k, 3, 2) of the CAD face at the corners of each facet of a solid."""
+        elements = self.mesh.ngmesh.Elements2D()
+        parts = {"u": 8, "v": 16}  # behind the number of a triangle, in records of 24 bytes
+        info = np.dtype(
+            {
+                "names": [*parts],
+                "formats": ["<f8"] * 2,
+                "offsets": [*parts.values()],
+                "itemsize": 24,
+            }
+        )
+        size = memoryview(elements).nbytes // max(1, len(elements))
+        corner = np.dtype(
+            {"names": ["at"], "formats": [(info, 3)], "offsets": [PARAMETERS], "itemsize": size}
+        )
+        at = np.frombuffer(elements, dtype=corner)["at"]
+        return np.stack([at["u"], at["v"]], axis=-1)
+
+    @property
     def corners(self) -> Array:
         """Coordinates (ne, d + 1, d) of the vertices of each element, lengths."""
         return self.vertices[self.elements]
@@ -94,7 +116,9 @@ class MeshArrays:
     def measures(self) -> Array:
         """Signed area (ne,) of each triangle, or volume of each tetrahedron."""
         corners = self.corners
-        return np.linalg.det(corners[:, 1:] - corners[:, :1]) / math.factorial(self.dim)
+        # Netgen's tetrahedra are positive with the fourth vertex below the first three.
+        size = math.factorial(self.dim) * (-1) ** self.dim
+        return np.linalg.det(corners[:, 1:] - corners[:, :1]) / size
 
     @cached_property
     def extent(self) -> float:

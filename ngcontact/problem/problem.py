@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import ngsolve as ng
@@ -13,10 +14,11 @@ from netgen.occ import OCCGeometry
 
 from . import checks
 from .contact import Contact
-from .material import ABOUT_AN_AXIS, Elastic, Hooke, require_model, varies
+from .material import ABOUT_AN_AXIS, SOLID, Elastic, Hooke, model_for, varies
 from .mesh_arrays import MeshArrays
 from .strain import InitialStrain, check_strains, components, strain_data
 from .values import (
+    TUPLES,
     Scalar,
     Vector,
     body_mask,
@@ -41,29 +43,30 @@ class Problem:
     Parameters
     ----------
     geometry
-        OCCGeometry of dimension 2, or an ngsolve.Mesh, which is used as it is.
+        OCCGeometry of dimension 2 or of solids, or an ngsolve.Mesh, which is used as it is. Its
+        dimension d is that of the bodies: vectors are pairs in the plane and triples in space.
     materials
         `Elastic` or `Hooke` per body, a body being a named material region.
     displacement
-        Gamma_u: per boundary a pair of numbers, scalar CoefficientFunctions or None (component
-        left free), or a CoefficientFunction of dim 2, in units of length. Kept as pairs of
+        Gamma_u: per boundary d numbers, scalar CoefficientFunctions or None (component left
+        free), or a CoefficientFunction of dim d, in units of length. Kept as tuples of
         CoefficientFunction or None.
     sliding
         Gamma_0, u.n = 0 without shear: a name or several. Kept as one pattern, or None.
     traction
         Gamma_tau: per boundary a number or a scalar CoefficientFunction, the pressure p of the
-        traction -p n with the outward normal n of the body, or a pair, or a CoefficientFunction
-        of dim 2, in units of stress. Kept as CoefficientFunction of dim 1 or 2;
+        traction -p n with the outward normal n of the body, or d of them, or a
+        CoefficientFunction of dim d, in units of stress. Kept as CoefficientFunction of dim 1 or d;
         `traction_vector` is the traction itself.
     force
-        F per body and area: a pair or a CoefficientFunction of dim 2, any consistent units.
+        F per body and area, or volume: d numbers or a CoefficientFunction, consistent units.
         Kept as the latter.
     contact
         Gamma_K: the pairs, kept as a tuple.
     model
-        "plane strain", "plane stress" or "axisymmetric": a body of revolution about x = 0 by its
-        meridian section, x = r >= 0 and y = z; loads are per area and volume of the body, forces
-        those of the whole body.
+        "plane strain" (when left out), "plane stress" or "axisymmetric": a body of revolution
+        about x = 0 by its meridian section, x = r >= 0 and y = z; loads are per area and volume of
+        the body, forces those of the whole body. Solids take none, and have "solid".
     strain
         Initial strain e0 per body, dimensionless, as alpha dT of a body that is heated: the stress
         is C (e(u) - e0). A number acts in all three directions; a pair is (xx, yy), with none
@@ -85,7 +88,7 @@ class Problem:
     traction: Mapping[str, Scalar | Vector] = field(default_factory=dict)
     force: Mapping[str, Vector] = field(default_factory=dict)
     contact: Sequence[Contact] = ()
-    model: str = "plane strain"
+    model: str = None  # type: ignore[assignment]  # a name, once it is made
     strain: Mapping[str, Scalar | Vector | Sequence[Vector]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -94,7 +97,8 @@ class Problem:
             raise TypeError(
                 f"geometry is {checks.kind_of(self.geometry)}: give an OCCGeometry or ngsolve.Mesh"
             )
-        require_model(self.model)
+        dim = checks.dimension_of(self.geometry)
+        object.__setattr__(self, "model", model_for(dim, self.model))
         materials = by_region(self.materials, "materials", _law)
         for name, law in materials.items():
             if isinstance(law, Hooke):
@@ -103,14 +107,26 @@ class Problem:
             raise ValueError("materials = {}: give every body an Elastic or a Hooke")
         for name, value in {
             "materials": materials,
-            "displacement": by_region(self.displacement, "displacement", displacement_components),
+            "displacement": by_region(
+                self.displacement, "displacement", partial(displacement_components, dim=dim)
+            ),
             "sliding": region_pattern(self.sliding),
-            "traction": by_region(self.traction, "traction", traction_data),
-            "force": by_region(self.force, "force", vector_data),
-            "contact": _contacts(self.contact),
-            "strain": by_region(self.strain, "strain", strain_data),
+            "traction": by_region(self.traction, "traction", partial(traction_data, dim=dim)),
+            "force": by_region(self.force, "force", partial(vector_data, dim=dim)),
+            "contact": _contacts(self.contact, dim),
+            "strain": by_region(self.strain, "strain", partial(strain_data, dim=dim)),
         }.items():
             object.__setattr__(self, name, value)
+
+    @property
+    def dim(self) -> int:
+        """The dimension of the bodies, and of vectors."""
+        return 3 if self.model == SOLID else 2
+
+    def refuse_solids(self, what: str) -> None:
+        """Raise a `ValueError` for solids, which `what` does not serve."""
+        if self.dim == 3:
+            raise ValueError(f"{what} is not available for solids: see docs/solids.md")
 
     def __repr__(self) -> str:
         """In a few words, instead of all data."""
@@ -136,14 +152,14 @@ class Problem:
         return table(("", "where", "what"), rows)
 
     def traction_vector(self, pattern: str) -> ng.CoefficientFunction:
-        """Return P of HH81 (3.7) on a key of `traction`, dim 2; a pressure p becomes -p n.
+        """Return P of HH81 (3.7) on a key of `traction`, dim d; a pressure p becomes -p n.
 
-        The normal n is that of the element beside a segment, outward whichever way this runs.
+        The normal n is that of the element beside a facet, outward whichever way this runs.
         """
         load: ng.CoefficientFunction = self.traction[pattern]
         if load.dim > 1:
             return load  # P in (3.7)
-        return -load * ng.BoundaryFromVolumeCF(ng.specialcf.normal(2))
+        return -load * ng.BoundaryFromVolumeCF(ng.specialcf.normal(self.dim))
 
     def initial_strains(self, mesh: ng.Mesh) -> dict[str, tuple[Elastic | Hooke, InitialStrain]]:
         """Law and initial strain of each body of `mesh` that has one, by its own name."""
@@ -173,11 +189,11 @@ class Problem:
         TypeError
             If `mesh` is not an `ngsolve.Mesh`, or a gap function does not return numbers.
         ValueError
-            If the mesh is no valid plane triangulation, a name selects nothing, two conditions
+            If the mesh is no valid mesh of simplices, a name selects nothing, two conditions
             meet on one boundary, a contact pair is impossible, or data are not finite or not
             elliptic.
         """
-        checks.check_mesh(mesh)
+        checks.check_mesh(mesh, self.dim)
         view, names = MeshArrays(mesh), mesh.GetBoundaries()
 
         def regions(argument: str, patterns: Iterable[str]) -> checks.Masks:
@@ -198,7 +214,7 @@ class Problem:
 
         checks.check_bodies(mesh, materials)
         prescribed = zip(displacement.items(), self.displacement.values(), strict=True)
-        full = {key: mask for (key, mask), (x, y) in prescribed if not (x is None or y is None)}
+        full = {key: mask for (key, mask), parts in prescribed if None not in parts}
         others = displacement | traction | sliding
         for one, other, right in (
             (sliding, displacement, "keep one of the two"),
@@ -219,7 +235,7 @@ class Problem:
             (materials, self.materials.values(), checks.INSIDE),
             (force, self.force.values(), checks.INSIDE),
             (strain, self.strain.values(), checks.INSIDE),
-            (traction, self.traction.values(), checks.IN_SEGMENTS),
+            (traction, self.traction.values(), checks.IN_FACETS),
             (displacement, self.displacement.values(), checks.AT_ENDS),
             (gaps, [pair.gap for pair in self.contact], checks.AT_ENDS),
         ):
@@ -227,7 +243,7 @@ class Problem:
         laws = zip(materials.items(), self.materials.values(), strict=True)
         general = [item for item, law in laws if isinstance(law, Hooke)]
         plane = dict(general if self.model == "plane strain" else [])
-        check_strains(view, strain, self.strain.values(), plane, checks.INSIDE)
+        check_strains(view, strain, self.strain.values(), plane, checks.INSIDE[self.dim])
         if self.model in ABOUT_AN_AXIS:
             sides = [side for pair in self.contact for side in pair.sides]
             vectors = self.displacement, self.traction, self.force
@@ -241,10 +257,15 @@ def _law(value: Any, what: str) -> Elastic | Hooke:
     return value
 
 
-def _contacts(value: Any) -> tuple[Contact, ...]:
+def _contacts(value: Any, dim: int) -> tuple[Contact, ...]:
     if not isinstance(value, Sequence) or isinstance(value, str):
         raise TypeError(f"contact = {value!r}: give a list of Contact(...)")
     for number, entry in enumerate(value):
         if not isinstance(entry, Contact):
             raise TypeError(f"contact[{number}] = {entry!r}: give a Contact(...)")
+        if entry.direction is not None and len(entry.direction) != dim:
+            raise ValueError(
+                f"contact[{number}].direction = {tuple(entry.direction)} has length "
+                f"{len(entry.direction)}: give {TUPLES[dim]}"
+            )
     return tuple(value)

@@ -12,10 +12,13 @@ from ..arrays import Mask
 from .mesh_arrays import MeshArrays
 from .values import SYMMETRIC, refuse_where, scalar_data
 
-RIGHT = (
-    "give a number, which acts in all three directions, a pair (xx, yy), a triple (xx, yy, zz), "
-    "about an axis (rr, zz, hoop), or a symmetric matrix (2, 2)"
-)
+RIGHT = {
+    2: "give a number, which acts in all three directions, a pair (xx, yy), a triple (xx, yy, zz), "
+    "about an axis (rr, zz, hoop), or a symmetric matrix (2, 2)",
+    3: "give a number, which acts in all three directions, a triple (xx, yy, zz), or a symmetric "
+    "matrix (3, 3)",
+}
+SHAPES = {2: [(), (1,), (2,), (3,), (2, 2)], 3: [(), (1,), (3,), (3, 3)]}
 
 
 class InitialStrain(NamedTuple):
@@ -23,36 +26,46 @@ class InitialStrain(NamedTuple):
 
     xx: ng.CoefficientFunction
     yy: ng.CoefficientFunction
-    normal: ng.CoefficientFunction  # to the plane
+    normal: ng.CoefficientFunction  # to the plane: zz of solids
     shear: ng.CoefficientFunction  # the engineering one, gamma_xy
+    yz: ng.CoefficientFunction  # and those of solids, gamma_yz, gamma_xz
+    xz: ng.CoefficientFunction
 
 
-def strain_data(value: Any, what: str) -> ng.CoefficientFunction:
-    """Return a strain as it was given: a scalar, (2,), (3,) or (2, 2); `components` reads it."""
+def strain_data(value: Any, what: str, dim: int) -> ng.CoefficientFunction:
+    """Return a strain as it was given: a scalar, (2,), (3,) or a matrix; `components` reads it."""
+    right = RIGHT[dim]
     if isinstance(value, ng.CoefficientFunction):
-        if tuple(value.dims) not in ((), (1,), (2,), (3,), (2, 2)):
+        if tuple(value.dims) not in SHAPES[dim]:
             dims = tuple(value.dims)
-            raise ValueError(f"{what} is a CoefficientFunction of dims {dims}: {RIGHT}")
+            raise ValueError(f"{what} is a CoefficientFunction of dims {dims}: {right}")
         if value.is_complex:
             raise TypeError(f"{what} is a complex CoefficientFunction: it must be real")
         return value
     if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
         return ng.CF(scalar_data(value, what))
     rows = [list(row) if isinstance(row, Sequence | np.ndarray) else [row] for row in value]
-    if [len(row) for row in rows] not in ([1, 1], [1, 1, 1], [2, 2]):
-        raise ValueError(f"{what} = {value!r}: {RIGHT}")
+    columns = {len(row) for row in rows}
+    scalars = not any(isinstance(row, Sequence | np.ndarray) for row in value)
+    shape = (len(rows),) if scalars else (len(rows), *columns)
+    if shape not in SHAPES[dim] or shape == (1,):
+        raise ValueError(f"{what} = {value!r}: {right}")
     entries = tuple(scalar_data(entry, what) for row in rows for entry in row)
-    return ng.CF(entries, dims=(2, 2)) if len(entries) == 4 else ng.CF(entries)
+    return ng.CF(entries, dims=shape) if len(shape) == 2 else ng.CF(entries)
 
 
 def components(data: ng.CoefficientFunction) -> InitialStrain:
     """The components of what `strain_data` returned."""
     zero = ng.CF(0.0)
     if data.dim == 1:
-        return InitialStrain(data, data, data, zero)
-    if data.dim == 4:
-        return InitialStrain(data[0, 0], data[1, 1], zero, data[0, 1] + data[1, 0])
-    return InitialStrain(data[0], data[1], data[2] if data.dim == 3 else zero, zero)
+        return InitialStrain(data, data, data, zero, zero, zero)
+    if data.dim >= 4:
+        d = int(data.dims[0])
+        shear = {(i, j): data[i, j] + data[j, i] for i in range(d) for j in range(i)}
+        normal, yz, xz = (data[2, 2], shear[2, 1], shear[2, 0]) if d == 3 else (zero,) * 3
+        return InitialStrain(data[0, 0], data[1, 1], normal, shear[1, 0], yz, xz)
+    normal = data[2] if data.dim == 3 else zero
+    return InitialStrain(data[0], data[1], normal, zero, zero, zero)
 
 
 def check_strains(
@@ -69,12 +82,14 @@ def check_strains(
     elements are looked at at points of a `rule`.
     """
     for (label, mask), data in zip(masks.items(), strains, strict=True):
-        if data.dim == 4:
+        if data.dim >= 4:
+            d = int(data.dims[0])
             every = view.mesh.MapToAllElements(rule, ng.VOL)
             points = every[mask[view.bodies][every["nr"]]]
-            values = data(points)
-            bad = np.abs(values[:, 1] - values[:, 2]) > SYMMETRIC * np.abs(values).max(initial=0.0)
-            refuse_where(points, bad, values, label, "a strain is symmetric, xy = yx")
+            values = data(points).reshape(-1, d, d)
+            skew = np.abs(values - values.transpose(0, 2, 1)).max(axis=(1, 2))
+            bad = skew > SYMMETRIC * np.abs(values).max(initial=0.0)
+            refuse_where(points, bad, data(points), label, "a strain is symmetric, xy = yx")
         for body, where in plane.items() if data.dim in (1, 3) else ():
             if (mask & where).any():
                 raise ValueError(

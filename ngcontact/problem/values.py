@@ -14,6 +14,7 @@ import ngsolve as ng
 import numpy as np
 
 SYMMETRIC = 1e-12  # difference of entries, relative to the largest: input has that many digits
+TUPLES = {2: "a pair", 3: "a triple"}  # of components, by the dimension
 
 Scalar: TypeAlias = float | ng.CoefficientFunction
 Vector: TypeAlias = Sequence[Scalar] | ng.CoefficientFunction
@@ -63,8 +64,9 @@ def refuse_where(
     """
     if bad.any():
         first = int(np.argmax(bad))
-        x, y = ng.CF((ng.x, ng.y))(points[first : first + 1])[0]
-        raise ValueError(f"{what} = {values[first].tolist()} at ({x:.6g}, {y:.6g}): {right}")
+        x = ng.CF((ng.x, ng.y, ng.z))(points)
+        place = ", ".join(f"{c:.6g}" for c in x[first, : 3 if x[:, 2].any() else 2])
+        raise ValueError(f"{what} = {values[first].tolist()} at ({place}): {right}")
 
 
 def region_name(value: Any, what: str) -> str:
@@ -110,41 +112,45 @@ def by_region(value: Any, what: str, normalise: Callable[[Any, str], Any]) -> Re
     return Regions(what, entries)
 
 
-def pair_of(value: Any, what: str) -> tuple[Any, Any]:
-    """Return the two entries of a sequence or of a CoefficientFunction of dim 2."""
+def entries_of(value: Any, what: str, dim: int) -> tuple[Any, ...]:
+    """Return the entries of a sequence, or of a CoefficientFunction, of `dim` of them."""
+    tuple_ = TUPLES[dim]
     if isinstance(value, ng.CoefficientFunction):
-        if tuple(value.dims) != (2,):
+        if tuple(value.dims) != (dim,):
             dims = tuple(value.dims)
-            raise ValueError(f"{what} is a CoefficientFunction of dims {dims}: give a 2-vector")
-        return value[0], value[1]
+            raise ValueError(f"{what} is a CoefficientFunction of dims {dims}: give a {dim}-vector")
+        return tuple(value[i] for i in range(dim))
     if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
-        raise TypeError(f"{what} = {value!r}: give a pair or a CoefficientFunction of dim 2")
-    if len(value) != 2:
-        raise ValueError(f"{what} = {value!r} has length {len(value)}: give a pair")
-    return value[0], value[1]
+        raise TypeError(f"{what} = {value!r}: give {tuple_} or a CoefficientFunction of dim {dim}")
+    if len(value) != dim:
+        raise ValueError(f"{what} = {value!r} has length {len(value)}: give {tuple_}")
+    return tuple(value)
 
 
-def displacement_components(value: Any, what: str) -> tuple[ng.CoefficientFunction | None, ...]:
-    """Return the two components of a prescribed displacement, None where one is free."""
-    pair = tuple(
-        None if entry is None else ng.CF(scalar_data(entry, what)) for entry in pair_of(value, what)
+def displacement_components(
+    value: Any, what: str, dim: int
+) -> tuple[ng.CoefficientFunction | None, ...]:
+    """Return the components of a prescribed displacement, `dim` of them, None where one is free."""
+    components = tuple(
+        None if entry is None else ng.CF(scalar_data(entry, what))
+        for entry in entries_of(value, what, dim)
     )
-    if pair == (None, None):
-        raise ValueError(f"{what} = (None, None) prescribes nothing: leave the boundary out")
-    return pair
+    if components == (None,) * dim:
+        raise ValueError(f"{what} = {components} prescribes nothing: leave the boundary out")
+    return components
 
 
-def vector_data(value: Any, what: str) -> ng.CoefficientFunction:
-    """Return a vector field (dim 2)."""
-    entries = tuple(scalar_data(entry, what) for entry in pair_of(value, what))
+def vector_data(value: Any, what: str, dim: int) -> ng.CoefficientFunction:
+    """Return a vector field of `dim` components."""
+    entries = tuple(scalar_data(entry, what) for entry in entries_of(value, what, dim))
     return value if isinstance(value, ng.CoefficientFunction) else ng.CF(entries)
 
 
-def traction_data(value: Any, what: str) -> ng.CoefficientFunction:
-    """Return a pressure (dim 1) or a traction (dim 2)."""
+def traction_data(value: Any, what: str, dim: int) -> ng.CoefficientFunction:
+    """Return a pressure (dim 1) or a traction of `dim` components."""
     vector = isinstance(value, Sequence | np.ndarray) and not isinstance(value, str)
     if vector or (isinstance(value, ng.CoefficientFunction) and value.dim != 1):
-        return vector_data(value, what)
+        return vector_data(value, what, dim)
     return ng.CF(scalar_data(value, what))
 
 
@@ -157,19 +163,21 @@ def region_pattern(value: Any) -> str | None:
     return "|".join(region_name(entry, "an entry of sliding") for entry in value) or None
 
 
-def unit_vector(value: Any, what: str) -> tuple[float, float]:
+def unit_vector(value: Any, what: str) -> tuple[float, ...]:
     """Return a direction as a unit vector; the size of its entries never overflows."""
-    right = "give a pair of numbers, like (0, -1), one direction for all"
+    right = "give a pair of numbers, like (0, -1), three for solids, one direction for all"
     if isinstance(value, str | ng.CoefficientFunction):
         raise TypeError(f"{what} = {value!r:.60}: {right}")
-    x, y = (scalar_data(entry, what) for entry in pair_of(value, what))
-    if not (isinstance(x, float) and isinstance(y, float)):
+    dim = 3 if isinstance(value, Sequence | np.ndarray) and len(value) == 3 else 2
+    entries = [scalar_data(entry, what) for entry in entries_of(value, what, dim)]
+    vector = tuple(entry for entry in entries if isinstance(entry, float))
+    if len(vector) < dim:
         raise TypeError(f"{what} = {value!r:.60}: {right}")
-    size = max(abs(x), abs(y))
+    size = max(map(abs, vector))
     if size == 0:
-        raise ValueError(f"{what} = ({x}, {y}): give a vector from secondary to primary body")
-    length = math.hypot(x / size, y / size)
-    return x / size / length, y / size / length
+        raise ValueError(f"{what} = {vector}: give a vector from secondary to primary body")
+    length = math.hypot(*(x / size for x in vector))
+    return tuple(x / size / length for x in vector)
 
 
 LONG = 4000  # characters of what is printed; numbers are short

@@ -107,7 +107,9 @@ FOUND: WeakKeyDictionary[Any, dict[Any, Features]] = WeakKeyDictionary()
 
 
 def _functions(problem: Problem) -> Iterator[Datum]:
-    """All data that are no numbers."""
+    """All data that are no numbers; of solids none are looked at."""
+    if problem.dim == 3:
+        return
     data = [Datum("force", name, 0, F, F) for name, F in problem.force.items()]
     data += [Datum("traction", name, 0, p, p) for name, p in problem.traction.items()]
     data += [Datum("strain", name, 0, e, e) for name, e in problem.strain.items()]

@@ -64,7 +64,7 @@ class RoughElements:
 def _rough(problem: Problem, mesh: ng.Mesh) -> Iterator[tuple[str, RoughElements]]:
     """Where laws are rough, then initial strains, and whose they are."""
     view = SampledElements(mesh, 2)
-    for pattern, law in problem.materials.items():
+    for pattern, law in problem.materials.items() if mesh.dim == 2 else ():
         if not varies(law):
             continue
         C = law.voigt(problem.model)

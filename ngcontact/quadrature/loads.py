@@ -72,7 +72,7 @@ class Load:
 
         Known from its first time in a run on this mesh. Numbers are nowhere rough.
         """
-        if numbers(self.data):
+        if numbers(self.data) or self.region.mesh.dim == 3:  # of solids not looked at
             return None
         mesh, degree = self.region.mesh, max(order, 2) + 1  # displacements' times a radius
         kept: dict[Any, tuple[ng.CoefficientFunction, RoughLoad | None]]

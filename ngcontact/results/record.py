@@ -15,6 +15,7 @@ from ..problem import table
 
 HEAD = ("level", "unknowns", "estimate", "seconds")
 BAR_WIDTH = 20  # characters
+AXES = "xyz"
 
 Number = int | float
 Level = TypeVar("Level", bound=Guaranteed)
@@ -43,17 +44,16 @@ def record_of(solution: Guaranteed) -> dict[str, Number]:
         ),
     }
     for number, pair in enumerate(solution.pairs):
-        x, y = (solution.contact_force(number) + 0.0).tolist()  # no -0.0
+        force = (solution.contact_force(number) + 0.0).tolist()  # no -0.0
+        row |= {f"contact_{number}_force_{axis}": x for axis, x in zip(AXES, force, strict=False)}
         row |= {
-            f"contact_{number}_force_x": x,
-            f"contact_{number}_force_y": y,
             f"contact_{number}_peak_pressure": float(pair.pressure.max(initial=0.0)),
             f"contact_{number}_active": int(np.count_nonzero(pair.active)),
             f"contact_{number}_points": int(pair.gap.size),
         }
     for name, reaction in solution.reactions.items():
-        x, y = (reaction + 0.0).tolist()
-        row |= {f"reaction_{name}_x": x, f"reaction_{name}_y": y}
+        parts = zip(AXES, (reaction + 0.0).tolist(), strict=False)
+        row |= {f"reaction_{name}_{axis}": x for axis, x in parts}
     row |= {f"residual_{name}": float(value) for name, value in solution.residuals.items()}
     return row | {f"work_{name}": int(count) for name, count in solution.work.items()}
 
@@ -79,7 +79,7 @@ def facts(solution: Guaranteed) -> list[tuple[str, str]]:
     contact = solution.problem.contact
     # Always six digits, that columns of neighbouring lines agree.
     sizes = [
-        f"{np.hypot(*solution.contact_force(k)):#.6g}".rstrip(".") for k in range(len(contact))
+        f"{math.hypot(*solution.contact_force(k)):#.6g}".rstrip(".") for k in range(len(contact))
     ]
     if len(contact) > 1:
         sizes = [f"{pair.secondary} {size}" for pair, size in zip(contact, sizes, strict=True)]
@@ -105,11 +105,10 @@ def html_of(solution: Guaranteed) -> str:
     for number, (pair, contact) in enumerate(
         zip(solution.pairs, solution.problem.contact, strict=True)
     ):
-        x, y = solution.contact_force(number) + 0.0
+        force = ", ".join(f"{x:.6g}" for x in solution.contact_force(number) + 0.0)
         peak = float(pair.pressure.max(initial=0.0))
         active = f"{np.count_nonzero(pair.active)}/{pair.gap.size}"
-        force = f"({x:.6g}, {y:.6g})"
-        lines.append((str(number), contact.named(), force, f"{peak:.6g}", active))
+        lines.append((str(number), contact.named(), f"({force})", f"{peak:.6g}", active))
     return about + table(("contact", "of", "force", "peak pressure", "active"), lines)
 
 

@@ -204,6 +204,7 @@ def values_at(
     solution: Solved, points: Any, body: str | None = None, outside: str = "error"
 ) -> Values:
     """Values at `points`, (..., 2) lengths; see `Solution.at`."""
+    solution.problem.refuse_solids("Solution.at")
     if outside not in OUTSIDE:
         raise ValueError(f"outside={outside!r}: choose one of {OUTSIDE}")
     where, stress = _points(points), full_stress(solution)

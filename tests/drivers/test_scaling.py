@@ -23,7 +23,7 @@ from ngcontact import (
     adapt,
     solve,
 )
-from ngcontact.fem.boundary import boundary_trace
+from ngcontact.fem import boundary_trace
 from tests.drivers.similarities import (
     AS_IT_IS,
     cornered,

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
-from ngcontact.fem.boundary import boundary_trace, nodal_basis
+from ngcontact.fem import boundary_trace
+from ngcontact.fem.boundary import nodal_basis
 from ngcontact.geometries import blocks, disc_on_block, graphs, rings
 from tests.mesh.test_curving import glued
 

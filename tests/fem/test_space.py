@@ -9,7 +9,7 @@ from ngsolve.meshes import MakeStructured2DMesh
 
 from drivers.reference import cases
 from ngcontact import Elastic, Hooke, Problem, solve
-from ngcontact.fem.boundary import boundary_trace
+from ngcontact.fem import boundary_trace
 from ngcontact.fem.space import assemble
 from ngcontact.geometries import disc, graphs, rings
 from ngcontact.mesh import curve, first_mesh

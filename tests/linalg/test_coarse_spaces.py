@@ -44,27 +44,32 @@ def transformed(n, one, other, d):
 
 
 def space(order, rounds, d=2):
-    """T, parents and nodes of the two lines, and a linear displacement (d * n,)."""
+    """T, parents and functions of degree 1 of the two lines, a linear displacement (d * n,)."""
     points, parents, both = facing_lines(rounds, d)
     segments = both.reshape(-1, 2)
     inner = len(points) + np.arange(len(segments) * (order - 1)).reshape(len(segments), -1)
     nodes = np.column_stack([segments[:, 0], inner, segments[:, 1]])
     s = gauss_lobatto(order)[1:-1, None]
-    ends = points[segments][:, :, None]
-    points = np.concatenate([points, ((1 - s) * ends[:, 0] + s * ends[:, 1]).reshape(-1, d)])
+    shares = np.column_stack([1 - s, s])
+    one, share = np.repeat(segments, order - 1, axis=0), np.tile(shares, (len(segments), 1))
+    rows = np.concatenate([np.arange(len(points)), np.repeat(inner.ravel(), 2)])
+    columns = np.concatenate([np.arange(len(points)), one.ravel()])
+    values = np.concatenate([np.ones(len(points)), share.ravel()])
+    linear = from_triplets(values, rows, columns, (len(points) + inner.size, len(points)))
+    points = linear @ points
     one, other = (np.unique(half) for half in np.split(nodes, 2))
     at = np.argsort(points[one, 0]), np.argsort(points[other, 0])
     rng = np.random.default_rng(order)
     u = points @ rng.normal(size=(d, d)) + rng.normal(size=d)
-    return transformed(len(points), one[at[0]], other[at[1]], d), parents, nodes, u.T.ravel()
+    return transformed(len(points), one[at[0]], other[at[1]], d), parents, linear, u.T.ravel()
 
 
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_linear_displacements_are_in_all_spaces(order, d):
-    T, parents, nodes, u = space(order, 4, d)
+    T, parents, linear, u = space(order, 4, d)
     y = sp.linalg.spsolve(T.tocsc(), u)
-    steps = coarsenings(T, parents, nodes, d * FIRST, d)
+    steps = coarsenings(T, parents, linear, d * FIRST, d)
     # Half of a line's segments have more than half of its vertices: two generations a step.
     assert len(steps) == (2 if order == 1 else 3)
     for step in steps:
@@ -77,8 +82,8 @@ def test_linear_displacements_are_in_all_spaces(order, d):
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_unknowns_that_stay_mean_the_same(order, d):
-    T, parents, nodes, _ = space(order, 3, d)
-    for step in coarsenings(T, parents, nodes, 0, d):
+    T, parents, linear, _ = space(order, 3, d)
+    for step in coarsenings(T, parents, linear, 0, d):
         chosen = step.P[step.kept]
         # Theory: the identity; round-off of the frames.
         assert abs(chosen - sp.eye_array(chosen.shape[0])).max() < 1e-13
@@ -90,25 +95,25 @@ def test_spaces_shrink_geometrically_where_refinement_is_local():
     first = np.full((2, 2), -1)
     chain = np.column_stack([np.zeros(depth, dtype=int), np.arange(1, depth + 1)])
     parents = np.concatenate([first, chain])
-    nodes = np.array([[0, depth + 1]])
     T = sp.eye_array(2 * len(parents), format="csr")
-    sizes = [step.P.shape for step in coarsenings(T, parents, nodes, 4)]
+    linear = sp.eye_array(len(parents), format="csr")
+    sizes = [step.P.shape for step in coarsenings(T, parents, linear, 4)]
     assert all(k <= n / 2 for n, k in sizes)
     assert sizes[0][0] == 2 * len(parents)
     assert sizes[-1][1] <= 8
 
 
 def test_small_spaces_have_no_coarser_ones():
-    T, parents, nodes, _ = space(1, 3)
+    T, parents, linear, _ = space(1, 3)
     assert T.shape[0] < COARSEST
-    assert coarsenings(T, parents, nodes) == []
+    assert coarsenings(T, parents, linear) == []
 
 
 def test_rows_in_a_ring_are_refused():
     T = sp.eye_array(8, format="lil")
     T[0, 1] = T[1, 0] = 0.5
     with pytest.raises(RingError, match="ring"):
-        coarsenings(T.tocsr(), np.array([[-1, -1]] * 2 + [[0, 1]] * 2), np.array([[0, 1]]), 0)
+        coarsenings(T.tocsr(), np.array([[-1, -1]] * 2 + [[0, 1]] * 2), sp.eye_array(4), 0)
 
 
 SIZE = 40

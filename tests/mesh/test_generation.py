@@ -21,7 +21,6 @@ from tests.pairs import (
     BOUNDED,
     ENLARGING,
     ROUND_OFF,
-    SOFT,
     pressed,
     unmatched,
 )
@@ -157,12 +156,6 @@ def test_two_cams_without_a_direction_are_told_to_give_one():
         first_mesh(problem, 0.2)
     along = replace(problem, contact=[Contact("upper_rim", "lower_rim", direction=(0, -1))])
     assert first_mesh(along, 0.2).ne > 50
-
-
-def test_solids_are_no_bodies():
-    box = occ.Box((0, 0, 0), (1, 1, 1))
-    with pytest.raises(ValueError, match="contains solids"):
-        first_mesh(Problem(geometry=OCCGeometry(box), materials={"a": SOFT}))
 
 
 def test_a_mesh_has_its_size_already():

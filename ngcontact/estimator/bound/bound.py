@@ -235,6 +235,7 @@ def refuse_bound(problem: Problem, trace: BoundaryTrace, pairs: Sequence[Contact
     ValueError
         What stands in the way.
     """
+    problem.refuse_solids("a guaranteed bound")
     bent = trace.curved_segments
     axis = trace.model.on_axis(trace.curve[:, [0, -1]].reshape(-1, 2)).reshape(-1, 2)
     for refused, what in (

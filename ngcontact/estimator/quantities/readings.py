@@ -66,6 +66,7 @@ class Measured(Guaranteed):
 
     def contact_area(self, pair: int = 0) -> float:
         """Length of a pair's line in contact, an area about an axis; any consistent units."""
+        self.problem.refuse_solids("contact_area")
         return area_in_contact(state_of(self.pairs, pair), self.discrete.space.trace)[0]
 
     def quantities(self, pair: int = 0) -> Quantities:
@@ -79,6 +80,7 @@ class Measured(Guaranteed):
         `ContactWarning` and a note below the table say why. Where corners make a stress infinite
         the row names them; its value is the largest farther away.
         """
+        self.problem.refuse_solids("quantities()")
         state, boundary = state_of(self.pairs, pair), self.discrete.space.trace
         known = "_proved" in self.__dict__
         proof, reason = self._proved

@@ -1,0 +1,187 @@
+"""Where the ray from a contact point meets the facing facets of a solid. NumPy only.
+
+Facets are surfaces (q, n, 3) given by their points at the nodes of `reference.triangle`, as in
+`FacetTrace.curve`; `side` (q,) is +1 where the outward normal is that of the vertices' order.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..arrays import Array, Index, Mask
+from ..reference.triangle import CENTRE, lagrange, lagrange_gradient
+from .projection import GRAZING_COSINE, MATCHING_DISTANCE, NEWTON_STEPS, PAIRS_AT_ONCE, Partners
+
+DEGREES = {3: 1, 6: 2, 10: 3}  # by the number of nodes
+NEAREST = 8  # facets by their middles, at which a ray is tried before all others
+# Barycentric coordinate, negative, up to which a ray meets a facet: on planes of symmetry points
+# lie on the rim, and curved edges of both sides differ by round-off.
+OUTSIDE = 1e-7
+STANDS_STILL = 1e-14  # change of barycentric coordinates at which Newton's method has arrived
+
+
+def none_met(size: int) -> Partners:
+    """Partners of points (size,) that meet nothing."""
+    return Partners(np.full(size, -1), np.tile(CENTRE, (size, 1)), np.full(size, np.inf))
+
+
+def onto(
+    points: Array, directions: Array, surface: Array, facet: Index, start: Array | None = None
+) -> tuple[Array, Array]:
+    """Barycentric coordinates (k, 3) where lines meet facets, or planes that go on, and distances.
+
+    Lines through `points` (k, 3) along `directions` (k, 3), `facet` (k,) of `surface` (q, n, 3), by
+    Newton's method from `start` (k, 3); NaN where a line does not cross. Distances are (k,).
+    """
+    degree = DEGREES[surface.shape[1]]
+    L = np.tile(CENTRE, (len(points), 1)) if start is None else start.copy()
+    distance = np.zeros(len(points))
+    for _ in range(NEWTON_STEPS if degree > 1 else 2):
+        x = np.einsum("ki,kid->kd", lagrange(degree, L), surface[facet])
+        tangents = np.einsum("kij,kid->kdj", lagrange_gradient(degree, L), surface[facet])
+        matrix = np.concatenate([tangents, -directions[:, :, None]], axis=2)
+        step = _solved(matrix, points + distance[:, None] * directions - x)
+        move = np.clip(step[:, :2], -2.0, 2.0) if degree > 1 else step[:, :2]
+        L[:, :2] += move
+        L[:, 2] -= move.sum(axis=1)
+        distance += step[:, 2]
+        if np.nanmax(np.abs(step[:, :2]), initial=0.0) <= STANDS_STILL:
+            break
+    return L, distance
+
+
+def _solved(matrices: Array, right: Array) -> Array:
+    """Solutions (k, 3) of systems (k, 3, 3), NaN where they are singular."""
+    a, b, c = matrices.transpose(2, 0, 1)
+    bc = np.cross(b, c)
+    determinant = (a * bc).sum(axis=1)
+    size = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1) * np.linalg.norm(c, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        inverse = np.where(np.abs(determinant) > GRAZING_COSINE * size, 1 / determinant, np.nan)
+    parts = [(right * bc).sum(axis=1), (right * np.cross(c, a)).sum(axis=1)]
+    parts.append((right * np.cross(a, b)).sum(axis=1))
+    return np.stack(parts, axis=1) * inverse[:, None]
+
+
+def line_coordinates(points: Array, corners: Array, directions: Array) -> Array:
+    """Barycentric coordinates (k, 3) where lines meet the planes of triangles.
+
+    Lines through `points` (k, 3) along `directions` (k, 3), triangles by `corners` (k, 3, 3).
+    """
+    edges = np.stack([corners[:, 0] - corners[:, 2], corners[:, 1] - corners[:, 2]], axis=2)
+    matrix = np.concatenate([edges, -directions[:, :, None]], axis=2)
+    L = _solved(matrix, points - corners[:, 2])[:, :2]
+    return np.column_stack([L, 1 - L.sum(axis=1)])
+
+
+def _faces(surface: Array, side: Array, facet: Index, L: Array, directions: Array) -> Mask:
+    """Whether outward normals at `L` (k, 3) of facets `facet` (k,) oppose `directions` (k, 3)."""
+    degree = DEGREES[surface.shape[1]]
+    tangents = np.einsum("kij,kid->kdj", lagrange_gradient(degree, L), surface[facet])
+    normal = np.cross(tangents[..., 0], tangents[..., 1]) * side[facet, None]
+    across = (normal * directions).sum(axis=1)
+    return np.asarray(across < -GRAZING_COSINE * np.linalg.norm(normal, axis=1))
+
+
+def coincident(
+    points: Array, directions: Array, surface: Array, side: Array, nodes: Array
+) -> Partners:
+    """Partners among the nodes of the facing facets that lie at the points themselves.
+
+    As `projection.coincident` finds them in the plane, of `points` (k, 3) with `directions` (k, 3)
+    on the `surface` (q, n, 3), `side` (q,); `nodes` (j, 3) are barycentric coordinates.
+    """
+    found = none_met(len(points))
+    if len(surface) == 0 or len(points) == 0:
+        return found
+    shapes = lagrange(DEGREES[surface.shape[1]], nodes)
+    places = np.einsum("ji,qid->qjd", shapes, surface)
+    size = np.linalg.norm(surface[:, 1] - surface[:, 0], axis=1)
+    tree = cKDTree(places.reshape(-1, 3))
+    reach = MATCHING_DISTANCE * size.max()
+    distances, numbers = tree.query(points, k=NEAREST, distance_upper_bound=reach)
+    for column in range(NEAREST - 1, -1, -1):  # a node belongs to several facets
+        near = np.flatnonzero(np.isfinite(distances[:, column]))
+        facet, local = np.divmod(numbers[near, column], len(nodes))
+        meets = _faces(surface, side, facet, nodes[local], directions[near])
+        near, facet, local = near[meets], facet[meets], local[meets]
+        found.segment[near], found.s[near] = facet, nodes[local]
+        offset = places[facet, local] - points[near]
+        found.distance[near] = (offset * directions[near]).sum(axis=1)
+    return found
+
+
+def _met(
+    point: Index, facet: Index, points: Array, directions: Array, surface: Array, side: Array
+) -> tuple[Index, Array, Array]:
+    """Which (j,) of the pairs (r,) of `point` and `facet` meet, where (j, 3) and how far (j,)."""
+    L, distance = onto(points[point], directions[point], surface, facet)
+    inside = np.flatnonzero(L.min(axis=1) >= -OUTSIDE)
+    point, facet, L, distance = point[inside], facet[inside], L[inside], distance[inside]
+    faces = np.flatnonzero(_faces(surface, side, facet, L, directions[point]))
+    return inside[faces], L[faces], distance[faces]
+
+
+def cast(
+    points: Array, directions: Array, surface: Array, side: Array, *, ahead: bool = False
+) -> Partners:
+    """Nearest points, along given directions, of facets whose outward normal opposes them.
+
+    From `points` (k, 3) along unit vectors `directions` (k, 3) to the `surface` (q, n, 3), `side`
+    (q,). Both senses count unless only points `ahead` do, so that overlapping bodies give negative
+    distances.
+    """
+    found = none_met(len(points))
+    if len(surface) == 0 or len(points) == 0:
+        return found
+    middle = surface[:, :3].mean(axis=1)
+    radius = np.linalg.norm(surface - middle[:, None], axis=2).max(axis=1)
+    _, near = cKDTree(middle).query(points, k=min(NEAREST, len(middle)))
+    near = near.reshape(len(points), -1)
+    tried = [(np.repeat(np.arange(len(points)), near.shape[1]), near.ravel())]
+    _take(found, *tried[0], points, directions, surface, side, ahead)
+    block = max(1, PAIRS_AT_ONCE // len(middle))
+    # Of the others those whose ball the line passes; a nearer one of these may hide what was met.
+    for first in range(0, len(points), block):
+        here = np.arange(first, min(first + block, len(points)))
+        here = here[found.segment[here] < 0]
+        d, x = directions[here], points[here]
+        along = d @ middle.T - (d * x).sum(axis=1)[:, None]
+        square = (x**2).sum(axis=1)[:, None] - 2 * x @ middle.T + (middle**2).sum(axis=1)
+        passes = square - along**2 <= radius**2 * (1 + OUTSIDE)
+        at, facet = np.nonzero(passes)
+        _take(found, here[at], facet, points, directions, surface, side, ahead)
+    return found
+
+
+def _take(
+    found: Partners,
+    point: Index,
+    facet: Index,
+    points: Array,
+    directions: Array,
+    surface: Array,
+    side: Array,
+    ahead: bool,
+) -> None:
+    """Enter the nearest of what the pairs (r,) of `point` and `facet` meet into `found`."""
+    pairs, L, distance = _met(point, facet, points, directions, surface, side)
+    if ahead:
+        size = MATCHING_DISTANCE * np.abs(surface).max()
+        kept = distance >= -size
+        pairs, L, distance = pairs[kept], L[kept], distance[kept]
+    order = np.lexsort((np.abs(distance), point[pairs]))
+    _, first = np.unique(point[pairs[order]], return_index=True)
+    best = order[first]
+    at = point[pairs[best]]
+    found.segment[at], found.s[at] = facet[pairs[best]], L[best]
+    found.distance[at] = distance[best]
+
+
+def snap(L: Array, nodes: Array) -> Array:
+    """Barycentric coordinates (k, 3), those of `L` (k, 3) moved to `nodes` (q, 3) they match."""
+    apart = np.abs(L[:, None] - nodes).max(axis=2)
+    nearest = apart.argmin(axis=1)
+    matches = apart[np.arange(len(L)), nearest] <= MATCHING_DISTANCE
+    return np.where(matches[:, None], nodes[nearest], L)

@@ -1,0 +1,286 @@
+"""Boundary facets of a mesh of solids, with nodes as segments of a plane mesh have them.
+
+Nodes are those of `reference.triangle`; a place on a facet is given by barycentric coordinates. On
+the facets where conditions are posed, values at the nodes replace NGSolve's edge and face
+functions: coefficients are Phi^-1 times the values, Phi (q, q) the functions at the nodes. On some,
+where a facet faces another body in part, the unknowns are Bernstein coefficients c instead: values
+are B c, of functions that are nowhere negative.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import ngsolve as ng
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from ..arrays import Array, Index, Mask, from_triplets
+from ..mesh import CadFace, cad_faces, face_normals
+from ..problem import MeshArrays
+from ..reference import triangle
+from .boundary import BENT, CORNER, CORNER_WITHOUT_CAD, BoundaryTrace, segment_trace
+from .model import PLANE, Model
+from .solid import SOLID_MODEL
+
+NO_ENTRY = 1e-13  # of changes of basis, whose entries are of size 1: round-off
+
+
+@dataclass(frozen=True, eq=False)
+class FacetTrace(BoundaryTrace):
+    """Facets of the whole boundary of solids, k of them, with q nodes each.
+
+    What `BoundaryTrace` says of segments holds of facets; parameters s are barycentric coordinates
+    (k, 3), curves are surfaces by the points (k, q', 3) at the nodes of their degree, the `side` is
+    +1 where the outward normal is that of the vertices' order, and nothing lies on an axis.
+    """
+
+    faces: list[CadFace] | None = None  # by region number
+    # (n,), nodes whose unknown is a Bernstein coefficient; none when left out
+    bernstein: Mask = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _again, (self.mesh, self.order, self.bernstein)
+
+    def point(self, segment: Index, s: Array) -> Array:
+        """Points (k, 3) of the mesh's surface at `s` (k, 3) of facets `segment` (k,)."""
+        return np.einsum(
+            "ki,kid->kd", triangle.lagrange(self.geometry_order, s), self.curve[segment]
+        )
+
+    def derivative(self, segment: Index, s: Array) -> Array:
+        """Derivatives (k, 3, 2) with respect to L0, L1, at `s` (k, 3) of facets `segment` (k,)."""
+        weights = triangle.lagrange_gradient(self.geometry_order, s)
+        return np.einsum("kij,kid->kdj", weights, self.curve[segment])
+
+    def area_vector(self, segment: Index, s: Array) -> Array:
+        """Outward normals (k, 3) with the length of an area per unit weight of `triangle.gauss`.
+
+        At `s` (k, 3) of facets `segment` (k,).
+        """
+        tangents = self.derivative(segment, s)
+        vectors = np.cross(tangents[..., 0], tangents[..., 1]) / 2
+        return np.asarray(vectors * self.side[segment, None])
+
+    def normal(self, segment: Index, s: Array) -> Array:
+        """Outward unit normals (k, 3) of the mesh at `s` (k, 3) of facets `segment` (k,)."""
+        vectors = self.area_vector(segment, s)
+        return vectors / np.linalg.norm(vectors, axis=1)[:, None]
+
+    def exact_normal(self, segment: Index, s: Array) -> Array:
+        """The same (k, 3) of CAD faces, if any, at `s` (k, 3) of facets `segment` (k,)."""
+        normals = self.normal(segment, s)
+        exact = face_normals(self.mesh, segment, s, self.point(segment, s))
+        if exact is None:
+            return normals
+        return exact * np.where((exact * normals).sum(axis=1) < 0, -1.0, 1.0)[:, None]
+
+    def at_nodes(self, segments: Index) -> tuple[Index, Array]:
+        """Facet (n,) and s (n, 3) of all nodes of `segments` (k,), one facet after the other."""
+        s = triangle.nodes(self.order)
+        return np.repeat(segments, len(s)), np.tile(s, (len(segments), 1))
+
+    def same_nodes(self, other: BoundaryTrace) -> bool:
+        """Whether the nodes are those of another trace, with the same unknowns."""
+        same = isinstance(other, FacetTrace) and np.array_equal(self.bernstein, other.bernstein)
+        return same and super().same_nodes(other)
+
+    def places(self, segments: Index) -> Array:
+        """Barycentric coordinates (k, q, 3) of the nodes of `segments` (k,)."""
+        return np.broadcast_to(triangle.nodes(self.order), (len(segments), self.nodes.shape[1], 3))
+
+    def barycentric(self, segments: Index) -> Array:
+        """The same (k, q, 3) of the nodes of `segments` (k,)."""
+        return self.places(segments)
+
+    def shapes(self, segment: Index, s: Array) -> Array:
+        """Functions (k, q) of the unknowns at the nodes, at `s` (k, 3) of `segment` (k,)."""
+        values = triangle.lagrange(self.order, s)
+        if self.bernstein.any():
+            values = np.einsum("ki,kij->kj", values, self.values_of_unknowns(segment))
+        return values
+
+    def values_of_unknowns(self, segments: Index) -> Array:
+        """B (k, q, q), from the unknowns at the nodes of `segments` (k,) to the values there."""
+        q = self.nodes.shape[1]
+        if not self.bernstein.any():
+            return np.broadcast_to(np.eye(q), (len(segments), q, q))
+        chosen = self.bernstein[self.nodes[segments]]
+        B = np.where(chosen[:, :, None], triangle.bernstein(self.order), np.eye(q))
+        return np.asarray(B)
+
+    def unknowns_of_values(self, segments: Index, values: Array) -> Array:
+        """Unknowns (k, q, ...) of functions of `values` (k, q, ...) at nodes of `segments` (k,)."""
+        if not self.bernstein.any():
+            return values
+        flat = values.reshape(*values.shape[:2], -1)
+        found = np.linalg.solve(self.values_of_unknowns(segments), flat)
+        return np.asarray(found.reshape(values.shape))
+
+    def lengths(self, segments: Index) -> Array:
+        """Longest straight edges (k,) of `segments` (k,)."""
+        corners = self.curve[segments, :3]
+        return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+
+    def sizes(self, segments: Index) -> Array:
+        """Areas (k,) of the plane triangles of the vertices of `segments` (k,)."""
+        a, b, c = self.curve[segments, :3].transpose(1, 0, 2)
+        return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+
+    @cached_property
+    def curved_segments(self) -> Mask:
+        """Facets (k,) that leave the planes of their vertices."""
+        flat = np.einsum("qi,kid->kqd", triangle.nodes(self.geometry_order), self.curve[:, :3])
+        off = np.abs(self.curve - flat).max(axis=(1, 2))
+        return np.asarray(off > BENT * self.lengths(np.arange(len(self.curve))))
+
+    @cached_property
+    def _middles(self) -> NDArray:
+        return self.mesh.MapToAllElements(ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1]), ng.BND)
+
+    def evaluate(self, function: ng.CoefficientFunction, segment: Index, s: Array) -> Array:
+        """Values (k, dim) of a CoefficientFunction at `s` (k, 3) of facets `segment` (k,)."""
+        points = self._middles[segment].copy()
+        points["x"], points["y"] = s[:, 0], s[:, 1]
+        return np.asarray(function(points)).reshape(len(segment), function.dim)
+
+    def number_points(self, segment: Index, node: Index, vector: Array) -> tuple[Index, Array]:
+        """Number the nodes of several facets: once each, at an edge of the body once a side.
+
+        Points (k,) of `node` (k,) on `segment` (k,), and their mean vectors (m, 3) by area of
+        `vector` (k, 3), as in the plane. Facets at a node are on one side where their vectors are
+        linked by turns that make no edge.
+        """
+        order = np.lexsort((self.region[segment], node))
+        number, count = np.full(len(node), -1), 0
+        _, first, size = np.unique(node[order], return_index=True, return_counts=True)
+        for start, many in zip(first, size, strict=True):
+            at = order[start : start + many]
+            if many == 1 or not self._turned(segment[at], vector[at]):
+                number[at] = count
+                count += 1
+                continue
+            for i, each in enumerate(at):
+                for j in at[:i]:
+                    turn = np.linalg.norm(vector[[each]] - vector[[j]], axis=1)
+                    if not self._corner(segment[[j]], segment[[each]], turn)[0]:
+                        number[each] = number[j]
+                        break
+                else:
+                    number[each] = count
+                    count += 1
+        mean = np.zeros((count, 3))
+        np.add.at(mean, number, vector * self.sizes(segment)[:, None])
+        return number, mean / np.linalg.norm(mean, axis=1)[:, None]
+
+    def _corner(self, first: Index, second: Index, turn: Array) -> Mask:
+        """Whether pairs of facets (k,) at a node, whose normals differ by `turn`, form edges."""
+        if self.faces is not None:
+            return turn > CORNER
+        names = np.array(self.mesh.GetBoundaries())
+        named = names[self.region[first]] != names[self.region[second]]
+        return (turn > CORNER_WITHOUT_CAD) | (named & (turn > CORNER))
+
+    def _turned(self, segment: Index, vector: Array) -> bool:
+        """Whether one of the vectors (k, 3) of facets at a node is on another side of an edge."""
+        turn = np.linalg.norm(vector - vector[0], axis=1)
+        return bool(self._corner(segment[np.zeros(len(segment), int)], segment, turn).any())
+
+    def nodal_basis(self, segments: Index) -> sp.csr_array:
+        """Matrix (n, n) from unknowns at the nodes of `segments` (k,), and others, to NGSolve's."""
+        size = self.space.ndof
+        if self.order == 1:
+            return sp.eye_array(size, format="csr")
+        inner = self.nodes[segments][:, 3:]
+        B = self.values_of_unknowns(segments)
+        change = np.linalg.solve(self._functions_at_nodes(segments), B)[:, 3:]
+        functions = self._functions[segments][:, 3:]
+        rows, columns = np.broadcast_arrays(functions[:, :, None], self.nodes[segments][:, None])
+        kept = np.abs(change) > NO_ENTRY
+        rows, columns, values = rows[kept], columns[kept], change[kept]
+        # Facets with a common edge say the same of it.
+        _, first = np.unique(rows * size + columns, return_index=True)
+        rest = np.ones(size, dtype=bool)
+        rest[inner] = False
+        same = np.flatnonzero(rest)
+        return from_triplets(
+            np.concatenate([np.ones(len(same)), values[first]]),
+            np.concatenate([same, rows[first]]),
+            np.concatenate([same, columns[first]]),
+            (size, size),
+        )
+
+    @cached_property
+    def _functions(self) -> Index:
+        """NGSolve's unknowns (k, q) of each facet, in its order."""
+        elements = self.mesh.Elements(ng.BND)
+        return np.array([self.space.GetDofNrs(el) for el in elements], dtype=np.intp)
+
+    def _functions_at_nodes(self, segments: Index) -> Array:
+        """Phi (k, q, q): NGSolve's functions at the nodes, which the order of vertices decides."""
+        order = np.argsort(self.nodes[segments][:, :3], axis=1) @ [9, 3, 1]
+        values = np.zeros((len(segments), *(self.nodes.shape[1],) * 2))
+        for kind in np.unique(order):
+            at = np.flatnonzero(order == kind)
+            shape = self.space.GetFE(ng.ElementId(ng.BND, int(segments[at[0]])))
+            points = triangle.nodes(self.order)[:, :2].tolist()
+            values[at] = np.array([shape.CalcShape(x, y, 0.0).NumPy() for x, y in points])
+        return values
+
+
+def facet_trace(mesh: ng.Mesh, order: int) -> FacetTrace:
+    """Trace of the displacements of degree `order` on the boundary of a mesh of solids."""
+    view, space = MeshArrays(mesh), ng.H1(mesh, order=order)
+    vertices = view.facets
+    degree = max(1, mesh.GetCurveOrder())
+    points = [(x, y, 0.0) for x, y, _ in triangle.nodes(degree)]
+    rule = ng.IntegrationRule(points, [1.0] * len(points))
+    curve = np.asarray(ng.CF((ng.x, ng.y, ng.z))(mesh.MapToAllElements(rule, ng.BND)))
+    curve = curve.reshape(len(vertices), len(points), 3)
+    element = view.facet_elements
+    a, b, c = curve[:, :3].transpose(1, 0, 2)
+    inwards = view.corners[element].mean(axis=1) - (a + b + c) / 3
+    facing = (np.cross(b - a, c - a) * inwards).sum(axis=1)
+    none = np.zeros(len(vertices), dtype=np.intp)
+    trace = FacetTrace(
+        mesh=mesh,
+        space=space,
+        order=order,
+        geometry_order=degree,
+        region=view.boundaries,
+        nodes=vertices,
+        element=element,
+        body=view.bodies[element],
+        inner=view.inner_facets,
+        curve=curve,
+        side=np.where(facing > 0, -1.0, 1.0),
+        edges=None,
+        faces=cad_faces(mesh),
+        model=SOLID_MODEL,
+        axis=none,
+        on_axis=none > 0,
+    )
+    return trace if order == 1 else replace(trace, nodes=_nodes(trace, vertices))
+
+
+def _nodes(trace: FacetTrace, vertices: Index) -> Index:
+    """Numbers (k, q) of the nodes: those of NGSolve's unknowns, along edges from the lower end."""
+    nodes = trace._functions.copy()
+    for (first, last), inner in zip(triangle.EDGES, triangle.edge_nodes(trace.order), strict=True):
+        falling = np.flatnonzero(vertices[:, first] > vertices[:, last])[:, None]
+        nodes[falling, inner] = nodes[falling, inner[::-1]]
+    return nodes
+
+
+def boundary_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTrace:
+    """Trace of the displacements of degree `order` on the boundary of `mesh`, in a model."""
+    if mesh.dim == 3:
+        return facet_trace(mesh, order)
+    return segment_trace(mesh, order, model)
+
+
+def _again(mesh: ng.Mesh, order: int, bernstein: Mask) -> FacetTrace:
+    return replace(facet_trace(mesh, order), bernstein=bernstein)

@@ -1,0 +1,139 @@
+"""The exact boundary faces of an OCC geometry of solids: points, normals, facets of a mesh on them.
+
+Netgen hands out one CAD face for each face region of a mesh, in the same order, and keeps with each
+surface triangle the surface parameters (u, v) of its corners. They are exact to 1e-10, also after
+refinement; Newton's method on the surface takes them to round-off.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import ngsolve as ng
+import numpy as np
+from netgen.occ import OCCGeometry, TopoDS_Shape
+
+from ..arrays import Array, Index, Mask
+from ..problem import MeshArrays
+
+NEWTON_STEPS = 30
+SETTLED = 1e-15  # step on the surface, relative to the coordinates, at which Newton has arrived
+FLAT = 1e-12  # difference of unit normals up to which a face is plane
+SAMPLES = 7  # points of a face, in both parameters, that tell whether it is plane
+SINGULAR = 1e-9  # sine of the angle of both tangents, below which the surface has a pole
+
+
+class CadFace:
+    """One CAD face as a parametrised surface.
+
+    Attributes
+    ----------
+    name : str
+        Boundary name.
+    """
+
+    def __init__(self, face: TopoDS_Shape) -> None:
+        self._surface = face.surf
+        self.name = face.name or ""
+        self._plane: dict[tuple[float, ...], Array] = {}
+
+    def _at(self, uv: Array) -> tuple[Array, Array]:
+        """Points (k, 3) and both tangents (k, 3, 2) at parameters `uv` (k, 2)."""
+        found = [self._surface.D1(float(u), float(v)) for u, v in uv]
+        values = np.array([[(a.x, a.y, a.z) for a in one] for one in found]).reshape(-1, 3, 3)
+        return values[:, 0], values[:, 1:].transpose(0, 2, 1)
+
+    def normal_at(self, uv: Array) -> Array:
+        """Unit normals (k, 3) at parameters `uv` (k, 2), on one side of the face or the other."""
+        normals = [list(self._surface.Normal(float(u), float(v))) for u, v in uv]
+        return np.array(normals).reshape(-1, 3)
+
+    def plane(self, uv: Array) -> Array | None:
+        """Its unit normal (3,), if the part between parameters `uv` (k, 2) is plane, else None."""
+        low, high = uv.min(axis=0), uv.max(axis=0)
+        key = (*low, *high)
+        if key not in self._plane:
+            grid = np.stack(np.meshgrid(*np.linspace(low, high, SAMPLES).T), axis=-1)
+            normals = self.normal_at(grid.reshape(-1, 2))
+            flat = np.abs(normals - normals[0]).max() <= FLAT
+            self._plane[key] = normals[0] if flat else np.zeros(0)
+        return self._plane[key] if self._plane[key].size else None
+
+    def project(self, points: Array, uv: Array) -> Array:
+        """Parameters (k, 2) of the feet of `points` (k, 3), by Newton's method from `uv` (k, 2)."""
+        uv, size = uv.copy(), np.abs(points).max(initial=0.0)
+        rest = np.arange(len(uv))
+        for _ in range(NEWTON_STEPS):
+            x, t = self._at(uv[rest])
+            # At a pole one tangent vanishes: that parameter stays.
+            step = (np.linalg.pinv(t, rcond=SINGULAR) @ (points[rest] - x)[..., None])[..., 0]
+            uv[rest] += step
+            rest = rest[np.linalg.norm((t @ step[..., None])[..., 0], axis=1) > SETTLED * size]
+            if rest.size == 0:
+                break
+        return uv
+
+
+@lru_cache(maxsize=1)  # for all meshes of one adaptive run
+def _faces(geometry: OCCGeometry) -> list[CadFace]:
+    return [CadFace(face) for face in geometry.shape.faces]
+
+
+def cad_faces(mesh: ng.Mesh) -> list[CadFace] | None:
+    """CAD faces by boundary region number, or None for a mesh without an OCC geometry."""
+    geometry = mesh.ngmesh.GetGeometry()
+    if not isinstance(geometry, OCCGeometry):
+        return None
+    faces, names = _faces(geometry), mesh.GetBoundaries()
+    if [face.name or "default" for face in faces] != [name or "default" for name in names]:
+        return None
+    return faces
+
+
+def curved_facets(mesh: ng.Mesh) -> Mask | None:
+    """Facets (k,) of curved CAD faces; None without CAD."""
+    faces = cad_faces(mesh)
+    if faces is None:
+        return None
+    view = MeshArrays(mesh)
+    region, uv = view.boundaries, view.surface_parameters
+    curved = np.zeros(len(region), dtype=bool)
+    for number in np.unique(region):
+        at = region == number
+        curved[at] = faces[number].plane(uv[at].reshape(-1, 2)) is None
+    return curved
+
+
+def unwrapped(uv: Array) -> Array:
+    """Parameters (k, 3, 2), those `uv` (k, 3, 2) of corners of triangles without jumps at a seam.
+
+    A jump is by a period, 2 pi, of an angle: no triangle turns by half of that.
+    """
+    jump = np.round((uv - uv[:, :1]) / (2 * np.pi))
+    return np.where(np.abs(uv - uv[:, :1]) > np.pi, uv - 2 * np.pi * jump, uv)
+
+
+def face_normals(mesh: ng.Mesh, facets: Index, shapes: Array, points: Array) -> Array | None:
+    """Unit normals (k, 3) of the CAD faces at `points` (k, 3) of a mesh, None without CAD.
+
+    The points lie on `facets` (k,), where the functions of degree 1 are `shapes` (k, 3).
+    """
+    faces = cad_faces(mesh)
+    if faces is None:
+        return None
+    view = MeshArrays(mesh)
+    region, uv = view.boundaries, view.surface_parameters
+    normals = np.zeros((len(facets), 3))
+    for number in np.unique(region[facets]):
+        at, face = np.flatnonzero(region[facets] == number), faces[number]
+        if (plane := face.plane(uv[region == number].reshape(-1, 2))) is not None:
+            normals[at] = plane
+            continue
+        start = np.einsum("ki,kid->kd", shapes[at], unwrapped(uv[facets[at]]))
+        # Facets share their nodes: each place once.
+        size = np.abs(points[at]).max(initial=0.0) or 1.0
+        rounded = np.round(points[at] / size, 13)
+        _, first, back = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+        feet = face.project(points[at[first]], start[first])
+        normals[at] = face.normal_at(feet)[back.ravel()]
+    return normals

@@ -1,0 +1,1 @@
+"""Reference facets: nodes, basis functions and quadrature. NumPy only."""

@@ -1,0 +1,159 @@
+"""What solids refuse: the value, and what would be right."""
+
+from dataclasses import replace
+
+import netgen.occ as occ
+import ngsolve as ng
+import numpy as np
+import pytest
+from netgen.meshing import Element2D, Element3D, FaceDescriptor, Mesh, MeshPoint, Pnt
+from ngsolve.meshes import MakeStructured3DMesh
+
+from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
+from tests.solids.meshes import boxes
+from tests.solids.test_patch import LAWS, blocks, pressed
+
+SOFT = Elastic(1.0, 0.3)
+BOX = {"a": SOFT}
+
+
+def box(name="a"):
+    solid = occ.Box((0, 0, 0), (1, 1, 1))
+    solid.solids.name = name
+    solid.faces.name = "side"
+    solid.faces.Min(occ.Z).name = "bottom"
+    return solid
+
+
+def mixed():
+    face = occ.WorkPlane().MoveTo(3, 0).Rectangle(1, 1).Face()
+    return occ.OCCGeometry(occ.Compound([box(), face]))
+
+
+def glued():
+    return occ.OCCGeometry(occ.Glue([box(), occ.Box((0, 0, 1), (1, 1, 2))]))
+
+
+def gap_of_two(x, y):
+    return 0 * x
+
+
+OBSTACLE = {"secondary": "bottom", "direction": (0, 0, -1), "gap": 0.0}
+
+
+@pytest.mark.parametrize(
+    ("data", "error", "words"),
+    [
+        ({"geometry": mixed}, ValueError, "bound none of them: bodies are either solids or faces"),
+        ({"geometry": glued}, ValueError, "bounds two solids.*Compound, not Glue"),
+        ({"displacement": {"bottom": (0, 0)}}, ValueError, "length 2: give a triple"),
+        ({"traction": {"side": (0, 1)}}, ValueError, "length 2: give a triple"),
+        ({"force": {"a": ng.CF((0, 1))}}, ValueError, r"dims \(2,\): give a 3-vector"),
+        ({"model": "plane stress"}, ValueError, "is for plane bodies: leave it out with solids"),
+        ({"materials": {"a": Hooke(np.eye(3))}}, ValueError, r"\(3, 3\).*needs a 6x6"),
+        ({"materials": {"a": Hooke(np.eye(4))}}, ValueError, r"\(4, 4\).*needs a 6x6"),
+        ({"contact": [Contact(**OBSTACLE | {"direction": (0, -1)})]}, ValueError, "give a triple"),
+    ],
+)
+def test_problems_that_are_refused(data, error, words):
+    given = {"geometry": lambda: occ.OCCGeometry(box()), "materials": BOX} | data
+    with pytest.raises(error, match=words):
+        Problem(**given | {"geometry": given["geometry"]()})
+
+
+def one_tetrahedron(corners):
+    mesh = Mesh(dim=3)
+    points = [mesh.Add(MeshPoint(Pnt(*x))) for x in corners]
+    mesh.SetMaterial(1, "a")
+    face = mesh.Add(FaceDescriptor(surfnr=1, domin=1, bc=1))
+    mesh.Add(Element3D(1, points))
+    for k in range(4):
+        mesh.Add(Element2D(face, points[:k] + points[k + 1 :]))
+    mesh.SetBCName(0, "side")
+    return ng.Mesh(mesh)
+
+
+def curved_without_cad():
+    mesh = ng.Mesh(occ.OCCGeometry(occ.Sphere((0, 0, 0), 1)).GenerateMesh(maxh=1))
+    mesh.Curve(2)
+    mesh.ngmesh.SetGeometry(None)
+    return mesh
+
+
+INVERTED = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+
+
+@pytest.mark.parametrize(
+    ("mesh", "words"),
+    [
+        (lambda: MakeStructured3DMesh(hexes=True, nx=1), "1 hexahedra, prisms or pyramids"),
+        (lambda: one_tetrahedron(INVERTED), r"1 inverted.*tetrahedra.*signed volume -?0\.167"),
+        (lambda: blocks(1, 1), 'body "upper" has no material'),
+    ],
+)
+def test_meshes_that_are_refused(mesh, words):
+    mesh = mesh()
+    with pytest.raises(ValueError, match=words):
+        solve(Problem(mesh, {mesh.GetMaterials()[-1]: SOFT}))
+
+
+def test_unnamed_solids():
+    with pytest.raises(ValueError, match="give every solid a name"):
+        solve(Problem(occ.OCCGeometry(box("")), {".*": SOFT}))
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "words"),
+    [
+        ({"sliding": "lower_botom"}, ValueError, 'did you mean "lower_bottom"'),
+        (
+            {"contact": [Contact("upper_bottom", gap=gap_of_two)]},
+            TypeError,
+            "must take three arrays",
+        ),
+        (
+            {"contact": [Contact("upper_top", "lower_bottom", direction=(0, 0, -1))]},
+            ValueError,
+            r"no point.*faces.*direction=\(0, 0, -1\)",
+        ),
+    ],
+)
+def test_data_that_do_not_fit(changes, error, words):
+    problem = replace(pressed(blocks(2, 2)), traction={}, **changes)
+    with pytest.raises(error, match=words):
+        solve(replace(problem, sliding=changes.get("sliding")))
+
+
+def test_what_stays_plane():
+    problem = pressed(blocks(2, 2))
+    for order in (4, 2.5):
+        with pytest.raises(ValueError, match=f"order={order} is not available; solids have"):
+            solve(problem, order=order)
+    with pytest.raises(ValueError, match="leave it out with solids"):
+        solve(problem, element="superparametric")
+    solution = solve(problem)
+    assert solution.order == 2
+    for name in ("hoop_stress", "out_of_plane_stress"):
+        with pytest.raises(ValueError, match="a solid has no"):
+            getattr(solution, name)
+    with pytest.raises(ValueError, match="axisymmetric"):
+        solution.revolved("body.vtu")
+    with pytest.raises(ValueError, match="not available for solids"):
+        solution.error_bound  # noqa: B018
+    with pytest.raises(ValueError, match="not available for solids"):
+        list(adapt(problem, guaranteed=True))
+
+
+def test_prescribed_on_both_sides():
+    """Bodies that share a plane with prescribed displacements which overlap there."""
+    mesh = boxes(
+        ("upper", (0, 0, 0), (1, 1, 1), (2, 2, 2)), ("lower", (0, 0, -1), (1, 1, 0), (2,) * 3)
+    )
+    problem = Problem(
+        mesh,
+        LAWS,
+        displacement={"upper_left": (0, 0, -0.1), "lower_left": (0, 0, 0)},
+        contact=[Contact("upper_bottom", "lower_top", direction=(0, 0, -1))],
+    )
+    with pytest.raises(ValueError, match="violated by prescribed displacements on both sides"):
+        solve(problem)

@@ -1,0 +1,137 @@
+"""Curved faces: press fit of shells along exact normals, sliding, obstacles, normals."""
+
+import math
+
+import netgen.occ as occ
+import ngsolve as ng
+import numpy as np
+import pytest
+
+from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact.fem import boundary_trace
+from ngcontact.geometries.solids import shells
+
+# Radii 0.5, 1, 1.5, moduli 1 and 3, Poisson's ratios .3 and .2, overlap .01: c1 = .55, c2 = 7 / 19.
+PRESSURE = 0.01 / (0.55 + 7 / 19)
+LAWS = {"inner": Elastic(1.0, 0.3), "outer": Elastic(3.0, 0.2)}
+
+
+def press_fit(geometry):
+    return Problem(
+        geometry=geometry,
+        materials=LAWS,
+        sliding=["x", "y", "z"],
+        contact=[Contact("inner_contact", "outer_contact", gap=-0.01)],
+    )
+
+
+def unmatched(one, other):
+    """A mesh of both shells whose nodes do not face each other, with these sizes."""
+    geometry = shells()
+    for part in (*geometry.shape.faces, *geometry.shape.solids):
+        part.maxh = one if part.name.startswith("inner") else other
+    return ng.Mesh(geometry.GenerateMesh(maxh=max(one, other)))
+
+
+def errors(solution):
+    """Relative errors of the pressure, in the mean and as root of the mean square, by area."""
+    weight, miss = solution.pairs[0].line.weight, solution.pressure / PRESSURE - 1
+    mean = weight @ miss / weight.sum()
+    return abs(mean), math.sqrt(weight @ miss**2 / weight.sum())
+
+
+@pytest.mark.parametrize(
+    ("order", "maxh", "mean", "rms"), [(2, 0.35, 1e-2, 2e-2), (3, 0.35, 1e-3, 2e-2)]
+)
+def test_press_fit_of_identified_faces(order, maxh, mean, rms):
+    """Measured: 7.9e-3 and 1.7e-2 at order 2, 4e-4 and 8e-3 at order 3."""
+    solution = solve(press_fit(shells()), maxh=maxh, order=order)
+    assert solution.work["gap_searches"] == 0
+    assert errors(solution)[0] < mean
+    assert errors(solution)[1] < rms
+    [x, y, z] = solution.contact_force() / (-math.pi / 4 * PRESSURE)
+    assert max(abs(x - y), abs(y - z)) < 1e-2
+
+
+@pytest.mark.parametrize(("order", "sizes", "mean", "rms"), [(3, (0.25, 0.3), 4e-4, 1.5e-2)])
+def test_press_fit_of_any_meshes(order, sizes, mean, rms):
+    """Measured: 2.3e-4 and 9.1e-3."""
+    solution = solve(press_fit(unmatched(*sizes)), order=order)
+    assert errors(solution)[0] < mean
+    assert errors(solution)[1] < rms
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_exact_normals(order):
+    """Of a sphere and of a cylinder, to round-off, on a refined mesh, at the seam and at a pole."""
+    ball, pin = occ.Sphere((0, 0, 0), 1), occ.Cylinder(occ.Pnt(4, 0, 0), occ.gp_Dir(0, 0, 1), 1, 2)
+    ball.faces.name, pin.faces.name = "ball", "end"
+    for face in pin.faces:
+        if abs(face.center.z - 1) < 0.5:
+            face.name = "pin"
+    for body, name in ((ball, "ball"), (pin, "pin")):
+        body.solids.name = name
+    mesh = ng.Mesh(occ.OCCGeometry(occ.Compound([ball, pin])).GenerateMesh(maxh=0.6))
+    mesh.Refine()
+    mesh.Curve(order)
+    trace = boundary_trace(mesh, order)
+    facet, s = trace.at_nodes(trace.segments("ball"))
+    x = trace.point(facet, s)
+    radial = x / np.linalg.norm(x, axis=1)[:, None]
+    assert np.abs(trace.exact_normal(facet, s) - radial).max() < 1e-14
+    facet, s = trace.at_nodes(trace.segments("pin"))
+    x = trace.point(facet, s) - [4, 0, 0]
+    x[:, 2] = 0.0
+    radial = x / np.linalg.norm(x, axis=1)[:, None]
+    assert np.abs(trace.exact_normal(facet, s) - radial).max() < 1e-14
+
+
+def test_sliding_on_a_cylinder():
+    """A pin in a rigid hole turns freely and bears a pressure at its ends: plane strain."""
+    pin = occ.Cylinder(occ.Pnt(0, 0, 0), occ.gp_Dir(0, 0, 1), 1, 1)
+    pin.solids.name = "pin"
+    for face in pin.faces:
+        face.name = {0: "low", 1: "high"}.get(round(2 * face.center.z) / 2, "round")
+    nu = 0.3
+    problem = Problem(
+        geometry=occ.OCCGeometry(pin),
+        materials={"pin": Elastic(1.0, nu)},
+        displacement={"low": (None, None, 0)},
+        sliding="round",
+        traction={"high": 1.0},
+    )
+    solution = solve(problem, maxh=0.5, order=2)
+    assert [str(motion).split(" ")[0] for motion in solution.free_motions] == ["rotation"]
+    # Confined compression: E (1 - nu) / ((1 + nu) (1 - 2 nu)), on facets of order 2: 1e-3 measured.
+    modulus = (1 - nu) / ((1 + nu) * (1 - 2 * nu))
+    area = ng.Integrate(1, solution.mesh.Boundaries("high"))
+    work = -2 * solution.energy
+    assert work == pytest.approx(area / modulus, rel=5e-3)
+    assert solution.reactions["low"][2] == pytest.approx(area, rel=1e-12)
+
+
+@pytest.mark.parametrize("bilateral", [False, True])
+def test_rigid_obstacle(bilateral):
+    """A block on a rigid plane below it, by a gap; bilateral it is pulled as well."""
+    from tests.solids.meshes import boxes
+
+    mesh = boxes(("a", (0, 0, 0), (1, 1, 1), (2, 2, 2)))
+    gap = 0.01
+    sign = 1.0 if bilateral else -1.0
+    problem = Problem(
+        geometry=mesh,
+        materials={"a": Elastic(1.0, 0.3)},
+        traction={"a_top": (0, 0, sign)},
+        contact=[
+            Contact(
+                "a_bottom",
+                direction=(0, 0, -1),
+                gap=lambda x, y, z: gap + 0 * x,
+                bilateral=bilateral,
+            )
+        ],
+    )
+    solution = solve(problem, order=2)
+    assert np.abs(solution.pressure + sign).max() < 1e-10
+    u = np.asarray(solution.displacement(solution.mesh(0.5, 0.5, 0.0)))
+    assert u[2] == pytest.approx(-gap, abs=1e-12)

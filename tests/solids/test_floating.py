@@ -1,0 +1,67 @@
+"""Solids that supports do not hold: six motions each, some of them held by contact."""
+
+import ngsolve as ng
+import numpy as np
+import pytest
+
+from ngcontact import Contact, NoEquilibriumError, Problem, solve
+from tests.solids.meshes import boxes
+from tests.solids.test_patch import LAWS
+
+
+def cube_on_block(counts=(2, 2), **conditions):
+    mesh = boxes(
+        ("upper", (-0.5, -0.5, 0), (0.5, 0.5, 1), (counts[0],) * 3),
+        ("lower", (-1, -1, -1), (1, 1, 0), (2 * counts[1], 2 * counts[1], counts[1])),
+    )
+    given = {"displacement": {"lower_bottom": (0, 0, 0)}, "traction": {"upper_top": 1.0}}
+    return Problem(
+        geometry=mesh,
+        materials=LAWS,
+        contact=[Contact("upper_bottom", "lower_top", direction=(0, 0, -1))],
+        **(given | conditions),
+    )
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_cube_without_supports(order):
+    solution = solve(cube_on_block(), order=order)
+    assert np.abs(solution.contact_force() - [0, 0, 1]).max() < 1e-12
+    words = [str(motion) for motion in solution.free_motions]
+    assert len(words) == 3
+    assert sum(word.startswith("translation") for word in words) == 2
+    assert sum("rotation" in word and "along (0, 0, 1)" in word for word in words) == 1
+
+
+def test_block_that_slides():
+    """Both bodies float: six motions that nothing resists."""
+    solution = solve(cube_on_block(displacement={"lower_bottom": (None, None, 0)}), order=2)
+    assert len(solution.free_motions) == 6
+    assert 'rotation of "upper"' in str(solution)
+
+
+@pytest.mark.parametrize(
+    ("pull", "words"),
+    [((0.1, 0, -1), r'translation of "upper" along \(1, 0, 0\)'), ((0, 0, 1), "translation")],
+)
+def test_loads_that_nothing_resists(pull, words):
+    with pytest.raises(NoEquilibriumError, match=words) as failure:
+        solve(cube_on_block(traction={"upper_top": pull}), order=1)
+    assert failure.value.body == "upper"
+
+
+def test_twisting_load():
+    """A moment about the vertical axis, by a function: the motion that it drives is named."""
+    load = ng.CF((-0.1 * ng.y, 0.1 * ng.x, -1))
+    with pytest.raises(NoEquilibriumError, match=r"about the axis along \(0, 0, 1\)"):
+        solve(cube_on_block(traction={"upper_top": load}), order=2)
+
+
+def test_eccentric_load():
+    """Moments of contact forces are those of the load."""
+    load = ng.CF((0, 0, -(1 + ng.x)))
+    solution = solve(cube_on_block(counts=(2, 3), traction={"upper_top": load}), order=2)
+    assert solution.force.sum() == pytest.approx(1.0, abs=1e-12)
+    # int x (1 + x) over the top
+    assert solution.force @ solution.points[:, 0] == pytest.approx(1 / 12, abs=1e-10)
+    assert solution.force @ solution.points[:, 1] == pytest.approx(0.0, abs=1e-10)
