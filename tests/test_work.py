@@ -1,5 +1,7 @@
 """A scene pays only for what it contains: counts of the work done, never seconds."""
 
+import sys
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from drivers.benchmark.studies.linear import uniform_mesh
 from drivers.benchmark.studies.overhead import two_blocks
 from drivers.reference import cases
 from ngcontact import solve
+from ngcontact.mesh import first_mesh
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])
@@ -42,3 +45,28 @@ def test_a_large_cold_start_follows_a_coarse_run():
     u, v = (s.displacement.vec.FV().NumPy() for s in (given, solution))
     # Two factorisations of other active sets: round-off times the condition, about 1e5.
     np.testing.assert_allclose(u, v, rtol=0, atol=1e-10 * np.abs(v).max())
+
+
+@pytest.mark.parametrize("order", [2, 4])
+@pytest.mark.parametrize(
+    ("made", "most"),
+    # Counted 5400 and 6200; fewer or more by a tenth with other versions of NumPy and SciPy.
+    [(cases.disc_on_rigid_plane, 6000), (cases.partly_opening_block, 6500)],
+)
+def test_a_small_level_calls_few_functions_of_python(made, most, order):
+    """What a level of a thousand unknowns costs is calls: of `solve` and the estimate."""
+    problem = made()
+    mesh, calls = first_mesh(problem, None), 0
+
+    def count(frame, event, argument):
+        nonlocal calls
+        calls += event == "call"
+
+    _ = solve(problem, mesh, order=order).error_estimate  # what is made once a process
+    before = sys.getprofile()
+    sys.setprofile(count)
+    try:
+        _ = solve(problem, mesh, order=order).error_estimate
+    finally:
+        sys.setprofile(before)
+    assert 0 < calls <= most

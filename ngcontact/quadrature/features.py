@@ -191,22 +191,23 @@ def _told(kind: str, values: Array) -> tuple[Array, float]:
 
 
 def _lost(values: Array, window: int, inside: Mask | None = None) -> Array:
-    """What the opening of `values` along all axes, in a window of so many samples, lost of peaks.
+    """What the opening of `values`, in a window of so many samples, lost of peaks.
 
-    On a line windows do not reach beyond its ends; in a plane they do not beyond the samples
-    `inside`, and nothing is lost beside values that are kept, as windows do not fit into convex
-    corners.
+    Along a line it is the last axis, of several components, and windows do not reach beyond its
+    ends; in a plane all axes, and they do not reach beyond the samples `inside`, and nothing is
+    lost beside values that are kept, as windows do not fit into convex corners.
     """
     least, again = values, window if inside is None else window + BESIDE
+    axes = [-1] if inside is None else range(values.ndim)
     if inside is not None:
         least = np.where(inside, least, np.inf)
-    for axis in range(values.ndim):
+    for axis in axes:
         least = minimum_filter1d(least, window, axis)
     if inside is None:
-        least[: window // 2] = least[-(window // 2) :] = -np.inf
+        least[..., : window // 2] = least[..., -(window // 2) :] = -np.inf
     else:
         least = np.where(inside, least, -np.inf)
-    for axis in range(values.ndim):
+    for axis in axes:
         least = maximum_filter1d(least, again, axis)
     return np.asarray(values - least)
 
@@ -268,8 +269,8 @@ def _on_lines(kind: str, lines: list[_Line]) -> tuple[Array, Array]:
     _, limit = _told(kind, sampled)
     found = [NONE]
     for line in lines:
-        for component in np.hstack([line.sampled, -line.sampled]).T:
-            departure = _departures(component, limit)
+        components = np.ascontiguousarray(np.hstack([line.sampled, -line.sampled]).T)
+        for departure in _departures(components, limit):
             changes = np.diff(np.concatenate([[0], (departure > 0).astype(int), [0]]))
             runs = np.flatnonzero(changes).reshape(-1, 2).tolist()
             if len(runs) <= FEATURES:  # else no features but roughness, which the estimate tells
@@ -301,19 +302,20 @@ def _feature(line: _Line, departure: Array, first: int, last: int) -> tuple[floa
 
 
 def _departures(values: Array, limit: float) -> Array:
-    """By how much each of `values` (n,) departs in a peak, by more than a limit, (n,); else 0."""
-    found = np.zeros(len(values))
-    windows = [window for window in WINDOWS if window <= len(values) / 2]
+    """By how much each of `values` (c, n) departs in a peak, by more than a limit; else 0."""
+    found = np.zeros(values.shape)
+    windows = [window for window in WINDOWS if window <= values.shape[1] / 2]
     lost = [_lost(values, window) for window in windows]
     for window, (now, then) in zip(windows, pairwise(lost), strict=False):
         some = (now > limit) & (then < SATURATED * now)
         around = maximum_filter1d(values, window) - minimum_filter1d(values, window)
         some &= now > STEEP * around
-        for back in (1, -1):  # runs that reach an end
-            n = int(np.argmin(np.append(some[::back], False)))
-            beside = np.ptp(values[::back][: BESIDE_ENDS * window])
-            if window > AT_ENDS or now[::back][:n].max(initial=0.0) <= STEEP * beside:
-                some[::back][:n] = False
+        for peaks, size, value in zip(some, now, values, strict=True):
+            for back in (1, -1):  # runs that reach an end
+                n = int(np.argmin(np.append(peaks[::back], False)))
+                beside = np.ptp(value[::back][: BESIDE_ENDS * window])
+                if window > AT_ENDS or size[::back][:n].max(initial=0.0) <= STEEP * beside:
+                    peaks[::back][:n] = False
         found = np.maximum(found, np.where(some, now, 0.0))
     return found
 
