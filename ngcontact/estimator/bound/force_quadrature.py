@@ -20,9 +20,8 @@ PARTS_OF_A_SIDE = 4  # of each side
 DIVISIONS = 2  # how often triangles are divided
 SMOOTH_FORCE = 1e-3  # of the largest force: what polynomials miss where triangles are not divided
 POLYNOMIAL_FORCE = 1e-8  # of that: what is missed of polynomials by round-off
-SMOOTH_DEGREES = 3  # degrees by which these are above those that stresses balance
 CURVED_FACTOR = 2  # times the order of rules along curves, for polynomials in x
-FINER_DEGREES = 2  # degrees by which rules on triangles are above those on their parts
+FINER_DEGREES = 4  # degrees by which rules on triangles are above those on their parts
 LEAST_DEGREE = 3  # degree of stresses on parts: lower ones do not meet all tractions
 FORCES_AT_ONCE = 100  # triangles with forces that are no numbers
 
@@ -114,7 +113,7 @@ def force_quadrature(
                 at, feature = where_features_are(one.spots, view, np.arange(mesh.ne))
                 narrow[at[view.sizes[at] > PARTS_OF_A_SIDE * one.widths[feature]]] = True
         least[narrow[cells.parent]] = DIVISIONS
-    n = max(0, degree - 1 - cells.trace.model.extent) + SMOOTH_DEGREES
+    n = max(0, degree - 1 - cells.trace.model.extent)
     order = 2 * max(degree, LEAST_DEGREE) + 2
     return ForceQuadrature(thresholds, n, DIVISIONS, order, least, followed, followed > 0)
 
