@@ -73,8 +73,10 @@ def find_contacts(geometry: OCCGeometry | ng.Mesh, *, within: float) -> list[Fou
     reach = scalar_data(within, "within")
     if not (isinstance(reach, float) and reach > 0):
         raise ValueError(f"within = {within}: give a positive length")
-    mesh = first_mesh(Problem(geometry, {".*": Elastic(E=1.0, nu=0.0)}))
-    check_mesh(mesh)
+    problem = Problem(geometry, {".*": Elastic(E=1.0, nu=0.0)})
+    problem.refuse_solids("find_contacts")
+    mesh = first_mesh(problem)
+    check_mesh(mesh, 2)
     trace = boundary_trace(curve(mesh, CURVED, "isoparametric")[0], 1)
     seen = {pair: _least(trace, *facing) for pair, facing in _facing(trace, reach).items()}
     near = {pair: place for pair, place in seen.items() if abs(place.gap) <= reach}

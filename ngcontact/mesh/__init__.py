@@ -13,4 +13,5 @@ from .curving import vertex_parents as vertex_parents
 from .faces import CadFace as CadFace
 from .faces import cad_faces as cad_faces
 from .faces import face_normals as face_normals
+from .files import read as read
 from .generation import first_mesh as first_mesh

@@ -86,8 +86,7 @@ def check_mesh(mesh: ng.Mesh, dim: int = 2) -> None:
     if mesh.dim != dim:
         raise ValueError(
             f"mesh has dimension {mesh.dim}, and bodies lie in the plane: make it with "
-            "OCCGeometry(shape, dim=2); a file of Gmsh has to hold triangles of first order "
-            "(Mesh.ElementOrder = 1)"
+            "OCCGeometry(shape, dim=2), or read a file by ngcontact.mesh.read"
         )
     if mesh.ne == 0:
         raise ValueError("mesh has 0 elements: generate it first")

@@ -110,5 +110,5 @@ def test_sides_without_names_of_their_own_are_refused():
         find_contacts(row_of_discs(1e-3, names=False), within=1e-2)
     with pytest.raises(TypeError, match="geometry is"):
         find_contacts("blocks", within=1e-2)
-    with pytest.raises(ValueError, match="dimension"):
+    with pytest.raises(ValueError, match="find_contacts is not available for solids"):
         find_contacts(ng.Mesh(unit_cube.GenerateMesh(maxh=1)), within=1e-2)

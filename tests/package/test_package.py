@@ -50,7 +50,7 @@ def test_a_wheel_brings_one_package_and_its_types(wheel):
     assert "ngcontact/geometries/straight.py" in brought
     metadata = Parser().parsestr(wheel.read(information).decode())
     assert metadata["Version"] == ngcontact.__version__
-    assert {"notebook", "parallel", "test", "dev", "docs", "bench"} == set(
+    assert {"notebook", "files", "parallel", "test", "dev", "docs", "bench"} == set(
         metadata.get_all("Provides-Extra")
     )
 

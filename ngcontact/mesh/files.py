@@ -1,0 +1,356 @@
+"""Meshes of files: triangles with named bodies and boundaries, curved sides of second order."""
+
+from __future__ import annotations
+
+import io
+import os
+from collections import defaultdict
+from collections.abc import Iterator
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import netgen.meshing as ngm
+import netgen.occ as occ
+import ngsolve as ng
+import numpy as np
+
+from ..arrays import Array, Index
+from ..errors import warn
+from ..problem import check_mesh
+
+# Corners of the cells that are read; those of second order have middles of their sides, too.
+CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4, "line": 2, "line3": 2}
+SOLIDS = ("tetra", "hexahedron", "wedge", "pyramid")
+FLAT = 1e-9  # extent along z, relative to that in the plane, of a file that lies in one
+BENT = 1e-6  # distance of a middle from its chord, relative to this, from which a side is curved
+CORNER = np.deg2rad(30)  # turn of a line at which curves end
+POLYGON = np.deg2rad(1)  # turn of straight sides from which they may stand for a curve
+TANGENT_NODES = 5  # of a curve, from which the tangent at one is taken
+# Points of a cell at which it may fold.
+LATTICE = [(i / 4, j / 4, 0) for i in range(5) for j in range(5 - i)]
+
+
+class _Cells(NamedTuple):
+    """Cells of one kind, k of them with c corners."""
+
+    nodes: Index  # (k, c)
+    middles: Index  # (k, c) of the sides that begin at each corner, -1 where there are none
+    names: np.ndarray  # (k,) of their groups
+
+
+class _Side(NamedTuple):
+    """A side of a triangle on the boundary, by the numbers of nodes."""
+
+    start: int  # the body lies to the left
+    stop: int
+    middle: int  # -1 where the side is straight
+    name: str
+    body: int
+
+
+def read(path: str | os.PathLike[str]) -> ng.Mesh:
+    """Mesh of a file, for `Problem`: the formats of meshio, as Gmsh's 2.2 and 4.1 or Abaqus'.
+
+    Bodies are the named groups of cells, boundaries those of lines; outer sides without a name are
+    "default". Quadrilaterals are split along their shorter diagonals. Curved sides of second order
+    become smooth curves through the nodes of the file, which end where lines turn by 30 degrees;
+    meshes of higher order and refinement follow them.
+
+    Raises
+    ------
+    ImportError
+        meshio is missing.
+    FileNotFoundError, ValueError
+        No such file; what does not fit: solids, other cells, bodies without a name, lines that are
+        no sides, cells that overlap or are degenerate, bodies that do not lie in a plane.
+    """
+    try:
+        import meshio
+    except ImportError as error:
+        raise ImportError('meshio reads files: pip install "ngcontact[files]"') from error
+    source = Path(path)
+    if not source.is_file():
+        raise FileNotFoundError(f'there is no file "{source}"')
+    said = io.StringIO()  # meshio prints, and leaves Python where it knows no format
+    try:
+        with redirect_stdout(said), redirect_stderr(said):
+            file = meshio.read(source)
+    except (Exception, SystemExit) as error:
+        why = " ".join(f"{said.getvalue()} {error}".split())
+        raise ValueError(f'"{source}" cannot be read as a mesh: {why}') from error
+    try:
+        return _mesh_of(file)
+    except ValueError as error:
+        raise ValueError(f'"{source}": {error}') from error
+
+
+def _mesh_of(file: Any) -> ng.Mesh:
+    cells, lines = _cells(file)
+    points = _plane(np.asarray(file.points, dtype=float), cells)
+    triangles, names, middles = _triangles(points, cells)
+    bodies = list(dict.fromkeys(names.tolist()))
+    sides = _boundary(triangles, np.array([bodies.index(n) for n in names]), middles, lines)
+    runs = list(_runs(points, sides))
+    mesh = ngm.Mesh(dim=2)
+    used, numbers = np.unique(triangles, return_inverse=True)
+    mesh.AddPoints(np.column_stack([points[used], np.zeros(len(used))]))
+    for k, body in enumerate(bodies, start=1):
+        mesh.Add(ngm.FaceDescriptor(surfnr=k, domin=k, bc=k))
+        mesh.SetMaterial(k, body)
+        own = numbers.reshape(triangles.shape)[names == body]
+        mesh.AddElements(2, k, np.ascontiguousarray(own, dtype=np.int32))
+    curves: list[occ.Edge] = []
+    turn = 0.0
+    if any(side.middle >= 0 for side in sides):
+        curves, turn = _curves(points, runs)
+    else:  # one region a name
+        by_name = defaultdict(list)
+        for side in sides:
+            by_name[side.name].append(side)
+        runs = list(by_name.values())
+    for k, run in enumerate(runs, start=1):
+        ends = np.searchsorted(used, [(side.start, side.stop) for side in run])
+        mesh.AddElements(1, k, np.ascontiguousarray(ends, dtype=np.int32))
+        mesh.SetBCName(k - 1, run[0].name)
+        if curves:
+            edge = mesh.EdgeDescriptor(k)
+            edge.edgenr, edge.domin, edge.domout = k, run[0].body + 1, 0
+            edge.surfnr = run[0].body + 1, 0
+    if curves:
+        mesh.SetGeometry(occ.OCCGeometry(occ.Compound(curves), dim=2))
+    found = ng.Mesh(mesh)
+    check_mesh(found, 2)
+    if curves:
+        _check_curved(found)
+        warn(
+            f"sides of second order in a file turn by up to {np.rad2deg(turn):.2g} degrees where "
+            "curves are taken for smooth: normals are known to about that"
+        )
+    elif (turn := _turn_of_polygons(points, sides)) > POLYGON:
+        warn(
+            f"straight sides of a file turn by {np.rad2deg(turn):.2g} degrees without corners: "
+            "if they are to be a curve, refinement does not make it round; write the file in "
+            "second order"
+        )
+    return found
+
+
+def _cells(file: Any) -> tuple[list[_Cells], list[_Cells]]:
+    """Triangles and quadrilaterals, and lines."""
+    cells: list[_Cells] = []
+    lines: list[_Cells] = []
+    for block, names in zip(file.cells, _names(file), strict=True):
+        kind, count = block.type, len(block.data)
+        if kind == "vertex" or not count:
+            continue
+        if kind.startswith(SOLIDS):
+            raise ValueError(
+                f'{count} cells of kind "{kind}" are solids, and bodies lie in the plane: mesh a '
+                "section of them (gmsh -2)"
+            )
+        if kind not in CORNERS:
+            raise ValueError(
+                f'{count} cells of kind "{kind}": triangles, quadrilaterals and lines of first or '
+                "second order are read"
+            )
+        data, c = np.asarray(block.data, dtype=np.intp), CORNERS[kind]
+        middles = np.full((count, c), -1)
+        if data.shape[1] > c and c > 2:
+            middles = data[:, c : 2 * c]
+        (lines if c == 2 else cells).append(_Cells(data[:, :c], middles, names))
+    if not cells:
+        raise ValueError("there are no triangles or quadrilaterals")
+    for part in cells:
+        nameless = np.flatnonzero(part.names == "")
+        if nameless.size:
+            x, y = file.points[part.nodes[nameless[0], 0], :2]
+            raise ValueError(
+                f"{nameless.size} cells, one at ({x:.6g}, {y:.6g}), are of no body: give every "
+                "body a name (Gmsh: a Physical Surface)"
+            )
+    return cells, lines
+
+
+def _names(file: Any) -> list[np.ndarray]:
+    """The name (k,) of the group of each cell, by blocks: of several the smallest one's, or ""."""
+    found = [np.full(len(block.data), "", dtype=object) for block in file.cells]
+    sets = {k: parts for k, parts in file.cell_sets.items() if not k.startswith("gmsh:")}
+    if sets:
+        sizes = {k: sum(0 if x is None else len(x) for x in parts) for k, parts in sets.items()}
+        for name in sorted(sets, key=lambda k: -sizes[k]):
+            for own, part in zip(found, sets[name], strict=True):
+                if part is not None and len(part):
+                    own[np.asarray(part, dtype=np.intp)] = name
+        return found
+    tags = file.cell_data.get("gmsh:physical", file.cell_data.get("cell_tags"))
+    for block, own, tag in zip(file.cells, found, tags or (), strict=bool(tags)):
+        for number, several in getattr(file, "cell_tags", {}).items():
+            own[np.asarray(tag) == number] = several[0]
+        for name, (number, dim) in file.field_data.items():
+            if block.dim == dim:
+                own[np.asarray(tag) == number] = name
+    return found
+
+
+def _plane(points: Array, cells: list[_Cells]) -> Array:
+    """Points (n, 2) of a file whose cells lie in a plane z = const."""
+    used = points[np.unique(np.concatenate([part.nodes.ravel() for part in cells]))]
+    if used.shape[1] > 2 and np.ptp(used[:, 2]) > FLAT * np.ptp(used[:, :2], axis=0).max():
+        low, high = used[:, 2].min(), used[:, 2].max()
+        raise ValueError(f"bodies do not lie in a plane: z is from {low:.6g} to {high:.6g}")
+    return points[:, :2]
+
+
+def _triangles(
+    points: Array, cells: list[_Cells]
+) -> tuple[Index, np.ndarray, dict[tuple[int, int], int]]:
+    """Corners (n, 3), anticlockwise, and names (n,); middles of curved sides by their ends."""
+    corners, names, middles = [], [], dict[tuple[int, int], int]()
+    for part in cells:
+        a, b, m = part.nodes, np.roll(part.nodes, -1, axis=1), part.middles
+        off = np.abs(points[m] - (points[a] + points[b]) / 2).max(axis=2)
+        bent = (m >= 0) & (off > BENT * np.abs(points[b] - points[a]).max(axis=2))
+        for x, y, z in zip(a[bent].tolist(), b[bent].tolist(), m[bent].tolist(), strict=True):
+            middles[min(x, y), max(x, y)] = z
+        if a.shape[1] == 4:
+            one, other = np.linalg.norm(points[a[:, 2:]] - points[a[:, :2]], axis=2).T
+            a = np.where((other < one)[:, None], b, a)
+            a = np.concatenate([a[:, [0, 1, 2]], a[:, [0, 2, 3]]])
+        corners.append(a)
+        names.append(np.resize(part.names, len(a)))
+    found = np.concatenate(corners)
+    edge = points[found[:, 1:]] - points[found[:, :1]]
+    clockwise = edge[:, 0, 0] * edge[:, 1, 1] < edge[:, 0, 1] * edge[:, 1, 0]
+    found[clockwise] = found[clockwise, ::-1]
+    return found, np.concatenate(names), middles
+
+
+def _boundary(
+    triangles: Index, body: Index, middles: dict[tuple[int, int], int], lines: list[_Cells]
+) -> list[_Side]:
+    """Outer sides, and those inside that have a name, each once."""
+    known: dict[tuple[int, int], list[tuple[int, int, int]]] = defaultdict(list)
+    for own, corner in zip(body.tolist(), triangles.tolist(), strict=True):
+        for a, b in zip(corner, corner[1:] + corner[:1], strict=True):
+            known[min(a, b), max(a, b)].append((a, b, own))
+    several = sum(len(x) > 2 or len({a for a, *_ in x}) < len(x) for x in known.values())
+    if several:
+        raise ValueError(
+            f"cells overlap on {several} sides, or occur twice: every cell belongs to one body"
+        )
+    named: dict[tuple[int, int], str] = {}
+    for part in lines:
+        for (a, b), name in zip(part.nodes.tolist(), part.names.tolist(), strict=True):
+            if name:
+                if (min(a, b), max(a, b)) not in known:
+                    raise ValueError(f'a line of "{name}" is no side of a cell')
+                named[min(a, b), max(a, b)] = name
+    return [
+        _Side(*at[0][:2], middles.get(key, -1), named.get(key, "default"), at[0][2])
+        for key, at in known.items()
+        if len(at) == 1 or key in named
+    ]
+
+
+def _tangents(points: Array, side: _Side) -> Array:
+    """Unit tangents (2, 2) at the start and at the stop of a side."""
+    a, b = points[side.start], points[side.stop]
+    m = points[side.middle] if side.middle >= 0 else (a + b) / 2
+    found = np.array([4 * m - 3 * a - b, a + 3 * b - 4 * m])
+    return found / np.linalg.norm(found, axis=1)[:, None]
+
+
+def _turn(one: Array, other: Array) -> float:
+    """Angle between unit vectors (2,)."""
+    return float(np.arctan2(abs(one[0] * other[1] - one[1] * other[0]), one @ other))
+
+
+def _runs(points: Array, sides: list[_Side]) -> Iterator[list[_Side]]:
+    """Sides one after the other that are one curve, or one straight line, of one name and body."""
+    starts = defaultdict(list)
+    for k, side in enumerate(sides):
+        starts[side.name, side.body, side.start].append(k)
+    following: dict[int, int] = {}
+    for k, side in enumerate(sides):
+        after = starts[side.name, side.body, side.stop]
+        if len(after) == 1 and (side.middle >= 0) == (sides[after[0]].middle >= 0):
+            turn = _turn(_tangents(points, side)[1], _tangents(points, sides[after[0]])[0])
+            if turn < (CORNER if side.middle >= 0 else BENT):
+                following[k] = after[0]
+    left = dict.fromkeys([k for k in range(len(sides)) if k not in set(following.values())])
+    left |= dict.fromkeys(range(len(sides)))  # ends of curves first, then closed ones
+    while left:
+        at, run = next(iter(left)), []
+        while at in left:
+            del left[at]
+            run.append(sides[at])
+            at = following.get(at, -1)
+        yield run
+
+
+def _curves(points: Array, runs: list[list[_Side]]) -> tuple[list[occ.Edge], float]:
+    """An edge of a drawing for each run, and the largest turn (radians) where they are smooth."""
+    at: dict[int, list[Array]] = defaultdict(list)  # tangents at nodes
+    for run in runs:
+        for side in run:
+            first, last = _tangents(points, side)
+            at[side.start].append(first)
+            at[side.stop].append(last)
+    smooth = {n: (x[0] + x[1]) for n, x in at.items() if len(x) == 2 and _turn(*x) < CORNER}
+    largest, found = 0.0, []
+    for run in runs:
+        nodes = [run[0].start] + [n for s in run for n in (s.middle, s.stop) if n >= 0]
+        x = points[nodes]
+        if run[0].middle < 0:
+            edge = occ.Segment(*(occ.Pnt(*p, 0) for p in x[[0, -1]]))
+        else:
+            largest = max([largest, *(_turn(*at[s.stop]) for s in run if s.stop in smooth)])
+            closed = nodes[0] == nodes[-1] and nodes[0] in smooth
+            slope = _slopes(x, closed=closed)
+            for k in () if closed else (0, -1):  # it goes on in another curve, or a straight line
+                slope[k] = smooth.get(nodes[k], slope[k])
+            slope /= np.linalg.norm(slope, axis=1)[:, None]
+            edge = occ.SplineInterpolation(
+                [occ.Pnt(*p, 0) for p in x],
+                tol=BENT * float(np.linalg.norm(np.diff(x, axis=0), axis=1).min()),
+                tangents={k: occ.Vec(*t, 0) for k, t in enumerate(slope)},
+            )
+        edge.name = run[0].name
+        found.append(edge)
+    return found, largest
+
+
+def _slopes(x: Array, *, closed: bool) -> Array:
+    """Derivatives (n, 2) at points (n, 2) along a curve, each of a polynomial through some."""
+    n, m = len(x), min(len(x), TANGENT_NODES)
+    first = np.arange(n) - m // 2
+    at = (first if closed else np.clip(first, 0, n - m))[:, None] + np.arange(m)
+    at = at % (n - 1) if closed else at  # the last point is the first
+    step = np.linalg.norm(np.diff(x[at], axis=1), axis=2)
+    t = np.cumsum(np.column_stack([np.zeros(n), step]), axis=1)
+    here = (at == (np.arange(n) % (n - 1 if closed else n))[:, None]).argmax(axis=1)
+    t = (t - t[np.arange(n), here][:, None]) / t[:, -1:]
+    powers = t[..., None] ** np.arange(m)
+    return np.asarray(np.linalg.solve(powers, x[at])[:, 1])
+
+
+def _check_curved(mesh: ng.Mesh) -> None:
+    """Refuse elements that their curved sides fold."""
+    curved = ng.Mesh(mesh.ngmesh.Copy())
+    curved.Curve(2)
+    points = curved.MapToAllElements(ng.IntegrationRule(LATTICE, [1 / 30] * 15), ng.VOL)
+    bad = ng.Det(ng.specialcf.JacobianMatrix(2, 2))(points).ravel() <= 0
+    if bad.any():
+        x, y = ng.CF((ng.x, ng.y))(points[bad][:1])[0]
+        raise ValueError(f"curved sides fold a cell near ({x:.6g}, {y:.6g}): mesh it finer there")
+
+
+def _turn_of_polygons(points: Array, sides: list[_Side]) -> float:
+    """The largest turn (radians), less than a corner's, between straight sides of one name."""
+    at: dict[tuple[int, str], list[Array]] = defaultdict(list)
+    for side in sides:
+        for node, tangent in zip((side.start, side.stop), _tangents(points, side), strict=True):
+            at[node, side.name].append(tangent)
+    turns = [_turn(*x) for x in at.values() if len(x) == 2]
+    return max((turn for turn in turns if turn < CORNER), default=0.0)

@@ -1,0 +1,289 @@
+"""Meshes of files: Gmsh's formats, written here, what is kept of them, and what is refused."""
+
+import math
+import warnings
+from dataclasses import replace
+
+import ngsolve as ng
+import numpy as np
+import pytest
+
+from drivers.reference.straight import relative_energy_error
+from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, find_contacts, solve
+from ngcontact.geometries import blocks, disc_on_block, rings
+from ngcontact.mesh import cad_edges, curve, first_mesh, read
+from ngcontact.problem import MeshArrays
+from tests.test_fits import exact, fit
+
+KINDS = {
+    ("line", 1): 1,
+    ("tri", 1): 2,
+    ("line", 2): 8,
+    ("tri", 2): 9,
+    ("quad", 1): 3,
+    ("tet", 1): 4,
+}
+
+
+class File:
+    """Nodes (n, 3), and blocks of cells: kind, nodes (k, m) from 0, name or ""."""
+
+    def __init__(self, points, blocks):
+        self.points = np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
+        self.blocks = blocks
+
+    def write(self, path, version, order=1):
+        """As Gmsh does, in text."""
+        dims = {"line": 1, "tri": 2, "quad": 2, "tet": 3}
+        groups = dict.fromkeys((dims[kind], name) for kind, _, name in self.blocks if name)
+        tags = {group: k for k, group in enumerate(groups, start=1)}
+        lines = [
+            "$MeshFormat",
+            f"{version} 0 8",
+            "$EndMeshFormat",
+            "$PhysicalNames",
+            str(len(tags)),
+        ]
+        lines += [f'{dim} {tag} "{name}"' for (dim, name), tag in tags.items()]
+        lines += ["$EndPhysicalNames"]
+        nodes = [f"{x!r} {y!r} {z!r}" for x, y, z in self.points.tolist()]
+        count, total = len(nodes), sum(len(cells) for _, cells, _ in self.blocks)
+        if version == 2.2:
+            lines += ["$Nodes", str(count), *(f"{k} {x}" for k, x in enumerate(nodes, start=1))]
+            lines += ["$EndNodes", "$Elements", str(total)]
+            number = 0
+            for entity, (kind, cells, name) in enumerate(self.blocks, start=1):
+                tag = tags.get((dims[kind], name), 0)
+                for cell in (cells + 1).tolist():
+                    number += 1
+                    head = [number, KINDS[kind, order], 2, tag, entity]
+                    lines.append(" ".join(map(str, head + cell)))
+        else:
+            each = {dim: [] for dim in range(4)}
+            for entity, (kind, _, name) in enumerate(self.blocks, start=1):
+                tag = tags.get((dims[kind], name))
+                own = f"1 {tag}" if tag else "0"
+                each[dims[kind]].append(f"{entity} 0 0 0 0 0 0 {own} 0")
+            lines += ["$Entities", " ".join(str(len(each[dim])) for dim in range(4))]
+            lines += [line for dim in range(4) for line in each[dim]]
+            lines += ["$EndEntities", "$Nodes", f"1 {count} 1 {count}", f"2 1 0 {count}"]
+            lines += [*map(str, range(1, count + 1)), *nodes, "$EndNodes"]
+            lines += ["$Elements", f"{len(self.blocks)} {total} 1 {total}"]
+            number = 0
+            for entity, (kind, cells, _) in enumerate(self.blocks, start=1):
+                lines.append(f"{dims[kind]} {entity} {KINDS[kind, order]} {len(cells)}")
+                for cell in (cells + 1).tolist():
+                    number += 1
+                    lines.append(" ".join(map(str, [number, *cell])))
+        path.write_text("\n".join([*lines, "$EndElements", ""]))
+        return path
+
+
+def drawn(geometry, maxh, order=1):
+    """A drawing, meshed, as a file of first or second order, whose middles lie on the curves."""
+    mesh = first_mesh(Problem(geometry, {".*": Elastic(E=1.0, nu=0.3)}), maxh)
+    view, edges = MeshArrays(mesh), cad_edges(mesh)
+    points, middles = view.vertices.tolist(), {}
+
+    def middle(a, b, edge=None):
+        key = min(a, b), max(a, b)
+        if key not in middles:
+            x = (view.vertices[a] + view.vertices[b])[None] / 2
+            x = x if edge is None else edge.point(edge.project(x))
+            middles[key] = len(points)
+            points.append(x[0].tolist())
+        return middles[key]
+
+    blocks = []
+    for k, name in enumerate(mesh.GetBoundaries()):
+        cells = view.facets[view.boundaries == k]
+        if order == 2:
+            cells = np.array([[a, b, middle(a, b, edges[k])] for a, b in cells.tolist()])
+        blocks.append(("line", cells, name))
+    for k, name in enumerate(mesh.GetMaterials()):
+        cells = view.elements[view.bodies == k]
+        if order == 2:
+            sides = [[middle(a, b), middle(b, c), middle(c, a)] for a, b, c in cells.tolist()]
+            cells = np.hstack([cells, sides])
+        blocks.append(("tri", cells, name))
+    return File(np.array(points), blocks)
+
+
+def square(kind="quad", name="body", rim="rim"):
+    points = np.array([(0, 0), (1, 0), (1, 1), (0, 1)], dtype=float)
+    cells = {"quad": [[0, 1, 2, 3]], "tri": [[0, 1, 2], [2, 0, 3]]}[kind]
+    sides = [[0, 1], [1, 2], [2, 3]]
+    return File(points, [("line", np.array(sides), rim), (kind, np.array(cells), name)])
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+@pytest.mark.parametrize("order", [1, 2])
+def test_straight_files_are_the_meshes_they_were(tmp_path, version, order):
+    """Two blocks: the same solution as on the mesh that was written."""
+    file = drawn(blocks(), 0.4, order)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        mesh = read(file.write(tmp_path / "blocks.msh", version, order))
+    data = {
+        "materials": {"upper|lower": Elastic(E=1.0, nu=0.3)},
+        "displacement": {"bottom": (0, 0), "top": (0, -0.1 - 0.05 * ng.x)},
+    }
+    drawing = Problem(blocks(), contact=find_contacts(blocks(), within=1e-6), **data)
+    one = solve(drawing, first_mesh(Problem(blocks(), data["materials"]), 0.4), order=2)
+    other = solve(
+        replace(drawing, geometry=mesh, contact=find_contacts(mesh, within=1e-6)), order=2
+    )
+    assert sorted(set(mesh.GetBoundaries())) == sorted(set(one.mesh.GetBoundaries()))
+    assert mesh.ne == one.mesh.ne
+    assert other.energy == pytest.approx(one.energy, rel=1e-10)
+
+
+@pytest.mark.parametrize("version", [2.2, 4.1])
+def test_curved_sides_of_second_order_are_kept(tmp_path, version):
+    file = drawn(disc_on_block(), 0.3, 2)
+    with pytest.warns(ContactWarning, match=r"turn by up to 0.\d+ degrees where curves are"):
+        mesh = read(file.write(tmp_path / "disc.msh", version, 2))
+    fine = curve(mesh, 4, "isoparametric")[0]
+    half = math.pi / 4  # quarter of a disc: area
+    area = ng.Integrate(1.0, fine.Materials("disc"), order=8)
+    polygon = ng.Integrate(1.0, mesh.Materials("disc"))
+    assert abs(area - half) < 1e-3 * abs(polygon - half)
+    r = ng.sqrt(ng.x**2 + (ng.y - 1) ** 2)
+    arc = fine.Boundaries("disc_arc")
+    off = math.sqrt(ng.Integrate((r - 1) ** 2, arc, order=8) / ng.Integrate(1.0, arc))
+    assert off < 1e-5
+    straight = [edge.name for edge in cad_edges(mesh) if edge.straight]
+    assert "block_top" in straight
+    assert "disc_arc" not in straight
+
+
+@pytest.mark.filterwarnings("ignore:sides of second order")
+def test_second_order_keeps_the_rates_of_order_2(tmp_path):
+    """A press fit against Lame's solution, whose circles the file has to its accuracy."""
+    file = drawn(rings(0.5, 1.0, 2.0, 1e-3, quarter=True), 0.125, 2)
+    mesh = read(file.write(tmp_path / "rings.msh", 4.1, 2))
+    stress, pressure = exact(1e-3)
+    problem = replace(fit(1e-3), geometry=mesh)
+    levels = list(adapt(problem, order=2, max_dofs=6000))
+    errors = [relative_energy_error(level, stress) for level in levels]
+    estimates = [level.relative_error_estimate for level in levels]
+    unknowns = [level.displacement.space.ndof for level in levels]
+    rate = np.polyfit(np.log(unknowns), np.log(errors), 1)[0]
+    assert rate < -0.9  # theory: 1
+    assert all(error < known for error, known in zip(errors, estimates, strict=True))
+    right = pressure["outer"] * (1 - 1e-3) * math.pi / 2
+    assert levels[-1].force.sum() == pytest.approx(right, rel=1e-3)
+
+
+def pin_in_plate(geometry):
+    """A pin that is pressed down in a hole of the ring of `rings`, wider by 1e-3."""
+    return Problem(
+        geometry,
+        {"inner|outer": Elastic(E=1.0, nu=0.3)},
+        displacement={"rim": (0, 0), "hole": (0, -5e-3)},
+        contact=[Contact("inner_contact", "outer_contact")],
+    )
+
+
+def pressed_disc(geometry):
+    return Problem(
+        geometry,
+        {"disc|block": Elastic(E=1.0, nu=0.3)},
+        sliding="axis",
+        displacement={"block_bottom": (None, 0), "disc_top": (None, -0.02)},
+        contact=[Contact("disc_arc", "block_top", direction=(0, -1))],
+    )
+
+
+@pytest.mark.filterwarnings("ignore:sides of second order")
+@pytest.mark.parametrize(
+    ("posed", "geometry"),
+    [(pin_in_plate, rings(0.5, 1.0, 2.0, -1e-3)), (pressed_disc, disc_on_block())],
+)
+def test_contact_on_the_curves_of_a_file(tmp_path, posed, geometry):
+    """Energies and forces are those of the drawing, within the estimates."""
+    drawn_one = [*adapt(posed(geometry), tolerance=1e-2)][-1]
+    mesh = read(drawn(geometry, 0.15, 2).write(tmp_path / "file.msh", 4.1, 2))
+    levels = list(adapt(posed(mesh), order=2, max_dofs=12_000))
+    for level in levels:
+        allowed = level.error_estimate**2 + drawn_one.error_estimate**2
+        # Half of that but for the file's curve, 1e-3 of the clearance off.
+        assert abs(level.energy - drawn_one.energy) < allowed
+    one, other = (np.linalg.norm(s.contact_force()) for s in (drawn_one, levels[-1]))
+    assert other == pytest.approx(one, rel=2e-3)
+
+
+def test_first_order_files_say_that_curves_are_polygons(tmp_path):
+    with pytest.warns(ContactWarning, match="straight sides of a file turn by .* degrees without"):
+        mesh = read(drawn(rings(), 0.4).write(tmp_path / "rings.msh", 2.2))
+    assert cad_edges(mesh) is None
+
+
+@pytest.mark.filterwarnings("ignore:sides of second order")
+def test_whole_circles_are_closed_curves(tmp_path):
+    """Of one name, as a pin and its hole; vertices of quarter arcs are no corners."""
+    mesh = read(drawn(rings(), 0.5, 2).write(tmp_path / "rings.msh", 4.1, 2))
+    edges = {edge.name: edge for edge in cad_edges(mesh)}
+    assert len(edges) == len(cad_edges(mesh)) == 4
+    assert all(edge.closed for edge in edges.values())
+    angle = np.linspace(0, 2 * math.pi, 100)
+    circle = 2.0 * np.column_stack([np.cos(angle), np.sin(angle)])
+    normal = edges["rim"].normal(circle)
+    assert np.abs(np.abs((normal * circle / 2).sum(axis=1)) - 1).max() < 1e-6
+
+
+def test_quadrilaterals_are_split_and_lines_without_a_name_are_default(tmp_path):
+    mesh = read(square().write(tmp_path / "square.msh", 2.2))
+    assert (mesh.ne, mesh.GetMaterials()) == (2, ("body",))
+    assert sorted(mesh.GetBoundaries()) == ["default", "rim"]
+    assert ng.Integrate(1.0, mesh) == pytest.approx(1.0)
+    clockwise = read(square("tri").write(tmp_path / "square.msh", 4.1))
+    assert ng.Integrate(1.0, clockwise) == pytest.approx(1.0)
+
+
+def changed(file, points=None, more=()):
+    file.points = file.points if points is None else np.array(points, dtype=float)
+    file.blocks = [*file.blocks, *more]
+    return file
+
+
+@pytest.mark.parametrize(
+    ("file", "told"),
+    [
+        (square(name=""), r"1 cells, one at \(0, 0\), are of no body: give every body a name"),
+        (changed(square(), more=[("tet", np.array([[0, 1, 2, 3]]), "solid")]), 'kind "tetra" are'),
+        (changed(square(), [(0, 0, 0), (1, 0, 0), (1, 1, 1), (0, 1, 1)]), "do not lie in a plane"),
+        (changed(square(), more=[("line", np.array([[1, 3]]), "cut")]), '\'?"cut" is no side'),
+        (changed(square(), more=[("tri", np.array([[0, 1, 2]]), "twin")]), "overlap on"),
+        (
+            changed(square("tri"), [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0)]),
+            "degenerate",
+        ),
+        (File(square().points, square().blocks[:1]), "no triangles or quadrilaterals"),
+    ],
+)
+def test_files_that_do_not_fit_are_refused(tmp_path, file, told):
+    if file.points.shape[1] == 2:
+        file = File(file.points, file.blocks)
+    path = file.write(tmp_path / "part.msh", 2.2)
+    with pytest.raises(ValueError, match=told) as caught:
+        read(path)
+    assert "part.msh" in str(caught.value)
+
+
+def test_what_is_no_file_of_a_mesh(tmp_path, capsys):
+    with pytest.raises(FileNotFoundError, match="there is no file"):
+        read(tmp_path / "none.msh")
+    for name in ("text.msh", "text.txt"):
+        (tmp_path / name).write_text("no mesh\n")
+        with pytest.raises(ValueError, match=f"{name}.* cannot be read as a mesh"):
+            read(tmp_path / name)
+    assert capsys.readouterr().out == ""
+
+
+def test_sides_that_fold_a_cell_are_refused(tmp_path):
+    points = [(0, 0), (1, 0), (0.5, 0.1), (0.5, 0.15), (0.75, 0.05), (0.25, 0.05)]
+    cells = np.array([[0, 1, 2, 3, 4, 5]])
+    file = File(np.array(points), [("tri", cells, "body")])
+    with pytest.raises(ValueError, match="curved sides fold a cell near"):
+        read(file.write(tmp_path / "folded.msh", 2.2, 2))
