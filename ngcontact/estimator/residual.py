@@ -327,8 +327,9 @@ def _squares(
         degree = order
     data = DATA_BONUS if problem.force else 0
     if degree or data:  # else there is no divergence
-        inside = element_integral(solution, divergence, 2 * degree + data)
-        parts["element"] = solution.element_weight * inside
+        followed = 2 * (max(order, 2) + 1) if of_loads else 0  # of polynomials for rough forces
+        inside = element_integral(solution, divergence, max(2 * degree + data, followed))
+        parts["element"] += solution.element_weight * inside
     parts["jump"] = solution.edge_weight / 2 * edge_integral(solution, jump, 2 * degree)
     for term in residuals:
         residual = term.residual.copy()
