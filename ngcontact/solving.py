@@ -18,6 +18,7 @@ from .adaptivity import (
     check_bool,
     continued,
     corners,
+    doerfler,
     next_plan,
     settled,
     unresolvable,
@@ -36,7 +37,7 @@ from .discrete import (
 from .errors import ContactError, ConvergenceError, NoEquilibriumError, warn
 from .estimator import refuse_bound
 from .fem import boundary_trace, check_element, model_of, unknowns
-from .mesh import check_curves, curve, first_mesh, same_geometry
+from .mesh import check_curves, copied, curve, first_mesh, same_geometry
 from .plausibility import (
     EXACT,
     at_round_off,
@@ -47,7 +48,7 @@ from .plausibility import (
     estimates_rise,
     warn_of_implausible,
 )
-from .problem import Contact, MeshArrays, Problem
+from .problem import Contact, MeshArrays, Problem, bisect
 from .quadrature import evaluations, look, unresolved, warn_of_unresolved
 from .results import with_progress
 from .solution import Solution
@@ -272,7 +273,7 @@ def adapt(
     problem: Problem,
     *,
     maxh: float | None = None,
-    order: int | None = 4,
+    order: int | str | None = None,
     element: str = "isoparametric",
     theta: float = 0.5,
     tolerance: float | None = None,
@@ -290,8 +291,9 @@ def adapt(
     maxh : float, optional
         Largest element size of the first mesh; when left out an eighth of the geometry, half of
         that on bounded contact zones.
-    order : int, optional
-        Degree, 1 to 4. 4 is best for errors of 1e-3 and less; None chooses (docs/adaptivity.md).
+    order : int or "auto", optional
+        Degree, 1 to 4; 4 when left out, which is best for errors of 1e-3 and less. "auto" chooses
+        (docs/adaptivity.md). Of solids 1 to 3, 2 when left out.
     element : str
         As in `solve`.
     theta : float
@@ -323,10 +325,13 @@ def adapt(
     ConvergenceError
         The active set of a level did not settle.
     """
-    problem.refuse_solids("adapt")
-    degree = 1 if order is None else order
-    refinement = Refinement(degree, element, theta, tolerance, max_dofs, guaranteed)
-    if order is None:
+    if problem.dim == 3:
+        if guaranteed or start is not None or order == "auto":
+            problem.refuse_solids('adapt with guaranteed=True, start or order="auto"')
+        order = check_element(2 if order is None else order, element, problem.dim)
+    usual = 1 if order == "auto" else 4 if order is None else order
+    refinement = Refinement(usual, element, theta, tolerance, max_dofs, guaranteed)
+    if order == "auto":
         refinement = refinement.choosing(start.order if isinstance(start, Solution) else None)
     check_bool("progress", progress)
     mesh = _first_level(problem, maxh, refinement, start)
@@ -339,7 +344,8 @@ def adapt(
             "both values; make them equal there, or leave guaranteed out"
         )
     warn_of_implausible(problem, mesh, refinement.order)
-    solutions = with_warnings(levels(problem, mesh, refinement, start))
+    run = levels(problem, mesh, refinement, start) if problem.dim == 2 else None
+    solutions = with_warnings(run or levels_of_solids(problem, mesh, refinement))
     return Run(with_progress(solutions, tolerance, max_dofs) if progress else solutions)
 
 
@@ -494,6 +500,38 @@ def levels(
         what += " outside of the corners of contradictory supports" if small.any() else ""
         warn(
             f"the {what} is {error:.2e}, more than tolerance={goal:g}: the next level would exceed "
+            f"max_dofs={refinement.max_dofs:g}; give a larger max_dofs or tolerance"
+        )
+
+
+def levels_of_solids(
+    problem: Problem, mesh: ng.Mesh, refinement: Refinement
+) -> Generator[Solution]:
+    """Levels of solids from a first mesh on: one marking each, nothing is planned ahead."""
+    order, element, goal = refinement.order, refinement.element, refinement.tolerance or 0.0
+    solution: Solution | None = None
+    while unknowns(mesh, order, element) <= refinement.max_dofs:
+        if solution is not None:  # its factorisation is of no use to the next one
+            solution.discrete.systems.forget()
+        solution = replace(solve_on(problem, mesh, order, element, solution), adaptive=True)
+        problem = solution.problem
+        yield solution
+        error = solution.relative_error_estimate
+        if not np.isfinite(error):
+            raise ConvergenceError(
+                f"the error estimate is {error}, so nothing can be refined; choose units in which "
+                "the squares of loads and displacements are numbers",
+                iterate=solution.minimiser,
+            )
+        log.info("%s", solution)
+        if error <= max(goal, EXACT) or _is_exact(solution):
+            return
+        mesh = copied(solution.mesh)
+        bisect(mesh, doerfler(solution.indicators, refinement.theta))
+        mesh, _ = curve(mesh, order, element)
+    if solution is not None and goal and error > goal:
+        warn(
+            f"the estimate is {error:.2e}, more than tolerance={goal:g}: the next level would exceed "
             f"max_dofs={refinement.max_dofs:g}; give a larger max_dofs or tolerance"
         )
 

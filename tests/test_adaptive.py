@@ -82,7 +82,7 @@ def test_elements_in_which_contact_ends_are_always_refined():
 def test_orders_rise_with_accuracy():
     """Without order and tolerance: 3 as long as errors are of percents, then 4."""
     case = cases.hertz_contact()
-    levels = list(adapt(case.problem, order=None, max_dofs=16_000))
+    levels = list(adapt(case.problem, order="auto", max_dofs=16_000))
     assert [level.order for level in levels] == [3, 3, 4, 4]
     sizes, errors = [unknowns(s) for s in levels], []
     for level in levels:

@@ -1,3 +1,5 @@
+from .casting import onto as onto
+from .clipping import FacetPieces as FacetPieces
 from .dual import FacingPieces as FacingPieces
 from .dual import contact_line as contact_line
 from .dual import divided as divided
@@ -29,3 +31,5 @@ from .state import transitions_on as transitions_on
 from .zone import ContactZone as ContactZone
 from .zone import contact_points as contact_points
 from .zone import for_partial_cover as for_partial_cover
+from .zone import interpolated_rays as interpolated_rays
+from .zone import zone_pieces as zone_pieces

@@ -236,9 +236,7 @@ def _means(trace: FacetTrace, zone: ContactZone, facets: Index, parts: FacetPiec
     local, facing = (np.repeat(x, g) for x in (parts.local, zone.facing[parts.facing]))
     facet, x = facets[local], trace.point(facets[local], s)
     w = measure(trace, zone.contact, facet, s).reshape(r, g) * parts.share[:, None] * weights
-    at_nodes = rays(trace, zone.contact, *trace.at_nodes(facets)).reshape(k, q, 3)
-    d = np.einsum("ki,kid->kd", triangle.lagrange(p, s), at_nodes[local])
-    d /= np.linalg.norm(d, axis=1)[:, None]
+    d = interpolated_rays(trace, zone.contact, facets, local, s)
     there, eps = onto(x, d, trace.curve, facing)
     if zone.contact.gap is not None:
         eps = prescribed_gap(zone.contact, trace, facet, s, x)
@@ -321,6 +319,53 @@ def contact_zone(trace: FacetTrace, contact: Contact, taken: Index | None = None
     if len(zone.segments) and not facing.any():
         raise ValueError(no_point_faces(contact))
     return without(zone, np.flatnonzero(~carries))
+
+
+def interpolated_rays(
+    trace: FacetTrace, contact: Contact, facets: Index, local: Index, s: Array
+) -> Array:
+    """Unit vectors (k, 3) to the primary at `s` (k, 3) of `facets` (j,), by number `local` (k,).
+
+    Between the nodes they are interpolated: a normal of CAD costs Newton's method.
+    """
+    at_nodes = rays(trace, contact, *trace.at_nodes(facets)).reshape(len(facets), -1, 3)
+    d = np.einsum("ki,kid->kd", triangle.lagrange(trace.order, s), at_nodes[local])
+    return np.asarray(d / np.linalg.norm(d, axis=1)[:, None])
+
+
+def zone_pieces(trace: FacetTrace, zone: ContactZone) -> FacetPieces:
+    """Parts of the facets of a zone, each of which faces one of the primary or an obstacle.
+
+    Whole facets where the vertices of both are at the same places.
+    """
+    k = len(zone.segments)
+    if zone.contact.primary is None:
+        own = np.flatnonzero((zone.rows >= 0).any(axis=1))
+        facing = np.zeros(len(own), dtype=np.intp)
+    else:
+        vertices = MeshArrays(trace.mesh).vertices
+        ends = trace.nodes[zone.facing, :3]
+        there = np.unique(ends)
+        distance, near = cKDTree(vertices[there]).query(vertices[trace.nodes[zone.segments, :3]])
+        close = (distance <= MATCHING_DISTANCE * trace.lengths(zone.segments)[:, None]).all(axis=1)
+        powers = trace.mesh.nv ** np.arange(3)
+        keys, wanted = (np.sort(x, axis=1) @ powers for x in (ends, there[near]))
+        order = np.argsort(keys)
+        found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
+        own = np.flatnonzero(close & (keys[found] == wanted))
+        facing = found[own]
+    whole = FacetPieces(own, np.tile(np.eye(3), (len(own), 1, 1)), facing, np.ones(len(own)))
+    rest = np.setdiff1d(np.arange(k), own)
+    if zone.contact.primary is None or not rest.size:
+        return whole
+    reach = _reach(trace, zone)[rest]
+    parts = facing_pieces(trace, zone.contact, zone.segments[rest], zone.facing, reach)
+    return FacetPieces(
+        np.concatenate([whole.local, rest[parts.local]]),
+        np.concatenate([whole.corners, parts.corners]),
+        np.concatenate([whole.facing, parts.facing]),
+        np.concatenate([whole.share, parts.share]),
+    )
 
 
 def for_partial_cover(trace: BoundaryTrace, contacts: Sequence[Contact]) -> BoundaryTrace:

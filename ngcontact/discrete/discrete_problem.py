@@ -67,11 +67,14 @@ class MultigridUse:
         Unknowns by order from which it is the faster one, on one thread: at 80 000 of orders 1
         and 2 both take the same time, of order 3 at a million; it always takes less memory. See
         docs/performance.md.
+    large_solids : dict of int to int
+        The same of solids, whose factors fill up sooner.
     coarsest : int
         Unknowns up to which there is no coarser space, and a problem is factorised anyway.
     """
 
     large: dict[int, int] = field(default_factory=lambda: {1: 100_000, 2: 100_000})
+    large_solids: dict[int, int] = field(default_factory=lambda: dict.fromkeys((1, 2, 3), 25_000))
     coarsest: int = COARSEST
 
 
@@ -88,7 +91,8 @@ def linear_systems(
     factor, trace = cholesky(matrix), space.trace
     parents = vertex_parents(trace.mesh)
     size = program.b.size
-    small = size < MULTIGRID.large.get(trace.order, np.inf) or size <= MULTIGRID.coarsest
+    large = MULTIGRID.large if trace.model.dim == 2 else MULTIGRID.large_solids
+    small = size < large.get(trace.order, np.inf) or size <= MULTIGRID.coarsest
     d = trace.model.dim
     coarsest = d * np.count_nonzero(parents[:, 0] < 0)  # of the first mesh
     if small or coarsest > (1 - MIN_REFINED) * size:

@@ -56,6 +56,7 @@ from ..quadrature import features_of, loads_of, pieces, rough_moduli, rough_segm
 from ..solved import Solved
 from .contact import between_nodes, closing_energy, on_contact, remaining
 from .pressure_correction import correcting_pressure
+from .surfaces import surface_terms
 from .terms import (
     DATA_BONUS,
     BoundaryPoints,
@@ -86,7 +87,7 @@ def scaled(solved: Solved) -> ScaledSolution:
     any_varies = bool(problem.varying)
     exact = mesh.GetCurveOrder() == 1 and not any_varies and boundary.model.polynomial
     degree = boundary.order - 1 if exact else boundary.order
-    projected = ng.GridFunction(ng.L2(mesh, order=degree, dim=3))
+    projected = ng.GridFunction(ng.L2(mesh, order=degree, dim=components(stress).dim))
     # The points of NGSolve's rule of order 2 lie on edges, along which moduli may jump.
     bonus = 1 if boundary.order == 1 and any_varies else 0
     projected.Set(components(stress).Compile(), bonus_intorder=bonus)
@@ -285,9 +286,12 @@ def estimate(solved: Solved, corrected_from: float = NEARLY_INCOMPRESSIBLE) -> E
     """
     pairs, boundary = solved.pairs, solved.discrete.space.trace
     solution = scaled(solved)
-    terms = [on_contact(solution, pair, pairs) for pair in pairs]
-    rest = remaining(boundary.inner | boundary.on_axis, [term.covered for term in terms])
-    terms.append(on_supports_and_loads(solution, rest))
+    if solved.problem.dim == 3:
+        terms, corrected_from = surface_terms(solution, pairs), math.inf
+    else:
+        terms = [on_contact(solution, pair, pairs) for pair in pairs]
+        rest = remaining(boundary.inner | boundary.on_axis, [term.covered for term in terms])
+        terms.append(on_supports_and_loads(solution, rest))
     parts = _squares(solution, terms, corrected_from)
     total = np.sum(list(parts.values()), axis=0)
     unit = solution.unit / math.sqrt(solution.modulus)  # of the energy norm
@@ -359,7 +363,7 @@ def _body_forces(
             forces[body] = ng.IfPos(rough, projection, forces[body])
             rest = solution.element_weight * (found.rest / solution.unit) ** 2 * solution.measure
             squares += [Squares("element", every, rest), solution.missed(every, found.missed)]
-    return mesh.MaterialCF(forces, default=ng.CF((0, 0))), squares
+    return mesh.MaterialCF(forces, default=ng.CF((0,) * problem.dim)), squares
 
 
 @dataclass(frozen=True, eq=False)
@@ -370,7 +374,6 @@ class Estimated(Solved):
 
     @cached_property
     def _estimate(self) -> Estimate:
-        self.problem.refuse_solids("the error estimate")
         self.work["estimates"] += 1
         return estimate(self)
 

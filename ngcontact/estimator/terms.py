@@ -154,7 +154,10 @@ class ScaledSolution:
 
 
 def components(stress: ng.CoefficientFunction) -> ng.CoefficientFunction:
-    """(xx, yy, xy) of a stress (2, 2)."""
+    """(xx, yy, xy) of a stress (2, 2), of a solid's (3, 3) also those with z, in Voigt's order."""
+    if stress.dim == 9:
+        pairs = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+        return ng.CF(tuple(stress[i, j] for i, j in pairs))
     xx, xy, _, yy = stress
     return ng.CF((xx, yy, xy))
 
@@ -175,8 +178,14 @@ def oscillation(solution: ScaledSolution) -> Array:
 def divergence_and_jump(
     stress: ng.GridFunction,
 ) -> tuple[ng.CoefficientFunction, ng.CoefficientFunction]:
-    """Div sigma and [sigma n] of a projected stress, two of two components."""
+    """Div sigma and [sigma n] of a projected stress, two of d components."""
     slope = ng.Grad(stress)
+    if stress.dim == 6:
+        xx, yy, zz, yz, xz, xy = stress - stress.Other()
+        tensor = ng.CF((xx, xy, xz, xy, yy, yz, xz, yz, zz), dims=(3, 3))
+        rows = ((0, 5, 4), (5, 1, 3), (4, 3, 2))
+        divergence = ng.CF(tuple(sum(slope[c, j] for j, c in enumerate(row)) for row in rows))
+        return divergence, tensor * ng.specialcf.normal(3)
     xx, yy, xy = stress - stress.Other()
     jump = ng.CF((xx, xy, xy, yy), dims=(2, 2)) * ng.specialcf.normal(2)
     return ng.CF((slope[0, 0] + slope[2, 1], slope[2, 0] + slope[1, 1])), jump

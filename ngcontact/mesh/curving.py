@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ngsolve as ng
 import numpy as np
+from netgen.meshing import IdentificationType
 
 from ..arrays import Array, Integers, Mask
 from ..problem import MeshArrays
@@ -38,8 +39,11 @@ def vertex_parents(mesh: ng.Mesh) -> Integers:
 
 
 def copied(mesh: ng.Mesh) -> ng.Mesh:
-    """Copy that keeps the names, the geometry and the parents; not curved."""
+    """Copy that keeps the names, the geometry, the parents and matched points; not curved."""
     copy = ng.Mesh(mesh.ngmesh.Copy())
+    for one, other, *_ in mesh.ngmesh.GetIdentifications():  # of solids; `Copy` drops them
+        periodic = IdentificationType.PERIODIC
+        copy.ngmesh.AddPointIdentification(one, other, identnr=1, type=periodic)
     keep_parents(copy, vertex_parents(mesh))
     return copy
 

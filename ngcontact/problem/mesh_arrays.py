@@ -197,7 +197,7 @@ def move_vertices(mesh: ng.Mesh, positions: Array) -> None:
 def bisect(mesh: ng.Mesh, marked: Mask) -> None:
     """Refine the elements `marked` (ne,) of a mesh in place, which straightens it."""
     MeshArrays(mesh)._elements["refine"] = marked  # all of them: they are True by default
-    mesh.Refine()
+    mesh.Refine(mark_surface_elements=mesh.dim == 2)  # of solids all are marked by default
 
 
 def on_axis(points: Array) -> Mask:

@@ -1,0 +1,220 @@
+"""Residuals of a solution on the boundary of solids: supports, loads, contact.
+
+As `estimator.residual` and `estimator.contact` have them of plane bodies, by quadrature on facets
+and on the parts of facets that face each other. Loads and prescribed displacements are not looked
+at between the points of quadrature.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import ngsolve as ng
+import numpy as np
+
+from ..arrays import Array, Index, Mask
+from ..contact import (
+    ContactState,
+    FacetPieces,
+    interpolated_rays,
+    onto,
+    prescribed_gap,
+    zone_pieces,
+)
+from ..fem import FacetTrace
+from ..reference import triangle
+from .terms import BoundaryResidual, BoundaryTerms, Parts, ScaledSolution, Squares
+
+DATA_DEGREE = 4  # of quadrature above the discrete terms, for the data
+NOTHING = Parts(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))  # of lines
+
+
+@dataclass(frozen=True, eq=False)
+class SurfacePoints:
+    """Points of quadrature on facets."""
+
+    facet: Index  # (k,)
+    s: Array  # (k, 3) barycentric coordinates
+    weight: Array  # (k,) areas
+
+
+def _points(trace: FacetTrace, facets: Index, degree: int) -> SurfacePoints:
+    """On whole `facets` (j,), exact for polynomials of a degree on straight ones."""
+    s, w = triangle.gauss(degree)
+    every, places = np.repeat(facets, len(s)), np.tile(s, (len(facets), 1))
+    area = np.linalg.norm(trace.area_vector(every, places), axis=1)
+    return SurfacePoints(every, places, area * np.tile(w, len(facets)))
+
+
+def _traction(solution: ScaledSolution, points: SurfacePoints) -> Array:
+    """Traction sigma_h n (k, 3) over the unit of stress."""
+    trace = solution.boundary
+    stress = trace.evaluate(ng.BoundaryFromVolumeCF(solution.stress), points.facet, points.s)
+    normal = trace.normal(points.facet, points.s)
+    return np.einsum("kij,kj->ki", stress.reshape(-1, 3, 3), normal)
+
+
+def _residual(
+    solution: ScaledSolution, points: SurfacePoints, name: str, values: Array, factor: float = 1.0
+) -> BoundaryResidual:
+    """Residual tractions `values` (k, c), with their weight (h / p) / 2mu."""
+    element = solution.boundary.element[points.facet]
+    weight = factor * solution.edge_weight[element] * points.weight
+    return BoundaryResidual(name, element, weight, values, [])
+
+
+def surface_terms(solution: ScaledSolution, pairs: Sequence[ContactState]) -> list[BoundaryTerms]:
+    """Terms of the whole boundary: of each pair, and of what no pair covers."""
+    terms, left = [], ~solution.boundary.inner
+    for pair in pairs:
+        term, covered = on_zone(solution, pair)
+        terms.append(term)
+        left[covered] = False
+    rest = np.flatnonzero(left)
+    return [*terms, on_supports_and_loads(solution, rest)]
+
+
+def on_supports_and_loads(solution: ScaledSolution, facets: Index) -> BoundaryTerms:
+    """What is left of (3.6), (3.7), (3.8) on `facets` (j,) of no pair; the rest is free."""
+    problem, trace = solution.problem, solution.boundary
+    points = _points(trace, facets, 2 * solution.order + DATA_DEGREE)
+    t, element = _traction(solution, points), trace.element[points.facet]
+    held = np.zeros(t.shape, dtype=bool)
+    miss = np.zeros(t.shape)
+    for pattern, components in problem.displacement.items():
+        at = np.flatnonzero(trace.lies_on(points.facet, pattern))
+        u = trace.evaluate(solution.displacement, points.facet[at], points.s[at])
+        for axis, value in enumerate(components):
+            if value is not None:
+                given = trace.evaluate(value, points.facet[at], points.s[at])[:, 0]
+                miss[at, axis], held[at, axis] = u[:, axis] - given, True
+    for pattern in problem.traction:
+        at = np.flatnonzero(trace.lies_on(points.facet, pattern))
+        load = problem.traction_vector(pattern)
+        t[at] -= trace.evaluate(load, points.facet[at], points.s[at]) / solution.unit  # (3.7)
+    t[held] = 0.0
+    if problem.sliding is not None:  # (3.8): no shear
+        at = np.flatnonzero(trace.lies_on(points.facet, str(problem.sliding)))
+        n = trace.normal(points.facet[at], points.s[at])
+        t[at] -= (t[at] * n).sum(axis=1)[:, None] * n
+    squares = 2 * solution.mu[element] / solution.diameter[element] * points.weight
+    squares = squares * ((miss / solution.strain) ** 2).sum(axis=1)  # (3.6)
+    return BoundaryTerms(
+        residuals=[_residual(solution, points, "boundary", t)],
+        squares=[Squares("displacement", element, squares)],
+        covered=NOTHING,
+    )
+
+
+def discrete_pressure(trace: FacetTrace, pair: ContactState, local: Index, s: Array) -> Array:
+    """The pressure (k,) that the forces stand for, at `s` (k, 3) of facets `local` (k,) of a zone.
+
+    At order 2 linear through the middles of edges, with Bernstein's polynomials where vertices have
+    rows, too.
+    """
+    value = np.append(pair.force / pair.line.weight, 0.0)[pair.line.rows]
+    if trace.order != 2:
+        return np.asarray((triangle.lagrange(trace.order, s) * value[local]).sum(axis=1))
+    edges = value[:, 3:]
+    opposite = (triangle.EDGES[None] == np.arange(3)[:, None, None]).any(axis=2)
+    linear = np.where(opposite, 1.0, -1.0) @ edges.T  # at a vertex: both edges there less the other
+    has = pair.line.rows[:, :3] >= 0
+    value[:, :3] = np.where(has, value[:, :3], linear.T)
+    shapes = triangle.lagrange(2, s)
+    by_edges = (1 - 2 * s[:, OPPOSITE]) * edges[local]
+    quadratic = np.einsum("ki,ij,kj->k", shapes, triangle.bernstein(2), value[local])
+    return np.where(has[local].any(axis=1), quadratic, by_edges.sum(axis=1))
+
+
+# The vertex that no edge has, by edge.
+OPPOSITE = np.array([({0, 1, 2} - set(edge)).pop() for edge in triangle.EDGES.tolist()])
+
+
+def _in_contact(pair: ContactState) -> Mask:
+    """Facets (k,) of a zone all of whose rows are active."""
+    active = np.append(pair.active, False)[pair.line.rows]
+    has = pair.line.rows >= 0
+    return np.asarray((active | ~has).all(axis=1) & has.any(axis=1))
+
+
+def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms, Index]:
+    """Terms of one pair, and the facets (j,) that it covers.
+
+    Where all rows of a facet are active both bodies have one pressure, the mean of both tractions;
+    elsewhere that of the discrete forces. The gap is not to be negative, and closed under pressure.
+    """
+    trace, zone = solution.boundary, pair.line
+    assert isinstance(trace, FacetTrace)
+    degree = 2 * solution.order
+    parts = zone_pieces(trace, zone)
+    covered = parts.covered(len(zone.segments))
+    alone = np.flatnonzero(covered == 0)
+    met = np.bincount(parts.facing, minlength=len(zone.facing)) > 0
+    residuals: list[BoundaryResidual] = []
+    squares: list[Squares] = []
+    s, w = triangle.gauss(degree)
+    local = np.repeat(parts.local, len(s))
+    own = _on_parts(trace, zone.segments[parts.local], parts, s, w)
+    d = interpolated_rays(trace, zone.contact, zone.segments, local, own.s)
+    n = trace.normal(own.facet, own.s)
+    cosine = (n * d).sum(axis=1)
+    weight = own.weight * np.abs(cosine)  # across the direction
+    pi = discrete_pressure(trace, pair, local, own.s) / solution.unit
+    if zone.contact.direction is None:
+        weight, cosine = own.weight, np.ones(len(cosine))
+    full = _in_contact(pair)[local]
+    element = trace.element[own.facet]
+    u = trace.evaluate(solution.displacement, own.facet, own.s)
+    t = _traction(solution, own) / np.abs(cosine)[:, None]
+    sides = [(element, t, 1.0)]
+    distance = np.zeros(len(pi))
+    if zone.contact.primary is not None:
+        facing = np.repeat(zone.facing[parts.facing], len(s))
+        x = trace.point(own.facet, own.s)
+        there, distance = onto(x, d, trace.curve, facing)
+        other = SurfacePoints(facing, there, weight)
+        across = np.abs((trace.normal(facing, there) * d).sum(axis=1))
+        u = u - trace.evaluate(solution.displacement, facing, there)
+        sides.append((trace.element[facing], _traction(solution, other) / across[:, None], -1.0))
+    if zone.contact.gap is not None:
+        distance = prescribed_gap(
+            zone.contact, trace, own.facet, own.s, trace.point(own.facet, own.s)
+        )
+    gap = (distance - (u * d).sum(axis=1)) / solution.strain
+    along = [sign * (t * d).sum(axis=1) + pi for _, t, sign in sides]
+    mean = sum((t * d).sum(axis=1) for _, t, _ in sides) / 2
+    least = np.min([solution.edge_weight[e] for e, _, _ in sides], axis=0)
+    stiff = np.min([solution.mu[e] / solution.diameter[e] for e, _, _ in sides], axis=0)
+    both = np.where(full & (len(sides) == 2), np.abs(mean), np.inf)
+    for (e, t, _), miss in zip(sides, along, strict=True):
+        own_weight = solution.edge_weight[e]
+        shared = np.isfinite(both)
+        values = np.where(shared, both, miss)[:, None]
+        factor = np.where(shared, least, own_weight) * weight
+        residuals.append(BoundaryResidual("pressure", e, factor, values, []))
+        shear = t - (t * d).sum(axis=1)[:, None] * d
+        residuals.append(BoundaryResidual("tangential", e, own_weight * weight, shear, []))
+        depth = stiff * np.minimum(gap, 0.0) ** 2
+        left = np.maximum(pi, 0.0) * np.maximum(gap, 0.0) / 2
+        left = np.where(full, np.minimum(left, stiff * gap**2), left)
+        if zone.contact.bilateral:
+            depth, left = stiff * gap**2, np.zeros(len(gap))
+        share = weight / len(sides)
+        squares.append(Squares("penetration", e, depth * share))
+        squares.append(Squares("complementarity", e, left * share))
+    free = np.concatenate([zone.segments[alone], zone.facing[~met]])
+    points = _points(trace, free, degree)
+    residuals.append(_residual(solution, points, "boundary", _traction(solution, points)))
+    both_sides = np.concatenate([zone.segments, zone.facing])
+    return BoundaryTerms(residuals, squares, NOTHING), both_sides
+
+
+def _on_parts(
+    trace: FacetTrace, facets: Index, parts: FacetPieces, s: Array, w: Array
+) -> SurfacePoints:
+    """Points `s` (g, 3) with weights `w` (g,) of all parts, on their `facets` (r,)."""
+    facet, places = np.repeat(facets, len(s)), parts.places(s)
+    area = np.linalg.norm(trace.area_vector(facet, places), axis=1)
+    weight = area * (parts.share[:, None] * w).ravel()
+    return SurfacePoints(facet, places, weight)
