@@ -531,8 +531,8 @@ def levels_of_solids(
         mesh, _ = curve(mesh, order, element)
     if solution is not None and goal and error > goal:
         warn(
-            f"the estimate is {error:.2e}, more than tolerance={goal:g}: the next level would exceed "
-            f"max_dofs={refinement.max_dofs:g}; give a larger max_dofs or tolerance"
+            f"the estimate is {error:.2e}, more than tolerance={goal:g}: the next level would "
+            f"exceed max_dofs={refinement.max_dofs:g}; give a larger max_dofs or tolerance"
         )
 
 

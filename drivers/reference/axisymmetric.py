@@ -62,9 +62,8 @@ class Spheroid(NamedTuple):
     square: CF
 
 
-def spheroid(a: float, body: str) -> Spheroid:
-    """Coordinates in one half-space, without cancellation on either side of the circle's edge."""
-    r, Z = ng.x, depth(body)
+def spheroid(a: float, r: CF, Z: CF) -> Spheroid:
+    """Coordinates at radius and depth, without cancellation on either side of the circle's edge."""
     b = r * r + Z * Z - a * a
     S = ng.sqrt(b * b + 4 * a * a * Z * Z)
     t_inside = ng.sqrt(ng.IfPos(-b, S - b, 1.0) / (2 * a * a))
@@ -76,7 +75,13 @@ def spheroid(a: float, body: str) -> Spheroid:
 
 def huber_displacement(material: Elastic, p0: float, a: float, body: str) -> CF:
     """Displacement (2,) under Hertz's pressure; nothing moves at a distance."""
-    c, m, r = spheroid(a, body), moduli(material), ng.x
+    spread, sink = huber(material, p0, a, ng.x, depth(body))
+    return ng.CF((ng.x * spread, SIDES[body] * sink))
+
+
+def huber(material: Elastic, p0: float, a: float, r: CF, Z: CF) -> tuple[CF, CF]:
+    """Radial displacement over the radius, and that into the depth, at a radius and a depth."""
+    c, m = spheroid(a, r, Z), moduli(material)
     nu = material.nu
     edge = a * a / 3 * (1 + c.t + c.t * c.t) / ((1 + c.t) * c.square)
     chi_r = 2 * edge + c.Z * (c.q / c.square - c.phi / a)  # dchi/dr over pi p0 r
@@ -84,13 +89,12 @@ def huber_displacement(material: Elastic, p0: float, a: float, body: str) -> CF:
     sink = 2 * c.Z * (c.t - c.Z * c.phi / a)  # Z^2 a^2 times the integral of Z^2's coefficient
     V = a * c.phi + (r * r * pull - sink) / 2  # over pi p0
     scale = p0 / (4 * m.mu)
-    u_r = -scale * r * ((1 - 2 * nu) * chi_r + c.Z * pull)
-    return ng.CF((u_r, SIDES[body] * scale * (2 * (1 - nu) * V + sink)))
+    return -scale * ((1 - 2 * nu) * chi_r + c.Z * pull), scale * (2 * (1 - nu) * V + sink)
 
 
 def huber_stress(material: Elastic, p0: float, a: float, body: str) -> tuple[CF, CF]:
     """Stress (2, 2) in the plane and hoop stress under Hertz's pressure."""
-    c, nu, r = spheroid(a, body), material.nu, ng.x
+    c, nu, r = spheroid(a, ng.x, depth(body)), material.nu, ng.x
     edge = (1 - 2 * nu) / 3 * a * a * (1 + c.t + c.t * c.t) / ((1 + c.t) * c.square)
     bulge, arc = (1 - nu) * c.q * c.q / c.square, (1 + nu) * c.q / a * c.phi
     zz = -a * a * c.t * c.t * c.t / c.S
@@ -146,7 +150,7 @@ class Indentation:
 
 def punch_displacement(material: Elastic, P: CF | float, a: float, body: str) -> CF:
     """Displacement (2,) under a flat punch of radius a with the force P."""
-    c, m, nu = spheroid(a, body), moduli(material), material.nu
+    c, m, nu = spheroid(a, ng.x, depth(body)), moduli(material), material.nu
     scale = P / (4 * math.pi * m.mu)
     chi_r = 1 / (c.square * (1 + c.t))  # dchi/dr over P r
     pull = -c.q / (c.square * c.S)  # dV/dr over P r

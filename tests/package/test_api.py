@@ -20,8 +20,8 @@ SIGNATURES = {
     "Contact": "(secondary, primary=None, direction=None, gap=None, bilateral=False, rows='auto', "
     "roles='given')",
     "solve": "(problem, mesh=None, *, maxh=None, order=None, element='isoparametric', start=None)",
-    "adapt": "(problem, *, maxh=None, order=None, element='isoparametric', theta=0.5, tolerance=None, "
-    "max_dofs=100000, guaranteed=False, start=None, progress=False)",
+    "adapt": "(problem, *, maxh=None, order=None, element='isoparametric', theta=0.5, "
+    "tolerance=None, max_dofs=100000, guaranteed=False, start=None, progress=False)",
     "solve_qp": "(A, f, B, g, E=None, e=None, active=None)",
     "find_contacts": "(geometry, *, within)",
     "load": "(path)",
