@@ -325,12 +325,12 @@ def adapt(
     ConvergenceError
         The active set of a level did not settle.
     """
-    if problem.dim == 3:
-        if guaranteed or start is not None or order == "auto":
-            problem.refuse_solids('adapt with guaranteed=True, start or order="auto"')
-        order = check_element(2 if order is None else order, element, problem.dim)
-    usual = 1 if order == "auto" else 4 if order is None else order
-    refinement = Refinement(usual, element, theta, tolerance, max_dofs, guaranteed)
+    if guaranteed or start is not None or order == "auto":
+        problem.refuse_solids('adapt with guaranteed=True, start or order="auto"')
+    usual = 4 if problem.dim == 2 else 2
+    degree = 1 if order == "auto" else usual if order is None else order
+    degree = check_element(degree, element, problem.dim)
+    refinement = Refinement(degree, element, theta, tolerance, max_dofs, guaranteed)
     if order == "auto":
         refinement = refinement.choosing(start.order if isinstance(start, Solution) else None)
     check_bool("progress", progress)

@@ -11,7 +11,8 @@ import ngsolve as ng
 from drivers.reference.axisymmetric import huber
 from drivers.reference.cases import BLOCKS, FIRST, SECOND
 from drivers.reference.westergaard import CF, effective_modulus
-from ngcontact import Contact, Problem
+from ngcontact import Contact, Problem, Solution
+from ngcontact.fem.solid import SOLID_MODEL
 
 
 class HertzOfSolids(NamedTuple):
@@ -21,6 +22,19 @@ class HertzOfSolids(NamedTuple):
     p0: float
     P: float
     displacement: dict[str, CF]
+
+
+def relative_energy_error(solution: Solution, exact: HertzOfSolids) -> float:
+    """Energy norm of the error over that of u_h, the exact field interpolated two degrees up."""
+    mesh, problem, order = solution.mesh, solution.problem, solution.order
+    V, square = ng.VectorH1(mesh, order=order + 2), 0.0
+    for body, u in exact.displacement.items():
+        there, miss = mesh.Materials(body), ng.GridFunction(V)
+        miss.Set(u - solution.displacement, definedon=there)
+        e = SOLID_MODEL.strain(miss)
+        density = ng.InnerProduct(problem.materials[body].voigt("solid") * e, e)
+        square += ng.Integrate(density, mesh, definedon=there, order=2 * order + 4)
+    return math.sqrt(square) / solution.energy_norm
 
 
 def quarter_cubes() -> occ.OCCGeometry:

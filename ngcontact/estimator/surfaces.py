@@ -16,13 +16,14 @@ import numpy as np
 from ..arrays import Array, Index, Mask
 from ..contact import (
     ContactState,
+    ContactZone,
     FacetPieces,
     interpolated_rays,
     onto,
     prescribed_gap,
     zone_pieces,
 )
-from ..fem import FacetTrace
+from ..fem import BoundaryTrace, FacetTrace
 from ..reference import triangle
 from .terms import BoundaryResidual, BoundaryTerms, Parts, ScaledSolution, Squares
 
@@ -39,12 +40,18 @@ class SurfacePoints:
     weight: Array  # (k,) areas
 
 
-def _points(trace: FacetTrace, facets: Index, degree: int) -> SurfacePoints:
+def _points(trace: BoundaryTrace, facets: Index, degree: int) -> SurfacePoints:
     """On whole `facets` (j,), exact for polynomials of a degree on straight ones."""
     s, w = triangle.gauss(degree)
     every, places = np.repeat(facets, len(s)), np.tile(s, (len(facets), 1))
-    area = np.linalg.norm(trace.area_vector(every, places), axis=1)
-    return SurfacePoints(every, places, area * np.tile(w, len(facets)))
+    weight = _areas(trace, every, places) * np.tile(w, len(facets))
+    return SurfacePoints(every, places, weight)
+
+
+def _areas(trace: BoundaryTrace, facets: Index, s: Array) -> Array:
+    """Areas (k,) per unit weight of `triangle.gauss` at `s` (k, 3) of `facets` (k,)."""
+    tangents = trace.derivative(facets, s)
+    return np.asarray(np.linalg.norm(np.cross(tangents[..., 0], tangents[..., 1]), axis=1) / 2)
 
 
 def _traction(solution: ScaledSolution, points: SurfacePoints) -> Array:
@@ -145,7 +152,8 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
     elsewhere that of the discrete forces. The gap is not to be negative, and closed under pressure.
     """
     trace, zone = solution.boundary, pair.line
-    assert isinstance(trace, FacetTrace)
+    if not (isinstance(trace, FacetTrace) and isinstance(zone, ContactZone)):
+        raise TypeError("a pair of solids is asked for")
     degree = 2 * solution.order
     parts = zone_pieces(trace, zone)
     covered = parts.covered(len(zone.segments))
@@ -215,6 +223,5 @@ def _on_parts(
 ) -> SurfacePoints:
     """Points `s` (g, 3) with weights `w` (g,) of all parts, on their `facets` (r,)."""
     facet, places = np.repeat(facets, len(s)), parts.places(s)
-    area = np.linalg.norm(trace.area_vector(facet, places), axis=1)
-    weight = area * (parts.share[:, None] * w).ravel()
+    weight = _areas(trace, facet, places) * (parts.share[:, None] * w).ravel()
     return SurfacePoints(facet, places, weight)

@@ -99,7 +99,7 @@ def unknowns_of(order: int, vertices: int, edges: int, elements: int) -> int:
     return 2 * (vertices + (order - 1) * edges + inner * elements)
 
 
-def check_element(order: int, element: str, dim: int = 2) -> int:
+def check_element(order: int | str, element: str, dim: int = 2) -> int:
     """The order; raise unless the element is one of `ELEMENTS` with an order it is available in."""
     if dim == 3:
         if element != "isoparametric":

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from drivers.reference.solids import hertz_of_solids
+from drivers.reference.solids import hertz_of_solids, relative_energy_error
 from ngcontact import Elastic, Problem, adapt, solve
 from ngcontact.discrete.discrete_problem import MULTIGRID
 from ngcontact.geometries.solids import shells
@@ -48,6 +48,15 @@ def test_hertz_by_levels(hertz):
     assert all(level.work["gap_searches"] == 0 for level in levels)  # nodes face nodes
     estimates = [level.relative_error_estimate for level in levels]
     assert all(np.diff(estimates) < 0)
+
+
+def test_effectivity(hertz):
+    """Measured 4.5 to 4.8 on all levels but the first."""
+    exact, levels = hertz
+    for level in levels[1:]:
+        error = relative_energy_error(level, exact)
+        assert 3 < level.relative_error_estimate / error < 8
+    assert error < 8e-2  # measured 6e-2 at 9138 unknowns
 
 
 def test_parts_of_the_estimate(hertz):
