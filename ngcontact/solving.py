@@ -25,7 +25,7 @@ from .adaptivity import (
     warn_of_limit,
 )
 from .arrays import joined, root_of_squares
-from .contact import with_roles
+from .contact import decided
 from .discrete import (
     DiscreteProblem,
     carried_active_set,
@@ -260,11 +260,11 @@ def _doubted(
     else:
         bodies = [name for one in tried if one.rigid for name in one.rigid.free.names]
     trace, names = boundary_trace(mesh, order, model_of(problem)), mesh.GetMaterials()
-    decided = [with_roles(trace, contact) for contact in problem.contact]
-    primaries = [trace.body[trace.segments(pair.primary)] for pair in decided]
+    pairs = [decided(trace, contact) for contact in problem.contact]
+    primaries = [trace.body[trace.segments(pair.primary)] for pair in pairs]
     return {
         number: pair
-        for number, (pair, body) in enumerate(zip(decided, primaries, strict=True))
+        for number, (pair, body) in enumerate(zip(pairs, primaries, strict=True))
         if pair.primary is not None and any(names[i] in bodies for i in np.unique(body))
     }
 

@@ -15,7 +15,6 @@ from .line import partners as partners
 from .line import prescribed_gap as prescribed_gap
 from .line import rays as rays
 from .line import twins as twins
-from .line import with_roles as with_roles
 from .line import without as without
 from .projection import MATCHING_DISTANCE as MATCHING_DISTANCE
 from .projection import crossings as crossings
@@ -30,6 +29,7 @@ from .state import state_of as state_of
 from .state import transitions_on as transitions_on
 from .zone import ContactZone as ContactZone
 from .zone import contact_points as contact_points
+from .zone import decided as decided
 from .zone import for_partial_cover as for_partial_cover
 from .zone import interpolated_rays as interpolated_rays
 from .zone import zone_pieces as zone_pieces

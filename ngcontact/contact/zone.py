@@ -23,9 +23,11 @@ from .dual import FacingMeans, contact_line, with_means
 from .line import (
     FACING_COSINE,
     GAP_ROUND_OFF,
+    SIDE_DIFFERENCE,
     ContactLine,
     no_point_faces,
     prescribed_gap,
+    with_roles,
     without,
 )
 from .projection import MATCHING_DISTANCE, Partners
@@ -304,11 +306,52 @@ def _reach(trace: FacetTrace, zone: ContactZone) -> Array:
     return np.where(reach < 0, apart.max(initial=0.0), reach)
 
 
+def with_zone_roles(trace: FacetTrace, contact: Contact) -> Contact:
+    """The pair with `roles` decided, as `line.with_roles` does in the plane."""
+    if contact.roles == "given" or contact.primary is None:
+        return contact
+
+    def covered(pair: Contact) -> float:
+        """Share of the secondary's area that faces the primary, by facets that wholly do."""
+        zone, _ = nodal_zone(trace, pair)
+        area = trace.sizes(zone.segments)
+        return float(area[zone.faces].sum() / area.sum())
+
+    def length(pair: Contact) -> float:
+        return float(trace.lengths(trace.segments(pair.secondary)).mean())
+
+    def bulge(pair: Contact) -> float:
+        """How far normals at vertices point away from the middles of their facets, relative."""
+        facets = trace.segments(pair.secondary)
+        every, corners = np.repeat(facets, 3), np.tile(np.eye(3), (len(facets), 1))
+        out = trace.point(every, corners).reshape(-1, 3, 3)
+        out = (out - out.mean(axis=1, keepdims=True)).reshape(-1, 3)
+        away = (trace.exact_normal(every, corners) * out).sum(axis=1)
+        return float(away.mean() / trace.lengths(facets).mean())
+
+    one, other = replace(contact, roles="given"), replace(contact, roles="given").swapped()
+    a, b = covered(one), covered(other)
+    if abs(a - b) > SIDE_DIFFERENCE:
+        return one if a > b else other
+    a, b = length(one), length(other)
+    if abs(a - b) > SIDE_DIFFERENCE * max(a, b):
+        return one if a < b else other
+    return other if bulge(other) > bulge(one) + SIDE_DIFFERENCE else one
+
+
+def decided(trace: BoundaryTrace, contact: Contact) -> Contact:
+    """The pair with `roles` decided, in the plane and in space."""
+    if isinstance(trace, FacetTrace):
+        return with_zone_roles(trace, contact)
+    return with_roles(trace, contact)
+
+
 def contact_zone(trace: FacetTrace, contact: Contact, taken: Index | None = None) -> ContactZone:
     """Contact points of one pair of solids; facets `taken` (j,) belong to other pairs.
 
     Errors are those of `contact_line`.
     """
+    contact = with_zone_roles(trace, contact)
     zone, facing = nodal_zone(trace, contact, taken)
     carries = np.zeros(len(facing) + 1, dtype=bool)
     carries[zone.rows[weighs(trace, zone.segments)]] = True
@@ -377,7 +420,7 @@ def for_partial_cover(trace: BoundaryTrace, contacts: Sequence[Contact]) -> Boun
     if not isinstance(trace, FacetTrace) or trace.order == 1:
         return trace
     chosen = np.zeros(trace.space.ndof, dtype=bool)
-    for contact in contacts:
+    for contact in (with_zone_roles(trace, contact) for contact in contacts):
         facets, facing = trace.segments(contact.secondary), trace.segments(contact.primary)
         vertices, others = (np.unique(trace.nodes[x, :3]) for x in (facets, facing))
         if contact.rows == "nodal" or not others.size or _coincide(trace, vertices, others):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from ngcontact import Contact, Elastic, Hooke, Problem, solve
+from ngcontact import Contact, Elastic, Hooke, Problem, load, solve
 from ngcontact.contact.zone import facing_pieces
 from ngcontact.discrete import discretise, first_active_set, minimise_energy
 from ngcontact.fem import stress_of
@@ -154,3 +154,24 @@ def test_isotropic_law_as_a_matrix():
     other = solve(pressed(mesh, laws=LAWS | {"upper": Hooke(C)}), order=2)
     assert one.energy == pytest.approx(other.energy, rel=1e-12)
     assert np.abs(one.force - other.force).max() <= 1e-12 * one.force.max()
+
+
+@pytest.mark.parametrize("secondary", SIDES)
+def test_roles(secondary):
+    """The covered side becomes secondary, of two the finer, whichever way the pair is given."""
+    for counts, width, expected in (((2, 2), 1.5, "upper_bottom"), ((2, 4), 1.0, "lower_top")):
+        problem = pressed(blocks(*counts, width=width), secondary)
+        problem = replace(problem, contact=[replace(problem.contact[0], roles="auto")])
+        solution = solve(problem, order=1)
+        assert solution.discrete.lines[0].contact.secondary == expected
+        assert np.abs(solution.contact_force()[2]) == pytest.approx(1.0, abs=1e-10)
+
+
+def test_a_saved_solution(tmp_path):
+    solution = solve(pressed(blocks(3, 2)), order=2)
+    again = load(solution.save(tmp_path / "cube.ngcontact"))
+    assert np.array_equal(again.force, solution.force)
+    assert again.relative_error_estimate == pytest.approx(
+        solution.relative_error_estimate, abs=1e-12
+    )
+    assert solution.record()["contact_0_force_z"] == pytest.approx(1.0, abs=1e-10)
