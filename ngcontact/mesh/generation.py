@@ -6,12 +6,13 @@ import re
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise, product
+from itertools import pairwise
 from numbers import Real
 
 import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
+from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask, across, rightward
 from ..problem import Contact, MeshArrays, Problem
@@ -162,6 +163,25 @@ def _nearest_crossing(samples: Array, x: Array, along: Array) -> Array:
     return points[np.arange(len(x)), best]
 
 
+def _at_least(x: Array, edge: CadEdge) -> Array:
+    """A distance (k,) of points `x` (k, 2) from a curve that is no more than the true one.
+
+    That from the box of its samples, which it leaves by no more than the way between two of them.
+    """
+    step = np.linalg.norm(np.diff(edge.samples, axis=0), axis=1).max()
+    low, high = edge.samples.min(axis=0) - step, edge.samples.max(axis=0) + step
+    return np.linalg.norm(np.maximum(np.maximum(low - x, x - high), 0.0), axis=1)
+
+
+def _near(secondary: CadEdge, facing: list[Edge]) -> list[Edge]:
+    """Those edges of `facing` that may be the nearest to some point of a curve."""
+    x = secondary.samples
+    step = np.linalg.norm(np.diff(x, axis=0), axis=1).max()
+    samples = np.concatenate([edge.curve.samples for edge in facing])
+    reach = cKDTree(samples).query(x)[0] + 2 * step  # more than the distance at any point
+    return [edge for edge in facing if (_at_least(x, edge.curve) <= reach).any()]
+
+
 def _nearest_of(x: Array, edge: CadEdge, others: list[Edge]) -> Mask:
     """Whether no other edge is nearer to the points `x` (k, 2) than `edge`."""
 
@@ -172,7 +192,7 @@ def _nearest_of(x: Array, edge: CadEdge, others: list[Edge]) -> Mask:
     slack = COINCIDENT * edge.size
     nearest = np.ones(len(x), dtype=bool)
     for other in others:
-        if other.curve is not edge:
+        if other.curve is not edge and (_at_least(x, other.curve) < own).any():
             nearest &= own <= distance(other.curve) + slack
     return nearest
 
@@ -285,8 +305,12 @@ def divided(problem: Problem, shape: occ.TopoDS_Shape, maxh: float, finer: float
         if contact.primary is not None:
             sides = _named(edges, contact.secondary)
             facing = _named(edges, contact.primary)
-            for secondary, primary in product(sides, facing):
-                _divide(contact, secondary, primary, sides, facing)
+            for secondary in sides:
+                near = facing
+                if contact.direction is None and len(facing) > 1:  # the nearest one counts
+                    near = _near(secondary.curve, facing)
+                for primary in near:
+                    _divide(contact, secondary, primary, sides, facing)
     return edges
 
 

@@ -1,0 +1,83 @@
+"""Scenes of many bodies: a bearing of twelve rollers between two rings, 24 pairs."""
+
+import math
+
+import numpy as np
+import pytest
+from netgen.occ import ArcOfCircle, Pnt
+
+from ngcontact import Elastic, Problem, adapt, find_contacts
+from ngcontact.geometries.region import body, compound
+
+ROLLERS, RADIUS, RACE, THICKNESS = 12, 0.2, 1.0, 0.3
+STEP = 2 * math.pi / ROLLERS
+
+
+def arc(centre, radius, start, stop):
+    """Between two angles."""
+    angles = (start, (start + stop) / 2, stop)
+    return ArcOfCircle(
+        *(
+            Pnt(centre[0] + radius * math.cos(t), centre[1] + radius * math.sin(t), 0)
+            for t in angles
+        )
+    )
+
+
+def bearing():
+    """Rollers that touch both rings, the first below the origin."""
+    angles = [k * STEP - math.pi / 2 for k in range(ROLLERS)]
+    far, bodies = RACE + 2 * RADIUS, []
+    for name, low, high, hole, rim in (
+        ("inner", RACE - THICKNESS, RACE, "bore", "inner_race"),
+        ("outer", far, far + THICKNESS, "outer_race", "rim"),
+    ):
+        outline = [(rim, arc((0, 0), high, a, a + STEP)) for a in angles]
+        inside = [(hole, arc((0, 0), low, a + STEP, a)) for a in angles[::-1]]
+        bodies.append(body(name, outline, inside))
+    for k, a in enumerate(angles, start=1):
+        centre = (RACE + RADIUS) * math.cos(a), (RACE + RADIUS) * math.sin(a)
+        quarters = [(a + math.pi / 2 * (i - 1), a + math.pi / 2 * i) for i in range(4)]
+        names = [f"roller{k}_{side}" for side in ("out", "out", "in", "in")]
+        loop = [(n, arc(centre, RADIUS, *q)) for n, q in zip(names, quarters, strict=True)]
+        bodies.append(body(f"roller{k}", loop))
+    return compound(*bodies)
+
+
+@pytest.mark.filterwarnings("ignore:contact .*a zone in contact is")
+@pytest.mark.filterwarnings("ignore:contact .*bodies pass through")
+def test_a_bearing_with_twelve_rollers():
+    geometry = bearing()
+    pairs = find_contacts(geometry, within=1e-3)
+    sides = [
+        {f"roller{k}_{s}", f"{ring}_race"}
+        for s, ring in (("in", "inner"), ("out", "outer"))
+        for k in range(1, 13)
+    ]
+    assert len(pairs) == 24
+    assert all({pair.secondary, pair.primary} in sides for pair in pairs)
+    assert max(abs(pair.least_gap) for pair in pairs) < 1e-12
+    problem = Problem(
+        geometry,
+        {".*": Elastic(E=2e5, nu=0.3)},
+        displacement={"rim": (0, 0), "bore": (0, -1e-2)},
+        contact=pairs,
+    )
+    *_, solution = adapt(problem, order=2, max_dofs=12_000)
+    force = {}
+    for k, pair in enumerate(pairs):
+        [name] = [side for side in pair.sides if "roller" in side]
+        sign = 1 if pair.secondary == name else -1
+        force[name] = sign * solution.contact_force(k)
+    largest = max(map(np.linalg.norm, force.values()))
+    inner = np.array([force[f"roller{k}_in"] for k in range(1, 13)])
+    outer = np.array([force[f"roller{k}_out"] for k in range(1, 13)])
+    # Each roller, and both rings, in equilibrium.
+    assert np.abs(inner + outer).max() < 1e-10 * largest
+    assert np.abs(solution.reactions["bore"] - inner.sum(axis=0)).max() < 1e-10 * largest
+    assert np.abs(solution.reactions["rim"] - outer.sum(axis=0)).max() < 1e-10 * largest
+    # Symmetric about the line of the load, to the error of the mesh; rollers above carry nothing.
+    size = np.linalg.norm(inner, axis=1)
+    assert np.abs(size[1:] - size[:0:-1]).max() < 1e-2 * largest
+    assert (size[4:9] < 1e-9 * largest).all()
+    assert (np.diff(size[:5]) < 0).all()
