@@ -86,10 +86,10 @@ def across(d: Array) -> Array:
 
 
 def rightward(slope: Array, other: Array | None = None) -> Array:
-    """Unit normals (..., d) of the d - 1 slopes (..., d) of a curve or a surface.
+    """Unit normals (..., d) of a curve with `slope` (..., 2), or of a surface with two slopes.
 
-    To the right of a vector in the plane, along the cross product of two in space: before the
-    slopes they make a positively oriented basis.
+    In space `slope` and `other` (..., 3) are those. To the right of a vector in the plane, along
+    the cross product of two in space: before the slopes normals make a positively oriented basis.
     """
     normal = -across(slope) if other is None else np.cross(slope, other)
     return np.asarray(normal / np.sqrt((normal**2).sum(axis=-1, keepdims=True)))

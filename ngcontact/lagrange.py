@@ -82,7 +82,10 @@ def at(curve: Array, segment: Index, s: Array) -> Array:
 
 
 def slope(curve: Array, segment: Index, s: Array) -> Array:
-    """Derivatives (k, 2) of the same with respect to s."""
+    """Derivatives (k, 2) of the same with respect to s.
+
+    At `s` (k,) of the curves `segment` (k,) among those through the points `curve` (n, p + 1, 2).
+    """
     return (lagrange_derivative(curve.shape[1] - 1, s)[:, None] @ curve[segment])[:, 0]
 
 

@@ -189,7 +189,7 @@ STAGES = {  # cumulative seconds of these functions; none calls another
     "rows": [
         ("dual", "contact_line"),
         ("constraints", "change_of_basis"),
-        ("boundary", "boundary_trace"),
+        ("boundary", "segment_trace"),
     ],
     "rigid motions": [("equilibrium", "equilibrium")],
     "matrix": [("sparse", "congruent")],

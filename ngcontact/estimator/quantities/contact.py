@@ -31,7 +31,8 @@ def peak_of(
 ) -> Quantity:
     """The largest pressure, away from corners at which it is infinite.
 
-    `star` are values of p* at the nodes of the pair's segments, if there are any.
+    `star` (n,) are values of p* at the nodes of the pair's segments, one segment after the other,
+    if there are any.
     """
     name, line, pressure = "peak pressure", pair.line, pair.pressure
     boundary, rows = solution.discrete.space.trace, line.rows
