@@ -160,6 +160,7 @@ def _gaps(trace: BoundaryTrace, segment: Index, s: Array, other: Index) -> tuple
     """
     normal = trace.exact_normal(segment, s)
     met = partners(trace, other, segment, trace.point(segment, s), normal, nodes=False)
+    met.distance[met.segment < 0] = np.inf  # also of what lies beyond the own body
     at = np.flatnonzero(met.segment >= 0)
     opposed = (trace.normal(met.segment[at], met.s[at]) * normal[at]).sum(axis=1) <= OPPOSED
     met.distance[at[~opposed]] = np.inf

@@ -6,7 +6,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 from netgen.csg import unit_cube
-from netgen.occ import Circle, Compound, Glue, MoveTo, OCCGeometry, X
+from netgen.occ import Circle, Compound, Glue, MoveTo, OCCGeometry, X, Y
 
 from drivers.reference import cases
 from ngcontact import ContactWarning, Elastic, Problem, find_contacts, solve
@@ -42,6 +42,19 @@ def test_the_gallery_s_pairs(geometry, within, expected):
     for pair, (*_, gap) in zip(found, expected, strict=True):
         assert pair.least_gap == pytest.approx(gap, abs=1e-6)
         assert pair.gap is None  # measured where it is solved
+
+
+@pytest.mark.parametrize("within", [0.6, 1.1, 10.0])
+def test_nothing_is_found_through_a_body(within):
+    """Behind a body, seen from its far side, another one is no partner, whatever `within` is."""
+    bodies = []
+    for name, y in (("lower", 0.0), ("upper", 0.5)):
+        face = MoveTo(0, y).Rectangle(1, 0.5).Face()
+        face.name, face.edges.name = name, f"{name}_side"
+        face.edges.Min(Y).name, face.edges.Max(Y).name = f"{name}_bottom", f"{name}_top"
+        bodies.append(face)
+    found = find_contacts(OCCGeometry(Compound(bodies), dim=2), within=within)
+    assert sides(found) == [("lower_top", "upper_bottom")]
 
 
 def test_found_pairs_are_those_that_are_given():
