@@ -61,6 +61,8 @@ class Solution(Measured):
         numbers.
     adaptive : bool
         Whether it is a level of `adapt`, whose estimate is needed anyway.
+    earlier : tuple of ndarray (c, 8)
+        Of c pairs of solids what `quantities` tells, on up to two levels of `adapt` before.
     tree : RefinementTree
         The first mesh of a run, and which of its elements those of `mesh` are parts of.
     coarse_levels : int

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import ngsolve as ng
 import numpy as np
 
 from .arrays import Array, Index, Mask
-from .contact import ContactState, contact_states, state_of
+from .contact import ContactState, contact_states, curves_at_ends, signed_distance, state_of
 from .discrete import DiscreteProblem, RigidMotion, resultants
-from .fem import energy_norm, model_of, normal_stress_of, potential_energy, stress_of
+from .fem import FacetTrace, energy_norm, model_of, normal_stress_of, potential_energy, stress_of
 from .problem import Problem
 from .qp import Iterate, kkt_residuals
 
@@ -144,13 +145,17 @@ class Solved:
         rigid = self.discrete.rigid
         return [] if rigid is None else rigid.left_free(self.active)
 
-    def transitions(self, pair: int = 0) -> Array:
+    def transitions(self, pair: int = 0) -> Any:
         """Points (k, 2) where a pair's contact turns from binding to non-binding, each a length.
 
-        None, k = 0, where all of the pair is in contact, or nothing.
+        Of solids a list of polylines (k, 3), on the secondary before deformation: closed ones end
+        where they start, others at the rim of the secondary or of what faces it. None, k = 0 or an
+        empty list, where all of the pair is in contact, or nothing.
         """
-        self.problem.refuse_solids("transitions")
-        return state_of(self.pairs, pair).transitions.position
+        state, trace = state_of(self.pairs, pair), self.discrete.space.trace
+        if isinstance(trace, FacetTrace):
+            return curves_at_ends(signed_distance(self.problem, trace, state))
+        return state.transitions.position
 
     @cached_property
     def energy(self) -> float:

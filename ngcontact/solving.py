@@ -35,7 +35,7 @@ from .discrete import (
     minimise_energy,
 )
 from .errors import ContactError, ConvergenceError, NoEquilibriumError, warn
-from .estimator import refuse_bound
+from .estimator import refuse_bound, told_before
 from .fem import boundary_trace, check_element, model_of, unknowns
 from .mesh import check_curves, copied, curve, first_mesh, same_geometry
 from .plausibility import (
@@ -513,7 +513,9 @@ def levels_of_solids(
     while unknowns(mesh, order, element) <= refinement.max_dofs:
         if solution is not None:  # its factorisation is of no use to the next one
             solution.discrete.systems.forget()
-        solution = replace(solve_on(problem, mesh, order, element, solution), adaptive=True)
+        earlier = () if solution is None else told_before(solution)
+        solution = solve_on(problem, mesh, order, element, solution)
+        solution = replace(solution, adaptive=True, earlier=earlier)
         problem = solution.problem
         yield solution
         error = solution.relative_error_estimate

@@ -4,6 +4,11 @@ from .dual import FacingPieces as FacingPieces
 from .dual import contact_line as contact_line
 from .dual import divided as divided
 from .dual import end_to_end as end_to_end
+from .end_curves import SignedDistance as SignedDistance
+from .end_curves import area_in_contact as area_in_contact
+from .end_curves import curves_at_ends as curves_at_ends
+from .end_curves import signed_distance as signed_distance
+from .end_curves import with_vertices as with_vertices
 from .line import FACING_COSINE as FACING_COSINE
 from .line import GAP_ROUND_OFF as GAP_ROUND_OFF
 from .line import ContactLine as ContactLine

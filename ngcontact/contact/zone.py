@@ -296,7 +296,7 @@ def with_dual_rows(trace: FacetTrace, zone: ContactZone, facing: Mask) -> tuple[
     return zone, carries & (zone.weight > SMALLEST_SHARE * whole)
 
 
-def _reach(trace: FacetTrace, zone: ContactZone) -> Array:
+def _reach(trace: FacetTrace, zone: ContactLine) -> Array:
     """How far away what faces the nodes of each facet is, (k,); the most where none is known."""
     met = np.flatnonzero(zone.partner >= 0)
     apart = np.full(len(zone.node) + 1, -1.0)
@@ -344,6 +344,21 @@ def decided(trace: BoundaryTrace, contact: Contact) -> Contact:
     if isinstance(trace, FacetTrace):
         return with_zone_roles(trace, contact)
     return with_roles(trace, contact)
+
+
+def covered_shares(trace: FacetTrace, zone: ContactLine, chosen: Index) -> Array:
+    """Shares (j,) of facets that face the primary, those `chosen` (j,) among `zone.segments`.
+
+    1 at facets whose rows stand at nodes alone.
+    """
+    means = np.append(zone.means, False)[zone.rows[chosen]].any(axis=1)
+    share, at = np.ones(len(chosen)), chosen[means]
+    if len(at):
+        reach = _reach(trace, zone)[at]
+        facets = zone.segments[at]
+        parts = facing_pieces(trace, zone.contact, facets, zone.facing, reach)
+        share[means] = np.minimum(parts.covered(len(facets)), 1.0)
+    return share
 
 
 def contact_zone(trace: FacetTrace, contact: Contact, taken: Index | None = None) -> ContactZone:

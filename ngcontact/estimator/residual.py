@@ -371,6 +371,7 @@ class Estimated(Solved):
     """Members of `Solution` that estimate its error, made when the first of them is asked for."""
 
     adaptive: bool = False  # whether it is a level of `adapt`, whose estimate is needed anyway
+    earlier: tuple[Array, ...] = ()  # figures (c, 8) of c pairs of solids, of levels before
 
     @cached_property
     def _estimate(self) -> Estimate:

@@ -15,6 +15,7 @@ from .model import MODELS as MODELS
 from .model import Model as Model
 from .moduli import NEARLY_INCOMPRESSIBLE as NEARLY_INCOMPRESSIBLE
 from .moduli import Moduli as Moduli
+from .moduli import contact_modulus as contact_modulus
 from .moduli import moduli_of as moduli_of
 from .moduli import nearly_incompressible as nearly_incompressible
 from .moduli import warn_of_locking as warn_of_locking

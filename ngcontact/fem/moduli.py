@@ -10,9 +10,10 @@ import ngsolve as ng
 import numpy as np
 from scipy.linalg import block_diag
 
-from ..arrays import Array, Mask
+from ..arrays import Array, Index, Mask
 from ..errors import warn
 from ..problem import Elastic, Hooke, MeshArrays, Problem, varies
+from .boundary import BoundaryTrace
 
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
 NEARLY_INCOMPRESSIBLE = 6.0
@@ -84,6 +85,22 @@ def moduli_of(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Mod
         rigidity[at] = np.linalg.eigvalsh(rest)[..., -1].max(axis=1) / 2
         ratio[at] = 2 * kappa[:, 0] / smallest[:, 0]
     return Moduli(shear, bulk, rigidity, ratio)
+
+
+def contact_modulus(problem: Problem, trace: BoundaryTrace, *sides: Index) -> float:
+    """E* of solids, a stress: 1 / E* is the sum of (1 - nu^2) / E, in the mean over each side.
+
+    The sides are facets (k,); one without facets is rigid. Of laws that are not isotropic the
+    modulus of shear and the bulk modulus of `Moduli` count.
+    """
+    asked = np.zeros(trace.mesh.ne, dtype=bool)
+    asked[trace.element[np.concatenate(sides)]] = True
+    moduli, compliance = moduli_of(problem, trace.mesh, asked), 0.0
+    for side in sides:
+        if len(side):
+            mu, kappa = (x[trace.element[side]].mean() for x in (moduli.shear, moduli.bulk))
+            compliance += (3 * kappa + 4 * mu) / (4 * mu * (3 * kappa + mu))
+    return 1 / compliance
 
 
 def _constant(law: Elastic | Hooke, model: str, mesh: ng.Mesh) -> Array:

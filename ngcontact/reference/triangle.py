@@ -35,6 +35,18 @@ def edge_nodes(order: int) -> Index:
 
 
 @lru_cache
+def parts(order: int) -> Index:
+    """Nodes (t, 3) at the corners of the t = order^2 triangles into which the nodes divide one."""
+    divided = {
+        1: [[0, 1, 2]],
+        2: [[0, 5, 3], [1, 4, 5], [2, 3, 4], [5, 4, 3]],
+        3: [[0, 7, 4], [1, 5, 8], [2, 3, 6]]
+        + [[9, a, b] for a, b in ((7, 8), (8, 5), (5, 6), (6, 3), (3, 4), (4, 7))],
+    }
+    return np.array(divided[order])
+
+
+@lru_cache
 def _exponents(order: int) -> Index:
     """Exponents (q, 2) of L0 and L1 in the monomials of a degree."""
     return np.array([(i, j) for i in range(order + 1) for j in range(order + 1 - i)])

@@ -149,7 +149,7 @@ UNITS = {
 }
 SOLUTION = {  # every attribute and method of `Solution` by the dimension of what it gives
     "length": "displacement points gap transitions",
-    "stress": "stress out_of_plane_stress hoop_stress pressure equilibrated",
+    "stress": "stress out_of_plane_stress hoop_stress pressure pressure_field equilibrated",
     "force": "force contact_force nodal_reaction reactions",
     "energy": "energy estimate_parts bound_parts energy_bounds",
     "energy norm": "energy_norm indicators error_estimate error_bound",
@@ -158,7 +158,8 @@ SOLUTION = {  # every attribute and method of `Solution` by the dimension of wha
 }
 # ... and those that are no quantities: objects, names, numbers of things, truth values, files.
 PLAIN = """problem mesh order element discrete minimiser work coarse_levels tree adaptive pair
-active steps free_motions stress_free estimated bounded pairs write revolved plot draw save"""
+active steps free_motions stress_free estimated bounded pairs write revolved plot draw save
+earlier"""
 
 
 def has_unit(text, *dimensions):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from netgen.occ import Circle, Compound, MoveTo, OCCGeometry, Y
 
-from drivers.reference import cases
+from drivers.reference import axisymmetric_cases, cases
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.geometries import blocks, disc
 from tests.runs import solved
@@ -226,3 +226,27 @@ def test_a_body_that_contact_alone_holds_has_a_proved_force():
     row = solve(problem, maxh=0.4, order=2).quantities()["force"]
     assert row.guaranteed
     assert abs(row.value - 2) <= row.error <= 1e-9
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+@pytest.mark.parametrize("scene", ["hertz", "rings", "axis"])
+def test_the_pressure_as_a_function(scene, order):
+    """It meets the pressures at contact points, also on the axis of revolution, and is 0 beyond."""
+    problem = {
+        "hertz": lambda: cases.hertz_contact().problem,
+        "rings": lambda: cases.ring_in_ring().problem,
+        "axis": lambda: axisymmetric_cases.hertz_contact()[0],
+    }[scene]()
+    solution = solve(problem, maxh=0.1, order=order)
+    field, [state] = solution.pressure_field(), solution.pairs
+    trace, rows = solution.discrete.space.trace, state.line.rows
+    segment, s = trace.at_nodes(state.line.segments)
+    values = trace.evaluate(field, segment, s)[:, 0]
+    expected = np.append(solution.pressure, 0.0)[rows].ravel()
+    assert np.abs(values - expected).max() < 1e-12 * solution.pressure.max()
+    if scene == "hertz":  # of a straight line; weights are integrals of the basis functions
+        whole = ng.Integrate(field * ng.ds(bonus_intorder=order), solution.mesh)
+        assert whole == pytest.approx(solution.force.sum(), rel=1e-12)
+        secondary = solution.mesh.Boundaries(problem.contact[0].secondary)
+        points = solution.mesh.MapToAllElements(ng.IntegrationRule([(0, 0, 0)], [1]), secondary)
+        assert field(points).max() == pytest.approx(values.reshape(rows.shape)[:, -1].max())

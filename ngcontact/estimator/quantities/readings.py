@@ -29,14 +29,16 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array
-from ...contact import ContactState, state_of
+from ...contact import ContactState, signed_distance, state_of
+from ...contact import area_in_contact as area_on_surface
 from ...discrete import load_by_shape
 from ...errors import ContactError, warn
-from ...fem import BoundaryTrace, load_vector, stress_of
+from ...fem import BoundaryTrace, FacetTrace, load_vector, stress_of
 from ...quadrature import has_rough_loads
 from ..bound import FINE, EquilibratedStress, Guaranteed, force_bar
 from .contact import approach_of, area_in_contact, direction_of, ends_of, left_out, peak_of
 from .stresses import largest_von_mises, singular_corners
+from .surfaces import pressure_field, quantities_of_solids
 from .table import Quantities, Quantity, unknown
 
 # Relative errors over the square of the relative estimate, measured on random scenes of all orders.
@@ -65,9 +67,31 @@ class Measured(Guaranteed):
         return {}
 
     def contact_area(self, pair: int = 0) -> float:
-        """Length of a pair's line in contact, an area about an axis; any consistent units."""
-        self.problem.refuse_solids("contact_area")
-        return area_in_contact(state_of(self.pairs, pair), self.discrete.space.trace)[0]
+        """Length of a pair's line in contact, an area about an axis and of solids.
+
+        Of the secondary before deformation, up to `transitions`; any consistent units.
+        """
+        state, trace = state_of(self.pairs, pair), self.discrete.space.trace
+        if isinstance(trace, FacetTrace):
+            return area_on_surface(signed_distance(self.problem, trace, state), state)
+        return area_in_contact(state, trace)[0]
+
+    def pressure_field(self, pair: int = 0) -> ng.GridFunction:
+        """The pressure of a pair as a function on its secondary, in units of stress.
+
+        It is integrated over that boundary and read at points of it, as those of
+        ``mesh.MapToAllElements(rule, mesh.Boundaries(secondary))``; elsewhere it is 0, also on the
+        primary, which ``mesh(x, y, z, ng.BND)`` may find where both coincide.
+
+        In the plane polynomials of degree `order` on each segment, which meet `pressure` at the
+        contact points. On solids linear on each facet at orders 1 and 2, between the pressures at
+        vertices: at order 2 means, by area, of the linear functions through the middles of edges,
+        whose resultant on plane facets is that of the contact. At order 3 of degree 2 on each
+        facet with a point in contact, nearest to the mean traction of both sides: better than
+        `pressure` where the stress is resolved (docs/solids.md).
+        """
+        self.discrete.space.require_mesh()
+        return pressure_field(self, state_of(self.pairs, pair))
 
     def quantities(self, pair: int = 0) -> Quantities:
         """Force, contact area, pressures, ends, approach, energy, von Mises stress, with errors.
@@ -79,9 +103,14 @@ class Measured(Guaranteed):
         as a rule beside its estimate. Where no bound is known all are estimates, and a
         `ContactWarning` and a note below the table say why. Where corners make a stress infinite
         the row names them; its value is the largest farther away.
+
+        Of solids forces, with "force, z", area, pressures, of which the peak is that of
+        `pressure_field`, and energy. Levels of `adapt` from the third on have errors: the larger of
+        the last two differences between levels.
         """
-        self.problem.refuse_solids("quantities()")
         state, boundary = state_of(self.pairs, pair), self.discrete.space.trace
+        if self.problem.dim == 3:
+            return quantities_of_solids(self, pair)
         known = "_proved" in self.__dict__
         proof, reason = self._proved
         if proof is None and not known:

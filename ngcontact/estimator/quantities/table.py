@@ -27,7 +27,7 @@ class Quantity:
     kind : str
         "guaranteed": the true value of the problem lies within `error` of `value`; "estimated": as
         a rule it does; "none": nothing is known of the error, which is NaN.
-    place : ndarray (2,) or None
+    place : ndarray (d,) or None
         Where it is.
     proved : float or None
         The proved error beside an estimated one; None where none is proved.
@@ -105,8 +105,8 @@ def error_of_largest(value: float, samples: Array, errors: Array) -> float:
 
 
 def _point(x: Array) -> str:
-    """A point `x` (2,) in brackets."""
-    return f"({x[0]:.6g}, {x[1]:.6g})"
+    """A point `x` (d,) in brackets."""
+    return f"({', '.join(f'{value:.6g}' for value in x)})"
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,156 @@
+"""The pressure as a field, on lines and on surfaces, and what solids tell of their contact."""
+
+from __future__ import annotations
+
+import ngsolve as ng
+import numpy as np
+
+from ...arrays import Array, Index
+from ...contact import ContactState, area_in_contact, signed_distance, with_vertices
+from ...contact.zone import partners, rays
+from ...fem import BoundaryTrace, FacetTrace
+from ...problem import MeshArrays
+from ...reference import triangle
+from ...solved import Solved
+from ..residual import Estimated
+from .table import Quantities, Quantity
+
+LEVELS = 2  # before the last one, whose figures tell the error
+NAMES = (
+    "force",
+    *(f"force, {axis}" for axis in "xyz"),
+    *("contact area", "mean pressure", "peak pressure", "energy"),
+)
+
+
+def pressure_field(solution: Solved, state: ContactState) -> ng.GridFunction:
+    """The pressure of a pair as a function on its secondary; see `Solution.pressure_field`."""
+    line, trace = state.line, solution.discrete.space.trace
+    boundary = solution.mesh.Boundaries(line.contact.secondary)
+    if not isinstance(trace, FacetTrace):
+        _, s = trace.at_nodes(line.segments)
+        values = np.append(state.pressure, 0.0)[line.rows]
+        return _by_facet(trace, boundary, trace.order, line.segments, s, values, 0 * values + 1)
+    if trace.order == 3:
+        return _mean_traction(solution, trace, state)
+    field = ng.GridFunction(ng.H1(solution.mesh, order=1, definedon=boundary))
+    vertices, size = trace.nodes[line.segments], trace.sizes(line.segments)
+    values = np.append(state.pressure, np.nan)[line.rows]
+    values = with_vertices(values, line.rows < 0, vertices, size)[:, :3]
+    known = np.isfinite(values)
+    # Of several sides of an edge the mean, by area.
+    share = (known * size[:, None])[known]
+    at, n = vertices[:, :3][known], solution.mesh.nv
+    area = np.bincount(at, share, n)
+    total = np.bincount(at, share * values[known], n)
+    field.vec.FV().NumPy()[:n] = np.where(area > 0, total / np.where(area > 0, area, 1.0), 0.0)
+    return field
+
+
+def _by_facet(
+    trace: BoundaryTrace,
+    boundary: ng.Region,
+    degree: int,
+    segments: Index,
+    s: Array,
+    values: Array,
+    weights: Array,
+) -> ng.GridFunction:
+    """Polynomials on `segments` (k,), nearest to `values` (k, g) at `s` by `weights` (k, g)."""
+    field = ng.GridFunction(ng.SurfaceL2(trace.mesh, order=degree, definedon=boundary))
+    if not len(segments):
+        return field
+    space, (k, g) = field.space, values.shape
+    vertices = MeshArrays(trace.mesh).facets[segments]
+    order = np.argsort(vertices, axis=1) @ 3 ** np.arange(1, vertices.shape[1] + 1)
+    order += trace.axis[segments]  # nodes are others there
+    places = s.reshape(k, g, -1)
+    # NGSolve's segment runs from the second vertex to the first.
+    at = places[..., :2] if places.shape[-1] > 1 else 1 - places[..., [0, 0]]
+    shapes = np.zeros((k, g, len(space.GetDofNrs(ng.ElementId(ng.BND, int(segments[0]))))))
+    for kind in np.unique(order):
+        some = np.flatnonzero(order == kind)
+        element = space.GetFE(ng.ElementId(ng.BND, int(segments[some[0]])))
+        points = at[some[0]].tolist()
+        shapes[some] = np.array([element.CalcShape(x, y, 0.0).NumPy() for x, y in points])
+    weighted = np.einsum("kg,kgi->kig", weights, shapes)
+    found = np.linalg.solve(weighted @ shapes, weighted @ values[..., None])[..., 0]
+    numbers = [space.GetDofNrs(ng.ElementId(ng.BND, int(i))) for i in segments]
+    field.vec.FV().NumPy()[np.array(numbers)] = found
+    return field
+
+
+def _mean_traction(solution: Solved, trace: FacetTrace, state: ContactState) -> ng.GridFunction:
+    """Mean of the tractions of both sides along the direction, where a facet has points in contact.
+
+    Of bodies on rigid obstacles the traction of the one.
+    """
+    line, d = state.line, trace.order - 1
+    boundary = solution.mesh.Boundaries(line.contact.secondary)
+    touched = np.append(state.active, False)[line.rows].any(axis=1)
+    facets = line.segments[touched]
+    points, weights = triangle.gauss(2 * d)
+    facet, s = np.repeat(facets, len(weights)), np.tile(points, (len(facets), 1))
+    directions, x = rays(trace, line.contact, facet, s), trace.point(facet, s)
+    stress = ng.BoundaryFromVolumeCF(solution.stress)
+
+    def traction(facet: Index, s: Array, directions: Array) -> Array:
+        """Pressures (j,) along `directions` (j, 3), over areas as these see them."""
+        sigma = trace.evaluate(stress, facet, s).reshape(-1, 3, 3)
+        normal = trace.normal(facet, s)
+        across = (normal * directions).sum(axis=1)
+        return np.asarray(-np.einsum("ki,kij,kj->k", directions, sigma, normal) / across)
+
+    values = traction(facet, s, directions)
+    if len(line.facing):
+        found = partners(trace, line.facing, facet, x, directions)
+        met = np.flatnonzero(found.segment >= 0)
+        other = traction(found.segment[met], found.s[met], directions[met])
+        values[met] = (values[met] + other) / 2
+    size = np.linalg.norm(trace.area_vector(facet, s), axis=1).reshape(-1, len(weights)) * weights
+    return _by_facet(trace, boundary, d, facets, s, values.reshape(size.shape), size)
+
+
+def figures(solution: Solved, state: ContactState) -> tuple[Array, Array]:
+    """Values (8,) of a pair of solids by `NAMES`, and where (3,) the pressure is largest."""
+    trace, line = solution.discrete.space.trace, state.line
+    assert isinstance(trace, FacetTrace)  # of solids
+    force = -state.force @ line.direction
+    along = float(np.linalg.norm(force))
+    if line.contact.direction is not None:
+        along = abs(float(force @ np.array(line.contact.direction)))
+    area = area_in_contact(signed_distance(solution.problem, trace, state), state)
+    facet, s = trace.at_nodes(line.segments)
+    pressure = trace.evaluate(pressure_field(solution, state), facet, s)[:, 0]
+    at = np.argmax(pressure)
+    mean, peak = float(state.force.sum()) / area if area > 0 else 0.0, float(pressure[at])
+    values = [along, *(force + 0.0), area, mean, peak, solution.energy]
+    return np.array(values), trace.point(facet[[at]], s[[at]])[0]
+
+
+def told_before(solution: Estimated) -> tuple[Array, ...]:
+    """Figures (c, 8) of a level of solids and the one before it, which the next level needs."""
+    now = np.array([figures(solution, state)[0] for state in solution.pairs])
+    return (*solution.earlier, now)[-LEVELS:]
+
+
+def quantities_of_solids(solution: Estimated, pair: int) -> Quantities:
+    """Values of a pair, on levels of `adapt` with the larger of the last two level differences."""
+    values, place = figures(solution, solution.pairs[pair])
+    levels = np.array([*(before[pair] for before in solution.earlier), values])
+    known = len(levels) > LEVELS
+    errors = np.abs(np.diff(levels, axis=0)).max(axis=0) if known else np.full(len(NAMES), np.nan)
+    rows = [
+        Quantity(
+            name,
+            float(value),
+            float(error),
+            "estimated" if known else "none",
+            place if name == "peak pressure" else None,
+        )
+        for name, value, error in zip(NAMES, values, errors, strict=True)
+    ]
+    note = "errors: the larger of the last two differences between levels"
+    if not known:
+        note = "without errors: the third level of adapt and later ones tell them"
+    return Quantities(tuple(rows), note)

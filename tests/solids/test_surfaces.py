@@ -1,0 +1,192 @@
+"""What solids tell of their contact: ends, area, pressure as a field, quantities with errors."""
+
+import math
+from dataclasses import replace
+
+import ngsolve as ng
+import numpy as np
+import pytest
+
+from drivers.reference.solids import hertz_of_solids
+from ngcontact import Contact, Elastic, Problem, adapt, solve
+from ngcontact.geometries.solids import shells
+from tests.solids.meshes import boxes
+from tests.solids.test_curved import PRESSURE, press_fit, unmatched
+from tests.solids.test_patch import SIDES, TURN, blocks, pressed
+
+HERTZ, EXACT = hertz_of_solids()
+RADIUS, PEAK, FORCE = EXACT.a, EXACT.p0, EXACT.P / 4  # of a quarter
+
+
+@pytest.fixture(scope="module")
+def levels():
+    """Hertz contact of two cubes by order, level by level."""
+    most = {1: 4_000, 2: 40_000, 3: 22_000}
+    return {order: list(adapt(HERTZ, order=order, max_dofs=n)) for order, n in most.items()}
+
+
+def radius_of(polyline):
+    """Of the circle with the area that a quarter of it encloses."""
+    x, y = polyline[:, :2].T
+    return math.sqrt(2 / math.pi * abs((x[:-1] * y[1:] - x[1:] * y[:-1]).sum()))
+
+
+@pytest.mark.parametrize(
+    ("order", "enclosed", "points"), [(1, 3e-2, 1e-1), (2, 3e-3, 2e-2), (3, 1e-2, 6e-2)]
+)
+def test_end_of_hertz_contact(levels, order, enclosed, points):
+    """One quarter of a circle, from one plane of symmetry to the other.
+
+    Measured, by the area that it encloses: 1.1e-2, 1.1e-5 and 6.8e-3; of its points: 7.2e-2, 1.5e-2
+    and 3.6e-2, at 2.0e3, 2.6e4 and 2.0e4 unknowns.
+    """
+    solution = levels[order][-1]
+    [end] = solution.transitions()
+    r = np.linalg.norm(end, axis=1)
+    assert radius_of(end) == pytest.approx(RADIUS, rel=enclosed)
+    assert r == pytest.approx(RADIUS, rel=points)
+    assert sorted(np.abs(end[[0, -1]]).min(axis=1)) == [0, 0]
+    assert np.abs(end[:, 2]).max() == 0
+    assert solution.contact_area() == pytest.approx(math.pi / 4 * radius_of(end) ** 2, rel=1e-9)
+
+
+@pytest.mark.parametrize(("order", "rms"), [(2, 8e-3), (3, 2.5e-2)])
+def test_pressure_field_of_hertz_contact(levels, order, rms):
+    """Away from the end, relative to the peak, by area. Measured: 4.8e-3 and 1.5e-2."""
+    solution = levels[order][-1]
+    field, square = solution.pressure_field(), ng.x**2 + ng.y**2
+    inside = ng.IfPos((0.8 * RADIUS) ** 2 - square, 1.0, 0.0)
+    exact = PEAK * ng.sqrt(ng.IfPos(RADIUS**2 - square, 1 - square / RADIUS**2, 0))
+    top = ng.ds("lower_contact", bonus_intorder=8)
+    miss = ng.Integrate(inside * (field - exact) ** 2 * top, solution.mesh)
+    assert math.sqrt(miss / ng.Integrate(inside * top, solution.mesh)) < rms * PEAK
+    if order == 2:  # the resultant is that of the contact, on plane facets
+        assert ng.Integrate(field * top, solution.mesh) == pytest.approx(
+            solution.force.sum(), rel=1e-10
+        )
+
+
+def test_quantities(levels):
+    """Without errors of one level; with the larger of two differences of three."""
+    assert all(row.kind == "none" and math.isnan(row.error) for row in levels[2][1].quantities())
+    told = [level.quantities() for level in levels[2]]
+    last = told[-1]
+    exact = {
+        "force": FORCE,
+        "force, x": 0,
+        "force, z": -FORCE,
+        "contact area": math.pi / 4 * RADIUS**2,
+        "mean pressure": FORCE / (math.pi / 4 * RADIUS**2),
+        "peak pressure": PEAK,
+    }
+    for name, value in exact.items():
+        row = last[name]
+        values = [level[name].value for level in told[-3:]]
+        assert row.error == np.abs(np.diff(values)).max()
+        assert row.kind == "estimated"
+        assert abs(row.value - value) <= row.error, name
+    assert last["energy"].value == levels[2][-1].energy
+    assert np.linalg.norm(last["peak pressure"].place) < RADIUS / 4
+    assert "larger of the last two differences" in str(last)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+@pytest.mark.parametrize("secondary", SIDES)
+@pytest.mark.parametrize("counts", [(2, 2), (3, 2)])
+def test_uniform_pressure(order, secondary, counts):
+    """All of both faces: nothing ends, exact values, with a direction and along normals."""
+    mesh = blocks(*counts, turn=TURN)
+    for direction in (True, False):
+        solution = solve(pressed(mesh, secondary, direction, turn=TURN), order=order)
+        assert solution.transitions() == []
+        assert solution.contact_area() == pytest.approx(1.0, rel=1e-12)
+        field, name = solution.pressure_field(), SIDES[secondary][0]
+        miss = ng.Integrate((field - 1) ** 2 * ng.ds(name), mesh)
+        assert math.sqrt(miss) < 1e-10
+        assert ng.Integrate(field * ng.ds, mesh) == pytest.approx(1.0, rel=1e-10)  # 0 elsewhere
+        rows = solution.quantities()
+        for key in ("force", "contact area", "mean pressure", "peak pressure"):
+            assert rows[key].value == pytest.approx(1.0, rel=1e-10)
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_area_of_facets_that_face_in_part(order):
+    """The face of a cube, tied to a wider block whose facets bear the contact points."""
+    problem = pressed(blocks(3, 4, width=1.45), "lower")
+    tied = replace(problem, contact=[replace(problem.contact[0], bilateral=True)])
+    solution = solve(tied, order=order)
+    assert solution.transitions() == []
+    assert solution.contact_area() == pytest.approx(1.0, rel=1e-9)
+
+
+@pytest.mark.parametrize(("order", "rms"), [(2, 2e-2), (3, 3e-2)])
+@pytest.mark.parametrize("matched", [True, False])
+def test_press_fit(order, rms, matched):
+    """Of shells: the whole sphere touches, at one pressure.
+
+    Measured: 1.3e-2 to 1.4e-2 at order 2, 2.2e-2 to 2.3e-2 at order 3, where tractions are those of
+    the elements; 1.8e-2 with maxh=0.25 and 4.4e-3 with 0.18.
+    """
+    problem = press_fit(shells())
+    mesh = None if matched else unmatched(0.3, 0.35)
+    solution = solve(problem, mesh, maxh=0.35 if matched else None, order=order)
+    name = problem.contact[0].secondary
+    area = ng.Integrate(1, solution.mesh.Boundaries(name))
+    assert solution.transitions() == []
+    assert solution.contact_area() == pytest.approx(area, rel=1e-6)
+    miss = solution.pressure_field() / PRESSURE - 1
+    found = math.sqrt(ng.Integrate(miss**2 * ng.ds(name), solution.mesh) / area)
+    assert found < rms
+
+
+def test_nothing_in_contact():
+    """A cube above an obstacle that it does not reach."""
+    problem = Problem(
+        boxes(("a", (0, 0, 0), (1, 1, 1), (2, 2, 2))),
+        {"a": Elastic(1.0, 0.3)},
+        displacement={"a_top": (0, 0, 0)},
+        contact=[Contact("a_bottom", direction=(0, 0, -1), gap=0.1)],
+    )
+    for order in (1, 2, 3):
+        solution = solve(problem, order=order)
+        assert solution.transitions() == []
+        assert solution.contact_area() == 0
+        assert all(row.value == 0 for row in solution.quantities())
+
+
+def indented(length=1.0, stress=1.0):
+    """A block under a rigid paraboloid, whole, in units of length and stress."""
+    low, high = (-length, -length, -length), (length, length, 0)
+    return Problem(
+        boxes(("a", low, high, (8, 8, 4)), turn=TURN),
+        {"a": Elastic(stress, 0.3)},
+        displacement={"a_bottom": (0, 0, 0)},
+        contact=[Contact("a_top", direction=TURN[:, 2], gap=paraboloid(length))],
+    )
+
+
+def paraboloid(length):
+    """Its distance from the plane through the origin, less than nothing at its lowest point."""
+    return lambda x, y, z: (x * x + y * y + z * z) / length / 2 - 0.1 * length
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_closed_ends_in_all_units(order):
+    one = solve(indented(), order=order)
+    [end] = one.transitions()
+    assert np.array_equal(end[0], end[-1])
+    assert np.abs(end @ TURN[:, 2]).max() < 1e-15
+    flat = end @ TURN[:, :2]
+    x, y = flat.T
+    enclosed = abs((x[:-1] * y[1:] - x[1:] * y[:-1]).sum()) / 2
+    assert one.contact_area() == pytest.approx(enclosed, rel=1e-12)
+    angle = np.unwrap(np.arctan2(y, x))
+    assert abs(angle[-1] - angle[0]) == pytest.approx(2 * math.pi)  # once around
+    for length, stress in ((1e4, 1e9), (1e-4, 1e-9)):
+        other = solve(indented(length, stress), order=order)
+        [same] = other.transitions()
+        assert np.abs(same / length - end).max() < 1e-8
+        for row, known in zip(other.quantities(), one.quantities(), strict=True):
+            unit = {"force": stress * length**2, "contact": length**2, "energy": stress * length**3}
+            size = unit.get(row.name.split()[0].rstrip(","), stress)
+            assert row.value / size == pytest.approx(known.value, rel=1e-8, abs=1e-12), row.name
