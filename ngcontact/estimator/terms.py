@@ -134,6 +134,11 @@ class ScaledSolution:
         return (self.diameter / self.order) ** 2 / (2 * self.mu)
 
     @cached_property
+    def constant(self) -> ng.comp.ProxyFunction:
+        """Test function that is constant on each element."""
+        return ng.L2(self.mesh, order=0).TestFunction()
+
+    @cached_property
     def measure(self) -> Array:
         """What an area of the mesh stands for in the body, in the middle of elements, (ne,)."""
         return self.model.measure(MeshArrays(self.mesh).corners.mean(axis=1))
@@ -165,8 +170,7 @@ def components(stress: ng.CoefficientFunction) -> ng.CoefficientFunction:
 def oscillation(solution: ScaledSolution) -> Array:
     """Squares (ne,) of |sigma_h - Pi sigma_h| in the norm of C^-1, where data in the body vary."""
     problem, mesh, projected = solution.problem, solution.mesh, solution.projected
-    v = ng.L2(mesh, order=0).TestFunction()
-    forms, miss = [], components(solution.stress) - projected
+    v, forms, miss = solution.constant, [], components(solution.stress) - projected
     for body, law in problem.varying.items():
         compliance = solution.model.compliance(law.voigt(problem.model) / solution.modulus)
         density = solution.model.weighted(ng.InnerProduct(compliance * miss, miss))
@@ -195,7 +199,7 @@ def element_integral(
     solution: ScaledSolution, residual: ng.CoefficientFunction, order: int
 ) -> Array:
     """Squares of a residual integrated over each element, (ne,)."""
-    model, v = solution.model, ng.L2(solution.mesh, order=0).TestFunction()
+    model, v = solution.model, solution.constant
     dx = ng.dx(bonus_intorder=order + 2 * model.bonus)
     squares = model.weighted(ng.InnerProduct(residual, residual)).Compile()  # in 2/3 of the time
     return _assembled(v, squares * v * dx)
@@ -207,8 +211,7 @@ def edge_integral(solution: ScaledSolution, jump: ng.CoefficientFunction, order:
     Where the other side is stiffer, times the ratio of both moduli mu: stiff bodies take up what
     soft ones cannot.
     """
-    mesh, mu = solution.mesh, solution.mu
-    v = ng.L2(mesh, order=0).TestFunction()
+    mesh, mu, v = solution.mesh, solution.mu, solution.constant
     squares = solution.model.weighted(ng.InnerProduct(jump, jump)).Compile()  # in half of the time
     squares = squares * (v + v.Other())
     dx = ng.dx(skeleton=True, bonus_intorder=order)

@@ -9,7 +9,7 @@ points, so that every condition at a node concerns the two unknowns of that node
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import ngsolve as ng
@@ -32,25 +32,16 @@ ORDERS_OF_SOLIDS = (1, 2, 3)
 ELEMENTS = ("isoparametric", "superparametric", "physical")
 
 
-def edge_bubbles(space: ng.FESpace, axis: int = 0) -> Array:
-    """Values (order - 1, order - 1) of the edge functions of an H1 space at the interior nodes.
+@lru_cache
+def edge_bubbles(order: int, axis: int = 0) -> Array:
+    """Values (order - 1, order - 1) of NGSolve's edge functions of H1 at the interior nodes.
 
     Row i is the i-th interior Gauss-Lobatto point from the end with the lower vertex number,
     column j the j-th edge function. Which points, says `axis`: see `gauss_lobatto`.
     """
-    mesh, order = space.mesh, space.globalorder
-    element = ng.ElementId(ng.VOL, 0)
-    vertices = [v.nr for v in mesh[element].vertices]
-    edge = mesh[element].edges[0]
-    low, high = sorted(v.nr for v in mesh[edge].vertices)
-    reference = np.array([[1.0, 0.0], [0.0, 1.0], [0.0, 0.0]])
-    start, stop = reference[vertices.index(low)], reference[vertices.index(high)]
-    numbers = list(space.GetDofNrs(element))
-    columns = [numbers.index(d) for d in space.GetDofNrs(edge)]
-    shape = space.GetFE(element)
-    points = [start + s * (stop - start) for s in gauss_lobatto(order, axis)[1:-1]]
-    values = np.array([shape.CalcShape(float(px), float(py), 0.0).NumPy() for px, py in points])
-    return values[:, columns]
+    shape = ng.fem.H1FE(ng.ET.SEGM, order)  # from its vertex 0 at 1 to its vertex 1 at 0
+    points = 1 - gauss_lobatto(order, axis)[1:-1]
+    return np.array([shape.CalcShape(x, 0.0, 0.0).NumPy()[2:] for x in points.tolist()])
 
 
 def nodal_basis(trace: BoundaryTrace, segments: Index) -> sp.csr_array:
@@ -68,7 +59,7 @@ def nodal_basis(trace: BoundaryTrace, segments: Index) -> sp.csr_array:
     values = np.zeros((len(nodes), order - 1, order + 1))
     for end in np.unique(axis):
         s = gauss_lobatto(order, int(end))[1:-1]
-        bubbles = np.linalg.inv(edge_bubbles(trace.space, int(end)))
+        bubbles = np.linalg.inv(edge_bubbles(order, int(end)))
         values[axis == end] = bubbles @ np.column_stack([s - 1, np.eye(order - 1), -s])
     rows = np.repeat(nodes[:, 1:-1, None], order + 1, axis=2)
     cols = np.repeat(nodes[:, None, :], order - 1, axis=1)
@@ -141,7 +132,7 @@ def _physical_basis(V: ng.FESpace, trace: BoundaryTrace) -> sp.csr_array:
     value = bary - np.where((triangles[:, :, None] == trace.nodes[:, None, :]).any(axis=2), 0.5, 0)
     numbers = np.array([[*V.GetDofNrs(el.edges[0]), -1][0] for el in mesh.Elements(ng.BND)])
     on = numbers >= 0
-    bubble = 1 / edge_bubbles(ng.H1(mesh, order=2))[0, 0]
+    bubble = 1 / edge_bubbles(2)[0, 0]
     rows = np.repeat(numbers[on], 3)
     edges = from_triplets(
         (bubble * value[on]).ravel(), rows, triangles[on].ravel(), (V.ndof // 2, mesh.nv)
@@ -354,8 +345,8 @@ def segment_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTr
     nodes = ends = view.facets
     space = ng.H1(mesh, order=order)
     if order > 1:
-        # From the end with the lower number, as NGSolve orients its edges.
-        interior = np.array([space.GetDofNrs(el.edges[0]) for el in mesh.Elements(ng.BND)])
+        # From the end with the lower number, as NGSolve orients its edges; after both ends.
+        interior = np.array([el.dofs[2:] for el in space.Elements(ng.BND)])
         interior = np.where((ends[:, 0] < ends[:, 1])[:, None], interior, interior[:, ::-1])
         nodes = np.column_stack([ends[:, 0], interior, ends[:, 1]])
 

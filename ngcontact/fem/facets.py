@@ -216,8 +216,7 @@ class FacetTrace(BoundaryTrace):
     @cached_property
     def _functions(self) -> Index:
         """NGSolve's unknowns (k, q) of each facet, in its order."""
-        elements = self.mesh.Elements(ng.BND)
-        return np.array([self.space.GetDofNrs(el) for el in elements], dtype=np.intp)
+        return np.array([el.dofs for el in self.space.Elements(ng.BND)], dtype=np.intp)
 
     def _functions_at_nodes(self, segments: Index) -> Array:
         """Phi (k, q, q): NGSolve's functions at the nodes, which the order of vertices decides."""

@@ -20,7 +20,7 @@ NEARLY_INCOMPRESSIBLE = 6.0
 # ... and from which order 1 locks: nu = 0.4545, where errors are 1.3 times those of nu = 0.3.
 LOCKING = 11.0
 
-# Laws (q, q) of numbers, by the model.
+# What `_moduli` has of laws of numbers, by the model.
 CONSTANT: WeakKeyDictionary[Elastic | Hooke, dict[str, Array]] = WeakKeyDictionary()
 
 # Voigt strains of a unit of volume, without change of volume, and of shear, as rows.
@@ -61,7 +61,7 @@ class Moduli:
 
 def moduli_of(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Moduli:
     """Moduli of elements `asked` (ne,) for, of all when left out."""
-    shear, bulk, rigidity, ratio = np.zeros((4, mesh.ne))
+    result = np.zeros((4, mesh.ne))
     region = MeshArrays(mesh).bodies
     for pattern, law in problem.materials.items():
         at = np.array(mesh.Materials(pattern).Mask())[region]
@@ -73,18 +73,22 @@ def moduli_of(problem: Problem, mesh: ng.Mesh, asked: Mask | None = None) -> Mod
             points = mesh.MapToAllElements(rule, ng.VOL).reshape(-1, len(rule))[at]
             law_there = law.voigt(problem.model)
             C = np.asarray(law_there(points.ravel()))
-            C = C.reshape(-1, len(rule), *law_there.dims)
+            result[:, at] = _moduli(C.reshape(-1, len(rule), *law_there.dims))
         else:
-            C = _constant(law, problem.model, mesh)[None, None]
-        strains, kappa = mandel(C), _bulk(C)
-        smallest = np.linalg.eigvalsh(strains)[..., 0]  # (2.7)
-        dilatation = np.ones(C.shape[-1])
-        dilatation[-SHEARS[C.shape[-1]] :] = 0.0
-        rest = strains - kappa[..., None, None] * np.outer(dilatation, dilatation)
-        shear[at], bulk[at] = smallest.min(axis=1) / 2, kappa[:, 0]
-        rigidity[at] = np.linalg.eigvalsh(rest)[..., -1].max(axis=1) / 2
-        ratio[at] = 2 * kappa[:, 0] / smallest[:, 0]
-    return Moduli(shear, bulk, rigidity, ratio)
+            result[:, at] = _constant(law, problem.model, mesh)
+    return Moduli(*result)
+
+
+def _moduli(C: Array) -> Array:
+    """Fields (4, k) of `Moduli` by laws `C` (k, n, q, q) at points of k elements."""
+    strains, kappa = mandel(C), _bulk(C)
+    smallest = np.linalg.eigvalsh(strains)[..., 0]  # (2.7)
+    dilatation = np.ones(C.shape[-1])
+    dilatation[-SHEARS[C.shape[-1]] :] = 0.0
+    rest = strains - kappa[..., None, None] * np.outer(dilatation, dilatation)
+    rigidity = np.linalg.eigvalsh(rest)[..., -1].max(axis=1) / 2
+    ratio = 2 * kappa[:, 0] / smallest[:, 0]
+    return np.array([smallest.min(axis=1) / 2, kappa[:, 0], rigidity, ratio])
 
 
 def contact_modulus(problem: Problem, trace: BoundaryTrace, *sides: Index) -> float:
@@ -104,13 +108,13 @@ def contact_modulus(problem: Problem, trace: BoundaryTrace, *sides: Index) -> fl
 
 
 def _constant(law: Elastic | Hooke, model: str, mesh: ng.Mesh) -> Array:
-    """A law of numbers as a matrix (q, q), made once."""
+    """The same (4, 1) of a law of numbers, made once."""
     kept = CONSTANT.setdefault(law, {})
     if model not in kept:
         rule = ng.IntegrationRule([(1 / 3, 1 / 3, 0)], [1])
         C = np.asarray(law.voigt(model)(mesh.MapToAllElements(rule, ng.VOL)[:1]))
         size = round(math.sqrt(C.size))
-        kept[model] = C.reshape(size, size)
+        kept[model] = _moduli(C.reshape(1, 1, size, size))
     return kept[model]
 
 

@@ -117,7 +117,8 @@ class CadEdge:
 
     def normal(self, points: Array) -> Array:
         """Unit normals (k, 2) at the projections of `points` (k, 2), right of the tangent."""
-        return rightward(self.derivative(self.project(points)))
+        t = np.full(len(points), self.start) if self.straight else self.project(points)
+        return rightward(self.derivative(t))
 
     def level(self, axis: Array, values: Array, near: Array) -> Array:
         """Parameters (k,) where coordinates along `axis` (2,), or (k, 2), take `values` (k,).

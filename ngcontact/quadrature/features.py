@@ -273,7 +273,7 @@ def _on_lines(kind: str, lines: list[_Line]) -> tuple[Array, Array]:
         for departure in _departures(components, limit):
             changes = np.diff(np.concatenate([[0], (departure > 0).astype(int), [0]]))
             runs = np.flatnonzero(changes).reshape(-1, 2).tolist()
-            if len(runs) <= FEATURES:  # else no features but roughness, which the estimate tells
+            if 0 < len(runs) <= FEATURES:  # else no features but roughness, which the estimate tells
                 seen = [_feature(line, departure, first, last) for first, last in runs]
                 at, widths = np.reshape(seen, (-1, 2)).T
                 found.append(np.column_stack([line.places(at), widths]))
@@ -308,6 +308,8 @@ def _departures(values: Array, limit: float) -> Array:
     lost = [_lost(values, window) for window in windows]
     for window, (now, then) in zip(windows, pairwise(lost), strict=False):
         some = (now > limit) & (then < SATURATED * now)
+        if not some.any():
+            continue
         around = maximum_filter1d(values, window) - minimum_filter1d(values, window)
         some &= now > STEEP * around
         for peaks, size, value in zip(some, now, values, strict=True):
