@@ -50,8 +50,8 @@ def test_a_large_cold_start_follows_a_coarse_run():
 @pytest.mark.parametrize("order", [2, 4])
 @pytest.mark.parametrize(
     ("made", "most"),
-    # Counted 5400 and 6200; fewer or more by a tenth with other versions of NumPy and SciPy.
-    [(cases.disc_on_rigid_plane, 6000), (cases.partly_opening_block, 6500)],
+    # Counted 4900 and 6000; other versions of NumPy and SciPy may call more or fewer of their own.
+    [(cases.disc_on_rigid_plane, 5100), (cases.partly_opening_block, 6300)],
 )
 def test_a_small_level_calls_few_functions_of_python(made, most, order):
     """What a level of a thousand unknowns costs is calls: of `solve` and the estimate."""

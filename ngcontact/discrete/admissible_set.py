@@ -46,10 +46,8 @@ def _guided(problem: Problem, trace: BoundaryTrace) -> Conditions:
     """Gamma_0, (3.8): zero normal displacement at the nodes, with the exact normals."""
     if problem.sliding is None:
         return no_conditions(trace.model.dim)
-    segments = trace.segments(str(problem.sliding))
-    segment, s = trace.at_nodes(segments)
-    node = trace.nodes[segments].ravel()
-    number, normal = trace.number_points(segment, node, trace.exact_normal(segment, s))
+    node = trace.nodes[trace.segments(str(problem.sliding))].ravel()
+    number, normal = trace.guide(str(problem.sliding))
     _, first = np.unique(number, return_index=True)
     return Conditions(node=node[first], direction=normal, value=np.zeros(len(first)))  # (3.8)
 

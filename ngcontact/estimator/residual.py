@@ -245,9 +245,7 @@ def _guide_normals(solution: ScaledSolution, points: BoundaryPoints) -> Array:
     """Unit vectors (k, 2) by which Gamma_0 is held at points of it."""
     boundary = solution.boundary
     segments = boundary.segments(str(solution.problem.sliding))
-    at, at_node = boundary.at_nodes(segments)
-    node = boundary.nodes[segments].ravel()
-    number, normal = boundary.number_points(at, node, boundary.exact_normal(at, at_node))
+    number, normal = boundary.guide(str(solution.problem.sliding))
     nodal = normal[number].reshape(len(segments), -1, 2)
     return between_nodes(nodal[np.searchsorted(segments, points.segment)], points.s)[0]
 

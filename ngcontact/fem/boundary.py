@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..arrays import Array, Index, Mask, for_components, from_triplets, rightward
 from ..lagrange import at, gauss_lobatto, lagrange, slope
 from ..mesh import CadEdge, cad_edges
-from ..problem import MeshArrays, boundary_mask
+from ..problem import POSITION, MeshArrays, boundary_mask
 from .model import PLANE, Model
 
 CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two rows at a smaller
@@ -210,6 +210,20 @@ class BoundaryTrace:
                 normals[here] = np.where(outward[:, None], exact, -exact)
         return normals
 
+    @cached_property
+    def _guides(self) -> dict[str, tuple[Index, Array]]:
+        return {}
+
+    def guide(self, pattern: str) -> tuple[Index, Array]:
+        """`number_points` at the nodes of the segments of a pattern, with exact normals; kept."""
+        if pattern not in self._guides:
+            segments = self.segments(pattern)
+            segment, s = self.at_nodes(segments)
+            normal = self.exact_normal(segment, s)
+            node = self.nodes[segments].ravel()
+            self._guides[pattern] = self.number_points(segment, node, normal)
+        return self._guides[pattern]
+
     def at_nodes(self, segments: Index) -> tuple[Index, Array]:
         """Segment (n,) and s (n,) of all nodes of `segments` (k,), one segment after the other."""
         return np.repeat(segments, self.order + 1), self.places(segments).ravel()
@@ -352,8 +366,8 @@ def segment_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTr
 
     degree = max(1, mesh.GetCurveOrder())
     rule = ng.IntegrationRule([(1 - s, 0, 0) for s in gauss_lobatto(degree)], [1] * (degree + 1))
-    curve = np.asarray(ng.CF((ng.x, ng.y))(mesh.MapToAllElements(rule, ng.BND)))
-    curve = curve.reshape(-1, degree + 1, 2)
+    curve = np.asarray(POSITION(mesh.MapToAllElements(rule, ng.BND)))
+    curve = curve[:, :2].reshape(-1, degree + 1, 2)
 
     element, inner = view.facet_elements, view.inner_facets
     xy = view.vertices

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask, from_triplets
 from ..mesh import CadFace, cad_faces, face_normals
-from ..problem import MeshArrays
+from ..problem import POSITION, MeshArrays
 from ..reference import triangle
 from .boundary import BENT, CORNER, CORNER_WITHOUT_CAD, BoundaryTrace, segment_trace
 from .model import PLANE, Model
@@ -237,7 +237,7 @@ def facet_trace(mesh: ng.Mesh, order: int) -> FacetTrace:
     degree = max(1, mesh.GetCurveOrder())
     points = [(x, y, 0.0) for x, y, _ in triangle.nodes(degree)]
     rule = ng.IntegrationRule(points, [1.0] * len(points))
-    curve = np.asarray(ng.CF((ng.x, ng.y, ng.z))(mesh.MapToAllElements(rule, ng.BND)))
+    curve = np.asarray(POSITION(mesh.MapToAllElements(rule, ng.BND)))
     curve = curve.reshape(len(vertices), len(points), 3)
     element = view.facet_elements
     a, b, c = curve[:, :3].transpose(1, 0, 2)

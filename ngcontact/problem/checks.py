@@ -17,7 +17,7 @@ import numpy as np
 from netgen.occ import OCCGeometry
 
 from ..arrays import Array, Index, Mask
-from .mesh_arrays import MeshArrays, on_axis
+from .mesh_arrays import POSITION, MeshArrays, on_axis
 from .values import body_mask, boundary_mask, refuse_where
 
 # By 'argument "pattern"': which of the r boundaries or bodies of a mesh it selects, bool (r,).
@@ -281,7 +281,7 @@ def check_values(
 
 def _of_coordinates(points: Array, gap: Callable[..., Any], label: str, dim: int) -> Array:
     """Values (k,) of a function of coordinates at mesh `points` (k,), refused if no number each."""
-    x = ng.CF((ng.x, ng.y, ng.z))(points).T[:dim].copy()
+    x = POSITION(points).T[:dim].copy()
     names, count = (("x, y", "two"), ("x, y, z", "three"))[dim - 2]
     try:
         values = np.asarray(gap(*x))

@@ -19,6 +19,8 @@ PARAMETERS = 32  # bytes of Netgen's triangles before those of their corners' su
 
 ON_AXIS = 1e-9  # radius, relative to the largest, up to which a point lies on the axis x = 0
 
+POSITION = ng.CF((ng.x, ng.y, ng.z))  # of a mesh point, lengths
+
 _RECORDS: dict[tuple[type, int], np.dtype] = {}  # Netgen's layouts, of kinds of so many bytes
 
 

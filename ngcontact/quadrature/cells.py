@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask, root_of_squares
-from ..problem import MeshArrays
+from ..problem import POSITION, MeshArrays
 
 DEEPEST = {1: 38, 2: 10}  # halvings of the sides: points beside corners of smaller parts are these
 MOST_CELLS = 20_000  # parts that are halved at a time: rougher functions are noise
@@ -362,7 +362,7 @@ class SampledElements:
 
     def positions(self, elements: Index, reference: Array) -> Array:
         """Places (j, 2) at a point `reference` (j, dim) of each of `elements` (j,)."""
-        return self.evaluate(ng.CF((ng.x, ng.y)), elements, reference[:, None])[:, 0]
+        return self.evaluate(POSITION, elements, reference[:, None])[:, 0, :2]
 
     def samples(
         self, function: ng.CoefficientFunction, elements: Index, fewest: int = 0

@@ -25,7 +25,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask
 from ..errors import warn
-from ..problem import Problem, numbers, varies
+from ..problem import POSITION, Problem, numbers, varies
 from .cells import Cells, SampledElements, lattice, looked
 
 ON_LINE = 2048  # samples of a boundary: none are further apart than 1 / 1365 of it
@@ -174,7 +174,7 @@ def _values(function: Function, points: NDArray) -> Array:
     if isinstance(function, ng.CoefficientFunction):
         values = looked(function, points)
     else:
-        x, y = ng.CF((ng.x, ng.y))(points).T.copy()
+        x, y, _ = POSITION(points).T.copy()
         values = np.asarray(function(x, y), dtype=float)[:, None]
     return np.where(np.isfinite(values), values, 0.0)
 
@@ -273,7 +273,7 @@ def _on_lines(kind: str, lines: list[_Line]) -> tuple[Array, Array]:
         for departure in _departures(components, limit):
             changes = np.diff(np.concatenate([[0], (departure > 0).astype(int), [0]]))
             runs = np.flatnonzero(changes).reshape(-1, 2).tolist()
-            if 0 < len(runs) <= FEATURES:  # else no features but roughness, which the estimate tells
+            if 0 < len(runs) <= FEATURES:  # more are roughness, which the estimate tells
                 seen = [_feature(line, departure, first, last) for first, last in runs]
                 at, widths = np.reshape(seen, (-1, 2)).T
                 found.append(np.column_stack([line.places(at), widths]))
