@@ -74,7 +74,7 @@ def rings(
     hole = positive("inner", inner)
     shaft = above("interface", interface, "inner", hole)
     rim = above("outer", outer, "interface", shaft)
-    bore = _bore(hole, shaft, rim, interference)
+    bore = bore_of(hole, shaft, rim, interference)
     part = _quarter_ring if flag("quarter", quarter) else _full_ring
     return compound(
         part("inner", hole, shaft, "hole", "inner_contact"),
@@ -147,7 +147,7 @@ def ball_in_socket(
     return compound(body("ball", ball), body("socket", socket))
 
 
-def _bore(hole: float, shaft: float, rim: float, interference: float) -> float:
+def bore_of(hole: float, shaft: float, rim: float, interference: float) -> float:
     """Inner radius of the outer ring, refused where it leaves the radii `hole` to `rim`."""
     bore = shaft - finite("interference", interference)
     if not hole < bore < rim:

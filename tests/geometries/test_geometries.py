@@ -24,6 +24,8 @@ from ngcontact.geometries import (
     sleeve_on_shaft,
 )
 
+from .test_solids import SOLIDS
+
 PI = math.pi
 LINE = ((-1.0, 0.0), (-0.2, 0.3), (0.5, -0.1), (1.0, 0.2))  # a convex and a re-entrant corner
 SLOPE = math.tan(math.radians(10))
@@ -89,9 +91,9 @@ def ends_of(geometry, name):
 
 
 def test_docstrings_list_the_regions_of_every_geometry():
-    assert {make.__name__ for make, *_ in CASES} == set(geometries.__all__)
+    assert {make.__name__ for make, *_ in CASES + SOLIDS} == set(geometries.__all__)
     found = {}
-    for make, options, _ in CASES:
+    for make, options, _ in CASES + SOLIDS:
         mesh = mesh_of(make(**options), order=1)
         names = {*mesh.GetMaterials(), *mesh.GetBoundaries()}
         found.setdefault(make, set()).update(names)

@@ -9,7 +9,7 @@ import pytest
 
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries.solids import shells
+from ngcontact.geometries import shells
 
 # Radii 0.5, 1, 1.5, moduli 1 and 3, Poisson's ratios .3 and .2, overlap .01: c1 = .55, c2 = 7 / 19.
 PRESSURE = 0.01 / (0.55 + 7 / 19)
@@ -20,7 +20,7 @@ def press_fit(geometry):
     return Problem(
         geometry=geometry,
         materials=LAWS,
-        sliding=["x", "y", "z"],
+        sliding="cut_x|cut_y|cut_z",
         contact=[Contact("inner_contact", "outer_contact", gap=-0.01)],
     )
 
@@ -29,7 +29,7 @@ def unmatched(one, other):
     """A mesh of both shells whose nodes do not face each other, with these sizes."""
     geometry = shells()
     for part in (*geometry.shape.faces, *geometry.shape.solids):
-        part.maxh = one if part.name.startswith("inner") else other
+        part.maxh = one if part.name in ("inner", "inner_contact", "hole") else other
     return ng.Mesh(geometry.GenerateMesh(maxh=max(one, other)))
 
 
