@@ -224,6 +224,23 @@ class BoundaryTrace:
             self._guides[pattern] = self.number_points(segment, node, normal)
         return self._guides[pattern]
 
+    def beyond_cad(self, segment: Index, points: Array) -> Array:
+        """Distance (k,) of `points` (k, 2) beyond the CAD curves of segments `segment` (k,).
+
+        Negative within the body; infinite at straight curves and without CAD.
+        """
+        beyond, edges = np.full(len(points), np.inf), self.edges or []
+        outward = self.normal(segment, np.full(len(segment), 0.5))
+        for region in np.unique(self.region[segment]) if edges else ():
+            edge = edges[region]
+            at = np.flatnonzero(self.region[segment] == region)
+            if not edge.straight:
+                normal = edge.normal(points[at])
+                normal *= np.sign((normal * outward[at]).sum(axis=1))[:, None]
+                foot = edge.point(edge.project(points[at]))
+                beyond[at] = ((points[at] - foot) * normal).sum(axis=1)
+        return beyond
+
     def at_nodes(self, segments: Index) -> tuple[Index, Array]:
         """Segment (n,) and s (n,) of all nodes of `segments` (k,), one segment after the other."""
         return np.repeat(segments, self.order + 1), self.places(segments).ravel()

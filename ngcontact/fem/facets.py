@@ -19,7 +19,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ..arrays import Array, Index, Mask, from_triplets
-from ..mesh import CadFace, cad_faces, face_normals
+from ..mesh import CadFace, beyond_faces, cad_faces, face_normals
 from ..problem import POSITION, MeshArrays
 from ..reference import triangle
 from .boundary import BENT, CORNER, CORNER_WITHOUT_CAD, BoundaryTrace, segment_trace
@@ -77,6 +77,11 @@ class FacetTrace(BoundaryTrace):
         if exact is None:
             return normals
         return exact * np.where((exact * normals).sum(axis=1) < 0, -1.0, 1.0)[:, None]
+
+    def beyond_cad(self, segment: Index, points: Array) -> Array:
+        """Distance (k,) of `points` (k, 3) beyond the CAD faces of facets `segment` (k,)."""
+        middle = np.tile(triangle.CENTRE, (len(segment), 1))
+        return beyond_faces(self.mesh, segment, points, self.normal(segment, middle))
 
     def at_nodes(self, segments: Index) -> tuple[Index, Array]:
         """Facet (n,) and s (n, 3) of all nodes of `segments` (k,), one facet after the other."""

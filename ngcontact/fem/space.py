@@ -274,7 +274,11 @@ def normal_stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.Coef
 
 
 def von_mises(stress: Array) -> Array:
-    """Von Mises stress (k,) of the components xx, yy, xy, zz in `stress` (k, 4), same units."""
+    """Von Mises stress (k,) of the components xx, yy, xy, zz in `stress` (k, 4), same units.
+
+    Of solids yz and xz follow, (k, 6).
+    """
     size = float(np.abs(stress).max(initial=0.0)) or 1.0  # squares must stay in range
-    xx, yy, xy, zz = stress.T / size
-    return size * np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * xy**2)
+    xx, yy, xy, zz, *others = stress.T / size
+    shear = sum((other**2 for other in others), xy**2)
+    return size * np.sqrt(((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) / 2 + 3 * shear)

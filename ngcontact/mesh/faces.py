@@ -43,6 +43,10 @@ class CadFace:
         values = np.array([[(a.x, a.y, a.z) for a in one] for one in found]).reshape(-1, 3, 3)
         return values[:, 0], values[:, 1:].transpose(0, 2, 1)
 
+    def point(self, uv: Array) -> Array:
+        """Points (k, 3) at parameters (k, 2)."""
+        return self._at(uv)[0]
+
     def normal_at(self, uv: Array) -> Array:
         """Unit normals (k, 3) at parameters `uv` (k, 2), on one side of the face or the other."""
         normals = [list(self._surface.Normal(float(u), float(v))) for u, v in uv]
@@ -137,3 +141,21 @@ def face_normals(mesh: ng.Mesh, facets: Index, shapes: Array, points: Array) -> 
         feet = face.project(points[at[first]], start[first])
         normals[at] = face.normal_at(feet)[back.ravel()]
     return normals
+
+
+def beyond_faces(mesh: ng.Mesh, facets: Index, points: Array, outward: Array) -> Array:
+    """Distance (k,) of `points` (k, 3) beyond the CAD faces of `facets` (k,).
+
+    Negative within the body, where `outward` (k, 3) points away from it; infinite at plane faces
+    and without CAD.
+    """
+    beyond, faces, view = np.full(len(points), np.inf), cad_faces(mesh) or [], MeshArrays(mesh)
+    region, uv = view.boundaries, view.surface_parameters
+    for number in np.unique(region[facets]) if faces else ():
+        at, face = np.flatnonzero(region[facets] == number), faces[number]
+        if face.plane(uv[region == number].reshape(-1, 2)) is None:
+            feet = face.project(points[at], unwrapped(uv[facets[at]]).mean(axis=1))
+            normal = face.normal_at(feet)
+            normal *= np.sign((normal * outward[at]).sum(axis=1))[:, None]
+            beyond[at] = ((points[at] - face.point(feet)) * normal).sum(axis=1)
+    return beyond

@@ -87,9 +87,12 @@ def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
 
 
 def full_stress(solution: Solved) -> ng.CoefficientFunction:
-    """Stress components xx, yy, xy and zz, the one normal to the plane, (4,)."""
+    """Stress components xx, yy, xy, zz, the one normal to the plane, (4,); of solids yz, xz."""
     stress = solution.stress
-    return ng.CF((stress[0, 0], stress[1, 1], stress[0, 1], solution.out_of_plane_stress))
+    plane = stress[0, 0], stress[1, 1], stress[0, 1]
+    if solution.mesh.dim == 3:
+        return ng.CF((*plane, stress[2, 2], stress[1, 2], stress[0, 2]))
+    return ng.CF((*plane, solution.out_of_plane_stress))
 
 
 def principal_stresses(stress: Array) -> Array:

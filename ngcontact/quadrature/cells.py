@@ -277,7 +277,10 @@ def divisions(dim: int, sizes: Array, extent: float) -> Index:
 
 @dataclass(frozen=True, eq=False)
 class SampledElements:
-    """All triangles of a mesh, `dim` 2, or all segments of its boundary, 1."""
+    """All triangles of a mesh, `dim` 2, or all segments of its boundary, 1.
+
+    Points and values are those of tetrahedra, too, with `dim` 3, and of their boundary, 2.
+    """
 
     mesh: ng.Mesh
     dim: int
@@ -337,8 +340,9 @@ class SampledElements:
 
     @cached_property
     def _middles(self) -> NDArray:
-        rule = ng.IntegrationRule([(1 / 3, 1 / 3 if self.dim == 2 else 0.0, 0.0)], [1])
-        return self.mesh.MapToAllElements(rule, ng.VOL if self.dim == 2 else ng.BND)
+        middle = [*[1 / (self.dim + 1)] * self.dim, *[0.0] * (3 - self.dim)]
+        kind = ng.VOL if self.dim == self.mesh.dim else ng.BND
+        return self.mesh.MapToAllElements(ng.IntegrationRule([middle], [1]), kind)
 
     def points(self, elements: Index, reference: Array) -> NDArray:
         """NGSolve's points (j, n) at `reference` (j, n, dim), or (n, dim), of `elements` (j,)."""
@@ -346,7 +350,7 @@ class SampledElements:
         points = self._middles[np.repeat(elements, reference.shape[1])]
         points = points.reshape(reference.shape[:2])
         for axis in range(self.dim):
-            points["xy"[axis]] = reference[..., axis]
+            points["xyz"[axis]] = reference[..., axis]
         return points
 
     def evaluate(
