@@ -1,4 +1,4 @@
-"""Nodes of curved triangles with values of a solution there; neighbours on curves."""
+"""Nodes of curved triangles and tetrahedra, values of a solution there; neighbours on curves."""
 
 from __future__ import annotations
 
@@ -16,18 +16,24 @@ from ..arrays import Array, Index, from_triplets
 from ..problem import MeshArrays
 from ..solved import Solved
 
+# Of VTK's tetrahedra, by the numbers of their vertices.
+EDGES = (0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)
+FACES = (0, 1, 3), (1, 2, 3), (2, 0, 3), (0, 2, 1)
+# Places of the components of `full_stress` in the tensor.
+COMPONENTS = (0, 0), (1, 1), (0, 1), (2, 2), (1, 2), (0, 2)
+
 
 @dataclass(frozen=True, eq=False)
 class Nodes:
-    """Lagrange nodes of a triangle mesh, shared inside a body and never between bodies."""
+    """Lagrange nodes of a mesh, shared inside a body and never between bodies."""
 
-    cells: Index  # (ne, n) in VTK's order, n = (order + 1) (order + 2) / 2
+    cells: Index  # (ne, n) in VTK's order, of triangles n = (order + 1) (order + 2) / 2
     body: Index  # (ne,), position of the element's region in `names`
     names: tuple[str, ...]  # the material regions
     at: NDArray[Any]  # (k,), the same nodes as mesh points, element after element: k = ne n
 
     def values(self, function: ng.CoefficientFunction) -> Array:
-        """Nodal values (k, dim) at all k nodes: the mean over the triangles that meet there."""
+        """Nodal values (k, dim) at all k nodes: the mean over the elements that meet there."""
         numbers = self.cells.ravel()
         found = np.asarray(function(self.at), dtype=float).reshape(len(numbers), -1)
         count = np.bincount(numbers)
@@ -48,6 +54,17 @@ def lattice(order: int) -> Index:
     return np.concatenate([order * unit, *edges, *inside])
 
 
+def tetrahedron(order: int) -> Index:
+    """Barycentric indices (n, 4) of the nodes of VTK's Lagrange tetrahedron of order 1, 2 or 3.
+
+    With respect to Netgen's vertices: VTK sees its tetrahedra turned inside out.
+    """
+    unit, step = np.eye(4, dtype=np.intp)[[1, 0, 2, 3]], np.arange(1, order)[:, None]
+    edges = [(order - step) * unit[a] + step * unit[b] for a, b in EDGES]
+    faces = [unit[list(face)].sum(axis=0)[None] for face in FACES] if order == 3 else []
+    return np.concatenate([order * unit, *edges, *faces])
+
+
 def subdivision(order: int) -> tuple[list[list[int]], list[list[int]]]:
     """Small triangles (order^2, 3) and sides (3, order + 1) of a `lattice` triangle."""
     number = {(b, c): k for k, (_, b, c) in enumerate(lattice(order).tolist())}
@@ -63,22 +80,25 @@ def subdivision(order: int) -> tuple[list[list[int]], list[list[int]]]:
 
 
 def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
-    """Nodes of the Lagrange triangles of a mesh; ``ValueError`` if it has other elements."""
-    weights = lattice(order)
-    # NGSolve's reference triangle has its vertices at (1, 0), (0, 1), (0, 0).
-    places = [(a / order, b / order, 0.0) for a, b, _ in weights]
-    rule = ng.IntegrationRule(places, [0.0] * len(places))
-    at = mesh.MapToAllElements({ng.TRIG: rule}, ng.VOL)
+    """Nodes of the Lagrange elements of a mesh of simplices; ``ValueError`` if it has others."""
+    solid = mesh.dim == 3
+    weights = tetrahedron(order) if solid else lattice(order)
+    # NGSolve's reference triangle has its vertices at (1, 0), (0, 1), (0, 0), and so on in space.
+    places = np.zeros((len(weights), 3))
+    places[:, : mesh.dim] = weights[:, : mesh.dim] / order
+    rule = ng.IntegrationRule([tuple(x) for x in places.tolist()], [0.0] * len(places))
+    at = mesh.MapToAllElements({ng.TET if solid else ng.TRIG: rule}, ng.VOL)
     view = MeshArrays(mesh)
     if others := view.without_simplices():
-        raise ValueError(f"{others} elements of the mesh are no triangles; mesh without quads")
+        kind, right = ("tetrahedra", "hexahedra") if solid else ("triangles", "quads")
+        raise ValueError(f"{others} elements of the mesh are no {kind}; mesh without {right}")
     names = tuple(dict.fromkeys(mesh.GetMaterials()))
     regions = np.array([names.index(name) for name in mesh.GetMaterials()], dtype=np.intp)
     body = regions[view.bodies]
     vertices = view.elements * len(names) + body[:, None]
     # A node is known by the vertices it leans on and its weights there, from any triangle.
     key = np.where(weights > 0, vertices[:, None, :] * (order + 1) + weights, 0)
-    key = np.sort(key.reshape(-1, 3), axis=1)
+    key = np.sort(key.reshape(-1, mesh.dim + 1), axis=1)
     rank = np.lexsort(key.T)
     fresh = np.any(np.diff(key[rank], axis=0, prepend=-1), axis=1)
     cells = np.empty(len(key), dtype=np.intp)
@@ -95,11 +115,17 @@ def full_stress(solution: Solved) -> ng.CoefficientFunction:
     return ng.CF((*plane, solution.out_of_plane_stress))
 
 
+def stress_tensors(stress: Array) -> Array:
+    """Stress (k, 3, 3) with the components (k, 4), or (k, 6), of `full_stress`."""
+    tensors = np.zeros((len(stress), 3, 3))
+    for (i, j), component in zip(COMPONENTS, stress.T, strict=False):
+        tensors[:, i, j] = tensors[:, j, i] = component
+    return tensors
+
+
 def principal_stresses(stress: Array) -> Array:
-    """Principal stresses (k, 3), the largest first, of xx, yy, xy, zz in `stress` (k, 4)."""
-    xx, yy, xy, zz = stress.T
-    mean, radius = (xx + yy) / 2, np.hypot((xx - yy) / 2, xy)
-    return np.asarray(-np.sort(-np.stack([mean + radius, mean - radius, zz], axis=1), axis=1))
+    """Principal stresses (k, 3), the largest first, of `stress` (k, 4) or (k, 6)."""
+    return np.asarray(np.linalg.eigvalsh(stress_tensors(stress))[:, ::-1])
 
 
 def neighbour_tree(points: Array) -> csr_array:

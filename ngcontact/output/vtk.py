@@ -20,14 +20,16 @@ from ..problem import ABOUT_AN_AXIS
 from ..solved import Solved
 from .files import check_path, replacing
 from .nodes import full_stress, neighbour_tree, nodes_of, subdivision
+from .surface import contact_surface
 
 if TYPE_CHECKING:
     import pyvista
 
 PLANE = ("xx", "yy", "xy", "zz")  # components of a stress, as `full_stress` orders them
 MERIDIAN = ("rr", "zz", "rz", "hoop")
-VTK_CELL = {1: 5, 2: 22}  # VTK_TRIANGLE, VTK_QUADRATIC_TRIANGLE
-VTK_LAGRANGE_TRIANGLE = 69  # every higher order
+SOLID = ("xx", "yy", "zz", "xy", "yz", "xz")  # as VTK orders those of a symmetric tensor
+# Triangles and tetrahedra: linear, quadratic, Lagrange's of every higher order.
+VTK_CELLS = {2: (5, 22, 69), 3: (10, 24, 71)}
 VTK_WEDGE = 13
 SECTION_ANGLE = 6.0  # degrees between two sections of a body of revolution, at most
 
@@ -52,15 +54,18 @@ def write_solution(
 ) -> Path:
     """Bodies of a solution as ``.vtu``, contact points beside it as ``<stem>_contact.vtp``.
 
-    The cells are Lagrange triangles of the order of the geometry or of the displacement,
-    whichever is higher. Point data: ``displacement``, ``stress`` (xx, yy, xy and zz, the one
-    normal to the plane; of bodies of revolution rr, zz, rz and hoop; means inside each body),
-    ``hoop_stress`` of bodies of revolution, and ``von_mises``, made of ``stress``. Cell data:
-    ``body``, whose names are the field data ``body_names``, and ``indicators`` if they have
-    been computed already.
+    The cells are Lagrange triangles or tetrahedra of the order of the geometry or of the
+    displacement, whichever is higher. Point data: ``displacement``, ``stress`` (xx, yy, xy and zz,
+    the one normal to the plane; of bodies of revolution rr, zz, rz and hoop; of solids xx, yy, zz,
+    xy, yz and xz; means inside each body), ``hoop_stress`` of bodies of revolution, and
+    ``von_mises``, made of ``stress``. Cell data: ``body``, whose names are the field data
+    ``body_names``, and ``indicators`` if they have been computed already.
     Contact points: ``pressure``, ``gap``, ``force``, ``active``, ``pair``, and the ``traction`` on
-    the secondary, a vector. Field data of both files: the names by number of the pair in
-    ``pair_names``, ``secondary_names``, ``primary_names``. Any consistent units. Returns the path.
+    the secondary, a vector. Those of solids are joined by triangles, some corners of which are no
+    contact points: ``contact_point`` is 0 there, as are force and traction; pressure and gap are
+    means of those beside, or 0 and NaN where the surface faces nothing. Field data of both files:
+    the names by number of the pair in ``pair_names``, ``secondary_names``, ``primary_names``. Any
+    consistent units. Returns the path.
     A file appears complete or not at all. Raises ``ValueError`` and ``OSError`` as `check_path`
     does, before any work. Of the `sections` of a body of revolution see `write_revolved`.
     """
@@ -71,7 +76,8 @@ def write_solution(
     from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
     writers = vtkXMLUnstructuredGridWriter(), vtkXMLPolyDataWriter()
-    made = _bodies(solution, sections), _contact(solution, sections)
+    contact = _surfaces if solution.mesh.dim == 3 else _contact
+    made = bodies_of(solution, sections), contact(solution, sections)
     with replacing(target, beside) as drafts:
         for writer, data, draft in zip(writers, made, drafts, strict=True):
             writer.SetFileName(str(draft))
@@ -164,8 +170,8 @@ def _increasing(times: Iterable[float]) -> list[float]:
 
 
 def _in_space(vectors: Array) -> Array:
-    """Vectors (k, 2) with a third component 0."""
-    return np.column_stack([vectors, np.zeros(len(vectors))])
+    """Vectors (k, d) with a third component 0 in the plane."""
+    return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
 def _sized(cells: Index) -> Index:
@@ -173,16 +179,18 @@ def _sized(cells: Index) -> Index:
     return np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
 
 
-def _bodies(solution: Estimated, sections: Sections | None = None) -> pyvista.UnstructuredGrid:
-    """Bodies with their fields: curved triangles, or wedges between `sections`."""
+def bodies_of(solution: Estimated, sections: Sections | None = None) -> pyvista.UnstructuredGrid:
+    """Bodies with their fields: curved elements, or wedges between `sections`."""
     import pyvista
 
-    order, u = max(solution.mesh.GetCurveOrder(), solution.order), solution.displacement
-    nodes = nodes_of(solution.mesh, order)
-    values = nodes.values(ng.CF((ng.x, ng.y, u[0], u[1], full_stress(solution))))
+    order, d = max(solution.mesh.GetCurveOrder(), solution.order), solution.mesh.dim
+    nodes, place = nodes_of(solution.mesh, order), (ng.x, ng.y, ng.z)[:d]
+    values = nodes.values(ng.CF((*place, solution.displacement, full_stress(solution))))
     about_an_axis = solution.problem.model in ABOUT_AN_AXIS
     components, names = [0, 1, 2, 3], MERIDIAN if about_an_axis else PLANE
-    cells, kind, body = nodes.cells, VTK_CELL.get(order, VTK_LAGRANGE_TRIANGLE), nodes.body
+    if d == 3:
+        components, names = [0, 1, 3, 2, 4, 5], SOLID
+    cells, kind, body = nodes.cells, VTK_CELLS[d][min(order, 3) - 1], nodes.body
     lifted, times = _in_space, 1
     if sections is not None:
         triangles = nodes.cells[:, subdivision(order)[0]].reshape(-1, 3)
@@ -193,9 +201,9 @@ def _bodies(solution: Estimated, sections: Sections | None = None) -> pyvista.Un
         components, names = [0, 1, 3, 2], ("rr", "zz", "hoop", "rz")
         lifted, times = sections.turned, len(sections.angles)
     kinds = np.full(len(cells), kind, dtype=np.uint8)
-    grid = pyvista.UnstructuredGrid(_sized(cells), kinds, lifted(values[:, :2]))
-    stress = values[:, 4:]
-    grid.point_data["displacement"] = lifted(values[:, 2:4])
+    grid = pyvista.UnstructuredGrid(_sized(cells), kinds, lifted(values[:, :d]))
+    stress = values[:, 2 * d :]
+    grid.point_data["displacement"] = lifted(values[:, d : 2 * d])
     grid.point_data["stress"] = np.tile(stress[:, components], (times, 1))
     for k, name in enumerate(names):
         grid.GetPointData().GetAbstractArray("stress").SetComponentName(k, name)
@@ -237,6 +245,39 @@ def _contact(solution: Solved, sections: Sections | None = None) -> pyvista.Poly
             kind = np.int32 if name in ("active", "pair") else float
             data.point_data[name] = np.tile(np.asarray(getattr(solution, name), kind), times)
         data.point_data["traction"] = lifted(-solution.pressure[:, None] * solution.direction)
+    _name_pairs(data, solution)
+    return data
+
+
+def _surfaces(solution: Solved, sections: Sections | None = None) -> pyvista.PolyData:
+    """Contact points of solids and the triangles between them; solids have no `sections`."""
+    import pyvista
+
+    points, triangles = solution.points, []
+    values = np.column_stack([solution.pressure, solution.gap, solution.pair])
+    for pair in np.unique(solution.pair).tolist():
+        surface = contact_surface(solution, pair)
+        others = surface.row < 0
+        number = np.where(others, len(points) - 1 + np.cumsum(others), surface.row)
+        triangles.append(number[surface.triangles])
+        own = [np.nan_to_num(surface.values(solution.pressure)), surface.values(solution.gap)]
+        own.append(np.full(len(others), float(pair)))
+        points = np.concatenate([points, surface.points[others]])
+        values = np.concatenate([values, np.stack(own, axis=1)[others]])
+    data = pyvista.PolyData()
+    if m := len(solution.points):
+        single, faces = np.arange(m)[:, None], _sized(np.concatenate(triangles))
+        data = pyvista.PolyData(points, verts=_sized(single), faces=faces)
+        data.point_data["pressure"], data.point_data["gap"] = values[:, 0], values[:, 1]
+        data.point_data["pair"] = values[:, 2].astype(np.int32)
+        for name, known in {
+            "force": solution.force,
+            "active": solution.active.astype(np.int32),
+            "contact_point": np.ones(m, dtype=np.int32),
+            "traction": -solution.pressure[:, None] * solution.direction,
+        }.items():
+            shape = (len(points) - m, *known.shape[1:])
+            data.point_data[name] = np.concatenate([known, np.zeros(shape, known.dtype)])
     _name_pairs(data, solution)
     return data
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from ..arrays import Array, Index, Mask, joined, rows_of
+from ..arrays import Array, Index, joined, rows_of
 from ..fem import BoundaryTrace, von_mises
-from ..output import full_stress, principal_stresses
+from ..output import COMPONENTS, full_stress, principal_stresses, stress_tensors
 from ..problem import MeshArrays, body_mask, regions_of
 from ..quadrature import SampledElements
 from ..solved import Solved
@@ -22,8 +23,6 @@ INSIDE = 1e-9  # barycentric coordinate, negative, up to which a point lies in a
 ROUND_OFF = 64 * np.finfo(float).eps  # ... relative to coordinates over the element's size
 # Side of an element, in the order of `MeshArrays.sides`, opposite to each of its vertices.
 OPPOSITE = {2: [1, 2, 0], 3: [3, 2, 1, 0]}
-# Places of xx, yy, xy and zz, and of yz and xz, in the tensor.
-COMPONENTS = [(0, 0), (1, 1), (0, 1), (2, 2), (1, 2), (0, 2)]
 BULGE = 1.5  # radius of a curved element over that of its vertices: 1.2 on a quarter of a circle
 STEPS = 30  # of Newton's method; measured: 7 at most on a disc of eight elements
 CHUNK = 20_000  # points at a time
@@ -175,18 +174,19 @@ class Values:
     @property
     def von_mises(self) -> Array:
         """Von Mises stress (...,)."""
-        known = np.isfinite(self.tensor).all(axis=(-1, -2))
-        result = np.full(self.body.shape, np.nan)
-        rows, columns = np.transpose(COMPONENTS)
-        result[known] = von_mises(self.tensor[known][:, rows, columns])
-        return result
+        return self._where_known(von_mises, ())
 
     @property
     def principal_stresses(self) -> Array:
         """The three principal stresses (..., 3), the largest first."""
+        return self._where_known(principal_stresses, (3,))
+
+    def _where_known(self, function: Callable[[Array], Array], shape: tuple[int, ...]) -> Array:
+        """Values (..., *shape) of a `function` of components (k, 6), NaN outside of bodies."""
         known = np.isfinite(self.tensor).all(axis=(-1, -2))
-        result = np.full((*self.body.shape, 3), np.nan)
-        result[known] = np.linalg.eigvalsh(self.tensor[known])[:, ::-1]
+        result = np.full((*self.body.shape, *shape), np.nan)
+        rows, columns = np.transpose(COMPONENTS)
+        result[known] = function(self.tensor[known][:, rows, columns])
         return result
 
     @property
@@ -228,9 +228,8 @@ def values_at(
     sums = [np.bincount(found.point, column, minlength=len(flat)) for column in known.T]
     with np.errstate(invalid="ignore"):
         means = np.stack(sums, axis=1) / count[:, None]  # 0 / 0 is NaN
-    tensor = np.where(np.isnan(means[:, -1:, None]), np.nan, np.zeros((3, 3)))
-    for (i, j), component in zip(COMPONENTS, means[:, d:].T, strict=False):
-        tensor[:, i, j] = tensor[:, j, i] = component
+    tensor = stress_tensors(means[:, d:])
+    tensor[count == 0] = np.nan
     names = np.array([*mesh.GetMaterials(), ""])
     region = np.full(len(flat), -1)
     region[found.point] = MeshArrays(mesh).bodies[found.element]
