@@ -15,7 +15,7 @@ import numpy as np
 from . import __version__
 from .adaptivity import RefinementTree
 from .estimator import Measured
-from .output import Profile, Unit, plot_solution, write_revolved, write_solution
+from .output import Profile, Unit, plot_solids, plot_solution, write_revolved, write_solution
 from .results import (
     Number,
     Values,
@@ -230,7 +230,8 @@ class Solution(Measured):
             `mirror` that is no line of symmetry.
         """
         options = {"units": units or {}, "profile": profile or {}, "mesh": mesh, "mirror": mirror}
-        plot_solution(self, path, scale, field=field, limits=limits, **options)
+        draw = plot_solids if self.problem.dim == 3 else plot_solution
+        draw(self, path, scale, field=field, limits=limits, **options)
 
     __repr__ = __str__  # instead of all arrays
 

@@ -12,6 +12,7 @@ from .pictures import plot_solution as plot_solution
 from .pictures import write_film as write_film
 from .scene import Profile as Profile
 from .scene import Unit as Unit
+from .solids import plot_solids as plot_solids
 from .vtk import write_revolved as write_revolved
 from .vtk import write_series as write_series
 from .vtk import write_solution as write_solution

@@ -6,11 +6,11 @@ import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..arrays import Array
+from ..arrays import Array, Index, Mask
 from ..solved import Solved
 from .files import check_path, replacing
 from .scene import Scene, Style, contact_lines, coordinates, picture, zones_of
@@ -44,6 +44,14 @@ FILM_DPI = 80
 HEADROOM = 1.05  # of the largest pressure in a film
 
 Window = tuple[Array, Array]  # lower left and upper right corner, each (2,)
+
+
+class Scale(NamedTuple):
+    """What is beside the colours of a picture."""
+
+    label: str
+    ends: tuple[float, float]  # of the values
+    limits: tuple[float, float]  # of the colours
 
 
 def plot_solution(
@@ -252,17 +260,25 @@ def colour_range(scene: Scene, windows: Sequence[Window]) -> tuple[float, float]
     stresses at corners and at ends of supports, which grow on every finer mesh. Where both signs
     occur colours are symmetric about 0.
     """
-    values, areas = np.abs(scene.values), scene.areas()
-    mean, middle = values[scene.triangles].mean(axis=1), scene.moved[scene.triangles].mean(axis=1)
-    top = _all_but(PEAK_AREA, mean, areas)
-    for low, high in windows:
-        seen = np.all((middle >= low) & (middle <= high), axis=1)
-        if seen.any():
-            top = max(top, _all_but(PEAK_AREA, mean[seen], areas[seen]))
-    largest = float(values.max(initial=0.0))
+    middle = scene.moved[scene.triangles].mean(axis=1)
+    parts = [np.all((middle >= low) & (middle <= high), axis=1) for low, high in windows]
+    return colour_limits(scene.values, scene.triangles, scene.areas(), parts)
+
+
+def colour_limits(
+    values: Array, triangles: Index, areas: Array, parts: Sequence[Mask]
+) -> tuple[float, float]:
+    """Ends of the scale of `values` (k,) at nodes, of all `triangles` (t, 3) and of some `parts`.
+
+    See `colour_range`; `areas` (t,) are those of the triangles.
+    """
+    mean = np.abs(values)[triangles].mean(axis=1)
+    seen = [np.ones(len(areas), dtype=bool), *(part for part in parts if part.any())]
+    top = max(_all_but(PEAK_AREA, mean[part], areas[part]) for part in seen)
+    largest = float(np.abs(values).max(initial=0.0))
     top = largest if largest <= CUT_OFF * top else top
     top = top or 1.0
-    return (-top, top) if scene.values.min(initial=0.0) < 0 else (0.0, top)
+    return (-top, top) if values.min(initial=0.0) < 0 else (0.0, top)
 
 
 def draw_scene(
@@ -293,7 +309,10 @@ def draw_scene(
     space = " " if width / height > 0.9 else "\n"
     bodies.set_title(f"deformed bodies,{space}displacement × {scene.scale:g}")
     _draw_windows(bodies, close, windows, style.unit("length")[1])
-    _colour_bar(figure, shading, [bodies, *close], scene, limits)
+    (label, kind, _), (_, unit) = scene.shown, style.unit(scene.shown.kind)
+    ends = float(scene.values.min()) / unit, float(scene.values.max()) / unit
+    scale = Scale(style.title(label, kind), ends, (limits[0] / unit, limits[1] / unit))
+    colour_bar(figure, shading, [bodies, *close], scale)
     _draw_pressures(pressures, scene.solution, style, parts)
     return pressures
 
@@ -349,18 +368,15 @@ def _draw_windows(
             bodies.annotate(str(k + 1), (right, top), **at, color="crimson", weight="bold")
 
 
-def _colour_bar(
-    figure: Figure, shading: Any, axes: list[Axes], scene: Scene, limits: tuple[float, float]
-) -> None:
+def colour_bar(figure: Figure, shading: Any, axes: list[Axes], scale: Scale) -> None:
     """Scale of colours; an arrow and a number say what lies beyond its ends."""
-    least, most, (low, high) = float(scene.values.min()), float(scene.values.max()), limits
-    label, kind, _ = scene.shown
+    label, (least, most), (low, high) = scale
     below, above = least < low, most > high
     extend = {(True, True): "both", (True, False): "min", (False, True): "max"}
     bar = figure.colorbar(
         shading,
         ax=axes,
-        label=scene.style.title(label, kind),
+        label=label,
         extend=extend.get((below, above), "neither"),
     )
     bar.ax.ticklabel_format(axis="y", **POWERS)
@@ -371,10 +387,10 @@ def _colour_bar(
         (below, least, "least", 0.0, -14, "top"),
     ):
         if beyond:
-            text = f"{word} {value / scene.style.unit(kind)[1]:.3g}"
+            text = f"{word} {value:.3g}"
             at: dict[str, Any] = {"xycoords": "axes fraction", "textcoords": "offset points"}
-            style: dict[str, Any] = {"ha": "center", "va": va, "fontsize": 8}
-            bar.ax.annotate(text, (0.5, y), xytext=(0, offset), **at, **style)
+            font: dict[str, Any] = {"ha": "center", "va": va, "fontsize": 8}
+            bar.ax.annotate(text, (0.5, y), xytext=(0, offset), **at, **font)
 
 
 def shown_part(solution: Solved) -> Array | None:

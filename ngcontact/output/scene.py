@@ -30,6 +30,7 @@ NEAR = 0.25  # of a zone's size: distance to a line of symmetry up to which both
 STRAIGHT = 1e-6  # distance from the line, relative to its length, of a straight boundary
 ACROSS = 1e-6  # displacement across a line, relative to the largest on it, that is round-off
 UNITS = ("length", "stress")  # what has a unit
+AXES = ("x", "y", "z")
 
 Unit = str | tuple[str, float]
 Profile = Callable[[Array], Any] | tuple[Any, Any]
@@ -115,22 +116,23 @@ class Field(NamedTuple):
     values: Callable[[Nodes], Array]  # (k,), at the nodes of a picture
 
 
-def coordinates(solution: Solved) -> tuple[str, str]:
-    """Names of both coordinates."""
-    return ("r", "z") if solution.problem.model in ABOUT_AN_AXIS else ("x", "y")
+def coordinates(solution: Solved) -> tuple[str, ...]:
+    """Names of the coordinates."""
+    return ("r", "z") if solution.problem.model in ABOUT_AN_AXIS else AXES[: solution.mesh.dim]
 
 
 def fields(solution: Solved) -> dict[str, Field]:
     """Every field by name."""
-    x, y = coordinates(solution)
-    names = (f"{x}{x}", f"{y}{y}", f"{x}{y}", "zz" if x == "x" else "hoop")
+    x, y, *z = coordinates(solution)
+    names = (f"{x}{x}", f"{y}{y}", f"{x}{y}", "zz" if x == "x" else "hoop", "yz", "xz")
+    names = names[: 2 * solution.mesh.dim]
 
     def stress(label: str, of: Callable[[Array], Array]) -> Field:
-        """Of the components xx, yy, xy, zz (k, 4)."""
+        """Of the components of `full_stress`."""
         return Field(label, "stress", lambda nodes: of(nodes.values(full_stress(solution))))
 
     def displacement(label: str, of: Callable[[Array], Array]) -> Field:
-        """Of the components (k, 2)."""
+        """Of the components (k, d)."""
         move = ng.CF(tuple(solution.displacement))
         return Field(f"displacement{label}", "length", lambda nodes: of(nodes.values(move)))
 
@@ -149,9 +151,11 @@ def fields(solution: Solved) -> dict[str, Field]:
         "mean_pressure": stress(
             "mean pressure, −tr σ/3", lambda s: -s[:, [0, 1, 3]].sum(axis=1) / 3
         ),
-        "displacement": displacement(", absolute value", lambda u: np.hypot(*u.T)),
-        f"displacement_{x}": displacement(f" along {x}", component(0)),
-        f"displacement_{y}": displacement(f" along {y}", component(1)),
+        "displacement": displacement(", absolute value", lambda u: np.linalg.norm(u, axis=1)),
+        **{
+            f"displacement_{a}": displacement(f" along {a}", component(k))
+            for k, a in enumerate((x, y, *z))
+        },
     }
 
 
@@ -307,7 +311,7 @@ def picture(solution: Solved, style: Style) -> Scene:
     if scale is None:
         body = np.empty(len(place), dtype=np.intp)
         body[nodes.cells] = nodes.body[:, None]
-        scale = _chosen_scale(solution, place, move, body)
+        scale = chosen_scale(solution, place, move, body)
     zones = [zone.rows for zone in zones_of(solution, contact_lines(solution))]
     zones.sort(key=lambda rows: -float(np.abs(solution.force[rows]).sum()))
     tree = KDTree(place)
@@ -351,7 +355,7 @@ def _mirrored(scene: Scene, line: SymmetryLine, place: Array) -> Scene:
     )
 
 
-def _chosen_scale(solution: Solved, place: Array, move: Array, body: Index) -> float:
+def chosen_scale(solution: Solved, place: Array, move: Array, body: Index) -> float:
     """Factor 1, 2, 5, 10, ... on the displacement: seen, yet no false overlap of the bodies.
 
     Contact turns a gap e into `gap`; a factor s draws it as e - s (e - gap). For e, the distance
