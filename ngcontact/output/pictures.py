@@ -65,7 +65,6 @@ def plot_solution(
     `options` are those of `Style`. With a `path` nothing is shown on a screen. Returns the figure.
     """
     style = Style(scale, **options)
-    solution.problem.refuse_solids("plot")
     target = None if path is None else check_path(path, ".png")
     scene = picture(solution, style)
     figure = new_figure(target)
@@ -144,6 +143,8 @@ def write_film(
         raise ValueError(f"titles: {len(titles)} for {len(frames)} solutions")
     if not (np.isfinite(seconds) and seconds > 0):
         raise ValueError(f"seconds = {seconds}: give a positive time")
+    for solution in frames:
+        solution.problem.refuse_solids("a film")
     target = check_path(path, ".gif")
     scenes = [picture(solution, style) for solution in frames]
     scale = min(scene.scale for scene in scenes)  # one for all, the most careful one

@@ -124,8 +124,8 @@ def coordinates(solution: Solved) -> tuple[str, ...]:
 def fields(solution: Solved) -> dict[str, Field]:
     """Every field by name."""
     x, y, *z = coordinates(solution)
-    names = (f"{x}{x}", f"{y}{y}", f"{x}{y}", "zz" if x == "x" else "hoop", "yz", "xz")
-    names = names[: 2 * solution.mesh.dim]
+    normal = "zz" if x == "x" else "hoop"
+    names = [f"{x}{x}", f"{y}{y}", f"{x}{y}", normal, "yz", "xz"][: 2 * solution.mesh.dim]
 
     def stress(label: str, of: Callable[[Array], Array]) -> Field:
         """Of the components of `full_stress`."""

@@ -1,4 +1,4 @@
-"""Pictures of solids: bodies cut open with a field, pressure on its surface and along axes."""
+"""Pictures of solids: bodies cut open with a field, pressure on its surface and along the cuts."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index
-from ..reference import triangle
 from ..solved import Solved
 from .files import check_path
-from .nodes import EDGES, FACES, Nodes, nodes_of
+from .nodes import EDGES, FACES, nodes_of
 from .pictures import (
     COLOURS,
     POWERS,
@@ -25,59 +24,44 @@ from .pictures import (
     new_figure,
     show,
 )
-from .scene import AXES, STRAIGHT, Field, Style, chosen_scale
+from .scene import AXES, STRAIGHT, Style, chosen_scale
 from .surface import ContactSurface, contact_surface
-from .vtk import VTK_CELLS
+from .vtk import VTK_CELLS, sized
 
 if TYPE_CHECKING:
     import pyvista
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FRONT = np.array([0.5, 1.0, 0.0])  # into the picture, from the eye
-ALONG = 0.5  # cosine to the load from which a plane of symmetry does not pass through the zone
+FRONT, UP = np.array([-0.45, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])  # of a picture
+TILT, TURN = 0.35, 0.45  # of the view on a cut: upwards, and to the others
+ALONG = 0.5  # cosine to the load from which a plane does not pass through the zone in contact
 PIXELS = 1000  # of an image, along its longer side
 MARGIN = 0.4  # of a zone in contact, shown beside it
-SMALL = 0.2  # half of a zone's extent, relative to the bodies, from which no close-up is needed
-SMALLEST = 0.02  # extent of a zone that is shown, relative to its surface
-TILT, TURN = 0.35, 0.45  # of the view on a section: upwards, and to the second one
+SMALL, SMALLEST = 0.2, 0.02  # zones smaller than the bodies by this have a close-up; least size
+CURVED = 2  # times that sides of curved elements are halved
+SHARP = 40  # degrees, of edges that are drawn
 PRESSED = "YlOrRd"  # colours of pressures
-CURVED = 2  # divisions of the sides of curved elements, by two each time
 FLAT: dict[str, Any] = {"ambient": 0.75, "diffuse": 0.3, "specular": 0.0}  # colours as on the scale
 
 
-class View(NamedTuple):
-    """A parallel projection."""
+class Cut(NamedTuple):
+    """A plane at which bodies are seen from the inside."""
 
-    eye: Array  # (3,), unit vector to the eye
-    right: Array  # (3,), on the screen
-    up: Array  # (3,)
-
-    def seen(self, points: Array) -> Array:
-        """Coordinates (k, 2) on the screen of `points` (k, 3)."""
-        return np.stack([points @ self.right, points @ self.up], axis=1)
-
-
-def _view(eye: Array, up: Array) -> View:
-    """The view from the direction `eye` (3,), with `up` (3,) upwards."""
-    eye = eye / np.linalg.norm(eye)
-    right = np.cross(up, eye)
-    right /= np.linalg.norm(right)
-    return View(eye, right, np.cross(eye, right))
+    point: Array  # (3,)
+    normal: Array  # (3,), outward
+    rim: bool  # whether it bounds the bodies, as a plane of symmetry does
 
 
 class Zone(NamedTuple):
-    """Where a pair is in contact, and the planes that cut it."""
+    """Where a pair is in contact, and what cuts it."""
 
-    pair: int
     surface: ContactSurface
     pressure: Array  # (n,), at the nodes of the surface
-    direction: Array  # (3,), mean of the rows by their forces
-    middle: Array  # (3,), of the forces, on planes of symmetry
+    middle: Array  # (3,), on planes of symmetry
     half: float  # half of its extent, a length
-    view: View  # on the surface, its axes as near to those of coordinates as may be
-    planes: list[tuple[Array, Array]]  # a point (3,) and the outward normal (3,), foremost first
-    symmetric: bool  # whether these bound the bodies
+    frame: Array  # (3, 3), rows: along the surface, as near to the axes as may be, and across
+    cuts: list[Cut]  # the foremost first
 
 
 def plot_solids(
@@ -93,23 +77,32 @@ def plot_solids(
     style = Style(scale, **options)
     if style.mirror is not None:
         raise ValueError(f'mirror = "{style.mirror}": solids are not mirrored; leave it out')
-    target, shown = None if path is None else check_path(path, ".png"), style.shown(solution)
+    target, _ = None if path is None else check_path(path, ".png"), style.shown(solution)
     _ = solution.stress  # refuses a mesh that was changed, whatever field is shown
-    bodies = _bodies(solution, style, shown)
-    force = {k: np.abs(p.force).sum() for k, p in enumerate(solution.pairs) if p.gap.size}
-    zone = _zone(solution, max(force, key=lambda k: float(force[k]))) if force else None
+    forces = [float(pair.force.sum()) if pair.gap.size else -np.inf for pair in solution.pairs]
+    zone = _zone(solution, int(np.argmax(forces))) if len(solution.points) else None
     figure = new_figure(target, figsize=(12, 9.5 if zone else 6))
-    if zone is None:
-        parts = figure.subplot_mosaic("b")
-    else:
-        parts = figure.subplot_mosaic(
-            "bc;ps" if zone.half < SMALL * bodies.grid.length else "bb;ps"
-        )
-        _draw_pressure(figure, parts["p"], solution, style, zone)
+    close = zone is not None and zone.half < SMALL * float(np.ptp(zone.surface.trace.curve))
+    parts = figure.subplot_mosaic(("bc;ps" if close else "bb;ps") if zone else "b")
+    _draw_bodies(figure, parts, solution, style, zone)
+    if zone is not None:
+        name = solution.problem.contact[int(np.argmax(forces))].secondary
+        _draw_pressure(figure, parts["p"], style, zone, name)
+        for k, line in enumerate(_ends(solution, int(np.argmax(forces)))):
+            seen = line @ zone.frame[:2].T / style.unit("length")[1]
+            parts["p"].plot(*seen.T, color=COLOURS[0], lw=2, label="" if k else "end of contact")
+            parts["p"].legend()
         _draw_profiles(parts["s"], style, zone)
-    _draw_bodies(figure, parts, style, shown, bodies, zone)
     show(figure, target, bbox_inches="tight", pad_inches=0.05)
     return figure
+
+
+def _ends(solution: Solved, pair: int) -> list[Array]:
+    """Lines (k, 3) at which contact of one pair ends; none where they are not available."""
+    try:
+        return list(solution.transitions(pair))
+    except ValueError:
+        return []
 
 
 def _zone(solution: Solved, pair: int) -> Zone:
@@ -117,144 +110,154 @@ def _zone(solution: Solved, pair: int) -> Zone:
     surface, state = contact_surface(solution, pair), solution.pairs[pair]
     touches = state.active if state.active.any() else np.ones(state.gap.size, dtype=bool)
     weight, place = np.where(touches, state.line.weight, 0.0), state.line.position
-    middle, direction = (weight @ x / weight.sum() for x in (place, state.line.direction))
-    size = float(np.ptp(surface.points, axis=0).max())
-    planes = []
+    middle, d = (weight @ x / weight.sum() for x in (place, state.line.direction))
+    if np.linalg.norm(d) < ALONG:  # all around a body: the front of it
+        d = state.line.direction[np.argmax(state.line.direction @ FRONT)]
+    size, cuts = float(np.ptp(surface.points, axis=0).max()), []
     for point, normal in _symmetry_planes(solution, STRAIGHT * size):
         if np.abs((surface.points - point) @ normal).min() <= STRAIGHT * size:
-            planes.append((point, normal))
-            if abs(normal @ direction) < ALONG * np.linalg.norm(direction):
+            cuts.append(Cut(point, normal, True))
+            if abs(normal @ d) < ALONG * np.linalg.norm(d):
                 middle = middle - ((middle - point) @ normal) * normal
-                direction = direction - (direction @ normal) * normal
-    direction = direction / np.linalg.norm(direction)
-    planes.sort(key=lambda plane: float(plane[1] @ FRONT))
-    axes = np.eye(3)[np.sort(np.argsort(np.abs(direction), kind="stable")[:2])]
-    first = axes[0] - (axes[0] @ direction) * direction
-    first /= np.linalg.norm(first)
-    second = np.cross(direction, first)
-    second *= np.copysign(1.0, second @ axes[1])
-    symmetric = bool(planes)
-    if not symmetric:
-        planes = [(middle, -second), (middle, -first)]
-    half = max(float(np.linalg.norm(place[touches] - middle, axis=1).max()), SMALLEST * size)
-    pressure = np.nan_to_num(_readable(surface, solution))
-    view = View(np.cross(first, second), first, second)
-    return Zone(pair, surface, pressure, direction, middle, half, view, planes, symmetric)
-
-
-def _readable(surface: ContactSurface, solution: Solved) -> Array:
-    """Pressure (n,) at the nodes: of order 2 linear between the means at vertices."""
-    found = surface.values(solution.pressure)
-    if surface.trace.order == 2:
-        means = found[surface.nodes[:, triangle.EDGES]].mean(axis=2)
-        known = np.isfinite(means)
-        found[surface.nodes[:, 3:][known]] = means[known]
-    # Means beside the end of contact go on below 0, where no row is.
-    return np.maximum(found, min(0.0, float(solution.pressure.min())))
+                d = d - (d @ normal) * normal
+    cuts.sort(key=lambda cut: -float(cut.normal @ FRONT))
+    one, other = np.eye(3)[np.sort(np.argsort(np.abs(d), kind="stable")[:2])]
+    first = one - (one @ d) / (d @ d) * d
+    second = np.cross(d, first)
+    frame = np.array([first, second * np.copysign(1.0, second @ other), np.zeros(3)])
+    frame[:2] /= np.linalg.norm(frame[:2], axis=1)[:, None]
+    frame[2] = np.cross(*frame[:2])
+    half = float(np.linalg.norm(place[touches] - middle, axis=1).max())
+    cuts = cuts or [Cut(middle, axis * np.sign(axis @ FRONT), False) for axis in frame[1::-1]]
+    pressure = surface.pressure(solution)
+    return Zone(surface, pressure, middle, max(half, SMALLEST * size), frame, cuts)
 
 
 def _symmetry_planes(solution: Solved, slack: float) -> list[tuple[Array, Array]]:
     """A point (3,) and the outward normal (3,) of each plane on which bodies slide."""
-    trace, found = solution.discrete.space.trace, []
-    if solution.problem.sliding is None:
-        return []
-    facets = trace.segments(str(solution.problem.sliding))
+    trace = solution.discrete.space.trace
+    sliding = solution.problem.sliding
+    facets = trace.segments(sliding if isinstance(sliding, str) else None)
+    found: list[tuple[Array, Array]] = []
     for region in np.unique(trace.region[facets]):
         some = facets[trace.region[facets] == region]
-        place = np.tile(triangle.CENTRE, (len(some), 1))
-        normal, points = trace.normal(some, place).mean(axis=0), trace.curve[some].reshape(-1, 3)
-        off = np.abs((points - points[0]) @ normal).max()
-        fresh = all(np.abs((points - x) @ n).max() > slack for x, n in found)
-        if off <= slack and fresh:
-            found.append((points[0], normal / np.linalg.norm(normal)))
+        points = trace.curve[some].reshape(-1, 3)
+        _, place = trace.at_nodes(some[:1])
+        normal = trace.normal(some[:1], place[:1])[0]
+        known = any(np.abs((points - x) @ n).max() <= slack for x, n in found)
+        if np.abs((points - points[0]) @ normal).max() <= slack and not known:
+            found.append((points[0], normal))
     return found
 
 
-class Bodies(NamedTuple):
-    """Deformed bodies with the field."""
-
-    grid: pyvista.UnstructuredGrid
-    edges: pyvista.PolyData  # of elements on the surface
-    scale: float
-
-
-def _bodies(solution: Solved, style: Style, shown: Field) -> Bodies:
-    """The bodies of a picture."""
+def _grid(solution: Solved, style: Style) -> tuple[pyvista.UnstructuredGrid, Index, float]:
+    """Deformed bodies with the field as point data "shown", edges on their surface, the scale."""
     import pyvista
 
-    order = max(solution.mesh.GetCurveOrder(), solution.order)
+    order, shown = max(solution.mesh.GetCurveOrder(), solution.order), style.shown(solution)
     nodes = nodes_of(solution.mesh, order)
     found = nodes.values(ng.CF((ng.x, ng.y, ng.z, *solution.displacement)))
-    place, move = found[:, :3], found[:, 3:]
-    body = np.empty(len(place), dtype=np.intp)
+    place, move, body = found[:, :3], found[:, 3:], np.empty(len(found), dtype=np.intp)
     body[nodes.cells] = nodes.body[:, None]
     scale = chosen_scale(solution, place, move, body) if style.scale is None else style.scale
-    moved = place + scale * move
-    grid = pyvista.UnstructuredGrid({VTK_CELLS[3][order - 1]: nodes.cells}, moved)
+    grid = pyvista.UnstructuredGrid({VTK_CELLS[3][order - 1]: nodes.cells}, place + scale * move)
     grid.point_data["shown"] = shown.values(nodes) / style.unit(shown.kind)[1]
-    return Bodies(grid, _lines(moved, _surface_edges(nodes, order)), scale)
-
-
-def _surface_edges(nodes: Nodes, order: int) -> Index:
-    """Nodes (e, order + 1) of the edges of elements on the surface of bodies."""
-    faces = np.sort(nodes.cells[:, FACES], axis=2)
-    _, back, count = np.unique(
-        faces.reshape(-1, 3), axis=0, return_inverse=True, return_counts=True
-    )
-    outside = (count[back] == 1).reshape(faces.shape[:2])
+    faces = np.sort(nodes.cells[:, FACES], axis=2).reshape(-1, 3)
+    _, same, count = np.unique(faces, axis=0, return_inverse=True, return_counts=True)
+    outside = (count[same.ravel()] == 1).reshape(-1, 4, 1)
     belongs = np.array([[set(edge) <= set(face) for edge in EDGES] for face in FACES])
-    on = (outside[:, :, None] & belongs).any(axis=1)
     inner = 4 + np.arange(6 * (order - 1)).reshape(6, order - 1)
     local = np.column_stack([np.array(EDGES)[:, 0], inner, np.array(EDGES)[:, 1]])
-    edges = nodes.cells[:, local][on]
-    _, first = np.unique(np.sort(edges[:, [0, -1]], axis=1), axis=0, return_index=True)
-    return np.asarray(edges[first])
+    return grid, nodes.cells[:, local][(outside & belongs).any(axis=1)], scale
 
 
-def _surface(grid: pyvista.UnstructuredGrid) -> pyvista.PolyData:
-    """The surface of curved elements as small triangles."""
+def _draw_bodies(
+    figure: Figure, parts: dict[str, Axes], solution: Solved, style: Style, zone: Zone | None
+) -> None:
+    """The bodies, cut open at the `zone`, and that close up if there is a part for it."""
     import pyvista
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
     from vtkmodules.vtkFiltersGeometry import vtkDataSetSurfaceFilter
 
-    surface = vtkDataSetSurfaceFilter()
-    surface.SetInputData(grid)
-    surface.SetNonlinearSubdivisionLevel(CURVED)
-    surface.Update()
-    return pyvista.wrap(surface.GetOutput()).triangulate()
-
-
-def _lines(points: Array, lines: Index) -> pyvista.PolyData:
-    """Lines (e, j) through `points` (k, 3)."""
-    import pyvista
-
-    sized = np.column_stack([np.full(len(lines), lines.shape[1]), lines])
-    return pyvista.PolyData(points, lines=sized.ravel())
+    (grid, lines, scale), shown = _grid(solution, style), style.shown(solution)
+    edges = pyvista.PolyData(grid.points, lines=sized(lines))
+    normals = [cut.normal for cut in zone.cuts] if zone else [FRONT]
+    if zone and not zone.cuts[0].rim:
+        grid, edges = (
+            x.clip(normal=zone.cuts[0].normal, origin=zone.middle) for x in (grid, edges)
+        )
+    eye = normals[0] + TURN * sum(normals[1:], np.zeros(3))
+    if np.abs(np.array(normals) @ UP).max() < ALONG:
+        eye = eye + TILT * UP
+    eye = eye / np.linalg.norm(eye)
+    right = np.cross(UP, eye) / np.linalg.norm(np.cross(UP, eye))
+    frame = np.array([right, np.cross(eye, right), eye])
+    filtered = vtkDataSetSurfaceFilter()
+    filtered.SetInputData(grid)
+    filtered.SetNonlinearSubdivisionLevel(CURVED)
+    filtered.Update()
+    surface = pyvista.wrap(filtered.GetOutput()).triangulate()
+    values, triangles = np.asarray(surface["shown"]), surface.faces.reshape(-1, 4)[:, 1:]
+    seen = surface.points @ frame[:2].T
+    windows, near = [(seen.min(axis=0), seen.max(axis=0))], []
+    if zone and "c" in parts:
+        middle, half = frame[:2] @ zone.middle, (1 + 2 * MARGIN) * zone.half
+        windows.append((middle - half, middle + half))
+        apart = np.linalg.norm(surface.points[triangles].mean(axis=1) - zone.middle, axis=1)
+        near.append(apart < half)
+    areas, (_, unit) = np.asarray(surface.compute_cell_sizes()["Area"]), style.unit(shown.kind)
+    given = style.limits and (style.limits[0] / unit, style.limits[1] / unit)
+    limits = given or colour_limits(values, triangles, areas, near)
+    colours = SIGNED if limits[0] < 0 < limits[1] else RISING
+    meshes = [(surface, {"scalars": "shown", "cmap": colours, "clim": limits, **FLAT})]
+    ahead = 1e-3 * surface.length * eye  # so that lines are seen
+    if style.mesh:
+        thin = {"color": "black" if colours == SIGNED else "white", "opacity": 0.35}
+        meshes.append((edges.translate(ahead), thin))
+    others = {"boundary_edges": False, "non_manifold_edges": False, "manifold_edges": False}
+    outline = surface.clean().extract_feature_edges(SHARP, **others)
+    meshes.append((outline.translate(ahead), {"color": "black", "line_width": 2}))
+    titles = f"deformed bodies, displacement × {scale:g}", "zone in contact"
+    for name, window, title in zip("bc", windows, titles, strict=False):
+        parts[name].imshow(_image(frame, window, meshes))
+        parts[name].set_axis_off()
+        parts[name].set_title(title)
+    there = [parts[name] for name in "bc" if name in parts]
+    colouring = Scale(
+        style.title(shown.label, shown.kind), (float(values.min()), float(values.max())), limits
+    )
+    colour_bar(figure, ScalarMappable(Normalize(*limits), colours), there, colouring)
+    for axes in there:
+        axes.set_anchor("C")
 
 
 def _image(
-    view: View, low: Array, high: Array, meshes: list[tuple[pyvista.DataSet, dict[str, Any]]]
+    frame: Array,
+    window: tuple[Array, Array],
+    meshes: list[tuple[pyvista.DataSet, dict[str, Any]]],
 ) -> Array:
-    """Image (h, w, 3) of `meshes`, with their options, between corners (2,) on the screen."""
+    """Image (h, w, 3) of `meshes` with options in a `window`, two corners (2,), without a display.
+
+    Rows of `frame` (3, 3) point to the right, upwards and to the eye.
+    """
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
 
-    size = np.maximum((high - low) / (high - low).max() * PIXELS, 2).astype(int)
+    low, high = window
     verbosity = vtkLogger.GetCurrentVerbosityCutoff()
-    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # without a display VTK would say so
+    vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)  # VTK says that there is no display
+    size = np.maximum((high - low) / (high - low).max() * PIXELS, 2).astype(int)
     plotter = pyvista.Plotter(off_screen=True, window_size=size.tolist(), lighting="light kit")
     plotter.enable_parallel_projection()
     plotter.enable_anti_aliasing("ssaa")
     for mesh, options in meshes:
         if mesh.n_points:
             plotter.add_mesh(mesh, show_scalar_bar=False, **options)
-    middle = (low + high) / 2
-    focus = middle[0] * view.right + middle[1] * view.up
-    depth = [x for mesh, _ in meshes for x in (mesh.points @ view.eye) if mesh.n_points]
-    focus = focus + view.eye * (max(depth) + min(depth)) / 2
-    far = 2 * (max(depth) - min(depth)) + 2 * float((high - low).max())
-    plotter.camera.focal_point = tuple(focus)
-    plotter.camera.position = tuple(focus + far * view.eye)
-    plotter.camera.up = tuple(view.up)
+    depth, far = meshes[0][0].points @ frame[2], 2 * meshes[0][0].length
+    focus = np.array([*(low + high) / 2, depth.mean()]) @ frame
+    plotter.camera.focal_point, plotter.camera.position = focus, focus + far * frame[2]
+    plotter.camera.up = frame[1]
     plotter.camera.parallel_scale = float(high[1] - low[1]) / 2
     plotter.renderer.ResetCameraClippingRange()
     image = np.asarray(plotter.screenshot(return_img=True))
@@ -263,149 +266,68 @@ def _image(
     return image
 
 
-def _draw_bodies(
-    figure: Figure,
-    parts: dict[str, Axes],
-    style: Style,
-    shown: Field,
-    bodies: Bodies,
-    zone: Zone | None,
-) -> None:
-    """The bodies, cut open at the `zone`, and that close up if there is a part for it."""
-    grid, edges, cuts = bodies.grid, bodies.edges, [-FRONT]
-    if zone is not None:
-        cuts = [normal for _, normal in zone.planes]
-        if not zone.symmetric:
-            (point, normal), _ = zone.planes
-            grid, edges = (x.clip(normal=normal, origin=point) for x in (grid, edges))
-    eye = cuts[0] + TURN * sum(cuts[1:], np.zeros(3))
-    if np.abs(np.array(cuts)[:, 2]).max() < ALONG:
-        eye = eye + np.array([0.0, 0.0, TILT])
-    view = _view(eye, np.array([0.0, 0.0, 1.0]))
-    surface = _surface(grid)
-    values, triangles = np.asarray(surface["shown"]), surface.faces.reshape(-1, 4)[:, 1:]
-    seen = view.seen(surface.points)
-    windows = [(seen.min(axis=0), seen.max(axis=0))]
-    near = [np.ones(len(triangles), dtype=bool)]
-    if zone is not None and "c" in parts:
-        middle, half = view.seen(zone.middle[None])[0], (1 + 2 * MARGIN) * zone.half
-        windows.append((middle - half, middle + half))
-        apart = np.linalg.norm(surface.points[triangles].mean(axis=1) - zone.middle, axis=1)
-        near.append(apart < half)
-    areas = np.asarray(surface.compute_cell_sizes()["Area"])
-    limits = style.limits or colour_limits(values, triangles, areas, near)
-    if style.limits:
-        limits = tuple(x / style.unit(shown.kind)[1] for x in style.limits)
-    colours = SIGNED if limits[0] < 0 < limits[1] else RISING
-    outline = surface.clean().extract_feature_edges(
-        40, boundary_edges=False, non_manifold_edges=False, manifold_edges=False
-    )
-    ahead = 1e-3 * surface.length * view.eye
-    meshes = [(surface, {"scalars": "shown", "cmap": colours, "clim": limits, **FLAT})]
-    if style.mesh:
-        lines = {"color": "black" if colours == SIGNED else "white", "opacity": 0.35}
-        meshes.append((edges.translate(ahead), {**lines, "line_width": 1}))
-    meshes.append((outline.translate(ahead), {"color": "black", "line_width": 2}))
-    titles = (f"deformed bodies, displacement × {bodies.scale:g}", "zone in contact")
-    for axes, (low, high), title in zip(map(parts.get, "bc"), windows, titles, strict=False):
-        axes.imshow(_image(view, low, high, meshes))
-        axes.set_axis_off()
-        axes.set_title(title)
-    drawn = _shading(limits, colours)
-    ends = float(values.min()), float(values.max())
-    there = [parts[name] for name in "bc" if name in parts]
-    colour_bar(figure, drawn, there, Scale(style.title(shown.label, shown.kind), ends, limits))
-    for axes in there:
-        axes.set_anchor("C")
-
-
-def _shading(limits: tuple[float, float], colours: str) -> Any:
-    """What a scale of colours shows."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-
-    return ScalarMappable(Normalize(*limits), colours)
-
-
 def _name(axis: Array, other: str) -> str:
     """Name of the coordinate along an `axis` (3,), or `other`."""
     along = np.flatnonzero(np.abs(axis) > 1 - STRAIGHT)
     return AXES[along[0]] if along.size else other
 
 
-def _draw_pressure(figure: Figure, axes: Axes, solution: Solved, style: Style, zone: Zone) -> None:
-    """The pressure on its surface as colour, and the end of contact."""
-    import pyvista
+def _draw_pressure(figure: Figure, axes: Axes, style: Style, zone: Zone, name: str) -> None:
+    """The pressure on the surface of `name` as colour."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.tri import Triangulation
 
     surface, (_, length), (_, stress) = zone.surface, style.unit("length"), style.unit("stress")
-    faces = np.column_stack([np.full(len(surface.triangles), 3), surface.triangles])
-    data = pyvista.PolyData(surface.points, faces=faces.ravel())
-    data.point_data["pressure"] = zone.pressure / stress
-    seen, middle = zone.view.seen(surface.points), zone.view.seen(zone.middle[None])[0]
-    half = (1 + MARGIN) * zone.half
-    rim = 0.03 * half
-    low = np.maximum(middle - half, seen.min(axis=0) - rim)
-    high = np.minimum(middle + half, seen.max(axis=0) + rim)
-    limits = 0.0, float(zone.pressure.max(initial=0.0)) / stress or 1.0
-    meshes = [(data, {"scalars": "pressure", "cmap": PRESSED, "clim": limits, "lighting": False})]
+    seen, middle = (x @ zone.frame[:2].T / length for x in (surface.points, zone.middle))
+    values, half = zone.pressure / stress, (1 + MARGIN) * zone.half / length
+    top = float(values.max(initial=0.0)) or 1.0
+    drawing = {"shading": "gouraud", "cmap": PRESSED, "vmin": 0.0, "vmax": top}
+    shading = axes.tripcolor(Triangulation(*seen.T, surface.triangles), values, **drawing)
     if style.mesh:
-        order = surface.trace.order
-        inner = [triangle.edge_nodes(order)[k] for k in range(3)]
-        local = [[i, *between, j] for (i, j), between in zip(triangle.EDGES, inner, strict=True)]
-        edges = _lines(surface.points, surface.nodes[:, local].reshape(-1, order + 1))
-        ahead = 1e-3 * data.length * zone.view.eye
-        meshes.append((edges.translate(ahead), {"color": "black", "opacity": 0.2}))
-    image = _image(zone.view, low, high, meshes)
-    axes.imshow(image, extent=(low[0], high[0], low[1], high[1]) / np.array(length))
-    for number, line in enumerate(solution.transitions(zone.pair)):
-        name = "end of contact" if number == 0 else None
-        axes.plot(*zone.view.seen(line).T / length, color="#56B4E9", lw=2, label=name)
-        axes.legend()
-    names = (_name(zone.view.right, "along the surface"), _name(zone.view.up, "along the surface"))
-    pair = solution.problem.contact[zone.pair].secondary
-    title = f"pressure on {pair}" + (" (of the largest force)" if len(solution.pairs) > 1 else "")
-    axes.set(
-        xlabel=style.title(names[0], "length"), ylabel=style.title(names[1], "length"), title=title
-    )
+        lines = list(seen[surface.edges])
+        axes.add_collection(LineCollection(lines, colors="k", lw=0.4, alpha=0.2))
+    ends = np.array([middle - half, middle + half]).T
+    ends = np.clip(ends, seen.min(axis=0)[:, None], seen.max(axis=0)[:, None])
+    ends = ends + 0.03 * np.ptp(ends, axis=1)[:, None] * [-1, 1]
+    x, y = (style.title(_name(e, "along the surface"), "length") for e in zone.frame[:2])
+    axes.set(aspect="equal", xlim=ends[0], ylim=ends[1], xlabel=x, ylabel=y)
+    axes.set_title(f"pressure on {name}")
     axes.ticklabel_format(**POWERS)
-    label = style.title("contact pressure", "stress")
-    colour_bar(figure, _shading(limits, PRESSED), [axes], Scale(label, limits, limits))
+    ends_of_values = float(values.min()), top
+    colouring = Scale(style.title("contact pressure", "stress"), ends_of_values, (0.0, top))
+    colour_bar(figure, shading, [axes], colouring)
 
 
 def _draw_profiles(axes: Axes, style: Style, zone: Zone) -> None:
-    """The pressure along the planes that cut the zone."""
+    """The pressure along the cuts."""
     import pyvista
 
     surface, (_, length), (_, stress) = zone.surface, style.unit("length"), style.unit("stress")
-    faces = np.column_stack([np.full(len(surface.triangles), 3), surface.triangles])
-    data = pyvista.PolyData(surface.points, faces=faces.ravel())
+    data = pyvista.PolyData(surface.points, faces=sized(surface.triangles))
     data.point_data["pressure"] = zone.pressure / stress
     names, ends = [], []
-    for k, (point, normal) in enumerate(zone.planes):
-        along = np.cross(normal, zone.direction)
-        along /= np.linalg.norm(along)
-        along *= np.sign(along[np.argmax(np.abs(along))])
-        # A plane of symmetry bounds the surface, and cuts it just inside.
-        inside = STRAIGHT * data.length * normal if zone.symmetric else 0 * normal
-        line = data.slice(normal=normal, origin=point - inside)
-        s = line.points @ along
-        order, middle = np.argsort(s), zone.middle @ along
+    for k, cut in enumerate(zone.cuts):
+        along = np.cross(cut.normal, zone.frame[2])
+        along *= np.sign(along[np.argmax(np.abs(along))]) / np.linalg.norm(along)
+        # A plane that bounds the surface cuts it just inside.
+        inside = STRAIGHT * data.length * cut.normal if cut.rim else 0.0
+        line = data.slice(normal=cut.normal, origin=cut.point - inside)
+        s = np.asarray(line.points @ along)
+        order, half = np.argsort(s), (1 + MARGIN) * zone.half
         names.append(_name(along, f"cut {k + 1}"))
-        axes.plot(
-            s[order] / length, line["pressure"][order], color=COLOURS[k], label=f"along {names[-1]}"
-        )
-        ends += [middle - (1 + MARGIN) * zone.half, middle + (1 + MARGIN) * zone.half]
-        ends = [max(min(ends), float(s.min())), min(max(ends), float(s.max()))]
+        axes.plot(s[order] / length, line["pressure"][order], color=COLOURS[k], label=names[-1])
+        ends += list(np.clip(zone.middle @ along + np.array([-half, half]), s.min(), s.max()))
+    part = np.linspace(min(ends), max(ends), PROFILE_SAMPLES)
     for stroke, (label, profile) in zip(("--", ":", "-."), style.profile.items(), strict=False):
-        s = np.linspace(*ends, PROFILE_SAMPLES)
-        s, p = (s, profile(s)) if callable(profile) else map(np.asarray, profile)
-        axes.plot(s / length, np.broadcast_to(p, s.shape) / stress, stroke, color="k", label=label)
-    axes.set_xlim(ends[0] / length, ends[1] / length)
+        s, p = (part, profile(part)) if callable(profile) else map(np.asarray, profile)
+        p = np.broadcast_to(np.asarray(p, dtype=float), s.shape)
+        axes.plot(s / length, p / stress, stroke, color="k", lw=1.2, label=label)
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
     axes.set(
+        xlim=(part[0] / length, part[-1] / length),
         xlabel=style.title(" or ".join(dict.fromkeys(names)), "length"),
         ylabel=style.title("contact pressure", "stress"),
-        title="pressure along the cuts",
+        title="contact pressure along the cuts",
     )
     axes.ticklabel_format(**POWERS)
     axes.grid(alpha=0.3)

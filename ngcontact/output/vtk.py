@@ -25,8 +25,13 @@ from .surface import contact_surface
 if TYPE_CHECKING:
     import pyvista
 
-PLANE = ("xx", "yy", "xy", "zz")  # components of a stress, as `full_stress` orders them
-MERIDIAN = ("rr", "zz", "rz", "hoop")
+PLANE: tuple[str, ...] = (
+    "xx",
+    "yy",
+    "xy",
+    "zz",
+)  # components of a stress, as `full_stress` orders them
+MERIDIAN: tuple[str, ...] = ("rr", "zz", "rz", "hoop")
 SOLID = ("xx", "yy", "zz", "xy", "yz", "xz")  # as VTK orders those of a symmetric tensor
 # Triangles and tetrahedra: linear, quadratic, Lagrange's of every higher order.
 VTK_CELLS = {2: (5, 22, 69), 3: (10, 24, 71)}
@@ -69,7 +74,6 @@ def write_solution(
     A file appears complete or not at all. Raises ``ValueError`` and ``OSError`` as `check_path`
     does, before any work. Of the `sections` of a body of revolution see `write_revolved`.
     """
-    solution.problem.refuse_solids("write")
     target = check_path(path, ".vtu")
     beside = check_path(target.with_name(f"{target.stem}_contact.vtp"), ".vtp")
     from vtkmodules.vtkCommonCore import vtkObject
@@ -174,7 +178,7 @@ def _in_space(vectors: Array) -> Array:
     return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
 
 
-def _sized(cells: Index) -> Index:
+def sized(cells: Index) -> Index:
     """Cells (k, n) as VTK reads them: n before the nodes of each, (k (n + 1),)."""
     return np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
 
@@ -201,7 +205,7 @@ def bodies_of(solution: Estimated, sections: Sections | None = None) -> pyvista.
         components, names = [0, 1, 3, 2], ("rr", "zz", "hoop", "rz")
         lifted, times = sections.turned, len(sections.angles)
     kinds = np.full(len(cells), kind, dtype=np.uint8)
-    grid = pyvista.UnstructuredGrid(_sized(cells), kinds, lifted(values[:, :d]))
+    grid = pyvista.UnstructuredGrid(sized(cells), kinds, lifted(values[:, :d]))
     stress = values[:, 2 * d :]
     grid.point_data["displacement"] = lifted(values[:, d : 2 * d])
     grid.point_data["stress"] = np.tile(stress[:, components], (times, 1))
@@ -232,14 +236,14 @@ def _contact(solution: Solved, sections: Sections | None = None) -> pyvista.Poly
     names, lifted, times = ["pressure", "gap", "active", "pair"], _in_space, 1
     if sections is None and len(points):
         single = np.arange(len(points))[:, None]
-        data = pyvista.PolyData(_in_space(points), verts=_sized(single), lines=_sized(links))
+        data = pyvista.PolyData(_in_space(points), verts=sized(single), lines=sized(links))
         names.append("force")
     elif sections is not None and len(links):
         first, second = (len(points) * at[:, None] for at in (sections.first, sections.second))
         quads = [first + links[:, 0], first + links[:, 1], second + links[:, 1]]
         faces = np.stack([*quads, second + links[:, 0]], axis=2).reshape(-1, 4)
         lifted, times = sections.turned, len(sections.angles)
-        data = pyvista.PolyData(lifted(points), faces=_sized(faces))
+        data = pyvista.PolyData(lifted(points), faces=sized(faces))
     if data.n_points:
         for name in names:
             kind = np.int32 if name in ("active", "pair") else float
@@ -266,18 +270,17 @@ def _surfaces(solution: Solved, sections: Sections | None = None) -> pyvista.Pol
         values = np.concatenate([values, np.stack(own, axis=1)[others]])
     data = pyvista.PolyData()
     if m := len(solution.points):
-        single, faces = np.arange(m)[:, None], _sized(np.concatenate(triangles))
-        data = pyvista.PolyData(points, verts=_sized(single), faces=faces)
+        single, faces = np.arange(m)[:, None], sized(np.concatenate(triangles))
+        data = pyvista.PolyData(points, verts=sized(single), faces=faces)
         data.point_data["pressure"], data.point_data["gap"] = values[:, 0], values[:, 1]
         data.point_data["pair"] = values[:, 2].astype(np.int32)
-        for name, known in {
-            "force": solution.force,
-            "active": solution.active.astype(np.int32),
-            "contact_point": np.ones(m, dtype=np.int32),
-            "traction": -solution.pressure[:, None] * solution.direction,
-        }.items():
-            shape = (len(points) - m, *known.shape[1:])
-            data.point_data[name] = np.concatenate([known, np.zeros(shape, known.dtype)])
+        rest = len(points) - m
+        for name in ("force", "active"):
+            known = np.asarray(getattr(solution, name), np.int32 if name == "active" else float)
+            data.point_data[name] = np.pad(known, (0, rest))
+        data.point_data["contact_point"] = np.pad(np.ones(m, np.int32), (0, rest))
+        traction = -solution.pressure[:, None] * solution.direction
+        data.point_data["traction"] = np.pad(traction, ((0, rest), (0, 0)))
     _name_pairs(data, solution)
     return data
 

@@ -72,6 +72,6 @@ def stub(order=3, stress=None, model="plane strain", materials=None, mesh=None, 
     if stress is None:
         stress = ng.CF((ng.x, ng.y, ng.y, ng.x * ng.y), dims=(2, 2))
     zz = MODELS[model].out_of_plane(
-        problem.materials, mesh, [stress[0, 0], stress[1, 1], stress[0, 1]]
+        problem.materials, {}, mesh, [stress[0, 0], stress[1, 1], stress[0, 1]]
     )
     return Stub(mesh, order, u, stress, points, problem, zz)
