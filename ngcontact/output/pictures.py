@@ -143,8 +143,8 @@ def write_film(
         raise ValueError(f"titles: {len(titles)} for {len(frames)} solutions")
     if not (np.isfinite(seconds) and seconds > 0):
         raise ValueError(f"seconds = {seconds}: give a positive time")
-    for solution in frames:
-        solution.problem.refuse_solids("a film")
+    if any(solution.mesh.dim == 3 for solution in frames):
+        raise ValueError("a film shows plane bodies: write pictures of solids by plot()")
     target = check_path(path, ".gif")
     scenes = [picture(solution, style) for solution in frames]
     scale = min(scene.scale for scene in scenes)  # one for all, the most careful one
