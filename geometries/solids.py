@@ -32,8 +32,8 @@ def ball_on_block(
 ) -> OCCGeometry:
     """Lower half of a ball that rests at the origin on the top of a round block.
 
-    About the axis both are the body of revolution of `disc_on_block`. Lengths are in any
-    consistent unit.
+    Both are bodies of revolution by the section `disc_on_block`.
+    Lengths are in any consistent unit.
 
     Parameters
     ----------
@@ -94,7 +94,8 @@ def crossed_cylinders(
     """Halves of two cylinders at right angles, which touch at the origin.
 
     Where gaps are A x^2 + B y^2 contact is an ellipse: A = 1 / (2 `lower_radius`),
-    B = 1 / (2 `radius`). Lengths are in any consistent unit.
+    B = 1 / (2 `radius`).
+    Lengths are in any consistent unit.
 
     Parameters
     ----------

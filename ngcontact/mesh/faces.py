@@ -44,7 +44,7 @@ class CadFace:
         return values[:, 0], values[:, 1:].transpose(0, 2, 1)
 
     def point(self, uv: Array) -> Array:
-        """Points (k, 3) at parameters (k, 2)."""
+        """Points (k, 3) at parameters `uv` (k, 2)."""
         return self._at(uv)[0]
 
     def normal_at(self, uv: Array) -> Array:

@@ -116,7 +116,7 @@ def full_stress(solution: Solved) -> ng.CoefficientFunction:
 
 
 def stress_tensors(stress: Array) -> Array:
-    """Stress (k, 3, 3) with the components (k, 4), or (k, 6), of `full_stress`."""
+    """Tensors (k, 3, 3) of `stress` (k, 4), or (k, 6), the components of `full_stress`."""
     tensors = np.zeros((len(stress), 3, 3))
     for (i, j), component in zip(COMPONENTS, stress.T, strict=False):
         tensors[:, i, j] = tensors[:, j, i] = component

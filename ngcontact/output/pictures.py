@@ -269,7 +269,7 @@ def colour_range(scene: Scene, windows: Sequence[Window]) -> tuple[float, float]
 def colour_limits(
     values: Array, triangles: Index, areas: Array, parts: Sequence[Mask]
 ) -> tuple[float, float]:
-    """Ends of the scale of `values` (k,) at nodes, of all `triangles` (t, 3) and of some `parts`.
+    """Ends of the scale of `values` (k,) at nodes, of all `triangles` (t, 3), some `parts` (t,).
 
     See `colour_range`; `areas` (t,) are those of the triangles.
     """

@@ -358,6 +358,8 @@ def _mirrored(scene: Scene, line: SymmetryLine, place: Array) -> Scene:
 def chosen_scale(solution: Solved, place: Array, move: Array, body: Index) -> float:
     """Factor 1, 2, 5, 10, ... on the displacement: seen, yet no false overlap of the bodies.
 
+    Of nodes at `place` (k, d), which `move` (k, d), of the bodies of numbers `body` (k,).
+
     Contact turns a gap e into `gap`; a factor s draws it as e - s (e - gap). For e, the distance
     to the nearest node of another body errs on the side of a smaller factor.
     """

@@ -48,7 +48,7 @@ class Sections:
     second: Index  # (q,), and ends
 
     def turned(self, vectors: Array) -> Array:
-        """Vectors (r, z) (k, 2) about z by all angles: (t k, 3)."""
+        """The `vectors` (k, 2), r and z, about z by all angles: (t k, 3)."""
         r, z = vectors.T
         x, y = np.outer(np.cos(self.angles), r), np.outer(np.sin(self.angles), r)
         return np.stack([x, y, np.broadcast_to(z, x.shape)], axis=2).reshape(-1, 3)
@@ -81,7 +81,7 @@ def write_solution(
 
     writers = vtkXMLUnstructuredGridWriter(), vtkXMLPolyDataWriter()
     contact = _surfaces if solution.mesh.dim == 3 else _contact
-    made = bodies_of(solution, sections), contact(solution, sections)
+    made = _bodies(solution, sections), contact(solution, sections)
     with replacing(target, beside) as drafts:
         for writer, data, draft in zip(writers, made, drafts, strict=True):
             writer.SetFileName(str(draft))
@@ -179,11 +179,11 @@ def _in_space(vectors: Array) -> Array:
 
 
 def sized(cells: Index) -> Index:
-    """Cells (k, n) as VTK reads them: n before the nodes of each, (k (n + 1),)."""
+    """The `cells` (k, n) as VTK reads them: n before the nodes of each, (k (n + 1),)."""
     return np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
 
 
-def bodies_of(solution: Estimated, sections: Sections | None = None) -> pyvista.UnstructuredGrid:
+def _bodies(solution: Estimated, sections: Sections | None = None) -> pyvista.UnstructuredGrid:
     """Bodies with their fields: curved elements, or wedges between `sections`."""
     import pyvista
 

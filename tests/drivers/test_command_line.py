@@ -67,7 +67,7 @@ def recorder(main):
 
 def test_drivers_are_listed(capsys):
     found = listed()
-    assert len(found) == 10
+    assert len(found) == 11
     lines = capsys.readouterr().out.splitlines()
     for name, line in found.items():
         assert line.endswith(".")
