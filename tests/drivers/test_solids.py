@@ -37,5 +37,5 @@ def test_a_ball_in_its_cup():
     ],
 )
 def test_semi_axes_of_hertz(ratio, exact):
-    """Of A = F = E* = 1: values of tables of elliptic integrals, to half a unit of their seventh digit."""
+    """Of A = F = E* = 1: by elliptic integrals, to seven digits."""
     assert ellipse(1.0, ratio, 1.0, 1.0) == pytest.approx(exact, rel=4e-7)
