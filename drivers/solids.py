@@ -72,9 +72,10 @@ def rows_of(
     """A solution, a list to put names, values and exact values into, and the rows made of it."""
     start = time.process_time()
     solution = solve(problem, mesh, maxh=maxh, order=order)
-    seconds, found = time.process_time() - start, []
+    seconds = time.process_time() - start
+    found: list[tuple[str, float, float]] = []
     unknowns = solution.displacement.space.ndof
-    rows = (Row(scene, order, unknowns, *entry, seconds) for entry in found)
+    rows = (Row(scene, order, unknowns, q, x, exact, seconds) for q, x, exact in found)
     return solution, found, rows
 
 
