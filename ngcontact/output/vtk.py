@@ -48,7 +48,7 @@ class Sections:
     second: Index  # (q,), and ends
 
     def turned(self, vectors: Array) -> Array:
-        """Vectors (t k, 3): `vectors` (k, 2), r and z, turned about z by all angles."""
+        """Vectors (m, 3) that `vectors` (k, 2) of components r, z are at each of the angles."""
         r, z = vectors.T
         x, y = np.outer(np.cos(self.angles), r), np.outer(np.sin(self.angles), r)
         return np.stack([x, y, np.broadcast_to(z, x.shape)], axis=2).reshape(-1, 3)
@@ -179,7 +179,7 @@ def _in_space(vectors: Array) -> Array:
 
 
 def sized(cells: Index) -> Index:
-    """Numbers (k (n + 1),) of `cells` (k, n) as VTK reads them: n before the nodes of each."""
+    """Numbers (m,) of `cells` (k, n) as VTK reads them: n before the nodes of each."""
     return np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
 
 
