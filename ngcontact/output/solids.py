@@ -88,21 +88,13 @@ def plot_solids(
     if zone is not None:
         name = solution.problem.contact[int(np.argmax(forces))].secondary
         _draw_pressure(figure, parts["p"], style, zone, name)
-        for k, line in enumerate(_ends(solution, int(np.argmax(forces)))):
+        for k, line in enumerate(solution.transitions(int(np.argmax(forces)))):
             seen = line @ zone.frame[:2].T / style.unit("length")[1]
             parts["p"].plot(*seen.T, color=COLOURS[0], lw=2, label="" if k else "end of contact")
             parts["p"].legend()
         _draw_profiles(parts["s"], style, zone)
     show(figure, target, bbox_inches="tight", pad_inches=0.05)
     return figure
-
-
-def _ends(solution: Solved, pair: int) -> list[Array]:
-    """Lines (k, 3) at which contact of one pair ends; none where they are not available."""
-    try:
-        return list(solution.transitions(pair))
-    except ValueError:
-        return []
 
 
 def _zone(solution: Solved, pair: int) -> Zone:
