@@ -215,7 +215,7 @@ class BoundaryTrace:
         return {}
 
     def guide(self, pattern: str) -> tuple[Index, Array]:
-        """`number_points` at the nodes of the segments of a pattern, with exact normals; kept."""
+        """Numbers (n,) of points at nodes of a pattern, and their exact normals (m, 2); kept."""
         if pattern not in self._guides:
             segments = self.segments(pattern)
             segment, s = self.at_nodes(segments)
