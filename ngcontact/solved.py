@@ -190,3 +190,12 @@ class Solved:
         `complementarity`: sum of force times gap over force times length.
         """
         return kkt_residuals(self.discrete.program, self.minimiser)
+
+
+def full_stress(solution: Solved) -> ng.CoefficientFunction:
+    """Stress components xx, yy, xy, zz, the one normal to the plane, (4,); of solids yz, xz."""
+    stress = solution.stress
+    plane = stress[0, 0], stress[1, 1], stress[0, 1]
+    if solution.mesh.dim == 3:
+        return ng.CF((*plane, stress[2, 2], stress[1, 2], stress[0, 2]))
+    return ng.CF((*plane, solution.out_of_plane_stress))

@@ -5,7 +5,6 @@ from .convergence import slope_triangle as slope_triangle
 from .files import check_path as check_path
 from .files import replacing as replacing
 from .nodes import COMPONENTS as COMPONENTS
-from .nodes import full_stress as full_stress
 from .nodes import principal_stresses as principal_stresses
 from .nodes import stress_tensors as stress_tensors
 from .pictures import plot_solution as plot_solution

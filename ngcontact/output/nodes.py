@@ -14,7 +14,6 @@ from scipy.spatial import KDTree
 
 from ..arrays import Array, Index, from_triplets
 from ..problem import MeshArrays
-from ..solved import Solved
 
 # Of VTK's tetrahedra, by the numbers of their vertices.
 EDGES = (0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)
@@ -104,15 +103,6 @@ def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
     cells = np.empty(len(key), dtype=np.intp)
     cells[rank] = np.cumsum(fresh) - 1
     return Nodes(cells.reshape(-1, len(weights)), body, names, at)
-
-
-def full_stress(solution: Solved) -> ng.CoefficientFunction:
-    """Stress components xx, yy, xy, zz, the one normal to the plane, (4,); of solids yz, xz."""
-    stress = solution.stress
-    plane = stress[0, 0], stress[1, 1], stress[0, 1]
-    if solution.mesh.dim == 3:
-        return ng.CF((*plane, stress[2, 2], stress[1, 2], stress[0, 2]))
-    return ng.CF((*plane, solution.out_of_plane_stress))
 
 
 def stress_tensors(stress: Array) -> Array:

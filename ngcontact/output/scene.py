@@ -15,10 +15,9 @@ from scipy.spatial import KDTree
 from ..arrays import Array, Index, Mask, across
 from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS, MeshArrays
-from ..solved import Solved
+from ..solved import Solved, full_stress
 from .nodes import (
     Nodes,
-    full_stress,
     neighbour_tree,
     nodes_of,
     principal_stresses,

@@ -17,9 +17,9 @@ from ..arrays import Array, Index
 from ..estimator import Estimated
 from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS
-from ..solved import Solved
+from ..solved import Solved, full_stress
 from .files import check_path, replacing
-from .nodes import full_stress, neighbour_tree, nodes_of, subdivision
+from .nodes import neighbour_tree, nodes_of, subdivision
 from .surface import contact_surface
 
 if TYPE_CHECKING:

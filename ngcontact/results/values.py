@@ -13,10 +13,10 @@ from scipy.spatial import KDTree
 
 from ..arrays import Array, Index, joined, rows_of
 from ..fem import BoundaryTrace, von_mises
-from ..output import COMPONENTS, full_stress, principal_stresses, stress_tensors
+from ..output import COMPONENTS, principal_stresses, stress_tensors
 from ..problem import MeshArrays, body_mask, regions_of
 from ..quadrature import SampledElements
-from ..solved import Solved
+from ..solved import Solved, full_stress
 
 OUTSIDE = ("error", "nan")
 INSIDE = 1e-9  # barycentric coordinate, negative, up to which a point lies in an element
