@@ -30,6 +30,13 @@ INSIDE = {
     2: ng.IntegrationRule([(1 / 6, 1 / 6, 0), (2 / 3, 1 / 6, 0), (1 / 6, 2 / 3, 0)], [1 / 6] * 3),
     3: ng.IntegrationRule(ng.TET, 2),
 }
+# Middles of the sides of elements: stresses, which initial strains belong to, are compared there.
+ON_SIDES = {
+    2: ng.IntegrationRule([(0.5, 0, 0), (0, 0.5, 0), (0.5, 0.5, 0)], [1 / 6] * 3),
+    3: ng.IntegrationRule(
+        [(0, 1 / 3, 1 / 3), (1 / 3, 0, 1 / 3), (1 / 3, 1 / 3, 0), (1 / 3,) * 3], [1 / 24] * 4
+    ),
+}
 IN_FACETS = {2: ng.IntegrationRule(ng.SEGM, 3), 3: ng.IntegrationRule(ng.TRIG, 3)}
 AT_ENDS = {
     2: ng.IntegrationRule([(0, 0, 0), (0.5, 0, 0), (1, 0, 0)], [1 / 6, 2 / 3, 1 / 6]),
@@ -104,7 +111,11 @@ def check_mesh(mesh: ng.Mesh, dim: int = 2) -> None:
             f"{first} with the vertices {view.corners[first].tolist()} has the signed {what} "
             f"{size[first]:.3g}, which must be positive{order}"
         )
-    if dim == 3 and mesh.GetCurveOrder() > 1 and mesh.ngmesh.GetGeometry() is None:
+    if (
+        dim == 3
+        and mesh.GetCurveOrder() > 1
+        and not isinstance(mesh.ngmesh.GetGeometry(), OCCGeometry)
+    ):
         raise ValueError(
             "the mesh is curved without a geometry, and normals of its facets are none of the "
             "body's: give the OCC geometry, or a mesh of first order"
@@ -259,9 +270,11 @@ def check_values(
     """Refuse data, one for each mask (r,), that are not finite, or laws that are not elliptic.
 
     A law, a number, a function of a mesh point or of coordinates, or a tuple of these and None,
-    looked at in the selected elements at points of a rule, by dimension, `INSIDE` for bodies.
+    looked at in the selected elements at points of a rule, by dimension, `INSIDE` or `ON_SIDES` for
+    bodies.
     """
-    vb, region = (ng.VOL, view.bodies) if rule is INSIDE else (ng.BND, view.boundaries)
+    of_bodies = rule is INSIDE or rule is ON_SIDES
+    vb, region = (ng.VOL, view.bodies) if of_bodies else (ng.BND, view.boundaries)
     everywhere = view.mesh.MapToAllElements(rule[view.dim], vb)
     for (label, mask), value in zip(masks.items(), data, strict=True):
         points = np.asarray(everywhere[mask[region][everywhere["nr"]]])

@@ -235,6 +235,7 @@ class Problem:
             (materials, self.materials.values(), checks.INSIDE),
             (force, self.force.values(), checks.INSIDE),
             (strain, self.strain.values(), checks.INSIDE),
+            (strain, self.strain.values(), checks.ON_SIDES),
             (traction, self.traction.values(), checks.IN_FACETS),
             (displacement, self.displacement.values(), checks.AT_ENDS),
             (gaps, [pair.gap for pair in self.contact], checks.AT_ENDS),

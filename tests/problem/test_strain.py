@@ -52,6 +52,7 @@ def test_values_that_are_refused(value, error, told):
         (strained({"uper": 1e-3}), 'strain "uper" selects no region; did you mean "upper"'),
         (strained({"upper": 1e-3, "upper|lower": 0.0}), "give every region once"),
         (strained({"upper": ng.sqrt(-1 - ng.x)}), "must be finite"),
+        (strained({"upper": ng.log(ng.y)}), "must be finite"),  # on the line y = 0 alone
         (strained({"upper": ((0.0, 1e-3), (2e-3, 0.0))}), "symmetric, xy = yx"),
         (strained({"upper": 1e-3}, Hooke(np.eye(3))), r"give the pair \(xx, yy\)"),
         (strained({"upper": (0.0, 0.0, 1e-3)}, Hooke(np.eye(3))), "normal to the plane"),

@@ -74,9 +74,8 @@ def one_tetrahedron(corners):
 
 
 def curved_without_cad():
-    mesh = ng.Mesh(occ.OCCGeometry(occ.Sphere((0, 0, 0), 1)).GenerateMesh(maxh=1))
+    mesh = MakeStructured3DMesh(hexes=False, nx=1)
     mesh.Curve(2)
-    mesh.ngmesh.SetGeometry(None)
     return mesh
 
 
@@ -89,6 +88,7 @@ INVERTED = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
         (lambda: MakeStructured3DMesh(hexes=True, nx=1), "1 hexahedra, prisms or pyramids"),
         (lambda: one_tetrahedron(INVERTED), r"1 inverted.*tetrahedra.*signed volume -?0\.167"),
         (lambda: blocks(1, 1), 'body "upper" has no material'),
+        (curved_without_cad, "curved without a geometry"),
     ],
 )
 def test_meshes_that_are_refused(mesh, words):
