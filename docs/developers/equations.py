@@ -1,4 +1,4 @@
-"""Where the equations of HH81 stand in the code, from the comments at the lines themselves.
+"""The functions that implement the equations of HH81, from the comments at their lines.
 
 ``python docs/developers/equations.py`` writes ``equations.md``. A comment names what its line, or
 the line below it, implements: ``# (2.10)``, ``# HH81 (2.3), (2.5)``, ``# Remark 3.7``; a range such
@@ -57,10 +57,9 @@ RANGE = re.compile(rf"({NAME.pattern})\s*[-–]\s*({NAME.pattern})")
 
 @dataclass(frozen=True)
 class Place:
-    """A line of the code: file below the repository, number, and the function around it."""
+    """A function of the package: file below the repository, qualified name."""
 
     path: str
-    line: int
     function: str
 
 
@@ -106,8 +105,8 @@ def comments(source: str) -> Iterator[tuple[int, str]]:
 
 @cache
 def places() -> dict[str, list[Place]]:
-    """Lines of the package with a comment that names an equation, by equation."""
-    found = defaultdict(list)
+    """Functions of the package with a comment that names an equation, once each, by equation."""
+    found: dict[str, dict[Place, None]] = defaultdict(dict)
     for path in sorted((ROOT / "ngcontact").rglob("*.py")):
         source = path.read_text()
         functions = _functions(source)
@@ -115,15 +114,12 @@ def places() -> dict[str, list[Place]]:
             around = [name for first, last, name in functions if first <= line <= last]
             file = path.relative_to(ROOT).as_posix()
             for name in named(comment):
-                found[name].append(Place(file, line, around[-1] if around else "module"))
-    return dict(found)
+                found[name][Place(file, around[-1] if around else "module")] = None
+    return {name: list(where) for name, where in found.items()}
 
 
 def _row(name: str, meaning: str, where: list[Place]) -> str:
-    links = [
-        f"[{p.path.removeprefix('ngcontact/')}:{p.line}](../../{p.path}#L{p.line}) `{p.function}`"
-        for p in where
-    ]
+    links = [f"[{p.path.removeprefix('ngcontact/')}](../../{p.path}) `{p.function}`" for p in where]
     return f"| {name} | {meaning} | {'<br>'.join(links)} |"
 
 
@@ -135,9 +131,10 @@ def page() -> str:
         [
             "# Equation index",
             "",
-            "What J. Haslinger and I. Hlaváček (1981) state, and the lines that implement it.",
-            "Made by `python docs/developers/equations.py` from the comments at these lines; the",
-            "symbols are those of [notation](../notation.md).",
+            "What J. Haslinger and I. Hlaváček (1981) state, and the functions that implement",
+            "it: a comment in each names the equation at its line.",
+            "Made by `python docs/developers/equations.py`; the symbols are those of",
+            "[notation](../notation.md).",
             "",
             "| HH81 | states | where |",
             "|---|---|---|",
