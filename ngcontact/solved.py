@@ -130,8 +130,9 @@ class Solved:
     def reactions(self) -> dict[str, Array]:
         """Resultant (d,) of every boundary of Gamma_u, Gamma_0 on its body, force per thickness.
 
-        A node shared by several of them counts for the last entry of `displacement`, then for
-        `sliding`; a name that several bodies share gives the sum over them.
+        At a node of several of them each has the parts along the directions that it prescribes; a
+        direction that several prescribe is shared in proportion to their lengths or areas there. A
+        name that several bodies share gives the sum over them.
         """
         return resultants(self.problem, self.discrete.space.trace, self.nodal_reaction)
 

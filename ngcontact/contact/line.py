@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import accumulate, pairwise
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 import ngsolve as ng
 import numpy as np
@@ -35,6 +35,7 @@ GAP_ROUND_OFF = 4 * np.finfo(float).eps  # round-off of a measured gap, relative
 class ContactLine:
     """The secondary side of one pair and its m contact points."""
 
+    by_segment: ClassVar[tuple[str, ...]] = ("segments", "rows", "faces", "shares")
     contact: Contact
     segments: Index  # (k,) segments of the secondary boundary
     facing: Index  # (q,) segments of the primary boundary
@@ -57,6 +58,10 @@ class ContactLine:
     def dim(self) -> int:
         """Of the bodies."""
         return 2
+
+    def pressure(self, force: Array) -> Array:
+        """Pressures (m,) of the forces (m,) at its points: (3.10), (3.10')."""
+        return np.asarray(force / self.weight)
 
 
 Values = TypeVar("Values", Array, Mask)

@@ -162,7 +162,7 @@ class ContactState:
     @property
     def pressure(self) -> Array:
         """-T_n per unit length (P1), -T_xi per unit eta (P2), (m,): units of stress."""
-        pressure = self.force / self.line.weight  # (3.10), (3.10')
+        pressure = self.line.pressure(self.force)  # (3.10), (3.10')
         return continued_to_axis(self.line, pressure, self.active)
 
     @cached_property

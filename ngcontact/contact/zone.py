@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -35,6 +36,7 @@ from .projection import MATCHING_DISTANCE, Partners
 ROUND_OFF = 1e-13  # of basis functions at nodes, which vanish there
 SLIVER = 1e-9  # share of a facet, in all its facing parts, below which it faces nothing
 WHOLE = 1 - SLIVER  # ... and from which it faces wholly
+LEAST_COVERED = 0.5  # of a node's weight on its whole facets, below which pressures are means
 SMALLEST_SHARE = 1e-8  # of a node's weight on its whole facets, below which it carries no row
 
 
@@ -45,10 +47,42 @@ class ContactZone(ContactLine):
     Weights are areas, across a fixed direction as the direction sees them.
     """
 
+    by_segment: ClassVar[tuple[str, ...]] = (*ContactLine.by_segment, "covered")
+    covered: Array  # (k, q) what the part of each facet that faces the primary adds to weights
+
     @property
     def dim(self) -> int:
         """Of the bodies."""
         return 3
+
+    def pressure(self, force: Array) -> Array:
+        """Pressures (m,) of the forces (m,) at its points.
+
+        Force over weight, but where most of a point's facets face nothing. It lies beside the part
+        that faces the primary then, and its force balances the moments of others, too: its
+        pressure is the mean over the facing parts around it, so far that they amount to half the
+        area of its facets.
+        """
+        pressure, (k, q) = np.asarray(force / self.weight), self.rows.shape
+        on = self.rows >= 0
+        facet, point = np.repeat(np.arange(k), q)[on.ravel()], self.rows[on]
+        at = from_triplets(np.ones(len(point)), point, facet, (len(force), k))
+        whole, covered = (
+            np.bincount(point, x[on], len(force)) for x in (self.shares, self.covered)
+        )
+        beside = np.flatnonzero(covered < LEAST_COVERED * whole)
+        area, pushed = (
+            np.bincount(facet, x, k) for x in (self.covered[on], self.covered[on] * pressure[point])
+        )
+        enough, near = LEAST_COVERED * (at @ self.shares.sum(axis=1))[beside], at[beside]
+        while beside.size:
+            reached = near @ area
+            pressure[beside] = (near @ pushed) / reached
+            wider = near @ (at.T @ at)
+            wider.data[:] = 1.0
+            small = (reached < enough) & (np.diff(wider.indptr) > np.diff(near.indptr))
+            beside, near, enough = beside[small], wider[small], enough[small]
+        return pressure
 
 
 def rays(trace: FacetTrace, contact: Contact, facet: Index, s: Array) -> Array:
@@ -188,6 +222,7 @@ def nodal_zone(
         on_axis=np.zeros(len(first), dtype=bool),
         means=np.zeros(len(first), dtype=bool),
         shares=shares,
+        covered=shares,
         searches=int(found.searched),
     )
     return zone, facing_points
@@ -291,7 +326,10 @@ def with_dual_rows(trace: FacetTrace, zone: ContactZone, facing: Mask) -> tuple[
     facets = zone.segments[~matched]
     parts = facing_pieces(trace, zone.contact, facets, zone.facing, _reach(trace, zone)[~matched])
     whole = np.bincount(zone.rows.ravel() + 1, zone.shares.ravel(), len(facing) + 1)[1:]
-    zone, carries = with_means(trace, zone, facing, matched, _means(trace, zone, facets, parts))
+    means, covered = _means(trace, zone, facets, parts), zone.covered.copy()
+    covered[~matched] = means.D
+    zone, carries = with_means(trace, zone, facing, matched, means)
+    zone = replace(zone, covered=covered)
     # Slivers: what they carry is less than the round-off of what others say.
     return zone, carries & (zone.weight > SMALLEST_SHARE * whole)
 

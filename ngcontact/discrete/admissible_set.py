@@ -21,6 +21,7 @@ from ..contact import ContactLine, by_line, without
 from ..fem import BoundaryTrace, Space
 from ..problem import Problem, boundary_mask
 
+SAME_DIRECTION = 1e-12  # squared sine below which two boundaries prescribe one direction
 DIRECTION_DIFFERENCE = 1e-9  # of unit vectors, up to which two points at a node are one
 
 
@@ -76,24 +77,39 @@ def conditioned_segments(problem: Problem, trace: BoundaryTrace) -> Index:
 def resultants(problem: Problem, trace: BoundaryTrace, reaction: Array) -> dict[str, Array]:
     """Sums (d,) of the forces `reaction` (n, d) of supports, by boundary of Gamma_u and Gamma_0.
 
-    Per unit thickness, on the nodes of the boundary and all others.
+    Per unit thickness, on the nodes of the boundary and all others. At a node of several boundaries
+    each has the parts along the directions that it prescribes. A direction that several prescribe
+    is shared in proportion to their lengths or areas beside the node, as the consistent nodal
+    forces of one constant traction would be.
     """
-    mesh = trace.mesh
+    mesh, (n, d) = trace.mesh, reaction.shape
     names = np.array(mesh.GetBoundaries())
-    patterns = [
-        *reversed(list(problem.displacement)),  # at a common node the last one is in force
-        *([] if problem.sliding is None else [str(problem.sliding)]),
-    ]
-    counted = np.zeros(len(reaction), dtype=bool)
-    result: dict[str, Array] = {}
-    for pattern in patterns:
+    supports: list[tuple[str, Array]] = []  # patterns and directions (k * q, j, d) at their nodes
+    for pattern, components in problem.displacement.items():
+        axes = np.eye(d)[[function is not None for function in components]]
+        count = trace.nodes[trace.segments(pattern)].size
+        supports.append((pattern, np.broadcast_to(axes, (count, *axes.shape))))
+    if problem.sliding is not None:
+        number, normal = trace.guide(str(problem.sliding))
+        supports.append((str(problem.sliding), normal[number][:, None]))
+    every, held = [], np.zeros((n, d, d))  # sums of size a a' at nodes, a the directions
+    for pattern, directions in supports:
         segments = trace.segments(pattern)
-        named = names[trace.region[segments]]
+        node, q = trace.nodes[segments].ravel(), trace.nodes.shape[1]
+        size = np.repeat(trace.sizes(segments), q)
+        share = np.einsum("k,kja,kjb->kab", size, directions, directions)
+        np.add.at(held, node, share)
+        every.append((pattern, np.repeat(trace.region[segments], q), node, share))
+    # The forces size a (a.y) add up to that of the node.
+    some, y = held.any(axis=(1, 2)), np.zeros((n, d))
+    inverse = np.linalg.pinv(held[some], SAME_DIRECTION, hermitian=True)
+    y[some] = np.einsum("iab,ib->ia", inverse, reaction[some])
+    result: dict[str, Array] = {}
+    for pattern, region, node, share in every:
+        forces = np.einsum("kab,kb->ka", share, y[node])
         for name in dict.fromkeys(names[boundary_mask(mesh, pattern)]):
-            nodes = np.unique(trace.nodes[segments[named == name]])
-            nodes = nodes[~counted[nodes]]
-            counted[nodes] = True
-            result[str(name)] = trace.model.resultant(reaction[nodes].sum(axis=0))
+            total = trace.model.resultant(forces[names[region] == name].sum(axis=0))
+            result[str(name)] = result.get(str(name), 0.0) + total
     return result
 
 
@@ -206,7 +222,7 @@ def merged(lines: list[ContactLine], rows: Rows) -> tuple[list[ContactLine], Row
         earlier = [one.segments for one in lines[:k] if _share_primary(one, lines[k])]
         taken = np.isin(line.segments, np.concatenate([np.zeros(0, np.intp), *earlier]))
         left = (line.rows >= 0).any(axis=1) | ~had | ~taken
-        kept.append(rows_of(line, left, "segments", "rows", "faces", "shares"))
+        kept.append(rows_of(line, left, *line.by_segment))
     return kept, replace(rows, g=g, equality=equality).select(first)
 
 

@@ -264,6 +264,10 @@ class BoundaryTrace:
         """Lengths (k,) of the chords of `segments` (k,)."""
         return np.linalg.norm(self.curve[segments, -1] - self.curve[segments, 0], axis=1)
 
+    def sizes(self, segments: Index) -> Array:
+        """Measures (k,) of the straight `segments` (k,): lengths, in space areas."""
+        return self.lengths(segments)
+
     def nodal_basis(self, segments: Index) -> sp.csr_array:
         """Matrix (n, n) from node values on `segments` (k,) and other unknowns to NGSolve's."""
         return nodal_basis(self, segments)

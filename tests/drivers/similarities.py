@@ -193,9 +193,6 @@ def differences(first, other, motion, vertex, triangle) -> dict[str, float]:
     def off(value, image, scale):
         return float(np.abs(value - image).max(initial=0.0) / scale)
 
-    reactions = [(first.reactions[name], other.reactions[name]) for name in first.reactions]
-    if motion.seed is not None:  # a node that two boundaries share is of the one numbered first
-        reactions = [tuple(np.sum(side, axis=0) for side in zip(*reactions, strict=True))]
     found = {
         "points": 0.0 if complete else math.inf,
         "active": 0.0 if (other.active[number] == first.active[same]).all() else math.inf,
@@ -211,8 +208,8 @@ def differences(first, other, motion, vertex, triangle) -> dict[str, float]:
             sign * other.contact_force() / force, pushed @ motion.turn.T, np.linalg.norm(pushed)
         ),
         "reactions": max(
-            off(theirs / force, ours @ motion.turn.T, np.linalg.norm(pushed))
-            for ours, theirs in reactions
+            off(other.reactions[name] / force, ours @ motion.turn.T, np.linalg.norm(pushed))
+            for name, ours in first.reactions.items()
         ),
         "energy": 0.0 if other.energy == scaled else off(other.energy / scaled, 1.0, 1.0),
         "estimate": abs(other.error_estimate / (root * size) / first.error_estimate - 1),
