@@ -60,7 +60,7 @@ class ContactLine:
         return 2
 
     def pressure(self, force: Array) -> Array:
-        """Pressures (m,) of the forces (m,) at its points: (3.10), (3.10')."""
+        """Pressures (m,) of the `force` (m,) at its points: (3.10), (3.10')."""
         return np.asarray(force / self.weight)
 
 

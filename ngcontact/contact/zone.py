@@ -56,7 +56,7 @@ class ContactZone(ContactLine):
         return 3
 
     def pressure(self, force: Array) -> Array:
-        """Pressures (m,) of the forces (m,) at its points.
+        """Pressures (m,) of the `force` (m,) at its points.
 
         Force over weight, but where most of a point's facets face nothing. It lies beside the part
         that faces the primary then, and its force balances the moments of others, too: its
