@@ -2,14 +2,21 @@
 
 import sys
 
+import ngsolve as ng
 import numpy as np
 import pytest
 
 from drivers.benchmark.studies.linear import uniform_mesh
-from drivers.benchmark.studies.overhead import two_blocks
 from drivers.reference import cases
-from ngcontact import solve
+from ngcontact import Contact, solve
 from ngcontact.mesh import first_mesh
+
+
+def two_blocks(gap=None):
+    """Blocks under a pressure that opens a part of their contact; `gap` keeps them apart."""
+    contact = Contact("upper_contact", "lower_contact", direction=(0, -1), gap=gap)
+    held = {"bottom": (0, 0), "upper_left": (0, 0)}
+    return cases.touching_blocks(held, traction={"top": 1.0 - 3 * ng.x}, contact=[contact])
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])
@@ -21,11 +28,23 @@ def test_bodies_apart_cost_one_system(order):
     assert solution.work["back_solves"] <= 3  # the load, and what round-off asks to refine
 
 
-def test_what_is_not_asked_for_is_not_done():
+@pytest.mark.parametrize(
+    ("problem", "searches", "curved"),
+    [
+        (two_blocks(), 0, False),
+        (cases.ring_in_ring().problem, 0, True),
+        (cases.pressed_disc(), 1, True),
+    ],
+    ids=["matched blocks", "matched rings", "disc on block"],
+)
+def test_only_other_lines_are_searched_and_only_curved_edges_curved(problem, searches, curved):
+    work = solve(problem, maxh=0.3, order=2).work
+    assert (work["gap_searches"], work["curved_elements"] > 0) == (searches, curved)
+
+
+def test_the_estimate_is_made_once_when_it_is_asked_for():
     solution = solve(two_blocks(), maxh=0.3, order=2)
     assert solution.work["estimates"] == 0
-    assert solution.work["curved_elements"] == 0
-    assert solution.work["gap_searches"] == 0
     _ = solution.indicators, solution.error_estimate, solution.relative_error_estimate
     assert solution.work["estimates"] == 1
 

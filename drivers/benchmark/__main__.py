@@ -42,7 +42,7 @@ def machine() -> str:
     )
 
 
-Part: TypeAlias = Literal["tax", "levels", "growth", "large", "accuracy", "skip", "stages"]
+Part: TypeAlias = Literal["tax", "levels", "growth", "large", "accuracy", "stages"]
 # Each returns rows and their table in Markdown; its docstring is the title.
 PARTS: dict[Part, Callable[[Extent], tuple[list[Any], str]]] = {
     "tax": overhead.taxes,
@@ -50,7 +50,6 @@ PARTS: dict[Part, Callable[[Extent], tuple[list[Any], str]]] = {
     "growth": processes.growth,
     "large": processes.large,
     "accuracy": accuracy.accuracy,
-    "skip": overhead.scenes,
     "stages": overhead.all_stages,
 }
 
@@ -73,7 +72,7 @@ def main(
     parts : sequence of str
         Tables.
     problems : sequence of str
-        Common problems; what scenes skip is shown on others.
+        Common problems.
     rounds : int
         Number of times that each solve is measured; tables give medians. Growth, large and stages
         measure once.

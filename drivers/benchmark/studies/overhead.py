@@ -1,7 +1,4 @@
-"""Overhead of contact and of adaptivity over the linear solve, and where the time goes.
-
-Also of the import, and what a scene does not pay for that does not contain it.
-"""
+"""Overhead of contact, of adaptivity and of the import, and where the time of a level goes."""
 
 from __future__ import annotations
 
@@ -14,18 +11,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TypeAlias
 
-import ngsolve as ng
 import numpy as np
 
 from drivers.benchmark.scenes.problems import Common
 from drivers.benchmark.studies import Extent
 from drivers.benchmark.studies.linear import linear_solve, uniform_mesh
-from drivers.reference import cases
 from drivers.tables import of_dicts
-from ngcontact import Contact, Elastic, Problem, adapt, solve
+from ngcontact import adapt, solve
 from ngcontact.adaptivity import doerfler, refined
-from ngcontact.geometries import blocks
-from ngcontact.geometries.region import body, compound, polygon
 
 Row: TypeAlias = dict[str, Any]  # by title
 SIZES = (1_000, 10_000, 100_000, 300_000)
@@ -118,68 +111,6 @@ def import_seconds(rounds: int = 7) -> tuple[float, float]:
     times = [[float(subprocess.check_output(x)) for x in commands] for _ in range(rounds)]
     plain, ours = np.median(times, axis=0).tolist()
     return plain, ours
-
-
-SIZE = 15_000  # unknowns, about
-
-STEEL = Elastic(E=200.0, nu=0.3)
-COUNTS = ("factorizations", "back_solves", "gap_searches", "curved_elements", "estimates")
-
-
-def two_blocks(gap: float | None = None, third: bool = False) -> Problem:
-    """Blocks under a pressure that opens a part of their contact; `gap` keeps them apart."""
-    geometry = blocks()
-    materials = {"upper": STEEL, "lower": STEEL}
-    displacement: dict[str, tuple[float, float]] = {"bottom": (0, 0), "upper_left": (0, 0)}
-    if third:
-        corners = [(3.0, -1.0), (5.0, -1.0), (5.0, 1.0), (3.0, 1.0)]
-        names = ["third_bottom", "third_side", "third_top", "third_side"]
-        geometry = compound(geometry.shape, body("third", polygon(corners, names)))
-        materials["third"] = STEEL
-        displacement["third_bottom"] = (0, 0)
-    return Problem(
-        geometry=geometry,
-        materials=materials,
-        displacement=displacement,
-        traction={"top": 1.0 - 3 * ng.x},
-        contact=[Contact("upper_contact", "lower_contact", direction=(0, -1), gap=gap)],
-    )
-
-
-def scenes(extent: Extent) -> tuple[list[dict[str, object]], str]:
-    """What scenes skip."""
-    opening, rings = two_blocks(), cases.ring_in_ring().problem
-    found: list[dict[str, object]] = []
-    for feature, variant, problem in (
-        ("contact", "touching", opening),
-        ("contact", "apart", two_blocks(gap=1.0)),
-        ("third body", "with", two_blocks(third=True)),
-        ("third body", "without", opening),
-        ("estimate", "asked for", opening),
-        ("estimate", "not asked for", opening),
-        ("curved edges", "matched rings", rings),
-        ("curved edges", "matched blocks", opening),
-        ("gap search", "disc on block", cases.pressed_disc()),
-        ("gap search", "matched rings", rings),
-    ):
-        mesh, seconds = uniform_mesh(problem, ORDER, min(SIZE, extent.max_dofs)), []
-        for _ in range(extent.rounds):
-            start = time.perf_counter()
-            solution = solve(problem, mesh, order=ORDER)
-            if variant == "asked for":
-                _ = solution.error_estimate
-            seconds.append(time.perf_counter() - start)
-        found.append(
-            {
-                "feature": feature,
-                "scene": variant,
-                "unknowns": solution.displacement.space.ndof,
-                "systems": len(solution.steps),
-                **{name.replace("_", " "): solution.work[name] for name in COUNTS},
-                "s": f"{np.median(seconds):.3g}",
-            }
-        )
-    return found, of_dicts(found)
 
 
 STAGED = (1_000, 10_000, 100_000, 1_000_000)
