@@ -88,21 +88,18 @@ def _root_profiles(c: float, upper: Elastic, lower: Elastic) -> tuple[Profile, P
     )
 
 
-def transition(upper: Elastic, lower: Elastic, *, c: float = 1.0, bending: float = 0.0) -> Exact:
+def transition(upper: Elastic, lower: Elastic, *, c: float = 1.0) -> Exact:
     """One change from contact (x < 0) to separation (x > 0) of bodies with no initial gap.
 
     Z = i c sqrt(z): p = c sqrt(-x), gap = 4 c x^(3/2) / (3 E*). The displacement grows as r^(3/2),
-    which is the regularity of frictionless contact with smooth data. `bending` is a curvature
-    common to both bodies, u_y = -bending x^2 / 2 on y = 0: the contact line deflects, the pressure
-    stays. Units: c stress per square root of length, bending 1 / length.
+    which is the regularity of frictionless contact with smooth data. Units: c stress per square
+    root of length.
     """
     materials = {"upper": upper, "lower": lower}
-    x, y, fields = ng.x, ng.y, {}
-    for body, material in materials.items():
-        root, ratio = half_plane(root_potential(c, body), material, body), moduli(material).ratio
-        bent = bending * ng.CF((x * y, -(x * x + ratio * y * y) / 2))
-        grad = bending * ng.CF((y, x, -x, -ratio * y), dims=(2, 2))
-        fields[body] = Field(root.u + bent, root.grad + grad)
+    fields = {
+        body: half_plane(root_potential(c, body), material, body)
+        for body, material in materials.items()
+    }
     return Exact(*equilibrium_fields(fields, materials), *_root_profiles(c, upper, lower))
 
 

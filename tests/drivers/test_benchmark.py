@@ -22,7 +22,7 @@ from drivers.benchmark.engines import (
     ngsolve,
 )
 from drivers.benchmark.engines.active_set import FELUPE, SCIKIT, solved
-from drivers.benchmark.scenes.meshes import KINDS, made, sides, which
+from drivers.benchmark.scenes.meshes import KINDS, made
 from drivers.benchmark.scenes.plane import contact_end, peak, weights
 from drivers.benchmark.scenes.problems import Common, block, disc
 from drivers.benchmark.studies import overhead, processes
@@ -121,14 +121,6 @@ def test_factorisations_agree(order: int):
     assert found[0] == pytest.approx(found[1], rel=1e-10)  # round-off: measured 1e-14
 
 
-def test_sides_of_two_triangles():
-    triangles = np.array([[0, 1, 2], [2, 1, 3]])
-    ends, number = sides(triangles)
-    np.testing.assert_array_equal(ends, [[0, 1], [0, 2], [1, 2], [1, 3], [2, 3]])
-    np.testing.assert_array_equal(number, [[0, 2, 1], [2, 3, 4]])
-    np.testing.assert_array_equal(which(ends, np.array([[3, 2], [0, 1]])), [4, 0])
-
-
 def test_a_missing_package_is_named():
     with pytest.raises(NotInstalledError, match=r"Nothing needs no_such_code.*bench"):
         needed("Nothing", "math", "no_such_code")
@@ -186,11 +178,6 @@ def smallest_angle(corners: np.ndarray) -> float:
         a, b = (corners[:, (k + i) % 3] - corners[:, k] for i in (1, 2))
         angles.append(np.degrees(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(1))))
     return float(np.min(angles))
-
-
-def test_an_unknown_kind_is_refused():
-    with pytest.raises(ValueError, match="kind='fine'"):
-        made(COMMON["disc"], "fine", 1, 1000)
 
 
 @pytest.mark.parametrize("order", [1, 2])

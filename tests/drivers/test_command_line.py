@@ -7,17 +7,14 @@ import os
 import re
 import subprocess
 import sys
-from dataclasses import astuple
 from pathlib import Path
-from shlex import quote
-from typing import Literal
+from shlex import quote, split
 
 import pytest
 
-from drivers import hertz
 from drivers.__main__ import drivers
 from drivers.__main__ import main as listed
-from drivers.command_line import Count, Positive, run
+from drivers.command_line import run
 from drivers.reference.cases import touching_blocks
 from drivers.tables import last_level, table
 from ngcontact import solve
@@ -75,13 +72,6 @@ def test_drivers_are_listed(capsys):
         assert shown.endswith(line)
 
 
-def test_the_list_is_a_command(tmp_path):
-    done = python(tmp_path, "drivers")
-    assert done.returncode == 0
-    for name in drivers():
-        assert f"python -m drivers.{name} " in done.stdout
-
-
 @pytest.mark.parametrize("name", drivers())
 @pytest.mark.study(witness=["stress"])
 def test_help_states_units_and_defaults_and_runs_nothing(name, tmp_path):
@@ -117,6 +107,7 @@ def shown(value):
         ("hertz", "--radius 2 --tolerance 1e-3 --out o", {"radius": 2, "tolerance": 1e-3}),
         ("hertz", "--press 1e-3 --order 2 --max-dofs 5e3", {"order": 2, "max_dofs": 5000}),
         ("hertz", "--disc 1e9 0.2 --block 2e9 0.4", {"disc": (1e9, 0.2), "block": (2e9, 0.4)}),
+        ("adaptive_study", "'flat punch' --out o", {"studies": ["flat punch"], "out": Path("o")}),
         ("convergence", "S1 S9 --levels 3", {"parts": ["S1", "S9"], "levels": 3}),
         ("adaptive_study", "--orders 1 2 --reference 9000", {"orders": [1, 2], "reference": 9000}),
         ("stress", "data scenes --seed 4", {"trials": ["data", "scenes"], "seed": 4}),
@@ -124,24 +115,8 @@ def shown(value):
     ],
 )
 def test_parameters_reach_main(name, words, expected):
-    given = run(recorder(main_of(name)), words.split())
+    given = run(recorder(main_of(name)), split(words))
     assert {key: given[key] for key in expected} == expected
-
-
-def test_names_with_spaces():
-    words = ["flat punch", "hertz a=0.3", "--out", "here"]
-    given = run(recorder(main_of("adaptive_study")), words)
-    assert given == {"studies": words[:2], "out": Path("here")}
-
-
-@pytest.mark.study
-def test_numbers_come_back(tmp_path, capsys):
-    words = "--radius 0.02 --order 1 --max-dofs 300".split()
-    computed, _ = run(hertz.main, [*words, "--out", str(tmp_path / "results")])
-    again, _ = hertz.main(radius=0.02, order=1, max_dofs=300, out=None)
-    assert astuple(computed) == pytest.approx(astuple(again), rel=1e-9)
-    assert (tmp_path / "results" / "hertz.vtu").exists()
-    assert "radius 20 mm" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -175,36 +150,6 @@ def test_bad_values_are_refused_with_a_reason(name, words, said, monkeypatch, ca
         run(main_of(name), words.split())
     assert stopped.value.code == 2
     assert said in capsys.readouterr().err
-
-
-def test_help_does_not_call_main(capsys):
-    def main(*, length: Positive = 1.0, kind: Literal["a", "b"] = "a", count: Count = 2) -> float:
-        """Something.
-
-        Parameters
-        ----------
-        length : float
-            Its length, m.
-        """
-        raise AssertionError
-
-    with pytest.raises(SystemExit) as stopped:
-        run(main, ["--help"])
-    assert stopped.value.code == 0
-    printed = capsys.readouterr().out
-    assert "Its length, m. [default: 1]" in printed
-    assert "[choices: a, b] [default: a]" in printed
-
-
-def test_bad_input_found_by_main_is_a_message(monkeypatch, capsys):
-    def main(*, x: float = 1.0) -> float:
-        """Something."""
-        raise ValueError(f"x={x} is too large")
-
-    with pytest.raises(SystemExit) as stopped:
-        run(main, ["--x", "3"])
-    assert stopped.value.code == 2
-    assert "x=3.0 is too large" in capsys.readouterr().err
 
 
 def test_levels_are_printed_as_they_are_and_the_last_one_is_returned(capsys):

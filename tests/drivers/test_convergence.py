@@ -2,7 +2,6 @@
 
 from typing import get_args
 
-import ngsolve as ng
 import numpy as np
 import pytest
 
@@ -83,20 +82,6 @@ def test_theorems_and_remarks(part, run, maxh, levels):
     band = 0.07 if part in ("polygon", "remark 3.3") else 0.05
     assert abs(rows[-1].rate - one.expected) <= band
     assert max(row.identities for row in rows) < IDENTITIES
-
-
-def test_body_on_gamma_0_only():
-    """Data exactly as in the paper: homogeneous, semicoercive; the lower body slides freely."""
-    case = cases.guided_transition()
-    assert list(case.problem.displacement) == ["top"]
-    solutions, _ = rows_of(case, order=1, maxh=0.26, levels=2)
-    [motion] = solutions[-1].free_motions
-    assert motion.bodies == ("lower",)
-    mesh = solutions[-1].mesh
-    boundary = mesh.Materials("lower").Boundaries()
-    along, length = ng.Integrate(ng.CF((solutions[-1].displacement[0], 1)), boundary)
-    size = np.abs(solutions[-1].displacement.vec.FV().NumPy()).max()
-    assert abs(along) < 1e-13 * size * length  # p(u_h) = 0, Remark 3.7
 
 
 def test_tension_on_the_bilateral_part_only():

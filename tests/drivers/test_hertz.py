@@ -10,7 +10,6 @@ import pyvista
 from drivers import hertz, spheres
 from drivers.hertz import Quantities, compare
 from drivers.reference.cases import FIRST, SECOND
-from drivers.reference.half_spaces import Hertz, plane_modulus, together
 from drivers.reference.westergaard import moduli
 from ngcontact import Contact, Problem, adapt
 from ngcontact.geometries import disc, disc_on_block, disc_on_disc
@@ -36,23 +35,6 @@ def test_hertz_agrees_with_the_formulas(tmp_path, capsys):
     assert {"displacement", "stress", "von_mises"} <= set(bodies.point_data)
     contact = pyvista.read(tmp_path / "hertz_contact.vtp")
     assert contact["pressure"].max() == computed.peak
-
-
-@pytest.mark.study
-def test_similar_discs_have_the_same_pressure():
-    options = {"order": 2, "max_dofs": 2000, "out": None}
-    (one, _), (other, formulas) = (hertz.main(radius=r, **options) for r in (0.01, 0.04))
-    assert other.peak == pytest.approx(one.peak, rel=1e-9)  # the same problem in other units
-    assert other.a == pytest.approx(4 * one.a, rel=1e-9)
-    assert formulas.force == pytest.approx(4 * one.force, rel=1e-9)
-    softer, _ = hertz.main(disc=(21e9, 0.3), block=(7e9, 0.33), **options)
-    assert softer.peak == pytest.approx(one.peak / 10, rel=1e-9)
-
-
-def test_a_tolerance_ends_the_refinement(capsys):
-    hertz.main(order=2, tolerance=0.5, out=None)
-    levels = [line for line in capsys.readouterr().out.splitlines() if line[:8].strip().isdigit()]
-    assert float(levels[-1].split()[3]) <= 0.5 < float(levels[-2].split()[3])
 
 
 def test_a_comparison_gives_the_difference_in_percent(capsys):
@@ -128,10 +110,3 @@ def test_the_driver_agrees_with_the_formulas(tmp_path, capsys):
     assert {path.name for path in tmp_path.iterdir()} == names
     contact = pyvista.read(tmp_path / "spheres_contact.vtp")
     assert contact["pressure"].max() == computed.peak
-
-
-def test_equal_radii_and_laws_are_a_ball_on_a_rigid_plane():
-    """Hertz: 1/R is the sum of both curvatures, the stiffness half that of one body."""
-    a, peak = Hertz(10.0, together([0.01, 0.01]), together([plane_modulus(1e9, 0.3)] * 2)).sphere()
-    assert a == pytest.approx((0.75 * 10.0 * 0.005 * 2 * 0.91e-9) ** (1 / 3))
-    assert peak == pytest.approx(1.5 * 10.0 / (math.pi * a**2))

@@ -39,11 +39,6 @@ def test_as_the_error_against_the_exact_stress(make, order, element):
     assert found == pytest.approx(exact, rel=0.02)
 
 
-def test_of_itself_there_is_none():
-    solution = solve(cases.pressed_disc(), maxh=0.3, order=2)
-    assert Overkill(solution).relative_error(solution) < 1e-9  # points found again to round-off
-
-
 def test_differences_of_energies_are_no_errors_on_curves():
     """Order 1: what the polygons miss of the disc is in the energy, with the sign of its own."""
     problem = cases.disc_on_rigid_plane()

@@ -83,33 +83,3 @@ def test_points_derivatives_and_normals_agree_with_ngsolve(make):
         segment, s = segment[outside], s[outside]
         expected = trace.evaluate(ng.specialcf.normal(2), segment, s)
         np.testing.assert_allclose(trace.normal(segment, s), expected, atol=1e-12)
-
-
-def numbered(trace, segments):
-    """Points of the nodes of segments: numbers by entry, vectors, nodes by point."""
-    segment, s = trace.at_nodes(segments)
-    node = trace.nodes[segments].ravel()
-    number, vector = trace.number_points(segment, node, trace.exact_normal(segment, s))
-    at = np.empty(len(vector), dtype=int)
-    at[number] = node
-    assert (at[number] == node).all()  # a point has one node
-    return number, vector, at
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_two_points_at_corners_of_the_geometry(order):
-    trace = boundary_trace(meshed(blocks(line=LINE), maxh=0.3), order)
-    segments = trace.segments("upper_contact")
-    number, vector, at = numbered(trace, segments)
-    nodes = np.unique(trace.nodes[segments])
-    assert len(vector) == len(nodes) + 2
-    twice = np.flatnonzero(np.bincount(at, minlength=trace.space.ndof) == 2)
-    xy = np.full((trace.space.ndof, 2), np.nan)
-    segment, s = trace.at_nodes(segments)
-    xy[trace.nodes[segments].ravel()] = trace.point(segment, s)
-    np.testing.assert_allclose(xy[twice[np.argsort(xy[twice, 0])]], LINE[1:3], atol=1e-15)
-    # Every entry has the normal of its own side of the line: to the right of the line's direction.
-    side = np.searchsorted([LINE[1][0], LINE[2][0]], trace.curve[segments].mean(axis=1)[:, 0])
-    along = np.diff(np.array(LINE), axis=0)
-    right = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
-    np.testing.assert_allclose(vector[number], right[np.repeat(side, order + 1)], atol=1e-15)

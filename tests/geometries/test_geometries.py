@@ -121,29 +121,6 @@ def test_areas_bodies_and_normals(make, options, areas):
         mesh.Curve(3)
 
 
-CURVES = {
-    "ring": (rings, "inner_contact|outer_contact", lambda x, y: np.hypot(x, y) - 1),
-    "disc": (disc_on_block, "disc_arc", lambda x, y: np.hypot(x, y - 1) - 1),
-    "Bezier": (lambda: graphs(parabola, flat), "upper_contact", lambda x, y: y - x**2 / 2),
-    "spline": (lambda: graphs(bowl, flat), "upper_contact", lambda x, y: y - 0.1 * np.sin(4 * x)),
-}
-
-
-@pytest.mark.parametrize("curve", CURVES)
-@pytest.mark.study(witness=["Bezier", "spline"])
-def test_curved_mesh_follows_the_exact_curve(curve):
-    make, boundary, distance = CURVES[curve]
-    at, deviation = [(t, 0, 0) for t in np.linspace(0, 1, 7)], []
-    for maxh in (0.2, 0.1):
-        mesh = mesh_of(make(), maxh=maxh)
-        rule = ng.IntegrationRule(at, [1.0] * len(at))
-        points = mesh.MapToAllElements(rule, mesh.Boundaries(boundary))
-        deviation.append(np.abs(distance(ng.x(points).ravel(), ng.y(points).ravel())).max())
-    # Theory: cubic segments are off by O(h^4); measured rates 3.8 to 4.25, at most 3.1e-6.
-    assert math.log2(deviation[0] / deviation[1]) == pytest.approx(4, abs=0.3)
-    assert deviation[1] < 1e-5
-
-
 @pytest.mark.parametrize(
     ("f", "bound"),
     [

@@ -141,13 +141,6 @@ def test_effectivity_beside_a_finer_solution(name):
     assert ratios[-1] <= last
 
 
-ENDS = {  # of a block on a wide one with vertices at -1/2, 0, 1/2
-    "inside": (-0.37, 0.28),
-    "next to nothing faces": (-0.37, 0.005),
-    "next to nothing is bare": (-0.495, 0.495),
-}
-
-
 def in_a_step(rows, slope=0.0):
     """A block in the corner of a step; its wall leans by `slope`."""
     block = [(0, 0), (1, 0), (1, 1), (slope, 1)]

@@ -8,7 +8,9 @@ from functools import cache
 import ngsolve as ng
 import numpy as np
 import pytest
+from numpy.polynomial import legendre
 
+from drivers import check_certificate
 from drivers.reference import axisymmetric_cases, cases
 from ngcontact import Contact, Elastic, Hooke, Problem, solve
 from ngcontact.geometries import rings
@@ -35,12 +37,13 @@ def weighted(**changes):
 
 
 def about_an_axis(inner):
-    """Cylinders under an axial load that varies."""
+    """Cylinders under an axial load and a radial force that vary."""
     return Problem(
         geometry=axisymmetric_cases.cylinders(inner),
         materials=cases.BLOCKS,
         displacement={"bottom": (0, 0)},
         traction={"top": (0, -0.01 * (1 + ng.x))},
+        force={"upper|lower": (0.01 * ng.x * ng.y, -0.005)},
         contact=[Contact("upper_contact", "lower_contact")],
         model="axisymmetric",
     )
@@ -70,121 +73,68 @@ def solved(name):
     return solve(make(), maxh=0.5, order=order)
 
 
-def powers(degree, x):
-    """Monomials (n, q, m) and their derivatives by x and y, at points (n, q, 2)."""
-    i, j = np.array([(i, j) for i in range(degree + 1) for j in range(degree + 1 - i)]).T
-    X, Y = x[..., :1], x[..., 1:]
-    by_x = i * X ** np.maximum(i - 1, 0) * Y**j
-    by_y = j * X**i * Y ** np.maximum(j - 1, 0)
-    return X**i * Y**j, by_x, by_y
-
-
-class Polynomials:
-    """The stress on all triangles (times r about an axis) through values at points inside."""
-
-    def __init__(self, solution):
-        found, mesh = solution.equilibrated, solution.mesh
-        self.axial = solution.problem.model == "axisymmetric"
-        self.x, self.degree = found.triangles, found.degree
-        numbers = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
-        corners = np.array(mesh.ngmesh.Coordinates())[numbers][found.element][:, :, :2]
-        self.middle = self.x.mean(axis=1, keepdims=True)
-        self.size = np.ptp(self.x, axis=1).max(axis=1)[:, None, None]
-        n = self.degree + 3
-        shares = np.array([(i, j, n - i - j) for i in range(1, n) for j in range(1, n - i)]) / n
-        x = shares @ self.x
-        edges = np.stack([corners[:, 0] - corners[:, 2], corners[:, 1] - corners[:, 2]], axis=-1)
-        reference = np.linalg.solve(edges[:, None], (x - corners[:, None, 2])[..., None])[..., 0]
-        element = np.repeat(found.element, len(shares))
-        values = found.values(element, reference.reshape(-1, 2)).reshape(*x.shape[:2], -1)
-        if self.axial:
-            values = values * x[..., :1]
-        self.largest = np.abs(values).max()
-        P = powers(self.degree, self.local(x))[0]
-        self.c = np.linalg.pinv(P) @ values
-        off = np.abs(P @ self.c - values).max()
-        assert off <= ROUND_OFF * self.largest  # polynomials of that degree they are
-
-    def local(self, x):
-        return (x - self.middle) / self.size
-
-    def __call__(self, x):
-        """Components (n, q, c) and their derivatives by x and y, at points (n, q, 2)."""
-        values, by_x, by_y = powers(self.degree, self.local(x))
-        return values @ self.c, by_x @ self.c / self.size, by_y @ self.c / self.size
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_the_divergence_balances_the_force(name):
-    solution = solved(name)
+@pytest.fixture(params=SCENES)
+def certified(request, tmp_path):
+    """A scene, its certificate as the driver reads it, and the places of the lattice (n, q, 2)."""
+    solution = solved(request.param)
     settled(solution)
-    s = Polynomials(solution)
-    x = np.random.default_rng(0).dirichlet(np.ones(3), 5) @ s.x
-    values, dx, dy = s(x)
-    hoop = values[..., 2] / x[..., 0] if s.axial else 0.0  # of T = r s
-    div = np.stack([dx[..., 0] + dy[..., -1] - hoop, dx[..., -1] + dy[..., 1]], axis=-1)
-    force, mesh = np.zeros_like(div), solution.mesh
-    owner = np.array([e.mat for e in mesh.Elements()])[solution.equilibrated.element]
+    path = solution.equilibrated.save(tmp_path / "certificate.npz")
+    assert check_certificate.check(path)  # divergence, continuity, p* on both bodies, signs, B
+    with np.load(path) as file:
+        found = check_certificate.Certificate(dict(file))
+    places = found.corners[:, :1] + found.a["lattice"] @ np.swapaxes(found.edges, 1, 2)
+    return solution, found, places
+
+
+def forces(solution, x):
+    """F (n, q, 2) of the problem at places (n, q, 2) of the triangles of the stress."""
+    found, mesh = np.zeros(x.shape), solution.mesh
+    body = np.array([e.index for e in mesh.Elements()])[solution.equilibrated.element]
     for name, f in solution.problem.force.items():
-        at = owner == name
-        points = mesh(*x[at].reshape(-1, 2).T)
-        force[at] = np.asarray(ng.CF(f)(points)).reshape(force[at].shape)
-    off = np.abs(div + force) * s.size
-    assert off.max() <= ROUND_OFF * s.largest
-
-
-def sides_of(s):
-    """For every side of a triangle: points on it and what s n is there, by its two ends."""
-    found = {}
-    t = np.linspace(0.1, 0.9, 6)
-    for i in range(3):
-        a, b = s.x[:, (i + 1) % 3], s.x[:, (i + 2) % 3]
-        x = a[:, None] + t[:, None] * (b - a)[:, None]
-        values = s(x)[0]
-        n = np.column_stack([b[:, 1] - a[:, 1], a[:, 0] - b[:, 0]])
-        n = n / np.linalg.norm(n, axis=1, keepdims=True)
-        tx = values[..., 0] * n[:, :1] + values[..., -1] * n[:, 1:]
-        ty = values[..., -1] * n[:, :1] + values[..., 1] * n[:, 1:]
-        for k in range(len(a)):
-            first, last = (tuple(np.round(z, 9)) for z in (a[k], b[k]))
-            ahead = first < last
-            force = np.column_stack([tx[k], ty[k]])
-            key = (first, last) if ahead else (last, first)
-            order = slice(None) if ahead else slice(None, None, -1)
-            found.setdefault(key, []).append((x[k, order], force[order], n[k]))
+        at = np.array(list(mesh.Materials(name).Mask()), dtype=bool)[body]
+        found[at] = np.asarray(ng.CF(f)(mesh(*x[at].reshape(-1, 2).T))).reshape(found[at].shape)
     return found
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_tractions_are_continuous(name):
-    """What one triangle exerts the other has; of two bodies that touch, in contact and beside."""
-    s = Polynomials(solved(name))
-    pairs = [both for both in sides_of(s).values() if len(both) == 2]
-    assert len(pairs) > 10
-    for (_, one, _), (_, other, _) in pairs:
-        assert np.abs(one + other).max() <= ROUND_OFF * s.largest
+def test_the_certificate_is_of_the_stress_and_of_the_forces(certified):
+    solution, found, x = certified
+    stress, mesh = solution.equilibrated, solution.mesh
+    numbers = mesh.ngmesh.Elements2D().NumPy()["nodes"][:, :3].astype(int) - 1
+    a, b, c = np.array(mesh.ngmesh.Coordinates())[numbers][stress.element][:, :, :2].swapaxes(0, 1)
+    edges = np.stack([a - c, b - c], axis=-1)
+    reference = np.linalg.solve(edges[:, None], (x - c[:, None])[..., None])[..., 0]
+    element = np.repeat(stress.element, x.shape[1])
+    s = stress.values(element, reference.reshape(-1, 2)).reshape(*x.shape[:2], -1)
+    F, measure = forces(solution, x), 2 * np.pi * x[..., :1] if found.axial else 1.0
+    size = ROUND_OFF * found.largest
+    assert np.abs(measure * s[..., [0, 1, -1]] - found.a["stress"]).max() <= size
+    length = np.abs(found.edges).max(axis=(1, 2))[:, None, None]
+    own = slice(int(found.axial), None)  # the radial force is in the hoop stress
+    assert np.abs(length * (measure * F - found.a["force"]))[..., own].max() <= size
+    if found.axial:
+        _, divergence = found.at(np.arange(len(x)), found.a["lattice"])
+        hoop = divergence[..., 0] + measure[..., 0] * F[..., 0]
+        assert np.abs(length[..., 0] * (2 * np.pi * s[..., 2] - hoop)).max() <= size
 
 
-@pytest.mark.parametrize("name", ["opening-1", "weighted-2", "weighted-3", "anisotropic-2"])
-def test_tractions_are_those_given(name):
-    """On half of the top and on a side; none on what is free, no shear on guides."""
-    s, seen = Polynomials(solved(name)), 0
-    for both in sides_of(s).values():
-        x, force, _ = both[0]
-        expected, own = np.zeros_like(force), slice(0, 2)
-        if len(both) == 2 or np.allclose(x[:, 1], -1):  # in a body, or held
-            continue
-        if np.allclose(x[:, 1], 1) and x[:, 0].max() < 1:
-            expected[:, 1] = -1.0
-            if name != "opening-1":
-                expected += np.column_stack([0.1 * x[:, 0], -x[:, 0]])
-        elif np.allclose(x[:, 0], 2) and x[:, 1].min() > 0 and name != "opening-1":
-            expected[:, 1] = 0.2
-        elif np.allclose(x[:, 0], 0):
-            own = slice(1, 2)
-        assert np.abs(force - expected)[:, own].max() <= ROUND_OFF * s.largest
-        seen += 1
-    assert seen > 5
+@pytest.mark.parametrize("certified", ["opening-1", "weighted-2", "weighted-3"], indirect=True)
+def test_the_certificate_is_of_the_tractions(certified):
+    """On half of the top and on a side; none on what is free."""
+    solution, found, _ = certified
+    a, t = found.a, np.linspace(0, 1, 5)
+    start, stop = a["vertices"][a["side_vertices"]].swapaxes(0, 1)
+    x = start[:, None] + t[:, None] * (stop - start)[:, None]
+    told = a["side_traction"] @ legendre.legvander(2 * t - 1, a["side_traction"].shape[2] - 1).T
+    expected, varied = np.zeros(x.shape), bool(solution.problem.force)
+    low, high = x.min(axis=1), x.max(axis=1)
+    pressed, right = (low[:, 1] == 1) & (high[:, 0] <= 1), (low[:, 0] == 2) & (low[:, 1] >= 0)
+    expected[pressed] = (0, -1) + varied * x[pressed, :, :1] * (0.1, -1)
+    expected[right] = (0, 0.2 * varied)
+    expected *= np.linalg.norm(stop - start, axis=1)[:, None, None]
+    free = ~a["side_held"]  # by component
+    assert free.any()
+    off = np.abs(told.swapaxes(1, 2) - expected)
+    assert off[np.broadcast_to(free[:, None], off.shape)].max() <= ROUND_OFF * found.largest
 
 
 def test_a_function_of_elements_and_places():

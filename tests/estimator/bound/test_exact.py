@@ -16,7 +16,6 @@ from tests.runs import levels
 from tests.scenes import pressed, unmatched_blocks
 
 RESIDUAL = 1e-10  # of equilibrium, relative to the largest stress; measured at most 5e-14
-ENERGY_ONE_TRANSITION = (1.293180760825 + 0.520333087196) / 2  # L(u) by Clapeyron, no loads
 
 
 def settled(solution):

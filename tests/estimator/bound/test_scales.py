@@ -14,7 +14,6 @@ from tests.estimator.bound.test_exact import settled
 from tests.given_meshes import two_blocks
 
 SMALL, LARGE = 1e-9, 1e9
-BENDING = 0.02 * ng.x  # of a top that is pressed and tilted
 
 
 def softened(problem, scale):
