@@ -167,6 +167,33 @@ def test_shrink_fit(order, limit):
     assert solution.contact_force() == pytest.approx((0, 0), abs=EXACT * exact.p)
 
 
+def widened(law, a, b, inner, outer, r):
+    """Lame: radial displacement at r of a tube a < r < b under pressures, ends guided."""
+    sums = (1 - 2 * law.nu) * (inner * a**2 - outer * b**2) * r + (inner - outer) * (a * b) ** 2 / r
+    return (1 + law.nu) * sums / (law.E * (b**2 - a**2))
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("load", [0.1, 0.5])
+@pytest.mark.study(witness=["0.1-2", "0.5-2"])
+def test_a_tube_is_blown_up_through_its_clearance(load, order):
+    """A load between both closes the clearance; what is above it presses on the hub."""
+    bore, r, rim, clearance = 0.4, 1.1, 1.9, 0.05
+    problem, _ = cases.fitted_rings()
+    contact = [Contact("sleeve_contact", "hub_contact", gap=clearance)]
+    problem = replace(problem, displacement={}, traction={"bore": load}, contact=contact)
+    free = widened(FIRST, bore, r, load, 0, r) - clearance
+    give = widened(SECOND, r, rim, 1, 0, r) - widened(FIRST, bore, r, 0, 1, r)
+    p = max(free, 0.0) / give
+    assert (p > 0) == (load > 0.2)
+    solution = solve(problem, maxh=0.02 * order, order=order)
+    assert solution.active.all() == (p > 0)
+    # As accurate as the shrink fit below, relative to the load.
+    limit = {1: 1.5e-2, 2: 6e-4, 3: 5e-5, 4: 5e-6}[order] * load
+    assert solution.pressure == pytest.approx(p, abs=limit)
+    assert solution.gap == pytest.approx(max(-free, 0.0), abs=limit)
+
+
 # Relative energy error at 4000 unknowns that `adapt` stays below: 1.5 times what was measured.
 # Then force, radius and peak pressure.
 HUBER = {

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import pyvista
 
+from drivers.reference import cases
 from drivers.stress.motion import Motion
 from drivers.stress.scenes.drawing import rotation
 from ngcontact import (
@@ -260,3 +261,24 @@ def test_interrupted_run_keeps_its_solutions(tmp_path):
         assert solution.error_estimate > 0
         solution.write(tmp_path / "level.vtu")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["level.vtu", "level_contact.vtp"]
+
+
+@pytest.mark.study
+@pytest.mark.skipif(not hasattr(signal, "setitimer"), reason="no timer sends signals")
+@pytest.mark.parametrize("seconds", [0.02, 0.07, 0.15, 0.3, 0.6])
+def test_a_timer_that_interrupts_a_run_leaves_whole_levels(seconds):
+    """Wherever it strikes, also in NGSolve, which raises late or once it returns."""
+    problem, given = cases.hertz_contact().problem, []
+    before = signal.signal(signal.SIGALRM, signal.default_int_handler)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, seconds)
+        with pytest.raises(KeyboardInterrupt):
+            given.extend(adapt(problem, order=2, max_dofs=10**7))
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
+    for solution in given:
+        assert max(solution.residuals.values()) < SAME
+        assert solution.error_estimate > 0
+    again = solve(problem, maxh=0.3, order=2)  # nothing is left half done
+    assert max(again.residuals.values()) < SAME

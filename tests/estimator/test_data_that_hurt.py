@@ -13,12 +13,8 @@ import pytest
 from netgen.occ import Circle, Glue, OCCGeometry
 from ngsolve.meshes import MakeStructured2DMesh
 
-from drivers.reference import cases
-from drivers.reference.curved import rings as ring_solution
 from drivers.reference.overkill import Overkill
-from drivers.reference.straight import energy_error
-from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
-from ngcontact.geometries import rings
+from ngcontact import ContactWarning, Elastic, Problem, adapt, solve
 from ngcontact.geometries.region import body, compound, polygon
 from tests.quadrature.test_loads import box, loaded, square
 
@@ -37,9 +33,6 @@ def of_levels(problem, order, resolved=None, unknowns=1000):
     else:
         pytest.fail("the finer solution is too coarse")
     return [s.error_estimate / error for s, error in zip(shown, errors, strict=True)], levels
-
-
-# --- prescribed displacements and bilateral gaps ---
 
 
 # --- loads ---
@@ -90,7 +83,7 @@ LOADS = {
 }
 
 
-@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("order", [1, 2, 4])
 @pytest.mark.parametrize("name", LOADS)
 @pytest.mark.study(witness=["a strip of shear beside the corner-1", "two strips that cancel-1"])
 def test_loads(name, order):
@@ -164,41 +157,6 @@ def test_moduli_that_jump_inside_elements(name, order):
     # With edges the data are resolved: measured 2.8 to 4.9.
     found, _ = of_levels(resolved, order)
     assert 1 <= min(found) <= max(found) <= 8
-
-
-# --- a slip along a curved zone ---
-
-RING = {"outer": cases.FIRST, "inner": cases.SECOND}
-SLIPS = {
-    "the inner ring, a pressure that waves": ({"inner": -0.4}, RING, {"q0": 1e-3, "qn": 4e-4}),
-    "both rings, a press fit": ({"inner": 0.3, "outer": -0.5}, RING, {"q0": 1e-3, "delta": 1e-3}),
-    "a stiff ring, 1e3": ({"outer": 1.0}, RING | {"inner": Elastic(3e3, 0.2)}, {"q0": 1e-3}),
-}
-
-
-@pytest.mark.parametrize("name", SLIPS)
-@pytest.mark.study
-def test_slips_along_a_curved_zone(name):
-    turns, laws, loads = SLIPS[name]
-    exact = ring_solution(laws["outer"], laws["inner"], **loads)
-    gap = -loads.get("delta", 0.0)
-    turned = {
-        side: exact.displacement[ring] + turns.get(ring, 0.0) * ng.CF((-ng.y, ng.x))
-        for ring, side in (("outer", "rim"), ("inner", "hole"))
-    }
-    problem = Problem(
-        geometry=rings(quarter=False),
-        materials=laws,
-        displacement=turned,
-        contact=[Contact("outer_contact", "inner_contact", gap=gap)],
-    )
-    solutions = [solve(problem, maxh=h) for h in (0.4, 0.2, 0.1)]
-    errors = [energy_error(s, exact)[0] for s in solutions]
-    found = np.array([s.error_estimate for s in solutions])
-    # Measured 3.4 to 4.9.
-    assert 1 <= (found / errors).min() <= (found / errors).max() <= 8
-    # Meshes made anew. By the mesh's normals it fell like the root of h.
-    assert np.log2(found[0] / found[-1]) / 2 > 0.85
 
 
 def test_waves_between_the_vertices_of_a_support():
