@@ -10,9 +10,9 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from ..errors import warn
-from ..fem import warn_of_locking
+from ..fem import boundary_trace, warn_of_locking
 from ..mesh import cad_edges
-from ..problem import Problem, numbers
+from ..problem import MeshArrays, Problem, numbers
 from ..quadrature import SampledElements, features_of, warn_of_data, warn_of_jumps
 
 APART = 1e-6  # values of two supports at one corner, relative to the largest, that are two values
@@ -24,15 +24,15 @@ class Contradiction:
     """Two supports and a corner of theirs."""
 
     supports: tuple[str, str]  # names
-    place: Array  # (2,), the corner, a length
+    place: Array  # (d,), the corner, or a vertex of the common edge, a length
     message: str  # what they say there
     amount: float  # by how much they differ, a length
 
 
 def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
     """All of Gamma_u with itself, within a boundary, too, and with guides, by component."""
-    if problem.dim == 3:  # edges and lines of solids are not looked at
-        return []
+    if problem.dim == 3:
+        return _of_solids(problem, mesh)
     found = []
     seen = [one for one in features_of(problem, mesh) if one.kind == "displacement"]
     for one in seen:
@@ -61,6 +61,47 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
         found += _across_guides(str(problem.sliding), view, shared, known)
     largest = max((one.largest for one in seen), default=0.0)
     return [one for one in found if one.amount > NOISE * largest]
+
+
+def _of_solids(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
+    """The same at vertices of solids: of two facets there the least and the largest value."""
+    trace, found = boundary_trace(mesh, 1), []
+    n, names = mesh.nv, np.array(mesh.GetBoundaries())
+    low, high = np.full((3, n), np.inf), np.full((3, n), -np.inf)
+    least, most = np.zeros((2, 3, n), dtype=np.intp)  # the regions that prescribe these
+    for pattern, components in problem.displacement.items():
+        facet, s = trace.at_nodes(trace.segments(pattern))
+        node = trace.nodes[trace.segments(pattern)].ravel()
+        for axis, function in enumerate(components):
+            if function is not None:
+                u = trace.evaluate(function, facet, s)[:, 0]
+                for extreme, region, sign in ((low, least, -1), (high, most, 1)):
+                    order = np.argsort(sign * u, kind="stable")  # the last one counts
+                    at, value = node[order], u[order]
+                    beyond = sign * value > sign * extreme[axis, at]
+                    extreme[axis, at[beyond]] = value[beyond]
+                    region[axis, at[beyond]] = trace.region[facet[order[beyond]]]
+    known = high >= low
+    low, high = (np.where(known, x, 0.0) for x in (low, high))
+    scale = np.maximum(np.abs(low), np.abs(high))
+    x = MeshArrays(mesh).vertices
+    for axis, vertex in np.argwhere(high - low > APART * scale):
+        one, other = (names[region[axis, vertex]] for region in (least, most))
+        a, b = low[axis, vertex], high[axis, vertex]
+        message = f'displacement "{one}" and "{other}" prescribe {a:.6g} and {b:.6g}'
+        message += f" along {'xyz'[axis]}"
+        found.append(Contradiction((one, other), x[vertex], message, float(b - a)))
+    if problem.sliding is not None:
+        number, normal = trace.guide(str(problem.sliding))
+        node = trace.nodes[trace.segments(str(problem.sliding))].ravel()
+        across = (normal[number] * high[:, node].T).sum(axis=1)
+        led = ((np.abs(normal[number]) <= APART) | known[:, node].T).all(axis=1)
+        for k in np.flatnonzero(led & (np.abs(across) > APART * scale[:, node].max(axis=0))):
+            name = names[most[np.argmax(np.abs(normal[number[k]])), node[k]]]
+            message = f'displacement "{name}" leads {across[k]:.6g} across the guide '
+            message += f'"{problem.sliding}"'
+            found.append(Contradiction((name, "guide"), x[node[k]], message, abs(across[k])))
+    return [one for one in found if one.amount > NOISE * scale.max()]
 
 
 def _shared(problem: Problem, view: SampledElements) -> Mask:
@@ -127,10 +168,11 @@ def warn_of_implausible(problem: Problem, mesh: ng.Mesh, order: int) -> None:
     for one in contradictions(problem, mesh):
         if one.supports not in told:
             told.add(one.supports)
-            where = "a point" if one.supports[0] == one.supports[1] else "their corner"
-            x, y = one.place
+            common = ("corner", "edge")[problem.dim - 2]
+            where = "a point" if one.supports[0] == one.supports[1] else f"their {common}"
+            place = ", ".join(f"{x:.6g}" for x in one.place)
             warn(
-                f"{one.message} at {where} ({x:.6g}, {y:.6g}): the energy is infinite and no "
-                "mesh resolves it; make them equal there"
+                f"{one.message} at {where} ({place}): the energy is infinite and no mesh resolves "
+                "it; make them equal there"
             )
     warn_of_jumps(problem, mesh)

@@ -52,6 +52,7 @@ CORNERS = {
 ELEMENTS = {2: ("triangles", "quadrilaterals"), 3: ("tetrahedra", "hexahedra, prisms or pyramids")}
 
 OVERLAP = 0.5  # of the smaller of two bodies, from which they lie on top of each other
+SKEW = (0.83, 0.29, 0.47)  # a direction in which no mesh has edges
 PLACES = 200  # of a connected piece that are looked for in another one
 FLAT = 16 * np.finfo(float).eps  # measure of an element over its longest edge^d, without height
 NO_RADIAL = 1e-9  # radial part on the axis, relative to the largest value, that is round-off
@@ -220,9 +221,8 @@ def check_overlaps(view: MeshArrays) -> None:
 
     An interference at a contact line is none. Of each two connected pieces whose boxes overlap by
     so much, places at equal steps of the smaller one's area are looked for in the larger one.
+    In space bodies are solids, and areas are volumes.
     """
-    if view.dim == 3:  # boxes and triangles of the plane, see below
-        return
     piece = view.pieces[view.elements[:, 0]]
     parts = [np.flatnonzero(piece == k) for k in range(piece.max(initial=0) + 1)]
     if len(parts) == 1:
@@ -241,27 +241,32 @@ def check_overlaps(view: MeshArrays) -> None:
         if share > OVERLAP:
             names = view.mesh.GetMaterials()
             name, beside = (names[view.bodies[parts[k][0]]] for k in (small, large))
+            what = ("area", "volume")[view.dim - 2]
             raise ValueError(
-                f'body "{name}" of area {size[small]:.4g} and body "{beside}" of area '
-                f"{size[large]:.4g} lie on top of each other on an area of about "
+                f'body "{name}" of {what} {size[small]:.4g} and body "{beside}" of {what} '
+                f"{size[large]:.4g} lie on top of each other on a {what} of about "
                 f"{share * size[small]:.2g}: cut one out of the other (outer - inner) or draw them "
                 "side by side"
             )
 
 
 def _inside(points: Array, view: MeshArrays, part: Index) -> Mask:
-    """Which `points` (k, 2) lie in the triangles `part` (n,) of a mesh, (k,).
+    """Which `points` (k, d) lie in the elements `part` (n,) of a mesh, (k,).
 
-    Where a line to the right crosses their boundary, the sides of one triangle alone, an odd number
-    of times.
+    Where a ray crosses their boundary, the sides of one element alone, an odd number of times.
     """
-    keys, count = np.unique(view.keys(view.sides[part]), return_counts=True)
-    a, b = (view.vertices[k] for k in np.divmod(keys[count == 1], len(view.vertices)))
-    x, y = points[:, 0, None], points[:, 1, None]
-    crossed = (a[:, 1] > y) != (b[:, 1] > y)
-    rise = np.where(a[:, 1] == b[:, 1], 1.0, b[:, 1] - a[:, 1])
-    right = x < a[:, 0] + (y - a[:, 1]) / rise * (b[:, 0] - a[:, 0])
-    return np.asarray((crossed & right).sum(axis=1) % 2 == 1)
+    sides = view.sides[part].reshape(-1, view.dim)
+    _, first, count = np.unique(view.keys(sides), return_index=True, return_counts=True)
+    corners = view.vertices[sides[first[count == 1]]]
+    ray = np.array(SKEW[: view.dim])
+    edges = np.swapaxes(corners[:, 1:] - corners[:, :1], 1, 2)
+    system = np.concatenate([edges, np.tile(-ray[:, None], (len(corners), 1, 1))], axis=2)
+    across = np.linalg.det(system) != 0
+    at = np.einsum(
+        "fij,kfj->kfi", np.linalg.inv(system[across]), points[:, None] - corners[across, 0]
+    )
+    crossed = (at > 0).all(axis=2) & (at[..., :-1].sum(axis=2) < 1)
+    return np.asarray(crossed.sum(axis=1) % 2 == 1)
 
 
 def check_values(

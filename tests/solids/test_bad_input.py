@@ -1,5 +1,7 @@
 """What solids refuse: the value, and what would be right."""
 
+import re
+import warnings
 from dataclasses import replace
 
 import netgen.occ as occ
@@ -157,3 +159,37 @@ def test_prescribed_on_both_sides():
     )
     with pytest.raises(ValueError, match="violated by prescribed displacements on both sides"):
         solve(problem)
+
+
+def two_boxes(first, second, **data):
+    mesh = boxes(("a", *first, (3, 3, 3)), ("b", *second, (2, 2, 2)))
+    held = {"b_bottom": (0, 0, 0)}
+    return Problem(geometry=mesh, materials={"a": SOFT, "b": SOFT}, displacement=held | data)
+
+
+def test_bodies_on_top_of_each_other():
+    """Of the smaller one more than a half lies in the other; an interference does not."""
+    for depth in (0.6, 1.0):
+        problem = two_boxes(((0.1, 0.1, -depth), (0.9, 0.9, 1 - depth)), ((0, 0, -1), (1, 1, 0)))
+        with pytest.raises(ValueError, match="on top of each other on a volume of about"):
+            solve(problem)
+    solve(two_boxes(((0, 0, -0.2), (1, 1, 0.8)), ((0, 0, -1), (1, 1, 0)), a_top=(0, 0, 0)))
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ({"a_left": (0, 0, 0), "a_back": (0, 0, 0.1)}, "prescribe 0 and 0.1 along z at their edge"),
+        ({"a_left": (None, 0.1, 0), "sliding": "a_front"}, "leads -?0.1 across the guide"),
+        ({"a_left|a_back": (0, 0, ng.x)}, ""),
+        ({"a_left": (0.1, 0, 0), "sliding": "a_front"}, ""),
+    ],
+)
+def test_supports_that_contradict_each_other(data, words):
+    sliding = data.pop("sliding", None)
+    problem = two_boxes(((0, 0, 1), (1, 1, 2)), ((0, 0, -1), (1, 1, 0)), **data)
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        solve(replace(problem, sliding=sliding), order=1)
+    assert len(told) == bool(words)
+    assert all(re.search(words, str(one.message)) for one in told)
