@@ -76,9 +76,8 @@ def nodal_basis(trace: BoundaryTrace, segments: Index) -> sp.csr_array:
 
 def unknowns(mesh: ng.Mesh, order: int, element: str) -> int:
     """Number of unknowns of the displacement on a mesh that is curved to the element's degree."""
-    if mesh.dim == 3:
-        faces = (order - 1) * (order - 2) // 2 * mesh.nface
-        return 3 * (mesh.nv + (order - 1) * mesh.nedge + faces)
+    if mesh.dim == 3:  # `mesh.nedge` counts edges of no element after bisections
+        return 3 * int(ng.H1(mesh, order=order).ndof)
     # Functions linear in physical coordinates are kept in a space with boundary edge functions.
     edges = mesh.GetNE(ng.BND) if element == "physical" and mesh.GetCurveOrder() > 1 else 0
     return unknowns_of(order, mesh.nv + edges, mesh.nedge, mesh.ne)
