@@ -44,7 +44,6 @@ from .plausibility import (
     contradictions,
     doubt_of_refinement,
     doubts,
-    doubts_of_surfaces,
     estimates_rise,
     warn_of_implausible,
 )
@@ -543,8 +542,7 @@ def warn_of_doubts(solution: Solution, told: set[object], *, last: bool) -> None
 
     What a finer mesh mends is left out unless none follows: the mesh is the `last`.
     """
-    plane = solution.problem.dim == 2
-    found = doubts(solution, last=last) if plane else doubts_of_surfaces(solution)
+    found = doubts(solution, last=last)
     for doubt, message in found.items():
         if doubt not in told:
             warn(message)

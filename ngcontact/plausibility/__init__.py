@@ -7,4 +7,3 @@ from .refinement import EXACT as EXACT
 from .refinement import at_round_off as at_round_off
 from .refinement import doubt_of_refinement as doubt_of_refinement
 from .refinement import estimates_rise as estimates_rise
-from .surfaces import doubts_of_surfaces as doubts_of_surfaces

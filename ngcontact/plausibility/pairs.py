@@ -26,7 +26,7 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import Array, Index, across
 from ..contact import ContactState, in_contact, partners, prescribed_gap, twins
 from ..fem import BoundaryTrace, Moduli, moduli_of
-from ..problem import Contact, Problem
+from ..problem import Problem
 from ..solved import Solved
 from .refinement import moves_rigidly
 
@@ -72,10 +72,11 @@ def doubts(solution: Solved, *, last: bool) -> Doubts:
     Fixed directions far from the normals, bodies that are drawn far apart or otherwise than their
     gap is given, and strains that are not small, which no mesh mends; of the `last` mesh also zones
     in contact that are too short for it, and bodies that pass through each other between contact
-    points. Of all pairs together, bodies that nothing resists.
+    points. Of all pairs together, bodies that nothing resists. Zones and curves of solids are not
+    looked at.
     """
     problem, pairs, space = solution.problem, solution.pairs, solution.discrete.space
-    trace, u = space.trace, solution.displacement.vec.FV().NumPy()
+    trace, u, plane = space.trace, solution.displacement.vec.FV().NumPy(), problem.dim == 2
     found: Doubts = {}
     largest = [np.abs(state.force).max(initial=0.0) for state in pairs]
     noise = FORCE_ROUND_OFF * np.abs(space.diagonal * u).max(initial=0.0)
@@ -84,13 +85,15 @@ def doubts(solution: Solved, *, last: bool) -> Doubts:
     for number, (state, force) in enumerate(zip(pairs, largest, strict=True)):
         messages = {}
         if force > noise:
-            zones = zones_of(state)
+            zones = zones_of(state) if plane else _whole_zone(state)
             messages["strain"] = _large_strains(problem, trace, state, zones)
             if not messages["strain"]:  # which leaves nothing else to believe
-                messages["direction"] = _inclined(trace, state) or _drawn_apart(trace, state)
+                messages["direction"] = _inclined(trace, state)
                 messages["gap"] = contradicted(trace, state)
+            if plane and not messages["strain"]:
+                messages["direction"] = messages["direction"] or _drawn_apart(trace, state)
                 messages["zone"] = _short_zone(state, zones) if last else ""
-        if last and not messages.get("strain"):  # with forces or without
+        if plane and last and not messages.get("strain"):  # with forces or without
             messages["penetration"] = _penetration(solution, state, peak)
         name = f"contact {number} of {state.line.contact.named()}"
         found |= {(what, number): f"{name}: {text}" for what, text in messages.items() if text}
@@ -153,22 +156,23 @@ def zones_of(state: ContactState) -> ContactZones:
     )
 
 
+def _whole_zone(state: ContactState) -> ContactZones:
+    """All of a pair of solids as one zone: force, area."""
+    force, area = np.abs(state.force).sum(), state.line.weight[state.active].sum()
+    some = slice(0, int(area > 0))
+    return ContactZones(
+        np.array([force])[some], np.array([area])[some], np.ones(1), np.zeros(1, int)
+    )
+
+
 def _large_strains(
     problem: Problem, trace: BoundaryTrace, state: ContactState, zones: ContactZones
 ) -> str:
     """Message where strains are far from small, or nothing."""
     pressure = float((np.abs(zones.force) / zones.weight).max(initial=0.0))
-    modulus = softer_in_compression(problem, trace, state)
-    return large_strain_message(pressure, modulus) if pressure > LARGE_PRESSURE * modulus else ""
-
-
-def softer_in_compression(problem: Problem, trace: BoundaryTrace, state: ContactState) -> float:
-    """Modulus of confined compression of the softer of both sides, a stress."""
-    return _softer(lambda law: law.bulk + law.shear, problem, trace, state)
-
-
-def large_strain_message(pressure: float, modulus: float) -> str:
-    """What is said of a mean pressure that is larger than the modulus."""
+    modulus = _softer(lambda law: law.bulk + law.shear, problem, trace, state)
+    if pressure <= LARGE_PRESSURE * modulus:
+        return ""
     return (
         f"the mean pressure in contact, {pressure:.3g}, is {pressure / modulus:.2g} times the "
         f"modulus {modulus:.3g} of the softer body in confined compression: strains are not small; "
@@ -259,23 +263,18 @@ def _penetration(solution: Solved, state: ContactState, peak: float) -> str:
 
 def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
     """Message where surfaces that carry force are inclined to the fixed direction, or nothing."""
-    line = state.line
-    if line.contact.direction is None or not state.active.any():
+    xi = state.line.contact.direction
+    if xi is None or not state.active.any():
         return ""
-    xi = np.array(line.contact.direction)
-    angle, force = _inclinations(trace, state, xi)
+    angles = _inclinations if len(xi) == 2 else surface_inclinations
+    angle, force = angles(trace, state, np.array(xi))
     if force[angle > INCLINED].sum() <= FORCE_SHARE * force.sum():
         return ""
-    return inclined_message(line.contact, angle)
-
-
-def inclined_message(contact: Contact, angle: Array) -> str:
-    """What is said of surfaces inclined to a fixed direction by an `angle` (m,) each."""
-    told = ", ".join(f"{component:.3g}" for component in contact.direction or ())
     return (
-        f"surfaces in contact are inclined to direction=({told}) by up to "
-        f"{np.rad2deg(angle.max()):.0f} degrees, so that forces do not act along their normals; "
-        "leave the direction out (direction=None), or give each flank a pair of its own direction"
+        f"surfaces in contact are inclined to direction=({', '.join(f'{x:.3g}' for x in xi)}) by "
+        f"up to {np.rad2deg(angle.max()):.0f} degrees, so that forces do not act along their "
+        "normals; leave the direction out (direction=None), or give each flank a pair of its own "
+        "direction"
     )
 
 
@@ -306,6 +305,23 @@ def _inclinations(trace: BoundaryTrace, state: ContactState, xi: Array) -> tuple
         other = np.where((ends >= 0).all(axis=1), cross, -1.0)
     cosine[steep] = np.maximum(cosine[steep], other)
     return np.arccos(np.clip(cosine, -1.0, 1.0)), share.sum(axis=1)
+
+
+def surface_inclinations(
+    trace: BoundaryTrace, state: ContactState, xi: Array
+) -> tuple[Array, Array]:
+    """Angles (m,) in radians between `xi` (3,) and the surfaces of solids at points, forces (m,).
+
+    The smaller one of both surfaces, of each the normal that is nearest to `xi`; 0 at open points.
+    """
+    line, cosine = state.line, np.full(len(state.active) + 1, -1.0)
+    normal = trace.exact_normal(*trace.at_nodes(line.segments))
+    np.maximum.at(cosine, line.rows.ravel(), normal @ xi)
+    cosine, met = cosine[:-1], np.flatnonzero(line.partner >= 0)
+    there = -trace.exact_normal(line.partner[met], line.partner_s[met]) @ xi
+    cosine[met] = np.maximum(cosine[met], there)
+    angle = np.where(state.active, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
+    return angle, np.abs(state.force)
 
 
 def _drawn_apart(trace: BoundaryTrace, state: ContactState) -> str:

@@ -10,7 +10,7 @@ from netgen.occ import Axis, Z
 
 from drivers.reference import cases
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
-from ngcontact.geometries import blocks, disc_on_disc, rings
+from ngcontact.geometries import blocks, cube_on_block, disc_on_disc, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.plausibility.pairs import PEAK_ERROR, way_and_error
 
@@ -234,3 +234,24 @@ def test_a_gap_of_the_other_sign_than_the_drawing_is_told(interference, gap):
     says, draws = sides if gap > 0 else sides[::-1]
     parts = (f"gap says that bodies are {abs(gap):.3g} {says}", f"0.01 {draws}")
     assert only(lambda: solve(pressed_ring(interference, gap), maxh=0.3, order=2), *parts)
+
+
+def pressed_cube(direction=(0, 0, -1), gap=None):
+    """A cube pressed down on a block that is as wide."""
+    return Problem(
+        geometry=cube_on_block(width=1.0),
+        materials={"cube|block": Elastic(E=1.0, nu=0.3)},
+        displacement={"block_bottom": (0, 0, 0), "cube_top": (0, 0, -1e-3)},
+        contact=[Contact("cube_bottom", "block_top", direction=direction, gap=gap)],
+    )
+
+
+def test_solids_are_told_of_directions_gaps_and_strains():
+    slope = math.radians(30)
+    inclined = pressed_cube((math.sin(slope), 0, -math.cos(slope)))
+    for problem, *parts in (
+        (inclined, DIRECTION, "30 degrees", "direction=(0.5, 0, -0.866)"),
+        (pressed_cube(gap=-3.0), STRAIN, "sign of gap"),
+    ):
+        assert only(lambda problem=problem: solve(problem, maxh=0.7, order=1), *parts)
+    assert quiet(lambda: solve(pressed_cube(), maxh=0.7, order=1))
