@@ -39,7 +39,7 @@ from .estimator import refuse_bound, told_before
 from .fem import boundary_trace, check_element, model_of, unknowns
 from .mesh import check_curves, copied, curve, first_mesh, same_geometry
 from .plausibility import (
-    EXACT,
+    EXACT_ESTIMATE,
     at_round_off,
     contradictions,
     doubt_of_refinement,
@@ -58,7 +58,7 @@ COARSE_ELEMENTS = 4  # of that run along the largest extent
 COARSE_ORDER = 3
 COARSE_DOFS = 1500  # its unknowns, which resolve the ends of a zone or two
 COARSE_SHARE = 1 / 40  # ... or, where that is more, their share: waves in contact have many ends
-ALIKE = 0.1  # relative difference of energies up to which two coarse solutions are one
+SAME_ENERGY = 0.1  # relative difference of energies up to which two coarse solutions are one
 BOUND_RATIO = 0.2  # bound over estimate that is hoped for at first; measured: 0.17 to 1
 
 ONE_PER_LEVEL = (
@@ -241,7 +241,7 @@ def solve_on(
             "support"
         )
         return second
-    if first is None or abs(first.energy - second.energy) > ALIKE * abs(second.energy):
+    if first is None or abs(first.energy - second.energy) > SAME_ENERGY * abs(second.energy):
         raise doubt
     return first  # so are the bodies made, not the rows
 
@@ -481,7 +481,7 @@ def levels(
             error = estimate
             if small.any():  # no mesh makes the estimate less there
                 error *= root_of_squares(solution.indicators[~small]) / solution.error_estimate
-        if not narrow and (error <= max(goal, EXACT) or _is_exact(solution)):
+        if not narrow and (error <= max(goal, EXACT_ESTIMATE) or _is_exact(solution)):
             return
         now = ratio * estimate if guaranteed else error
         seen = np.any([one.elements for one in narrow], axis=0) if narrow else np.zeros_like(small)
@@ -525,7 +525,7 @@ def levels_of_solids(
                 iterate=solution.minimiser,
             )
         log.info("%s", solution)
-        if error <= max(goal, EXACT) or _is_exact(solution):
+        if error <= max(goal, EXACT_ESTIMATE) or _is_exact(solution):
             return
         mesh = copied(solution.mesh)
         bisect(mesh, doerfler(solution.indicators, refinement.theta))

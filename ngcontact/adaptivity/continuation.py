@@ -17,7 +17,8 @@ from .planning import Aim, Forecast, Plan, Refinement, areas, depths, planned, t
 from .refinement import RefinementTree, Refining
 from .singularities import at_limit, ends_of_contact, settled
 
-HALF = 0.5  # of the unknowns that the tolerance asks for: a first level that knows another load
+# Of the unknowns that the tolerance asks for: a first level that knows another load.
+FIRST_LEVEL_SHARE = 0.5
 
 
 def continued(
@@ -39,7 +40,7 @@ def continued(
         singular=joined([first.corners, ends_of_contact(start.pairs)]),
     )
     now = start.relative_error_estimate * error / root_of_squares(start.indicators)
-    share = (goal or now) / now * HALF ** (-order / 2)  # unknowns ~ error^(-2/p)
+    share = (goal or now) / now * FIRST_LEVEL_SHARE ** (-order / 2)  # unknowns ~ error^(-2/p)
     most = refinement.growth**2 * unknowns(start.mesh, order, element)
     aim = Aim(most, refinement.max_dofs, share, refinement.theta, refinement.ending, np.inf)
     refining = rebuilt(problem, first.tree, known, aim, element)

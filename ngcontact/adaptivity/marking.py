@@ -6,8 +6,9 @@ import numpy as np
 
 from ..arrays import Array, Mask
 
-SPARE = 1e-14  # share of a sum that round-off may keep from being carried
-DIGITS = 30  # binary ones in which squares are compared: what round-off tells apart is one number
+SUM_ROUND_OFF = 1e-14  # share of a sum that round-off may keep from being carried
+# Binary ones in which squares are compared: what round-off tells apart is one number.
+COMPARED_DIGITS = 30
 
 
 def doerfler(indicators: Array, theta: float) -> Mask:
@@ -26,12 +27,12 @@ def doerfler(indicators: Array, theta: float) -> Mask:
     """
     squares = (indicators / max(indicators.max(initial=0.0), np.finfo(float).tiny)) ** 2
     mantissa, exponent = np.frexp(squares)
-    compared = np.ldexp(np.round(np.ldexp(mantissa, DIGITS)), exponent - DIGITS)
+    compared = np.ldexp(np.round(np.ldexp(mantissa, COMPARED_DIGITS)), exponent - COMPARED_DIGITS)
     order = np.argsort(-compared, kind="stable")
     carried = np.cumsum(squares[order])
     marked = np.zeros(len(indicators), dtype=bool)
     if carried.size and carried[-1] > 0:
-        count = np.searchsorted(carried, theta * carried[-1] * (1 - SPARE)) + 1
+        count = np.searchsorted(carried, theta * carried[-1] * (1 - SUM_ROUND_OFF)) + 1
         marked[order[:count]] = True
     return marked
 
@@ -51,4 +52,4 @@ def together(marked: Mask, alike: Mask, sizes: Array) -> Mask:
     both = marked & alike
     if not both.any():
         return marked
-    return np.asarray(marked | (alike & (sizes >= sizes[both].min() * (1 - SPARE))))
+    return np.asarray(marked | (alike & (sizes >= sizes[both].min() * (1 - SUM_ROUND_OFF))))

@@ -18,11 +18,14 @@ from .marking import doerfler, together
 from .refinement import RefinementTree, Refining
 from .singularities import Singularities, at_ends, at_limit, ends_of_contact, settled
 
-BESIDE = 0.1  # barycentric coordinate: a point so far outside of an element still touches it
-MARKINGS = 8  # most that one estimate is good for
-WRONG = 2.0  # estimate over its forecast from which it is planned half as far; measured .2 to 1.4
-FIRST = 3  # order that is chosen at least: a first level of order 2 costs as much, and sees less
-GROWTH = 2.0  # of the unknowns up to which the next level is planned at first
+# Barycentric coordinate: a point so far outside of an element still touches it.
+TOUCHING_COORDINATE = 0.1
+MAX_MARKINGS = 8  # most that one estimate is good for
+# Estimate over its forecast from which it is planned half as far; measured .2 to 1.4.
+WRONG_FORECAST = 2.0
+# Order that is chosen at least: a first level of order 2 costs as much, and sees less.
+LEAST_ORDER = 3
+FIRST_GROWTH = 2.0  # of the unknowns up to which the next level is planned at first
 
 
 def best_order(error: float) -> int:
@@ -68,7 +71,7 @@ class Refinement:
     max_dofs: float
     guaranteed: bool = False
     ending: float = 0.1
-    growth: float = GROWTH
+    growth: float = FIRST_GROWTH
     rising: bool = False
 
     def __post_init__(self) -> None:
@@ -101,8 +104,8 @@ class Refinement:
         if start is not None:
             return replace(self, order=start)
         if self.tolerance is None:
-            return replace(self, order=FIRST, rising=True)
-        return replace(self, order=max(FIRST, best_order(self.tolerance)))
+            return replace(self, order=LEAST_ORDER, rising=True)
+        return replace(self, order=max(LEAST_ORDER, best_order(self.tolerance)))
 
     def next_order(self, order: int, error: float) -> int:
         """The order of the level after one of an `order` and relative `error`."""
@@ -152,7 +155,11 @@ def next_plan(
 
     error = root_of_squares(indicators) or 1.0
     most = refinement.growth if refinement.tolerance is None else refinement.growth**2
-    growth = max(last.growth / 2, 1.0) if error > WRONG * last.error else min(2 * last.growth, most)
+    growth = (
+        max(last.growth / 2, 1.0)
+        if error > WRONG_FORECAST * last.error
+        else min(2 * last.growth, most)
+    )
     now = unknowns(mesh, order, refinement.element)
     relative = min(solution.relative_error_estimate, 1.0)
     scale = relative ** (order / last.order - 1)  # errors of orders p on one mesh are c^p
@@ -182,7 +189,7 @@ class Aim:
     error: float  # over the one that was estimated
     theta: float  # Doerfler's share
     ending: float  # size of elements at ends of contact over their line, per error
-    markings: float = MARKINGS
+    markings: float = MAX_MARKINGS
 
 
 def planned(
@@ -234,7 +241,7 @@ def depths(corners: Array, places: Array) -> Array:
 
 def touching(corners: Array, places: Array) -> Mask:
     """Whether triangles with `corners` (n, 3, 2) touch points `places` (k, 2), (n, k)."""
-    return depths(corners[:, None], places) >= -BESIDE
+    return depths(corners[:, None], places) >= -TOUCHING_COORDINATE
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,8 +14,9 @@ from ..fem import BoundaryTrace, boundary_trace, unknowns_of
 from ..mesh import CadEdge, copied
 from ..problem import Contact, MeshArrays, Problem, bisect, move_vertices
 
-TOUCHING = 1e-12  # distance, relative to the geometry, up to which two vertices are at one place
-ROUNDS = 12  # refinements after which a facing segment that still lags takes dual rows
+# Distance, relative to the geometry, up to which two vertices are at one place.
+VERTEX_DISTANCE = 1e-12
+MATCHING_ROUNDS = 12  # refinements after which a facing segment that still lags takes dual rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,7 +110,7 @@ def _move_to_partners(
     pairs, xy = np.array(new), mesh.vertices
     if contact.direction is None:
         apart = np.linalg.norm(xy[pairs[:, 0]] - xy[pairs[:, 1]], axis=1)
-        pairs = pairs[apart > TOUCHING * mesh.extent]
+        pairs = pairs[apart > VERTEX_DISTANCE * mesh.extent]
         normal = np.zeros((len(pairs), 2))
         for edge, at in _by_edge(trace, pairs[:, 0]):
             normal[at] = edge.normal(xy[pairs[at, 0]])
@@ -179,7 +180,7 @@ class Refining:
         matched = any(self._pairs)
         if matched:
             flags[_facing_elements(self._pairs, self._segments, flags)] = True
-        for _ in range(ROUNDS):
+        for _ in range(MATCHING_ROUNDS):
             bisect(self.mesh, flags)
             if not matched:
                 break

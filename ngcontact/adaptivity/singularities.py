@@ -15,12 +15,12 @@ from ..fem import BoundaryTrace
 from ..mesh import resolved_lengths
 from ..problem import MeshArrays, Problem
 
-AT_ENDS = 1.5  # u ~ r^(3/2) where contact ends: the squared error of an element is ~ h^3
-AT_CHANGES = 0.75  # of conditions: u ~ r^0.71 where right angles are clamped to one side
-AT_CORNERS = 0.5  # that point inwards: u ~ r^0.54 where 270 degrees are free, r^(1/2) at slits
-BLUNT = 0.1  # radians by which the normal turns at a corner that points inwards
-HALVED = 2.5  # least length that halves need, whose sizes differ by a quarter at most
-SETTLED = 1e-3  # radius of discs in which nothing is refined, over the extent of the mesh
+END_POWER = 1.5  # u ~ r^(3/2) where contact ends: the squared error of an element is ~ h^3
+CHANGE_POWER = 0.75  # of conditions: u ~ r^0.71 where right angles are clamped to one side
+CORNER_POWER = 0.5  # that point inwards: u ~ r^0.54 where 270 degrees are free, r^(1/2) at slits
+BLUNT_ANGLE = 0.1  # radians by which the normal turns at a corner that points inwards
+MIN_HALVED_LENGTH = 2.5  # least length that halves need, whose sizes differ by a quarter at most
+RESOLUTION_RADIUS = 1e-3  # radius of discs in which nothing is refined, over the extent of the mesh
 
 
 def at_ends(trace: BoundaryTrace, pairs: Sequence[ContactState], share: float) -> Mask:
@@ -43,7 +43,7 @@ def at_limit(mesh: ng.Mesh, degree: int) -> Mask:
     if degree > 1:  # straight segments have no middles to place
         view = MeshArrays(mesh)
         element = view.facet_elements
-        limit[element[resolved_lengths(mesh) < HALVED]] = True
+        limit[element[resolved_lengths(mesh) < MIN_HALVED_LENGTH]] = True
     return limit
 
 
@@ -66,7 +66,7 @@ def settled(mesh: ng.Mesh, places: Array) -> Mask:
     All within a thousandth of the mesh's extent of one.
     """
     view = MeshArrays(mesh)
-    radius = SETTLED * np.ptp(view.vertices, axis=0).max()
+    radius = RESOLUTION_RADIUS * np.ptp(view.vertices, axis=0).max()
     result = np.zeros(mesh.ne, dtype=bool)
     for place in places:
         near = np.linalg.norm(view.vertices - place, axis=1) <= radius
@@ -101,18 +101,18 @@ def _at(places: Array, power: float, extents: Array | float = np.inf) -> Singula
 
 def ends_of_contact(pairs: Sequence[ContactState]) -> Singularities:
     """Where contact turns from binding to non-binding, on both bodies."""
-    found = [_at(np.empty((0, 2)), AT_ENDS)]
+    found = [_at(np.empty((0, 2)), END_POWER)]
     for pair in pairs:
         line, ends = pair.line, pair.transitions
         extent = float(np.linalg.norm(np.ptp(line.position, axis=0))) if line.node.size else 0.0
-        found.append(_at(ends.position, AT_ENDS, extent))
+        found.append(_at(ends.position, END_POWER, extent))
         if line.contact.primary is not None:
             inner, outer = line.position[ends.inner], line.position[ends.outer]
             apart = np.linalg.norm(outer - inner, axis=1)
             s = np.linalg.norm(ends.position - inner, axis=1) / np.where(apart > 0, apart, np.inf)
             gap = (1 - s) * line.gap[ends.inner] + s * line.gap[ends.outer]
             facing = ends.position + gap[:, None] * line.direction[ends.inner]
-            found.append(_at(facing, AT_ENDS, extent))
+            found.append(_at(facing, END_POWER, extent))
     return joined(found)
 
 
@@ -145,7 +145,7 @@ def _reentrant(trace: BoundaryTrace) -> Index:
     ends = trace.region[segment[first]] != trace.region[segment[second]]  # as CAD edges do
     first, second = first[ends], second[ends]
     one, other = (trace.exact_normal(segment[at], s[at]) for at in (first, second))
-    return vertex[first[np.linalg.norm(one - other, axis=1) > BLUNT]]
+    return vertex[first[np.linalg.norm(one - other, axis=1) > BLUNT_ANGLE]]
 
 
 def corners(problem: Problem, trace: BoundaryTrace) -> Singularities:
@@ -158,4 +158,4 @@ def corners(problem: Problem, trace: BoundaryTrace) -> Singularities:
     np.maximum.at(most, ends, kind)
     changing, inwards = np.flatnonzero(least < most), _reentrant(trace)
     turning = view.vertices[np.setdiff1d(changing, inwards)]
-    return joined([_at(turning, AT_CHANGES), _at(view.vertices[inwards], AT_CORNERS)])
+    return joined([_at(turning, CHANGE_POWER), _at(view.vertices[inwards], CORNER_POWER)])

@@ -14,11 +14,11 @@ from ..reference.triangle import CENTRE, lagrange, lagrange_gradient
 from .projection import GRAZING_COSINE, MATCHING_DISTANCE, NEWTON_STEPS, PAIRS_AT_ONCE, Partners
 
 DEGREES = {3: 1, 6: 2, 10: 3}  # by the number of nodes
-NEAREST = 8  # facets by their middles, at which a ray is tried before all others
+NEAREST_FACETS = 8  # facets by their middles, at which a ray is tried before all others
 # Barycentric coordinate, negative, up to which a ray meets a facet: on planes of symmetry points
 # lie on the rim, and curved edges of both sides differ by round-off.
-OUTSIDE = 1e-7
-STANDS_STILL = 1e-14  # change of barycentric coordinates at which Newton's method has arrived
+OUTSIDE_COORDINATE = 1e-7
+NEWTON_TOLERANCE = 1e-14  # change of barycentric coordinates at which Newton's method has arrived
 
 
 def none_met(size: int) -> Partners:
@@ -46,7 +46,7 @@ def onto(
         L[:, :2] += move
         L[:, 2] -= move.sum(axis=1)
         distance += step[:, 2]
-        if np.nanmax(np.abs(step[:, :2]), initial=0.0) <= STANDS_STILL:
+        if np.nanmax(np.abs(step[:, :2]), initial=0.0) <= NEWTON_TOLERANCE:
             break
     return L, distance
 
@@ -100,8 +100,8 @@ def coincident(
     size = np.linalg.norm(surface[:, 1] - surface[:, 0], axis=1)
     tree = cKDTree(places.reshape(-1, 3))
     reach = MATCHING_DISTANCE * size.max()
-    distances, numbers = tree.query(points, k=NEAREST, distance_upper_bound=reach)
-    for column in range(NEAREST - 1, -1, -1):  # a node belongs to several facets
+    distances, numbers = tree.query(points, k=NEAREST_FACETS, distance_upper_bound=reach)
+    for column in range(NEAREST_FACETS - 1, -1, -1):  # a node belongs to several facets
         near = np.flatnonzero(np.isfinite(distances[:, column]))
         facet, local = np.divmod(numbers[near, column], len(nodes))
         meets = _faces(surface, side, facet, nodes[local], directions[near])
@@ -117,7 +117,7 @@ def _met(
 ) -> tuple[Index, Array, Array]:
     """Which (j,) of the pairs (r,) of `point` and `facet` meet, where (j, 3) and how far (j,)."""
     L, distance = onto(points[point], directions[point], surface, facet)
-    inside = np.flatnonzero(L.min(axis=1) >= -OUTSIDE)
+    inside = np.flatnonzero(L.min(axis=1) >= -OUTSIDE_COORDINATE)
     point, facet, L, distance = point[inside], facet[inside], L[inside], distance[inside]
     faces = np.flatnonzero(_faces(surface, side, facet, L, directions[point]))
     return inside[faces], L[faces], distance[faces]
@@ -137,7 +137,7 @@ def cast(
         return found
     middle = surface[:, :3].mean(axis=1)
     radius = np.linalg.norm(surface - middle[:, None], axis=2).max(axis=1)
-    _, near = cKDTree(middle).query(points, k=min(NEAREST, len(middle)))
+    _, near = cKDTree(middle).query(points, k=min(NEAREST_FACETS, len(middle)))
     near = near.reshape(len(points), -1)
     tried = [(np.repeat(np.arange(len(points)), near.shape[1]), near.ravel())]
     _take(found, *tried[0], points, directions, surface, side, ahead)
@@ -149,7 +149,7 @@ def cast(
         d, x = directions[here], points[here]
         along = d @ middle.T - (d * x).sum(axis=1)[:, None]
         square = (x**2).sum(axis=1)[:, None] - 2 * x @ middle.T + (middle**2).sum(axis=1)
-        passes = square - along**2 <= radius**2 * (1 + OUTSIDE)
+        passes = square - along**2 <= radius**2 * (1 + OUTSIDE_COORDINATE)
         at, facet = np.nonzero(passes)
         _take(found, here[at], facet, points, directions, surface, side, ahead)
     return found

@@ -20,7 +20,8 @@ from ..reference import triangle
 from .state import ContactState
 from .zone import covered_shares
 
-INSIDE = np.finfo(float).tiny  # distance at a node in contact without pressure: a sign alone
+# Distance at a node in contact without pressure: a sign alone.
+INSIDE_DISTANCE = np.finfo(float).tiny
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +49,7 @@ def signed_distance(problem: Problem, trace: FacetTrace, state: ContactState) ->
     slope = _slope(trace, line.segments, name, at_nodes(opened), at_nodes(closed))
     K = 0.75 * contact_modulus(problem, trace, line.segments, line.facing) * slope**1.5
     if 0 < K**2 < np.inf:
-        value = np.where(active, np.maximum(closed / K**2, INSIDE), -opened / slope)
+        value = np.where(active, np.maximum(closed / K**2, INSIDE_DISTANCE), -opened / slope)
     else:  # nothing is open, or without a slope: ends lie midway between nodes
         value = np.where(active, 1.0, -1.0)
     return SignedDistance(trace, line.segments, at_nodes(value), name)

@@ -20,8 +20,9 @@ from ..problem import Contact, Elastic, MeshArrays, Problem, check_mesh, scalar_
 from .line import partners, with_roles
 
 PLACES = (np.arange(8) + 0.5) / 8  # of a segment, at which distances are looked at
-OPPOSED = -0.5  # cosine between normals up to which boundaries face each other
-ROUNDS = 6  # in which the part of a segment where a gap is least is looked at four times closer
+OPPOSED_COSINE = -0.5  # cosine between normals up to which boundaries face each other
+# In which the part of a segment where a gap is least is looked at four times closer.
+SEARCH_ROUNDS = 6
 CURVED = 6  # degree of the mesh of a drawing
 
 
@@ -162,7 +163,7 @@ def _gaps(trace: BoundaryTrace, segment: Index, s: Array, other: Index) -> tuple
     met = partners(trace, other, segment, trace.point(segment, s), normal, nodes=False)
     met.distance[met.segment < 0] = np.inf  # also of what lies beyond the own body
     at = np.flatnonzero(met.segment >= 0)
-    opposed = (trace.normal(met.segment[at], met.s[at]) * normal[at]).sum(axis=1) <= OPPOSED
+    opposed = (trace.normal(met.segment[at], met.s[at]) * normal[at]).sum(axis=1) <= OPPOSED_COSINE
     met.distance[at[~opposed]] = np.inf
     return met.distance, met.segment
 
@@ -170,7 +171,7 @@ def _gaps(trace: BoundaryTrace, segment: Index, s: Array, other: Index) -> tuple
 def _least(trace: BoundaryTrace, segment: Index, s: Array, other: Index) -> _Place:
     """The least gap near a sample, on its segment (1,)."""
     width, at, steps = 2 * PLACES[0], float(s[0]), np.linspace(-1, 1, 9)
-    for _ in range(ROUNDS):
+    for _ in range(SEARCH_ROUNDS):
         s = np.unique(np.clip(at + width * steps, 0, 1))
         gap, _ = _gaps(trace, np.repeat(segment, len(s)), s, other)
         k = int(np.abs(gap).argmin())

@@ -33,9 +33,9 @@ from .line import (
 )
 from .projection import MATCHING_DISTANCE, Partners
 
-ROUND_OFF = 1e-13  # of basis functions at nodes, which vanish there
+BASIS_ROUND_OFF = 1e-13  # of basis functions at nodes, which vanish there
 SLIVER = 1e-9  # share of a facet, in all its facing parts, below which it faces nothing
-WHOLE = 1 - SLIVER  # ... and from which it faces wholly
+WHOLE_SHARE = 1 - SLIVER  # ... and from which it faces wholly
 LEAST_COVERED = 0.5  # of a node's weight on its whole facets, below which pressures are means
 SMALLEST_SHARE = 1e-8  # of a node's weight on its whole facets, below which it carries no row
 
@@ -236,7 +236,7 @@ def _coupling(trace: FacetTrace, partner: Index, place: Array) -> sp.csr_array:
     row = np.repeat(met, share.shape[1])
     size = (len(partner), trace.space.ndof)
     coupling = from_triplets(share.ravel(), row, trace.nodes[partner[met]].ravel(), size)
-    coupling.data[np.abs(coupling.data) < ROUND_OFF] = 0.0
+    coupling.data[np.abs(coupling.data) < BASIS_ROUND_OFF] = 0.0
     coupling.eliminate_zeros()
     return coupling
 
@@ -295,7 +295,7 @@ def _means(trace: FacetTrace, zone: ContactZone, facets: Index, parts: FacetPiec
     row, column = np.broadcast_arrays(row[:, :, None], column[:, None, :])
     size = (k * q, trace.space.ndof)
     coupling = from_triplets(blocks.ravel(), row.ravel(), column.ravel(), size)
-    return FacingMeans(D, np.einsum("kij,kj->ki", change, gap), coupling, covered > WHOLE)
+    return FacingMeans(D, np.einsum("kij,kj->ki", change, gap), coupling, covered > WHOLE_SHARE)
 
 
 def matched_facets(trace: FacetTrace, zone: ContactZone) -> Mask:
@@ -482,7 +482,7 @@ def for_partial_cover(trace: BoundaryTrace, contacts: Sequence[Contact]) -> Boun
         share = facing_pieces(trace, contact, facets, facing, _reach(trace, zone)).covered(
             len(facets)
         )
-        partly = (share > SLIVER) & (share < WHOLE)
+        partly = (share > SLIVER) & (share < WHOLE_SHARE)
         chosen[trace.nodes[facets[partly], 3:]] = True
     return replace(trace, bernstein=chosen) if chosen.any() else trace
 

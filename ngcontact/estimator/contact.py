@@ -36,14 +36,17 @@ from .terms import (
     Squares,
 )
 
-ARRIVED = 1e-8  # last step of Newton's method for a parameter: the next one would be its square
+# Last step of Newton's method for a parameter: the next one would be its square.
+NEWTON_TOLERANCE = 1e-8
 SLIVER = 1e-9  # share of a segment below which a part of it is none
-ALIKE = 1 - 1e-6  # cosine of directions from which points of two pairs at a node are one
+# Cosine of directions from which points of two pairs at a node are one.
+SAME_DIRECTION_COSINE = 1 - 1e-6
 GAP_NOISE = 4e-15  # of a gap, relative to the displacement and, where it is measured, to positions
-BUMP = 2.0  # |w| |d_s w| over the largest w^2; 1 at least, 1.2 to 1.7 of hats, Gauss's, parabolas
-UNRESOLVED = 0.1  # distance of a gap from polynomials over its range, from which it is followed
-NO_GAP = 1e-12  # ... relative to the gap, below which there is none
-DIVISIONS = 4  # of a piece on which the gap is no polynomial
+# |w| |d_s w| over the largest w^2; 1 at least, 1.2 to 1.7 of hats, Gauss's, parabolas.
+BUMP_FACTOR = 2.0
+UNRESOLVED_GAP = 0.1  # distance of a gap from polynomials over its range, from which it is followed
+OPENING_ROUND_OFF = 1e-12  # ... relative to the gap, below which there is none
+PIECE_DIVISIONS = 4  # of a piece on which the gap is no polynomial
 MAX_PIECES = 100_000  # pieces looked at, from which no more are divided
 
 
@@ -127,7 +130,7 @@ def covered_parts(
         twice = joined([rest, rest])
         d, _ = directions(boundary, line, twice.local, s)
         x = boundary.point(line.segments[twice.local], s)
-        t = crossings(x, across(d), boundary.curve, twice.facing, twice.opposite, ARRIVED)
+        t = crossings(x, across(d), boundary.curve, twice.facing, twice.opposite, NEWTON_TOLERANCE)
         inside = (s > 0) & (s < 1)  # where a vertex of the primary is passed
         ends = np.where(inside, np.round(t), t).reshape(2, -1)
         low[whole:], high[whole:] = np.sort(ends, axis=0)
@@ -183,13 +186,15 @@ def followed_gap(
     while len(pieces.local):
         at_rule, at_between = gap_at(rule), gap_at(between)
         number += len(pieces.local)
-        allowed = UNRESOLVED * np.ptp(at_rule, axis=1) + NO_GAP * np.abs(at_rule).max()
+        allowed = (
+            UNRESOLVED_GAP * np.ptp(at_rule, axis=1) + OPENING_ROUND_OFF * np.abs(at_rule).max()
+        )
         rough = np.abs(at_between - at_rule @ follow.T).max(axis=1) > allowed
         rough &= number < MAX_PIECES
         done.append(rows_of(pieces, np.flatnonzero(~rough)))
-        pieces = rows_of(pieces, np.repeat(np.flatnonzero(rough), DIVISIONS))
-        step = (pieces.stop - pieces.start) / DIVISIONS
-        start = pieces.start + step * np.tile(np.arange(DIVISIONS), rough.sum())
+        pieces = rows_of(pieces, np.repeat(np.flatnonzero(rough), PIECE_DIVISIONS))
+        step = (pieces.stop - pieces.start) / PIECE_DIVISIONS
+        start = pieces.start + step * np.tile(np.arange(PIECE_DIVISIONS), rough.sum())
         pieces = replace(pieces, start=start, stop=start + step)
     if len(done) == 1:
         return done[0]
@@ -264,7 +269,7 @@ def facing_points(
         s_there, distance = np.zeros(len(s)), np.zeros(len(s))
     else:
         near = pieces.opposite[part]
-        s_there = crossings(x, across(d), boundary.curve, facing, near, ARRIVED)
+        s_there = crossings(x, across(d), boundary.curve, facing, near, NEWTON_TOLERANCE)
         offset = at(boundary.curve, facing, s_there) - x
         distance = (offset * d).sum(axis=1)
         distance[np.abs(distance) <= GAP_ROUND_OFF * np.abs(x).max(initial=0.0)] = 0.0
@@ -322,7 +327,7 @@ def closing_energy(
     if or_more:
         largest = np.zeros(size)
         np.maximum.at(largest, segment, measure * w**2)
-        times = np.minimum(times, BUMP * h * over_square(largest))
+        times = np.minimum(times, BUMP_FACTOR * h * over_square(largest))
     return stiffness * w**2 * np.maximum(times, 1)[segment]
 
 
@@ -384,7 +389,7 @@ def at_nodes(
             d[:] = line.contact.direction
         # At a corner the point whose direction is the nearer one.
         alike = np.where(nodes[at, None] == other.line.node, d @ other.line.direction.T, -1.0)
-        best, same = alike.argmax(axis=1), alike.max(axis=1) > ALIKE
+        best, same = alike.argmax(axis=1), alike.max(axis=1) > SAME_DIRECTION_COSINE
         pressure.ravel()[at[same]] = other.pressure[best[same]]
         active.ravel()[at[same]] = other.active[best[same]]
     return pressure, active

@@ -28,7 +28,8 @@ from ..linalg import cholesky, lower_half, shared
 from ..problem import MeshArrays
 from .terms import BoundaryResidual, PressureShare, ScaledSolution
 
-HELD = 1e6  # stiffness of supports in the last term, relative to the elements beside them
+# Stiffness of supports in the last term, relative to the elements beside them.
+SUPPORT_STIFFNESS = 1e6
 FLOATING = 1e-9  # ... and of the bedding that keeps free bodies, relative to their size
 
 
@@ -171,7 +172,7 @@ class _Forms:
         a = ng.BilinearForm(self.V, symmetric=True)
         work = self.mu * (model.gradients(u, v) + bedding * u * v)
         a += model.weighted(work) * ng.dx(definedon=self.region, bonus_intorder=model.bonus)
-        held = ng.BoundaryFromVolumeCF(HELD * self.mu) / ng.specialcf.mesh_size
+        held = ng.BoundaryFromVolumeCF(SUPPORT_STIFFNESS * self.mu) / ng.specialcf.mesh_size
         for pattern, components in problem.displacement.items():
             for axis, value in enumerate(components):
                 if value is not None:

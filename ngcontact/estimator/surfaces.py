@@ -28,7 +28,7 @@ from ..reference import triangle
 from .terms import BoundaryResidual, BoundaryTerms, Parts, ScaledSolution, Squares
 
 DATA_DEGREE = 4  # of quadrature above the discrete terms, for the data
-NOTHING = Parts(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))  # of lines
+NO_PARTS = Parts(np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0))  # of lines
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +110,7 @@ def on_supports_and_loads(solution: ScaledSolution, facets: Index) -> BoundaryTe
     return BoundaryTerms(
         residuals=[_residual(solution, points, "boundary", t)],
         squares=[Squares("displacement", element, squares)],
-        covered=NOTHING,
+        covered=NO_PARTS,
     )
 
 
@@ -215,7 +215,7 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
     points = _points(trace, free, degree)
     residuals.append(_residual(solution, points, "boundary", _traction(solution, points)))
     both_sides = np.concatenate([zone.segments, zone.facing])
-    return BoundaryTerms(residuals, squares, NOTHING), both_sides
+    return BoundaryTerms(residuals, squares, NO_PARTS), both_sides
 
 
 def _on_parts(

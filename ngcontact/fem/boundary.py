@@ -25,7 +25,8 @@ from .model import PLANE, Model
 
 CORNER = 5e-4  # turn (radians) from which two CAD edges meet at a corner: two rows at a smaller
 # one would be dependent to 1 / turn^2
-BENT = 1e-12  # distance of a segment from its chord, relative to it, from which it is curved
+# Distance of a segment from its chord, relative to it, from which it is curved.
+CURVED_DISTANCE = 1e-12
 CORNER_WITHOUT_CAD = np.deg2rad(30)  # ... and two segments of one name on a mesh without CAD
 ORDERS = (1, 2, 3, 4)
 ORDERS_OF_SOLIDS = (1, 2, 3)
@@ -325,7 +326,7 @@ class BoundaryTrace:
         ends = self.curve[:, :1], self.curve[:, -1:]
         nodes = gauss_lobatto(self.geometry_order)[:, None]
         off = np.abs(self.curve - ends[0] - nodes * (ends[1] - ends[0])).max(axis=(1, 2))
-        return np.asarray(off > BENT * self.lengths(np.arange(len(self.curve))))
+        return np.asarray(off > CURVED_DISTANCE * self.lengths(np.arange(len(self.curve))))
 
     @cached_property
     def curved_elements(self) -> Mask:

@@ -22,11 +22,11 @@ from ..arrays import Array, Index, Mask, from_triplets
 from ..mesh import CadFace, beyond_faces, cad_faces, face_normals
 from ..problem import POSITION, MeshArrays
 from ..reference import triangle
-from .boundary import BENT, CORNER, CORNER_WITHOUT_CAD, BoundaryTrace, segment_trace
+from .boundary import CORNER, CORNER_WITHOUT_CAD, CURVED_DISTANCE, BoundaryTrace, segment_trace
 from .model import PLANE, Model
 from .solid import SOLID_MODEL
 
-NO_ENTRY = 1e-13  # of changes of basis, whose entries are of size 1: round-off
+ENTRY_ROUND_OFF = 1e-13  # of changes of basis, whose entries are of size 1: round-off
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +140,7 @@ class FacetTrace(BoundaryTrace):
         """Facets (k,) that leave the planes of their vertices."""
         flat = np.einsum("qi,kid->kqd", triangle.nodes(self.geometry_order), self.curve[:, :3])
         off = np.abs(self.curve - flat).max(axis=(1, 2))
-        return np.asarray(off > BENT * self.lengths(np.arange(len(self.curve))))
+        return np.asarray(off > CURVED_DISTANCE * self.lengths(np.arange(len(self.curve))))
 
     @cached_property
     def _middles(self) -> NDArray:
@@ -204,7 +204,7 @@ class FacetTrace(BoundaryTrace):
         change = np.linalg.solve(self._functions_at_nodes(segments), B)[:, 3:]
         functions = self._functions[segments][:, 3:]
         rows, columns = np.broadcast_arrays(functions[:, :, None], self.nodes[segments][:, None])
-        kept = np.abs(change) > NO_ENTRY
+        kept = np.abs(change) > ENTRY_ROUND_OFF
         rows, columns, values = rows[kept], columns[kept], change[kept]
         # Facets with a common edge say the same of it.
         _, first = np.unique(rows * size + columns, return_index=True)

@@ -13,7 +13,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Mask
-from ..problem import ON_AXIS, Elastic, Hooke, InitialStrain, MeshArrays, on_axis
+from ..problem import AXIS_RADIUS, Elastic, Hooke, InitialStrain, MeshArrays, on_axis
 
 CF: TypeAlias = ng.CoefficientFunction
 Laws: TypeAlias = Mapping[str, Elastic | Hooke]
@@ -129,7 +129,7 @@ class _Axisymmetric(Model):
         rr, zz, rz = super().strain(u)
         hoop = u[0] / ng.x
         if isinstance(u, ng.GridFunction):  # forms are integrated inside of elements
-            tiny = ON_AXIS * float(MeshArrays(u.space.mesh).vertices[:, 0].max())
+            tiny = AXIS_RADIUS * float(MeshArrays(u.space.mesh).vertices[:, 0].max())
             hoop = ng.IfPos(ng.x - tiny, hoop, rr)
         return ng.CF((rr, zz, hoop, rz))  # (2.6)
 

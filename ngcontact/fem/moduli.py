@@ -18,7 +18,7 @@ from .boundary import BoundaryTrace
 # kappa / mu from which a body counts as nearly incompressible: nu = 5/12; nowhere in plane stress.
 NEARLY_INCOMPRESSIBLE = 6.0
 # ... and from which order 1 locks: nu = 0.4545, where errors are 1.3 times those of nu = 0.3.
-LOCKING = 11.0
+LOCKING_RATIO = 11.0
 
 # What `_moduli` has of laws of numbers, by the model.
 CONSTANT: WeakKeyDictionary[Elastic | Hooke, dict[str, Array]] = WeakKeyDictionary()
@@ -158,7 +158,7 @@ def warn_of_locking(problem: Problem, mesh: ng.Mesh, order: int) -> None:
     """Warn of every body that elements of order 1 are too stiff for."""
     if order > 1:
         return
-    for name, ratio in nearly_incompressible(problem, mesh, LOCKING).items():
+    for name, ratio in nearly_incompressible(problem, mesh, LOCKING_RATIO).items():
         warn(
             f'body "{name}" is nearly incompressible, lambda / mu = {ratio - 1:.3g}: elements of '
             "order 1 lock; use order=2 or higher"

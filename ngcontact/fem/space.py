@@ -20,7 +20,7 @@ from .model import MODELS, Model
 from .solid import SOLID_MODEL
 
 LOAD_BONUS = 6  # quadrature orders above the default: loads may be as rough as r^(-1/2)
-CANCELLED = 1e-6  # energy relative to its terms below which fewer than ten digits are left
+CANCELLED_ENERGY = 1e-6  # energy relative to its terms below which fewer than ten digits are left
 ROUGH_PARTS = 8  # of the sides of an element in which a law is rough, each with a rule of its own
 MODULUS_BONUS = 4  # quadrature orders above the default: moduli may be as rough as r^(-1/2)
 # ... and for the map of a curved element, where derivatives are no polynomials: the default rule
@@ -223,7 +223,7 @@ def _scaled_energy(
     size = power_of_two(u)
     if space.initial is None:
         energy = float(u / size @ (space.A @ (u / size)))
-        if energy > CANCELLED * float(space.diagonal @ (u / size) ** 2):
+        if energy > CANCELLED_ENERGY * float(space.diagonal @ (u / size) ** 2):
             return size, energy
     space.require_mesh()
     model, energy = model_of(problem), 0.0

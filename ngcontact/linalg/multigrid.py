@@ -20,7 +20,7 @@ from ..arrays import Array, Mask
 from .coarse_spaces import Coarsening
 from .sparse import handed_over, inverse_of, shared
 
-TRIAL = 25  # V-cycles after which is judged whether the target will be reached
+TRIAL_CYCLES = 25  # V-cycles after which is judged whether the target will be reached
 DEGREE = 4  # of the polynomial: of 2 to 4 the fastest in whole solves of a million unknowns
 EIGENVALUE_ERROR = 0.1  # relative, of the largest eigenvalue
 LANCZOS_STEPS = 6  # before it is told whether that is met: it is
@@ -238,7 +238,9 @@ class Multigrid:
             size = float(max(residual.max(), -residual.min()))
             if size <= target:
                 return x.FV().NumPy().copy(), count
-            if count == TRIAL and count * np.log(target / first) < most * np.log(size / first):
+            if count == TRIAL_CYCLES and count * np.log(target / first) < most * np.log(
+                size / first
+            ):
                 break
             self.cycle(r, z)
             last, product = product, ng.InnerProduct(r, z)

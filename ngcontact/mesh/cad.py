@@ -17,12 +17,13 @@ from ..arrays import Array, across, rightward
 
 SAMPLES = 65  # points of an edge from which a projection starts
 NEWTON_STEPS = 30
-MISSED = 1e-9  # distance, relative to the edge, beyond which a level counts as not reached
-UNIFORM = 1e-9  # relative change of speed along an arc of a circle
+LEVEL_DISTANCE = 1e-9  # distance, relative to the edge, beyond which a level counts as not reached
+SPEED_CHANGE = 1e-9  # relative change of speed along an arc of a circle
 STRAIGHT = 1e-12  # distance from the chord, relative to the edge; OCC keeps about 1e-15
 LONG_ARC = 0.5  # parameters, angles on arcs of circles, from which the arc is fitted
-EXACT = 8 * np.finfo(float).eps  # distance, relative to the edge, at which a formula is its curve
-SETTLED = 1e-15  # relative change of a parameter at which Newton's method has arrived
+# Distance, relative to the edge, at which a formula is its curve.
+FORMULA_DISTANCE = 8 * np.finfo(float).eps
+NEWTON_TOLERANCE = 1e-15  # relative change of a parameter at which Newton's method has arrived
 
 
 class CadEdge:
@@ -38,7 +39,7 @@ class CadEdge:
         self.size = float(np.abs(np.ptp(self._x, axis=0)).max())  # its extent, a length
         chord = self._x[0] + np.linspace(0, 1, SAMPLES)[:, None] * (self._x[-1] - self._x[0])
         self.straight = bool(np.abs(self._x - chord).max() <= STRAIGHT * self.size)
-        self.closed = bool(np.abs(self._x[-1] - self._x[0]).max() <= MISSED * self.size)
+        self.closed = bool(np.abs(self._x[-1] - self._x[0]).max() <= LEVEL_DISTANCE * self.size)
         if not self.straight:
             self._axes = self._fitted()
 
@@ -51,7 +52,7 @@ class CadEdge:
         slopes = np.column_stack([-shapes[two, 1], shapes[two, 0]])
         axes = np.linalg.solve(slopes, self.derivative(self._t[two]))
         centre = (self._x - shapes @ axes)[two].mean(axis=0)
-        exact = np.abs(centre + shapes @ axes - self._x).max() <= EXACT * self.size
+        exact = np.abs(centre + shapes @ axes - self._x).max() <= FORMULA_DISTANCE * self.size
         return np.vstack([centre, axes]) if exact else None
 
     @property
@@ -63,7 +64,7 @@ class CadEdge:
     def uniform(self) -> bool:
         """Whether its speed is constant, as on arcs of circles."""
         speed = np.linalg.norm(self.derivative(self._t), axis=1)
-        return bool(np.ptp(speed) <= UNIFORM * speed.max())
+        return bool(np.ptp(speed) <= SPEED_CHANGE * speed.max())
 
     def point(self, t: Array) -> Array:
         """Points (k, 2) at the parameters `t` (k,)."""
@@ -91,7 +92,7 @@ class CadEdge:
             new = np.clip(t - step(t), self.start, self.stop)
             moved = np.abs(new - t).max(initial=0.0)
             t = new
-            if moved <= SETTLED * length:
+            if moved <= NEWTON_TOLERANCE * length:
                 break
         return t
 
@@ -135,7 +136,7 @@ class CadEdge:
             return (along(self.point(t)) - values) / np.where(slope == 0, np.inf, slope)
 
         t = self._newton(self.project(near), step)
-        missed = np.abs(along(self.point(t)) - values) > MISSED * self.size
+        missed = np.abs(along(self.point(t)) - values) > LEVEL_DISTANCE * self.size
         return np.where(missed, np.nan, t)
 
     def opposite(self, points: Array, normals: Array) -> Array:
@@ -184,4 +185,4 @@ def same_geometry(one: OCCGeometry | ng.Mesh, other: OCCGeometry | ng.Mesh) -> b
         return False
     points, other_points = (np.array([edge.samples for edge in each]) for each in (edges, others))
     size = np.ptp(points.reshape(-1, 2), axis=0).max()
-    return bool(np.abs(points - other_points).max() <= MISSED * size)
+    return bool(np.abs(points - other_points).max() <= LEVEL_DISTANCE * size)

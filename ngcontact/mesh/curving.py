@@ -16,9 +16,11 @@ PARENTS = "_ngcontact_parents"  # attribute of a mesh: it lives as long as the m
 # on other curves 1e-10 over the speed counts as met. On edges of extent SMALL_EDGE that changes no
 # more than 1e-8 of it as long as elements keep their shape.
 SMALL_EDGE = 1e-2  # extent of an edge; measured: all but arcs of circles are wrong from 2e-3
-SHORTEST = 1e-6  # a segment of a curved edge; measured: elements of order 4 turn over at 5e-7
+# A segment of a curved edge; measured: elements of order 4 turn over at 5e-7.
+MIN_CURVED_LENGTH = 1e-6
 SHORTEST_ON_SMALL = 1e-5  # ... of a smaller arc; measured: middles displaced from 5e-6, order 4
-ON_CURVE = 1e-12  # distance, relative to the geometry's size, at which an element misses its curve
+# Distance, relative to the geometry's size, at which an element misses its curve.
+CURVE_DISTANCE = 1e-12
 
 
 def vertex_parents(mesh: ng.Mesh) -> Integers:
@@ -66,7 +68,7 @@ def resolved_lengths(mesh: ng.Mesh) -> Array:
 
 def _shortest(edge: CadEdge) -> float:
     """Length from which OCC curves the elements at a segment of an edge."""
-    return SHORTEST_ON_SMALL if edge.size < SMALL_EDGE else SHORTEST
+    return SHORTEST_ON_SMALL if edge.size < SMALL_EDGE else MIN_CURVED_LENGTH
 
 
 def unresolved(mesh: ng.Mesh) -> bool:
@@ -85,7 +87,7 @@ def check_curves(mesh: ng.Mesh) -> None:
                 f'the curved edge "{edge.name}" has the extent {edge.size:g} and segments of '
                 f"{shortest * _shortest(edge):g}, on which the geometry kernel loses digits; "
                 f"choose a smaller unit of length: curved edges of {SMALL_EDGE:g} and more may "
-                f"have segments down to {SHORTEST:g}"
+                f"have segments down to {MIN_CURVED_LENGTH:g}"
             )
 
 
@@ -94,7 +96,7 @@ def _straightened(mesh: ng.Mesh) -> bool:
     position = ng.CF((ng.x, ng.y, ng.z))
     off = ng.BoundaryFromVolumeCF(position) - position
     missed, size = (ng.Integrate(ng.InnerProduct(x, x), mesh, ng.BND) for x in (off, position))
-    return bool(missed > ON_CURVE**2 * size)
+    return bool(missed > CURVE_DISTANCE**2 * size)
 
 
 def _on_curves(mesh: ng.Mesh) -> Mask | None:

@@ -17,10 +17,11 @@ from ..arrays import Array, Index, Mask
 from ..problem import MeshArrays
 
 NEWTON_STEPS = 30
-SETTLED = 1e-15  # step on the surface, relative to the coordinates, at which Newton has arrived
-FLAT = 1e-12  # difference of unit normals up to which a face is plane
+# Step on the surface, relative to the coordinates, at which Newton has arrived.
+NEWTON_TOLERANCE = 1e-15
+NORMAL_DIFFERENCE = 1e-12  # difference of unit normals up to which a face is plane
 SAMPLES = 7  # points of a face, in both parameters, that tell whether it is plane
-SINGULAR = 1e-9  # sine of the angle of both tangents, below which the surface has a pole
+POLE_SINE = 1e-9  # sine of the angle of both tangents, below which the surface has a pole
 
 
 class CadFace:
@@ -59,7 +60,7 @@ class CadFace:
         if key not in self._plane:
             grid = np.stack(np.meshgrid(*np.linspace(low, high, SAMPLES).T), axis=-1)
             normals = self.normal_at(grid.reshape(-1, 2))
-            flat = np.abs(normals - normals[0]).max() <= FLAT
+            flat = np.abs(normals - normals[0]).max() <= NORMAL_DIFFERENCE
             self._plane[key] = normals[0] if flat else np.zeros(0)
         return self._plane[key] if self._plane[key].size else None
 
@@ -70,9 +71,11 @@ class CadFace:
         for _ in range(NEWTON_STEPS):
             x, t = self._at(uv[rest])
             # At a pole one tangent vanishes: that parameter stays.
-            step = (np.linalg.pinv(t, rcond=SINGULAR) @ (points[rest] - x)[..., None])[..., 0]
+            step = (np.linalg.pinv(t, rcond=POLE_SINE) @ (points[rest] - x)[..., None])[..., 0]
             uv[rest] += step
-            rest = rest[np.linalg.norm((t @ step[..., None])[..., 0], axis=1) > SETTLED * size]
+            rest = rest[
+                np.linalg.norm((t @ step[..., None])[..., 0], axis=1) > NEWTON_TOLERANCE * size
+            ]
             if rest.size == 0:
                 break
         return uv

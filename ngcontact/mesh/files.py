@@ -22,8 +22,9 @@ from ..problem import check_mesh
 # Corners of the cells that are read; those of second order have middles of their sides, too.
 CORNERS = {"triangle": 3, "triangle6": 3, "quad": 4, "quad8": 4, "quad9": 4, "line": 2, "line3": 2}
 SOLIDS = ("tetra", "hexahedron", "wedge", "pyramid")
-FLAT = 1e-9  # extent along z, relative to that in the plane, of a file that lies in one
-BENT = 1e-6  # distance of a middle from its chord, relative to this, from which a side is curved
+PLANE_EXTENT = 1e-9  # extent along z, relative to that in the plane, of a file that lies in one
+# Distance of a middle from its chord, relative to this, from which a side is curved.
+CURVED_DISTANCE = 1e-6
 CORNER = np.deg2rad(30)  # turn of a line at which curves end
 POLYGON = np.deg2rad(1)  # turn of straight sides from which they may stand for a curve
 TANGENT_NODES = 5  # of a curve, from which the tangent at one is taken
@@ -196,7 +197,7 @@ def _names(file: Any) -> list[np.ndarray]:
 def _plane(points: Array, cells: list[_Cells]) -> Array:
     """Points (n, 2) of a file whose cells lie in a plane z = const."""
     used = points[np.unique(np.concatenate([part.nodes.ravel() for part in cells]))]
-    if used.shape[1] > 2 and np.ptp(used[:, 2]) > FLAT * np.ptp(used[:, :2], axis=0).max():
+    if used.shape[1] > 2 and np.ptp(used[:, 2]) > PLANE_EXTENT * np.ptp(used[:, :2], axis=0).max():
         low, high = used[:, 2].min(), used[:, 2].max()
         raise ValueError(f"bodies do not lie in a plane: z is from {low:.6g} to {high:.6g}")
     return points[:, :2]
@@ -210,7 +211,7 @@ def _triangles(
     for part in cells:
         a, b, m = part.nodes, np.roll(part.nodes, -1, axis=1), part.middles
         off = np.abs(points[m] - (points[a] + points[b]) / 2).max(axis=2)
-        bent = (m >= 0) & (off > BENT * np.abs(points[b] - points[a]).max(axis=2))
+        bent = (m >= 0) & (off > CURVED_DISTANCE * np.abs(points[b] - points[a]).max(axis=2))
         for x, y, z in zip(a[bent].tolist(), b[bent].tolist(), m[bent].tolist(), strict=True):
             middles[min(x, y), max(x, y)] = z
         if a.shape[1] == 4:
@@ -276,7 +277,7 @@ def _runs(points: Array, sides: list[_Side]) -> Iterator[list[_Side]]:
         after = starts[side.name, side.body, side.stop]
         if len(after) == 1 and (side.middle >= 0) == (sides[after[0]].middle >= 0):
             turn = _turn(_tangents(points, side)[1], _tangents(points, sides[after[0]])[0])
-            if turn < (CORNER if side.middle >= 0 else BENT):
+            if turn < (CORNER if side.middle >= 0 else CURVED_DISTANCE):
                 following[k] = after[0]
     left = dict.fromkeys([k for k in range(len(sides)) if k not in set(following.values())])
     left |= dict.fromkeys(range(len(sides)))  # ends of curves first, then closed ones
@@ -313,7 +314,7 @@ def _curves(points: Array, runs: list[list[_Side]]) -> tuple[list[occ.Edge], flo
             slope /= np.linalg.norm(slope, axis=1)[:, None]
             edge = occ.SplineInterpolation(
                 [occ.Pnt(*p, 0) for p in x],
-                tol=BENT * float(np.linalg.norm(np.diff(x, axis=0), axis=1).min()),
+                tol=CURVED_DISTANCE * float(np.linalg.norm(np.diff(x, axis=0), axis=1).min()),
                 tangents={k: occ.Vec(*t, 0) for k, t in enumerate(slope)},
             )
         edge.name = run[0].name

@@ -19,29 +19,36 @@ from ..problem import Contact, MeshArrays, Problem
 from .cad import CadEdge
 from .identified import identify_coinciding_faces
 
-COARSE = 8  # elements along the largest extent of the geometry when no mesh size is given ...
-FINER = 2  # ... and that many times more on a bounded zone: contact may end anywhere on it
+# Elements along the largest extent of the geometry when no mesh size is given ...
+DEFAULT_ELEMENTS = 8
+# ... and that many times more on a bounded zone: contact may end anywhere on it.
+BOUNDED_ZONE_FACTOR = 2
 
 # Lengths that OCC and Netgen serve; given meshes have no such limits. Measured with discs, blocks,
 # rings and splines: meshes are as at size 1 up to 4e8, from 1e9 on Netgen ignores sizes or never
 # returns. OCC merges points within 1e-7; a body of twice that has no mesh, of 2e-6 it has one.
-FARTHEST = 5e8  # from the origin
-SMALLEST = 1e-6  # extent
+MAX_COORDINATE = 5e8  # from the origin
+MIN_EXTENT = 1e-6  # extent
 
 MESHING = threading.Lock()
 
-STEEPEST = 0.5  # cosine between a curve's normal and the direction below which nodes go unmatched
-NEARER = 0.01  # of an edge: what a polygon of its samples tells apart
-COINCIDENT = 1e-6  # distance, relative to an edge, up to which two edges are one contact line
-CLOSE = 0.1  # share of the spacing, or of a segment, within which a node yields to one beside it
-FINE = 513  # samples on which a division is laid out
-APART = 1e-9  # share of an edge up to which two nodes are one
-TURN = 0.5  # largest turn (radians) of a curve along one contact segment
-SPARE = 1e-9  # share by which a run of elements may exceed their size, not to gain one by round-off
-NARROW = 0.1  # of the size of a segment: gaps that contact may close
-CONSTANT = 1e-6  # of the size of a segment: change within half of it up to which a gap has no least
-THERE = 1e-6  # of a segment: distance up to which a node lies at a place
-CLOSER = 2**-6  # of a sample's distance: from its error of 1e-5 to one of 1e-9, above round-off
+# Cosine between a curve's normal and the direction below which nodes go unmatched.
+MIN_MATCHED_COSINE = 0.5
+SAMPLE_RESOLUTION = 0.01  # of an edge: what a polygon of its samples tells apart
+LINE_DISTANCE = 1e-6  # distance, relative to an edge, up to which two edges are one contact line
+# Share of the spacing, or of a segment, within which a node yields to one beside it.
+MIN_NODE_DISTANCE = 0.1
+DIVISION_SAMPLES = 513  # samples on which a division is laid out
+NODE_DISTANCE = 1e-9  # share of an edge up to which two nodes are one
+MAX_TURN = 0.5  # largest turn (radians) of a curve along one contact segment
+# Share by which a run of elements may exceed their size, not to gain one by round-off.
+SIZE_SLACK = 1e-9
+MAX_CLOSED_GAP = 0.1  # of the size of a segment: gaps that contact may close
+# Of the size of a segment: change within half of it up to which a gap has no least.
+CONSTANT_GAP_CHANGE = 1e-6
+PLACE_DISTANCE = 1e-6  # of a segment: distance up to which a node lies at a place
+# Of a sample's distance: from its error of 1e-5 to one of 1e-9, above round-off.
+SEARCH_STEP = 2**-6
 
 
 def _segments(x: Array, y: Array, maxh: float) -> Array:
@@ -52,7 +59,7 @@ def _segments(x: Array, y: Array, maxh: float) -> Array:
         angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
         turn = np.abs(np.gradient(angle)) if len(angle) > 1 else np.zeros(1)
         density = np.maximum(density, np.linalg.norm(steps, axis=1) / maxh)
-        density = np.maximum(density, turn / TURN)
+        density = np.maximum(density, turn / MAX_TURN)
     return np.concatenate([[0.0], np.cumsum(density)])
 
 
@@ -66,10 +73,10 @@ def narrowest(t: Array, x: Array, y: Array, maxh: float, gap: Callable[[Array], 
     bend = before - 2 * here + after
     step = np.diff(_segments(x, y, maxh))
     change = np.abs(bend) / 8 / np.maximum(step[:-1], step[1:]) ** 2  # within half a segment
-    turns = (np.abs(here) <= NARROW * maxh) & ((before - here) * (after - here) >= 0)
-    place = t[1:-1][turns & (change > CONSTANT * maxh)]
+    turns = (np.abs(here) <= MAX_CLOSED_GAP * maxh) & ((before - here) * (after - here) >= 0)
+    place = t[1:-1][turns & (change > CONSTANT_GAP_CHANGE * maxh)]
     apart = (t[-1] - t[0]) / (len(t) - 1)
-    for width in (apart, CLOSER * apart) if len(place) else ():  # vertices of parabolas
+    for width in (apart, SEARCH_STEP * apart) if len(place) else ():  # vertices of parabolas
         before, here, after = (gap(place + side * width) for side in (-1, 0, 1))
         place = place + width / 2 * (before - after) / (before - 2 * here + after)
     return np.unique(place[(place > t[0]) & (place < t[-1])])
@@ -79,20 +86,20 @@ def spaced(t: Array, x: Array, y: Array, maxh: float, places: Array) -> Array:
     """Parameters (n,) of nodes between samples at `t` (k,), the first and the last included.
 
     `x` and `y` (k, 2) are the points there, and those that they see on the other curve; segments
-    are no longer than `maxh` on either and turn by `TURN` at most. Nodes lie at the parameters
+    are no longer than `maxh` on either and turn by `MAX_TURN` at most. Nodes lie at the parameters
     `places` (j,), but for those beside an end or another one.
     """
     total = _segments(x, y, maxh)
 
     def even(start: float, stop: float) -> Array:
-        count = max(1, int(np.ceil((stop - start) * (1 - SPARE))))
+        count = max(1, int(np.ceil((stop - start) * (1 - SIZE_SLACK))))
         return np.linspace(start, stop, count + 1)
 
     marks = even(0, total[-1])
     stops = np.interp(places, t, total)
-    stops = stops[(stops > CLOSE) & (stops < total[-1] - CLOSE)]
-    stops = stops[np.diff(stops, prepend=0.0) > CLOSE]
-    if (np.abs(stops[:, None] - marks).min(axis=1) > THERE).any():
+    stops = stops[(stops > MIN_NODE_DISTANCE) & (stops < total[-1] - MIN_NODE_DISTANCE)]
+    stops = stops[np.diff(stops, prepend=0.0) > MIN_NODE_DISTANCE]
+    if (np.abs(stops[:, None] - marks).min(axis=1) > PLACE_DISTANCE).any():
         bounds = [0.0, *stops.tolist(), total[-1]]
         marks = np.unique(np.concatenate([even(*part) for part in pairwise(bounds)]))
     return np.interp(marks, total, t)
@@ -117,19 +124,19 @@ class Edge:
         for run in runs:  # without nodes of later ones that would leave slivers of an edge
             spacing = np.diff(np.sort(run)).min(initial=1.0)
             distance = np.abs(run[:, None] - nodes).min(axis=1)
-            nodes = np.concatenate([nodes, run[distance > CLOSE * spacing]])
+            nodes = np.concatenate([nodes, run[distance > MIN_NODE_DISTANCE * spacing]])
         nodes = np.sort(nodes)
-        inside = nodes[(nodes > APART) & (nodes < 1 - APART)]
-        inside = inside[np.diff(inside, prepend=-1.0) > APART]
+        inside = nodes[(nodes > NODE_DISTANCE) & (nodes < 1 - NODE_DISTANCE)]
+        inside = inside[np.diff(inside, prepend=-1.0) > NODE_DISTANCE]
         result = inside.tolist()
-        t = np.linspace(start, stop, FINE)
+        t = np.linspace(start, stop, DIVISION_SAMPLES)
         x = self.curve.point(t)
         arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
         grid = (t - start) / (stop - start)
         for low, high in pairwise([0.0, *inside.tolist(), 1.0]):
             if not any(run.min() < (low + high) / 2 < run.max() for run in runs):
                 s0, s1 = np.interp([low, high], grid, arc)
-                count = int(np.ceil((s1 - s0) / self.maxh * (1 - SPARE)))
+                count = int(np.ceil((s1 - s0) / self.maxh * (1 - SIZE_SLACK)))
                 fill = np.interp(np.linspace(s0, s1, count + 1)[1:-1], arc, grid)
                 result.extend(fill.tolist())
         return sorted(result)
@@ -189,7 +196,7 @@ def _nearest_of(x: Array, edge: CadEdge, others: list[Edge]) -> Mask:
         return np.linalg.norm(to.point(to.project(x)) - x, axis=1)
 
     own = distance(edge)
-    slack = COINCIDENT * edge.size
+    slack = LINE_DISTANCE * edge.size
     nearest = np.ones(len(x), dtype=bool)
     for other in others:
         if other.curve is not edge and (_at_least(x, other.curve) < own).any():
@@ -204,7 +211,7 @@ def _opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple
     """
     if contact.direction is None:
         t = other.project(x)
-        apart = np.linalg.norm(other.point(t) - x, axis=1) > COINCIDENT * other.size
+        apart = np.linalg.norm(other.point(t) - x, axis=1) > LINE_DISTANCE * other.size
         if contact.gap is None and apart.any():  # clearance or interference: along the normals
             t[apart] = other.opposite(x[apart], rightward(slope[apart]))
         else:
@@ -227,7 +234,10 @@ def _behind(contact: Contact, x: Array, y: Array, edges: list[Edge]) -> Mask:
     along = np.array(contact.direction)
     distance = np.abs((y - x) @ along)
     for edge in edges:
-        nearest, close = _nearest_crossing(edge.curve.samples, y, along), NEARER * edge.curve.size
+        nearest, close = (
+            _nearest_crossing(edge.curve.samples, y, along),
+            SAMPLE_RESOLUTION * edge.curve.size,
+        )
         met = np.abs((nearest - y) @ across(along)) <= close
         behind |= met & (np.abs((y - nearest) @ along) < distance - close)
     return behind
@@ -251,7 +261,7 @@ def _divide(
 
     `beside` and `facing` are all edges of the secondary and of the primary, these two included.
     """
-    t = np.linspace(secondary.curve.start, secondary.curve.stop, FINE)
+    t = np.linspace(secondary.curve.start, secondary.curve.stop, DIVISION_SAMPLES)
     ends = _ends_between(contact, secondary.curve, primary.curve)
     apart = np.abs(t[:, None] - ends).min(axis=1, initial=np.inf)
     t = np.sort(np.concatenate([t[apart > (t[1] - t[0]) / 2], ends]))
@@ -265,7 +275,7 @@ def _divide(
         slope_there = primary.curve.derivative(np.where(faces, other, primary.curve.start))
         for tangent in (slope, slope_there):
             cosine = np.abs(tangent @ across(np.array(contact.direction)))
-            faces &= cosine >= STEEPEST * np.linalg.norm(tangent, axis=1)
+            faces &= cosine >= MIN_MATCHED_COSINE * np.linalg.norm(tangent, axis=1)
 
     def gap(t: Array) -> Array:
         """Signed distances (k,) to the points opposite to `t` (k,), NaN where there are none."""
@@ -275,7 +285,7 @@ def _divide(
         return np.where(np.isnan(there), np.nan, ((y - x) * along).sum(axis=1))
 
     maxh = min(secondary.maxh, primary.maxh)
-    sliver = CLOSE * min(maxh, secondary.curve.size, primary.curve.size)
+    sliver = MIN_NODE_DISTANCE * min(maxh, secondary.curve.size, primary.curve.size)
     for run in _facing_runs(faces, np.searchsorted(t, np.sort(ends))):
         if np.linalg.norm(np.diff(x[run], axis=0), axis=1).sum() < sliver:
             continue  # beside the vertex of one edge, which faces near that of another
@@ -369,19 +379,23 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
     shape = problem.geometry.shape
     low, high = (np.array([x.x, x.y, x.z]) for x in shape.bounding_box)
     extent, far = float((high - low).max()), float(np.abs([low, high]).max())
-    if not (extent >= SMALLEST and far <= FARTHEST):
+    if not (extent >= MIN_EXTENT and far <= MAX_COORDINATE):
         raise ValueError(
             f"the geometry has the extent {extent:g} and reaches {far:g} from the origin: the "
-            f"geometry kernel and Netgen mesh extents from {SMALLEST:g} and places up to "
-            f"{FARTHEST:g}; choose another unit of length, or another origin"
+            f"geometry kernel and Netgen mesh extents from {MIN_EXTENT:g} and places up to "
+            f"{MAX_COORDINATE:g}; choose another unit of length, or another origin"
         )
-    finer = FINER if maxh is None else 1
-    maxh = extent / COARSE if maxh is None else maxh
+    finer = BOUNDED_ZONE_FACTOR if maxh is None else 1
+    maxh = extent / DEFAULT_ELEMENTS if maxh is None else maxh
     if isinstance(maxh, bool) or not isinstance(maxh, Real):
-        raise TypeError(f"maxh={maxh!r} is not a number; give a length like {extent / COARSE:g}")
+        raise TypeError(
+            f"maxh={maxh!r} is not a number; give a length like {extent / DEFAULT_ELEMENTS:g}"
+        )
     maxh = float(maxh)
     if not (np.isfinite(maxh) and maxh > 0):
-        raise ValueError(f"maxh={maxh} must be positive and finite, like {extent / COARSE:g}")
+        raise ValueError(
+            f"maxh={maxh} must be positive and finite, like {extent / DEFAULT_ELEMENTS:g}"
+        )
     if problem.dim == 3:
         with MESHING:
             identify_coinciding_faces(problem, shape)

@@ -11,7 +11,8 @@ import numpy as np
 from ..arrays import Array
 from ..problem import Problem
 
-COINCIDENT = 1e-6  # distance, relative to a face, up to which two faces are one: OCC's own is 1e-7
+# Distance, relative to a face, up to which two faces are one: OCC's own is 1e-7.
+FACE_DISTANCE = 1e-6
 NAME = "ngcontact"  # of what is identified
 
 
@@ -25,13 +26,13 @@ def _points(face: occ.TopoDS_Shape) -> Array:
 def _coincide(one: occ.TopoDS_Shape, other: occ.TopoDS_Shape) -> bool:
     """Whether two faces have the same area and the same points."""
     size = one.mass**0.5
-    if abs(one.mass - other.mass) > COINCIDENT * one.mass:
+    if abs(one.mass - other.mass) > FACE_DISTANCE * one.mass:
         return False
     a, b = _points(one), _points(other)
     if len(a) != len(b):
         return False
     apart = np.linalg.norm(a[:, None] - b, axis=2)
-    return bool(max(apart.min(axis=0).max(), apart.min(axis=1).max()) <= COINCIDENT * size)
+    return bool(max(apart.min(axis=0).max(), apart.min(axis=1).max()) <= FACE_DISTANCE * size)
 
 
 def identify_coinciding_faces(problem: Problem, shape: occ.TopoDS_Shape) -> None:

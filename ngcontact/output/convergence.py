@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-SPAN = 2.5  # of a triangle's side along the unknowns
-BELOW = 0.6  # of the curve, where a triangle lies
+TRIANGLE_SPAN = 2.5  # of a triangle's side along the unknowns
+TRIANGLE_DEPTH = 0.6  # of the curve, where a triangle lies
 
 Run = Sequence[Guaranteed] | tuple[Any, Any]
 
@@ -42,9 +42,9 @@ def slope_triangle(axes: Axes, x: Array, y: Array, rate: float, above: bool = Fa
 def _triangle(x: Array, y: Array, rate: float, above: bool) -> Array:
     """Corners (4, 2) of a triangle, closed; the third one is at the right angle."""
     right = float(x[-1])
-    left = right / SPAN
-    end = float(y[-1]) * (1 / BELOW if above else BELOW)
-    start = end * SPAN**rate
+    left = right / TRIANGLE_SPAN
+    end = float(y[-1]) * (1 / TRIANGLE_DEPTH if above else TRIANGLE_DEPTH)
+    start = end * TRIANGLE_SPAN**rate
     corner = (right, start) if above else (left, end)
     return np.array([(left, start), (right, end), corner, (left, start)])
 

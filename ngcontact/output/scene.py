@@ -25,9 +25,11 @@ from .nodes import (
 )
 
 MAX_TRIANGLES = 200_000  # of a picture: more cannot be seen
-NEAR = 0.25  # of a zone's size: distance to a line of symmetry up to which both halves are one zone
+# Of a zone's size: distance to a line of symmetry up to which both halves are one zone.
+MIRROR_DISTANCE = 0.25
 STRAIGHT = 1e-6  # distance from the line, relative to its length, of a straight boundary
-ACROSS = 1e-6  # displacement across a line, relative to the largest on it, that is round-off
+# Displacement across a line, relative to the largest on it, that is round-off.
+SYMMETRY_ROUND_OFF = 1e-6
 UNITS = ("length", "stress")  # what has a unit
 AXES = ("x", "y", "z")
 
@@ -260,7 +262,7 @@ def symmetry_line(mesh: ng.Mesh, displacement: ng.GridFunction, pattern: str) ->
     if (np.abs(line.distance(x)) > line.slack).any():
         raise ValueError(f'mirror = "{pattern}" is not straight: give a boundary on one line')
     away = np.abs(u @ line.normal).max()
-    if away > ACROSS * np.abs(displacement.vec.FV().NumPy()).max():
+    if away > SYMMETRY_ROUND_OFF * np.abs(displacement.vec.FV().NumPy()).max():
         raise ValueError(
             f'mirror = "{pattern}" moves across its line by {away:.3g}: it is no line of symmetry'
         )
@@ -341,7 +343,7 @@ def _mirrored(scene: Scene, line: SymmetryLine, place: Array) -> Scene:
     count = len(scene.moved)
     zones = []
     for zone in scene.zones:
-        near = np.abs(line.distance(zone)).min() <= NEAR * np.ptp(zone, axis=0).max()
+        near = np.abs(line.distance(zone)).min() <= MIRROR_DISTANCE * np.ptp(zone, axis=0).max()
         zones.append(np.concatenate([zone, line.reflected(zone)]) if near else zone)
     return replace(
         scene,

@@ -35,12 +35,12 @@ if TYPE_CHECKING:
 
 FRONT, UP = np.array([-0.45, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])  # of a picture
 TILT, TURN = 0.35, 0.45  # of the view on a cut: upwards, and to the others
-ALONG = 0.5  # cosine to the load from which a plane does not pass through the zone in contact
+LOAD_COSINE = 0.5  # cosine to the load from which a plane does not pass through the zone in contact
 PIXELS = 1000  # of an image, along its longer side
-MARGIN = 0.4  # of a zone in contact, shown beside it
+ZONE_MARGIN = 0.4  # of a zone in contact, shown beside it
 SMALL, SMALLEST = 0.2, 0.02  # zones smaller than the bodies by this have a close-up; least size
 CURVED = 2  # times that sides of curved elements are halved
-SHARP = 40  # degrees, of edges that are drawn
+DRAWN_EDGE_ANGLE = 40  # degrees, of edges that are drawn
 PRESSED = "YlOrRd"  # colours of pressures
 FLAT: dict[str, Any] = {"ambient": 0.75, "diffuse": 0.3, "specular": 0.0}  # colours as on the scale
 
@@ -103,13 +103,13 @@ def _zone(solution: Solved, pair: int) -> Zone:
     touches = state.active if state.active.any() else np.ones(state.gap.size, dtype=bool)
     weight, place = np.where(touches, state.line.weight, 0.0), state.line.position
     middle, d = (weight @ x / weight.sum() for x in (place, state.line.direction))
-    if np.linalg.norm(d) < ALONG:  # all around a body: the front of it
+    if np.linalg.norm(d) < LOAD_COSINE:  # all around a body: the front of it
         d = state.line.direction[np.argmax(state.line.direction @ FRONT)]
     size, cuts = float(np.ptp(surface.points, axis=0).max()), []
     for point, normal in _symmetry_planes(solution, STRAIGHT * size):
         if np.abs((surface.points - point) @ normal).min() <= STRAIGHT * size:
             cuts.append(Cut(point, normal, True))
-            if abs(normal @ d) < ALONG * np.linalg.norm(d):
+            if abs(normal @ d) < LOAD_COSINE * np.linalg.norm(d):
                 middle = middle - ((middle - point) @ normal) * normal
                 d = d - (d @ normal) * normal
     cuts.sort(key=lambda cut: -float(cut.normal @ FRONT))
@@ -180,7 +180,7 @@ def _draw_bodies(
             x.clip(normal=zone.cuts[0].normal, origin=zone.middle) for x in (grid, edges)
         )
     eye = normals[0] + TURN * sum(normals[1:], np.zeros(3))
-    if np.abs(np.array(normals) @ UP).max() < ALONG:
+    if np.abs(np.array(normals) @ UP).max() < LOAD_COSINE:
         eye = eye + TILT * UP
     eye = eye / np.linalg.norm(eye)
     right = np.cross(UP, eye) / np.linalg.norm(np.cross(UP, eye))
@@ -194,7 +194,7 @@ def _draw_bodies(
     seen = surface.points @ frame[:2].T
     windows, near = [(seen.min(axis=0), seen.max(axis=0))], []
     if zone and "c" in parts:
-        middle, half = frame[:2] @ zone.middle, (1 + 2 * MARGIN) * zone.half
+        middle, half = frame[:2] @ zone.middle, (1 + 2 * ZONE_MARGIN) * zone.half
         windows.append((middle - half, middle + half))
         apart = np.linalg.norm(surface.points[triangles].mean(axis=1) - zone.middle, axis=1)
         near.append(apart < half)
@@ -208,7 +208,7 @@ def _draw_bodies(
         thin = {"color": "black" if colours == SIGNED else "white", "opacity": 0.35}
         meshes.append((edges.translate(ahead), thin))
     others = {"boundary_edges": False, "non_manifold_edges": False, "manifold_edges": False}
-    outline = surface.clean().extract_feature_edges(SHARP, **others)
+    outline = surface.clean().extract_feature_edges(DRAWN_EDGE_ANGLE, **others)
     meshes.append((outline.translate(ahead), {"color": "black", "line_width": 2}))
     titles = f"deformed bodies, displacement × {scale:g}", "zone in contact"
     for name, window, title in zip("bc", windows, titles, strict=False):
@@ -271,7 +271,7 @@ def _draw_pressure(figure: Figure, axes: Axes, style: Style, zone: Zone, name: s
 
     surface, (_, length), (_, stress) = zone.surface, style.unit("length"), style.unit("stress")
     seen, middle = (x @ zone.frame[:2].T / length for x in (surface.points, zone.middle))
-    values, half = zone.pressure / stress, (1 + MARGIN) * zone.half / length
+    values, half = zone.pressure / stress, (1 + ZONE_MARGIN) * zone.half / length
     top = float(values.max(initial=0.0)) or 1.0
     drawing = {"shading": "gouraud", "cmap": PRESSED, "vmin": 0.0, "vmax": top}
     shading = axes.tripcolor(Triangulation(*seen.T, surface.triangles), values, **drawing)
@@ -305,7 +305,7 @@ def _draw_profiles(axes: Axes, style: Style, zone: Zone) -> None:
         inside = STRAIGHT * data.length * cut.normal if cut.rim else 0.0
         line = data.slice(normal=cut.normal, origin=cut.point - inside)
         s = np.asarray(line.points @ along)
-        order, half = np.argsort(s), (1 + MARGIN) * zone.half
+        order, half = np.argsort(s), (1 + ZONE_MARGIN) * zone.half
         names.append(_name(along, f"cut {k + 1}"))
         axes.plot(s[order] / length, line["pressure"][order], color=COLOURS[k], label=names[-1])
         ends += list(np.clip(zone.middle @ along + np.array([-half, half]), s.min(), s.max()))

@@ -3,7 +3,7 @@
 from .data import contradictions as contradictions
 from .data import warn_of_implausible as warn_of_implausible
 from .pairs import doubts as doubts
-from .refinement import EXACT as EXACT
+from .refinement import EXACT_ESTIMATE as EXACT_ESTIMATE
 from .refinement import at_round_off as at_round_off
 from .refinement import doubt_of_refinement as doubt_of_refinement
 from .refinement import estimates_rise as estimates_rise

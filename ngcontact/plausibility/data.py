@@ -15,8 +15,10 @@ from ..mesh import cad_edges
 from ..problem import MeshArrays, Problem, numbers
 from ..quadrature import SampledElements, features_of, warn_of_data, warn_of_jumps
 
-APART = 1e-6  # values of two supports at one corner, relative to the largest, that are two values
-NOISE = 64 * np.finfo(float).eps  # ... and to the largest of all values: below it is round-off
+# Values of two supports at one corner, relative to the largest, that are two values.
+SUPPORT_DIFFERENCE = 1e-6
+# ... and to the largest of all values: below it is round-off.
+VALUE_ROUND_OFF = 64 * np.finfo(float).eps
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
             values = ends.values(value, view.evaluate if numbers(value) else view.look)
             for vertex, u in zip(ends.vertices.tolist(), values[:, 0].tolist(), strict=True):
                 name, other = known.setdefault((vertex, axis), (pattern, u))
-                if abs(u - other) > APART * max(abs(other), abs(u)):
+                if abs(u - other) > SUPPORT_DIFFERENCE * max(abs(other), abs(u)):
                     message = (
                         f'displacement "{name}" and "{pattern}" prescribe {other:.6g} and {u:.6g} '
                         f"along {'xy'[axis]}"
@@ -60,7 +62,7 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
     if problem.sliding is not None and known:
         found += _across_guides(str(problem.sliding), view, shared, known)
     largest = max((one.largest for one in seen), default=0.0)
-    return [one for one in found if one.amount > NOISE * largest]
+    return [one for one in found if one.amount > VALUE_ROUND_OFF * largest]
 
 
 def _of_solids(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
@@ -85,7 +87,7 @@ def _of_solids(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
     low, high = (np.where(known, x, 0.0) for x in (low, high))
     scale = np.maximum(np.abs(low), np.abs(high))
     x = MeshArrays(mesh).vertices
-    for axis, vertex in np.argwhere(high - low > APART * scale):
+    for axis, vertex in np.argwhere(high - low > SUPPORT_DIFFERENCE * scale):
         one, other = (names[region[axis, vertex]] for region in (least, most))
         a, b = low[axis, vertex], high[axis, vertex]
         message = f'displacement "{one}" and "{other}" prescribe {a:.6g} and {b:.6g}'
@@ -95,13 +97,15 @@ def _of_solids(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
         number, normal = trace.guide(str(problem.sliding))
         node = trace.nodes[trace.segments(str(problem.sliding))].ravel()
         across = (normal[number] * high[:, node].T).sum(axis=1)
-        led = ((np.abs(normal[number]) <= APART) | known[:, node].T).all(axis=1)
-        for k in np.flatnonzero(led & (np.abs(across) > APART * scale[:, node].max(axis=0))):
+        led = ((np.abs(normal[number]) <= SUPPORT_DIFFERENCE) | known[:, node].T).all(axis=1)
+        for k in np.flatnonzero(
+            led & (np.abs(across) > SUPPORT_DIFFERENCE * scale[:, node].max(axis=0))
+        ):
             name = names[most[np.argmax(np.abs(normal[number[k]])), node[k]]]
             message = f'displacement "{name}" leads {across[k]:.6g} across the guide '
             message += f'"{problem.sliding}"'
             found.append(Contradiction((name, "guide"), x[node[k]], message, abs(across[k])))
-    return [one for one in found if one.amount > NOISE * scale.max()]
+    return [one for one in found if one.amount > VALUE_ROUND_OFF * scale.max()]
 
 
 def _shared(problem: Problem, view: SampledElements) -> Mask:
@@ -146,12 +150,12 @@ def _across_guides(
         if edges is not None:
             [exact] = edges[view.arrays.boundaries[ends.segments[k]]].normal(places[k : k + 1])
             normal = exact if exact @ normal > 0 else -exact
-        needed = [axis for axis in (0, 1) if abs(normal[axis]) > APART]
+        needed = [axis for axis in (0, 1) if abs(normal[axis]) > SUPPORT_DIFFERENCE]
         if all((vertex, axis) in known for axis in needed):
             name = known[vertex, needed[0]][0]
             u = [known.get((vertex, axis), ("", 0.0))[1] for axis in (0, 1)]
             across = float(normal @ u)
-            if abs(across) > APART * max(map(abs, u)):
+            if abs(across) > SUPPORT_DIFFERENCE * max(map(abs, u)):
                 message = f'displacement "{name}" leads {across:.6g} across the guide "{guides}"'
                 found.append(Contradiction((name, "guide"), places[k], message, abs(across)))
     return found

@@ -37,7 +37,7 @@ FORCE_SHARE = 0.01
 # blocks with Hertz's gap, pins in holes, orders 1 to 4) the peak was wrong by more than 10 % in 30
 # of 55 zones below, in 1 of 98 above (12 %), by more than 20 % in 24 and none. Three segments at
 # all orders told 93, of which 30 were wrong by 10 %.
-RESOLVED = 2
+RESOLVED_INTERVALS = 2
 # Contact forces of this size, relative to the largest term of a force, are round-off.
 FORCE_ROUND_OFF = 100 * np.finfo(float).eps
 # Share of the peak of the pressure from which it matters that bodies pass through each other. They
@@ -53,15 +53,16 @@ LARGE_PRESSURE = 1.0
 PLACES = (np.arange(4) + 0.5) / 4  # on a segment; what lies between them is 1 / 16 of its sagitta
 MOST_SEGMENTS = 32  # of a pair that are looked at for penetration
 LENGTH_ROUND_OFF = 100 * np.finfo(float).eps  # of lengths and displacements
-INCLINED = np.deg2rad(15)  # from which forces along the direction are wrong by 1 - cos = 3.4 %
-BESIDE_ENDS = 0.01  # of a segment
+# From which forces along the direction are wrong by 1 - cos = 3.4 %.
+INCLINED_ANGLE = np.deg2rad(15)
+END_MARGIN = 0.01  # of a segment
 # Error of the peak from which a way is told. Between two discs whose radii are 1 and 1, 1 and 3, 3
 # and 1 peaks were wrong by 0.93 to 1.05 times what is said here, measured at ways of 0.01 to 0.16;
 # of pins with a clearance of 2 to 25 % of their radius by 0.93 to 0.96 times that, of holes as
 # secondary, 5 to 25 %, by -1.02 to -1.06 times, at 2 % by half.
 PEAK_ERROR = 0.02
 # Share of a given gap of one sign from which a drawn one of the other sign contradicts it.
-OTHERWISE = 0.5
+CONTRADICTED_SHARE = 0.5
 
 Doubts = dict[tuple[str, int], str]  # messages by what is doubted and the number of the pair
 
@@ -194,11 +195,11 @@ def _softer(
 def _short_zone(state: ContactState, zones: ContactZones) -> str:
     """Message where zones in contact are too short for the mesh, or nothing.
 
-    Below `RESOLVED` the peak of Hertz's pressure is wrong by up to 70, 59, 64, 79 % at orders 1 to
-    4. Contact of a whole line is resolved whatever its segments.
+    Below `RESOLVED_INTERVALS` the peak of Hertz's pressure is wrong by up to 70, 59, 64, 79 % at
+    orders 1 to 4. Contact of a whole line is resolved whatever its segments.
     """
     cut = (zones.ends > 0) & (np.abs(zones.force) > FORCE_SHARE * np.abs(state.force).sum())
-    needed = RESOLVED * zones.ends / (state.line.rows.shape[1] - 1)
+    needed = RESOLVED_INTERVALS * zones.ends / (state.line.rows.shape[1] - 1)
     short = np.flatnonzero(cut & (zones.segments < needed))
     if state.line.contact.bilateral or not short.size:
         return ""
@@ -268,7 +269,7 @@ def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
         return ""
     angles = _inclinations if len(xi) == 2 else surface_inclinations
     angle, force = angles(trace, state, np.array(xi))
-    if force[angle > INCLINED].sum() <= FORCE_SHARE * force.sum():
+    if force[angle > INCLINED_ANGLE].sum() <= FORCE_SHARE * force.sum():
         return ""
     return (
         f"surfaces in contact are inclined to direction=({', '.join(f'{x:.3g}' for x in xi)}) by "
@@ -289,9 +290,9 @@ def _inclinations(trace: BoundaryTrace, state: ContactState, xi: Array) -> tuple
     touching = np.flatnonzero(share.any(axis=1))
     share, segment, rows = share[touching], line.segments[touching], line.rows[touching]
     s = (share * trace.places(segment)).sum(axis=1) / share.sum(axis=1)
-    s = np.clip(s, BESIDE_ENDS, 1 - BESIDE_ENDS)
+    s = np.clip(s, END_MARGIN, 1 - END_MARGIN)
     cosine = trace.exact_normal(segment, s) @ xi
-    steep = np.flatnonzero(cosine < np.cos(INCLINED))
+    steep = np.flatnonzero(cosine < np.cos(INCLINED_ANGLE))
     other = np.full(len(steep), -1.0)
     if len(steep) and facing:
         x, d = trace.point(segment[steep], s[steep]), np.tile(xi, (len(steep), 1))
@@ -386,7 +387,7 @@ def contradicted(trace: BoundaryTrace, state: ContactState) -> str:
     facing = trace.point(line.partner[meets], line.partner_s[meets])
     drawn = ((facing - line.position[meets]) * line.direction[meets]).sum(axis=1)
     other = (-sign * drawn).min(initial=np.inf)
-    if not OTHERWISE * least <= other < np.inf:
+    if not CONTRADICTED_SHARE * least <= other < np.inf:
         return ""
     words = ("apart", "into each other")
     says, draws = words if sign > 0 else words[::-1]

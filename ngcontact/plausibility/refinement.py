@@ -12,12 +12,13 @@ from ..arrays import Array, root_of_squares
 from ..fem import Space, energy_norm, moduli_of
 from ..problem import MeshArrays, Problem
 
-LEVELS = 2  # after the best one: at twice the unknowns each no mesh is still too coarse
-EXACT = 1e-12  # relative estimate at which refinement stops: the solution is exact
-RIGID = 1e-8  # estimate, relative to its terms, of bodies that do not deform; measured 4e-9
-BEYOND_NOISE = 1e-4  # ... above which no round-off reaches
+RISING_LEVELS = 2  # after the best one: at twice the unknowns each no mesh is still too coarse
+EXACT_ESTIMATE = 1e-12  # relative estimate at which refinement stops: the solution is exact
+# Estimate, relative to its terms, of bodies that do not deform; measured 4e-9.
+RIGID_ESTIMATE = 1e-8
+NOISE_LIMIT = 1e-4  # ... above which no round-off reaches
 STRESS_NOISE = 100 * np.finfo(float).eps  # relative to its terms; measured 0.5 to 50 eps
-RISE = 1.1  # over the best one, which is more than the noise of one level
+RISE_FACTOR = 1.1  # over the best one, which is more than the noise of one level
 
 
 def at_round_off(
@@ -29,17 +30,17 @@ def at_round_off(
     them by the root of mu, their energy by the root of kappa only.
     """
     terms = space.terms(displacement)
-    if estimate > BEYOND_NOISE * terms:  # as nearly always
+    if estimate > NOISE_LIMIT * terms:  # as nearly always
         return False
-    if estimate <= RIGID * terms and moves_rigidly(problem, space, displacement):
+    if estimate <= RIGID_ESTIMATE * terms and moves_rigidly(problem, space, displacement):
         return True  # nothing deforms, and the rest is the round-off of gaps
     ratio = float(moduli_of(problem, space.trace.mesh).ratio.max())
-    return estimate <= max(EXACT, STRESS_NOISE * math.sqrt(ratio)) * terms
+    return estimate <= max(EXACT_ESTIMATE, STRESS_NOISE * math.sqrt(ratio)) * terms
 
 
 def moves_rigidly(problem: Problem, space: Space, displacement: ng.GridFunction) -> bool:
     """Whether the energy of a displacement is round-off: no body deforms."""
-    return energy_norm(problem, space, displacement) <= EXACT * space.terms(displacement)
+    return energy_norm(problem, space, displacement) <= EXACT_ESTIMATE * space.terms(displacement)
 
 
 def estimates_rise(estimates: Sequence[float]) -> bool:
@@ -50,7 +51,7 @@ def estimates_rise(estimates: Sequence[float]) -> bool:
     """
     best = int(np.argmin(estimates))
     since, last = estimates[best:], estimates[-1]
-    return len(since) > LEVELS and last > RISE * since[0] and last == max(since)
+    return len(since) > RISING_LEVELS and last > RISE_FACTOR * since[0] and last == max(since)
 
 
 def doubt_of_refinement(mesh: ng.Mesh, indicators: Array, estimates: Sequence[float]) -> str:

@@ -9,7 +9,7 @@ from .material import MODEL_NAMES as MODEL_NAMES
 from .material import Elastic as Elastic
 from .material import Hooke as Hooke
 from .material import varies as varies
-from .mesh_arrays import ON_AXIS as ON_AXIS
+from .mesh_arrays import AXIS_RADIUS as AXIS_RADIUS
 from .mesh_arrays import POSITION as POSITION
 from .mesh_arrays import MeshArrays as MeshArrays
 from .mesh_arrays import bisect as bisect

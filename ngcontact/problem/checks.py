@@ -26,19 +26,19 @@ Masks: TypeAlias = dict[str, Mask]
 # Where data are looked at in every element. Loads are integrated and may be singular at an end;
 # prescribed values and gaps are interpolated and must exist there.
 # By the dimension of the bodies.
-INSIDE = {
+ELEMENT_RULES = {
     2: ng.IntegrationRule([(1 / 6, 1 / 6, 0), (2 / 3, 1 / 6, 0), (1 / 6, 2 / 3, 0)], [1 / 6] * 3),
     3: ng.IntegrationRule(ng.TET, 2),
 }
 # Middles of the sides of elements: stresses, which initial strains belong to, are compared there.
-ON_SIDES = {
+SIDE_RULES = {
     2: ng.IntegrationRule([(0.5, 0, 0), (0, 0.5, 0), (0.5, 0.5, 0)], [1 / 6] * 3),
     3: ng.IntegrationRule(
         [(0, 1 / 3, 1 / 3), (1 / 3, 0, 1 / 3), (1 / 3, 1 / 3, 0), (1 / 3,) * 3], [1 / 24] * 4
     ),
 }
-IN_FACETS = {2: ng.IntegrationRule(ng.SEGM, 3), 3: ng.IntegrationRule(ng.TRIG, 3)}
-AT_ENDS = {
+FACET_RULES = {2: ng.IntegrationRule(ng.SEGM, 3), 3: ng.IntegrationRule(ng.TRIG, 3)}
+END_RULES = {
     2: ng.IntegrationRule([(0, 0, 0), (0.5, 0, 0), (1, 0, 0)], [1 / 6, 2 / 3, 1 / 6]),
     3: ng.IntegrationRule([(1, 0, 0), (0, 1, 0), (0, 0, 0), (1 / 3, 1 / 3, 0)], [1 / 8] * 4),
 }
@@ -51,11 +51,11 @@ CORNERS = {
 # What messages call the elements, others that are refused, and faces of bodies, by dimension.
 ELEMENTS = {2: ("triangles", "quadrilaterals"), 3: ("tetrahedra", "hexahedra, prisms or pyramids")}
 
-OVERLAP = 0.5  # of the smaller of two bodies, from which they lie on top of each other
+OVERLAP_SHARE = 0.5  # of the smaller of two bodies, from which they lie on top of each other
 SKEW = (0.83, 0.29, 0.47)  # a direction in which no mesh has edges
-PLACES = 200  # of a connected piece that are looked for in another one
-FLAT = 16 * np.finfo(float).eps  # measure of an element over its longest edge^d, without height
-NO_RADIAL = 1e-9  # radial part on the axis, relative to the largest value, that is round-off
+SAMPLE_PLACES = 200  # of a connected piece that are looked for in another one
+FLATNESS = 16 * np.finfo(float).eps  # measure of an element over its longest edge^d, without height
+RADIAL_ROUND_OFF = 1e-9  # radial part on the axis, relative to the largest value, that is round-off
 
 
 def dimension_of(geometry: OCCGeometry | ng.Mesh) -> int:
@@ -103,7 +103,7 @@ def check_mesh(mesh: ng.Mesh, dim: int = 2) -> None:
         right = "it must be a triangulation" if dim == 2 else "it must consist of tetrahedra"
         raise ValueError(f"mesh has {others} {ELEMENTS[dim][1]}: {right}")
     size = view.measures
-    bad = ~(size > FLAT * view.diameters**dim)  # so a NaN is bad
+    bad = ~(size > FLATNESS * view.diameters**dim)  # so a NaN is bad
     if bad.any():
         first = int(np.argmax(bad))
         what, order = ("area", " (vertices counterclockwise)") if dim == 2 else ("volume", "")
@@ -232,13 +232,13 @@ def check_overlaps(view: MeshArrays) -> None:
     box = np.array([[view.corners[p].min((0, 1)), view.corners[p].max((0, 1))] for p in parts])
     for small, large in itertools.combinations(np.argsort(size, kind="stable").tolist(), 2):
         width = np.minimum(box[small, 1], box[large, 1]) - np.maximum(box[small, 0], box[large, 0])
-        if min(width) <= 0 or width.prod() <= OVERLAP * size[small]:
+        if min(width) <= 0 or width.prod() <= OVERLAP_SHARE * size[small]:
             continue
         upto = np.cumsum(area[parts[small]])
-        at = np.searchsorted(upto, (np.arange(PLACES) + 0.5) / PLACES * upto[-1])
+        at = np.searchsorted(upto, (np.arange(SAMPLE_PLACES) + 0.5) / SAMPLE_PLACES * upto[-1])
         middle = view.corners[parts[small][at]].mean(axis=1)
         share = float(_inside(middle, view, parts[large]).mean())
-        if share > OVERLAP:
+        if share > OVERLAP_SHARE:
             names = view.mesh.GetMaterials()
             name, beside = (names[view.bodies[parts[k][0]]] for k in (small, large))
             what = ("area", "volume")[view.dim - 2]
@@ -275,10 +275,10 @@ def check_values(
     """Refuse data, one for each mask (r,), that are not finite, or laws that are not elliptic.
 
     A law, a number, a function of a mesh point or of coordinates, or a tuple of these and None,
-    looked at in the selected elements at points of a rule, by dimension, `INSIDE` or `ON_SIDES` for
-    bodies.
+    looked at in the selected elements at points of a rule, by dimension, `ELEMENT_RULES` or
+    `SIDE_RULES` for bodies.
     """
-    of_bodies = rule is INSIDE or rule is ON_SIDES
+    of_bodies = rule is ELEMENT_RULES or rule is SIDE_RULES
     vb, region = (ng.VOL, view.bodies) if of_bodies else (ng.BND, view.boundaries)
     everywhere = view.mesh.MapToAllElements(rule[view.dim], vb)
     for (label, mask), value in zip(masks.items(), data, strict=True):
@@ -362,7 +362,7 @@ def check_about_axis(
         points = mesh.MapToAllElements(CORNERS[ends.shape[1] - 1], vb)
         found = np.asarray(radial(points[np.repeat(at, ends.shape[1])])).reshape(-1, radial.dim)
         size, values = np.abs(found[np.isfinite(found)]).max(initial=0.0), found[:, 0]
-        bad = axis[ends[at]].ravel() & (np.abs(values) > NO_RADIAL * size)
+        bad = axis[ends[at]].ravel() & (np.abs(values) > RADIAL_ROUND_OFF * size)
         if bad.any():
             part = "rr - hoop or rz =" if what == "strain" else "the radial component"
             raise ValueError(

@@ -22,7 +22,8 @@ SOLID = "solid"  # the model of bodies in space, the only one
 MODEL_NAMES = tuple(name for name in VOIGT if name != SOLID)
 ABOUT_AN_AXIS = ("axisymmetric",)
 
-DEFINITE = 16 * np.finfo(float).eps  # a pivot, relative to where it starts: round-off of zero
+# A pivot, relative to where it starts: round-off of zero.
+PIVOT_ROUND_OFF = 16 * np.finfo(float).eps
 
 _RIGHT_E = "Young's modulus must be positive and finite"
 _RIGHT_NU = "Poisson's ratio must lie in -1 < nu < 1/2"
@@ -251,7 +252,7 @@ def _faults(matrices: np.ndarray) -> list[tuple[np.ndarray, str]]:
             start = matrices[:, k, k]
             # A small pivot enlarges the round-off in those after it: bound their product.
             share = share * (left[:, k, k] / start)
-            definite &= (start > 0) & (share > DEFINITE)  # (2.7)
+            definite &= (start > 0) & (share > PIVOT_ROUND_OFF)  # (2.7)
             row = left[:, k, :].copy()
             left -= row[:, :, None] * (row / row[:, k, None])[:, None, :]
     return [

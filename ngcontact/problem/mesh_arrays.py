@@ -17,7 +17,7 @@ SIDES = {2: [[0, 1], [1, 2], [2, 0]], 3: [[0, 1, 2], [0, 1, 3], [0, 2, 3], [1, 2
 
 PARAMETERS = 32  # bytes of Netgen's triangles before those of their corners' surface parameters
 
-ON_AXIS = 1e-9  # radius, relative to the largest, up to which a point lies on the axis x = 0
+AXIS_RADIUS = 1e-9  # radius, relative to the largest, up to which a point lies on the axis x = 0
 
 POSITION = ng.CF((ng.x, ng.y, ng.z))  # of a mesh point, lengths
 
@@ -205,4 +205,4 @@ def bisect(mesh: ng.Mesh, marked: Mask) -> None:
 def on_axis(points: Array) -> Mask:
     """Which of `points` (k, 2), those of a mesh or of its whole boundary, have r = 0, (k,)."""
     r = np.abs(points[:, 0])
-    return np.asarray(r <= ON_AXIS * r.max(initial=0.0))
+    return np.asarray(r <= AXIS_RADIUS * r.max(initial=0.0))

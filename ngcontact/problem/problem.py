@@ -232,19 +232,19 @@ class Problem:
             for j, (sides, pair) in enumerate(zip(pairs, self.contact, strict=True))
         }
         for masks, data, rule in (
-            (materials, self.materials.values(), checks.INSIDE),
-            (force, self.force.values(), checks.INSIDE),
-            (strain, self.strain.values(), checks.INSIDE),
-            (strain, self.strain.values(), checks.ON_SIDES),
-            (traction, self.traction.values(), checks.IN_FACETS),
-            (displacement, self.displacement.values(), checks.AT_ENDS),
-            (gaps, [pair.gap for pair in self.contact], checks.AT_ENDS),
+            (materials, self.materials.values(), checks.ELEMENT_RULES),
+            (force, self.force.values(), checks.ELEMENT_RULES),
+            (strain, self.strain.values(), checks.ELEMENT_RULES),
+            (strain, self.strain.values(), checks.SIDE_RULES),
+            (traction, self.traction.values(), checks.FACET_RULES),
+            (displacement, self.displacement.values(), checks.END_RULES),
+            (gaps, [pair.gap for pair in self.contact], checks.END_RULES),
         ):
             checks.check_values(view, masks, data, rule)
         laws = zip(materials.items(), self.materials.values(), strict=True)
         general = [item for item, law in laws if isinstance(law, Hooke)]
         plane = dict(general if self.model == "plane strain" else [])
-        check_strains(view, strain, self.strain.values(), plane, checks.INSIDE[self.dim])
+        check_strains(view, strain, self.strain.values(), plane, checks.ELEMENT_RULES[self.dim])
         if self.model in ABOUT_AN_AXIS:
             sides = [side for pair in self.contact for side in pair.sides]
             vectors = self.displacement, self.traction, self.force

@@ -180,7 +180,7 @@ def unit_vector(value: Any, what: str) -> tuple[float, ...]:
     return tuple(x / size / length for x in vector)
 
 
-LONG = 4000  # characters of what is printed; numbers are short
+LONG_TEXT = 4000  # characters of what is printed; numbers are short
 KNOWN: WeakKeyDictionary[ng.CoefficientFunction, bool] = WeakKeyDictionary()  # numbers or not
 # Lines of what NGSolve prints of numbers, in vectors, times others and times the normal.
 _NUMBER = r"(?:[-+.\de]+|-?inf|nan)"
@@ -197,7 +197,7 @@ def _lines(value: ng.CoefficientFunction) -> list[str]:
     text = str(value).replace("ZeroCF", "0")
     if text.strip() == "ZeroCoefficientFunction":
         return ["coef 0, real"] * int(value.dim)
-    return text.splitlines() if len(text) < LONG else [text]
+    return text.splitlines() if len(text) < LONG_TEXT else [text]
 
 
 def numbers(data: ng.CoefficientFunction) -> bool:

@@ -19,7 +19,8 @@ BORDER = 16  # changed rows up to which a bordered solve is cheaper than a facto
 BORDER_GROWTH = 4  # ... times this for every one before: the sets that follow change less and less
 BORDER_ROUND_OFF = 1e-14  # of its singular values, relative to the largest
 SINGULAR_RESIDUAL = 1e-6  # residual, relative to the first, above which the matrix is singular
-ROUND_OFF = 64 * np.finfo(float).eps  # ... unless it is that of values that balance each other
+# ... unless it is that of values that balance each other.
+BALANCE_ROUND_OFF = 64 * np.finfo(float).eps
 
 
 @dataclass(eq=False)
@@ -282,7 +283,7 @@ class BorderedSystems:
         """Round-off of the forces of prescribed values on the unknowns `balanced` (n,)."""
         p = self.program
         given = abs(p.K) @ np.where(p.fixed, np.abs(p.values), 0.0)
-        return ROUND_OFF * _largest(given[balanced])
+        return BALANCE_ROUND_OFF * _largest(given[balanced])
 
 
 def _row(C: sp.csr_array, i: int) -> tuple[Index, Array]:

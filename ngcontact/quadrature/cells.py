@@ -14,19 +14,21 @@ from scipy.spatial import cKDTree
 from ..arrays import Array, Index, Mask, root_of_squares
 from ..problem import POSITION, MeshArrays
 
-DEEPEST = {1: 38, 2: 10}  # halvings of the sides: points beside corners of smaller parts are these
+# Halvings of the sides: points beside corners of smaller parts are these.
+MAX_HALVINGS = {1: 38, 2: 10}
 MOST_CELLS = 20_000  # parts that are halved at a time: rougher functions are noise
-AT_CORNERS = 1e-4  # distance of the points at corners from these, relative to a part
-BEYOND = 0.05  # share of a part beyond the last point of the rule
+CORNER_POINT_DISTANCE = 1e-4  # distance of the points at corners from these, relative to a part
+RULE_MARGIN = 0.05  # share of a part beyond the last point of the rule
 GOLDEN = (1 + 5**0.5) / 2  # takes points on a line out of step with waves
 
 # Parts of the bodies' extent: a disc, or a length, of a hundredth of it contains a point.
-FINEST = {1: 256, 2: 116}
+LATTICE_DIVISIONS = {1: 256, 2: 116}
 # Of the side of an element: the polynomials miss a step at any of the points by 7 %.
-PARTS = {1: (16, 32, 128), 2: (2, 4, 8, 12, 16, 24, 32)}
+SIDE_PARTS = {1: (16, 32, 128), 2: (2, 4, 8, 12, 16, 24, 32)}
 POINTS = 3  # parts of a lattice that one of the rule is as good as
 DEGREE = 6  # of polynomials that the usual rules integrate against displacements
-ENOUGH = {1: 1e-8, 2: 1e-6}  # error of a part relative to the integral of the size of a function
+# Error of a part relative to the integral of the size of a function.
+INTEGRAL_ERROR = {1: 1e-8, 2: 1e-6}
 
 # Orders of the rules on a part, and the degree of the polynomial through their points that tells
 # their corners: of loads, whose moments are taken again, and of integrals that are wanted as such.
@@ -78,8 +80,8 @@ def gauss_rule(dim: int, order: int) -> tuple[Array, Array]:
 
 
 def inward(points: Array) -> Array:
-    """Places (m, dim), by `AT_CORNERS` of the way to the middle inside of `points` (m, dim)."""
-    return points + AT_CORNERS * (1 / (points.shape[1] + 1) - points)
+    """Places (m, dim): `points` (m, dim) moved by `CORNER_POINT_DISTANCE` of the way inwards."""
+    return points + CORNER_POINT_DISTANCE * (1 / (points.shape[1] + 1) - points)
 
 
 @lru_cache
@@ -214,19 +216,19 @@ def refined(
         """Values (k, m, c), and integrals and what may lie beyond the points (k, 2, c)."""
         values, weights = integrand(cells.element, cells.points(rule)), cells.weights(rule)
         beyond = np.abs(rule.misses @ values).max(axis=1) * weights.sum(axis=1)[:, None]
-        return values, np.stack([(weights[:, None] @ values)[:, 0], BEYOND * beyond], axis=1)
+        return values, np.stack([(weights[:, None] @ values)[:, 0], RULE_MARGIN * beyond], axis=1)
 
     values, coarse = integrals(cells)
     if total is None:
         total = float((cells.weights(rule) * np.abs(values).sum(axis=2)).sum())
     allowed = share * total
-    for depth in range(DEEPEST[dim]):
+    for depth in range(MAX_HALVINGS[dim]):
         halves = cells.divided(2)
         values, fine = integrals(halves)
         differs = fine[:, 0].reshape(len(coarse), 2**dim, -1).sum(axis=1) - coarse[:, 0]
         sizes = np.maximum(np.abs(differs), coarse[:, 1])
         error = sizes.max(axis=1)
-        last = depth == DEEPEST[dim] - 1 or np.count_nonzero(error > allowed) > MOST_CELLS
+        last = depth == MAX_HALVINGS[dim] - 1 or np.count_nonzero(error > allowed) > MOST_CELLS
         some = (error > allowed) & (not last)
         if corners is not None and some.any():
             some = cells.beside(some, corners)
@@ -269,9 +271,9 @@ def looked(function: ng.CoefficientFunction, points: NDArray) -> Array:
 
 
 def divisions(dim: int, sizes: Array, extent: float) -> Index:
-    """How many of `PARTS` the side of elements of `sizes` (k,) is divided into, (k,)."""
-    finest = np.array(PARTS[dim])
-    at = np.searchsorted(finest, sizes * (FINEST[dim] / extent))
+    """How many of `SIDE_PARTS` the side of elements of `sizes` (k,) is divided into, (k,)."""
+    finest = np.array(SIDE_PARTS[dim])
+    at = np.searchsorted(finest, sizes * (LATTICE_DIVISIONS[dim] / extent))
     return finest[np.minimum(at, len(finest) - 1)]
 
 
@@ -407,7 +409,7 @@ class SampledElements:
         cells = Cells.whole(self.dim, elements[~fine])
         if fine.any():
             cells = Cells.joined([cells, self.in_parts(elements[fine])])
-        found = refined(values, cells, INTEGRALS, ENOUGH[self.dim], corners=self.corners)
+        found = refined(values, cells, INTEGRALS, INTEGRAL_ERROR[self.dim], corners=self.corners)
         return found.integral, found.error
 
 

@@ -28,38 +28,45 @@ from ..errors import warn
 from ..problem import POSITION, Problem, numbers, varies
 from .cells import Cells, SampledElements, lattice, looked
 
-ON_LINE = 2048  # samples of a boundary: none are further apart than 1 / 1365 of it
-IN_BODY = 5.2e-3  # between samples of a body, over its extent: discs of radius 3e-3 hold one
-TURN = 0.3  # angle of their lattice, out of step with edges
+LINE_SAMPLES = 2048  # samples of a boundary: none are further apart than 1 / 1365 of it
+BODY_SPACING = 5.2e-3  # between samples of a body, over its extent: discs of radius 3e-3 hold one
+LATTICE_ANGLE = 0.3  # angle of their lattice, out of step with edges
 WINDOWS = (3, 7, 15, 31, 63, 127, 255)  # samples, each of twice the last and one
-STEEP = 0.5  # of the change in a window, what is lost there of a feature
-AT_ENDS = 31  # of these, for features at ends of lines, where the end of a wave looks like one ...
-BESIDE_ENDS = 4  # ... but changes far more within so many windows
+WINDOW_LOSS = 0.5  # of the change in a window, what is lost there of a feature
+# Of these, for features at ends of lines, where the end of a wave looks like one ...
+END_WINDOW = 31
+END_WINDOWS = 4  # ... but changes far more within so many windows
 # The same in bodies; laws are not integrated on parts of elements that follow them.
 IN_PLANE = {"force": (5, 11), "materials": (5, 11, 23, 47), "strain": (5, 11, 23, 47)}
-BESIDE = 4  # samples, half of them on each side
-SATURATED = 1.5  # times what a window loses, from which the next one loses more than a feature
+WINDOW_SAMPLES = 4  # samples, half of them on each side
+LOSS_GROWTH = 1.5  # times what a window loses, from which the next one loses more than a feature
 # Departures that count: of loads relative to their mean size, of laws in their logarithm, of
 # displacements and gaps relative to their range.
-SHARE = {"traction": 0.1, "force": 0.1, "materials": 0.1, "displacement": 1e-5, "gap": 1e-5}
-SHARE["strain"] = 0.1  # ... as of loads
-ROUND_OFF = 1e-10  # of values, relative to the largest
-FEW = 6  # samples in a feature up to which what is between them is looked at
-MEASURED = 65  # points across a feature, to tell its width
+FEATURE_SHARES = {
+    "traction": 0.1,
+    "force": 0.1,
+    "materials": 0.1,
+    "displacement": 1e-5,
+    "gap": 1e-5,
+}
+FEATURE_SHARES["strain"] = 0.1  # ... as of loads
+VALUE_ROUND_OFF = 1e-10  # of values, relative to the largest
+NARROW_SAMPLES = 6  # samples in a feature up to which what is between them is looked at
+WIDTH_POINTS = 65  # points across a feature, to tell its width
 FEATURES = 200  # of one function on a line
-ACROSS = 16  # features of a body of which widths are measured ...
-WIDE = 8.0  # ... up to so many samples on either side ...
-CHORD = 20  # ... by so many points: to a quarter
-NARROWEST = 0.1  # samples: no feature is taken for narrower
+MEASURED_FEATURES = 16  # features of a body of which widths are measured ...
+MAX_HALF_WIDTH = 8.0  # ... up to so many samples on either side ...
+CHORD_POINTS = 20  # ... by so many points: to a quarter
+MIN_WIDTH = 0.1  # samples: no feature is taken for narrower
 QUARTERS = np.linspace(0, 1, 5)
 QUARTERINGS = 18  # in which a part is quartered: what still changes across 1e-11 of it jumps
 KEPT_CHANGE = 0.9  # what the last half of the steps leave of a jump; of x^(1/10) they leave 0.3
 STEADY_CHANGE = 1e-9  # change across a part, relative to the largest value, that is not looked into
 # Size of an element over the width of a feature in it, up to which it is resolved. Loads are
 # integrated on parts of elements, but stresses in equilibrium meet body forces on so many of them.
-RESOLVED = {"displacement": 2.0, "gap": 2.0, "materials": 2.0, "strain": 2.0}
-IN_BOUNDS = RESOLVED | {"force": 32.0, "traction": 2.0}  # the last one on curves
-BENT = 1e-9  # of a segment, its distance from a chord
+RESOLVED_WIDTHS = {"displacement": 2.0, "gap": 2.0, "materials": 2.0, "strain": 2.0}
+BOUND_WIDTHS = RESOLVED_WIDTHS | {"force": 32.0, "traction": 2.0}  # the last one on curves
+CHORD_DISTANCE = 1e-9  # of a segment, its distance from a chord
 
 Function: TypeAlias = ng.CoefficientFunction | Callable[[Array, Array], Array]
 
@@ -88,7 +95,7 @@ class Features:
         return self.spots[:, 2]
 
 
-NONE = np.empty((0, 3))
+NO_JUMPS = np.empty((0, 3))
 LOADS = ("traction", "force", "strain")
 
 
@@ -141,7 +148,7 @@ def features_of(problem: Problem, mesh: ng.Mesh, *, again: bool = False) -> list
 
 def features_in(load: object) -> Array:
     """Places and widths (k, 3) that were found of a load, on all boundaries or in all bodies."""
-    return np.concatenate([NONE, *(one.spots for one in FOUND.get(load, {}).values())])
+    return np.concatenate([NO_JUMPS, *(one.spots for one in FOUND.get(load, {}).values())])
 
 
 def _looked_at(problem: Problem, mesh: ng.Mesh, datum: Datum) -> Features:
@@ -151,14 +158,14 @@ def _looked_at(problem: Problem, mesh: ng.Mesh, datum: Datum) -> Features:
     if kind == "materials":  # the diagonal of the law; compiled, as a modulus stands in each entry
         C = function.voigt(problem.model)
         function = ng.CF(tuple(C[k, k] for k in range(C.dims[0]))).Compile()
-    spots, jumps, samples, largest = [NONE], [NONE], 0, 0.0
+    spots, jumps, samples, largest = [NO_JUMPS], [NO_JUMPS], 0, 0.0
     names = view.names[inside]
     for part in dict.fromkeys(names.tolist()):  # regions of one name are one part
         elements = inside[names == part]
         if view.dim == 2:
             found, values = _in_body(kind, function, view, elements)
         else:
-            spacing = float(view.sizes[elements].sum() / ON_LINE)
+            spacing = float(view.sizes[elements].sum() / LINE_SAMPLES)
             chains = _chains(view, elements)
             lines = [_Line(function, view, *chain, spacing) for chain in chains]
             found, values = _on_lines(kind, lines)
@@ -183,11 +190,11 @@ def _told(kind: str, values: Array) -> tuple[Array, float]:
     """What is looked at of `values` (n, c), (n, c'), and what counts as a departure."""
     if kind == "materials":
         stiffness = np.log(np.maximum(np.abs(values), np.finfo(float).tiny))
-        return stiffness.mean(axis=1, keepdims=True), SHARE[kind]
+        return stiffness.mean(axis=1, keepdims=True), FEATURE_SHARES[kind]
     size = float(np.abs(values).max(initial=0.0))
     unit = float(np.abs(values).max(axis=1).mean()) if kind in LOADS else 0.0
     unit = unit or float(np.ptp(values, axis=0).max(initial=0.0))
-    return values, max(SHARE[kind] * unit, ROUND_OFF * size)
+    return values, max(FEATURE_SHARES[kind] * unit, VALUE_ROUND_OFF * size)
 
 
 def _lost(values: Array, window: int, inside: Mask | None = None) -> Array:
@@ -197,7 +204,7 @@ def _lost(values: Array, window: int, inside: Mask | None = None) -> Array:
     ends; in a plane all axes, and they do not reach beyond the samples `inside`, and nothing is
     lost beside values that are kept, as windows do not fit into convex corners.
     """
-    least, again = values, window if inside is None else window + BESIDE
+    least, again = values, window if inside is None else window + WINDOW_SAMPLES
     axes = [-1] if inside is None else range(values.ndim)
     if inside is not None:
         least = np.where(inside, least, np.inf)
@@ -267,7 +274,7 @@ def _on_lines(kind: str, lines: list[_Line]) -> tuple[Array, Array]:
     """Features (k, 3) of a function along all `lines` of a boundary, and all its samples (n, c)."""
     sampled = np.concatenate([line.sampled for line in lines])
     _, limit = _told(kind, sampled)
-    found = [NONE]
+    found = [NO_JUMPS]
     for line in lines:
         components = np.ascontiguousarray(np.hstack([line.sampled, -line.sampled]).T)
         for departure in _departures(components, limit):
@@ -289,8 +296,8 @@ def _feature(line: _Line, departure: Array, first: int, last: int) -> tuple[floa
     low = t[first - 1] if first else 0.0
     high = t[last] if last < len(t) else line.ends[-1]
     fine, away = t[first:last], departure[first:last]
-    if last - first < FEW:  # what is between samples counts
-        fine = low + (high - low) * (np.arange(MEASURED) + 0.5) / MEASURED
+    if last - first < NARROW_SAMPLES:  # what is between samples counts
+        fine = low + (high - low) * (np.arange(WIDTH_POINTS) + 0.5) / WIDTH_POINTS
         found = line.values(fine)
         # Both ends are beside the feature, unless the line ends there.
         base = found[[0 if first else -1, -1 if last < len(t) else 0]].mean(axis=0)
@@ -298,7 +305,7 @@ def _feature(line: _Line, departure: Array, first: int, last: int) -> tuple[floa
     most = away > away.max() / 2
     width = np.count_nonzero(most) / len(most) * (high - low)
     middle = np.median(fine[most]) if most.any() else (low + high) / 2
-    return float(middle), max(width, NARROWEST * line.spacing)
+    return float(middle), max(width, MIN_WIDTH * line.spacing)
 
 
 def _departures(values: Array, limit: float) -> Array:
@@ -307,16 +314,16 @@ def _departures(values: Array, limit: float) -> Array:
     windows = [window for window in WINDOWS if window <= values.shape[1] / 2]
     lost = [_lost(values, window) for window in windows]
     for window, (now, then) in zip(windows, pairwise(lost), strict=False):
-        some = (now > limit) & (then < SATURATED * now)
+        some = (now > limit) & (then < LOSS_GROWTH * now)
         if not some.any():
             continue
         around = maximum_filter1d(values, window) - minimum_filter1d(values, window)
-        some &= now > STEEP * around
+        some &= now > WINDOW_LOSS * around
         for peaks, size, value in zip(some, now, values, strict=True):
             for back in (1, -1):  # runs that reach an end
                 n = int(np.argmin(np.append(peaks[::back], False)))
-                beside = np.ptp(value[::back][: BESIDE_ENDS * window])
-                if window > AT_ENDS or size[::back][:n].max(initial=0.0) <= STEEP * beside:
+                beside = np.ptp(value[::back][: END_WINDOWS * window])
+                if window > END_WINDOW or size[::back][:n].max(initial=0.0) <= WINDOW_LOSS * beside:
                     peaks[::back][:n] = False
         found = np.maximum(found, np.where(some, now, 0.0))
     return found
@@ -348,8 +355,11 @@ def _in_body(
 ) -> tuple[Array, Array]:
     """Features (k, 3) of a function in a body, and all its samples (n, c)."""
     corners = view.arrays.corners[elements].reshape(-1, 2)
-    spacing = IN_BODY * float(np.ptp(corners, axis=0).max())
-    c, s = np.cos([TURN, TURN + np.pi / 3]), np.sin([TURN, TURN + np.pi / 3])
+    spacing = BODY_SPACING * float(np.ptp(corners, axis=0).max())
+    c, s = (
+        np.cos([LATTICE_ANGLE, LATTICE_ANGLE + np.pi / 3]),
+        np.sin([LATTICE_ANGLE, LATTICE_ANGLE + np.pi / 3]),
+    )
     sides = spacing * np.column_stack([c, s])  # of the lattice's cells, as rows
     corners = corners @ np.linalg.inv(sides)
     origin = np.floor(corners.min(axis=0))
@@ -377,7 +387,7 @@ def _in_body(
         # Around convex corners of a part more is lost in the wide window, if not at a sample.
         for window, (now, then) in zip(windows[1:], pairwise(lost), strict=True):
             around = [uniform_filter(x, 2 * window + 1, mode="constant") for x in (now, then)]
-            flagged[part] |= (now > limit) & (around[1] < SATURATED * around[0])
+            flagged[part] |= (now > limit) & (around[1] < LOSS_GROWTH * around[0])
     x = places[flagged]
     return np.column_stack([x, _widths(kind, function, view, x, spacing)]), values
 
@@ -405,10 +415,10 @@ def _widths(
     """
     if not len(places):
         return np.empty(0)
-    some = places[np.linspace(0, len(places) - 1, min(len(places), ACROSS)).astype(int)]
-    t = spacing * np.geomspace(NARROWEST, WIDE, CHORD)
+    some = places[np.linspace(0, len(places) - 1, min(len(places), MEASURED_FEATURES)).astype(int)]
+    t = spacing * np.geomspace(MIN_WIDTH, MAX_HALF_WIDTH, CHORD_POINTS)
     t = np.concatenate([-t[::-1], [0.0], t])
-    angle, middle = TURN / 2 + np.pi / 3 * np.arange(3), CHORD
+    angle, middle = LATTICE_ANGLE / 2 + np.pi / 3 * np.arange(3), CHORD_POINTS
     steps = t[:, None, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     x = some[:, None, None] + steps
     known, values = _inside(function, view, np.arange(len(view.sizes)), x)
@@ -420,7 +430,7 @@ def _widths(
     up = np.cumprod(same[:, middle:], axis=1).sum(axis=1)
     down = np.cumprod(same[:, middle::-1], axis=1).sum(axis=1)
     width = (t[middle + up - 1] - t[middle - down + 1]).min(axis=1)
-    width = np.maximum(width, NARROWEST * spacing)
+    width = np.maximum(width, MIN_WIDTH * spacing)
     apart = np.linalg.norm(some[:, None] - some, axis=2)
     width = np.where(apart <= width, width, 0.0).max(axis=1)  # chords near corners are shorter
     return np.asarray(width[cKDTree(some).query(places)[1]])
@@ -521,7 +531,7 @@ class Unresolved:
 
 def unresolved(problem: Problem, mesh: ng.Mesh, *, in_bounds: bool = False) -> list[Unresolved]:
     """Functions whose features are narrower than a mesh shows, or `in_bounds` of the error."""
-    limits, found = IN_BOUNDS if in_bounds else RESOLVED, []
+    limits, found = BOUND_WIDTHS if in_bounds else RESOLVED_WIDTHS, []
     for one in features_of(problem, mesh):
         if one.kind not in limits or not len(one.places):
             continue
@@ -533,7 +543,7 @@ def unresolved(problem: Problem, mesh: ng.Mesh, *, in_bounds: bool = False) -> l
         if one.kind == "traction":  # straight segments are cut at features
             middle = view.positions(at, np.full((len(at), 1), 0.5))
             off = np.linalg.norm(middle - view.arrays.vertices[view.ends[at]].mean(axis=1), axis=1)
-            large &= off > BENT * view.sizes[at]
+            large &= off > CHORD_DISTANCE * view.sizes[at]
         if not large.any():
             continue
         elements = np.bincount(at[large], minlength=len(view.sizes)) > 0

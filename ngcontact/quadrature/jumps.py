@@ -17,7 +17,7 @@ from .features import features_of
 
 # Change of a law in an element over its least value there, of an initial strain over its largest in
 # the body, from which it is rough there, or jumps.
-CHANGE = 0.5
+JUMP_CHANGE = 0.5
 HALVINGS = 24  # of the distance between two points: what still changes across 1e-7 of it jumps
 
 
@@ -69,7 +69,7 @@ def _rough(problem: Problem, mesh: ng.Mesh) -> Iterator[tuple[str, RoughElements
             continue
         C = law.voigt(problem.model)
         for here, values in view.samples(C, view.inside(mesh.Materials(pattern))):
-            limit = CHANGE * values[..., :: C.dims[0] + 1].mean(axis=2).min(axis=1)
+            limit = JUMP_CHANGE * values[..., :: C.dims[0] + 1].mean(axis=2).min(axis=1)
             k = np.flatnonzero(np.ptp(values, axis=1).max(axis=1) > limit)
             if len(k):
                 yield f'materials "{pattern}"', RoughElements(view, C, here[k], values[k], limit[k])
@@ -78,7 +78,7 @@ def _rough(problem: Problem, mesh: ng.Mesh) -> Iterator[tuple[str, RoughElements
     for one in features_of(problem, mesh):
         if one.kind != "strain":
             continue
-        e0, limit = problem.strain[one.name], CHANGE * one.largest
+        e0, limit = problem.strain[one.name], JUMP_CHANGE * one.largest
         for here, values in view.samples(e0, view.inside(mesh.Materials(one.name))):
             k = np.flatnonzero(np.ptp(values, axis=1).max(axis=1) > limit)
             if len(k):

@@ -28,21 +28,25 @@ from .cells import (
     monomials,
     refined,
 )
-from .features import LOADS, NONE, features_in, features_of, towards, where_features_are
+from .features import LOADS, NO_JUMPS, features_in, features_of, towards, where_features_are
 
 SHAPE = 0.05  # what polynomials miss of a load at a point, relative to its largest value ...
-SHARE = {1: 1e-4, 2: 2e-3}  # ... or over an element, relative to its integral: it is rough there
-STEP = 2  # times what values vary at the points: no others are further apart in smooth functions
-COARSE = 4  # elements in the width of a feature, from which it is looked at as all else is
+# ... or over an element, relative to its integral: it is rough there.
+ROUGH_SHARES = {1: 1e-4, 2: 2e-3}
+# Times what values vary at the points: no others are further apart in smooth functions.
+VARIATION_FACTOR = 2
+# Elements in the width of a feature, from which it is looked at as all else is.
+ELEMENTS_PER_FEATURE = 4
 CURVED = 4  # quadrature orders for the maps of curved elements
-FINE = {1: 1e-6, 2: 3e-5}  # error of a part relative to that integral at which it is not halved
+# Error of a part relative to that integral at which it is not halved.
+PART_ERRORS = {1: 1e-6, 2: 3e-5}
 ROUGH_LOADS = "_ngcontact_loads"  # attribute of a mesh: the estimate asks what assembly asked
-LOST = 1e-3  # of a load that quadrature may miss without a word
+LOST_SHARE = 1e-3  # of a load that quadrature may miss without a word
 
-FEWEST = 8  # points on a segment at least, which show any interpolation error
-RESOLVED = 0.1  # what polynomials miss of values, relative to what the mesh does: they are rough
-NOISE = 1e-10  # ... and relative to the values
-FOLLOWED = 1e-3  # error of the squares on a part, relative to all of them
+MIN_SEGMENT_POINTS = 8  # points on a segment at least, which show any interpolation error
+ROUGH_MISS = 0.1  # what polynomials miss of values, relative to what the mesh does: they are rough
+VALUE_ROUND_OFF = 1e-10  # ... and relative to the values
+SQUARES_ERROR = 1e-3  # error of the squares on a part, relative to all of them
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +120,7 @@ def narrow_forces(problem: Problem, mesh: ng.Mesh, order: int) -> Mask:
 
 
 def rough_load(
-    load: ng.CoefficientFunction, region: ng.Region, degree: int, features: Array = NONE
+    load: ng.CoefficientFunction, region: ng.Region, degree: int, features: Array = NO_JUMPS
 ) -> RoughLoad | None:
     """A load on a region, bodies or boundaries, where it is rough; None where it is nowhere.
 
@@ -136,9 +140,9 @@ def rough_load(
     here, beyond = _steps(load, view, inside, least[inside], most[inside])
     miss[here] = np.maximum(miss[here], beyond)
     share = miss * sizes**view.dim / view.dim
-    rough = (miss > SHAPE * largest) | (share > SHARE[view.dim] * total)
+    rough = (miss > SHAPE * largest) | (share > ROUGH_SHARES[view.dim] * total)
     near, feature = where_features_are(features, view, inside)
-    rough[near[sizes[near] > features[feature, 2] / COARSE]] = True
+    rough[near[sizes[near] > features[feature, 2] / ELEMENTS_PER_FEATURE]] = True
     if not rough.any():
         return None
     rough = view.with_neighbours(rough, inside)  # a part of a feature may have none of the points
@@ -152,7 +156,7 @@ def rough_load(
         start, rule = towards(features, start, view), Rule.of(view.dim, *MOMENTS[view.dim])
         size = np.abs(density(start.element, start.points(rule))).max(axis=2)
         total = max(total, float((size * start.weights(rule)).sum()))
-    found = refined(density, start, MOMENTS, FINE[view.dim], total, view.corners)
+    found = refined(density, start, MOMENTS, PART_ERRORS[view.dim], total, view.corners)
     projection, rest = _projected(found, view, degree)
     missed = np.bincount(found.cells.element, found.missed, len(rough)).astype(float)
     return RoughLoad(rough, projection, rest, missed, total, found.cells)
@@ -171,13 +175,13 @@ def _steps(
     np.minimum.at(lowest, at, most[:, None])
     np.maximum.at(highest, at, least[:, None])
     np.maximum.at(most_varied, at, varies[:, None])
-    apart = np.any(highest - lowest > STEP * most_varied, axis=1)
+    apart = np.any(highest - lowest > VARIATION_FACTOR * most_varied, axis=1)
     some = np.flatnonzero(np.any(apart[at], axis=1))
     if not len(some):
         return elements[some], np.empty(0)
     values = view.look(load, elements[some], beside_edges(view.dim))
     beyond = np.maximum(values - most[some, None], least[some, None] - values)
-    beyond = np.maximum(beyond - STEP * varies[some, None], 0.0)
+    beyond = np.maximum(beyond - VARIATION_FACTOR * varies[some, None], 0.0)
     return elements[some], np.asarray(beyond.max(axis=(1, 2), initial=0.0))
 
 
@@ -239,7 +243,7 @@ def warn_of_data(problem: Problem, mesh: ng.Mesh, order: int) -> None:
             )
     for load in loads_of(problem, mesh):
         found = load.where_rough(order)
-        if found is not None and found.missed.sum() > LOST * found.total:
+        if found is not None and found.missed.sum() > LOST_SHARE * found.total:
             warn(
                 f'{load.kind} "{load.name}" is finer than any quadrature: up to '
                 f"{found.missed.sum() / found.total:.1%} of it may be missed; give a smoother load"
@@ -257,10 +261,10 @@ def rough_segments(
         return np.zeros(len(segments), dtype=bool)
     left, largest = np.zeros(mesh.GetNE(ng.BND)), 0.0
     view = SampledElements(mesh, 1)
-    for here, found in view.samples(ng.CF(tuple(values)), segments, FEWEST):
+    for here, found in view.samples(ng.CF(tuple(values)), segments, MIN_SEGMENT_POINTS):
         left[here] = missed_by_polynomials(found, 1)
         largest = max(largest, float(np.abs(found).max()))
-    return np.asarray(left[segments] > max(RESOLVED * missed, NOISE * largest))
+    return np.asarray(left[segments] > max(ROUGH_MISS * missed, VALUE_ROUND_OFF * largest))
 
 
 def pieces(miss: Callable[[Index, Array], Array], mesh: ng.Mesh, sizes: Array, at: Index) -> Cells:
@@ -272,6 +276,6 @@ def pieces(miss: Callable[[Index, Array], Array], mesh: ng.Mesh, sizes: Array, a
     def squares(segment: Index, s: Array) -> Array:
         return np.asarray(sizes[segment, None, None] * miss(segment, s[..., 0]) ** 2)
 
-    n = max(FEWEST, int(divisions(1, sizes[at], MeshArrays(mesh).extent).max()))
+    n = max(MIN_SEGMENT_POINTS, int(divisions(1, sizes[at], MeshArrays(mesh).extent).max()))
     cells = Cells.whole(1, at).divided(n)
-    return refined(squares, cells, MOMENTS, FOLLOWED).cells
+    return refined(squares, cells, MOMENTS, SQUARES_ERROR).cells

@@ -26,7 +26,7 @@ from ..solved import Solved
 
 SUFFIX = ".ngcontact"
 FORMAT = 1  # of the files
-MADE = ("_estimate", "_bound")  # members that cost much, kept where they have been made
+STORED_MEMBERS = ("_estimate", "_bound")  # members that cost much, kept where they have been made
 
 
 def state_of(solution: Solved) -> dict[str, Any]:
@@ -34,7 +34,7 @@ def state_of(solution: Solved) -> dict[str, Any]:
     discrete, plain = solution.discrete, {"discrete", "displacement"}
     discrete.space.require_mesh()
     own = {name: getattr(solution, name) for name in field_names(solution) if name not in plain}
-    own |= {name: vars(solution)[name] for name in MADE if name in vars(solution)}
+    own |= {name: vars(solution)[name] for name in STORED_MEMBERS if name in vars(solution)}
     arrays = {name: getattr(discrete, name) for name in field_names(discrete)}
     for name in ("problem", "space", "program", "systems"):
         del arrays[name]

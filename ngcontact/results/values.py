@@ -19,13 +19,15 @@ from ..quadrature import SampledElements
 from ..solved import Solved, full_stress
 
 OUTSIDE = ("error", "nan")
-INSIDE = 1e-9  # barycentric coordinate, negative, up to which a point lies in an element
-ROUND_OFF = 64 * np.finfo(float).eps  # ... relative to coordinates over the element's size
+INSIDE_COORDINATE = 1e-9  # barycentric coordinate, negative, up to which a point lies in an element
+# ... relative to coordinates over the element's size.
+COORDINATE_ROUND_OFF = 64 * np.finfo(float).eps
 # Side of an element, in the order of `MeshArrays.sides`, opposite to each of its vertices.
 OPPOSITE = {2: [1, 2, 0], 3: [3, 2, 1, 0]}
-BULGE = 1.5  # radius of a curved element over that of its vertices: 1.2 on a quarter of a circle
+# Radius of a curved element over that of its vertices: 1.2 on a quarter of a circle.
+CURVED_RADIUS = 1.5
 STEPS = 30  # of Newton's method; measured: 7 at most on a disc of eight elements
-CHUNK = 20_000  # points at a time
+POINTS_AT_ONCE = 20_000  # points at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +46,7 @@ def locate(trace: BoundaryTrace, points: Array) -> Location:
     beside it.
     """
     finder = _Finder(trace)
-    chunks = np.array_split(np.arange(len(points)), max(1, -(-len(points) // CHUNK)))
+    chunks = np.array_split(np.arange(len(points)), max(1, -(-len(points) // POINTS_AT_ONCE)))
     return joined([finder.find(points, at) for at in chunks])
 
 
@@ -57,7 +59,7 @@ class _Finder:
         self.body = view.bodies
         self.corners, self.curved = view.corners, trace.geometry_order > 1
         middle = self.corners.mean(axis=1)
-        radius = np.linalg.norm(self.corners - middle[:, None], axis=2).max(axis=1) * BULGE
+        radius = np.linalg.norm(self.corners - middle[:, None], axis=2).max(axis=1) * CURVED_RADIUS
         self.size = np.linalg.norm(np.ptp(self.corners, axis=1), axis=1)
         # Elements of about one size at a time: large ones are near many points, small ones few.
         octave = np.frexp(radius)[1]
@@ -76,7 +78,10 @@ class _Finder:
         point = at[point]
         reference = self._references(points[point], element)
         share = np.column_stack([reference, 1 - reference.sum(axis=1)])
-        tolerance = INSIDE + ROUND_OFF * np.abs(points[point]).max(axis=1) / self.size[element]
+        tolerance = (
+            INSIDE_COORDINATE
+            + COORDINATE_ROUND_OFF * np.abs(points[point]).max(axis=1) / self.size[element]
+        )
         outside = ~(share >= -tolerance[:, None])  # so a NaN is outside
         inside = ~outside.any(axis=1)
         key = point * len(self.mesh.GetMaterials()) + self.body[element]
@@ -84,7 +89,9 @@ class _Finder:
         side = self.facet[element[left], outside[left].argmax(axis=1)]
         left, side = left[side >= 0], side[side >= 0]
         x = points[point[left]]
-        tolerance = INSIDE * self.trace.lengths(side) + ROUND_OFF * np.abs(x).max(axis=1)
+        tolerance = INSIDE_COORDINATE * self.trace.lengths(side) + COORDINATE_ROUND_OFF * np.abs(
+            x
+        ).max(axis=1)
         beside = left[self.trace.beyond_cad(side, x) <= tolerance]
         rows = np.concatenate([np.flatnonzero(inside), beside])
         rows = rows[np.argsort(point[rows], kind="stable")]
@@ -120,7 +127,7 @@ class _Finder:
                 step = _solved(values[:, d:].reshape(-1, d, d), miss)
             step = np.clip(np.nan_to_num(step), -0.5, 0.5)
             reference[near] = np.clip(reference[near] + step, -2, 3)
-            near = near[np.abs(step).max(axis=1) > INSIDE / 100]
+            near = near[np.abs(step).max(axis=1) > INSIDE_COORDINATE / 100]
         reference[near] = np.nan  # where elements do not reach
         return reference
 

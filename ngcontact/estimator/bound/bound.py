@@ -28,7 +28,13 @@ from .elements import Element, by_triangle, elements_of, rigid_motions
 from .facing import TO_ENDS, facing_sides, guide_sides, held_motions, new_vertices, pressure_support
 from .force_quadrature import ForceQuadrature, force_quadrature
 from .lifting import Prescribed, lifted, prescribed_on_supports
-from .oscillation import EQUILIBRIUM, BalancedCells, balanced_again, oscillation_norms, residuals
+from .oscillation import (
+    EQUILIBRIUM_RESIDUAL,
+    BalancedCells,
+    balanced_again,
+    oscillation_norms,
+    residuals,
+)
 from .program import Balanced, DualProgram, dual_program
 from .tractions import BoundaryData, boundary_data, side_rule
 
@@ -84,7 +90,7 @@ class DualProblem:
         distance, largest = found.s.norms()
         scale = max(largest, least)
         residual = float(residuals(cells, self.program.multipliers, found.unbalanced, scale).max())
-        if not residual <= EQUILIBRIUM:
+        if not residual <= EQUILIBRIUM_RESIDUAL:
             raise ContactError(
                 f"no equilibrated stress was found: the residual relative to the largest stress is "
                 f"{residual:.1e}"

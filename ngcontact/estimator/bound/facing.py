@@ -36,7 +36,7 @@ SAME_VERTEX = 1e-6  # of the shorter segment: vertices that face each other up t
 SIDE_OVERHANG = 1e-9  # of a side, by which it may exceed the one it faces; 1e-14 in 320 scenes
 CONTACT_MARGIN = 0.05  # of a segment, by which p* goes beyond the last zero of the gap
 VERTEX_DISTANCE = 0.1  # of a segment: ends of contact nearer to a vertex are no vertices
-SLIVER = 0.1  # of the sides beside it, a side between them on which r does not change
+NARROW_SIDE = 0.1  # of the sides beside it, a side between them on which r does not change
 PARALLEL_MOTION = 0.1  # sine of the angle to prescribed motions, up to which d is one of them
 POINTS, WEIGHTS = gauss(2 * DATA_DEGREE)
 # From values at `POINTS` to Legendre's coefficients, and to values at Gauss-Lobatto points.
@@ -406,7 +406,7 @@ def _merged_vertices(cells: Cells, side: Index, slots: Index) -> tuple[Index, Ma
     length = np.linalg.norm(np.diff(cells.vertices[cells.ends], axis=1)[:, 0], axis=1)
     beside = np.zeros(len(number))
     np.maximum.at(beside, cells.ends[side], length[side, None])
-    narrow = length[every] < SLIVER * beside[cells.ends[every]].min(axis=1)
+    narrow = length[every] < NARROW_SIDE * beside[cells.ends[every]].min(axis=1)
     for a, b in cells.ends[every[narrow]]:
         number[number == number[b]] = number[a]
     return number, narrow[: len(side)]

@@ -29,7 +29,7 @@ from .polynomials import edges
 from .program import dual_program
 from .tractions import BoundaryData, side_rule
 
-EQUILIBRIUM = 1e-10  # residual of equilibrium, relative to the largest stress
+EQUILIBRIUM_RESIDUAL = 1e-10  # residual of equilibrium, relative to the largest stress
 POINTS_ON_SIDE = 17  # points on each side
 # Shares of corners in places at which the middle of both balls is sought, beside the incentre.
 BALL_CENTRES = np.array([(i, j, 8 - i - j) for i in range(1, 8) for j in range(1, 8 - i)]) / 8
@@ -156,7 +156,7 @@ def balanced_again(
                 inner, share = BalancedCells(parts, s, finer, *both), len(at) / len(counts)
                 both = balanced_again(displacement, given, inner, own, scale, limit * share)
             one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
-            settled = left.reshape(-1, k).max(axis=1) <= EQUILIBRIUM
+            settled = left.reshape(-1, k).max(axis=1) <= EQUILIBRIUM_RESIDUAL
             better = settled & (one + two < c[at] + D[at])
             c[at[better]], D[at[better]] = one[better], two[better]
     return c, D

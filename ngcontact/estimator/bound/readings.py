@@ -21,7 +21,7 @@ from .facing import TO_ENDS, WEIGHTS, bernstein
 from .polynomials import scalars
 
 ENERGY_ROUND_OFF = 64 * np.finfo(float).eps  # of an energy, relative to its terms
-FINE = 3 * LOAD_BONUS  # quadrature orders above the default for the work of loads
+WORK_BONUS = 3 * LOAD_BONUS  # quadrature orders above the default for the work of loads
 INSIDE_PART = 1e-9  # parameters nearer to an end are inside of the part that begins there
 LATTICE_INSET = 0.1  # of a step of the lattice: it keeps off an axis, where s is not defined
 SAME_NORM = 1e-12  # relative difference of norms that are one: processors differ
@@ -302,7 +302,7 @@ class Guaranteed(Estimated):
         space, u = self.discrete.space, self.displacement
         if self.problem.force or self.problem.traction:
             space.require_mesh()
-            space = replace(space, f=load_vector(self.problem, space.V, FINE))
+            space = replace(space, f=load_vector(self.problem, space.V, WORK_BONUS))
         energy = potential_energy(self.problem, space, u)
         noise = ENERGY_ROUND_OFF * (self.energy_norm**2 + abs(energy))
         return energy - self._bound.below - noise, energy + self._bound.above + noise

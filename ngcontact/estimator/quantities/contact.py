@@ -13,17 +13,18 @@ from ...solved import Solved
 from ..residual import Estimated
 from .table import Quantity, Singular, error_of_largest, unknown
 
-NO_LOAD = 1e-9  # part of the largest load that is none
+LOAD_ROUND_OFF = 1e-9  # part of the largest load that is none
 # Error of pressures over the largest difference on a segment to p*, and to the discrete stress:
 # chosen on 113 random scenes, orders 1 to 4.
-OFF_STAR, OFF_STRESS, OFF_ALONE = 2.0, 1.0, 2.0  # the last where there is no p*
-OF_STEP = 0.3  # of the distance of points, part of the bar of an end: chosen on 80 random scenes
+STAR_FACTOR, STRESS_FACTOR, LONE_STRESS_FACTOR = 2.0, 1.0, 2.0  # the last where there is no p*
+# Of the distance of points, part of the bar of an end: chosen on 80 random scenes.
+END_STEP_SHARE = 0.3
 # Relative errors of the lengths of curves of a degree over powers of half their turn: on arcs of 10
 # to 30 degrees .17 to .175, .053 to .054, .0145 to .0156, .0033 to .0034.
-BENT = {1: (0.18, 2), 2: (0.055, 4), 3: (0.016, 4), 4: (0.0035, 6)}
-LEFT_OUT = 1.5  # of the pressure beside: measured 0.98 to 1.05 at a clamped end
+ARC_LENGTH_ERRORS = {1: (0.18, 2), 2: (0.055, 4), 3: (0.016, 4), 4: (0.0035, 6)}
+HELD_POINT_FACTOR = 1.5  # of the pressure beside: measured 0.98 to 1.05 at a clamped end
 SAMPLES = np.linspace(0, 1, 17)  # where pressures are looked at on a segment
-BESIDE = 0.05  # of a line's extent, how far from it corners count
+CORNER_RANGE = 0.05  # of a line's extent, how far from it corners count
 
 
 def peak_of(
@@ -44,9 +45,11 @@ def peak_of(
     peak, place = float(pressure[at]), line.position[at]
     if solution.relative_error_estimate > 1:
         return unknown(name, peak, place, infinite)
-    off = (OFF_ALONE if star is None else OFF_STRESS) * _off_stress(pair, boundary, solution.stress)
+    off = (LONE_STRESS_FACTOR if star is None else STRESS_FACTOR) * _off_stress(
+        pair, boundary, solution.stress
+    )
     if star is not None:
-        off = np.maximum(off, OFF_STAR * _off_star(pair, star))
+        off = np.maximum(off, STAR_FACTOR * _off_star(pair, star))
     segment, s = np.repeat(line.segments, len(SAMPLES)), np.tile(SAMPLES, len(line.segments))
     every = np.repeat(rows, len(SAMPLES), axis=0)
     samples = (np.append(pressure, 0.0)[every] * boundary.shapes(segment, s)).sum(axis=1)
@@ -66,7 +69,7 @@ def _pressed_corners(corners: Singular, points: Array) -> Array:
     if not len(points) or not len(places):
         return places[:0]
     away = np.linalg.norm(places[:, None] - points, axis=2).min(axis=1)
-    return places[away <= BESIDE * np.ptp(points, axis=0).max()]
+    return places[away <= CORNER_RANGE * np.ptp(points, axis=0).max()]
 
 
 def _off_star(pair: ContactState, star: Array) -> Array:
@@ -132,7 +135,7 @@ def _error_of_end(pair: ContactState, number: int) -> float:
         line = len(t) > 1 and y[0] != y[1]
         zero = abs(t[0] - y[0] * (t[1] - t[0]) / (y[1] - y[0])) if line else zone
         found.append(min(float(zero), zone))
-    return max(found) + OF_STEP * step
+    return max(found) + END_STEP_SHARE * step
 
 
 def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float, float]:
@@ -141,7 +144,7 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
     Each interval between two points in contact counts, and what is left of the way to an end of
     contact. Where a point in contact has no neighbour that faces the other body, half of the way
     counts, with a bar of that size. A curve of degree 1 is shorter than its arc by the square of
-    half of its turn over 6, others by what `BENT` tells.
+    half of its turn over 6, others by what `ARC_LENGTH_ERRORS` tells.
     """
     line, ends = pair.line, pair.transitions
     if not pair.active.any():
@@ -162,7 +165,7 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
         area += float((ends.beyond * measure).sum())
         error += float((errors * measure).sum())
     normals = [boundary.exact_normal(line.segments, np.full(len(sizes), end)) for end in (0.0, 1.0)]
-    factor, power = BENT[boundary.geometry_order]
+    factor, power = ARC_LENGTH_ERRORS[boundary.geometry_order]
     bent = factor * (np.linalg.norm(normals[1] - normals[0], axis=1) / 2) ** power
     return max(area, 0.0), error + float((sizes.sum(axis=1) * bent).sum())
 
@@ -189,7 +192,7 @@ def left_out(pair: ContactState, boundary: BoundaryTrace) -> float:
     segment, s = np.repeat(line.segments[some], len(t)), np.tile(t, len(some))
     share = boundary.shapes(segment, s) * _line_element(boundary, segment, s)[:, None]
     share = np.abs(np.einsum("kgi,g->ki", share.reshape(len(some), len(t), -1), w))
-    return LEFT_OUT * float(((share * held[some]).sum(axis=1) * beside[some]).sum())
+    return HELD_POINT_FACTOR * float(((share * held[some]).sum(axis=1) * beside[some]).sum())
 
 
 def direction_of(solution: Solved, pair: int) -> tuple[Array, str]:
@@ -214,7 +217,7 @@ def direction_of(solution: Solved, pair: int) -> tuple[Array, str]:
     moved = np.zeros(2)
     for sign, body in _sides(solution.pairs[pair], bodies):
         load = loads[:, bodies.of_vertex == body].sum(axis=1)
-        if np.linalg.norm(load) > NO_LOAD * float(np.abs(loads).sum()):
+        if np.linalg.norm(load) > LOAD_ROUND_OFF * float(np.abs(loads).sum()):
             candidates.append((load, "the load"))
         moved += sign * np.nan_to_num(_held(solution, bodies, body))
     candidates.append((moved, "the prescribed displacement"))

@@ -35,17 +35,19 @@ from ...discrete import load_by_shape
 from ...errors import ContactError, warn
 from ...fem import BoundaryTrace, FacetTrace, load_vector, stress_of
 from ...quadrature import has_rough_loads
-from ..bound import FINE, EquilibratedStress, Guaranteed, force_bar
+from ..bound import WORK_BONUS, EquilibratedStress, Guaranteed, force_bar
 from .contact import approach_of, area_in_contact, direction_of, ends_of, left_out, peak_of
 from .stresses import largest_von_mises, singular_corners
 from .surfaces import pressure_field, quantities_of_solids
 from .table import Quantities, Quantity, unknown
 
 # Relative errors over the square of the relative estimate, measured on random scenes of all orders.
-FORCE = {1: 0.3, 2: 0.3, 3: 0.3, 4: 1.5}  # by order: 96 % of 118 are at most that, most of Hertz
-APPROACH = 2.0  # 97 % of 187 are at most that
-ROUND_OFF = 64 * np.finfo(float).eps  # of what is prescribed, of forces relative to their terms
-ON_AXIS = 1e-14  # coordinate over the bodies' extent that is 0
+# By order: 96 % of 118 are at most that, most of Hertz.
+FORCE_FACTORS = {1: 0.3, 2: 0.3, 3: 0.3, 4: 1.5}
+APPROACH_FACTOR = 2.0  # 97 % of 187 are at most that
+# Of what is prescribed, of forces relative to their terms.
+VALUE_ROUND_OFF = 64 * np.finfo(float).eps
+AXIS_COORDINATE = 1e-14  # coordinate over the bodies' extent that is 0
 DX_ORDER = 5  # degree of NGSolve's quadrature with dx, without a bonus
 STRAIGHT = 1e-12  # difference of directions that are one: round-off
 
@@ -123,7 +125,7 @@ class Measured(Guaranteed):
         e, along = direction_of(self, pair)
         e = e + 0.0  # no -0
         largest = max(abs(float(one.force.sum())) for one in self.pairs)
-        of_order = FORCE[self.order] * self.relative_error_estimate**2 * largest
+        of_order = FORCE_FACTORS[self.order] * self.relative_error_estimate**2 * largest
         sum_error = of_order + left_out(state, boundary)
         of_shape = float(np.linalg.norm(load_by_shape(self.problem, self.mesh)))
         force = self.contact_force(pair)
@@ -133,7 +135,7 @@ class Measured(Guaranteed):
             proved, reason = _proved_force_errors(self, pair, e)
             if np.isfinite(proved).all():
                 forces = [x.with_proof(bar) for x, bar in zip(forces, proved.tolist(), strict=True)]
-        if of_shape > ROUND_OFF * largest:
+        if of_shape > VALUE_ROUND_OFF * largest:
             forces = [replace(x, error=x.error + of_shape, kind="estimated") for x in forces]
         rows = [
             *forces,
@@ -152,7 +154,7 @@ class Measured(Guaranteed):
             notes.append(f"guaranteed on the domain of the mesh, of curves of degree {degree}")
         for k, row in enumerate(rows):
             if row.place is not None:
-                off_axis = np.abs(row.place) >= ON_AXIS * size
+                off_axis = np.abs(row.place) >= AXIS_COORDINATE * size
                 rows[k] = replace(row, place=np.where(off_axis, row.place, 0.0))
         return Quantities(tuple(rows), "; ".join(text for text in notes if text))
 
@@ -179,7 +181,7 @@ def _approach(solution: Measured, state: ContactState, e: Array, turning: float)
     value, relative = abs(float(moved @ e)), solution.relative_error_estimate
     size = float(np.linalg.norm(state.line.direction.T @ state.force))
     turn = turning / size if size > 0 else 0.0
-    error = APPROACH * relative**2 * float(free @ np.abs(e)) + ROUND_OFF * value
+    error = APPROACH_FACTOR * relative**2 * float(free @ np.abs(e)) + VALUE_ROUND_OFF * value
     error += turn * float(np.linalg.norm(moved))
     return Quantity("approach", value, error, "estimated")
 
@@ -244,11 +246,11 @@ def _component_error(solution: Guaranteed, pair: int, e: Array) -> float:
     solution.work["equilibrations"] += 1
     error = force_bar(solution.equilibrated.proof, u, G, directions)
     a, b = (x.vec.FV().NumPy() for x in (u, G))
-    noise = ROUND_OFF * float(np.sqrt((space.diagonal @ a**2) * (space.diagonal @ b**2)))
+    noise = VALUE_ROUND_OFF * float(np.sqrt((space.diagonal @ a**2) * (space.diagonal @ b**2)))
     # What quadrature of stiffness and loads misses of A(u_h, G) - l(G).
     problem, missed = solution.problem, 0.0
     if problem.force or problem.traction:
-        missed -= float((load_vector(problem, space.V, FINE) - space.f) @ b)
+        missed -= float((load_vector(problem, space.V, WORK_BONUS) - space.f) @ b)
     inexact = space.trace.curved_elements | bool(problem.varying)
     if inexact.any():
         p, geometry = space.trace.order, space.trace.geometry_order

@@ -21,15 +21,15 @@ from ...problem import Elastic, MeshArrays, Problem, body_mask
 from ..residual import Estimated
 from .table import Quantity, Singular, error_of_largest, unknown
 
-SAME = 1e-9  # distance, relative to an element, at which points of two elements are one
+POINT_DISTANCE = 1e-9  # distance, relative to an element, at which points of two elements are one
 FREE, GUIDED, HELD, PRESSED = range(4)  # what is on a side of a corner
-SMOOTH = 0.05  # turn, radians, below which an angle is one of 180 degrees
-NEAR = 0.1  # of the way to the next corner, how far from a corner its stress counts
-MEETING = 1e-6  # of a segment, distance at which two corners meet
+STRAIGHT_TURN = 0.05  # turn, radians, below which an angle is one of 180 degrees
+CORNER_REACH = 0.1  # of the way to the next corner, how far from a corner its stress counts
+CORNER_DISTANCE = 1e-6  # of a segment, distance at which two corners meet
 # Error over the largest difference in an element to the equilibrated stress, and over that between
 # elements, a part of which counts: chosen on 113 random scenes, orders 1 to 4.
-MISES, OF_JUMP = 1.1, 0.5
-HALF = 0.5  # of the largest stress: elements with less do not hold the true largest one
+MISES_FACTOR, JUMP_FACTOR = 1.1, 0.5
+STRESS_SHARE = 0.5  # of the largest stress: elements with less do not hold the true largest one
 DIVISIONS, CONSTANT = 6, 3  # of sides, where stresses are looked at; those of order 1 are constant
 
 
@@ -53,7 +53,7 @@ def singular_corners(
     )
     turn = np.arccos(np.clip((one * other).sum(axis=1), -1, 1))
     angle = np.pi + np.where(mesh.angles[vertex] > np.pi, turn, -turn)
-    corner = (np.abs(angle - np.pi) > SMOOTH) | (kind[first] != kind[second])
+    corner = (np.abs(angle - np.pi) > STRAIGHT_TURN) | (kind[first] != kind[second])
     vertex, first, second, angle = vertex[corner], first[corner], second[corner], angle[corner]
 
     place, body = mesh.vertices[vertex], trace.body[first]
@@ -69,17 +69,19 @@ def singular_corners(
     # Angle of what faces each corner: 180 degrees of a line, 90 stand for a rigid one.
     facing = np.where(rigid, np.pi / 2, np.pi)
     for i in range(len(place)):
-        met = np.linalg.norm(place - place[i], axis=1) <= MEETING * h[i]
+        met = np.linalg.norm(place - place[i], axis=1) <= CORNER_DISTANCE * h[i]
         facing[i] = next(iter(angle[met & (body != body[i])]), facing[i])
     edge = (high == PRESSED) & ((low == FREE) | ((low == PRESSED) & (facing == np.pi)))
     critical[edge] = (np.pi - facing)[edge]
     uneven = edge & ~rigid & _turned_apart(problem, trace, place, body, np.array([angle, facing]))
-    straight = (low == high) & (np.abs(angle - np.pi) <= SMOOTH)  # nothing changes
-    found = ~straight & ((angle > critical + SMOOTH) | uneven)
+    straight = (low == high) & (np.abs(angle - np.pi) <= STRAIGHT_TURN)  # nothing changes
+    found = ~straight & ((angle > critical + STRAIGHT_TURN) | uneven)
     size, reach = float(np.ptp(trace.curve, axis=(0, 1)).max()), []
     for x, least in zip(place[found], h[found].tolist(), strict=True):
         away = np.linalg.norm(place - x, axis=1)
-        reach.append(max(NEAR * float(away[away > MEETING * size].min(initial=size)), least))
+        reach.append(
+            max(CORNER_REACH * float(away[away > CORNER_DISTANCE * size].min(initial=size)), least)
+        )
     return Singular(place[found] + 0.0, np.array(reach), (high == PRESSED)[found])
 
 
@@ -142,7 +144,7 @@ def _turned_apart(
             nearest = np.linalg.norm(middle[others] - x, axis=1).argmin()
             one, two = compliance[body[i]], compliance[trace.body[outer[others][nearest]]]
             turn = one / (np.tan(a) - a) + two / (np.tan(b) - b)
-            result[i] = turn < -SMOOTH / 2 * (one + two)
+            result[i] = turn < -STRAIGHT_TURN / 2 * (one + two)
     return result
 
 
@@ -183,7 +185,7 @@ def largest_von_mises(
     alone = equilibrated is None and mesh.ne == 1  # nothing to compare with
     if solution.relative_error_estimate > 1 or alone:
         return unknown(name, value, place, infinite)
-    high = np.asarray(np.where(away, mises, 0.0).reshape(-1, n).max(axis=1) >= HALF * value)
+    high = np.asarray(np.where(away, mises, 0.0).reshape(-1, n).max(axis=1) >= STRESS_SHARE * value)
     some = np.repeat(high, n)
     off = _jumps(mesh, xy, mises, n)[some]
     if equilibrated is not None:
@@ -198,8 +200,8 @@ def largest_von_mises(
             ratio = (trace * own[:, 3].reshape(-1, n)).sum(axis=1) / np.where(square, square, 1.0)
             other[:, 3] = own[:, 3] + (now - trace.ravel()) * np.repeat(ratio, n)
         apart = np.where(known, np.abs(von_mises(other) - mises[some]), 0.0)
-        off = np.maximum(OF_JUMP * off, apart)
-    off = MISES * np.repeat(off.reshape(-1, n).max(axis=1), n)
+        off = np.maximum(JUMP_FACTOR * off, apart)
+    off = MISES_FACTOR * np.repeat(off.reshape(-1, n).max(axis=1), n)
     error = error_of_largest(value, mises[some & away], off[away[some]])
     return Quantity(name, value, error, "estimated", place, infinite=infinite)
 
@@ -208,7 +210,7 @@ def _jumps(mesh: ng.Mesh, points: Array, mises: Array, n: int) -> Array:
     """Differences (k,) of `mises` (k,) at equal ones of the `points` (k, 2) of a body, n by n."""
     view = MeshArrays(mesh)
     body = view.pieces[view.elements[:, 0]]
-    least = SAME * float(np.ptp(view.corners, axis=1).max(axis=1).min())
+    least = POINT_DISTANCE * float(np.ptp(view.corners, axis=1).max(axis=1).min())
     key = np.round(points / least).astype(np.int64)
     key = np.column_stack([key, np.repeat(body, n)])
     order = np.lexsort(key.T)

@@ -15,7 +15,7 @@ from ...solved import Solved
 from ..residual import Estimated
 from .table import Quantities, Quantity
 
-LEVELS = 2  # before the last one, whose figures tell the error
+EARLIER_LEVELS = 2  # before the last one, whose figures tell the error
 NAMES = (
     "force",
     *(f"force, {axis}" for axis in "xyz"),
@@ -131,14 +131,14 @@ def figures(solution: Solved, state: ContactState) -> tuple[Array, Array]:
 def told_before(solution: Estimated) -> tuple[Array, ...]:
     """Figures (c, 8) of a level of solids and the one before it, which the next level needs."""
     now = np.array([figures(solution, state)[0] for state in solution.pairs])
-    return (*solution.earlier, now)[-LEVELS:]
+    return (*solution.earlier, now)[-EARLIER_LEVELS:]
 
 
 def quantities_of_solids(solution: Estimated, pair: int) -> Quantities:
     """Values of a pair, on levels of `adapt` with the larger of the last two level differences."""
     values, place = figures(solution, solution.pairs[pair])
     levels = np.array([*(before[pair] for before in solution.earlier), values])
-    known = len(levels) > LEVELS
+    known = len(levels) > EARLIER_LEVELS
     errors = np.abs(np.diff(levels, axis=0)).max(axis=0) if known else np.full(len(NAMES), np.nan)
     rows = [
         Quantity(
