@@ -6,6 +6,7 @@ from .errors import NoEquilibriumError as NoEquilibriumError
 from .output import plot_convergence as plot_convergence
 from .output import write_film as write_film
 from .output import write_series as write_series
+from .polishing import polish as polish
 from .problem import Contact as Contact
 from .problem import Elastic as Elastic
 from .problem import Hooke as Hooke

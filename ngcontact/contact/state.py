@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from ..arrays import Array, Index, Mask
+from ..fem import ORDERS
 from .line import ContactLine, by_line, in_contact, twins
 
 # Stencil of the fit, by measurement on Hertz contact at orders 1 to 4: the two points next to the
@@ -109,7 +110,10 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
             opened = opened[: (len(opened) + 1) // 2]  # the other half belongs to its other end
         steps = np.linalg.norm(np.diff(x[[inner, *opened]], axis=0), axis=1)
         distance = np.cumsum(steps)
-        at = _closing_point(distance, gap[opened], order)
+        if order > ORDERS[-1]:  # of `polish`: a vertex of the mesh lies there
+            at: float | None = 0.0
+        else:
+            at = _closing_point(distance, gap[opened], order)
         if at is None:
             at = distance[0] / 2
         closed = closed[:2]

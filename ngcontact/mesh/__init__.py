@@ -16,3 +16,5 @@ from .faces import cad_faces as cad_faces
 from .faces import face_normals as face_normals
 from .files import read as read
 from .generation import first_mesh as first_mesh
+from .generation import graded_mesh as graded_mesh
+from .generation import opposite as opposite

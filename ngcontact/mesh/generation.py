@@ -8,10 +8,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from itertools import pairwise
 from numbers import Real
+from typing import Any
 
 import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
+from netgen.meshing import MeshingParameters
 from scipy.spatial import cKDTree
 
 from ..arrays import Array, Index, Mask, across, rightward
@@ -32,6 +34,8 @@ MIN_EXTENT = 1e-6  # extent
 
 MESHING = threading.Lock()
 
+Size = Callable[[Array], Array]  # largest length of an element (k,) at points (k, 2)
+
 # Cosine between a curve's normal and the direction below which nodes go unmatched.
 MIN_MATCHED_COSINE = 0.5
 SAMPLE_RESOLUTION = 0.01  # of an edge: what a polygon of its samples tells apart
@@ -51,14 +55,20 @@ PLACE_DISTANCE = 1e-6  # of a segment: distance up to which a node lies at a pla
 SEARCH_STEP = 2**-6
 
 
-def _segments(x: Array, y: Array, maxh: float) -> Array:
+def _elements(x: Array, maxh: float | Size) -> Array:
+    """How many elements lie between neighbours of the points `x` (k, 2), (k - 1,)."""
+    lengths = np.linalg.norm(np.diff(x, axis=0), axis=1)
+    return np.asarray(lengths / (maxh((x[:-1] + x[1:]) / 2) if callable(maxh) else maxh))
+
+
+def _segments(x: Array, y: Array, maxh: float | Size) -> Array:
     """How many segments reach up to each of the points `x`, `y` (k, 2) of facing curves, (k,)."""
     density = np.zeros(len(x) - 1)
     for points in (x, y):
         steps = np.diff(points, axis=0)
         angle = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
         turn = np.abs(np.gradient(angle)) if len(angle) > 1 else np.zeros(1)
-        density = np.maximum(density, np.linalg.norm(steps, axis=1) / maxh)
+        density = np.maximum(density, _elements(points, maxh))
         density = np.maximum(density, turn / MAX_TURN)
     return np.concatenate([[0.0], np.cumsum(density)])
 
@@ -82,7 +92,7 @@ def narrowest(t: Array, x: Array, y: Array, maxh: float, gap: Callable[[Array], 
     return np.unique(place[(place > t[0]) & (place < t[-1])])
 
 
-def spaced(t: Array, x: Array, y: Array, maxh: float, places: Array) -> Array:
+def spaced(t: Array, x: Array, y: Array, maxh: float | Size, places: Array) -> Array:
     """Parameters (n,) of nodes between samples at `t` (k,), the first and the last included.
 
     `x` and `y` (k, 2) are the points there, and those that they see on the other curve; segments
@@ -112,6 +122,7 @@ class Edge:
     shape: occ.TopoDS_Shape  # the edge of the geometry
     curve: CadEdge  # the same as a curve
     maxh: float  # largest element size along it, a length
+    size: Size | None = None  # ... where it varies, and `maxh` is infinite
     # Parameters (j,) of the nodes on each part that faces another line; first those of parts with a
     # narrowest place, whose nodes stay.
     runs: list[Array] = field(default_factory=list)
@@ -131,12 +142,14 @@ class Edge:
         result = inside.tolist()
         t = np.linspace(start, stop, DIVISION_SAMPLES)
         x = self.curve.point(t)
-        arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(x, axis=0), axis=1))])
+        arc = np.concatenate([[0.0], np.cumsum(_elements(x, self.maxh))])
+        if self.size is not None:  # nothing else bounds the turn of long segments
+            arc = _segments(x, x, self.size)
         grid = (t - start) / (stop - start)
         for low, high in pairwise([0.0, *inside.tolist(), 1.0]):
             if not any(run.min() < (low + high) / 2 < run.max() for run in runs):
                 s0, s1 = np.interp([low, high], grid, arc)
-                count = int(np.ceil((s1 - s0) / self.maxh * (1 - SIZE_SLACK)))
+                count = int(np.ceil((s1 - s0) * (1 - SIZE_SLACK)))
                 fill = np.interp(np.linspace(s0, s1, count + 1)[1:-1], arc, grid)
                 result.extend(fill.tolist())
         return sorted(result)
@@ -204,8 +217,8 @@ def _nearest_of(x: Array, edge: CadEdge, others: list[Edge]) -> Mask:
     return nearest
 
 
-def _opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple[Array, Array]:
-    """Parameters on `other` opposite to points `x` (NaN where there are none), and the points.
+def opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple[Array, Array]:
+    """Parameters (k,) on `other` opposite to points `x` (k, 2), NaN where none is, and the points.
 
     Without a direction on the normals of the curve through `x`, whose tangents are `slope` (k, 2).
     """
@@ -247,26 +260,40 @@ def _ends_between(contact: Contact, secondary: CadEdge, primary: CadEdge) -> Arr
     """Parameters on the secondary at which parts end that face the primary."""
     at = np.array([primary.start, primary.stop])
     x = primary.point(at)
-    ends, _ = _opposite(contact, x, primary.derivative(at), secondary)
+    ends, _ = opposite(contact, x, primary.derivative(at), secondary)
     met = ~np.isnan(ends)
     if contact.direction is None and met.any():
         ends[met] = secondary.project(x[met])  # its normal there passes the end of the primary
     return np.unique(ends[met])  # both are one point of a closed curve
 
 
+def _on(curve: CadEdge, points: Array, t: Array) -> Array:
+    """Parameters (j,) of those `points` (k, 2) that lie on a curve, between samples at `t` (q,)."""
+    at = curve.project(points)
+    off = np.linalg.norm(curve.point(at) - points, axis=1)
+    inside = (off <= LINE_DISTANCE * curve.size) & (at > t[0]) & (at < t[-1])
+    return np.unique(at[inside])
+
+
 def _divide(
-    contact: Contact, secondary: Edge, primary: Edge, beside: list[Edge], facing: list[Edge]
+    contact: Contact,
+    secondary: Edge,
+    primary: Edge,
+    beside: list[Edge],
+    facing: list[Edge],
+    fixed: Array,
 ) -> None:
     """Lay a common division {C_j} on the parts of two edges that face each other.
 
     `beside` and `facing` are all edges of the secondary and of the primary, these two included.
+    Where sizes vary nodes lie at the points `fixed` (k, 2), else where gaps are narrowest.
     """
     t = np.linspace(secondary.curve.start, secondary.curve.stop, DIVISION_SAMPLES)
     ends = _ends_between(contact, secondary.curve, primary.curve)
     apart = np.abs(t[:, None] - ends).min(axis=1, initial=np.inf)
     t = np.sort(np.concatenate([t[apart > (t[1] - t[0]) / 2], ends]))
     x, slope = secondary.curve.point(t), secondary.curve.derivative(t)
-    other, y = _opposite(contact, x, slope, primary.curve)
+    other, y = opposite(contact, x, slope, primary.curve)
     faces = ~np.isnan(other)
     if contact.direction is None and len(facing) > 1:
         faces &= _nearest_of(x, primary.curve, facing)
@@ -280,7 +307,7 @@ def _divide(
     def gap(t: Array) -> Array:
         """Signed distances (k,) to the points opposite to `t` (k,), NaN where there are none."""
         x, slope = secondary.curve.point(t), secondary.curve.derivative(t)
-        there, y = _opposite(contact, x, slope, primary.curve)
+        there, y = opposite(contact, x, slope, primary.curve)
         along = rightward(slope) if contact.direction is None else np.array(contact.direction)
         return np.where(np.isnan(there), np.nan, ((y - x) * along).sum(axis=1))
 
@@ -289,10 +316,13 @@ def _divide(
     for run in _facing_runs(faces, np.searchsorted(t, np.sort(ends))):
         if np.linalg.norm(np.diff(x[run], axis=0), axis=1).sum() < sliver:
             continue  # beside the vertex of one edge, which faces near that of another
-        places = narrowest(t[run], x[run], y[run], maxh, gap)
-        nodes = spaced(t[run], x[run], y[run], maxh, places)
+        if secondary.size is None:
+            places = narrowest(t[run], x[run], y[run], maxh, gap)
+        else:
+            places = _on(secondary.curve, fixed, t[run])
+        nodes = spaced(t[run], x[run], y[run], secondary.size or maxh, places)
         at_nodes = secondary.curve.point(nodes), secondary.curve.derivative(nodes)
-        there, _ = _opposite(contact, *at_nodes, primary.curve)
+        there, _ = opposite(contact, *at_nodes, primary.curve)
         met = ~np.isnan(there)
         if met.any():
             for edge, found in ((secondary, nodes[met]), (primary, there[met])):
@@ -311,6 +341,12 @@ def divided(problem: Problem, shape: occ.TopoDS_Shape, maxh: float, finer: float
             for line in filter(None, (contact.secondary, contact.primary)):
                 for edge in _named(edges, line):
                     edge.maxh = min(edge.maxh, finer)
+    _divide_facing(problem, edges, np.zeros((0, 2)))
+    return edges
+
+
+def _divide_facing(problem: Problem, edges: list[Edge], fixed: Array) -> None:
+    """Lay common divisions on the parts of all pairs' edges that face; `fixed` as in `_divide`."""
     for contact in problem.contact:
         if contact.primary is not None:
             sides = _named(edges, contact.secondary)
@@ -320,8 +356,7 @@ def divided(problem: Problem, shape: occ.TopoDS_Shape, maxh: float, finer: float
                 if contact.direction is None and len(facing) > 1:  # the nearest one counts
                     near = _near(secondary.curve, facing)
                 for primary in near:
-                    _divide(contact, secondary, primary, sides, facing)
-    return edges
+                    _divide(contact, secondary, primary, sides, facing, fixed)
 
 
 def _require_complete(mesh: ng.Mesh, problem: Problem) -> None:
@@ -341,15 +376,15 @@ def _require_complete(mesh: ng.Mesh, problem: Problem) -> None:
         )
 
 
-def _generated(shape: occ.TopoDS_Shape, edges: list[Edge], maxh: float) -> ng.Mesh:
-    """Netgen's mesh; the geometry, which is the user's, is left as it was."""
+def _generated(shape: occ.TopoDS_Shape, edges: list[Edge], **options: Any) -> ng.Mesh:
+    """Netgen's mesh, by its `options`; the geometry, which is the user's, is left as it was."""
     sizes = [edge.shape.maxh for edge in edges]
     try:
         for edge in edges:
             edge.shape.maxh = edge.maxh
-            if edge.runs:
+            if edge.runs or edge.size is not None:
                 edge.shape.partition = edge.partition()
-        return ng.Mesh(occ.OCCGeometry(shape, dim=2).GenerateMesh(maxh=maxh))
+        return ng.Mesh(occ.OCCGeometry(shape, dim=2).GenerateMesh(**options))
     finally:
         for edge, size in zip(edges, sizes, strict=True):
             edge.shape.maxh, edge.shape.partition = size, None
@@ -404,6 +439,46 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
         return mesh
     with MESHING:  # sizes and divisions are told to Netgen on the shape, which others may mesh, too
         edges = divided(problem, shape, maxh, maxh / finer)
-        mesh = _generated(shape, edges, maxh)
+        mesh = _generated(shape, edges, maxh=maxh)
+    _require_complete(mesh, problem)
+    return mesh
+
+
+def graded_mesh(problem: Problem, size: Size, places: Array) -> ng.Mesh:
+    """Mesh of a plane problem's geometry with sizes that vary, matched on facing lines.
+
+    Parameters
+    ----------
+    problem : Problem
+        With a geometry.
+    size : callable
+        Largest length (k,) of the sides of elements on edges at points (k, 2); inside of bodies
+        elements grow from there.
+    places : ndarray (k, 2)
+        Points of the secondary contact lines at which nodes lie, and those that face them.
+
+    Raises
+    ------
+    ValueError
+        Netgen failed to fill a body.
+    """
+    shape = problem.geometry.shape
+    with MESHING:
+        free = (edge for edge in shape.edges if edge.partition is None)
+        edges = [Edge(edge, CadEdge(edge), np.inf, size) for edge in free]
+        _divide_facing(problem, edges, places)
+        for contact in problem.contact:
+            for edge in _named(edges, contact.secondary) if contact.primary is None else ():
+                t = np.linspace(edge.curve.start, edge.curve.stop, DIVISION_SAMPLES)
+                x = edge.curve.point(t)
+                edge.runs.append(spaced(t, x, x, size, _on(edge.curve, places, t)))
+        parameters = MeshingParameters()
+        for edge in edges:  # what partitions ask for, elements inside of bodies do not know
+            share = np.array([0.0, *edge.partition(), 1.0])
+            x = edge.curve.point(edge.curve.start + share * (edge.curve.stop - edge.curve.start))
+            middle, length = (x[:-1] + x[1:]) / 2, np.linalg.norm(np.diff(x, axis=0), axis=1)
+            for (a, b), h in zip(middle.tolist(), length.tolist(), strict=True):
+                parameters.RestrictH(a, b, 0.0, h)
+        mesh = _generated(shape, edges, mp=parameters)
     _require_complete(mesh, problem)
     return mesh

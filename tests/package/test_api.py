@@ -14,7 +14,7 @@ from ngcontact import geometries
 
 ROOT = Path(__file__).parents[2]
 PUBLIC = """Contact ContactError ContactWarning ConvergenceError Elastic Hooke NoEquilibriumError
-Problem Solution adapt find_contacts load plot_convergence solve solve_qp write_film
+Problem Solution adapt find_contacts load plot_convergence polish solve solve_qp write_film
 write_series""".split()
 SIGNATURES = {
     "Contact": "(secondary, primary=None, direction=None, gap=None, bilateral=False, rows='auto', "
@@ -22,6 +22,7 @@ SIGNATURES = {
     "solve": "(problem, mesh=None, *, maxh=None, order=None, element='isoparametric', start=None)",
     "adapt": "(problem, *, maxh=None, order=None, element='isoparametric', theta=0.5, "
     "tolerance=None, max_dofs=100000, guaranteed=False, start=None, progress=False)",
+    "polish": "(solution, digits=8)",
     "solve_qp": "(A, f, B, g, E=None, e=None, active=None)",
     "find_contacts": "(geometry, *, within)",
     "load": "(path)",

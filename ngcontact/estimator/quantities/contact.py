@@ -165,7 +165,9 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
         area += float((ends.beyond * measure).sum())
         error += float((errors * measure).sum())
     normals = [boundary.exact_normal(line.segments, np.full(len(sizes), end)) for end in (0.0, 1.0)]
-    factor, power = ARC_LENGTH_ERRORS[boundary.geometry_order]
+    # Higher ones are closer:
+    known = min(boundary.geometry_order, max(ARC_LENGTH_ERRORS))
+    factor, power = ARC_LENGTH_ERRORS[known]
     bent = factor * (np.linalg.norm(normals[1] - normals[0], axis=1) / 2) ** power
     return max(area, 0.0), error + float((sizes.sum(axis=1) * bent).sum())
 

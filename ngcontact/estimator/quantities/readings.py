@@ -125,7 +125,8 @@ class Measured(Guaranteed):
         e, along = direction_of(self, pair)
         e = e + 0.0  # no -0
         largest = max(abs(float(one.force.sum())) for one in self.pairs)
-        of_order = FORCE_FACTORS[self.order] * self.relative_error_estimate**2 * largest
+        factor = FORCE_FACTORS[min(self.order, max(FORCE_FACTORS))]
+        of_order = factor * self.relative_error_estimate**2 * largest
         sum_error = of_order + left_out(state, boundary)
         of_shape = float(np.linalg.norm(load_by_shape(self.problem, self.mesh)))
         force = self.contact_force(pair)

@@ -1,0 +1,102 @@
+"""The bilateral problem of a known zone: contact with equality where it is closed, none elsewhere.
+
+Where a zone ends too far out or in by t, the gap beside the end is K r^(1/2) + c r^(3/2) + ... with
+the distance r from it, and K = 3/2 c t to first order: the end of the contact problem, with K = 0,
+is found by Newton's method for each end alone, since the solution depends on t by t^2 only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import ngsolve as ng
+import numpy as np
+
+from ..discrete import discretise, minimise_energy
+from ..errors import ConvergenceError
+from ..lagrange import gauss, lagrange
+from ..problem import Problem
+from ..solved import Solved
+from .geometric_mesh import RATIO, EndOfContact, GeometricMesh
+
+ELEMENT = "isoparametric"
+FIT_DEGREE = 4  # of gap / r^(1/2) in r, over the layers
+SAMPLES = 3  # per node, at which signs are looked at
+WRONG_PRESSURE = 1e-3  # of the largest, which is the error of pressures at ends
+WRONG_GAP = 1e-6  # of the largest displacement
+
+
+def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved:
+    """The solution with contact on the closed segments of a mesh, of degree `order`."""
+    curved = mesh.mesh(order)
+    discrete = discretise(problem, curved, order, ELEMENT)
+    p, start = discrete.program, 0
+    zone = np.zeros(len(p.g), dtype=bool)
+    for line in discrete.lines:
+        points = line.rows[mesh.closed[line.segments]].ravel()
+        zone[start + points[points >= 0]] = True
+        start += len(line.node)
+    known = replace(p, equality=zone, g=np.where(zone, p.g, np.inf))
+    minimiser = minimise_energy(replace(discrete, program=known), zone)
+    if not np.array_equal(minimiser.active, zone):
+        raise ConvergenceError("contact alone cannot hold a body", iterate=minimiser)
+    counts = {
+        "assemblies": 1,
+        "factorizations": minimiser.factorizations,
+        "back_solves": minimiser.back_solves,
+        "gap_searches": sum(line.searches for line in discrete.lines),
+        "curved_elements": int(np.count_nonzero(discrete.space.trace.curved_segments)),
+    }
+    return Solved(
+        problem=problem,
+        mesh=curved,
+        order=order,
+        element=ELEMENT,
+        displacement=discrete.displacement(minimiser.u),
+        discrete=discrete,
+        minimiser=minimiser,
+        work=counts | dict.fromkeys(("estimates", "equilibrations", "evaluations"), 0),
+    )
+
+
+def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact, layers: int) -> float:
+    """How far out a zone ends, a length, by the singular coefficient of the gap beside its end."""
+    state, x = solution.pairs[end.pair], mesh.vertices[end.vertex]
+    reach = mesh.vertices[end.opened] - x
+    size = float(np.linalg.norm(reach))
+    r = np.linalg.norm(state.line.position - x, axis=1) / size
+    beside = ~state.active & ((state.line.position - x) @ reach > 0)
+    beside &= (r > RATIO**layers * (1 + 1e-6)) & (r < 1 + 1e-6)  # but the last layer
+    r = r[beside]
+    # The error of the gap in each layer is a share of r^(3/2), so that a weight of 1 / r is fair.
+    powers = np.vander(r, FIT_DEGREE + 1, increasing=True) / r[:, None]
+    K, c = np.linalg.lstsq(powers, state.gap[beside] / r**1.5, rcond=None)[0][:2]
+    return float(K / (1.5 * c)) * size
+
+
+def wrong_signs(solution: Solved) -> str | None:
+    """What contradicts contact between nodes: tension in the zone, or penetration; None if none."""
+    trace, order = solution.discrete.space.trace, solution.order
+    s, _ = gauss(2 * SAMPLES * order)
+    stress = ng.BoundaryFromVolumeCF(solution.stress)
+    reach = np.abs(solution.displacement.vec.FV().NumPy()).max()
+    for number, state in enumerate(solution.pairs):
+        line = state.line
+        known = np.asarray((line.rows >= 0).all(axis=1))
+        points = np.where(known[:, None], line.rows, 0)
+        closed = known & state.active[points].all(axis=1)
+        opened = np.flatnonzero(known & ~closed)
+        gap = state.gap[points[opened]] @ lagrange(order, s).T
+        if gap.min(initial=0.0) < -WRONG_GAP * reach:
+            at = np.unravel_index(gap.argmin(), gap.shape)
+            x = trace.point(line.segments[opened[at[0]]][None], s[at[1]][None])[0]
+            return f"pair {number} penetrates by {-gap.min():.2g} at ({x[0]:.6g}, {x[1]:.6g})"
+        inside = line.segments[closed]
+        segment, places = np.repeat(inside, len(s)), np.tile(s, len(inside))
+        sigma = trace.evaluate(stress, segment, places).reshape(-1, 2, 2)
+        normal = trace.normal(segment, places)
+        pressure = -np.einsum("ki,kij,kj->k", normal, sigma, normal)
+        if pressure.min(initial=0.0) < -WRONG_PRESSURE * pressure.max(initial=0.0):
+            x = trace.point(segment, places)[pressure.argmin()]
+            return f"pair {number} is under tension at ({x[0]:.6g}, {x[1]:.6g})"
+    return None

@@ -1,0 +1,251 @@
+"""Meshes graded geometrically towards singular points: layers of elements of one ratio of sizes.
+
+Towards a point at which the solution is like r^a, polynomials of degree p on layers whose sizes
+fall by a constant ratio converge exponentially in p, if the number of layers grows with p (Gui,
+Babuska 1986, Numer. Math. 49:577; Schwab 1998, p- and hp-Finite Element Methods, 4.5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import netgen.meshing as ngm
+import ngsolve as ng
+import numpy as np
+
+from ..arrays import Array, Index, Mask
+from ..contact import ContactState, Transitions, contact_points, twins
+from ..discrete import carried_active_set
+from ..fem import boundary_trace, model_of
+from ..mesh import CadEdge, cad_edges, graded_mesh, opposite
+from ..problem import Contact, MeshArrays, Problem
+
+RATIO = 0.15  # of the sizes of layers: near the best, (2^(1/2) - 1)^2 (Gui, Babuska 1986)
+SHARE = 0.6  # of the contact up to its middle, which elements at its end may have
+GROWTH = 0.4  # of sizes per distance from the ends: 0.6 has three times the error at order 8
+LARGEST = 0.5  # of the extent of the bodies
+
+
+@dataclass(frozen=True)
+class EndOfContact:
+    """A vertex at which contact ends, away from corners."""
+
+    pair: int  # number of the pair
+    vertex: int  # of the secondary
+    closed: int  # the next vertex on the side in contact, before any layers
+    opened: int  # and on the other side
+
+
+@dataclass(frozen=True, eq=False)
+class GeometricMesh:
+    """A plane mesh as arrays, whose ends of contact can be moved and be given layers."""
+
+    source: ng.Mesh  # with the geometry and the names of regions
+    contacts: Sequence[Contact]
+    vertices: Array  # (nv, 2)
+    triangles: Index  # (ne, 3), anticlockwise
+    bodies: Index  # (ne,), material region numbers
+    segments: Index  # (k, 2), vertices of the segments of the boundary
+    boundaries: Index  # (k,), boundary region numbers
+    pair: Index  # (k,), the contact pair whose secondary a segment belongs to, -1 for none
+    closed: Mask  # (k,), those of secondaries that are in contact
+    partner: Index  # (nv,), vertex that faces one of a secondary, -1 for none
+
+    @cached_property
+    def edges(self) -> list[CadEdge]:
+        """CAD edges by boundary region number."""
+        return cad_edges(self.source) or []
+
+    @cached_property
+    def ends(self) -> list[EndOfContact]:
+        """Vertices between a segment in contact and an open one of the same CAD edge."""
+        found = []
+        own = np.flatnonzero(self.pair >= 0)
+        for vertex in np.unique(self.segments[own]).tolist():
+            at = own[(self.segments[own] == vertex).any(axis=1)]
+            if len(at) == 2 and self.closed[at].sum() == 1 and np.ptp(self.boundaries[at]) == 0:
+                inner, outer = at if self.closed[at[0]] else at[::-1]
+                beside = (int(self.segments[k].sum()) - vertex for k in (inner, outer))
+                found.append(EndOfContact(int(self.pair[inner]), vertex, *beside))
+        return found
+
+    def _edge(self, vertex: int) -> CadEdge:
+        """CAD edge of the secondary at one of its vertices."""
+        own = (self.segments == vertex).any(axis=1) & (self.pair >= 0)
+        return self.edges[int(self.boundaries[own][0])]
+
+    def _facing(self, vertex: int, place: Array) -> Array:
+        """The point (2,) of the primary that faces a `place` (2,) of the secondary at a vertex."""
+        there = (self.segments == self.partner[vertex]).any(axis=1)
+        there &= np.isin(self.segments, self.partner).all(axis=1)
+        own = (self.segments == vertex).any(axis=1) & (self.pair >= 0)
+        contact, edge = self.contacts[int(self.pair[own][0])], self._edge(vertex)
+        slope = edge.derivative(edge.project(place[None]))
+        met = [
+            opposite(contact, place[None], slope, self.edges[k])[1][0]
+            for k in dict.fromkeys(self.boundaries[there].tolist())
+        ]
+        return min(
+            met, key=lambda x: float(np.linalg.norm(x - self.vertices[self.partner[vertex]]))
+        )
+
+    def moved(self, end: EndOfContact, distance: float) -> GeometricMesh:
+        """The mesh with an end of contact moved by a `distance` along its edge, outwards.
+
+        The vertex that faces it moves along.
+        """
+        vertices, edge = self.vertices.copy(), self._edge(end.vertex)
+        outwards = vertices[end.opened] - vertices[end.vertex]
+        tangent = edge.derivative(edge.project(vertices[[end.vertex]]))[0]
+        tangent *= np.sign(tangent @ outwards) / np.linalg.norm(tangent)
+        near = vertices[[end.vertex]] + distance * tangent
+        vertices[end.vertex] = edge.point(edge.project(near))[0]
+        if (facing := int(self.partner[end.vertex])) >= 0:
+            vertices[facing] = self._facing(end.vertex, vertices[end.vertex])
+        return replace(self, vertices=vertices)
+
+    def with_layers(self, vertex: int, count: int) -> GeometricMesh:
+        """The mesh with so many layers more at a vertex, and at the one that faces it."""
+        mesh = self
+        for _ in range(count):
+            mesh = mesh._with_layer(vertex)
+        return mesh
+
+    def _with_layer(self, vertex: int) -> GeometricMesh:
+        """One layer more; the layers of facing vertices face each other."""
+        mesh, new = self._cut(vertex, {})
+        facing = int(self.partner[vertex])
+        if facing < 0:
+            return mesh
+        own = (self.segments == vertex).any(axis=1) & (self.pair >= 0)
+        there = self.segments[(self.segments == facing).any(axis=1)].ravel().tolist()
+        beside = [k for k in self.segments[own].ravel().tolist() if k != vertex]
+        matched = [k for k in beside if self.partner[k] in there]
+        places = {
+            int(self.partner[k]): mesh._facing(vertex, mesh.vertices[new[k]]) for k in matched
+        }
+        mesh, opposite_ = mesh._cut(facing, places)
+        partner = mesh.partner.copy()
+        for k in matched:
+            partner[new[k]] = opposite_[int(self.partner[k])]
+        return replace(mesh, partner=partner)
+
+    def _cut(self, vertex: int, known: dict[int, Array]) -> tuple[GeometricMesh, dict[int, int]]:
+        """The mesh with all sides at a vertex cut, and the new vertices by the sides' far ends.
+
+        Each triangle there becomes three. New vertices of `known` far ends lie where those say.
+        """
+        at, corner = np.nonzero(self.triangles == vertex)
+        a, b = (self.triangles[at, (corner + k) % 3] for k in (1, 2))
+        far = np.unique(np.concatenate([a, b]))
+        first = len(self.vertices)
+        new = {int(end): first + k for k, end in enumerate(far)}
+        x = self.vertices[vertex] + RATIO * (self.vertices[far] - self.vertices[vertex])
+        side = np.flatnonzero((self.segments == vertex).any(axis=1))
+        ends = self.segments[side].sum(axis=1) - vertex
+        cut = np.array([new[k] for k in ends.tolist()], dtype=np.intp)
+        for place, boundary in zip((cut - first).tolist(), self.boundaries[side], strict=True):
+            edge = self.edges[boundary]
+            x[place] = edge.point(edge.project(x[[place]]))[0]
+        for end, point in known.items():
+            x[new[end] - first] = point
+        near_a, near_b = (np.array([new[k] for k in end.tolist()]) for end in (a, b))
+        kept = np.delete(np.arange(len(self.triangles)), at)
+        parts = ((np.full(len(at), vertex), near_a, near_b), (near_a, a, b), (near_a, b, near_b))
+        at_vertex = self.segments[side] == vertex
+        inner, segments = np.where(at_vertex, vertex, cut[:, None]), self.segments.copy()
+        segments[side] = np.where(at_vertex, cut[:, None], self.segments[side])
+        body = self.bodies[at]
+        mesh = replace(
+            self,
+            vertices=np.concatenate([self.vertices, x]),
+            triangles=np.concatenate([self.triangles[kept], *(np.stack(t, 1) for t in parts)]),
+            bodies=np.concatenate([self.bodies[kept], body, body, body]),
+            segments=np.concatenate([segments, inner]),
+            boundaries=np.concatenate([self.boundaries, self.boundaries[side]]),
+            pair=np.concatenate([self.pair, self.pair[side]]),
+            closed=np.concatenate([self.closed, self.closed[side]]),
+            partner=np.concatenate([self.partner, np.full(len(x), -1)]),
+        )
+        return mesh, new
+
+    def mesh(self, degree: int) -> ng.Mesh:
+        """The same for NGSolve, curved to a `degree`; its segments come in the same order."""
+        old, new = self.source.ngmesh, ngm.Mesh(dim=2)
+        new.SetGeometry(old.GetGeometry())
+        new.AddPoints(np.column_stack([self.vertices, np.zeros(len(self.vertices))]))
+        for number, descriptor in enumerate(old.FaceDescriptors()):
+            new.Add(descriptor)
+            new.SetMaterial(number + 1, self.source.GetMaterials()[number])
+        for descriptor in old.EdgeDescriptors():
+            new.Add(descriptor)
+        for ends, boundary in zip(self.segments.tolist(), self.boundaries.tolist(), strict=True):
+            new.Add(ngm.Element1D([k + 1 for k in ends], index=boundary + 1))
+        for corners, body in zip(self.triangles.tolist(), self.bodies.tolist(), strict=True):
+            new.Add(ngm.Element2D(body + 1, [k + 1 for k in corners]))
+        for number, name in enumerate(self.source.GetBoundaries()):
+            new.SetBCName(number, name)
+        mesh = ng.Mesh(new)
+        mesh.Curve(degree)
+        return mesh
+
+
+def isolated(state: ContactState) -> Mask:
+    """Ends (k,) of contact of a pair that are not at corners of its line."""
+    return ~np.isin(state.transitions.inner, twins(state.line))
+
+
+def _half_length(line_ends: Transitions, run: Index, x: Array) -> float:
+    """Length of a `run` of points `x` (m, 2) from an end; half of it if another end follows."""
+    length = float(np.linalg.norm(np.diff(x[run], axis=0), axis=1).sum())
+    both = np.concatenate([line_ends.inner, line_ends.outer])
+    return length / 2 if np.count_nonzero(both == run[-1]) > (len(run) == 1) else length
+
+
+def coarse_mesh(problem: Problem, pairs: Sequence[ContactState], extent: float) -> GeometricMesh:
+    """Coarse mesh with vertices at the ends of contact of a solution, finest there.
+
+    Its segments are in contact where those of the solution are; `extent` is that of the bodies.
+    """
+    places, sizes = [], []
+    for state in pairs:
+        ends, x = state.transitions, state.line.position
+        for k in np.flatnonzero(isolated(state)):
+            runs = (run[k] for run in (ends.closed, ends.opened))
+            reach = [_half_length(ends, run, x) + float(ends.beyond[k]) for run in runs]
+            places.append(ends.position[k])
+            sizes.append(SHARE * min(reach))
+    fixed, least = np.array(places), np.array(sizes)
+
+    def size(x: Array) -> Array:
+        distance = np.linalg.norm(x[:, None] - fixed, axis=2)
+        return np.minimum((least + GROWTH * distance).min(axis=1), LARGEST * extent)
+
+    mesh = graded_mesh(problem, size, fixed)
+    view, trace = MeshArrays(mesh), boundary_trace(mesh, 2, model_of(problem))
+    lines = [contact_points(trace, contact) for contact in problem.contact]
+    pair, closed = np.full(len(view.facets), -1), np.zeros(len(view.facets), dtype=bool)
+    partner, start = np.full(mesh.nv, -1), 0
+    active = carried_active_set(lines, pairs)
+    for number, line in enumerate(lines):
+        own = np.append(active[start : start + len(line.node)], False)
+        start += len(line.node)
+        pair[line.segments] = number
+        closed[line.segments] = own[line.rows[:, 1]]  # by the middle
+        at = (line.partner >= 0) & np.isin(line.partner_s, (0.0, 1.0)) & (line.node < mesh.nv)
+        side = np.where(line.partner_s[at] == 0.0, 0, -1)
+        partner[line.node[at]] = trace.nodes[line.partner[at], side]
+    return GeometricMesh(
+        source=mesh,
+        contacts=[line.contact for line in lines],
+        vertices=view.vertices,
+        triangles=view.elements,
+        bodies=view.bodies,
+        segments=view.facets,
+        boundaries=view.boundaries,
+        pair=pair,
+        closed=closed,
+        partner=partner,
+    )

@@ -1,0 +1,151 @@
+"""Polished solutions against exact ones, what is refused, and what is returned unchanged."""
+
+from dataclasses import replace
+from functools import cache
+
+import ngsolve as ng
+import numpy as np
+import pytest
+
+import ngcontact as nc
+from drivers.benchmark.scenes.problems import BLOCK, DISC
+from drivers.reference.cases import (
+    UPWARDS,
+    disc_on_rigid_plane,
+    hertz_contact,
+    one_transition,
+    partly_opening_block,
+    pressure_patch,
+    touching_blocks,
+)
+from drivers.reference.straight import relative_energy_error
+from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, polish, solve
+from ngcontact.geometries import ball_on_block
+from tests.given_meshes import two_blocks
+
+
+@cache
+def solved_disc():
+    """The disc on a rigid plane within two percent."""
+    *_, coarse = adapt(disc_on_rigid_plane(), tolerance=2e-2)
+    return coarse
+
+
+@cache
+def polished_disc():
+    """The same, polished."""
+    return polish(solved_disc(), digits=7)
+
+
+def test_disc_on_a_rigid_plane():
+    polished = polished_disc()
+    assert polished.displacement.space.ndof < 4000
+    assert polished.order == 8
+    assert 2 * polished.contact_force()[1] == pytest.approx(DISC.force, rel=1e-7)
+    assert polished.energy == pytest.approx(DISC.energy, rel=1e-7)
+    assert polished.pressure[polished.points[:, 0].argmin()] == pytest.approx(DISC.peak, rel=1e-6)
+    assert polished.transitions()[0, 0] == pytest.approx(DISC.half_width, rel=1e-5)
+
+
+def test_what_a_polished_solution_serves(tmp_path):
+    polished = polished_disc()
+    table = polished.quantities()
+    for name, value in (("force", DISC.force / 2), ("energy", DISC.energy)):
+        assert abs(table[name].value - value) <= table[name].error
+    assert table["energy"].error <= 1e-6 * DISC.energy  # proved
+    assert polished.contact_area() == pytest.approx(np.arcsin(DISC.half_width), rel=1e-5)
+    assert polished.residuals["equilibrium"] < 1e-12
+    polished.write(tmp_path / "disc.vtu")
+    loaded = nc.load(polished.save(tmp_path / "disc.ngcontact"))
+    assert np.array_equal(loaded.force, polished.force)
+    assert np.array_equal(loaded.transitions(), polished.transitions())
+    assert loaded.energy == pytest.approx(polished.energy, rel=1e-12)
+
+
+def test_block_that_opens():
+    *_, coarse = adapt(partly_opening_block(), tolerance=1e-2)
+    polished = polish(coarse, digits=7)
+    assert -polished.energy == pytest.approx(BLOCK.energy, rel=1e-7)
+    assert polished.contact_force() == pytest.approx([0, BLOCK.force], rel=1e-9, abs=1e-9)
+    assert polished.pressure.max() == pytest.approx(BLOCK.peak, rel=1e-6)
+    assert polished.transitions()[0, 0] == pytest.approx(BLOCK.half_width, rel=1e-5)
+
+
+@pytest.mark.parametrize("half_width", [0.3, 0.05])
+def test_hertz(half_width):
+    case = hertz_contact(half_width=half_width)
+    *_, coarse = adapt(case.problem, tolerance=1e-2)
+    polished = polish(coarse, digits=6)
+    assert relative_energy_error(polished, case.exact) < 1e-3
+    assert abs(polished.contact_force()[1]) == pytest.approx(case.exact.P, rel=1e-6)
+    ends = np.sort(polished.transitions()[:, 0])
+    assert ends == pytest.approx([-half_width, half_width], rel=1e-4)
+
+
+def test_exact_root():
+    case = one_transition()
+    *_, coarse = adapt(case.problem, tolerance=1e-2)
+    polished = polish(coarse, digits=8)
+    assert relative_energy_error(polished, case.exact) < 1e-4
+    assert abs(polished.transitions()[0, 0]) < 1e-6
+    x = polished.points[polished.active, 0]
+    pressure = polished.pressure[polished.active]
+    error = np.abs(pressure - case.exact.pressure(x))
+    assert error[x > -0.9].max() < 1e-4  # at vertices; 1e-6 between them
+    assert np.median(error) < 1e-6
+
+
+def refused():
+    """What is refused, by words of the message."""
+    coarse, case = solved_disc(), one_transition()
+    plane, touching = coarse.problem, case.problem
+    bilateral = replace(plane, contact=[replace(plane.contact[0], bilateral=True)])
+    dual = replace(touching, contact=[replace(touching.contact[0], rows="dual")])
+    given = replace(touching, geometry=two_blocks(np.linspace(-1, 1, 9), np.linspace(-1, 1, 9)))
+    solid = Problem(
+        geometry=ball_on_block(),
+        materials={"ball|block": Elastic(E=1.0, nu=0.3)},
+        contact=[Contact(secondary="ball_surface", primary="block_top", direction=(0, 0, -1))],
+    )
+    return {
+        "digits=0": (coarse, 0),
+        "digits=13": (coarse, 13),
+        "digits=8.0 is not an integer": (coarse, 8.0),
+        "not a Problem": (plane, 8),
+        "solids": (replace(coarse, problem=solid), 8),
+        "bodies of revolution": (replace(coarse, problem=replace(plane, model="axisymmetric")), 8),
+        "is bilateral": (solve(bilateral, maxh=0.5), 8),
+        "geometry, not a mesh": (solve(given), 8),
+        "face no nodes": (solve(dual, maxh=0.5), 8),
+        "no ends": (solve(pressure_patch().problem, maxh=0.5), 8),
+    }
+
+
+def test_what_it_does_not_serve_is_refused_by_name():
+    for words, (solution, digits) in refused().items():
+        with pytest.raises((ValueError, TypeError), match=words):
+            polish(solution, digits)
+
+
+def test_a_zone_of_another_load_is_returned_unchanged():
+    """Its ends are too far away to be followed."""
+    coarse = solved_disc()
+    pressed = replace(coarse.problem, displacement={"top": (None, -0.05)})
+    with pytest.warns(ContactWarning, match="polish returns the solution as it is: its ends"):
+        assert polish(other := replace(coarse, problem=pressed)) is other
+
+
+def test_a_zone_that_is_missed_is_returned_unchanged():
+    """The gap closes at x = 0.4 and, which the given solution does not know, at x = -0.5."""
+    dip = (ng.x - 0.4) ** 2
+    second = dip * ((ng.x + 0.5) ** 2 + 0.01) / 0.81
+    known, whole = (
+        touching_blocks(
+            {"top": (0, -0.02), "bottom": (0, 0)}, contact=[replace(UPWARDS, gap=0.5 * gap)]
+        )
+        for gap in (dip, second)
+    )
+    *_, coarse = adapt(known, tolerance=5e-2)
+    assert len(coarse.transitions()) == 2
+    with pytest.warns(ContactWarning, match="polish returns the solution as it is: pair 0 penetr"):
+        assert polish(other := replace(coarse, problem=whole), digits=4) is other
