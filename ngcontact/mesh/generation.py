@@ -218,7 +218,7 @@ def _nearest_of(x: Array, edge: CadEdge, others: list[Edge]) -> Mask:
 
 
 def opposite(contact: Contact, x: Array, slope: Array, other: CadEdge) -> tuple[Array, Array]:
-    """Parameters (k,) on `other` opposite to points `x` (k, 2), NaN where none is, and the points.
+    """Parameters (k,) on `other` opposite to points `x` (k, 2), or NaN, and those points (k, 2).
 
     Without a direction on the normals of the curve through `x`, whose tangents are `slope` (k, 2).
     """
