@@ -11,7 +11,7 @@ from .planning import planned as planned
 from .refinement import RefinementTree as RefinementTree
 from .refinement import Refining as Refining
 from .refinement import refined as refined
-from .singularities import AT_ENDS as AT_ENDS
+from .singularities import END_POWER as END_POWER
 from .singularities import Singularities as Singularities
 from .singularities import at_ends as at_ends
 from .singularities import at_limit as at_limit

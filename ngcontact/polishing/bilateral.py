@@ -17,13 +17,13 @@ from ..errors import ConvergenceError
 from ..lagrange import gauss, lagrange
 from ..problem import Problem
 from ..solved import Solved
-from .geometric_mesh import RATIO, EndOfContact, GeometricMesh
+from .geometric_mesh import LAYER_RATIO, EndOfContact, GeometricMesh
 
 ELEMENT = "isoparametric"
 FIT_DEGREE = 4  # of gap / r^(1/2) in r, over the layers
-SAMPLES = 3  # per node, at which signs are looked at
-WRONG_PRESSURE = 1e-3  # of the largest, which is the error of pressures at ends
-WRONG_GAP = 1e-6  # of the largest displacement
+SAMPLES_PER_NODE = 3  # per node, at which signs are looked at
+PRESSURE_ERROR = 1e-3  # of the largest, which is the error of pressures at ends
+GAP_ERROR = 1e-6  # of the largest displacement
 
 
 def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved:
@@ -66,7 +66,7 @@ def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact, layers: int
     size = float(np.linalg.norm(reach))
     r = np.linalg.norm(state.line.position - x, axis=1) / size
     beside = ~state.active & ((state.line.position - x) @ reach > 0)
-    beside &= (r > RATIO**layers * (1 + 1e-6)) & (r < 1 + 1e-6)  # but the last layer
+    beside &= (r > LAYER_RATIO**layers * (1 + 1e-6)) & (r < 1 + 1e-6)  # but the last layer
     r = r[beside]
     # The error of the gap in each layer is a share of r^(3/2), so that a weight of 1 / r is fair.
     powers = np.vander(r, FIT_DEGREE + 1, increasing=True) / r[:, None]
@@ -77,7 +77,7 @@ def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact, layers: int
 def wrong_signs(solution: Solved) -> str | None:
     """What contradicts contact between nodes: tension in the zone, or penetration; None if none."""
     trace, order = solution.discrete.space.trace, solution.order
-    s, _ = gauss(2 * SAMPLES * order)
+    s, _ = gauss(2 * SAMPLES_PER_NODE * order)
     stress = ng.BoundaryFromVolumeCF(solution.stress)
     reach = np.abs(solution.displacement.vec.FV().NumPy()).max()
     for number, state in enumerate(solution.pairs):
@@ -87,7 +87,7 @@ def wrong_signs(solution: Solved) -> str | None:
         closed = known & state.active[points].all(axis=1)
         opened = np.flatnonzero(known & ~closed)
         gap = state.gap[points[opened]] @ lagrange(order, s).T
-        if gap.min(initial=0.0) < -WRONG_GAP * reach:
+        if gap.min(initial=0.0) < -GAP_ERROR * reach:
             at = np.unravel_index(gap.argmin(), gap.shape)
             x = trace.point(line.segments[opened[at[0]]][None], s[at[1]][None])[0]
             return f"pair {number} penetrates by {-gap.min():.2g} at ({x[0]:.6g}, {x[1]:.6g})"
@@ -96,7 +96,7 @@ def wrong_signs(solution: Solved) -> str | None:
         sigma = trace.evaluate(stress, segment, places).reshape(-1, 2, 2)
         normal = trace.normal(segment, places)
         pressure = -np.einsum("ki,kij,kj->k", normal, sigma, normal)
-        if pressure.min(initial=0.0) < -WRONG_PRESSURE * pressure.max(initial=0.0):
+        if pressure.min(initial=0.0) < -PRESSURE_ERROR * pressure.max(initial=0.0):
             x = trace.point(segment, places)[pressure.argmin()]
             return f"pair {number} is under tension at ({x[0]:.6g}, {x[1]:.6g})"
     return None

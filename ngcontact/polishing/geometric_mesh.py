@@ -22,10 +22,10 @@ from ..fem import boundary_trace, model_of
 from ..mesh import CadEdge, cad_edges, graded_mesh, opposite
 from ..problem import Contact, MeshArrays, Problem
 
-RATIO = 0.15  # of the sizes of layers: near the best, (2^(1/2) - 1)^2 (Gui, Babuska 1986)
-SHARE = 0.6  # of the contact up to its middle, which elements at its end may have
-GROWTH = 0.4  # of sizes per distance from the ends: 0.6 has three times the error at order 8
-LARGEST = 0.5  # of the extent of the bodies
+LAYER_RATIO = 0.15  # of the sizes of layers: near the best, (2^(1/2) - 1)^2 (Gui, Babuska 1986)
+END_SIZE = 0.6  # of the contact up to its middle, which elements at its end may have
+SIZE_GROWTH = 0.4  # of sizes per distance from the ends: 0.6 has three times the error at order 8
+MAX_SIZE = 0.5  # of the extent of the bodies
 
 
 @dataclass(frozen=True)
@@ -142,7 +142,7 @@ class GeometricMesh:
         far = np.unique(np.concatenate([a, b]))
         first = len(self.vertices)
         new = {int(end): first + k for k, end in enumerate(far)}
-        x = self.vertices[vertex] + RATIO * (self.vertices[far] - self.vertices[vertex])
+        x = self.vertices[vertex] + LAYER_RATIO * (self.vertices[far] - self.vertices[vertex])
         side = np.flatnonzero((self.segments == vertex).any(axis=1))
         ends = self.segments[side].sum(axis=1) - vertex
         cut = np.array([new[k] for k in ends.tolist()], dtype=np.intp)
@@ -216,12 +216,12 @@ def coarse_mesh(problem: Problem, pairs: Sequence[ContactState], extent: float) 
             runs = (run[k] for run in (ends.closed, ends.opened))
             reach = [_half_length(ends, run, x) + float(ends.beyond[k]) for run in runs]
             places.append(ends.position[k])
-            sizes.append(SHARE * min(reach))
+            sizes.append(END_SIZE * min(reach))
     fixed, least = np.array(places), np.array(sizes)
 
     def size(x: Array) -> Array:
         distance = np.linalg.norm(x[:, None] - fixed, axis=2)
-        return np.minimum((least + GROWTH * distance).min(axis=1), LARGEST * extent)
+        return np.minimum((least + SIZE_GROWTH * distance).min(axis=1), MAX_SIZE * extent)
 
     mesh = graded_mesh(problem, size, fixed)
     view, trace = MeshArrays(mesh), boundary_trace(mesh, 2, model_of(problem))

@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from ..adaptivity import AT_ENDS, RefinementTree, corners
+from ..adaptivity import END_POWER, RefinementTree, corners
 from ..arrays import Array, Mask, field_names
 from ..errors import ContactError, warn
 from ..fem import BoundaryTrace, boundary_trace, model_of
@@ -21,19 +21,19 @@ from ..problem import MeshArrays, Problem
 from ..solution import Solution
 from ..solved import Solved
 from .bilateral import excess, solve_bilateral, wrong_signs
-from .geometric_mesh import RATIO, GeometricMesh, coarse_mesh, isolated
+from .geometric_mesh import LAYER_RATIO, GeometricMesh, coarse_mesh, isolated
 
-DIGITS = 12
+MAX_DIGITS = 12
 ORDERS = (4, 6, 8, 10)
 MAX_STEPS = 8  # of Newton's method, at one order
-ROUGH = 1e-2  # of the size of elements at the ends: how closely these are found at order 4
-LARGEST_STEP = 0.3  # of the segments beside, by which an end may move in a step
-LEAST_LAYERS = 2
-SAME = 1e-9  # of the extent, up to which two places are one
-RIGHT = 1e-3  # radians by which a right angle may differ from one
-BLUNT = 0.5  # radians by which a convex corner turns at least
-EXPECTED = 0.1  # ratio of two changes from order to order; measured: 0.02 to 0.1
-SLOWEST = 0.8  # ... of what hardly converges
+STEP_TOLERANCE = 1e-2  # of the size of elements at the ends: how closely these are found at order 4
+MAX_STEP = 0.3  # of the segments beside, by which an end may move in a step
+MIN_LAYERS = 2
+PLACE_DISTANCE = 1e-9  # of the extent, up to which two places are one
+RIGHT_ANGLE_ERROR = 1e-3  # radians by which a right angle may differ from one
+BLUNT_ANGLE = 0.5  # radians by which a convex corner turns at least
+USUAL_RATIO = 0.1  # ratio of two changes from order to order; measured: 0.02 to 0.1
+MAX_RATIO = 0.8  # ... of what hardly converges
 
 log = logging.getLogger("ngcontact")
 
@@ -77,9 +77,9 @@ def _check(solution: object, digits: object) -> None:
     if not isinstance(solution, Solution):
         raise TypeError(f"polish takes a Solution, not a {type(solution).__name__}")
     if isinstance(digits, bool) or not isinstance(digits, int | np.integer):
-        raise TypeError(f"digits={digits!r} is not an integer; give 1 to {DIGITS}")
-    if not 1 <= digits <= DIGITS:
-        raise ValueError(f"digits={digits}: give 1 to {DIGITS}")
+        raise TypeError(f"digits={digits!r} is not an integer; give 1 to {MAX_DIGITS}")
+    if not 1 <= digits <= MAX_DIGITS:
+        raise ValueError(f"digits={digits}: give 1 to {MAX_DIGITS}")
     problem = solution.problem
     problem.refuse_solids("polish")
     if problem.model == "axisymmetric":
@@ -135,7 +135,7 @@ def _polished(solution: Solution, digits: int) -> Solution:
                 share,
                 error,
             )
-            if share <= (10.0 ** (2 - digits) if final else ROUGH):
+            if share <= (10.0 ** (2 - digits) if final else STEP_TOLERANCE):
                 break
         else:
             raise _NotPolishedError(f"its ends of contact do not settle at order {order}")
@@ -166,7 +166,7 @@ def _error(values: list[Array]) -> float:
     size = np.abs(values[-1])
     size[:-1] = size[:-1].max()
     changes = (np.abs(np.diff(values, axis=0)) / size).max(axis=1)
-    ratio = EXPECTED if len(changes) == 1 else min(changes[-1] / changes[-2], SLOWEST)
+    ratio = USUAL_RATIO if len(changes) == 1 else min(changes[-1] / changes[-2], MAX_RATIO)
     return float(changes[-1] * ratio / (1 - ratio))
 
 
@@ -183,7 +183,7 @@ def _followed(
         size = float(np.linalg.norm(beside, axis=1).min())
         share = -excess(solution, graded, end, layers) / size
         largest = max(largest, abs(share))
-        moved = moved.moved(end, size * float(np.clip(share, -LARGEST_STEP, LARGEST_STEP)))
+        moved = moved.moved(end, size * float(np.clip(share, -MAX_STEP, MAX_STEP)))
     return largest, moved
 
 
@@ -193,15 +193,17 @@ def _layers(
     """Layers at ends of contact, and at other vertices where singularities are: vertex, number."""
     trace = boundary_trace(mesh.source, 1, model_of(problem))
     found, regular = corners(problem, trace), _regular_corners(problem, trace, mesh)
-    least = digits / (2 * math.log10(1 / RATIO))  # the squared error falls with h^(2 power)
+    least = digits / (2 * math.log10(1 / LAYER_RATIO))  # the squared error falls with h^(2 power)
     faced = {int(k): vertex for vertex, k in enumerate(mesh.partner) if k >= 0}
     layers = dict[int, int]()
     for place, power in zip(found.places, found.powers, strict=True):
         distance = np.linalg.norm(mesh.vertices - place, axis=1)
-        for vertex in np.flatnonzero((distance <= SAME * distance.max()) & ~regular).tolist():
+        for vertex in np.flatnonzero(
+            (distance <= PLACE_DISTANCE * distance.max()) & ~regular
+        ).tolist():
             one = faced.get(vertex, vertex)  # both have them
             layers[one] = max(layers.get(one, 0), math.ceil(least / power))
-    return max(LEAST_LAYERS, round(least / AT_ENDS)), list(layers.items())
+    return max(MIN_LAYERS, round(least / END_POWER)), list(layers.items())
 
 
 def _regular_corners(problem: Problem, trace: BoundaryTrace, mesh: GeometricMesh) -> Mask:
@@ -218,7 +220,7 @@ def _regular_corners(problem: Problem, trace: BoundaryTrace, mesh: GeometricMesh
         on, axes = trace.lies_on(every, name), [k for k in (0, 1) if given[k] is not None]
         held |= on
         if len(axes) == 1:
-            guide |= on & (np.abs(normal[:, axes[0]]) > 1 - RIGHT**2)
+            guide |= on & (np.abs(normal[:, axes[0]]) > 1 - RIGHT_ANGLE_ERROR**2)
     touching = np.unique(mesh.segments[mesh.closed])
     touching = np.union1d(touching, mesh.partner[touching])
     natural = ~held & ~np.isin(mesh.segments, touching).all(axis=1)
@@ -228,13 +230,13 @@ def _regular_corners(problem: Problem, trace: BoundaryTrace, mesh: GeometricMesh
         else np.array([trace.edges[k].straight for k in trace.region])
     )
     regular = np.zeros(len(mesh.vertices), dtype=bool)
-    convex = MeshArrays(mesh.source).angles < np.pi - BLUNT
+    convex = MeshArrays(mesh.source).angles < np.pi - BLUNT_ANGLE
     outer = np.flatnonzero(~trace.inner)
     for vertex in np.unique(mesh.segments[outer])[:]:
         at = outer[(mesh.segments[outer] == vertex).any(axis=1)]
         if len(at) == 2 and convex[vertex]:
             s = (mesh.segments[at, 1] == vertex).astype(float)
             one, other = trace.exact_normal(at, s)
-            mirrored = (guide & straight)[at].any() and abs(one @ other) < RIGHT
+            mirrored = (guide & straight)[at].any() and abs(one @ other) < RIGHT_ANGLE_ERROR
             regular[vertex] = mirrored or natural[at].all()
     return regular
