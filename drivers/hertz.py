@@ -21,7 +21,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from drivers.command_line import Count, Order, Positive, run
-from drivers.reference.half_spaces import Hertz, plane_modulus, together
+from drivers.reference.half_spaces import Hertz, plane_modulus, reduced
 from drivers.tables import Columns, last_level
 from ngcontact import Contact, Elastic, Problem, Solution, adapt
 from ngcontact.geometries import disc_on_block
@@ -152,7 +152,7 @@ def main(
         f"A disc of radius {radius * 1e3:g} mm, E = {disc[0] / 1e9:g} GPa, nu = {disc[1]:g}, "
         f"pressed on a block, E = {block[0] / 1e9:g} GPa, nu = {block[1]:g}"
     )
-    modulus = together([plane_modulus(*disc), plane_modulus(*block)])
+    modulus = reduced([plane_modulus(*disc), plane_modulus(*block)])
     solution, computed, expected = computed_and_expected(
         pressed(radius, press, Elastic(*disc), Elastic(*block)),
         COLUMNS,

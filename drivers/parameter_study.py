@@ -20,7 +20,7 @@ from typing import Any, Literal, TypeAlias
 
 from drivers.command_line import Count, Order, Positive, run
 from drivers.hertz import pressed
-from drivers.reference.half_spaces import Hertz, plane_modulus, together
+from drivers.reference.half_spaces import Hertz, plane_modulus, reduced
 from drivers.tables import Columns, printed, write_csv
 from ngcontact import Elastic, Problem, adapt
 
@@ -109,7 +109,7 @@ def table(grid: Sequence[tuple[float, float]], rows: Sequence[Row]) -> list[dict
     """Parameters, Hertz's peak under the force of both halves, and the record, one dict a solve."""
     found = []
     for (depth, E), row in zip(grid, rows, strict=True):
-        stiffness = together([plane_modulus(E, NU), plane_modulus(BLOCK, NU)])
+        stiffness = reduced([plane_modulus(E, NU), plane_modulus(BLOCK, NU)])
         _, peak = Hertz(2 * row["contact_0_force_y"], 1.0, stiffness).cylinder()
         found.append({"depth": depth, "E": E, "hertz_peak": peak, **row})
     return found

@@ -24,7 +24,7 @@ from drivers.hertz import (
     computed_and_expected,
     draw,
 )
-from drivers.reference.half_spaces import Hertz, plane_modulus, together
+from drivers.reference.half_spaces import Hertz, plane_modulus, reduced
 from drivers.tables import Columns
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.geometries import disc_on_disc
@@ -96,11 +96,11 @@ def main(
         f"A ball of radius {radius * 1e3:g} mm, E = {upper[0] / 1e9:g} GPa, nu = {upper[1]:g}, on "
         f"one of radius {lower_radius * 1e3:g} mm, E = {lower[0] / 1e9:g} GPa, nu = {lower[1]:g}"
     )
-    modulus = together([plane_modulus(*upper), plane_modulus(*lower)])
+    modulus = reduced([plane_modulus(*upper), plane_modulus(*lower)])
     solution, computed, expected = computed_and_expected(
         pressed(radii, press * radius, Elastic(*upper), Elastic(*lower)),
         COLUMNS,
-        lambda force: Hertz(force, together(radii), modulus).sphere(),
+        lambda force: Hertz(force, reduced(radii), modulus).sphere(),
         order=order,
         tolerance=tolerance,
         max_dofs=max_dofs,

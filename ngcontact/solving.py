@@ -15,12 +15,12 @@ from .adaptivity import (
     Plan,
     Refinement,
     RefinementTree,
+    below_resolution,
     check_bool,
     continued,
     corners,
     doerfler,
     next_plan,
-    settled,
     unresolvable,
     warn_of_limit,
 )
@@ -35,20 +35,20 @@ from .discrete import (
     minimise_energy,
 )
 from .errors import ContactError, ConvergenceError, NoEquilibriumError, warn
-from .estimator import refuse_bound, told_before
+from .estimator import earlier_figures, refuse_bound
 from .fem import boundary_trace, check_element, model_of, unknowns
 from .mesh import check_curves, copied, curve, first_mesh, same_geometry
 from .plausibility import (
     EXACT_ESTIMATE,
     at_round_off,
     contradictions,
-    doubt_of_refinement,
-    doubts,
     estimates_rise,
+    pair_warnings,
+    refinement_warning,
     warn_of_implausible,
 )
 from .problem import Contact, MeshArrays, Problem, bisect
-from .quadrature import evaluations, look, unresolved, warn_of_unresolved
+from .quadrature import evaluations, sample_data, unresolved, warn_of_unresolved
 from .results import with_progress
 from .solution import Solution
 
@@ -121,7 +121,7 @@ def solve(
     mesh = first_mesh(problem, maxh) if mesh is None else mesh
     problem.check(mesh)
     before = evaluations()
-    look(problem, mesh)
+    sample_data(problem, mesh)
     coarse: list[Solution] = []
     if start is None:
         warn_of_implausible(problem, mesh, order)
@@ -132,7 +132,7 @@ def solve(
     solution = replace(solution, coarse_levels=len(coarse))
     solution.work["evaluations"] = evaluations() - before
     log.info("%s", solution)
-    warn_of_doubts(solution, set(), last=True)
+    warn_of_pairs(solution, set(), last=True)
     return solution
 
 
@@ -334,7 +334,7 @@ def adapt(
         refinement = refinement.choosing(start.order if isinstance(start, Solution) else None)
     check_bool("progress", progress)
     mesh = _first_level(problem, maxh, refinement, start)
-    look(problem, mesh)
+    sample_data(problem, mesh)
     if guaranteed and (found := contradictions(problem, mesh)):
         x, y = found[0].place
         raise ValueError(  # no refinement makes a bound there
@@ -476,7 +476,7 @@ def levels(
                 iterate=solution.minimiser,
             )
         log.info("%s", solution)
-        small = settled(solution.mesh, plan.corners.unresolvable)
+        small = below_resolution(solution.mesh, plan.corners.unresolvable)
         if not guaranteed:
             error = estimate
             if small.any():  # no mesh makes the estimate less there
@@ -512,7 +512,7 @@ def levels_of_solids(
     while unknowns(mesh, order, element) <= refinement.max_dofs:
         if solution is not None:  # its factorisation is of no use to the next one
             solution.discrete.systems.forget()
-        earlier = () if solution is None else told_before(solution)
+        earlier = () if solution is None else earlier_figures(solution)
         solution = solve_on(problem, mesh, order, element, solution)
         solution = replace(solution, adaptive=True, earlier=earlier)
         problem = solution.problem
@@ -537,12 +537,12 @@ def levels_of_solids(
         )
 
 
-def warn_of_doubts(solution: Solution, told: set[object], *, last: bool) -> None:
+def warn_of_pairs(solution: Solution, told: set[object], *, last: bool) -> None:
     """Warn of what may be wrong but was not `told` before, and add it there.
 
     What a finer mesh mends is left out unless none follows: the mesh is the `last`.
     """
-    found = doubts(solution, last=last)
+    found = pair_warnings(solution, last=last)
     for doubt, message in found.items():
         if doubt not in told:
             warn(message)
@@ -560,13 +560,13 @@ def with_warnings(solutions: Iterator[Solution]) -> Generator[Solution]:
     estimates: list[float] = []
     solution = None
     for solution in solutions:
-        warn_of_doubts(solution, told, last=False)
+        warn_of_pairs(solution, told, last=False)
         yield solution
         if unresolved(solution.problem, solution.mesh):  # estimates rise when data are seen
             estimates.clear()
         estimates.append(solution.relative_error_estimate)
         if "estimates" not in told and estimates_rise(estimates):
             told.add("estimates")
-            warn(doubt_of_refinement(solution.mesh, solution.indicators, estimates))
+            warn(refinement_warning(solution.mesh, solution.indicators, estimates))
     if solution is not None:
-        warn_of_doubts(solution, told, last=True)
+        warn_of_pairs(solution, told, last=True)

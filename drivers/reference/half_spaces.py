@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 
-def together(values: Sequence[float]) -> float:
+def reduced(values: Sequence[float]) -> float:
     """1 / (1 / R_1 + 1 / R_2): radii of two bodies in contact, or their plane moduli."""
     return 1 / sum(1 / value for value in values)
 

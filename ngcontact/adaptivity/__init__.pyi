@@ -1,6 +1,6 @@
 from .continuation import continued as continued
 from .marking import doerfler as doerfler
-from .marking import together as together
+from .marking import mark_alike as mark_alike
 from .planning import Aim as Aim
 from .planning import Forecast as Forecast
 from .planning import Plan as Plan
@@ -15,8 +15,8 @@ from .singularities import END_POWER as END_POWER
 from .singularities import Singularities as Singularities
 from .singularities import at_ends as at_ends
 from .singularities import at_limit as at_limit
+from .singularities import below_resolution as below_resolution
 from .singularities import corners as corners
 from .singularities import ends_of_contact as ends_of_contact
-from .singularities import settled as settled
 from .singularities import unresolvable as unresolvable
 from .singularities import warn_of_limit as warn_of_limit

@@ -15,7 +15,7 @@ from ..problem import MeshArrays, Problem
 from .marking import doerfler
 from .planning import Aim, Forecast, Plan, Refinement, areas, depths, planned, touching
 from .refinement import RefinementTree, Refining
-from .singularities import at_limit, ends_of_contact, settled
+from .singularities import at_limit, below_resolution, ends_of_contact
 
 # Of the unknowns that the tolerance asks for: a first level that knows another load.
 FIRST_LEVEL_SHARE = 0.5
@@ -30,7 +30,7 @@ def continued(
     which is not round-off: it will tell where contact ends now, and the level after it can be the
     last one. `first` is the plan of the first mesh, with the tree of the elements of `start`.
     """
-    small = settled(start.mesh, first.corners.unresolvable)
+    small = below_resolution(start.mesh, first.corners.unresolvable)
     rest = start.indicators if small.all() else np.where(small, 0.0, start.indicators)
     order, element, error = refinement.order, refinement.element, root_of_squares(rest)
     known = Forecast(

@@ -37,7 +37,7 @@ def doerfler(indicators: Array, theta: float) -> Mask:
     return marked
 
 
-def together(marked: Mask, alike: Mask, sizes: Array) -> Mask:
+def mark_alike(marked: Mask, alike: Mask, sizes: Array) -> Mask:
     """The marked elements, and all `alike` ones that are as large as the smallest marked of these.
 
     Of masks `marked` (ne,) and `alike` (ne,), with diameters `sizes` (ne,), a mask (ne,). Where one
@@ -46,7 +46,8 @@ def together(marked: Mask, alike: Mask, sizes: Array) -> Mask:
 
     Examples
     --------
-    >>> together(np.array([True, False, False]), np.array([True, True, True]), np.array([2, 1, 3]))
+    >>> marked, alike = np.array([True, False, False]), np.array([True, True, True])
+    >>> mark_alike(marked, alike, np.array([2, 1, 3]))
     array([ True, False,  True])
     """
     both = marked & alike

@@ -14,9 +14,9 @@ from ..fem import ORDERS, check_element, unknowns
 from ..mesh import curve, unresolved
 from ..problem import MeshArrays
 from ..quadrature import jumping_moduli
-from .marking import doerfler, together
+from .marking import doerfler, mark_alike
 from .refinement import RefinementTree, Refining
-from .singularities import Singularities, at_ends, at_limit, ends_of_contact, settled
+from .singularities import Singularities, at_ends, at_limit, below_resolution, ends_of_contact
 
 # Barycentric coordinate: a point so far outside of an element still touches it.
 TOUCHING_COORDINATE = 0.1
@@ -137,7 +137,7 @@ def next_plan(
     elements `narrow` (ne,) data are narrower than these.
     """
     problem, mesh, theta = solution.problem, solution.mesh, refinement.theta
-    small = settled(mesh, last.corners.unresolvable)
+    small = below_resolution(mesh, last.corners.unresolvable)
     indicators = np.where(small, 0.0, solution.indicators)
     if not indicators.any():
         indicators = solution.indicators
@@ -147,7 +147,7 @@ def next_plan(
     marked = doerfler(indicators, theta)
     if (marked & limit).any():  # for ever: the others are refined instead
         marked |= doerfler(np.where(limit, 0.0, indicators), theta)
-    marked = together(marked, jumping, MeshArrays(mesh).diameters)
+    marked = mark_alike(marked, jumping, MeshArrays(mesh).diameters)
     marked |= at_ends(solution.discrete.space.trace, solution.pairs, size) | narrow
     stuck, marked = bool((marked & limit).any()), marked & ~limit
     if not marked.any():
@@ -181,11 +181,11 @@ def next_plan(
 class Aim:
     """How far a level is planned: until it has so many `unknowns`, or so small an `error`.
 
-    With at most the unknowns `most`, and so many `markings` as the forecast is good for.
+    With `max_unknowns` at most, and so many `markings` as the forecast is good for.
     """
 
     unknowns: float
-    most: float
+    max_unknowns: float
     error: float  # over the one that was estimated
     theta: float  # Doerfler's share
     ending: float  # size of elements at ends of contact over their line, per error
@@ -198,16 +198,16 @@ def planned(
     """The next level's mesh, refined but not finished, and the error that is forecast on it.
 
     The elements `marked` (ne,) are refined, then again and again those that the forecast marks.
-    Elements at unresolvable corners count no more once they are small, as in `settled`.
+    Elements at unresolvable corners count no more once they are small, as in `below_resolution`.
     """
     problem, given, marks, forecasts = refining.problem, refining.given, [marked], [forecast]
     while True:
         parent = refining.bisect(marks[-1])
         forecast = forecasts[-1].after(MeshArrays(refining.mesh).corners, parent)
-        small = settled(refining.mesh, forecast.singular.unresolvable)
+        small = below_resolution(refining.mesh, forecast.singular.unresolvable)
         forecasts.append(replace(forecast, squares=np.where(small, 0.0, forecast.squares)))
         unknowns, error = refining.unknowns(forecast.order, element), forecasts[-1].error
-        if unknowns > aim.most and len(marks) > 1:  # one too many: again without it
+        if unknowns > aim.max_unknowns and len(marks) > 1:  # one too many: again without it
             refining = Refining(problem, given)
             for again in marks[:-1]:
                 refining.bisect(again)

@@ -66,15 +66,15 @@ class RigidMotion:
         t, turn, centre = self.translation[0], self.rotation[0], self.middle[0]
         first = f'of "{self.bodies[0]}"'
         if not turn.any():
-            words = f"translation {first} along {_told(t / np.abs(t).max())}"
+            words = f"translation {first} along {_described(t / np.abs(t).max())}"
         elif len(turn) == 1:
-            words = f"rotation {first} about {_told(centre + across(t) / turn)}"
+            words = f"rotation {first} about {_described(centre + across(t) / turn)}"
         else:
             pitch = turn @ t / (turn @ turn) * turn  # along the axis
             at = centre + np.cross(turn, t) / (turn @ turn)
             kind = "screw" if np.abs(pitch).max() > NULL_SPACE_TOLERANCE * np.abs(t).max() else ""
-            along = _told(turn / np.abs(turn).max())
-            words = f"{kind or 'rotation'} {first} about the axis along {along} through {_told(at)}"
+            axis = f"along {_described(turn / np.abs(turn).max())} through {_described(at)}"
+            words = f"{kind or 'rotation'} {first} about the axis {axis}"
         return words + "".join(f' with "{name}"' for name in self.bodies[1:])
 
     def field(self, body: int) -> ng.CoefficientFunction:
@@ -87,7 +87,7 @@ class RigidMotion:
         return ng.CF(tuple(t)) + ng.Cross(ng.CF(tuple(turn)), ng.CF(tuple(arm)))
 
 
-def _told(x: Array) -> str:
+def _described(x: Array) -> str:
     """A vector in a few characters."""
     return f"({', '.join(f'{value:.3g}' for value in x + 0.0)})"
 

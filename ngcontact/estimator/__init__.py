@@ -5,7 +5,7 @@ from .bound import refuse_bound as refuse_bound
 from .quantities import Measured as Measured
 from .quantities import Quantities as Quantities
 from .quantities import Quantity as Quantity
-from .quantities import told_before as told_before
+from .quantities import earlier_figures as earlier_figures
 from .residual import Estimate as Estimate
 from .residual import Estimated as Estimated
 from .residual import estimate as estimate

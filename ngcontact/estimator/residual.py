@@ -196,7 +196,7 @@ def _rough_tractions(
         change = found.projection - load.density
         residual[at] += boundary.evaluate(change, segment[at], s[at]) / solution.unit
         element = boundary.element
-        rest = solution.edge_weight[element] * (found.rest / solution.unit) ** 2
+        rest = solution.edge_weight[element] * (found.projection_error / solution.unit) ** 2
         squares.append(Squares("traction", element, rest * solution.measure[element]))
         squares.append(solution.missed(element, found.missed))
     return squares
@@ -359,8 +359,9 @@ def _body_forces(
             rough.vec.FV().NumPy()[:] = found.rough
             projection = found.projection * (1 / solution.unit)
             forces[body] = ng.IfPos(rough, projection, forces[body])
-            rest = solution.element_weight * (found.rest / solution.unit) ** 2 * solution.measure
-            squares += [Squares("element", every, rest), solution.missed(every, found.missed)]
+            weight = solution.element_weight * solution.measure
+            missed = weight * (found.projection_error / solution.unit) ** 2
+            squares += [Squares("element", every, missed), solution.missed(every, found.missed)]
     return mesh.MaterialCF(forces, default=ng.CF((0,) * problem.dim)), squares
 
 

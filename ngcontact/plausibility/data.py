@@ -49,7 +49,7 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
         for axis, value in enumerate(components):
             if value is None or not len(ends.vertices):
                 continue
-            values = ends.values(value, view.evaluate if numbers(value) else view.look)
+            values = ends.values(value, view.evaluate if numbers(value) else view.sample)
             for vertex, u in zip(ends.vertices.tolist(), values[:, 0].tolist(), strict=True):
                 name, other = known.setdefault((vertex, axis), (pattern, u))
                 if abs(u - other) > SUPPORT_DIFFERENCE * max(abs(other), abs(u)):

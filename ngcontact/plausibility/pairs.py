@@ -64,10 +64,10 @@ PEAK_ERROR = 0.02
 # Share of a given gap of one sign from which a drawn one of the other sign contradicts it.
 CONTRADICTED_SHARE = 0.5
 
-Doubts = dict[tuple[str, int], str]  # messages by what is doubted and the number of the pair
+PairWarnings = dict[tuple[str, int], str]  # messages by what is doubted and the number of the pair
 
 
-def doubts(solution: Solved, *, last: bool) -> Doubts:
+def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
     """What may be wrong with a solution, pair by pair.
 
     Fixed directions far from the normals, bodies that are drawn far apart or otherwise than their
@@ -78,7 +78,7 @@ def doubts(solution: Solved, *, last: bool) -> Doubts:
     """
     problem, pairs, space = solution.problem, solution.pairs, solution.discrete.space
     trace, u, plane = space.trace, solution.displacement.vec.FV().NumPy(), problem.dim == 2
-    found: Doubts = {}
+    found: PairWarnings = {}
     largest = [np.abs(state.force).max(initial=0.0) for state in pairs]
     noise = FORCE_ROUND_OFF * np.abs(space.diagonal * u).max(initial=0.0)
     noise = max(noise, FORCE_ROUND_OFF * max(largest, default=0.0))

@@ -54,7 +54,7 @@ def estimates_rise(estimates: Sequence[float]) -> bool:
     return len(since) > RISING_LEVELS and last > RISE_FACTOR * since[0] and last == max(since)
 
 
-def doubt_of_refinement(mesh: ng.Mesh, indicators: Array, estimates: Sequence[float]) -> str:
+def refinement_warning(mesh: ng.Mesh, indicators: Array, estimates: Sequence[float]) -> str:
     """Message for estimates that rise, with the place of the largest of the `indicators` (ne,)."""
     view, worst = MeshArrays(mesh), int(np.argmax(indicators))
     x, y = view.corners[worst].mean(axis=0)

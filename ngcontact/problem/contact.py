@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import ngsolve as ng
 import numpy as np
 
-from .values import region_name, scalar_data, told, unit_vector
+from .values import described, region_name, scalar_data, unit_vector
 
 Gap: TypeAlias = float | ng.CoefficientFunction | Callable[..., np.ndarray]
 
@@ -100,11 +100,12 @@ class Contact:
         other = "a rigid obstacle" if self.primary is None else f'"{self.primary}"'
         return f'"{self.secondary}" with {other}'
 
-    def told(self) -> str:
+    def description(self) -> str:
         """How it is measured, in a few words."""
-        parts = ["along the normal" if self.direction is None else f"along {told(self.direction)}"]
+        along = "the normal" if self.direction is None else described(self.direction)
+        parts = [f"along {along}"]
         if self.gap is not None:
-            parts.append(f"gap {told(self.gap)}")
+            parts.append(f"gap {described(self.gap)}")
         return ", ".join([*parts, *(["bilateral"] if self.bilateral else [])])
 
     def swapped(self) -> Contact:

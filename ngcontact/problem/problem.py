@@ -24,11 +24,11 @@ from .values import (
     body_mask,
     boundary_mask,
     by_region,
+    described,
     displacement_components,
     numbers,
     region_pattern,
     table,
-    told,
     traction_data,
     vector_data,
 )
@@ -137,18 +137,18 @@ class Problem:
         """What a notebook shows: a table of the data, a line each."""
         rows = [("model", "", self.model)]
         for name, law in self.materials.items():
-            rows.append(("material", name, law.told()))
+            rows.append(("material", name, law.description()))
         for name, values in self.displacement.items():
-            rows.append(("displacement", name, told(values)))
+            rows.append(("displacement", name, described(values)))
         if self.sliding is not None:
             rows.append(("sliding", str(self.sliding), "no normal displacement, no shear"))
         for name, load in self.traction.items():
             kind = "pressure " if ng.CF(load).dim == 1 else ""
-            rows.append(("traction", name, kind + told(load)))
-        rows += [("force", name, told(load)) for name, load in self.force.items()]
-        rows += [("strain", name, told(strain)) for name, strain in self.strain.items()]
+            rows.append(("traction", name, kind + described(load)))
+        rows += [("force", name, described(load)) for name, load in self.force.items()]
+        rows += [("strain", name, described(strain)) for name, strain in self.strain.items()]
         for number, pair in enumerate(self.contact):
-            rows.append((f"contact {number}", pair.named(), pair.told()))
+            rows.append((f"contact {number}", pair.named(), pair.description()))
         return table(("", "where", "what"), rows)
 
     def traction_vector(self, pattern: str) -> ng.CoefficientFunction:

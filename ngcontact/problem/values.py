@@ -207,12 +207,12 @@ def numbers(data: ng.CoefficientFunction) -> bool:
     return KNOWN[data]
 
 
-def told(value: Any) -> str:
+def described(value: Any) -> str:
     """A value in a few characters: numbers, "free" for None, "function" for all that varies."""
     if value is None:
         return "free"
     if isinstance(value, tuple):
-        return f"({', '.join(map(told, value))})"
+        return f"({', '.join(map(described, value))})"
     if not isinstance(value, ng.CoefficientFunction):
         return f"{value:.6g}" if isinstance(value, Real) else "function"
     lines = _lines(value)

@@ -14,9 +14,9 @@ from .jumps import warn_of_jumps as warn_of_jumps
 from .loads import Load as Load
 from .loads import has_rough_loads as has_rough_loads
 from .loads import loads_of as loads_of
-from .loads import look as look
 from .loads import narrow_forces as narrow_forces
 from .loads import pieces as pieces
 from .loads import rough_load as rough_load
 from .loads import rough_segments as rough_segments
+from .loads import sample_data as sample_data
 from .loads import warn_of_data as warn_of_data

@@ -264,7 +264,7 @@ def evaluations() -> int:
     return _Count.points
 
 
-def looked(function: ng.CoefficientFunction, points: NDArray) -> Array:
+def sampled(function: ng.CoefficientFunction, points: NDArray) -> Array:
     """Values (..., c) of a function among the data at mesh `points` (j, n) or (n,), counted."""
     _Count.points += points.size
     return np.asarray(function(points.ravel())).reshape(*points.shape, function.dim)
@@ -362,9 +362,9 @@ class SampledElements:
         points = self.points(elements, reference)
         return np.asarray(function(points.ravel())).reshape(*points.shape, function.dim)
 
-    def look(self, data: ng.CoefficientFunction, elements: Index, reference: Array) -> Array:
+    def sample(self, data: ng.CoefficientFunction, elements: Index, reference: Array) -> Array:
         """Values (j, n, c) of `data` at `reference` (j, n, dim) of `elements` (j,), counted."""
-        return looked(data, self.points(elements, reference))
+        return sampled(data, self.points(elements, reference))
 
     def positions(self, elements: Index, reference: Array) -> Array:
         """Places (j, 2) at a point `reference` (j, dim) of each of `elements` (j,)."""
@@ -382,7 +382,7 @@ class SampledElements:
         count = np.maximum(count, fewest)
         for n in np.unique(count).tolist():
             here = elements[count == n]
-            yield here, self.look(function, here, lattice(self.dim, n))
+            yield here, self.sample(function, here, lattice(self.dim, n))
 
     def in_parts(self, elements: Index) -> Cells:
         """The `elements` (k,) in parts, on which rules see what the points of a lattice see."""

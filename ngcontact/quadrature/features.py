@@ -26,7 +26,7 @@ from scipy.spatial import cKDTree
 from ..arrays import Array, Index, Mask
 from ..errors import warn
 from ..problem import POSITION, Problem, numbers, varies
-from .cells import Cells, SampledElements, lattice, looked
+from .cells import Cells, SampledElements, lattice, sampled
 
 LINE_SAMPLES = 2048  # samples of a boundary: none are further apart than 1 / 1365 of it
 BODY_SPACING = 5.2e-3  # between samples of a body, over its extent: discs of radius 3e-3 hold one
@@ -141,7 +141,7 @@ def features_of(problem: Problem, mesh: ng.Mesh, *, again: bool = False) -> list
     for datum in _functions(problem):
         known = FOUND.setdefault(datum.owner, {})
         if again or datum[:3] not in known:
-            known[datum[:3]] = _looked_at(problem, mesh, datum)
+            known[datum[:3]] = _sampled_features(problem, mesh, datum)
         found.append(known[datum[:3]])
     return found
 
@@ -151,7 +151,7 @@ def features_in(load: object) -> Array:
     return np.concatenate([NO_JUMPS, *(one.spots for one in FOUND.get(load, {}).values())])
 
 
-def _looked_at(problem: Problem, mesh: ng.Mesh, datum: Datum) -> Features:
+def _sampled_features(problem: Problem, mesh: ng.Mesh, datum: Datum) -> Features:
     kind, name, function = datum.kind, datum.name, datum.function
     view = SampledElements(mesh, 2 if kind in IN_PLANE else 1)
     inside = view.inside(mesh.Materials(name) if view.dim == 2 else mesh.Boundaries(name))
@@ -179,7 +179,7 @@ def _looked_at(problem: Problem, mesh: ng.Mesh, datum: Datum) -> Features:
 def _values(function: Function, points: NDArray) -> Array:
     """Values (n, c) at NGSolve's `points` (n,), 0 where infinite."""
     if isinstance(function, ng.CoefficientFunction):
-        values = looked(function, points)
+        values = sampled(function, points)
     else:
         x, y, _ = POSITION(points).T.copy()
         values = np.asarray(function(x, y), dtype=float)[:, None]

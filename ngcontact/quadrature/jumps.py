@@ -25,8 +25,8 @@ class Jump(NamedTuple):
     """Where a law jumps in one element."""
 
     place: tuple[float, float]  # lengths
-    least: float  # the value on one side of the component that jumps
-    most: float  # and on the other
+    low: float  # the value on one side of the component that jumps
+    high: float  # and on the other
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class RoughElements:
         x, u = lattice(2, round(of.shape[1] ** 0.5))[ends], of[row[:, None], ends]
         for _ in range(HALVINGS):
             middle = x.mean(axis=1)
-            v = self.view.look(self.C, self.at, middle[:, None])[row, 0, which]
+            v = self.view.sample(self.C, self.at, middle[:, None])[row, 0, which]
             side = (np.abs(v - u[:, 0]) > np.abs(v - u[:, 1])).astype(int)  # which end to move
             x[row, side], u[row, side] = middle, v
         kept = np.ptp(u, axis=1) > self.limit
@@ -113,10 +113,10 @@ def warn_of_jumps(problem: Problem, mesh: ng.Mesh) -> None:
         jumps.setdefault(pattern, []).extend(elements.jumps().values())
     for pattern, found in jumps.items():
         if found:
-            (x, y), least, most = max(found, key=lambda jump: jump.most - jump.least)
+            (x, y), low, high = max(found, key=lambda jump: jump.high - jump.low)
             warn(
                 f"{pattern} jump inside {len(found)} elements, most near "
-                f"({x:.4g}, {y:.4g}): a component from {least:.3g} to {most:.3g}. No order "
+                f"({x:.4g}, {y:.4g}): a component from {low:.3g} to {high:.3g}. No order "
                 "converges fast there; make the line an edge of the geometry, with a body of its "
                 "own on either side"
             )

@@ -55,7 +55,7 @@ class RoughLoad:
 
     rough: Mask  # (n,), where that is
     projection: ng.GridFunction  # there the polynomial, discontinuous, with the load's moments
-    rest: Array  # (n,), root of the integral of the square of what it misses of the load
+    projection_error: Array  # (n,), L2 norm of what it misses of the load
     missed: Array  # (n,), error of the integral of the load, a force
     total: float  # integral of the load's size, a force
     cells: Cells  # parts of the rough elements on which a rule integrates the load
@@ -89,7 +89,7 @@ class Load:
         return found
 
 
-def look(problem: Problem, mesh: ng.Mesh) -> None:
+def sample_data(problem: Problem, mesh: ng.Mesh) -> None:
     """Look at all functions of a problem anew, as each run does: parameters may have changed."""
     features_of(problem, mesh, again=True)
     mesh.__dict__.pop(ROUGH_LOADS, None)
@@ -149,7 +149,7 @@ def rough_load(
     start = view.in_parts(np.flatnonzero(rough))
 
     def density(elements: Index, reference: Array) -> Array:
-        values = view.look(load, elements, reference)
+        values = view.sample(load, elements, reference)
         return np.asarray(values * view.evaluate(view.measure, elements, reference))
 
     if len(features):  # of which the points of the lattice may have seen nothing
@@ -179,7 +179,7 @@ def _steps(
     some = np.flatnonzero(np.any(apart[at], axis=1))
     if not len(some):
         return elements[some], np.empty(0)
-    values = view.look(load, elements[some], beside_edges(view.dim))
+    values = view.sample(load, elements[some], beside_edges(view.dim))
     beyond = np.maximum(values - most[some, None], least[some, None] - values)
     beyond = np.maximum(beyond - VARIATION_FACTOR * varies[some, None], 0.0)
     return elements[some], np.asarray(beyond.max(axis=(1, 2), initial=0.0))

@@ -39,7 +39,13 @@ def forecast(mesh, order=2, singular=NONE):
 
 def aim(**changes):
     """Without an end but for the `changes`."""
-    default = {"unknowns": np.inf, "most": np.inf, "error": 0.0, "theta": 0.5, "ending": 0.1}
+    default = {
+        "unknowns": np.inf,
+        "max_unknowns": np.inf,
+        "error": 0.0,
+        "theta": 0.5,
+        "ending": 0.1,
+    }
     return Aim(**(default | changes))
 
 
@@ -80,9 +86,9 @@ def test_plans_end_at_the_aim_and_never_exceed_the_most():
     assert (np.diff(errors) < 0).all()
     assert plan(error=errors[1]) == (sizes[1], errors[1])
     # One unknown too many: all markings but the last; the first one is refined whatever comes.
-    assert plan(unknowns=4000, most=sizes[2] - 1)[0] < sizes[2]
-    assert plan(unknowns=4000, most=sizes[2]) == (sizes[2], errors[2])
-    assert plan(unknowns=4000, most=1) == (sizes[0], errors[0])
+    assert plan(unknowns=4000, max_unknowns=sizes[2] - 1)[0] < sizes[2]
+    assert plan(unknowns=4000, max_unknowns=sizes[2]) == (sizes[2], errors[2])
+    assert plan(unknowns=4000, max_unknowns=1) == (sizes[0], errors[0])
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from ngcontact.adaptivity import Refinement
-from ngcontact.adaptivity.marking import doerfler, together
+from ngcontact.adaptivity.marking import doerfler, mark_alike
 from ngcontact.adaptivity.planning import best_order
 
 SHARES = st.floats(0.01, 1.0)
@@ -69,9 +69,9 @@ def test_alike_elements_are_marked_together_down_to_the_smallest_marked():
     alike = np.array([True, True, True, False, True])
     sizes = np.array([1.0, 2.0, 0.5, 4.0, 1.0])
     marked = np.array([True, False, False, False, False])
-    assert together(marked, alike, sizes).tolist() == [True, True, False, False, True]
+    assert mark_alike(marked, alike, sizes).tolist() == [True, True, False, False, True]
     others = np.array([False, False, False, True, False])
-    assert (together(others, alike, sizes) == others).all()
+    assert (mark_alike(others, alike, sizes) == others).all()
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])

@@ -12,7 +12,7 @@ from drivers.reference import cases
 from ngcontact import Contact, ContactWarning, Elastic, Hooke, Problem, adapt, solve
 from ngcontact.adaptivity import refined
 from ngcontact.mesh import first_mesh
-from ngcontact.quadrature import features_of, look, unresolved, warn_of_jumps
+from ngcontact.quadrature import features_of, sample_data, unresolved, warn_of_jumps
 from ngcontact.quadrature.cells import lattice
 from ngcontact.quadrature.features import steps_along
 from tests.quadrature.test_loads import box, loaded, square
@@ -137,7 +137,7 @@ def bump(x, start, width):
 
 def found(problem, kind, maxh=0.3):
     mesh = first_mesh(problem, maxh)
-    look(problem, mesh)
+    sample_data(problem, mesh)
     return next(one for one in features_of(problem, mesh) if one.kind == kind and one.samples)
 
 

@@ -111,7 +111,7 @@ def test_rough_loads_in_any_unit(unit, load):
     assert total == pytest.approx(0.01 * load * unit, rel=1e-4)
     # It vanishes but on the strip: |P|^2 = |Pi P|^2 + |P - Pi P|^2.
     inside = ng.Integrate((projection[1] / load) ** 2, mesh, ng.BND, order=8)
-    rest = ((rough.rest / load) ** 2).sum()
+    rest = ((rough.projection_error / load) ** 2).sum()
     assert inside + rest == pytest.approx(0.01 * unit, rel=1e-4)
 
 

@@ -13,7 +13,7 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Hooke, adapt, solve
-from ngcontact.problem.values import told
+from ngcontact.problem.values import described
 from ngcontact.results import with_progress
 from tests.results.test_values import two_blocks
 
@@ -103,7 +103,7 @@ def test_a_bound_counts_where_there_is_one(capsys):
     ],
 )
 def test_values_in_a_few_characters(value, text):
-    assert told(value) == text
+    assert described(value) == text
 
 
 def cells(html):

@@ -178,7 +178,7 @@ def _line_element(boundary: BoundaryTrace, segment: Index, s: Array) -> Array:
     return np.asarray(ds * boundary.measure(segment, s))
 
 
-def left_out(pair: ContactState, boundary: BoundaryTrace) -> float:
+def held_point_force(pair: ContactState, boundary: BoundaryTrace) -> float:
     """Size of the force at points that supports hold, of which no row tells; of the element's size.
 
     A line in contact that ends on Gamma_u has a force there that its supports cannot tell from

@@ -36,7 +36,7 @@ from ...errors import ContactError, warn
 from ...fem import BoundaryTrace, FacetTrace, load_vector, stress_of
 from ...quadrature import has_rough_loads
 from ..bound import WORK_BONUS, EquilibratedStress, Guaranteed, force_bar
-from .contact import approach_of, area_in_contact, direction_of, ends_of, left_out, peak_of
+from .contact import approach_of, area_in_contact, direction_of, ends_of, held_point_force, peak_of
 from .stresses import largest_von_mises, singular_corners
 from .surfaces import pressure_field, quantities_of_solids
 from .table import Quantities, Quantity, unknown
@@ -127,7 +127,7 @@ class Measured(Guaranteed):
         largest = max(abs(float(one.force.sum())) for one in self.pairs)
         factor = FORCE_FACTORS[min(self.order, max(FORCE_FACTORS))]
         of_order = factor * self.relative_error_estimate**2 * largest
-        sum_error = of_order + left_out(state, boundary)
+        sum_error = of_order + held_point_force(state, boundary)
         of_shape = float(np.linalg.norm(load_by_shape(self.problem, self.mesh)))
         force = self.contact_force(pair)
         told = {"force": e @ force, "force, x": force[0] + 0.0, "force, y": force[1] + 0.0}

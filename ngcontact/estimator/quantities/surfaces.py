@@ -128,7 +128,7 @@ def figures(solution: Solved, state: ContactState) -> tuple[Array, Array]:
     return np.array(values), trace.point(facet[[at]], s[[at]])[0]
 
 
-def told_before(solution: Estimated) -> tuple[Array, ...]:
+def earlier_figures(solution: Estimated) -> tuple[Array, ...]:
     """Figures (c, 8) of a level of solids and the one before it, which the next level needs."""
     now = np.array([figures(solution, state)[0] for state in solution.pairs])
     return (*solution.earlier, now)[-EARLIER_LEVELS:]
