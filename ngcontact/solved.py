@@ -122,9 +122,10 @@ class Solved:
     @cached_property
     def nodal_reaction(self) -> Array:
         """Forces (n, d) of the supports on the nodes, force per thickness, A u - f + B' force."""
-        d = self.discrete
-        residual = d.space.A @ self.displacement.vec.FV().NumPy() - d.space.right_side
-        return (d.space.basis.T @ residual + d.B.T @ self.force).reshape(self.problem.dim, -1).T
+        d, space = self.discrete, self.discrete.space
+        internal = space.A @ self.displacement.vec.FV().NumPy()
+        residual = internal - space.condensed(space.right_side)
+        return (space.basis.T @ residual + d.B.T @ self.force).reshape(self.problem.dim, -1).T
 
     @cached_property
     def reactions(self) -> dict[str, Array]:

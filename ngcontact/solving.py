@@ -196,7 +196,7 @@ def solve_on(
             mesh=mesh,
             order=order,
             element=element,
-            displacement=discrete.displacement(minimiser.u),
+            displacement=discrete.displacement(minimiser.u, discrete.space.right_side),
             discrete=discrete,
             minimiser=minimiser,
             work={

@@ -250,4 +250,6 @@ def admissible_set(problem: Problem, space: Space, found: Sequence[ContactLine])
     length = float(np.abs(trace.curve).max())
     stiffness = space.stiffness() if rows.coupling.nnz else None  # else all rows have one host
     basis = change_of_basis(conditions, rows, length, stiffness)
+    if space.inner.any():  # of these nothing is left in the matrix
+        basis = replace(basis, fixed=basis.fixed | space.inner)
     return AdmissibleSet(kept_lines(lines, basis.kept), conditions, rows.select(basis.kept), basis)

@@ -154,10 +154,11 @@ class DiscreteProblem:
             u=y, force=force, active=active, steps=[], factorizations=work[0], back_solves=work[1]
         )
 
-    def displacement(self, unknowns: Array) -> ng.GridFunction:
-        """The displacement with the given `unknowns` (2n,)."""
-        result = ng.GridFunction(self.space.V)
-        result.vec.FV().NumPy()[:] = self.space.basis @ (self.basis.T @ unknowns)
+    def displacement(self, unknowns: Array, load: Array | None = None) -> ng.GridFunction:
+        """The displacement with the given `unknowns` (2n,), under a `load` (2N,) if any."""
+        result, space = ng.GridFunction(self.space.V), self.space
+        u = space.basis @ (self.basis.T @ unknowns)
+        result.vec.FV().NumPy()[:] = space.extended(u, load)
         return result
 
 
@@ -281,11 +282,13 @@ def discretise(
     T = space.basis @ basis.T
     same_unknowns = previous is not None and same_basis(basis, previous.basis)
     if previous is not None and same_unknowns and np.array_equal(nodal, previous.space.nodal):
-        program = _program(T.T @ space.right_side, admissible, rigid, previous.program.K)
+        program = _program(
+            T.T @ space.condensed(space.right_side), admissible, rigid, previous.program.K
+        )
         systems = previous.systems
     else:
         K, matrix = congruent(space.matrix, space.A, T)
-        program = _program(T.T @ space.right_side, admissible, rigid, K)
+        program = _program(T.T @ space.condensed(space.right_side), admissible, rigid, K)
         systems = linear_systems(program, matrix, space, basis)
     return DiscreteProblem(
         problem=problem,

@@ -37,8 +37,11 @@ class Space:
     nodal: Index  # (k,), segments of the trace on which conditions are posed at nodes
     # (2N, 2n) from n node values there, and unknowns elsewhere, to the unknowns of V.
     basis: sp.csr_array
-    A: sp.csr_array  # (2N, 2N), stiffness
-    matrix: ng.BaseMatrix  # the same for NGSolve, in the same memory
+    form: ng.BilinearForm
+    # (2N, 2N), its stiffness; where there are unknowns `inner`, of elements alone, the Schur
+    # complement of these, whose rows are empty (static condensation)
+    A: sp.csr_array
+    inner: Mask  # (2N,)
     f: Array  # (2N,), load
     initial: Array | None  # (2N,), what initial strains add to that, if there are any
     vertices: Array  # (nv, 2), where those of the mesh were
@@ -47,6 +50,41 @@ class Space:
     def right_side(self) -> Array:
         """Load with initial strains, (2N,): A u is this where nothing is held."""
         return self.f if self.initial is None else self.f + self.initial
+
+    @property
+    def matrix(self) -> ng.BaseMatrix:
+        """A for NGSolve, in the same memory."""
+        return self.form.mat
+
+    def _times(self, operator: ng.BaseMatrix, x: Array) -> Array:
+        """What an operator of the form makes of `x` (2N,), at the unknowns `inner` alone."""
+        right, product = self.matrix.CreateRowVector(), self.matrix.CreateColVector()
+        right.FV().NumPy()[:] = x
+        product.data = operator * right
+        return np.asarray(product.FV().NumPy())
+
+    def condensed(self, f: Array) -> Array:
+        """What a load `f` (2N,) is to A: f_b - A_bi A_ii^-1 f_i at unknowns b, none at inner i."""
+        if not self.inner.any():
+            return f
+        return np.where(self.inner, 0.0, f + self._times(self.form.harmonic_extension_trans, f))
+
+    def extended(self, u: Array, f: Array | None = None) -> Array:
+        """`u` (2N,) with the inner unknowns of least energy under a load `f` (2N,), if any."""
+        if not self.inner.any():
+            return u
+        inner = self._times(self.form.harmonic_extension, np.where(self.inner, 0.0, u))
+        if f is not None:
+            inner = inner + self._times(self.form.inner_solve, f)
+        return np.where(self.inner, inner, u)
+
+    def energy(self, u: Array) -> float:
+        """A(u, u) of HH81 (3.1) for a displacement `u` (2N,)."""
+        energy = float(u @ (self.A @ u))
+        if self.inner.any():
+            left = np.where(self.inner, u - self.extended(u), 0.0)
+            energy += float(left @ self._times(self.form.inner_matrix, left))
+        return energy
 
     @cached_property
     def diagonal(self) -> Array:
@@ -165,7 +203,8 @@ def assemble(
     nodal = np.arange(len(trace.region)) if nodal is None else nodal
     u, v = V.TnT()
     model = model_of(problem)
-    a = ng.BilinearForm(V, symmetric=True)
+    condense = mesh.dim == 2 and trace.order > 2  # else no unknown is of one element alone
+    a = ng.BilinearForm(V, symmetric=True, condense=condense, store_inner=condense)
     rough = rough_moduli(problem, mesh)
     for body, law in problem.materials.items():
         measures = _form_measures(trace, body, varies(law), rough)
@@ -173,13 +212,15 @@ def assemble(
             for dx in measures:
                 a += work * dx
     a.Assemble()
+    A = shared(a.mat)
     return Space(
         V=V,
         trace=trace,
         nodal=nodal,
         basis=node_basis(V, trace, nodal, element),
-        A=shared(a.mat),
-        matrix=a.mat,
+        form=a,
+        A=A,
+        inner=(np.diff(A.indptr) == 0) & condense,
         f=load_vector(problem, V, LOAD_BONUS),
         initial=initial_load(problem, V, trace),
         vertices=MeshArrays(mesh).vertices,
@@ -189,7 +230,13 @@ def assemble(
 def body_of_unknown(space: Space, bodies: Bodies) -> Index:
     """Number of the body that each unknown (2N,) of V_h belongs to."""
     # Vertices come first, so that the first entry of a row is one of an element of its body.
-    return bodies.of_vertex[space.A.indices[space.A.indptr[:-1]]]
+    vertex = np.empty(len(space.inner), dtype=np.intp)
+    vertex[~space.inner] = space.A.indices[space.A.indptr[:-1][~space.inner]]
+    if space.inner.any():  # for each component in the order of the elements
+        of_element = MeshArrays(space.trace.mesh).elements[:, 0]
+        each = np.count_nonzero(space.inner) // (2 * len(of_element))
+        vertex[space.inner] = np.tile(np.repeat(of_element, each), 2)
+    return bodies.of_vertex[vertex]
 
 
 def potential_energy(problem: Problem, space: Space, displacement: ng.GridFunction) -> float:
@@ -222,7 +269,7 @@ def _scaled_energy(
     u, mesh, order = displacement.vec.FV().NumPy(), space.trace.mesh, space.trace.order
     size = power_of_two(u)
     if space.initial is None:
-        energy = float(u / size @ (space.A @ (u / size)))
+        energy = space.energy(u / size)
         if energy > CANCELLED_ENERGY * float(space.diagonal @ (u / size) ** 2):
             return size, energy
     space.require_mesh()

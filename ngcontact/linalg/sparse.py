@@ -12,12 +12,12 @@ import numpy as np
 import scipy.sparse as sp
 from pyngcore import Array_D_S, Array_I_S
 
-from ..arrays import Array, Factor, Index, Mask, Solve, from_triplets
+from ..arrays import Array, Factor, Index, Mask, Solve
 
 # Unknowns up to which one thread factorises sooner than NGSolve has started others and they have
 # found their work: that takes 25 ms of processor time, 10 000 unknowns of order 3 on one thread 33.
 ONE_THREAD = 10_000
-MULTIPLIED_ENTRIES = 200_000  # of a matrix, up to which T'AT costs no more than the change to it
+MULTIPLIED_ENTRIES = 20_000  # of a matrix, up to which T'AT costs no more than the change to it
 
 _COUNT = threading.Lock()  # of the threads of managers to come, one number for the whole process
 
@@ -91,16 +91,9 @@ def change_of_basis(A: sp.csr_array, T: sp.csr_array) -> sp.csr_array:
 
     `T` (n, n) is the identity but for a few rows.
     """
-    same = np.diff(T.indptr) == 1
-    single = np.flatnonzero(same)
-    entry = T.indptr[single]
-    same[single] = (T.indices[entry] == single) & (T.data[entry] == 1.0)
-    changed = np.flatnonzero(~same)
-    each = np.arange(changed.size)
-    ones = from_triplets(np.ones(changed.size), each, changed, (changed.size, T.shape[0]))
-    D = T[changed] - ones  # T = I + D, its rows
-    rows = D.T @ A[changed]  # D'A: as A is symmetric, AD is its transpose
-    return (rows + rows.T + rows[:, changed] @ D).tocsr()
+    D = T - sp.eye_array(A.shape[0], format="csr")
+    part = D.T.tocsr() @ A  # D'A: as A is symmetric, AD is its transpose
+    return (part @ T + part.T).tocsr()
 
 
 @contextmanager

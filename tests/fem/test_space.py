@@ -5,6 +5,7 @@ import math
 import ngsolve as ng
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from ngsolve.meshes import MakeStructured2DMesh
 
 from drivers.reference import cases
@@ -12,6 +13,7 @@ from ngcontact import Elastic, Hooke, Problem, solve
 from ngcontact.fem import boundary_trace
 from ngcontact.fem.space import assemble
 from ngcontact.geometries import disc, graphs, rings
+from ngcontact.linalg import shared
 from ngcontact.mesh import curve, first_mesh
 
 ORDERS = [1, 2, 3, 4]
@@ -100,9 +102,37 @@ def test_stiffness_and_loads_of_any_function_are_integrals(make, element, order)
     C = ng.CF(tuple(isotropic(1.0, 0.3).ravel()), dims=(3, 3))
     energy = ng.Integrate(E * ng.InnerProduct(C * e, e), mesh, order=20)
     # Gradients of mapped polynomials are rational: the rule has an error, measured up to 6e-5.
-    assert v @ (space.A @ v) == pytest.approx(energy, rel=2e-4)
+    assert space.energy(v) == pytest.approx(energy, rel=2e-4)
     work = ng.Integrate(F * u, mesh, order=12) + ng.Integrate(P * u, mesh, ng.BND, order=20)
     assert v @ space.f == pytest.approx(work, rel=1e-7)
+
+
+@pytest.mark.parametrize("order", [3, 4])
+def test_unknowns_inside_of_elements_are_condensed(order):
+    """Against the whole matrix: loads on the others, extensions under a load, energies."""
+    mesh = curve(CURVED["disc"](), order, "isoparametric")[0]
+    F = ng.CF((1 + ng.x, ng.y**2))
+    space = space_of(mesh, "isoparametric", order, force=dict.fromkeys(mesh.GetMaterials(), F))
+    u, v = space.V.TnT()
+    whole = ng.BilinearForm(space.V, symmetric=True)
+    C = ng.CF(tuple(isotropic(2.0, 0.3).ravel()), dims=(3, 3))
+    e, d = (
+        ng.CF((ng.Grad(w)[0, 0], ng.Grad(w)[1, 1], ng.Grad(w)[0, 1] + ng.Grad(w)[1, 0]))
+        for w in (u, v)
+    )
+    # The rule of curved elements is that of the package.
+    whole += ng.InnerProduct(C * e, d) * ng.dx(bonus_intorder=2)
+    A = sp.csr_array(shared(whole.Assemble().mat))
+    inner, f = space.inner, space.f
+    per_element = (order - 1) * (order - 2)
+    assert np.count_nonzero(inner) == per_element * mesh.ne
+    w = np.random.default_rng(order).normal(size=len(f))
+    scale = np.abs(A.data).max()
+    left = f - A @ space.extended(w, f)
+    assert np.abs(left[inner]).max() <= 1e-12 * scale
+    outer = left - (space.condensed(f) - space.A @ w)
+    assert np.abs(outer[~inner]).max() <= 1e-12 * scale
+    assert space.energy(w) == pytest.approx(w @ (A @ w), rel=1e-12)
 
 
 def square(order=1, **data):
