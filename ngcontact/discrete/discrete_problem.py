@@ -37,7 +37,7 @@ from ..linalg import (
     truncated_multigrid,
 )
 from ..mesh import vertex_parents
-from ..problem import MeshArrays, Problem, varies
+from ..problem import Problem, varies
 from ..qp import (
     BorderedSystems,
     Iterate,
@@ -169,7 +169,7 @@ def same_mesh(trace: BoundaryTrace, space: Space) -> bool:
         trace.model is old.model
         and trace.same_nodes(old)
         and np.array_equal(trace.curve, old.curve)
-        and np.array_equal(MeshArrays(trace.mesh).vertices, space.vertices)
+        and np.array_equal(trace.arrays.vertices, space.vertices)
     )
 
 

@@ -22,7 +22,7 @@ from ..constraints import BasisTransformation, Conditions, Rows
 from ..errors import NoEquilibriumError
 from ..fem import Bodies, Space, body_of_unknown, connected_bodies, model_of
 from ..linalg import shared
-from ..problem import MeshArrays, Problem, numbers
+from ..problem import Problem, numbers
 from ..qp import NULL_SPACE_TOLERANCE, NullSpace, pinned_null_space, vanishing_combinations
 from ..quadrature import Load, SampledElements, loads_of
 
@@ -198,7 +198,7 @@ def _node_values(space: Space, bodies: Bodies) -> Array:
     place, one = np.zeros((n, d)), np.zeros(n)
     one[: trace.mesh.nv] = 1.0
     if trace.geometry_order == 1:  # edge and inner functions have no part in straight elements
-        place[: trace.mesh.nv] = MeshArrays(trace.mesh).vertices
+        place[: trace.mesh.nv] = trace.arrays.vertices
     else:
         field = ng.GridFunction(trace.space)
         for axis, x in enumerate((ng.x, ng.y, ng.z)[:d]):
@@ -431,7 +431,7 @@ def _integrated_work(loads: Sequence[Load], free: FreeMotions) -> tuple[Array, A
     space, bodies = free.space, free.bodies
     mesh, count = space.trace.mesh, len(free.combinations[0])
     found = np.zeros((2, count))
-    body = {ng.VOL: bodies.of_vertex[MeshArrays(mesh).elements[:, 0]], ng.BND: bodies.of_segment}
+    body = {ng.VOL: bodies.of_vertex[space.trace.arrays.elements[:, 0]], ng.BND: bodies.of_segment}
     for load in loads:
         of = body[load.region.VB()]
         for r, b in itertools.product(range(count), range(len(bodies.names))):

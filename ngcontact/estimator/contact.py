@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.polynomial.legendre import legvander
@@ -170,10 +170,8 @@ def followed_gap(
     gap, rule = line.contact.gap, gauss(order)[0]
     if gap is None or isinstance(gap, float) or len(pieces.local) == 0:
         return pieces
-    ends = np.concatenate([[0.0], rule, [1.0]])
-    between = (ends[1:] + ends[:-1]) / 2
-    basis = [legvander(2 * s - 1, len(rule) - 1) for s in (rule, between)]
-    follow = basis[1] @ np.linalg.inv(basis[0])
+    between, follow = _between(order)
+    places = np.concatenate([rule, between])
 
     def gap_at(s: Array) -> Array:
         """Data (r, n) at places `s` (n,) of the pieces (r,), lengths."""
@@ -184,7 +182,7 @@ def followed_gap(
 
     done, number = [], 0
     while len(pieces.local):
-        at_rule, at_between = gap_at(rule), gap_at(between)
+        at_rule, at_between = np.split(gap_at(places), [len(rule)], axis=1)
         number += len(pieces.local)
         allowed = (
             UNRESOLVED_GAP * np.ptp(at_rule, axis=1) + OPENING_ROUND_OFF * np.abs(at_rule).max()
@@ -200,6 +198,19 @@ def followed_gap(
         return done[0]
     found = joined(done)
     return rows_of(found, np.lexsort((found.start, found.local)))
+
+
+@lru_cache
+def _between(order: int) -> tuple[Array, Array]:
+    """Places (q + 1,) between the q Gauss points of `order` on [0, 1].
+
+    And the values there of the polynomial through values at the points, (q + 1, q).
+    """
+    rule = gauss(order)[0]
+    ends = np.concatenate([[0.0], rule, [1.0]])
+    between = (ends[1:] + ends[:-1]) / 2
+    basis = [legvander(2 * s - 1, len(rule) - 1) for s in (rule, between)]
+    return between, np.asarray(basis[1] @ np.linalg.inv(basis[0]))
 
 
 def directions(

@@ -51,7 +51,6 @@ from ..fem import (
 )
 from ..lagrange import gauss, gauss_derivative
 from ..linalg import cholesky, lower_half, shared
-from ..problem import MeshArrays
 from ..quadrature import features_of, loads_of, pieces, rough_moduli, rough_segments
 from ..solved import Solved
 from .contact import between_nodes, closing_energy, on_contact, remaining
@@ -114,7 +113,7 @@ def scaled(solved: Solved) -> ScaledSolution:
         rigidity=stiffness.rigidity / modulus,
         incompressibility=stiffness.ratio,
         rough=rough,
-        diameter=MeshArrays(mesh).diameters,
+        diameter=boundary.arrays.diameters,
     )
 
 

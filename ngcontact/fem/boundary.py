@@ -45,6 +45,17 @@ def edge_bubbles(order: int, axis: int = 0) -> Array:
     return np.array([shape.CalcShape(x, 0.0, 0.0).NumPy()[2:] for x in points.tolist()])
 
 
+@lru_cache
+def _edge_coefficients(order: int, axis: int) -> Array:
+    """Coefficients (order - 1, order + 1) of NGSolve's edge functions by values at all nodes.
+
+    Those of the interior nodes, less the linear part.
+    """
+    s = gauss_lobatto(order, axis)[1:-1]
+    values = np.column_stack([s - 1, np.eye(order - 1), -s])
+    return np.asarray(np.linalg.inv(edge_bubbles(order, axis)) @ values)
+
+
 def nodal_basis(trace: BoundaryTrace, segments: Index) -> sp.csr_array:
     """Matrix (n, n) from node values on `segments` (k,) and other unknowns to those of NGSolve."""
     order, size = trace.order, trace.space.ndof
@@ -56,23 +67,16 @@ def nodal_basis(trace: BoundaryTrace, segments: Index) -> sp.csr_array:
     axis = np.where(falling, -axis, axis)
     _, first = np.unique(nodes[:, 1], return_index=True)
     nodes, axis = nodes[first], axis[first]
-    # Edge function coefficients: bubbles (values - linear part).
-    values = np.zeros((len(nodes), order - 1, order + 1))
-    for end in np.unique(axis):
-        s = gauss_lobatto(order, int(end))[1:-1]
-        bubbles = np.linalg.inv(edge_bubbles(order, int(end)))
-        values[axis == end] = bubbles @ np.column_stack([s - 1, np.eye(order - 1), -s])
-    rows = np.repeat(nodes[:, 1:-1, None], order + 1, axis=2)
-    cols = np.repeat(nodes[:, None, :], order - 1, axis=1)
-    rest = np.ones(size, dtype=bool)
-    rest[nodes[:, 1:-1]] = False
-    same = np.flatnonzero(rest)
-    return from_triplets(
-        np.concatenate([np.ones(len(same)), values.ravel()]),
-        np.concatenate([same, rows.ravel()]),
-        np.concatenate([same, cols.ravel()]),
-        (size, size),
-    )
+    count = np.ones(size + 1, dtype=np.int32)  # of entries in rows, of the identity but ...
+    count[0], count[nodes[:, 1:-1] + 1] = 0, order + 1
+    starts = np.cumsum(count, dtype=np.int32)
+    columns = np.repeat(np.arange(size, dtype=np.int32), count[1:])
+    values = np.ones(len(columns))
+    places = starts[nodes[:, 1:-1]][:, :, None] + np.arange(order + 1)  # ... on edges
+    columns[places] = nodes[:, None]
+    for end in set(axis.tolist()):
+        values[places[axis == end]] = _edge_coefficients(order, end)
+    return sp.csr_array((values, columns, starts), (size, size))
 
 
 def unknowns(mesh: ng.Mesh, order: int, element: str) -> int:
@@ -167,6 +171,7 @@ class BoundaryTrace:
     """
 
     mesh: ng.Mesh
+    arrays: MeshArrays  # of the mesh as it was
     space: ng.FESpace  # scalar H1, whose unknowns number the nodes
     order: int  # degree of the displacement on a segment
     geometry_order: int  # degree of the curve of a segment
@@ -258,6 +263,8 @@ class BoundaryTrace:
 
     def measure(self, segment: Index, s: Array) -> Array:
         """What a length stands for in the body, (k,), at `s` (k,) of segments `segment` (k,)."""
+        if not self.model.extent:
+            return np.ones(len(segment))
         return self.model.measure(self.point(segment, s))
 
     def lengths(self, segments: Index) -> Array:
@@ -308,17 +315,24 @@ class BoundaryTrace:
         """Unknowns (k, q, ...) of functions of `values` (k, q, ...) at nodes of `segments` (k,)."""
         return values
 
-    def lies_on(self, segment: Index, *patterns: str | None) -> Mask:
+    def lies_on(self, segment: Index | slice, *patterns: str | None) -> Mask:
         """Which of `segment` (k,) are of boundaries that patterns select, (k,); None does not."""
-        regions = np.zeros(len(self.mesh.GetBoundaries()), dtype=bool)
+        known = self._masks
         for pattern in patterns:
-            if pattern is not None:
-                regions |= boundary_mask(self.mesh, pattern)
-        return regions[self.region[segment]]
+            if pattern is not None and pattern not in known:
+                known[pattern] = boundary_mask(self.mesh, pattern)[self.region]
+        chosen = [known[pattern] for pattern in patterns if pattern is not None]
+        if len(chosen) == 1:
+            return chosen[0][segment]
+        return np.any([np.zeros(len(self.region), dtype=bool), *chosen], axis=0)[segment]
+
+    @cached_property
+    def _masks(self) -> dict[str, Mask]:
+        return {}
 
     def segments(self, *patterns: str | None) -> Index:
         """Segments (j,) of the boundaries that the patterns select, as in `lies_on`."""
-        return self.lies_on(np.arange(len(self.region)), *patterns).nonzero()[0]
+        return self.lies_on(slice(None), *patterns).nonzero()[0]
 
     @cached_property
     def curved_segments(self) -> Mask:
@@ -331,11 +345,14 @@ class BoundaryTrace:
     @cached_property
     def curved_elements(self) -> Mask:
         """Elements (ne,) with a curved side."""
-        view = MeshArrays(self.mesh)
         if self.geometry_order == 1:
             return np.zeros(self.mesh.ne, dtype=bool)
-        bent = self.curved_segments
-        return np.asarray(np.isin(view.keys(view.sides), view.keys(view.facets[bent])).any(axis=1))
+        view, bent = self.arrays, self.curved_segments
+        curved = np.bincount(self.element[bent], minlength=self.mesh.ne) > 0
+        if self.inner[bent].any():  # between two elements
+            sides = view.keys(view.sides)
+            curved |= np.isin(sides, view.keys(view.facets[bent])).any(axis=1)
+        return np.asarray(curved)
 
     @cached_property
     def _middles(self) -> NDArray:
@@ -397,6 +414,7 @@ def segment_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryTr
     axis = model.on_axis(curve.reshape(-1, 2)).reshape(-1, degree + 1)
     return BoundaryTrace(
         mesh=mesh,
+        arrays=view,
         space=space,
         order=order,
         geometry_order=degree,
@@ -427,7 +445,7 @@ class Bodies:
 
 def connected_bodies(trace: BoundaryTrace) -> Bodies:
     """The connected pieces of the mesh of `trace`."""
-    piece = MeshArrays(trace.mesh).pieces
+    piece = trace.arrays.pieces
     pieces, number = np.unique(piece[trace.nodes[:, 0]], return_inverse=True)
     materials = trace.mesh.GetMaterials()
     names = {int(b): materials[m] for b, m in zip(number, trace.body, strict=True)}

@@ -251,6 +251,7 @@ def facet_trace(mesh: ng.Mesh, order: int) -> FacetTrace:
     none = np.zeros(len(vertices), dtype=np.intp)
     trace = FacetTrace(
         mesh=mesh,
+        arrays=view,
         space=space,
         order=order,
         geometry_order=degree,

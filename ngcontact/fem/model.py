@@ -83,12 +83,12 @@ class Model:
         """Resultant (2,) in the body of `force` (2,), a sum over nodes in the plane."""
         return force
 
-    def in_plane(self, voigt: list[CF]) -> CF:
+    def in_plane(self, voigt: CF) -> CF:
         """Stress (2, 2) in the plane by its q Voigt components."""
         xx, yy, xy = voigt
         return ng.CF((xx, xy, xy, yy), dims=(2, 2))
 
-    def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: list[CF]) -> CF:
+    def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: CF) -> CF:
         """Stress normal to the plane, a scalar, by the q Voigt components of the stress.
 
         A general law does not say what it is in plane strain: 0 is taken there.
@@ -113,7 +113,7 @@ class _PlaneStress(Model):
     def initial_strain(self, law: Elastic | Hooke, e: InitialStrain) -> CF:
         return ng.CF((e.xx, e.yy, e.shear))
 
-    def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: list[CF]) -> CF:
+    def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: CF) -> CF:
         return ng.CF(0.0)
 
 
@@ -169,11 +169,11 @@ class _Axisymmetric(Model):
     def resultant(self, force: Array) -> Array:
         return np.array([0.0, force[1]])  # radial forces cancel around the axis
 
-    def in_plane(self, voigt: list[CF]) -> CF:
+    def in_plane(self, voigt: CF) -> CF:
         rr, zz, _, rz = voigt
         return ng.CF((rr, rz, rz, zz), dims=(2, 2))
 
-    def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: list[CF]) -> CF:
+    def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: CF) -> CF:
         return voigt[2]
 
     def hoop(self, normal: CF) -> CF:

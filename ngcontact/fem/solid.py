@@ -27,12 +27,12 @@ class _Solid(Model):
     def volume(self, u: CF) -> CF:
         return ng.Trace(ng.Grad(u))
 
-    def in_plane(self, voigt: list[CF]) -> CF:
+    def in_plane(self, voigt: CF) -> CF:
         """Stress (3, 3) by its Voigt components."""
         xx, yy, zz, yz, xz, xy = voigt
         return ng.CF((xx, xy, xz, xy, yy, yz, xz, yz, zz), dims=(3, 3))
 
-    def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: list[CF]) -> CF:
+    def out_of_plane(self, materials: Laws, strains: Strains, mesh: ng.Mesh, voigt: CF) -> CF:
         """Refused: all of the stress of a solid is in its tensor."""
         raise ValueError("a solid has no stress out of a plane: .stress has all of it, (3, 3)")
 

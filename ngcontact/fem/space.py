@@ -110,7 +110,9 @@ class Space:
 
     def stiffness(self) -> Array:
         """Force per displacement of the nodes, (n,), by its order of magnitude."""
-        diagonal = self.basis.power(2).T @ self.diagonal
+        B = self.basis
+        squares = B.data**2 * np.repeat(self.diagonal, np.diff(B.indptr))
+        diagonal = np.bincount(B.indices, squares, B.shape[1])
         return diagonal.reshape(self.trace.model.dim, -1).max(axis=0)
 
 
@@ -223,7 +225,7 @@ def assemble(
         inner=(np.diff(A.indptr) == 0) & condense,
         f=load_vector(problem, V, LOAD_BONUS),
         initial=initial_load(problem, V, trace),
-        vertices=MeshArrays(mesh).vertices,
+        vertices=trace.arrays.vertices,
     )
 
 
@@ -233,7 +235,7 @@ def body_of_unknown(space: Space, bodies: Bodies) -> Index:
     vertex = np.empty(len(space.inner), dtype=np.intp)
     vertex[~space.inner] = space.A.indices[space.A.indptr[:-1][~space.inner]]
     if space.inner.any():  # for each component in the order of the elements
-        of_element = MeshArrays(space.trace.mesh).elements[:, 0]
+        of_element = space.trace.arrays.elements[:, 0]
         each = np.count_nonzero(space.inner) // (2 * len(of_element))
         vertex[space.inner] = np.tile(np.repeat(of_element, each), 2)
     return bodies.of_vertex[vertex]
@@ -298,19 +300,19 @@ def elastic_strain(problem: Problem, displacement: ng.GridFunction) -> ng.Coeffi
     return e if e0 is None else e - e0
 
 
-def voigt_stress(problem: Problem, displacement: ng.GridFunction) -> list[ng.CoefficientFunction]:
-    """The q Voigt components of the stress of a displacement, in the units of the moduli."""
-    model, mesh = model_of(problem), displacement.space.mesh
-    e = elastic_strain(problem, displacement)
-    by_body = {
-        body: model.stress(law.voigt(problem.model), e) for body, law in problem.materials.items()
-    }
-    return [mesh.MaterialCF({body: s[i] for body, s in by_body.items()}) for i in range(e.dim)]
+def voigt_stress(problem: Problem, displacement: ng.GridFunction) -> ng.CoefficientFunction:
+    """The Voigt stress (q,) of a displacement, in the units of the moduli."""
+    model, e = model_of(problem), elastic_strain(problem, displacement)
+    laws = problem.materials.items()
+    return displacement.space.mesh.MaterialCF(
+        {body: model.stress(law.voigt(problem.model), e) for body, law in laws}
+    )
 
 
 def stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.CoefficientFunction:
     """Stress (d, d) of a displacement, in the plane (2, 2), sigma_h, in units of the moduli."""
-    return model_of(problem).in_plane(voigt_stress(problem, displacement))
+    # Compiled, the strains are evaluated once for all components.
+    return model_of(problem).in_plane(voigt_stress(problem, displacement)).Compile()
 
 
 def normal_stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.CoefficientFunction:

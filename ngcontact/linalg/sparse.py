@@ -17,7 +17,7 @@ from ..arrays import Array, Factor, Index, Mask, Solve
 # Unknowns up to which one thread factorises sooner than NGSolve has started others and they have
 # found their work: that takes 25 ms of processor time, 10 000 unknowns of order 3 on one thread 33.
 ONE_THREAD = 10_000
-MULTIPLIED_ENTRIES = 20_000  # of a matrix, up to which T'AT costs no more than the change to it
+MULTIPLIED_ENTRIES = 60_000  # of a matrix, up to which T'AT costs no more than the change to it
 
 _COUNT = threading.Lock()  # of the threads of managers to come, one number for the whole process
 

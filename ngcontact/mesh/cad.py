@@ -55,6 +55,14 @@ class CadEdge:
         exact = np.abs(centre + shapes @ axes - self._x).max() <= FORMULA_DISTANCE * self.size
         return np.vstack([centre, axes]) if exact else None
 
+    @cached_property
+    def _circle(self) -> bool:
+        """Whether it is an arc of a circle, as far as is known."""
+        if self._axes is None:
+            return False
+        a, b = self._axes[1:]
+        return bool(max(abs(a @ b), abs(a @ a - b @ b)) <= EXACT * (a @ a))
+
     @property
     def name(self) -> str:
         """Boundary name."""
@@ -102,6 +110,12 @@ class CadEdge:
             along = self._x[-1] - self._x[0]
             s = (points - self._x[0]) @ along / (along @ along)
             return self.start + np.clip(s, 0, 1) * (self.stop - self.start)
+        if self._axes is not None and self._circle:
+            centre, a, b = self._axes
+            offset = points - centre
+            t = self.start + (np.arctan2(offset @ b, offset @ a) - self.start) % (2 * np.pi)
+            nearer = 2 * t > self.start + self.stop + 2 * np.pi  # to the start, beyond the stop
+            return np.where(nearer, self.start, np.minimum(t, self.stop))
         nearest = ((points[:, None] - self._x) ** 2).sum(axis=2).argmin(axis=1)
 
         def step(t: Array) -> Array:

@@ -20,8 +20,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from ..arrays import Array, Index, across
 from ..contact import ContactState, in_contact, partners, prescribed_gap, twins
@@ -141,8 +139,10 @@ def zones_of(state: ContactState) -> ContactZones:
     both = np.concatenate([along, across])
     touching = closed[both].sum(axis=1)
     inside = both[touching == 2]
-    graph = sp.coo_array((np.ones(len(inside)), inside.T), shape=2 * (len(closed),))
-    label = connected_components(graph, directed=False)[1]
+    label = np.arange(len(closed))
+    while (label[inside[:, 0]] != label[inside[:, 1]]).any():  # of paths: as often as they halve
+        np.minimum.at(label, inside, label[inside].min(axis=1, keepdims=True))
+        label = label[label]
     zones, number = np.unique(label[closed], return_inverse=True)
     zone, k = np.full(len(closed), -1), len(zones)
     zone[closed] = number

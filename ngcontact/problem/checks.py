@@ -142,8 +142,10 @@ def regions_of(
     masks: Masks = {}
     for pattern in patterns:
         # NGSolve drops the misspelt half of "left|rigth" without a word, so look at each half.
-        for part in [pattern] if set(pattern) & set("()[]{}\\") else pattern.split("|"):
-            if not mask_of(mesh, part).any():
+        mask = mask_of(mesh, pattern)
+        single = "|" not in pattern or set(pattern) & set("()[]{}\\")
+        for part in [pattern] if single else pattern.split("|"):
+            if not (mask if single else mask_of(mesh, part)).any():
                 known = sorted(set(names))
                 close = difflib.get_close_matches(part, known, n=1)
                 hint = f'did you mean "{close[0]}"? ' if close else ""
@@ -153,9 +155,8 @@ def regions_of(
                     hint = "it is a body, and boundaries are asked for; "
                 raise ValueError(f'{argument} "{part}" selects no region; {hint}there are {known}')
         label = f'{argument} "{pattern}"'
-        mask = {label: mask_of(mesh, pattern)}
-        refuse_common(names, masks, mask, "give every region once")
-        masks |= mask
+        refuse_common(names, masks, {label: mask}, "give every region once")
+        masks[label] = mask
     return masks
 
 
