@@ -211,7 +211,7 @@ def edge_integral(solution: ScaledSolution, jump: ng.CoefficientFunction, order:
     Where the other side is stiffer, times the ratio of both moduli mu: stiff bodies take up what
     soft ones cannot.
     """
-    mesh, mu, v = solution.mesh, solution.mu, solution.constant
+    mu, v = solution.mu, solution.constant
     squares = solution.model.weighted(ng.InnerProduct(jump, jump)).Compile()  # in half of the time
     squares = squares * (v + v.Other())
     dx = ng.dx(skeleton=True, bonus_intorder=order)

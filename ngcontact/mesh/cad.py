@@ -61,7 +61,7 @@ class CadEdge:
         if self._axes is None:
             return False
         a, b = self._axes[1:]
-        return bool(max(abs(a @ b), abs(a @ a - b @ b)) <= EXACT * (a @ a))
+        return bool(max(abs(a @ b), abs(a @ a - b @ b)) <= FORMULA_DISTANCE * (a @ a))
 
     @property
     def name(self) -> str:
