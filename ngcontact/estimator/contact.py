@@ -182,7 +182,8 @@ def followed_gap(
 
     done, number = [], 0
     while len(pieces.local):
-        at_rule, at_between = np.split(gap_at(places), [len(rule)], axis=1)
+        values = gap_at(places)
+        at_rule, at_between = values[:, : len(rule)], values[:, len(rule) :]
         number += len(pieces.local)
         allowed = (
             UNRESOLVED_GAP * np.ptp(at_rule, axis=1) + OPENING_ROUND_OFF * np.abs(at_rule).max()
