@@ -57,20 +57,20 @@ class Space:
         return self.form.mat
 
     def _times(self, operator: ng.BaseMatrix, x: Array) -> Array:
-        """What an operator of the form makes of `x` (2N,), at the unknowns `inner` alone."""
+        """An operator of the form times `x` (2N,), which is (2N,)."""
         right, product = self.matrix.CreateRowVector(), self.matrix.CreateColVector()
         right.FV().NumPy()[:] = x
         product.data = operator * right
         return np.asarray(product.FV().NumPy())
 
     def condensed(self, f: Array) -> Array:
-        """What a load `f` (2N,) is to A: f_b - A_bi A_ii^-1 f_i at unknowns b, none at inner i."""
+        """The load (2N,) on A of a load `f` (2N,): f_b - A_bi A_ii^-1 f_i, none at inner i."""
         if not self.inner.any():
             return f
         return np.where(self.inner, 0.0, f + self._times(self.form.harmonic_extension_trans, f))
 
     def extended(self, u: Array, f: Array | None = None) -> Array:
-        """`u` (2N,) with the inner unknowns of least energy under a load `f` (2N,), if any."""
+        """Unknowns (2N,): `u` (2N,) but for inner ones, of least energy under a load `f` (2N,)."""
         if not self.inner.any():
             return u
         inner = self._times(self.form.harmonic_extension, np.where(self.inner, 0.0, u))
