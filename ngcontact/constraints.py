@@ -196,7 +196,7 @@ class _Supported:
 
     @property
     def fixed(self) -> Mask:
-        """Which components in the frames are prescribed, (n, d)."""
+        """Mask (n, d) of the components in the frames that are prescribed."""
         return np.arange(self.values.shape[1]) < self.frames.used[:, None]
 
 

@@ -1,4 +1,4 @@
-"""What a user reads: displacement, pressure, gap, forces, errors, tables, files and pictures."""
+"""The solution: displacement, pressure, gap, forces, errors, tables, files and pictures."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ class Solution(Measured):
         return Draw(self.displacement, self.mesh, deformation=True)
 
     def __getstate__(self) -> dict[str, Any]:
-        """What is pickled and copied: factorisations stay behind."""
+        """State for pickling and copying, without factorisations."""
         return state_of(self)
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -171,7 +171,7 @@ class Solution(Measured):
         return line_of(self)
 
     def _repr_html_(self) -> str:
-        """What a notebook shows."""
+        """Table for notebooks."""
         return html_of(self)
 
     def write(self, path: str | os.PathLike[str]) -> Path:

@@ -21,7 +21,7 @@ STRESS_FREE = 1e-12  # norm of a stress, relative to the terms that cancel in it
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """What `Solution` is made of, and what all rooms read; its fields are explained there."""
+    """The solved mesh that all rooms read; `Solution` explains its fields."""
 
     problem: Problem
     mesh: ng.Mesh

@@ -1,4 +1,4 @@
-"""Where elements are refined whatever their indicators, or are not: singular points, limits."""
+"""Singular points and limits: elements that are refined whatever their indicators, or never."""
 
 from __future__ import annotations
 
@@ -89,18 +89,18 @@ class Singularities:
 
 
 def unresolvable(places: Sequence[Array]) -> Singularities:
-    """Those at `places` (k, 2) at which supports contradict each other."""
+    """Singularities at `places` (k, 2) at which supports contradict each other."""
     return _at(np.array(places).reshape(-1, 2), 0.0)
 
 
 def _at(places: Array, power: float, extents: Array | float = np.inf) -> Singularities:
-    """Those at `places` (k, 2), all of one power."""
+    """Singularities at `places` (k, 2), all of one power."""
     count = len(places)
     return Singularities(places, np.full(count, power), np.full(count, extents))
 
 
 def ends_of_contact(pairs: Sequence[ContactState]) -> Singularities:
-    """Where contact turns from binding to non-binding, on both bodies."""
+    """Singularities at transitions from binding to non-binding contact, on both bodies."""
     found = [_at(np.empty((0, 2)), END_POWER)]
     for pair in pairs:
         line, ends = pair.line, pair.transitions

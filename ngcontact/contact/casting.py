@@ -1,4 +1,4 @@
-"""Where the ray from a contact point meets the facing facets of a solid. NumPy only.
+"""Partners on facing facets of solids: points at which rays meet them. NumPy only.
 
 Facets are surfaces (q, n, 3) given by their points at the nodes of `reference.triangle`, as in
 `FacetTrace.curve`; `side` (q,) is +1 where the outward normal is that of the vertices' order.

@@ -1,4 +1,4 @@
-"""Where contact between solids ends: curves on the secondary, and the area that they enclose.
+"""Ends of contact between solids: curves on the secondary, and the area that they enclose.
 
 At a distance t from a frictionless end the pressure inside is K t^(1/2), and the gap outside is
 4 K t^(3/2) / (3 E*), as in the plane. So f = p^2 / K^2 inside, -(3 E* gap / 4 K)^(2/3) outside, is

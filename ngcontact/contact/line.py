@@ -56,7 +56,7 @@ class ContactLine:
 
     @property
     def dim(self) -> int:
-        """Of the bodies."""
+        """Dimension of the bodies."""
         return 2
 
     def pressure(self, force: Array) -> Array:
@@ -147,7 +147,7 @@ def partners(
 
 
 def no_point_faces(contact: Contact) -> str:
-    """What is said of a pair of which no point faces."""
+    """Message for a pair of which no point faces."""
     along = (
         "along its outward normals: choose boundaries that look at each other, or give the "
         "direction from the secondary body to the primary one"

@@ -1,4 +1,4 @@
-"""Where the ray from a contact point meets the facing curve. NumPy only.
+"""Partners on facing curves: points at which rays meet them. NumPy only.
 
 Curves are segments (q, degree + 1, 2) given by their points at the Gauss-Lobatto parameters, as
 in `BoundaryTrace.curve`; `side` (q,) is +1 where the outward normal lies to the right.
@@ -215,7 +215,7 @@ def snap(s: Array, nodes: Array) -> Array:
 
 
 def feet(points: Array, curve: Array, direction: Array | None) -> tuple[Index, Array]:
-    """Where segments pass points: on the lines along `direction`, or on their own normals.
+    """Parameters at which segments pass points: on lines along `direction`, or on own normals.
 
     For `points` (k, 2) and segments `curve` (q, p + 1, 2); without a `direction` (2,) on their
     normals at the foot. Segments (r,) that pass a point between their ends, once for each, and

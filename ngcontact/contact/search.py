@@ -105,7 +105,7 @@ def find_contacts(geometry: OCCGeometry | ng.Mesh, *, within: float) -> list[Fou
 
 
 class _Place(NamedTuple):
-    """Where a gap is least."""
+    """Place at which a gap is least."""
 
     name: str  # of the boundary it is measured from
     gap: float

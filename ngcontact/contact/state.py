@@ -1,4 +1,4 @@
-"""What a solution says of each pair: gap, force, pressure, and where contact ends."""
+"""State of each pair: gap, force, pressure, and ends of contact."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ class ContactState:
 
     @cached_property
     def transitions(self) -> Transitions:
-        """Where contact turns from binding to non-binding."""
+        """Transitions from binding to non-binding contact."""
         return transitions_on(self.line, self.gap, self.active)
 
 

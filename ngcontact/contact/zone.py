@@ -52,7 +52,7 @@ class ContactZone(ContactLine):
 
     @property
     def dim(self) -> int:
-        """Of the bodies."""
+        """Dimension of the bodies."""
         return 3
 
     def pressure(self, force: Array) -> Array:

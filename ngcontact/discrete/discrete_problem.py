@@ -59,7 +59,7 @@ MIN_REFINED = 0.7  # share of the unknowns that must be gone in the coarsest spa
 
 @dataclass
 class MultigridUse:
-    """Where multigrid takes the place of a factorisation.
+    """Sizes from which multigrid takes the place of a factorisation.
 
     Attributes
     ----------

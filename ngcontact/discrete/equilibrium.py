@@ -62,7 +62,7 @@ class RigidMotion:
     multiplier: float = 0.0
 
     def __str__(self) -> str:
-        """What the first body does."""
+        """The motion of the first body in words."""
         t, turn, centre = self.translation[0], self.rotation[0], self.middle[0]
         first = f'of "{self.bodies[0]}"'
         if not turn.any():
@@ -302,7 +302,7 @@ def equilibrium(
 
 
 def _placing(rows: Array, work: Array, g: Array, equality: Mask) -> tuple[Array, Mask]:
-    """Where the load presses rigid bodies: amounts (r,), and the rows (m,) that carry it.
+    """Amounts (r,) of motions by which the load presses rigid bodies, and rows (m,) that carry it.
 
     No movement without load, and where bodies must deform to fit at all.
     """
@@ -356,7 +356,7 @@ class _Unbalanced:
 
 
 def _unbalanced(rows: Array, equality: Mask, work: Array) -> _Unbalanced:
-    """What contact forces, not negative but on equalities, cannot balance of the work (r,)."""
+    """Part of the work (r,) that contact forces, not negative but on equalities, cannot balance."""
     scale = np.abs(work).max(initial=0.0)
     G = np.vstack([rows, -rows[equality]]).T
     if scale == 0.0 or G.shape[1] == 0:
@@ -448,7 +448,7 @@ def _integrated_work(loads: Sequence[Load], free: FreeMotions) -> tuple[Array, A
 
 
 def _change_by_shape(problem: Problem, mesh: ng.Mesh, motion: RigidMotion | None = None) -> Array:
-    """What curved sides change of the work of each load on a rigid motion, (k, 1).
+    """Change of the work of each load on a rigid motion by curved sides, (k, 1).
 
     Of bodies with names of their own; on the d translations of all, (k, d), without a motion. The
     centre of a disc is not that of its mesh.
@@ -472,7 +472,7 @@ def _change_by_shape(problem: Problem, mesh: ng.Mesh, motion: RigidMotion | None
 
 
 def load_by_shape(problem: Problem, mesh: ng.Mesh) -> Array:
-    """What curved sides change of all loads at most, forces (d,) per thickness.
+    """Largest change of all loads by curved sides, forces (d,) per thickness.
 
     A disc weighs more than its mesh, and pressure acts on more than the mesh of an arc.
     """

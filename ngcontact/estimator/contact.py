@@ -142,7 +142,7 @@ def covered_parts(
 
 
 def remaining(inner: Mask, covered: list[Parts]) -> Parts:
-    """What `covered` leaves of all segments that are not `inner` (q,)."""
+    """Parts of all segments that are not `inner` (q,) which `covered` leaves."""
     outer = np.flatnonzero(~inner)
     count = len(outer)
     # Every segment as an interval [2 n, 2 n + 1] of one axis; an empty part at both of its ends.

@@ -250,7 +250,7 @@ def _guide_normals(solution: ScaledSolution, points: BoundaryPoints) -> Array:
 
 
 def _off_guide(solution: ScaledSolution, points: BoundaryPoints, normal: Array) -> Squares:
-    """What u_h.n between the nodes of Gamma_0 costs."""
+    """Squares of u_h.n between the nodes of Gamma_0."""
     element = solution.boundary.element[points.segment]
     u = solution.boundary.evaluate(solution.displacement, points.segment, points.s)
     miss = (u * normal).sum(axis=1)

@@ -1,4 +1,4 @@
-"""What the residual estimate is made of: units, stresses inside bodies, residuals, squares."""
+"""Terms of the residual estimate: units, stresses inside bodies, residuals, squares."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Parts:
 
 
 class PressureShare(NamedTuple):
-    """What a corrected pressure delta at points of the boundary adds to residuals."""
+    """Share of a pressure correction delta in residuals at points of the boundary."""
 
     at: Index  # (n,), numbers of the residuals
     segment: Index  # (n,)
@@ -71,7 +71,7 @@ class Squares(NamedTuple):
 
 
 class BoundaryTerms(NamedTuple):
-    """What the `covered` parts of the boundary contribute."""
+    """Contributions of the `covered` parts of the boundary."""
 
     residuals: list[BoundaryResidual]
     squares: list[Squares]
@@ -140,7 +140,7 @@ class ScaledSolution:
 
     @cached_property
     def measure(self) -> Array:
-        """What an area of the mesh stands for in the body, in the middle of elements, (ne,)."""
+        """Measure of the body over that of the mesh, in the middle of elements, (ne,)."""
         return self.model.measure(self.boundary.arrays.corners.mean(axis=1))
 
     def missed(self, element: Index, force: Array) -> Squares:

@@ -262,7 +262,7 @@ class BoundaryTrace:
         return values
 
     def measure(self, segment: Index, s: Array) -> Array:
-        """What a length stands for in the body, (k,), at `s` (k,) of segments `segment` (k,)."""
+        """Measure of the body over length, (k,), at `s` (k,) of segments `segment` (k,)."""
         if not self.model.extent:
             return np.ones(len(segment))
         return self.model.measure(self.point(segment, s))
@@ -316,7 +316,7 @@ class BoundaryTrace:
         return values
 
     def lies_on(self, segment: Index | slice, *patterns: str | None) -> Mask:
-        """Which of `segment` (k,) are of boundaries that patterns select, (k,); None does not."""
+        """Mask (k,) of `segment` (k,) on boundaries that patterns select; None selects none."""
         known = self._masks
         for pattern in patterns:
             if pattern is not None and pattern not in known:

@@ -23,7 +23,7 @@ MERIDIAN = (0, 1, 3)  # components of rr, zz, hoop, rz without the hoop
 
 
 class Model:
-    """What the program asks a model; by itself plane strain: xx, yy, xy of unit thickness."""
+    """Plane strain of unit thickness, components xx, yy, xy; other models override it."""
 
     dim = 2  # components of a displacement
     # Which translations and rotations of a body cause no strain.
@@ -68,7 +68,7 @@ class Model:
         return ng.InnerProduct(ng.Grad(u), ng.Grad(v))
 
     def weighted(self, density: CF) -> CF:
-        """What is integrated over the plane mesh, or its boundary, for a density of the body."""
+        """Integrand over the plane mesh, or its boundary, of a density of the body."""
         return density
 
     def measure(self, points: Array) -> Array:
@@ -76,7 +76,7 @@ class Model:
         return np.ones(len(points))
 
     def on_axis(self, points: Array) -> Mask:
-        """Which of all `points` (k, 2) of a boundary lie where the body has no extent, (k,)."""
+        """Mask (k,) of the `points` (k, 2) of a boundary at which the body has no extent."""
         return np.zeros(len(points), dtype=bool)
 
     def resultant(self, force: Array) -> Array:

@@ -44,7 +44,7 @@ SAMPLES = {
 
 @dataclass(frozen=True, eq=False)
 class Moduli:
-    """What is asked of the law in each element, stresses; 0 where nothing was asked."""
+    """Moduli of the law in each element, stresses; 0 where they were not asked for."""
 
     # Half the smallest eigenvalue of C on strains, c_0 / 2 in HH81 (2.7), the least in the
     # element: mu of isotropic laws with nu >= 0, and kappa below.

@@ -295,7 +295,7 @@ def initial_strain(problem: Problem, mesh: ng.Mesh) -> ng.CoefficientFunction | 
 
 
 def elastic_strain(problem: Problem, displacement: ng.GridFunction) -> ng.CoefficientFunction:
-    """What the law makes the stress of, e(u) - e0, Voigt (q,)."""
+    """Elastic strain e(u) - e0, of which the law makes the stress, Voigt (q,)."""
     e, e0 = model_of(problem).strain(displacement), initial_strain(problem, displacement.space.mesh)
     return e if e0 is None else e - e0
 

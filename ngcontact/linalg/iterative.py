@@ -20,7 +20,7 @@ log = logging.getLogger("ngcontact")
 
 @dataclass(frozen=True)
 class Limits:
-    """What the iterations may cost."""
+    """Limits of the iterations."""
 
     # V-cycles with coarse matrices of another active set, from which new ones are cheaper:
     renewal: int = 20

@@ -194,7 +194,7 @@ def _at_least(x: Array, edge: CadEdge) -> Array:
 
 
 def _near(secondary: CadEdge, facing: list[Edge]) -> list[Edge]:
-    """Those edges of `facing` that may be the nearest to some point of a curve."""
+    """The edges of `facing` that may be the nearest to some point of a curve."""
     x = secondary.samples
     step = np.linalg.norm(np.diff(x, axis=0), axis=1).max()
     samples = np.concatenate([edge.curve.samples for edge in facing])

@@ -47,7 +47,7 @@ Window = tuple[Array, Array]  # lower left and upper right corner, each (2,)
 
 
 class Scale(NamedTuple):
-    """What is beside the colours of a picture."""
+    """Colour scale of a picture."""
 
     label: str
     ends: tuple[float, float]  # of the values

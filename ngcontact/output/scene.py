@@ -1,4 +1,4 @@
-"""What a picture shows: style, field, curved elements as triangles, contact lines and zones."""
+"""Scene of a picture: style, field, curved elements as triangles, contact lines and zones."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ Profile = Callable[[Array], Any] | tuple[Any, Any]
 
 @dataclass(frozen=True, eq=False)
 class Style:
-    """What a picture shows, and how: the options of `Solution.plot`, and what they must be."""
+    """Options of `Solution.plot`, checked."""
 
     scale: float | None = None
     field: str | ng.CoefficientFunction = "von_mises"
@@ -274,7 +274,7 @@ def symmetry_line(mesh: ng.Mesh, displacement: ng.GridFunction, pattern: str) ->
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """What is drawn of the bodies: triangles and lines that follow the curved elements."""
+    """The bodies as triangles and lines that follow the curved elements."""
 
     solution: Solved
     style: Style

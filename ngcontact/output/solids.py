@@ -54,7 +54,7 @@ class Cut(NamedTuple):
 
 
 class Zone(NamedTuple):
-    """Where a pair is in contact, and what cuts it."""
+    """Zone in contact of a pair, and the planes that cut it."""
 
     surface: ContactSurface
     pressure: Array  # (n,), at the nodes of the surface

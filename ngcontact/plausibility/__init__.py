@@ -1,4 +1,4 @@
-"""What may be wrong although the discrete problem is solved, and what to do about it."""
+"""Plausibility of data and results: warnings, with what to do about each."""
 
 from .data import contradictions as contradictions
 from .data import warn_of_implausible as warn_of_implausible

@@ -1,4 +1,4 @@
-"""What is looked at before the first solve: loads, laws, corners at which supports contradict."""
+"""Plausibility of data before the first solve: loads, laws, supports that contradict."""
 
 from __future__ import annotations
 
@@ -130,7 +130,7 @@ class _Ends:
         self._places = np.asarray(1.0 - end[:, None, None], dtype=float)  # as NGSolve runs
 
     def values(self, function: ng.CoefficientFunction, evaluate: Callable[..., Array]) -> Array:
-        """Of a function there, (k, c)."""
+        """Values of a function there, (k, c)."""
         return evaluate(function, self.segments, self._places)[:, 0]
 
 

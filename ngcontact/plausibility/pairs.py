@@ -1,4 +1,4 @@
-"""What may be wrong with pairs in contact: directions, gaps, penetration, large strains.
+"""Plausibility of pairs in contact: directions, gaps, penetration, large strains.
 
 Along a fixed direction xi the tangential part of the jump does not enter (2.10), and forces act
 along xi. That is right to first order where one of the two surfaces lies across xi: points of the
@@ -66,7 +66,7 @@ PairWarnings = dict[tuple[str, int], str]  # messages by what is doubted and the
 
 
 def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
-    """What may be wrong with a solution, pair by pair.
+    """Messages on implausible results, by the kind of doubt and the number of the pair.
 
     Fixed directions far from the normals, bodies that are drawn far apart or otherwise than their
     gap is given, and strains that are not small, which no mesh mends; of the `last` mesh also zones

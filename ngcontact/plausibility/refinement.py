@@ -1,4 +1,4 @@
-"""Whether refinement helps: estimates that are round-off, or rise from level to level."""
+"""Plausibility of refinement: estimates that are round-off, or rise from level to level."""
 
 from __future__ import annotations
 

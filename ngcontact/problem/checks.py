@@ -124,7 +124,7 @@ def check_mesh(mesh: ng.Mesh, dim: int = 2) -> None:
 
 
 def kind_of(value: Any) -> str:
-    """What a value is that should be a mesh or a geometry."""
+    """Kind of a value that should be a mesh or a geometry."""
     kind = type(value)
     if kind.__module__.startswith("netgen") and kind.__name__ == "Mesh":
         return "a raw Netgen mesh, which ngsolve.Mesh(mesh) wraps"
@@ -252,7 +252,7 @@ def check_overlaps(view: MeshArrays) -> None:
 
 
 def _inside(points: Array, view: MeshArrays, part: Index) -> Mask:
-    """Which `points` (k, d) lie in the elements `part` (n,) of a mesh, (k,).
+    """Mask (k,) of the `points` (k, d) in the elements `part` (n,) of a mesh.
 
     Where a ray crosses their boundary, the sides of one element alone, an odd number of times.
     """

@@ -210,6 +210,6 @@ def bisect(mesh: ng.Mesh, marked: Mask) -> None:
 
 
 def on_axis(points: Array) -> Mask:
-    """Which of `points` (k, 2), those of a mesh or of its whole boundary, have r = 0, (k,)."""
+    """Mask (k,) of the `points` (k, 2) of a mesh, or of its whole boundary, at which r = 0."""
     r = np.abs(points[:, 0])
     return np.asarray(r <= AXIS_RADIUS * r.max(initial=0.0))

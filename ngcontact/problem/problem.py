@@ -134,7 +134,7 @@ class Problem:
         return f"Problem({self.model}; bodies {', '.join(self.materials)}; contact {pairs})"
 
     def _repr_html_(self) -> str:
-        """What a notebook shows: a table of the data, a line each."""
+        """Table of the data for notebooks, a line each."""
         rows = [("model", "", self.model)]
         for name, law in self.materials.items():
             rows.append(("material", name, law.description()))

@@ -193,7 +193,7 @@ _OF_NUMBERS = re.compile(rf"\s*({_NUMBER}\*\()?(coef ({_VECTOR}|{_TIMES}), real{
 
 
 def _lines(value: ng.CoefficientFunction) -> list[str]:
-    """What NGSolve prints of a function."""
+    """Lines that NGSolve prints of a function."""
     text = str(value).replace("ZeroCF", "0")
     if text.strip() == "ZeroCoefficientFunction":
         return ["coef 0, real"] * int(value.dim)

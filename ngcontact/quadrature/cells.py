@@ -150,7 +150,7 @@ class Cells:
         return np.abs(np.linalg.det(self.side))[:, None] * rule.weights
 
     def __getitem__(self, at: Mask | Index) -> Cells:
-        """Those selected by `at` (k,), a mask or numbers."""
+        """The cells selected by `at` (k,), a mask or numbers."""
         return Cells(self.element[at], self.origin[at], self.side[at])
 
     def divided(self, n: int) -> Cells:
@@ -307,7 +307,7 @@ class SampledElements:
 
     @property
     def corners(self) -> Array | None:
-        """Of all triangles, (n, 3, 2), lengths."""
+        """Corners of all triangles, (n, 3, 2), lengths."""
         return self.arrays.corners if self.dim == 2 else None
 
     @property
@@ -414,7 +414,7 @@ class SampledElements:
 
 
 def missed_by_polynomials(values: Array, dim: int) -> Array:
-    """What polynomials up to `DEGREE` miss at most, (j,), of `values` (j, n, c) on a lattice."""
+    """Largest errors (j,) of polynomials up to `DEGREE` in `values` (j, n, c) on a lattice."""
     basis = polynomials(dim, round(values.shape[1] ** (1 / dim)))
     return np.abs(values - basis @ (basis.T @ values)).max(axis=(1, 2))
 

@@ -86,7 +86,7 @@ class Features:
 
     @property
     def places(self) -> Array:
-        """Where the features are, (k, 2), lengths."""
+        """Places (k, 2) of the features, lengths."""
         return self.spots[:, :2]
 
     @property
@@ -133,7 +133,7 @@ def _functions(problem: Problem) -> Iterator[Datum]:
 
 
 def features_of(problem: Problem, mesh: ng.Mesh, *, again: bool = False) -> list[Features]:
-    """What was found of all functions of a problem when they were looked at last, if ever.
+    """Features of all functions of a problem from their last sampling, if there was one.
 
     Each run looks at them `again`: parameters may have changed.
     """
@@ -187,7 +187,7 @@ def _values(function: Function, points: NDArray) -> Array:
 
 
 def _told(kind: str, values: Array) -> tuple[Array, float]:
-    """What is looked at of `values` (n, c), (n, c'), and what counts as a departure."""
+    """Components (n, c') of `values` (n, c) that are searched, and the least departure."""
     if kind == "materials":
         stiffness = np.log(np.maximum(np.abs(values), np.finfo(float).tiny))
         return stiffness.mean(axis=1, keepdims=True), FEATURE_SHARES[kind]
@@ -309,7 +309,7 @@ def _feature(line: _Line, departure: Array, first: int, last: int) -> tuple[floa
 
 
 def _departures(values: Array, limit: float) -> Array:
-    """By how much each of `values` (c, n) departs in a peak, by more than a limit; else 0."""
+    """Departure of each of `values` (c, n) in a peak, where it exceeds a limit; else 0."""
     found = np.zeros(values.shape)
     windows = [window for window in WINDOWS if window <= values.shape[1] / 2]
     lost = [_lost(values, window) for window in windows]
@@ -473,7 +473,7 @@ def where_features_are(
 
 
 def steps_along(values: Callable[[Array], Array], t: Array, known: Array) -> tuple[Array, Array]:
-    """Where a function jumps along a line (j,), and by how much (j,).
+    """Places (j,) at which a function jumps along a line, and amounts (j,).
 
     Looked into are parts whose slope is not between those of their neighbours, as where a smooth
     function does not bend from one side to the other. Of their quarters the one is kept whose
@@ -498,7 +498,7 @@ def steps_along(values: Callable[[Array], Array], t: Array, known: Array) -> tup
 
 
 def _odd(slope: Array, noise: float) -> Mask:
-    """Which slopes (n,) are not between those of their neighbours, by more than `noise`.
+    """Mask of slopes (n,) that are not between those of their neighbours, by more than `noise`.
 
     At ends not between that of the neighbour and one that goes on as the next two do, twice as far.
     """
@@ -521,7 +521,7 @@ class Unresolved:
     elements: Mask  # (ne,), all triangles that are too large
 
     def __str__(self) -> str:
-        """What is told of it."""
+        """Message of the warning."""
         x, y = self.place
         return (
             f'{self.kind} "{self.name}" has a feature {self.width:.2g} wide near '

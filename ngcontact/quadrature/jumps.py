@@ -22,7 +22,7 @@ HALVINGS = 24  # of the distance between two points: what still changes across 1
 
 
 class Jump(NamedTuple):
-    """Where a law jumps in one element."""
+    """Jump of a law in one element."""
 
     place: tuple[float, float]  # lengths
     low: float  # the value on one side of the component that jumps
@@ -40,7 +40,7 @@ class RoughElements:
     limit: Array  # (k,), of a change
 
     def jumps(self) -> dict[int, Jump]:
-        """Where it jumps, at most one place in each element, by its number.
+        """Jumps by number of the element, at most one in each.
 
         From the points of a lattice at which a component is least and largest, the half of their
         distance across which it changes more is kept, again and again: a smooth change shrinks by
@@ -62,7 +62,7 @@ class RoughElements:
 
 
 def _rough(problem: Problem, mesh: ng.Mesh) -> Iterator[tuple[str, RoughElements]]:
-    """Where laws are rough, then initial strains, and whose they are."""
+    """Elements in which laws are rough, then initial strains, by the body."""
     view = SampledElements(mesh, 2)
     for pattern, law in problem.materials.items() if mesh.dim == 2 else ():
         if not varies(law):

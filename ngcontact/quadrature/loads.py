@@ -165,7 +165,7 @@ def rough_load(
 def _steps(
     load: ng.CoefficientFunction, view: SampledElements, elements: Index, least: Array, most: Array
 ) -> tuple[Index, Array]:
-    """Those (j,) of `elements` (k,) with steps beside the points looked at, and how large (j,).
+    """Numbers (j,) of `elements` (k,) with steps beside the sampled points, and their sizes (j,).
 
     A step whose far side has none of the points leaves values of neighbours that do not meet: there
     it is looked for at the edges. `least` and `most` (k, c) are those at the points.
@@ -253,7 +253,7 @@ def warn_of_data(problem: Problem, mesh: ng.Mesh, order: int) -> None:
 def rough_segments(
     values: Sequence[ng.CoefficientFunction], mesh: ng.Mesh, segments: Index, missed: float
 ) -> Mask:
-    """Which `segments` (k,) have values, scalars, that are not seen at a few points, (k,).
+    """Mask (k,) of `segments` (k,) with values, scalars, that are not seen at a few points.
 
     `missed` is how far a displacement is from them there. Numbers are nowhere rough.
     """

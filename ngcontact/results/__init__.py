@@ -1,4 +1,4 @@
-"""What a solution is asked for: values where one wants them, tables, files that outlive it."""
+"""Results of a solution: values at points, tables, files."""
 
 from .archive import read as read
 from .archive import restored as restored

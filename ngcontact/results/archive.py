@@ -30,7 +30,7 @@ STORED_MEMBERS = ("_estimate", "_bound")  # members that cost much, kept where t
 
 
 def state_of(solution: Solved) -> dict[str, Any]:
-    """What a solution is made of again by `restored`, all of it fit to be pickled."""
+    """Picklable state from which `restored` makes a solution again."""
     discrete, plain = solution.discrete, {"discrete", "displacement"}
     discrete.space.require_mesh()
     own = {name: getattr(solution, name) for name in field_names(solution) if name not in plain}
@@ -100,7 +100,7 @@ def _parts(problem: Problem) -> Iterator[tuple[str, Any]]:
 
 
 def read(path: str | os.PathLike[str], version: str) -> Any:
-    """What `save` wrote to `path`."""
+    """The solution that `save` wrote to `path`."""
     source = Path(path)
     try:
         with gzip.open(source, "rb") as file:

@@ -64,7 +64,7 @@ def line_of(solution: Guaranteed) -> str:
 
 
 def facts(solution: Guaranteed) -> list[tuple[str, str]]:
-    """What is worth a word, by name; of one width in all lines of a run but for the last ones."""
+    """Facts about a solution by name; of one width in all lines of a run but for the last ones."""
     active = f"{np.count_nonzero(solution.active)}/{solution.active.size}"
     told = [
         ("order", f"{solution.order}"),
@@ -91,7 +91,7 @@ def facts(solution: Guaranteed) -> list[tuple[str, str]]:
 
 
 def html_of(solution: Guaranteed) -> str:
-    """What a notebook shows: facts, then a line for each pair."""
+    """Table for notebooks: facts, then a line for each pair."""
     rows = []
     for name, value in facts(solution):
         if not name:  # as "12 steps"
@@ -157,7 +157,7 @@ def _terminal(rows: list[tuple[str, ...]], share: float) -> None:
 
 
 def _notebook() -> Any:
-    """What shows rows in the notebook that runs this, or None."""
+    """Display of rows in the notebook that runs this, or None."""
     shell = sys.modules["IPython"].get_ipython() if "IPython" in sys.modules else None
     if type(shell).__name__ != "ZMQInteractiveShell":
         return None

@@ -67,7 +67,7 @@ class Element:
     dofs: Index  # (b, d) numbers of the multipliers
 
     def among(self, at: Index) -> tuple[Index, Index]:
-        """Which of triangles `at` (k,) are its own, (r,), and their places among these, (r,)."""
+        """Numbers (r,) of its own in triangles `at` (k,), and their places among its own, (r,)."""
         own = self.places.at
         some = np.minimum(np.searchsorted(own, at), len(own) - 1)
         mine = np.flatnonzero(own[some] == at)
@@ -242,7 +242,7 @@ def elements_of(
 
 
 def _of_body(values: Mapping[str, Any], cells: Cells, at: Index) -> Any:
-    """What is given, by patterns of names, for the body of triangles `at` (b,); None if nothing."""
+    """Entry of data by patterns of names for the body of triangles `at` (b,), or None."""
     mesh, body = cells.trace.mesh, int(cells.bodies[at[0]])
     return next((value for k, value in values.items() if mesh.Materials(k).Mask()[body]), None)
 

@@ -86,7 +86,7 @@ def jump(
 
 
 class FacingPoints(NamedTuple):
-    """What faces j places on each of k segments of a secondary."""
+    """Points that face j places on each of k segments of a secondary."""
 
     gap: Array  # (k, j) of u_h
     direction: Array  # (k, j, 2) d
@@ -102,7 +102,7 @@ def facing_points(
     segment: Index,
     s: Array,
 ) -> FacingPoints:
-    """What faces the places `s` (k, j) on segments `segment` (k,) of the secondary."""
+    """Points that face the places `s` (k, j) on segments `segment` (k,) of the secondary."""
     contact, every, t = pair.line.contact, np.repeat(segment, s.shape[1]), s.ravel()
     x, d = trace.point(every, t), rays(trace, contact, every, t)
     opposite = partners(trace, pair.line.facing, every, x, d)
@@ -120,7 +120,7 @@ def facing_points(
 
 
 class PressureSupport(NamedTuple):
-    """Where p* of a pair may act."""
+    """Parts of the boundary on which p* of a pair may act."""
 
     pair: ContactState
     # (k,) of the secondary: in contact, beside contact, or where u_h penetrates the other body

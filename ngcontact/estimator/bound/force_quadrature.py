@@ -66,7 +66,7 @@ class ForceQuadrature:
 
     @property
     def order(self) -> int:
-        """Of the rules on triangles that are not divided."""
+        """Order of the rules on triangles that are not divided."""
         return self.lowest + FINER_DEGREES * self.levels
 
     def divided(

@@ -1,4 +1,4 @@
-"""What an equilibrated stress misses of its data, and how much of the energy that can be.
+"""Oscillation: data that an equilibrated stress misses, and their largest share of the energy.
 
 Constants of Poincare (Payne, Weinberger 1960, Arch. Rational Mech. Anal. 5:286; Bebendorf 2003), of
 Korn (Costabel, Dauge 2015, Arch. Rational Mech. Anal. 217:873, theorem 2.3) and of traces are known

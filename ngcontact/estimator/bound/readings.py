@@ -1,4 +1,4 @@
-"""What a solution says of its error that is proved: bounds, their stress, a certificate."""
+"""Guaranteed bounds of a solution's error, their equilibrated stress, and its certificate."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class EquilibratedStress:
 
     @property
     def degree(self) -> int:
-        """Of its polynomials on triangles with straight sides; about an axis of r times it."""
+        """Degree of its polynomials on triangles with straight sides; about an axis of r s."""
         return min(e.degree for e in self.proof.dual.elements)
 
     @property
@@ -288,7 +288,7 @@ class Guaranteed(Estimated):
 
     @property
     def bound_parts(self) -> dict[str, float]:
-        """What the square of the bound is the sum of, each an energy per thickness.
+        """Terms of the square of the bound, each an energy per thickness.
 
         `constitutive`: |s - sigma_h|^2 of the equilibrated stress s; `complementarity`: twice the
         integral of p* times the gap; `lifting`: what correcting u_h on Gamma_u and Gamma_K costs;

@@ -1,4 +1,4 @@
-"""What users read of a contact, each with a bar of its error."""
+"""Quantities of interest of a contact, each with a bar of its error."""
 
 from .readings import Measured as Measured
 from .surfaces import earlier_figures as earlier_figures

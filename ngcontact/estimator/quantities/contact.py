@@ -232,7 +232,7 @@ def direction_of(solution: Solved, pair: int) -> tuple[Array, str]:
 
 
 def approach_of(solution: Solved, state: ContactState) -> tuple[Array, Array]:
-    """By what vector (2,) the bodies of a pair approach, and sizes (2,) of what is not given of it.
+    """Vector (2,) by which the bodies of a pair approach, and sizes (2,) of its free part.
 
     Each body moves by the mean of what its supports prescribe, or, where none does, by the
     mean of its displacement; a rigid obstacle stays.

@@ -1,4 +1,4 @@
-"""What a solution says of its quantities of interest.
+"""Quantities of interest of a solution.
 
 The bar of the energy is proved, and beside its estimate that of the force, by a dual problem. The
 others are estimated, by measurement (docs/bounds.md):
@@ -65,7 +65,7 @@ class Measured(Guaranteed):
 
     @cached_property
     def _force_errors(self) -> dict[int, tuple[Array, str]]:
-        """By pair what is proved of the force, (2,), infinite where nothing is, and why."""
+        """Proved errors of the force by pair, (2,), infinite where nothing is proved, and why."""
         return {}
 
     def contact_area(self, pair: int = 0) -> float:
@@ -197,7 +197,7 @@ def _energy(solution: Measured, proved: bool) -> Quantity:
 
 
 def _proved_force_errors(solution: Measured, pair: int, e: Array) -> tuple[Array, str]:
-    """What is proved of a pair's force along `e` (2,) and of its components, (3,), or why nothing.
+    """Proved errors (3,) of a pair's force along `e` (2,) and of its components, or why none.
 
     Infinite where nothing is proved, or more than the force itself.
     """

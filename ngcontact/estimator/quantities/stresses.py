@@ -86,7 +86,7 @@ def singular_corners(
 
 
 def _conditions(problem: Problem, trace: BoundaryTrace) -> Index:
-    """What is on each segment (k,): `FREE`, `GUIDED`, `HELD` or `PRESSED`."""
+    """Condition on each segment (k,): `FREE`, `GUIDED`, `HELD` or `PRESSED`."""
     segments = np.arange(len(trace.region))
     kind = np.full(len(segments), FREE)
     for pair in problem.contact:
@@ -102,7 +102,7 @@ def _conditions(problem: Problem, trace: BoundaryTrace) -> Index:
 
 
 def _closed(pairs: Sequence[ContactState], place: Array, h: Array) -> tuple[Mask, Mask]:
-    """Which of the vertices at `place` (v, 2) are in contact, and with a rigid obstacle."""
+    """Masks of the vertices at `place` (v, 2): in contact, and in contact with a rigid obstacle."""
     closed, rigid = np.zeros(len(place), dtype=bool), np.zeros(len(place), dtype=bool)
     for pair in pairs:
         line, active = pair.line, in_contact(pair.line, pair.active)
@@ -120,7 +120,7 @@ def _closed(pairs: Sequence[ContactState], place: Array, h: Array) -> tuple[Mask
 def _turned_apart(
     problem: Problem, trace: BoundaryTrace, place: Array, body: Index, angles: Array
 ) -> Mask:
-    """Where a uniform pressure would turn both wedges (v,) at an end of contact apart.
+    """Mask (v,) of ends of contact at which a uniform pressure would turn both wedges apart.
 
     It turns a wedge of angle a with one free side by log r / (E (tan a - a)), E that of the model;
     where the sum of both is negative the pressure is infinite (Dundurs and Lee 1972). `angles`

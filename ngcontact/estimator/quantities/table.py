@@ -80,7 +80,7 @@ class Singular:
         return np.unique(self.places, axis=0)
 
     def near(self, points: Array, pressed: bool = False) -> Mask:
-        """Which of the `points` (m, 2) lie within the reach of a corner, (m,)."""
+        """Mask (m,) of the `points` (m, 2) within the reach of a corner."""
         result = np.zeros(len(points), dtype=bool)
         for place, r, of_contact in zip(self.places, self.reach, self.pressed, strict=True):
             if of_contact or not pressed:
