@@ -57,9 +57,9 @@ COARSE_RUN_FROM = 20_000
 COARSE_ELEMENTS = 4  # of that run along the largest extent
 COARSE_ORDER = 3
 COARSE_DOFS = 1500  # its unknowns, which resolve the ends of a zone or two
-COARSE_SHARE = 1 / 40  # ... or, where that is more, their share: waves in contact have many ends
+COARSE_SHARE = 1 / 40  # ... or this share, if that is more: a wavy surface touches in many zones
 SAME_ENERGY = 0.1  # relative difference of energies up to which two coarse solutions are one
-BOUND_RATIO = 0.2  # bound over estimate that is hoped for at first; measured: 0.17 to 1
+BOUND_RATIO = 0.2  # bound over estimate, assumed until a bound is known; measured: 0.17 to 1
 
 ONE_PER_LEVEL = (
     "adapt(...) {}: it yields one Solution per level; loop over it, or take the last one by "
@@ -95,7 +95,7 @@ def solve(
         of degree `order` + 1. "physical": (2.4), linear in physical coordinates on curved
         elements, order 1 only.
     start : Solution, optional
-        Of the same pairs on any mesh: its active set warms the start. On its own mesh with the
+        Of the same pairs on any mesh: its active set is the first guess. On its own mesh with the
         same bodies, supports and pairs, assembly and factorisation are taken over: another load
         costs back-solves only.
 
@@ -151,7 +151,7 @@ def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> li
     refinement = Refinement(COARSE_ORDER, "isoparametric", 0.5, None, most)
     try:
         return list(levels(problem, _first_level(problem, maxh, refinement, None), refinement))
-    except (ContactError, ValueError) as error:  # it decides nothing but the start
+    except (ContactError, ValueError) as error:  # only the first guess depends on it
         log.debug("no coarse run: %s", error)
         return []
 
@@ -243,7 +243,7 @@ def solve_on(
         return second
     if first is None or abs(first.energy - second.energy) > SAME_ENERGY * abs(second.energy):
         raise doubt
-    return first  # so are the bodies made, not the rows
+    return first  # both roles give one energy: it is the bodies that are hardly held
 
 
 def _doubted(
@@ -251,8 +251,8 @@ def _doubted(
 ) -> dict[int, Contact]:
     """Pairs by number, with roles decided, whose primary is of a body that supports leave free.
 
-    Normals of a hole, at points of a pin that lies elsewhere in it, all but resist the turning of
-    the pin, with forces that are not there; its own normals leave it free.
+    Normals of a hole, at points of a pin that is not in its middle, nearly prevent the pin from
+    turning, by forces that do not exist; the normals of the pin leave it free.
     """
     if isinstance(error, NoEquilibriumError):
         bodies = error.motion.bodies
@@ -351,7 +351,7 @@ def adapt(
 class Run(Iterator[Solution]):
     """The levels of `adapt`, made one by one by a generator of `solutions`.
 
-    It tells who takes it for a `Solution` what it is.
+    Whoever uses it as a `Solution` gets an error that explains.
     """
 
     def __init__(self, solutions: Generator[Solution]) -> None:
@@ -460,43 +460,45 @@ def levels(
         solution = solve_on(problem, plan.mesh, plan.order, element, solution or start)
         problem = solution.problem  # roles that fail are exchanged once
         solution = replace(solution, adaptive=True, tree=plan.tree)
-        narrow = unresolved(problem, solution.mesh, in_bounds=guaranteed)
+        unresolved_data = unresolved(problem, solution.mesh, in_bounds=guaranteed)
         error = math.inf
         if guaranteed:
             refuse_bound(problem, solution.discrete.space.trace, solution.pairs)
-            hoped = ratio * solution.relative_error_estimate
-            if not narrow and (solution.bounded or hoped <= goal):
+            predicted = ratio * solution.relative_error_estimate
+            if not unresolved_data and (solution.bounded or predicted <= goal):
                 error, ratio = solution.relative_error_bound, _bound_ratio(solution)
         yield solution
         estimate = solution.relative_error_estimate
-        if not np.isfinite(solution.error_estimate):  # it would mark nothing, for ever
+        if not np.isfinite(solution.error_estimate):  # nothing would be marked, in an endless loop
             raise ConvergenceError(
                 f"the error estimate is {solution.error_estimate}, so nothing can be refined; "
                 "choose units in which the squares of loads and displacements are numbers",
                 iterate=solution.minimiser,
             )
         log.info("%s", solution)
-        small = below_resolution(solution.mesh, plan.corners.unresolvable)
+        excluded = below_resolution(solution.mesh, plan.corners.unresolvable)
         if not guaranteed:
             error = estimate
-            if small.any():  # no mesh makes the estimate less there
-                error *= root_of_squares(solution.indicators[~small]) / solution.error_estimate
-        if not narrow and (error <= max(goal, EXACT_ESTIMATE) or _is_exact(solution)):
+            if excluded.any():  # no mesh makes the estimate less there
+                error *= root_of_squares(solution.indicators[~excluded]) / solution.error_estimate
+        if not unresolved_data and (error <= max(goal, EXACT_ESTIMATE) or _is_exact(solution)):
             return
-        now = ratio * estimate if guaranteed else error
-        seen = np.any([one.elements for one in narrow], axis=0) if narrow else np.zeros_like(small)
-        plan = next_plan(solution, refinement, plan, goal / now if now else 1.0, seen)
+        expected = ratio * estimate if guaranteed else error
+        of_data = np.any(
+            [np.zeros_like(excluded), *(one.elements for one in unresolved_data)], axis=0
+        )
+        plan = next_plan(solution, refinement, plan, goal / expected if expected else 1.0, of_data)
         if plan.ends or (plan.stuck and not warned):
             warned = True
             warn_of_limit(solution.discrete.space.trace, ends=plan.ends)
         if plan.ends:
             return
-    if solution is None or narrow or goal == 0.0:  # of narrow data there is a warning
+    if solution is None or unresolved_data or goal == 0.0:  # of narrow data there is a warning
         return
     error = solution.relative_error_bound if guaranteed else error
     if error > goal:
         what = "bound" if guaranteed else "estimate"
-        what += " outside of the corners of contradictory supports" if small.any() else ""
+        what += " outside of the corners of contradictory supports" if excluded.any() else ""
         warn(
             f"the {what} is {error:.2e}, more than tolerance={goal:g}: the next level would exceed "
             f"max_dofs={refinement.max_dofs:g}; give a larger max_dofs or tolerance"
@@ -537,16 +539,16 @@ def levels_of_solids(
         )
 
 
-def warn_of_pairs(solution: Solution, told: set[object], *, last: bool) -> None:
-    """Warn of what may be wrong but was not `told` before, and add it there.
+def warn_of_pairs(solution: Solution, issued: set[object], *, last: bool) -> None:
+    """Warn of what may be wrong and is not among the `issued` warnings, and add it there.
 
     What a finer mesh mends is left out unless none follows: the mesh is the `last`.
     """
     found = pair_warnings(solution, last=last)
     for doubt, message in found.items():
-        if doubt not in told:
+        if doubt not in issued:
             warn(message)
-    told.update(found)
+    issued.update(found)
     if last:
         warn_of_unresolved(solution.problem, solution.mesh)
 
@@ -556,17 +558,17 @@ def with_warnings(solutions: Iterator[Solution]) -> Generator[Solution]:
 
     What no mesh mends is said at the first level that shows it, what refinement mends at the last.
     """
-    told: set[object] = set()
+    issued: set[object] = set()
     estimates: list[float] = []
     solution = None
     for solution in solutions:
-        warn_of_pairs(solution, told, last=False)
+        warn_of_pairs(solution, issued, last=False)
         yield solution
         if unresolved(solution.problem, solution.mesh):  # estimates rise when data are seen
             estimates.clear()
         estimates.append(solution.relative_error_estimate)
-        if "estimates" not in told and estimates_rise(estimates):
-            told.add("estimates")
+        if "estimates" not in issued and estimates_rise(estimates):
+            issued.add("estimates")
             warn(refinement_warning(solution.mesh, solution.indicators, estimates))
     if solution is not None:
-        warn_of_pairs(solution, told, last=True)
+        warn_of_pairs(solution, issued, last=True)

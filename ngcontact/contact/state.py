@@ -35,7 +35,9 @@ def _neighbours(line: ContactLine) -> tuple[dict[int, list[int]], Index]:
     return neighbours, links
 
 
-def _run(start: int, before: int, neighbours: dict[int, list[int]], active: Mask) -> list[int]:
+def _run_of_points(
+    start: int, before: int, neighbours: dict[int, list[int]], active: Mask
+) -> list[int]:
     """Points from `start` on, away from `before`, as long as they share the state of `start`."""
     run, last = [start], before
     while True:
@@ -71,10 +73,10 @@ class Transitions:
     """Places where contact of one pair turns from binding to non-binding, k of them."""
 
     inner: Index  # (k,) the last active contact point
-    outer: Index  # (k,) the first open one; at a corner the next but one
+    outer: Index  # (k,) the first open one; at a corner the one after that
     position: Array  # (k, 2) the transition itself
     beyond: Array  # (k,) its distance from the last active point along the line, outwards
-    # By end, in the order of the line, as far as contact is closed or open:
+    # For each end the points from there on, as far as contact is closed or open:
     closed: list[Index]  # the points (q,) from the last active one inwards
     opened: list[Index]  # and those (q,) from the first open one outwards
 
@@ -97,8 +99,8 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
     outwards: list[Index] = []
     for link in links[active[links[:, 0]] != active[links[:, 1]]].tolist():
         inner, outer = sorted(link, key=lambda i: not active[i])
-        opened = _run(outer, inner, neighbours, active)
-        closed = _run(inner, outer, neighbours, active)
+        opened = _run_of_points(outer, inner, neighbours, active)
+        closed = _run_of_points(inner, outer, neighbours, active)
         inwards.append(np.array(closed))
         outwards.append(np.array(opened))
         if line.node[inner] == line.node[outer]:  # the node touches one side of a corner only
@@ -107,7 +109,7 @@ def transitions_on(line: ContactLine, gap: Array, active: Mask) -> Transitions:
             beyond.append(0.0)
             continue
         if len(opened) > 1 and any(active[i] for i in neighbours[opened[-1]]):
-            opened = opened[: (len(opened) + 1) // 2]  # the other half belongs to its other end
+            opened = opened[: (len(opened) + 1) // 2]  # its other end uses the other half
         steps = np.linalg.norm(np.diff(x[[inner, *opened]], axis=0), axis=1)
         distance = np.cumsum(steps)
         if order > ORDERS[-1]:  # of `polish`: a vertex of the mesh lies there
@@ -139,7 +141,9 @@ def ending_segments(line: ContactLine, ends: Transitions) -> Index:
 
 
 TURN_COSINE = np.sqrt(0.5)  # cosine up to which both sides of a corner have one pressure
-AXIS_SHARE = 1 / 3  # of the contact around an axis, to which its pressure is the continuation
+AXIS_SHARE = (
+    1 / 3
+)  # of the radius of a zone around an axis, over which its pressure is fitted there
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,7 +185,7 @@ def continued_to_axis(line: ContactLine, pressure: Array, active: Mask) -> Array
     At orders 1 and 2 the point on the axis, of the least weight, has an error of the size of the
     element's: on balls at 5000 unknowns 6.5 and 1.3 %, of the continuation 0.3 %. It is the
     fit of c0 + c1 r^2, by weights, to the nearer third of the contact around the axis, `active`
-    (m,), of which it misses 3e-4 on balls; with fewer than two points there the value is as it is.
+    (m,), with an error of 3e-4 on balls; with fewer than two points there the value is as it is.
     """
     if line.rows.shape[1] > 3 or not line.on_axis.any():
         return pressure
@@ -203,9 +207,9 @@ def pressure_across_corners(line: ContactLine, force: Array, active: Mask) -> Ar
     """Pressure (m,): force over weight, but at corners one value for both sides.
 
     `Solution.pressure` is force over weight everywhere, which at corners of small turns splits the
-    node's force without a meaning. A stress that is continuous at a corner without friction has
+    node's force arbitrarily. A stress that is continuous at a corner without friction has
     both normals as eigenvectors, so that both pressures are equal unless the sides are
-    perpendicular. Up to a turn of 45 degrees they are told together, from the part of the node's
+    perpendicular. Up to a turn of 45 degrees both get one value, from the part of the node's
     force along the sum of weight times normal: what a uniform pressure on both sides exerts.
 
     Parameters

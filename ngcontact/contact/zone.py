@@ -58,10 +58,10 @@ class ContactZone(ContactLine):
     def pressure(self, force: Array) -> Array:
         """Pressures (m,) of the `force` (m,) at its points.
 
-        Force over weight, but where most of a point's facets face nothing. It lies beside the part
-        that faces the primary then, and its force balances the moments of others, too: its
-        pressure is the mean over the facing parts around it, so far that they amount to half the
-        area of its facets.
+        Force over weight, except at points most of whose facets face nothing: there the force also
+        carries the balance of moments of the points around, and force over weight is no pressure.
+        These points get the mean over rings of facets around them, the smallest whose facing parts
+        amount to half the area of the point's own facets.
         """
         pressure, (k, q) = np.asarray(force / self.weight), self.rows.shape
         on = self.rows >= 0
@@ -71,13 +71,13 @@ class ContactZone(ContactLine):
             np.bincount(point, x[on], len(force)) for x in (self.shares, self.covered)
         )
         beside = np.flatnonzero(covered < LEAST_COVERED * whole)
-        area, pushed = (
+        area, total = (
             np.bincount(facet, x, k) for x in (self.covered[on], self.covered[on] * pressure[point])
         )
         enough, near = LEAST_COVERED * (at @ self.shares.sum(axis=1))[beside], at[beside]
         while beside.size:
             reached = near @ area
-            pressure[beside] = (near @ pushed) / reached
+            pressure[beside] = (near @ total) / reached
             wider = near @ (at.T @ at)
             wider.data[:] = 1.0
             small = (reached < enough) & (np.diff(wider.indptr) > np.diff(near.indptr))
@@ -102,7 +102,7 @@ def partners(
     """Points of facets `facing` (q,) opposite to `points` (k, 3), which lie on facets `own` (k,).
 
     As in the plane: nodes at the same place first, the nearest along the `directions` (k, 3) then,
-    but for those that lie beyond the own body.
+    except those behind the far side of the own body.
     """
     found = none_met(len(points))
     if facing.size == 0:
@@ -143,7 +143,7 @@ def measure(trace: FacetTrace, contact: Contact, facet: Index, s: Array) -> Arra
 def facet_weights(trace: FacetTrace, contact: Contact, facets: Index) -> Array:
     """Integrals (k, q) of the basis functions over each of the `facets` (k,).
 
-    At order 2 those of the vertices are none, by kind and not by round-off.
+    At order 2 those of the vertices are exactly 0.
     """
     s, w = triangle.gauss(trace.order + 2 * trace.geometry_order)
     k = len(facets)
@@ -246,7 +246,7 @@ def facing_pieces(
 ) -> FacetPieces:
     """Parts of `facets` (k,) that face one of the facets `facing` (q,) each.
 
-    Along the normal in the middle of each without a direction, no further away than `reach` (k,).
+    Without a direction, along the normal at the centroid, no further away than `reach` (k,).
     """
     d = rays(trace, contact, facets, np.tile(triangle.CENTRE, (len(facets), 1)))
     far = np.inf if contact.direction is not None else reach
@@ -330,7 +330,7 @@ def with_dual_rows(trace: FacetTrace, zone: ContactZone, facing: Mask) -> tuple[
     covered[~matched] = means.D
     zone, carries = with_means(trace, zone, facing, matched, means)
     zone = replace(zone, covered=covered)
-    # Slivers: what they carry is less than the round-off of what others say.
+    # Slivers: their forces are less than the round-off of the others.
     return zone, carries & (zone.weight > SMALLEST_SHARE * whole)
 
 
@@ -468,7 +468,7 @@ def for_partial_cover(trace: BoundaryTrace, contacts: Sequence[Contact]) -> Boun
     """The trace with Bernstein coefficients where facets of a secondary face their primary in part.
 
     There the integrals of the other functions may be negative, and without some of these rows the
-    psi would not add up to 1. In the plane hats replace phi in the rows alone.
+    psi would not add up to 1. In the plane hat functions replace phi, in the rows alone.
     """
     if not isinstance(trace, FacetTrace) or trace.order == 1:
         return trace

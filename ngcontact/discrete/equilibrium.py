@@ -26,13 +26,15 @@ from ..problem import Problem, numbers
 from ..qp import NULL_SPACE_TOLERANCE, NullSpace, pinned_null_space, vanishing_combinations
 from ..quadrature import Load, SampledElements, loads_of
 
-STRAIN_FORCE = 1e-9  # force of a rigid motion, relative to its terms, that shows it is not in V_h
+STRAIN_FORCE = 1e-9  # force of a rigid motion, relative to its terms, from which it is not in V_h
 LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
 ADDED_DEGREES = 2  # of the mesh's curved sides, to see their error
-QUADRATURE_ERRORS = 3.0  # of the load's work, measured, that are allowed; up to .21 were met
+QUADRATURE_ERRORS = (
+    3.0  # multiple of the measured error of a load's work that is allowed; up to .21 was met
+)
 WORK_NOISE = 1e-10  # ... and this, relative to the sum of its terms, round-off
 FORCE_ROUND_OFF = 1e-13  # of all contact forces: what their least squares leave, measured 2e-14
-MIN_RESISTANCE = 1e-2  # of a motion, that closes or opens no gap more: contact hardly resists it
+MIN_RESISTANCE = 1e-2  # change of gaps by a unit motion, below which contact hardly resists it
 WORK_ROUND_OFF = 1e-14  # work, relative to the most that the load could do, that is none
 
 
@@ -122,7 +124,7 @@ class FreeMotions:
 
     @cached_property
     def means(self) -> Array:
-        """Integrals (2N, r) of v.z over the boundaries for the motions z, made when asked for."""
+        """Integrals (d * N, r) of v.z over the boundaries for the motions z, made on first use."""
         V, model = self.space.V, self.space.trace.model
         mass = ng.BilinearForm(V)
         u, v = V.TnT()
@@ -223,7 +225,7 @@ class Rigid:
     free: FreeMotions
     rows: Array  # (m, r) left sides of the contact rows, lengths
     work: Array  # (r,) of the load, before what quadrature left of it was taken out
-    motions: Array  # (2n, r) in the unknowns of the program
+    motions: Array  # (d * n, r) in the unknowns of the program
     null_space: NullSpace  # their part that no row resists, and the rest
     placing: Array  # (r,) amounts by which the load moves rigid bodies until contact stops them
     carries: Mask  # (m,) rows that would carry the load there
@@ -236,14 +238,14 @@ class Rigid:
     def hardly_held(self, values: Array) -> NoEquilibriumError | None:
         """The error of a large motion that hardly changes any gap, None without one.
 
-        Of one body or all, in the displacement of node `values` (2n,). A wrong moment, as of a
-        hole's normals at points of a pin that lies elsewhere in it, drives it as far as round-off
-        and the mesh allow.
+        Of one body or all, in the displacement of node `values` (d * n,). Wrong moments make
+        it as large as the mesh allows, as those of a hole's normals at points of a pin that is not
+        in its middle.
         """
         free, extent = self.free, np.abs(values).max(initial=0.0)
         amounts = np.linalg.solve(free.nodal.T @ free.nodal, free.nodal.T @ values)
-        lineal = vanishing_combinations(self.rows)
-        amounts -= lineal @ np.linalg.lstsq(lineal, amounts)[0]
+        unresisted = vanishing_combinations(self.rows)
+        amounts -= unresisted @ np.linalg.lstsq(unresisted, amounts)[0]
         for part in (free.combinations, *free.of_bodies):
             mine = np.where(part.any(axis=0), amounts, 0.0)
             size, seen = (np.abs(x @ mine).max(initial=0.0) for x in (part, self.rows))
@@ -261,14 +263,14 @@ class Rigid:
         return None
 
     def on(self, space: Space | None) -> Rigid:
-        """The same as functions of an equal space; of None, to be kept without one."""
+        """The same as functions of an equal space; None drops the space, to be kept without one."""
         return replace(self, free=replace(self.free, space=space))  # type: ignore[arg-type]
 
 
 def equilibrium(
     problem: Problem, space: Space, conditions: Conditions, rows: Rows, basis: BasisTransformation
 ) -> tuple[Rigid | None, Array]:
-    """The rigid motions that supports leave free, and the load (2N,) in equilibrium on them.
+    """The rigid motions that supports leave free, and the load (d * N,) in equilibrium on them.
 
     None, and the load as it is, if supports alone hold all bodies.
 
@@ -293,11 +295,11 @@ def equilibrium(
         f = f - free.means @ np.linalg.solve(free.gram, left)
     placing, carries = _placing(left_sides, work - left, rows.g, rows.equality)
     motions = basis.coordinates(free.nodal, left_sides)
-    lineal = vanishing_combinations(left_sides)
+    unresisted = vanishing_combinations(left_sides)
     means = np.zeros((len(motions), 0))
-    if lineal.size:  # the mean of such a motion over the boundary of the bodies vanishes
-        means = basis.T.T @ (space.basis.T @ (free.means @ lineal))
-    null_space = pinned_null_space(motions, lineal, means.T, basis.unknown, basis.fixed)
+    if unresisted.size:  # the mean of such a motion over the boundary of the bodies vanishes
+        means = basis.T.T @ (space.basis.T @ (free.means @ unresisted))
+    null_space = pinned_null_space(motions, unresisted, means.T, basis.unknown, basis.fixed)
     return Rigid(free, left_sides, work, motions, null_space, placing, carries), f
 
 
@@ -306,23 +308,23 @@ def _placing(rows: Array, work: Array, g: Array, equality: Mask) -> tuple[Array,
 
     No movement without load, and where bodies must deform to fit at all.
     """
-    stay = np.zeros(len(work)), np.zeros(len(g), dtype=bool)
+    no_motion = np.zeros(len(work)), np.zeros(len(g), dtype=bool)
     scale, force = np.abs(g).max(initial=0.0), np.abs(work).max(initial=0.0)
     if scale == 0.0 or force == 0.0:
-        return stay
-    lineal = vanishing_combinations(rows)
+        return no_motion
+    unresisted = vanishing_combinations(rows)
     free = ~equality
     result = linprog(
         -work / force,
         A_ub=rows[free] if free.any() else None,
         b_ub=g[free] / scale if free.any() else None,
-        A_eq=np.vstack([rows[equality], lineal.T]),
-        b_eq=np.concatenate([g[equality] / scale, np.zeros(lineal.shape[1])]),
+        A_eq=np.vstack([rows[equality], unresisted.T]),
+        b_eq=np.concatenate([g[equality] / scale, np.zeros(unresisted.shape[1])]),
         bounds=(None, None),
         method="highs",
     )
     if result.status != 0:
-        return stay
+        return no_motion
     carries = np.zeros(len(g), dtype=bool)
     if free.any():
         carries[free] = result.ineqlin.marginals < -NULL_SPACE_TOLERANCE
@@ -333,7 +335,7 @@ def _placing(rows: Array, work: Array, g: Array, equality: Mask) -> tuple[Array,
 class _Unbalanced:
     """The `work` (r,) of a load that contact forces cannot balance, and the sum of these forces.
 
-    Their round-off reaches bodies without load of their own.
+    Round-off of the forces gives work on bodies that carry no load, too.
     """
 
     work: Array
@@ -380,7 +382,7 @@ def _check_work(
         return
     motion, mesh = free.motion(left.motion), free.space.trace.mesh
     of_shape = 0.0
-    if len(set(motion.bodies)) == len(motion.bodies):  # regions tell them
+    if len(set(motion.bodies)) == len(motion.bodies):  # their names tell them apart
         of_shape = abs(float(_change_by_shape(problem, mesh, motion).sum()))
     if not left.is_within(noise, QUADRATURE_ERRORS * of_shape):
         raise NoEquilibriumError(
@@ -420,9 +422,9 @@ def _measured_work(problem: Problem, free: FreeMotions) -> tuple[Array, Array] |
                 parts = amounts[:, moving].T.tolist()
                 powers = [r * density[0] + s * density[1] + t * turn for r, s, t in parts]
                 power = model.weighted(ng.CF(tuple(powers)))
-                done, missed = view.integral(power, here, rough)
-                work[moving] += done
-                error[moving] += missed
+                work_here, error_here = view.integral(power, here, rough)
+                work[moving] += work_here
+                error[moving] += error_here
     return work, error
 
 

@@ -231,7 +231,9 @@ def directions(
         segment, at_node = boundary.at_nodes(line.segments)
         here = without.ravel()
         nodal[without] = boundary.exact_normal(segment[here], at_node[here])
-    for k in np.flatnonzero(boundary.axis[line.segments]):  # whose nodes are others
+    for k in np.flatnonzero(
+        boundary.axis[line.segments]
+    ):  # whose nodes are those of a rule with weight r
         s_here = gauss_lobatto(boundary.order)
         nodal[k] = boundary.exact_normal(np.full(len(s_here), line.segments[k]), s_here)
     return between_nodes(nodal[local], s)
@@ -268,11 +270,11 @@ def facing_points(
     parts = Parts(line.segments[pieces.local], pieces.start, pieces.stop)
     part, (segment, s, weight) = parts.points(order)
     local, facing = pieces.local[part], pieces.facing[part]
-    d, turn = directions(boundary, line, local, s)
+    d, turning_rate = directions(boundary, line, local, s)
     x, slope = boundary.point(segment, s), boundary.derivative(segment, s)
     speed = jacobian(boundary, line.contact, segment, s)
     length = np.linalg.norm(slope, axis=1) * boundary.measure(segment, s)
-    # Where the direction touches a curve nothing is per eta.
+    # Where the direction is tangent to a curve d eta is 0: per arc length.
     along = speed <= FACING_COSINE * length
     weight, speed = weight * speed, np.where(along, length, speed)
     stretch = np.ones((2, len(s)))
@@ -290,7 +292,9 @@ def facing_points(
         turning, size = (there * across(d)).sum(axis=1), np.linalg.norm(there, axis=1)
         along |= np.abs(turning) <= FACING_COSINE * size
         turning = np.where(along, size, turning)
-        rate = ((slope * across(d)).sum(axis=1) - (offset * across(turn)).sum(axis=1)) / turning
+        rate = (
+            (slope * across(d)).sum(axis=1) - (offset * across(turning_rate)).sum(axis=1)
+        ) / turning
         length = size * boundary.measure(facing, s_there)
         stretch[1] = np.abs(rate) * length / speed
     weight[along], stretch[:, along] = 0.0, 1.0
@@ -367,7 +371,7 @@ def on_contact(
         terms = BoundaryResidual("tangential", x.element, x.weight, x.across[..., 0], [share])
         residuals.append(terms)
     residuals += _normal(sides, pressure, full, line.contact.bilateral)  # (3.10), (3.10')
-    # Where both bodies meet the softer gives way to a depth.
+    # An overlap of two bodies costs the energy of the softer one.
     stiffness = np.min([side.stiffness for side in sides], axis=0)
     closed, depth = _gap_squares(solution, line, points, pressure, full, stiffness)
     squares, weight = [], points.own.weight / len(sides)
@@ -467,7 +471,7 @@ def _normal(
 
     Any pressure that is not negative may stand for pi_h, by which the estimate compares both sides:
     where a segment is in contact with all its nodes (`full`) that is the mean of both tractions,
-    and the stiffer body takes up the difference. `pressure` and `full` (k,) are at all points.
+    and the difference counts for the stiffer body. `pressure` and `full` (k,) are at all points.
     """
     own, other = sides[0], sides[-1]
     tension = np.zeros_like(pressure) if bilateral else np.maximum(-pressure, 0)
@@ -516,7 +520,7 @@ def _gap_squares(
     if contact.primary is not None:
         u -= boundary.evaluate(solution.displacement, *points.facing[:2])
     gap = points.distance - (u * points.direction).sum(axis=1)
-    gap[np.abs(gap) <= noise] = 0.0  # its root counts: 1e-16 would be an estimate of 1e-8
+    gap[np.abs(gap) <= noise] = 0.0  # the estimate has its square root: 1e-8 of 1e-16
     gap /= solution.strain
     opening, depth = np.maximum(gap, 0), np.minimum(gap, 0)
     cost = partial(closing_energy, solution, points.own, stiffness)

@@ -73,17 +73,17 @@ def _residual(
 
 def surface_terms(solution: ScaledSolution, pairs: Sequence[ContactState]) -> list[BoundaryTerms]:
     """Terms of the whole boundary: of each pair, and of what no pair covers."""
-    terms, left = [], ~solution.boundary.inner
+    terms, uncovered = [], ~solution.boundary.inner
     for pair in pairs:
         term, covered = on_zone(solution, pair)
         terms.append(term)
-        left[covered] = False
-    rest = np.flatnonzero(left)
+        uncovered[covered] = False
+    rest = np.flatnonzero(uncovered)
     return [*terms, on_supports_and_loads(solution, rest)]
 
 
 def on_supports_and_loads(solution: ScaledSolution, facets: Index) -> BoundaryTerms:
-    """What is left of (3.6), (3.7), (3.8) on `facets` (j,) of no pair; the rest is free."""
+    """Residuals of (3.6), (3.7), (3.8) on `facets` (j,) of no pair; the rest is free."""
     problem, trace = solution.problem, solution.boundary
     points = _points(trace, facets, 2 * solution.order + DATA_DEGREE)
     t, element = _traction(solution, points), trace.element[points.facet]
@@ -125,7 +125,9 @@ def discrete_pressure(trace: FacetTrace, pair: ContactState, local: Index, s: Ar
         return np.asarray((triangle.lagrange(trace.order, s) * value[local]).sum(axis=1))
     edges = value[:, 3:]
     opposite = (triangle.EDGES[None] == np.arange(3)[:, None, None]).any(axis=2)
-    linear = np.where(opposite, 1.0, -1.0) @ edges.T  # at a vertex: both edges there less the other
+    linear = (
+        np.where(opposite, 1.0, -1.0) @ edges.T
+    )  # at a vertex: the sum of its two edges less the third
     has = pair.line.rows[:, :3] >= 0
     value[:, :3] = np.where(has, value[:, :3], linear.T)
     shapes = triangle.lagrange(2, s)
@@ -148,8 +150,9 @@ def _in_contact(pair: ContactState) -> Mask:
 def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms, Index]:
     """Terms of one pair, and the facets (j,) that it covers.
 
-    Where all rows of a facet are active both bodies have one pressure, the mean of both tractions;
-    elsewhere that of the discrete forces. The gap is not to be negative, and closed under pressure.
+    Where all rows of a facet are active both bodies have one pressure, and half the jump of their
+    tractions counts; elsewhere the difference from the discrete forces. Gaps count where they are
+    negative, and where they are open under pressure.
     """
     trace, zone = solution.boundary, pair.line
     if not (isinstance(trace, FacetTrace) and isinstance(zone, ContactZone)):
@@ -191,10 +194,10 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
         )
     gap = (distance - (u * d).sum(axis=1)) / solution.strain
     along = [sign * (t * d).sum(axis=1) + pi for _, t, sign in sides]
-    mean = sum((t * d).sum(axis=1) for _, t, _ in sides) / 2
+    half_jump = sum((t * d).sum(axis=1) for _, t, _ in sides) / 2
     least = np.min([solution.edge_weight[e] for e, _, _ in sides], axis=0)
     stiff = np.min([solution.mu[e] / solution.diameter[e] for e, _, _ in sides], axis=0)
-    both = np.where(full & (len(sides) == 2), np.abs(mean), np.inf)
+    both = np.where(full & (len(sides) == 2), np.abs(half_jump), np.inf)
     for (e, t, _), miss in zip(sides, along, strict=True):
         own_weight = solution.edge_weight[e]
         shared = np.isfinite(both)
@@ -204,13 +207,13 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
         shear = t - (t * d).sum(axis=1)[:, None] * d
         residuals.append(BoundaryResidual("tangential", e, own_weight * weight, shear, []))
         depth = stiff * np.minimum(gap, 0.0) ** 2
-        left = np.maximum(pi, 0.0) * np.maximum(gap, 0.0) / 2
-        left = np.where(full, np.minimum(left, stiff * gap**2), left)
+        product = np.maximum(pi, 0.0) * np.maximum(gap, 0.0) / 2
+        product = np.where(full, np.minimum(product, stiff * gap**2), product)
         if zone.contact.bilateral:
-            depth, left = stiff * gap**2, np.zeros(len(gap))
+            depth, product = stiff * gap**2, np.zeros(len(gap))
         share = weight / len(sides)
         squares.append(Squares("penetration", e, depth * share))
-        squares.append(Squares("complementarity", e, left * share))
+        squares.append(Squares("complementarity", e, product * share))
     free = np.concatenate([zone.segments[alone], zone.facing[~met]])
     points = _points(trace, free, degree)
     residuals.append(_residual(solution, points, "boundary", _traction(solution, points)))

@@ -43,7 +43,7 @@ class FacetTrace(BoundaryTrace):
     bernstein: Mask = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _again, (self.mesh, self.order, self.bernstein)
+        return _restored, (self.mesh, self.order, self.bernstein)
 
     def point(self, segment: Index, s: Array) -> Array:
         """Points (k, 3) of the mesh's surface at `s` (k, 3) of facets `segment` (k,)."""
@@ -153,11 +153,11 @@ class FacetTrace(BoundaryTrace):
         return np.asarray(function(points)).reshape(len(segment), function.dim)
 
     def number_points(self, segment: Index, node: Index, vector: Array) -> tuple[Index, Array]:
-        """Number the nodes of several facets: once each, at an edge of the body once a side.
+        """Number the nodes of several facets: a point each, at edges of the body one a face.
 
         Points (k,) of `node` (k,) on `segment` (k,), and their mean vectors (m, 3) by area of
         `vector` (k, 3), as in the plane. Facets at a node are on one side where their vectors are
-        linked by turns that make no edge.
+        linked by angles that make no edge.
         """
         order = np.lexsort((self.region[segment], node))
         number, count = np.full(len(node), -1), 0
@@ -206,7 +206,7 @@ class FacetTrace(BoundaryTrace):
         rows, columns = np.broadcast_arrays(functions[:, :, None], self.nodes[segments][:, None])
         kept = np.abs(change) > ENTRY_ROUND_OFF
         rows, columns, values = rows[kept], columns[kept], change[kept]
-        # Facets with a common edge say the same of it.
+        # Facets with a common edge have equal entries there.
         _, first = np.unique(rows * size + columns, return_index=True)
         rest = np.ones(size, dtype=bool)
         rest[inner] = False
@@ -248,7 +248,7 @@ def facet_trace(mesh: ng.Mesh, order: int) -> FacetTrace:
     a, b, c = curve[:, :3].transpose(1, 0, 2)
     inwards = view.corners[element].mean(axis=1) - (a + b + c) / 3
     facing = (np.cross(b - a, c - a) * inwards).sum(axis=1)
-    none = np.zeros(len(vertices), dtype=np.intp)
+    zeros = np.zeros(len(vertices), dtype=np.intp)
     trace = FacetTrace(
         mesh=mesh,
         arrays=view,
@@ -265,8 +265,8 @@ def facet_trace(mesh: ng.Mesh, order: int) -> FacetTrace:
         edges=None,
         faces=cad_faces(mesh),
         model=SOLID_MODEL,
-        axis=none,
-        on_axis=none > 0,
+        axis=zeros,
+        on_axis=zeros > 0,
     )
     return trace if order == 1 else replace(trace, nodes=_nodes(trace, vertices))
 
@@ -275,8 +275,8 @@ def _nodes(trace: FacetTrace, vertices: Index) -> Index:
     """Numbers (k, q) of the nodes: those of NGSolve's unknowns, along edges from the lower end."""
     nodes = trace._functions.copy()
     for (first, last), inner in zip(triangle.EDGES, triangle.edge_nodes(trace.order), strict=True):
-        falling = np.flatnonzero(vertices[:, first] > vertices[:, last])[:, None]
-        nodes[falling, inner] = nodes[falling, inner[::-1]]
+        reversed_edges = np.flatnonzero(vertices[:, first] > vertices[:, last])[:, None]
+        nodes[reversed_edges, inner] = nodes[reversed_edges, inner[::-1]]
     return nodes
 
 
@@ -287,5 +287,5 @@ def boundary_trace(mesh: ng.Mesh, order: int, model: Model = PLANE) -> BoundaryT
     return segment_trace(mesh, order, model)
 
 
-def _again(mesh: ng.Mesh, order: int, bernstein: Mask) -> FacetTrace:
+def _restored(mesh: ng.Mesh, order: int, bernstein: Mask) -> FacetTrace:
     return replace(facet_trace(mesh, order), bernstein=bernstein)
