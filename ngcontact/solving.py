@@ -97,7 +97,7 @@ def solve(
     start : Solution, optional
         Of the same pairs on any mesh: its active set is the first guess. On its own mesh with the
         same bodies, supports and pairs, assembly and factorisation are taken over: another load
-        costs back-solves only.
+        costs back-solves only. Its mesh and order are not taken over: give them.
 
     Returns
     -------
@@ -360,6 +360,10 @@ class Run(Iterator[Solution]):
     def __next__(self) -> Solution:
         """The next level."""
         return next(self._solutions)
+
+    def __repr__(self) -> str:
+        """What it is, and how to get at the levels."""
+        return "<" + ONE_PER_LEVEL.format("has not run to its end") + ">"
 
     def close(self) -> None:
         """Make no more levels."""

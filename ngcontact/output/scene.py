@@ -59,6 +59,10 @@ class Style:
             len(self.limits) == 2 and -np.inf < self.limits[0] < self.limits[1] < np.inf
         ):
             raise ValueError(f"limits = {self.limits}: give two finite numbers, the smaller first")
+        if not isinstance(self.units, Mapping):
+            raise TypeError(
+                f'units = {self.units!r}: give a mapping, as {{"length": "mm", "stress": "MPa"}}'
+            )
         for kind in self.units:
             if kind not in UNITS:
                 raise ValueError(f'units: "{kind}" is none of {", ".join(UNITS)}')

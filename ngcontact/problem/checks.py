@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 
 import ngsolve as ng
 import numpy as np
-from netgen.occ import OCCGeometry
+from netgen.occ import OCCGeometry, TopoDS_Shape
 
 from ..arrays import Array, Index, Mask
 from .mesh_arrays import POSITION, MeshArrays, on_axis
@@ -128,7 +128,10 @@ def kind_of(value: Any) -> str:
     kind = type(value)
     if kind.__module__.startswith("netgen") and kind.__name__ == "Mesh":
         return "a raw Netgen mesh, which ngsolve.Mesh(mesh) wraps"
-    return f"a {kind.__name__}"
+    if isinstance(value, TopoDS_Shape):
+        return f"a {kind.__name__}, which OCCGeometry(shape, dim=2) wraps, dim=3 for solids"
+    article = "an" if kind.__name__[0] in "aeiouAEIOU" else "a"
+    return f"{article} {kind.__name__}"
 
 
 def regions_of(

@@ -15,6 +15,7 @@ from ..problem import table
 
 HEAD = ("level", "unknowns", "estimate", "seconds")
 BAR_WIDTH = 20  # characters
+MOTIONS_NAMED = 3  # free motions that a line names, at most
 AXES = "xyz"
 
 Number = int | float
@@ -85,8 +86,11 @@ def facts(solution: Guaranteed) -> list[tuple[str, str]]:
         sizes = [f"{pair.secondary} {size}" for pair, size in zip(contact, sizes, strict=True)]
     if sizes:
         told.append(("force", ", ".join(sizes)))
-    if solution.free_motions:
-        told.append(("free:", "; ".join(map(str, solution.free_motions))))
+    motions = solution.free_motions
+    if len(motions) > MOTIONS_NAMED:
+        told.append(("free:", f"{len(motions)} rigid motions (free_motions)"))
+    elif motions:
+        told.append(("free:", "; ".join(map(str, motions))))
     return told
 
 
