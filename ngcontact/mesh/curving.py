@@ -111,8 +111,15 @@ def curve(mesh: ng.Mesh, order: int, element: str) -> tuple[ng.Mesh, int]:
     """Mesh curved to the element's degree, and the number of elements at curved edges or faces.
 
     A mesh without an OCC geometry, without curved ones, or curved to that degree already is
-    used as it is; otherwise, also after `Refine` has straightened it, the result is a copy.
+    used as it is; otherwise, also after `Refine` has straightened it, the result is a copy. So it
+    is of a mesh with halved edges, which bisection keeps among those in use: a file of the mesh
+    has none, and numbers the edges otherwise.
     """
+    if ng.H1(mesh, order=2).ndof < mesh.nv + mesh.nedge:
+        before = mesh.GetCurveOrder()
+        mesh = copied(mesh)
+        if before > 1:
+            mesh.Curve(before)
     degree = order if element == "isoparametric" else order + 1  # (2.8)
     curved = _on_curves(mesh) if mesh.dim == 2 else curved_facets(mesh)
     if curved is None:

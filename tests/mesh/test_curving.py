@@ -6,6 +6,7 @@ from functools import partial
 import ngsolve as ng
 import numpy as np
 import pytest
+from netgen.geom2d import SplineGeometry
 from netgen.occ import (
     Axis,
     Glue,
@@ -61,6 +62,17 @@ def test_elements_that_refinement_straightened_are_curved_again(order):
     assert area == pytest.approx(ng.Integrate(flux, again, ng.BND, order=2 * order), rel=1e-13)
     assert area == pytest.approx(math.pi / 4, rel=1e-3)
     assert ng.Integrate(ng.CF(1), mesh, order=2 * order) != pytest.approx(area, rel=1e-3)
+
+
+def test_a_refined_mesh_is_curved_again_also_without_cad():
+    circle = SplineGeometry()
+    circle.AddCircle((0, 0), 1)
+    mesh = mesh_of(circle)
+    mesh.Refine()
+    mesh.Curve(3)
+    curved, _ = curve(mesh, 3, "isoparametric")
+    assert curved.nedge == (3 * mesh.ne + mesh.GetNE(ng.BND)) / 2 < mesh.nedge  # Euler
+    assert ng.Integrate(ng.CF(1), curved, order=6) == pytest.approx(math.pi, rel=1e-4)
 
 
 BLOCK = cases.partly_opening_block()  # straight, nodes matched

@@ -14,8 +14,9 @@ import pytest
 
 import ngcontact
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Hooke, adapt, solve
+from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
 from tests.scenes import unmatched_blocks
+from tests.solids.meshes import boxes
 
 ROOT = Path(__file__).parents[2]
 SOFT = Elastic(E=1.0, nu=0.3)
@@ -42,6 +43,29 @@ def on_a_mesh():
     return two_blocks(geometry=mesh)
 
 
+def refined_by_hand():
+    """A given mesh of which NGSolve halved some edges, and keeps them among those in use."""
+    mesh = ng.Mesh(unmatched_blocks().GenerateMesh(maxh=0.5))
+    for element in mesh.Elements(ng.VOL):
+        mesh.SetRefinementFlag(element, mesh[element.vertices[0]].point[0] > 0.5)
+    mesh.Refine()
+    return two_blocks(geometry=mesh)
+
+
+def adapted_solids():
+    bodies = boxes(
+        ("lower", (0, 0, 0), (2, 2, 1), (2, 2, 1)), ("upper", (0, 0, 1), (1, 1, 2), (1, 1, 1))
+    )
+    problem = Problem(
+        geometry=bodies,
+        materials={"lower|upper": SOFT},
+        displacement={"lower_bottom": (0, 0, 0)},
+        traction={"upper_top": 0.01},
+        contact=[Contact("upper_bottom", "lower_top")],
+    )
+    return list(adapt(problem, order=2, max_dofs=3000))[-1]
+
+
 SCENES = {
     "pressed disc": lambda: solve(cases.pressed_disc(), maxh=0.4, order=3),
     "adapted": lambda: list(adapt(cases.partly_opening_block(), order=2, max_dofs=1500))[-1],
@@ -50,6 +74,8 @@ SCENES = {
     ),
     "laws": lambda: solve(varying(), maxh=0.5, order=2),
     "a mesh that is given": lambda: solve(on_a_mesh(), order=2),
+    "a mesh that NGSolve refined": lambda: solve(refined_by_hand(), order=2),
+    "adapted solids": adapted_solids,
     "free motion": lambda: solve(
         two_blocks(displacement={"bottom": (0, 0)}, traction={"top": 0.01}), maxh=0.5
     ),
