@@ -41,9 +41,9 @@ def at_limit(mesh: ng.Mesh, degree: int) -> Mask:
     """
     limit = np.zeros(mesh.ne, dtype=bool)
     if degree > 1:  # straight segments have no middles to place
-        view = MeshArrays(mesh)
-        element = view.facet_elements
-        limit[element[resolved_lengths(mesh) < MIN_HALVED_LENGTH]] = True
+        short = resolved_lengths(mesh) < MIN_HALVED_LENGTH
+        if short.any():
+            limit[MeshArrays(mesh).facet_elements[short]] = True
     return limit
 
 

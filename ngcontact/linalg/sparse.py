@@ -82,8 +82,30 @@ def congruent(
     change = change_of_basis(A, T)
     if change.nnz == 0:
         return A, matrix
-    total = (matrix + handed_over(change)).CreateSparseMatrix()
+    places = _places(A, change)
+    if places is None:
+        total = (matrix + handed_over(change)).CreateSparseMatrix()
+    else:
+        total = matrix.CreateMatrix()
+        values = total.AsVector().FV().NumPy()
+        values[:] = A.data
+        values[places] += change.data
     return shared(total), total
+
+
+def _places(A: sp.csr_array, change: sp.csr_array) -> Index | None:
+    """Numbers (k,) of the entries of `A` at those of its `change`, both (n, n).
+
+    None where `A` has no entry for one of them, as between two bodies.
+    """
+    n, rows = A.shape[0], np.diff(change.indptr).nonzero()[0]
+    count = np.diff(A.indptr)[rows]
+    first = A.indptr[rows] - np.cumsum(count) + count
+    entries = np.arange(count.sum()) + np.repeat(first, count)
+    keys = np.repeat(rows, count) * n + A.indices[entries]  # rising, as columns are in each row
+    wanted = np.repeat(rows, np.diff(change.indptr)[rows]) * n + change.indices
+    found = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+    return entries[found] if np.array_equal(keys[found], wanted) else None
 
 
 def change_of_basis(A: sp.csr_array, T: sp.csr_array) -> sp.csr_array:

@@ -7,7 +7,7 @@ import numpy as np
 from netgen.meshing import IdentificationType
 
 from ..arrays import Array, Integers, Mask
-from ..problem import MeshArrays
+from ..problem import PIECES, MeshArrays
 from .cad import CadEdge, cad_edges
 from .faces import curved_facets
 
@@ -47,6 +47,8 @@ def copied(mesh: ng.Mesh) -> ng.Mesh:
         periodic = IdentificationType.PERIODIC
         copy.ngmesh.AddPointIdentification(one, other, identnr=1, type=periodic)
     keep_parents(copy, vertex_parents(mesh))
+    if hasattr(mesh, PIECES):
+        setattr(copy, PIECES, getattr(mesh, PIECES))
     return copy
 
 
