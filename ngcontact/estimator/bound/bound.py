@@ -179,6 +179,7 @@ def _bound(
     degree, lift = max(p + 1, 2 + extent), p + LIFTING_DEGREES
     # 1. Cells.
     guided = trace.segments(None if problem.sliding is None else str(problem.sliding))
+    guided = guided[~trace.on_axis[guided]]  # the axis guides by itself: there u_r = 0
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
     loaded = np.append(trace.segments(*problem.traction, *touching), guided)
     whole = [name for name, values in problem.displacement.items() if None not in values]

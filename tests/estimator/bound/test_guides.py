@@ -12,8 +12,8 @@ from netgen.occ import Axis, OCCGeometry, WorkPlane, Z
 from drivers.reference import cases
 from drivers.reference.overkill import Overkill
 from drivers.reference.straight import energy_error
-from ngcontact import ContactError, Elastic, Problem, adapt, solve
-from ngcontact.geometries import blocks, rings
+from ngcontact import Contact, ContactError, Elastic, Problem, adapt, solve
+from ngcontact.geometries import blocks, rings, rounded_punch
 from ngcontact.geometries.region import DOWN, LEFT, RIGHT, UP, body, quarter_arc
 from tests.estimator.bound.test_exact import settled
 
@@ -129,3 +129,16 @@ def test_the_bar_of_a_force_beside_a_curved_guide():
         row = q[f"force, {axis}"]
         # Both are on the domains of their meshes.
         assert abs(value - row.value) <= row.proved + 1e-4 * size
+
+
+def test_a_guide_on_the_axis_changes_nothing():
+    """There u_r = 0 anyway, and the circles of the axis have no length."""
+    problem = Problem(
+        geometry=rounded_punch(),
+        materials={".*": ONE},
+        displacement={"block_bottom": (0, 0), "indenter_top": (None, -0.01)},
+        contact=[Contact("end", "block_top", direction=(0, -1))],
+        model="axisymmetric",
+    )
+    free, guided = (solve(replace(problem, sliding=x), maxh=0.4) for x in ((), "axis"))
+    assert guided.error_bound == pytest.approx(free.error_bound, rel=1e-9)
