@@ -7,6 +7,7 @@ is found by Newton's method for each end alone, since the solution depends on t 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import ngsolve as ng
@@ -15,20 +16,23 @@ import numpy as np
 from ..discrete import discretise, minimise_energy
 from ..errors import ConvergenceError
 from ..lagrange import gauss, lagrange
+from ..mesh import check_curves
 from ..problem import Problem
 from ..solved import Solved
-from .geometric_mesh import LAYER_RATIO, EndOfContact, GeometricMesh
+from .geometric_mesh import EndOfContact, GeometricMesh
 
 ELEMENT = "isoparametric"
 FIT_DEGREE = 4  # of gap / r^(1/2) in r, over the layers
 SAMPLES_PER_NODE = 3  # per node, at which signs are looked at
 PRESSURE_ERROR = 1e-3  # of the largest, which is the error of pressures at ends
 GAP_ERROR = 1e-6  # of the largest displacement
+ROUND_OFF = 1e-6  # of distances on curves, in which ends of segments are told
 
 
 def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved:
     """The solution with contact on the closed segments of a mesh, of degree `order`."""
     curved = mesh.mesh(order)
+    check_curves(curved)
     discrete = discretise(problem, curved, order, ELEMENT)
     p, start = discrete.program, 0
     zone = np.zeros(len(p.g), dtype=bool)
@@ -59,14 +63,18 @@ def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved
     )
 
 
-def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact, layers: int) -> float:
-    """How far out a zone ends, a length, by the singular coefficient of the gap beside its end."""
+def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact) -> float:
+    """How far out a zone ends, a length, by the singular coefficient of the gap beside its end.
+
+    The `solution` is of the `mesh` with layers at its ends.
+    """
     state, x = solution.pairs[end.pair], mesh.vertices[end.vertex]
     reach = mesh.vertices[end.opened] - x
     size = float(np.linalg.norm(reach))
     r = np.linalg.norm(state.line.position - x, axis=1) / size
     beside = ~state.active & ((state.line.position - x) @ reach > 0)
-    beside &= (r > LAYER_RATIO**layers * (1 + 1e-6)) & (r < 1 + 1e-6)  # but the last layer
+    last = np.sort(r[beside])[solution.order - 1]  # the last layer does not know r^(1/2)
+    beside &= (r > last * (1 + ROUND_OFF)) & (r < 1 + ROUND_OFF)
     r = r[beside]
     # The error of the gap in each layer is a share of r^(3/2), so that a weight of 1 / r is fair.
     powers = np.vander(r, FIT_DEGREE + 1, increasing=True) / r[:, None]
@@ -74,8 +82,11 @@ def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact, layers: int
     return float(K / (1.5 * c)) * size
 
 
-def wrong_signs(solution: Solved) -> str | None:
-    """What contradicts contact between nodes: tension in the zone, or penetration; None if none."""
+def wrong_signs(solution: Solved, tips: Sequence[int]) -> str | None:
+    """What contradicts contact between nodes: tension in the zone, or penetration; None if none.
+
+    Stresses are not known on segments that end at the vertices `tips` of layers.
+    """
     trace, order = solution.discrete.space.trace, solution.order
     s, _ = gauss(2 * SAMPLES_PER_NODE * order)
     stress = ng.BoundaryFromVolumeCF(solution.stress)
@@ -92,6 +103,7 @@ def wrong_signs(solution: Solved) -> str | None:
             x = trace.point(line.segments[opened[at[0]]][None], s[at[1]][None])[0]
             return f"pair {number} penetrates by {-gap.min():.2g} at ({x[0]:.6g}, {x[1]:.6g})"
         inside = line.segments[closed]
+        inside = inside[~np.isin(trace.nodes[inside], tips).any(axis=1)]
         segment, places = np.repeat(inside, len(s)), np.tile(s, len(inside))
         sigma = trace.evaluate(stress, segment, places).reshape(-1, 2, 2)
         normal = trace.normal(segment, places)

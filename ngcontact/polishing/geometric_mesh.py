@@ -22,9 +22,12 @@ from ..fem import boundary_trace, model_of
 from ..mesh import CadEdge, cad_edges, graded_mesh, opposite
 from ..problem import Contact, MeshArrays, Problem
 
-LAYER_RATIO = 0.15  # of the sizes of layers: near the best, (2^(1/2) - 1)^2 (Gui, Babuska 1986)
-END_SIZE = 0.6  # of the contact up to its middle, which elements at its end may have
-SIZE_GROWTH = 0.4  # of sizes per distance from the ends: 0.6 has three times the error at order 8
+# Ratios of the sizes of layers: (2^(1/2) - 1)^2 = 0.17 is best for energies (Gui, Babuska), and a
+# larger one for the singular coefficient, which tells where contact ends.
+CORNER_RATIO = 0.15
+END_RATIO = 0.4
+END_SIZE = 0.45  # of the contact up to its middle, which elements at its end may have
+SIZE_GROWTH = 0.8  # of sizes, over the distance from the ends
 MAX_SIZE = 0.5  # of the extent of the bodies
 
 
@@ -71,68 +74,70 @@ class GeometricMesh:
                 found.append(EndOfContact(int(self.pair[inner]), vertex, *beside))
         return found
 
-    def _edge(self, vertex: int) -> CadEdge:
-        """CAD edge of the secondary at one of its vertices."""
-        own = (self.segments == vertex).any(axis=1) & (self.pair >= 0)
-        return self.edges[int(self.boundaries[own][0])]
+    def _between(self, one: int, other: int) -> int:
+        """Number of the segment between two vertices, -1 where there is none."""
+        found = np.flatnonzero(np.isin(self.segments, (one, other)).all(axis=1))
+        return int(found[0]) if len(found) else -1
 
-    def _facing(self, vertex: int, place: Array) -> Array:
-        """The point (2,) of the primary that faces a `place` (2,) of the secondary at a vertex."""
-        there = (self.segments == self.partner[vertex]).any(axis=1)
-        there &= np.isin(self.segments, self.partner).all(axis=1)
-        own = (self.segments == vertex).any(axis=1) & (self.pair >= 0)
-        contact, edge = self.contacts[int(self.pair[own][0])], self._edge(vertex)
+    def _facing(self, vertex: int, far: int, place: Array) -> Array | None:
+        """The point (2,) that faces a `place` (2,) of the secondary's side from `vertex` to `far`.
+
+        None where no segment of the primary faces that.
+        """
+        there = self._between(int(self.partner[vertex]), int(self.partner[far]))
+        if there < 0:
+            return None
+        own = self._between(vertex, far)
+        edge, facing = (self.edges[int(self.boundaries[k])] for k in (own, there))
         slope = edge.derivative(edge.project(place[None]))
-        met = [
-            opposite(contact, place[None], slope, self.edges[k])[1][0]
-            for k in dict.fromkeys(self.boundaries[there].tolist())
-        ]
-        return min(
-            met, key=lambda x: float(np.linalg.norm(x - self.vertices[self.partner[vertex]]))
-        )
+        contact = self.contacts[int(self.pair[own])]
+        return opposite(contact, place[None], slope, facing)[1][0]
 
     def moved(self, end: EndOfContact, distance: float) -> GeometricMesh:
         """The mesh with an end of contact moved by a `distance` along its edge, outwards.
 
         The vertex that faces it moves along.
         """
-        vertices, edge = self.vertices.copy(), self._edge(end.vertex)
+        vertices = self.vertices.copy()
+        edge = self.edges[int(self.boundaries[self._between(end.vertex, end.closed)])]
         outwards = vertices[end.opened] - vertices[end.vertex]
         tangent = edge.derivative(edge.project(vertices[[end.vertex]]))[0]
         tangent *= np.sign(tangent @ outwards) / np.linalg.norm(tangent)
         near = vertices[[end.vertex]] + distance * tangent
         vertices[end.vertex] = edge.point(edge.project(near))[0]
-        if (facing := int(self.partner[end.vertex])) >= 0:
-            vertices[facing] = self._facing(end.vertex, vertices[end.vertex])
+        met = self._facing(end.vertex, end.closed, vertices[end.vertex])
+        if met is not None:
+            vertices[self.partner[end.vertex]] = met
         return replace(self, vertices=vertices)
 
-    def with_layers(self, vertex: int, count: int) -> GeometricMesh:
+    def with_layers(self, vertex: int, ratio: float, count: int) -> GeometricMesh:
         """The mesh with so many layers more at a vertex, and at the one that faces it."""
         mesh = self
         for _ in range(count):
-            mesh = mesh._with_layer(vertex)
+            mesh = mesh._with_layer(vertex, ratio)
         return mesh
 
-    def _with_layer(self, vertex: int) -> GeometricMesh:
+    def _with_layer(self, vertex: int, ratio: float) -> GeometricMesh:
         """One layer more; the layers of facing vertices face each other."""
-        mesh, new = self._cut(vertex, {})
+        mesh, new = self._cut(vertex, ratio, {})
         facing = int(self.partner[vertex])
         if facing < 0:
             return mesh
         own = (self.segments == vertex).any(axis=1) & (self.pair >= 0)
-        there = self.segments[(self.segments == facing).any(axis=1)].ravel().tolist()
-        beside = [k for k in self.segments[own].ravel().tolist() if k != vertex]
-        matched = [k for k in beside if self.partner[k] in there]
-        places = {
-            int(self.partner[k]): mesh._facing(vertex, mesh.vertices[new[k]]) for k in matched
-        }
-        mesh, opposite_ = mesh._cut(facing, places)
-        partner = mesh.partner.copy()
-        for k in matched:
-            partner[new[k]] = opposite_[int(self.partner[k])]
-        return replace(mesh, partner=partner)
+        places, partner = dict[int, Array](), list[tuple[int, int]]()
+        for far in (self.segments[own].sum(axis=1) - vertex).tolist():
+            met = self._facing(vertex, far, mesh.vertices[new[far]])
+            if met is not None:
+                places[int(self.partner[far])] = met
+                partner.append((new[far], int(self.partner[far])))
+        mesh, beyond = mesh._cut(facing, ratio, places)
+        for one, far in partner:
+            mesh.partner[one] = beyond[far]
+        return mesh
 
-    def _cut(self, vertex: int, known: dict[int, Array]) -> tuple[GeometricMesh, dict[int, int]]:
+    def _cut(
+        self, vertex: int, ratio: float, known: dict[int, Array]
+    ) -> tuple[GeometricMesh, dict[int, int]]:
         """The mesh with all sides at a vertex cut, and the new vertices by the sides' far ends.
 
         Each triangle there becomes three. New vertices of `known` far ends lie where those say.
@@ -142,7 +147,7 @@ class GeometricMesh:
         far = np.unique(np.concatenate([a, b]))
         first = len(self.vertices)
         new = {int(end): first + k for k, end in enumerate(far)}
-        x = self.vertices[vertex] + LAYER_RATIO * (self.vertices[far] - self.vertices[vertex])
+        x = self.vertices[vertex] + ratio * (self.vertices[far] - self.vertices[vertex])
         side = np.flatnonzero((self.segments == vertex).any(axis=1))
         ends = self.segments[side].sum(axis=1) - vertex
         cut = np.array([new[k] for k in ends.tolist()], dtype=np.intp)
@@ -230,10 +235,10 @@ def coarse_mesh(problem: Problem, pairs: Sequence[ContactState], extent: float) 
     partner, start = np.full(mesh.nv, -1), 0
     active = carried_active_set(lines, pairs)
     for number, line in enumerate(lines):
-        own = np.append(active[start : start + len(line.node)], False)
+        own, middle = active[start : start + len(line.node)], line.rows[:, 1]
         start += len(line.node)
-        pair[line.segments] = number
-        closed[line.segments] = own[line.rows[:, 1]]  # by the middle
+        met = line.segments[middle >= 0]
+        pair[met], closed[met] = number, own[middle[middle >= 0]]
         at = (line.partner >= 0) & np.isin(line.partner_s, (0.0, 1.0)) & (line.node < mesh.nv)
         side = np.where(line.partner_s[at] == 0.0, 0, -1)
         partner[line.node[at]] = trace.nodes[line.partner[at], side]

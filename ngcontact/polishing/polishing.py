@@ -16,30 +16,27 @@ from ..adaptivity import END_POWER, RefinementTree, corners
 from ..arrays import Array, Mask, field_names
 from ..errors import ContactError, warn
 from ..fem import BoundaryTrace, boundary_trace, model_of
-from ..mesh import cad_edges
+from ..mesh import cad_edges, resolved_lengths
 from ..problem import MeshArrays, Problem
 from ..solution import Solution
 from ..solved import Solved
 from .bilateral import excess, solve_bilateral, wrong_signs
-from .geometric_mesh import LAYER_RATIO, GeometricMesh, coarse_mesh, isolated
+from .geometric_mesh import CORNER_RATIO, END_RATIO, GeometricMesh, coarse_mesh, isolated
 
 MAX_DIGITS = 12
 ORDERS = (4, 6, 8, 10)
-MAX_STEPS = 8  # of Newton's method, at one order
+MAX_STEPS = 12  # of Newton's method, at one order
 STEP_TOLERANCE = 1e-2  # of the size of elements at the ends: how closely these are found at order 4
 MAX_STEP = 0.3  # of the segments beside, by which an end may move in a step
 MIN_LAYERS = 2
 PLACE_DISTANCE = 1e-9  # of the extent, up to which two places are one
 RIGHT_ANGLE_ERROR = 1e-3  # radians by which a right angle may differ from one
 BLUNT_ANGLE = 0.5  # radians by which a convex corner turns at least
-USUAL_RATIO = 0.1  # ratio of two changes from order to order; measured: 0.02 to 0.1
+USUAL_RATIO = 0.1  # of two changes from order to order; measured: 0.02 to 0.1
+RATIO_GROWTH = 2.0  # ... from one order to the next at most; measured: 1.5 to 2.3
 MAX_RATIO = 0.8  # ... of what hardly converges
 
 log = logging.getLogger("ngcontact")
-
-
-class _NotPolishedError(Exception):
-    """Why a solution is returned unchanged."""
 
 
 def polish(solution: Solution, digits: int = 8) -> Solution:
@@ -67,7 +64,7 @@ def polish(solution: Solution, digits: int = 8) -> Solution:
     _check(solution, digits)
     try:
         return _polished(solution, digits)
-    except (_NotPolishedError, ContactError, ValueError, np.linalg.LinAlgError) as error:
+    except (RuntimeError, ValueError) as error:  # of meshing, solving, or of what follows
         warn(f"polish returns the solution as it is: {error}")
         return solution
 
@@ -109,25 +106,22 @@ def _polished(solution: Solution, digits: int) -> Solution:
     mesh = coarse_mesh(problem, solution.pairs, extent)
     count = sum(int(isolated(state).sum()) for state in solution.pairs)
     if len(mesh.ends) != count:
-        raise _NotPolishedError(
+        raise ContactError(
             f"a mesh with vertices at its {count} ends of contact was not found; refine first"
         )
-    end_layers, corner_layers = _layers(problem, mesh, digits)
+    layers = _layers(problem, mesh, digits)
     values, error = list[Array](), math.inf
     for order in ORDERS:
         final = False
         for step in range(MAX_STEPS):
             graded = mesh
-            for vertex, layers in [
-                *((end.vertex, end_layers) for end in mesh.ends),
-                *corner_layers,
-            ]:
-                graded = graded.with_layers(vertex, layers)
+            for vertex, (ratio, number) in layers.items():
+                graded = graded.with_layers(vertex, ratio, number)
             polished = solve_bilateral(problem, graded, order)
             if step == 0 and order > ORDERS[0]:
                 error = _error([*values, _quantities(polished)])
                 final = error <= 10.0**-digits or order == ORDERS[-1]
-            share, mesh = _followed(mesh, polished, graded, end_layers)
+            share, mesh = _followed(mesh, polished)
             log.info(
                 "polish: order %d, %d unknowns, ends off by %.1e of elements, error %.1e",
                 order,
@@ -135,24 +129,22 @@ def _polished(solution: Solution, digits: int) -> Solution:
                 share,
                 error,
             )
-            if share <= (10.0 ** (2 - digits) if final else STEP_TOLERANCE):
+            if share <= (10.0 ** (1 - digits) if final else STEP_TOLERANCE):
                 break
         else:
-            raise _NotPolishedError(f"its ends of contact do not settle at order {order}")
+            raise ContactError(f"its ends of contact do not settle at order {order}")
         values.append(_quantities(polished))
         if final:
             break
     if not error < math.sqrt(10.0**-digits):
-        raise _NotPolishedError(
-            f"orders {ORDERS} do not converge: they leave errors of {error:.1e}"
-        )
-    if (wrong := wrong_signs(polished)) is not None:
-        raise _NotPolishedError(wrong)
-    if error > 10.0**-digits:
-        warn(f"polish: order {order} has about {-math.log10(error):.0f} digits, not {digits}")
-    mesh_of = polished.mesh
+        raise ContactError(f"orders {ORDERS} do not converge: they leave errors of {error:.1e}")
+    tips = [tip for vertex in layers for tip in (vertex, int(mesh.partner[vertex]))]
+    if (wrong := wrong_signs(polished, tips)) is not None:
+        raise ContactError(wrong)
+    if (reached := round(-math.log10(error))) < digits:
+        warn(f"polish: order {order} has about {reached} digits, not {digits}")
     kept = {name: getattr(polished, name) for name in field_names(polished)}
-    return Solution(**kept, tree=RefinementTree(mesh_of, np.arange(mesh_of.ne)))
+    return Solution(**kept, tree=RefinementTree(polished.mesh, np.arange(polished.mesh.ne)))
 
 
 def _quantities(solution: Solved) -> Array:
@@ -166,51 +158,53 @@ def _error(values: list[Array]) -> float:
     size = np.abs(values[-1])
     size[:-1] = size[:-1].max()
     changes = (np.abs(np.diff(values, axis=0)) / size).max(axis=1)
-    ratio = USUAL_RATIO if len(changes) == 1 else min(changes[-1] / changes[-2], MAX_RATIO)
-    return float(changes[-1] * ratio / (1 - ratio))
+    ratio = USUAL_RATIO if len(changes) == 1 else RATIO_GROWTH * changes[-1] / changes[-2]
+    return float(changes[-1] * min(ratio, MAX_RATIO) / (1 - min(ratio, MAX_RATIO)))
 
 
-def _followed(
-    mesh: GeometricMesh, solution: Solved, graded: GeometricMesh, layers: int
-) -> tuple[float, GeometricMesh]:
-    """The mesh with its ends moved to where they belong, and the largest share that they moved.
+def _followed(mesh: GeometricMesh, solution: Solved) -> tuple[float, GeometricMesh]:
+    """By what share of the segments beside them ends of contact are off; the mesh with them moved.
 
-    Of the segments beside them.
+    The `solution` is of the mesh with its layers.
     """
     largest, moved = 0.0, mesh
     for end in mesh.ends:
         beside = mesh.vertices[[end.closed, end.opened]] - mesh.vertices[end.vertex]
         size = float(np.linalg.norm(beside, axis=1).min())
-        share = -excess(solution, graded, end, layers) / size
+        share = -excess(solution, mesh, end) / size
+        if not math.isfinite(share):
+            raise ContactError("the gap beside an end of contact does not open")
         largest = max(largest, abs(share))
         moved = moved.moved(end, size * float(np.clip(share, -MAX_STEP, MAX_STEP)))
     return largest, moved
 
 
-def _layers(
-    problem: Problem, mesh: GeometricMesh, digits: int
-) -> tuple[int, list[tuple[int, int]]]:
-    """Layers at ends of contact, and at other vertices where singularities are: vertex, number."""
+def _layers(problem: Problem, mesh: GeometricMesh, digits: int) -> dict[int, tuple[float, int]]:
+    """Ratio and number of the layers at ends of contact and at other singular vertices."""
     trace = boundary_trace(mesh.source, 1, model_of(problem))
     found, regular = corners(problem, trace), _regular_corners(problem, trace, mesh)
-    least = digits / (2 * math.log10(1 / LAYER_RATIO))  # the squared error falls with h^(2 power)
+    # The squared error falls with h^(2 power), and a tenth of the energy or less is there.
+    corner, end = (-(digits - 1) / 2 / math.log10(ratio) for ratio in (CORNER_RATIO, END_RATIO))
+    count = max(MIN_LAYERS, round(end / END_POWER))
+    layers = {end.vertex: (END_RATIO, count) for end in mesh.ends}
+    room = resolved_lengths(mesh.source)  # over the least that curves may have
     faced = {int(k): vertex for vertex, k in enumerate(mesh.partner) if k >= 0}
-    layers = dict[int, int]()
     for place, power in zip(found.places, found.powers, strict=True):
         distance = np.linalg.norm(mesh.vertices - place, axis=1)
-        for vertex in np.flatnonzero(
-            (distance <= PLACE_DISTANCE * distance.max()) & ~regular
-        ).tolist():
-            one = faced.get(vertex, vertex)  # both have them
-            layers[one] = max(layers.get(one, 0), math.ceil(least / power))
-    return max(MIN_LAYERS, round(least / END_POWER)), list(layers.items())
+        at = (distance <= PLACE_DISTANCE * distance.max()) & ~regular
+        for vertex in np.flatnonzero(at).tolist():
+            one = faced.get(vertex, vertex)
+            beside = np.isin(mesh.segments, (one, mesh.partner[one])).any(axis=1)
+            most = -math.log(room[beside].min()) / math.log(CORNER_RATIO)
+            layers[one] = CORNER_RATIO, math.ceil(min(corner / power, max(most - 1, 0)))
+    return layers
 
 
 def _regular_corners(problem: Problem, trace: BoundaryTrace, mesh: GeometricMesh) -> Mask:
     """Vertices (nv,) at which conditions change without a singularity worth of layers.
 
-    Right angles at a guide, a line of symmetry: their mirror image has no corner. And convex
-    corners between sides that tractions or nothing act on.
+    Right angles at a guide, a line of symmetry: their mirror image has no corner. Convex corners
+    between sides that tractions or nothing act on. And where a side is free on both sides.
     """
     every = np.arange(len(trace.region))
     normal = trace.exact_normal(every, np.full(len(every), 0.5))
@@ -224,19 +218,16 @@ def _regular_corners(problem: Problem, trace: BoundaryTrace, mesh: GeometricMesh
     touching = np.unique(mesh.segments[mesh.closed])
     touching = np.union1d(touching, mesh.partner[touching])
     natural = ~held & ~np.isin(mesh.segments, touching).all(axis=1)
-    straight = (
-        ~trace.curved_segments
-        if trace.edges is None
-        else np.array([trace.edges[k].straight for k in trace.region])
-    )
-    regular = np.zeros(len(mesh.vertices), dtype=bool)
-    convex = MeshArrays(mesh.source).angles < np.pi - BLUNT_ANGLE
+    free = natural & ~trace.lies_on(every, *problem.traction)
+    straight = np.array([edge.straight for edge in mesh.edges])[trace.region]
+    regular, angle = np.zeros(len(mesh.vertices), dtype=bool), MeshArrays(mesh.source).angles
     outer = np.flatnonzero(~trace.inner)
-    for vertex in np.unique(mesh.segments[outer])[:]:
+    for vertex in np.unique(mesh.segments[outer]):
         at = outer[(mesh.segments[outer] == vertex).any(axis=1)]
-        if len(at) == 2 and convex[vertex]:
-            s = (mesh.segments[at, 1] == vertex).astype(float)
-            one, other = trace.exact_normal(at, s)
+        if len(at) == 2 and angle[vertex] < np.pi + BLUNT_ANGLE:
+            convex = angle[vertex] < np.pi - BLUNT_ANGLE
+            one, other = trace.exact_normal(at, (mesh.segments[at, 1] == vertex).astype(float))
             mirrored = (guide & straight)[at].any() and abs(one @ other) < RIGHT_ANGLE_ERROR
-            regular[vertex] = mirrored or natural[at].all()
+            smooth = natural[at].all() if convex else free[at].all()
+            regular[vertex] = (convex and mirrored) or smooth
     return regular
