@@ -1,7 +1,9 @@
-"""Solids in contact beside exact solutions: shells, a ball in a cup, crossed cylinders, a column.
+"""Solids in contact beside exact solutions: a column, shells, balls, cylinders, half-spaces.
+
+Columns, shells and the ball in a cup on one mesh each, the others by `adapt`.
 
 python -m drivers.solids
-python -m drivers.solids --finer 0.7
+python -m drivers.solids --finer 0.7 --max-dofs 110000
 """
 
 from __future__ import annotations
@@ -11,23 +13,38 @@ import time
 from collections.abc import Iterator
 from typing import NamedTuple
 
+import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
-from netgen.meshing import MeshingParameters
 from netgen.occ import OCCGeometry
 from scipy.special import ellipe, ellipk
 
-from drivers.command_line import Positive, run
+from drivers.command_line import Count, Positive, run
 from drivers.reference.half_spaces import plane_modulus, reduced
+from drivers.reference.solids import quarter_cubes
 from drivers.tables import Columns, printed
-from ngcontact import Contact, Elastic, Problem, Solution, solve
-from ngcontact.geometries import ball_in_cup, crossed_cylinders, cube_on_block, shells
+from ngcontact import Contact, Elastic, Hooke, Problem, Solution, adapt, solve
+from ngcontact.geometries import (
+    ball_in_cup,
+    ball_on_block,
+    crossed_cylinders,
+    cube_on_block,
+    disc_on_block,
+    shells,
+)
+from ngcontact.geometries.solids import body, compound
 
 SOFT, HARD = Elastic(E=1.0, nu=0.3), Elastic(E=3.0, nu=0.2)
 # Lame's solution of both shells: 1 and 3 of E, .3 and .2 of nu, radii .5, 1, 1.5, overlap .01.
 PRESS_FIT = 0.01 / (0.55 + 7 / 19)
 # Force, pressure at the axis and end of contact of the body of revolution, order 4, adaptive.
 CUP = 0.007139354, 0.007938601, 0.6626341
+STEP = 0.4  # of `theta`: so small that the last level comes near the most unknowns
+STEEL = Elastic(E=210e3, nu=0.3)  # MPa
+# c11, c12, c13, c33, c44 about an axis along z, and what takes the place of E / (1 - nu^2) under a
+# load along it, 2 sqrt((c31^2 - c13^2) / c11 / (1 / c44 + 2 / (c31 + c13))), c31 = sqrt(c11 c33):
+# Delafargue, Ulm 2004, Int. J. Solids Struct. 41:7351.
+LAYERED, LAYERED_MODULUS = (1.6, 0.6, 0.5, 2.4, 0.3), 1.4712200
 
 
 class Row(NamedTuple):
@@ -39,12 +56,13 @@ class Row(NamedTuple):
     quantity: str
     computed: float
     exact: float
-    seconds: float  # of the processor, for the scene
+    solves: int  # back-solves or V-cycles, of the last level
+    seconds: float  # of the processor, for the scene, all levels
 
     @property
     def difference(self) -> float:
-        """Relative to the exact value."""
-        return self.computed / self.exact - 1
+        """Relative to the exact value; of what should vanish the value."""
+        return self.computed / self.exact - 1 if self.exact else self.computed
 
 
 COLUMNS: Columns = {
@@ -55,6 +73,7 @@ COLUMNS: Columns = {
     "  computed": "{0.computed:.6g}",
     "     exact": "{0.exact:.6g}",
     "difference": "{0.difference:+.1e}",
+    "solves": "{0.solves}",
     "seconds": "{0.seconds:.1f}",
 }
 
@@ -67,15 +86,28 @@ def sized(geometry: OCCGeometry, sizes: dict[str, float], maxh: float) -> ng.Mes
 
 
 def rows_of(
-    scene: str, problem: Problem, mesh: ng.Mesh | None, maxh: float | None, order: int
+    scene: str,
+    problem: Problem,
+    order: int,
+    *,
+    mesh: ng.Mesh | None = None,
+    maxh: float | None = None,
+    max_dofs: int | None = None,
 ) -> tuple[Solution, list[tuple[str, float, float]], Iterator[Row]]:
-    """A solution, a list to put names, values and exact values into, and the rows made of it."""
+    """A solution, a list to put names, values and exact values into, and the rows made of it.
+
+    The last level of `adapt` where `max_dofs` are given.
+    """
     start = time.process_time()
-    solution = solve(problem, mesh, maxh=maxh, order=order)
+    if max_dofs is None:
+        solution = solve(problem, mesh, maxh=maxh, order=order)
+    else:
+        levels = adapt(problem, maxh=maxh, order=order, max_dofs=max_dofs, theta=STEP)
+        *_, solution = levels
     seconds = time.process_time() - start
     found: list[tuple[str, float, float]] = []
-    unknowns = solution.displacement.space.ndof
-    rows = (Row(scene, order, unknowns, q, x, exact, seconds) for q, x, exact in found)
+    unknowns, solves = solution.displacement.space.ndof, solution.work["back_solves"]
+    rows = (Row(scene, order, unknowns, q, x, exact, solves, seconds) for q, x, exact in found)
     return solution, found, rows
 
 
@@ -91,7 +123,9 @@ def press_fit(order: int, finer: float, matched: bool) -> Iterator[Row]:
     if not matched:
         inner = dict.fromkeys(("inner", "inner_contact", "hole"), 0.25 * finer)
         mesh, name = sized(problem.geometry, inner, 0.3 * finer), "press fit, unmatched"
-    solution, found, rows = rows_of(name, problem, mesh, None if mesh else 0.35 * finer, order)
+    solution, found, rows = rows_of(
+        name, problem, order, mesh=mesh, maxh=None if mesh else 0.35 * finer
+    )
     weight, pressure = solution.pairs[0].line.weight, solution.pressure
     found.append(("mean pressure", float(weight @ pressure / weight.sum()), PRESS_FIT))
     found.append(("largest pressure", float(pressure.max()), PRESS_FIT))
@@ -109,7 +143,7 @@ def cup(order: int, finer: float) -> Iterator[Row]:
     )
     sizes = {"ball_surface": 0.12 * finer, "cup_surface": 0.12 * finer}
     mesh = sized(problem.geometry, sizes, 0.5 * finer)
-    solution, found, rows = rows_of("ball in cup, normals", problem, mesh, None, order)
+    solution, found, rows = rows_of("ball in cup, normals", problem, order, mesh=mesh)
     line, active = solution.pairs[0].line, solution.active
     found.append(("force", 4 * float(solution.contact_force()[2]), CUP[0]))
     near = np.argsort(np.hypot(*solution.points[:, :2].T))[:4]
@@ -131,28 +165,157 @@ def ellipse(A: float, B: float, force: float, modulus: float) -> tuple[float, fl
     return a, b, 3 * force / (2 * math.pi * a * b)
 
 
-def cylinders(order: int, finer: float) -> Iterator[Row]:
-    """Crossed cylinders: an ellipse, by the moments of the pressure."""
+def semi_axes(
+    solution: Solution, A: float, B: float, modulus: float
+) -> list[tuple[str, float, float]]:
+    """Names, values, and what Hertz says at the computed force, of a quarter of an ellipse.
+
+    Semi-axes by the second moments of the forces: of an ellipse a^2 / 5.
+    """
+    force, (x, y, _) = solution.force, solution.points.T
+    a, b, p0 = ellipse(A, B, 4 * float(force.sum()), modulus)
+    axes = (math.sqrt(5 * float(force @ at**2) / float(force.sum())) for at in (x, y))
+    pressure, weight = solution.pressure, solution.pairs[0].line.weight
+    square = 1 - (x / a) ** 2 - (y / b) ** 2
+    inside = square > 0.36  # within .8 of the semi-axes
+    off = (pressure - p0 * np.sqrt(np.maximum(square, 0.0)))[inside] / p0
+    rms = math.sqrt(float(weight[inside] @ off**2 / weight[inside].sum()))
+    return [
+        *zip(("semi-axis a", "semi-axis b"), axes, (a, b), strict=True),
+        ("area", 4 * solution.contact_area(), math.pi * a * b),
+        ("pressure of points, rms", rms, 0.0),
+    ]
+
+
+def cylinders(order: int, max_dofs: int) -> Iterator[Row]:
+    """Crossed steel cylinders of radii 10 and 20, 1000 N: an ellipse (mm, MPa)."""
     problem = Problem(
-        geometry=crossed_cylinders(radius=1.0, lower_radius=3.0, length=2.0),
-        materials={"upper": SOFT, "lower": HARD},
-        displacement={"bottom": (0, 0, 0), "top": (0, 0, -0.02)},
+        geometry=crossed_cylinders(radius=10.0, lower_radius=20.0, length=6.0),
+        materials={"upper|lower": STEEL},
+        displacement={"bottom": (0, 0, 0)},
+        traction={"top": (0, 0, -250 / (6 * 10))},
         sliding="cut_x|cut_y",
         contact=[Contact("upper_surface", "lower_surface", direction=(0, 0, -1))],
     )
-    parameters = MeshingParameters(maxh=finer, grading=0.4)
-    for x in np.linspace(0, 0.25, 6):
-        for y in np.linspace(0, 0.15, 4):
-            parameters.RestrictH(float(x), float(y), 0.0, 0.05 * finer)
-    mesh = ng.Mesh(problem.geometry.GenerateMesh(mp=parameters))
-    solution, found, rows = rows_of("crossed cylinders", problem, mesh, None, order)
-    force = solution.force
-    modulus = reduced([plane_modulus(1.0, 0.3), plane_modulus(3.0, 0.2)])
-    a, b, _ = ellipse(1 / 6, 1 / 2, 4 * float(force.sum()), modulus)
-    for name, x, exact in zip(
-        ("semi-axis a", "semi-axis b"), solution.points.T, (a, b), strict=False
-    ):
-        found.append((name, math.sqrt(5 * float(force @ x**2) / float(force.sum())), exact))
+    solution, found, rows = rows_of("crossed cylinders", problem, order, max_dofs=max_dofs)
+    modulus = reduced([plane_modulus(STEEL.E, STEEL.nu)] * 2)
+    found += semi_axes(solution, 1 / 40, 1 / 20, modulus)
+    yield from rows
+
+
+def blocks(order: int, max_dofs: int) -> Iterator[Row]:
+    """Two cubes with a gap A x^2 + B y^2, B / A = 4, as data."""
+    A, B, depth = 0.1, 0.4, 0.005
+    problem = Problem(
+        geometry=quarter_cubes(),
+        materials={"upper": SOFT, "lower": HARD},
+        displacement={"upper_outer|lower_outer": (0, 0, 0)},
+        sliding="x|y",
+        contact=[
+            Contact(
+                "lower_contact",
+                "upper_contact",
+                direction=(0, 0, 1),
+                gap=lambda x, y, z: A * x**2 + B * y**2 - depth,
+            )
+        ],
+    )
+    solution, found, rows = rows_of("ellipse, B/A = 4", problem, order, maxh=0.4, max_dofs=max_dofs)
+    modulus = reduced([plane_modulus(law.E, law.nu) for law in (SOFT, HARD)])
+    found += semi_axes(solution, A, B, modulus)
+    yield from rows
+
+
+def layered(order: int, max_dofs: int) -> Iterator[Row]:
+    """A rigid ball of radius 1 on a transversely isotropic block: a circle."""
+    c11, c12, c13, c33, c44 = LAYERED
+    C = np.diag([c11, c11, c33, c44, c44, (c11 - c12) / 2])
+    C[[0, 0, 1, 1, 2, 2], [1, 2, 0, 2, 0, 1]] = c12, c13, c12, c13, c13, c13
+    block = occ.Box((0, 0, -2), (2, 2, 0))
+    block.faces.name = "outer"
+    block.faces.Min(occ.X).name, block.faces.Min(occ.Y).name = "cut_x", "cut_y"
+    block.faces.Max(occ.Z).name = "top"
+    ball = Contact("top", direction=(0, 0, 1), gap=lambda x, y, z: (x**2 + y**2) / 2 - 0.02)
+    problem = Problem(
+        geometry=compound(body("block", block)),
+        materials={"block": Hooke(C)},
+        displacement={"outer": (0, 0, 0)},
+        sliding="cut_x|cut_y",
+        contact=[ball],
+    )
+    solution, found, rows = rows_of(
+        "layered half-space", problem, order, maxh=0.5, max_dofs=max_dofs
+    )
+    force, (x, y, _) = solution.force, solution.points.T
+    total = float(force.sum())
+    radius = (0.75 * 4 * total / LAYERED_MODULUS) ** (1 / 3)
+    by_area = math.sqrt(4 * solution.contact_area() / math.pi)
+    found.append(("radius by area", by_area, radius))
+    by_moments = math.sqrt(2.5 * float(force @ (x**2 + y**2)) / total)
+    found.append(("radius by moments", by_moments, radius))
+    yield from rows
+
+
+def meridian(depth: float) -> Solution:
+    """The ball on a block as bodies of revolution, pressed together by `depth`, order 4."""
+    problem = Problem(
+        geometry=disc_on_block(),
+        materials={"disc": SOFT, "block": HARD},
+        displacement={"block_bottom": (0, 0), "disc_top": (0, -depth)},
+        contact=[Contact("disc_arc", "block_top", direction=(0, -1))],
+        model="axisymmetric",
+    )
+    *_, solution = adapt(problem, order=4, max_dofs=8000)
+    return solution
+
+
+def ball(order: int, max_dofs: int) -> Iterator[Row]:
+    """A ball on a block, beside the bodies of revolution."""
+    depth = 0.02
+    problem = Problem(
+        geometry=ball_on_block(),
+        materials={"ball": SOFT, "block": HARD},
+        displacement={"block_bottom": (0, 0, 0), "ball_top": (0, 0, -depth)},
+        sliding="cut_x|cut_y",
+        contact=[Contact("ball_surface", "block_top", direction=(0, 0, -1))],
+    )
+    exact = meridian(depth)
+    solution, found, rows = rows_of("ball on block", problem, order, max_dofs=max_dofs)
+    [end], r = exact.transitions(), np.hypot(*solution.points[:, :2].T)
+    rising, peak = np.argsort(exact.points[:, 0]), float(exact.pressure.max())
+    expected = np.interp(r, exact.points[rising, 0], exact.pressure[rising])
+    inside, weight = r < 0.8 * end[0], solution.pairs[0].line.weight
+    off = (solution.pressure - expected)[inside] / peak
+    rms = math.sqrt(float(weight[inside] @ off**2 / weight[inside].sum()))
+    force, axial = 4 * solution.contact_force()[2], exact.contact_force()[1]
+    found.append(("force", float(force), float(axial)))
+    by_area = math.sqrt(4 * solution.contact_area() / math.pi)
+    found.append(("end, by area", by_area, float(end[0])))
+    found.append(("pressure of points, rms", rms, 0.0))
+    found.append(("pressure of points, max", float(np.abs(off).max()), 0.0))
+    yield from rows
+
+
+def balls(order: int, max_dofs: int) -> Iterator[Row]:
+    """Code_Aster's SSNV104, two balls of one law, by one on a rigid plane: Hertz (mm, MPa)."""
+    part = occ.Sphere((0, 0, 50), 50) * occ.Box((0, 0, -1), (60, 60, 50))
+    part.faces.name = "surface"
+    part.faces.Min(occ.X).name, part.faces.Min(occ.Y).name = "cut_x", "cut_y"
+    part.faces.Max(occ.Z).name = "equator"
+    problem = Problem(
+        geometry=compound(body("ball", part)),
+        materials={"ball": Elastic(E=20e3, nu=0.3)},
+        displacement={"equator": (None, None, -2)},
+        sliding="cut_x|cut_y",
+        contact=[Contact("surface", direction=(0, 0, -1), gap=lambda x, y, z: z)],
+    )
+    solution, found, rows = rows_of("SSNV104, two balls", problem, order, max_dofs=max_dofs)
+    peak = solution.quantities()["peak pressure"].value
+    found.append(("largest pressure", peak, 2798.3))
+    radius = math.sqrt(4 * solution.contact_area() / math.pi)
+    force = 4 * float(solution.force.sum())
+    modulus = reduced([plane_modulus(20e3, 0.3)] * 2)
+    found.append(("radius, at its force", radius, (0.75 * force * 25 / modulus) ** (1 / 3)))
     yield from rows
 
 
@@ -165,22 +328,24 @@ def column(order: int, finer: float) -> Iterator[Row]:
         traction={"cube_top": 0.1},
         contact=[Contact("cube_bottom", "block_top", direction=(0, 0, -1))],
     )
-    solution, found, rows = rows_of("column, no supports", problem, None, 0.5 * finer, order)
+    solution, found, rows = rows_of("column, no supports", problem, order, maxh=0.5 * finer)
     found.append(("force", float(solution.contact_force()[2]), 0.1))
     found.append(("largest pressure", float(solution.pressure.max()), 0.1))
     yield from rows
 
 
-def main(*, finer: Positive = 1.0) -> list[Row]:
-    """Solve solids on one mesh each and print quantities beside exact ones.
+def main(*, finer: Positive = 1.0, max_dofs: Count = 30_000) -> list[Row]:
+    """Solve solids and print quantities beside exact ones.
 
-    Forces and radii of the ball in its cup are those of the body of revolution; semi-axes of
-    crossed cylinders are Hertz's at the computed force, for half-spaces.
+    Of balls on a block and in a cup those of bodies of revolution; semi-axes and radii are Hertz's
+    at the computed force, for half-spaces, and the peak of SSNV104 is that of half-spaces.
 
     Parameters
     ----------
     finer : float
-        Factor of all sizes of elements, without unit.
+        Factor of sizes of elements where one mesh is given, without unit.
+    max_dofs : int
+        Unknowns of adaptive levels.
 
     Returns
     -------
@@ -195,7 +360,8 @@ def main(*, finer: Positive = 1.0) -> list[Row]:
             yield from press_fit(order, finer, matched)
         for order in (1, 2):
             yield from cup(order, finer)
-        yield from cylinders(2, finer)
+        for scene in (ball, blocks, cylinders, layered, balls):
+            yield from scene(2, max_dofs)
 
     return printed(COLUMNS, scenes())
 

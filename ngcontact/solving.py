@@ -523,11 +523,11 @@ def levels_of_solids(
         solution = replace(solution, adaptive=True, earlier=earlier)
         problem = solution.problem
         yield solution
-        error = solution.relative_error_estimate
-        if not np.isfinite(error):
+        error = solution.relative_error_estimate  # infinite where the first mesh meets no contact
+        if not np.isfinite(solution.error_estimate):
             raise ConvergenceError(
-                f"the error estimate is {error}, so nothing can be refined; choose units in which "
-                "the squares of loads and displacements are numbers",
+                f"the error estimate is {solution.error_estimate}, so nothing can be refined; "
+                "choose units in which the squares of loads and displacements are numbers",
                 iterate=solution.minimiser,
             )
         log.info("%s", solution)
