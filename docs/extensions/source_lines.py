@@ -1,6 +1,6 @@
 """Links of the pages to lines of the source lead to the listings that viewcode makes, or nowhere.
 
-On a checkout `../../ngcontact/fem/space.py#L31` is a link that works. The site has a listing of a
+On a checkout `../../ngcontact/fem/space.py` is a link that works. The site has a listing of a
 module only if the reference documents something in it; the text of other links stands as code.
 """
 

@@ -117,7 +117,7 @@ class Rule:
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class ElementParts:
     """Parts of elements, k of them."""
 
     element: Index  # (k,), the element of each
@@ -125,16 +125,16 @@ class Cells:
     side: Array  # (k, dim, dim), sides from there, as rows
 
     @staticmethod
-    def whole(dim: int, elements: Index) -> Cells:
+    def whole(dim: int, elements: Index) -> ElementParts:
         """The `elements` (k,) themselves."""
         size = len(elements)
-        return Cells(elements, np.zeros((size, dim)), np.tile(np.eye(dim), (size, 1, 1)))
+        return ElementParts(elements, np.zeros((size, dim)), np.tile(np.eye(dim), (size, 1, 1)))
 
     @staticmethod
-    def joined(several: list[Cells]) -> Cells:
+    def joined(several: list[ElementParts]) -> ElementParts:
         """All of several."""
         parts = zip(*((cells.element, cells.origin, cells.side) for cells in several), strict=True)
-        return Cells(*map(np.concatenate, parts))
+        return ElementParts(*map(np.concatenate, parts))
 
     @property
     def dim(self) -> int:
@@ -149,14 +149,14 @@ class Cells:
         """Weights of a rule, (k, m)."""
         return np.abs(np.linalg.det(self.side))[:, None] * rule.weights
 
-    def __getitem__(self, at: Mask | Index) -> Cells:
+    def __getitem__(self, at: Mask | Index) -> ElementParts:
         """The cells selected by `at` (k,), a mask or numbers."""
-        return Cells(self.element[at], self.origin[at], self.side[at])
+        return ElementParts(self.element[at], self.origin[at], self.side[at])
 
-    def divided(self, n: int) -> Cells:
+    def divided(self, n: int) -> ElementParts:
         """Each in n^dim equal parts, one after the other."""
         origin, side = parts(self.dim, n)
-        return Cells(
+        return ElementParts(
             np.repeat(self.element, len(origin)),
             (self.origin[:, None] + origin @ self.side).reshape(-1, *origin.shape[1:]),
             (side @ self.side[:, None]).reshape(-1, *side.shape[1:]),
@@ -178,7 +178,7 @@ class Cells:
 class Refined:
     """Parts of elements, k of them, on which a rule integrates a function of c components."""
 
-    cells: Cells
+    cells: ElementParts
     rule: Rule  # of m points on each
     values: Array  # (k, m, c), the function at its points
     missed: Array  # (k,), error over a part that is halved no more although it is too large, else 0
@@ -195,7 +195,7 @@ class Refined:
 
 def refined(
     integrand: Integrand,
-    cells: Cells,
+    cells: ElementParts,
     rules: dict[int, tuple[int, int]],
     share: float,
     total: float | None = None,
@@ -212,7 +212,7 @@ def refined(
     rule = Rule.of(dim, *rules[dim])
     found, kept, missed, differences, errors = [], [], [], [], []
 
-    def integrals(cells: Cells) -> tuple[Array, Array]:
+    def integrals(cells: ElementParts) -> tuple[Array, Array]:
         """Values (k, m, c), and integrals and what may lie beyond the points (k, 2, c)."""
         values, weights = integrand(cells.element, cells.points(rule)), cells.weights(rule)
         beyond = np.abs(rule.misses @ values).max(axis=1) * weights.sum(axis=1)[:, None]
@@ -245,7 +245,7 @@ def refined(
     sums = np.abs(np.concatenate(differences).sum(axis=0))
     roots = np.array([root_of_squares(column) for column in np.concatenate(errors).T])
     return Refined(
-        Cells.joined(found),
+        ElementParts.joined(found),
         rule,
         np.concatenate(kept),
         np.concatenate(missed),
@@ -384,13 +384,13 @@ class SampledElements:
             here = elements[count == n]
             yield here, self.sample(function, here, lattice(self.dim, n))
 
-    def in_parts(self, elements: Index) -> Cells:
+    def in_parts(self, elements: Index) -> ElementParts:
         """The `elements` (k,) in parts, on which rules see what the points of a lattice see."""
         count = divisions(self.dim, self.sizes[elements], self.arrays.extent)
         count = np.maximum(count // POINTS, 2)
         several = np.unique(count).tolist()
-        return Cells.joined(
-            [Cells.whole(self.dim, elements[count == n]).divided(n) for n in several]
+        return ElementParts.joined(
+            [ElementParts.whole(self.dim, elements[count == n]).divided(n) for n in several]
         )
 
     def integral(
@@ -406,9 +406,9 @@ class SampledElements:
             found = self.evaluate(density, elements, reference)
             return np.asarray(found * self.evaluate(self.measure, elements, reference))
 
-        cells = Cells.whole(self.dim, elements[~fine])
+        cells = ElementParts.whole(self.dim, elements[~fine])
         if fine.any():
-            cells = Cells.joined([cells, self.in_parts(elements[fine])])
+            cells = ElementParts.joined([cells, self.in_parts(elements[fine])])
         found = refined(values, cells, INTEGRALS, INTEGRAL_ERROR[self.dim], corners=self.corners)
         return found.integral, found.error
 

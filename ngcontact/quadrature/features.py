@@ -26,7 +26,7 @@ from scipy.spatial import cKDTree
 from ..arrays import Array, Index, Mask
 from ..errors import warn
 from ..problem import POSITION, Problem, numbers, varies
-from .cells import Cells, SampledElements, lattice, sampled
+from .cells import ElementParts, SampledElements, lattice, sampled
 
 LINE_SAMPLES = 2048  # samples of a boundary: none are further apart than 1 / 1365 of it
 BODY_SPACING = 5.2e-3  # between samples of a body, over its extent: discs of radius 3e-3 hold one
@@ -436,7 +436,7 @@ def _widths(
     return np.asarray(width[cKDTree(some).query(places)[1]])
 
 
-def towards(features: Array, cells: Cells, view: SampledElements) -> Cells:
+def towards(features: Array, cells: ElementParts, view: SampledElements) -> ElementParts:
     """The `cells`, halved at `features` (k, 3), places and widths, to the size of these."""
     done, tree = [], cKDTree(features[:, :2])
     middle = np.full((1, 1, view.dim), 1 / (view.dim + 1))
@@ -449,7 +449,7 @@ def towards(features: Array, cells: Cells, view: SampledElements) -> Cells:
         near = (distance <= size + width) & (size > width)
         done.append(cells[~near])
         cells = cells[near].divided(2)
-    return Cells.joined(done)
+    return ElementParts.joined(done)
 
 
 def where_features_are(

@@ -17,7 +17,7 @@ from ..errors import warn
 from ..problem import MeshArrays, Problem, numbers
 from .cells import (
     MOMENTS,
-    Cells,
+    ElementParts,
     Refined,
     Rule,
     SampledElements,
@@ -58,7 +58,7 @@ class RoughLoad:
     projection_error: Array  # (n,), L2 norm of what it misses of the load
     missed: Array  # (n,), error of the integral of the load, a force
     total: float  # integral of the load's size, a force
-    cells: Cells  # parts of the rough elements on which a rule integrates the load
+    cells: ElementParts  # parts of the rough elements on which a rule integrates the load
 
 
 @dataclass(frozen=True, eq=False)
@@ -267,7 +267,9 @@ def rough_segments(
     return np.asarray(left[segments] > max(ROUGH_MISS * missed, VALUE_ROUND_OFF * largest))
 
 
-def pieces(miss: Callable[[Index, Array], Array], mesh: ng.Mesh, sizes: Array, at: Index) -> Cells:
+def pieces(
+    miss: Callable[[Index, Array], Array], mesh: ng.Mesh, sizes: Array, at: Index
+) -> ElementParts:
     """Pieces of segments `at` (k,) on which Gauss points tell the squares of what is missed.
 
     `miss` has values (k, m, c) at parameters (k, m) of segments (k,) of lengths `sizes` (q,).
@@ -277,5 +279,5 @@ def pieces(miss: Callable[[Index, Array], Array], mesh: ng.Mesh, sizes: Array, a
         return np.asarray(sizes[segment, None, None] * miss(segment, s[..., 0]) ** 2)
 
     n = max(MIN_SEGMENT_POINTS, int(divisions(1, sizes[at], MeshArrays(mesh).extent).max()))
-    cells = Cells.whole(1, at).divided(n)
+    cells = ElementParts.whole(1, at).divided(n)
     return refined(squares, cells, MOMENTS, SQUARES_ERROR).cells

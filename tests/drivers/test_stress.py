@@ -32,7 +32,7 @@ def test_the_exit_status_tells_of_failures(monkeypatch, capsys):
 
 @pytest.mark.parametrize("seed", [0, 2, 3, 5, 6, 7, 8])  # the quick kinds
 @pytest.mark.study(witness=["0", "7", "3"])
-def test_estimates_of_data_that_hurt(seed):
+def test_estimates_of_unresolved_data(seed):
     assert data.outcome(seed).passed
 
 

@@ -85,7 +85,7 @@ def jump(
     return values, largest
 
 
-class FacingPoints(NamedTuple):
+class OppositePoints(NamedTuple):
     """Points that face j places on each of k segments of a secondary."""
 
     gap: Array  # (k, j) of u_h
@@ -95,13 +95,13 @@ class FacingPoints(NamedTuple):
     faces: Mask  # (k, j) whether the place faces the body or the obstacle
 
 
-def facing_points(
+def opposite_points(
     trace: BoundaryTrace,
     displacement: ng.CoefficientFunction,
     pair: ContactState,
     segment: Index,
     s: Array,
-) -> FacingPoints:
+) -> OppositePoints:
     """Points that face the places `s` (k, j) on segments `segment` (k,) of the secondary."""
     contact, every, t = pair.line.contact, np.repeat(segment, s.shape[1]), s.ravel()
     x, d = trace.point(every, t), rays(trace, contact, every, t)
@@ -116,7 +116,7 @@ def facing_points(
     u, size = jump(trace, displacement, (segment, s), at)
     gap = gap - (u.reshape(d.shape) * d).sum(axis=1)
     gap[np.abs(gap) <= GAP_NOISE * size] = 0.0
-    return FacingPoints(gap.reshape(s.shape), d.reshape(u.shape), *at, faces.reshape(s.shape))
+    return OppositePoints(gap.reshape(s.shape), d.reshape(u.shape), *at, faces.reshape(s.shape))
 
 
 class PressureSupport(NamedTuple):
@@ -150,7 +150,7 @@ def pressure_support(
             span = np.vstack([span, np.column_stack([parts.start, parts.stop])])
             smooth = np.append(smooth, parts.local >= 0)
         s = span[:, :1] + np.diff(span, axis=1) * POINTS
-        there = facing_points(trace, displacement, pair, line.segments[rest[local]], s)
+        there = opposite_points(trace, displacement, pair, line.segments[rest[local]], s)
         overlap = np.asarray(((there.gap < 0) & there.faces).any(axis=1))
         smooth &= there.faces.all(axis=1)
         c, off = fitted(there.gap[smooth], degree)
@@ -162,7 +162,7 @@ def pressure_support(
         for j in np.flatnonzero(turns[i]):  # contact up to the last zero of the gap, and farther
             s = np.linspace(places[i, j], places[i, j + 1], ZERO_SAMPLES)
             s = s if active[i, j] else s[::-1]
-            gap = facing_points(trace, displacement, pair, line.segments[[i]], s[None]).gap[0]
+            gap = opposite_points(trace, displacement, pair, line.segments[[i]], s[None]).gap[0]
             last = np.append(s[0], s[gap < 0])[-1]
             ends.append(last + CONTACT_MARGIN * np.sign(s[-1] - s[0]))
         both = np.array([*ends, 1.0] if active[i, -1] else ends).reshape(-1, 2)
@@ -310,7 +310,7 @@ def facing_sides(
     contact, (of_pressure, degree) = line.contact, degrees
     every = np.flatnonzero(np.isin(cells.segment, reach.segments))
     t = np.concatenate([[INSIDE_SIDE], POINTS, [1 - INSIDE_SIDE]])
-    found = facing_points(trace, displacement, pair, *on_segments(cells, every, t))
+    found = opposite_points(trace, displacement, pair, *on_segments(cells, every, t))
     faces = found.faces[:, 1:-1]
     keep = np.asarray(faces.all(axis=1))
     if (found.gap[:, 1:-1][faces & ~keep[:, None]] < 0).any():

@@ -12,7 +12,7 @@ from ...arrays import Array
 from ...fem import model_of
 from .bound import DualProblem, Proof, largest
 from .cells import Cells
-from .facing import POINTS, FacingSides, bernstein, facing_points, fitted, jump, on_segments
+from .facing import POINTS, FacingSides, bernstein, fitted, jump, on_segments, opposite_points
 from .lifting import lifted
 from .program import Balanced
 
@@ -143,7 +143,7 @@ def _beside(
     trace, segment = cells.trace, cells.segment
     side = np.setdiff1d(np.flatnonzero(np.isin(segment, f.pair.line.segments)), f.side)
     place = on_segments(cells, side, POINTS)
-    found = facing_points(trace, displacement, f.pair, *place)
+    found = opposite_points(trace, displacement, f.pair, *place)
     values, _ = jump(trace, G, place, (found.segment, found.s))
     excess = np.abs(((values - e) * found.direction).sum(axis=2))
     some = found.faces & (excess > JUMP_NOISE)
