@@ -105,7 +105,7 @@ class Rows:
     def repeated(self) -> Index:
         """Number (m,) of an earlier row with the same left side, or the row's own number.
 
-        Where two contact lines meet smoothly, both ask for the row of their common node.
+        Where two contact lines meet smoothly, both have a row at their common node.
         """
         number = np.arange(len(self.node))
         order = np.argsort(self.node, kind="stable")

@@ -66,7 +66,7 @@ class Solution(Measured):
     tree : RefinementTree
         The first mesh of a run, and which of its elements those of `mesh` are parts of.
     coarse_levels : int
-        Levels of the coarse adaptive run that told `solve` the first active set of a large mesh.
+        Levels of the coarse adaptive run that gave `solve` the first active set of a large mesh.
     """
 
     tree: RefinementTree = field(kw_only=True)

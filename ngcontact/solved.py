@@ -36,7 +36,7 @@ class Solved:
     def stress(self) -> ng.CoefficientFunction:
         """Stress, a (3, 3) CoefficientFunction, (2, 2) in the plane, in units of stress.
 
-        What is computed on first use and looks at the mesh asks for it: estimate, bound, values at
+        Members that are computed on first use from the mesh require it: estimate, bound, values at
         points, files and pictures.
 
         Raises
@@ -52,7 +52,7 @@ class Solved:
         """Stress normal to the plane, a scalar CoefficientFunction, in units of stress.
 
         nu (xx + yy) in plane strain, less E e0_zz with an initial strain, 0 where a general `Hooke`
-        law does not tell it and in plane stress, the hoop stress about an axis.
+        law does not determine it and in plane stress, the hoop stress about an axis.
         """
         return normal_stress_of(self.problem, self.displacement)
 

@@ -170,7 +170,7 @@ def _check_start(problem: Problem, start: object) -> None:
 def solve_on(
     problem: Problem, mesh: ng.Mesh, order: int, element: str, start: Solution | None
 ) -> Solution:
-    """Solution on one mesh, of which names and values are known to be right.
+    """Solution on one mesh; names and values have been checked.
 
     Roles of pairs that fail, or that leave a body all but free, are tried the other way round,
     once; `Solution.problem` has the pairs as they were solved.
@@ -406,7 +406,7 @@ def _check_continuation(problem: Problem, start: Solution, order: int, element: 
     if (start.order, start.element) != (order, element):
         raise ValueError(
             f"start has order={start.order} and element={start.element!r}, not order={order} and "
-            f"element={element!r}: give the same, its indicators tell nothing of others"
+            f"element={element!r}: give the same, its indicators say nothing of others"
         )
     here, there = ([(c.secondary, c.primary) for c in p.contact] for p in (problem, start.problem))
     if [set(pair) for pair in here] != [set(pair) for pair in there]:  # roles may be exchanged
@@ -449,7 +449,7 @@ def _bound_ratio(solution: Solution) -> float:
 def levels(
     problem: Problem, mesh: ng.Mesh, refinement: Refinement, start: Solution | None = None
 ) -> Generator[Solution]:
-    """Levels from a first mesh on, of which names and values are known to be right.
+    """Levels from a first mesh on; names and values have been checked.
 
     The mesh is curved as the element asks, and the first of the sequence of `start`, a solution
     for another load.

@@ -17,7 +17,7 @@ from .planning import Aim, Forecast, Plan, Refinement, areas, depths, planned, t
 from .refinement import RefinementTree, Refining
 from .singularities import at_limit, below_resolution, ends_of_contact
 
-# Of the unknowns that the tolerance asks for: a first level that knows another load.
+# Of the unknowns that the tolerance requires: on the first level of another load.
 FIRST_LEVEL_SHARE = 0.5
 
 
@@ -26,9 +26,9 @@ def continued(
 ) -> Plan:
     """The first level of a `problem` that is near the one of `start`.
 
-    It has half the unknowns that the `goal` asks for, a relative estimate, or that of `start`,
-    which is not round-off: it will tell where contact ends now, and the level after it can be the
-    last one. `first` is the plan of the first mesh, with the tree of the elements of `start`.
+    It has half the unknowns that the `goal`, a relative estimate, requires, or that of `start`: it
+    shows where contact ends now, and the level after it can be the last one. `first` is the plan of
+    the first mesh, with the tree of the elements of `start`.
     """
     small = below_resolution(start.mesh, first.corners.unresolvable)
     rest = start.indicators if small.all() else np.where(small, 0.0, start.indicators)
@@ -77,12 +77,12 @@ class TransferredForecast(Forecast):
     """Squared indicators on coarser elements, or others, from those of a mesh that was solved on.
 
     The indicators of known elements in one element make a mean of |D^(p+1) u|^2, or at a singular
-    point its coefficient; both tell the element's indicator by the powers of `Forecast`.
+    point its coefficient; both give the element's indicator by the powers of `Forecast`.
     """
 
     known: Forecast  # of the mesh that was solved on, n elements
     inside: Index  # (n,), the element in which the centre of each of these lies
-    aim: float  # error over the known one that is asked for
+    aim: float  # the error to reach, over the known one
 
     def after(self, corners: Array, parent: Index) -> TransferredForecast:
         """On elements with `corners` (k, 3, 2), each of them a part of a `parent` (k,)."""
@@ -93,9 +93,9 @@ class TransferredForecast(Forecast):
         return replace(self, corners=corners, squares=squares, inside=inside)
 
     def marked(self, theta: float, share: float) -> Mask:
-        """Elements (ne,) to refine: so many that the others have the error asked for.
+        """Elements (ne,) to refine: so many that the others have the error `aim`.
 
-        That tells the share instead of `theta`. Contact will end elsewhere: `share` is of no use.
+        `aim` takes the place of `theta`. `share`, of ends of contact, is not read: they move.
         """
         rest = (self.aim / self.error) ** 2 if self.error > 0 else 1.0
         return doerfler(np.sqrt(self.squares), 1.0 - min(rest, 1.0))

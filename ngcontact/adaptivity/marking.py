@@ -7,7 +7,7 @@ import numpy as np
 from ..arrays import Array, Mask
 
 SUM_ROUND_OFF = 1e-14  # share of a sum that round-off may keep from being carried
-# Binary ones in which squares are compared: what round-off tells apart is one number.
+# Binary ones in which squares are compared: those that differ by round-off are one number.
 COMPARED_DIGITS = 30
 
 

@@ -211,8 +211,8 @@ class Refining:
 def refined(problem: Problem, mesh: ng.Mesh, marked: Mask | None = None) -> ng.Mesh:
     """Refined copy of a mesh, straight-sided, with matched contact lines kept matched.
 
-    Of the elements `marked` (ne,), or of all. The pairs of the problem tell which vertices face
-    each other; facing segments have the same number of new nodes.
+    Of the elements `marked` (ne,), or of all. The pairs of the problem determine which vertices
+    face each other; facing segments have the same number of new nodes.
     """
     refining = Refining(problem, mesh)
     refining.bisect(np.ones(mesh.ne, dtype=bool) if marked is None else marked)

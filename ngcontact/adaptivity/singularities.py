@@ -61,7 +61,7 @@ def warn_of_limit(trace: BoundaryTrace, *, ends: bool) -> None:
 
 
 def below_resolution(mesh: ng.Mesh, places: Array) -> Mask:
-    """Elements (ne,) that lie at `places` (k, 2) where refinement is of no use, and are small.
+    """Elements (ne,) that lie at `places` (k, 2) where refinement does not help, and are small.
 
     All within a thousandth of the mesh's extent of one.
     """

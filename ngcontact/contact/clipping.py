@@ -16,7 +16,7 @@ from ..arrays import Array, Index
 from .casting import line_coordinates
 
 SLIVER = 1e-13  # share of a facet below which a part of it is none
-MOST_CORNERS = 7  # of a triangle that is cut three times, and one to spare
+MOST_CORNERS = 7  # of a triangle that is cut three times, and one more
 
 
 @dataclass(frozen=True, eq=False)

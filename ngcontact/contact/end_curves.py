@@ -2,7 +2,7 @@
 
 At a distance t from a frictionless end the pressure inside is K t^(1/2), and the gap outside is
 4 K t^(3/2) / (3 E*), as in the plane. So f = p^2 / K^2 inside, -(3 E* gap / 4 K)^(2/3) outside, is
-the distance from the end, with a sign. The median slope of gap^(2/3) beside the contact tells K.
+the distance from the end, with a sign. The median slope of gap^(2/3) beside the contact gives K.
 Ends are the zero contour of f, which is linear between nodes.
 """
 

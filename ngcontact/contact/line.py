@@ -181,7 +181,7 @@ def prescribed_gap(
 def jacobian(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
     """Arc length (P1) or eta (P2) per s, (k,), at `s` (k,) of segments `segment` (k,).
 
-    Times what a length stands for in the model.
+    Times the measure of the model.
     """
     derivative, measure = trace.derivative(segment, s), trace.measure(segment, s)
     if contact.direction is None:

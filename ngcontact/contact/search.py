@@ -51,7 +51,7 @@ class FoundContact(Contact):
 def find_contacts(geometry: OCCGeometry | ng.Mesh, *, within: float) -> list[FoundContact]:
     """Pairs of boundaries of different bodies that face each other, ready for `Problem`.
 
-    Bodies are connected pieces; boundaries are told by their names. The secondary is the side that
+    Bodies are connected pieces; boundaries are known by their names. The secondary is the side that
     the other one covers wholly, of two the finer, of equal ones the convex one (`roles="auto"`).
 
     Parameters
@@ -95,8 +95,9 @@ def find_contacts(geometry: OCCGeometry | ng.Mesh, *, within: float) -> list[Fou
         own = next((place for place in places if re.escape(place.name) == one), places[0])
         found.append(FoundContact(one, other, least_gap=own.gap, place=own.point))
     if not found:
-        told = min(((abs(p.gap), *pair) for pair, p in seen.items()), default=None)
-        nearest = "" if told is None else f'; "{told[1]}" is {told[0]:.4g} apart from "{told[2]}"'
+        pair_gap = min(((abs(p.gap), *pair) for pair, p in seen.items()), default=None)
+        gap, one, other = pair_gap or (0.0, "", "")
+        nearest = f'; "{one}" is {gap:.4g} apart from "{other}"' if pair_gap else ""
         warn(
             f"no boundaries of different bodies face each other within {within:g}{nearest}; bodies "
             "with common vertices are one (join them by Compound, not Glue)"

@@ -206,7 +206,7 @@ def merged(lines: list[ContactLine], rows: Rows) -> tuple[list[ContactLine], Row
         rows = replace(rows, coupling=(mean @ rows.coupling).tocsr(), g=mean @ rows.g)
     g, equality = rows.g.copy(), np.zeros(len(number), dtype=bool)
     np.logical_or.at(equality, number, rows.equality)
-    # An equality is the tightest; what another pair at that node asks for follows or is refused.
+    # An equality is the tightest; another pair's row at that node follows from it or is refused.
     tight = np.where(rows.equality | averaged | ~equality[number], rows.g, np.inf)
     tight[averaged & repeated] = np.inf  # in the mean already
     g[first] = np.inf

@@ -414,8 +414,8 @@ def first_active_set(discrete: DiscreteProblem) -> Mask:
 def carried_active_set(lines: Sequence[ContactLine], previous: Sequence[ContactState]) -> Mask:
     """Warm start (m,): the state of the nearest contact point of the same pair on another mesh.
 
-    At orders above 1 the points around a transition are told by the side of it they lie on: it is
-    located more closely than the nodes of either mesh.
+    At orders above 1 the points around a transition are divided by the side of it they lie on: it
+    is located more closely than the nodes of either mesh.
     """
     carried = [_carried(new, old) for new, old in zip(lines, previous, strict=True)]
     return np.concatenate([np.zeros(0, dtype=bool), *carried])
@@ -426,7 +426,7 @@ def _carried(new: ContactLine, old: ContactState) -> Mask:
     known = old.line
     if known.node.size == 0 or new.node.size == 0:
         return np.zeros(new.node.size, dtype=bool)
-    # Two points at a corner are told apart by their directions.
+    # Two points at a corner are distinguished by their directions.
     size = CORNER_DISTANCE * np.ptp(known.position, axis=0).max(initial=0.0)
     tree = cKDTree(np.column_stack([known.position, size * known.direction]))
     places = np.column_stack([new.position, size * new.direction])

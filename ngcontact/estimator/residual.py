@@ -122,7 +122,7 @@ def _project_by_compliance(
 ) -> None:
     """Replace a projection by that in the norm of C^-1 on the elements `rough` (ne,).
 
-    Where moduli jump inside an element its soft part tells what the stress is, not the mean.
+    Where moduli jump inside an element its soft part determines the stress, not the mean.
     """
     problem, model = solved.problem, solved.discrete.space.trace.model
     mesh, order = projected.space.mesh, projected.space.globalorder

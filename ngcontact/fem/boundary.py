@@ -183,7 +183,7 @@ class BoundaryTrace:
     curve: Array  # (k, geometry_order + 1, 2), at its Gauss-Lobatto points
     side: Array  # (k,), +1 where the outward normal lies right of the direction of s, else -1
     edges: list[CadEdge] | None  # by region number
-    model: Model  # what lengths of segments stand for
+    model: Model  # with the measure of segments
     axis: Index  # (k,), -1 or 1 where s = 0 or s = 1 alone lies on the axis of revolution, else 0
     on_axis: Mask  # (k,), segments that lie on it
 

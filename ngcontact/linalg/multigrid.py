@@ -23,7 +23,7 @@ from .sparse import handed_over, inverse_of, shared
 TRIAL_CYCLES = 25  # V-cycles after which is judged whether the target will be reached
 DEGREE = 4  # of the polynomial: of 2 to 4 the fastest in whole solves of a million unknowns
 EIGENVALUE_ERROR = 0.1  # relative, of the largest eigenvalue
-LANCZOS_STEPS = 6  # before it is told whether that is met: it is
+LANCZOS_STEPS = 6  # before it is decided whether that is met: it is
 SAFETY = 1.1  # what it is taken for, over what is found; 0.82 of it would do for convergence
 
 

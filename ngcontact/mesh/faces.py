@@ -20,7 +20,7 @@ NEWTON_STEPS = 30
 # Step on the surface, relative to the coordinates, at which Newton has arrived.
 NEWTON_TOLERANCE = 1e-15
 NORMAL_DIFFERENCE = 1e-12  # difference of unit normals up to which a face is plane
-SAMPLES = 7  # points of a face, in both parameters, that tell whether it is plane
+SAMPLES = 7  # points of a face, in both parameters, that show whether it is plane
 POLE_SINE = 1e-9  # sine of the angle of both tangents, below which the surface has a pole
 
 

@@ -38,7 +38,7 @@ Size = Callable[[Array], Array]  # largest length of an element (k,) at points (
 
 # Cosine between a curve's normal and the direction below which nodes go unmatched.
 MIN_MATCHED_COSINE = 0.5
-SAMPLE_RESOLUTION = 0.01  # of an edge: what a polygon of its samples tells apart
+SAMPLE_RESOLUTION = 0.01  # of an edge: the least difference that a polygon of its samples shows
 LINE_DISTANCE = 1e-6  # distance, relative to an edge, up to which two edges are one contact line
 # Share of the spacing, or of a segment, within which a node yields to one beside it.
 MIN_NODE_DISTANCE = 0.1
@@ -117,7 +117,7 @@ def spaced(t: Array, x: Array, y: Array, maxh: float | Size, places: Array) -> A
 
 @dataclass(eq=False)
 class Edge:
-    """A CAD edge with the nodes that contact asks for."""
+    """A CAD edge with the nodes that contact requires."""
 
     shape: occ.TopoDS_Shape  # the edge of the geometry
     curve: CadEdge  # the same as a curve
@@ -437,7 +437,7 @@ def first_mesh(problem: Problem, maxh: float | None = None) -> ng.Mesh:
             mesh = ng.Mesh(occ.OCCGeometry(shape).GenerateMesh(maxh=maxh))
         _require_complete(mesh, problem)
         return mesh
-    with MESHING:  # sizes and divisions are told to Netgen on the shape, which others may mesh, too
+    with MESHING:  # sizes and divisions are set on the shape, which others may mesh, too
         edges = divided(problem, shape, maxh, maxh / finer)
         mesh = _generated(shape, edges, maxh=maxh)
     _require_complete(mesh, problem)

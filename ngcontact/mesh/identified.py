@@ -1,4 +1,4 @@
-"""Faces of two solids that coincide: Netgen divides them alike if it is told that they are one."""
+"""Faces of two solids that coincide: Netgen divides them alike where they are identified."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NAME = "ngcontact"  # of what is identified
 
 
 def _points(face: occ.TopoDS_Shape) -> Array:
-    """Points (n, 3) that tell faces apart: vertices, centres of edges, its own."""
+    """Points (n, 3) that distinguish faces: vertices, centres of edges, its own."""
     vertices = [vertex.p for vertex in face.vertices]
     middles = [edge.center for edge in face.edges]
     return np.array([(p.x, p.y, p.z) for p in [*vertices, *middles, face.center]])

@@ -20,10 +20,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from PIL.Image import Image
 
-# Colours of Okabe and Ito, told apart with any colour vision, and marks for those who print grey.
+# Colours of Okabe and Ito, distinct for any colour vision, and marks for those who print grey.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
-RISING, SIGNED = "viridis", "RdBu_r"  # colour maps, told apart with any colour vision
+RISING, SIGNED = "viridis", "RdBu_r"  # colour maps, distinct for any colour vision
 HEIGHT = 5.0  # of a picture, inches
 # Powers of ten from which numbers on a scale are given with one for all.
 POWERS: dict[str, Any] = {"scilimits": (-3, 4), "useMathText": True}

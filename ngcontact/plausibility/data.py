@@ -168,10 +168,10 @@ def warn_of_implausible(problem: Problem, mesh: ng.Mesh, order: int) -> None:
     """
     warn_of_locking(problem, mesh, order)
     warn_of_data(problem, mesh, order)
-    told: set[tuple[str, str]] = set()
+    warned: set[tuple[str, str]] = set()
     for one in contradictions(problem, mesh):
-        if one.supports not in told:
-            told.add(one.supports)
+        if one.supports not in warned:
+            warned.add(one.supports)
             common = ("corner", "edge")[problem.dim - 2]
             where = "a point" if one.supports[0] == one.supports[1] else f"their {common}"
             place = ", ".join(f"{x:.6g}" for x in one.place)

@@ -34,7 +34,7 @@ FORCE_SHARE = 0.01
 # half a zone has one end, as its pressure has the peak in the middle. On 153 coarse meshes (discs,
 # blocks with Hertz's gap, pins in holes, orders 1 to 4) the peak was wrong by more than 10 % in 30
 # of 55 zones below, in 1 of 98 above (12 %), by more than 20 % in 24 and none. Three segments at
-# all orders told 93, of which 30 were wrong by 10 %.
+# all orders warned of 93, of which 30 were wrong by 10 %.
 RESOLVED_INTERVALS = 2
 # Contact forces of this size, relative to the largest term of a force, are round-off.
 FORCE_ROUND_OFF = 100 * np.finfo(float).eps
@@ -54,7 +54,7 @@ LENGTH_ROUND_OFF = 100 * np.finfo(float).eps  # of lengths and displacements
 # From which forces along the direction are wrong by 1 - cos = 3.4 %.
 INCLINED_ANGLE = np.deg2rad(15)
 END_MARGIN = 0.01  # of a segment
-# Error of the peak from which a way is told. Between two discs whose radii are 1 and 1, 1 and 3, 3
+# Error of the peak from which a way is warned of. Between two discs of radii 1 and 1, 1 and 3, 3
 # and 1 peaks were wrong by 0.93 to 1.05 times what is said here, measured at ways of 0.01 to 0.16;
 # of pins with a clearance of 2 to 25 % of their radius by 0.93 to 0.96 times that, of holes as
 # secondary, 5 to 25 %, by -1.02 to -1.06 times, at 2 % by half.

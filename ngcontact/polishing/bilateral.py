@@ -26,7 +26,7 @@ FIT_DEGREE = 4  # of gap / r^(1/2) in r, over the layers
 SAMPLES_PER_NODE = 3  # per node, at which signs are looked at
 PRESSURE_ERROR = 1e-3  # of the largest, which is the error of pressures at ends
 GAP_ERROR = 1e-6  # of the largest displacement
-ROUND_OFF = 1e-6  # of distances on curves, in which ends of segments are told
+ROUND_OFF = 1e-6  # of distances on curves, in which ends of segments are compared
 
 
 def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved:

@@ -23,7 +23,7 @@ from ..mesh import CadEdge, cad_edges, graded_mesh, opposite
 from ..problem import Contact, MeshArrays, Problem
 
 # Ratios of the sizes of layers: (2^(1/2) - 1)^2 = 0.17 is best for energies (Gui, Babuska), and a
-# larger one for the singular coefficient, which tells where contact ends.
+# larger one for the singular coefficient, which shows where contact ends.
 CORNER_RATIO = 0.15
 END_RATIO = 0.4
 END_SIZE = 0.45  # of the contact up to its middle, which elements at its end may have

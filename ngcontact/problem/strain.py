@@ -75,7 +75,7 @@ def check_strains(
     plane: Mapping[str, Mask],
     rule: ng.IntegrationRule,
 ) -> None:
-    """Refuse strains that are not symmetric, or of which a law does not tell what they do.
+    """Refuse strains that are not symmetric, or whose stress the law does not determine.
 
     A general law in the plane does not say how strains normal to it act in plane strain: `plane`
     (r,) are the masks of such laws, `masks` (r,) those of `strains`, as of `strain_data`. All

@@ -67,7 +67,7 @@ class ActiveSetIteration:
         return p.null_space.pins.size == 0 or p.null_space.resisted(p.unknown[self.active])
 
     def result(self) -> Iterate:
-        """The current iterate, with the lineal motions that its conditions ask for."""
+        """The current iterate, with the lineal motions that its conditions require."""
         null_space, y = self.systems.program.null_space, self.y
         if null_space.held.size:
             y = y - null_space.lineal @ (null_space.conditions @ y)

@@ -48,7 +48,7 @@ class Border:
     touched: Index  # (t,) unknowns where V is not zero
     V: Array  # (k, t) its transpose there
     size: Array  # (k,) roots of the diagonal of S
-    # (k, k) the Schur complement, over these: only so can small pivots be told, as forces stand
+    # (k, k) the Schur complement, over these: only so are small pivots seen, as forces stand
     # beside displacements.
     S: Array
 
@@ -260,7 +260,7 @@ class BorderedSystems:
             self.y[p.unknown[system.active]] = p.g[system.active]
 
     def _improve(self, system: Border, tolerance: float) -> None:
-        """Correct the solution once more if its residual asks for it."""
+        """Correct the solution once more if its residual is large."""
         p = self.program
         residual = self.unbalanced(system.active, system.anchor)
         if system.largest(residual) > tolerance * self.scale:

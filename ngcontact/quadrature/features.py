@@ -52,7 +52,7 @@ FEATURE_SHARES = {
 FEATURE_SHARES["strain"] = 0.1  # ... as of loads
 VALUE_ROUND_OFF = 1e-10  # of values, relative to the largest
 NARROW_SAMPLES = 6  # samples in a feature up to which what is between them is looked at
-WIDTH_POINTS = 65  # points across a feature, to tell its width
+WIDTH_POINTS = 65  # points across a feature, to measure its width
 FEATURES = 200  # of one function on a line
 MEASURED_FEATURES = 16  # features of a body of which widths are measured ...
 MAX_HALF_WIDTH = 8.0  # ... up to so many samples on either side ...
@@ -186,7 +186,7 @@ def _values(function: Function, points: NDArray) -> Array:
     return np.where(np.isfinite(values), values, 0.0)
 
 
-def _told(kind: str, values: Array) -> tuple[Array, float]:
+def _searched(kind: str, values: Array) -> tuple[Array, float]:
     """Components (n, c') of `values` (n, c) that are searched, and the least departure."""
     if kind == "materials":
         stiffness = np.log(np.maximum(np.abs(values), np.finfo(float).tiny))
@@ -273,7 +273,7 @@ class _Line:
 def _on_lines(kind: str, lines: list[_Line]) -> tuple[Array, Array]:
     """Features (k, 3) of a function along all `lines` of a boundary, and all its samples (n, c)."""
     sampled = np.concatenate([line.sampled for line in lines])
-    _, limit = _told(kind, sampled)
+    _, limit = _searched(kind, sampled)
     found = [NO_JUMPS]
     for line in lines:
         components = np.ascontiguousarray(np.hstack([line.sampled, -line.sampled]).T)
@@ -366,10 +366,10 @@ def _in_body(
     shape = tuple(np.ceil(corners.max(axis=0) - origin).astype(int) + 1)
     places = (np.moveaxis(np.indices(shape), 0, -1) + origin) @ sides
     inside, values = _inside(function, view, elements, places)
-    told, limit = _told(kind, values)
+    searched, limit = _searched(kind, values)
     flagged, windows = np.zeros(shape, dtype=bool), IN_PLANE[kind]
     wide = windows[-1]
-    for component in told.T:
+    for component in searched.T:
         array = np.full(shape, np.nan)
         array[inside] = component
         some = np.zeros(shape, dtype=bool)  # a feature is left within half of the smaller window
@@ -422,10 +422,10 @@ def _widths(
     steps = t[:, None, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     x = some[:, None, None] + steps
     known, values = _inside(function, view, np.arange(len(view.sizes)), x)
-    found = _told(kind, values)[0]
-    told = np.zeros((*known.shape, found.shape[1]))
-    told[known] = found
-    away = np.where(known, np.abs(told - told[:, middle, None]).max(axis=3), 0.0)
+    found = _searched(kind, values)[0]
+    searched = np.zeros((*known.shape, found.shape[1]))
+    searched[known] = found
+    away = np.where(known, np.abs(searched - searched[:, middle, None]).max(axis=3), 0.0)
     same = away <= away.max(axis=1, keepdims=True) / 2
     up = np.cumprod(same[:, middle:], axis=1).sum(axis=1)
     down = np.cumprod(same[:, middle::-1], axis=1).sum(axis=1)

@@ -270,7 +270,7 @@ def rough_segments(
 def pieces(
     miss: Callable[[Index, Array], Array], mesh: ng.Mesh, sizes: Array, at: Index
 ) -> ElementParts:
-    """Pieces of segments `at` (k,) on which Gauss points tell the squares of what is missed.
+    """Pieces of segments `at` (k,) on which Gauss points integrate the squares of what is missed.
 
     `miss` has values (k, m, c) at parameters (k, m) of segments (k,) of lengths `sizes` (q,).
     """

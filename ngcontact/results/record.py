@@ -67,16 +67,16 @@ def line_of(solution: Guaranteed) -> str:
 def facts(solution: Guaranteed) -> list[tuple[str, str]]:
     """Facts about a solution by name; of one width in all lines of a run but for the last ones."""
     active = f"{np.count_nonzero(solution.active)}/{solution.active.size}"
-    told = [
+    entries = [
         ("order", f"{solution.order}"),
         ("", f"{solution.displacement.space.ndof:7d} unknowns"),
         ("", f"{active:>9} active"),
         ("", f"{len(solution.steps):2d} steps"),
     ]
     if solution.estimated or solution.adaptive:
-        told.append(("estimate", f"{solution.relative_error_estimate:.2e}"))
+        entries.append(("estimate", f"{solution.relative_error_estimate:.2e}"))
     if solution.bounded:
-        told.append(("bound", f"{solution.relative_error_bound:.2e}"))
+        entries.append(("bound", f"{solution.relative_error_bound:.2e}"))
     contact = solution.problem.contact
     # Always six digits, that columns of neighbouring lines agree.
     sizes = [
@@ -85,13 +85,13 @@ def facts(solution: Guaranteed) -> list[tuple[str, str]]:
     if len(contact) > 1:
         sizes = [f"{pair.secondary} {size}" for pair, size in zip(contact, sizes, strict=True)]
     if sizes:
-        told.append(("force", ", ".join(sizes)))
+        entries.append(("force", ", ".join(sizes)))
     motions = solution.free_motions
     if len(motions) > MOTIONS_NAMED:
-        told.append(("free:", f"{len(motions)} rigid motions (free_motions)"))
+        entries.append(("free:", f"{len(motions)} rigid motions (free_motions)"))
     elif motions:
-        told.append(("free:", "; ".join(map(str, motions))))
-    return told
+        entries.append(("free:", "; ".join(map(str, motions))))
+    return entries
 
 
 def html_of(solution: Guaranteed) -> str:
@@ -119,7 +119,7 @@ def html_of(solution: Guaranteed) -> str:
 def with_progress(
     solutions: Iterator[Level], tolerance: float | None, max_dofs: float
 ) -> Generator[Level]:
-    """The same levels, each told when it is done.
+    """The same levels, each reported when it is done.
 
     A line of `sys.stderr` each, or one table in a notebook that grows; with a bar that is full at
     the tolerance, or at `max_dofs` where there is none.

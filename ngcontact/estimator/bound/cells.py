@@ -3,7 +3,7 @@
 Its vertices are those of the mesh, and places on Gamma_K: where contact ends, and where vertices
 of one body face a side of the other. There both bodies have the same sides, so that p* is one
 polynomial on each. A triangle with such a place, or with a curved side, becomes triangles with a
-common apex, the opposite vertex or, where several sides ask for it, the middle.
+common apex, the opposite vertex or, where several sides require it, the middle.
 """
 
 from __future__ import annotations

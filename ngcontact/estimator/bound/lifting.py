@@ -126,7 +126,7 @@ def lifting_of(
     Raises
     ------
     ContactError
-        Conditions at a vertex ask for different displacements.
+        Conditions at a vertex require different displacements.
     """
     norms, degrees = np.zeros(len(cells.triangles)), np.full(len(cells.ends), degree)
     largest = [np.abs(one.amount).max(axis=1, initial=0.0) for one in prescribed]
@@ -174,7 +174,7 @@ def lifting_of(
     w = (V @ parts[..., None])[..., 0]
     missed = np.abs((w[number] * d).sum(axis=1) - amount).max()
     if missed > max(INCONSISTENT_AMOUNT * unit, 100 * LIFTING_NOISE * extent):
-        raise ContactError("conditions that meet at a vertex ask for different displacements")
+        raise ContactError("conditions that meet at a vertex require different displacements")
     rim = _on_sides(cells, np.flatnonzero((count == 1) & fixed), degree)
     held[np.searchsorted(nodes, rim)] = True
     dofs = [2 * np.searchsorted(nodes, part.nodes) for part in stiffness]

@@ -117,7 +117,7 @@ class DualProgram:
             y, active = found.u, found.active
         force, last = np.zeros(len(p.g)), np.inf
         while True:
-            # Stresses of stiff bodies are small differences of multipliers: tractions tell what is
+            # Stresses of stiff bodies are small differences of multipliers: tractions show what is
             # left. Rows beyond their limits, as those that pull by round-off, stay at these.
             change = self.T @ y
             parts = zip(elements, s.coefficients, strict=True)

@@ -182,8 +182,8 @@ def _certificate(proof: Proof) -> dict[str, Any]:
     found = {"cells have a curved side": int(cells.curved.sum())}
     found["sides have a direction of contact or guide that turns along them"] = turning
     if any(found.values()):
-        told = " and ".join(f"{n} {what}" for what, n in found.items() if n)
-        raise ValueError(f"no certificate: {told}; tractions and p* are no polynomials there")
+        reasons = " and ".join(f"{n} {what}" for what, n in found.items() if n)
+        raise ValueError(f"no certificate: {reasons}; tractions and p* are no polynomials there")
     own, _ = stress.s.norms()
     replaced = np.flatnonzero(~np.isclose(stress.distance, own, rtol=SAME_NORM, atol=0))
     arrays: dict[str, Any] = {

@@ -179,10 +179,10 @@ def _line_element(boundary: BoundaryTrace, segment: Index, s: Array) -> Array:
 
 
 def held_point_force(pair: ContactState, boundary: BoundaryTrace) -> float:
-    """Size of the force at points that supports hold, of which no row tells; of the element's size.
+    """Size of the force at points that supports hold, which no row has; of the element's size.
 
-    A line in contact that ends on Gamma_u has a force there that its supports cannot tell from
-    their own. Its share is that of the point's shape function, its pressure that beside.
+    A line in contact that ends on Gamma_u has a force there that its supports cannot distinguish
+    from their own. Its share is that of the point's shape function, its pressure that beside.
     """
     line = pair.line
     held = (line.rows < 0) & line.faces[:, None]
@@ -198,7 +198,7 @@ def held_point_force(pair: ContactState, boundary: BoundaryTrace) -> float:
 
 
 def direction_of(solution: Solved, pair: int) -> tuple[Array, str]:
-    """Unit vector (2,) along which the force of a pair is told, and what it is.
+    """Unit vector (2,) along which the force of a pair is given, and what it is.
 
     The axis of revolution; the pair's direction; that of the loads on the secondary's body, or of
     those on the primary's; that in which prescribed displacements press the bodies together; that

@@ -53,7 +53,7 @@ STRAIGHT = 1e-12  # difference of directions that are one: round-off
 
 
 class Measured(Guaranteed):
-    """Members of `Solution` that tell figures with their errors."""
+    """Members of `Solution` that give figures with their errors."""
 
     @cached_property
     def _proved(self) -> tuple[EquilibratedStress | None, str]:
@@ -130,8 +130,8 @@ class Measured(Guaranteed):
         sum_error = of_order + held_point_force(state, boundary)
         of_shape = float(np.linalg.norm(load_by_shape(self.problem, self.mesh)))
         force = self.contact_force(pair)
-        told = {"force": e @ force, "force, x": force[0] + 0.0, "force, y": force[1] + 0.0}
-        forces = [Quantity(k, float(value), sum_error, "estimated") for k, value in told.items()]
+        parts = {"force": e @ force, "force, x": force[0] + 0.0, "force, y": force[1] + 0.0}
+        forces = [Quantity(k, float(value), sum_error, "estimated") for k, value in parts.items()]
         if proof is not None:
             proved, reason = _proved_force_errors(self, pair, e)
             if np.isfinite(proved).all():

@@ -1,10 +1,11 @@
 """The largest von Mises stress, with an estimated bar, and corners where it is infinite.
 
 At the tip of a wedge it is infinite where the angle is larger than a critical one, which the
-conditions on both sides tell (Williams 1952): 180 degrees where both are free or both are held, 90
-where one is guided and the other is free, held or guided, arcsin ((kappa + 1) / 4)^(1/2) where one
-is held and the other is free. In contact without friction both bodies count: a corner that presses
-on a line is one of 270 degrees in all. Of other moduli it is infinite at smaller angles, too.
+conditions on both sides determine (Williams 1952): 180 degrees where both are free or both are
+held, 90 where one is guided and the other is free, held or guided, arcsin ((kappa + 1) / 4)^(1/2)
+where one is held and the other is free. In contact without friction both bodies count: a corner
+that presses on a line is one of 270 degrees in all. Of other moduli it is infinite at smaller
+angles, too.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The pressure as a field, on lines and on surfaces, and what solids tell of their contact."""
+"""The pressure as a field, on lines and on surfaces, and quantities of the contact of solids."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ...solved import Solved
 from ..residual import Estimated
 from .table import Quantities, Quantity
 
-EARLIER_LEVELS = 2  # before the last one, whose figures tell the error
+EARLIER_LEVELS = 2  # before the last one, whose figures give the error
 NAMES = (
     "force",
     *(f"force, {axis}" for axis in "xyz"),
@@ -152,5 +152,5 @@ def quantities_of_solids(solution: Estimated, pair: int) -> Quantities:
     ]
     note = "errors: the larger of the last two differences between levels"
     if not known:
-        note = "without errors: the third level of adapt and later ones tell them"
+        note = "without errors: the third level of adapt and later ones have them"
     return Quantities(tuple(rows), note)

@@ -118,7 +118,7 @@ class Quantities:
     rows : tuple of Quantity
         In order.
     note : str
-        What is to be said of all: why nothing is guaranteed, along what the force is told.
+        Remarks on all: why nothing is guaranteed, along which direction the force is given.
     """
 
     rows: tuple[Quantity, ...]

@@ -110,7 +110,7 @@ def test_guides_that_are_crossed_are_refused():
     problem = replace(half_ellipse(), displacement={"cut": (0.01, 0.01)})
     with pytest.warns(match="leads"):
         solution = solve(problem, maxh=0.5, order=2)
-    with pytest.raises(ContactError, match="at a vertex ask for different displacements"):
+    with pytest.raises(ContactError, match="at a vertex require different displacements"):
         _ = solution.error_bound
 
 

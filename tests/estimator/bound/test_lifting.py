@@ -96,7 +96,7 @@ def test_directions_in_a_vertex():
     assert energy(cells, problem, both, 4) <= 1e-20  # a translation
     slanted = [asked_of(cells, name, d, flat) for name in SIDES for d in ((1, 1), (1, -1))]
     assert energy(cells, problem, slanted, 4) <= 1e-20
-    with pytest.raises(ContactError, match="at a vertex ask for different displacements"):
+    with pytest.raises(ContactError, match="at a vertex require different displacements"):
         energy(
             cells,
             problem,

@@ -26,7 +26,7 @@ def test_jumping_displacements_have_no_energy():
         case.problem, displacement={"top": (0, -0.1), "upper_left": (0, 0), "bottom": (0, 0)}
     )
     solution = solve(problem, maxh=0.5, order=2)
-    with pytest.raises(ContactError, match="at a vertex ask for different displacements"):
+    with pytest.raises(ContactError, match="at a vertex require different displacements"):
         _ = solution.error_bound
 
 
