@@ -6,6 +6,8 @@ Facets are surfaces (q, n, 3) given by their points at the nodes of `reference.t
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -112,15 +114,35 @@ def coincident(
     return found
 
 
-def _met(
-    point: Index, facet: Index, points: Array, directions: Array, surface: Array, side: Array
-) -> tuple[Index, Array, Array]:
-    """Which (j,) of the pairs (r,) of `point` and `facet` meet, where (j, 3) and how far (j,)."""
-    L, distance = onto(points[point], directions[point], surface, facet)
-    inside = np.flatnonzero(L.min(axis=1) >= -OUTSIDE_COORDINATE)
-    point, facet, L, distance = point[inside], facet[inside], L[inside], distance[inside]
-    faces = np.flatnonzero(_faces(surface, side, facet, L, directions[point]))
-    return inside[faces], L[faces], distance[faces]
+@dataclass(frozen=True, eq=False)
+class _Rays:
+    """Lines through k points, and the facets that they may meet, as `cast` has them."""
+
+    points: Array  # (k, 3)
+    directions: Array  # (k, 3)
+    surface: Array  # (q, n, 3)
+    side: Array  # (q,)
+    ahead: bool  # whether only what lies ahead is met
+
+    def met(self, point: Index, facet: Index) -> tuple[Index, Partners]:
+        """Which (j,) of the pairs (r,) of `point` and `facet` meet, and where."""
+        d = self.directions[point]
+        L, distance = onto(self.points[point], d, self.surface, facet)
+        inside = np.flatnonzero(L.min(axis=1) >= -OUTSIDE_COORDINATE)
+        meets = _faces(self.surface, self.side, facet[inside], L[inside], d[inside])
+        if self.ahead:
+            meets &= distance[inside] >= -MATCHING_DISTANCE * np.abs(self.surface).max()
+        pairs = inside[meets]
+        return pairs, Partners(facet[pairs], L[pairs], distance[pairs])
+
+    def take(self, found: Partners, point: Index, facet: Index) -> None:
+        """Enter the nearest of what the pairs (r,) of `point` and `facet` meet into `found`."""
+        pairs, met = self.met(point, facet)
+        order = np.lexsort((np.abs(met.distance), point[pairs]))
+        at, first = np.unique(point[pairs[order]], return_index=True)
+        best = order[first]
+        found.segment[at], found.s[at] = met.segment[best], met.s[best]
+        found.distance[at] = met.distance[best]
 
 
 def cast(
@@ -139,8 +161,8 @@ def cast(
     radius = np.linalg.norm(surface - middle[:, None], axis=2).max(axis=1)
     _, near = cKDTree(middle).query(points, k=min(NEAREST_FACETS, len(middle)))
     near = near.reshape(len(points), -1)
-    tried = [(np.repeat(np.arange(len(points)), near.shape[1]), near.ravel())]
-    _take(found, *tried[0], points, directions, surface, side, ahead)
+    rays = _Rays(points, directions, surface, side, ahead)
+    rays.take(found, np.repeat(np.arange(len(points)), near.shape[1]), near.ravel())
     block = max(1, PAIRS_AT_ONCE // len(middle))
     # Of the others those whose ball the line passes; a nearer one of these may hide what was met.
     for first in range(0, len(points), block):
@@ -151,32 +173,8 @@ def cast(
         square = (x**2).sum(axis=1)[:, None] - 2 * x @ middle.T + (middle**2).sum(axis=1)
         passes = square - along**2 <= radius**2 * (1 + OUTSIDE_COORDINATE)
         at, facet = np.nonzero(passes)
-        _take(found, here[at], facet, points, directions, surface, side, ahead)
+        rays.take(found, here[at], facet)
     return found
-
-
-def _take(
-    found: Partners,
-    point: Index,
-    facet: Index,
-    points: Array,
-    directions: Array,
-    surface: Array,
-    side: Array,
-    ahead: bool,
-) -> None:
-    """Enter the nearest of what the pairs (r,) of `point` and `facet` meet into `found`."""
-    pairs, L, distance = _met(point, facet, points, directions, surface, side)
-    if ahead:
-        size = MATCHING_DISTANCE * np.abs(surface).max()
-        kept = distance >= -size
-        pairs, L, distance = pairs[kept], L[kept], distance[kept]
-    order = np.lexsort((np.abs(distance), point[pairs]))
-    _, first = np.unique(point[pairs[order]], return_index=True)
-    best = order[first]
-    at = point[pairs[best]]
-    found.segment[at], found.s[at] = facet[pairs[best]], L[best]
-    found.distance[at] = distance[best]
 
 
 def snap(L: Array, nodes: Array) -> Array:
