@@ -10,10 +10,9 @@ import numpy as np
 
 from ..arrays import Array, Index, Mask, across, joined, root_of_squares
 from ..estimator import Estimated
-from ..fem import ORDERS, check_element, unknowns
+from ..fem import ORDERS, check_element, jumping_moduli, unknowns
 from ..mesh import curve, unresolved
 from ..problem import MeshArrays
-from ..quadrature import jumping_moduli
 from .marking import doerfler, mark_alike
 from .refinement import RefinementTree, Refining
 from .singularities import Singularities, at_ends, at_limit, below_resolution, ends_of_contact

@@ -47,7 +47,8 @@ def signed_distance(problem: Problem, trace: FacetTrace, state: ContactState) ->
     closed = np.where(active, state.pressure**2, 0.0)
     opened = np.where(active, 0.0, np.maximum(state.gap, 0.0) ** (2 / 3))
     slope = _slope(trace, line.segments, name, at_nodes(opened), at_nodes(closed))
-    K = 0.75 * contact_modulus(problem, trace, line.segments, line.facing) * slope**1.5
+    sides = trace.element[line.segments], trace.element[line.facing]
+    K = 0.75 * contact_modulus(problem, trace.mesh, *sides) * slope**1.5
     if 0 < K**2 < np.inf:
         value = np.where(active, np.maximum(closed / K**2, INSIDE_DISTANCE), -opened / slope)
     else:  # nothing is open, or without a slope: ends lie midway between nodes

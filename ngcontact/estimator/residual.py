@@ -48,10 +48,11 @@ from ..fem import (
     law_measures,
     moduli_of,
     nearly_incompressible,
+    rough_moduli,
 )
 from ..lagrange import gauss, gauss_derivative
 from ..linalg import cholesky, lower_half, shared
-from ..quadrature import features_of, loads_of, pieces, rough_moduli, rough_segments
+from ..quadrature import features_of, loads_of, pieces, rough_segments
 from ..solved import Solved
 from .contact import between_nodes, closing_energy, on_contact, remaining
 from .pressure_correction import correcting_pressure

@@ -16,8 +16,11 @@ from .model import Model as Model
 from .moduli import NEARLY_INCOMPRESSIBLE as NEARLY_INCOMPRESSIBLE
 from .moduli import Moduli as Moduli
 from .moduli import contact_modulus as contact_modulus
+from .moduli import jumping_moduli as jumping_moduli
 from .moduli import moduli_of as moduli_of
 from .moduli import nearly_incompressible as nearly_incompressible
+from .moduli import rough_moduli as rough_moduli
+from .moduli import warn_of_jumps as warn_of_jumps
 from .moduli import warn_of_locking as warn_of_locking
 from .space import LOAD_BONUS as LOAD_BONUS
 from .space import Space as Space

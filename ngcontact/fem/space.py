@@ -14,9 +14,10 @@ import scipy.sparse as sp
 from ..arrays import Array, Index, Mask, power_of_two
 from ..linalg import shared
 from ..problem import MeshArrays, Problem, varies
-from ..quadrature import composite, loads_of, rough_moduli
+from ..quadrature import composite, loads_of
 from .boundary import Bodies, BoundaryTrace, node_basis, vector_space
 from .model import MODELS, Model
+from .moduli import rough_moduli
 from .solid import SOLID_MODEL
 
 LOAD_BONUS = 6  # quadrature orders above the default: loads may be as rough as r^(-1/2)

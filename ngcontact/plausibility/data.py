@@ -10,10 +10,10 @@ import numpy as np
 
 from ..arrays import Array, Mask
 from ..errors import warn
-from ..fem import boundary_trace, warn_of_locking
+from ..fem import boundary_trace, warn_of_jumps, warn_of_locking
 from ..mesh import cad_edges
 from ..problem import MeshArrays, Problem, numbers
-from ..quadrature import SampledElements, features_of, warn_of_data, warn_of_jumps
+from ..quadrature import SampledElements, features_of, warn_of_data
 
 # Values of two supports at one corner, relative to the largest, that are two values.
 SUPPORT_DIFFERENCE = 1e-6

@@ -3,14 +3,12 @@
 from .cells import SampledElements as SampledElements
 from .cells import composite as composite
 from .cells import evaluations as evaluations
+from .cells import lattice as lattice
 from .features import Unresolved as Unresolved
 from .features import features_of as features_of
 from .features import unresolved as unresolved
 from .features import warn_of_unresolved as warn_of_unresolved
 from .features import where_features_are as where_features_are
-from .jumps import jumping_moduli as jumping_moduli
-from .jumps import rough_moduli as rough_moduli
-from .jumps import warn_of_jumps as warn_of_jumps
 from .loads import Load as Load
 from .loads import has_rough_loads as has_rough_loads
 from .loads import loads_of as loads_of

@@ -11,8 +11,9 @@ import pytest
 from drivers.reference import cases
 from ngcontact import Contact, ContactWarning, Elastic, Hooke, Problem, adapt, solve
 from ngcontact.adaptivity import refined
+from ngcontact.fem import warn_of_jumps
 from ngcontact.mesh import first_mesh
-from ngcontact.quadrature import features_of, sample_data, unresolved, warn_of_jumps
+from ngcontact.quadrature import features_of, sample_data, unresolved
 from ngcontact.quadrature.cells import lattice
 from ngcontact.quadrature.features import steps_along
 from tests.quadrature.test_loads import box, loaded, square
