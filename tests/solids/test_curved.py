@@ -135,3 +135,4 @@ def test_rigid_obstacle(bilateral):
     assert np.abs(solution.pressure + sign).max() < 1e-10
     u = np.asarray(solution.displacement(solution.mesh(0.5, 0.5, 0.0)))
     assert u[2] == pytest.approx(-gap, abs=1e-12)
+    assert solution.relative_error_estimate < 1e-12  # round-off: measured 5e-14
