@@ -43,9 +43,8 @@ def vertex_parents(mesh: ng.Mesh) -> Integers:
 def copied(mesh: ng.Mesh) -> ng.Mesh:
     """Copy that keeps the names, the geometry, the parents and matched points; not curved."""
     copy = ng.Mesh(mesh.ngmesh.Copy())
-    for one, other, *_ in mesh.ngmesh.GetIdentifications():  # of solids; `Copy` drops them
-        periodic = IdentificationType.PERIODIC
-        copy.ngmesh.AddPointIdentification(one, other, identnr=1, type=periodic)
+    for one, other, number in mesh.ngmesh.GetIdentifications():  # of solids; `Copy` drops them
+        copy.ngmesh.AddPointIdentification(one, other, number, IdentificationType.PERIODIC)
     keep_parents(copy, vertex_parents(mesh))
     if hasattr(mesh, PIECES):
         setattr(copy, PIECES, getattr(mesh, PIECES))

@@ -13,7 +13,6 @@ from ..problem import Problem
 
 # Distance, relative to a face, up to which two faces are one: OCC's own is 1e-7.
 FACE_DISTANCE = 1e-6
-NAME = "ngcontact"  # of what is identified
 
 
 def _points(face: occ.TopoDS_Shape) -> Array:
@@ -38,16 +37,18 @@ def _coincide(one: occ.TopoDS_Shape, other: occ.TopoDS_Shape) -> bool:
 def identify_coinciding_faces(problem: Problem, shape: occ.TopoDS_Shape) -> None:
     """Let Netgen divide faces of contact pairs alike where they lie on each other.
 
-    The shape remembers it; to say it again changes nothing.
+    The shape remembers it, by a name for each two of its faces; to say it again changes nothing.
     """
+    here = occ.gp_Trsf.Translation(occ.gp_Vec(0, 0, 0))
+    faces = list(shape.faces)
     for contact in problem.contact:
         if contact.primary is None:
             continue
         sides = [
-            [face for face in shape.faces if re.fullmatch(pattern, face.name or "")]
+            {i for i, face in enumerate(faces) if re.fullmatch(pattern, face.name or "")}
             for pattern in (contact.primary, contact.secondary)
         ]
-        for one, other in product(*sides):
-            if _coincide(one, other):
-                here = occ.gp_Trsf.Translation(occ.gp_Vec(0, 0, 0))
-                one.Identify(other, NAME, occ.IdentificationType.PERIODIC, here)
+        for i, j in sorted({(min(both), max(both)) for both in product(*sides)}):
+            if _coincide(faces[i], faces[j]):
+                name, kind = f"ngcontact {i} {j}", occ.IdentificationType.PERIODIC
+                faces[i].Identify(faces[j], name, kind, here)

@@ -7,7 +7,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from ngcontact import Contact, Elastic, Problem, solve
+from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import shells
 
@@ -136,3 +136,39 @@ def test_rigid_obstacle(bilateral):
     u = np.asarray(solution.displacement(solution.mesh(0.5, 0.5, 0.0)))
     assert u[2] == pytest.approx(-gap, abs=1e-12)
     assert solution.relative_error_estimate < 1e-12  # round-off: measured 5e-14
+
+
+def bars(top):
+    """Four bars about one edge, which four pairs of faces share, under displacements (x, y)."""
+    bodies = []
+    for name, corner in {"a": (0, 0, 0), "b": (1, 0, 0), "c": (0, 1, 0), "d": (1, 1, 0)}.items():
+        bar = occ.Box(corner, tuple(x + 1 for x in corner))
+        bar.solids.name = name
+        for axis, way in {"x": occ.X, "y": occ.Y, "z": occ.Z}.items():
+            bar.faces.Min(way).name, bar.faces.Max(way).name = f"{name}_{axis}0", f"{name}_{axis}1"
+        bodies.append(bar)
+    return Problem(
+        geometry=occ.OCCGeometry(occ.Compound(bodies)),
+        materials={".*": Elastic(1.0, 0.3)},
+        displacement={
+            "a_x0|c_x0": (0, None, None),
+            "a_y0|b_y0": (None, 0, None),
+            ".*_z0": (None, None, 0),
+            "b_x1|d_x1": (-0.01, None, None),
+            "c_y1|d_y1": (None, top, None),
+        },
+        contact=[
+            Contact(f"{one}1", f"{other}0")
+            for one, other in (("a_x", "b_x"), ("a_y", "c_y"), ("b_y", "d_y"), ("c_x", "d_x"))
+        ],
+    )
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_pairs_of_faces_that_share_an_edge(order):
+    """All four are divided alike, also by bisection; the stress is E / (1 - nu) / 200."""
+    solution = solve(bars(-0.01), maxh=0.6, order=order)
+    np.testing.assert_allclose(solution.pressure, 0.005 / 0.7, rtol=1e-10)
+    levels = list(adapt(bars(-0.01 * (1 + ng.x * ng.z)), maxh=0.6, order=order, max_dofs=3000))
+    assert len(levels) > 1
+    assert all(level.work["gap_searches"] == 0 for level in levels)  # nodes face nodes
