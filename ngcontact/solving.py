@@ -362,7 +362,7 @@ class Run(Iterator[Solution]):
         return next(self._solutions)
 
     def __repr__(self) -> str:
-        """What it is, and how to get at the levels."""
+        """Summary, and the way to the levels."""
         return "<" + ONE_PER_LEVEL.format("has not run to its end") + ">"
 
     def close(self) -> None:

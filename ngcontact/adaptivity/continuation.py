@@ -85,7 +85,7 @@ class TransferredForecast(Forecast):
     aim: float  # the error to reach, over the known one
 
     def after(self, corners: Array, parent: Index) -> TransferredForecast:
-        """On elements with `corners` (k, 3, 2), each of them a part of a `parent` (k,)."""
+        """Forecast on elements with `corners` (k, 3, 2), each of them a part of a `parent` (k,)."""
         inherited = super().after(corners, parent).squares
         inside = _inside(self.known.corners.mean(axis=1), self.inside, corners, parent)
         squares = transferred(self.known, inside, corners)

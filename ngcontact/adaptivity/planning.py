@@ -45,7 +45,7 @@ def check_bool(name: str, value: object) -> None:
 
 @dataclass(frozen=True)
 class Refinement:
-    """How a sequence of levels is refined, and when it ends.
+    """Refinement of a sequence of levels, and its end.
 
     Raises `ValueError` or `TypeError` with the offending value and what would be right.
 
@@ -178,7 +178,7 @@ def next_plan(
 
 @dataclass(frozen=True)
 class Aim:
-    """How far a level is planned: until it has so many `unknowns`, or so small an `error`.
+    """Aim of a planned level: so many `unknowns`, or so small an `error`.
 
     With `max_unknowns` at most, and so many `markings` as the forecast is good for.
     """
@@ -263,7 +263,7 @@ class Forecast:
         return float(np.sqrt(self.squares.sum()))
 
     def after(self, corners: Array, parent: Index) -> Forecast:
-        """On elements with `corners` (k, 3, 2), each of them a part of a `parent` (k,)."""
+        """Forecast on elements with `corners` (k, 3, 2), each of them a part of a `parent` (k,)."""
         area = areas(corners)
         share = np.minimum(area / areas(self.corners)[parent], 1.0)
         power = np.full(len(parent), self.order + 1.0)

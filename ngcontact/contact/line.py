@@ -301,7 +301,7 @@ def with_roles(trace: BoundaryTrace, contact: Contact) -> Contact:
         return float(trace.lengths(trace.segments(pair.secondary)).mean())
 
     def bulge(pair: Contact) -> float:
-        """How far the middles of segments lie outside their chords, relative."""
+        """Distance of the middles of segments from their chords, outwards, relative."""
         segments = trace.segments(pair.secondary)
         normal = trace.exact_normal(*trace.at_nodes(segments)).reshape(len(segments), -1, 2)
         along = trace.curve[segments, -1] - trace.curve[segments, 0]

@@ -335,7 +335,7 @@ def with_dual_rows(trace: FacetTrace, zone: ContactZone, facing: Mask) -> tuple[
 
 
 def _reach(trace: FacetTrace, zone: ContactLine) -> Array:
-    """How far away what faces the nodes of each facet is, (k,); the most where none is known."""
+    """Distance (k,) of what faces the nodes of each facet; the largest where none is known."""
     met = np.flatnonzero(zone.partner >= 0)
     apart = np.full(len(zone.node) + 1, -1.0)
     there = trace.point(zone.partner[met], zone.partner_s[met])
@@ -359,7 +359,7 @@ def with_zone_roles(trace: FacetTrace, contact: Contact) -> Contact:
         return float(trace.lengths(trace.segments(pair.secondary)).mean())
 
     def bulge(pair: Contact) -> float:
-        """How far normals at vertices point away from the middles of their facets, relative."""
+        """Slope of normals at vertices away from the middles of their facets, relative."""
         facets = trace.segments(pair.secondary)
         every, corners = np.repeat(facets, 3), np.tile(np.eye(3), (len(facets), 1))
         out = trace.point(every, corners).reshape(-1, 3, 3)

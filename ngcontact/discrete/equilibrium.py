@@ -112,7 +112,7 @@ class FreeMotions:
 
     @property
     def names(self) -> list[str]:
-        """Of the bodies that can move."""
+        """Names of the bodies that can move."""
         both = zip(self.bodies.names, self.of_bodies, strict=True)
         return [name for name, part in both if part.any()]
 
@@ -429,7 +429,7 @@ def _measured_work(problem: Problem, free: FreeMotions) -> tuple[Array, Array] |
 
 
 def _integrated_work(loads: Sequence[Load], free: FreeMotions) -> tuple[Array, Array]:
-    """The same of solids: what two rules of quadrature differ by is the error."""
+    """The work of loads on solids; its error is the difference of two rules of quadrature."""
     space, bodies = free.space, free.bodies
     mesh, count = space.trace.mesh, len(free.combinations[0])
     found = np.zeros((2, count))

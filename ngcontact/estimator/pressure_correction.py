@@ -136,7 +136,7 @@ class _Forms:
         return shared(a.mat), f.vec.FV().NumPy().copy()
 
     def on_boundary(self, terms: Sequence[BoundaryResidual]) -> tuple[sp.csr_array, Array]:
-        """The same of the boundary terms, right side (n,)."""
+        """Right side (n,) of the boundary terms."""
         boundary, size = self.solution.boundary, self.space.ndof
         shape = []
         for j in range(self.functions):

@@ -41,7 +41,7 @@ class SurfacePoints:
 
 
 def _points(trace: BoundaryTrace, facets: Index, degree: int) -> SurfacePoints:
-    """On whole `facets` (j,), exact for polynomials of a degree on straight ones."""
+    """Points on whole `facets` (j,), exact for polynomials of a degree on straight ones."""
     s, w = triangle.gauss(degree)
     every, places = np.repeat(facets, len(s)), np.tile(s, (len(facets), 1))
     weight = _areas(trace, every, places) * np.tile(w, len(facets))

@@ -204,7 +204,7 @@ class BoundaryTrace:
         return rightward(self.derivative(segment, s)) * self.side[segment, None]
 
     def exact_normal(self, segment: Index, s: Array) -> Array:
-        """The same of the CAD edges, at `s` (k,) of segments `segment` (k,), (k, 2), if any."""
+        """Normals (k, 2) of the CAD edges, if any, at `s` (k,) of segments `segment` (k,)."""
         normals, regions = self.normal(segment, s), self.region[segment]
         if self.edges is not None:
             points = self.point(segment, s)

@@ -71,7 +71,7 @@ class FacetTrace(BoundaryTrace):
         return vectors / np.linalg.norm(vectors, axis=1)[:, None]
 
     def exact_normal(self, segment: Index, s: Array) -> Array:
-        """The same (k, 3) of CAD faces, if any, at `s` (k, 3) of facets `segment` (k,)."""
+        """Normals (k, 3) of CAD faces, if any, at `s` (k, 3) of facets `segment` (k,)."""
         normals = self.normal(segment, s)
         exact = face_normals(self.mesh, segment, s, self.point(segment, s))
         if exact is None:

@@ -59,7 +59,7 @@ def coarsenings(
 
 
 def _depths(parents: Integers) -> Integers:
-    """How many generations of parents each vertex has, (nv,)."""
+    """Number of generations of parents of each vertex, (nv,)."""
     depth = np.zeros(len(parents), dtype=np.intp)
     new = np.flatnonzero(parents[:, 0] >= 0)
     while True:

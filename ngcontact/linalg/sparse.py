@@ -31,7 +31,7 @@ class _View:
 
 
 def shared(matrix: ng.BaseMatrix) -> sp.csr_array:
-    """The same matrix (m, n) for SciPy, in the same memory: no values and columns are copied."""
+    """A matrix (m, n) for SciPy, in the memory of NGSolve's: no values and columns are copied."""
     values, columns, starts = (np.asarray(_View(x, matrix)) for x in matrix.CSR())
     if len(values) <= np.iinfo(columns.dtype).max:  # SciPy has both of one type, or copies
         starts = starts.astype(columns.dtype)

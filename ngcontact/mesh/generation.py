@@ -56,13 +56,13 @@ SEARCH_STEP = 2**-6
 
 
 def _elements(x: Array, maxh: float | Size) -> Array:
-    """How many elements lie between neighbours of the points `x` (k, 2), (k - 1,)."""
+    """Numbers (k - 1,) of elements between neighbours of the points `x` (k, 2)."""
     lengths = np.linalg.norm(np.diff(x, axis=0), axis=1)
     return np.asarray(lengths / (maxh((x[:-1] + x[1:]) / 2) if callable(maxh) else maxh))
 
 
 def _segments(x: Array, y: Array, maxh: float | Size) -> Array:
-    """How many segments reach up to each of the points `x`, `y` (k, 2) of facing curves, (k,)."""
+    """Numbers (k,) of segments up to each of the points `x`, `y` (k, 2) of facing curves."""
     density = np.zeros(len(x) - 1)
     for points in (x, y):
         steps = np.diff(points, axis=0)

@@ -50,7 +50,7 @@ def _triangle(x: Array, y: Array, rate: float, above: bool) -> Array:
 
 
 def _crossed(corners: Array, curves: Sequence[tuple[Array, Array]]) -> int:
-    """How many points of `curves`, and of the lines between, lie in the box of a triangle."""
+    """Number of points of `curves`, and of the lines between, in the box of a triangle."""
     low, high = np.log(corners.min(axis=0)), np.log(corners.max(axis=0))
     at, count = np.linspace(low[0], high[0], 50), 0
     for x, y in curves:

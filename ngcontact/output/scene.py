@@ -133,11 +133,11 @@ def fields(solution: Solved) -> dict[str, Field]:
     names = [f"{x}{x}", f"{y}{y}", f"{x}{y}", normal, "yz", "xz"][: 2 * solution.mesh.dim]
 
     def stress(label: str, of: Callable[[Array], Array]) -> Field:
-        """Of the components of `full_stress`."""
+        """Field of the components of `full_stress`."""
         return Field(label, "stress", lambda nodes: of(nodes.values(full_stress(solution))))
 
     def displacement(label: str, of: Callable[[Array], Array]) -> Field:
-        """Of the components (k, d)."""
+        """Field of the components (k, d)."""
         move = ng.CF(tuple(solution.displacement))
         return Field(f"displacement{label}", "length", lambda nodes: of(nodes.values(move)))
 

@@ -66,7 +66,7 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
 
 
 def _of_solids(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
-    """The same at vertices of solids: of two facets there the least and the largest value."""
+    """Values at vertices of solids: of two facets there the least and the largest one."""
     trace, found = boundary_trace(mesh, 1), []
     n, names = mesh.nv, np.array(mesh.GetBoundaries())
     low, high = np.full((3, n), np.inf), np.full((3, n), -np.inf)

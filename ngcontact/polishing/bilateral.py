@@ -64,7 +64,7 @@ def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved
 
 
 def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact) -> float:
-    """How far out a zone ends, a length, by the singular coefficient of the gap beside its end.
+    """Length by which a zone ends too far out, by the singular coefficient of the gap there.
 
     The `solution` is of the `mesh` with layers at its ends.
     """
@@ -83,7 +83,7 @@ def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact) -> float:
 
 
 def wrong_signs(solution: Solved, tips: Sequence[int]) -> str | None:
-    """What contradicts contact between nodes: tension in the zone, or penetration; None if none.
+    """Contradiction of contact between nodes: tension in the zone, or penetration; None if none.
 
     Stresses are not known on segments that end at the vertices `tips` of layers.
     """

@@ -177,7 +177,7 @@ class GeometricMesh:
         return mesh, new
 
     def mesh(self, degree: int) -> ng.Mesh:
-        """The same for NGSolve, curved to a `degree`; its segments come in the same order."""
+        """NGSolve's mesh, curved to a `degree`; its segments come in the same order."""
         old, new = self.source.ngmesh, ngm.Mesh(dim=2)
         new.SetGeometry(old.GetGeometry())
         new.AddPoints(np.column_stack([self.vertices, np.zeros(len(self.vertices))]))

@@ -148,7 +148,7 @@ def _polished(solution: Solution, digits: int) -> Solution:
 
 
 def _quantities(solution: Solved) -> Array:
-    """What is to converge: the forces of all pairs and the energy, (q,)."""
+    """Figures (q,) that are to converge: the forces of all pairs and the energy."""
     forces = [solution.contact_force(k) for k in range(len(solution.pairs))]
     return np.append(np.concatenate(forces), solution.energy)
 
@@ -163,7 +163,7 @@ def _error(values: list[Array]) -> float:
 
 
 def _followed(mesh: GeometricMesh, solution: Solved) -> tuple[float, GeometricMesh]:
-    """By what share of the segments beside them ends of contact are off; the mesh with them moved.
+    """Share of the segments beside them by which ends of contact are off; the mesh with them moved.
 
     The `solution` is of the mesh with its layers.
     """

@@ -101,7 +101,7 @@ class Contact:
         return f'"{self.secondary}" with {other}'
 
     def description(self) -> str:
-        """How it is measured, in a few words."""
+        """Direction, gap and kind, in a few words."""
         along = "the normal" if self.direction is None else described(self.direction)
         parts = [f"along {along}"]
         if self.gap is not None:

@@ -129,7 +129,7 @@ class Problem:
             raise ValueError(f"{what} is not available for solids: see docs/solids.md")
 
     def __repr__(self) -> str:
-        """In a few words, instead of all data."""
+        """Summary in a few words, instead of all data."""
         pairs = ", ".join(pair.named() for pair in self.contact) or "none"
         return f"Problem({self.model}; bodies {', '.join(self.materials)}; contact {pairs})"
 

@@ -94,7 +94,7 @@ def pinned_null_space(
 
 
 def _separated(vectors: Array, places: Index) -> Index:
-    """Those of the `places`, one a vector, at which the vectors are most independent."""
+    """Places among `places`, one a vector, at which the vectors are most independent."""
     count = vectors.shape[1]
     if count == 0:
         return np.zeros(0, dtype=np.intp)

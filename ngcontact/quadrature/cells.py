@@ -138,7 +138,7 @@ class ElementParts:
 
     @property
     def dim(self) -> int:
-        """Of the elements."""
+        """Dimension of the elements."""
         return self.origin.shape[1]
 
     def points(self, rule: Rule) -> Array:
@@ -271,7 +271,7 @@ def sampled(function: ng.CoefficientFunction, points: NDArray) -> Array:
 
 
 def divisions(dim: int, sizes: Array, extent: float) -> Index:
-    """How many of `SIDE_PARTS` the side of elements of `sizes` (k,) is divided into, (k,)."""
+    """Number (k,) of `SIDE_PARTS` into which the sides of elements of `sizes` (k,) are divided."""
     finest = np.array(SIDE_PARTS[dim])
     at = np.searchsorted(finest, sizes * (LATTICE_DIVISIONS[dim] / extent))
     return finest[np.minimum(at, len(finest) - 1)]

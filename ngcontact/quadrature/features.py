@@ -91,7 +91,7 @@ class Features:
 
     @property
     def widths(self) -> Array:
-        """How wide they are, (k,), lengths."""
+        """Widths (k,), lengths."""
         return self.spots[:, 2]
 
 
@@ -198,7 +198,7 @@ def _searched(kind: str, values: Array) -> tuple[Array, float]:
 
 
 def _lost(values: Array, window: int, inside: Mask | None = None) -> Array:
-    """What the opening of `values`, in a window of so many samples, lost of peaks.
+    """Height of peaks that the opening of `values`, in a window of so many samples, lost.
 
     Along a line it is the last axis, of several components, and windows do not reach beyond its
     ends; in a plane all axes, and they do not reach beyond the samples `inside`, and nothing is
@@ -253,7 +253,7 @@ class _Line:
         return self.segments[k], np.where(self.turned[k], 1 - s, s)[:, None]
 
     def values(self, t: Array) -> Array:
-        """Of the function (n, c) at the lengths `t` (n,)."""
+        """Values (n, c) of the function at the lengths `t` (n,)."""
         segments, s = self._at(t)
         return _values(self.function, self.view.points(segments, s[:, None])[:, 0])
 

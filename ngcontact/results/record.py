@@ -119,7 +119,7 @@ def html_of(solution: Guaranteed) -> str:
 def with_progress(
     solutions: Iterator[Level], tolerance: float | None, max_dofs: float
 ) -> Generator[Level]:
-    """The same levels, each reported when it is done.
+    """The levels as they come, each reported when it is done.
 
     A line of `sys.stderr` each, or one table in a notebook that grows; with a bar that is full at
     the tolerance, or at `max_dofs` where there is none.
@@ -142,7 +142,7 @@ def with_progress(
 
 
 def _share(used: float, first: float, error: float, tolerance: float | None) -> float:
-    """How much of the way is done, in [0, 1]: of the digits asked for, or of the unknowns."""
+    """Share of the run that is done, in [0, 1]: of `tolerance`'s digits, or of the unknowns."""
     if tolerance is None:
         return min(used, 1.0)
     if not error > tolerance:

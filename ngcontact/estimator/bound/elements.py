@@ -82,7 +82,7 @@ class Element:
         return np.asarray((self.N @ mu[self.dofs][..., None])[..., 0])
 
     def of_strain(self, strain: Array) -> Element:
-        """The same triangles for a displacement of `strain` (b, q, v), without body forces."""
+        """These triangles for a displacement of `strain` (b, q, v), without body forces."""
         local = coordinates(self.corners, self.places.x)
         T = stresses(self.degree, self.corners, local, self.axial, self.on_axis)
         rows, rest = _weighted(T, self.places.weight, self.compliance, strain)

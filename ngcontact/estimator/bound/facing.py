@@ -183,7 +183,7 @@ def new_vertices(
     np.minimum.at(size, trace.nodes[:, [0, -1]], length[:, None])
 
     def nearest(k: Index, s: Array) -> tuple[Array, Array]:
-        """How far (r,) the nearer ends of segments (r,) are, and the `size` there."""
+        """Distances (r,) of the nearer ends of segments (r,), and the `size` there."""
         return np.minimum(s, 1 - s) * length[k], size[trace.nodes[k, np.where(s < 0.5, 0, -1)]]
 
     found = [np.zeros((0, 2))]

@@ -24,7 +24,7 @@ KAPPA_GROWTH = 2.0  # times the least M / B, up to which kappa may grow: the bar
 def force_bar(
     proof: Proof, displacement: ng.GridFunction, G: ng.GridFunction, directions: Sequence[Array]
 ) -> float:
-    """How far a component of a contact force is from the true one, at most.
+    """Bound of the error of a component of a contact force.
 
     Loads and stiffness count as they are integrated. A force per unit thickness.
 

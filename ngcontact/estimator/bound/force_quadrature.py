@@ -49,7 +49,7 @@ def pattern(thirds: bool) -> tuple[Array, Index]:
 
 @dataclass(frozen=True, eq=False)
 class ForceQuadrature:
-    """How body forces are integrated on n triangles: on parts where they are no polynomials.
+    """Quadrature of body forces on n triangles, in parts where they are no polynomials.
 
     The rule on a triangle is that on its parts, so that resultants are the same.
     """

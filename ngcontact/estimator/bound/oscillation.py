@@ -66,7 +66,7 @@ def oscillation_norms(cells: Cells, elements: Sequence[Element], tractions: Arra
 
 
 class Constants(NamedTuple):
-    """Of b triangles, for |grad w| = 1."""
+    """Constants of b triangles, for |grad w| = 1."""
 
     poincare: Array  # (b,)
     korn: Array  # (b,)

@@ -146,7 +146,7 @@ def balancing(degree: int, corners: Array, x: Array, force: Array, axial: bool) 
 
 @lru_cache
 def _antiderivatives(degree: int) -> Array:
-    """Of the m `products` by both coordinates in those k of a degree more, (2, k, m)."""
+    """Antiderivatives (2, k, m) of the m `products` by both coordinates; k are of a degree more."""
     (i, j), (p, q) = products(degree), products(degree + 1)
     up, p, q = legendre.legint(np.eye(degree + 1)), p[:, None], q[:, None]
     return np.stack([up[p, i] * (q == j), up[q, j] * (p == i)])

@@ -263,7 +263,7 @@ class Guaranteed(Estimated):
 
     @property
     def error_bound(self) -> float:
-        """At least A(u - u_h, u - u_h)^(1/2), root of an energy per unit thickness.
+        """Upper bound of A(u - u_h, u - u_h)^(1/2), root of an energy per unit thickness.
 
         u is the solution on the domain of the mesh. Proved by an equilibrated stress, but for
         round-off and for data that are no polynomials, which are looked at in points of quadrature.

@@ -104,7 +104,7 @@ class BoundaryData:
     pressed: Array
 
     def followed(self) -> Index:
-        """How often triangles (n,) are divided to follow tractions: `DIVISIONS` times at most."""
+        """Number of divisions (n,) of triangles that follow tractions, `DIVISIONS` at most."""
         cells, found = self.cells, np.zeros(len(self.cells.triangles), dtype=np.intp)
         breaks = np.bincount(self.breaks[:, 0].astype(np.intp), minlength=len(cells.trace.region))
         count = np.append(breaks, 0)[cells.segment]  # none inside, -1
@@ -114,7 +114,7 @@ class BoundaryData:
     def with_pressure(
         self, lines: Sequence[FacingSides], pressure: Sequence[Array]
     ) -> BoundaryData:
-        """The same with pressures on lines: coefficients `pressure` (k, n) on each."""
+        """These data with pressures on lines: coefficients `pressure` (k, n) on each."""
         pressed = np.zeros_like(self.pressed)
         for f, p in zip(lines, pressure, strict=True):
             force = (f.force(p) / WEIGHTS)[..., None] * f.direction

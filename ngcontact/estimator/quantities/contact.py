@@ -111,7 +111,7 @@ def ends_of(pair: ContactState) -> list[Quantity]:
 
 
 def _error_of_end(pair: ContactState, number: int) -> float:
-    """How far an end of contact is from the true one: by secants, and a part of the step there.
+    """Error of an end of contact: by secants, and a part of the step there.
 
     Near the end gap^(2/3) outside and p^2 inside are smooth in the length along the line. Where the
     line through the first two of either vanishes elsewhere, the discrete end is as uncertain; where

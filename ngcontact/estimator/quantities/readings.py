@@ -214,7 +214,7 @@ def _proved_force_errors(solution: Measured, pair: int, e: Array) -> tuple[Array
 
 
 def _force_errors(solution: Guaranteed, pair: int, e: Array) -> Array:
-    """How far a pair's contact force is from the true one at most, along `e` (2,) and across it."""
+    """Bounds of the error of a pair's contact force along `e` (2,) and across it."""
     if not solution.problem.model.startswith("plane"):
         raise ValueError(f'no bar of the force is proved for "{solution.problem.model}"')
     if len(solution.pairs[pair].line.node) == 0:
@@ -235,7 +235,7 @@ def _force_errors(solution: Guaranteed, pair: int, e: Array) -> Array:
 
 
 def _component_error(solution: Guaranteed, pair: int, e: Array) -> float:
-    """How far the force's component along `e` (2,) is from the true one, by a dual problem."""
+    """Bound of the error of the force's component along `e` (2,), by a dual problem."""
     states, space, u = solution.pairs, solution.discrete.space, solution.displacement
     directions = [e if number == pair else 0 * e for number in range(len(states))]
     jumps = [s.line.direction @ d for s, d in zip(states, directions, strict=True)]

@@ -96,7 +96,7 @@ def unknown(
 
 
 def error_of_largest(value: float, samples: Array, errors: Array) -> float:
-    """How far a `value` is from the largest of what is within `errors` (k,) of `samples` (k,).
+    """Largest distance of a `value` from the largest of `samples` (k,) known to `errors` (k,).
 
     At most: the largest lies between those of samples - errors and of samples + errors.
     """
