@@ -38,17 +38,19 @@ def onto(
     """
     degree = DEGREES[surface.shape[1]]
     L = np.tile(CENTRE, (len(points), 1)) if start is None else start.copy()
-    distance = np.zeros(len(points))
+    distance, moving = np.zeros(len(points)), np.arange(len(points))
     for _ in range(NEWTON_STEPS if degree > 1 else 2):
-        x = np.einsum("ki,kid->kd", lagrange(degree, L), surface[facet])
-        tangents = np.einsum("kij,kid->kdj", lagrange_gradient(degree, L), surface[facet])
-        matrix = np.concatenate([tangents, -directions[:, :, None]], axis=2)
-        step = _solved(matrix, points + distance[:, None] * directions - x)
+        places, d, here = surface[facet[moving]], directions[moving], L[moving]
+        x = np.einsum("ki,kid->kd", lagrange(degree, here), places)
+        tangents = places.transpose(0, 2, 1) @ lagrange_gradient(degree, here)
+        matrix = np.concatenate([tangents, -d[:, :, None]], axis=2)
+        step = _solved(matrix, points[moving] + distance[moving, None] * d - x)
         move = np.clip(step[:, :2], -2.0, 2.0) if degree > 1 else step[:, :2]
-        L[:, :2] += move
-        L[:, 2] -= move.sum(axis=1)
-        distance += step[:, 2]
-        if np.nanmax(np.abs(step[:, :2]), initial=0.0) <= NEWTON_TOLERANCE:
+        L[moving, :2] += move
+        L[moving, 2] -= move.sum(axis=1)
+        distance[moving] += step[:, 2]
+        moving = moving[np.abs(step[:, :2]).max(axis=1) > NEWTON_TOLERANCE]
+        if not moving.size:
             break
     return L, distance
 

@@ -478,10 +478,10 @@ def for_partial_cover(trace: BoundaryTrace, contacts: Sequence[Contact]) -> Boun
         vertices, others = (np.unique(trace.nodes[x, :3]) for x in (facets, facing))
         if contact.rows == "nodal" or not others.size or _coincide(trace, vertices, others):
             continue
-        zone, _ = nodal_zone(trace, contact)
-        share = facing_pieces(trace, contact, facets, facing, _reach(trace, zone)).covered(
-            len(facets)
-        )
+        reach = np.zeros(len(facets))
+        if contact.direction is None:
+            reach = _reach(trace, nodal_zone(trace, contact)[0])
+        share = facing_pieces(trace, contact, facets, facing, reach).covered(len(facets))
         partly = (share > SLIVER) & (share < WHOLE_SHARE)
         chosen[trace.nodes[facets[partly], 3:]] = True
     return replace(trace, bernstein=chosen) if chosen.any() else trace

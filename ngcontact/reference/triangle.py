@@ -54,7 +54,7 @@ def _exponents(order: int) -> Index:
 
 def _monomials(order: int, L: Array, derivative: int | None = None) -> Array:
     """Monomials (k, q) at `L` (k, 3), or their derivatives with respect to L0 (0) or L1 (1)."""
-    powers = [np.power.outer(x, np.arange(order + 1)) for x in L[:, :2].T]
+    powers = [np.vander(x, order + 1, increasing=True) for x in L[:, :2].T]
     if derivative is not None:
         x = powers[derivative]
         powers[derivative] = np.zeros_like(x)
