@@ -52,7 +52,7 @@ def test_semi_axes_of_hertz(ratio, exact):
         (cylinders, 30_000, (2e-3, 3e-3, 1.5e-2, 2e-2)),
         # 1.3e-2, 1.8e-3 at 11 835, on an obstacle that the first mesh does not meet.
         (layered, 13_000, (2e-2, 3e-3)),
-        # 6.2e-2, 2.0e-3: the peak of bodies of revolution, too, is 5 % above that of half-spaces.
+        # 6.2e-2, 2.0e-3: the peak of bodies of revolution, too, is 4 % above that of half-spaces.
         (balls, 12_000, (8e-2, 4e-3)),
     ],
     ids=["ball", "blocks", "cylinders", "layered", "balls"],
