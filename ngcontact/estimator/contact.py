@@ -353,8 +353,12 @@ def on_contact(
     """Residuals on both sides of one pair of all `pairs`."""
     boundary, line = solution.boundary, pair.line
     nodal, active = at_nodes(boundary, pair, pairs)
-    pieces, whole = facing_pieces(boundary, line, np.asarray(np.isfinite(nodal).any(axis=1)))
-    covered = covered_parts(boundary, line, pieces, whole)
+    known = np.isfinite(nodal)
+    pieces, whole = facing_pieces(boundary, line, np.asarray(known.any(axis=1)))
+    # Without contact a boundary is free, and may face several others.
+    closed = (known & (active | (nodal != 0))).any(axis=1)
+    held = closed[pieces.local]
+    covered = covered_parts(boundary, line, rows_of(pieces, held), np.count_nonzero(held[:whole]))
     if len(pieces.local) == 0:
         return BoundaryTerms([], [], covered)
     order = 2 * solution.order + DATA_BONUS
@@ -362,9 +366,10 @@ def on_contact(
     nodal = _pressure_on_segments(nodal, boundary.places(line.segments))
     pressure = (boundary.shapes(*points.own[:2]) * nodal[points.local]).sum(axis=1) / solution.unit
     full = np.asarray(active.all(axis=1))[points.local]
-    sides = [_side(solution, points, pressure, own=True)]
+    meets = closed[points.local]
+    sides = [_side(solution, points, pressure, meets, own=True)]
     if line.contact.primary is not None:
-        sides.append(_side(solution, points, -pressure, own=False))
+        sides.append(_side(solution, points, -pressure, meets, own=False))
     residuals, every = [], np.arange(len(pressure))
     for x in sides:  # (3.11), (3.11'): no friction
         share = PressureShare(every, x.points.segment, x.points.s, x.across[..., 1])
@@ -443,8 +448,13 @@ class _Side:
     across: Array  # (k, 2, 2)
 
 
-def _side(solution: ScaledSolution, points: FacingPoints, pressure: Array, *, own: bool) -> _Side:
-    """The tractions of the secondary, or those of the primary; `pressure` (k,) is pi_h or -pi_h."""
+def _side(
+    solution: ScaledSolution, points: FacingPoints, pressure: Array, meets: Mask, *, own: bool
+) -> _Side:
+    """The tractions of the secondary, or those of the primary; `pressure` (k,) is pi_h or -pi_h.
+
+    They count where a segment `meets` (k,) the other body.
+    """
     boundary, d = solution.boundary, points.direction
     here = points.own if own else points.facing
     segment, s, weight = here
@@ -457,7 +467,7 @@ def _side(solution: ScaledSolution, points: FacingPoints, pressure: Array, *, ow
     return _Side(
         points=here,
         element=element,
-        weight=solution.edge_weight[element] * weight / stretch,
+        weight=solution.edge_weight[element] * weight * meets / stretch,
         stiffness=solution.rigidity[element] / solution.diameter[element],
         along=along,
         across=across,
