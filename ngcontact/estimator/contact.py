@@ -358,7 +358,7 @@ def on_contact(
     # Without contact a boundary is free, and may face several others.
     closed = (known & (active | (nodal != 0))).any(axis=1)
     held = closed[pieces.local]
-    covered = covered_parts(boundary, line, rows_of(pieces, held), np.count_nonzero(held[:whole]))
+    covered = covered_parts(boundary, line, rows_of(pieces, held), int(held[:whole].sum()))
     if len(pieces.local) == 0:
         return BoundaryTerms([], [], covered)
     order = 2 * solution.order + DATA_BONUS

@@ -8,7 +8,7 @@ its border, so that singularity sits in a small Schur complement alone. NumPy an
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -56,7 +56,11 @@ class NullSpace:
 
     def resisted(self, rows: Index) -> bool:
         """Whether rows with the unknowns `rows` (k,) resist all motions that are not lineal."""
-        return vanishing_combinations(self.others[rows]).shape[1] == 0
+        return self.unresisted(rows).shape[1] == 0
+
+    def unresisted(self, rows: Index) -> Array:
+        """Motions (n, k) of `others` that rows with the unknowns `rows` (m,) do not resist."""
+        return self.others @ vanishing_combinations(self.others[rows])
 
 
 def no_null_space(n: int) -> NullSpace:
@@ -78,12 +82,12 @@ def pinned_null_space(
     places = np.flatnonzero(free)
     lineal = motions @ combinations
     lineal[rows] = 0.0
-    held = _separated(lineal, places)
+    held = separated(lineal, places)
     # What completes the lineal motions, less what these contribute at the held unknowns.
     rest = motions @ np.linalg.svd(combinations, full_matrices=True)[0][:, lineal.shape[1] :]
     rest -= lineal @ np.linalg.solve(lineal[held], rest[held]) if held.size else 0.0
     rest[held] = 0.0
-    pins = _separated(rest, places)
+    pins = separated(rest, places)
     return NullSpace(
         lineal=lineal,
         others=rest,
@@ -93,8 +97,8 @@ def pinned_null_space(
     )
 
 
-def _separated(vectors: Array, places: Index) -> Index:
-    """Places among `places`, one a vector, at which the vectors are most independent."""
+def separated(vectors: Array, places: Index) -> Index:
+    """Places (q,) among `places` (k,) at which the `vectors` (n, q) are most independent."""
     count = vectors.shape[1]
     if count == 0:
         return np.zeros(0, dtype=np.intp)
@@ -216,3 +220,7 @@ class Anchor:
 
     stiffness: Array  # (q,) force per displacement
     at: Array  # (q,) values of the pins from which they pull
+
+    def only(self, held: Mask) -> Anchor | None:
+        """The same at the pins `held` (q,) alone, None at none."""
+        return replace(self, stiffness=held * self.stiffness) if held.any() else None
