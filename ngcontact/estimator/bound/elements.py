@@ -11,7 +11,7 @@ and the tractions of s are N'N mu + N'g + <s_p n, .>.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,10 +22,10 @@ from numpy.polynomial import legendre
 from ...arrays import Array, Index, Mask
 from ...fem import connected_bodies, elastic_strain
 from ...lagrange import gauss
-from ...problem import MeshArrays, Problem, varies
+from ...problem import MeshArrays, Problem, numbers, varies
 from ...qp import vanishing_combinations
+from .body_forces import ForceRules, projection
 from .cells import Cells, Places, places
-from .force_quadrature import ForceQuadrature, projection
 from .polynomials import CORNERS, balancing, coordinates, stresses
 
 TURNED_NORMAL = 1e-4  # sine of the angle between normals that are not one
@@ -55,8 +55,7 @@ class Element:
     strain: Array  # (b, q, v) e(u_h), less initial strains, Voigt
     source: ng.CoefficientFunction | None  # the body force
     force: Array  # (b, j, 2) coefficients, as of `scalars`, of the body force that s_p balances
-    # (b,) parts of each triangle on which forces are integrated, two at least where tractions are
-    pieces: Index
+    depth: Index  # (b,) how often triangles are divided to integrate forces
     missed: Array  # (b,) L2 norm of what of the body force s_p does not balance, times the measure
     modulus: Array  # (b,) smallest eigenvalue of C in Mandel's scaling, a stress
     combined: Array  # (b, n, m) T from the n polynomials of `stresses`, orthonormal: (T, T) = 1
@@ -168,6 +167,11 @@ class Multipliers:
         k = 2 * (int(np.max(self.degree[side])) + 1)
         return np.add.outer(self.start[side], np.arange(k))
 
+    def by_degree(self, side: Index) -> Iterator[tuple[int, Index]]:
+        """Each degree of sides `side` (k,), and which of them, (r,), have it; none of -1."""
+        for degree in np.unique(self.degree[side[side >= 0]]).tolist():
+            yield degree, np.flatnonzero((side >= 0) & (self.degree[side] == degree))
+
 
 def by_triangle(elements: Sequence[Element], values: Sequence[Array | Index]) -> Array:
     """One array (n,) of `values` (b,) on each element's triangles, n in all."""
@@ -188,6 +192,9 @@ def multipliers(problem: Problem, cells: Cells, degree: int) -> Multipliers:
     segment, s = cells.on_side(side, np.repeat([0.0, 1.0], len(side) // 2))
     off = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
     higher = cells.curved.copy()
+    rough = [name for name, load in problem.traction.items() if not numbers(load)]
+    loaded = np.isin(cells.segment, cells.trace.segments(*rough))
+    higher[cells.owner[loaded & ~cells.inner]] = True
     higher[cells.owner[side[np.linalg.norm(off, axis=1) > TURNED_NORMAL]]] = True
     own, of_side = degree + CURVED_DEGREES * higher, np.zeros(len(cells.ends), dtype=np.intp)
     np.maximum.at(of_side, cells.sides, own[:, None])
@@ -222,7 +229,7 @@ def elements_of(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     degree: int,
-    rules: ForceQuadrature,
+    rules: ForceRules,
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, in groups of one kind, and their multipliers.
 
@@ -262,7 +269,7 @@ def _element(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     mu: Multipliers,
-    rules: ForceQuadrature,
+    rules: ForceRules,
     at: Index,
 ) -> Element:
     """Triangles `at` (b,) of one kind, condensed."""
@@ -273,19 +280,19 @@ def _element(
     )
     axial, curved = model.extent > 0, bool(cells.curved[at[0]])
     law = _of_body(problem.materials, cells, at)
-    rational = curved or axial or law in problem.varying.values()
-    points = places(cells, at, 2 * degree + 4 * rational)
+    varying = law in problem.varying.values()
+    rational = curved or axial or varying
+    points = places(cells, at, 2 * degree + 2 * rational + 2 * varying)
     corners = cells.corners[at]
     local = coordinates(corners, points.x) if curved else points.local
     compliance = compliance_at(problem, cells, points)
     strain = points.evaluate(cells, elastic_strain(problem, displacement))
     source = _of_body(problem.force, cells, at)
-    n = min(max(0, degree - 1 - axial), rules.order // 2)
+    n = max(0, degree - 1 - axial)
     force, missed = np.zeros((len(at), (n + 1) * (n + 2) // 2, 2)), np.zeros(len(at))
-    pieces, hoop = np.ones(len(at), dtype=np.intp), np.zeros(points.weight.shape)
+    depth, hoop = np.zeros(len(at), dtype=np.intp), np.zeros(points.weight.shape)
     if source is not None:
-        threshold = dict(zip(problem.force.values(), rules.thresholds, strict=True))[source]
-        force, missed, size, pieces = projection(source, cells, at, n, rules, threshold)
+        force, missed, size, depth = projection(source, cells, at, n, rules)
         missed = np.where(missed <= FORCE_ROUND_OFF * size, 0.0, missed)
         if axial:
             force[..., 0] = 0.0
@@ -317,7 +324,7 @@ def _element(
         strain=strain,
         source=source,
         force=force,
-        pieces=np.maximum(pieces, 1 + rules.followed[at]),
+        depth=depth,
         missed=missed,
         modulus=np.broadcast_to(1 / largest, len(at)),
         combined=combined,
@@ -335,9 +342,12 @@ def _weighted(T: Array, weight: Array, compliance: Array, strain: Array) -> tupl
     And a `strain` (b, q, v) as one (b, 1, q v). `weight` is (b, q), `compliance` C^-1 = L L'
     (b, q, v, v) or (1, 1, v, v).
     """
-    L, root = np.linalg.cholesky(compliance), np.sqrt(weight)[..., None, None]
-    rows = (root * L.swapaxes(2, 3) @ T).reshape(len(T), -1, T.shape[-1])
-    return rows, (root * (np.linalg.inv(L) @ strain[..., None])).reshape(len(T), 1, -1)
+    L, root = np.linalg.cholesky(compliance), np.sqrt(weight)[..., None]
+    strain = (np.linalg.inv(L) @ (root * strain)[..., None]).reshape(len(T), 1, -1)
+    rows = np.zeros_like(T)
+    for i, j in zip(*np.nonzero(np.abs(L).max(axis=(0, 1))), strict=True):
+        rows[:, :, j] += root * L[..., i, j, None] * T[:, :, i]
+    return rows.reshape(len(T), -1, T.shape[-1]), strain
 
 
 def _nearest(rows: Array, rest: Array) -> tuple[Array, Array]:

@@ -20,7 +20,7 @@ from scipy.sparse.linalg import splu
 
 from ...arrays import Array, Index, Mask, from_triplets
 from ...errors import ContactError
-from ...linalg import change_of_basis, cholesky, handed_over
+from ...linalg import change_of_basis, cholesky, lower_half, shared
 from ...qp import (
     BorderedSystems,
     QuadraticProgram,
@@ -68,9 +68,10 @@ class DualProgram:
     @cached_property
     def systems(self) -> BorderedSystems:
         """Its linear systems; what is factorised is the matrix made definite."""
-        lower = sp.tril(self.program.K, format="csr")
-        lower.setdiag((1 + DIAGONAL_SHIFT) * self.program.diagonal)
-        return BorderedSystems(self.program, cholesky(handed_over(lower)))
+        matrix = lower_half(self.program.K)
+        lower = shared(matrix)
+        lower.data[lower.indptr[1:] - 1] *= 1 + DIAGONAL_SHIFT  # the last entry of each row
+        return BorderedSystems(self.program, cholesky(matrix))
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the factor, which is made again."""
@@ -215,18 +216,19 @@ def _basis(
     plain = np.ones(d, dtype=bool)
     for line in lines:
         means = line.psi.T * (line.weight[:, None] / line.mass[..., None])  # (k, n, j)
-        for i, (side, other) in enumerate(zip(line.side, line.other, strict=True)):
-            load = means[i, :, None] * line.direction[i].T  # (n, 2, j)
-            R = (load @ traces(mu.degree[side], POINTS)).reshape(len(load), -1)
-            at, row = mu.of(side), np.arange(m, m + len(R))
-            m += len(R)
+        load = means[:, :, None] * line.direction.swapaxes(1, 2)[:, None]
+        row = m + np.arange(line.mass.size).reshape(line.mass.shape)
+        m += row.size
+        for degree, some in mu.by_degree(line.side):
+            R = (load[some] @ traces(degree, POINTS)).reshape(*row[some].shape, -1)
+            at, rest = mu.of(line.side[some]), np.linalg.svd(R)[2][:, R.shape[1] :]
             plain[at] = False
-            own.append(Block(row, at, R))
-            inverse = np.linalg.inv(np.vstack([R, np.linalg.svd(R)[2][len(R) :]]))
-            solved.append(Block(at, at, inverse))
-            if other >= 0:
-                R = -(load @ traces(mu.degree[other], line.there[i])).reshape(len(load), -1)
-                across.append(Block(row, mu.of(other), R))
+            own.append(Block(row[some], at, R))
+            solved.append(Block(at, at, np.linalg.inv(np.concatenate([R, rest], axis=1))))
+        for degree, some in mu.by_degree(line.other):
+            R = -(load[some] @ traces(degree, line.there[some])[:, None])
+            at = mu.of(line.other[some])
+            across.append(Block(row[some], at, R.reshape(*row[some].shape, -1)))
     part = _summed(solved, (d, d)) + sp.diags_array(plain.astype(float), format="csr")
     R = _summed(across, (m, d))
     M, T = -part[:, unknown] @ R, part  # mu = part y + M mu, from the primary to the secondary

@@ -13,12 +13,13 @@ from ...arrays import Array, Index, Mask
 from ...lagrange import gauss_derivative, lagrange
 from ...problem import Problem, numbers
 from ...quadrature import loads_of
+from .body_forces import DIVISIONS
 from .cells import Cells
 from .elements import Multipliers, traces
 from .facing import DATA_DEGREE, POINTS, TO_LEGENDRE, WEIGHTS, FacingSides, jump, on_segments
-from .force_quadrature import DIVISIONS, PARTS_OF_A_SIDE
+from .traction_free import DIVISION
 
-FINEST_PARTS = PARTS_OF_A_SIDE**DIVISIONS  # parts of a side
+FINEST_PARTS = DIVISION**DIVISIONS  # parts of a side
 SAME_BREAK = 1e-10  # of a side: breaks nearer to its ends are these
 TRACTION_ROUND_OFF = 1e-10  # relative to the largest stress: as equilibrium is accepted
 
@@ -37,8 +38,7 @@ class SideRule:
     def moments(self, mu: Multipliers, values: Array) -> Array:
         """Integrals (d,) of tractions `values` (m, j, 2) times the multipliers."""
         total, load = np.zeros(int(mu.start[-1])), (self.weight * self.measure)[..., None] * values
-        for k in np.unique(mu.degree[self.side]).tolist():
-            at = np.flatnonzero(mu.degree[self.side] == k)
+        for k, at in mu.by_degree(self.side):
             parts = np.einsum("mjc,mji->mci", load[at], traces(k, self.t[at])).reshape(len(at), -1)
             np.add.at(total, mu.start[self.side[at], None] + np.arange(2 * (k + 1)), parts)
         return total
@@ -102,14 +102,6 @@ class BoundaryData:
     breaks: Array
     # (e, j, 2) what pressures of lines exert: forces per t, with the measure, at `POINTS`
     pressed: Array
-
-    def followed(self) -> Index:
-        """Number of divisions (n,) of triangles that follow tractions, `DIVISIONS` at most."""
-        cells, found = self.cells, np.zeros(len(self.cells.triangles), dtype=np.intp)
-        breaks = np.bincount(self.breaks[:, 0].astype(np.intp), minlength=len(cells.trace.region))
-        count = np.append(breaks, 0)[cells.segment]  # none inside, -1
-        np.maximum.at(found, cells.owner, np.where(count >= FINEST_PARTS, DIVISIONS, count > 0))
-        return found
 
     def with_pressure(
         self, lines: Sequence[FacingSides], pressure: Sequence[Array]
