@@ -19,7 +19,7 @@ PARAMETERS = 32  # bytes of Netgen's triangles before those of their corners' su
 
 AXIS_RADIUS = 1e-9  # radius, relative to the largest, up to which a point lies on the axis x = 0
 
-PIECES = "_ngcontact_pieces"  # attribute of a mesh: its elements, and `MeshArrays.pieces` of them
+PIECES = "_ngcontact_pieces"  # attribute of a mesh: the hash of its elements, and their `pieces`
 
 POSITION = ng.CF((ng.x, ng.y, ng.z))  # of a mesh point, lengths
 
@@ -145,16 +145,17 @@ class MeshArrays:
         from scipy.sparse import csr_array  # not needed to state a problem
         from scipy.sparse.csgraph import connected_components
 
+        key = hash(self.elements.tobytes())
         known = self.mesh.__dict__.get(PIECES)
-        if known is not None and np.array_equal(known[0], self.elements):
-            return known[1]
+        if known is not None and known[0] == key:
+            return np.asarray(known[1])
         nv, (ne, corners) = len(self.vertices), self.elements.shape
         # Vertices first, to be numbered first, then elements, each joined to its vertices.
         starts = np.concatenate([np.zeros(nv), corners * np.arange(ne + 1)]).astype(np.int32)
         joins = self.elements.ravel().astype(np.int32)
         graph = csr_array((np.ones(joins.size), joins, starts), (nv + ne, nv + ne))
         found = connected_components(graph, directed=False)[1][:nv].astype(np.intp)
-        self.mesh.__dict__[PIECES] = self.elements, found
+        self.mesh.__dict__[PIECES] = key, found
         return found
 
     @property

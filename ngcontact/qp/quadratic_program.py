@@ -56,7 +56,11 @@ class NullSpace:
 
     def resisted(self, rows: Index) -> bool:
         """Whether rows with the unknowns `rows` (k,) resist all motions that are not lineal."""
-        return self.unresisted(rows).shape[1] == 0
+        part = self.others[rows]
+        if part.shape[1] == 0 or len(part) < part.shape[1]:
+            return part.shape[1] == 0
+        least = np.linalg.svd(part, compute_uv=False)[-1]
+        return bool(least > NULL_SPACE_TOLERANCE * np.sqrt(len(part)))
 
     def unresisted(self, rows: Index) -> Array:
         """Motions (n, k) of `others` that rows with the unknowns `rows` (m,) do not resist."""
