@@ -176,3 +176,14 @@ def test_a_zone_that_is_missed_is_returned_unchanged():
     assert len(coarse.transitions()) == 2
     with pytest.warns(ContactWarning, match="polish returns the solution as it is: pair 0 penetr"):
         assert polish(other := replace(coarse, problem=whole), digits=4) is other
+
+
+def test_weight_inside_of_elements_counts():
+    """Unknowns inside of elements are eliminated, and have loads of their own."""
+    problem = replace(disc_on_rigid_plane(), force={"disc": (0, -0.3)})
+    *_, coarse = adapt(problem, tolerance=2e-2)
+    *_, fine = adapt(problem, tolerance=1e-3)
+    polished = polish(coarse, digits=5)
+    assert polished.order > 4
+    error = fine.relative_error_estimate**2
+    assert polished.energy == pytest.approx(fine.energy, rel=error)

@@ -56,7 +56,7 @@ def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved
         mesh=curved,
         order=order,
         element=ELEMENT,
-        displacement=discrete.displacement(minimiser.u),
+        displacement=discrete.displacement(minimiser.u, discrete.space.right_side),
         discrete=discrete,
         minimiser=minimiser,
         work=counts | dict.fromkeys(("estimates", "equilibrations", "evaluations"), 0),
