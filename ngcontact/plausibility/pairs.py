@@ -17,14 +17,25 @@ where the hole is the secondary.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Array, Index, across
-from ..contact import ContactState, in_contact, partners, prescribed_gap, twins
-from ..fem import BoundaryTrace, Moduli, moduli_of
+from ..arrays import Array, Index, across, from_triplets, rows_of
+from ..contact import (
+    ContactState,
+    ContactZone,
+    in_contact,
+    interpolated_rays,
+    onto,
+    partners,
+    prescribed_gap,
+    twins,
+    zone_pieces,
+)
+from ..fem import BoundaryTrace, FacetTrace, Moduli, connected_bodies, moduli_of
 from ..problem import Problem
+from ..reference import triangle
 from ..solved import Solved
 from .refinement import moves_rigidly
 
@@ -36,6 +47,7 @@ FORCE_SHARE = 0.01
 # of 55 zones below, in 1 of 98 above (12 %), by more than 20 % in 24 and none. Three segments at
 # all orders warned of 93, of which 30 were wrong by 10 %.
 RESOLVED_INTERVALS = 2
+RESOLVED_POINTS = 4  # of solids, points in contact of a zone with open points around it
 # Contact forces of this size, relative to the largest term of a force, are round-off.
 FORCE_ROUND_OFF = 100 * np.finfo(float).eps
 # Share of the peak of the pressure from which it matters that bodies pass through each other. They
@@ -48,6 +60,8 @@ MISSING_PRESSURE = 0.25
 # mean of a zone stays finite at the corners of a punch, where the peak does not; confined bodies
 # that are nearly incompressible bear pressures far above E at small strains.
 LARGE_PRESSURE = 1.0
+# Difference of displacements along an axis, over the extent of a body, from which nothing is small.
+LARGE_DISPLACEMENT = 0.25
 PLACES = (np.arange(4) + 0.5) / 4  # on a segment; what lies between them is 1 / 16 of its sagitta
 MOST_SEGMENTS = 32  # of a pair that are looked at for penetration
 LENGTH_ROUND_OFF = 100 * np.finfo(float).eps  # of lengths and displacements
@@ -71,8 +85,9 @@ def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
     Fixed directions far from the normals, bodies that are drawn far apart or otherwise than their
     gap is given, and strains that are not small, which no mesh mends; of the `last` mesh also zones
     in contact that are too short for it, and bodies that pass through each other between contact
-    points. Of all pairs together, bodies that nothing resists. Zones and curves of solids are not
-    looked at.
+    points. Of all pairs together, bodies that nothing resists, displacements that are not small,
+    and, of the `last` mesh, loads that bring no pair into contact. Solids that are drawn far apart
+    are not told of their normals.
     """
     problem, pairs, space = solution.problem, solution.pairs, solution.discrete.space
     trace, u, plane = space.trace, solution.displacement.vec.FV().NumPy(), problem.dim == 2
@@ -91,14 +106,61 @@ def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
                 messages["gap"] = contradicted(trace, state)
             if plane and not messages["strain"]:
                 messages["direction"] = messages["direction"] or _drawn_apart(trace, state)
-                messages["zone"] = _short_zone(state, zones) if last else ""
-        if plane and last and not messages.get("strain"):  # with forces or without
+            if last and not messages["strain"]:
+                messages["zone"] = _short_zone(state, zones) if plane else _small_zone(state)
+        if last and not messages.get("strain"):  # with forces or without
             messages["penetration"] = _penetration(solution, state, peak)
         name = f"contact {number} of {state.line.contact.named()}"
         found |= {(what, number): f"{name}: {text}" for what, text in messages.items() if text}
     if max(largest, default=0.0) <= noise and (text := _unresisted(solution)):
         found["rigid", 0] = text
+    if not found and (text := _large_displacements(solution)):
+        found["displacement", 0] = text
+    if last and not found and (text := _all_open(solution)):
+        found["open", 0] = text
     return found
+
+
+def _all_open(solution: Solved) -> str:
+    """Message where something moves, nothing is in contact and no pair nearer, or nothing."""
+    pairs = [state for state in solution.pairs if state.gap.size]
+    nearer = [state.active.any() or state.gap.min() < state.line.gap.min() for state in pairs]
+    if not pairs or any(nearer) or not solution.displacement.vec.FV().NumPy().any():
+        return ""
+    return (
+        "no pair is in contact, and none comes nearer; look at the signs of displacement, strain "
+        "and gap"
+    )
+
+
+def _large_displacements(solution: Solved) -> str:
+    """Message where prescribed lengths change a body by a large part of its extent, or nothing.
+
+    Lengths are prescribed by supports and by bodies that are drawn into each other. What forces and
+    initial strains do scales with the modulus, by which benchmarks are often given.
+    """
+    trace, dim = solution.discrete.space.trace, solution.problem.dim
+    if not any(state.active.any() for state in solution.pairs):
+        return ""
+    bodies, prescribed = connected_bodies(trace), 0.0
+    u = solution.displacement.vec.FV().NumPy().reshape(dim, -1)[:, : trace.mesh.nv]
+    for axis, values in enumerate(u):
+        names = [name for name, u in solution.problem.displacement.items() if u[axis] is not None]
+        at = trace.nodes[trace.segments(*names)]
+        prescribed = max(prescribed, float(np.ptp(np.append(values[at[at < len(values)]], 0.0))))
+    overlap = max(-float(state.line.gap.min(initial=0.0)) for state in solution.pairs)
+    low, high = (np.full((len(bodies.names), dim), end) for end in (np.inf, -np.inf))
+    np.minimum.at(low, bodies.of_vertex, u.T)
+    np.maximum.at(high, bodies.of_vertex, u.T)
+    change, extent = (high - low).max(axis=1), 2 * bodies.size
+    worst = int(np.argmax(change / extent))
+    if min(change[worst], prescribed + overlap) <= LARGE_DISPLACEMENT * extent[worst]:
+        return ""
+    return (
+        f'body "{bodies.names[worst]}" is deformed or turned by {change[worst]:.3g}, '
+        f"{change[worst] / extent[worst]:.2g} times its extent: displacements are not small; check "
+        "the units of displacement, gap and drawing"
+    )
 
 
 def _unresisted(solution: Solved) -> str:
@@ -211,53 +273,115 @@ def _short_zone(state: ContactState, zones: ContactZones) -> str:
     )
 
 
-def _penetration(solution: Solved, state: ContactState, peak: float) -> str:
-    """Message where bodies pass through each other between contact points, or nothing.
-
-    On the curves of the mesh, where the gap may be negative between nodes: not where all are in
-    contact, nor where it is wide beside its change on the segment and its neighbours. `peak` is the
-    largest pressure of all pairs.
-    """
-    line, trace, gap = state.line, solution.discrete.space.trace, np.maximum(state.gap, 0.0)
-    contact = line.contact
-    if contact.bilateral or state.active.all():
+def _small_zone(state: ContactState) -> str:
+    """Message where a zone between solids has too few points in contact, or nothing."""
+    rows = state.line.rows
+    known, m = rows >= 0, len(state.gap)
+    facet = np.nonzero(known)[0]
+    touches = from_triplets(np.ones(len(facet)), facet, rows[known], (len(rows), m))
+    touches = touches[:, np.flatnonzero(state.active)]
+    count, zone = connected_components(touches.T @ touches, directed=False)
+    opened = np.append(~state.active, False)[rows].any(axis=1)
+    cut = np.zeros(count, dtype=bool)
+    cut[zone[touches[np.flatnonzero(opened)].indices]] = True
+    force = np.bincount(zone, np.abs(state.force[state.active]), count)
+    points = np.bincount(zone, minlength=count)
+    small = cut & (force > FORCE_SHARE * force.sum()) & (points < RESOLVED_POINTS)
+    if state.line.contact.bilateral or not small.any():
         return ""
+    return (
+        f"a zone in contact has {points[small].min()} contact points, fewer than "
+        f"{RESOLVED_POINTS}: forces and pressures may be wrong by half; use adapt, or a smaller "
+        "maxh"
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Between:
+    """Places (k,) between contact points, what they face there, and how far apart it is drawn."""
+
+    segment: Index  # (k,)
+    s: Array  # (k, ...) on it
+    x: Array  # (k, d)
+    direction: Array  # (k, d)
+    facing: Index  # (k,), negative where nothing faces
+    s_facing: Array  # (k, ...)
+    distance: Array  # (k,), infinite where nothing is met
+
+
+def _between_points(trace: BoundaryTrace, state: ContactState) -> _Between:
+    """Places on segments in the plane: not where all points are in contact, nor where it is wide.
+
+    The gap may be negative between nodes unless it is wide beside its change on the segment and its
+    neighbours.
+    """
+    line, gap, contact = state.line, np.maximum(state.gap, 0.0), state.line.contact
     whole = np.flatnonzero((line.rows >= 0).all(axis=1))
     rows, high = line.rows[whole], np.zeros(len(gap))
     np.maximum.at(high, rows, np.broadcast_to(gap[rows].max(axis=1)[:, None], rows.shape))
     least, most = gap[rows].min(axis=1), high[rows].max(axis=1)
     near = np.flatnonzero((2 * least < most) & ~state.active[rows].all(axis=1))
     local = whole[near[np.argsort(least[near], kind="stable")[:MOST_SEGMENTS]]]
-    if not len(local):
-        return ""
     segment, s = np.repeat(line.segments[local], len(PLACES)), np.tile(PLACES, len(local))
     x, d = trace.point(segment, s), trace.normal(segment, s)
     if contact.direction is not None:
         d = np.tile(contact.direction, (len(s), 1))
-    opposite = partners(trace, line.facing, segment, x, d, nodes=False)
-    there, s_there, distance = opposite.segment, opposite.s, opposite.distance
-    if contact.gap is not None:
-        distance = prescribed_gap(contact, trace, segment, s, x)
-    met = np.isfinite(distance) & ((there >= 0) | (contact.primary is None))
+    there = partners(trace, line.facing, segment, x, d, nodes=False)
+    return _Between(segment, s, x, d, there.segment, there.s, there.distance)
+
+
+def _between_nodes(trace: BoundaryTrace, state: ContactState) -> _Between:
+    """Corners and centres of the facing parts of facets of solids with open points."""
+    zone = state.line
+    assert isinstance(trace, FacetTrace)  # of solids
+    assert isinstance(zone, ContactZone)
+    parts, places = zone_pieces(trace, zone), np.vstack([np.eye(3), triangle.CENTRE])
+    local, facing = (np.repeat(i, len(places)) for i in (parts.local, parts.facing))
+    opened = np.asarray(np.append(~state.active, False)[zone.rows].any(axis=1))
+    some = np.flatnonzero(opened[local])
+    local, facing, s = local[some], facing[some], parts.places(places)[some]
+    x = trace.point(zone.segments[local], s)
+    d = interpolated_rays(trace, zone.contact, zone.segments, local, s)
+    there, s_there, distance = np.full(len(x), -1), np.zeros((len(x), 3)), np.zeros(len(x))
+    if zone.contact.primary is not None:
+        there = zone.facing[facing]
+        s_there, distance = onto(x, d, trace.curve, there)
+    return _Between(zone.segments[local], s, x, d, there, s_there, distance)
+
+
+def _penetration(solution: Solved, state: ContactState, peak: float) -> str:
+    """Message where bodies pass through each other between contact points, or nothing.
+
+    On the curves of the mesh. `peak` is the largest pressure of all pairs.
+    """
+    trace, contact = solution.discrete.space.trace, state.line.contact
+    if contact.bilateral or state.active.all():
+        return ""
+    seen = (_between_points if trace.mesh.dim == 2 else _between_nodes)(trace, state)
+    if contact.gap is not None and len(seen.x):
+        apart = prescribed_gap(contact, trace, seen.segment, seen.s, seen.x)
+        seen = replace(seen, distance=apart)
+    met = np.isfinite(seen.distance) & ((seen.facing >= 0) | (contact.primary is None))
     if not met.any():
         return ""
-    u = trace.evaluate(solution.displacement, segment[met], s[met])
-    noise = LENGTH_ROUND_OFF * (np.abs(u).max() + np.abs(x[met]).max())
+    seen = rows_of(seen, met)
+    u = trace.evaluate(solution.displacement, seen.segment, seen.s)
+    noise = LENGTH_ROUND_OFF * (np.abs(u).max() + np.abs(seen.x).max())
     if contact.primary is not None:
-        u = u - trace.evaluate(solution.displacement, there[met], s_there[met])
-    left = distance[met] - (u * d[met]).sum(axis=1)  # (2.10)
+        u = u - trace.evaluate(solution.displacement, seen.facing, seen.s_facing)
+    left = seen.distance - (u * seen.direction).sum(axis=1)  # (2.10)
     deepest = int(np.argmin(left))
     depth = -float(left[deepest])
     if depth <= noise:
         return ""
-    [length] = trace.lengths(segment[met][[deepest]])
+    [length] = trace.lengths(seen.segment[[deepest]])
     missing = _softer(lambda law: law.shear, solution.problem, trace, state) * depth / float(length)
     if missing <= MISSING_PRESSURE * peak:
         return ""
-    x, y = x[met][deepest]
+    place = ", ".join(f"{value:.4g}" for value in seen.x[deepest])
     return (
         f"bodies pass through each other between contact points, by {depth:.3g} near "
-        f"({x:.4g}, {y:.4g}), where no point lies: pressures of about {missing:.2g} are not seen; "
+        f"({place}), where no point lies: pressures of about {missing:.2g} are not seen; "
         "give the mesh a node there, or use adapt, or a smaller maxh"
     )
 

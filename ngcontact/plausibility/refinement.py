@@ -57,12 +57,12 @@ def estimates_rise(estimates: Sequence[float]) -> bool:
 def refinement_warning(mesh: ng.Mesh, indicators: Array, estimates: Sequence[float]) -> str:
     """Message for estimates that rise, with the place of the largest of the `indicators` (ne,)."""
     view, worst = MeshArrays(mesh), int(np.argmax(indicators))
-    x, y = view.corners[worst].mean(axis=0)
+    place = ", ".join(f"{x:.4g}" for x in view.corners[worst].mean(axis=0))
     share = float((indicators[worst] / root_of_squares(indicators)) ** 2)
     rise = ", ".join(f"{estimate:.2e}" for estimate in estimates[int(np.argmin(estimates)) :])
     return (
         f"refinement does not help: the relative error estimate rises ({rise}). The largest "
-        f"indicator, {share:.0%} of the squares, is near ({x:.4g}, {y:.4g}) in body "
+        f"indicator, {share:.0%} of the squares, is near ({place}) in body "
         f'"{mesh.GetMaterials()[view.bodies[worst]]}"; usual causes are a gap or a load that jumps '
         "or is rougher than the mesh, a prescribed displacement that jumps, and a direction of "
         "contact far from the normals"

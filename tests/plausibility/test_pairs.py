@@ -4,14 +4,23 @@ import math
 import warnings
 from dataclasses import replace
 
+import ngsolve as ng
 import numpy as np
 import pytest
 from netgen.occ import Axis, Z
 
 from drivers.reference import cases
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
-from ngcontact.geometries import blocks, cube_on_block, disc_on_disc, rings
+from ngcontact.geometries import (
+    ball_on_block,
+    blocks,
+    cube_on_block,
+    disc_on_block,
+    disc_on_disc,
+    rings,
+)
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
+from ngcontact.plausibility import doubt_of_refinement
 from ngcontact.plausibility.pairs import PEAK_ERROR, way_and_error
 
 SOFT = Elastic(E=1.0, nu=0.3)
@@ -255,3 +264,63 @@ def test_solids_are_told_of_directions_gaps_and_strains():
     ):
         assert only(lambda problem=problem: solve(problem, maxh=0.7, order=1), *parts)
     assert quiet(lambda: solve(pressed_cube(), maxh=0.7, order=1))
+
+
+THROUGH, SMALL_ZONE = "pass through each other", "contact points, fewer than 4"
+
+
+def pressed_ball(press):
+    """A quarter of a ball of radius 1, pressed into a block."""
+    return Problem(
+        geometry=ball_on_block(width=1.0, height=1.0),
+        materials={"ball|block": SOFT},
+        displacement={"block_bottom": (0, 0, 0), "ball_top": (0, 0, -press)},
+        sliding="cut_x|cut_y",
+        contact=[Contact("ball_surface", "block_top", direction=(0, 0, -1))],
+    )
+
+
+def test_solids_are_told_of_penetration_where_no_row_stands():
+    """At order 2 the vertex that touches first has no row; the force is 0."""
+    found = []
+    run = lambda: found.append(solve(pressed_ball(0.005), maxh=0.7))  # noqa: E731
+    assert only(run, THROUGH, "by 0.005 near (0, 0, 0)")
+    assert not found[0].active.any()
+
+
+def test_solids_are_told_of_zones_of_few_points():
+    """One point in contact at order 1, the pressures of which are far off."""
+    assert only(lambda: solve(pressed_ball(0.005), maxh=0.7, order=1), SMALL_ZONE, "has 1")
+    assert quiet(lambda: solve(pressed_ball(0.2), maxh=0.4))  # five
+
+
+@pytest.mark.parametrize("unit", [1.0, 1e3])
+def test_displacements_of_the_size_of_a_body_are_told(unit):
+    """A displacement in another unit of length; E cannot tell, as forces follow it."""
+    disc = replace(
+        cases.pressed_disc(),
+        geometry=disc_on_block(radius=unit),
+        displacement={"block_bottom": (0, 0), "disc_top": (0, -unit / 2)},
+    )
+    parts = 'body "disc"', "0.32 times its extent: displacements are not small"
+    assert only(lambda: solve(disc, maxh=0.2 * unit, order=2), *parts)
+
+
+@pytest.mark.parametrize("solids", [False, True])
+def test_loads_that_bring_nothing_into_contact_are_told(solids):
+    """A displacement of the wrong sign; without any there is nothing to say."""
+    problem = pressed_ball(-0.01) if solids else cases.pressed_disc()
+    for lift in (0.01, 0.0):
+        given = {"block_bottom": (0, 0), "disc_top": (0, lift)}
+        if solids:
+            given = {"block_bottom": (0, 0, 0), "ball_top": (0, 0, lift)}
+        run = lambda given=given: solve(replace(problem, displacement=given), maxh=0.7)  # noqa: E731
+        assert only(run, "no pair is in contact") if lift else quiet(run)
+
+
+def test_estimates_of_solids_that_rise_are_told_with_their_place():
+    mesh = solve(pressed_cube(), maxh=0.7, order=1).mesh
+    message = doubt_of_refinement(mesh, np.arange(1.0, mesh.ne + 1), [1e-2, 2e-2, 3e-2])
+    place = message[message.index("near (") + 6 : message.index(") in body")].split(", ")
+    corners = [mesh[v].point for v in mesh[ng.ElementId(ng.VOL, mesh.ne - 1)].vertices]
+    assert [float(x) for x in place] == pytest.approx(np.mean(corners, axis=0), abs=1e-3)
