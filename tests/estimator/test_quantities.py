@@ -199,6 +199,27 @@ def test_corners_of_infinite_stress_are_named():
     assert q["peak pressure"].infinite[:, 1] == pytest.approx([0, 0])
     # The ends are corners of the punch: 0.5, to round-off of a sum of segments.
     assert abs(half - 0.5) <= q["contact area"].error + 1e-14
+    words = "away from where it is infinite: (-0.5, 0), (0.5, 0)"
+    assert str(q["peak pressure"]).endswith(words)
+    assert "at (5.5, 0)" in str(replace(q["energy"], place=np.array([5.5, 2e-15])))
+
+
+@pytest.mark.parametrize("swap", [False, True])
+def test_a_punch_in_contact_is_as_wide_as_it_is(swap):
+    """Also where the wider side is the secondary: nothing beyond the corner counts."""
+    punch = cases.flat_punch()
+    pair = punch.contact[0]
+    problem = replace(punch, contact=[pair.swapped() if swap else pair])
+    area = solve(problem, maxh=0.3, order=2).quantities()["contact area"]
+    assert area.value == pytest.approx(1.0, rel=1e-12)
+    assert area.error <= 1e-12
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_stresses_are_not_looked_at_on_an_axis():
+    """Where hoop strains are 0 / 0."""
+    solution = solve(axisymmetric_cases.pressed_cylinders(), maxh=0.5, order=2)
+    assert solution.quantities()["von Mises"].value == pytest.approx(1.0, rel=1e-9)
 
 
 @pytest.mark.parametrize(("order", "h"), [(1, 0.2), (2, 0.5), (3, 0.5), (4, 0.5)])

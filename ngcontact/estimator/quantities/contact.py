@@ -5,7 +5,7 @@ from __future__ import annotations
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Index
+from ...arrays import Array, Index, Mask
 from ...contact import ContactState, in_contact
 from ...fem import Bodies, BoundaryTrace, connected_bodies
 from ...lagrange import gauss
@@ -143,8 +143,9 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
 
     Each interval between two points in contact counts, and what is left of the way to an end of
     contact. Where a point in contact has no neighbour that faces the other body, half of the way
-    counts, with a bar of that size. A curve of degree 1 is shorter than its arc by the square of
-    half of its turn over 6, others by what `ARC_LENGTH_ERRORS` tells.
+    counts, with a bar of that size, unless the point faces the end of that body's line. A curve of
+    degree 1 is shorter than its arc by the square of half of its turn over 6, others by what
+    `ARC_LENGTH_ERRORS` tells.
     """
     line, ends = pair.line, pair.transitions
     if not pair.active.any():
@@ -156,7 +157,9 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
     ds = _line_element(boundary, np.repeat(line.segments, s[0].size), s.ravel())
     sizes = width * (ds.reshape(s.shape) @ w)
     whole = closed[:, :-1] & closed[:, 1:]
-    alone = (closed[:, :-1] & (line.rows[:, 1:] < 0)) | (closed[:, 1:] & (line.rows[:, :-1] < 0))
+    # An interval beyond the end of the primary is none of contact.
+    partly = closed & ~np.append(_faces_end(pair, boundary), False)[line.rows]
+    alone = (partly[:, :-1] & (line.rows[:, 1:] < 0)) | (partly[:, 1:] & (line.rows[:, :-1] < 0))
     half = 0.5 * float(sizes[alone].sum())
     area, error = float(sizes[whole].sum()) + half, half
     if count := len(ends.position):
@@ -170,6 +173,17 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
     factor, power = ARC_LENGTH_ERRORS[known]
     bent = factor * (np.linalg.norm(normals[1] - normals[0], axis=1) / 2) ** power
     return max(area, 0.0), error + float((sizes.sum(axis=1) * bent).sum())
+
+
+def _faces_end(pair: ContactState, boundary: BoundaryTrace) -> Mask:
+    """Which points (m,) face an end of the primary's line."""
+    line, ends = pair.line, boundary.nodes[:, [0, -1]]
+    vertices, count = np.unique(ends[line.facing], return_counts=True)
+    at = np.flatnonzero((line.partner >= 0) & np.isin(line.partner_s, (0.0, 1.0)))
+    vertex = ends[line.partner[at], line.partner_s[at].astype(int)]
+    result = np.zeros(len(line.partner), dtype=bool)
+    result[at] = np.isin(vertex, vertices[count == 1])
+    return result
 
 
 def _line_element(boundary: BoundaryTrace, segment: Index, s: Array) -> Array:

@@ -191,10 +191,12 @@ def largest_von_mises(
     off = _jumps(mesh, xy, mises, n)[some]
     if equilibrated is not None:
         element = np.flatnonzero(high)
-        whole = equilibrated(np.repeat(element, n), np.tile(places, (len(element), 1)))
-        known = np.asarray(np.isfinite(whole).all(axis=1))  # it divides by r, 0 on the axis
-        whole = np.where(known[:, None], whole, 0.0)
-        other, own = whole[:, [0, 1, -1, 2]], stress[some]
+        known = ~solution.discrete.space.trace.model.on_axis(xy)[some]  # there r = 0 divides
+        own, at_places = stress[some], np.tile(places, (len(element), 1))
+        found = equilibrated(np.repeat(element, n)[known], at_places[known])
+        whole = np.zeros((len(own), found.shape[1]))
+        whole[known] = found
+        other = whole[:, [0, 1, -1, 2]]
         if whole.shape[1] == 3:  # out of the plane: nu times the trace, or 0
             trace, now = own[:, :2].sum(axis=1).reshape(-1, n), other[:, :2].sum(axis=1)
             square = (trace**2).sum(axis=1)

@@ -11,6 +11,8 @@ import numpy as np
 
 from ...arrays import Array, Mask
 
+POINT_ROUND_OFF = 1e-12  # of coordinates that are printed, relative to the largest
+
 
 @dataclass(frozen=True, eq=False)
 class Quantity:
@@ -62,7 +64,8 @@ class Quantity:
             at += f"  (guaranteed +- {self.proved:.2g})"
         if self.infinite is not None and len(self.infinite):
             several = f" and {len(self.infinite) - 3} more" if len(self.infinite) > 3 else ""
-            at += f"  infinite at {', '.join(map(_point, self.infinite[:3]))}{several}"
+            corners = ", ".join(map(_point, self.infinite[:3]))
+            at += f"  away from where it is infinite: {corners}{several}"
         return f"{self.name:22s} {self.value:14.7g} {bar}  {self.kind:10s}{at}".rstrip()
 
 
@@ -105,7 +108,8 @@ def error_of_largest(value: float, samples: Array, errors: Array) -> float:
 
 
 def _point(x: Array) -> str:
-    """A point `x` (d,) in brackets."""
+    """A point `x` (d,) in brackets, round-off of its largest coordinate as 0."""
+    x = np.where(np.abs(x) > POINT_ROUND_OFF * np.abs(x).max(), x, 0.0)
     return f"({', '.join(f'{value:.6g}' for value in x)})"
 
 
