@@ -28,6 +28,7 @@ HEIGHT = 5.0  # of a picture, inches
 # Powers of ten from which numbers on a scale are given with one for all.
 POWERS: dict[str, Any] = {"scilimits": (-3, 4), "useMathText": True}
 PROFILE_SAMPLES = 400  # of a function that is drawn over the pressure
+STROKES = ("--", ":", "-.", "-")
 
 MAX_CLOSE_UPS = 4
 SMALL = 0.2  # half of a close-up's size over that of the picture, from which the picture shows it
@@ -484,15 +485,7 @@ def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> N
             axes.plot([], [], "o", ms=4, mec="0.4", mfc=fill, label=name)
     if np.ptp(part) > 0:
         axes.set_xlim(*part / length)
-    strokes = ("-", "--", ":", "-.")
-    for k, (label, profile) in enumerate(style.profile.items()):
-        if callable(profile):
-            s = np.linspace(part[0], part[1], PROFILE_SAMPLES)
-            p = np.broadcast_to(np.asarray(profile(s), dtype=float), s.shape)
-        else:
-            s, p = (np.asarray(values, dtype=float) for values in profile)
-        stroke = strokes[k % len(strokes)]
-        axes.plot(s / length, p / stress, stroke, color="k", lw=1.2, label=label, zorder=3)
+    draw_profiles(axes, style, part)
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
     arcs = [pair.direction is None for pair in contact]
     names = ["arc position"] * any(arcs) + ["η, along the contact line"] * (not all(arcs))
@@ -501,3 +494,16 @@ def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> N
     axes.set_ylabel(style.title(title, "stress"))
     axes.ticklabel_format(**POWERS)
     axes.grid(alpha=0.3)
+
+
+def draw_profiles(axes: Axes, style: Style, part: Array) -> None:
+    """The given profiles over the pressures, functions on a `part` (2,) of the coordinate."""
+    (_, length), (_, stress) = style.unit("length"), style.unit("stress")
+    for k, (label, profile) in enumerate(style.profile.items()):
+        if callable(profile):
+            s = np.linspace(part[0], part[1], PROFILE_SAMPLES)
+            p = np.broadcast_to(np.asarray(profile(s), dtype=float), s.shape)
+        else:
+            s, p = (np.asarray(values, dtype=float) for values in profile)
+        stroke = STROKES[k % len(STROKES)]
+        axes.plot(s / length, p / stress, stroke, color="k", lw=1.2, label=label, zorder=3)

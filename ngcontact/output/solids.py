@@ -15,12 +15,12 @@ from .nodes import EDGES, FACES, nodes_of
 from .pictures import (
     COLOURS,
     POWERS,
-    PROFILE_SAMPLES,
     RISING,
     SIGNED,
     Scale,
     colour_bar,
     colour_limits,
+    draw_profiles,
     new_figure,
     show,
 )
@@ -80,15 +80,18 @@ def plot_solids(
     target, _ = None if path is None else check_path(path, ".png"), style.shown(solution)
     _ = solution.stress  # refuses a mesh that was changed, whatever field is shown
     forces = [float(pair.force.sum()) if pair.gap.size else -np.inf for pair in solution.pairs]
-    zone = _zone(solution, int(np.argmax(forces))) if len(solution.points) else None
+    pair, pairs = int(np.argmax(forces)), solution.problem.contact
+    zone = _zone(solution, pair) if len(solution.points) else None
     figure = new_figure(target, figsize=(12, 9.5 if zone else 6))
     close = zone is not None and zone.half < SMALL * float(np.ptp(zone.surface.trace.curve))
     parts = figure.subplot_mosaic(("bc;ps" if close else "bb;ps") if zone else "b")
     _draw_bodies(figure, parts, solution, style, zone)
     if zone is not None:
-        name = solution.problem.contact[int(np.argmax(forces))].secondary
+        name = pairs[pair].secondary
+        if len(pairs) > 1:
+            name += f"\npair {pair}, of {len(pairs)} that of the largest force"
         _draw_pressure(figure, parts["p"], style, zone, name)
-        for k, line in enumerate(solution.transitions(int(np.argmax(forces)))):
+        for k, line in enumerate(solution.transitions(pair)):
             seen = line @ zone.frame[:2].T / style.unit("length")[1]
             parts["p"].plot(*seen.T, color=COLOURS[0], lw=2, label="" if k else "end of contact")
             parts["p"].legend()
@@ -309,11 +312,8 @@ def _draw_profiles(axes: Axes, style: Style, zone: Zone) -> None:
         names.append(_name(along, f"cut {k + 1}"))
         axes.plot(s[order] / length, line["pressure"][order], color=COLOURS[k], label=names[-1])
         ends += list(np.clip(zone.middle @ along + np.array([-half, half]), s.min(), s.max()))
-    part = np.linspace(min(ends), max(ends), PROFILE_SAMPLES)
-    for stroke, (label, profile) in zip(("--", ":", "-."), style.profile.items(), strict=False):
-        s, p = (part, profile(part)) if callable(profile) else map(np.asarray, profile)
-        p = np.broadcast_to(np.asarray(p, dtype=float), s.shape)
-        axes.plot(s / length, p / stress, stroke, color="k", lw=1.2, label=label)
+    part = np.array([min(ends), max(ends)])
+    draw_profiles(axes, style, part)
     axes.axhline(0, color="0.6", lw=0.8, zorder=0)
     axes.set(
         xlim=(part[0] / length, part[-1] / length),

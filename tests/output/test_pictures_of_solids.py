@@ -1,9 +1,12 @@
 """Pictures of solids: what is cut, where, and which pressure is drawn; options that are refused."""
 
+from dataclasses import replace
+
 import matplotlib.image
 import numpy as np
 import pytest
 
+from ngcontact import Contact, solve
 from ngcontact.output import plot_solids, write_film
 from ngcontact.output.surface import contact_surface
 from tests.output.test_solids import PRESSURE, pressed_ball, pressed_cube
@@ -91,3 +94,17 @@ def test_what_is_refused(tmp_path):
     with pytest.raises(ValueError, match="a film"):
         write_film(tmp_path / "cube.gif", [solution])
     assert not path.exists()
+
+
+def test_every_profile_is_drawn_and_the_pair_is_named(tmp_path):
+    """Four of them, each with a stroke of its own; of several pairs the one that is drawn."""
+    problem = pressed_cube(2).problem
+    pairs = [Contact("block_top", gap=1.0, direction=(0, 0, 1)), *problem.contact]
+    solution = solve(replace(problem, contact=pairs), maxh=0.7, order=2)
+    profile = {f"p{k}": (lambda s, k=k: 0 * s + 0.1 * k) for k in range(4)}
+    figure = plot_solids(solution, tmp_path / "cube.png", profile=profile)
+    drawn = [line for line in panel(figure, "contact pressure").lines if line.get_color() == "k"]
+    assert [line.get_label() for line in drawn] == list(profile)
+    assert len({line.get_linestyle() for line in drawn}) == 4
+    title = panel(figure, "pressure on").get_title()
+    assert title == "pressure on cube_bottom\npair 1, of 2 that of the largest force"
