@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..arrays import Array, Index, across, from_triplets, rows_of
+from ..arrays import Array, Index, across, rows_of
 from ..contact import (
     ContactState,
     ContactZone,
@@ -194,6 +194,15 @@ def _neighbours(state: ContactState) -> Index:
     return np.array([one[both], other[both]]).T
 
 
+def _labels(links: Index, count: int) -> Index:
+    """One number for each connected part of `count` points with `links` (l, 2), (count,)."""
+    label = np.arange(count)
+    while (label[links[:, 0]] != label[links[:, 1]]).any():  # of paths: as often as they halve
+        np.minimum.at(label, links, label[links].min(axis=1, keepdims=True))
+        label = label[label]
+    return label
+
+
 def zones_of(state: ContactState) -> ContactZones:
     """The zones of one pair."""
     line, along, across = state.line, _neighbours(state), twins(state.line)
@@ -201,11 +210,7 @@ def zones_of(state: ContactState) -> ContactZones:
     both = np.concatenate([along, across])
     touching = closed[both].sum(axis=1)
     inside = both[touching == 2]
-    label = np.arange(len(closed))
-    while (label[inside[:, 0]] != label[inside[:, 1]]).any():  # of paths: as often as they halve
-        np.minimum.at(label, inside, label[inside].min(axis=1, keepdims=True))
-        label = label[label]
-    zones, number = np.unique(label[closed], return_inverse=True)
+    zones, number = np.unique(_labels(inside, len(closed))[closed], return_inverse=True)
     zone, k = np.full(len(closed), -1), len(zones)
     zone[closed] = number
     ending = both[touching == 1]
@@ -275,17 +280,15 @@ def _short_zone(state: ContactState, zones: ContactZones) -> str:
 
 def _small_zone(state: ContactState) -> str:
     """Message where a zone between solids has too few points in contact, or nothing."""
-    rows = state.line.rows
-    known, m = rows >= 0, len(state.gap)
-    facet = np.nonzero(known)[0]
-    touches = from_triplets(np.ones(len(facet)), facet, rows[known], (len(rows), m))
-    touches = touches[:, np.flatnonzero(state.active)]
-    count, zone = connected_components(touches.T @ touches, directed=False)
-    opened = np.append(~state.active, False)[rows].any(axis=1)
-    cut = np.zeros(count, dtype=bool)
-    cut[zone[touches[np.flatnonzero(opened)].indices]] = True
-    force = np.bincount(zone, np.abs(state.force[state.active]), count)
-    points = np.bincount(zone, minlength=count)
+    rows, m = state.line.rows, len(state.gap)
+    closed, opened = (np.append(x, False)[rows] for x in (state.active, ~state.active))
+    first = np.broadcast_to(rows[np.arange(len(rows)), closed.argmax(axis=1)][:, None], rows.shape)
+    label = _labels(np.column_stack([first[closed], rows[closed]]), m)
+    zones, zone = np.unique(label[state.active], return_inverse=True)
+    ending = rows[closed & opened.any(axis=1, keepdims=True)]
+    cut = np.isin(zones, label[ending])
+    force = np.bincount(zone, np.abs(state.force[state.active]), len(zones))
+    points = np.bincount(zone, minlength=len(zones))
     small = cut & (force > FORCE_SHARE * force.sum()) & (points < RESOLVED_POINTS)
     if state.line.contact.bilateral or not small.any():
         return ""

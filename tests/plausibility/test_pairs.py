@@ -20,7 +20,7 @@ from ngcontact.geometries import (
     rings,
 )
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
-from ngcontact.plausibility import doubt_of_refinement
+from ngcontact.plausibility import refinement_warning
 from ngcontact.plausibility.pairs import PEAK_ERROR, way_and_error
 
 SOFT = Elastic(E=1.0, nu=0.3)
@@ -320,7 +320,7 @@ def test_loads_that_bring_nothing_into_contact_are_told(solids):
 
 def test_estimates_of_solids_that_rise_are_told_with_their_place():
     mesh = solve(pressed_cube(), maxh=0.7, order=1).mesh
-    message = doubt_of_refinement(mesh, np.arange(1.0, mesh.ne + 1), [1e-2, 2e-2, 3e-2])
+    message = refinement_warning(mesh, np.arange(1.0, mesh.ne + 1), [1e-2, 2e-2, 3e-2])
     place = message[message.index("near (") + 6 : message.index(") in body")].split(", ")
     corners = [mesh[v].point for v in mesh[ng.ElementId(ng.VOL, mesh.ne - 1)].vertices]
     assert [float(x) for x in place] == pytest.approx(np.mean(corners, axis=0), abs=1e-3)
