@@ -55,14 +55,16 @@ UNIFORM = {  # strains that no point of a free body resists
 }
 
 
-@pytest.mark.parametrize("model", MODELS)
-@pytest.mark.parametrize("kind", UNIFORM)
+# About an axis rr and hoop are equal, rz is 0.
+OF_MODEL = [
+    (m, k) for m in MODELS for k in UNIFORM if m != "axisymmetric" or k in ("number", "triple")
+]
+
+
+@pytest.mark.parametrize(("model", "kind"), OF_MODEL)
 @pytest.mark.parametrize("order", [1, 2, 3, 4])
 def test_uniform_strains_of_free_bodies_make_no_stress(model, kind, order):
     """Measured 3e-16 to 8e-14 of E alpha dT."""
-    about = model == "axisymmetric"
-    if about and kind in ("pair", "matrix"):
-        pytest.skip("about an axis rr and hoop are equal, rz is 0")
     for law in (STEEL, orthotropic(model)):
         if law is not STEEL and model == "plane strain" and kind in ("number", "triple"):
             continue  # refused
