@@ -220,6 +220,17 @@ def check_pressures(
             )
 
 
+def check_shared(names: Sequence[str], traction: Masks, shared: Mask) -> None:
+    """Refuse tractions, by masks (r,), on boundaries that are `shared` (r,) by two bodies."""
+    for label, mask in traction.items():
+        if (mask & shared).any():
+            raise ValueError(
+                f'{label}: the edge "{names[int(np.argmax(mask & shared))]}" is shared by two '
+                "bodies, and no traction acts on one of them alone there: give the edges of their "
+                "own boundary names of their own, or join the bodies by Compound, not Glue"
+            )
+
+
 def check_overlaps(view: MeshArrays) -> None:
     """Refuse bodies drawn on top of each other, and a face drawn over a part of itself.
 

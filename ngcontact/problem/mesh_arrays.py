@@ -166,7 +166,15 @@ class MeshArrays:
     @property
     def inner_facets(self) -> Mask:
         """Facets (k,) between two elements: lines inside bodies."""
-        return self._at_facets[1]
+        one, other = self._at_facets
+        return one != other
+
+    @property
+    def shared_facets(self) -> Mask:
+        """Facets (k,) between two bodies that are glued."""
+        names = np.array(self.mesh.GetMaterials())[self.bodies]
+        one, other = self._at_facets
+        return np.asarray(names[one] != names[other])
 
     def keys(self, vertices: Index) -> Index:
         """Numbers (k, ...) of sets of `vertices` (k, ..., d), whatever the order of these is."""
@@ -187,7 +195,7 @@ class MeshArrays:
         return _records(mesh.Elements1D() if self.dim == 2 else mesh.Elements2D())
 
     @cached_property
-    def _at_facets(self) -> tuple[Index, Mask]:
+    def _at_facets(self) -> tuple[Index, Index]:
         marked = np.zeros(len(self.vertices), dtype=bool)
         marked[self.facets] = True
         sides = self.sides.reshape(-1, self.dim)
@@ -196,7 +204,8 @@ class MeshArrays:
         order = np.argsort(keys)
         first = np.searchsorted(keys[order], wanted)
         last = np.searchsorted(keys[order], wanted, side="right")
-        return some[order[first]] // (self.dim + 1), last - first > 1
+        one, other = (some[order[at]] // (self.dim + 1) for at in (first, last - 1))
+        return one, other
 
 
 def move_vertices(mesh: ng.Mesh, positions: Array) -> None:

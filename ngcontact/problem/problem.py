@@ -224,9 +224,13 @@ class Problem:
         ):
             checks.refuse_common(names, one, other, right)
         checks.check_overlaps(view)
-        inner = np.bincount(view.boundaries[view.inner_facets], minlength=len(names)) > 0
+        inner, shared = (
+            np.bincount(view.boundaries[facets], minlength=len(names)) > 0
+            for facets in (view.inner_facets, view.shared_facets)
+        )
         checks.check_pairs(view, pairs, inner)
         checks.check_pressures(names, traction, self.traction.values(), inner)
+        checks.check_shared(names, traction, shared)
         gaps = {
             f'contact[{j}].gap of "{pair.secondary}"': next(iter(sides.values()))
             for j, (sides, pair) in enumerate(zip(pairs, self.contact, strict=True))

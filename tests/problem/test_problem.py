@@ -7,7 +7,7 @@ import netgen.meshing
 import ngsolve as ng
 import numpy as np
 import pytest
-from netgen.occ import Box, Compound, Glue, OCCGeometry, Pnt, WorkPlane, X, Y
+from netgen.occ import Box, Compound, Glue, MoveTo, OCCGeometry, Pnt, WorkPlane, X, Y
 from ngsolve.meshes import MakeStructured2DMesh
 
 from ngcontact.geometries import blocks
@@ -303,3 +303,18 @@ def test_data_of_numbers_alone_are_told_from_functions():
     """The former are nowhere looked at; taking a function for numbers would miss what it does."""
     assert all(map(numbers, OF_NUMBERS))
     assert not any(map(numbers, FUNCTIONS))
+
+
+def test_a_traction_between_glued_bodies_is_refused():
+    lower, upper = (MoveTo(0, y).Rectangle(1, 1).Face() for y in (0, 1))
+    for face, name in ((lower, "lower"), (upper, "upper")):
+        face.name, face.edges.name = name, "side"
+    lower.edges.Max(Y).name = upper.edges.Min(Y).name = "between"
+    glued = Problem(
+        OCCGeometry(Glue([lower, upper]), dim=2),
+        {".*": Elastic(E=1.0, nu=0.3)},
+        traction={"between": (0, -1)},
+        contact=[],
+    )
+    with pytest.raises(ValueError, match=r'traction "between": the edge .* shared by two bodies'):
+        glued.check(ng.Mesh(glued.geometry.GenerateMesh(maxh=1)))
