@@ -237,8 +237,9 @@ def coarse_mesh(problem: Problem, pairs: Sequence[ContactState], extent: float) 
     for number, line in enumerate(lines):
         own, middle = active[start : start + len(line.node)], line.rows[:, 1]
         start += len(line.node)
-        met = line.segments[middle >= 0]
-        pair[met], closed[met] = number, own[middle[middle >= 0]]
+        new = (middle >= 0) & (pair[line.segments] < 0)  # to earlier pairs those of both
+        met = line.segments[new]
+        pair[met], closed[met] = number, own[middle[new]]
         at = (line.partner >= 0) & np.isin(line.partner_s, (0.0, 1.0)) & (line.node < mesh.nv)
         side = np.where(line.partner_s[at] == 0.0, 0, -1)
         partner[line.node[at]] = trace.nodes[line.partner[at], side]
