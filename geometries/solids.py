@@ -394,7 +394,18 @@ def _half_space(
 
 
 def body(name: str, shape: TopoDS_Shape) -> TopoDS_Shape:
-    """A solid with its name."""
+    """A solid with its name.
+
+    Raises
+    ------
+    ValueError
+        If the geometry kernel, which knows absolute lengths, makes no solid of so small a shape.
+    """
+    if len(shape.solids) != 1:
+        raise ValueError(
+            f'"{name}" is {len(shape.solids)} solids and not one: lengths are too small for the '
+            "geometry kernel, which knows absolute ones; use a smaller unit of length"
+        )
     (solid,) = shape.solids
     solid.name = name
     return solid

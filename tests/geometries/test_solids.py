@@ -114,6 +114,7 @@ def test_the_cup_and_the_interference_have_the_radii_asked_for():
     ("make", "options", "error", "message"),
     [
         (ball_on_block, {"radius": 0}, ValueError, "radius = 0: expected a positive"),
+        (ball_on_block, {"radius": 1e-4}, ValueError, "use a smaller unit of length"),
         (ball_on_block, {"width": -1}, ValueError, "width = -1: expected a positive"),
         (ball_on_block, {"symmetric": 1}, TypeError, "symmetric = 1: expected True or False"),
         (crossed_cylinders, {"lower_radius": "1"}, TypeError, "lower_radius = '1': expected a"),
