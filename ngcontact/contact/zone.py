@@ -55,6 +55,16 @@ class ContactZone(ContactLine):
         """Dimension of the bodies."""
         return 3
 
+    def covered_shares(self, on_parts: Array, everywhere: Array) -> Array:
+        """Integrals (k,) of functions over the parts that face, over those on whole facets.
+
+        Of values `on_parts` (m,) and `everywhere` (m,) at the points; 0 at facets without points.
+        The same values give 1 where nodes face nodes.
+        """
+        pairs = (self.covered, on_parts), (self.shares, everywhere)
+        part, whole = ((x * np.append(v, 0.0)[self.rows]).sum(axis=1) for x, v in pairs)
+        return np.asarray(np.divide(part, whole, out=np.zeros(len(part)), where=whole > 0))
+
     def pressure(self, force: Array) -> Array:
         """Pressures (m,) of the `force` (m,) at its points.
 
@@ -382,21 +392,6 @@ def decided(trace: BoundaryTrace, contact: Contact) -> Contact:
     if isinstance(trace, FacetTrace):
         return with_zone_roles(trace, contact)
     return with_roles(trace, contact)
-
-
-def covered_shares(trace: FacetTrace, zone: ContactLine, chosen: Index) -> Array:
-    """Shares (j,) of facets that face the primary, those `chosen` (j,) among `zone.segments`.
-
-    1 at facets whose rows stand at nodes alone.
-    """
-    means = np.append(zone.means, False)[zone.rows[chosen]].any(axis=1)
-    share, at = np.ones(len(chosen)), chosen[means]
-    if len(at):
-        reach = _reach(trace, zone)[at]
-        facets = zone.segments[at]
-        parts = facing_pieces(trace, zone.contact, facets, zone.facing, reach)
-        share[means] = np.minimum(parts.covered(len(facets)), 1.0)
-    return share
 
 
 def contact_zone(trace: FacetTrace, contact: Contact, taken: Index | None = None) -> ContactZone:

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...arrays import Array, Index
 from ...contact import ContactState, area_in_contact, signed_distance, with_vertices
-from ...contact.zone import partners, rays
+from ...contact.zone import WHOLE_SHARE, ContactZone, partners, rays
 from ...fem import BoundaryTrace, FacetTrace
 from ...problem import MeshArrays
 from ...reference import triangle
@@ -33,18 +33,28 @@ def pressure_field(solution: Solved, state: ContactState) -> ng.GridFunction:
         return _by_facet(trace, boundary, trace.order, line.segments, s, values, 0 * values + 1)
     if trace.order == 3:
         return _mean_traction(solution, trace, state)
-    field = ng.GridFunction(ng.H1(solution.mesh, order=1, definedon=boundary))
-    vertices, size = trace.nodes[line.segments], trace.sizes(line.segments)
+    assert isinstance(line, ContactZone)  # of solids
+    values, whole = _at_vertices(trace, state), np.ones(len(state.force))
+    share = line.covered_shares(np.abs(state.force / line.weight), np.abs(state.pressure))
+    # Facets without a pressure of their own share vertices with others.
+    share = np.where(share > 0, share, line.covered_shares(whole, whole) > WHOLE_SHARE)
+    values *= share[:, None]
+    s = np.tile(np.eye(3), (len(values), 1))
+    return _by_facet(trace, boundary, 1, line.segments, s, values, 0 * values + 1)
+
+
+def _at_vertices(trace: FacetTrace, state: ContactState) -> Array:
+    """Pressures (k, 3) at the vertices of facets: of several facets the mean, by what faces."""
+    line, whole = state.line, np.ones(len(state.force))
+    assert isinstance(line, ContactZone)  # of solids
+    vertices = trace.nodes[line.segments]
+    size = trace.sizes(line.segments) * line.covered_shares(whole, whole)
     values = np.append(state.pressure, np.nan)[line.rows]
     values = with_vertices(values, line.rows < 0, vertices, size)[:, :3]
     known = np.isfinite(values)
-    # Of several sides of an edge the mean, by area.
-    share = (known * size[:, None])[known]
-    at, n = vertices[:, :3][known], solution.mesh.nv
-    area = np.bincount(at, share, n)
-    total = np.bincount(at, share * values[known], n)
-    field.vec.FV().NumPy()[:n] = np.where(area > 0, total / np.where(area > 0, area, 1.0), 0.0)
-    return field
+    share, at, n = (known * size[:, None])[known], vertices[:, :3], trace.mesh.nv
+    area, total = (np.bincount(at[known], x, n) for x in (share, share * values[known]))
+    return np.asarray((total / np.where(area > 0, area, 1.0))[at])
 
 
 def _by_facet(
@@ -120,8 +130,12 @@ def figures(solution: Solved, state: ContactState) -> tuple[Array, Array]:
     if line.contact.direction is not None:
         along = abs(float(force @ np.array(line.contact.direction)))
     area = area_in_contact(signed_distance(solution.problem, trace, state), state)
-    facet, s = trace.at_nodes(line.segments)
-    pressure = trace.evaluate(pressure_field(solution, state), facet, s)[:, 0]
+    if trace.order == 3:
+        facet, s = trace.at_nodes(line.segments)
+        pressure = trace.evaluate(pressure_field(solution, state), facet, s)[:, 0]
+    else:
+        facet, s = np.repeat(line.segments, 3), np.tile(np.eye(3), (len(line.segments), 1))
+        pressure = _at_vertices(trace, state).ravel()
     at = np.argmax(pressure)
     mean, peak = float(state.force.sum()) / area if area > 0 else 0.0, float(pressure[at])
     values = [along, *(force + 0.0), area, mean, peak, solution.energy]
