@@ -236,15 +236,18 @@ def close_ups(scenes: Sequence[Scene]) -> list[Window]:
         (a, b), (c, d) = _window(zone, low, high), _window(other, low, high)
         return bool((a < d).all() and (c < b).all())
 
-    for zone in [zone for scene in scenes[::-1] for zone in scene.zones]:
+    def small(window: Window) -> bool:
+        return bool((window[1] - window[0]).max() < 2 * SMALL * (high - low).max())
+
+    zones = [zone for scene in scenes[::-1] for zone in scene.zones]
+    for zone in [zone for zone in zones if small(_window(zone, low, high))]:
         joined = zone
         while met := [k for k, group in enumerate(groups) if overlap(group, joined)]:
             joined = np.concatenate([*(groups[k] for k in met), joined])
             groups = [group for k, group in enumerate(groups) if k not in met]
         groups.append(joined)
     windows = [_window(group, low, high) for group in groups]
-    size = (high - low).max()
-    return [w for w in windows if (w[1] - w[0]).max() < 2 * SMALL * size][:MAX_CLOSE_UPS]
+    return [window for window in windows if small(window)][:MAX_CLOSE_UPS]
 
 
 def _all_but(share: float, values: Array, weights: Array) -> float:
@@ -470,7 +473,7 @@ def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> N
     lines, contact = contact_lines(solution), solution.problem.contact
     several = len(contact) > 1
     for k, (pair, rows, s) in enumerate(lines):
-        colour, mark = COLOURS[pair % len(COLOURS)], MARKS[pair % len(MARKS)]
+        colour, mark = colour_and_mark(pair)
         active, p, at = solution.active[rows], solution.pressure[rows] / stress, s / length
         new = several and pair not in [other for other, *_ in lines[:k]]
         title = f"pair {pair}: {contact[pair].secondary}" if new else None
@@ -494,6 +497,12 @@ def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> N
     axes.set_ylabel(style.title(title, "stress"))
     axes.ticklabel_format(**POWERS)
     axes.grid(alpha=0.3)
+
+
+def colour_and_mark(pair: int) -> tuple[str, str]:
+    """Colour and mark of a pair; of the first 49 no two have both."""
+    n = len(COLOURS)
+    return COLOURS[pair % n], MARKS[(pair + pair // n) % len(MARKS)]
 
 
 def draw_profiles(axes: Axes, style: Style, part: Array) -> None:

@@ -11,7 +11,12 @@ from matplotlib import pyplot
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.output import plot_solution
-from ngcontact.output.pictures import colour_range, cut_pressure
+from ngcontact.output.pictures import (
+    close_ups,
+    colour_and_mark,
+    colour_range,
+    cut_pressure,
+)
 from ngcontact.output.scene import Style, contact_lines, picture
 from tests.output.stubs import stub, two_bodies
 
@@ -245,3 +250,17 @@ def test_a_singular_corner_leaves_the_colours(tmp_path, uniform):
 @pytest.fixture(scope="module")
 def pressed_half():
     return solve(cases.pressed_disc(), maxh=0.4, order=2)
+
+
+def test_small_zones_beside_large_ones_are_shown():
+    """The zone of a roller on a beam that lies on its base all along."""
+    moved = np.array([[-40.0, -30.0], [40.0, 16.0]])
+    line = np.column_stack([np.linspace(-20, 20, 9), np.full(9, -10.0)])
+    roller = np.column_stack([np.linspace(-0.5, 0.5, 5), np.zeros(5)])
+    [(low, high)] = close_ups([SimpleNamespace(moved=moved, zones=[line, roller])])
+    assert low == pytest.approx((-0.9, -0.9))
+    assert high == pytest.approx((0.9, 0.9))
+
+
+def test_pairs_differ_by_colour_or_mark():
+    assert len({colour_and_mark(pair) for pair in range(49)}) == 49
