@@ -36,7 +36,7 @@ from .oscillation import (
     residuals,
 )
 from .program import Balanced, DualProgram, dual_program
-from .tractions import BoundaryData, boundary_data, side_rule
+from .tractions import BoundaryData, boundary_data, rough_places, side_rule
 
 NO_BOUND = "no guaranteed bound is known"
 BESIDE_VERTICES = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
@@ -183,7 +183,8 @@ def _bound(
     loaded = np.append(trace.segments(*problem.traction, *touching), guided)
     whole = [name for name, values in problem.displacement.items() if None not in values]
     reaches = [pressure_support(trace, displacement, pair, lift) for pair in pairs]
-    cells = cells_of(trace, new_vertices(trace, reaches, beside), loaded, trace.segments(*whole))
+    cuts = rough_places(problem, trace) | new_vertices(trace, reaches, beside)
+    cells = cells_of(trace, cuts, loaded, trace.segments(*whole))
     # 2. Stresses.
     given = boundary_data(problem, cells)
     rules = force_rules(problem, cells, p + RAISED_DEGREES)

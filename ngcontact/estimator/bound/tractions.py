@@ -10,6 +10,7 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from ...arrays import Array, Index, Mask
+from ...fem import BoundaryTrace
 from ...lagrange import gauss_derivative, lagrange
 from ...problem import Problem, numbers
 from ...quadrature import loads_of
@@ -147,6 +148,31 @@ class BoundaryData:
         values = self.tractions(self.cells, rule, np.zeros(rule.x.shape))
         fixed = np.repeat(self.held.ravel(), np.repeat(mu.degree + 1, 2))
         return rule.moments(mu, values), fixed  # (3.7)
+
+
+def rough_places(problem: Problem, trace: BoundaryTrace) -> dict[int, Array]:
+    """Rising parameters s, (j,), at which tractions are rough, by segment: vertices of the cells.
+
+    Of places nearer to each other than 1 / `FINEST_PARTS` those that quadrature divides most: the
+    middle of its smallest cells, where a jump or a kink is, so that both sides of it are smooth.
+    """
+    found: dict[int, list[float]] = {}
+    for load in loads_of(problem, trace.mesh):
+        rough = load.where_rough(trace.order) if load.kind == "traction" else None
+        if rough is None:
+            continue
+        start, size = 1 - rough.cells.origin[:, 0], rough.cells.side[:, 0, 0]  # s falls in NGSolve
+        for k in np.unique(rough.cells.element).tolist():
+            own = np.flatnonzero(rough.cells.element == k)
+            own = own[np.argsort(size[own], kind="stable")]
+            least = own[size[own] == size[own[0]]]
+            places = [np.median(start[least] - size[least] / 2)]
+            places += np.column_stack([start, start - size])[own].ravel().tolist()
+            kept = found.setdefault(k, [])
+            for s in places:
+                if min(abs(s - other) for other in (0.0, 1.0, *kept)) > 1 / FINEST_PARTS:
+                    kept.append(float(s))
+    return {k: np.sort(s) for k, s in found.items() if s}
 
 
 def boundary_data(problem: Problem, cells: Cells) -> BoundaryData:
