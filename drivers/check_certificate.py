@@ -3,11 +3,10 @@
 The file is written by `Solution.equilibrated.save`. Nothing of the package or of NGSolve is used.
 On each triangle the stress times a measure (1, or 2 pi r about an axis) is the polynomial T of its
 values at a lattice. Checked are, as equations between polynomials, that the divergence of T
-balances the force; that tractions are continuous; that on the boundary they are the given ones and
-those of p*, which acts on both bodies alike; that p* >= 0 and the gap is open, by Bernstein
-coefficients; and that B follows from the arrays. About an axis the radial equation is no condition:
-it says what the hoop stress is. Taken as told are the problem's data, the strain of the discrete
-solution, the gap, and the norms of the lifting and where no polynomial meets the data.
+balances the force; that tractions are continuous, and on the boundary the given ones and those of
+p*, which acts on both bodies alike; that p* >= 0 and the gap is open, by Bernstein coefficients;
+and that B follows from the arrays. About an axis the radial equation only says what the hoop stress
+is. Taken as given are the data, e(u_h), the gap, and norms of w and of what is missed of the data.
 
     python -m drivers.check_certificate certificate.npz
 """

@@ -33,7 +33,7 @@ from ..contact import (
     twins,
     zone_pieces,
 )
-from ..fem import BoundaryTrace, FacetTrace, Moduli, connected_bodies, moduli_of
+from ..fem import BoundaryTrace, FacetTrace, Moduli, moduli_of
 from ..problem import Problem
 from ..reference import triangle
 from ..solved import Solved
@@ -60,8 +60,6 @@ MISSING_PRESSURE = 0.25
 # mean of a zone stays finite at the corners of a punch, where the peak does not; confined bodies
 # that are nearly incompressible bear pressures far above E at small strains.
 LARGE_PRESSURE = 1.0
-# Difference of displacements along an axis, over the extent of a body, from which nothing is small.
-LARGE_DISPLACEMENT = 0.25
 PLACES = (np.arange(4) + 0.5) / 4  # on a segment; what lies between them is 1 / 16 of its sagitta
 MOST_SEGMENTS = 32  # of a pair that are looked at for penetration
 LENGTH_ROUND_OFF = 100 * np.finfo(float).eps  # of lengths and displacements
@@ -85,9 +83,8 @@ def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
     Fixed directions far from the normals, bodies that are drawn far apart or otherwise than their
     gap is given, and strains that are not small, which no mesh mends; of the `last` mesh also zones
     in contact that are too short for it, and bodies that pass through each other between contact
-    points. Of all pairs together, bodies that nothing resists, displacements that are not small,
-    and, of the `last` mesh, loads that bring no pair into contact. Solids that are drawn far apart
-    are not told of their normals.
+    points. Of all pairs together, bodies that nothing resists and, of the `last` mesh, loads that
+    bring no pair into contact. Normals of solids that are drawn far apart are not looked at.
     """
     problem, pairs, space = solution.problem, solution.pairs, solution.discrete.space
     trace, u, plane = space.trace, solution.displacement.vec.FV().NumPy(), problem.dim == 2
@@ -114,8 +111,6 @@ def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
         found |= {(what, number): f"{name}: {text}" for what, text in messages.items() if text}
     if max(largest, default=0.0) <= noise and (text := _unresisted(solution)):
         found["rigid", 0] = text
-    if not found and (text := _large_displacements(solution)):
-        found["displacement", 0] = text
     if last and not found and (text := _all_open(solution)):
         found["open", 0] = text
     return found
@@ -130,36 +125,6 @@ def _all_open(solution: Solved) -> str:
     return (
         "no pair is in contact, and none comes nearer; look at the signs of displacement, strain "
         "and gap"
-    )
-
-
-def _large_displacements(solution: Solved) -> str:
-    """Message where prescribed lengths change a body by a large part of its extent, or nothing.
-
-    Lengths are prescribed by supports and by bodies that are drawn into each other. What forces and
-    initial strains do scales with the modulus, by which benchmarks are often given.
-    """
-    trace, dim = solution.discrete.space.trace, solution.problem.dim
-    if not any(state.active.any() for state in solution.pairs):
-        return ""
-    bodies, prescribed = connected_bodies(trace), 0.0
-    u = solution.displacement.vec.FV().NumPy().reshape(dim, -1)[:, : trace.mesh.nv]
-    for axis, values in enumerate(u):
-        names = [name for name, u in solution.problem.displacement.items() if u[axis] is not None]
-        at = trace.nodes[trace.segments(*names)]
-        prescribed = max(prescribed, float(np.ptp(np.append(values[at[at < len(values)]], 0.0))))
-    overlap = max(-float(state.line.gap.min(initial=0.0)) for state in solution.pairs)
-    low, high = (np.full((len(bodies.names), dim), end) for end in (np.inf, -np.inf))
-    np.minimum.at(low, bodies.of_vertex, u.T)
-    np.maximum.at(high, bodies.of_vertex, u.T)
-    change, extent = (high - low).max(axis=1), 2 * bodies.size
-    worst = int(np.argmax(change / extent))
-    if min(change[worst], prescribed + overlap) <= LARGE_DISPLACEMENT * extent[worst]:
-        return ""
-    return (
-        f'body "{bodies.names[worst]}" is deformed or turned by {change[worst]:.3g}, '
-        f"{change[worst] / extent[worst]:.2g} times its extent: displacements are not small; check "
-        "the units of displacement, gap and drawing"
     )
 
 

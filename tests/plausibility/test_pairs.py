@@ -15,7 +15,6 @@ from ngcontact.geometries import (
     ball_on_block,
     blocks,
     cube_on_block,
-    disc_on_block,
     disc_on_disc,
     rings,
 )
@@ -292,18 +291,6 @@ def test_solids_are_told_of_zones_of_few_points():
     """One point in contact at order 1, the pressures of which are far off."""
     assert only(lambda: solve(pressed_ball(0.005), maxh=0.7, order=1), SMALL_ZONE, "has 1")
     assert quiet(lambda: solve(pressed_ball(0.2), maxh=0.4))  # five
-
-
-@pytest.mark.parametrize("unit", [1.0, 1e3])
-def test_displacements_of_the_size_of_a_body_are_told(unit):
-    """A displacement in another unit of length; E cannot tell, as forces follow it."""
-    disc = replace(
-        cases.pressed_disc(),
-        geometry=disc_on_block(radius=unit),
-        displacement={"block_bottom": (0, 0), "disc_top": (0, -unit / 2)},
-    )
-    parts = 'body "disc"', "0.32 times its extent: displacements are not small"
-    assert only(lambda: solve(disc, maxh=0.2 * unit, order=2), *parts)
 
 
 @pytest.mark.parametrize("solids", [False, True])

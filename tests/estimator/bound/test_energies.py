@@ -232,3 +232,31 @@ def test_the_proved_bar_contains_the_exact_force():
             assert abs(row.value - exact) <= row.proved
     assert proved[-1] <= 0.02 * exact
     assert np.diff(proved).max(initial=-1.0) < 0
+
+
+ROUGH = {  # largest effectivity; measured 1.11, 1.17, 1.05, 1.05, without vertices there 1.2 to 6
+    "kink": (ng.IfPos(ng.x - 0.7123, 0.7123 - ng.x, 0.0), 1.25),
+    "jump": (ng.IfPos(ng.x - 0.7123, -1.0, 0.0), 1.3),
+    "narrow": (-ng.exp(-(((ng.x - 1.1) / 0.05) ** 2)), 1.15),
+    "root": (-(((ng.x - 0.71) ** 2) ** 0.25), 1.15),
+}
+
+
+@pytest.mark.parametrize("name", ROUGH)
+def test_tractions_that_are_rough_inside_segments(name):
+    """Errors by the energy of a graded solution of order 4, which is 1e3 times nearer."""
+    load, effectivity = ROUGH[name]
+    outline = polygon([(0, 0), (2, 0), (2, 1), (0, 1)], ["foot", "side", "top", "left"])
+    problem = Problem(
+        geometry=compound(body("block", outline)),
+        materials={"block": LAW},
+        displacement={"left": (0, None)},
+        traction={"top": (0, load)},
+        contact=[Contact("foot", direction=(0, -1), gap=0)],
+    )
+    *_, fine = adapt(problem, tolerance=1e-5)
+    solution = solve(problem, maxh=0.25, order=2)
+    lower, upper = solution.energy_bounds
+    assert lower <= fine.energy <= upper
+    error = (2 * (solution.energy - fine.energy)) ** 0.5
+    assert error <= solution.error_bound <= effectivity * error
