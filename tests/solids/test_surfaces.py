@@ -61,6 +61,7 @@ def test_pressure_field_of_hertz_contact(levels, order, rms):
     top = ng.ds("lower_contact", bonus_intorder=8)
     miss = ng.Integrate(inside * (field - exact) ** 2 * top, solution.mesh)
     assert math.sqrt(miss / ng.Integrate(inside * top, solution.mesh)) < rms * PEAK
+    assert isinstance(field.space, ng.H1 if order == 2 else ng.SurfaceL2)
     if order == 2:  # the resultant is that of the contact, on plane facets
         assert ng.Integrate(field * top, solution.mesh) == pytest.approx(
             solution.force.sum(), rel=1e-10

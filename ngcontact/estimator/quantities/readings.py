@@ -86,12 +86,12 @@ class Measured(Guaranteed):
         primary, which ``mesh(x, y, z, ng.BND)`` may find where both coincide.
 
         In the plane polynomials of degree `order` on each segment, which meet `pressure` at the
-        contact points. On solids linear on each facet at orders 1 and 2, between the pressures at
+        contact points. On solids of order 1 in H1 at orders 1 and 2, between the pressures at
         vertices: at order 2 means, by area, of the linear functions through the middles of edges,
-        whose resultant on plane facets is that of the contact. Facets that face the primary in part
-        have means over the whole facet: the resultant is met to 5 % on a secondary twice as wide
-        (order 3: 12 %). At order 3 of degree 2 on each
-        facet with a point in contact, nearest to the mean traction of both sides: better than
+        whose resultant on plane facets is that of the contact. Where facets face the primary in
+        part it is linear on each facet, with means over these: the resultant is met to 5 % on a
+        secondary twice as wide (order 3: 12 %). At order 3 of degree 2 on each facet with a point
+        in contact, nearest to the mean traction of both sides: better than
         `pressure` where the stress is resolved (docs/solids.md).
         """
         self.discrete.space.require_mesh()

@@ -35,6 +35,10 @@ def pressure_field(solution: Solved, state: ContactState) -> ng.GridFunction:
         return _mean_traction(solution, trace, state)
     assert isinstance(line, ContactZone)  # of solids
     values, whole = _at_vertices(trace, state), np.ones(len(state.force))
+    if (line.covered_shares(whole, whole) > WHOLE_SHARE).all():  # continuous
+        field = ng.GridFunction(ng.H1(solution.mesh, order=1, definedon=boundary))
+        field.vec.FV().NumPy()[trace.nodes[line.segments][:, :3]] = values
+        return field
     share = line.covered_shares(np.abs(state.force / line.weight), np.abs(state.pressure))
     # Facets without a pressure of their own share vertices with others.
     share = np.where(share > 0, share, line.covered_shares(whole, whole) > WHOLE_SHARE)
