@@ -153,8 +153,9 @@ class BoundaryData:
 def rough_places(problem: Problem, trace: BoundaryTrace) -> dict[int, Array]:
     """Rising parameters s, (j,), at which tractions are rough, by segment: vertices of the cells.
 
-    Of places nearer to each other than 1 / `FINEST_PARTS` those that quadrature divides most: the
-    middle of its smallest cells, where a jump or a kink is, so that both sides of it are smooth.
+    First the middle of the smallest cells of quadrature, where a jump or a kink is, so that both
+    sides of it are smooth; then ends of cells, the smallest first, that are 1 / `DIVISION` of the
+    segment away from all others: flat triangles lose digits.
     """
     found: dict[int, list[float]] = {}
     for load in loads_of(problem, trace.mesh):
@@ -168,9 +169,10 @@ def rough_places(problem: Problem, trace: BoundaryTrace) -> dict[int, Array]:
             least = own[size[own] == size[own[0]]]
             places = [np.median(start[least] - size[least] / 2)]
             places += np.column_stack([start, start - size])[own].ravel().tolist()
+            limits = [1 / FINEST_PARTS] + [1 / DIVISION] * (len(places) - 1)
             kept = found.setdefault(k, [])
-            for s in places:
-                if min(abs(s - other) for other in (0.0, 1.0, *kept)) > 1 / FINEST_PARTS:
+            for s, apart in zip(places, limits, strict=True):
+                if min(abs(s - other) for other in (0.0, 1.0, *kept)) > apart:
                     kept.append(float(s))
     return {k: np.sort(s) for k, s in found.items() if s}
 
