@@ -141,9 +141,8 @@ def ending_segments(line: ContactLine, ends: Transitions) -> Index:
 
 
 TURN_COSINE = np.sqrt(0.5)  # cosine up to which both sides of a corner have one pressure
-AXIS_SHARE = (
-    1 / 3
-)  # of the radius of a zone around an axis, over which its pressure is fitted there
+# Of the radius of a zone around an axis, over which its pressure is fitted there.
+AXIS_SHARE = 1 / 3
 
 
 @dataclass(frozen=True, eq=False)

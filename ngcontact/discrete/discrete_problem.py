@@ -154,7 +154,7 @@ class DiscreteProblem:
             u=y, force=force, active=active, steps=[], factorizations=work[0], back_solves=work[1]
         )
 
-    def displacement(self, unknowns: Array, load: Array | None = None) -> ng.GridFunction:
+    def displacement(self, unknowns: Array, load: Array | None) -> ng.GridFunction:
         """The displacement with the given `unknowns` (2n,), under a `load` (2N,) if any."""
         result, space = ng.GridFunction(self.space.V), self.space
         u = space.basis @ (self.basis.T @ unknowns)

@@ -29,10 +29,9 @@ from ..quadrature import Load, SampledElements, loads_of
 STRAIN_FORCE = 1e-9  # force of a rigid motion, relative to its terms, from which it is not in V_h
 LOAD_ORDER = 10  # of quadrature, enough for smooth loads on curved elements
 ADDED_DEGREES = 2  # of the mesh's curved sides, to see their error
-QUADRATURE_ERRORS = (
-    3.0  # multiple of the measured error of a load's work that is allowed; up to .21 was met
-)
-WORK_NOISE = 1e-10  # ... and this, relative to the sum of its terms, round-off
+# Multiple of the measured error of a load's work that is allowed; up to .21 was met.
+QUADRATURE_ERRORS = 3.0
+WORK_NOISE = 1e-10  # work that is allowed besides, relative to the sum of its terms: round-off
 FORCE_ROUND_OFF = 1e-13  # of all contact forces: what their least squares leave, measured 2e-14
 MIN_RESISTANCE = 1e-2  # change of gaps by a unit motion, below which contact hardly resists it
 WORK_ROUND_OFF = 1e-14  # work, relative to the most that the load could do, that is none

@@ -185,9 +185,8 @@ def followed_gap(
         values = gap_at(places)
         at_rule, at_between = values[:, : len(rule)], values[:, len(rule) :]
         number += len(pieces.local)
-        allowed = (
-            UNRESOLVED_GAP * np.ptp(at_rule, axis=1) + OPENING_ROUND_OFF * np.abs(at_rule).max()
-        )
+        allowed = UNRESOLVED_GAP * np.ptp(at_rule, axis=1)
+        allowed += OPENING_ROUND_OFF * np.abs(at_rule).max()
         rough = np.abs(at_between - at_rule @ follow.T).max(axis=1) > allowed
         rough &= number < MAX_PIECES
         done.append(rows_of(pieces, np.flatnonzero(~rough)))
@@ -231,9 +230,8 @@ def directions(
         segment, at_node = boundary.at_nodes(line.segments)
         here = without.ravel()
         nodal[without] = boundary.exact_normal(segment[here], at_node[here])
-    for k in np.flatnonzero(
-        boundary.axis[line.segments]
-    ):  # whose nodes are those of a rule with weight r
+    # At an axis nodes are those of a rule with the weight r.
+    for k in np.flatnonzero(boundary.axis[line.segments]):
         s_here = gauss_lobatto(boundary.order)
         nodal[k] = boundary.exact_normal(np.full(len(s_here), line.segments[k]), s_here)
     return between_nodes(nodal[local], s)
@@ -292,11 +290,9 @@ def facing_points(
         turning, size = (there * across(d)).sum(axis=1), np.linalg.norm(there, axis=1)
         along |= np.abs(turning) <= FACING_COSINE * size
         turning = np.where(along, size, turning)
-        rate = (
-            (slope * across(d)).sum(axis=1) - (offset * across(turning_rate)).sum(axis=1)
-        ) / turning
+        rate = (slope * across(d)).sum(axis=1) - (offset * across(turning_rate)).sum(axis=1)
         length = size * boundary.measure(facing, s_there)
-        stretch[1] = np.abs(rate) * length / speed
+        stretch[1] = np.abs(rate / turning) * length / speed
     weight[along], stretch[:, along] = 0.0, 1.0
     if line.contact.gap is not None:
         distance = prescribed_gap(line.contact, boundary, segment, s, x)

@@ -125,9 +125,8 @@ def discrete_pressure(trace: FacetTrace, pair: ContactState, local: Index, s: Ar
         return np.asarray((triangle.lagrange(trace.order, s) * value[local]).sum(axis=1))
     edges = value[:, 3:]
     opposite = (triangle.EDGES[None] == np.arange(3)[:, None, None]).any(axis=2)
-    linear = (
-        np.where(opposite, 1.0, -1.0) @ edges.T
-    )  # at a vertex: the sum of its two edges less the third
+    # At a vertex the sum of its two edges less the third.
+    linear = np.where(opposite, 1.0, -1.0) @ edges.T
     has = pair.line.rows[:, :3] >= 0
     value[:, :3] = np.where(has, value[:, :3], linear.T)
     shapes = triangle.lagrange(2, s)

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
 FRONT, UP = np.array([-0.45, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])  # of a picture
 TILT, TURN = 0.35, 0.45  # of the view on a cut: upwards, and to the others
 LOAD_COSINE = 0.5  # cosine to the load from which a plane does not pass through the zone in contact
+VERTICAL_COSINE = 0.5  # cosine to the vertical from which a cut is not looked at from above
 PIXELS = 1000  # of an image, along its longer side
 ZONE_MARGIN = 0.4  # of a zone in contact, shown beside it
 SMALL, SMALLEST = 0.2, 0.02  # zones smaller than the bodies by this have a close-up; least size
@@ -60,8 +61,8 @@ class Zone(NamedTuple):
     pressure: Array  # (n,), at the nodes of the surface
     middle: Array  # (3,), on planes of symmetry
     half: float  # half of its extent, a length
-    frame: Array  # (3, 3), rows: along the surface, as near to the axes as may be, and across
-    cuts: list[Cut]  # the foremost first
+    frame: Array  # (3, 3), rows: along the surface, by the axes where possible, and across
+    cuts: list[Cut]  # the nearest to the viewer first
 
 
 def plot_solids(
@@ -106,7 +107,7 @@ def _zone(solution: Solved, pair: int) -> Zone:
     touches = state.active if state.active.any() else np.ones(state.gap.size, dtype=bool)
     weight, place = np.where(touches, state.line.weight, 0.0), state.line.position
     middle, d = (weight @ x / weight.sum() for x in (place, state.line.direction))
-    if np.linalg.norm(d) < LOAD_COSINE:  # all around a body: the front of it
+    if np.linalg.norm(d) < LOAD_COSINE:  # normals cancel, as on a closed surface: the front of it
         d = state.line.direction[np.argmax(state.line.direction @ FRONT)]
     size, cuts = float(np.ptp(surface.points, axis=0).max()), []
     for point, normal in _symmetry_planes(solution, STRAIGHT * size):
@@ -169,7 +170,7 @@ def _grid(solution: Solved, style: Style) -> tuple[pyvista.UnstructuredGrid, Ind
 def _draw_bodies(
     figure: Figure, parts: dict[str, Axes], solution: Solved, style: Style, zone: Zone | None
 ) -> None:
-    """The bodies, cut open at the `zone`, and that close up if there is a part for it."""
+    """The bodies, cut open at the `zone`, which is enlarged if there is a part for it."""
     import pyvista
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -183,7 +184,7 @@ def _draw_bodies(
             x.clip(normal=zone.cuts[0].normal, origin=zone.middle) for x in (grid, edges)
         )
     eye = normals[0] + TURN * sum(normals[1:], np.zeros(3))
-    if np.abs(np.array(normals) @ UP).max() < LOAD_COSINE:
+    if np.abs(np.array(normals) @ UP).max() < VERTICAL_COSINE:
         eye = eye + TILT * UP
     eye = eye / np.linalg.norm(eye)
     right = np.cross(UP, eye) / np.linalg.norm(np.cross(UP, eye))

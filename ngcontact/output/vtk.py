@@ -25,12 +25,8 @@ from .surface import contact_surface
 if TYPE_CHECKING:
     import pyvista
 
-PLANE: tuple[str, ...] = (
-    "xx",
-    "yy",
-    "xy",
-    "zz",
-)  # components of a stress, as `full_stress` orders them
+# Components of a stress, as `full_stress` orders them.
+PLANE: tuple[str, ...] = ("xx", "yy", "xy", "zz")
 MERIDIAN: tuple[str, ...] = ("rr", "zz", "rz", "hoop")
 SOLID = ("xx", "yy", "zz", "xy", "yz", "xz")  # as VTK orders those of a symmetric tensor
 # Triangles and tetrahedra: linear, quadratic, Lagrange's of every higher order.

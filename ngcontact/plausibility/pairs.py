@@ -98,7 +98,7 @@ def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
         if force > noise:
             zones = zones_of(state) if plane else _whole_zone(state)
             messages["strain"] = _large_strains(problem, trace, state, zones)
-            if not messages["strain"]:  # which leaves nothing else to believe
+            if not messages["strain"]:  # else no other check means anything
                 messages["direction"] = _inclined(trace, state)
                 messages["gap"] = contradicted(trace, state)
             if plane and not messages["strain"]:

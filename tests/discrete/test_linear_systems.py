@@ -102,7 +102,7 @@ def test_points_are_moved(order):
     jumps = np.where(active, 1.0, 0.0)
     found = discrete.influence(active, jumps)
     assert (found.factorizations, found.back_solves) == (0, 1)
-    g = discrete.displacement(found.u).vec.FV().NumPy()
+    g = discrete.displacement(found.u, None).vec.FV().NumPy()
     nodes = discrete.basis.T @ found.u
     # Round-off of one back-solve: measured 1e-15 to 1e-13.
     assert np.abs((discrete.B @ nodes - 1)[active]).max() <= 1e-12

@@ -45,9 +45,8 @@ def peak_of(
     peak, place = float(pressure[at]), line.position[at]
     if solution.relative_error_estimate > 1:
         return unknown(name, peak, place, infinite)
-    off = (LONE_STRESS_FACTOR if star is None else STRESS_FACTOR) * _off_stress(
-        pair, boundary, solution.stress
-    )
+    factor = LONE_STRESS_FACTOR if star is None else STRESS_FACTOR
+    off = factor * _off_stress(pair, boundary, solution.stress)
     if star is not None:
         off = np.maximum(off, STAR_FACTOR * _off_star(pair, star))
     segment, s = np.repeat(line.segments, len(SAMPLES)), np.tile(SAMPLES, len(line.segments))

@@ -243,7 +243,7 @@ def _component_error(solution: Guaranteed, pair: int, e: Array) -> float:
     jumps = [s.line.direction @ d for s, d in zip(states, directions, strict=True)]
     jump = np.where(solution.active, np.concatenate(jumps), 0.0)
     found = solution.discrete.influence(solution.active, jump)
-    G = solution.discrete.displacement(found.u)
+    G = solution.discrete.displacement(found.u, None)
     solution.work["factorizations"] += found.factorizations
     solution.work["back_solves"] += found.back_solves
     solution.work["equilibrations"] += 1
