@@ -23,14 +23,14 @@ from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...problem import Problem
 from ...quadrature import features_of, unresolved
-from .body_forces import force_rules
 from .cells import Cells, cells_of
 from .elements import Element, by_triangle, elements_of, rigid_motions
 from .facing import TO_ENDS, facing_sides, guide_sides, held_motions, new_vertices, pressure_support
+from .force_quadrature import ForceQuadrature, force_quadrature
 from .lifting import Prescribed, lifted, prescribed_on_supports
 from .oscillation import (
     EQUILIBRIUM_RESIDUAL,
-    RAISED_DEGREES,
+    BalancedCells,
     balanced_again,
     oscillation_norms,
     residuals,
@@ -64,6 +64,7 @@ class DualProblem:
     given: BoundaryData
     prescribed: list[Prescribed]  # u_D - u_h
     elements: list[Element]
+    rules: ForceQuadrature  # how forces are integrated
     moments: Array  # (d,) of the given tractions with the multipliers
     program: DualProgram
 
@@ -72,12 +73,12 @@ class DualProblem:
         displacement: ng.GridFunction,
         found: Balanced,
         least: float = 0.0,
-        again: bool = True,
+        degree: int | None = None,
     ) -> AdmissibleStress:
         """The stress `found` as an admissible one, with its distance from C e of u_h.
 
         Residuals are relative to the largest stress, which counts as `least` at the least. Where s
-        misses much of body forces they are balanced `again`.
+        misses much of the data, stresses of more than a `degree` are balanced again.
 
         Raises
         ------
@@ -98,10 +99,10 @@ class DualProblem:
         at = cells.owner[rule.side]
         have = found.s.tractions(at, rule.x, rule.normal)
         missed = rule.missed(cells, given.tractions(cells, rule, have) - have, scale)
-        norms = oscillation_norms(cells, elements, missed)
-        loads = norms.forces + norms.tractions
-        if again:
-            distance, loads = balanced_again(given.problem, cells, displacement, found.s, norms)
+        loads = oscillation_norms(cells, elements, missed)
+        if degree is not None:
+            level = BalancedCells(cells, found.s, self.rules, distance, loads)
+            distance, loads = balanced_again(displacement, given, level, degree, scale)
         if not np.isfinite(loads).all():
             raise ValueError(
                 "no guaranteed bound is known for loads that are no polynomials beside the axis; "
@@ -187,13 +188,14 @@ def _bound(
     cells = cells_of(trace, cuts, loaded, trace.segments(*whole))
     # 2. Stresses.
     given = boundary_data(problem, cells)
-    rules = force_rules(problem, cells, p + RAISED_DEGREES)
+    rules = force_quadrature(problem, cells, degree, np.maximum(given.followed(), cells.curved))
     mu, elements = elements_of(problem, cells, displacement, degree, rules)
     # 3. The gap, on guides and on Gamma_K.
     prescribed = prescribed_on_supports(cells, given, displacement)
     lines, side = [], np.flatnonzero(np.isin(cells.segment, guided))
-    for k, own in mu.by_degree(side):
-        lines.append(guide_sides(cells, displacement, side[own], (k - extent, lift)))
+    for k in np.unique(mu.degree[side]).tolist():
+        own = side[mu.degree[side] == k]
+        lines.append(guide_sides(cells, displacement, own, (k - extent, lift)))
     holding = [(x.side, x.direction[:, [0, -1]]) for x in prescribed]
     held = held_motions(cells, holding + [(x.side, TO_ENDS @ x.direction) for x in lines])
     moduli = by_triangle(elements, [e.modulus for e in elements])
@@ -208,10 +210,10 @@ def _bound(
     # The dual problem: s and p*.
     moments, fixed = given.moments(mu)
     program = dual_program(mu, elements, fixed, rigid_motions(cells, mu, fixed), lines)
-    dual = DualProblem(cells, given, prescribed, elements, moments, program)
+    dual = DualProblem(cells, given, prescribed, elements, rules, moments, program)
     stiffest = min(np.diagonal(e.compliance, axis1=-2, axis2=-1).min() for e in elements)
     felt = NOTICEABLE_STRAIN * size / float(stiffest * cells.diameters.min())
-    stress = dual.admissible(displacement, program.nearest(elements, moments), felt)
+    stress = dual.admissible(displacement, program.nearest(elements, moments), felt, degree)
     # The identity.
     c, D = stress.distance, stress.loads
     closed = float(sum((p * x.bound).sum() for p, x in zip(stress.pressure, lines, strict=True)))

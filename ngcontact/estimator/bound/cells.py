@@ -20,8 +20,6 @@ from ...errors import ContactError
 from ...fem import BoundaryTrace
 from ...lagrange import gauss
 from ...problem import MeshArrays
-from .polynomials import edges
-from .traction_free import DIVISION, composite
 
 NEWTON_STEPS = 8
 NEWTON_STEP = 1e-9  # of an element: the next step is round-off
@@ -130,17 +128,11 @@ class Cells:
         return x, np.where(back[..., None], -dx, dx)
 
     def image(self, at: Index, local: Array) -> tuple[Array, Array]:
-        """Points (b, q, 2) of triangles `at` (b,), and derivatives (b, q, 2, 2) by (a, b).
+        """Points (b, q, 2) of triangles `at` (b,), and derivatives (b, q, 2, 2) by `local` (q, 2).
 
-        `local` (q, 2), or (b, q, 2) in straight ones, are shares (a, b) of corners 2 and 0 where
-        the base is straight. Where it is curved points lie on straight lines from the apex,
-        x = x_0 + (1 - b) (base(a / (1 - b)) - x_0).
+        `local` are shares (a, b) of corners 2 and 0 where the base is straight. Where it is curved
+        points lie on straight lines from the apex, x = x_0 + (1 - b) (base(a / (1 - b)) - x_0).
         """
-        if not self.curved[at].any():
-            corners = self.corners[at]
-            E = edges(corners)
-            x = corners[:, 1:2] + local @ E.swapaxes(1, 2)
-            return x, np.broadcast_to(E[:, None], (*x.shape, 2))
         a, b = local.T
         t = np.divide(a, 1 - b, out=np.zeros(len(a)), where=b < 1)
         apex, (base, slope) = self.corners[at, :1], self.around(at, 0, t)
@@ -168,7 +160,7 @@ class Places:
     """Quadrature points of b triangles, q in each."""
 
     at: Index  # (b,) the triangles
-    local: Array  # (q, 2) or (b, q, 2) their places (a, b) in each, as of `Cells.image`
+    local: Array  # (q, 2) their places (a, b) in each, as of `Cells.image`
     x: Array  # (b, q, 2) points, lengths
     slopes: Array  # (b, q, 2, 2) derivatives by (a, b)
     weight: Array  # (b, q) weights in the plane times the model's measure
@@ -181,11 +173,11 @@ class Places:
         return cells.evaluate(function, np.repeat(self.at, q), flat).reshape(b, q, -1)
 
 
-def places(cells: Cells, at: Index, order: int, depth: int = 0) -> Places:
+def places(cells: Cells, at: Index, order: int, along: int | None = None) -> Places:
     """Quadrature of degree `order` in triangles `at` (b,), all straight or all with a curved base.
 
-    On the parts of triangles that are divided `depth` times. On curved ones in the distance from
-    the apex, and in the parameter of the base.
+    On curved ones in the distance from the apex, and in the parameter of the base, there of the
+    degree `along`, by default the same.
 
     Raises
     ------
@@ -193,34 +185,20 @@ def places(cells: Cells, at: Index, order: int, depth: int = 0) -> Places:
         A curved side goes beyond the middle of its element.
     """
     if len(at) and cells.curved[at[0]]:
-        g, w = gauss(order)
-        n = DIVISION**depth
-        g, w = ((np.arange(n)[:, None] + g) / n).ravel(), np.tile(w / n, n)
-        sigma, t = (z.ravel() for z in np.meshgrid(g, g, indexing="ij"))
-        local, weight = np.column_stack([sigma * t, 1 - sigma]), np.outer(w * g, w).ravel()
+        (g, w), (h, v) = gauss(order), gauss(order if along is None else along)
+        sigma, t = (z.ravel() for z in np.meshgrid(g, h, indexing="ij"))
+        local, weight = np.column_stack([sigma * t, 1 - sigma]), np.outer(w * g, v).ravel()
     else:
-        local, weight = composite(depth, order)
-    return located(cells, at, local, weight)
-
-
-def located(cells: Cells, at: Index, local: Array, weight: Array) -> Places:
-    """Places `local` (q, 2), or (b, q, 2), in triangles `at` (b,), with a `weight` (q,) by (a, b).
-
-    As of `Cells.image`.
-
-    Raises
-    ------
-    ContactError
-        A curved side goes beyond the middle of its element.
-    """
+        rule = ng.IntegrationRule(ng.TRIG, order)
+        local, weight = np.array(rule.points)[:, :2], np.array(rule.weights)
     x, slopes = cells.image(at, local)
     area = slopes[..., 0, 0] * slopes[..., 1, 1] - slopes[..., 0, 1] * slopes[..., 1, 0]
     if not (area > 0).all():
         raise ContactError("a curved side of the mesh goes beyond the middle of its element")
-    a, b = local[..., 0], local[..., 1]
-    found = np.stack([b, 1 - a - b, a], axis=-1) @ cells.barycentric[at, :, :2]
+    shares = np.column_stack([local[:, 1], 1 - local.sum(axis=1), local[:, 0]])
+    found = shares @ cells.barycentric[at, :, :2]
     bent = np.flatnonzero(cells.trace.curved_elements[cells.parent[at]])
-    owner, flat = np.repeat(at[bent], x.shape[1]), found[bent].reshape(-1, 2)
+    owner, flat = np.repeat(at[bent], len(weight)), found[bent].reshape(-1, 2)
     for _ in range(NEWTON_STEPS if bent.size else 0):
         slope = cells.evaluate(ng.specialcf.JacobianMatrix(2), owner, flat).reshape(-1, 2, 2)
         miss = x[bent].reshape(-1, 2) - cells.evaluate(ng.CF((ng.x, ng.y)), owner, flat)

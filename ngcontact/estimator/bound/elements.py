@@ -22,10 +22,10 @@ from numpy.polynomial import legendre
 from ...arrays import Array, Index, Mask
 from ...fem import connected_bodies, elastic_strain
 from ...lagrange import gauss
-from ...problem import MeshArrays, Problem, numbers, varies
+from ...problem import MeshArrays, Problem, varies
 from ...qp import vanishing_combinations
-from .body_forces import ForceRules, projection
 from .cells import Cells, Places, places
+from .force_quadrature import ForceQuadrature, projection
 from .polynomials import CORNERS, balancing, coordinates, stresses
 
 TURNED_NORMAL = 1e-4  # sine of the angle between normals that are not one
@@ -55,7 +55,8 @@ class Element:
     strain: Array  # (b, q, v) e(u_h), less initial strains, Voigt
     source: ng.CoefficientFunction | None  # the body force
     force: Array  # (b, j, 2) coefficients, as of `scalars`, of the body force that s_p balances
-    depth: Index  # (b,) how often triangles are divided to integrate forces
+    # (b,) parts of each triangle on which forces are integrated, two at least where tractions are
+    pieces: Index
     missed: Array  # (b,) L2 norm of what of the body force s_p does not balance, times the measure
     modulus: Array  # (b,) smallest eigenvalue of C in Mandel's scaling, a stress
     combined: Array  # (b, n, m) T from the n polynomials of `stresses`, orthonormal: (T, T) = 1
@@ -192,9 +193,6 @@ def multipliers(problem: Problem, cells: Cells, degree: int) -> Multipliers:
     segment, s = cells.on_side(side, np.repeat([0.0, 1.0], len(side) // 2))
     off = cells.trace.exact_normal(segment, s) - cells.trace.normal(segment, s)
     higher = cells.curved.copy()
-    rough = [name for name, load in problem.traction.items() if not numbers(load)]
-    loaded = np.isin(cells.segment, cells.trace.segments(*rough))
-    higher[cells.owner[loaded & ~cells.inner]] = True
     higher[cells.owner[side[np.linalg.norm(off, axis=1) > TURNED_NORMAL]]] = True
     own, of_side = degree + CURVED_DEGREES * higher, np.zeros(len(cells.ends), dtype=np.intp)
     np.maximum.at(of_side, cells.sides, own[:, None])
@@ -229,7 +227,7 @@ def elements_of(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     degree: int,
-    rules: ForceRules,
+    rules: ForceQuadrature,
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, in groups of one kind, and their multipliers.
 
@@ -269,7 +267,7 @@ def _element(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     mu: Multipliers,
-    rules: ForceRules,
+    rules: ForceQuadrature,
     at: Index,
 ) -> Element:
     """Triangles `at` (b,) of one kind, condensed."""
@@ -280,19 +278,19 @@ def _element(
     )
     axial, curved = model.extent > 0, bool(cells.curved[at[0]])
     law = _of_body(problem.materials, cells, at)
-    varying = law in problem.varying.values()
-    rational = curved or axial or varying
-    points = places(cells, at, 2 * degree + 2 * rational + 2 * varying)
+    rational = curved or axial or law in problem.varying.values()
+    points = places(cells, at, 2 * degree + 4 * rational)
     corners = cells.corners[at]
     local = coordinates(corners, points.x) if curved else points.local
     compliance = compliance_at(problem, cells, points)
     strain = points.evaluate(cells, elastic_strain(problem, displacement))
     source = _of_body(problem.force, cells, at)
-    n = max(0, degree - 1 - axial)
+    n = min(max(0, degree - 1 - axial), rules.order // 2)
     force, missed = np.zeros((len(at), (n + 1) * (n + 2) // 2, 2)), np.zeros(len(at))
-    depth, hoop = np.zeros(len(at), dtype=np.intp), np.zeros(points.weight.shape)
+    pieces, hoop = np.ones(len(at), dtype=np.intp), np.zeros(points.weight.shape)
     if source is not None:
-        force, missed, size, depth = projection(source, cells, at, n, rules)
+        threshold = dict(zip(problem.force.values(), rules.thresholds, strict=True))[source]
+        force, missed, size, pieces = projection(source, cells, at, n, rules, threshold)
         missed = np.where(missed <= FORCE_ROUND_OFF * size, 0.0, missed)
         if axial:
             force[..., 0] = 0.0
@@ -324,7 +322,7 @@ def _element(
         strain=strain,
         source=source,
         force=force,
-        depth=depth,
+        pieces=np.maximum(pieces, 1 + rules.followed[at]),
         missed=missed,
         modulus=np.broadcast_to(1 / largest, len(at)),
         combined=combined,

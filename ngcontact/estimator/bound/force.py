@@ -61,12 +61,12 @@ def force_bar(
     given, moments = replace(dual.given, loads={}), np.zeros_like(dual.moments)
     test = replace(dual, given=given, elements=elements, moments=moments)
     nearest, ratio = _within(test, stress.pressure, np.inf)
-    t = test.admissible(displacement, nearest, again=False)
+    t = test.admissible(displacement, nearest)
     costless = float(np.linalg.norm(t.distance + t.loads)) / B if B > 0 else 0.0
     limit = max(kappa, KAPPA_GROWTH * costless)
     if ratio > limit:
         nearest, ratio = _within(test, stress.pressure, limit, nearest)
-        t = test.admissible(displacement, nearest, again=False)
+        t = test.admissible(displacement, nearest)
     kappa = max(kappa, costless, ratio)
     # What of [G] - d.e is more than kappa times the gap after its own lifting.
     r = []

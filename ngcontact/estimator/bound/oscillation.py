@@ -4,60 +4,42 @@ Constants of Poincare (Payne, Weinberger 1960, Arch. Rational Mech. Anal. 5:286;
 Korn (Costabel, Dauge 2015, Arch. Rational Mech. Anal. 217:873, theorem 2.3) and of traces are known
 for each triangle; docs/bounds.md has the proof. Extrema on curves are taken over points.
 
-Where F is no polynomial s balances a projection. On a straight triangle T where that counts,
-the stress t of `traction_free` balances more of F: on the whole of T, or on parts of it and of
-these. s + t stands for s on T, with what it misses itself; both have the same resultants, for the
-rules on T are those on its parts.
+Where F or P are no polynomials s balances projections of them. On a triangle T where that counts,
+the stress s' nearest to sigma_h with the tractions of s on inner sides and on Gamma_u, with P and
+p* on the others, and -div s' = F, is sought of a higher degree, or on parts of T, where again F and
+P are met in projections. s' may stand for s on T, with what it misses itself; both have the same
+resultants, for the rules on T are those on its parts.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
-from ...fem import elastic_strain
-from ...problem import Problem
-from .body_forces import PART_DEGREE, PART_ORDER
-from .cells import Cells, Places, located
-from .elements import Element, Multipliers, Stress, by_triangle, compliance_at
-from .polynomials import edges, scalars
-from .traction_free import (
-    DIVISION,
-    balancing_stress,
-    basis,
-    composite,
-    fit,
-    free_stress,
-    parts,
-    restriction,
-    up_to,
-)
+from .cells import Cells
+from .elements import Element, Multipliers, Stress, by_triangle, elements_of
+from .force_quadrature import LEAST_DEGREE, PARTS_OF_A_SIDE, ForceQuadrature
+from .polynomials import edges
+from .program import dual_program
+from .tractions import BoundaryData, side_rule
 
 EQUILIBRIUM_RESIDUAL = 1e-10  # residual of equilibrium, relative to the largest stress
 POINTS_ON_SIDE = 17  # points on each side
 # Shares of corners in places at which the middle of both balls is sought, beside the incentre.
 BALL_CENTRES = np.array([(i, j, 8 - i - j) for i in range(1, 8) for j in range(1, 8 - i)]) / 8
-RAISED_DEGREES = 3  # above the order of displacements: forces on whole triangles
+RAISED_DEGREES = 3  # degrees of stresses on whole triangles, as long as forces are smooth there
 NEGLIGIBLE_SHARE = 0.02  # of |s - sigma_h|^2: so much may be added by data not balanced again
 TRIANGLES_AT_ONCE = 200  # triangles
 
 
-class Oscillation(NamedTuple):
-    """Norms of the stress that balances what a stress misses of the data of n triangles."""
-
-    unit: Array  # (n,) that for a body force of norm 1, times the measure
-    forces: Array  # (n,) for what is missed of body forces
-    tractions: Array  # (n,) for what is missed of tractions
-
-
-def oscillation_norms(cells: Cells, elements: Sequence[Element], tractions: Array) -> Oscillation:
-    """Norms D_T of a stress that balances what s misses of body forces and tractions.
+def oscillation_norms(cells: Cells, elements: Sequence[Element], tractions: Array) -> Array:
+    """Norms D_T (n,) of a stress that balances what s misses of body forces and tractions.
 
     `tractions` (n, 3) are L2 norms on the sides, orthogonal to rigid motions, times the measure.
 
@@ -68,7 +50,7 @@ def oscillation_norms(cells: Cells, elements: Sequence[Element], tractions: Arra
     """
     forces = by_triangle(elements, [e.missed for e in elements])
     least = by_triangle(elements, [e.modulus for e in elements])
-    unit, of_tractions = np.zeros((2, len(forces)))
+    found = np.zeros(len(forces))
     some = (forces > 0) | (tractions > 0).any(axis=1)
     for points in (2, POINTS_ON_SIDE):  # on straight sides extrema are at ends
         at = np.flatnonzero(some & (cells.curved == (points > 2)))
@@ -78,10 +60,9 @@ def oscillation_norms(cells: Cells, elements: Sequence[Element], tractions: Arra
                 "no guaranteed bound is known for loads that are no polynomials at the axis; use "
                 "error_estimate"
             )
-        scale = known.korn / np.sqrt(least[at] * known.measure)
-        unit[at] = known.poincare * scale
-        of_tractions[at] = (known.trace * tractions[at]).sum(axis=1) * scale
-    return Oscillation(unit, unit * forces, of_tractions)
+        total = known.poincare * forces[at] + (known.trace * tractions[at]).sum(axis=1)
+        found[at] = known.korn * total / np.sqrt(least[at] * known.measure)
+    return found
 
 
 class Constants(NamedTuple):
@@ -120,177 +101,65 @@ def _constants(cells: Cells, at: Index, points: int) -> Constants:
     return Constants(poincare, np.sqrt(1 + 2 / beta**2), trace, measure)
 
 
-class Division(NamedTuple):
-    """Triangles in n^2 parts, and polynomials on these."""
-
-    n: int
-    degree: int  # of stresses
-    force_degree: int  # of forces that they balance
-    order: int  # of the rule for forces
-
-
-class Parts(NamedTuple):
-    """b triangles, or parts of such, with polynomials of m coefficients."""
-
-    at: Index  # (b,) the triangles that they are parts of
-    origin: Array  # (b, 2) places (a, b) of their own (0, 0) in these
-    scale: Array  # (b,) of their (a, b)
-    stress: Array  # (b, m, 3)
-    force: Array  # (b, m, 2) what the stress balances
-
-    def some(self, which: Index) -> Parts:
-        """Those `which` (r,) alone."""
-        return Parts(**{name: x[which] for name, x in self._asdict().items()})
-
-    def edges(self, cells: Cells) -> Array:
-        """E (b, 2, 2), lengths, of their own (a, b)."""
-        return edges(cells.corners[self.at]) * self.scale[:, None, None]
-
-    def places(self, cells: Cells, x: Array, w: Array) -> Places:
-        """Places of a rule with points `x` (q, 2) and weights `w` (q,) in each."""
-        local = self.origin[:, None] + self.scale[:, None, None] * x
-        found = located(cells, self.at, local, w)
-        return replace(found, weight=found.weight * self.scale[:, None] ** 2)
-
-
 @dataclass(frozen=True, eq=False)
-class Remainders:
-    """What polynomials miss of a body force on straight triangles of the plane, balanced."""
+class BalancedCells:
+    """A stress on n triangles of cells, in equilibrium with what `rules` see of forces."""
 
-    problem: Problem
     cells: Cells
-    displacement: ng.CoefficientFunction  # u_h
-    element: Element  # the triangles
     s: Stress
-    unit: Array  # (n,) as of `Oscillation`
-
-    def whole(self, at: Index, degree: int) -> Parts:
-        """Triangles `at` (b,) with s and what it balances, polynomials of a `degree`."""
-        e, rule = self.element, composite(0, 2 * degree)
-        zero, one = np.zeros((len(at), 2)), np.ones(len(at))
-        found = Parts(at, zero, one, np.empty(0), np.empty(0))
-        x, take = found.places(self.cells, *rule).x, fit(degree, 0, 2 * degree)
-        some = e.among(at)[1]
-        force = scalars(e.force_degree, e.corners[some], x) @ e.force[some]
-        return found._replace(stress=take @ self.s.values(at, x), force=take @ force)
-
-    def norms(self, whole: Parts, own: Division, depth: int, limit: float) -> tuple[Array, Array]:
-        """|s + t - sigma_h| and D_T (b,) each, with t as of `Division`.
-
-        Forces are integrated on triangles that are divided `depth` times. What D_T add to the
-        squared norms beyond a `limit` is balanced on parts of parts.
-        """
-        b, inner = len(whole.at), depth - (own.n > 1)
-        part, missed = self.balanced(whole, own, inner)
-        loads = self.unit[part.at] * np.abs(part.scale) * missed
-        distance = self.distances(part, own)
-        again = that_count(distance, loads, limit) if inner else np.zeros(0, dtype=np.intp)
-        if again.size:
-            both = self.norms(part.some(again), own, inner, limit)
-            better = both[0] + both[1] < distance[again] + loads[again]
-            for old, new in zip((distance, loads), both, strict=True):
-                old[again[better]] = new[better]
-        one, two = (np.linalg.norm(x.reshape(b, -1), axis=1) for x in (distance, loads))
-        return one, two
-
-    def balanced(self, whole: Parts, own: Division, inner: int) -> tuple[Parts, Array]:
-        """The parts with s + t and what it balances, and norms (k,) of what that misses of F.
-
-        Forces are integrated on parts that are divided `inner` times.
-        """
-        b, m, (origin, scale) = len(whole.at), own.degree, parts(own.n)
-        k, take = b * len(scale), restriction(own.n, m)
-        part = Parts(
-            np.repeat(whole.at, len(scale)),
-            (whole.origin[:, None] + whole.scale[:, None, None] * origin).reshape(-1, 2),
-            (whole.scale[:, None] * scale).ravel(),
-            (take @ whole.stress[:, None]).reshape(k, -1, 3),
-            (take @ whole.force[:, None]).reshape(k, -1, 2),
-        )
-        rule, E = composite(inner, own.order), whole.edges(self.cells)
-        points = part.places(self.cells, *rule)
-        P, F = basis(m, rule[0]), points.evaluate(self.cells, self.element.source)
-        rest = fit(own.force_degree, inner, own.order) @ (F - P @ part.force)
-        on_reference = (rest.reshape(b, -1, 2) @ np.linalg.inv(E).swapaxes(1, 2)).reshape(b, -1)
-        by_force = balancing_stress(own.n, own.force_degree, m).reshape(-1, on_reference.shape[1])
-        t = mapped(E, (on_reference @ by_force.T).reshape(b, -1, 3)).reshape(k, -1, 3)
-        part.force[:, up_to(own.force_degree, m)] += rest
-        part.stress[:] += t
-        square = ((F - P @ part.force) ** 2).sum(axis=2)
-        return part, np.sqrt((points.weight * square).sum(axis=1))
-
-    def distances(self, part: Parts, own: Division) -> Array:
-        """Distances (b,) of stresses from that of u_h, on whole triangles of the nearest ones.
-
-        They differ by stresses without tractions and divergence.
-        """
-        m, rule = own.degree, composite(0, 2 * own.degree)
-        points, P = part.places(self.cells, *rule), basis(m, rule[0])
-        compliance = compliance_at(self.problem, self.cells, points)
-        strain = points.evaluate(self.cells, elastic_strain(self.problem, self.displacement))
-        strain -= (compliance @ (P @ part.stress)[..., None])[..., 0]
-        if own.n == 1:
-            free = np.moveaxis(free_stress(m), 2, 0).reshape(-1, 3)
-            free = mapped(part.edges(self.cells), free).reshape(len(strain), -1, *P.T.shape[:1], 3)
-            free = P @ free  # (b, r, q, 3)
-            strains = (compliance[:, None] @ free[..., None])[..., 0]
-            weighted = (points.weight[:, None, :, None] * free).reshape(*free.shape[:2], -1)
-            products = weighted @ strains.reshape(weighted.shape).swapaxes(1, 2)
-            c = np.linalg.solve(products, weighted @ strain.reshape(len(strain), -1, 1))
-            strain -= (c[..., None] * strains).sum(axis=1)
-        square = ((np.linalg.inv(compliance) @ strain[..., None])[..., 0] * strain).sum(axis=2)
-        return np.asarray(np.sqrt((points.weight * square).sum(axis=1)))
-
-
-def mapped(E: Array, t: Array) -> Array:
-    """Stresses E t E' (b, j, 3) by edges `E` (b, 2, 2) from `t` (b, j, 3) or (j, 3)."""
-    E = E[:, None]
-    t = E @ t[..., np.array([[0, 2], [2, 1]])] @ E.swapaxes(2, 3)
-    return np.asarray(t[..., [0, 1, 0], [0, 1, 1]])
-
-
-def that_count(distance: Array, loads: Array, limit: float) -> Index:
-    """Numbers (r,) of the largest `loads` (n,), without which a `limit` holds.
-
-    It is what loads may add to the squares of each `distance` (n,), all together.
-    """
-    lost = (distance + loads) ** 2 - distance**2
-    order = np.argsort(lost)
-    return np.sort(order[np.cumsum(lost[order]) > limit])
+    rules: ForceQuadrature
+    distance: Array  # (n,) |s - sigma_h|
+    loads: Array  # (n,) norms of what s misses of the data
 
 
 def balanced_again(
-    problem: Problem,
-    cells: Cells,
     displacement: ng.CoefficientFunction,
-    s: Stress,
-    missed: Oscillation,
+    given: BoundaryData,
+    level: BalancedCells,
+    degree: int,
+    scale: float,
+    allowed: float | None = None,
 ) -> tuple[Array, Array]:
-    """Distances from sigma_h, and D_T, (n,) each, of s + t with t as of `traction_free`.
+    """Distances and loads, (n,) each as of `level`, of the better stress on each triangle.
 
-    On straight triangles of the plane where forces count, and the better one of s and s + t.
+    Stresses are of a `degree` on straight triangles; residuals are relative to the largest one,
+    `scale`. Data may add what is `allowed` to B^2; by default a share of |s - sigma_h|^2.
     """
-    distance, _ = s.norms()
-    loads = missed.forces.copy()
-    limit = NEGLIGIBLE_SHARE * float(distance @ distance)
-    counts = that_count(distance, loads + missed.tractions, limit)
-    counts = counts[~cells.curved[counts] & (loads[counts] > 0)]
-    p = cells.trace.order
-    for e in s.elements if cells.trace.model.extent == 0 else ():
-        view = Remainders(problem, cells, displacement, e, s, missed.unit)
-        mine, some = e.among(counts)
-        for depth in np.unique(e.depth[some]).tolist():
-            m = p + RAISED_DEGREES
-            own = Division(1, m + 2, m, 2 * m + 2)
-            if depth:
-                own = Division(DIVISION, max(p + 1, PART_DEGREE + 2), PART_DEGREE, PART_ORDER)
-            every = counts[mine[e.depth[some] == depth]]
-            for at in np.array_split(every, -(-len(every) // TRIANGLES_AT_ONCE)):
-                whole = view.whole(at, own.degree)
-                one, two = view.norms(whole, own, depth, limit * len(at) / len(counts))
-                better = one + two < distance[at] + loads[at]
-                distance[at[better]], loads[at[better]] = one[better], two[better]
-    return distance, loads + missed.tractions
+    c, D, rules = level.distance.copy(), level.loads.copy(), level.rules
+    limit = NEGLIGIBLE_SHARE * float(c @ c) if allowed is None else allowed
+    pieces = by_triangle(level.s.elements, [e.pieces for e in level.s.elements])
+    for third in (None, False, True):  # whole triangles, their parts
+        lost = (c + D) ** 2 - c**2
+        order = np.argsort(lost)
+        counts = np.sort(order[np.cumsum(lost[order]) > limit])
+        smooth, divided = pieces < PARTS_OF_A_SIDE**2, (pieces > 1) & (rules.thirds == third)
+        fits = smooth if third is None else divided
+        some = counts[fits[counts]]
+        for at in np.array_split(some, -(-len(some) // TRIANGLES_AT_ONCE)) if len(some) else ():
+            parts, finer = rules.divided(level.cells, at, third)
+            own = degree + RAISED_DEGREES if third is None else max(degree, LEAST_DEGREE)
+            k = len(parts.triangles) // len(at)
+            mu, elements = elements_of(given.problem, parts, displacement, own, finer)
+            rule = side_rule(parts, given.breaks, np.flatnonzero(~parts.inner))
+            owner = parts.owner[rule.side]
+            whole = level.s.tractions(at[owner // k], rule.x, rule.normal)
+            wanted = given.tractions(parts, rule, whole)
+            moments = rule.moments(mu, wanted)
+            free, motions = np.zeros(len(moments), dtype=bool), np.zeros((len(moments), 0))
+            program = dual_program(mu, elements, free, motions, [])
+            s = program.nearest(elements, moments).s
+            left = residuals(parts, mu, moments - s.traction_moments()[0], scale)
+            have = s.tractions(owner, rule.x, rule.normal)
+            loads = oscillation_norms(parts, elements, rule.missed(parts, wanted - have, scale))
+            both = s.norms()[0], loads
+            if finer.levels and third is not None:
+                inner, share = BalancedCells(parts, s, finer, *both), len(at) / len(counts)
+                both = balanced_again(displacement, given, inner, own, scale, limit * share)
+            one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
+            settled = left.reshape(-1, k).max(axis=1) <= EQUILIBRIUM_RESIDUAL
+            better = settled & (one + two < c[at] + D[at])
+            c[at[better]], D[at[better]] = one[better], two[better]
+    return c, D
 
 
 def residuals(cells: Cells, mu: Multipliers, left: Array, largest: float) -> Array:

@@ -14,13 +14,12 @@ from ...fem import BoundaryTrace
 from ...lagrange import gauss_derivative, lagrange
 from ...problem import Problem, numbers
 from ...quadrature import loads_of
-from .body_forces import DIVISIONS
 from .cells import Cells
 from .elements import Multipliers, traces
 from .facing import DATA_DEGREE, POINTS, TO_LEGENDRE, WEIGHTS, FacingSides, jump, on_segments
-from .traction_free import DIVISION
+from .force_quadrature import DIVISIONS, PARTS_OF_A_SIDE
 
-FINEST_PARTS = DIVISION**DIVISIONS  # parts of a side
+FINEST_PARTS = PARTS_OF_A_SIDE**DIVISIONS  # parts of a side
 SAME_BREAK = 1e-10  # of a side: breaks nearer to its ends are these
 TRACTION_ROUND_OFF = 1e-10  # relative to the largest stress: as equilibrium is accepted
 
@@ -39,7 +38,8 @@ class SideRule:
     def moments(self, mu: Multipliers, values: Array) -> Array:
         """Integrals (d,) of tractions `values` (m, j, 2) times the multipliers."""
         total, load = np.zeros(int(mu.start[-1])), (self.weight * self.measure)[..., None] * values
-        for k, at in mu.by_degree(self.side):
+        for k in np.unique(mu.degree[self.side]).tolist():
+            at = np.flatnonzero(mu.degree[self.side] == k)
             parts = np.einsum("mjc,mji->mci", load[at], traces(k, self.t[at])).reshape(len(at), -1)
             np.add.at(total, mu.start[self.side[at], None] + np.arange(2 * (k + 1)), parts)
         return total
@@ -104,6 +104,14 @@ class BoundaryData:
     # (e, j, 2) what pressures of lines exert: forces per t, with the measure, at `POINTS`
     pressed: Array
 
+    def followed(self) -> Index:
+        """Number of divisions (n,) of triangles that follow tractions, `DIVISIONS` at most."""
+        cells, found = self.cells, np.zeros(len(self.cells.triangles), dtype=np.intp)
+        breaks = np.bincount(self.breaks[:, 0].astype(np.intp), minlength=len(cells.trace.region))
+        count = np.append(breaks, 0)[cells.segment]  # none inside, -1
+        np.maximum.at(found, cells.owner, np.where(count >= FINEST_PARTS, DIVISIONS, count > 0))
+        return found
+
     def with_pressure(
         self, lines: Sequence[FacingSides], pressure: Sequence[Array]
     ) -> BoundaryData:
@@ -154,8 +162,8 @@ def rough_places(problem: Problem, trace: BoundaryTrace) -> dict[int, Array]:
     """Rising parameters s, (j,), at which tractions are rough, by segment: vertices of the cells.
 
     First the middle of the smallest cells of quadrature, where a jump or a kink is, so that both
-    sides of it are smooth; then ends of cells, the smallest first, that are 1 / `DIVISION` of the
-    segment away from all others: flat triangles lose digits.
+    sides of it are smooth; then ends of cells, the smallest first, that are 1 / `PARTS_OF_A_SIDE`
+    of the segment away from all others: flat triangles lose digits.
     """
     found: dict[int, list[float]] = {}
     for load in loads_of(problem, trace.mesh):
@@ -169,7 +177,7 @@ def rough_places(problem: Problem, trace: BoundaryTrace) -> dict[int, Array]:
             least = own[size[own] == size[own[0]]]
             places = [np.median(start[least] - size[least] / 2)]
             places += np.column_stack([start, start - size])[own].ravel().tolist()
-            limits = [1 / FINEST_PARTS] + [1 / DIVISION] * (len(places) - 1)
+            limits = [1 / FINEST_PARTS] + [1 / PARTS_OF_A_SIDE] * (len(places) - 1)
             kept = found.setdefault(k, [])
             for s, apart in zip(places, limits, strict=True):
                 if min(abs(s - other) for other in (0.0, 1.0, *kept)) > apart:
