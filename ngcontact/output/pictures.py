@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
 RISING, SIGNED = "viridis", "RdBu_r"  # colour maps, distinct for any colour vision
+PANEL_PAD = 0.12  # inches beside panels, so that labels of neighbours stay apart
 HEIGHT = 5.0  # of a picture, inches
 # Powers of ten from which numbers on a scale are given with one for all.
 POWERS: dict[str, Any] = {"scilimits": (-3, 4), "useMathText": True}
@@ -305,6 +306,7 @@ def draw_scene(
     ratios = [float(np.clip(width / height, 0.6, 2)), *[1.0 / tall] * columns]
     ratios.append(1.2 if len(parts) == 1 else 0.8 * len(parts))
     figure.set_size_inches(2 + HEIGHT * 0.9 * sum(ratios), HEIGHT)
+    figure.set_layout_engine("constrained", w_pad=PANEL_PAD)
     grid = figure.add_gridspec(tall, columns + 2, width_ratios=ratios)
     bodies = figure.add_subplot(grid[:, 0])
     close = [figure.add_subplot(grid[k % tall, 1 + k // tall]) for k in range(len(windows))]
