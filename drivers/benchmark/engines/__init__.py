@@ -16,10 +16,6 @@ from drivers.benchmark.scenes.meshes import made
 from drivers.benchmark.scenes.plane import Reading
 from drivers.benchmark.scenes.problems import Common
 
-# In units of E / h, all run: the best one depends on order and size. A small one takes few steps
-# and errs less than the mesh does only while that is coarse.
-PENALTIES = (10.0, 100.0, 1000.0)
-
 
 class NotInstalledError(RuntimeError):
     """A package of an engine is missing; the message names both."""
@@ -76,15 +72,12 @@ class Engine:
     orders: tuple[int, ...] = (1, 2)
     penalties: tuple[float, ...] = ()
     meshed_obstacle: bool = False  # a rigid foundation is a mesh that is held
-    two_bodies: bool = True
-    largest: int = 10**9  # unknowns; more would take minutes a run, and up to 18 s with Akantu
+    largest: int = 10**9  # unknowns; more would take minutes a run
 
     def runs(self, common: Common, kinds: Sequence[str], sizes: Sequence[int]) -> Iterator[Run]:
         """Runs on meshes of the given kinds and numbers of unknowns."""
         modules = needed(self.name, *self.packages)
         rigid = common.problem.contact[0].primary is None
-        if not (rigid or self.two_bodies):
-            return
         for kind, order, size in product(kinds, self.orders, sizes):
             mesh = made(common, kind, order, size, self.meshed_obstacle and rigid)
             for penalty in self.penalties or (None,):

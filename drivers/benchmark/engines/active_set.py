@@ -1,6 +1,6 @@
 """The plain active set that a user of any finite element code writes, one factorisation a step.
 
-With SciPy's sparse LU for scikit-fem and FElupe, isoparametric.
+In scikit-fem with SciPy's sparse LU, isoparametric.
 """
 
 from __future__ import annotations
@@ -17,15 +17,12 @@ from scipy.sparse.linalg import splu
 from drivers.benchmark.engines import Engine, Solved
 from drivers.benchmark.scenes.meshes import Mesh, which
 from drivers.benchmark.scenes.plane import (
-    WEIGHTS,
     Assembled,
     Facing,
     Numbering,
     bounded,
-    interleaved,
     middles,
     moduli,
-    modulus,
     prescribed,
     pressures,
     read,
@@ -103,9 +100,6 @@ def solved(
     return Solved(seconds, steps, float(v @ (K @ v)) / 2, reading)
 
 
-QUADRATURE = 5  # degree of FElupe's with order 2; the default, 2, changes the disc's errors by 1 %
-
-
 def scikit_basis(skfem: Any, common: Common, made: Mesh, order: int) -> Any:
     """Vector basis on the triangles; the middles of the contact edges lie on the curve."""
     mesh = skfem.MeshTri(*(np.ascontiguousarray(a.T) for a in (made.points, made.triangles)))
@@ -137,48 +131,4 @@ def by_scikit(modules: Any, common: Common, made: Mesh, order: int) -> Solved:
     return solved(common, order, assembled)
 
 
-def quadratic(felupe: Any) -> Any:
-    """Quadratic triangle; FElupe's own (11.3.0) has a wrong slope of its last shape function."""
-
-    def gradient(rs: Array) -> Array:
-        r, s = rs
-        t = 1 - r - s
-        corners = [[1 - 4 * t, 1 - 4 * t], [4 * r - 1, 0 * s], [0 * r, 4 * s - 1]]
-        between = [[4 * (t - r), -4 * r], [4 * s, 4 * r], [-4 * s, 4 * (t - s)]]
-        return np.array(corners + between)
-
-    element = felupe.QuadraticTriangle()
-    element.gradient = gradient
-    return element
-
-
-def by_felupe(modules: Any, common: Common, made: Mesh, order: int) -> Solved:
-    """With FElupe, which has no regions of sides of triangles: loads are assembled here."""
-    [felupe] = modules
-
-    def assembled() -> Assembled:
-        places, cells, number = interleaved(common, made, order)
-        if order == 1:
-            region = felupe.RegionTriangle(felupe.Mesh(places, cells, "triangle"))
-        else:
-            rule = felupe.TriangleQuadrature(order=QUADRATURE)
-            mesh = felupe.Mesh(places, cells, "triangle6")
-            region = felupe.Region(mesh, quadratic(felupe), rule)
-        law, field = modulus(common), felupe.FieldPlaneStrain(region, dim=2)
-        body = felupe.SolidBody(
-            felupe.LinearElastic(E=law.E, nu=law.nu), felupe.FieldContainer([field])
-        )
-        f = np.zeros(number.unknown.size)
-        for name, pressure in pressures(common).items():
-            nodes = number.segments[name]
-            x, y = (number.points[nodes[:, -1]] - number.points[nodes[:, 0]]).T
-            # Bodies are on the left of their boundaries.
-            for unknown, component in zip(number.unknown, (-y, x), strict=True):
-                np.add.at(f, unknown[nodes], pressure * np.outer(component, WEIGHTS[order]))
-        return Assembled(sp.csr_array(body.assemble.matrix()), f, number)
-
-    return solved(common, order, assembled)
-
-
 SCIKIT = Engine("scikit-fem active set", by_scikit, ("skfem", "skfem.models.elasticity"))
-FELUPE = Engine("FElupe active set", by_felupe, ("felupe",))

@@ -36,13 +36,6 @@ OBSTACLE = "obstacle"
 SIDES = [[0, 1], [1, 2], [2, 0]]  # corners of a triangle that its sides join
 
 
-def sides(triangles: Indices) -> tuple[Indices, Indices]:
-    """End vertices (k, 2) of all sides, each once, and the sides (ne, 3) of the triangles."""
-    every = np.sort(triangles[:, SIDES], axis=2).reshape(-1, 2)
-    ends, number = np.unique(every, axis=0, return_inverse=True)
-    return ends, number.reshape(-1, 3)
-
-
 def which(ends: Indices, wanted: Indices) -> Indices:
     """Numbers (m,) of the sides that join `wanted` (m, 2) among those that join `ends` (k, 2)."""
     count = ends.max() + 1
@@ -100,7 +93,7 @@ class Mesh:
         corners = self.triangles[np.concatenate(own)]
         nodes = len(np.unique(corners))
         if order == 2:
-            nodes += len(sides(corners)[0])
+            nodes += len(np.unique(np.sort(corners[:, SIDES], axis=2).reshape(-1, 2), axis=0))
         return 2 * nodes
 
 

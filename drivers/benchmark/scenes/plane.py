@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from drivers.benchmark.scenes.meshes import OBSTACLE, Mesh, sides, which
+from drivers.benchmark.scenes.meshes import OBSTACLE, Mesh, which
 from drivers.benchmark.scenes.problems import Common
 from ngcontact import Elastic
 from ngcontact.arrays import from_triplets
@@ -176,17 +176,6 @@ def segments(made: Mesh, order: int, ends: Indices) -> dict[str, Indices]:
         name: np.insert(pairs, 1, len(made.points) + which(ends, pairs), axis=1)
         for name, pairs in made.edges.items()
     }
-
-
-def interleaved(common: Common, made: Mesh, order: int) -> tuple[Array, Indices, Numbering]:
-    """Places (n, 2), nodes (ne, 3 or 6) of the triangles, and unknowns that go node by node."""
-    ends, number = sides(made.triangles)
-    places, cells = made.points, made.triangles
-    if order == 2:
-        places = np.vstack([places, middles(common, made, ends)])
-        cells = np.hstack([cells, len(made.points) + number])
-    unknown = np.arange(places.size).reshape(-1, 2).T
-    return places, cells, Numbering(made.points, unknown, segments(made, order, ends))
 
 
 @dataclass(frozen=True)

@@ -8,29 +8,24 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
-from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
-from drivers.benchmark.engines import NotInstalledError, Run, akantu, kratos, ngsolve
-from drivers.benchmark.engines.active_set import FELUPE, SCIKIT
+from drivers.benchmark.engines import NotInstalledError, Run, kratos, ngsolve
+from drivers.benchmark.engines.active_set import SCIKIT
 from drivers.benchmark.scenes.meshes import KINDS
 from drivers.benchmark.scenes.problems import COMMONS, Common
 from drivers.benchmark.studies import Extent
 from drivers.tables import table
 from ngcontact import adapt
 
-ENGINES = (ngsolve.PENALTY, ngsolve.ACTIVE_SET, SCIKIT, FELUPE, kratos.MORTAR, akantu.PENALTY)
+ENGINES = (ngsolve.PENALTY, ngsolve.ACTIVE_SET, SCIKIT, kratos.MORTAR)
 OURS = "ngcontact"
 BUDGET = {2: 100_000, 3: 60_000, 4: 40_000}  # unknowns by order
 SIZES = (1_000, 4_000, 16_000, 64_000)
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 QUANTITIES = ("force", "peak", "half_width", "energy")
 TOGETHER = ("force", "peak", "half_width")
-BOUNDS = np.logspace(-1, -7, 61)  # errors below the last are those of the references
-LINES = {"uniform": "--", "graded": ":", "adaptive": "-"}
 
 
 @dataclass(frozen=True)
@@ -148,7 +143,6 @@ def accuracy(extent: Extent) -> tuple[list[Point], str]:
         here, lines = points(COMMONS[name](), extent.rounds, extent.max_dofs)
         found += here
         missing |= set(lines)
-    draw(extent.out / "benchmark_accuracy.png", found)
     return found, "\n\n".join([of_accuracy(found), *sorted(missing)])
 
 
@@ -167,39 +161,3 @@ def of_accuracy(found: Sequence[Point]) -> str:
     return table(
         ("problem", "quantity", "engine", "meshes", *(f"{t:.0e}" for t in TOLERANCES)), rows
     )
-
-
-def draw(path: Path, found: Sequence[Point]) -> None:
-    """Seconds from which errors stay below a bound: problems in rows, quantities in columns.
-
-    One line for an engine and kind of mesh, of its best order and settings, as in the table.
-    """
-    problems = list(dict.fromkeys(p.run.problem for p in found))
-    figure = Figure(figsize=(4 * len(QUANTITIES), 3.6 * len(problems)), layout="constrained")
-    panels = figure.subplots(
-        len(problems), len(QUANTITIES), sharex=True, sharey=True, squeeze=False
-    )
-    engines = [e for e in dict.fromkeys(p.engine for p in found) if e != OURS]
-    for row, problem in zip(panels, problems, strict=True):
-        mine = [p for p in found if p.run.problem == problem]
-        for panel, name in zip(row, QUANTITIES, strict=True):
-            panel.set_title(f"{problem}: {name.replace('_', '-')}", fontsize=10)
-            panel.grid(which="major", alpha=0.3)
-            for series in dict.fromkeys(p.series for p in found):
-                engine, kind = series
-                ours = engine == OURS
-                panel.loglog(
-                    [best_seconds(mine, series, (name,), bound) for bound in BOUNDS],
-                    BOUNDS,
-                    LINES[kind],
-                    color="black" if ours else f"C{engines.index(engine)}",
-                    lw=2.2 if ours else 1.2,
-                    label=f"{engine}, {kind}",
-                )
-    for panel in panels[-1]:
-        panel.set_xlabel("seconds")
-    for row in panels:
-        row[0].set_ylabel("relative error")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=5, fontsize=8)
-    FigureCanvasAgg(figure).print_png(path)
