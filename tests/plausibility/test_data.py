@@ -54,9 +54,11 @@ def test_what_goes_along_a_guide_does_not_contradict_it(angle):
     problem = replace(
         loaded(), geometry=OCCGeometry(shape, dim=2), displacement={"bottom": along}, sliding="left"
     )
+    free = replace(problem, displacement={"bottom": (0.1, None)})  # along y whatever fits the guide
     with warnings.catch_warnings():
         warnings.simplefilter("error", ContactWarning)
         solve(problem, maxh=0.4)
+        assert angle == 0 or not contradictions(free, first_mesh(free, 0.4))
     across = {"bottom": (0.1 * math.cos(a), 0.1 * math.sin(a))}
     with pytest.warns(ContactWarning, match="across the guide"):
         solve(replace(problem, displacement=across), maxh=0.4)
