@@ -9,11 +9,8 @@ from __future__ import annotations
 import math
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, redirect_stdout
-from io import TextIOBase
-from pathlib import Path
-from typing import Annotated, Any, TextIO, TypeAlias, TypeVar
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any, TypeAlias, TypeVar
 
 from cyclopts import App, CycloptsError, Group, Parameter, Token
 from cyclopts.validators import Number
@@ -57,32 +54,6 @@ def module_of(main: Callable[..., object]) -> str:
     """What follows ``python -m`` to run `main`."""
     spec = sys.modules[main.__module__].__spec__  # of __main__, the module that was asked for
     return spec.name.removesuffix(".__main__") if spec else main.__module__
-
-
-class _Twice(TextIOBase):
-    """A stream that writes to two."""
-
-    def __init__(self, *streams: TextIO) -> None:
-        self.streams = streams
-
-    def write(self, text: str) -> int:
-        """Write, at once: a study may take long, and be ended."""
-        for stream in self.streams:
-            stream.write(text)
-            stream.flush()
-        return len(text)
-
-
-@contextmanager
-def printed_in(folder: Path | None, name: str) -> Iterator[None]:
-    """Write what is printed meanwhile in a file of the folder, too; nowhere else without one."""
-    if folder is None:
-        yield
-        return
-    folder.mkdir(parents=True, exist_ok=True)
-    with (folder / name).open("w", encoding="utf-8") as file:
-        with redirect_stdout(_Twice(sys.stdout, file)):
-            yield
 
 
 def run(main: Callable[..., Result], tokens: Sequence[str] | None = None) -> Result:

@@ -14,13 +14,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
 import ngsolve as ng
 import numpy as np
 
-from drivers.command_line import Count, printed_in, run
+from drivers.command_line import Count, run
 from drivers.reference import cases, paper
 from drivers.reference.cases import Case
 from drivers.reference.curved import Rings
@@ -212,7 +211,7 @@ def print_table(title: str, table: Table, one: Run, levels: int) -> list[Level]:
 
 
 def main(
-    parts: Sequence[Part] = get_args(Part), *, levels: Count = LEVELS, out: Path | None = None
+    parts: Sequence[Part] = get_args(Part), *, levels: Count = LEVELS
 ) -> dict[str, list[Level]]:
     """Errors against exact solutions under uniform refinement, one table a problem and element.
 
@@ -225,8 +224,6 @@ def main(
         Patch tests, which need one mesh, and problems with exact solutions.
     levels : int
         Number of meshes of order 1, each of half the size of the one before; one less at order 2.
-    out : path, optional
-        Folder in which what is printed is written, too, as convergence.txt.
 
     Returns
     -------
@@ -234,18 +231,17 @@ def main(
         Rows by title of the table.
     """
     found: dict[str, list[Level]] = {}
-    with printed_in(out, "convergence.txt"):
-        for part in parts:
-            if part == "patch":
-                for name, (make, order) in PATCHES.items():
-                    print(f"\npatch test: {name}, order {order}")
-                    rows = study(make(), order=order, maxh=0.3, levels=1)
-                    found[name] = printed(COLUMNS, (row for _, row in rows))
-                continue
-            table = TABLES[part]
-            for one in table.runs:
-                title = f"{table.title}, {one.element}, order {one.order}"
-                found[title] = print_table(title, table, one, max(1, levels + 1 - one.order))
+    for part in parts:
+        if part == "patch":
+            for name, (make, order) in PATCHES.items():
+                print(f"\npatch test: {name}, order {order}")
+                rows = study(make(), order=order, maxh=0.3, levels=1)
+                found[name] = printed(COLUMNS, (row for _, row in rows))
+            continue
+        table = TABLES[part]
+        for one in table.runs:
+            title = f"{table.title}, {one.element}, order {one.order}"
+            found[title] = print_table(title, table, one, max(1, levels + 1 - one.order))
     return found
 
 

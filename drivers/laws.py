@@ -15,11 +15,10 @@ import math
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Literal, TypeAlias, get_args
 
 from drivers.adaptive_study.runs import Strategy, levels_of, rate
-from drivers.command_line import Count, Order, Positive, printed_in, run
+from drivers.command_line import Count, Order, Positive, run
 from drivers.reference.cases import Case
 from drivers.reference.laws import bent_fibres, graded, pressed_fibres, stiff_and_soft
 from drivers.reference.straight import energy_error
@@ -75,7 +74,6 @@ def main(
     contrasts: Sequence[Positive] = CONTRASTS,
     orders: Sequence[Order] = (1, 2, 3, 4),
     max_dofs: Count = 10_000,
-    out: Path | None = None,
 ) -> dict[str, list[Level]]:
     """Estimates, bounds and rates under any law, uniform and adaptive, against exact solutions.
 
@@ -93,8 +91,6 @@ def main(
         Degrees of the displacement on each element, 1 to 4.
     max_dofs : int
         Number of unknowns that no level exceeds.
-    out : path, optional
-        Folder in which the table is written, too, as laws.md.
 
     Returns
     -------
@@ -109,12 +105,11 @@ def main(
         for order in orders
         for strategy in get_args(Strategy)
     )
-    with printed_in(out, "laws.md"):
-        print(table((*TITLES, "estimate", "bound"), []))
-        for title, case, order, strategy in runs:
-            rows = levels(case, strategy, order, max_dofs)
-            found[f"{title}, order {order}, {strategy}"] = rows
-            print(line(title, order, strategy, rows), flush=True)
+    print(table((*TITLES, "estimate", "bound"), []))
+    for title, case, order, strategy in runs:
+        rows = levels(case, strategy, order, max_dofs)
+        found[f"{title}, order {order}, {strategy}"] = rows
+        print(line(title, order, strategy, rows), flush=True)
     return found
 
 

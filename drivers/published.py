@@ -21,7 +21,7 @@ import ngsolve as ng
 import numpy as np
 from netgen.occ import Compound, OCCGeometry, Rectangle, WorkPlane, Y
 
-from drivers.command_line import Count, Order, printed_in, run
+from drivers.command_line import Count, Order, run
 from drivers.reference.half_spaces import Hertz
 from drivers.tables import table
 from ngcontact import Contact, Elastic, Problem, Solution, adapt
@@ -323,7 +323,6 @@ def main(
     order: Order = 3,
     max_dofs: Count = 15_000,
     page: Path | None = None,
-    out: Path | None = None,
 ) -> dict[str, Solution]:
     """Published problems, one after the other.
 
@@ -337,8 +336,6 @@ def main(
         Number of unknowns that no level exceeds.
     page : path, optional
         File in which the table is written as a page.
-    out : path, optional
-        Folder in which what is printed is written, too, as published.md.
 
     Returns
     -------
@@ -347,12 +344,11 @@ def main(
     """
     solutions: dict[str, Solution] = {}
     sections = []
-    with printed_in(out, "published.md"):
-        for name in names:
-            started = time.perf_counter()
-            solutions[name] = solved(PUBLISHED[name], order, max_dofs)
-            sections.append(section(PUBLISHED[name], solutions[name]))
-            print(sections[-1], f"\n({time.perf_counter() - started:.1f} s)")
+    for name in names:
+        started = time.perf_counter()
+        solutions[name] = solved(PUBLISHED[name], order, max_dofs)
+        sections.append(section(PUBLISHED[name], solutions[name]))
+        print(sections[-1], f"\n({time.perf_counter() - started:.1f} s)")
     if page is not None:
         page.write_text(HEAD.format(order=order, max_dofs=max_dofs) + "\n".join(sections) + "\n")
     return solutions

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import netgen.occ as occ
@@ -24,6 +24,7 @@ from drivers.reference.half_spaces import plane_modulus, reduced
 from drivers.reference.solids import quarter_cubes
 from drivers.tables import Columns, printed
 from ngcontact import Contact, Elastic, Hooke, Problem, Solution, adapt, solve
+from ngcontact.arrays import Array, Mask
 from ngcontact.geometries import (
     ball_in_cup,
     ball_on_block,
@@ -93,8 +94,8 @@ def rows_of(
     mesh: ng.Mesh | None = None,
     maxh: float | None = None,
     max_dofs: int | None = None,
-) -> tuple[Solution, list[tuple[str, float, float]], Iterator[Row]]:
-    """A solution, a list to put names, values and exact values into, and the rows made of it.
+) -> tuple[Solution, Callable[[str, float, float], Row]]:
+    """A solution, and the row of a quantity: its name, its value and the exact one.
 
     The last level of `adapt` where `max_dofs` are given.
     """
@@ -105,10 +106,23 @@ def rows_of(
         levels = adapt(problem, maxh=maxh, order=order, max_dofs=max_dofs, theta=STEP)
         *_, solution = levels
     seconds = time.process_time() - start
-    found: list[tuple[str, float, float]] = []
     unknowns, solves = solution.displacement.space.ndof, solution.work["back_solves"]
-    rows = (Row(scene, order, unknowns, q, x, exact, solves, seconds) for q, x, exact in found)
-    return solution, found, rows
+
+    def row(quantity: str, computed: float, exact: float) -> Row:
+        return Row(scene, order, unknowns, quantity, computed, exact, solves, seconds)
+
+    return solution, row
+
+
+def rms(solution: Solution, inside: Mask, off: Array) -> float:
+    """Root of the mean over the area `inside` (m,) of squared differences `off` (m,) at points."""
+    weight = solution.pairs[0].line.weight[inside]
+    return math.sqrt(float(weight @ off[inside] ** 2 / weight.sum()))
+
+
+def radius_of(area: float) -> float:
+    """Radius of the circle of a quarter of which this is the area."""
+    return math.sqrt(4 * area / math.pi)
 
 
 def press_fit(order: int, finer: float, matched: bool) -> Iterator[Row]:
@@ -123,13 +137,10 @@ def press_fit(order: int, finer: float, matched: bool) -> Iterator[Row]:
     if not matched:
         inner = dict.fromkeys(("inner", "inner_contact", "hole"), 0.25 * finer)
         mesh, name = sized(problem.geometry, inner, 0.3 * finer), "press fit, unmatched"
-    solution, found, rows = rows_of(
-        name, problem, order, mesh=mesh, maxh=None if mesh else 0.35 * finer
-    )
+    solution, row = rows_of(name, problem, order, mesh=mesh, maxh=None if mesh else 0.35 * finer)
     weight, pressure = solution.pairs[0].line.weight, solution.pressure
-    found.append(("mean pressure", float(weight @ pressure / weight.sum()), PRESS_FIT))
-    found.append(("largest pressure", float(pressure.max()), PRESS_FIT))
-    yield from rows
+    yield row("mean pressure", float(weight @ pressure / weight.sum()), PRESS_FIT)
+    yield row("largest pressure", float(pressure.max()), PRESS_FIT)
 
 
 def cup(order: int, finer: float) -> Iterator[Row]:
@@ -143,14 +154,13 @@ def cup(order: int, finer: float) -> Iterator[Row]:
     )
     sizes = {"ball_surface": 0.12 * finer, "cup_surface": 0.12 * finer}
     mesh = sized(problem.geometry, sizes, 0.5 * finer)
-    solution, found, rows = rows_of("ball in cup, normals", problem, order, mesh=mesh)
+    solution, row = rows_of("ball in cup, normals", problem, order, mesh=mesh)
     line, active = solution.pairs[0].line, solution.active
-    found.append(("force", 4 * float(solution.contact_force()[2]), CUP[0]))
+    yield row("force", 4 * float(solution.contact_force()[2]), CUP[0])
     near = np.argsort(np.hypot(*solution.points[:, :2].T))[:4]
-    found.append(("pressure at the axis", float(solution.pressure[near].mean()), CUP[1]))
-    area = 4 * float(line.weight[active] @ -line.direction[active, 2])
-    found.append(("end, by area", math.sqrt(area / math.pi), CUP[2]))
-    yield from rows
+    yield row("pressure at the axis", float(solution.pressure[near].mean()), CUP[1])
+    area = float(line.weight[active] @ -line.direction[active, 2])
+    yield row("end, by area", radius_of(area), CUP[2])
 
 
 def ellipse(A: float, B: float, force: float, modulus: float) -> tuple[float, float, float]:
@@ -175,15 +185,13 @@ def semi_axes(
     force, (x, y, _) = solution.force, solution.points.T
     a, b, p0 = ellipse(A, B, 4 * float(force.sum()), modulus)
     axes = (math.sqrt(5 * float(force @ at**2) / float(force.sum())) for at in (x, y))
-    pressure, weight = solution.pressure, solution.pairs[0].line.weight
     square = 1 - (x / a) ** 2 - (y / b) ** 2
-    inside = square > 0.36  # within .8 of the semi-axes
-    off = (pressure - p0 * np.sqrt(np.maximum(square, 0.0)))[inside] / p0
-    rms = math.sqrt(float(weight[inside] @ off**2 / weight[inside].sum()))
+    off = solution.pressure / p0 - np.sqrt(np.maximum(square, 0.0))
+    within = square > 0.36  # .8 of the semi-axes
     return [
         *zip(("semi-axis a", "semi-axis b"), axes, (a, b), strict=True),
         ("area", 4 * solution.contact_area(), math.pi * a * b),
-        ("pressure of points, rms", rms, 0.0),
+        ("pressure of points, rms", rms(solution, within, off), 0.0),
     ]
 
 
@@ -197,10 +205,10 @@ def cylinders(order: int, max_dofs: int) -> Iterator[Row]:
         sliding="cut_x|cut_y",
         contact=[Contact("upper_surface", "lower_surface", direction=(0, 0, -1))],
     )
-    solution, found, rows = rows_of("crossed cylinders", problem, order, max_dofs=max_dofs)
+    solution, row = rows_of("crossed cylinders", problem, order, max_dofs=max_dofs)
     modulus = reduced([plane_modulus(STEEL.E, STEEL.nu)] * 2)
-    found += semi_axes(solution, 1 / 40, 1 / 20, modulus)
-    yield from rows
+    for quantity in semi_axes(solution, 1 / 40, 1 / 20, modulus):
+        yield row(*quantity)
 
 
 def blocks(order: int, max_dofs: int) -> Iterator[Row]:
@@ -220,10 +228,10 @@ def blocks(order: int, max_dofs: int) -> Iterator[Row]:
             )
         ],
     )
-    solution, found, rows = rows_of("ellipse, B/A = 4", problem, order, maxh=0.4, max_dofs=max_dofs)
+    solution, row = rows_of("ellipse, B/A = 4", problem, order, maxh=0.4, max_dofs=max_dofs)
     modulus = reduced([plane_modulus(law.E, law.nu) for law in (SOFT, HARD)])
-    found += semi_axes(solution, A, B, modulus)
-    yield from rows
+    for quantity in semi_axes(solution, A, B, modulus):
+        yield row(*quantity)
 
 
 def layered(order: int, max_dofs: int) -> Iterator[Row]:
@@ -243,17 +251,13 @@ def layered(order: int, max_dofs: int) -> Iterator[Row]:
         sliding="cut_x|cut_y",
         contact=[ball],
     )
-    solution, found, rows = rows_of(
-        "layered half-space", problem, order, maxh=0.5, max_dofs=max_dofs
-    )
+    solution, row = rows_of("layered half-space", problem, order, maxh=0.5, max_dofs=max_dofs)
     force, (x, y, _) = solution.force, solution.points.T
     total = float(force.sum())
     radius = (0.75 * 4 * total / LAYERED_MODULUS) ** (1 / 3)
-    by_area = math.sqrt(4 * solution.contact_area() / math.pi)
-    found.append(("radius by area", by_area, radius))
+    yield row("radius by area", radius_of(solution.contact_area()), radius)
     by_moments = math.sqrt(2.5 * float(force @ (x**2 + y**2)) / total)
-    found.append(("radius by moments", by_moments, radius))
-    yield from rows
+    yield row("radius by moments", by_moments, radius)
 
 
 def meridian(depth: float) -> Solution:
@@ -280,20 +284,16 @@ def ball(order: int, max_dofs: int) -> Iterator[Row]:
         contact=[Contact("ball_surface", "block_top", direction=(0, 0, -1))],
     )
     exact = meridian(depth)
-    solution, found, rows = rows_of("ball on block", problem, order, max_dofs=max_dofs)
+    solution, row = rows_of("ball on block", problem, order, max_dofs=max_dofs)
     [end], r = exact.transitions(), np.hypot(*solution.points[:, :2].T)
     rising, peak = np.argsort(exact.points[:, 0]), float(exact.pressure.max())
     expected = np.interp(r, exact.points[rising, 0], exact.pressure[rising])
-    inside, weight = r < 0.8 * end[0], solution.pairs[0].line.weight
-    off = (solution.pressure - expected)[inside] / peak
-    rms = math.sqrt(float(weight[inside] @ off**2 / weight[inside].sum()))
+    inside, off = r < 0.8 * end[0], (solution.pressure - expected) / peak
     force, axial = 4 * solution.contact_force()[2], exact.contact_force()[1]
-    found.append(("force", float(force), float(axial)))
-    by_area = math.sqrt(4 * solution.contact_area() / math.pi)
-    found.append(("end, by area", by_area, float(end[0])))
-    found.append(("pressure of points, rms", rms, 0.0))
-    found.append(("pressure of points, max", float(np.abs(off).max()), 0.0))
-    yield from rows
+    yield row("force", float(force), float(axial))
+    yield row("end, by area", radius_of(solution.contact_area()), float(end[0]))
+    yield row("pressure of points, rms", rms(solution, inside, off), 0.0)
+    yield row("pressure of points, max", float(np.abs(off[inside]).max()), 0.0)
 
 
 def balls(order: int, max_dofs: int) -> Iterator[Row]:
@@ -309,14 +309,13 @@ def balls(order: int, max_dofs: int) -> Iterator[Row]:
         sliding="cut_x|cut_y",
         contact=[Contact("surface", direction=(0, 0, -1), gap=lambda x, y, z: z)],
     )
-    solution, found, rows = rows_of("SSNV104, two balls", problem, order, max_dofs=max_dofs)
+    solution, row = rows_of("SSNV104, two balls", problem, order, max_dofs=max_dofs)
     peak = solution.quantities()["peak pressure"].value
-    found.append(("largest pressure", peak, 2798.3))
-    radius = math.sqrt(4 * solution.contact_area() / math.pi)
+    yield row("largest pressure", peak, 2798.3)
+    radius = radius_of(solution.contact_area())
     force = 4 * float(solution.force.sum())
     modulus = reduced([plane_modulus(20e3, 0.3)] * 2)
-    found.append(("radius, at its force", radius, (0.75 * force * 25 / modulus) ** (1 / 3)))
-    yield from rows
+    yield row("radius, at its force", radius, (0.75 * force * 25 / modulus) ** (1 / 3))
 
 
 def column(order: int, finer: float) -> Iterator[Row]:
@@ -328,10 +327,9 @@ def column(order: int, finer: float) -> Iterator[Row]:
         traction={"cube_top": 0.1},
         contact=[Contact("cube_bottom", "block_top", direction=(0, 0, -1))],
     )
-    solution, found, rows = rows_of("column, no supports", problem, order, maxh=0.5 * finer)
-    found.append(("force", float(solution.contact_force()[2]), 0.1))
-    found.append(("largest pressure", float(solution.pressure.max()), 0.1))
-    yield from rows
+    solution, row = rows_of("column, no supports", problem, order, maxh=0.5 * finer)
+    yield row("force", float(solution.contact_force()[2]), 0.1)
+    yield row("largest pressure", float(solution.pressure.max()), 0.1)
 
 
 def main(*, finer: Positive = 1.0, max_dofs: Count = 30_000) -> list[Row]:

@@ -64,7 +64,7 @@ def main(
 ) -> dict[Part, list[Any]]:
     """Run time against error, measured beside other codes on one machine.
 
-    Prints Markdown tables and writes them, with pictures. Everything takes about 55 minutes, 20 of
+    Prints Markdown tables and writes them. Everything takes about 55 minutes, 20 of
     them for the accuracy. Codes of the optional group bench that are not installed are left out.
 
     Parameters
@@ -89,7 +89,7 @@ def main(
     out.mkdir(parents=True, exist_ok=True)
     ng.SetNumThreads(1)
     print(machine(), flush=True)
-    extent, found = Extent(problems, rounds, max_dofs, out), {}
+    extent, found = Extent(problems, rounds, max_dofs), {}
     for name in parts:
         found[name], table = PARTS[name](extent)
         text = f"{machine()}\n\n## {PARTS[name].__doc__}\n\n{table}\n"

@@ -20,6 +20,7 @@ from drivers.reference.westergaard import (
     CF,
     SIDES,
     Field,
+    Potential,
     depth,
     effective_modulus,
     half_plane,
@@ -79,61 +80,46 @@ def equilibrium_fields(
     return displacement, stress, dict.fromkeys(fields, NO_FORCE)
 
 
-def _root_profiles(c: float, upper: Elastic, lower: Elastic) -> tuple[Profile, Profile]:
-    """Pressure and gap of `transition` and `transition_cutoff`."""
-    opening = 4 * c / (3 * effective_modulus(upper, lower))
-    return (
-        lambda x: c * np.sqrt(np.maximum(-np.asarray(x, float), 0)),
-        lambda x: opening * np.maximum(np.asarray(x, float), 0) ** 1.5,
-    )
-
-
-def transition(upper: Elastic, lower: Elastic, *, c: float = 1.0) -> Exact:
+def transition(
+    upper: Elastic, lower: Elastic, *, c: float = 1.0, plateau: float | None = None
+) -> Exact:
     """One change from contact (x < 0) to separation (x > 0) of bodies with no initial gap.
 
     Z = i c sqrt(z): p = c sqrt(-x), gap = 4 c x^(3/2) / (3 E*). The displacement grows as r^(3/2),
     which is the regularity of frictionless contact with smooth data. Units: c stress per square
-    root of length.
+    root of length. With a `plateau` times a C^3 cut-off chi, see `_fields`.
     """
-    materials = {"upper": upper, "lower": lower}
-    fields = {
-        body: half_plane(root_potential(c, body), material, body)
-        for body, material in materials.items()
-    }
-    return Exact(*equilibrium_fields(fields, materials), *_root_profiles(c, upper, lower))
+    opening = 4 * c / (3 * effective_modulus(upper, lower))
+    potentials = {body: root_potential(c, body) for body in SIDES}
+    return Exact(
+        *_fields(potentials, {"upper": upper, "lower": lower}, plateau),
+        pressure=lambda x: c * np.sqrt(np.maximum(-np.asarray(x, float), 0)),
+        gap=lambda x: opening * np.maximum(np.asarray(x, float), 0) ** 1.5,
+    )
 
 
-def transition_cutoff(
-    upper: Elastic, lower: Elastic, *, c: float = 1.0, height: float = 1.0, plateau: float = 0.5
-) -> Exact:
-    """`transition` times a C^3 cut-off chi: 1 for |y| <= plateau, falling to 0 at |y| = height.
-
-    Displacement and traction vanish on |y| = height, the homogeneous data of HH81 (3.6) and (3.8):
-    clamped top, guided bottom. The remaining data are tractions on the sides and a body force, zero
-    for |y| <= plateau. With a guided bottom the problem is semicoercive (HH81 Remark 3.7): the
-    lower body is determined up to a translation along x.
-    """
-    materials = {"upper": upper, "lower": lower}
-    fields = {
-        body: half_plane(root_potential(c, body), material, body)
-        for body, material in materials.items()
-    }
-    cut = _cut_off(fields, materials, height, plateau)
-    return Exact(*cut, *_root_profiles(c, upper, lower))
-
-
-def _cut_off(
-    fields: dict[str, Field], materials: dict[str, Elastic], height: float, plateau: float
+def _fields(
+    potentials: dict[str, Potential], materials: dict[str, Elastic], plateau: float | None
 ) -> tuple[dict[str, CF], dict[str, CF], dict[str, CF]]:
-    """Displacement, stress and force of equilibrated fields times the cut-off in |y|."""
+    """Displacement, stress and force of equilibrated fields, with a `plateau` times a cut-off.
+
+    That is 1 for |y| <= plateau and falls to 0 at |y| = 1, where displacement and traction vanish:
+    the homogeneous data of HH81 (3.6) and (3.8), clamped top, guided bottom. The remaining data are
+    tractions on the sides and a body force, zero for |y| <= plateau. With a guided bottom the
+    problem is semicoercive (HH81 Remark 3.7): the lower body is determined up to a translation
+    along x.
+    """
+    fields = {body: half_plane(potentials[body], law, body) for body, law in materials.items()}
+    if plateau is None:
+        return equilibrium_fields(fields, materials)
     displacement, stress, force = {}, {}, {}
     for body, material in materials.items():
         u, grad = fields[body]
-        m, t = moduli(material), (depth(body) - plateau) / (height - plateau)
+        m, t = moduli(material), (depth(body) - plateau) / (1 - plateau)
         t = ng.IfPos(t, ng.IfPos(1 - t, t, 1.0), 0.0)
         chi = 1 - t**4 * (35 - 84 * t + 70 * t**2 - 20 * t**3)
-        d1 = -SIDES[body] * 140 * t**3 * (1 - t) ** 3 / (height - plateau)  # d chi / dy
-        d2 = -420 * t**2 * (1 - t) ** 2 * (1 - 2 * t) / (height - plateau) ** 2
+        d1 = -SIDES[body] * 140 * t**3 * (1 - t) ** 3 / (1 - plateau)  # d chi / dy
+        d2 = -420 * t**2 * (1 - t) ** 2 * (1 - 2 * t) / (1 - plateau) ** 2
         displacement[body] = chi * u
         s, outer = hooke(material, grad), ng.CF((0, d1 * u[0], 0, d1 * u[1]), dims=(2, 2))
         stress[body] = hooke(material, chi * grad + outer)
@@ -158,26 +144,18 @@ def hertz(
     p = p0 sqrt(1 - x^2/a^2), p0 = a E* / (2 R), P = pi a p0 / 2 (K. L. Johnson, Contact Mechanics,
     1985, chapter 4): exact for the linearised enlarging zone problem, direction along y. For two
     curved bodies 1/R is the sum of both curvatures. With a `plateau` displacement and traction fall
-    to zero on |y| = 1, see `transition_cutoff`.
+    to zero on |y| = 1, see `_fields`.
     """
-    materials = {"upper": upper, "lower": lower}
     a = half_width
     p0 = a * effective_modulus(upper, lower) / (2 * radius)
-    fields = {
-        body: half_plane(hertz_potential(p0 / a, a, body), material, body)
-        for body, material in materials.items()
-    }
+    potentials = {body: hertz_potential(p0 / a, a, body) for body in SIDES}
 
     def gap(x: ArrayLike) -> NDArray[np.float64]:
         s = np.maximum(np.abs(np.asarray(x, float)) / a, 1.0)
         return a**2 / (2 * radius) * (s * np.sqrt(s**2 - 1) - np.arccosh(s))
 
-    if plateau is None:
-        parts = equilibrium_fields(fields, materials)
-    else:
-        parts = _cut_off(fields, materials, 1.0, plateau)
     return Hertz(
-        *parts,
+        *_fields(potentials, {"upper": upper, "lower": lower}, plateau),
         pressure=lambda x: p0 * np.sqrt(np.maximum(1 - (np.asarray(x, float) / a) ** 2, 0)),
         gap=gap,
         initial_gap=ng.x * ng.x / (2 * radius),

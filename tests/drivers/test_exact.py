@@ -16,7 +16,6 @@ from drivers.reference.straight import (
     patch,
     relative_energy_error,
     transition,
-    transition_cutoff,
 )
 from drivers.reference.westergaard import effective_modulus
 from ngcontact.problem.material import Elastic
@@ -33,7 +32,7 @@ CASES = {
     "transition": (transition(UPPER, LOWER, c=1.3), HALVES),
     "hertz": (hertz(UPPER, LOWER, radius=5.0, half_width=0.3), HALVES),
     "patch": (patch(UPPER, LOWER, p0=1.0, p1=0.5), HALVES),
-    "cutoff": (transition_cutoff(UPPER, LOWER, c=1.3), HALVES),
+    "cutoff": (transition(UPPER, LOWER, c=1.3, plateau=0.5), HALVES),
     "curved": (curved(UPPER, LOWER), dict.fromkeys(SIDE, (-0.5, 0.5, -0.3, 0.3))),
     "rings": (rings(UPPER, LOWER, qn=0.4, qi=0.2, n=4, delta=0.01), RINGS),
 }

@@ -205,12 +205,11 @@ def test_bent_fibres_do_not_stretch():
 
 
 @pytest.mark.study
-def test_the_study_prints_a_table(capsys, tmp_path):
-    found = main(["layers"], contrasts=[1e2], orders=[1], max_dofs=400, out=tmp_path / "out")
+def test_the_study_prints_a_table(capsys):
+    found = main(["layers"], contrasts=[1e2], orders=[1], max_dofs=400)
     assert set(found) == {f"layers, 100, order 1, {s}" for s in ("uniform", "adaptive")}
     for rows in found.values():
         assert all(1 <= row.estimate <= 10 and row.bound >= 1 for row in rows)
     printed = capsys.readouterr().out
-    assert (tmp_path / "out" / "laws.md").read_text() == printed
     assert printed.count("| layers, 100 | 1 |") == 2
     assert math.isfinite(float(printed.splitlines()[-1].split("|")[6]))

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
 
 from drivers.benchmark.scenes.problems import COMMONS, Common, Name
 
 
 @dataclass(frozen=True)
 class Extent:
-    """How much is measured, and where pictures go; see `main`."""
+    """How much is measured; see `main`."""
 
     problems: Sequence[Name]
     rounds: int
     max_dofs: int
-    out: Path
 
     def cases(
         self, orders: Sequence[int], sizes: Sequence[int]

@@ -20,9 +20,6 @@ from typing import Literal, TypeAlias, cast
 
 import ngsolve as ng
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from drivers.benchmark.scenes.problems import COMMONS, Name
 from drivers.benchmark.studies import Extent
@@ -106,7 +103,6 @@ def apart(extent: Extent, sizes: Sequence[int], kinds: Sequence[Kind]) -> list[P
 def growth(extent: Extent) -> tuple[list[Process], str]:
     """Growth of time and memory."""
     rows = apart(extent, GROWTH, ("linear", "contact"))
-    draw(extent.out / "benchmark_growth.png", rows)
     return rows, of_growth(rows)
 
 
@@ -152,37 +148,6 @@ def of_large(rows: Sequence[Process]) -> str:
     }
     both = ([r for r in rows if r.kind == path] for path in PATHS)
     return markdown(columns, zip(*both, strict=True))
-
-
-def draw(path: Path, rows: Sequence[Process]) -> None:
-    """Seconds and memory against unknowns."""
-    figure = Figure(figsize=(9, 4), layout="constrained")
-    panels = figure.subplots(1, 2)
-    keys = list(dict.fromkeys((r.problem, r.order) for r in rows))
-    for panel, value, title in (
-        (panels[0], "seconds", "seconds"),
-        (panels[1], "memory", "peak memory, GB"),
-    ):
-        for number, (problem, order) in enumerate(keys):
-            for kind, style in (("linear", ":"), ("contact", "-")):
-                mine = [r for r in rows if (r.problem, r.order, r.kind) == (problem, order, kind)]
-                panel.loglog(
-                    [r.unknowns for r in mine],
-                    [getattr(r, value) for r in mine],
-                    style + "o",
-                    color=f"C{number}",
-                    ms=3,
-                    label=f"{problem}, order {order}, {kind}",
-                )
-        panel.set_title(title, fontsize=10)
-        panel.set_xlabel("unknowns")
-        panel.yaxis.set_major_locator(LogLocator(subs=(1, 2, 5)))
-        panel.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
-        panel.yaxis.set_minor_formatter(NullFormatter())
-        panel.grid(which="major", alpha=0.3)
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside right center", fontsize=8)
-    FigureCanvasAgg(figure).print_png(path)
 
 
 if __name__ == "__main__":
