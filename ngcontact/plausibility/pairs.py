@@ -39,52 +39,51 @@ from ..reference import triangle
 from ..solved import Solved
 from .refinement import moves_rigidly
 
-# Share of a pair's force below which a part of its zone does not matter.
+# Share of the force of a pair. Parts of a contact zone that carry less are not judged.
 FORCE_SHARE = 0.01
-# Intervals between nodes, for each end at open points, from which a zone in contact is resolved:
-# half a zone has one end, as its pressure has the peak in the middle. On 153 coarse meshes (discs,
-# blocks with Hertz's gap, pins in holes, orders 1 to 4) the peak was wrong by more than 10 % in 30
-# of 55 zones below, in 1 of 98 above (12 %), by more than 20 % in 24 and none. Three segments at
-# all orders warned of 93, of which 30 were wrong by 10 %.
+# Intervals between nodes that resolve a contact zone, for each of its ends at open points: a zone
+# cut by a symmetry plane has one. Measured on 153 coarse meshes (discs, blocks with Hertz's gap,
+# pins in holes, orders 1 to 4): of 55 zones with fewer intervals 30 had a peak that was wrong by
+# more than 10 %, 24 by more than 20 %; of 98 zones with more one was wrong by 12 %.
 RESOLVED_INTERVALS = 2
-RESOLVED_POINTS = 4  # of solids, points in contact of a zone with open points around it
-# Contact forces of this size, relative to the largest term of a force, are round-off.
+RESOLVED_POINTS = 4  # points in contact that resolve a zone between solids
+# Round-off of contact forces, relative to the largest term of a nodal force.
 FORCE_ROUND_OFF = 100 * np.finfo(float).eps
-# Share of the peak of the pressure from which it matters that bodies pass through each other. They
-# do by up to 0.12 beside a single point in contact, measured at orders 1 to 4; where curves touch
-# between points by 0.42 and more, with forces wrong by a third or not there.
+# Missing pressure relative to the peak pressure, from which a penetration is reported. Measured at
+# orders 1 to 4: up to 0.12 beside a single point in contact, where results are right; 0.42 and more
+# where curves touch between contact points, and forces are wrong by a third or vanish.
 MISSING_PRESSURE = 0.25
-# Mean pressure of a zone over the modulus of confined compression from which a result means
-# nothing: a layer would be pressed to no thickness, Hertz's zone be over two radii wide. Wrong
-# signs and units lie beyond by orders of magnitude, examples with loads in units of E do not. The
-# mean of a zone stays finite at the corners of a punch, where the peak does not; confined bodies
-# that are nearly incompressible bear pressures far above E at small strains.
+# Mean pressure of a zone over the modulus of confined compression, from which strains are large: a
+# layer would have no thickness left, a zone of Hertz be over two radii wide. Wrong signs and units
+# exceed it by orders of magnitude. The mean is taken as the peak at the corners of a punch is
+# infinite, and this modulus as nearly incompressible bodies bear pressures far above E.
 LARGE_PRESSURE = 1.0
-PLACES = (np.arange(4) + 0.5) / 4  # on a segment; what lies between them is 1 / 16 of its sagitta
-MOST_SEGMENTS = 32  # of a pair that are looked at for penetration
+# Parameters on a segment at which penetration is sampled; between two of them a curve departs from
+# its chord by 1 / 16 of what it does on the segment.
+PLACES = (np.arange(4) + 0.5) / 4
+MOST_SEGMENTS = 32  # segments of a pair that are sampled for penetration, those of least gap
 LENGTH_ROUND_OFF = 100 * np.finfo(float).eps  # of lengths and displacements
-# From which forces along the direction are wrong by 1 - cos = 3.4 %.
+# Angle to the direction, from which forces along it are wrong by 1 - cos = 3.4 %.
 INCLINED_ANGLE = np.deg2rad(15)
-END_MARGIN = 0.01  # of a segment
-# Error of the peak from which a way is warned of. Between two discs of radii 1 and 1, 1 and 3, 3
-# and 1 peaks were wrong by 0.93 to 1.05 times what is said here, measured at ways of 0.01 to 0.16;
-# of pins with a clearance of 2 to 25 % of their radius by 0.93 to 0.96 times that, of holes as
-# secondary, 5 to 25 %, by -1.02 to -1.06 times, at 2 % by half.
+# Predicted relative error of the peak pressure, from which bodies drawn apart are reported. The
+# measured error over it: 0.93 to 1.05 between two discs (radii 1 and 1, 1 and 3, 3 and 1, drawn
+# 0.01 to 0.16 apart); 0.93 to 0.96 of pins with a clearance of 2 to 25 % of their radius; of holes
+# as secondary -1.02 to -1.06 (5 to 25 %), and half of that at 2 %.
 PEAK_ERROR = 0.02
-# Share of a given gap of one sign from which a drawn one of the other sign contradicts it.
+# Drawn gap over a given gap of the other sign, from which the two contradict each other.
 CONTRADICTED_SHARE = 0.5
 
-PairWarnings = dict[tuple[str, int], str]  # messages by what is doubted and the number of the pair
+PairWarnings = dict[tuple[str, int], str]  # messages by kind of warning and number of the pair
 
 
 def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
-    """Messages on implausible results, by the kind of doubt and the number of the pair.
+    """Messages on implausible results, by the kind of warning and the number of the pair.
 
-    Fixed directions far from the normals, bodies that are drawn far apart or otherwise than their
-    gap is given, and strains that are not small, which no mesh mends; of the `last` mesh also zones
-    in contact that are too short for it, and bodies that pass through each other between contact
-    points. Of all pairs together, bodies that nothing resists and, of the `last` mesh, loads that
-    bring no pair into contact. Normals of solids that are drawn far apart are not looked at.
+    On every mesh: fixed directions far from the normals, bodies that are drawn far apart, a given
+    gap that contradicts the drawing, strains that are not small, and bodies that move rigidly. On
+    the `last` mesh also: contact zones that the mesh does not resolve, penetration between contact
+    points, and loads that bring no pair into contact. Solids that are drawn far apart are not
+    checked.
     """
     problem, pairs, space = solution.problem, solution.pairs, solution.discrete.space
     trace, u, plane = space.trace, solution.displacement.vec.FV().NumPy(), problem.dim == 2
@@ -117,7 +116,7 @@ def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
 
 
 def _all_open(solution: Solved) -> str:
-    """Message where something moves, nothing is in contact and no pair nearer, or nothing."""
+    """Message where bodies move and no pair comes into contact or closer; "" elsewhere."""
     pairs = [state for state in solution.pairs if state.gap.size]
     nearer = [state.active.any() or state.gap.min() < state.line.gap.min() for state in pairs]
     if not pairs or any(nearer) or not solution.displacement.vec.FV().NumPy().any():
@@ -129,7 +128,7 @@ def _all_open(solution: Solved) -> str:
 
 
 def _unresisted(solution: Solved) -> str:
-    """Message where bodies in contact move without any deformation, or nothing."""
+    """Message where bodies in contact move rigidly; "" elsewhere."""
     u = solution.displacement
     if not any(state.active.any() for state in solution.pairs) or not u.vec.FV().NumPy().any():
         return ""
@@ -201,7 +200,7 @@ def _whole_zone(state: ContactState) -> ContactZones:
 def _large_strains(
     problem: Problem, trace: BoundaryTrace, state: ContactState, zones: ContactZones
 ) -> str:
-    """Message where strains are far from small, or nothing."""
+    """Message where strains are not small; "" elsewhere."""
     pressure = float((np.abs(zones.force) / zones.weight).max(initial=0.0))
     modulus = _softer(lambda law: law.bulk + law.shear, problem, trace, state)
     if pressure <= LARGE_PRESSURE * modulus:
@@ -216,7 +215,7 @@ def _large_strains(
 def _softer(
     modulus: Callable[[Moduli], Array], problem: Problem, trace: BoundaryTrace, state: ContactState
 ) -> float:
-    """Mean of a modulus along each side, of the two the smaller one; a stress."""
+    """Mean of a `modulus` over the elements at each side; that of the softer side, a stress."""
     sides = [trace.element[state.line.segments], trace.element[state.line.facing]]
     asked = np.zeros(trace.mesh.ne, dtype=bool)
     asked[np.concatenate(sides)] = True
@@ -225,10 +224,10 @@ def _softer(
 
 
 def _short_zone(state: ContactState, zones: ContactZones) -> str:
-    """Message where zones in contact are too short for the mesh, or nothing.
+    """Message where the mesh does not resolve a contact zone; "" elsewhere.
 
     Below `RESOLVED_INTERVALS` the peak of Hertz's pressure is wrong by up to 70, 59, 64, 79 % at
-    orders 1 to 4. Contact of a whole line is resolved whatever its segments.
+    orders 1 to 4. A whole line in contact has no ends to be resolved.
     """
     cut = (zones.ends > 0) & (np.abs(zones.force) > FORCE_SHARE * np.abs(state.force).sum())
     needed = RESOLVED_INTERVALS * zones.ends / (state.line.rows.shape[1] - 1)
@@ -244,7 +243,7 @@ def _short_zone(state: ContactState, zones: ContactZones) -> str:
 
 
 def _small_zone(state: ContactState) -> str:
-    """Message where a zone between solids has too few points in contact, or nothing."""
+    """Message where a contact zone between solids has too few points; "" elsewhere."""
     rows, m = state.line.rows, len(state.gap)
     closed, opened = (np.append(x, False)[rows] for x in (state.active, ~state.active))
     first = np.broadcast_to(rows[np.arange(len(rows)), closed.argmax(axis=1)][:, None], rows.shape)
@@ -265,23 +264,23 @@ def _small_zone(state: ContactState) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class _Between:
-    """Places (k,) between contact points, what they face there, and how far apart it is drawn."""
+class _Samples:
+    """k samples of two facing surfaces between contact points."""
 
-    segment: Index  # (k,)
-    s: Array  # (k, ...) on it
-    x: Array  # (k, d)
-    direction: Array  # (k, d)
-    facing: Index  # (k,), negative where nothing faces
-    s_facing: Array  # (k, ...)
-    distance: Array  # (k,), infinite where nothing is met
+    segment: Index  # (k,), of the secondary
+    s: Array  # (k, ...), places on it
+    x: Array  # (k, d), lengths
+    direction: Array  # (k, d), unit vectors to the primary
+    facing: Index  # (k,), segments of the primary, negative where none faces
+    s_facing: Array  # (k, ...), places on these
+    distance: Array  # (k,), drawn, along the direction; infinite where nothing faces
 
 
-def _between_points(trace: BoundaryTrace, state: ContactState) -> _Between:
-    """Places on segments in the plane: not where all points are in contact, nor where it is wide.
+def _samples_of_lines(trace: BoundaryTrace, state: ContactState) -> _Samples:
+    """Samples on segments of the plane where the gap may be negative between contact points.
 
-    The gap may be negative between nodes unless it is wide beside its change on the segment and its
-    neighbours.
+    These have an open point, and a least gap that is small compared with its change over the
+    segment and its neighbours.
     """
     line, gap, contact = state.line, np.maximum(state.gap, 0.0), state.line.contact
     whole = np.flatnonzero((line.rows >= 0).all(axis=1))
@@ -295,11 +294,11 @@ def _between_points(trace: BoundaryTrace, state: ContactState) -> _Between:
     if contact.direction is not None:
         d = np.tile(contact.direction, (len(s), 1))
     there = partners(trace, line.facing, segment, x, d, nodes=False)
-    return _Between(segment, s, x, d, there.segment, there.s, there.distance)
+    return _Samples(segment, s, x, d, there.segment, there.s, there.distance)
 
 
-def _between_nodes(trace: BoundaryTrace, state: ContactState) -> _Between:
-    """Corners and centres of the facing parts of facets of solids with open points."""
+def _samples_of_surfaces(trace: BoundaryTrace, state: ContactState) -> _Samples:
+    """Samples on facets of solids: corners and centres of facing parts, where a point is open."""
     zone = state.line
     assert isinstance(trace, FacetTrace)  # of solids
     assert isinstance(zone, ContactZone)
@@ -314,18 +313,19 @@ def _between_nodes(trace: BoundaryTrace, state: ContactState) -> _Between:
     if zone.contact.primary is not None:
         there = zone.facing[facing]
         s_there, distance = onto(x, d, trace.curve, there)
-    return _Between(zone.segments[local], s, x, d, there, s_there, distance)
+    return _Samples(zone.segments[local], s, x, d, there, s_there, distance)
 
 
 def _penetration(solution: Solved, state: ContactState, peak: float) -> str:
-    """Message where bodies pass through each other between contact points, or nothing.
+    """Message where bodies penetrate each other between contact points; "" elsewhere.
 
-    On the curves of the mesh. `peak` is the largest pressure of all pairs.
+    Surfaces are those of the mesh. `peak` is the largest pressure of all pairs.
     """
     trace, contact = solution.discrete.space.trace, state.line.contact
     if contact.bilateral or state.active.all():
         return ""
-    seen = (_between_points if trace.mesh.dim == 2 else _between_nodes)(trace, state)
+    sample = _samples_of_lines if trace.mesh.dim == 2 else _samples_of_surfaces
+    seen = sample(trace, state)
     if contact.gap is not None and len(seen.x):
         apart = prescribed_gap(contact, trace, seen.segment, seen.s, seen.x)
         seen = replace(seen, distance=apart)
@@ -355,12 +355,11 @@ def _penetration(solution: Solved, state: ContactState, peak: float) -> str:
 
 
 def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
-    """Message where surfaces that carry force are inclined to the fixed direction, or nothing."""
+    """Message where surfaces that carry force are inclined to the direction; "" elsewhere."""
     xi = state.line.contact.direction
     if xi is None or not state.active.any():
         return ""
-    angles = _inclinations if len(xi) == 2 else surface_inclinations
-    angle, force = angles(trace, state, np.array(xi))
+    angle, force = inclinations(trace, state, np.array(xi)), np.abs(state.force)
     if force[angle > INCLINED_ANGLE].sum() <= FORCE_SHARE * force.sum():
         return ""
     return (
@@ -371,71 +370,46 @@ def _inclined(trace: BoundaryTrace, state: ContactState) -> str:
     )
 
 
-def _inclinations(trace: BoundaryTrace, state: ContactState, xi: Array) -> tuple[Array, Array]:
-    """Angles (k,) in radians between `xi` and the surfaces on segments in contact, and forces (k,).
-
-    The smaller one of both surfaces, where the force on a segment acts, but beside its ends, as
-    corners have no normal.
-    """
-    line, facing = state.line, state.line.contact.primary is not None
-    share = np.append(np.abs(state.force), 0.0)[line.rows]
-    touching = np.flatnonzero(share.any(axis=1))
-    share, segment, rows = share[touching], line.segments[touching], line.rows[touching]
-    s = (share * trace.places(segment)).sum(axis=1) / share.sum(axis=1)
-    s = np.clip(s, END_MARGIN, 1 - END_MARGIN)
-    cosine = trace.exact_normal(segment, s) @ xi
-    steep = np.flatnonzero(cosine < np.cos(INCLINED_ANGLE))
-    other = np.full(len(steep), -1.0)
-    if len(steep) and facing:
-        x, d = trace.point(segment[steep], s[steep]), np.tile(xi, (len(steep), 1))
-        there = partners(trace, line.facing, segment[steep], x, d, nodes=False)
-        met = there.segment >= 0
-        other[met] = -trace.exact_normal(there.segment[met], there.s[met]) @ xi
-    elif len(steep):  # the curve of a rigid obstacle is that of the secondary moved by the gap
-        ends = rows[steep][:, [0, -1]]
-        chord = np.diff((line.position + line.gap[:, None] * xi)[ends], axis=1)[:, 0]
-        cross = np.abs(across(chord) @ xi) / np.linalg.norm(chord, axis=1)
-        other = np.where((ends >= 0).all(axis=1), cross, -1.0)
-    cosine[steep] = np.maximum(cosine[steep], other)
-    return np.arccos(np.clip(cosine, -1.0, 1.0)), share.sum(axis=1)
-
-
-def surface_inclinations(
-    trace: BoundaryTrace, state: ContactState, xi: Array
-) -> tuple[Array, Array]:
-    """Angles (m,) in radians between `xi` (3,) and the surfaces of solids at points, forces (m,).
+def inclinations(trace: BoundaryTrace, state: ContactState, xi: Array) -> Array:
+    """Angles (m,) in radians between `xi` (d,) and the surfaces at contact points.
 
     The smaller one of both surfaces, of each the normal that is nearest to `xi`; 0 at open points.
     """
     line, cosine = state.line, np.full(len(state.active) + 1, -1.0)
-    normal = trace.exact_normal(*trace.at_nodes(line.segments))
-    np.maximum.at(cosine, line.rows.ravel(), normal @ xi)
-    cosine, met = cosine[:-1], np.flatnonzero(line.partner >= 0)
+    touching = np.append(state.active, False)[line.rows].any(axis=1)
+    rows, segments = line.rows[touching], line.segments[touching]
+    np.maximum.at(cosine, rows.ravel(), trace.exact_normal(*trace.at_nodes(segments)) @ xi)
+    if line.contact.primary is None and len(xi) == 2:  # a line: the secondary moved by the gap
+        whole = rows[(rows >= 0).all(axis=1)]
+        moved = (line.position + line.gap[:, None] * xi)[whole]
+        chord = moved[:, -1] - moved[:, 0]
+        slope = np.abs(across(chord) @ xi) / np.linalg.norm(chord, axis=1)
+        np.maximum.at(cosine, whole, slope[:, None])
+    cosine, met = cosine[:-1], np.flatnonzero(state.active & (line.partner >= 0))
     there = -trace.exact_normal(line.partner[met], line.partner_s[met]) @ xi
     cosine[met] = np.maximum(cosine[met], there)
-    angle = np.where(state.active, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
-    return angle, np.abs(state.force)
+    return np.where(state.active, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
 
 
 def _drawn_apart(trace: BoundaryTrace, state: ContactState) -> str:
-    """Message where normals turn while bodies that are drawn apart come together, or nothing."""
+    """Message where normals turn over the gap that is drawn; "" elsewhere."""
     if state.line.contact.direction is not None:
         return ""
-    way, error = way_and_error(trace, state)
+    gap, error = drawn_gap_error(trace, state)
     if error <= PEAK_ERROR:
         return ""
     return (
-        f"bodies are drawn {way:.3g} apart, and the normals along which the gap is measured are "
+        f"bodies are drawn {gap:.3g} apart, and the normals along which the gap is measured are "
         f"not followed on the way: the peak of the pressure is wrong by about {error:.2g} of it; "
         "draw the bodies touching, or give the common normal as direction"
     )
 
 
-def way_and_error(trace: BoundaryTrace, state: ContactState) -> tuple[float, float]:
-    """Way that closes the gap, a length, and the share by which the peak of pressure is wrong.
+def drawn_gap_error(trace: BoundaryTrace, state: ContactState) -> tuple[float, float]:
+    """Drawn gap where forces act, a length, and the relative error of the peak pressure it causes.
 
-    Both in the mean by force; 0 where normals do not turn or the bodies are drawn touching. An
-    error of `PEAK_ERROR` or less is a bound of what it is.
+    Means weighted by force; 0 where normals do not turn or the bodies are drawn touching. Errors up
+    to `PEAK_ERROR` are upper bounds.
     """
     line, force, along = state.line, np.abs(state.force), _neighbours(state)
     weight = force[along].sum(axis=1)
@@ -448,11 +422,11 @@ def way_and_error(trace: BoundaryTrace, state: ContactState) -> tuple[float, flo
         bend = (turn * chord).sum(axis=1)
         return np.divide(bend, length, out=np.zeros(len(along)), where=length > 0)
 
-    way = float(np.average(np.maximum(line.gap, 0.0)[along].mean(axis=1), weights=weight))
+    gap = float(np.average(np.maximum(line.gap, 0.0)[along].mean(axis=1), weights=weight))
     mine = curvatures(line.position, line.direction)
     curvature = float(np.average(np.abs(mine), weights=weight))
-    if way * curvature <= PEAK_ERROR or line.contact.primary is None:
-        return way, way * curvature
+    if gap * curvature <= PEAK_ERROR or line.contact.primary is None:
+        return gap, gap * curvature
     meets = line.partner >= 0
     facing, normal = np.zeros_like(line.position), np.zeros_like(line.position)
     at = line.partner[meets], line.partner_s[meets]
@@ -462,12 +436,12 @@ def way_and_error(trace: BoundaryTrace, state: ContactState) -> tuple[float, flo
     other = float(np.average(theirs, weights=both)) if both.any() else 0.0
     # 1 / (R + S); a hole of the same radius, drawn so beside a given gap, counts as one about it.
     together = curvature + other
-    middle = -1 / way if together <= 0 else max(curvature * other / together, -1 / way)
-    return way, way * curvature * (1 + way * middle / 2)
+    middle = -1 / gap if together <= 0 else max(curvature * other / together, -1 / gap)
+    return gap, gap * curvature * (1 + gap * middle / 2)
 
 
 def contradicted(trace: BoundaryTrace, state: ContactState) -> str:
-    """Message where the given gap has the other sign than the one that is drawn, or nothing."""
+    """Message where a given gap and the drawn one have opposite signs; "" elsewhere."""
     line, contact = state.line, state.line.contact
     if contact.gap is None or contact.primary is None:
         return ""

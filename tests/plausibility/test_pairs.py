@@ -20,7 +20,7 @@ from ngcontact.geometries import (
 )
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.plausibility import refinement_warning
-from ngcontact.plausibility.pairs import PEAK_ERROR, way_and_error
+from ngcontact.plausibility.pairs import PEAK_ERROR, drawn_gap_error
 
 SOFT = Elastic(E=1.0, nu=0.3)
 DOWN = (0, -1)
@@ -190,7 +190,7 @@ def measured(problem, exact):
     solutions = []
     messages = told(lambda: solutions.extend(adapt(problem, order=3, tolerance=1e-2)))
     [pair] = solutions[-1].pairs
-    way, error = way_and_error(solutions[-1].discrete.space.trace, pair)
+    way, error = drawn_gap_error(solutions[-1].discrete.space.trace, pair)
     assert any(APART in message for message in messages) == (error > PEAK_ERROR)
     peak = exact(2 * np.hypot(*solutions[-1].contact_force()))
     return solutions[-1].pressure.max() / peak - 1, way, error
