@@ -23,27 +23,33 @@ if TYPE_CHECKING:
 # Colours of Okabe and Ito, distinct for any colour vision, and marks for those who print grey.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 MARKS = ("o", "s", "^", "D", "v", "P", "X")
-RISING, SIGNED = "viridis", "RdBu_r"  # colour maps, distinct for any colour vision
-PANEL_PAD = 0.12  # inches beside panels, so that labels of neighbours stay apart
+SEQUENTIAL, DIVERGING = "viridis", "RdBu_r"  # colour maps, distinct for any colour vision
+PANEL_PAD = 0.12  # inches between panels, so that their labels do not touch
 HEIGHT = 5.0  # of a picture, inches
-# Powers of ten from which numbers on a scale are given with one for all.
+# Below and above these powers of ten an axis has one common power of ten.
 POWERS: dict[str, Any] = {"scilimits": (-3, 4), "useMathText": True}
-PROFILE_SAMPLES = 400  # of a function that is drawn over the pressure
+PROFILE_SAMPLES = 400  # points at which a given profile is drawn
 STROKES = ("--", ":", "-.", "-")
 
 MAX_CLOSE_UPS = 4
-SMALL = 0.2  # half of a close-up's size over that of the picture, from which the picture shows it
-MARGIN = 0.9  # half of a close-up's size over that of its zone
-HALF_SIZES = 0.02, 0.002  # half-sizes, relative to the picture, of single points and of any zone
-PEAK_AREA = 0.005  # share of an area, beyond whose value colours may saturate
-CUT_OFF = 1.25  # largest value over that one up to which they do not
+# Half-size of a close-up over the size of the picture: larger zones need none.
+LARGEST_HALF_SIZE = 0.2
+ZONE_HALF_SIZE = 0.9  # half-size of a close-up over the size of its zone
+# Least half-size of a close-up over the size of the picture: of one or two points, of other zones.
+LEAST_HALF_SIZES = 0.02, 0.002
+# Share of the area whose values may lie beyond the colours, if the largest value is more than
+# `PEAK_RATIO` times the largest of the rest.
+PEAK_AREA, PEAK_RATIO = 0.005, 1.25
 
-BESIDE_ZONE = 0.75, 0.002  # shown beside a zone: of its length, and of all that is shown
-OWN_PANELS = 0.4, 4  # zones have panels of their own where they fill less, and are so many
-SINGLE, SPARE = 0.1, 4.0  # share of a zone whose pressures are cut if they are so much above others
+# Margin beside a zone in a plot of the pressure: of the length of the zone, and of all lines shown.
+ZONE_MARGINS = 0.75, 0.002
+# Zones have panels of their own if they fill less than this share, and are at most so many.
+PANEL_SHARE, MAX_PANELS = 0.4, 4
+# Pressures on this share of a zone are cut off if they exceed the rest by more than the factor.
+CUT_SHARE, CUT_RATIO = 0.1, 4.0
 
 FILM_DPI = 80
-HEADROOM = 1.05  # of the largest pressure in a film
+FILM_HEADROOM = 1.05  # end of the scale of a film over its largest pressure
 
 Window = tuple[Array, Array]  # lower left and upper right corner, each (2,)
 
@@ -52,8 +58,8 @@ class Scale(NamedTuple):
     """Colour scale of a picture."""
 
     label: str
-    ends: tuple[float, float]  # of the values
-    limits: tuple[float, float]  # of the colours
+    extremes: tuple[float, float]  # least and largest value
+    limits: tuple[float, float]  # values at the ends of the colours
 
 
 def plot_solution(
@@ -149,7 +155,7 @@ def write_film(
         raise ValueError("a film shows plane bodies: write pictures of solids by plot()")
     target = check_path(path, ".gif")
     scenes = [picture(solution, style) for solution in frames]
-    scale = min(scene.scale for scene in scenes)  # one for all, the most careful one
+    scale = min(scene.scale for scene in scenes)
     for k, scene in enumerate(scenes):
         if scene.scale != scale:
             scenes[k] = picture(frames[k], replace(style, scale=scale))
@@ -166,7 +172,7 @@ def write_film(
 
 
 def _images(scenes: Sequence[Scene], titles: Sequence[str]) -> list[Image]:
-    """The frames, drawn with one scale for all."""
+    """The frames, drawn with common scales."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from PIL import Image
@@ -176,7 +182,7 @@ def _images(scenes: Sequence[Scene], titles: Sequence[str]) -> list[Image]:
     limits = min(low for low, _ in ranges), max(high for _, high in ranges)
     if style.limits is None and limits[0] < 0:
         limits = -max(-limits[0], limits[1]), max(-limits[0], limits[1])
-    tops = [cut_pressure(s) or HEADROOM * float(s.pressure.max(initial=0.0)) for s in frames]
+    tops = [cut_pressure(s) or FILM_HEADROOM * float(s.pressure.max(initial=0.0)) for s in frames]
     top = max(tops) / style.unit("stress")[1]
     low, high = (corner / style.unit("length")[1] for corner in _corners(scenes))
     margin = 0.03 * (high - low).max()
@@ -197,38 +203,38 @@ def _images(scenes: Sequence[Scene], titles: Sequence[str]) -> list[Image]:
         images.append(Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB"))
     size = images[0].size
     images = [image if image.size == size else image.resize(size) for image in images]
-    # One palette for all: of its own each frame would show one stress in another colour.
+    # A common palette: one stress has one colour in all frames.
     strip = Image.fromarray(np.vstack([np.asarray(image) for image in images]))
     colours = np.array(strip.quantize(256).getpalette() or [255] * 3).reshape(-1, 3)
-    colours[(colours >= 240).all(axis=1)] = 255  # Pillow would take a neighbour of white
+    colours[(colours >= 240).all(axis=1)] = 255  # Pillow rounds white to a neighbour
     palette = Image.new("P", (1, 1))
     palette.putpalette(colours.ravel().tolist())
     return [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
 
 
 def _corners(scenes: Sequence[Scene]) -> Window:
-    """Lower left and upper right corner of all that the scenes show."""
+    """Lower left and upper right corner of all scenes."""
     low = np.min([scene.moved.min(axis=0) for scene in scenes], axis=0)
     return low, np.max([scene.moved.max(axis=0) for scene in scenes], axis=0)
 
 
 def _window(zone: Array, low: Array, high: Array) -> Window:
-    """The square about the points of a zone (c, 2), inside of the picture from `low` to `high`."""
+    """Square about the points (c, 2) of a zone, moved into the picture from `low` to `high`."""
     size = (high - low).max()
     first, last = zone.min(axis=0), zone.max(axis=0)
     extent = (last - first).max()
-    half = max(MARGIN * extent, HALF_SIZES[0 if len(zone) < 3 else 1] * size)
+    half = max(ZONE_HALF_SIZE * extent, LEAST_HALF_SIZES[0 if len(zone) < 3 else 1] * size)
     middle = (first + last) / 2
-    # At the rim of the picture, as on a symmetry plane, the window moves inwards.
+    # A zone at the rim, as on a symmetry plane, has a window that reaches inwards only.
     inner, outer = low + 0.95 * half, high - 0.95 * half
     middle = np.where(inner < outer, np.clip(middle, inner, outer), middle)
     return middle - half, middle + half
 
 
 def close_ups(scenes: Sequence[Scene]) -> list[Window]:
-    """Windows on the small zones in contact of one or more scenes, those of large forces first.
+    """Windows on the small contact zones of one or more scenes, those of large forces first.
 
-    Zones whose windows overlap share one; of those that a picture of all shows well there is none.
+    Zones whose windows overlap share one. Zones that are large in the whole picture have none.
     """
     low, high = _corners(scenes)
     groups: list[Array] = []
@@ -238,7 +244,7 @@ def close_ups(scenes: Sequence[Scene]) -> list[Window]:
         return bool((a < d).all() and (c < b).all())
 
     def small(window: Window) -> bool:
-        return bool((window[1] - window[0]).max() < 2 * SMALL * (high - low).max())
+        return bool((window[1] - window[0]).max() < 2 * LARGEST_HALF_SIZE * (high - low).max())
 
     zones = [zone for scene in scenes[::-1] for zone in scene.zones]
     for zone in [zone for zone in zones if small(_window(zone, low, high))]:
@@ -251,8 +257,8 @@ def close_ups(scenes: Sequence[Scene]) -> list[Window]:
     return [window for window in windows if small(window)][:MAX_CLOSE_UPS]
 
 
-def _all_but(share: float, values: Array, weights: Array) -> float:
-    """Value that all but a `share` of the `weights` (t,), areas or lengths, keeps below."""
+def _quantile(share: float, values: Array, weights: Array) -> float:
+    """The value exceeded on a `share` of the `weights` (t,), areas or lengths."""
     order = np.argsort(values, kind="stable")
     sums = np.cumsum(weights[order])
     last = np.searchsorted(sums, (1 - share) * sums[-1])
@@ -260,11 +266,11 @@ def _all_but(share: float, values: Array, weights: Array) -> float:
 
 
 def colour_range(scene: Scene, windows: Sequence[Window]) -> tuple[float, float]:
-    """Ends of the colour scale: of the bodies and in each window, without single peaks.
+    """Ends of the colour scale: of the bodies and of each window, without peaks.
 
-    Peaks are what lies above the value that all but `PEAK_AREA` of an area keeps below, far above:
-    stresses at corners and at ends of supports, which grow on every finer mesh. Where both signs
-    occur colours are symmetric about 0.
+    Peaks fill less than `PEAK_AREA` and exceed the rest by more than `PEAK_RATIO`: stresses at
+    corners and at ends of supports, which grow with refinement. Where both signs occur colours are
+    symmetric about 0.
     """
     middle = scene.moved[scene.triangles].mean(axis=1)
     parts = [np.all((middle >= low) & (middle <= high), axis=1) for low, high in windows]
@@ -274,15 +280,15 @@ def colour_range(scene: Scene, windows: Sequence[Window]) -> tuple[float, float]
 def colour_limits(
     values: Array, triangles: Index, areas: Array, parts: Sequence[Mask]
 ) -> tuple[float, float]:
-    """Ends of the scale of `values` (k,) at nodes, of all `triangles` (t, 3), some `parts` (t,).
+    """Ends of the scale of `values` (k,) at nodes of `triangles` (t, 3), see `colour_range`.
 
-    See `colour_range`; `areas` (t,) are those of the triangles.
+    Windows are `parts` (t,) of the triangles, `areas` (t,) the areas of these.
     """
     mean = np.abs(values)[triangles].mean(axis=1)
     seen = [np.ones(len(areas), dtype=bool), *(part for part in parts if part.any())]
-    top = max(_all_but(PEAK_AREA, mean[part], areas[part]) for part in seen)
+    top = max(_quantile(PEAK_AREA, mean[part], areas[part]) for part in seen)
     largest = float(np.abs(values).max(initial=0.0))
-    top = largest if largest <= CUT_OFF * top else top
+    top = largest if largest <= PEAK_RATIO * top else top
     top = top or 1.0
     return (-top, top) if values.min(initial=0.0) < 0 else (0.0, top)
 
@@ -294,10 +300,10 @@ def draw_scene(
     limits: tuple[float, float],
     parts: Sequence[Array] | None = None,
 ) -> list[Axes]:
-    """Draw a scene with its close-ups, its colours and the pressure; returns the axes of that.
+    """Draw a scene with close-ups, colour scale and pressure; returns the axes of the pressure.
 
-    Bodies are on the left, close-ups, two above each other, in the middle, pressures on the right:
-    on `parts` (2,) of the contact lines, which are chosen when left out.
+    Bodies are on the left, close-ups in the middle, two in a column, and pressures on the right, a
+    panel for each of the intervals `parts` (2,) of the contact lines, chosen when left out.
     """
     parts, style = parts or _shown_parts(scene.solution), scene.style
     width, height = np.ptp(scene.moved, axis=0)
@@ -325,7 +331,7 @@ def draw_scene(
 
 
 def _draw_bodies(axes: Axes, scene: Scene, limits: tuple[float, float]) -> Any:
-    """The field on the deformed bodies, element edges where asked for, outlines of the bodies."""
+    """The field on the deformed bodies, their outlines and, if `Style.mesh`, element edges."""
     from matplotlib.collections import LineCollection
     from matplotlib.tri import Triangulation
 
@@ -341,7 +347,7 @@ def _draw_bodies(axes: Axes, scene: Scene, limits: tuple[float, float]) -> Any:
         shading="gouraud",
         vmin=limits[0] / unit,
         vmax=limits[1] / unit,
-        cmap=SIGNED if signed else RISING,
+        cmap=DIVERGING if signed else SEQUENTIAL,
     )
     inner, outer = (list(moved[scene.edges[at]]) for at in (~scene.outline, scene.outline))
     if style.mesh:
@@ -358,7 +364,7 @@ def _draw_bodies(axes: Axes, scene: Scene, limits: tuple[float, float]) -> Any:
 def _draw_windows(
     bodies: Axes, close: Sequence[Axes], windows: Sequence[Window], unit: float
 ) -> None:
-    """Frames of the windows in the picture of the bodies, and the close-ups cut to them."""
+    """Frames of the windows around zones in the whole picture; axes of the close-ups."""
     from matplotlib.patches import Rectangle
 
     several = len(windows) > 1
@@ -376,7 +382,7 @@ def _draw_windows(
 
 
 def colour_bar(figure: Figure, shading: Any, axes: list[Axes], scale: Scale) -> None:
-    """Scale of colours; an arrow and a number say what lies beyond its ends."""
+    """Colour bar; arrows and numbers show extremes beyond its ends."""
     label, (least, most), (low, high) = scale
     below, above = least < low, most > high
     extend = {(True, True): "both", (True, False): "min", (False, True): "max"}
@@ -401,7 +407,7 @@ def colour_bar(figure: Figure, shading: Any, axes: list[Axes], scale: Scale) -> 
 
 
 def shown_part(solution: Solved) -> Array | None:
-    """Ends (2,) of what is shown of long boundaries: the zones in contact and what is beside."""
+    """Ends (2,) of the interval of the coordinate that holds all zones, with margins."""
     if not solution.active.any() or len(solution.points) < 2:
         return None
     lines = contact_lines(solution)
@@ -414,9 +420,9 @@ def shown_part(solution: Solved) -> Array | None:
 
 
 def _shown_parts(solution: Solved) -> list[Array]:
-    """Ends (2,) of each interval of the coordinate in which pressures are shown.
+    """Ends (2,) of the intervals of the coordinate in which pressures are shown.
 
-    One for each zone, where zones are small and far from each other, or one for all.
+    One for each zone where zones are small and far apart, otherwise one.
     """
     lines, whole = contact_lines(solution), shown_part(solution)
     if whole is None:
@@ -425,34 +431,30 @@ def _shown_parts(solution: Solved) -> list[Array]:
     parts: list[Array] = []
     for zone in sorted(zones_of(solution, lines), key=lambda zone: float(zone.s.min())):
         low, high = zone.s.min(), zone.s.max()
-        margin = max(BESIDE_ZONE[0] * (high - low), BESIDE_ZONE[1] * np.ptp(whole))
+        margin = max(ZONE_MARGINS[0] * (high - low), ZONE_MARGINS[1] * np.ptp(whole))
         part = np.array([low - margin, high + margin])
         if parts and part[0] <= parts[-1][1]:
             parts[-1][1] = max(parts[-1][1], part[1])
         else:
             parts.append(part)
-    share, most = OWN_PANELS
-    far = 1 < len(parts) <= most and sum(map(np.ptp, parts)) < share * np.ptp(whole)
+    far = 1 < len(parts) <= MAX_PANELS and sum(map(np.ptp, parts)) < PANEL_SHARE * np.ptp(whole)
     return parts if far else [whole]
 
 
 def cut_pressure(solution: Solved) -> float | None:
-    """End of the scale of pressures where single points, as at corners, lie far above the others.
-
-    In each zone all but `SINGLE` of its length lie below.
-    """
+    """End of the scale of pressures where peaks, as at corners, are cut off; None elsewhere."""
     typical = 0.0
     for _, rows, s in zones_of(solution, contact_lines(solution)):
         lengths = np.gradient(s) if len(s) > 1 else np.ones(1)
-        typical = max(typical, _all_but(SINGLE, solution.pressure[rows], lengths))
+        typical = max(typical, _quantile(CUT_SHARE, solution.pressure[rows], lengths))
     largest = float(solution.pressure.max(initial=0.0))
-    return SPARE / 2 * typical if largest > SPARE * typical > 0 else None
+    return CUT_RATIO / 2 * typical if largest > CUT_RATIO * typical > 0 else None
 
 
 def _draw_pressures(
     several: Sequence[Axes], solution: Solved, style: Style, parts: Sequence[Array]
 ) -> None:
-    """Pressure along the contact lines: one panel for each of the `parts` (2,), with one scale."""
+    """Pressure along the contact lines, a panel for each of the intervals `parts` (2,)."""
     (_, stress), top = style.unit("stress"), cut_pressure(solution)
     for axes, part in zip(several, parts, strict=True):
         _draw_pressure(axes, solution, style, part)
@@ -464,13 +466,13 @@ def _draw_pressures(
     for axes in several[1:]:
         axes.set(ylabel="", title="")
     if len(solution.problem.contact) > 1 or style.profile or not solution.active.all():
-        # Above the last of several panels, which has no title: inside it would cover points.
+        # Above the last of several panels, where it covers no points.
         above = {"loc": "lower right", "bbox_to_anchor": (1, 1), "borderaxespad": 0.3}
         last.legend(**above, fontsize="small", ncols=2) if last is not first else last.legend()
 
 
 def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> None:
-    """Pressure along one `part` (2,) of the lines, full where in contact and hollow where open."""
+    """Pressure on an interval `part` (2,): points in contact are filled, open ones hollow."""
     (_, length), (_, stress) = style.unit("length"), style.unit("stress")
     lines, contact = contact_lines(solution), solution.problem.contact
     several = len(contact) > 1
@@ -479,7 +481,7 @@ def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> N
         active, p, at = solution.active[rows], solution.pressure[rows] / stress, s / length
         new = several and pair not in [other for other, *_ in lines[:k]]
         title = f"pair {pair}: {contact[pair].secondary}" if new else None
-        size = 4 + 2 * min(len(contact) - 1 - pair, 2)  # seen behind those of later pairs
+        size = 4 + 2 * min(len(contact) - 1 - pair, 2)  # visible behind later pairs
         axes.plot(at, p, color=colour, lw=1, marker=mark, ms=4, markevery=[], label=title)
         for state, fill, name in ((active, colour, "in contact"), (~active, "w", "open")):
             label = name if state.any() and not several and k == 0 else None
@@ -502,13 +504,13 @@ def _draw_pressure(axes: Axes, solution: Solved, style: Style, part: Array) -> N
 
 
 def colour_and_mark(pair: int) -> tuple[str, str]:
-    """Colour and mark of a pair; of the first 49 no two have both."""
+    """Colour and mark of a pair; the first 49 pairs differ in one of them."""
     n = len(COLOURS)
     return COLOURS[pair % n], MARKS[(pair + pair // n) % len(MARKS)]
 
 
 def draw_profiles(axes: Axes, style: Style, part: Array) -> None:
-    """The given profiles over the pressures, functions on a `part` (2,) of the coordinate."""
+    """The given profiles over the pressures; functions on the interval `part` (2,)."""
     (_, length), (_, stress) = style.unit("length"), style.unit("stress")
     for k, (label, profile) in enumerate(style.profile.items()):
         if callable(profile):

@@ -14,9 +14,9 @@ from .files import check_path
 from .nodes import EDGES, FACES, nodes_of
 from .pictures import (
     COLOURS,
+    DIVERGING,
     POWERS,
-    RISING,
-    SIGNED,
+    SEQUENTIAL,
     Scale,
     colour_bar,
     colour_limits,
@@ -33,36 +33,41 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-FRONT, UP = np.array([-0.45, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])  # of a picture
-TILT, TURN = 0.35, 0.45  # of the view on a cut: upwards, and to the others
-LOAD_COSINE = 0.5  # cosine to the load from which a plane does not pass through the zone in contact
-VERTICAL_COSINE = 0.5  # cosine to the vertical from which a cut is not looked at from above
-PIXELS = 1000  # of an image, along its longer side
-ZONE_MARGIN = 0.4  # of a zone in contact, shown beside it
-SMALL, SMALLEST = 0.2, 0.02  # zones smaller than the bodies by this have a close-up; least size
-CURVED = 2  # times that sides of curved elements are halved
-DRAWN_EDGE_ANGLE = 40  # degrees, of edges that are drawn
-PRESSED = "YlOrRd"  # colours of pressures
-FLAT: dict[str, Any] = {"ambient": 0.75, "diffuse": 0.3, "specular": 0.0}  # colours as on the scale
+FRONT, UP = np.array([-0.45, -1.0, 0.0]), np.array([0.0, 0.0, 1.0])  # to the viewer, upwards
+# Components of the view on a cut: upwards, and along the normals of the other cuts.
+TILT, TURN = 0.35, 0.45
+# Cosine between the force and the normal of a plane of symmetry, up to which it cuts the zone; also
+# the length of a mean of unit normals, below which they cancel.
+FORCE_COSINE = 0.5
+VERTICAL_COSINE = 0.5  # of the normal of a cut, up to which the view on it is from above
+PIXELS = 1000  # of the longer side of an image
+ZONE_MARGIN = 0.4  # margin beside a contact zone over half its size
+CLOSE_UP_SIZE = 0.2  # half-size of a zone over that of the bodies, up to which it has a close-up
+LEAST_SIZE = 0.02  # least half-size of a zone, over that of the surface
+SUBDIVISIONS = 2  # of curved elements, each of which halves their sides
+DRAWN_EDGE_ANGLE = 40  # degrees between faces, from which their edge is drawn
+PRESSURE_COLOURS = "YlOrRd"
+# Little shading: surfaces have the colours of the scale.
+LIGHT: dict[str, Any] = {"ambient": 0.75, "diffuse": 0.3, "specular": 0.0}
 
 
 class Cut(NamedTuple):
-    """A plane at which bodies are seen from the inside."""
+    """A plane that cuts the bodies open, or of symmetry."""
 
     point: Array  # (3,)
     normal: Array  # (3,), outward
-    rim: bool  # whether it bounds the bodies, as a plane of symmetry does
+    symmetry: bool  # whether it is of symmetry, and bounds the bodies
 
 
 class Zone(NamedTuple):
-    """Zone in contact of a pair, and the planes that cut it."""
+    """The contact zone of a pair, and the planes that cut it."""
 
     surface: ContactSurface
     pressure: Array  # (n,), at the nodes of the surface
-    middle: Array  # (3,), on planes of symmetry
-    half: float  # half of its extent, a length
-    frame: Array  # (3, 3), rows: along the surface, by the axes where possible, and across
-    cuts: list[Cut]  # the nearest to the viewer first
+    middle: Array  # (3,), in planes of symmetry that cut it, a length
+    half: float  # half-size, a length
+    frame: Array  # (3, 3), rows: two tangents, along axes where possible, and the normal
+    cuts: list[Cut]  # those that face the viewer first
 
 
 def plot_solids(
@@ -84,7 +89,7 @@ def plot_solids(
     pair, pairs = int(np.argmax(forces)), solution.problem.contact
     zone = _zone(solution, pair) if len(solution.points) else None
     figure = new_figure(target, figsize=(12, 9.5 if zone else 6))
-    close = zone is not None and zone.half < SMALL * float(np.ptp(zone.surface.trace.curve))
+    close = zone is not None and zone.half < CLOSE_UP_SIZE * float(np.ptp(zone.surface.trace.curve))
     parts = figure.subplot_mosaic(("bc;ps" if close else "bb;ps") if zone else "b")
     _draw_bodies(figure, parts, solution, style, zone)
     if zone is not None:
@@ -102,18 +107,18 @@ def plot_solids(
 
 
 def _zone(solution: Solved, pair: int) -> Zone:
-    """The zone in contact of one pair; the whole surface where nothing touches."""
+    """The contact zone of one pair; its whole surface where no point is in contact."""
     surface, state = contact_surface(solution, pair), solution.pairs[pair]
     touches = state.active if state.active.any() else np.ones(state.gap.size, dtype=bool)
     weight, place = np.where(touches, state.line.weight, 0.0), state.line.position
     middle, d = (weight @ x / weight.sum() for x in (place, state.line.direction))
-    if np.linalg.norm(d) < LOAD_COSINE:  # normals cancel, as on a closed surface: the front of it
+    if np.linalg.norm(d) < FORCE_COSINE:  # on closed surfaces normals cancel: their front
         d = state.line.direction[np.argmax(state.line.direction @ FRONT)]
     size, cuts = float(np.ptp(surface.points, axis=0).max()), []
     for point, normal in _symmetry_planes(solution, STRAIGHT * size):
         if np.abs((surface.points - point) @ normal).min() <= STRAIGHT * size:
             cuts.append(Cut(point, normal, True))
-            if abs(normal @ d) < LOAD_COSINE * np.linalg.norm(d):
+            if abs(normal @ d) < FORCE_COSINE * np.linalg.norm(d):
                 middle = middle - ((middle - point) @ normal) * normal
                 d = d - (d @ normal) * normal
     cuts.sort(key=lambda cut: -float(cut.normal @ FRONT))
@@ -126,7 +131,7 @@ def _zone(solution: Solved, pair: int) -> Zone:
     half = float(np.linalg.norm(place[touches] - middle, axis=1).max())
     cuts = cuts or [Cut(middle, axis * np.sign(axis @ FRONT), False) for axis in frame[1::-1]]
     pressure = surface.pressure(solution)
-    return Zone(surface, pressure, middle, max(half, SMALLEST * size), frame, cuts)
+    return Zone(surface, pressure, middle, max(half, LEAST_SIZE * size), frame, cuts)
 
 
 def _symmetry_planes(solution: Solved, slack: float) -> list[tuple[Array, Array]]:
@@ -170,7 +175,7 @@ def _grid(solution: Solved, style: Style) -> tuple[pyvista.UnstructuredGrid, Ind
 def _draw_bodies(
     figure: Figure, parts: dict[str, Axes], solution: Solved, style: Style, zone: Zone | None
 ) -> None:
-    """The bodies, cut open at the `zone`, which is enlarged if there is a part for it."""
+    """The bodies, cut open at the `zone`, and a close-up of it if `parts` has axes "c"."""
     import pyvista
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -179,7 +184,7 @@ def _draw_bodies(
     (grid, lines, scale), shown = _grid(solution, style), style.shown(solution)
     edges = pyvista.PolyData(grid.points, lines=sized(lines))
     normals = [cut.normal for cut in zone.cuts] if zone else [FRONT]
-    if zone and not zone.cuts[0].rim:
+    if zone and not zone.cuts[0].symmetry:
         grid, edges = (
             x.clip(normal=zone.cuts[0].normal, origin=zone.middle) for x in (grid, edges)
         )
@@ -191,7 +196,7 @@ def _draw_bodies(
     frame = np.array([right, np.cross(eye, right), eye])
     filtered = vtkDataSetSurfaceFilter()
     filtered.SetInputData(grid)
-    filtered.SetNonlinearSubdivisionLevel(CURVED)
+    filtered.SetNonlinearSubdivisionLevel(SUBDIVISIONS)
     filtered.Update()
     surface = pyvista.wrap(filtered.GetOutput()).triangulate()
     values, triangles = np.asarray(surface["shown"]), surface.faces.reshape(-1, 4)[:, 1:]
@@ -205,11 +210,11 @@ def _draw_bodies(
     areas, (_, unit) = np.asarray(surface.compute_cell_sizes()["Area"]), style.unit(shown.kind)
     given = style.limits and (style.limits[0] / unit, style.limits[1] / unit)
     limits = given or colour_limits(values, triangles, areas, near)
-    colours = SIGNED if limits[0] < 0 < limits[1] else RISING
-    meshes = [(surface, {"scalars": "shown", "cmap": colours, "clim": limits, **FLAT})]
-    ahead = 1e-3 * surface.length * eye  # so that lines are seen
+    colours = DIVERGING if limits[0] < 0 < limits[1] else SEQUENTIAL
+    meshes = [(surface, {"scalars": "shown", "cmap": colours, "clim": limits, **LIGHT})]
+    ahead = 1e-3 * surface.length * eye  # lines in front of the surface
     if style.mesh:
-        thin = {"color": "black" if colours == SIGNED else "white", "opacity": 0.35}
+        thin = {"color": "black" if colours == DIVERGING else "white", "opacity": 0.35}
         meshes.append((edges.translate(ahead), thin))
     others = {"boundary_edges": False, "non_manifold_edges": False, "manifold_edges": False}
     outline = surface.clean().extract_feature_edges(DRAWN_EDGE_ANGLE, **others)
@@ -233,9 +238,10 @@ def _image(
     window: tuple[Array, Array],
     meshes: list[tuple[pyvista.DataSet, dict[str, Any]]],
 ) -> Array:
-    """Image (h, w, 3) of `meshes` with options in a `window`, two corners (2,), without a display.
+    """Image (h, w, 3) of `meshes` with options in a `window`, rendered without a display.
 
-    Rows of `frame` (3, 3) point to the right, upwards and to the eye.
+    Rows of `frame` (3, 3) point to the right, upwards and to the viewer; the window is given by two
+    corners (2,) in the first two.
     """
     import pyvista
     from vtkmodules.vtkCommonCore import vtkLogger
@@ -263,13 +269,13 @@ def _image(
 
 
 def _name(axis: Array, other: str) -> str:
-    """Name of the coordinate along an `axis` (3,), or `other`."""
+    """Name of the coordinate that an `axis` (3,) belongs to, or `other`."""
     along = np.flatnonzero(np.abs(axis) > 1 - STRAIGHT)
     return AXES[along[0]] if along.size else other
 
 
 def _draw_pressure(figure: Figure, axes: Axes, style: Style, zone: Zone, name: str) -> None:
-    """The pressure on the surface of `name` as colour."""
+    """The pressure on the surface of `name`, in colours."""
     from matplotlib.collections import LineCollection
     from matplotlib.tri import Triangulation
 
@@ -277,7 +283,7 @@ def _draw_pressure(figure: Figure, axes: Axes, style: Style, zone: Zone, name: s
     seen, middle = (x @ zone.frame[:2].T / length for x in (surface.points, zone.middle))
     values, half = zone.pressure / stress, (1 + ZONE_MARGIN) * zone.half / length
     top = float(values.max(initial=0.0)) or 1.0
-    drawing = {"shading": "gouraud", "cmap": PRESSED, "vmin": 0.0, "vmax": top}
+    drawing = {"shading": "gouraud", "cmap": PRESSURE_COLOURS, "vmin": 0.0, "vmax": top}
     shading = axes.tripcolor(Triangulation(*seen.T, surface.triangles), values, **drawing)
     if style.mesh:
         lines = list(seen[surface.edges])
@@ -306,7 +312,7 @@ def _draw_profiles(axes: Axes, style: Style, zone: Zone) -> None:
         along = np.cross(cut.normal, zone.frame[2])
         along *= np.sign(along[np.argmax(np.abs(along))]) / np.linalg.norm(along)
         # A plane that bounds the surface cuts it just inside.
-        inside = STRAIGHT * data.length * cut.normal if cut.rim else 0.0
+        inside = STRAIGHT * data.length * cut.normal if cut.symmetry else 0.0
         line = data.slice(normal=cut.normal, origin=cut.point - inside)
         s = np.asarray(line.points @ along)
         order, half = np.argsort(s), (1 + ZONE_MARGIN) * zone.half

@@ -8,10 +8,11 @@ import xml.etree.ElementTree as ET
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import ngsolve as ng
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arrays import Array, Index
 from ..estimator import Estimated
@@ -32,6 +33,7 @@ SOLID = ("xx", "yy", "zz", "xy", "yz", "xz")  # as VTK orders those of a symmetr
 # Triangles and tetrahedra: linear, quadratic, Lagrange's of every higher order.
 VTK_CELLS = {2: (5, 22, 69), 3: (10, 24, 71)}
 VTK_WEDGE = 13
+LINKS = {False: "lines", True: "faces"}  # cells between contact points, of solids
 SECTION_ANGLE = 6.0  # degrees between two sections of a body of revolution, at most
 
 
@@ -76,8 +78,7 @@ def write_solution(
     from vtkmodules.vtkIOXML import vtkXMLPolyDataWriter, vtkXMLUnstructuredGridWriter
 
     writers = vtkXMLUnstructuredGridWriter(), vtkXMLPolyDataWriter()
-    contact = _surfaces if solution.mesh.dim == 3 else _contact
-    made = _bodies(solution, sections), contact(solution, sections)
+    made = _bodies(solution, sections), _contact(solution, sections)
     with replacing(target, beside) as drafts:
         for writer, data, draft in zip(writers, made, drafts, strict=True):
             writer.SetFileName(str(draft))
@@ -179,7 +180,7 @@ def sized(cells: Index) -> Index:
     return np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
 
 
-def _bodies(solution: Estimated, sections: Sections | None = None) -> pyvista.UnstructuredGrid:
+def _bodies(solution: Estimated, sections: Sections | None) -> pyvista.UnstructuredGrid:
     """Bodies with their fields: curved elements, or wedges between `sections`."""
     import pyvista
 
@@ -219,64 +220,57 @@ def _bodies(solution: Estimated, sections: Sections | None = None) -> pyvista.Un
     return grid
 
 
-def _contact(solution: Solved, sections: Sections | None = None) -> pyvista.PolyData:
-    """Contact points and lines between neighbours of a pair, or its surface on `sections`."""
+def _contact(solution: Solved, sections: Sections | None) -> pyvista.PolyData:
+    """Contact points with lines, of solids triangles, between neighbours; surfaces on `sections`.
+
+    Some corners of the triangles of solids are no contact points.
+    """
     import pyvista
 
-    points, data = solution.points, pyvista.PolyData()
-    links: Index = np.zeros((0, 2), dtype=np.intp)
-    for pair in np.unique(solution.pair):
-        rows = np.flatnonzero(solution.pair == pair)
-        tree = neighbour_tree(points[rows]).tocoo()
-        links = np.concatenate([links, rows[np.column_stack([tree.row, tree.col])]])
-    names, lifted, times = ["pressure", "gap", "active", "pair"], _in_space, 1
-    if sections is None and len(points):
-        single = np.arange(len(points))[:, None]
-        data = pyvista.PolyData(_in_space(points), verts=sized(single), lines=sized(links))
-        names.append("force")
-    elif sections is not None and len(links):
-        first, second = (len(points) * at[:, None] for at in (sections.first, sections.second))
+    points, m, solid = solution.points, len(solution.points), solution.mesh.dim == 3
+    data, lifted, times = pyvista.PolyData(), _in_space, 1
+    fields: dict[str, NDArray[Any]] = {
+        "pressure": solution.pressure,
+        "gap": solution.gap,
+        "force": solution.force,
+        "active": solution.active.astype(np.int32),
+        "pair": solution.pair.astype(np.int32),
+        "traction": -solution.pressure[:, None] * solution.direction,
+    }
+    if solid:
+        fields["contact_point"] = np.ones(m, np.int32)
+    cells: list[Index] = []
+    for pair in np.unique(solution.pair).tolist():
+        if solid:
+            surface = contact_surface(solution, pair)
+            others = surface.row < 0
+            number = np.where(others, len(points) - 1 + np.cumsum(others), surface.row)
+            cells.append(number[surface.triangles])
+            points = np.concatenate([points, surface.points[others]])
+            own: dict[str, NDArray[Any]] = {
+                "pressure": np.nan_to_num(surface.values(solution.pressure)),
+                "gap": surface.values(solution.gap),
+                "pair": np.full(len(others), pair, np.int32),
+            }
+            for name, known in fields.items():
+                none = np.zeros((len(others), *known.shape[1:]), known.dtype)
+                fields[name] = np.concatenate([known, own.get(name, none)[others]])
+        else:
+            rows = np.flatnonzero(solution.pair == pair)
+            tree = neighbour_tree(points[rows]).tocoo()
+            cells.append(rows[np.column_stack([tree.row, tree.col])])
+    if sections is None and m:
+        single, joined = sized(np.arange(m)[:, None]), sized(np.concatenate(cells))
+        data = pyvista.PolyData(_in_space(points), verts=single, **{LINKS[solid]: joined})
+    elif sections is not None and cells and len(links := np.concatenate(cells)):
+        first, second = (m * at[:, None] for at in (sections.first, sections.second))
         quads = [first + links[:, 0], first + links[:, 1], second + links[:, 1]]
         faces = np.stack([*quads, second + links[:, 0]], axis=2).reshape(-1, 4)
         lifted, times = sections.turned, len(sections.angles)
         data = pyvista.PolyData(lifted(points), faces=sized(faces))
-    if data.n_points:
-        for name in names:
-            kind = np.int32 if name in ("active", "pair") else float
-            data.point_data[name] = np.tile(np.asarray(getattr(solution, name), kind), times)
-        data.point_data["traction"] = lifted(-solution.pressure[:, None] * solution.direction)
-    _name_pairs(data, solution)
-    return data
-
-
-def _surfaces(solution: Solved, sections: Sections | None = None) -> pyvista.PolyData:
-    """Contact points of solids and the triangles between them; solids have no `sections`."""
-    import pyvista
-
-    points, triangles = solution.points, []
-    values = np.column_stack([solution.pressure, solution.gap, solution.pair])
-    for pair in np.unique(solution.pair).tolist():
-        surface = contact_surface(solution, pair)
-        others = surface.row < 0
-        number = np.where(others, len(points) - 1 + np.cumsum(others), surface.row)
-        triangles.append(number[surface.triangles])
-        own = [np.nan_to_num(surface.values(solution.pressure)), surface.values(solution.gap)]
-        own.append(np.full(len(others), float(pair)))
-        points = np.concatenate([points, surface.points[others]])
-        values = np.concatenate([values, np.stack(own, axis=1)[others]])
-    data = pyvista.PolyData()
-    if m := len(solution.points):
-        single, faces = np.arange(m)[:, None], sized(np.concatenate(triangles))
-        data = pyvista.PolyData(points, verts=sized(single), faces=faces)
-        data.point_data["pressure"], data.point_data["gap"] = values[:, 0], values[:, 1]
-        data.point_data["pair"] = values[:, 2].astype(np.int32)
-        rest = len(points) - m
-        for name in ("force", "active"):
-            known = np.asarray(getattr(solution, name), np.int32 if name == "active" else float)
-            data.point_data[name] = np.pad(known, (0, rest))
-        data.point_data["contact_point"] = np.pad(np.ones(m, np.int32), (0, rest))
-        traction = -solution.pressure[:, None] * solution.direction
-        data.point_data["traction"] = np.pad(traction, ((0, rest), (0, 0)))
+        del fields["force"]
+    for name, known in fields.items() if data.n_points else ():
+        data.point_data[name] = lifted(known) if known.ndim == 2 else np.tile(known, times)
     _name_pairs(data, solution)
     return data
 
