@@ -1,4 +1,7 @@
-"""Checks of geometry parameters: the message says what, the value, and what would be right."""
+"""Checks of geometry parameters: the message says what, the value, and what would be right.
+
+Values of another type raise ``TypeError``, values out of range ``ValueError``.
+"""
 
 from __future__ import annotations
 
@@ -10,15 +13,7 @@ import numpy as np
 
 
 def finite(name: str, value: object) -> float:
-    """Finite real number.
-
-    Raises
-    ------
-    TypeError
-        If `value` is not a real number.
-    ValueError
-        If `value` is infinite or nan.
-    """
+    """Finite real number."""
     if not isinstance(value, Real) or isinstance(value, bool):
         raise TypeError(f"{name} = {value!r}: expected a real number, not {type(value).__name__}")
     number = float(value)
@@ -28,13 +23,7 @@ def finite(name: str, value: object) -> float:
 
 
 def positive(name: str, value: object) -> float:
-    """Finite real number above zero.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As `finite`, and ``ValueError`` for zero or a negative number.
-    """
+    """Finite real number above zero."""
     number = finite(name, value)
     if number <= 0:
         raise ValueError(f"{name} = {value!r}: expected a positive length")
@@ -42,13 +31,7 @@ def positive(name: str, value: object) -> float:
 
 
 def above(name: str, value: object, limit_name: str, limit: float) -> float:
-    """Finite real number strictly above a limit that another parameter sets.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As `finite`, and ``ValueError`` for a number not above `limit`.
-    """
+    """Finite real number strictly above a limit that another parameter sets."""
     number = finite(name, value)
     if number <= limit:
         raise ValueError(f"{name} = {value!r}: expected more than {limit_name} = {limit!r}")
@@ -56,28 +39,14 @@ def above(name: str, value: object, limit_name: str, limit: float) -> float:
 
 
 def flag(name: str, value: object) -> bool:
-    """Truth value.
-
-    Raises
-    ------
-    TypeError
-        If `value` is neither True nor False.
-    """
+    """Truth value."""
     if not isinstance(value, bool | np.bool_):
         raise TypeError(f"{name} = {value!r}: expected True or False")
     return bool(value)
 
 
 def count(name: str, value: object, least: int) -> int:
-    """Whole number, at least `least`.
-
-    Raises
-    ------
-    TypeError
-        If `value` is not a whole number.
-    ValueError
-        If `value` is below `least`.
-    """
+    """Whole number, at least `least`."""
     if not isinstance(value, Integral) or isinstance(value, bool):
         raise TypeError(f"{name} = {value!r}: expected a whole number")
     if value < least:
@@ -86,15 +55,7 @@ def count(name: str, value: object, least: int) -> int:
 
 
 def increasing_line(name: str, value: object) -> list[tuple[float, float]]:
-    """Vertices (x, y) of a polygonal line that runs strictly to the right.
-
-    Raises
-    ------
-    TypeError
-        If `value` is not a sequence of pairs of real numbers.
-    ValueError
-        If it has fewer than two vertices, or x does not increase strictly.
-    """
+    """Two or more vertices (x, y) of a polygonal line that runs strictly to the right."""
     right = "expected at least two vertices (x, y) with strictly increasing x"
     if not isinstance(value, Sequence | np.ndarray) or isinstance(value, str):
         raise TypeError(f"{name} = {value!r}: {right}")

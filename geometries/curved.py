@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from netgen.occ import Face, OCCGeometry
+from netgen.occ import OCCGeometry
 
 from ngcontact.geometries.check import above, count, finite, positive
 from ngcontact.geometries.graph_edge import GraphCurve, follow
@@ -75,7 +75,19 @@ def graphs(
     b, height = above("b", b, "a", a), positive("height", height)
     over = _curve("upper", upper, a, b, height, samples)
     under = _curve("lower", lower, a, b, height, samples)
-    return compound(_above(over, a, b, height), _below(under, a, b, -height))
+    upper_outline = [
+        ("upper_contact", over.edge()),
+        ("upper_right", segment(over.right, (b, height))),
+        ("top", segment((b, height), (a, height))),
+        ("upper_left", segment((a, height), over.left)),
+    ]
+    lower_outline = [
+        ("lower_contact", under.edge(leftward=True)),
+        ("lower_left", segment(under.left, (a, -height))),
+        ("bottom", segment((a, -height), (b, -height))),
+        ("lower_right", segment((b, -height), under.right)),
+    ]
+    return compound(body("upper", upper_outline), body("lower", lower_outline))
 
 
 def _curve(
@@ -91,29 +103,3 @@ def _curve(
             f"strictly between -height = {-height!r} and height = {height!r}"
         )
     return curve
-
-
-def _above(curve: GraphCurve, a: float, b: float, top: float) -> Face:
-    """Body between the curve and y = `top`."""
-    return body(
-        "upper",
-        [
-            ("upper_contact", curve.edge()),
-            ("upper_right", segment(curve.right, (b, top))),
-            ("top", segment((b, top), (a, top))),
-            ("upper_left", segment((a, top), curve.left)),
-        ],
-    )
-
-
-def _below(curve: GraphCurve, a: float, b: float, bottom: float) -> Face:
-    """Body between y = `bottom` and the curve."""
-    return body(
-        "lower",
-        [
-            ("lower_contact", curve.edge(leftward=True)),
-            ("lower_left", segment(curve.left, (a, bottom))),
-            ("bottom", segment((a, bottom), (b, bottom))),
-            ("lower_right", segment((b, bottom), curve.right)),
-        ],
-    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from netgen.occ import Face, OCCGeometry
+from netgen.occ import OCCGeometry
 
 from ngcontact.geometries.check import above, finite, increasing_line, positive
 from ngcontact.geometries.region import Point, body, compound, polygon
@@ -66,7 +66,13 @@ def blocks(
     if line is None:
         line = ((-width / 2, 0.0), (width / 2, 0.0))
     vertices = _line_between(-depth, height, line)
-    return compound(_upper_block(vertices, height), _lower_block(vertices, -depth))
+    (left, _), (right, _) = vertices[0], vertices[-1]
+    sides = len(vertices) - 1
+    names = ["upper_contact"] * sides + ["upper_right", "top", "upper_left"]
+    upper = polygon([*vertices, (right, height), (left, height)], names)
+    names = ["lower_contact"] * sides + ["lower_left", "bottom", "lower_right"]
+    lower = polygon([*vertices[::-1], (left, -depth), (right, -depth)], names)
+    return compound(body("upper", upper), body("lower", lower))
 
 
 def punch(
@@ -127,7 +133,15 @@ def punch(
         [(-half, 0.0), (half, 0.0), (half, top), (-half, top)],
         ["punch_contact", "punch_sides", "punch_top", "punch_sides"],
     )
-    return compound(body("punch", upper), _foundation(half, far, bottom))
+    surface = [(far, 0.0), (half, 0.0), (-half, 0.0), (-far, 0.0)]
+    foundation = polygon(
+        [*surface, (-far, bottom), (far, bottom)],
+        [
+            *("foundation_free", "foundation_contact", "foundation_free"),
+            *("foundation_sides", "foundation_bottom", "foundation_sides"),
+        ],
+    )
+    return compound(body("punch", upper), body("foundation", foundation))
 
 
 def sleeve_on_shaft(
@@ -205,30 +219,3 @@ def _line_between(bottom: float, top: float, line: object) -> list[Point]:
                 f"-lower_height = {bottom!r} and height = {top!r}"
             )
     return vertices
-
-
-def _upper_block(line: list[Point], top: float) -> Face:
-    """Block between a line and y = `top`."""
-    (left, _), (right, _) = line[0], line[-1]
-    names = ["upper_contact"] * (len(line) - 1) + ["upper_right", "top", "upper_left"]
-    return body("upper", polygon([*line, (right, top), (left, top)], names))
-
-
-def _lower_block(line: list[Point], bottom: float) -> Face:
-    """Block between y = `bottom` and a line."""
-    (left, _), (right, _) = line[0], line[-1]
-    names = ["lower_contact"] * (len(line) - 1) + ["lower_left", "bottom", "lower_right"]
-    return body("lower", polygon([*line[::-1], (left, bottom), (right, bottom)], names))
-
-
-def _foundation(half: float, far: float, bottom: float) -> Face:
-    """Foundation |x| <= `far` down to y = `bottom`, in contact for |x| <= `half`."""
-    surface = [(far, 0.0), (half, 0.0), (-half, 0.0), (-far, 0.0)]
-    outline = polygon(
-        [*surface, (-far, bottom), (far, bottom)],
-        [
-            *("foundation_free", "foundation_contact", "foundation_free"),
-            *("foundation_sides", "foundation_bottom", "foundation_sides"),
-        ],
-    )
-    return body("foundation", outline)
