@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import ngcontact
+from drivers.adaptive_study.runs import smallest_angle
 from drivers.benchmark.__main__ import PARTS, Part, main
 from drivers.benchmark.engines import (
     Engine,
@@ -167,14 +168,6 @@ def test_meshes_have_the_size_asked_for(name: str, kind: str, order: int):
     if name == "block":
         sides = [np.unique(mesh.points[mesh.edges[f"{b}_contact"], 0]) for b in ("upper", "lower")]
         np.testing.assert_allclose(*sides, rtol=0, atol=1e-12 * sides[0][-1])
-
-
-def smallest_angle(corners: np.ndarray) -> float:
-    angles = []
-    for k in range(3):
-        a, b = (corners[:, (k + i) % 3] - corners[:, k] for i in (1, 2))
-        angles.append(np.degrees(np.arctan2(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0], (a * b).sum(1))))
-    return float(np.min(angles))
 
 
 @pytest.mark.parametrize("order", [1, 2])
