@@ -274,7 +274,7 @@ def test_rings_close_at_their_temperature():
     clearance = 1e-3
     closing = clearance / free_growth(LAWS["inner"], 1.0)
     problem = fit(-clearance)
-    mesh = curve(first_mesh(problem, 0.3), 4, "isoparametric")[0]  # used as it is
+    mesh = curve(first_mesh(problem, 0.15), 4, "isoparametric")[0]  # used as it is
     first, forces = None, []
     for share in (1 - 1e-6, 1 + 1e-6, 1.5, 2.0):
         hot = replace(problem, strain={"inner": share * closing})
@@ -286,7 +286,8 @@ def test_rings_close_at_their_temperature():
     assert found == pytest.approx(closing, rel=1e-6)
     right = line_force(2 * clearance, clearance)
     assert forces[3] * 2 / math.pi == pytest.approx(right, rel=1e-4)
-    assert first.pressure == pytest.approx(right, rel=2e-3)  # per length of the nearer circle
+    # Per length of the inner circle, whose radius is 1; measured 4e-5, and 6e-4 at maxh = 0.3.
+    assert first.pressure == pytest.approx(right, rel=1e-4)
 
 
 def disc_in_square(strain, gap=1e-3):

@@ -2,8 +2,9 @@
 
 HH81 Remark 3.7. Directions that no contact row resists (lineality) are fixed by one held unknown
 each, whose force vanishes under a load in equilibrium; the others are left to contact. A few
-unknowns, the pins, make the factorised matrix definite for every active set and are released in
-its border, so that singularity sits in a small Schur complement alone. NumPy and SciPy only.
+unknowns, the pins, hold motions that the active rows of the factorised matrix hardly resist, and
+are released in its border, so that singularity sits in a small Schur complement alone. NumPy and
+SciPy only.
 """
 
 from __future__ import annotations
@@ -18,18 +19,22 @@ from scipy.linalg import qr
 from ..arrays import Array, Index, Mask
 
 NULL_SPACE_TOLERANCE = 1e-8  # singular value, of motions of size 1, below which nothing resists
+WEAK_RESISTANCE = 1e-2  # ... up to which rows resist so little that a factorisation loses digits
 CACHE_ROWS = 1 << 14  # rows that are copied at a time: the copy stays in the cache
 
 
-def vanishing_combinations(resisted: Array) -> Array:
-    """Combinations (r, l) of the r columns of `resisted` (k, r) that vanish, in echelon form."""
+def vanishing_combinations(resisted: Array, tolerance: float = NULL_SPACE_TOLERANCE) -> Array:
+    """Combinations (r, l) of the r columns of `resisted` (k, r) that vanish, in echelon form.
+
+    Up to the `tolerance`, in the root of the mean square of their k values.
+    """
     r = resisted.shape[1]
     if len(resisted) < r:
         resisted = np.pad(resisted, ((0, r - len(resisted)), (0, 0)))
     if r == 0:
         return np.zeros((0, 0))
     _, singular, directions = np.linalg.svd(resisted, full_matrices=False)
-    return echelon(directions[singular <= NULL_SPACE_TOLERANCE * np.sqrt(len(resisted))].T)
+    return echelon(directions[singular <= tolerance * np.sqrt(len(resisted))].T)
 
 
 def echelon(vectors: Array) -> Array:
@@ -62,9 +67,15 @@ class NullSpace:
         least = np.linalg.svd(part, compute_uv=False)[-1]
         return bool(least > NULL_SPACE_TOLERANCE * np.sqrt(len(part)))
 
-    def unresisted(self, rows: Index) -> Array:
+    def unresisted(self, rows: Index, tolerance: float = NULL_SPACE_TOLERANCE) -> Array:
         """Motions (n, k) of `others` that rows with the unknowns `rows` (m,) do not resist."""
-        return self.others @ vanishing_combinations(self.others[rows])
+        return self.others @ vanishing_combinations(self.others[rows], tolerance)
+
+    def weakly_resisted(self, rows: Index) -> Mask:
+        """Pins (q,) of the motions that rows with the unknowns `rows` (m,) hardly resist."""
+        if self.pins.size == 0:
+            return np.zeros(0, dtype=bool)
+        return np.isin(self.pins, separated(self.unresisted(rows, WEAK_RESISTANCE), self.pins))
 
 
 def no_null_space(n: int) -> NullSpace:
@@ -132,7 +143,7 @@ class QuadraticProgram:
         """Diagonal (n,) of K."""
         return np.asarray(self.K.diagonal())
 
-    @property
+    @cached_property
     def unit_rows(self) -> bool:
         """Whether every row is a single unknown."""
         return self.R is None

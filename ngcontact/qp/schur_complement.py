@@ -15,8 +15,7 @@ from .quadratic_program import Anchor, QuadraticProgram, SingularError
 
 COARSE_RESIDUAL = 1e-11  # relative to the largest met, at which the next active set is chosen
 FINE_RESIDUAL = 1e-14  # ... and of the last system
-BORDER = 16  # changed rows up to which a bordered solve is cheaper than a factorisation ...
-BORDER_GROWTH = 4  # ... times this for every one before: the sets that follow change less and less
+BORDER = 32  # back-solves that cost as much as a factorisation
 BORDER_ROUND_OFF = 1e-14  # of its singular values, relative to the largest
 SINGULAR_RESIDUAL = 1e-6  # residual, relative to the first, above which the matrix is singular
 # ... unless it is that of values that balance each other.
@@ -25,9 +24,10 @@ BALANCE_ROUND_OFF = 64 * np.finfo(float).eps
 
 @dataclass(eq=False)
 class Base:
-    """The factorised system K_0: that of one active set, with all pins held."""
+    """The factorised system K_0: that of one active set, with pins of motions it hardly resists."""
 
     active: Mask  # (m,) its active rows, none where rows are not unit rows
+    pinned: Mask  # (q,) pins that it holds
     free: Mask  # (n,) its unknowns
     inverse: Solve  # K_0^-1
     known: Array  # (k, n) solutions K_0^-1 v of the columns v that borders have had so far
@@ -42,7 +42,7 @@ class Border:
     base: Base
     active: Mask  # (m,)
     anchor: Anchor | None
-    at: Index  # (r,) unknowns that the base alone holds: released ones, and the pins
+    at: Index  # (r,) unknowns that the base alone holds: released ones, and its pins
     rows: Index  # (k - r,) rows that only the system holds
     column: Index  # (k,) places of K_0^-1 V among the known solutions of the base
     touched: Index  # (t,) unknowns where V is not zero
@@ -60,11 +60,11 @@ class Border:
 class BorderedSystems:
     """The systems K y + R' force = b, R y = g on the active rows, force = 0 on the others.
 
-    One set, the base, is factorised with all pins of the null space held. Another set is reached
-    by bordering that factor K_0 with one row and column for each row of R that changed state and
-    for each pin, V and D, at one back-solve for each. A right side (r, w) then takes the three
-    steps of Gill, Murray, Saunders, Wright (1990, A Schur-complement method for sparse quadratic
-    programming):
+    One set, the base, is factorised with pins held for all rigid motions that it hardly resists.
+    Another set is reached by bordering that factor K_0 with one row and column for each row of R
+    that changed state and for each of these pins, V and D, at one back-solve for each. A right side
+    (r, w) then takes the three steps of Gill, Murray, Saunders, Wright (1990, A Schur-complement
+    method for sparse quadratic programming):
 
     1. K_0 x = r
     2. S z = V'x - w with the Schur complement S = V' K_0^-1 V - D
@@ -82,8 +82,7 @@ class BorderedSystems:
         Factorises the matrix of the free unknowns (n,): answers a function that solves for right
         sides (n,) which vanish at the others, as the solution does.
     border : int
-        Changed rows up to which the first factorisation is bordered; a factorisation costs that
-        many back-solves.
+        Back-solves for changed rows after which the next set is factorised: they cost as much.
     """
 
     program: QuadraticProgram  # that of the last `restart`
@@ -170,7 +169,7 @@ class BorderedSystems:
 
     def _reach(self, active: Mask, anchor: Anchor | None) -> Border:
         """The system of an active set, solved."""
-        p, base = self.program, self._base_near(active)
+        p, base = self.program, self._base_near(active, anchor)
         self.system = system = self._bordered(base, active, anchor)
         self.force[~active] = 0.0
         if p.unit_rows:
@@ -182,24 +181,35 @@ class BorderedSystems:
         self._improve(system, COARSE_RESIDUAL)
         return system
 
-    def _base_near(self, active: Mask) -> Base:
-        """The base, or a new one where too many rows have changed."""
+    def _base_near(self, active: Mask, anchor: Anchor | None) -> Base:
+        """The base, or a new one where rows have cost enough, or anchors pull at other pins."""
         p, base = self.program, self.base
-        most = self.border * BORDER_GROWTH ** max(self.factorizations - 1, 0)
-        if base is not None and (
-            not p.unit_rows or np.count_nonzero(active != base.active) <= most
-        ):
+        pulled = np.zeros(p.null_space.pins.size) if anchor is None else anchor.stiffness
+        if base is not None and not p.unit_rows:
             return base
+        if base is not None and not pulled[~base.pinned].any():
+            rows, at = self._changed(base, active)
+            columns = base.place.keys() | {*at.tolist(), *(~rows).tolist()}
+            if len(columns) <= self.border + np.count_nonzero(base.pinned):
+                return base
         self.forget()  # two factorisations at a time would double the memory
-        free = ~p.fixed
-        free[np.concatenate([p.null_space.held, p.null_space.pins])] = False
         closed = active & p.unit_rows
-        if p.unit_rows:
-            free[p.unknown[active]] = False
-        self.base = Base(closed, free, self.factor(free), np.zeros((0, p.b.size)))
+        rows = p.unknown[active] if p.unit_rows else p.unknown
+        pinned = p.null_space.weakly_resisted(rows) | (pulled > 0)
+        free = ~p.fixed
+        free[np.concatenate([p.null_space.held, p.null_space.pins[pinned], rows])] = False
+        self.base = Base(closed, pinned, free, self.factor(free), np.zeros((0, p.b.size)))
         self.factorizations += 1
         self._start(closed)
         return self.base
+
+    def _changed(self, base: Base, active: Mask) -> tuple[Index, Index]:
+        """Rows that only the system of `active` (m,) holds, unknowns that only the base holds."""
+        p = self.program
+        at = p.null_space.pins[base.pinned]
+        if p.unit_rows:
+            at = np.concatenate([p.unknown[base.active & ~active], at])
+        return np.flatnonzero(active & ~base.active), at
 
     def _back_solve(self, base: Base, right: Array) -> Array:
         self.back_solves += 1
@@ -208,9 +218,7 @@ class BorderedSystems:
     def _bordered(self, base: Base, active: Mask, anchor: Anchor | None) -> Border:
         """The system of an active set as a border of the base, which learns its new columns."""
         p = self.program
-        rows, at = np.flatnonzero(active & ~base.active), p.null_space.pins
-        if p.unit_rows:
-            at = np.concatenate([p.unknown[base.active & ~active], at])
+        rows, at = self._changed(base, active)
         keys = np.concatenate([at, ~rows]).tolist()
         if not keys:
             V = np.zeros((0, 0))
@@ -234,8 +242,9 @@ class BorderedSystems:
         D[:, : at.size] = dense[:, np.searchsorted(touched, at)]
         D[: at.size] = D[:, : at.size].T
         if anchor is not None:
-            pins = np.arange(at.size - p.null_space.pins.size, at.size)
-            D[pins, pins] += anchor.stiffness
+            stiffness = anchor.stiffness[base.pinned]
+            pins = np.arange(at.size - stiffness.size, at.size)
+            D[pins, pins] += stiffness
         S = dense @ base.known[np.ix_(column, touched)].T - D
         size = np.sqrt(np.abs(np.diagonal(S)))
         size = np.where(size > 0, size, 1.0)
