@@ -224,8 +224,8 @@ def with_means(
     share = np.where(at_nodes, 1.0, nodal / weight)  # of the row at the node
     scale, shape = cosine / weight[point], (m, coupling.shape[0])
     means = from_triplets(scale, point, np.flatnonzero(here), shape) @ coupling
-    faces = line.faces.copy()
-    faces[chosen] = found.whole & here.all(axis=1)
+    faces, covered = line.faces.copy(), line.covered.copy()
+    faces[chosen], covered[chosen] = found.whole & here.all(axis=1), D
     line = replace(
         line,
         gap=share * np.where(share > 0, line.gap, 0.0) + gap / weight,
@@ -234,6 +234,7 @@ def with_means(
         coupling=(sp.diags_array(share) @ line.coupling + means).tocsr(),
         means=~at_nodes,
         faces=faces,
+        covered=covered,
         searches=1,
     )
     return line, carries

@@ -35,7 +35,7 @@ GAP_ROUND_OFF = 4 * np.finfo(float).eps  # round-off of a measured gap, relative
 class ContactLine:
     """The secondary side of one pair and its m contact points."""
 
-    by_segment: ClassVar[tuple[str, ...]] = ("segments", "rows", "faces", "shares")
+    by_segment: ClassVar[tuple[str, ...]] = ("segments", "rows", "faces", "shares", "covered")
     contact: Contact
     segments: Index  # (k,) segments of the secondary boundary
     facing: Index  # (q,) segments of the primary boundary
@@ -51,7 +51,8 @@ class ContactLine:
     coupling: sp.csr_array  # (m, n) weights of the n nodes in the displacement that faces points
     on_axis: Mask  # (m,) points on the axis of a body of revolution
     means: Mask  # (m,) points whose row is a mean over facing segments, not one at the node
-    shares: Array  # (k, order + 1) what each segment contributes to the weights of its points
+    shares: Array  # (k, order + 1) what each whole segment adds to the weights of its points
+    covered: Array  # (k, order + 1) what its part that faces the primary adds to them
     searches: int  # 1 if partners had to be searched, 0 if all are nodes at the same place
 
     @property
@@ -267,6 +268,7 @@ def nodal_line(
         on_axis=np.where(s[first] < 0.5, -1, 1) * trace.axis[segment[first]] * at_end == 1,
         means=np.zeros(len(first), dtype=bool),
         shares=shares,
+        covered=shares,
         searches=int(found.searched),
     )
     return line, facing_points

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 import scipy.sparse as sp
@@ -46,9 +45,6 @@ class ContactZone(ContactLine):
 
     Weights are areas, across a fixed direction as the direction sees them.
     """
-
-    by_segment: ClassVar[tuple[str, ...]] = (*ContactLine.by_segment, "covered")
-    covered: Array  # (k, q) what the part of each facet that faces the primary adds to weights
 
     @property
     def dim(self) -> int:
@@ -336,10 +332,8 @@ def with_dual_rows(trace: FacetTrace, zone: ContactZone, facing: Mask) -> tuple[
     facets = zone.segments[~matched]
     parts = facing_pieces(trace, zone.contact, facets, zone.facing, _reach(trace, zone)[~matched])
     whole = np.bincount(zone.rows.ravel() + 1, zone.shares.ravel(), len(facing) + 1)[1:]
-    means, covered = _means(trace, zone, facets, parts), zone.covered.copy()
-    covered[~matched] = means.D
+    means = _means(trace, zone, facets, parts)
     zone, carries = with_means(trace, zone, facing, matched, means)
-    zone = replace(zone, covered=covered)
     # Slivers: their forces are less than the round-off of the others.
     return zone, carries & (zone.weight > SMALLEST_SHARE * whole)
 

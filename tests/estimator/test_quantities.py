@@ -10,6 +10,7 @@ from netgen.occ import Circle, Compound, MoveTo, OCCGeometry, Y
 from drivers.reference import axisymmetric_cases, cases
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.geometries import blocks, disc
+from tests.given_meshes import two_blocks
 from tests.runs import solved
 
 
@@ -213,6 +214,30 @@ def test_a_punch_in_contact_is_as_wide_as_it_is(swap):
     area = solve(problem, maxh=0.3, order=2).quantities()["contact area"]
     assert area.value == pytest.approx(1.0, rel=1e-12)
     assert area.error <= 1e-12
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+@pytest.mark.parametrize("upper", [(-0.363, 0.637, 7), (-0.2, 0.1, 4)])
+def test_pressures_of_segments_that_face_in_part(upper, order):
+    """The secondary is wider and its nodes are others: resultant, sign, and 0 where none faces."""
+    mesh = two_blocks(np.linspace(*upper), np.linspace(-1.5, 1.5, 14))
+    base = cases.one_transition().problem
+    problem = Problem(
+        geometry=mesh,
+        materials=base.materials,
+        displacement={"bottom": (0, 0), "top": (0, -0.01)},
+        contact=[Contact("lower_contact", "upper_contact", direction=(0, 1))],
+    )
+    solution = solve(problem, order=order)
+    field, line = solution.pressure_field(), ng.ds("lower_contact", bonus_intorder=order)
+    # Sums of a dozen pressures, by Gauss' rule exact: measured 9e-15.
+    assert ng.Integrate(field * line, mesh) == pytest.approx(solution.force.sum(), rel=1e-12)
+    places = ng.IntegrationRule([(t, 0, 0) for t in np.linspace(0, 1, 9)], [1.0] * 9)
+    points = mesh.MapToAllElements(places, mesh.Boundaries("lower_contact"))
+    value, x = field(points).ravel(), ng.x(points).ravel()
+    far = (x < upper[0] - 3 / 13) | (x > upper[1] + 3 / 13)  # more than a segment
+    assert not value[far].any()
+    assert value.min() >= 0
 
 
 @pytest.mark.filterwarnings("error::RuntimeWarning")

@@ -86,14 +86,15 @@ class Measured(Guaranteed):
         primary, which ``mesh(x, y, z, ng.BND)`` may find where both coincide.
 
         In the plane polynomials of degree `order` on each segment, which meet `pressure` at the
-        contact points. On solids of order 1 in H1 at orders 1 and 2, between the pressures at
-        vertices: at order 2 means, by area, of the linear functions through the middles of edges,
-        whose resultant on plane facets is that of the contact. Where facets face the primary in
-        part it is linear on each facet, with means over these: the resultant was met to 4 to 9 % on
-        coarse meshes of wider secondaries. At order 3 of degree 2 on each facet with a point in
-        contact, nearest to the mean traction of both sides, whose resultant was met to 20 % there,
-        and to 9 % beside corners where it is infinite: better than
-        `pressure` where the stress is resolved (docs/solids.md).
+        contact points; on a segment that faces the primary in part they are times the share that
+        faces it, so that the resultant is that of the contact. On solids of order 1 in H1 at orders
+        1 and 2, between the pressures at vertices: at order 2 means, by area, of the linear
+        functions through the middles of edges, whose resultant on plane facets is that of the
+        contact. Where facets face the primary in part it is linear on each facet, with means over
+        these: the resultant was met to 4 to 9 % on coarse meshes of wider secondaries. At order 3
+        of degree 2 on each facet with a point in contact, nearest to the mean traction of both
+        sides, whose resultant was met to 20 % there, and to 9 % beside corners where it is
+        infinite: better than `pressure` where the stress is resolved (docs/solids.md).
         """
         self.discrete.space.require_mesh()
         return pressure_field(self, state_of(self.pairs, pair))

@@ -29,7 +29,7 @@ def pressure_field(solution: Solved, state: ContactState) -> ng.GridFunction:
     boundary = solution.mesh.Boundaries(line.contact.secondary)
     if not isinstance(trace, FacetTrace):
         _, s = trace.at_nodes(line.segments)
-        values = np.append(state.pressure, 0.0)[line.rows]
+        values = _at_nodes(trace, state)
         return _by_facet(trace, boundary, trace.order, line.segments, s, values, 0 * values + 1)
     if trace.order == 3:
         return _mean_traction(solution, trace, state)
@@ -45,6 +45,25 @@ def pressure_field(solution: Solved, state: ContactState) -> ng.GridFunction:
     values *= share[:, None]
     s = np.tile(np.eye(3), (len(values), 1))
     return _by_facet(trace, boundary, 1, line.segments, s, values, 0 * values + 1)
+
+
+def _at_nodes(trace: BoundaryTrace, state: ContactState) -> Array:
+    """Pressures (k, order + 1) at the nodes of segments.
+
+    On segments that face the primary in part they are linear between the points with rows, times
+    the share that faces it: the resultant of each is that of its rows.
+    """
+    line = state.line
+    values = np.append(state.pressure, 0.0)[line.rows]
+    known, s = line.rows >= 0, trace.places(line.segments)
+    partly = np.flatnonzero(known.any(axis=1) & ~line.faces)
+    for i in partly:
+        values[i] = np.interp(s[i], s[i, known[i]], values[i, known[i]])
+    of_rows = (line.covered * np.append(state.pressure, 0.0)[line.rows])[partly].sum(axis=1)
+    whole = (line.shares * values)[partly].sum(axis=1)
+    share = np.divide(of_rows, whole, out=np.zeros(len(partly)), where=whole > 0)
+    values[partly] *= share[:, None]
+    return np.asarray(values)
 
 
 def _at_vertices(trace: FacetTrace, state: ContactState) -> Array:
