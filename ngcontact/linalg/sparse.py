@@ -139,7 +139,7 @@ def inverse_of(matrix: ng.BaseMatrix, free: ng.BitArray) -> ng.BaseMatrix:
 
     Small ones on one thread, to the last bit the same on any machine, but for a caller's threads.
     """
-    if matrix.height > ONE_THREAD:
+    if free.NumSet() > ONE_THREAD:
         return matrix.Inverse(free, inverse="sparsecholesky")
     with one_thread():
         return matrix.Inverse(free, inverse="sparsecholesky")

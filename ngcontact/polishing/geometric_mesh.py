@@ -22,9 +22,10 @@ from ..fem import boundary_trace, model_of
 from ..mesh import CadEdge, cad_edges, graded_mesh, opposite
 from ..problem import Contact, MeshArrays, Problem
 
-# Ratios of the sizes of layers: (2^(1/2) - 1)^2 = 0.17 is best for energies (Gui, Babuska), and a
-# larger one for the singular coefficient, which shows where contact ends.
-CORNER_RATIO = 0.15
+# Ratios of the sizes of layers: (2^(1/2) - 1)^2 = 0.17 is best for energies in the limit (Gui,
+# Babuska), a larger one up to order 10 on two to four triangles a layer (measured: a tenth of the
+# error), and for the singular coefficient, which shows where contact ends.
+CORNER_RATIO = 0.25
 END_RATIO = 0.4
 END_SIZE = 0.45  # of the contact up to its middle, which elements at its end may have
 SIZE_GROWTH = 0.8  # of sizes, over the distance from the ends
@@ -79,8 +80,8 @@ class GeometricMesh:
         found = np.flatnonzero(np.isin(self.segments, (one, other)).all(axis=1))
         return int(found[0]) if len(found) else -1
 
-    def _facing(self, vertex: int, far: int, place: Array) -> Array | None:
-        """The point (2,) that faces a `place` (2,) of the secondary's side from `vertex` to `far`.
+    def _facing(self, vertex: int, far: int, places: Array) -> Array | None:
+        """Points (k, 2) that face `places` (k, 2) of the secondary's side from `vertex` to `far`.
 
         None where no segment of the primary faces that.
         """
@@ -89,9 +90,8 @@ class GeometricMesh:
             return None
         own = self._between(vertex, far)
         edge, facing = (self.edges[int(self.boundaries[k])] for k in (own, there))
-        slope = edge.derivative(edge.project(place[None]))
-        contact = self.contacts[int(self.pair[own])]
-        return opposite(contact, place[None], slope, facing)[1][0]
+        slope = edge.derivative(edge.project(places))
+        return opposite(self.contacts[int(self.pair[own])], places, slope, facing)[1]
 
     def moved(self, end: EndOfContact, distance: float) -> GeometricMesh:
         """The mesh with an end of contact moved by a `distance` along its edge, outwards.
@@ -105,76 +105,78 @@ class GeometricMesh:
         tangent *= np.sign(tangent @ outwards) / np.linalg.norm(tangent)
         near = vertices[[end.vertex]] + distance * tangent
         vertices[end.vertex] = edge.point(edge.project(near))[0]
-        met = self._facing(end.vertex, end.closed, vertices[end.vertex])
+        met = self._facing(end.vertex, end.closed, vertices[[end.vertex]])
         if met is not None:
-            vertices[self.partner[end.vertex]] = met
+            vertices[self.partner[end.vertex]] = met[0]
         return replace(self, vertices=vertices)
 
     def with_layers(self, vertex: int, ratio: float, count: int) -> GeometricMesh:
-        """The mesh with so many layers more at a vertex, and at the one that faces it."""
-        mesh = self
-        for _ in range(count):
-            mesh = mesh._with_layer(vertex, ratio)
-        return mesh
+        """The mesh with so many layers more at a vertex, and at the one that faces it.
 
-    def _with_layer(self, vertex: int, ratio: float) -> GeometricMesh:
-        """One layer more; the layers of facing vertices face each other."""
-        mesh, new = self._cut(vertex, ratio, {})
+        The layers of facing vertices face each other.
+        """
+        mesh, new = self._cut(vertex, ratio, count, {})
         facing = int(self.partner[vertex])
         if facing < 0:
             return mesh
         own = (self.segments == vertex).any(axis=1) & (self.pair >= 0)
-        places, partner = dict[int, Array](), list[tuple[int, int]]()
+        places, partner = dict[int, Array](), list[tuple[Index, int]]()
         for far in (self.segments[own].sum(axis=1) - vertex).tolist():
             met = self._facing(vertex, far, mesh.vertices[new[far]])
             if met is not None:
                 places[int(self.partner[far])] = met
                 partner.append((new[far], int(self.partner[far])))
-        mesh, beyond = mesh._cut(facing, ratio, places)
+        mesh, beyond = mesh._cut(facing, ratio, count, places)
         for one, far in partner:
             mesh.partner[one] = beyond[far]
         return mesh
 
     def _cut(
-        self, vertex: int, ratio: float, known: dict[int, Array]
-    ) -> tuple[GeometricMesh, dict[int, int]]:
+        self, vertex: int, ratio: float, count: int, known: dict[int, Array]
+    ) -> tuple[GeometricMesh, dict[int, Index]]:
         """The mesh with all sides at a vertex cut, and the new vertices by the sides' far ends.
 
-        Each triangle there becomes three. New vertices of `known` far ends lie where those say.
+        Each triangle there has `count` layers of two triangles in place of all but its tip. New
+        vertices (count,), inwards, of `known` far ends lie where those say.
         """
         at, corner = np.nonzero(self.triangles == vertex)
         a, b = (self.triangles[at, (corner + k) % 3] for k in (1, 2))
-        far = np.unique(np.concatenate([a, b]))
-        first = len(self.vertices)
-        new = {int(end): first + k for k, end in enumerate(far)}
-        x = self.vertices[vertex] + ratio * (self.vertices[far] - self.vertices[vertex])
+        far, middle = np.unique(np.concatenate([a, b])), self.vertices[vertex]
+        scale = ratio ** np.arange(1, count + 1)
+        x = middle + scale[:, None] * (self.vertices[far] - middle)[:, None]
         side = np.flatnonzero((self.segments == vertex).any(axis=1))
-        ends = self.segments[side].sum(axis=1) - vertex
-        cut = np.array([new[k] for k in ends.tolist()], dtype=np.intp)
-        for place, boundary in zip((cut - first).tolist(), self.boundaries[side], strict=True):
+        ends = np.searchsorted(far, self.segments[side].sum(axis=1) - vertex)
+        for k, boundary in zip(ends.tolist(), self.boundaries[side].tolist(), strict=True):
             edge = self.edges[boundary]
-            x[place] = edge.point(edge.project(x[[place]]))[0]
-        for end, point in known.items():
-            x[new[end] - first] = point
-        near_a, near_b = (np.array([new[k] for k in end.tolist()]) for end in (a, b))
-        kept = np.delete(np.arange(len(self.triangles)), at)
-        parts = ((np.full(len(at), vertex), near_a, near_b), (near_a, a, b), (near_a, b, near_b))
-        at_vertex = self.segments[side] == vertex
-        inner, segments = np.where(at_vertex, vertex, cut[:, None]), self.segments.copy()
-        segments[side] = np.where(at_vertex, cut[:, None], self.segments[side])
+            x[k] = edge.point(edge.project(x[k]))
+        for end, points in known.items():
+            x[np.searchsorted(far, end)] = points
+        new = len(self.vertices) + np.arange(len(far) * count).reshape(len(far), count)
+        ray = np.column_stack([far, new])  # from the far end inwards
+        ray_a, ray_b = (ray[np.searchsorted(far, end)] for end in (a, b))
+        parts = [
+            (np.full(len(at), vertex), ray_a[:, -1], ray_b[:, -1]),
+            (ray_a[:, 1:], ray_a[:, :-1], ray_b[:, :-1]),
+            (ray_a[:, 1:], ray_b[:, :-1], ray_b[:, 1:]),
+        ]
+        triangles = [np.stack(part, axis=-1).reshape(-1, 3) for part in parts]
         body = self.bodies[at]
+        at_vertex, segments = self.segments[side] == vertex, self.segments.copy()
+        segments[side] = np.where(at_vertex, vertex, ray[ends, -1:])
+        outer = np.where(at_vertex[:, None], ray[ends, 1:, None], ray[ends, :-1, None])
+        others = np.repeat(side, count)
         mesh = replace(
             self,
-            vertices=np.concatenate([self.vertices, x]),
-            triangles=np.concatenate([self.triangles[kept], *(np.stack(t, 1) for t in parts)]),
-            bodies=np.concatenate([self.bodies[kept], body, body, body]),
-            segments=np.concatenate([segments, inner]),
-            boundaries=np.concatenate([self.boundaries, self.boundaries[side]]),
-            pair=np.concatenate([self.pair, self.pair[side]]),
-            closed=np.concatenate([self.closed, self.closed[side]]),
-            partner=np.concatenate([self.partner, np.full(len(x), -1)]),
+            vertices=np.concatenate([self.vertices, x.reshape(-1, 2)]),
+            triangles=np.concatenate([np.delete(self.triangles, at, axis=0), *triangles]),
+            bodies=np.concatenate([np.delete(self.bodies, at), body, np.repeat(body, 2 * count)]),
+            segments=np.concatenate([segments, outer.reshape(-1, 2)]),
+            boundaries=np.concatenate([self.boundaries, self.boundaries[others]]),
+            pair=np.concatenate([self.pair, self.pair[others]]),
+            closed=np.concatenate([self.closed, self.closed[others]]),
+            partner=np.concatenate([self.partner, np.full(new.size, -1)]),
         )
-        return mesh, new
+        return mesh, dict(zip(far.tolist(), new, strict=True))
 
     def mesh(self, degree: int) -> ng.Mesh:
         """NGSolve's mesh, curved to a `degree`; its segments come in the same order."""
@@ -193,7 +195,8 @@ class GeometricMesh:
         for number, name in enumerate(self.source.GetBoundaries()):
             new.SetBCName(number, name)
         mesh = ng.Mesh(new)
-        mesh.Curve(degree)
+        if not all(edge.straight for edge in self.edges):
+            mesh.Curve(degree)
         return mesh
 
 
