@@ -20,8 +20,8 @@ NEWTON_STEPS = 30
 LEVEL_DISTANCE = 1e-9  # distance, relative to the edge, beyond which a level counts as not reached
 SPEED_CHANGE = 1e-9  # relative change of speed along an arc of a circle
 STRAIGHT = 1e-12  # distance from the chord, relative to the edge; OCC keeps about 1e-15
-LONG_ARC = 0.5  # parameters, angles on arcs of circles, from which the arc is fitted
-# Distance, relative to the edge, at which a formula is its curve.
+LONG_ARC = 0.5  # parameters from which an arc of an ellipse is fitted
+# Distance, relative to coordinates and axes, up to which a formula is its curve: their round-off.
 FORMULA_DISTANCE = 8 * np.finfo(float).eps
 NEWTON_TOLERANCE = 1e-15  # relative change of a parameter at which Newton's method has arrived
 
@@ -33,8 +33,10 @@ class CadEdge:
         self._edge = edge
         self.start, self.stop = edge.parameter_interval
         self._t = np.linspace(self.start, self.stop, SAMPLES)
+        self._middle = (self.start + self.stop) / 2
         self.straight = False  # a straight segment with a constant derivative, as far as is known
         self._axes: Array | None = None
+        self._circle = False  # an arc of a circle, as far as is known
         self._x = self.point(self._t)
         self.size = float(np.abs(np.ptp(self._x, axis=0)).max())  # its extent, a length
         chord = self._x[0] + np.linspace(0, 1, SAMPLES)[:, None] * (self._x[-1] - self._x[0])
@@ -44,24 +46,32 @@ class CadEdge:
             self._axes = self._fitted()
 
     def _fitted(self) -> Array | None:
-        """Rows (3, 2) c, a, b of x = c + a cos t + b sin t on arcs of circles and ellipses."""
+        """Rows (3, 2) c, a, b of x = c + a cos s + b sin s, s = t less the middle, on arcs.
+
+        Of circles, by the place and the slope in the middle, and of ellipses.
+        """
+        s = self._t - self._middle
+        shapes = np.column_stack([np.cos(s), np.sin(s)])
+
+        def exact(centre: Array, axes: Array) -> bool:
+            miss = np.abs(centre + shapes @ axes - self._x).max()
+            size = np.abs(self._x).max() + np.abs(axes).max()
+            return bool(miss <= FORMULA_DISTANCE * size)
+
+        x, [slope] = self._x[SAMPLES // 2], self.derivative(self._t[[SAMPLES // 2]])
+        radius = across(slope)
+        radius *= np.sign(radius @ (x - self._x[0]))  # outwards
+        axes = np.stack([radius, slope])
+        self._circle = exact(x - radius, axes)
+        if self._circle:
+            return np.vstack([x - radius, axes])
         if abs(self.stop - self.start) < LONG_ARC:  # cosines and sines would lose digits
             return None
-        shapes = np.column_stack([np.cos(self._t), np.sin(self._t)])
-        two = [0, int(np.abs(np.sin(self._t - self._t[0])).argmax())]  # as perpendicular as can be
+        two = [0, int(np.abs(np.sin(s - s[0])).argmax())]  # as perpendicular as can be
         slopes = np.column_stack([-shapes[two, 1], shapes[two, 0]])
         axes = np.linalg.solve(slopes, self.derivative(self._t[two]))
         centre = (self._x - shapes @ axes)[two].mean(axis=0)
-        exact = np.abs(centre + shapes @ axes - self._x).max() <= FORMULA_DISTANCE * self.size
-        return np.vstack([centre, axes]) if exact else None
-
-    @cached_property
-    def _circle(self) -> bool:
-        """Whether it is an arc of a circle, as far as is known."""
-        if self._axes is None:
-            return False
-        a, b = self._axes[1:]
-        return bool(max(abs(a @ b), abs(a @ a - b @ b)) <= FORMULA_DISTANCE * (a @ a))
+        return np.vstack([centre, axes]) if exact(centre, axes) else None
 
     @property
     def name(self) -> str:
@@ -80,7 +90,8 @@ class CadEdge:
             share = (np.asarray(t) - self.start) / (self.stop - self.start)
             return self._x[0] + share[:, None] * (self._x[-1] - self._x[0])
         if self._axes is not None:
-            return self._axes[0] + np.column_stack([np.cos(t), np.sin(t)]) @ self._axes[1:]
+            s = np.asarray(t) - self._middle
+            return self._axes[0] + np.column_stack([np.cos(s), np.sin(s)]) @ self._axes[1:]
         values = (self._edge.Value(float(ti)) for ti in t)
         return np.array([(p.x, p.y) for p in values]).reshape(-1, 2)
 
@@ -89,7 +100,8 @@ class CadEdge:
         if self.straight:
             return np.tile((self._x[-1] - self._x[0]) / (self.stop - self.start), (len(t), 1))
         if self._axes is not None:
-            return np.column_stack([-np.sin(t), np.cos(t)]) @ self._axes[1:]
+            s = np.asarray(t) - self._middle
+            return np.column_stack([-np.sin(s), np.cos(s)]) @ self._axes[1:]
         values = (self._edge.Tangent(float(ti)) for ti in t)
         return np.array([(v.x, v.y) for v in values]).reshape(-1, 2)
 
@@ -113,9 +125,8 @@ class CadEdge:
         if self._axes is not None and self._circle:
             centre, a, b = self._axes
             offset = points - centre
-            t = self.start + (np.arctan2(offset @ b, offset @ a) - self.start) % (2 * np.pi)
-            nearer = 2 * t > self.start + self.stop + 2 * np.pi  # to the start, beyond the stop
-            return np.where(nearer, self.start, np.minimum(t, self.stop))
+            s = np.arctan2(offset @ b, offset @ a)
+            return np.minimum(np.maximum(self._middle + s, self.start), self.stop)
         nearest = ((points[:, None] - self._x) ** 2).sum(axis=2).argmin(axis=1)
 
         def step(t: Array) -> Array:
