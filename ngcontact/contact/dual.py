@@ -215,17 +215,20 @@ def with_means(
     if line.contact.direction is None:  # of normals, where two sides share a point
         normal = trace.exact_normal(*trace.at_nodes(segments))[here.ravel()]
         cosine = (normal * line.direction[point]).sum(axis=1)
+    faces, covered = line.faces.copy(), line.covered.copy()
+    faces[chosen] = found.whole & here.all(axis=1)
+    weights = np.where(here, D, 0.0)
+    weights[here] *= cosine
+    covered[chosen] = weights
     nodal, dual, gap = np.zeros(m), np.zeros(m), np.zeros(m)
     np.add.at(nodal, line.rows[matched], line.shares[matched])
-    np.add.at(dual, point, D[here] * cosine)
+    np.add.at(dual, point, weights[here])
     np.add.at(gap, point, gaps[here] * cosine)
     at_nodes, carries = dual == 0, (dual > 0) | (facing & (nodal > 0))
     weight = np.where(at_nodes, 1.0, nodal + dual)
     share = np.where(at_nodes, 1.0, nodal / weight)  # of the row at the node
     scale, shape = cosine / weight[point], (m, coupling.shape[0])
     means = from_triplets(scale, point, np.flatnonzero(here), shape) @ coupling
-    faces, covered = line.faces.copy(), line.covered.copy()
-    faces[chosen], covered[chosen] = found.whole & here.all(axis=1), D
     line = replace(
         line,
         gap=share * np.where(share > 0, line.gap, 0.0) + gap / weight,

@@ -98,7 +98,8 @@ class CadEdge:
     def derivative(self, t: Array) -> Array:
         """Derivatives (k, 2) with respect to the parameter, at `t` (k,)."""
         if self.straight:
-            return np.tile((self._x[-1] - self._x[0]) / (self.stop - self.start), (len(t), 1))
+            slope = (self._x[[-1]] - self._x[[0]]) / (self.stop - self.start)
+            return slope.repeat(len(t), axis=0)
         if self._axes is not None:
             s = np.asarray(t) - self._middle
             return np.column_stack([-np.sin(s), np.cos(s)]) @ self._axes[1:]

@@ -62,10 +62,8 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
             facets = trace.segments(guide)
             facets = facets[known[:, trace.nodes[facets]].any(axis=(0, 2))]
             node, normal = trace.nodes[facets].ravel(), trace.exact_normal(*trace.at_nodes(facets))
-            across, needed = (
-                (normal * high[:, node].T).sum(axis=1),
-                np.abs(normal) > SUPPORT_DIFFERENCE,
-            )
+            across = (normal * high[:, node].T).sum(axis=1)
+            needed = np.abs(normal) > SUPPORT_DIFFERENCE
             led = np.abs(across) > SUPPORT_DIFFERENCE * size[:, node].max(axis=0, initial=0.0)
             for k in np.flatnonzero(led & (known[:, node].T | ~needed).all(axis=1)):
                 name = names[most[needed[k].argmax(), node[k]]]

@@ -120,8 +120,9 @@ def _polished(solution: Solution, digits: int) -> Solution:
             polished = solve_bilateral(problem, graded, order)
             if step == 0 and order > ORDERS[0]:
                 # The mesh is made for so many digits: small changes may be chance.
-                error = max(_error([*values, _quantities(polished)]), 10.0**-digits)
-                final = error == 10.0**-digits or order == ORDERS[-1]
+                error = _error([*values, _quantities(polished)])
+                final = error <= 10.0**-digits or order == ORDERS[-1]
+                error = max(error, 10.0**-digits)
             share, mesh = _followed(mesh, polished)
             log.info(
                 "polish: order %d, %d unknowns, ends off by %.1e of elements, estimated error %.1e",

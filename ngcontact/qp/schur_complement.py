@@ -188,16 +188,16 @@ class BorderedSystems:
         if base is not None and not p.unit_rows:
             return base
         if base is not None and not pulled[~base.pinned].any():
-            rows, at = self._changed(base, active)
-            columns = base.place.keys() | {*at.tolist(), *(~rows).tolist()}
+            added, at = self._changed(base, active)
+            columns = base.place.keys() | {*at.tolist(), *(~added).tolist()}
             if len(columns) <= self.border + np.count_nonzero(base.pinned):
                 return base
         self.forget()  # two factorisations at a time would double the memory
         closed = active & p.unit_rows
-        rows = p.unknown[active] if p.unit_rows else p.unknown
-        pinned = p.null_space.weakly_resisted(rows) | (pulled > 0)
+        held = p.unknown[closed] if p.unit_rows else p.unknown  # of other rows none
+        pinned = p.null_space.weakly_resisted(held) | (pulled > 0)
         free = ~p.fixed
-        free[np.concatenate([p.null_space.held, p.null_space.pins[pinned], rows])] = False
+        free[np.concatenate([p.null_space.held, p.null_space.pins[pinned], held])] = False
         self.base = Base(closed, pinned, free, self.factor(free), np.zeros((0, p.b.size)))
         self.factorizations += 1
         self._start(closed)

@@ -28,8 +28,7 @@ def pressure_field(solution: Solved, state: ContactState) -> ng.GridFunction:
     line, trace = state.line, solution.discrete.space.trace
     boundary = solution.mesh.Boundaries(line.contact.secondary)
     if not isinstance(trace, FacetTrace):
-        _, s = trace.at_nodes(line.segments)
-        values = _at_nodes(trace, state)
+        values, s = _at_nodes(trace, state), trace.places(line.segments)
         return _by_facet(trace, boundary, trace.order, line.segments, s, values, 0 * values + 1)
     if trace.order == 3:
         return _mean_traction(solution, trace, state)
@@ -53,17 +52,15 @@ def _at_nodes(trace: BoundaryTrace, state: ContactState) -> Array:
     On segments that face the primary in part they are linear between the points with rows, times
     the share that faces it: the resultant of each is that of its rows.
     """
-    line = state.line
-    values = np.append(state.pressure, 0.0)[line.rows]
-    known, s = line.rows >= 0, trace.places(line.segments)
+    line, known = state.line, state.line.rows >= 0
+    values = np.asarray(np.append(state.pressure, 0.0)[line.rows])
     partly = np.flatnonzero(known.any(axis=1) & ~line.faces)
+    force, s = (line.covered * values)[partly].sum(axis=1), trace.places(line.segments)
     for i in partly:
         values[i] = np.interp(s[i], s[i, known[i]], values[i, known[i]])
-    of_rows = (line.covered * np.append(state.pressure, 0.0)[line.rows])[partly].sum(axis=1)
     whole = (line.shares * values)[partly].sum(axis=1)
-    share = np.divide(of_rows, whole, out=np.zeros(len(partly)), where=whole > 0)
-    values[partly] *= share[:, None]
-    return np.asarray(values)
+    values[partly] *= np.divide(force, whole, out=np.zeros(len(partly)), where=whole > 0)[:, None]
+    return values
 
 
 def _at_vertices(trace: FacetTrace, state: ContactState) -> Array:
