@@ -162,6 +162,21 @@ def test_a_zone_of_another_load_is_returned_unchanged():
         assert polish(other := replace(coarse, problem=pressed)) is other
 
 
+@pytest.mark.parametrize("digits", [5, 6, 7])
+@pytest.mark.parametrize(
+    ("make", "exact", "sides"), [(disc_on_rigid_plane, DISC, 2), (partly_opening_block, BLOCK, 1)]
+)
+def test_estimated_errors_are_larger_than_the_true_ones(make, exact, sides, digits, caplog):
+    """The log tells them, as errors of forces and energy; the references have nine digits."""
+    *_, coarse = adapt(make(), tolerance=1e-2)
+    caplog.set_level("INFO", logger="ngcontact")
+    polished = polish(coarse, digits)
+    told = float(caplog.messages[-1].rsplit(" ", 1)[1])
+    assert told < 1e-4
+    assert sides * polished.contact_force()[1] == pytest.approx(exact.force, rel=told)
+    assert abs(polished.energy) == pytest.approx(exact.energy, rel=told)
+
+
 def test_a_zone_that_is_missed_is_returned_unchanged():
     """The gap closes at x = 0.4 and, which the given solution does not know, at x = -0.5."""
     dip = (ng.x - 0.4) ** 2
