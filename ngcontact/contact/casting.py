@@ -21,6 +21,7 @@ NEAREST_FACETS = 8  # facets by their middles, at which a ray is tried before al
 # lie on the rim, and curved edges of both sides differ by round-off.
 OUTSIDE_COORDINATE = 1e-7
 NEWTON_TOLERANCE = 1e-14  # change of barycentric coordinates at which Newton's method has arrived
+MISSING_CHANGE = 1e-8  # ... above which it has found no crossing in the end
 
 
 def none_met(size: int) -> Partners:
@@ -38,7 +39,7 @@ def onto(
     """
     degree = DEGREES[surface.shape[1]]
     L = np.tile(CENTRE, (len(points), 1)) if start is None else start.copy()
-    distance, moving = np.zeros(len(points)), np.arange(len(points))
+    distance, change, moving = np.zeros(len(points)), np.zeros(len(points)), np.arange(len(points))
     for _ in range(NEWTON_STEPS if degree > 1 else 2):
         places, d, here = surface[facet[moving]], directions[moving], L[moving]
         x = np.einsum("ki,kid->kd", lagrange(degree, here), places)
@@ -49,9 +50,11 @@ def onto(
         L[moving, :2] += move
         L[moving, 2] -= move.sum(axis=1)
         distance[moving] += step[:, 2]
-        moving = moving[np.abs(step[:, :2]).max(axis=1) > NEWTON_TOLERANCE]
+        change[moving] = np.abs(step[:, :2]).max(axis=1)
+        moving = moving[change[moving] > NEWTON_TOLERANCE]
         if not moving.size:
             break
+    L[change > MISSING_CHANGE] = np.nan
     return L, distance
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import shells
+from ngcontact.geometries import ball_on_block, shells
 
 # Radii 0.5, 1, 1.5, moduli 1 and 3, Poisson's ratios .3 and .2, overlap .01: c1 = .55, c2 = 7 / 19.
 PRESSURE = 0.01 / (0.55 + 7 / 19)
@@ -172,3 +172,21 @@ def test_pairs_of_faces_that_share_an_edge(order):
     levels = list(adapt(bars(-0.01 * (1 + ng.x * ng.z)), maxh=0.6, order=order, max_dofs=3000))
     assert len(levels) > 1
     assert all(level.work["gap_searches"] == 0 for level in levels)  # nodes face nodes
+
+
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_rays_beside_a_ball_meet_nothing(order):
+    """The block is wider than the ball, and secondary: only what lies below the ball faces it."""
+    problem = Problem(
+        geometry=ball_on_block(),
+        materials={"ball": LAWS["inner"], "block": LAWS["outer"]},
+        displacement={"block_bottom": (0, 0, 0), "ball_top": (0, 0, -0.02)},
+        sliding="cut_x|cut_y",
+        contact=[Contact("block_top", "ball_surface", direction=(0, 0, 1), roles="given")],
+    )
+    line = solve(problem, order=order).pairs[0].line
+    radius = np.hypot(*line.position[line.partner >= 0, :2].T)
+    # Measured: .86, 1 and .9998, to 2e-16; curves of degrees 2 and 3 may bulge beyond the rim.
+    assert 0.8 < radius.max() < 1.01
+    # Measured: -6.5e-3 at order 1, whose rows are means over chords; -1.2 of rays that met nothing.
+    assert line.gap.min() > -0.02
