@@ -25,7 +25,7 @@ from drivers.benchmark.studies import Extent, accuracy, overhead, processes
 from drivers.command_line import Count, run
 
 Size: TypeAlias = Annotated[Count, Parameter(validator=Number(gte=10_000))]
-PACKAGES = ("ngsolve", "numpy", "scipy", "scikit-fem", "KratosMultiphysics")
+PACKAGES = ("ngsolve", "numpy", "scipy", "KratosMultiphysics")
 
 
 def machine() -> str:

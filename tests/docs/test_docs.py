@@ -40,7 +40,6 @@ def test_comparison_is_that_of_the_benchmarks():
         "ngcontact, which finds the zone itself": ("ngcontact", "adaptive"),
         "active set in NGSolve, uniform meshes": ("NGSolve active set", "uniform"),
         "active set in NGSolve, graded meshes": ("NGSolve active set", "graded"),
-        "active set in scikit-fem, graded meshes": ("scikit-fem active set", "graded"),
         "penalty in NGSolve, graded meshes": ("NGSolve penalty", "graded"),
         "mortar in Kratos, graded meshes": ("Kratos mortar", "graded"),
     }

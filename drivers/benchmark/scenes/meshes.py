@@ -36,14 +36,6 @@ OBSTACLE = "obstacle"
 SIDES = [[0, 1], [1, 2], [2, 0]]  # corners of a triangle that its sides join
 
 
-def which(ends: Indices, wanted: Indices) -> Indices:
-    """Numbers (m,) of the sides that join `wanted` (m, 2) among those that join `ends` (k, 2)."""
-    count = ends.max() + 1
-    keys, found = (np.sort(pairs, axis=1) @ [count, 1] for pairs in (ends, wanted))
-    sorter = np.argsort(keys)
-    return sorter[np.searchsorted(keys, found, sorter=sorter)]
-
-
 @dataclass(frozen=True, eq=False)
 class Mesh:
     """Triangles of one common problem."""

@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from drivers.benchmark.scenes.meshes import OBSTACLE, Mesh, which
+from drivers.benchmark.scenes.meshes import OBSTACLE
 from drivers.benchmark.scenes.problems import Common
 from ngcontact import Elastic
 from ngcontact.arrays import from_triplets
@@ -155,27 +155,6 @@ def bounded(common: Common, assembled: Assembled) -> tuple[sp.csr_array, Array, 
     if basis is not None:
         K, f = (basis.T @ K @ basis).tocsr(), basis.T @ f
     return K, f, line
-
-
-def middles(common: Common, made: Mesh, ends: Indices) -> Array:
-    """Places (k, 2) of the middles of all sides; those of contact lie on the curve."""
-    places = made.points[ends].mean(axis=1)
-    [contact] = common.problem.contact
-    for name in (contact.secondary, contact.primary):
-        if name is not None:
-            at = which(ends, made.edges[name])
-            places[at] = common.on_curve(places[at])
-    return places
-
-
-def segments(made: Mesh, order: int, ends: Indices) -> dict[str, Indices]:
-    """Nodes (m, order + 1) of the segments of each boundary: vertices first, then sides."""
-    if order == 1:
-        return made.edges
-    return {
-        name: np.insert(pairs, 1, len(made.points) + which(ends, pairs), axis=1)
-        for name, pairs in made.edges.items()
-    }
 
 
 @dataclass(frozen=True)

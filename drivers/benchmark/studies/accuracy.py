@@ -12,14 +12,13 @@ from itertools import groupby
 import numpy as np
 
 from drivers.benchmark.engines import NotInstalledError, Run, kratos, ngsolve
-from drivers.benchmark.engines.active_set import SCIKIT
 from drivers.benchmark.scenes.meshes import KINDS
 from drivers.benchmark.scenes.problems import COMMONS, Common
 from drivers.benchmark.studies import Extent
 from drivers.tables import table
 from ngcontact import adapt
 
-ENGINES = (ngsolve.PENALTY, ngsolve.ACTIVE_SET, SCIKIT, kratos.MORTAR)
+ENGINES = (ngsolve.PENALTY, ngsolve.ACTIVE_SET, kratos.MORTAR)
 OURS = "ngcontact"
 BUDGET = {2: 100_000, 3: 60_000, 4: 40_000}  # unknowns by order
 SIZES = (1_000, 4_000, 16_000, 64_000)
