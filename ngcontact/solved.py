@@ -152,7 +152,8 @@ class Solved:
 
         Of solids a list of polylines (k, 3), on the secondary before deformation: closed ones end
         where they start, others at the rim of the secondary or of what faces it. None, k = 0 or an
-        empty list, where all of the pair is in contact, or nothing.
+        empty list, where all of the pair is in contact, or nothing. Beside a corner, one side of
+        which opens between two contact points only, there are none either.
         """
         state, trace = state_of(self.pairs, pair), self.discrete.space.trace
         if isinstance(trace, FacetTrace):

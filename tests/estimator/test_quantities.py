@@ -12,6 +12,7 @@ from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.geometries import blocks, disc
 from tests.given_meshes import two_blocks
 from tests.runs import solved
+from tests.scenes import divided
 
 
 def partly_lifted():
@@ -214,6 +215,22 @@ def test_a_punch_in_contact_is_as_wide_as_it_is(swap):
     area = solve(problem, maxh=0.3, order=2).quantities()["contact area"]
     assert area.value == pytest.approx(1.0, rel=1e-12)
     assert area.error <= 1e-12
+
+
+@pytest.mark.parametrize("swap", [False, True])
+@pytest.mark.parametrize("counts", [(8, 8), (20, 30), (30, 20)])
+def test_bars_of_areas_know_that_contact_opens_beside_a_corner(counts, swap):
+    """One side of it opens over 0.0303, as far as `adapt` tells at orders 2 and 3, both sides."""
+    line = ((-1.5, 0.0), (0.0, 0.0), (1.0, 0.3))
+    pair = Contact("upper_contact", "lower_contact")
+    problem = Problem(
+        geometry=divided(blocks(line=line), dict(zip(pair.sides, counts, strict=True))),
+        materials={"upper|lower": Elastic(E=1.0, nu=0.3)},
+        displacement={"top": (0, -0.05), "bottom": (0, 0)},
+        contact=[pair.swapped() if swap else pair],
+    )
+    area = solve(problem, maxh=3 / max(counts), order=1).quantities()["contact area"]
+    assert abs(area.value - 2.5137) <= area.error
 
 
 @pytest.mark.parametrize("order", [1, 2, 3, 4])

@@ -142,14 +142,17 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
 
     Each interval between two points in contact counts, and what is left of the way to an end of
     contact. Where a point in contact has no neighbour that faces the other body, half of the way
-    counts, with a bar of that size, unless the point faces the end of that body's line. A curve of
-    degree 1 is shorter than its arc by the square of half of its turn over 6, others by what
-    `ARC_LENGTH_ERRORS` tells.
+    counts, with a bar of that size, unless the point faces the end of that body's line. Intervals
+    beside the open side of a corner inside the contact count, with a bar of their size: contact
+    opens there over a part of them. A curve of degree 1 is shorter than its arc by the square of
+    half of its turn over 6, others by what `ARC_LENGTH_ERRORS` tells.
     """
     line, ends = pair.line, pair.transitions
     if not pair.active.any():
         return 0.0, 0.0
-    closed = np.append(in_contact(line, pair.active), False)[line.rows] & (line.rows >= 0)
+    active, closed = (
+        np.append(mask, False)[line.rows] for mask in (pair.active, in_contact(line, pair.active))
+    )
     places, (t, w) = boundary.places(line.segments), gauss(boundary.geometry_order + 2)
     width = np.diff(places, axis=1)
     s = places[:, :-1, None] + width[:, :, None] * t
@@ -160,7 +163,8 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
     partly = closed & ~np.append(_faces_end(pair, boundary), False)[line.rows]
     alone = (partly[:, :-1] & (line.rows[:, 1:] < 0)) | (partly[:, 1:] & (line.rows[:, :-1] < 0))
     half = 0.5 * float(sizes[alone].sum())
-    area, error = float(sizes[whole].sum()) + half, half
+    opened = whole & ~(active[:, :-1] & active[:, 1:])
+    area, error = float(sizes[whole].sum()) + half, half + float(sizes[opened].sum())
     if count := len(ends.position):
         measure = boundary.model.measure(ends.position)
         errors = np.array([_error_of_end(pair, k) for k in range(count)])
