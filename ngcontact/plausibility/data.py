@@ -50,7 +50,7 @@ def contradictions(problem: Problem, mesh: ng.Mesh) -> list[Contradiction]:
         low, high, least, most = _extremes(problem, trace)
         known = high >= low
         low, high = (np.where(known, u, 0.0) for u in (low, high))
-        size = np.maximum(np.abs(low), np.abs(high))
+        size = np.abs(high)  # that of `low`, too, where the two are alike
         largest = max(largest, float(size.max()))
         for at in map(tuple, np.argwhere(high - low > SUPPORT_DIFFERENCE * size)):
             (i, u), (j, v) = sorted(((least[at], low[at]), (most[at], high[at])))

@@ -20,8 +20,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
-from ..arrays import Array, Index, across, rows_of
+from ..arrays import Array, Index, across, from_triplets, rows_of
 from ..contact import (
     ContactState,
     ContactZone,
@@ -41,12 +42,12 @@ from .refinement import moves_rigidly
 
 # Share of the force of a pair. Parts of a contact zone that carry less are not judged.
 FORCE_SHARE = 0.01
-# Intervals between nodes that resolve a contact zone, for each of its ends at open points: a zone
-# cut by a symmetry plane has one. Measured on 153 coarse meshes (discs, blocks with Hertz's gap,
-# pins in holes, orders 1 to 4): of 55 zones with fewer intervals 30 had a peak that was wrong by
-# more than 10 %, 24 by more than 20 %; of 98 zones with more one was wrong by 12 %.
-RESOLVED_INTERVALS = 2
-RESOLVED_POINTS = 4  # points in contact that resolve a zone between solids
+# Nodes in contact that resolve a zone. Measured on 153 coarse meshes (discs, blocks with Hertz's
+# gap, pins in holes, orders 1 to 4): of 55 zones with fewer 30 had a peak that was wrong by more
+# than 10 %, 24 by more than 20 %; of 98 zones with more one was wrong by 12 %. Hertz's peaks were
+# wrong by up to 70, 59, 64, 79 % at orders 1 to 4.
+RESOLVED_NODES = 4
+RESOLVED_HALF = 3  # ... that has one end on its line: one cut by a symmetry plane
 # Round-off of contact forces, relative to the largest term of a nodal force.
 FORCE_ROUND_OFF = 100 * np.finfo(float).eps
 # Missing pressure relative to the peak pressure, from which a penetration is reported. Measured at
@@ -95,7 +96,7 @@ def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
     for number, (state, force) in enumerate(zip(pairs, largest, strict=True)):
         messages = {}
         if force > noise:
-            zones = zones_of(state) if plane else _whole_zone(state)
+            zones = zones_of(state)
             messages["strain"] = _large_strains(problem, trace, state, zones)
             if not messages["strain"]:  # else no other check means anything
                 messages["direction"] = _inclined(trace, state)
@@ -103,7 +104,7 @@ def pair_warnings(solution: Solved, *, last: bool) -> PairWarnings:
             if plane and not messages["strain"]:
                 messages["direction"] = messages["direction"] or _drawn_apart(trace, state)
             if last and not messages["strain"]:
-                messages["zone"] = _short_zone(state, zones) if plane else _small_zone(state)
+                messages["zone"] = _small_zone(state, zones)
         if last and not messages.get("strain"):  # with forces or without
             messages["penetration"] = _penetration(solution, state, peak)
         name = f"contact {number} of {state.line.contact.named()}"
@@ -145,10 +146,10 @@ def _unresisted(solution: Solved) -> str:
 class ContactZones:
     """The k connected zones of one pair in which its bodies touch."""
 
-    force: Array  # (k,), sums over the points of each zone, a force per unit thickness
-    weight: Array  # (k,), a length
-    segments: Array  # (k,), length in segments: of the interval in which it ends a half counts
-    ends: Index  # (k,), transitions to open points
+    force: Array  # (k,), sums over the points of each zone, as a pair's force
+    weight: Array  # (k,), a length, of solids an area
+    nodes: Index  # (k,), numbers of nodes in contact
+    ends: Index  # (k,), intervals or facets with points in contact and open ones
 
 
 def _neighbours(state: ContactState) -> Index:
@@ -158,42 +159,27 @@ def _neighbours(state: ContactState) -> Index:
     return np.array([one[both], other[both]]).T
 
 
-def _labels(links: Index, count: int) -> Index:
-    """One number for each connected part of `count` points with `links` (l, 2), (count,)."""
-    label = np.arange(count)
-    while (label[links[:, 0]] != label[links[:, 1]]).any():  # of paths: as often as they halve
-        np.minimum.at(label, links, label[links].min(axis=1, keepdims=True))
-        label = label[label]
-    return label
-
-
 def zones_of(state: ContactState) -> ContactZones:
-    """The zones of one pair."""
-    line, along, across = state.line, _neighbours(state), twins(state.line)
-    closed = in_contact(line, state.active) if len(across) else state.active
-    both = np.concatenate([along, across])
-    touching = closed[both].sum(axis=1)
-    inside = both[touching == 2]
-    zones, number = np.unique(_labels(inside, len(closed))[closed], return_inverse=True)
-    zone, k = np.full(len(closed), -1), len(zones)
-    zone[closed] = number
-    ending = both[touching == 1]
-    ends = np.bincount(zone[ending[closed[ending]]], minlength=k)
-    whole = np.bincount(zone[along[touching[: len(along)] == 2, 0]], minlength=k)
-    return ContactZones(
-        force=np.asarray(np.bincount(number, state.force[closed], minlength=k), dtype=float),
-        weight=np.asarray(np.bincount(number, line.weight[closed], minlength=k), dtype=float),
-        segments=(whole + ends / 2) / (line.rows.shape[1] - 1),
-        ends=ends,
-    )
+    """The zones of one pair: points in contact are linked along the line, of solids by facets."""
+    line, m, plane = state.line, len(state.gap), state.line.dim == 2
+    closed = in_contact(line, state.active) if plane else state.active
+    parts = np.concatenate([_neighbours(state), twins(line)]) if plane else line.rows
+    met, opened = (np.append(x, False)[parts] for x in (closed, ~closed))
+    first = parts[np.arange(len(parts)), met.argmax(axis=1)]
+    one, other = np.broadcast_to(first[:, None], parts.shape)[met], parts[met]
+    _, label = connected_components(from_triplets(np.ones(len(one)), one, other, (m, m)))
+    zones, number = np.unique(label[closed], return_inverse=True)
+    ending = label[first[met.any(axis=1) & opened.any(axis=1)]]
+    _, at_node = np.unique(line.node[closed], return_index=True)
 
+    def sums(values: Array) -> Array:
+        return np.asarray(np.bincount(number, values[closed], len(zones)), dtype=float)
 
-def _whole_zone(state: ContactState) -> ContactZones:
-    """All of a pair of solids as one zone: force, area."""
-    force, area = np.abs(state.force).sum(), state.line.weight[state.active].sum()
-    some = slice(0, int(area > 0))
     return ContactZones(
-        np.array([force])[some], np.array([area])[some], np.ones(1), np.zeros(1, int)
+        force=sums(state.force),
+        weight=sums(line.weight),
+        nodes=np.bincount(number[at_node], minlength=len(zones)),
+        ends=np.bincount(np.searchsorted(zones, ending), minlength=len(zones)),
     )
 
 
@@ -223,43 +209,22 @@ def _softer(
     return float(min(values[side].mean() for side in sides if len(side)))
 
 
-def _short_zone(state: ContactState, zones: ContactZones) -> str:
+def _small_zone(state: ContactState, zones: ContactZones) -> str:
     """Message where the mesh does not resolve a contact zone; "" elsewhere.
 
-    Below `RESOLVED_INTERVALS` the peak of Hertz's pressure is wrong by up to 70, 59, 64, 79 % at
-    orders 1 to 4. A whole line in contact has no ends to be resolved.
+    A whole line in contact has no ends to be resolved.
     """
     cut = (zones.ends > 0) & (np.abs(zones.force) > FORCE_SHARE * np.abs(state.force).sum())
-    needed = RESOLVED_INTERVALS * zones.ends / (state.line.rows.shape[1] - 1)
-    short = np.flatnonzero(cut & (zones.segments < needed))
-    if state.line.contact.bilateral or not short.size:
+    half = (zones.ends == 1) & (state.line.dim == 2)
+    needed = np.where(half, RESOLVED_HALF, RESOLVED_NODES)
+    small = np.flatnonzero(cut & (zones.nodes < needed))
+    if state.line.contact.bilateral or not small.size:
         return ""
-    worst = short[np.argmin(zones.segments[short] / needed[short])]
+    worst = small[np.argmin(zones.nodes[small] / needed[small])]
     return (
-        f"a zone in contact is {zones.segments[worst]:.2g} segments long, shorter than "
-        f"{needed[worst]:.2g}: the force is better than the pressure, whose peak may be wrong by "
-        "half; use adapt, or a smaller maxh"
-    )
-
-
-def _small_zone(state: ContactState) -> str:
-    """Message where a contact zone between solids has too few points; "" elsewhere."""
-    rows, m = state.line.rows, len(state.gap)
-    closed, opened = (np.append(x, False)[rows] for x in (state.active, ~state.active))
-    first = np.broadcast_to(rows[np.arange(len(rows)), closed.argmax(axis=1)][:, None], rows.shape)
-    label = _labels(np.column_stack([first[closed], rows[closed]]), m)
-    zones, zone = np.unique(label[state.active], return_inverse=True)
-    ending = rows[closed & opened.any(axis=1, keepdims=True)]
-    cut = np.isin(zones, label[ending])
-    force = np.bincount(zone, np.abs(state.force[state.active]), len(zones))
-    points = np.bincount(zone, minlength=len(zones))
-    small = cut & (force > FORCE_SHARE * force.sum()) & (points < RESOLVED_POINTS)
-    if state.line.contact.bilateral or not small.any():
-        return ""
-    return (
-        f"a zone in contact has {points[small].min()} contact points, fewer than "
-        f"{RESOLVED_POINTS}: forces and pressures may be wrong by half; use adapt, or a smaller "
-        "maxh"
+        f"a zone in contact is not resolved: it has {zones.nodes[worst]} nodes of at least "
+        f"{needed[worst]}, and the peak of its pressure may be wrong by half, of solids its force, "
+        "too; use adapt, or a smaller maxh"
     )
 
 

@@ -48,7 +48,7 @@ SCENES = {
 
 
 @pytest.mark.parametrize("scene", SCENES)
-@pytest.mark.filterwarnings("ignore:.*segments long")
+@pytest.mark.filterwarnings("ignore:.*is not resolved")
 @pytest.mark.study(witness=["rigid plane"])
 def test_proved_bars_of_the_force_overlap(scene):
     """Those of a coarse and of a fine solution contain the same value, the fine one is shorter."""

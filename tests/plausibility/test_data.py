@@ -64,6 +64,16 @@ def test_what_goes_along_a_guide_does_not_contradict_it(angle):
         solve(replace(problem, displacement=across), maxh=0.4)
 
 
+def test_a_guide_off_by_the_seventh_digit_contradicts_nothing():
+    """Its normal has a part of 2e-7 along the displacement, of which the other component is 0."""
+    shape = square().shape.Rotate(Axis((0, 0, 0), Z), 1e-5)
+    geometry = OCCGeometry(shape, dim=2)
+    problem = replace(
+        loaded(), geometry=geometry, displacement={"bottom": (0, 0.1)}, sliding="left"
+    )
+    assert contradictions(problem, first_mesh(problem, 0.4)) == []
+
+
 def test_round_off_is_no_contradiction():
     """On the axis the radial displacement e r is 1e-35 where Netgen's corner lies at r = 1e-32."""
     widened = (1e-3 * ng.x, 0.0)

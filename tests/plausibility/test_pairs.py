@@ -24,7 +24,7 @@ from ngcontact.plausibility.pairs import PEAK_ERROR, drawn_gap_error
 
 SOFT = Elastic(E=1.0, nu=0.3)
 DOWN = (0, -1)
-DIRECTION, STRAIN, ZONE = "inclined to direction", "mean pressure", "segments long"
+DIRECTION, STRAIN, ZONE = "inclined to direction", "mean pressure", "is not resolved"
 
 
 def told(call) -> list[str]:
@@ -265,7 +265,7 @@ def test_solids_are_told_of_directions_gaps_and_strains():
     assert quiet(lambda: solve(pressed_cube(), maxh=0.7, order=1))
 
 
-THROUGH, SMALL_ZONE = "pass through each other", "contact points, fewer than 4"
+THROUGH, SMALL_ZONE = "pass through each other", "is not resolved: it has 1 nodes of at least 4"
 
 
 def pressed_ball(press):
@@ -289,7 +289,7 @@ def test_solids_are_told_of_penetration_where_no_row_stands():
 
 def test_solids_are_told_of_zones_of_few_points():
     """One point in contact at order 1, the pressures of which are far off."""
-    assert only(lambda: solve(pressed_ball(0.005), maxh=0.7, order=1), SMALL_ZONE, "has 1")
+    assert only(lambda: solve(pressed_ball(0.005), maxh=0.7, order=1), SMALL_ZONE)
     assert quiet(lambda: solve(pressed_ball(0.2), maxh=0.4))  # five
 
 
