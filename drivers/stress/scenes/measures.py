@@ -43,25 +43,15 @@ class Measures:
         """Estimated error over the energy norm; 0 of 0."""
         return self.error / self.whole if self.whole > 0 else 0.0
 
-    def back(self, motion: Motion, old: Mapping[str, str] | None = None) -> Measures:
-        """The same in the units, frame and names before the scene was moved."""
+    def back(self, motion: Motion) -> Measures:
+        """The same in the units and the frame before the scene was moved."""
         root = motion.length * motion.modulus**0.5
         stress = motion.length * motion.modulus
-
-        def name(new: str) -> str:
-            return new if old is None else old[new]
-
         return Measures(
-            norm={name(k): x / root for k, x in self.norm.items()},
+            norm={k: x / root for k, x in self.norm.items()},
             energy=self.energy / root**2,
-            force={
-                "+".join(sorted(map(name, k.split("+")))): F @ motion.turn / stress
-                for k, F in self.force.items()
-            },
-            along={
-                (name(k), i): (s / motion.length, F / stress)
-                for (k, i), (s, F) in self.along.items()
-            },
+            force={k: F @ motion.turn / stress for k, F in self.force.items()},
+            along={k: (s / motion.length, F / stress) for k, (s, F) in self.along.items()},
             error=self.error / root,
         )
 

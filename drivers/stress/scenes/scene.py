@@ -234,30 +234,3 @@ class Scene:
             pressure={k: number(p, E) for k, p in self.pressure.items()},
             weight={k: vector(w, E / L) for k, w in self.weight.items()},
         )
-
-    def renamed(self, new: Mapping[str, str]) -> Scene:
-        """The scene with other names of bodies and sides."""
-
-        def keys(data: Mapping[str, Any]) -> dict[str, Any]:
-            return {new[k]: v for k, v in sorted(data.items(), key=lambda item: new[item[0]])}
-
-        def names(old: tuple[str, ...]) -> tuple[str, ...]:
-            return tuple(new[name] for name in old)
-
-        data: dict[str, Any] = {
-            k: keys(getattr(self, k)) for k in ("clamped", "pressure", "weight")
-        }
-        return replace(
-            self,
-            bodies=tuple(
-                b.mapped(lambda s: replace(s, name=new[s.name]), name=new[b.name])
-                for b in self.bodies
-            ),
-            pairs=tuple(
-                replace(p, secondary=names(p.secondary), primary=names(p.primary))
-                for p in self.pairs
-            ),
-            sliding=names(self.sliding),
-            finer=None if self.finer is None else keys(self.finer),
-            **data,
-        )
