@@ -22,12 +22,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from drivers.reference.straight import Exact, compiled, equilibrium_fields, shrinkage
-from drivers.reference.westergaard import CF, Potential, depth, half_plane, hooke, moduli
+from drivers.reference.westergaard import CF, Potential, depth, half_plane, moduli
 from ngcontact import Elastic, Hooke
 
 Point: TypeAlias = tuple[float, float]
 Fields: TypeAlias = tuple[dict[str, CF], dict[str, CF], dict[str, CF]]
-Derivatives: TypeAlias = tuple[CF, CF, CF, CF]  # of one variable: a function, its first three
 
 OPEN = 0.5  # part of the half-length of a bump over which an opening one parts the bodies
 
@@ -75,88 +74,36 @@ def equilibrated(displacement: dict[str, CF], materials: Mapping[str, Elastic | 
     return compiled(displacement), compiled(stress), compiled(force)
 
 
-def near_zone(
-    material: Elastic, zone: Zone, a: Derivatives, b: Derivatives, q: Derivatives
-) -> tuple[CF, CF, CF]:
-    """Displacement (2,), stress (2, 2) and force (2,) from a, b and q on the line d = 0.
+def near_zone(material: Elastic, zone: Zone, a: CF, b: CF, q: CF) -> CF:
+    """Displacement (2,) from a, b and q on the line d = 0, which do not depend on d.
 
     u_d = w(d) (a + d c) and u_s = w(d) (b + d e): on d = 0 there is no shear and the normal stress
     is q for e = k b - a' and c = (q - lam (k a + b')) / (lam + 2 mu), k the curvature.
     """
     m, k, d = moduli(material), zone.curvature, zone.d
-    stiff = m.lam + 2 * m.mu
-    c = [(q[i] - m.lam * (k * a[i] + b[i + 1])) / stiff for i in range(3)]
-    e = [k * b[i] - a[i + 1] for i in range(3)]
-    ratio = d / zone.reach
-    rest = ng.IfPos(1 - ratio * ratio, 1 - ratio * ratio, 0.0)
-    w = rest * rest * rest
-    w1 = -6 / zone.reach * ratio * rest * rest
-    w2 = (24 * ratio * ratio - 6 * rest) * rest / zone.reach**2
-    # f[i][j]: derivative i times by d and j times by s
-    fields = []
-    for start, slope in ((a, c), (b, e)):
-        line = [start[j] + d * slope[j] for j in range(3)]
-        fields.append(
-            (
-                [w * line[j] for j in range(3)],
-                [w1 * line[j] + w * slope[j] for j in range(2)],
-                [w2 * line[0] + 2 * w1 * slope[0]],
-            )
-        )
-    u, v = fields
-    h = 1 + k * d  # length per s
-    grad = ng.CF(
-        (u[1][0], (u[0][1] - k * v[0][0]) / h, v[1][0], (v[0][1] + k * u[0][0]) / h), dims=(2, 2)
-    )
-    # Navier's equations: F = -stiff grad(div u) + mu curl(curl u)
-    bulk_d = u[2][0] + (k * u[1][0] + v[1][1]) / h - k * (k * u[0][0] + v[0][1]) / h**2
-    bulk_s = u[1][1] + (k * u[0][1] + v[0][2]) / h
-    turn_s = v[1][1] + (k * v[0][1] - u[0][2]) / h
-    turn_d = v[2][0] + (k * v[1][0] - u[1][1]) / h - k * (k * v[0][0] - u[0][1]) / h**2
-    force = (-stiff * bulk_d + m.mu * turn_s / h, -stiff * bulk_s / h - m.mu * turn_d)
     (nx, ny), (tx, ty) = zone.across, zone.along
+
+    def slope(f: CF) -> CF:
+        """Derivative by s, which has the length 1 + k d."""
+        return (1 + k * d) * (tx * f.Diff(ng.x) + ty * f.Diff(ng.y))
+
+    c = (q - m.lam * (k * a + slope(b))) / (m.lam + 2 * m.mu)
+    e = k * b - slope(a)
     frame = ng.CF((nx, tx, ny, ty), dims=(2, 2))
-    return (
-        frame * ng.CF((u[0][0], v[0][0])),
-        hooke(material, frame * grad * frame.trans),
-        frame * ng.CF(force),
-    )
+    return _hat(d / zone.reach) * (frame * ng.CF((a + d * c, b + d * e)))
 
 
-def _power(t: CF, end: float, scale: float) -> Derivatives:
-    """Derivatives by s = scale t of the bump (1 - (t / end)^2)^3 for |t| < end, 0 elsewhere."""
-    r, unit = t / end, scale * end
-    inner = 1 - r * r
-    rest = ng.IfPos(inner, inner, 0.0)
-    third = ng.IfPos(inner, (72 * rest - 48 * r * r) * r, 0.0)
-    return (
-        rest * rest * rest,
-        -6 / unit * r * rest * rest,
-        (24 * r * r - 6 * rest) * rest / unit**2,
-        third / unit**3,
-    )
+def _hat(t: CF) -> CF:
+    """(1 - t^2)^3 for |t| < 1, 0 elsewhere."""
+    rest = ng.IfPos(1 - t * t, 1 - t * t, 0.0)
+    return rest * rest * rest
 
 
-def _step(t: CF, start: float, scale: float) -> Derivatives:
-    """Derivatives by s = scale t of 1 for |t| < start, falling to 0 at |t| = 1."""
-    size, sign, unit = ng.IfPos(t, t, -t), ng.IfPos(t, 1.0, -1.0), scale * (1 - start)
-    c = (size - start) / (1 - start)
+def _step(t: CF) -> CF:
+    """1 for |t| < `OPEN`, falling to 0 at |t| = 1."""
+    c = (ng.IfPos(t, t, -t) - OPEN) / (1 - OPEN)
     c = ng.IfPos(c, ng.IfPos(1 - c, c, 1.0), 0.0)
-    within = ng.IfPos(c * (1 - c), 1.0, 0.0)
-    return (
-        1 - c * c * (3 - 2 * c),
-        -6 / unit * sign * c * (1 - c),
-        within * (12 * c - 6) / unit**2,
-        ng.CF(0.0),
-    )
-
-
-def _sum(*terms: tuple[float, Derivatives]) -> Derivatives:
-    """Sum of factors times functions, with derivatives."""
-    first, second, third, fourth = (
-        sum((c * f[i] for c, f in terms if c), ng.CF(0.0)) for i in range(4)
-    )
-    return first, second, third, fourth
+    return 1 - c * c * (3 - 2 * c)
 
 
 def polygonal(
@@ -184,12 +131,13 @@ def polygonal(
     for start, end, bump in sides:
         if not 0 < 2 * bump.half_length < math.dist(start, end):
             raise ValueError(f"half_length = {bump.half_length!r}: must stay inside its side")
-    mean = (-shrink[0] * ng.CF((ng.x, ng.y)), ng.CF((-p, 0, 0, -p), dims=(2, 2)), ng.CF((0, 0)))
-    parts: Fields = ({}, {}, {})
-    for body, material in materials.items():
-        added = [_bump_field(material, body, *side, p, reach) for side in sides]
-        for part, first, more in zip(parts, mean, zip(*added, strict=True), strict=True):
-            part[body] = sum(more, first)
+    displacement = {
+        body: sum(
+            (_bump_field(law, body, *side, p, reach) for side in sides),
+            -shrink[0] * ng.CF((ng.x, ng.y)),
+        )
+        for body, law in materials.items()
+    }
 
     def along(x: ArrayLike, of: str) -> NDArray[np.float64]:
         """Pressure or gap, summed over sides; p and 0 away from bumps."""
@@ -200,11 +148,8 @@ def polygonal(
             total += _profile(bump, p, np.abs(s) / bump.half_length, of)
         return total
 
-    displacement, stress, force = map(compiled, parts)
     return Exact(
-        displacement,
-        stress,
-        force,
+        *equilibrated(displacement, materials),
         pressure=lambda x: along(x, "pressure"),
         gap=lambda x: along(x, "gap"),
     )
@@ -228,20 +173,20 @@ def _bump_field(
     bump: Bump,
     p: float,
     reach: float,
-) -> tuple[CF, CF, CF]:
-    """Displacement, stress and force that one bump adds to one body, see `polygonal`."""
+) -> CF:
+    """Displacement that one bump adds to one body, see `polygonal`."""
     size = math.dist(start, end)
     tx, ty = ((end[i] - start[i]) / size for i in range(2))
     mx, my = ((end[i] + start[i]) / 2 for i in range(2))
     t = ((ng.x - mx) * tx + (ng.y - my) * ty) / bump.half_length
     zone = Zone((ng.y - my) * tx - (ng.x - mx) * ty, (-ty, tx), (tx, ty), 0.0, reach)
-    hat, sign = _power(t, 1.0, bump.half_length), 1.0 if body == "upper" else -1.0
-    a, q = [(bump.bow, hat)], [(-bump.pressure, hat)]
+    hat, sign = _hat(t), 1.0 if body == "upper" else -1.0
+    a, q = bump.bow * hat, -bump.pressure * hat
     if bump.opening:
         # The outward normal n' of the upper body points down: each body moves by half of the gap.
-        a.append((sign * bump.opening / 2, _power(t, OPEN, bump.half_length)))
-        q = [(p, _step(t, OPEN, bump.half_length))]
-    return near_zone(material, zone, _sum(*a), _sum((sign * bump.slip, hat)), _sum(*q))
+        a += sign * bump.opening / 2 * _hat(t / OPEN)
+        q = p * _step(t)
+    return near_zone(material, zone, a, sign * bump.slip * hat, q)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -270,38 +215,18 @@ def circular(
     x, y = ng.x, ng.y
     r, theta = ng.sqrt(x * x + y * y), ng.atan2(y, x)
     cos, sin = ng.cos(4 * theta), ng.sin(4 * theta)
-    wave = (cos, -4 * sin, -16 * cos, 64 * sin)
-    across = (sin, 4 * cos, -16 * sin, -64 * cos)
     inside, outside = (ng.IfPos(f, f, 0.0) for f in (cos - turn, turn - cos))
-    # f(w): f' w', f'' w'^2 + f' w'', f''' w'^3 + 3 f'' w' w'' + f' w'''
-    w1, w2, w3 = wave[1:]
-    p = (
-        inside * inside,
-        2 * inside * w1,
-        ng.IfPos(inside, 2 * w1 * w1, 0.0) + 2 * inside * w2,
-        ng.CF(0.0),
-    )
-    gap = (
-        outside * outside * outside,
-        -3 * outside * outside * w1,
-        6 * outside * w1 * w1 - 3 * outside * outside * w2,
-        ng.IfPos(outside, -6 * w1 * w1 * w1, 0.0)
-        + 18 * outside * w1 * w2
-        - 3 * outside * outside * w3,
-    )
+    gap = opening * outside * outside * outside
     zone = Zone(r - 1, (x / r, y / r), (-y / r, x / r), 1.0, 1.0)
-    parts: Fields = ({}, {}, {})
-    for body, material, sign in (("outer", outer, 1.0), ("inner", inner, -1.0)):
-        a = _sum((bow, wave), (sign * opening / 2, gap))  # n' points inwards: gap = u_r' - u_r''
-        b, q = _sum((sign * slip, across)), _sum((-pressure, p))
-        for part, field in zip(parts, near_zone(material, zone, a, b, q), strict=True):
-            part[body] = field
+    materials, signs = {"outer": outer, "inner": inner}, {"outer": 1.0, "inner": -1.0}
+    displacement = {}
+    for body, sign in signs.items():
+        # n' points inwards: gap = u_r' - u_r''
+        a, b = bow * cos + sign / 2 * gap, sign * slip * sin
+        displacement[body] = near_zone(materials[body], zone, a, b, -pressure * inside * inside)
     end = math.acos(turn) / 4
-    displacement, stress, force = map(compiled, parts)
     return Circular(
-        displacement,
-        stress,
-        force,
+        *equilibrated(displacement, materials),
         pressure=lambda t: pressure * np.maximum(np.cos(4 * np.asarray(t)) - turn, 0) ** 2,
         gap=lambda t: opening * np.maximum(turn - np.cos(4 * np.asarray(t)), 0) ** 3,
         ends=(end, math.pi / 2 - end),
