@@ -11,10 +11,11 @@ computed. Writes hertz.vtu, hertz_contact.vtp and hertz.png.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypeAlias
+from typing import Annotated, TypeAlias
 
 import ngsolve as ng
 import numpy as np
@@ -22,7 +23,7 @@ from cyclopts import Parameter
 
 from drivers.command_line import Count, Order, Positive, run
 from drivers.reference.half_spaces import Hertz, plane_modulus, reduced
-from drivers.tables import Columns, last_level
+from drivers.tables import Columns, line
 from ngcontact import Contact, Elastic, Problem, Solution, adapt
 from ngcontact.geometries import disc_on_block
 
@@ -58,26 +59,31 @@ def pressed(radius: float, press: float, disc: Elastic, block: Elastic) -> Probl
 
 
 def computed_and_expected(
-    problem: Problem,
+    levels: Iterable[Solution],
     columns: Columns,
     expected: Callable[[float], tuple[float, float]],
     halves: int = 1,
-    **options: Any,
 ) -> tuple[Solution, Quantities, Quantities]:
-    """The last level of an adaptive run, what it says, and what Hertz does under its force.
+    """The last of the levels of a run, what it says, and what Hertz does under its force.
 
     Every level is printed. `expected` gives a and the peak; the force counts `halves` times.
     """
-
-    def measured(solution: Solution) -> Quantities:
+    print(f"unknowns  active  steps  estimate  {'  '.join(columns)}  seconds")
+    started = time.perf_counter()
+    for solution in levels:
         transitions = solution.transitions()
-        return Quantities(
+        computed = Quantities(
             force=halves * float(solution.contact_force()[1]),
             peak=float(solution.pressure.max()),
             a=float(transitions[:, 0].max()) if len(transitions) else math.nan,
         )
-
-    solution, computed = last_level(adapt(problem, **options), measured, columns)
+        estimate, now = solution.relative_error_estimate, time.perf_counter()
+        print(
+            f"{solution.displacement.space.ndof:8d}  {solution.active.sum():6d}  "
+            f"{len(solution.steps):5d}  {estimate:.2e}  {line(columns, computed)}  "
+            f"{now - started:7.2f}"
+        )
+        started = now
     a, peak = expected(computed.force)
     return solution, computed, Quantities(computed.force, peak, a)
 
@@ -153,14 +159,12 @@ def main(
         f"pressed on a block, E = {block[0] / 1e9:g} GPa, nu = {block[1]:g}"
     )
     modulus = reduced([plane_modulus(*disc), plane_modulus(*block)])
+    problem = pressed(radius, press, Elastic(*disc), Elastic(*block))
     solution, computed, expected = computed_and_expected(
-        pressed(radius, press, Elastic(*disc), Elastic(*block)),
+        adapt(problem, order=order, tolerance=tolerance, max_dofs=max_dofs),
         COLUMNS,
         lambda force: Hertz(force, radius, modulus).cylinder(),
         halves=2,
-        order=order,
-        tolerance=tolerance,
-        max_dofs=max_dofs,
     )
     compare("half-width, mm", radius, computed, expected)
     print("\nThe computed half, with errors (N/m, Pa, m):")

@@ -15,18 +15,10 @@ from pathlib import Path
 import ngsolve as ng
 
 from drivers.command_line import Count, Order, Positive, run
-from drivers.hertz import (
-    ALUMINIUM,
-    STEEL,
-    Law,
-    Quantities,
-    compare,
-    computed_and_expected,
-    draw,
-)
+from drivers.hertz import ALUMINIUM, STEEL, Law, Quantities, compare, computed_and_expected, draw
 from drivers.reference.half_spaces import Hertz, plane_modulus, reduced
 from drivers.tables import Columns
-from ngcontact import Contact, Elastic, Problem
+from ngcontact import Contact, Elastic, Problem, adapt
 from ngcontact.geometries import disc_on_disc
 
 
@@ -97,13 +89,11 @@ def main(
         f"one of radius {lower_radius * 1e3:g} mm, E = {lower[0] / 1e9:g} GPa, nu = {lower[1]:g}"
     )
     modulus = reduced([plane_modulus(*upper), plane_modulus(*lower)])
+    problem = pressed(radii, press * radius, Elastic(*upper), Elastic(*lower))
     solution, computed, expected = computed_and_expected(
-        pressed(radii, press * radius, Elastic(*upper), Elastic(*lower)),
+        adapt(problem, order=order, tolerance=tolerance, max_dofs=max_dofs),
         COLUMNS,
         lambda force: Hertz(force, reduced(radii), modulus).sphere(),
-        order=order,
-        tolerance=tolerance,
-        max_dofs=max_dofs,
     )
     compare("radius of contact, mm", min(radii), computed, expected)
     if out is not None:

@@ -7,13 +7,10 @@ they are printed a column is as wide as its title.
 from __future__ import annotations
 
 import csv
-import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
-
-from ngcontact import Solution
 
 Q = TypeVar("Q")
 Columns: TypeAlias = Mapping[str, str | Callable[[Any], str]]
@@ -64,23 +61,3 @@ def write_csv(path: Path, rows: Sequence[Any]) -> None:
         writer = csv.DictWriter(file, fieldnames=list(found[0]))
         writer.writeheader()
         writer.writerows(found)
-
-
-def last_level(
-    levels: Iterable[Solution],
-    measured: Callable[[Solution], Q],
-    columns: Columns,
-) -> tuple[Solution, Q]:
-    """Print all levels as they come; the last one and what is `measured` of it."""
-    print(f"unknowns  active  steps  estimate  {'  '.join(columns)}  seconds")
-    started = time.perf_counter()
-    for solution in levels:
-        estimate, computed = solution.relative_error_estimate, measured(solution)
-        now = time.perf_counter()
-        print(
-            f"{solution.displacement.space.ndof:8d}  {solution.active.sum():6d}  "
-            f"{len(solution.steps):5d}  {estimate:.2e}  {line(columns, computed)}  "
-            f"{now - started:7.2f}"
-        )
-        started = now
-    return solution, computed

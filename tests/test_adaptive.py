@@ -10,12 +10,7 @@ import pytest
 
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
-from ngcontact import (
-    ContactWarning,
-    adapt,
-    solve,
-    solving,
-)
+from ngcontact import ContactWarning, adapt, solve, solving
 from ngcontact.adaptivity import Refinement
 from ngcontact.geometries import disc as quarter_disc
 from ngcontact.geometries import disc_on_block

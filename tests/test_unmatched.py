@@ -20,16 +20,7 @@ from ngcontact import (
     solving,
 )
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries.region import (
-    DOWN,
-    LEFT,
-    RIGHT,
-    UP,
-    body,
-    compound,
-    polygon,
-    quarter_arc,
-)
+from ngcontact.geometries.region import DOWN, LEFT, RIGHT, UP, body, compound, polygon, quarter_arc
 from ngcontact.mesh import first_mesh
 from tests.scenes import distance, rectangle, solved_with_load
 

@@ -29,7 +29,7 @@ from drivers.adaptive_study.runs import (
     Name,
     Row,
     Strategy,
-    error_measure,
+    energy_errors,
     rate,
     run_of,
     seconds_to,
@@ -59,7 +59,7 @@ def compare(
 ) -> list[Row]:
     """Both strategies on one problem: tables on the screen, pictures in `out`."""
     study = STUDIES[name]()
-    error = error_measure(study, reference)
+    errors = energy_errors(study, reference)
     runs: Runs = {}
     stem = name.replace(" ", "_").replace("=", "").replace(".", "")
     for order in orders:
@@ -67,7 +67,7 @@ def compare(
         if study.exact is None:  # the reference has to be much finer
             most = min(most, int(SHARE * min(reference, study.finest)))
         for strategy in get_args(Strategy):
-            results = list(run_of(name, study, strategy, order, error, most))
+            results = list(run_of(name, study, strategy, order, errors, most))
             rows = runs[name, order, strategy] = [row for _, row in results]
             print(f"\n{name}, {strategy}, order {order}: rate N^{rate(rows):.2f}")
             printed(COLUMNS, rows)

@@ -75,17 +75,6 @@ def energy_errors(
     return Overkill(finest).energy_error
 
 
-def error_measure(study: Study, reference: int = REFERENCE) -> Callable[[Solution], float]:
-    """Relative error of stresses in the energy norm, as a function of a solution."""
-    errors = energy_errors(study, reference)
-
-    def relative(solution: Solution) -> float:
-        error, norm = errors(solution)
-        return error / norm
-
-    return relative
-
-
 @dataclass(frozen=True)
 class Row:
     """One level of one run, from the geometry on."""
@@ -159,23 +148,23 @@ def run_of(
     study: Study,
     strategy: Strategy,
     order: int,
-    error: Callable[[Solution], float],
+    errors: Callable[[Solution], tuple[float, float]],
     max_dofs: int,
 ) -> Iterator[tuple[Solution, Row]]:
-    """One run: its solutions and their rows."""
+    """One run: its solutions and their rows; `errors` as `energy_errors` returns it."""
     seconds, started = 0.0, time.process_time()
     for level, solution in enumerate(levels_of(study.problem, strategy, order, max_dofs)):
         seconds += time.process_time() - started
-        estimate, actual = solution.relative_error_estimate, error(solution)
+        error, norm = errors(solution)
         row = Row(
             case=name,
             strategy=strategy,
             order=order,
             level=level,
             unknowns=solution.displacement.space.ndof,
-            error=actual,
-            estimate=estimate,
-            effectivity=estimate / actual,
+            error=error / norm,
+            estimate=solution.relative_error_estimate,
+            effectivity=solution.relative_error_estimate * norm / error,
             near=share_near(solution, study.zone),
             half_width=half_width_error(study, solution),
             angle=smallest_angle(MeshArrays(solution.mesh).corners),

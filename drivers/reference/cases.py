@@ -14,25 +14,11 @@ import ngsolve as ng
 import numpy as np
 
 from drivers.reference.curved import Curved, bearing, curved, rings
-from drivers.reference.straight import (
-    Exact,
-    hertz,
-    patch,
-    transition,
-    uniform_pressure,
-)
+from drivers.reference.straight import Exact, hertz, patch, transition, uniform_pressure
 from ngcontact import Contact, Elastic, Problem, Solution
 from ngcontact.geometries import blocks, disc, disc_on_block, graphs, punch
 from ngcontact.geometries import rings as ring_geometry
-from ngcontact.geometries.region import (
-    RIGHT,
-    UP,
-    body,
-    compound,
-    polygon,
-    quarter_arc,
-    segment,
-)
+from ngcontact.geometries.region import RIGHT, UP, body, compound, polygon, quarter_arc, segment
 
 FIRST = Elastic(E=1.0, nu=0.3)
 SECOND = Elastic(E=3.0, nu=0.2)

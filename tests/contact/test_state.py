@@ -10,11 +10,7 @@ import pytest
 from drivers.reference import axisymmetric_cases as cases_about_an_axis
 from ngcontact import Contact, solve
 from ngcontact.contact.line import in_contact
-from ngcontact.contact.state import (
-    continued_to_axis,
-    pressure_across_corners,
-    transitions_on,
-)
+from ngcontact.contact.state import continued_to_axis, pressure_across_corners, transitions_on
 
 
 def line(x, order=1, y=None):

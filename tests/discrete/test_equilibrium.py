@@ -11,14 +11,7 @@ from netgen.occ import OCCGeometry
 
 from drivers.reference import cases
 from drivers.reference.straight import relative_energy_error
-from ngcontact import (
-    Contact,
-    ConvergenceError,
-    Elastic,
-    NoEquilibriumError,
-    Problem,
-    solve,
-)
+from ngcontact import Contact, ConvergenceError, Elastic, NoEquilibriumError, Problem, solve
 from ngcontact.discrete.discrete_problem import discretise, minimise_energy
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.mesh import first_mesh

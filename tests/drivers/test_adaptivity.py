@@ -9,7 +9,7 @@ import pytest
 
 from drivers import bounds
 from drivers.adaptive_study.__main__ import main
-from drivers.adaptive_study.runs import STUDIES, Name, error_measure, rate, run_of, share_near
+from drivers.adaptive_study.runs import STUDIES, Name, energy_errors, rate, run_of, share_near
 from drivers.reference import cases
 
 
@@ -17,7 +17,7 @@ from drivers.reference import cases
 def levels(name, strategy, order, unknowns):
     """Solutions and rows of one run up to a number of unknowns."""
     study = STUDIES[name]()
-    results = list(run_of(name, study, strategy, order, error_measure(study), unknowns))
+    results = list(run_of(name, study, strategy, order, energy_errors(study), unknowns))
     return [s for s, _ in results], [r for _, r in results]
 
 
@@ -91,10 +91,10 @@ def test_newton_steps_and_factorisations(name):
 def test_punch_regains_the_rate():
     """Corner r^(-1/2): N^-1/4 uniformly, N^-1/2 adaptively, both of order 1."""
     study = STUDIES["flat punch"]()
-    error = error_measure(study, reference=15_000)
+    errors = energy_errors(study, reference=15_000)
     rates = {}
     for strategy in ("uniform", "adaptive"):
-        levels = run_of("flat punch", study, strategy, 1, error, max_dofs=10_000)
+        levels = run_of("flat punch", study, strategy, 1, errors, max_dofs=10_000)
         rates[strategy] = rate([row for _, row in levels])
     assert abs(rates["uniform"] + 0.25) < 0.05
     assert abs(rates["adaptive"] + 0.5) < 0.075
@@ -135,9 +135,9 @@ def test_driver_writes_rows_and_pictures(tmp_path):
 def test_effectivity_on_curves():
     """By stresses: the same band as against exact solutions on straight lines."""
     study = STUDIES["disc on rigid plane"]()
-    error = error_measure(study, reference=12_000)
+    errors = energy_errors(study, reference=12_000)
     for order in (1, 2):
-        levels = run_of("disc on rigid plane", study, "adaptive", order, error, 9000)
+        levels = run_of("disc on rigid plane", study, "adaptive", order, errors, 9000)
         effectivities = np.array([row.effectivity for _, row in levels])[1:]
         assert len(effectivities) >= 3
         assert ((effectivities >= 1) & (effectivities <= 6)).all()

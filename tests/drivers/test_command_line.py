@@ -15,8 +15,9 @@ import pytest
 from drivers.__main__ import drivers
 from drivers.__main__ import main as listed
 from drivers.command_line import run
+from drivers.hertz import computed_and_expected
 from drivers.reference.cases import touching_blocks
-from drivers.tables import last_level, table
+from drivers.tables import table
 from ngcontact import solve
 
 ROOT = Path(__file__).parents[2]
@@ -155,10 +156,10 @@ def test_bad_values_are_refused_with_a_reason(name, words, said, monkeypatch, ca
 def test_levels_are_printed_as_they_are_and_the_last_one_is_returned(capsys):
     problem = touching_blocks({"bottom": (0, 0), "top": (0, -0.01)})
     levels = [solve(problem, maxh=h) for h in (1.0, 0.5)]
-    columns = {" force": lambda force: f"{force:.3f}", "in mN": lambda force: f"{1e3 * force:.0f}"}
-    last, force = last_level(levels, lambda level: level.contact_force()[1], columns)
+    columns = {" force": "{0.force:.3f}", "in mN": lambda found: f"{1e3 * found.force:.0f}"}
+    last, found, _ = computed_and_expected(levels, columns, lambda force: (0.0, 0.0))
     assert last is levels[1]
-    assert force == last.contact_force()[1]
+    assert found.force == last.contact_force()[1]
     head, *rows = capsys.readouterr().out.splitlines()
     assert head.split()[-4:] == ["force", "in", "mN", "seconds"]
     for level, row in zip(levels, rows, strict=True):

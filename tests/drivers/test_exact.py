@@ -11,12 +11,7 @@ from netgen.occ import Compound, OCCGeometry, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
 from drivers.reference.curved import curved, rings
-from drivers.reference.straight import (
-    hertz,
-    patch,
-    relative_energy_error,
-    transition,
-)
+from drivers.reference.straight import hertz, patch, relative_energy_error, transition
 from drivers.reference.westergaard import effective_modulus
 from ngcontact.problem.material import Elastic
 

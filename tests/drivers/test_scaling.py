@@ -17,13 +17,7 @@ import pyvista
 from drivers.reference import cases
 from drivers.stress.motion import Motion
 from drivers.stress.scenes.drawing import rotation
-from ngcontact import (
-    ConvergenceError,
-    Elastic,
-    Solution,
-    adapt,
-    solve,
-)
+from ngcontact import ConvergenceError, Elastic, Solution, adapt, solve
 from tests.drivers.similarities import (
     AS_IT_IS,
     cornered,

@@ -7,12 +7,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 from netgen.geom2d import SplineGeometry
-from netgen.occ import (
-    Axis,
-    Glue,
-    OCCGeometry,
-    WorkPlane,
-)
+from netgen.occ import Axis, Glue, OCCGeometry, WorkPlane
 from ngsolve.meshes import MakeStructured2DMesh
 
 from drivers.reference import cases

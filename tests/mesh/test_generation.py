@@ -15,15 +15,7 @@ from ngcontact.geometries import blocks, disc_on_block
 from ngcontact.mesh import generation
 from ngcontact.mesh.curving import check_curves
 from ngcontact.mesh.generation import first_mesh, narrowest, spaced
-from tests.pairs import (
-    ALL,
-    BLOCKS,
-    BOUNDED,
-    ENLARGING,
-    ROUND_OFF,
-    pressed,
-    unmatched,
-)
+from tests.pairs import ALL, BLOCKS, BOUNDED, ENLARGING, ROUND_OFF, pressed, unmatched
 from tests.scenes import coordinates, vertices
 
 SIZES = (None, 1.0, 0.4, 0.11)

@@ -11,12 +11,7 @@ from matplotlib import pyplot
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.output import plot_solution
-from ngcontact.output.pictures import (
-    close_ups,
-    colour_and_mark,
-    colour_range,
-    cut_pressure,
-)
+from ngcontact.output.pictures import close_ups, colour_and_mark, colour_range, cut_pressure
 from ngcontact.output.scene import Style, contact_lines, picture
 from tests.output.stubs import stub, two_bodies
 

@@ -11,13 +11,7 @@ from netgen.occ import Axis, Z
 
 from drivers.reference import cases
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, solve
-from ngcontact.geometries import (
-    ball_on_block,
-    blocks,
-    cube_on_block,
-    disc_on_disc,
-    rings,
-)
+from ngcontact.geometries import ball_on_block, blocks, cube_on_block, disc_on_disc, rings
 from ngcontact.geometries.region import body, compound, polygon, quarter_arc
 from ngcontact.plausibility import refinement_warning
 from ngcontact.plausibility.pairs import PEAK_ERROR, drawn_gap_error

@@ -18,11 +18,9 @@ from numpy.typing import NDArray
 from drivers.benchmark.engines import Engine, Solved
 from drivers.benchmark.scenes.meshes import OBSTACLE, Mesh
 from drivers.benchmark.scenes.plane import (
-    Assembled,
     Facing,
     Numbering,
     Reading,
-    bounded,
     contact_sides,
     facing,
     moduli,
@@ -74,17 +72,14 @@ def load(common: Common, space: ng.FESpace) -> ng.BaseVector:
 
 def numbering(mesh: ng.Mesh, order: int) -> Numbering:
     """Vertices, then edges; all first components before all second ones."""
-    nodes = mesh.nv + (mesh.nedge if order == 2 else 0)
     segments: dict[str, list[list[int]]] = {}
     for element in mesh.Elements(ng.BND):
         first, last = (vertex.nr for vertex in element.vertices)
         middle = [mesh.nv + element.edges[0].nr] if order == 2 else []
         segments.setdefault(element.mat, []).append([first, *middle, last])
-    return Numbering(
-        points=MeshArrays(mesh).vertices,
-        unknown=np.arange(2 * nodes).reshape(2, nodes),
-        segments={name: np.array(rows) for name, rows in segments.items()},
-    )
+    nodes = mesh.nv + (mesh.nedge if order == 2 else 0)
+    arrays = {name: np.array(rows) for name, rows in segments.items()}
+    return Numbering(MeshArrays(mesh).vertices, np.arange(2 * nodes).reshape(2, nodes), arrays)
 
 
 def nodal(numbering: Numbering) -> tuple[sp.csr_array, sp.csr_array]:
@@ -135,23 +130,34 @@ def active_set(
     raise RuntimeError(f"the active set still changes after {STEPS} steps")
 
 
-def assembled(common: Common, mesh: ng.Mesh, order: int) -> Assembled:
-    """Stiffness and load, with values at the nodes of the boundary as unknowns."""
-    mesh.Curve(order)
-    space = ng.VectorH1(mesh, order=order)
-    K, f = matrix(common, space), load(common, space).FV().NumPy().copy()
-    number = numbering(mesh, order)
-    return Assembled(K, f, number, nodal(number)[0] if order == 2 else None)
+def bounded(number: Numbering, line: Facing, order: int) -> sp.csr_array | None:
+    """Unknowns (n, n) from those of which one is bounded per contact node, if they differ.
+
+    Values at nodes; where two bodies meet, that of a secondary node is its opening over the node
+    opposite.
+    """
+    basis = nodal(number)[0] if order == 2 else None
+    if line.opposite is not None:
+        n = number.unknown.size
+        ties = from_triplets(np.ones(len(line.at)), line.at, line.opposite, (n, n))
+        opening = ties + sp.eye_array(n, format="csr")
+        basis = opening if basis is None else basis @ opening
+    return basis
 
 
 def by_active_set(_: object, common: Common, made: Mesh, order: int) -> Solved:
     """Refactorised at each step, on a mesh curved to the order of the elements."""
     mesh = made.copy()
     started = time.perf_counter()
-    known = assembled(common, mesh, order)
-    K, f, line = bounded(common, known)
-    fixed, value = prescribed(common, known.numbering)
-    v, force, steps = active_set(K, f, line, fixed, value)
+    mesh.Curve(order)
+    space = ng.VectorH1(mesh, order=order)
+    K, f = matrix(common, space), load(common, space).FV().NumPy().copy()
+    number = numbering(mesh, order)
+    line = facing(common, number)
+    basis = bounded(number, line, order)
+    if basis is not None:
+        K, f = (basis.T @ K @ basis).tocsr(), basis.T @ f
+    v, force, steps = active_set(K, f, line, *prescribed(common, number))
     seconds = time.perf_counter() - started
     reading = read(common, line.x, force, v[line.at] + line.gap, order)
     return Solved(seconds, steps, float(v @ (K @ v)) / 2, reading)

@@ -1,4 +1,4 @@
-"""A common problem in arrays, whatever the numbering of a code, and how answers are read.
+"""A common problem in arrays, and how answers are read.
 
 Nodal forces and gaps are read in the same way for every engine; the choices are those that came
 closest to the references on both common problems.
@@ -7,17 +7,14 @@ closest to the references on both common problems.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import ngsolve as ng
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from drivers.benchmark.scenes.meshes import OBSTACLE
 from drivers.benchmark.scenes.problems import Common
 from ngcontact import Elastic
-from ngcontact.arrays import from_triplets
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -31,10 +28,10 @@ OPEN = 6  # open nodes that find the end of contact
 
 @dataclass(frozen=True, eq=False)
 class Numbering:
-    """Nodes of order 1 or 2 and the unknowns of a code."""
+    """Nodes of order 1 or 2 and their unknowns."""
 
     points: Array  # vertices (nv, 2), the first nodes
-    unknown: Indices  # (2, n) of the displacement of all nodes
+    unknown: Indices  # (2, n) of the displacement of all nodes, by component
     segments: dict[str, Indices]  # nodes (k, order + 1) by boundary: end, middle if order 2, end
 
     def at(self, pattern: str) -> Indices:
@@ -127,34 +124,6 @@ def facing(common: Common, numbering: Numbering) -> Facing:
     if len(opposite) != len(nodes) or not np.allclose(place, there):
         raise ValueError("facing nodes differ: expected a mesh with matched contact lines")
     return Facing(place[:, 0], at, numbering.unknown[1, opposite], np.zeros(len(at)))
-
-
-class Assembled(NamedTuple):
-    """Elasticity of a common problem in a code's own unknowns.
-
-    `basis` (n, n) turns nodal values into unknowns where the code's own are others.
-    """
-
-    K: sp.csr_array  # stiffness (n, n)
-    f: Array  # load (n,)
-    numbering: Numbering
-    basis: sp.csr_array | None = None
-
-
-def bounded(common: Common, assembled: Assembled) -> tuple[sp.csr_array, Array, Facing]:
-    """Stiffness and load in unknowns of which one is bounded per contact node, and those nodes.
-
-    Where two bodies meet, the unknown of a secondary node is its opening over the node opposite.
-    """
-    K, f, numbering, basis = assembled
-    line = facing(common, numbering)
-    if line.opposite is not None:
-        ties = from_triplets(np.ones(len(line.at)), line.at, line.opposite, K.shape)
-        opening = ties + sp.eye_array(len(f), format="csr")
-        basis = opening if basis is None else basis @ opening
-    if basis is not None:
-        K, f = (basis.T @ K @ basis).tocsr(), basis.T @ f
-    return K, f, line
 
 
 @dataclass(frozen=True)

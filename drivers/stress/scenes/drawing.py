@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from drivers.stress.motion import Motion
+from drivers.stress.scenes.posing import geometry
 from drivers.stress.scenes.scene import (
     Affine,
     Array,
@@ -310,18 +311,6 @@ def rotation(angle: float) -> Array:
     return np.array([[c, -s], [s, c]])
 
 
-def _area(scene: Scene) -> float:
-    """Area of all bodies, about: of the polygons of their sides, less those of holes."""
-    total = 0.0
-    for body in scene.bodies:
-        for part in (body.sides, body.inner):
-            ends = [side.point(np.array([0.0, side.length / 2])) for side in part]
-            x = np.concatenate([np.zeros((0, 2)), *ends])
-            y = np.roll(x, -1, axis=0)
-            total += 0.5 * float((x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]).sum())
-    return total
-
-
 def scene_of(seed: int) -> Scene:
     """The scene of a seed: kinds take turns, everything else is drawn."""
     draw = np.random.default_rng([seed, 7])
@@ -331,7 +320,8 @@ def scene_of(seed: int) -> Scene:
     elements = math.exp(draw.uniform(low, high)) / order**2
     if scene.finer is not None:
         elements /= 2  # the finer body has more of them
-    maxh = math.sqrt(_area(scene) / (SHARE * elements))
+    area = sum(face.mass for face in geometry(scene).shape.faces)
+    maxh = math.sqrt(area / (SHARE * elements))
     models = ["plane strain", "plane stress"]
     scene = replace(scene, order=order, maxh=min(maxh, 0.5), model=str(draw.choice(models)))
     motion = Motion(

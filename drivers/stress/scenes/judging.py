@@ -113,8 +113,7 @@ def _carried(case: Case, what: str, motion: Motion) -> list[Finding]:
     if case.scene.straight:
         mesh, *_ = moved_mesh(case.solution.mesh, motion)
     other = answer(scene, mesh)
-    m = _there(scene, other)
-    m = None if m is None else m.back(motion)
+    m = None if other.solution is None else measured(scene, other.solution).back(motion)
     if mesh is None:
         return close(scene, what, case, other, m)
     return equal(what, case.without_geometry, other, m)
@@ -142,8 +141,7 @@ def permuted(case: Case) -> list[Finding]:
 
     scene = replace(case.scene, pairs=tuple(turned(p) for p in case.scene.pairs[::-1]))
     other = answer(scene, case.solution.mesh)
-    m = _there(scene, other)
-    return equal("permuted", case, other, m)
+    return equal("permuted", case, other, _there(scene, other))
 
 
 def swapped(case: Case) -> list[Finding]:
