@@ -30,6 +30,10 @@ MIN_PIVOT = 0.05  # least share of a row at the node whose unknown it becomes, i
 MIN_SINE = 1e-6  # sine below which two conditions at one node are the same
 INTERPOLATION_ERROR = 1e-8  # of prescribed values, relative to the largest: no interference
 COORDINATE_ERROR = 1e-13  # of gaps, relative to the largest coordinate: none either
+INDEPENDENT_ROWS = (
+    "exchange the sides of a pair whose secondary is the finer one and is held at an edge, give "
+    "each pair of boundaries once, or end one of them before that point"
+)
 STIFFNESS_CONTRAST = 1e3  # of the secondary and what faces it, above which the latter hosts
 
 
@@ -266,10 +270,7 @@ def _check_prescribed(
         node, coefficient = entries.node[here], entries.coefficient[here]
         where = f"the contact row at node {rows.node[j]} with direction {rows.direction[j]}"
         if (np.abs(coefficient[~supported.fixed[node]]) > MIN_SINE).any():
-            raise ValueError(
-                f"{where} depends on other contact rows there; leave one of the pairs out, or end "
-                "one of the contact boundaries before that point"
-            )
+            raise ValueError(f"{where} depends on other contact rows there; {INDEPENDENT_ROWS}")
         value = float((coefficient * supported.values[node]).sum())
         allowed = INTERPOLATION_ERROR * max(size, abs(rows.g[j])) + COORDINATE_ERROR * length
         excess = value - rows.g[j]
@@ -291,10 +292,7 @@ def _without_links(C: sp.csr_array, right: sp.csr_array) -> sp.csr_array:
     _, group = connected_components(block, connection="strong")
     ring = np.flatnonzero(np.bincount(group)[group] > 1)
     if ring.size and np.linalg.cond(block[np.ix_(ring, ring)]) > RING_CONDITION:
-        raise ValueError(
-            "contact rows depend on each other in a ring; leave one of the contact pairs out, or "
-            "give each pair of boundaries once"
-        )
+        raise ValueError(f"contact rows depend on each other in a ring; {INDEPENDENT_ROWS}")
     known = sp.diags_array(alone.astype(float)) @ right
     place = sp.eye_array(C.shape[0], format="csr")[:, linked]
     return known + place @ sp.csr_array(np.linalg.inv(block)) @ (right - C @ known)[linked]

@@ -161,6 +161,24 @@ def test_prescribed_on_both_sides():
         solve(problem)
 
 
+@pytest.mark.parametrize("wide", [0.0, 0.2])
+def test_a_finer_secondary_that_is_held_at_an_edge(wide):
+    """More rows than the coarser side has unknowns: the roles that are advised are solved."""
+    mesh = boxes(
+        ("upper", (0, 0, 0), (1, 1, 1), (4, 4, 2)),
+        ("lower", (-wide, -wide, -1), (1 + wide, 1 + wide, 0), (2, 2, 1)),
+    )
+    pair = Contact("upper_bottom", "lower_top")
+    held = {"upper_left|upper_top": (0, 0, -0.01), "lower_bottom": (0, 0, 0)}
+    problem = Problem(mesh, LAWS, displacement=held, contact=[pair])
+    with pytest.raises(ValueError, match="exchange the sides of a pair whose secondary is the fin"):
+        solve(problem, order=1)
+    solution = solve(replace(problem, contact=[pair.swapped()]), order=1)
+    supported = solution.reactions["lower_bottom"]
+    np.testing.assert_allclose(solution.contact_force(), -supported, atol=1e-12 * supported[2])
+    assert max(solution.residuals.values()) < 1e-12
+
+
 def two_boxes(first, second, **data):
     mesh = boxes(("a", *first, (3, 3, 3)), ("b", *second, (2, 2, 2)))
     held = {"b_bottom": (0, 0, 0)}
