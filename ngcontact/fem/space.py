@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -13,7 +14,16 @@ import scipy.sparse as sp
 
 from ..arrays import Array, Index, Mask, power_of_two
 from ..linalg import shared
-from ..problem import MeshArrays, Problem, varies
+from ..problem import (
+    Elastic,
+    Hooke,
+    InitialStrain,
+    MeshArrays,
+    Problem,
+    body_mask,
+    strain_components,
+    varies,
+)
 from ..quadrature import composite, loads_of
 from .boundary import Bodies, BoundaryTrace, node_basis, vector_space
 from .model import MODELS, Model
@@ -286,12 +296,26 @@ def _scaled_energy(
     return size, energy
 
 
+def initial_strains(
+    problem: Problem, mesh: ng.Mesh
+) -> dict[str, tuple[Elastic | Hooke, InitialStrain]]:
+    """Law and initial strain of each body of a mesh that has one, by its own name."""
+    found: dict[str, tuple[Elastic | Hooke, InitialStrain]] = {}
+    for pattern, data in problem.strain.items():
+        mine = body_mask(mesh, pattern)
+        for key, law in problem.materials.items():
+            at = np.flatnonzero(mine & body_mask(mesh, key))
+            names = [mesh.GetMaterials()[k] for k in at]
+            found |= {re.escape(name): (law, strain_components(data)) for name in names}
+    return found
+
+
 def initial_strain(problem: Problem, mesh: ng.Mesh) -> ng.CoefficientFunction | None:
     """The Voigt strain e0 (q,) of bodies that are without stress; None where there is none."""
     if not problem.strain:
         return None
     model = model_of(problem)
-    by_body = {k: model.initial_strain(*x) for k, x in problem.initial_strains(mesh).items()}
+    by_body = {k: model.initial_strain(*x) for k, x in initial_strains(problem, mesh).items()}
     return mesh.MaterialCF(by_body, default=0 * next(iter(by_body.values())))
 
 
@@ -319,7 +343,7 @@ def stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.Coefficient
 def normal_stress_of(problem: Problem, displacement: ng.GridFunction) -> ng.CoefficientFunction:
     """Stress normal to the plane of a displacement, a scalar, in the units of the moduli."""
     voigt, mesh = voigt_stress(problem, displacement), displacement.space.mesh
-    strains = problem.initial_strains(mesh) if problem.strain else {}
+    strains = initial_strains(problem, mesh)
     return model_of(problem).out_of_plane(problem.materials, strains, mesh, voigt)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -16,7 +15,7 @@ from . import checks
 from .contact import Contact
 from .material import ABOUT_AN_AXIS, SOLID, Elastic, Hooke, model_for, varies
 from .mesh_arrays import MeshArrays
-from .strain import InitialStrain, check_strains, components, strain_data
+from .strain import check_strains, strain_components, strain_data
 from .values import (
     TUPLES,
     Scalar,
@@ -161,17 +160,6 @@ class Problem:
             return load  # P in (3.7)
         return -load * ng.BoundaryFromVolumeCF(ng.specialcf.normal(self.dim))
 
-    def initial_strains(self, mesh: ng.Mesh) -> dict[str, tuple[Elastic | Hooke, InitialStrain]]:
-        """Law and initial strain of each body of `mesh` that has one, by its own name."""
-        found: dict[str, tuple[Elastic | Hooke, InitialStrain]] = {}
-        for pattern, data in self.strain.items():
-            mine = body_mask(mesh, pattern)
-            for key, law in self.materials.items():
-                at = np.flatnonzero(mine & body_mask(mesh, key))
-                names = [mesh.GetMaterials()[k] for k in at]
-                found |= {re.escape(name): (law, components(data)) for name in names}
-        return found
-
     @property
     def varying(self) -> dict[str, Elastic | Hooke]:
         """Laws, by keys of `materials`, whose stress need be no polynomial where e(u) is one.
@@ -252,7 +240,7 @@ class Problem:
         if self.model in ABOUT_AN_AXIS:
             sides = [side for pair in self.contact for side in pair.sides]
             vectors = self.displacement, self.traction, self.force
-            e0 = {name: components(data) for name, data in self.strain.items()}
+            e0 = {name: strain_components(data) for name, data in self.strain.items()}
             checks.check_about_axis(view, *vectors, sides, e0)
 
 

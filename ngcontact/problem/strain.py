@@ -33,7 +33,7 @@ class InitialStrain(NamedTuple):
 
 
 def strain_data(value: Any, what: str, dim: int) -> ng.CoefficientFunction:
-    """Return a strain as it was given: a scalar, (2,), (3,) or a matrix; `components` reads it."""
+    """A strain as it was given, a scalar, (2,), (3,) or a matrix, for `strain_components`."""
     right = RIGHT[dim]
     if isinstance(value, ng.CoefficientFunction):
         if tuple(value.dims) not in SHAPES[dim]:
@@ -54,7 +54,7 @@ def strain_data(value: Any, what: str, dim: int) -> ng.CoefficientFunction:
     return ng.CF(entries, dims=shape) if len(shape) == 2 else ng.CF(entries)
 
 
-def components(data: ng.CoefficientFunction) -> InitialStrain:
+def strain_components(data: ng.CoefficientFunction) -> InitialStrain:
     """The components of what `strain_data` returned."""
     zero = ng.CF(0.0)
     if data.dim == 1:
