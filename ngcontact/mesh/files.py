@@ -79,7 +79,12 @@ def read(path: str | os.PathLike[str]) -> ng.Mesh:
             file = meshio.read(source)
     except (Exception, SystemExit) as error:
         why = " ".join(f"{said.getvalue()} {error}".split())
-        raise ValueError(f'"{source}" cannot be read as a mesh: {why}') from error
+        raise ValueError(
+            f'"{source}" cannot be read as a mesh; meshio says: {why}. Look for an empty or cut '
+            "file, cells with nodes that it does not have, and kinds of cells that meshio does not "
+            "know, as CPS6 and CPE3 of Abaqus (it knows CPS3, CPS4, CPE6, S8R); Gmsh writes files "
+            "that are read (-format msh41)"
+        ) from error
     try:
         return _mesh_of(file)
     except ValueError as error:
@@ -197,6 +202,8 @@ def _names(file: Any) -> list[np.ndarray]:
 def _plane(points: Array, cells: list[_Cells]) -> Array:
     """Points (n, 2) of a file whose cells lie in a plane z = const."""
     used = points[np.unique(np.concatenate([part.nodes.ravel() for part in cells]))]
+    if not np.isfinite(used).all():
+        raise ValueError(f"{(~np.isfinite(used)).sum()} coordinates of nodes are no numbers")
     if used.shape[1] > 2 and np.ptp(used[:, 2]) > PLANE_EXTENT * np.ptp(used[:, :2], axis=0).max():
         low, high = used[:, 2].min(), used[:, 2].max()
         raise ValueError(f"bodies do not lie in a plane: z is from {low:.6g} to {high:.6g}")
@@ -311,10 +318,12 @@ def _curves(points: Array, runs: list[list[_Side]]) -> tuple[list[occ.Edge], flo
             slope = _slopes(x, closed=closed)
             for k in () if closed else (0, -1):  # it goes on in another curve, or a straight line
                 slope[k] = smooth.get(nodes[k], slope[k])
-            slope /= np.linalg.norm(slope, axis=1)[:, None]
+            # The kernel compares the lengths of tangents with `tol`, and uses their directions.
+            step = float(np.linalg.norm(np.diff(x, axis=0), axis=1).min())
+            slope *= step / np.linalg.norm(slope, axis=1)[:, None]
             edge = occ.SplineInterpolation(
                 [occ.Pnt(*p, 0) for p in x],
-                tol=CURVED_DISTANCE * float(np.linalg.norm(np.diff(x, axis=0), axis=1).min()),
+                tol=CURVED_DISTANCE * step,
                 tangents={k: occ.Vec(*t, 0) for k, t in enumerate(slope)},
             )
         edge.name = run[0].name

@@ -158,6 +158,18 @@ def test_curved_sides_of_second_order_are_kept(tmp_path, version):
 
 
 @pytest.mark.filterwarnings("ignore:sides of second order")
+@pytest.mark.parametrize("scale", [1e-3, 1e3, 1e9])
+def test_curves_are_those_of_the_file_in_any_unit(tmp_path, scale):
+    file, areas = drawn(rings(), 0.4, 2), []
+    for size in (1.0, scale):
+        file.points = file.points * size
+        mesh = read(file.write(tmp_path / "rings.msh", 4.1, 2))
+        mesh.Curve(3)
+        areas.append(ng.Integrate(1.0, mesh, order=6) / size**2)
+    assert areas[1] == pytest.approx(areas[0], rel=1e-12)  # round-off of the area
+
+
+@pytest.mark.filterwarnings("ignore:sides of second order")
 def test_second_order_keeps_the_rates_of_order_2(tmp_path):
     """A press fit against Lame's solution, whose circles the file has to its accuracy."""
     file = drawn(rings(0.5, 1.0, 2.0, 1e-3, quarter=True), 0.125, 2)
@@ -260,6 +272,8 @@ def changed(file, points=None, more=()):
             "degenerate",
         ),
         (File(square().points, square().blocks[:1]), "no triangles or quadrilaterals"),
+        (changed(square(), [(0, math.nan), (1, 0), (1, 1), (0, 1)]), "1 coordinates of nodes are"),
+        (changed(square(), [(0, 0), (1, 0), (1, 1)]), "cells with nodes that it does not have"),
     ],
 )
 def test_files_that_do_not_fit_are_refused(tmp_path, file, told):
@@ -274,9 +288,11 @@ def test_files_that_do_not_fit_are_refused(tmp_path, file, told):
 def test_what_is_no_file_of_a_mesh(tmp_path, capsys):
     with pytest.raises(FileNotFoundError, match="there is no file"):
         read(tmp_path / "none.msh")
-    for name in ("text.msh", "text.txt"):
-        (tmp_path / name).write_text("no mesh\n")
-        with pytest.raises(ValueError, match=f"{name}.* cannot be read as a mesh"):
+    element = "*NODE\n1, 0, 0\n*ELEMENT, TYPE=CPS6\n1, 1, 1, 1, 1, 1, 1\n"
+    files = {"text.msh": "no mesh\n", "text.txt": "no mesh\n", "empty.msh": "", "6.inp": element}
+    for name, text in files.items():
+        (tmp_path / name).write_text(text)
+        with pytest.raises(ValueError, match=f"{name}.* cannot be read as a mesh; meshio .* Gmsh"):
             read(tmp_path / name)
     assert capsys.readouterr().out == ""
 
