@@ -17,6 +17,10 @@ from .casting import line_coordinates
 
 SLIVER = 1e-13  # share of a facet below which a part of it is none
 MOST_CORNERS = 7  # of a triangle that is cut three times, and one more
+ON_EDGE = 1e-12  # barycentric coordinate up to which a corner lies on the edge where it is 0
+# The corner of a polygon furthest along this, in barycentric coordinates, is the apex of its fan.
+# No edge of rational coordinates is perpendicular to it: of two corners round-off would tell which.
+APEX_DIRECTION = np.array([1.0, 2**0.5, 5**0.5])
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +57,7 @@ def pieces(corners: Array, direction: Array, facing: Array, reach: Array) -> Fac
     apart = (L.min(axis=1) >= 1).any(axis=1) | (L.max(axis=1) <= 0).any(axis=1)
     apart |= ~np.isfinite(L).all(axis=(1, 2))
     local, other, L = local[~apart], other[~apart], L[~apart]
-    polygon, count = clipped(L)
+    polygon, count = _from_apex(*clipped(L))
     found = [
         (np.flatnonzero(count > i + 1), i) for i in range(1, MOST_CORNERS - 1)
     ]  # a fan of triangles
@@ -87,6 +91,17 @@ def _near(corners: Array, direction: Array, facing: Array, reach: Array) -> tupl
     return np.concatenate(local), np.concatenate(found)
 
 
+def _from_apex(polygon: Array, count: Index) -> tuple[Array, Index]:
+    """Corners (r, 7, 3) of which `count` (r,) count, from the apex on.
+
+    The first one of `clipped` depends on round-off, and so would quadrature of kinks.
+    """
+    number = np.arange(MOST_CORNERS)
+    along = np.where(number < count[:, None], polygon @ APEX_DIRECTION, -np.inf)
+    turned = (along.argmax(axis=1)[:, None] + number) % np.maximum(count, 1)[:, None]
+    return np.take_along_axis(polygon, turned[:, :, None], axis=1), count
+
+
 def clipped(polygon: Array) -> tuple[Array, Index]:
     """Triangles `polygon` (r, 3, 3) in barycentric coordinates, cut to the facet.
 
@@ -100,6 +115,7 @@ def clipped(polygon: Array) -> tuple[Array, Index]:
     corners[:, :3] = polygon
     count = np.full(r, 3)
     for i in range(3):  # L_i >= 0
+        corners[np.abs(corners[:, :, i]) < ON_EDGE, i] = 0.0
         cut, size = np.zeros_like(corners), np.zeros(r, dtype=np.intp)
 
         def append(at: Index, x: Array, cut: Array = cut, size: Index = size) -> None:

@@ -59,9 +59,7 @@ def test_turns_and_units(order):
         found, other = figures(order, TURN, length, modulus)
         # Required 1e-8; measured 1e-13.
         assert np.abs(found - expected).max() < 1e-11 * np.abs(expected).max()
-        # Gaps have kinks, of which quadrature sees what the division into triangles shows it,
-        # which round-off decides: measured 3e-5 to 1.3e-4.
-        assert other == pytest.approx(estimate, rel=1e-3)
+        assert other == pytest.approx(estimate, rel=1e-11)
 
 
 @pytest.mark.parametrize("order", [1, 2, 3])
