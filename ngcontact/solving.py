@@ -157,9 +157,14 @@ def _coarse_run(problem: Problem, mesh: ng.Mesh, order: int, element: str) -> li
 
 
 def _check_start(problem: Problem, start: object) -> None:
-    """Raise unless `start` is a solution of as many pairs as the problem has."""
+    """Raise unless `start` is a solution of as many dimensions and pairs as the problem has."""
     if not isinstance(start, Solution):
         raise TypeError(f"start is a {type(start).__name__}: give a Solution")
+    if start.problem.dim != problem.dim:
+        raise ValueError(
+            f"start is a solution of {start.problem.dim} dimensions, the problem is of "
+            f"{problem.dim}: leave start out, or give a solution of this problem with other loads"
+        )
     if len(start.discrete.lines) != len(problem.contact):
         raise ValueError(
             f"start has {len(start.discrete.lines)} contact pairs, the problem "

@@ -11,6 +11,7 @@ import pytest
 from netgen.meshing import Element2D, Element3D, FaceDescriptor, Mesh, MeshPoint, Pnt
 from ngsolve.meshes import MakeStructured3DMesh
 
+from drivers.reference import cases
 from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
 from tests.solids.meshes import boxes
 from tests.solids.test_patch import LAWS, blocks, pressed
@@ -159,6 +160,18 @@ def test_prescribed_on_both_sides():
     )
     with pytest.raises(ValueError, match="violated by prescribed displacements on both sides"):
         solve(problem)
+
+
+def test_a_start_in_another_dimension():
+    solid, plane = pressed(blocks(2, 2)), solve(cases.pressure_patch().problem, maxh=0.5)
+    with pytest.raises(
+        ValueError, match="start is a solution of 2 dimensions, the problem is of 3"
+    ):
+        solve(solid, start=plane)
+    with pytest.raises(
+        ValueError, match="start is a solution of 3 dimensions, the problem is of 2"
+    ):
+        solve(plane.problem, plane.mesh, start=solve(solid))
 
 
 @pytest.mark.parametrize("wide", [0.0, 0.2])
