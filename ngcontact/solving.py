@@ -25,7 +25,7 @@ from .adaptivity import (
     warn_of_limit,
 )
 from .arrays import joined, root_of_squares
-from .contact import decided
+from .contact import with_roles
 from .discrete import (
     DiscreteProblem,
     carried_active_set,
@@ -264,7 +264,7 @@ def _doubted(
     else:
         bodies = [name for one in tried if one.rigid for name in one.rigid.free.names]
     trace, names = boundary_trace(mesh, order, model_of(problem)), mesh.GetMaterials()
-    pairs = [decided(trace, contact) for contact in problem.contact]
+    pairs = [with_roles(trace, contact) for contact in problem.contact]
     primaries = [trace.body[trace.segments(pair.primary)] for pair in pairs]
     return {
         number: pair

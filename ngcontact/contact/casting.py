@@ -91,34 +91,6 @@ def _faces(surface: Array, side: Array, facet: Index, L: Array, directions: Arra
     return np.asarray(across < -GRAZING_COSINE * np.linalg.norm(normal, axis=1))
 
 
-def coincident(
-    points: Array, directions: Array, surface: Array, side: Array, nodes: Array
-) -> Partners:
-    """Partners among the nodes of the facing facets that lie at the points themselves.
-
-    As `projection.coincident` finds them in the plane, of `points` (k, 3) with `directions` (k, 3)
-    on the `surface` (q, n, 3), `side` (q,); `nodes` (j, 3) are barycentric coordinates.
-    """
-    found = none_met(len(points))
-    if len(surface) == 0 or len(points) == 0:
-        return found
-    shapes = lagrange(DEGREES[surface.shape[1]], nodes)
-    places = np.einsum("ji,qid->qjd", shapes, surface)
-    size = np.linalg.norm(surface[:, 1] - surface[:, 0], axis=1)
-    tree = cKDTree(places.reshape(-1, 3))
-    reach = MATCHING_DISTANCE * size.max()
-    distances, numbers = tree.query(points, k=NEAREST_FACETS, distance_upper_bound=reach)
-    for column in range(NEAREST_FACETS - 1, -1, -1):  # a node belongs to several facets
-        near = np.flatnonzero(np.isfinite(distances[:, column]))
-        facet, local = np.divmod(numbers[near, column], len(nodes))
-        meets = _faces(surface, side, facet, nodes[local], directions[near])
-        near, facet, local = near[meets], facet[meets], local[meets]
-        found.segment[near], found.s[near] = facet, nodes[local]
-        offset = places[facet, local] - points[near]
-        found.distance[near] = (offset * directions[near]).sum(axis=1)
-    return found
-
-
 @dataclass(frozen=True, eq=False)
 class _Rays:
     """Lines through k points, and the facets that they may meet, as `cast` has them."""
@@ -180,11 +152,3 @@ def cast(
         at, facet = np.nonzero(passes)
         rays.take(found, here[at], facet)
     return found
-
-
-def snap(L: Array, nodes: Array) -> Array:
-    """Barycentric coordinates (k, 3), those of `L` (k, 3) moved to `nodes` (q, 3) they match."""
-    apart = np.abs(L[:, None] - nodes).max(axis=2)
-    nearest = apart.argmin(axis=1)
-    matches = apart[np.arange(len(L)), nearest] <= MATCHING_DISTANCE
-    return np.where(matches[:, None], nodes[nearest], L)

@@ -7,8 +7,6 @@ left.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -23,29 +21,15 @@ ON_EDGE = 1e-12  # barycentric coordinate up to which a corner lies on the edge 
 APEX_DIRECTION = np.array([1.0, 2**0.5, 5**0.5])
 
 
-@dataclass(frozen=True, eq=False)
-class FacetPieces:
-    """Parts of secondary facets, r of them."""
-
-    local: Index  # (r,) number of the facet among those divided
-    corners: Array  # (r, 3, 3) barycentric coordinates of its corners there
-    facing: Index  # (r,) facet of the primary that it faces, among those given
-    share: Array  # (r,) of the area of the facet
-
-    def covered(self, count: int) -> Array:
-        """Share (k,) of each of the facets, `count` of them, that faces the primary."""
-        return np.asarray(np.bincount(self.local, self.share, count), dtype=float)
-
-    def places(self, points: Array) -> Array:
-        """Barycentric coordinates (r * g, 3) on the facets of `points` (g, 3) of all parts."""
-        return np.einsum("gi,rij->rgj", points, self.corners).reshape(-1, 3)
-
-
-def pieces(corners: Array, direction: Array, facing: Array, reach: Array) -> FacetPieces:
+def pieces(
+    corners: Array, direction: Array, facing: Array, reach: Array
+) -> tuple[Index, Array, Index]:
     """Divide facets with `corners` (k, 3, 3) by the `facing` (q, 3, 3) ones.
 
     Along one `direction` (k, 3) each; facing facets lie within `reach` (k,) of the lines' starts,
     everywhere along the lines where that is infinite, and run anticlockwise as seen from outside.
+    Of the parts numbers (r,) of facets, barycentric coordinates (r, 3, 3) of the corners there, and
+    numbers (r,) of facing facets.
     """
     local, other = _near(corners, direction, facing, reach)
     a, b, c = facing[other].transpose(1, 0, 2)
@@ -64,10 +48,9 @@ def pieces(corners: Array, direction: Array, facing: Array, reach: Array) -> Fac
     which = np.concatenate([np.zeros(0, dtype=np.intp), *(k for k, _ in found)])
     parts = [polygon[k][:, [0, i, i + 1]] for k, i in found]
     part = np.concatenate([np.zeros((0, 3, 3)), *parts])
-    share = np.abs(np.linalg.det(part))
-    kept = np.flatnonzero(share > SLIVER)
+    kept = np.flatnonzero(np.abs(np.linalg.det(part)) > SLIVER)
     which = which[kept]
-    return FacetPieces(local[which], part[kept], other[which], share[kept])
+    return local[which], part[kept], other[which]
 
 
 def _near(corners: Array, direction: Array, facing: Array, reach: Array) -> tuple[Index, Index]:

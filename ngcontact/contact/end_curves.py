@@ -18,7 +18,6 @@ from ..fem import FacetTrace, contact_modulus
 from ..problem import Problem
 from ..reference import triangle
 from .state import ContactState
-from .zone import ContactZone
 
 # Distance at a node in contact without pressure: a sign alone.
 INSIDE_DISTANCE = np.finfo(float).tiny
@@ -162,7 +161,6 @@ def area_in_contact(zone: SignedDistance, state: ContactState) -> float:
     s, w = triangle.gauss(2 * zone.trace.geometry_order)
     vectors = zone.trace.area_vector(np.repeat(facets, len(w)), np.tile(s, (len(facets), 1)))
     size = np.linalg.norm(vectors, axis=1).reshape(len(facets), len(w)) @ w
-    assert isinstance(state.line, ContactZone)  # of solids
     whole = np.ones(len(state.gap))
     covered = np.minimum(state.line.covered_shares(whole, whole)[some], 1.0)
     return float(share @ (size * covered))

@@ -22,6 +22,7 @@ NEWTON_STEPS = 20
 # its square. Below 1e-15, the round-off of places, no change falls, and all steps were taken.
 NEWTON_TOLERANCE = 1e-12
 LEBESGUE_CONSTANT = 2.0  # bounds interpolation at Gauss-Lobatto points: 1.98 at degree 7
+NEAREST_PLACES = 8  # among which the place of a point is sought
 PAIRS_AT_ONCE = 4_000_000  # of points and segments that are looked at together: bounds memory
 
 
@@ -33,14 +34,6 @@ class Partners:
     s: Array  # (k,) parameter on it
     distance: Array  # (k,) along the direction; negative where curves overlap, inf without one
     searched: bool = False  # False where all are nodes at the same place
-
-
-def normals(curve: Array, side: Array, segment: Index, s: Array) -> Array:
-    """Outward normals (k, 2), not normalised, at `s` (k,) of segments `segment` (k,).
-
-    Of the facing segments `curve` (q, p + 1, 2), `side` (q,).
-    """
-    return -across(slope(curve, segment, s)) * side[segment, None]
 
 
 def none_met(size: int) -> Partners:
@@ -173,45 +166,33 @@ def _faces(curve: Array, side: Array, segment: Index, s: Array, directions: Arra
 
     A ray along a straight boundary, such as a symmetry plane, does not meet it.
     """
-    normal = normals(curve, side, segment, s)
+    normal = -across(slope(curve, segment, s)) * side[segment, None]
     grazing = GRAZING_COSINE * np.linalg.norm(normal, axis=1)  # round-off must not decide
     return np.asarray((normal * directions).sum(axis=1) < -grazing)
 
 
 def coincident(
-    points: Array, directions: Array, curve: Array, side: Array, nodes: Array
-) -> Partners:
-    """Partners among the nodes of the facing segments that lie at the points themselves.
+    points: Array, directions: Array, places: Array, normals: Array, reach: Array
+) -> Index:
+    """Numbers (k,) of the nearest `places` (n, d) at which `points` (k, d) lie, -1 for none.
 
-    Of contact `points` (k, 2) with unit vectors `directions` (k, 2) towards segments `curve`
-    (q, p + 1, 2), `side` (q,), with nodes at the parameters `nodes` (q, order + 1); none where no
-    node is within `MATCHING_DISTANCE` of the point, or the curve does not face it.
+    Places lie within `reach` (n,) of their points, and their outward unit `normals` (n, d) oppose
+    the unit vectors `directions` (k, d): of a vertex that belongs to several segments the ray may
+    face only one of them.
     """
-    found = none_met(len(points))
-    if len(curve) == 0 or len(points) == 0:
+    found = np.full(len(points), -1)
+    if len(places) == 0 or len(points) == 0:
         return found
-    shapes = lagrange(curve.shape[1] - 1, nodes.ravel()).reshape(*nodes.shape, -1)
-    places = np.einsum("qji,qid->qjd", shapes, curve)
-    reach = MATCHING_DISTANCE * np.linalg.norm(curve[:, -1] - curve[:, 0], axis=1)
-    tree = cKDTree(places.reshape(-1, 2))
-    # A vertex belongs to two segments; the ray may face only one of them.
-    distances, numbers = tree.query(points, k=2, distance_upper_bound=reach.max())
-    for column in (1, 0):
-        near = np.flatnonzero(np.isfinite(distances[:, column]))
-        segment, local = np.divmod(numbers[near, column], nodes.shape[1])
-        meets = _faces(curve, side, segment, nodes[segment, local], directions[near])
-        meets &= distances[near, column] <= reach[segment]
-        near, segment, local = near[meets], segment[meets], local[meets]
-        found.segment[near], found.s[near] = segment, nodes[segment, local]
-        offset = places[segment, local] - points[near]
-        found.distance[near] = (offset * directions[near]).sum(axis=1)
+    distances, numbers = cKDTree(places).query(
+        points, k=NEAREST_PLACES, distance_upper_bound=reach.max()
+    )
+    point, column = np.isfinite(distances).nonzero()
+    place = numbers[point, column]
+    meets = (normals[place] * directions[point]).sum(axis=1) < -GRAZING_COSINE
+    meets &= distances[point, column] <= reach[place]
+    # The nearest one is entered last.
+    found[point[meets][::-1]] = place[meets][::-1]
     return found
-
-
-def snap(s: Array, nodes: Array) -> Array:
-    """Parameters `s` (k,) moved to those of the `nodes` (k, p + 1) that they match, (k,)."""
-    nearest = nodes[np.arange(len(s)), np.abs(s[:, None] - nodes).argmin(axis=1)]
-    return np.where(np.abs(s - nearest) <= MATCHING_DISTANCE, nearest, s)
 
 
 def feet(points: Array, curve: Array, direction: Array | None) -> tuple[Index, Array]:

@@ -17,7 +17,8 @@ from ..errors import warn
 from ..fem import BoundaryTrace, boundary_trace
 from ..mesh import curve, first_mesh
 from ..problem import Contact, Elastic, MeshArrays, Problem, check_mesh, scalar_data
-from .line import partners, with_roles
+from .facing import partners
+from .nodal import with_roles
 
 PLACES = (np.arange(8) + 0.5) / 8  # of a segment, at which distances are looked at
 OPPOSED_COSINE = -0.5  # cosine between normals up to which boundaries face each other

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from ..arrays import Array, Mask
 from ..constraints import BasisTransformation, Conditions, Rows
-from ..contact import ContactLine, ContactState, by_line, contact_points, for_partial_cover
+from ..contact import ContactLine, ContactState, by_line, contact_line, for_partial_cover
 from ..errors import ConvergenceError, NoEquilibriumError
 from ..fem import (
     LOAD_BONUS,
@@ -229,7 +229,7 @@ def contact_lines(
         )
         found = None if own.size else next(same, None)
         lines.append(
-            contact_points(trace, contact, own) if found is None else replace(found, searches=0)
+            contact_line(trace, contact, own) if found is None else replace(found, searches=0)
         )
     return lines
 

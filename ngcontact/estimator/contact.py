@@ -17,14 +17,14 @@ from ..contact import (
     ContactLine,
     ContactState,
     FacingPieces,
-    crossings,
     divided,
-    end_to_end,
     jacobian,
+    opposite,
+    opposite_segments,
     prescribed_gap,
 )
 from ..fem import BoundaryTrace
-from ..lagrange import at, gauss, gauss_lobatto, lagrange, lagrange_derivative
+from ..lagrange import gauss, gauss_lobatto, lagrange, lagrange_derivative
 from .terms import (
     DATA_BONUS,
     BoundaryPoints,
@@ -64,7 +64,8 @@ def facing_pieces(
         facing = _opposite_segments(boundary, line, carrying)
         whole = np.flatnonzero(facing >= 0)
     zero = np.zeros(len(whole))
-    pieces = FacingPieces(whole, zero, zero + 1, facing[whole], zero + 0.5)
+    ends = np.stack([zero, zero + 1], axis=1)
+    pieces = FacingPieces(whole, ends, facing[whole], zero + 0.5, zero + 1)
     rest = np.flatnonzero((facing < 0) & (line.faces | carrying))
     if line.contact.primary is not None and len(rest):
         parts = _divided(boundary, line, rest)
@@ -92,7 +93,7 @@ def _opposite_segments(boundary: BoundaryTrace, line: ContactLine, carrying: Mas
         partner = np.append(line.partner, line.facing[nearest // 2])
         partner_s = np.append(line.partner_s, nearest % 2)
         line = replace(line, rows=rows, partner=partner, partner_s=partner_s)
-    return end_to_end(boundary, line, faces)
+    return opposite_segments(boundary, line, faces)
 
 
 def _divided(boundary: BoundaryTrace, line: ContactLine, rest: Index) -> FacingPieces:
@@ -106,8 +107,7 @@ def _divided(boundary: BoundaryTrace, line: ContactLine, rest: Index) -> FacingP
     near = line.facing[np.isin(ends, met).any(axis=1)]
     if len(near):
         parts = divided(boundary, line.contact, segments, near)
-        covered = np.bincount(parts.local, parts.stop - parts.start, len(rest))
-        if (covered > 1 - SLIVER).all():
+        if (parts.covered(len(rest)) > 1 - SLIVER).all():
             return parts
     return divided(boundary, line.contact, segments, line.facing)
 
@@ -130,7 +130,7 @@ def covered_parts(
         twice = joined([rest, rest])
         d, _ = directions(boundary, line, twice.local, s)
         x = boundary.point(line.segments[twice.local], s)
-        t = crossings(x, across(d), boundary.curve, twice.facing, twice.opposite, NEWTON_TOLERANCE)
+        t, _ = opposite(boundary, x, d, twice.facing, twice.opposite, NEWTON_TOLERANCE)
         inside = (s > 0) & (s < 1)  # where a vertex of the primary is passed
         ends = np.where(inside, np.round(t), t).reshape(2, -1)
         low[whole:], high[whole:] = np.sort(ends, axis=0)
@@ -175,10 +175,9 @@ def followed_gap(
 
     def gap_at(s: Array) -> Array:
         """Data (r, n) at places `s` (n,) of the pieces (r,), lengths."""
-        s = pieces.start[:, None] + (pieces.stop - pieces.start)[:, None] * s
-        segment = np.repeat(line.segments[pieces.local], s.shape[1])
-        x = boundary.point(segment, s.ravel())
-        return prescribed_gap(line.contact, boundary, segment, s.ravel(), x).reshape(s.shape)
+        segment, places = np.repeat(line.segments[pieces.local], len(s)), pieces.places(s)
+        x = boundary.point(segment, places)
+        return prescribed_gap(line.contact, boundary, segment, places, x).reshape(-1, len(s))
 
     done, number = [], 0
     while len(pieces.local):
@@ -191,9 +190,9 @@ def followed_gap(
         rough &= number < MAX_PIECES
         done.append(rows_of(pieces, np.flatnonzero(~rough)))
         pieces = rows_of(pieces, np.repeat(np.flatnonzero(rough), PIECE_DIVISIONS))
-        step = (pieces.stop - pieces.start) / PIECE_DIVISIONS
+        step = pieces.share / PIECE_DIVISIONS
         start = pieces.start + step * np.tile(np.arange(PIECE_DIVISIONS), rough.sum())
-        pieces = replace(pieces, start=start, stop=start + step)
+        pieces = replace(pieces, corners=np.stack([start, start + step], axis=1), share=step)
     if len(done) == 1:
         return done[0]
     found = joined(done)
@@ -281,16 +280,14 @@ def facing_points(
         s_there, distance = np.zeros(len(s)), np.zeros(len(s))
     else:
         near = pieces.opposite[part]
-        s_there = crossings(x, across(d), boundary.curve, facing, near, NEWTON_TOLERANCE)
-        offset = at(boundary.curve, facing, s_there) - x
-        distance = (offset * d).sum(axis=1)
+        s_there, distance = opposite(boundary, x, d, facing, near, NEWTON_TOLERANCE)
         distance[np.abs(distance) <= GAP_ROUND_OFF * np.abs(x).max(initial=0.0)] = 0.0
         # Of (y(t) - x(s)) x d(s) = 0: dt / ds = (x' x d - (y - x) x d') / (y' x d).
         there = boundary.derivative(facing, s_there)
         turning, size = (there * across(d)).sum(axis=1), np.linalg.norm(there, axis=1)
         along |= np.abs(turning) <= FACING_COSINE * size
         turning = np.where(along, size, turning)
-        rate = (slope * across(d)).sum(axis=1) - (offset * across(turning_rate)).sum(axis=1)
+        rate = (slope * across(d)).sum(axis=1) - distance * (d * across(turning_rate)).sum(axis=1)
         length = size * boundary.measure(facing, s_there)
         stretch[1] = np.abs(rate / turning) * length / speed
     weight[along], stretch[:, along] = 0.0, 1.0
@@ -488,14 +485,14 @@ def _normal(
         full = full & (pressure + (other.along[:, 0] - own.along[:, 0]) / 2 >= 0)
     at, least = np.flatnonzero(full), np.min([side.weight for side in sides], axis=0)
     residuals = []
-    for side, opposite, sign in zip(sides, sides[::-1], signs, strict=True):
+    for side, faced, sign in zip(sides, sides[::-1], signs, strict=True):
         value = side.along.copy()
         value[:, 0] += sign * tension
         value[at] = side.along[at] / 2
-        value[at, 0] += opposite.along[at, 0] / 2
-        (segment, s, _), (there, s_there, _) = side.points, opposite.points
+        value[at, 0] += faced.along[at, 0] / 2
+        (segment, s, _), (there, s_there, _) = side.points, faced.points
         shares = [
-            PressureShare(at, there[at], s_there[at], opposite.along[at, 1:] / 2),
+            PressureShare(at, there[at], s_there[at], faced.along[at, 1:] / 2),
             PressureShare(np.arange(len(s)), segment, s, value[:, 1:]),
         ]
         weight = np.where(full, least, side.weight)

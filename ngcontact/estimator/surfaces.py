@@ -13,13 +13,12 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from ..arrays import Array, Index, Mask
+from ..arrays import Array, Index, Mask, rows_of
 from ..contact import (
     ContactState,
-    ContactZone,
-    FacetPieces,
+    FacingPieces,
     interpolated_rays,
-    onto,
+    opposite,
     prescribed_gap,
     zone_pieces,
 )
@@ -154,17 +153,18 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
     negative, and where they are open under pressure.
     """
     trace, zone = solution.boundary, pair.line
-    if not (isinstance(trace, FacetTrace) and isinstance(zone, ContactZone)):
+    if not isinstance(trace, FacetTrace):
         raise TypeError("a pair of solids is asked for")
     degree = 2 * solution.order
     parts = zone_pieces(trace, zone)
     covered = parts.covered(len(zone.segments))
     alone = np.flatnonzero(covered == 0)
-    met = np.isin(np.arange(len(zone.facing)), parts.facing)
+    met = np.isin(zone.facing, parts.facing)
     residuals: list[BoundaryResidual] = []
     squares: list[Squares] = []
     s, w = triangle.gauss(degree)
-    local = np.repeat(parts.local, len(s))
+    each = rows_of(parts, np.arange(len(parts.local)).repeat(len(s)))
+    local, facing = each.local, each.facing
     own = _on_parts(trace, zone.segments[parts.local], parts, s, w)
     d = interpolated_rays(trace, zone.contact, zone.segments, local, own.s)
     n = trace.normal(own.facet, own.s)
@@ -180,9 +180,8 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
     sides = [(element, t, 1.0)]
     distance = np.zeros(len(pi))
     if zone.contact.primary is not None:
-        facing = np.repeat(zone.facing[parts.facing], len(s))
         x = trace.point(own.facet, own.s)
-        there, distance = onto(x, d, trace.curve, facing)
+        there, distance = opposite(trace, x, d, facing, each.opposite)
         other = SurfacePoints(facing, there, weight)
         across = np.abs((trace.normal(facing, there) * d).sum(axis=1))
         u = u - trace.evaluate(solution.displacement, facing, there)
@@ -221,7 +220,7 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
 
 
 def _on_parts(
-    trace: FacetTrace, facets: Index, parts: FacetPieces, s: Array, w: Array
+    trace: FacetTrace, facets: Index, parts: FacingPieces, s: Array, w: Array
 ) -> SurfacePoints:
     """Points `s` (g, 3) with weights `w` (g,) of all parts, on their `facets` (r,)."""
     facet, places = np.repeat(facets, len(s)), parts.places(s)

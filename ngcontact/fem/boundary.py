@@ -10,15 +10,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
+from typing import Any, ClassVar
 
 import ngsolve as ng
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from ..arrays import Array, Index, Mask, for_components, from_triplets, rightward
-from ..lagrange import at, gauss_lobatto, lagrange, slope
+from ..arrays import Array, Index, Mask, across, for_components, from_triplets, rightward
+from ..lagrange import at, gauss, gauss_lobatto, lagrange, slope
 from ..mesh import CadEdge, cad_edges
 from ..problem import POSITION, MeshArrays, boundary_mask
 from .model import PLANE, Model
@@ -170,6 +170,8 @@ class BoundaryTrace:
     Methods take places as numbers of segments and parameters s on them.
     """
 
+    corners: ClassVar[list[int]] = [0, -1]  # which of the nodes of a segment are vertices
+    vertices: ClassVar[Array] = np.array([0.0, 1.0])  # (2,), their parameters
     mesh: ng.Mesh
     arrays: MeshArrays  # of the mesh as it was
     space: ng.FESpace  # scalar H1, whose unknowns number the nodes
@@ -198,6 +200,18 @@ class BoundaryTrace:
     def derivative(self, segment: Index, s: Array) -> Array:
         """Derivatives (k, 2) with respect to s, at `s` (k,) of segments `segment` (k,)."""
         return slope(self.curve, segment, s)
+
+    def area_vector(self, segment: Index, s: Array) -> Array:
+        """Outward normals (k, 2) with the length of dx/ds, times the measure of the body.
+
+        At `s` (k,) of segments `segment` (k,).
+        """
+        vectors = -across(self.derivative(segment, s)) * self.side[segment, None]
+        return vectors * self.measure(segment, s)[:, None] if self.model.extent else vectors
+
+    def rule(self, degree: int) -> tuple[Array, Array]:
+        """Parameters (g,) and weights (g,) on a segment, exact for polynomials of a `degree`."""
+        return gauss(degree)
 
     def normal(self, segment: Index, s: Array) -> Array:
         """Outward unit normals (k, 2) of the mesh at `s` (k,) of segments `segment` (k,)."""
@@ -250,6 +264,11 @@ class BoundaryTrace:
         """Segment (n,) and s (n,) of all nodes of `segments` (k,), one segment after the other."""
         return np.repeat(segments, self.order + 1), self.places(segments).ravel()
 
+    def at_places(self, segments: Index, s: Array) -> tuple[Index, Array]:
+        """Segment (n,) and s (n,) of the places `s` (g,) on each of `segments` (k,), in order."""
+        places = s[None].repeat(len(segments), axis=0)
+        return segments.repeat(len(s)), places.reshape(-1, *s.shape[1:])
+
     def places(self, segments: Index) -> Array:
         """Parameters (k, order + 1) of the nodes of `segments` (k,)."""
         return np.array([gauss_lobatto(self.order, end) for end in (0, 1, -1)])[self.axis[segments]]
@@ -260,6 +279,10 @@ class BoundaryTrace:
         for end in (-1, 1) if axis.any() else ():
             values[axis == end] = lagrange(self.order, s[axis == end], end)
         return values
+
+    def weighs(self, segments: Index) -> Mask:
+        """Nodes (k, q) of `segments` (k,) whose basis functions have a positive integral there."""
+        return np.ones((len(segments), self.nodes.shape[1]), dtype=bool)
 
     def measure(self, segment: Index, s: Array) -> Array:
         """Measure of the body over length, (k,), at `s` (k,) of segments `segment` (k,)."""
@@ -290,12 +313,11 @@ class BoundaryTrace:
         """
         n, vertices = self.space.ndof, self.mesh.nv
         size = self.model.dim
-        corners = [0, -1] if size == 2 else [0, 1, 2]
         shares = self.unknowns_of_values(segments, self.barycentric(segments))
         inner = self.nodes[segments] >= vertices
         rows, first = np.unique(self.nodes[segments][inner], return_index=True)
         rows = np.concatenate([np.arange(vertices), np.repeat(rows, size)])
-        ends = np.repeat(self.nodes[segments][:, corners], inner.sum(axis=1), axis=0)[first]
+        ends = np.repeat(self.nodes[segments][:, self.corners], inner.sum(axis=1), axis=0)[first]
         columns = np.concatenate([np.arange(vertices), ends.ravel()])
         values = np.concatenate([np.ones(vertices), shares[inner][first].ravel()])
         return from_triplets(values, rows, columns, (n, vertices))

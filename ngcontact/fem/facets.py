@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, ClassVar
 
 import ngsolve as ng
 import numpy as np
@@ -38,6 +38,8 @@ class FacetTrace(BoundaryTrace):
     +1 where the outward normal is that of the vertices' order, and nothing lies on an axis.
     """
 
+    corners: ClassVar[list[int]] = [0, 1, 2]
+    vertices: ClassVar[Array] = np.eye(3)  # (3, 3)
     faces: list[CadFace] | None = None  # by region number
     # (n,), nodes whose unknown is a Bernstein coefficient; none when left out
     bernstein: Mask = field(default_factory=lambda: np.zeros(0, dtype=bool))
@@ -65,6 +67,10 @@ class FacetTrace(BoundaryTrace):
         vectors = np.cross(tangents[..., 0], tangents[..., 1]) / 2
         return np.asarray(vectors * self.side[segment, None])
 
+    def rule(self, degree: int) -> tuple[Array, Array]:
+        """Barycentric coordinates (g, 3) and weights (g,) of `triangle.gauss`."""
+        return triangle.gauss(degree)
+
     def normal(self, segment: Index, s: Array) -> Array:
         """Outward unit normals (k, 3) of the mesh at `s` (k, 3) of facets `segment` (k,)."""
         vectors = self.area_vector(segment, s)
@@ -85,8 +91,7 @@ class FacetTrace(BoundaryTrace):
 
     def at_nodes(self, segments: Index) -> tuple[Index, Array]:
         """Facet (n,) and s (n, 3) of all nodes of `segments` (k,), one facet after the other."""
-        s = triangle.nodes(self.order)
-        return np.repeat(segments, len(s)), np.tile(s, (len(segments), 1))
+        return self.at_places(segments, triangle.nodes(self.order))
 
     def same_nodes(self, other: BoundaryTrace) -> bool:
         """Whether the nodes are those of another trace, with the same unknowns."""
@@ -107,6 +112,21 @@ class FacetTrace(BoundaryTrace):
         if self.bernstein.any():
             values = np.einsum("ki,kij->kj", values, self.values_of_unknowns(segment))
         return values
+
+    def weighs(self, segments: Index) -> Mask:
+        """Nodes (k, q) of `segments` (k,) whose functions have a positive integral there.
+
+        All at orders 1 and 3. At order 2 a vertex takes a share of edges with Bernstein
+        coefficients; the integral of its own function vanishes.
+        """
+        carries = super().weighs(segments)
+        if self.order == 2:
+            carries[:, :3] = False
+            if self.bernstein.any():
+                chosen = self.bernstein[self.nodes[segments]]
+                for ends, [inner] in zip(triangle.EDGES, triangle.edge_nodes(2), strict=True):
+                    carries[:, ends] |= chosen[:, [inner]]
+        return carries
 
     def values_of_unknowns(self, segments: Index) -> Array:
         """B (k, q, q), from the unknowns at the nodes of `segments` (k,) to the values there."""

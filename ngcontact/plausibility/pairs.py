@@ -25,10 +25,9 @@ from scipy.sparse.csgraph import connected_components
 from ..arrays import Array, Index, across, from_triplets, rows_of
 from ..contact import (
     ContactState,
-    ContactZone,
     in_contact,
     interpolated_rays,
-    onto,
+    opposite,
     partners,
     prescribed_gap,
     twins,
@@ -266,19 +265,17 @@ def _samples_of_surfaces(trace: BoundaryTrace, state: ContactState) -> _Samples:
     """Samples on facets of solids: corners and centres of facing parts, where a point is open."""
     zone = state.line
     assert isinstance(trace, FacetTrace)  # of solids
-    assert isinstance(zone, ContactZone)
     parts, places = zone_pieces(trace, zone), np.vstack([np.eye(3), triangle.CENTRE])
-    local, facing = (np.repeat(i, len(places)) for i in (parts.local, parts.facing))
+    each = rows_of(parts, np.arange(len(parts.local)).repeat(len(places)))
     opened = np.asarray(np.append(~state.active, False)[zone.rows].any(axis=1))
-    some = np.flatnonzero(opened[local])
-    local, facing, s = local[some], facing[some], parts.places(places)[some]
-    x = trace.point(zone.segments[local], s)
-    d = interpolated_rays(trace, zone.contact, zone.segments, local, s)
-    there, s_there, distance = np.full(len(x), -1), np.zeros((len(x), 3)), np.zeros(len(x))
+    some = np.flatnonzero(opened[each.local])
+    each, s = rows_of(each, some), parts.places(places)[some]
+    x = trace.point(zone.segments[each.local], s)
+    d = interpolated_rays(trace, zone.contact, zone.segments, each.local, s)
+    there, distance = each.opposite, np.zeros(len(x))
     if zone.contact.primary is not None:
-        there = zone.facing[facing]
-        s_there, distance = onto(x, d, trace.curve, there)
-    return _Samples(zone.segments[local], s, x, d, there, s_there, distance)
+        there, distance = opposite(trace, x, d, each.facing, there)
+    return _Samples(zone.segments[each.local], s, x, d, each.facing, there, distance)
 
 
 def _penetration(solution: Solved, state: ContactState, peak: float) -> str:

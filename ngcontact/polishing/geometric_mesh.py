@@ -16,7 +16,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask
-from ..contact import ContactState, Transitions, contact_points, twins
+from ..contact import ContactState, Transitions, contact_line, twins
 from ..discrete import carried_active_set
 from ..fem import boundary_trace, model_of
 from ..mesh import CadEdge, cad_edges, graded_mesh, opposite
@@ -233,7 +233,7 @@ def coarse_mesh(problem: Problem, pairs: Sequence[ContactState], extent: float) 
 
     mesh = graded_mesh(problem, size, fixed)
     view, trace = MeshArrays(mesh), boundary_trace(mesh, 2, model_of(problem))
-    lines = [contact_points(trace, contact) for contact in problem.contact]
+    lines = [contact_line(trace, contact) for contact in problem.contact]
     pair, closed = np.full(len(view.facets), -1), np.zeros(len(view.facets), dtype=bool)
     partner, start = np.full(mesh.nv, -1), 0
     active = carried_active_set(lines, pairs)

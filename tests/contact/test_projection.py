@@ -19,11 +19,6 @@ def graph(f, knots, degree=1):
     return np.stack([x, f(x)], axis=2)
 
 
-def nodes_on(curve, order):
-    """Parameters of the nodes of that degree on each segment."""
-    return np.tile(gauss_lobatto(order), (len(curve), 1))
-
-
 def upward(curve):
     """Sides for a body below a curve that runs to the right: the outward normal points up."""
     return -np.ones(len(curve))
@@ -126,27 +121,20 @@ def test_vertex_at_the_end_of_the_facing_side():
 def test_coincident_nodes(order):
     curve = graph(lambda x: 0.3 * x, [0, 0.4, 1])
     normal = np.array([-0.3, 1.0]) / math.hypot(0.3, 1)
-    nodes = np.einsum("ji,qid->qjd", lagrange(1, gauss_lobatto(order)), curve)
-    nodes = np.unique(nodes.reshape(-1, 2), axis=0)
+    nodes = np.einsum("ji,qid->qjd", lagrange(1, gauss_lobatto(order)), curve).reshape(-1, 2)
     lift = np.zeros(len(nodes))
     lift[::2] = 1e-11
     points = nodes + lift[:, None] * normal
-    found = coincident(
-        points, np.tile(-normal, (len(nodes), 1)), curve, upward(curve), nodes_on(curve, order)
-    )
-    np.testing.assert_allclose(at(curve, found), nodes, atol=1e-15)
-    assert np.isin(found.s, gauss_lobatto(order)).all()
-    # The gap is a subtraction of coordinates, not zero by decree.
-    np.testing.assert_allclose(found.distance, lift, atol=5e-16)  # two ulp of the coordinates
+    normals, reach = np.tile(normal, (len(nodes), 1)), np.full(len(nodes), 4e-10)
+    found = coincident(points, -normals, nodes, normals, reach)
+    np.testing.assert_array_equal(nodes[found], nodes)
+    beyond = coincident(points + 1e-9, -normals, nodes, normals, reach)
+    assert (beyond == -1).all()
+    assert (coincident(points, normals, nodes, normals, reach) == -1).all()  # from behind
 
 
 def test_coincident_vertex_of_two_segments():
     """At a corner the row of each side has its partner on the segment that opposes it."""
-    corner = np.array([[[0.0, 0.0], [1.0, 0.0]], [[1.0, 0.0], [1.0, -1.0]]])
-    points = np.ones((2, 2)) * [1.0, 0.0]
-    found = coincident(
-        points, np.array([[0.0, -1.0], [-1.0, 0.0]]), corner, -np.ones(2), nodes_on(corner, 1)
-    )
-    assert found.segment.tolist() == [0, 1]
-    assert found.s.tolist() == [1.0, 0.0]
-    assert found.distance.tolist() == [0.0, 0.0]
+    points, reach = np.ones((2, 2)) * [1.0, 0.0], np.full(2, 1e-9)
+    normals = np.array([[0.0, 1.0], [1.0, 0.0]])
+    assert coincident(points, -normals, points, normals, reach).tolist() == [0, 1]

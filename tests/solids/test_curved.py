@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ngcontact import Contact, Elastic, Problem, adapt, solve
+from ngcontact.contact import with_roles
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import ball_on_block, shells
 
@@ -31,6 +32,14 @@ def unmatched(one, other):
     for part in (*geometry.shape.faces, *geometry.shape.solids):
         part.maxh = one if part.name in ("inner", "inner_contact", "hole") else other
     return ng.Mesh(geometry.GenerateMesh(maxh=max(one, other)))
+
+
+@pytest.mark.parametrize("secondary", ["inner_contact", "outer_contact"])
+def test_of_shells_with_equal_facets_the_convex_side_is_secondary(secondary):
+    mesh = ng.Mesh(shells().GenerateMesh(maxh=0.2))
+    pair = Contact("inner_contact", "outer_contact", roles="auto")
+    pair = pair if pair.secondary == secondary else pair.swapped()
+    assert with_roles(boundary_trace(mesh, 1), pair).secondary == "inner_contact"
 
 
 def errors(solution):

@@ -8,7 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from ngcontact import Contact, Elastic, Hooke, Problem, load, solve
-from ngcontact.contact.zone import facing_pieces
+from ngcontact.contact import FacingPieces, divided
 from ngcontact.discrete import discretise, first_active_set, minimise_energy
 from ngcontact.fem import stress_of
 from ngcontact.reference import triangle
@@ -85,9 +85,8 @@ def uncovered(discrete, parts, facets):
     L, w = triangle.gauss(2 * trace.order)
     q, area = trace.nodes.shape[1], trace.sizes(facets)
     f, every = np.zeros(trace.space.ndof), np.arange(len(facets))
-    whole = parts.__class__(
-        every, np.tile(np.eye(3), (len(facets), 1, 1)), every, np.ones(len(facets))
-    )
+    corners = np.tile(np.eye(3), (len(facets), 1, 1))
+    whole = FacingPieces(every, corners, every, corners[:, 0], np.ones(len(facets)))
     for some, sign in ((whole, 1.0), (parts, -1.0)):
         at = facets[some.local]
         shapes = trace.shapes(np.repeat(at, len(w)), some.places(L)).reshape(len(at), len(w), q)
@@ -107,7 +106,7 @@ def test_overhang(order, accuracy):
     discrete = discretise(problem, mesh, order, "isoparametric")
     trace, [zone] = discrete.space.trace, discrete.lines
     facets = trace.segments("lower_top")
-    parts = facing_pieces(trace, zone.contact, facets, zone.facing, np.zeros(len(facets)))
+    parts = divided(trace, zone.contact, facets, zone.facing)
     share = parts.covered(len(facets))
     assert np.count_nonzero((share > 1e-9) & (share < 1 - 1e-9)) > 5
     assert share @ trace.sizes(facets) == pytest.approx(1.0, abs=1e-12)  # the cube's face

@@ -6,8 +6,15 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
-from ...contact import ContactState, area_in_contact, signed_distance, with_vertices
-from ...contact.zone import WHOLE_SHARE, ContactZone, partners, rays
+from ...contact import (
+    WHOLE_SHARE,
+    ContactState,
+    area_in_contact,
+    partners,
+    rays,
+    signed_distance,
+    with_vertices,
+)
 from ...fem import BoundaryTrace, FacetTrace
 from ...problem import MeshArrays
 from ...reference import triangle
@@ -32,7 +39,6 @@ def pressure_field(solution: Solved, state: ContactState) -> ng.GridFunction:
         return _by_facet(trace, boundary, trace.order, line.segments, s, values, 0 * values + 1)
     if trace.order == 3:
         return _mean_traction(solution, trace, state)
-    assert isinstance(line, ContactZone)  # of solids
     values, whole = _at_vertices(trace, state), np.ones(len(state.force))
     if (line.covered_shares(whole, whole) > WHOLE_SHARE).all():  # continuous
         field = ng.GridFunction(ng.H1(solution.mesh, order=1, definedon=boundary))
@@ -66,7 +72,6 @@ def _at_nodes(trace: BoundaryTrace, state: ContactState) -> Array:
 def _at_vertices(trace: FacetTrace, state: ContactState) -> Array:
     """Pressures (k, 3) at the vertices of facets: of several facets the mean, by what faces."""
     line, whole = state.line, np.ones(len(state.force))
-    assert isinstance(line, ContactZone)  # of solids
     vertices = trace.nodes[line.segments]
     size = trace.sizes(line.segments) * line.covered_shares(whole, whole)
     values = np.append(state.pressure, np.nan)[line.rows]

@@ -1,0 +1,274 @@
+"""What faces a secondary: directions, points opposite to points, pieces of segments that face.
+
+In the plane rays meet curves and segments are divided where they pass vertices of the primary
+(`contact.projection`); in space rays meet surfaces (`contact.casting`) and facets are clipped
+(`contact.clipping`). All else is the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from ..arrays import Array, Index, Mask, across, joined
+from ..fem import BoundaryTrace
+from ..lagrange import at
+from ..problem import Contact
+from ..reference import triangle
+from . import casting, clipping, projection
+from .line import ContactLine
+from .projection import MATCHING_DISTANCE, NEWTON_TOLERANCE, Partners, coincident, crossings, feet
+
+FACING_COSINE = 1e-8  # cosine between normal and direction from which a point faces the other body
+SLIVER = 1e-9  # share of a segment below which a piece of it is none
+WHOLE_SHARE = 1 - SLIVER  # ... of all its pieces, from which it faces wholly
+GAP_ROUND_OFF = 4 * np.finfo(float).eps  # round-off of a measured gap, relative to the coordinates
+
+
+def rays(trace: BoundaryTrace, contact: Contact, segment: Index, s: Array) -> Array:
+    """Unit vectors (k, d) to the primary from points at `s` (k,) of segments `segment` (k,)."""
+    if contact.direction is None:
+        return trace.exact_normal(segment, s)
+    return np.full((len(segment), trace.model.dim), contact.direction)
+
+
+def interpolated_rays(
+    trace: BoundaryTrace, contact: Contact, segments: Index, local: Index, s: Array
+) -> Array:
+    """Unit vectors (k, d) to the primary at `s` (k,) of `segments` (j,), by number `local` (k,).
+
+    On facets they are interpolated between the nodes: a normal of CAD costs Newton's method.
+    """
+    if trace.model.dim == 2 or contact.direction is not None:
+        return rays(trace, contact, segments[local], s)
+    at_nodes = trace.exact_normal(*trace.at_nodes(segments)).reshape(len(segments), -1, 3)
+    d = np.einsum("ki,kid->kd", triangle.lagrange(trace.order, s), at_nodes[local])
+    return np.asarray(d / np.linalg.norm(d, axis=1)[:, None])
+
+
+def partners(
+    trace: BoundaryTrace,
+    facing: Index,
+    own: Index,
+    points: Array,
+    directions: Array,
+    *,
+    nodes: bool = True,
+) -> Partners:
+    """Points of segments `facing` (q,) opposite to `points` (k, d): A_j and B_j of HH81 (2.10).
+
+    The points lie on the segments `own` (k,); `directions` (k, d) are unit vectors towards the
+    facing body. Some `nodes` may lie at others. None is met on a rigid obstacle.
+    """
+    by_dimension = projection if trace.model.dim == 2 else casting
+    found = by_dimension.none_met(len(points))
+    if facing.size == 0:
+        return found
+    if nodes:
+        segment, s = trace.at_nodes(facing)
+        places, reach = trace.point(segment, s), MATCHING_DISTANCE * trace.lengths(segment)
+        node = coincident(points, directions, places, trace.normal(segment, s), reach)
+        same = np.flatnonzero(node >= 0)
+        node = node[same]
+        found.segment[same], found.s[same] = segment[node], s[node]
+        found.distance[same] = ((places[node] - points[same]) * directions[same]).sum(axis=1)
+    rest = np.flatnonzero(found.segment < 0)
+    if rest.size:
+        x, d, cast = points[rest], directions[rest], by_dimension.cast
+        other = cast(x, d, trace.curve[facing], trace.side[facing])
+        # Overlap puts a partner behind the point, inside the own body; one that the backward ray
+        # meets only after it has left that body belongs to a far side.
+        behind = (other.segment >= 0) & (other.distance < 0)
+        body = trace.body[own[rest]]
+        for one in set(body[behind].tolist()):
+            here = np.flatnonzero(behind & (body == one))
+            rim = np.flatnonzero(trace.body == one)
+            out = cast(x[here], -d[here], trace.curve[rim], -trace.side[rim], ahead=True)
+            beyond = (out.segment >= 0) & (-other.distance[here] > out.distance)
+            other.segment[here[beyond]] = -1
+        found.segment[rest] = np.where(other.segment < 0, -1, facing[other.segment])
+        found.s[rest], found.distance[rest] = other.s, other.distance
+    # Points that only round-off keeps apart touch: no load is too small to be felt.
+    found.distance[np.abs(found.distance) <= GAP_ROUND_OFF * np.abs(points).max(initial=0.0)] = 0.0
+    return replace(found, searched=rest.size > 0)
+
+
+def snapped(trace: BoundaryTrace, segment: Index, s: Array) -> Array:
+    """Parameters `s` (k,) on segments `segment` (k,), of those that match nodes theirs: (k,)."""
+    nodes, every = trace.places(segment), np.arange(len(segment))
+    apart = np.abs(s[:, None] - nodes)
+    if apart.ndim == 3:
+        apart = apart.max(axis=2)
+    nearest = apart.argmin(axis=1)
+    match = apart[every, nearest] <= MATCHING_DISTANCE
+    s = s.copy()
+    s[match] = nodes[every[match], nearest[match]]
+    return s
+
+
+def opposite(
+    trace: BoundaryTrace,
+    points: Array,
+    directions: Array,
+    facing: Index,
+    near: Array,
+    settled: float = NEWTON_TOLERANCE,
+) -> tuple[Array, Array]:
+    """Parameters (k,) at which rays meet segments `facing` (k,) known to face, and distances (k,).
+
+    Of `points` (k, d) along the `directions` (k, d), by Newton's method from `near` (k,); in the
+    plane until no step is larger than `settled`.
+    """
+    if trace.model.dim == 3:
+        return casting.onto(points, directions, trace.curve, facing, near)
+    s = crossings(points, across(directions), trace.curve, facing, near, settled)
+    return s, ((at(trace.curve, facing, s) - points) * directions).sum(axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class FacingPieces:
+    """Parts of secondary segments or facets that face one of the primary each, r of them."""
+
+    local: Index  # (r,) number of the segment among those divided
+    # (r, 2) parameters of both ends, (r, 3, 3) barycentric coordinates of the corners of a triangle
+    corners: Array
+    facing: Index  # (r,) segment of the primary that it faces, -1 for a rigid obstacle
+    opposite: Array  # (r,) parameter there near to what faces its middle
+    share: Array  # (r,) of the segment, by parameter
+
+    @property
+    def start(self) -> Array:
+        """Parameters (r,) at which the intervals begin."""
+        return self.corners[:, 0]
+
+    @property
+    def stop(self) -> Array:
+        """Parameters (r,) at which they end."""
+        return self.corners[:, 1]
+
+    def covered(self, count: int) -> Array:
+        """Share (k,) of each of the segments, `count` of them, that faces the primary."""
+        return np.asarray(np.bincount(self.local, self.share, count), dtype=float)
+
+    def places(self, points: Array) -> Array:
+        """Parameters (r * g,) on the segments of the `points` (g,) of a rule on each piece."""
+        if self.corners.ndim == 3:
+            return np.einsum("gi,rij->rgj", points, self.corners).reshape(-1, 3)
+        return (self.start[:, None] + self.share[:, None] * points).ravel()
+
+
+def divided(
+    trace: BoundaryTrace,
+    contact: Contact,
+    segments: Index,
+    facing: Index,
+    reach: Array | None = None,
+) -> FacingPieces:
+    """Parts of `segments` (k,) that face one of the segments `facing` (q,) of the primary each.
+
+    Facets without a direction look along the normals in their middles, no further away than
+    `reach` (k,), which is left out with one.
+    """
+    if trace.model.dim == 3:
+        return _clipped(trace, contact, segments, facing, reach)
+    k, ends = len(segments), trace.nodes[facing][:, trace.corners]
+    _, first = np.unique(ends, return_index=True)
+    x = trace.curve[facing][:, [0, -1]].reshape(-1, 2)[first]
+    xi = None if contact.direction is None else np.array(contact.direction)
+    passing, s = feet(x, trace.curve[segments], xi)
+    local = np.concatenate([passing, np.arange(k), np.arange(k)])
+    cut = np.concatenate([s, np.zeros(k), np.ones(k)])
+    order = np.lexsort((cut, local))
+    local, cut = local[order], cut[order]
+    one = (local[1:] == local[:-1]) & (np.diff(cut) > SLIVER)
+    local, corners = local[:-1][one], np.stack([cut[:-1][one], cut[1:][one]], axis=1)
+    segment, middle = segments[local], corners.sum(axis=1) / 2
+    d = rays(trace, contact, segment, middle)
+    met = partners(trace, facing, segment, trace.point(segment, middle), d)
+    on = met.segment >= 0
+    share = corners[on, 1] - corners[on, 0]
+    return FacingPieces(local[on], corners[on], met.segment[on], met.s[on], share)
+
+
+def _clipped(
+    trace: BoundaryTrace, contact: Contact, facets: Index, facing: Index, reach: Array | None
+) -> FacingPieces:
+    """Pieces of `facets` (k,) by clipping, as of `divided`."""
+    middle = np.tile(triangle.CENTRE, (len(facets), 1))
+    d = rays(trace, contact, facets, middle)
+    far = np.full(len(facets), np.inf) if reach is None else reach
+    faces = np.flatnonzero((trace.normal(facets, middle) * d).sum(axis=1) > FACING_COSINE)
+    corners, other = trace.curve[facets[faces]][:, :3], trace.curve[facing][:, :3]
+    outward = trace.side[facing, None, None] > 0
+    other = np.where(outward, other, other[:, ::-1])  # anticlockwise from outside
+    local, parts, number = clipping.pieces(corners, d[faces], other, far[faces])
+    start, share = np.tile(triangle.CENTRE, (len(local), 1)), np.abs(np.linalg.det(parts))
+    return FacingPieces(faces[local], parts, facing[number], start, share)
+
+
+def opposite_segments(trace: BoundaryTrace, line: ContactLine, facing: Mask) -> Index:
+    """Segment of the primary whose vertices those of a segment face, (k,), -1 where none.
+
+    `facing` (m,) are the points that face the primary.
+    """
+    vertex = np.full(len(facing) + 1, -1)  # of the primary at each point
+    for corner, place in zip(trace.corners, trace.vertices, strict=True):
+        at = facing & (line.partner_s == place).reshape(len(facing), place.size).all(axis=1)
+        vertex[:-1][at] = trace.nodes[line.partner[at], corner]
+    corners = line.rows[:, trace.corners]
+    vertices = np.where(corners < 0, -1, vertex[corners])
+    sides = trace.nodes[line.facing][:, trace.corners]
+    keys, wanted = trace.arrays.keys(sides), trace.arrays.keys(vertices)
+    order = np.argsort(keys)
+    found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
+    same = (vertices >= 0).all(axis=1) & (keys[found] == wanted)
+    return np.where(same, line.facing[found], -1)
+
+
+def distances(trace: BoundaryTrace, line: ContactLine) -> Array:
+    """Distance (k,) of what faces the nodes of each segment; the largest where none is known.
+
+    Infinite along a direction.
+    """
+    if line.contact.direction is not None:
+        return np.full(len(line.segments), np.inf)
+    met = np.flatnonzero(line.partner >= 0)
+    apart = np.full(len(line.node) + 1, -1.0)
+    there = trace.point(line.partner[met], line.partner_s[met])
+    apart[met] = np.linalg.norm(there - line.position[met], axis=1)
+    reach = apart[line.rows].max(axis=1)
+    return np.where(reach < 0, apart.max(initial=0.0), reach)
+
+
+def zone_pieces(trace: BoundaryTrace, zone: ContactLine) -> FacingPieces:
+    """Parts of the facets of a zone, each of which faces one of the primary or an obstacle.
+
+    Whole facets where the vertices of both are at the same places.
+    """
+    k = len(zone.segments)
+    if zone.contact.primary is None:
+        own = np.flatnonzero((zone.rows >= 0).any(axis=1))
+        facing = np.full(len(own), -1)
+    else:
+        x = trace.arrays.vertices
+        ends = trace.nodes[zone.facing][:, trace.corners]
+        there = np.unique(ends)
+        own = trace.nodes[zone.segments][:, trace.corners]
+        distance, near = cKDTree(x[there]).query(x[own])
+        close = (distance <= MATCHING_DISTANCE * trace.lengths(zone.segments)[:, None]).all(axis=1)
+        keys, wanted = trace.arrays.keys(ends), trace.arrays.keys(there[near])
+        order = np.argsort(keys)
+        found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
+        own = np.flatnonzero(close & (keys[found] == wanted))
+        facing = zone.facing[found[own]]
+    corners = np.tile(np.eye(3), (len(own), 1, 1))
+    middle = np.tile(triangle.CENTRE, (len(own), 1))
+    whole = FacingPieces(own, corners, facing, middle, np.ones(len(own)))
+    rest = np.setdiff1d(np.arange(k), own)
+    if zone.contact.primary is None or not rest.size:
+        return whole
+    reach = distances(trace, zone)[rest]
+    parts = divided(trace, zone.contact, zone.segments[rest], zone.facing, reach)
+    return joined([whole, replace(parts, local=rest[parts.local])])
