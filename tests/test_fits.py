@@ -12,45 +12,53 @@ from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.geometries import rings
 
 BORE, RIM = 0.5, 2.0  # radii; the shaft has 1
-LAWS = {"inner": (1.0, 0.3), "outer": (2.0, 0.25)}  # E, nu
-CUTS = "inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y"
+LAWS = {"inner": Elastic(E=1.0, nu=0.3), "outer": Elastic(E=2.0, nu=0.25)}
 SIDES = ("outer_contact", "inner_contact")
 
 
-def lame(a, b, at):
-    """B and C of the radial stress B - C / r^2 in a ring a < r < b under pressure 1 at one rim."""
-    if at == b:
-        B = -(b**2) / (b**2 - a**2)
-        return B, B * a**2
-    C = 1 / (1 / a**2 - 1 / b**2)
-    return C / b**2, C
+def lame(interference):
+    """Radius of the rim in contact, B and C of each ring under the pressure 1 / radius on it.
+
+    The radial stress is B - C / r^2.
+    """
+    found = {}
+    for name, radius, free in (("inner", 1.0, BORE), ("outer", 1.0 - interference, RIM)):
+        B = radius / (free**2 - radius**2)
+        found[name] = radius, B, B * free**2
+    return found
+
+
+def line_force(interference, growth=0.0):
+    """Force per angle p r between the rings, the same on both sides.
+
+    The inner one is drawn larger by `interference` and grown by `growth` relative to the outer one.
+    """
+    give = 0.0
+    for name, (r, B, C) in lame(interference).items():
+        law = LAWS[name]
+        give += abs((1 + law.nu) / law.E * ((1 - 2 * law.nu) * B * r + C / r))
+    return (interference + growth) / give
 
 
 def exact(interference):
-    """Stress of each ring, and the pressure on each side; p R is the same on both."""
-    radius = {"inner": 1.0, "outer": 1.0 - interference}
-    part = {"inner": lame(BORE, 1.0, 1.0), "outer": lame(radius["outer"], RIM, radius["outer"])}
-    give = {}
-    for name, (E, nu) in LAWS.items():
-        (B, C), r = part[name], radius[name]
-        give[name] = abs((1 + nu) / E * ((1 - 2 * nu) * B * r + C / r))
-    line = interference / sum(give[name] / radius[name] for name in LAWS)  # p R
-    r2, stress = ng.x**2 + ng.y**2, {}
-    for name, (B, C) in part.items():
-        p = line / radius[name]
-        radial, hoop = p * (B - C / r2), p * (B + C / r2)
+    """Stress of each ring, and the pressure on each side."""
+    line, r2, stress, pressure = line_force(interference), ng.x**2 + ng.y**2, {}, {}
+    for name, (r, B, C) in lame(interference).items():
+        radial, hoop = line * (B - C / r2), line * (B + C / r2)
         xx, yy = (radial * u**2 + hoop * v**2 for u, v in ((ng.x, ng.y), (ng.y, ng.x)))
         xy = (radial - hoop) * ng.x * ng.y
         stress[name] = ng.CF((xx, xy, xy, yy), dims=(2, 2)) / r2
-    return SimpleNamespace(stress=stress), {name: line / radius[name] for name in LAWS}
+        pressure[name] = line / r
+    return SimpleNamespace(stress=stress), pressure
 
 
-def fit(interference, swap=False, **options):
+def fit(interference, swap=False, strain=None, **options):
     """A quarter of the rings."""
     return Problem(
         geometry=rings(BORE, 1.0, RIM, interference, quarter=True),
-        materials={name: Elastic(*law) for name, law in LAWS.items()},
-        sliding=CUTS,
+        materials=LAWS,
+        sliding="inner_cut_x|inner_cut_y|outer_cut_x|outer_cut_y",
+        strain=strain or {},
         contact=[Contact(*(SIDES[::-1] if swap else SIDES), **options)],
     )
 
