@@ -165,6 +165,18 @@ def test_sizes_bodies_and_normals(make, options, sizes):
             mesh.Curve(3)
 
 
+@pytest.mark.parametrize(("make", "options", "sizes"), CASES + SOLIDS)
+def test_sides_lie_where_their_names_say(make, options, sizes):
+    shape, middle = make(**options).shape, {}
+    for side in shape.faces if shape.solids else shape.edges:
+        middle.setdefault(side.name, []).append(side.center)
+    for name, places in middle.items():
+        for low, high, axis in (("left", "right", "x"), ("bottom", "top", "y")):
+            other = middle.get(name.replace(low, high), []) if low in name else []
+            axis = "z" if shape.solids and axis == "y" else axis
+            assert all(getattr(a, axis) < getattr(b, axis) for a in places for b in other)
+
+
 @pytest.mark.parametrize(
     ("f", "bound"),
     [
