@@ -22,8 +22,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from drivers.reference.straight import NO_FORCE, Exact, Profile, compiled
-from drivers.reference.straight import energy_error as energy_error
-from drivers.reference.straight import relative_energy_error as relative_energy_error
 from drivers.reference.westergaard import CF, SIDES, depth, effective_modulus, moduli
 from ngcontact import Elastic
 
