@@ -28,6 +28,7 @@ from .quadratic_program import (
     Iterate,
     QuadraticProgram,
     SingularError,
+    prescribing,
     separated,
 )
 from .schur_complement import BorderedSystems
@@ -45,6 +46,7 @@ PATIENCE = 10  # full switches allowed without fewer violated rows: p of Judice 
 PROXIMAL = 1e-3  # of the stiffness at the pins, where contact leaves rigid motions free
 MIN_PROXIMAL = 1e-6  # of that, to which it falls, tenfold at each proximal step
 REST_FORCE = 1e-14  # force of the proximal term, relative to stiffness times displacement
+REST_REACTION = 1e-12  # ... and that which prescribes a pin: round-off of a body's forces
 IDLE_WORK = 1e-12  # work of a load on a motion, relative to that of its parts
 STEADY_RATIO = 0.9  # of that force to the last, from which a motion is not slowing down
 MAX_PROXIMAL = 100  # proximal steps; most problems need less than five
@@ -63,13 +65,14 @@ class ActiveSetIteration:
     steps: list[int] = field(default_factory=list)  # changes after each linear system
     extent: float = 0.0  # largest displacement met so far
 
-    def idle(self, held: Mask) -> Mask | None:
-        """Pins (q,), as many as motions that neither active rows nor pins `held` (q,) resist.
+    def idle(self, anchor: Anchor | None = None) -> Mask | None:
+        """Pins (q,), as many as motions that neither active rows nor an `anchor` resist.
 
         None if the load does work on one of these motions.
         """
         p = self.systems.program
         pins = p.null_space.pins
+        held = np.zeros(pins.size, dtype=bool) if anchor is None else anchor.stiffness > 0
         if pins.size == 0 or held.all():
             return np.zeros(pins.size, dtype=bool)
         motions = p.null_space.unresisted(np.concatenate([p.unknown[self.active], pins[held]]))
@@ -82,12 +85,13 @@ class ActiveSetIteration:
         p = self.systems.program
         return p.null_space.resisted(p.unknown[self.active])
 
-    def rests(self, anchor: Anchor, held: Mask) -> bool:
-        """Whether an anchor pulls at none of the pins `held` (q,)."""
+    def rests(self, anchor: Anchor) -> bool:
+        """Whether an anchor pulls at no pin."""
         p = self.systems.program
         pins = p.null_space.pins
-        force = held * anchor.stiffness * np.abs(self.y[pins] - anchor.at)
-        return bool((force <= REST_FORCE * p.diagonal[pins] * self.extent).all())
+        force = np.abs(self.systems.reaction) + np.abs(anchor.pull(self.y[pins]))
+        limit = np.where(anchor.rigid, REST_REACTION, REST_FORCE) * p.diagonal[pins]
+        return bool((force <= limit * self.extent).all())
 
     def result(self) -> Iterate:
         """The current iterate, with the lineal motions that its conditions require."""
@@ -121,20 +125,20 @@ class ActiveSetIteration:
         self.active[steps.argmin()] = True
         return float(steps.min())
 
-    def settle(self, anchor: Anchor, held: Mask) -> Mask | None:
+    def settle(self, anchor: Anchor | None) -> tuple[Anchor | None, bool]:
         """Newton steps until the active set repeats.
 
-        The anchor pulls at the pins `held` (q,), and from then on at those of idle motions that
-        become free; the result (q,) is both, None if another motion becomes free. Rows on the
-        wrong side change theirs by block principal pivoting: as in Judice and Pires, ninf is the
-        fewest of them so far, and p the full switches left.
+        Pins of idle motions that become free are prescribed, too. The anchor with these, and
+        whether no other motion became free. Rows on the wrong side change theirs by block principal
+        pivoting: as in Judice and Pires, ninf is the fewest of them so far, and p the full switches
+        left.
         """
         m = self.systems.program.g.size
         ninf, p = m + 1, self.patience
         seen: set[bytes] = set()
-        tie, limit, pull = TIE, 100 + 20 * m, anchor.only(held)
+        tie, limit = TIE, 100 + 20 * m
         for _ in range(limit):
-            switched = wrong = self._solved(pull, tie)
+            switched = wrong = self._solved(anchor, tie)
             count = int(np.count_nonzero(wrong))
             ninf, p = (count, self.patience) if count < ninf else (ninf, p - 1)
             if count and p < 0:  # Murty's rule, until fewer rows are violated
@@ -143,16 +147,14 @@ class ActiveSetIteration:
             step = len(self.steps), self.active.sum(), self.steps[-1]
             log.debug("Newton step %d: %d active, %d change", *step)
             if count == 0:
-                return held  # (iv)
-            if (key := self.active.tobytes()) in seen:
-                tie = min(10 * tie, WIDEST_TIE)
+                return anchor, True  # (iv)
+            if (key := self.active.tobytes()) in seen:  # by a cycle, or by round-off
+                tie, p = min(10 * tie, WIDEST_TIE), p - PATIENCE
             seen.add(key)
             self.active = self.active ^ switched  # (ii)
-            if (idle := self.idle(held)) is None:
-                return None
-            if idle.any():
-                held = held | idle
-                pull = anchor.only(held)
+            if (idle := self.idle(anchor)) is None:
+                return anchor, False
+            anchor = prescribing(idle, anchor)
         raise ConvergenceError(
             f"the active set did not settle in {limit} Newton steps ({count} "
             "rows still change); check that the matrix is symmetric and positive definite",
@@ -216,21 +218,20 @@ def minimise(
     pins = p.null_space.pins
     hardness = p.diagonal[pins]  # of bodies that may be very unlike
     anchor = Anchor(PROXIMAL * hardness, np.zeros(pins.size))
-    every, none = np.ones(pins.size, dtype=bool), np.zeros(pins.size, dtype=bool)
     share, last = PROXIMAL, np.inf
     for _ in range(MAX_PROXIMAL):
         # On motions that stay free the load does no work: pins that hold them alone carry nothing.
         before = pins.size + 1
-        while (idle := current.idle(none)) is not None and np.count_nonzero(idle) < before:
-            held = current.settle(anchor, idle)
-            if held is None:
+        while (idle := current.idle()) is not None and np.count_nonzero(idle) < before:
+            held, settled = current.settle(prescribing(idle))
+            if not settled:
                 break
-            if current.rests(anchor, held):
+            if held is None or current.rests(held):
                 return current.result()
-            before = min(before - 1, int(held.sum()))
+            before = min(before - 1, int(np.count_nonzero(held.rigid)))
         # Rockafellar: the next y minimises L(y) + 1/2 stiffness (y - at)^2, until that force rests.
-        current.settle(anchor, every)
-        if current.rests(anchor, every):
+        current.settle(anchor)
+        if current.rests(anchor):
             return current.result()
         at = current.y[pins]
         moved = at - anchor.at

@@ -231,11 +231,28 @@ class SingularError(ArithmeticError):
 
 @dataclass(frozen=True, eq=False)
 class Anchor:
-    """Proximal terms stiffness / 2 (y - at)^2 on the q pins, which make every system definite."""
+    """What holds the q pins, so that every system is definite.
+
+    Proximal terms stiffness / 2 (y - at)^2; an infinite stiffness prescribes y = at.
+    """
 
     stiffness: Array  # (q,) force per displacement
     at: Array  # (q,) values of the pins from which they pull
 
-    def only(self, held: Mask) -> Anchor | None:
-        """The same at the pins `held` (q,) alone, None at none."""
-        return replace(self, stiffness=held * self.stiffness) if held.any() else None
+    @property
+    def rigid(self) -> Mask:
+        """Pins (q,) whose values are prescribed."""
+        return np.isinf(self.stiffness)
+
+    def pull(self, y: Array) -> Array:
+        """Force (q,) of the proximal terms on pins with the values `y` (q,)."""
+        return np.where(self.rigid, 0.0, self.stiffness) * (y - self.at)
+
+
+def prescribing(pins: Mask, anchor: Anchor | None = None) -> Anchor | None:
+    """An anchor that prescribes 0 at `pins` (q,), too; None of none."""
+    if not pins.any():
+        return anchor
+    if anchor is None:
+        anchor = Anchor(np.zeros(pins.size), np.zeros(pins.size))
+    return replace(anchor, stiffness=np.where(pins, np.inf, anchor.stiffness))

@@ -88,6 +88,7 @@ class BorderedSystems:
     program: QuadraticProgram  # that of the last `restart`
     y: Array  # (n,) the last solution
     force: Array  # (m,) its multipliers
+    reaction: Array  # (q,) forces of its pins that are prescribed
     internal: Array  # (n,) K y of the last solution of which `unbalanced` was asked
     scale: float  # largest force that a system was to balance
     factorizations: int  # since the last `restart`
@@ -112,6 +113,7 @@ class BorderedSystems:
         if closed is not None and p.unit_rows:
             self.y[p.unknown[closed]] = p.g[closed]
         self.force, self.internal, self.scale = np.zeros(p.g.size), np.zeros(p.b.size), 0.0
+        self.reaction = np.zeros(p.null_space.pins.size)
 
     def forget(self) -> None:
         """Give the memory of the factorisation back; it is made again when asked for."""
@@ -148,7 +150,9 @@ class BorderedSystems:
         residual = p.b - self.internal
         if anchor is not None:
             pins = p.null_space.pins
-            residual[pins] -= anchor.stiffness * (self.y[pins] - anchor.at)
+            residual[pins] -= anchor.pull(self.y[pins])
+            self.reaction = np.where(anchor.rigid, residual[pins], 0.0)
+            residual[pins] -= self.reaction
         if p.unit_rows:
             self.force[:] = 0.0
             self.force[active] = residual[p.unknown[active]]
@@ -175,6 +179,8 @@ class BorderedSystems:
         if p.unit_rows:
             held = base.active & active
             self.y[p.unknown[held]] = p.g[held]
+        if anchor is not None:
+            self.y[p.null_space.pins[anchor.rigid]] = anchor.at[anchor.rigid]
         residual = self.unbalanced(active, anchor)
         self.scale = max(self.scale, system.largest(residual))
         self._correct(system, residual, COARSE_RESIDUAL)
@@ -188,7 +194,7 @@ class BorderedSystems:
         if base is not None and not p.unit_rows:
             return base
         if base is not None and not pulled[~base.pinned].any():
-            added, at = self._changed(base, active)
+            added, at = self._changed(base, active, anchor)
             columns = base.place.keys() | {*at.tolist(), *(~added).tolist()}
             if len(columns) <= self.border + np.count_nonzero(base.pinned):
                 return base
@@ -203,10 +209,11 @@ class BorderedSystems:
         self._start(closed)
         return self.base
 
-    def _changed(self, base: Base, active: Mask) -> tuple[Index, Index]:
+    def _changed(self, base: Base, active: Mask, anchor: Anchor | None) -> tuple[Index, Index]:
         """Rows that only the system of `active` (m,) holds, unknowns that only the base holds."""
         p = self.program
-        at = p.null_space.pins[base.pinned]
+        pinned = base.pinned if anchor is None else base.pinned & ~anchor.rigid
+        at = p.null_space.pins[pinned]
         if p.unit_rows:
             at = np.concatenate([p.unknown[base.active & ~active], at])
         return np.flatnonzero(active & ~base.active), at
@@ -218,7 +225,7 @@ class BorderedSystems:
     def _bordered(self, base: Base, active: Mask, anchor: Anchor | None) -> Border:
         """The system of an active set as a border of the base, which learns its new columns."""
         p = self.program
-        rows, at = self._changed(base, active)
+        rows, at = self._changed(base, active, anchor)
         keys = np.concatenate([at, ~rows]).tolist()
         if not keys:
             V = np.zeros((0, 0))
@@ -242,7 +249,7 @@ class BorderedSystems:
         D[:, : at.size] = dense[:, np.searchsorted(touched, at)]
         D[: at.size] = D[:, : at.size].T
         if anchor is not None:
-            stiffness = anchor.stiffness[base.pinned]
+            stiffness = anchor.stiffness[base.pinned & ~anchor.rigid]
             pins = np.arange(at.size - stiffness.size, at.size)
             D[pins, pins] += stiffness
         S = dense @ base.known[np.ix_(column, touched)].T - D
