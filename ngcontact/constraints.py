@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -137,11 +138,20 @@ def no_conditions(d: int = 2) -> Conditions:
     return Conditions(np.zeros(0, dtype=np.intp), np.zeros((0, d)), np.zeros(0))
 
 
+class Links(NamedTuple):
+    """Coefficients of unknowns in contact rows, k of them."""
+
+    value: Array  # (k,)
+    own: Index  # (k,) unknown that the row is
+    other: Index  # (k,) unknown that it contains beside
+
+
 @dataclass(frozen=True, eq=False)
 class BasisTransformation:
     """Node values u = T y in unknowns of which some are prescribed and one is each row's value."""
 
     T: sp.csr_array  # (d * n, d * n) from the unknowns to x of all nodes, then y
+    links: Links  # what the rows contain of other unknowns than their own
     fixed: Mask  # (d * n,) prescribed unknowns
     values: Array  # (d * n,) their values
     unknown: Index  # (k,) unknown that equals the left side of each kept row
@@ -352,6 +362,7 @@ def change_of_basis(
     )
     return BasisTransformation(
         T=T,
+        links=Links(value, unknown[row], column),
         fixed=fixed.T.ravel(),
         values=supported.values.T.ravel(),
         unknown=unknown[kept],

@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from ..arrays import Array, Mask
+from ..arrays import Array, Mask, from_triplets
 from ..constraints import BasisTransformation, Conditions, Rows
 from ..contact import ContactLine, ContactState, by_line, contact_line, for_partial_cover
 from ..errors import ConvergenceError, NoEquilibriumError
@@ -32,8 +32,10 @@ from ..linalg import (
     IterativeSystems,
     Multigrid,
     cholesky,
+    cholesky_of_closed_rows,
     coarsenings,
     congruent,
+    handed_over,
     truncated_multigrid,
 )
 from ..mesh import vertex_parents
@@ -51,6 +53,7 @@ from .equilibrium import Rigid, equilibrium
 
 TOUCHING_GAP = 1e-12  # gap, relative to the zone, up to which points start active
 CORNER_DISTANCE = 1e-6  # of its two points, by their directions, relative to the zone
+IDLE_FORCE = 1e-9  # of a pair, relative to the largest of all pairs, which only round-off makes
 DISTANCE_ROUND_OFF = 1e-6  # difference of two distances, relative to them, that it may have made
 # Powers of ten between which sums of products keep their digits.
 MIN_EXPONENT, MAX_EXPONENT = -306, 305
@@ -82,13 +85,21 @@ MULTIGRID = MultigridUse()  # measurements and tests change it
 
 
 def linear_systems(
-    program: QuadraticProgram, matrix: ng.BaseMatrix, space: Space, basis: BasisTransformation
+    program: QuadraticProgram,
+    matrix: ng.BaseMatrix | None,
+    space: Space,
+    basis: BasisTransformation,
 ) -> BorderedSystems:
     """Systems of a discrete problem: by multigrid where it is large and has coarser spaces.
 
-    `matrix` is that of the `program` for NGSolve.
+    `matrix` is that of the `program` for NGSolve, None where `congruent` answers none.
     """
-    factor, trace = cholesky(matrix), space.trace
+    trace = space.trace
+    if matrix is None:
+        links = from_triplets(*basis.links, basis.T.shape)
+        factor = cholesky_of_closed_rows(space.matrix, space.A, space.basis, basis.T, links)
+    else:
+        factor = cholesky(matrix)
     parents = vertex_parents(trace.mesh)
     size = program.b.size
     large = MULTIGRID.large if trace.model.dim == 2 else MULTIGRID.large_solids
@@ -101,7 +112,8 @@ def linear_systems(
     def prepare(free: Mask) -> Multigrid:
         linear = trace.linear(space.nodal)
         steps = coarsenings(basis.T, parents, linear, MULTIGRID.coarsest, d)
-        return truncated_multigrid(matrix, steps, free)
+        of_all = handed_over(program.K) if matrix is None else matrix
+        return truncated_multigrid(of_all, steps, free)
 
     return IterativeSystems(program, factor, prepare)
 
@@ -415,10 +427,24 @@ def carried_active_set(lines: Sequence[ContactLine], previous: Sequence[ContactS
     """Warm start (m,): the state of the nearest contact point of the same pair on another mesh.
 
     At orders above 1 the points around a transition are divided by the side of it they lie on: it
-    is located more closely than the nodes of either mesh.
+    is located more closely than the nodes of either mesh. Of a pair that touches without a force
+    as many points are active as were.
     """
-    carried = [_carried(new, old) for new, old in zip(lines, previous, strict=True)]
+    sizes = [np.abs(old.force).max(initial=0.0) for old in previous]
+    without_force = IDLE_FORCE * max(sizes, default=0.0)
+    carried = [
+        _nearest(new, old) if size <= without_force else _carried(new, old)
+        for new, old, size in zip(lines, previous, sizes, strict=True)
+    ]
     return np.concatenate([np.zeros(0, dtype=bool), *carried])
+
+
+def _nearest(new: ContactLine, old: ContactState) -> Mask:
+    """Points (m,) of one pair that are nearest to an old active one."""
+    active = np.zeros(new.node.size, dtype=bool)
+    if active.size and old.active.any():
+        active[cKDTree(new.position).query(old.line.position[old.active])[1]] = True
+    return active
 
 
 def _carried(new: ContactLine, old: ContactState) -> Mask:

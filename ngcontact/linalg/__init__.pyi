@@ -6,6 +6,7 @@ from .multigrid import Multigrid as Multigrid
 from .multigrid import truncated_multigrid as truncated_multigrid
 from .sparse import change_of_basis as change_of_basis
 from .sparse import cholesky as cholesky
+from .sparse import cholesky_of_closed_rows as cholesky_of_closed_rows
 from .sparse import congruent as congruent
 from .sparse import handed_over as handed_over
 from .sparse import inverse_of as inverse_of

@@ -18,6 +18,7 @@ from ..arrays import Array, Factor, Index, Mask, Solve
 # found their work: that takes 25 ms of processor time, 10 000 unknowns of order 3 on one thread 33.
 ONE_THREAD = 10_000
 MULTIPLIED_ENTRIES = 60_000  # of a matrix, up to which T'AT costs no more than the change to it
+MAX_CHANGE = 0.4  # entries that contact rows change, relative to those of the matrix
 
 _COUNT = threading.Lock()  # of the threads of managers to come, one number for the whole process
 
@@ -68,11 +69,12 @@ def lower_half(K: sp.csr_array) -> ng.BaseMatrix:
 
 def congruent(
     matrix: ng.BaseMatrix, A: sp.csr_array, T: sp.csr_array
-) -> tuple[sp.csr_array, ng.BaseMatrix]:
+) -> tuple[sp.csr_array, ng.BaseMatrix | None]:
     """Matrix T'AT (k, k) of the unknowns y of u = T y, for SciPy and for NGSolve.
 
     `A` (n, n) is `matrix` for SciPy. `T` (n, k) is the identity but for nodes on the boundary: of a
-    large matrix only the change is multiplied and handed over, a small part of the whole.
+    large matrix only the change is multiplied and handed over, a small part of the whole. Where it
+    is not, as where many bodies meet, NGSolve gets none: see `cholesky_of_closed_rows`.
     """
     # element="physical" has fewer node values than edge unknowns
     if A.nnz <= MULTIPLIED_ENTRIES or T.shape[0] != T.shape[1]:
@@ -80,17 +82,24 @@ def congruent(
         product = right.CreateTranspose() @ (matrix @ right)
         return shared(product), product
     change = change_of_basis(A, T)
+    if change.nnz > MAX_CHANGE * A.nnz:
+        return A + change, None
+    total = _changed(matrix, A, change)
+    return shared(total), total
+
+
+def _changed(matrix: ng.BaseMatrix, A: sp.csr_array, change: sp.csr_array) -> ng.BaseMatrix:
+    """The sum of `matrix`, (n, n), which is `A` for SciPy, and a `change` (n, n), for NGSolve."""
     if change.nnz == 0:
-        return A, matrix
+        return matrix
     places = _places(A, change)
     if places is None:
-        total = (matrix + handed_over(change)).CreateSparseMatrix()
-    else:
-        total = matrix.CreateMatrix()
-        values = total.AsVector().FV().NumPy()
-        values[:] = A.data
-        values[places] += change.data
-    return shared(total), total
+        return (matrix + handed_over(change)).CreateSparseMatrix()
+    total = matrix.CreateMatrix()
+    values = total.AsVector().FV().NumPy()
+    values[:] = A.data
+    values[places] += change.data
+    return total
 
 
 def _places(A: sp.csr_array, change: sp.csr_array) -> Index | None:
@@ -158,5 +167,29 @@ def cholesky(matrix: ng.BaseMatrix) -> Factor:
             return solution.FV().NumPy().copy()
 
         return solve
+
+    return factor
+
+
+def cholesky_of_closed_rows(
+    matrix: ng.BaseMatrix,
+    A: sp.csr_array,
+    basis: sp.csr_array,
+    T: sp.csr_array,
+    links: sp.csr_array,
+) -> Factor:
+    """The same of T'(basis' A basis)T, in which contact rows that are open fill no entries.
+
+    `A` (n, n) is `matrix` for SciPy, `basis` (n, k) and `T` (k, k) lead from the unknowns y to its
+    own, and `links` (k, k) are what rows contain of other unknowns. With z = y less these at the
+    free unknowns, y = S z, the matrix of z is sparser.
+    """
+
+    def factor(free: Mask) -> Solve:
+        S = sp.eye_array(len(free), format="csr") + sp.diags_array(free.astype(float)) @ links
+        part = T @ S
+        part.eliminate_zeros()  # what cancels
+        solve = cholesky(_changed(matrix, A, change_of_basis(A, basis @ part)))(free)
+        return lambda b: np.asarray(S @ solve(S.T @ b))
 
     return factor

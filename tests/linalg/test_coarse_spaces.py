@@ -10,7 +10,13 @@ from ngcontact.constraints import Conditions, Rows, change_of_basis
 from ngcontact.lagrange import gauss_lobatto
 from ngcontact.linalg import sparse
 from ngcontact.linalg.coarse_spaces import COARSEST, RingError, coarsenings
-from ngcontact.linalg.sparse import cholesky, congruent, lower_half, shared
+from ngcontact.linalg.sparse import (
+    cholesky,
+    cholesky_of_closed_rows,
+    congruent,
+    lower_half,
+    shared,
+)
 
 FIRST = 4  # vertices of each line at first
 
@@ -148,6 +154,7 @@ def test_congruent_matrices(changed, full, monkeypatch):
     T[rng.permutation(SIZE)[:changed]] += rng.normal(size=(changed, SIZE))
     small, _ = congruent(A, shared(A), sp.csr_array(T))
     monkeypatch.setattr(sparse, "MULTIPLIED_ENTRIES", 0)
+    monkeypatch.setattr(sparse, "MAX_CHANGE", np.inf)
     K, total = congruent(A, shared(A), sp.csr_array(T))
     expected = T.T @ shared(A).toarray() @ T
     # Sums of at most SIZE^2 terms: 1e-13 is round-off.
@@ -161,6 +168,32 @@ def test_congruent_matrices(changed, full, monkeypatch):
     reference = expected @ right.FV().NumPy()
     allowed = 1e-13 * np.abs(reference).max()
     np.testing.assert_allclose(product.FV().NumPy(), reference, atol=allowed)
+
+
+def test_factors_without_the_couplings_of_open_rows(monkeypatch):
+    """They solve with the same matrix, of which no more is known to NGSolve than A."""
+    rng = np.random.default_rng(4)
+    given = definite(rng)
+    rows, half = np.arange(0, SIZE, 4), np.arange(1, SIZE, 2)
+    links = np.zeros((SIZE, SIZE))
+    links[np.ix_(rows, half)] = rng.normal(size=(len(rows), len(half)))
+    T = sp.csr_array((np.eye(SIZE) - links) * 2.0)
+    A = for_ngsolve(given)
+    basis = sp.eye_array(SIZE, format="csr")
+    monkeypatch.setattr(sparse, "MULTIPLIED_ENTRIES", 0)
+    monkeypatch.setattr(sparse, "MAX_CHANGE", 0.0)
+    K, matrix = congruent(A, shared(A), T)
+    assert matrix is None
+    factor = cholesky_of_closed_rows(A, shared(A), basis, T, sp.csr_array(links))
+    right = rng.normal(size=SIZE)
+    for closed in (rows, rows[:3], rows[:0]):
+        free = np.ones(SIZE, dtype=bool)
+        free[closed] = free[3] = False
+        solution = factor(free)(np.where(free, right, 0.0))
+        assert (solution[~free] == 0).all()
+        reference = np.linalg.solve(K.toarray()[np.ix_(free, free)], right[free])
+        # Round-off times the condition of T'AT, below 1e4.
+        np.testing.assert_allclose(solution[free], reference, rtol=0, atol=1e-11)
 
 
 def test_factorisation_of_principal_parts():
