@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import minimum_spanning_tree
-from scipy.spatial import KDTree
+from scipy.spatial import Delaunay, KDTree
 
 from ..arrays import Array, Index, from_triplets
 from ..problem import MeshArrays
@@ -64,18 +64,11 @@ def tetrahedron(order: int) -> Index:
     return np.concatenate([order * unit, *edges, *faces])
 
 
-def subdivision(order: int) -> tuple[list[list[int]], list[list[int]]]:
+def subdivision(order: int) -> tuple[Index, Index]:
     """Small triangles (order^2, 3) and sides (3, order + 1) of a `lattice` triangle."""
-    number = {(b, c): k for k, (_, b, c) in enumerate(lattice(order).tolist())}
-    triangles = [
-        [number[b + db, c + dc] for db, dc in corners]
-        for b, c in number
-        for corners in (((0, 0), (1, 0), (0, 1)), ((1, 0), (1, 1), (0, 1)))
-        if all((b + db, c + dc) in number for db, dc in corners)
-    ]
-    steps = range(order + 1)
-    bottom, left = [number[k, 0] for k in steps], [number[0, k] for k in steps]
-    return triangles, [bottom, [number[order - k, k] for k in steps], left]
+    inner = np.arange(3, 3 * order).reshape(3, -1)
+    sides = np.column_stack([[0, 1, 2], inner, [1, 2, 0]])
+    return Delaunay(lattice(order)[:, 1:]).simplices, sides
 
 
 def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:

@@ -2,5 +2,6 @@
 
 from .readings import Measured as Measured
 from .surfaces import earlier_figures as earlier_figures
+from .surfaces import pressure_field as pressure_field
 from .table import Quantities as Quantities
 from .table import Quantity as Quantity
