@@ -203,26 +203,26 @@ def check_pairs(view: MeshArrays, contact: Sequence[Masks], inner: Mask) -> None
                 )
 
 
-def check_pressures(
-    names: Sequence[str], traction: Masks, loads: Iterable[ng.CoefficientFunction], inner: Mask
+def check_tractions(
+    names: Sequence[str],
+    traction: Masks,
+    loads: Iterable[ng.CoefficientFunction],
+    inner: Mask,
+    shared: Mask,
 ) -> None:
-    """Refuse pressures, one for each mask (r,), on lines inside a body, which have two normals.
+    """Refuse tractions, one for each mask (r,), on lines that no single body bounds.
 
-    `inner` (r,) are boundaries between two triangles.
+    Pressures on boundaries between two triangles, `inner` (r,), which have two normals; and any
+    traction on those that are `shared` (r,) by two bodies.
     """
     for (label, mask), load in zip(traction.items(), loads, strict=True):
         if load.dim == 1 and (mask & inner).any():
-            name = names[int(np.argmax(mask & inner))]
             raise ValueError(
-                f'{label} is a pressure, and "{name}" lies inside a body or between two that are '
-                "glued, where no normal is the outward one: give the traction as a pair; if it "
-                "should bound a cut, draw what is cut off anticlockwise, as OCC needs it"
+                f'{label} is a pressure, and "{names[int(np.argmax(mask & inner))]}" lies inside a '
+                "body or between two that are glued, where no normal is the outward one: give the "
+                "traction as a pair; if it should bound a cut, draw what is cut off anticlockwise, "
+                "as OCC needs it"
             )
-
-
-def check_shared(names: Sequence[str], traction: Masks, shared: Mask) -> None:
-    """Refuse tractions, by masks (r,), on boundaries that are `shared` (r,) by two bodies."""
-    for label, mask in traction.items():
         if (mask & shared).any():
             raise ValueError(
                 f'{label}: the edge "{names[int(np.argmax(mask & shared))]}" is shared by two '

@@ -18,6 +18,7 @@ VOIGT = {  # components of stress and strain in each model, the shear strain an 
     "axisymmetric": ("rr", "zz", "hoop", "rz"),
     "solid": ("xx", "yy", "zz", "yz", "xz", "xy"),
 }
+SHEAR = ("xy", "rz", "yz", "xz")
 SOLID = "solid"  # the model of bodies in space, the only one
 MODEL_NAMES = tuple(name for name in VOIGT if name != SOLID)
 ABOUT_AN_AXIS = ("axisymmetric",)
@@ -53,18 +54,17 @@ def model_for(dim: int, model: str | None) -> str:
     return MODEL_NAMES[0] if model is None else require_model(model)
 
 
-def _isotropic(normal: Value, cross: Value, shear: Value, size: int) -> ng.CoefficientFunction:
-    """Return a law, dims (size, size), by its entries on the diagonal, beside it, and of shear."""
+def _isotropic(normal: Value, cross: Value, shear: Value, model: str) -> ng.CoefficientFunction:
+    """Return a law, dims (q, q), by its entries on the diagonal, beside it, and of shear."""
     # NGSolve takes numbers in a tuple slowly, and loses an interruption that comes meanwhile.
     n, c, s, zero = (ng.CF(value) for value in (normal, cross, shear, 0.0))
-    if size == 6:
-        at = [[n if i == j else c for j in range(3)] + [zero] * 3 for i in range(3)]
-        at += [[zero] * 3 + [s if i == j else zero for j in range(3)] for i in range(3)]
-        return ng.CF(tuple(entry for row in at for entry in row), dims=(6, 6))
-    if size == 4:
-        rows = (n, c, c, zero, c, n, c, zero, c, c, n, zero, zero, zero, zero, s)
-        return ng.CF(rows, dims=(4, 4))
-    return ng.CF((n, c, zero, c, n, zero, zero, zero, s), dims=(3, 3))
+    sheared = [name in SHEAR for name in VOIGT[model]]
+    entries = [
+        (s if one else n) if i == j else (zero if one or other else c)
+        for i, one in enumerate(sheared)
+        for j, other in enumerate(sheared)
+    ]
+    return ng.CF(tuple(entries), dims=(len(sheared), len(sheared)))
 
 
 _isotropic_numbers = lru_cache(_isotropic)  # asked for several times by each level
@@ -116,7 +116,7 @@ class Elastic:
             cross = normal * nu
         shear = E / (2 * (1 + nu))
         made = _isotropic if varies(self) else _isotropic_numbers
-        return made(normal, cross, shear, len(VOIGT[model]))
+        return made(normal, cross, shear, model)
 
     def description(self) -> str:
         """Its constants, in a few words."""

@@ -81,21 +81,9 @@ class MeshArrays:
     def surface_parameters(self) -> Array:
         """Parameters (k, 3, 2) of the CAD face at the corners of each facet of a solid."""
         elements = self.mesh.ngmesh.Elements2D()
-        parts = {"u": 8, "v": 16}  # behind the number of a triangle, in records of 24 bytes
-        info = np.dtype(
-            {
-                "names": [*parts],
-                "formats": ["<f8"] * 2,
-                "offsets": [*parts.values()],
-                "itemsize": 24,
-            }
-        )
-        size = memoryview(elements).nbytes // max(1, len(elements))
-        corner = np.dtype(
-            {"names": ["at"], "formats": [(info, 3)], "offsets": [PARAMETERS], "itemsize": size}
-        )
-        at = np.frombuffer(elements, dtype=corner)["at"]
-        return np.stack([at["u"], at["v"]], axis=-1)
+        records = np.frombuffer(elements, np.uint8).reshape(len(elements), -1)
+        corners = records[:, PARAMETERS : PARAMETERS + 72]  # a number, u and v of each
+        return np.ascontiguousarray(corners).view(float).reshape(-1, 3, 3)[..., 1:]
 
     @property
     def corners(self) -> Array:

@@ -217,8 +217,7 @@ class Problem:
             for facets in (view.inner_facets, view.shared_facets)
         )
         checks.check_pairs(view, pairs, inner)
-        checks.check_pressures(names, traction, self.traction.values(), inner)
-        checks.check_shared(names, traction, shared)
+        checks.check_tractions(names, traction, self.traction.values(), inner, shared)
         gaps = {
             f'contact[{j}].gap of "{pair.secondary}"': next(iter(sides.values()))
             for j, (sides, pair) in enumerate(zip(pairs, self.contact, strict=True))
