@@ -14,6 +14,7 @@ import netgen.meshing as ngm
 import netgen.occ as occ
 import ngsolve as ng
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from ..arrays import Array, Index
 from ..errors import warn
@@ -27,7 +28,6 @@ PLANE_EXTENT = 1e-9  # extent along z, relative to that in the plane, of a file 
 CURVED_DISTANCE = 1e-6
 CORNER = np.deg2rad(30)  # turn of a line at which curves end
 POLYGON = np.deg2rad(1)  # turn of straight sides from which they may stand for a curve
-TANGENT_NODES = 5  # of a curve, from which the tangent at one is taken
 # Points of a cell at which it may fold.
 LATTICE = [(i / 4, j / 4, 0) for i in range(5) for j in range(5 - i)]
 
@@ -315,7 +315,10 @@ def _curves(points: Array, runs: list[list[_Side]]) -> tuple[list[occ.Edge], flo
         else:
             largest = max([largest, *(_turn(*at[s.stop]) for s in run if s.stop in smooth)])
             closed = nodes[0] == nodes[-1] and nodes[0] in smooth
-            slope = _slopes(x, closed=closed)
+            t = np.cumsum([0.0, *np.linalg.norm(np.diff(x, axis=0), axis=1)])
+            slope = make_interp_spline(
+                t, x, min(5, len(x) - 1), bc_type="periodic" if closed else None
+            )(t, 1)
             for k in () if closed else (0, -1):  # it goes on in another curve, or a straight line
                 slope[k] = smooth.get(nodes[k], slope[k])
             # The kernel compares the lengths of tangents with `tol`, and uses their directions.
@@ -329,20 +332,6 @@ def _curves(points: Array, runs: list[list[_Side]]) -> tuple[list[occ.Edge], flo
         edge.name = run[0].name
         found.append(edge)
     return found, largest
-
-
-def _slopes(x: Array, *, closed: bool) -> Array:
-    """Derivatives (n, 2) at points (n, 2) along a curve, each of a polynomial through some."""
-    n, m = len(x), min(len(x), TANGENT_NODES)
-    first = np.arange(n) - m // 2
-    at = (first if closed else np.clip(first, 0, n - m))[:, None] + np.arange(m)
-    at = at % (n - 1) if closed else at  # the last point is the first
-    step = np.linalg.norm(np.diff(x[at], axis=1), axis=2)
-    t = np.cumsum(np.column_stack([np.zeros(n), step]), axis=1)
-    here = (at == (np.arange(n) % (n - 1 if closed else n))[:, None]).argmax(axis=1)
-    t = (t - t[np.arange(n), here][:, None]) / t[:, -1:]
-    powers = t[..., None] ** np.arange(m)
-    return np.asarray(np.linalg.solve(powers, x[at])[:, 1])
 
 
 def _check_curved(mesh: ng.Mesh) -> None:

@@ -6,7 +6,7 @@ import re
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, product
 from numbers import Real
 from typing import Any
 
@@ -19,7 +19,6 @@ from scipy.spatial import cKDTree
 from ..arrays import Array, Index, Mask, across, rightward
 from ..problem import Contact, MeshArrays, Problem
 from .cad import CadEdge
-from .identified import identify_coinciding_faces
 
 # Elements along the largest extent of the geometry when no mesh size is given ...
 DEFAULT_ELEMENTS = 8
@@ -53,6 +52,8 @@ CONSTANT_GAP_CHANGE = 1e-6
 PLACE_DISTANCE = 1e-6  # of a segment: distance up to which a node lies at a place
 # Of a sample's distance: from its error of 1e-5 to one of 1e-9, above round-off.
 SEARCH_STEP = 2**-6
+# Distance, relative to a face, up to which two faces are one: OCC's own is 1e-7.
+FACE_DISTANCE = 1e-6
 
 
 def _elements(x: Array, maxh: float | Size) -> Array:
@@ -357,6 +358,45 @@ def _divide_facing(problem: Problem, edges: list[Edge], fixed: Array) -> None:
                     near = _near(secondary.curve, facing)
                 for primary in near:
                     _divide(contact, secondary, primary, sides, facing, fixed)
+
+
+def _marks(face: occ.TopoDS_Shape) -> Array:
+    """Points (n, 3) that distinguish faces: vertices, centres of edges, its own."""
+    vertices = [vertex.p for vertex in face.vertices]
+    middles = [edge.center for edge in face.edges]
+    return np.array([(p.x, p.y, p.z) for p in [*vertices, *middles, face.center]])
+
+
+def _coincide(one: occ.TopoDS_Shape, other: occ.TopoDS_Shape) -> bool:
+    """Whether two faces have the same area and the same points."""
+    size = one.mass**0.5
+    if abs(one.mass - other.mass) > FACE_DISTANCE * one.mass:
+        return False
+    a, b = _marks(one), _marks(other)
+    if len(a) != len(b):
+        return False
+    apart = np.linalg.norm(a[:, None] - b, axis=2)
+    return bool(max(apart.min(axis=0).max(), apart.min(axis=1).max()) <= FACE_DISTANCE * size)
+
+
+def identify_coinciding_faces(problem: Problem, shape: occ.TopoDS_Shape) -> None:
+    """Let Netgen divide faces of contact pairs alike where they lie on each other.
+
+    The shape remembers it, by a name for each two of its faces; to say it again changes nothing.
+    """
+    here = occ.gp_Trsf.Translation(occ.gp_Vec(0, 0, 0))
+    faces = list(shape.faces)
+    for contact in problem.contact:
+        if contact.primary is None:
+            continue
+        sides = [
+            {i for i, face in enumerate(faces) if re.fullmatch(pattern, face.name or "")}
+            for pattern in (contact.primary, contact.secondary)
+        ]
+        for i, j in sorted({(min(both), max(both)) for both in product(*sides)}):
+            if _coincide(faces[i], faces[j]):
+                name, kind = f"ngcontact {i} {j}", occ.IdentificationType.PERIODIC
+                faces[i].Identify(faces[j], name, kind, here)
 
 
 def _require_complete(mesh: ng.Mesh, problem: Problem) -> None:
