@@ -123,25 +123,14 @@ class _Finder:
                 break
             values = elements.evaluate(mapped, element[near], reference[near, None])[:, 0]
             miss = points[near] - values[:, :d]
-            with np.errstate(all="ignore"):
-                step = _solved(values[:, d:].reshape(-1, d, d), miss)
+            slopes = values[:, d:].reshape(-1, d, d)
+            slopes[np.linalg.det(slopes) == 0] = np.nan
+            step = np.linalg.solve(slopes, miss[..., None])[..., 0]
             step = np.clip(np.nan_to_num(step), -0.5, 0.5)
             reference[near] = np.clip(reference[near] + step, -2, 3)
             near = near[np.abs(step).max(axis=1) > INSIDE_COORDINATE / 100]
         reference[near] = np.nan  # where elements do not reach
         return reference
-
-
-def _solved(matrices: Array, right: Array) -> Array:
-    """Solutions (q, d) of systems with `matrices` (q, d, d) and `right` (q, d) sides."""
-    if right.shape[1] == 3:
-        a, b, c = np.moveaxis(matrices, 2, 0)
-        parts = [np.cross(b, c), np.cross(c, a), np.cross(a, b)]
-        determinant = (a * parts[0]).sum(axis=1)
-        return np.stack([(right * part).sum(axis=1) / determinant for part in parts], axis=1)
-    (a, b), (c, d) = np.moveaxis(matrices, 0, 2)
-    x, y = right.T
-    return np.stack([d * x - b * y, a * y - c * x], axis=1) / (a * d - b * c)[:, None]
 
 
 @dataclass(frozen=True, eq=False)

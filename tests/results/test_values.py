@@ -76,6 +76,16 @@ def test_points_between_chord_and_arc_belong_to_the_body(order, radius):
     np.testing.assert_allclose(values.out_of_plane_stress, stress[2, 2], rtol=1e-9)
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_points_beyond_the_arc_by_a_tenth_digit_belong_to_the_body(order):
+    """Coordinates of ten digits lie beyond an arc; those of six are another place."""
+    turn = -np.linspace(0.05, 1.5, 31)
+    arc = np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    for beyond, name in ((1e-10, "disc"), (1e-6, "")):
+        values = stretched_disc(order).at((0, 1) + (1 + beyond) * arc, outside="nan")
+        assert set(values.body) == {name}
+
+
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_points_between_facet_and_sphere_belong_to_the_body(order):
     solution = stretched_shells(order)
