@@ -21,8 +21,8 @@ from drivers.reference.cases import (
 from drivers.reference.straight import relative_energy_error
 from ngcontact import Contact, ContactWarning, Elastic, Problem, adapt, polish, solve
 from ngcontact.geometries import ball_on_block
-from ngcontact.polishing.bilateral import solve_bilateral
 from ngcontact.polishing.geometric_mesh import END_RATIO, coarse_mesh
+from ngcontact.polishing.polishing import solve_bilateral
 from tests.given_meshes import two_blocks
 
 

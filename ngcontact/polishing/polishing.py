@@ -2,26 +2,42 @@
 
 Contact takes all smoothness away from a solution but at the ends of its zone, and at corners. On a
 mesh that is graded geometrically towards them (hp version), with vertices that follow the ends,
-errors fall exponentially with the order.
+errors fall exponentially with the order. In each step the zone is known: contact holds with
+equality where it is closed, and nowhere else.
+
+Where a zone ends too far out or in by t, the gap beside the end is K r^(1/2) + c r^(3/2) + ... with
+the distance r from it, and K = 3/2 c t to first order: the end of the contact problem, with K = 0,
+is found by Newton's method for each end alone, since the solution depends on t by t^2 only.
 """
 
 from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
+import ngsolve as ng
 import numpy as np
 
 from ..adaptivity import END_POWER, RefinementTree, corners
 from ..arrays import Array, Mask, field_names
-from ..errors import ContactError, warn
+from ..discrete import discretise, minimise_energy
+from ..errors import ContactError, ConvergenceError, warn
 from ..fem import BoundaryTrace, boundary_trace, model_of
-from ..mesh import cad_edges, resolved_lengths
+from ..lagrange import gauss, lagrange
+from ..mesh import cad_edges, check_curves, resolved_lengths
 from ..problem import MeshArrays, Problem
 from ..solution import Solution
 from ..solved import Solved
-from .bilateral import excess, solve_bilateral, wrong_signs
-from .geometric_mesh import CORNER_RATIO, END_RATIO, GeometricMesh, coarse_mesh, isolated
+from .geometric_mesh import (
+    CORNER_RATIO,
+    END_RATIO,
+    EndOfContact,
+    GeometricMesh,
+    coarse_mesh,
+    isolated,
+)
 
 MAX_DIGITS = 12
 ORDERS = (4, 6, 8, 10)
@@ -35,6 +51,12 @@ BLUNT_ANGLE = 0.5  # radians by which a convex corner turns at least
 LEAST_RATIO = 0.2  # of two changes from order to order, for errors; measured: 0.01 to 0.1
 RATIO_GROWTH = 2.0  # ... from one order to the next at most; measured: 1.5 to 2.3
 MAX_RATIO = 0.8  # ... of what hardly converges
+ELEMENT = "isoparametric"
+FIT_DEGREE = 4  # of gap / r^(1/2) in r, over the layers
+SAMPLES_PER_NODE = 3  # per node, at which signs are looked at
+PRESSURE_ERROR = 1e-3  # of the largest, which is the error of pressures at ends
+GAP_ERROR = 1e-6  # of the largest displacement
+ROUND_OFF = 1e-6  # of distances on curves, in which ends of segments are compared
 
 log = logging.getLogger("ngcontact")
 
@@ -234,3 +256,88 @@ def _regular_corners(problem: Problem, trace: BoundaryTrace, mesh: GeometricMesh
             smooth = natural[at].all() if convex else free[at].all()
             regular[vertex] = (convex and mirrored) or smooth
     return regular
+
+
+def solve_bilateral(problem: Problem, mesh: GeometricMesh, order: int) -> Solved:
+    """The solution with contact on the closed segments of a mesh, of degree `order`."""
+    curved = mesh.mesh(order)
+    check_curves(curved)
+    discrete = discretise(problem, curved, order, ELEMENT)
+    p, start = discrete.program, 0
+    zone = np.zeros(len(p.g), dtype=bool)
+    for line in discrete.lines:
+        points = line.rows[mesh.closed[line.segments]].ravel()
+        zone[start + points[points >= 0]] = True
+        start += len(line.node)
+    known = replace(p, equality=zone, g=np.where(zone, p.g, np.inf))
+    minimiser = minimise_energy(replace(discrete, program=known), zone)
+    if not np.array_equal(minimiser.active, zone):
+        raise ConvergenceError("contact alone cannot hold a body", iterate=minimiser)
+    counts = {
+        "assemblies": 1,
+        "factorizations": minimiser.factorizations,
+        "back_solves": minimiser.back_solves,
+        "gap_searches": sum(line.searches for line in discrete.lines),
+        "curved_elements": int(np.count_nonzero(discrete.space.trace.curved_segments)),
+    }
+    return Solved(
+        problem=problem,
+        mesh=curved,
+        order=order,
+        element=ELEMENT,
+        displacement=discrete.displacement(minimiser.u, discrete.space.right_side),
+        discrete=discrete,
+        minimiser=minimiser,
+        work=counts | dict.fromkeys(("estimates", "equilibrations", "evaluations"), 0),
+    )
+
+
+def excess(solution: Solved, mesh: GeometricMesh, end: EndOfContact) -> float:
+    """Length by which a zone ends too far out, by the singular coefficient of the gap there.
+
+    The `solution` is of the `mesh` with layers at its ends.
+    """
+    state, x = solution.pairs[end.pair], mesh.vertices[end.vertex]
+    reach = mesh.vertices[end.opened] - x
+    size = float(np.linalg.norm(reach))
+    r = np.linalg.norm(state.line.position - x, axis=1) / size
+    beside = ~state.active & ((state.line.position - x) @ reach > 0)
+    last = np.sort(r[beside])[solution.order - 1]  # the last layer does not know r^(1/2)
+    beside &= (r > last * (1 + ROUND_OFF)) & (r < 1 + ROUND_OFF)
+    r = r[beside]
+    # The error of the gap in each layer is a share of r^(3/2), so that a weight of 1 / r is fair.
+    powers = np.vander(r, FIT_DEGREE + 1, increasing=True) / r[:, None]
+    K, c = np.linalg.lstsq(powers, state.gap[beside] / r**1.5, rcond=None)[0][:2]
+    return float(K / (1.5 * c)) * size
+
+
+def wrong_signs(solution: Solved, tips: Sequence[int]) -> str | None:
+    """Contradiction of contact between nodes: tension in the zone, or penetration; None if none.
+
+    Stresses are not known on segments that end at the vertices `tips` of layers.
+    """
+    trace, order = solution.discrete.space.trace, solution.order
+    s, _ = gauss(2 * SAMPLES_PER_NODE * order)
+    stress = ng.BoundaryFromVolumeCF(solution.stress)
+    reach = np.abs(solution.displacement.vec.FV().NumPy()).max()
+    for number, state in enumerate(solution.pairs):
+        line = state.line
+        known = np.asarray((line.rows >= 0).all(axis=1))
+        points = np.where(known[:, None], line.rows, 0)
+        closed = known & state.active[points].all(axis=1)
+        opened = np.flatnonzero(known & ~closed)
+        gap = state.gap[points[opened]] @ lagrange(order, s).T
+        if gap.min(initial=0.0) < -GAP_ERROR * reach:
+            at = np.unravel_index(gap.argmin(), gap.shape)
+            x = trace.point(line.segments[opened[at[0]]][None], s[at[1]][None])[0]
+            return f"pair {number} penetrates by {-gap.min():.2g} at ({x[0]:.6g}, {x[1]:.6g})"
+        inside = line.segments[closed]
+        inside = inside[~np.isin(trace.nodes[inside], tips).any(axis=1)]
+        segment, places = np.repeat(inside, len(s)), np.tile(s, len(inside))
+        sigma = trace.evaluate(stress, segment, places).reshape(-1, 2, 2)
+        normal = trace.normal(segment, places)
+        pressure = -np.einsum("ki,kij,kj->k", normal, sigma, normal)
+        if pressure.min(initial=0.0) < -PRESSURE_ERROR * pressure.max(initial=0.0):
+            x = trace.point(segment, places)[pressure.argmin()]
+            return f"pair {number} is under tension at ({x[0]:.6g}, {x[1]:.6g})"
+    return None
