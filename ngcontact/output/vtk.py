@@ -20,8 +20,7 @@ from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS
 from ..solved import Solved, full_stress
 from .files import check_path, replacing
-from .nodes import neighbour_tree, nodes_of, subdivision
-from .surface import contact_surface
+from .nodes import contact_surface, neighbour_tree, nodes_of, subdivision
 
 if TYPE_CHECKING:
     import pyvista
