@@ -1,4 +1,4 @@
-"""Nodes of curved elements and of surfaces in contact, values there; neighbours on curves."""
+"""Nodes of curved triangles and tetrahedra, values of a solution there; neighbours on curves."""
 
 from __future__ import annotations
 
@@ -13,16 +13,13 @@ from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial import Delaunay, KDTree
 
 from ..arrays import Array, Index, from_triplets
-from ..contact import with_vertices
-from ..estimator import pressure_field
-from ..fem import BoundaryTrace
 from ..problem import MeshArrays
-from ..reference import triangle
-from ..solved import Solved
 
 # Of VTK's tetrahedra, by the numbers of their vertices.
 EDGES = (0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)
 FACES = (0, 1, 3), (1, 2, 3), (2, 0, 3), (0, 2, 1)
+# Triangles and tetrahedra: linear, quadratic, Lagrange's of every higher order.
+VTK_CELLS = {2: (5, 22, 69), 3: (10, 24, 71)}
 # Places of the components of `full_stress` in the tensor.
 COMPONENTS = (0, 0), (1, 1), (0, 1), (2, 2), (1, 2), (0, 2)
 
@@ -70,10 +67,15 @@ def tetrahedron(order: int) -> Index:
 
 
 def subdivision(order: int) -> tuple[Index, Index]:
-    """Small triangles (order^2, 3) and sides (3, order + 1) of a `lattice` triangle."""
+    """Small triangles (t, 3), t = order^2, and sides (3, order + 1) of a `lattice` triangle."""
     inner = np.arange(3, 3 * order).reshape(3, -1)
     sides = np.column_stack([[0, 1, 2], inner, [1, 2, 0]])
     return Delaunay(lattice(order)[:, 1:]).simplices, sides
+
+
+def sized(cells: Index) -> Index:
+    """Numbers (m,) of `cells` (k, n) as VTK reads them: n before the nodes of each."""
+    return np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
 
 
 def nodes_of(mesh: ng.Mesh, order: int) -> Nodes:
@@ -126,62 +128,3 @@ def neighbour_tree(points: Array) -> csr_array:
     weight = np.maximum(distance[other], np.finfo(float).tiny)
     graph = from_triplets(weight, start[other], neighbour[other], (len(points), len(points)))
     return minimum_spanning_tree(graph)
-
-
-@dataclass(frozen=True, eq=False)
-class ContactSurface:
-    """Facets of a secondary with contact points; n nodes, at a corner of the body one a side."""
-
-    trace: BoundaryTrace
-    pair: int
-    facets: Index  # (k,), in `trace`
-    nodes: Index  # (k, q), of each facet, as `reference.triangle` has them
-    points: Array  # (n, 3), places of the nodes, lengths
-    row: Index  # (n,), number in ``solution.points``; -1 where none is
-
-    @property
-    def edges(self) -> Index:
-        """Nodes (3 k, order + 1) of the edges of all facets, in order."""
-        inner = triangle.edge_nodes(self.trace.order)
-        local = np.column_stack([triangle.EDGES[:, 0], inner, triangle.EDGES[:, 1]])
-        return np.asarray(self.nodes[:, local].reshape(-1, self.trace.order + 1))
-
-    @property
-    def triangles(self) -> Index:
-        """Nodes (t, 3) of small triangles, order^2 of them to each facet."""
-        return np.asarray(self.nodes[:, triangle.parts(self.trace.order)].reshape(-1, 3))
-
-    def values(self, values: Array) -> Array:
-        """Values (n,) at the nodes, of `values` (m,) at contact points.
-
-        Vertices of order 2, which are none, as `contact.with_vertices` has them; what has no value
-        is NaN.
-        """
-        rows, found = self.row[self.nodes], np.empty(len(self.row))
-        size = self.trace.sizes(self.facets)
-        known = np.append(values, np.nan)[rows]
-        found[self.nodes] = with_vertices(known, rows < 0, self.nodes, size)
-        return found
-
-    def pressure(self, solution: Solved) -> Array:
-        """Pressure (n,) at the nodes: that of `pressure_field`, the mean over facets at a node."""
-        field = pressure_field(solution, solution.pairs[self.pair])
-        found = self.trace.evaluate(field, *self.trace.at_nodes(self.facets))[:, 0]
-        at = self.nodes.ravel()
-        # Means beside the end of contact go on below 0, where no row is.
-        least = min(0.0, float(solution.pressure.min()))
-        return np.maximum(np.bincount(at, found) / np.bincount(at), least)
-
-
-def contact_surface(solution: Solved, pair: int) -> ContactSurface:
-    """The surface of one pair: the facets that have contact points."""
-    trace, zone = solution.discrete.space.trace, solution.pairs[pair].line
-    first = int(np.searchsorted(solution.pair, pair))
-    kept = (zone.rows >= 0).any(axis=1)
-    facets, rows = zone.segments[kept], zone.rows[kept]
-    key = trace.nodes[facets] * (len(solution.points) + 1) + rows + 1
-    _, one, nodes = np.unique(key, return_index=True, return_inverse=True)
-    facet, place = trace.at_nodes(facets)
-    row = np.where(rows < 0, -1, first + rows).ravel()[one]
-    points = trace.point(facet[one], place[one])
-    return ContactSurface(trace, pair, facets, nodes.reshape(key.shape), points, row)

@@ -11,7 +11,7 @@ import numpy as np
 from ..arrays import Array, Index
 from ..solved import Solved
 from .files import check_path
-from .nodes import EDGES, FACES, ContactSurface, contact_surface, nodes_of
+from .nodes import EDGES, FACES, VTK_CELLS, nodes_of, sized
 from .pictures import (
     COLOURS,
     DIVERGING,
@@ -25,7 +25,7 @@ from .pictures import (
     show,
 )
 from .scene import AXES, STRAIGHT, Style, chosen_scale
-from .vtk import VTK_CELLS, sized
+from .surface import ContactSurface, contact_surface
 
 if TYPE_CHECKING:
     import pyvista

@@ -20,7 +20,8 @@ from ..fem import von_mises
 from ..problem import ABOUT_AN_AXIS
 from ..solved import Solved, full_stress
 from .files import check_path, replacing
-from .nodes import contact_surface, neighbour_tree, nodes_of, subdivision
+from .nodes import VTK_CELLS, neighbour_tree, nodes_of, sized, subdivision
+from .surface import contact_surface
 
 if TYPE_CHECKING:
     import pyvista
@@ -29,8 +30,6 @@ if TYPE_CHECKING:
 PLANE: tuple[str, ...] = ("xx", "yy", "xy", "zz")
 MERIDIAN: tuple[str, ...] = ("rr", "zz", "rz", "hoop")
 SOLID = ("xx", "yy", "zz", "xy", "yz", "xz")  # as VTK orders those of a symmetric tensor
-# Triangles and tetrahedra: linear, quadratic, Lagrange's of every higher order.
-VTK_CELLS = {2: (5, 22, 69), 3: (10, 24, 71)}
 VTK_WEDGE = 13
 LINKS = {False: "lines", True: "faces"}  # cells between contact points, of solids
 SECTION_ANGLE = 6.0  # degrees between two sections of a body of revolution, at most
@@ -172,11 +171,6 @@ def _increasing(times: Iterable[float]) -> list[float]:
 def _in_space(vectors: Array) -> Array:
     """Vectors (k, d) with a third component 0 in the plane."""
     return np.pad(vectors, ((0, 0), (0, 3 - vectors.shape[1])))
-
-
-def sized(cells: Index) -> Index:
-    """Numbers (m,) of `cells` (k, n) as VTK reads them: n before the nodes of each."""
-    return np.column_stack([np.full(len(cells), cells.shape[1]), cells]).ravel()
 
 
 def _bodies(solution: Estimated, sections: Sections | None) -> pyvista.UnstructuredGrid:

@@ -18,11 +18,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
+from numpy.typing import NDArray
 
-from ..arrays import Array, Index, across, from_triplets, rows_of
+from ..arrays import Array, Index, across, rows_of
 from ..contact import (
     ContactState,
     in_contact,
@@ -158,27 +159,37 @@ def _neighbours(state: ContactState) -> Index:
     return np.array([one[both], other[both]]).T
 
 
+def _labels(links: Index, count: int) -> Index:
+    """One number for each connected part of `count` points with `links` (l, 2), (count,)."""
+    label = np.arange(count)
+    while (label[links[:, 0]] != label[links[:, 1]]).any():  # of paths: as often as they halve
+        np.minimum.at(label, links, label[links].min(axis=1, keepdims=True))
+        label = label[label]
+    return label
+
+
 def zones_of(state: ContactState) -> ContactZones:
     """The zones of one pair: points in contact are linked along the line, of solids by facets."""
-    line, m, plane = state.line, len(state.gap), state.line.dim == 2
-    closed = in_contact(line, state.active) if plane else state.active
-    parts = np.concatenate([_neighbours(state), twins(line)]) if plane else line.rows
-    met, opened = (np.append(x, False)[parts] for x in (closed, ~closed))
+    line, m, corners = state.line, len(state.gap), twins(state.line)
+    closed, parts = state.active, line.rows
+    if line.dim == 2:
+        closed = in_contact(line, closed) if len(corners) else closed
+        parts = np.concatenate([_neighbours(state), corners])
+    met, opened = ((parts >= 0) & x[parts] for x in (closed, ~closed))
     first = parts[np.arange(len(parts)), met.argmax(axis=1)]
-    one, other = np.broadcast_to(first[:, None], parts.shape)[met], parts[met]
-    _, label = connected_components(from_triplets(np.ones(len(one)), one, other, (m, m)))
-    zones, number = np.unique(label[closed], return_inverse=True)
-    ending = label[first[met.any(axis=1) & opened.any(axis=1)]]
-    _, at_node = np.unique(line.node[closed], return_index=True)
+    label = _labels(np.array([(first[:, None] + 0 * parts)[met], parts[met]]).T, m)
 
-    def sums(values: Array) -> Array:
-        return np.asarray(np.bincount(number, values[closed], len(zones)), dtype=float)
+    def sums(points: Index, values: Array | None = None) -> NDArray[Any]:
+        """Sums (k,) by zones of `values` (j,), of ones without any, at `points` (j,)."""
+        return np.bincount(label[points], values, m)[zones]
 
+    (inside,) = closed.nonzero()
+    (zones,) = np.bincount(label[inside], minlength=m).nonzero()
     return ContactZones(
-        force=sums(state.force),
-        weight=sums(line.weight),
-        nodes=np.bincount(number[at_node], minlength=len(zones)),
-        ends=np.bincount(np.searchsorted(zones, ending), minlength=len(zones)),
+        force=sums(inside, state.force[inside]),
+        weight=sums(inside, line.weight[inside]),
+        nodes=sums(inside) - sums(corners[closed[corners].all(axis=1), 0]),
+        ends=sums(first[met.any(axis=1) & opened.any(axis=1)]),
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from ngcontact import Contact, solve
 from ngcontact.output import plot_solids, write_film
-from ngcontact.output.nodes import contact_surface
+from ngcontact.output.surface import contact_surface
 from tests.output.test_solids import PRESSURE, pressed_ball, pressed_cube
 
 

@@ -9,7 +9,8 @@ import pyvista
 
 from ngcontact import Contact, Elastic, Problem, solve, write_series
 from ngcontact.geometries import ball_on_block, cube_on_block, shells
-from ngcontact.output.nodes import contact_surface, nodes_of
+from ngcontact.output.nodes import nodes_of
+from ngcontact.output.surface import contact_surface
 
 PRESSURE = 0.1
 

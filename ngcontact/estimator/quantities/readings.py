@@ -35,10 +35,12 @@ from ...discrete import load_by_shape
 from ...errors import ContactError, warn
 from ...fem import BoundaryTrace, FacetTrace, load_vector, stress_of
 from ...quadrature import has_rough_loads
+from ...solved import Solved
 from ..bound import WORK_BONUS, EquilibratedStress, Guaranteed, force_bar
+from ..residual import Estimated
 from .contact import approach_of, area_in_contact, direction_of, ends_of, held_point_force, peak_of
 from .stresses import largest_von_mises, singular_corners
-from .surfaces import pressure_field, quantities_of_solids
+from .surfaces import pressure_at_vertices, pressure_field
 from .table import Quantities, Quantity, unknown
 
 # Relative errors over the square of the relative estimate, measured on random scenes of all orders.
@@ -50,6 +52,12 @@ VALUE_ROUND_OFF = 64 * np.finfo(float).eps
 AXIS_COORDINATE = 1e-14  # coordinate over the bodies' extent that is 0
 DX_ORDER = 5  # degree of NGSolve's quadrature with dx, without a bonus
 STRAIGHT = 1e-12  # difference of directions that are one: round-off
+EARLIER_LEVELS = 2  # before the last one, whose figures give the error
+NAMES = (  # of figures of solids
+    "force",
+    *(f"force, {axis}" for axis in "xyz"),
+    *("contact area", "mean pressure", "peak pressure", "energy"),
+)
 
 
 class Measured(Guaranteed):
@@ -266,3 +274,52 @@ def _component_error(solution: Guaranteed, pair: int, e: Array) -> float:
             missed += float(ng.Integrate(work * dx, mesh))
         missed -= float(a @ (space.A @ b)) - (0.0 if space.initial is None else space.initial @ b)
     return error + noise + abs(missed)
+
+
+def figures(solution: Solved, state: ContactState) -> tuple[Array, Array]:
+    """Values (8,) of a pair of solids by `NAMES`, and where (3,) the pressure is largest."""
+    trace, line = solution.discrete.space.trace, state.line
+    assert isinstance(trace, FacetTrace)  # of solids
+    force = -state.force @ line.direction
+    along = float(np.linalg.norm(force))
+    if line.contact.direction is not None:
+        along = abs(float(force @ np.array(line.contact.direction)))
+    area = area_on_surface(signed_distance(solution.problem, trace, state), state)
+    if trace.order == 3:
+        facet, s = trace.at_nodes(line.segments)
+        pressure = trace.evaluate(pressure_field(solution, state), facet, s)[:, 0]
+    else:
+        facet, s = np.repeat(line.segments, 3), np.tile(np.eye(3), (len(line.segments), 1))
+        pressure = pressure_at_vertices(trace, state).ravel()
+    at = np.argmax(pressure)
+    mean, peak = float(state.force.sum()) / area if area > 0 else 0.0, float(pressure[at])
+    values = [along, *(force + 0.0), area, mean, peak, solution.energy]
+    return np.array(values), trace.point(facet[[at]], s[[at]])[0]
+
+
+def earlier_figures(solution: Estimated) -> tuple[Array, ...]:
+    """Figures (c, 8) of a level of solids and the one before it, which the next level needs."""
+    now = np.array([figures(solution, state)[0] for state in solution.pairs])
+    return (*solution.earlier, now)[-EARLIER_LEVELS:]
+
+
+def quantities_of_solids(solution: Estimated, pair: int) -> Quantities:
+    """Values of a pair, on levels of `adapt` with the larger of the last two level differences."""
+    values, place = figures(solution, solution.pairs[pair])
+    levels = np.array([*(before[pair] for before in solution.earlier), values])
+    known = len(levels) > EARLIER_LEVELS
+    errors = np.abs(np.diff(levels, axis=0)).max(axis=0) if known else np.full(len(NAMES), np.nan)
+    rows = [
+        Quantity(
+            name,
+            float(value),
+            float(error),
+            "estimated" if known else "none",
+            place if name == "peak pressure" else None,
+        )
+        for name, value, error in zip(NAMES, values, errors, strict=True)
+    ]
+    note = "errors: the larger of the last two differences between levels"
+    if not known:
+        note = "without errors: the third level of adapt and later ones have them"
+    return Quantities(tuple(rows), note)

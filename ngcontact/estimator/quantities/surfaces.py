@@ -1,4 +1,4 @@
-"""The pressure as a field, on lines and on surfaces, and quantities of the contact of solids."""
+"""The pressure as a field, on lines and on surfaces."""
 
 from __future__ import annotations
 
@@ -6,28 +6,11 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
-from ...contact import (
-    WHOLE_SHARE,
-    ContactState,
-    area_in_contact,
-    partners,
-    rays,
-    signed_distance,
-    with_vertices,
-)
+from ...contact import WHOLE_SHARE, ContactState, partners, rays, with_vertices
 from ...fem import BoundaryTrace, FacetTrace
 from ...problem import MeshArrays
 from ...reference import triangle
 from ...solved import Solved
-from ..residual import Estimated
-from .table import Quantities, Quantity
-
-EARLIER_LEVELS = 2  # before the last one, whose figures give the error
-NAMES = (
-    "force",
-    *(f"force, {axis}" for axis in "xyz"),
-    *("contact area", "mean pressure", "peak pressure", "energy"),
-)
 
 
 def pressure_field(solution: Solved, state: ContactState) -> ng.GridFunction:
@@ -39,7 +22,7 @@ def pressure_field(solution: Solved, state: ContactState) -> ng.GridFunction:
         return _by_facet(trace, boundary, trace.order, line.segments, s, values, 0 * values + 1)
     if trace.order == 3:
         return _mean_traction(solution, trace, state)
-    values, whole = _at_vertices(trace, state), np.ones(len(state.force))
+    values, whole = pressure_at_vertices(trace, state), np.ones(len(state.force))
     if (line.covered_shares(whole, whole) > WHOLE_SHARE).all():  # continuous
         field = ng.GridFunction(ng.H1(solution.mesh, order=1, definedon=boundary))
         field.vec.FV().NumPy()[trace.nodes[line.segments][:, :3]] = values
@@ -69,7 +52,7 @@ def _at_nodes(trace: BoundaryTrace, state: ContactState) -> Array:
     return values
 
 
-def _at_vertices(trace: FacetTrace, state: ContactState) -> Array:
+def pressure_at_vertices(trace: FacetTrace, state: ContactState) -> Array:
     """Pressures (k, 3) at the vertices of facets: of several facets the mean, by what faces."""
     line, whole = state.line, np.ones(len(state.force))
     vertices = trace.nodes[line.segments]
@@ -144,52 +127,3 @@ def _mean_traction(solution: Solved, trace: FacetTrace, state: ContactState) -> 
         values[met] = (values[met] + other) / 2
     size = np.linalg.norm(trace.area_vector(facet, s), axis=1).reshape(-1, len(weights)) * weights
     return _by_facet(trace, boundary, d, facets, s, values.reshape(size.shape), size)
-
-
-def figures(solution: Solved, state: ContactState) -> tuple[Array, Array]:
-    """Values (8,) of a pair of solids by `NAMES`, and where (3,) the pressure is largest."""
-    trace, line = solution.discrete.space.trace, state.line
-    assert isinstance(trace, FacetTrace)  # of solids
-    force = -state.force @ line.direction
-    along = float(np.linalg.norm(force))
-    if line.contact.direction is not None:
-        along = abs(float(force @ np.array(line.contact.direction)))
-    area = area_in_contact(signed_distance(solution.problem, trace, state), state)
-    if trace.order == 3:
-        facet, s = trace.at_nodes(line.segments)
-        pressure = trace.evaluate(pressure_field(solution, state), facet, s)[:, 0]
-    else:
-        facet, s = np.repeat(line.segments, 3), np.tile(np.eye(3), (len(line.segments), 1))
-        pressure = _at_vertices(trace, state).ravel()
-    at = np.argmax(pressure)
-    mean, peak = float(state.force.sum()) / area if area > 0 else 0.0, float(pressure[at])
-    values = [along, *(force + 0.0), area, mean, peak, solution.energy]
-    return np.array(values), trace.point(facet[[at]], s[[at]])[0]
-
-
-def earlier_figures(solution: Estimated) -> tuple[Array, ...]:
-    """Figures (c, 8) of a level of solids and the one before it, which the next level needs."""
-    now = np.array([figures(solution, state)[0] for state in solution.pairs])
-    return (*solution.earlier, now)[-EARLIER_LEVELS:]
-
-
-def quantities_of_solids(solution: Estimated, pair: int) -> Quantities:
-    """Values of a pair, on levels of `adapt` with the larger of the last two level differences."""
-    values, place = figures(solution, solution.pairs[pair])
-    levels = np.array([*(before[pair] for before in solution.earlier), values])
-    known = len(levels) > EARLIER_LEVELS
-    errors = np.abs(np.diff(levels, axis=0)).max(axis=0) if known else np.full(len(NAMES), np.nan)
-    rows = [
-        Quantity(
-            name,
-            float(value),
-            float(error),
-            "estimated" if known else "none",
-            place if name == "peak pressure" else None,
-        )
-        for name, value, error in zip(NAMES, values, errors, strict=True)
-    ]
-    note = "errors: the larger of the last two differences between levels"
-    if not known:
-        note = "without errors: the third level of adapt and later ones have them"
-    return Quantities(tuple(rows), note)
