@@ -10,10 +10,11 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import legendre, polynomial
-from scipy.special import roots_jacobi
+from scipy.special import comb, roots_jacobi
 
 from .arrays import Array, Index
 
+COEFFICIENT_ROUND_OFF = 1e-12  # of coefficients in Bernstein's basis, relative to values
 HALVINGS = 54  # of [-1, 1], to the last bit
 
 
@@ -95,12 +96,34 @@ def _slopes(order: int) -> Array:
     return np.asarray(2 * legendre.legder(_coefficients(order)))
 
 
+@lru_cache
+def _to_bernstein(order: int) -> Array:
+    """Matrix (order + 1, order + 1) from values at Gauss-Lobatto points to Bernstein's basis."""
+    s, k = gauss_lobatto(order)[:, None], np.arange(order + 1)
+    return np.asarray(np.linalg.inv(comb(order, k) * s**k * (1 - s) ** (order - k)))
+
+
 def zeros(order: int, values: Array) -> tuple[Index, Array]:
     """All places in [0, 1] where polynomials change their sign: numbers (r,), parameters (r,).
 
-    Of degree `order` from 1, by their `values` (k, order + 1) at its Gauss-Lobatto points. Between
-    the zeros of its derivative a polynomial is monotone, so that halving finds them all, from the
-    linear derivative upwards.
+    Of degree `order` from 1, by their `values` (k, order + 1) at its Gauss-Lobatto points. Where
+    coefficients in Bernstein's basis have one sign there is none.
+    """
+    coefficients = values @ _to_bernstein(order).T
+    bound = COEFFICIENT_ROUND_OFF * np.abs(values).max(axis=1, initial=0.0)
+    low, high = coefficients.min(axis=1), coefficients.max(axis=1)
+    some = np.flatnonzero((low <= bound) & (high >= -bound))
+    if not some.size:
+        return some, np.zeros(0)
+    number, s = _zeros(order, values[some])
+    return some[number], s
+
+
+def _zeros(order: int, values: Array) -> tuple[Index, Array]:
+    """The same of polynomials that may have some.
+
+    Between the zeros of its derivative a polynomial is monotone, so that halving finds them all,
+    from the linear derivative upwards.
     """
     powers = np.vander(2 * gauss_lobatto(order) - 1, increasing=True)
     coefficients = np.linalg.solve(powers, values.T).T

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from ngcontact.lagrange import gauss, gauss_lobatto, lagrange, lagrange_derivative
+from ngcontact.lagrange import gauss, gauss_lobatto, lagrange, lagrange_derivative, zeros
 
 ORDERS = [1, 2, 3, 4, 5]
 S = np.linspace(0, 1, 23)
@@ -43,6 +43,22 @@ def test_interpolation_reproduces_polynomials_of_its_degree(order):
     error = S ** (order + 1) - lagrange(order, S) @ nodes ** (order + 1)
     expected = np.prod(S[:, None] - nodes, axis=1)
     np.testing.assert_allclose(error, expected, atol=2e-14)
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_zeros_are_all_changes_of_sign(order):
+    """Of polynomials by their roots, inside and outside, apart by a twenty-fifth at least."""
+    rng = np.random.default_rng(order)
+    places = -0.49 + 0.04 * np.arange(50)  # 0 and 1 are none of them
+    roots = np.array([rng.choice(places, order, replace=False) for _ in range(200)])
+    values = np.prod(gauss_lobatto(order)[:, None] - roots[:, None], axis=2)
+    number, s = zeros(order, values)
+    inside = (roots > 0) & (roots < 1)
+    np.testing.assert_array_equal(np.bincount(number, minlength=200), inside.sum(axis=1))
+    expected = np.sort(np.where(inside, roots, np.inf), axis=1)
+    # Round-off of coefficients over the product of distances of roots, at least 1e-5 at degree 5.
+    np.testing.assert_allclose(s, expected[np.isfinite(expected)], atol=1e-9)
+    assert zeros(order, np.ones((3, order + 1)))[0].size == 0
 
 
 @pytest.mark.parametrize("axis", [-1, 1])
