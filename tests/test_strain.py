@@ -16,6 +16,7 @@ from ngcontact.adaptivity import refined
 from ngcontact.geometries.region import RIGHT, UP, body, compound, quarter_arc, segment
 from ngcontact.mesh import curve, first_mesh
 from ngcontact.problem import MeshArrays, move_vertices
+from tests.solids.test_bad_input import box
 from tests.test_fits import LAWS, fit, line_force
 
 MODELS = ("plane strain", "plane stress", "axisymmetric")
@@ -79,6 +80,29 @@ def test_uniform_strains_of_free_bodies_make_no_stress(model, kind, order):
         zz = -2e11 * HOT
         solution = solve(block(UNIFORM[kind]), maxh=0.5, order=order)
         assert solution.at([0.4, 0.1]).out_of_plane_stress == pytest.approx(zz, rel=1e-12)
+
+
+OF_SOLIDS = {
+    "number": HOT,
+    "triple": (HOT, 2 * HOT, -HOT),
+    "matrix": HOT * np.array([[1.0, 0.3, 0.1], [0.3, -1.0, 0.2], [0.1, 0.2, 2.0]]),
+}
+
+
+@pytest.mark.parametrize("kind", OF_SOLIDS)
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_solids_that_nothing_holds_follow_their_strain(kind, order):
+    """Measured 1e-13 of E alpha dT."""
+    given = OF_SOLIDS[kind]
+    given = given.tolist() if kind == "matrix" else given
+    problem = Problem(OCCGeometry(box()), {"a": STEEL}, strain={"a": given})
+    solution = solve(problem, maxh=0.7, order=order)
+    points = solution.mesh.MapToAllElements({ng.TET: ng.IntegrationRule(ng.TET, 4)}, ng.VOL)
+    assert np.abs(solution.stress(points)).max() < 1e-12 * 2e11 * HOT
+    slope = ng.Grad(solution.displacement)(points).reshape(-1, 3, 3)
+    expected = given if kind == "matrix" else np.diag(np.broadcast_to(given, 3))
+    found = (slope + np.swapaxes(slope, 1, 2)) / 2
+    assert found == pytest.approx(np.broadcast_to(expected, found.shape), abs=1e-12 * HOT)
 
 
 @pytest.mark.parametrize("model", MODELS)

@@ -36,10 +36,6 @@ class _Solid(Model):
         """Refused: all of the stress of a solid is in its tensor."""
         raise ValueError("a solid has no stress out of a plane: .stress has all of it, (3, 3)")
 
-    def hoop(self, normal: CF) -> CF:
-        """Refused: solids have no axis."""
-        raise ValueError("a solid has no hoop stress: take components of .stress, (3, 3)")
-
     def divergence(self, plane: CF, stress: CF, normal: Callable[[], CF]) -> CF:
         return plane
 

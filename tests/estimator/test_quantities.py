@@ -113,6 +113,8 @@ def test_the_table_reads():
         q["torque"]
     with pytest.raises(ValueError, match="pair=1 is not a contact pair"):
         solution.quantities(1)
+    with pytest.raises(TypeError, match="pair='first' is not an integer"):
+        solution.contact_force("first")
 
 
 def free_pin(half=False):

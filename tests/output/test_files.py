@@ -3,6 +3,7 @@
 import errno
 import os
 import tempfile
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -102,6 +103,19 @@ def test_runs_are_drawn_with_their_rates(tmp_path):
     triangle = next(line.get_xydata() for line in axes.lines if len(line.get_xydata()) == 4)
     assert (triangle[:, 1] >= 1e-2).all()  # above, where the other run is not
     assert (tmp_path / "a.png").stat().st_size > 0
+    levels = [
+        SimpleNamespace(
+            displacement=SimpleNamespace(space=SimpleNamespace(ndof=n)),
+            order=1,
+            relative_error_estimate=3 * n**-0.5,
+            relative_error_bound=n**-0.5,
+            bounded=n > 1e2,
+        )
+        for n in x
+    ]
+    [axes] = plot_convergence(levels).axes
+    [bound] = [line for line in axes.lines if line.get_label() == "bound"]
+    assert bound.get_xydata() == pytest.approx(np.column_stack([x, x**-0.5])[1:])
     with pytest.raises(ValueError, match="no run is called three"):
         plot_convergence(runs, tmp_path / "b.png", rates={"three": 1.0})
     with pytest.raises(ValueError, match='run "one" is empty'):

@@ -84,6 +84,14 @@ def test_other_peaks_are_not_cut(solution, pressure):
     assert cut_pressure(touch(solution, [0.0], 0.9, pressure)) is None
 
 
+def test_where_nothing_is_in_contact_the_whole_line_is_shown(tmp_path, solution):
+    figure = plot_solution(solution, tmp_path / "a.png")
+    [axes] = [a for a in figure.axes if a.get_title() == "contact pressure"]
+    low, high = axes.get_xlim()
+    assert low <= -1
+    assert high >= 1
+
+
 def lines_of(points, direction=None, pair=None):
     contact = [SimpleNamespace(direction=direction)] * 2
     pair = np.zeros(len(points), dtype=int) if pair is None else pair
@@ -191,6 +199,8 @@ def test_fields_of_a_uniform_stress(uniform, field, value):
         ({"field": 3}, TypeError, "field = 3"),
         ({"field": ng.CF((1, 2))}, ValueError, "2 components"),
         ({"limits": (2.0, 1.0)}, ValueError, "the smaller first"),
+        ({"units": "mm"}, TypeError, "units = 'mm': give a mapping"),
+        ({"profile": {"a": ("x", "y")}}, TypeError, 'profile\\["a"\\]'),
         ({"units": {"force": "N"}}, ValueError, '"force" is none of'),
         ({"units": {"stress": ("MPa", 0.0)}}, ValueError, "its size"),
         ({"profile": {"a": ([1, 2], [3])}}, TypeError, 'profile\\["a"\\]'),

@@ -72,6 +72,8 @@ def test_contact_normalises():
     assert Contact("a", gap=ng.x).primary is None
     assert Contact("a", gap=max).gap is max
     assert Contact("a", "b").direction is None
+    with pytest.raises(ValueError, match=r"a rigid obstacle .* cannot be the secondary"):
+        Contact("a", gap=0).swapped()
 
 
 def test_problem_normalises(make, mesh):
@@ -98,6 +100,10 @@ def test_problem_normalises(make, mesh):
     assert problem.traction["b"](at) == (1, 0.5)
     assert problem.force["block"](at) == (0, -9.81)
     assert problem.contact == (TOUCH,)
+    assert repr(problem) == (
+        'Problem(plane strain; bodies block, punch; contact "punch_bottom" with "block_top")'
+    )
+    assert make(displacement=None).displacement == {}
 
 
 def test_pressure_pushes_against_the_outward_normal(make, mesh):
@@ -149,6 +155,8 @@ def test_bodies_are_the_connected_pieces(mesh):
         ({"gap": math.nan}, ValueError, "gap = nan: give a finite number"),
         ({"gap": ng.CF((1, 2))}, ValueError, "gap is a CoefficientFunction of dim 2: give a sca"),
         ({"bilateral": 1}, TypeError, "bilateral = 1: give True or False"),
+        ({"rows": "all"}, ValueError, "rows = 'all': choose one of"),
+        ({"roles": "auto", "primary": None, "gap": 0}, ValueError, "obstacle has no other side"),
         ({"friction": 0.2}, TypeError, r"frictionless, .* no friction=0\.2.*topics/limits\.md"),
     ],
 )
@@ -175,6 +183,11 @@ def test_contact_refuses(arguments, error, message):
         ({"force": {"block": -9.81}}, TypeError, 'force "block" = -9.81: give a pair'),
         ({"force": [("block", (0, 1))]}, TypeError, r"force = \[.*: give a dict"),
         ({"contact": [TOUCH, ("a", "b")]}, TypeError, r"contact\[1\] = \('a', 'b'\): give a Con"),
+        ({"geometry": shapes()[0]}, TypeError, r"a Face, which OCCGeometry\(shape, dim=2\) wraps"),
+        ({"sliding": 3}, TypeError, "sliding = 3: give a region name or a sequence of names"),
+        ({"sliding": ""}, ValueError, 'sliding = "": give a region name'),
+        ({"model": 2}, TypeError, "model = 2: give one of the strings"),
+        ({"model": "solid"}, ValueError, "model = 'solid' is for solids: choose one of"),
         ({"model": "3d"}, ValueError, 'model "3d" is unknown: choose one of .*plane stress'),
     ],
 )
@@ -191,6 +204,7 @@ OBSTACLE = {"secondary": "punch_bottom", "direction": (0, -1)}
     [
         ({"materials": {"blok": STEEL}}, r'materials "blok" .*mean "block"\? .*\[\'block\', \'pun'),
         ({"force": {"bottom": (0, 1)}}, r'force "bottom" selects no region; .*\[\'block\', \'pun'),
+        ({"traction": {"punch": 1}}, 'traction "punch" .* is a body, and boundaries are asked'),
         ({"traction": {"left|rigth": 1}}, 'traction "rigth" .*did you mean "right"'),
         ({"sliding": "(a|b)x"}, r'sliding "\(a\|b\)x" selects no region; there are \[\'block_top'),
         ({"sliding": "left("}, r'"left\(" is no name and no regular expression'),

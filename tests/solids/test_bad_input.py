@@ -9,7 +9,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 from netgen.meshing import Element2D, Element3D, FaceDescriptor, Mesh, MeshPoint, Pnt
-from ngsolve.meshes import MakeStructured3DMesh
+from ngsolve.meshes import MakeStructured2DMesh, MakeStructured3DMesh
 
 from drivers.reference import cases
 from ngcontact import Contact, Elastic, Hooke, Problem, adapt, solve
@@ -115,6 +115,11 @@ def test_unnamed_solids():
             "must take three arrays",
         ),
         (
+            {"contact": [Contact("upper_bottom", gap=lambda x, y, z: x.astype(str))]},
+            TypeError,
+            "returns values of type <U32: return real numbers",
+        ),
+        (
             {"contact": [Contact("upper_top", "lower_bottom", direction=(0, 0, -1))]},
             ValueError,
             r"no point.*faces.*direction=\(0, 0, -1\)",
@@ -135,6 +140,8 @@ def test_what_stays_plane():
     with pytest.raises(ValueError, match="leave it out with solids"):
         solve(problem, element="superparametric")
     solution = solve(problem)
+    with pytest.raises(ValueError, match="mesh has dimension 2, and the bodies are solids"):
+        solve(problem, MakeStructured2DMesh(quads=False, nx=1))
     assert solution.order == 2
     for name in ("hoop_stress", "out_of_plane_stress"):
         with pytest.raises(ValueError, match="a solid has no"):

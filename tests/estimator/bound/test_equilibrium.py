@@ -141,6 +141,8 @@ def test_a_function_of_elements_and_places():
     """Its distance to sigma_h is the constitutive part."""
     solution = solved("weighted-2")
     mesh, found = solution.mesh, solution.equilibrated
+    assert found.degree >= 2
+    assert found.triangles.shape == (len(found.element), 3, 2)
     t, w = gauss(60)
     a, b = (z.ravel() for z in np.meshgrid(t, t))
     reference = np.column_stack([a * (1 - b), a * b])
