@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import fields
+from functools import lru_cache
 from typing import Any, TypeAlias, TypeVar
 
 import numpy as np
@@ -53,14 +54,20 @@ def from_triplets(
     return sp.csr_array((values, at), shape=shape)
 
 
-def field_names(record: Any) -> list[str]:
-    """Names of the fields of a dataclass, or of one of its objects."""
-    return [field.name for field in fields(record)]
+@lru_cache
+def _names(kind: type) -> list[str]:
+    return [field.name for field in fields(kind)]
+
+
+def by_field(record: Any) -> dict[str, Any]:
+    """What a record holds, by the names of its fields."""
+    kind: Any = type(record)
+    return {name: getattr(record, name) for name in _names(kind)}
 
 
 def rows_of(record: Record, at: Index | Mask, *names: str) -> Record:
     """The rows `at` (k,), numbers or a mask, of arrays of a record: all, or the `names` alone."""
-    arrays = {name: getattr(record, name) for name in field_names(record)}
+    arrays = by_field(record)
     chosen = {name: arrays[name][at] for name in names or arrays}
     return type(record)(**arrays | chosen)
 
@@ -69,13 +76,13 @@ def joined(records: Sequence[Record]) -> Record:
     """The rows of all `records`, one after the other; there is at least one record."""
     if len(records) == 1:
         return records[0]
-    kind = type(records[0])
+    kind: Any = type(records[0])
 
     def stacked(name: str) -> Any:
         arrays = [getattr(record, name) for record in records]
         return sp.vstack(arrays, format="csr") if sp.issparse(arrays[0]) else np.concatenate(arrays)
 
-    return kind(*map(stacked, field_names(kind)))
+    return kind(*map(stacked, _names(kind)))
 
 
 def across(d: Array) -> Array:

@@ -146,7 +146,7 @@ def remaining(inner: Mask, covered: list[Parts]) -> Parts:
     outer = np.flatnonzero(~inner)
     count = len(outer)
     # Every segment as an interval [2 n, 2 n + 1] of one axis; an empty part at both of its ends.
-    ends = Parts(np.tile(outer, 2), np.repeat([0.0, 1.0], count), np.repeat([0.0, 1.0], count))
+    ends = Parts(np.concatenate([outer, outer]), *np.repeat([[0.0, 1.0]] * 2, count, axis=1))
     segment, start, stop = (
         np.concatenate([getattr(parts, name) for parts in (*covered, ends)])
         for name in ("segment", "start", "stop")
@@ -188,6 +188,9 @@ def followed_gap(
         allowed += OPENING_ROUND_OFF * np.abs(at_rule).max()
         rough = np.abs(at_between - at_rule @ follow.T).max(axis=1) > allowed
         rough &= number < MAX_PIECES
+        if not rough.any():
+            done.append(pieces)
+            break
         done.append(rows_of(pieces, np.flatnonzero(~rough)))
         pieces = rows_of(pieces, np.repeat(np.flatnonzero(rough), PIECE_DIVISIONS))
         step = pieces.share / PIECE_DIVISIONS
@@ -221,7 +224,7 @@ def directions(
     rows at the nodes, interpolated: exact on circles, on other curves to the degree plus one.
     """
     if line.contact.direction is not None:
-        d = np.tile(line.contact.direction, (len(s), 1))
+        d = np.full((len(s), 2), line.contact.direction)
         return d, np.zeros_like(d)
     nodal = np.append(line.direction, np.zeros((1, 2)), axis=0)[line.rows]
     without = line.rows < 0  # ends of Gamma_K on Gamma_u; parts that do not face

@@ -220,7 +220,7 @@ def _displacement(
         return np.asarray(w.reshape(*s.shape, len(data)) / solution.strain)
 
     number, start, length = np.arange(count), np.zeros(count), np.ones(count)
-    w = miss(number, np.tile(points, (count, 1)))
+    w = miss(number, points[None].repeat(count, axis=0))
     rough = rough_segments([*data.values()], mesh, segments, solution.strain * np.abs(w).max())
     if rough.any():
         found = pieces(miss, mesh, boundary.lengths(segments), np.flatnonzero(rough))

@@ -36,11 +36,10 @@ class Parts:
     def points(self, order: int) -> tuple[Index, BoundaryPoints]:
         """Number of its part (k,) and place of each Gauss point exact to a degree, weights in s."""
         rule, weight = gauss(order)
-        part = np.repeat(np.arange(len(self.segment)), len(rule))
-        length = (self.stop - self.start)[part]
-        s = self.start[part] + length * np.tile(rule, len(self.segment))
-        weights = length * np.tile(weight, len(self.segment))
-        return part, BoundaryPoints(self.segment[part], s, weights)
+        part = np.arange(len(self.segment)).repeat(len(rule))
+        length = (self.stop - self.start)[:, None]
+        s, weights = self.start[:, None] + length * rule, length * weight
+        return part, BoundaryPoints(self.segment[part], s.ravel(), weights.ravel())
 
 
 class PressureShare(NamedTuple):

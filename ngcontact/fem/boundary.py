@@ -262,7 +262,7 @@ class BoundaryTrace:
 
     def at_nodes(self, segments: Index) -> tuple[Index, Array]:
         """Segment (n,) and s (n,) of all nodes of `segments` (k,), one segment after the other."""
-        return np.repeat(segments, self.order + 1), self.places(segments).ravel()
+        return segments.repeat(self.order + 1), self.places(segments).ravel()
 
     def at_places(self, segments: Index, s: Array) -> tuple[Index, Array]:
         """Segment (n,) and s (n,) of the places `s` (g,) on each of `segments` (k,), in order."""

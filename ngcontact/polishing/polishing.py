@@ -21,7 +21,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..adaptivity import END_POWER, RefinementTree, corners
-from ..arrays import Array, Mask, field_names
+from ..arrays import Array, Mask, by_field
 from ..discrete import discretise, minimise_energy
 from ..errors import ContactError, ConvergenceError, warn
 from ..fem import BoundaryTrace, boundary_trace, model_of
@@ -167,8 +167,9 @@ def _polished(solution: Solution, digits: int) -> Solution:
         raise ContactError(wrong)
     if (reached := round(-math.log10(error))) < digits:
         warn(f"polish: order {order} has about {reached} digits, not {digits}")
-    kept = {name: getattr(polished, name) for name in field_names(polished)}
-    return Solution(**kept, tree=RefinementTree(polished.mesh, np.arange(polished.mesh.ne)))
+    return Solution(
+        **by_field(polished), tree=RefinementTree(polished.mesh, np.arange(polished.mesh.ne))
+    )
 
 
 def _quantities(solution: Solved) -> Array:

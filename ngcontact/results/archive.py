@@ -16,7 +16,7 @@ from typing import Any
 
 import ngsolve as ng
 
-from ..arrays import field_names
+from ..arrays import by_field
 from ..discrete import reassembled
 from ..fem import assemble, boundary_trace, model_of
 from ..mesh import keep_parents, vertex_parents
@@ -33,14 +33,14 @@ def state_of(solution: Solved) -> dict[str, Any]:
     """Picklable state from which `restored` makes a solution again."""
     discrete, plain = solution.discrete, {"discrete", "displacement"}
     discrete.space.require_mesh()
-    own = {name: getattr(solution, name) for name in field_names(solution) if name not in plain}
+    own = {name: x for name, x in by_field(solution).items() if name not in plain}
     own |= {name: vars(solution)[name] for name in STORED_MEMBERS if name in vars(solution)}
-    arrays = {name: getattr(discrete, name) for name in field_names(discrete)}
+    arrays = by_field(discrete)
     for name in ("problem", "space", "program", "systems"):
         del arrays[name]
     if discrete.rigid is not None:
         arrays["rigid"] = discrete.rigid.on(None)
-    program = {name: getattr(discrete.program, name) for name in field_names(discrete.program)}
+    program = by_field(discrete.program)
     del program["K"]
     return {
         "own": own,
