@@ -51,9 +51,9 @@ def test_end_of_hertz_contact(levels, order, enclosed, points):
     assert solution.contact_area() == pytest.approx(math.pi / 4 * radius_of(end) ** 2, rel=1e-9)
 
 
-@pytest.mark.parametrize(("order", "rms"), [(2, 8e-3), (3, 2.5e-2)])
+@pytest.mark.parametrize(("order", "rms"), [(2, 8e-3), (3, 1.5e-2)])
 def test_pressure_field_of_hertz_contact(levels, order, rms):
-    """Away from the end, relative to the peak, by area. Measured: 4.8e-3 and 1.5e-2."""
+    """Away from the end, relative to the peak, by area. Measured: 4.8e-3 and 9.0e-3."""
     solution = levels[order][-1]
     field, square = solution.pressure_field(), ng.x**2 + ng.y**2
     inside = ng.IfPos((0.8 * RADIUS) ** 2 - square, 1.0, 0.0)
@@ -62,10 +62,9 @@ def test_pressure_field_of_hertz_contact(levels, order, rms):
     miss = ng.Integrate(inside * (field - exact) ** 2 * top, solution.mesh)
     assert math.sqrt(miss / ng.Integrate(inside * top, solution.mesh)) < rms * PEAK
     assert isinstance(field.space, ng.H1 if order == 2 else ng.SurfaceL2)
-    if order == 2:  # the resultant is that of the contact, on plane facets
-        assert ng.Integrate(field * top, solution.mesh) == pytest.approx(
-            solution.force.sum(), rel=1e-10
-        )
+    # The resultant is that of the contact, on plane facets.
+    total = ng.Integrate(field * top, solution.mesh)
+    assert total == pytest.approx(solution.force.sum(), rel=1e-10)
 
 
 def test_quantities(levels):
@@ -194,11 +193,12 @@ def test_closed_ends_in_all_units(order):
             assert row.value / size == pytest.approx(known.value, rel=1e-8, abs=1e-12), row.name
 
 
-# Force of the field, relative: measured 1e-15, 5.1e-2 and 0.12. The corners of the punch are
-# singular: at order 3 both tractions miss the force by 6 % with the secondary above, too.
-@pytest.mark.parametrize(("order", "miss"), [(1, 1e-9), (2, 0.06), (3, 0.13)])
-def test_a_secondary_wider_than_its_primary(order, miss):
-    """A punch wholly in contact whose sides lie within facets of the block below."""
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_a_secondary_wider_than_its_primary(order):
+    """A punch wholly in contact whose sides lie within facets of the block below.
+
+    The field has the resultant of the contact, and no peak that the pressures of points lack.
+    """
     block, punch = occ.Box((-1, -1, -1), (1, 1, 0)), occ.Box((-0.53, -0.47, 0), (0.5, 0.5, 1))
     for body, name in ((block, "block"), (punch, "punch")):
         body.solids.name = name
@@ -214,12 +214,16 @@ def test_a_secondary_wider_than_its_primary(order, miss):
     assert force == pytest.approx(solution.force.sum(), rel=1e-9)
     assert solution.contact_area() == pytest.approx(1.03 * 0.97, rel=0.015)
     top = solution.mesh.Boundaries("block_top")
-    assert ng.Integrate(solution.pressure_field(), top) == pytest.approx(force, rel=miss)
+    field = solution.pressure_field()
+    assert ng.Integrate(field, top) == pytest.approx(force, rel=1e-9)
+    corners = ng.IntegrationRule([(1, 0), (0, 1), (0, 0)], [1] * 3)
+    values = np.asarray(field(solution.mesh.MapToAllElements(corners, top)))
+    assert values.max() < 1.5 * solution.pressure.max()  # measured: 1.27, 0.77 and 1.12 times
+    assert order == 3 or values.min() >= 0
 
 
-# At order 2 vertices at the rim take means, of facets that are scaled: 1.3e-3 measured.
-@pytest.mark.parametrize(("order", "miss"), [(1, 1e-9), (2, 2e-3)])
-def test_facets_beside_matched_ones_have_no_area(order, miss):
+@pytest.mark.parametrize("order", [1, 2, 3])
+def test_facets_beside_matched_ones_have_no_area(order):
     """Nodes face nodes under the upper cube; facets around it share some of them."""
     bodies = ("a", (0, 0, 0), (2, 2, 1), (4, 4, 2)), ("b", (0.5, 0.5, 1), (1.5, 1.5, 2), (2, 2, 2))
     problem = Problem(
@@ -231,4 +235,4 @@ def test_facets_beside_matched_ones_have_no_area(order, miss):
     solution = solve(problem, order=order)
     assert solution.contact_area() == pytest.approx(1.0, rel=1e-9)
     found = ng.Integrate(solution.pressure_field(), solution.mesh.Boundaries("a_top"))
-    assert found == pytest.approx(solution.force.sum(), rel=miss)
+    assert found == pytest.approx(solution.force.sum(), rel=1e-9)

@@ -98,11 +98,11 @@ class Measured(Guaranteed):
         faces it, so that the resultant is that of the contact. On solids of order 1 in H1 at orders
         1 and 2, between the pressures at vertices: at order 2 means, by area, of the linear
         functions through the middles of edges, whose resultant on plane facets is that of the
-        contact. Where facets face the primary in part it is linear on each facet, with means over
-        these: the resultant was met to 4 to 9 % on coarse meshes of wider secondaries. At order 3
-        of degree 2 on each facet with a point in contact, nearest to the mean traction of both
-        sides, whose resultant was met to 20 % there, and to 9 % beside corners where it is
-        infinite: better than `pressure` where the stress is resolved (docs/solids.md).
+        contact. Where facets face the primary in part it is linear on each facet, nowhere negative,
+        and has the resultant of the contact there. At order 3 of degree 2 on each facet with a
+        point in contact, the mean traction of both sides but for a constant, so that the resultant
+        is that of the contact, too: better than `pressure` where the stress is resolved
+        (docs/solids.md).
         """
         self.discrete.space.require_mesh()
         return pressure_field(self, state_of(self.pairs, pair))

@@ -6,7 +6,7 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
-from ...contact import WHOLE_SHARE, ContactState, partners, rays, with_vertices
+from ...contact import WHOLE_SHARE, ContactState, jacobian, partners, rays, with_vertices
 from ...fem import BoundaryTrace, FacetTrace
 from ...problem import MeshArrays
 from ...reference import triangle
@@ -20,17 +20,18 @@ def pressure_field(solution: Solved, state: ContactState) -> ng.GridFunction:
     if not isinstance(trace, FacetTrace):
         values, s = _at_nodes(trace, state), trace.places(line.segments)
         return _by_facet(trace, boundary, trace.order, line.segments, s, values, 0 * values + 1)
+    whole = np.ones(len(state.force))
+    mean = line.covered_shares(state.force / line.weight, whole)  # over whole facets
     if trace.order == 3:
-        return _mean_traction(solution, trace, state)
-    values, whole = pressure_at_vertices(trace, state), np.ones(len(state.force))
+        return _mean_traction(solution, trace, state, mean)
+    values = pressure_at_vertices(trace, state)
     if (line.covered_shares(whole, whole) > WHOLE_SHARE).all():  # continuous
         field = ng.GridFunction(ng.H1(solution.mesh, order=1, definedon=boundary))
         field.vec.FV().NumPy()[trace.nodes[line.segments][:, :3]] = values
         return field
-    share = line.covered_shares(np.abs(state.force / line.weight), np.abs(state.pressure))
-    # Facets without a pressure of their own share vertices with others.
-    share = np.where(share > 0, share, line.covered_shares(whole, whole) > WHOLE_SHARE)
-    values *= share[:, None]
+    values = np.maximum(values, 0.0)
+    values[~values.any(axis=1)] = 1.0
+    values *= (mean / values.mean(axis=1))[:, None]
     s = np.tile(np.eye(3), (len(values), 1))
     return _by_facet(trace, boundary, 1, line.segments, s, values, 0 * values + 1)
 
@@ -98,10 +99,12 @@ def _by_facet(
     return field
 
 
-def _mean_traction(solution: Solved, trace: FacetTrace, state: ContactState) -> ng.GridFunction:
+def _mean_traction(
+    solution: Solved, trace: FacetTrace, state: ContactState, mean: Array
+) -> ng.GridFunction:
     """Mean of the tractions of both sides along the direction, where a facet has points in contact.
 
-    Of bodies on rigid obstacles the traction of the one.
+    Of bodies on rigid obstacles the traction of the one; shifted to the `mean` (k,) of each facet.
     """
     line, d = state.line, trace.order - 1
     boundary = solution.mesh.Boundaries(line.contact.secondary)
@@ -125,5 +128,8 @@ def _mean_traction(solution: Solved, trace: FacetTrace, state: ContactState) -> 
         met = np.flatnonzero(found.segment >= 0)
         other = traction(found.segment[met], found.s[met], directions[met])
         values[met] = (values[met] + other) / 2
-    size = np.linalg.norm(trace.area_vector(facet, s), axis=1).reshape(-1, len(weights)) * weights
-    return _by_facet(trace, boundary, d, facets, s, values.reshape(size.shape), size)
+    size = jacobian(trace, line.contact, facet, s).reshape(-1, len(weights)) * weights
+    values = values.reshape(size.shape)
+    own = (size * values).sum(axis=1) / size.sum(axis=1)
+    values += (mean[touched] - own)[:, None]
+    return _by_facet(trace, boundary, d, facets, s, values, size)
