@@ -110,15 +110,6 @@ def has_rough_loads(problem: Problem, mesh: ng.Mesh, order: int) -> bool:
     return any(load.where_rough(order) for load in loads_of(problem, mesh))
 
 
-def narrow_forces(problem: Problem, mesh: ng.Mesh, order: int) -> Mask:
-    """Elements (ne,) in which quadrature of the usual order would miss a part of a body force."""
-    narrow = np.zeros(mesh.ne, dtype=bool)
-    for load in loads_of(problem, mesh):
-        if load.kind == "force" and (found := load.where_rough(order)):
-            narrow |= found.rough
-    return narrow
-
-
 def rough_load(
     load: ng.CoefficientFunction, region: ng.Region, degree: int, features: Array = NO_JUMPS
 ) -> RoughLoad | None:

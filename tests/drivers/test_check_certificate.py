@@ -157,8 +157,6 @@ TAMPERED_LOADS = {
     "no norms": alike("loads", np.zeros_like),
     "smaller norms": alike("loads", lambda v: v * (1 - 1e-6)),
     "negative norms": alike("loads", np.negative),
-    "a smaller distance": alike("replaced_distance", lambda v: changed(v, 1 - 1e-3)),
-    "distances replaced elsewhere": alike("replaced", lambda v: (v + 1) % (v.max() + 2)),
     "a force": alike("force", changed),
     "no force": alike("force", np.zeros_like),
     "a load": alike("side_traction", changed),

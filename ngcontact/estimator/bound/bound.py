@@ -17,30 +17,34 @@ from dataclasses import dataclass
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array
+from ...arrays import Array, Index
 from ...contact import ContactState
 from ...errors import ContactError
 from ...fem import BoundaryTrace
-from ...problem import Problem
-from ...quadrature import features_of, unresolved
-from .cells import Cells, cells_of
+from ...problem import Problem, numbers
+from ...quadrature import SampledElements, features_of, unresolved, where_features_are
+from .cells import Cells, bisected, cells_of, dependent, parted
 from .elements import Element, by_triangle, elements_of, rigid_motions
-from .facing import TO_ENDS, facing_sides, guide_sides, held_motions, new_vertices, pressure_support
-from .force_quadrature import ForceQuadrature, force_quadrature
-from .lifting import Prescribed, lifted, prescribed_on_supports
-from .oscillation import (
-    EQUILIBRIUM_RESIDUAL,
-    BalancedCells,
-    balanced_again,
-    oscillation_norms,
-    residuals,
+from .facing import (
+    TO_ENDS,
+    PressureSupport,
+    facing_middles,
+    facing_sides,
+    guide_sides,
+    held_motions,
+    new_vertices,
+    pressure_support,
 )
+from .lifting import Prescribed, lifted, prescribed_on_supports
+from .oscillation import EQUILIBRIUM_RESIDUAL, divided, oscillation_norms, residuals
 from .program import Balanced, DualProgram, dual_program
-from .tractions import BoundaryData, boundary_data, rough_places, side_rule
+from .tractions import FINEST_PARTS, LEAST_PART, BoundaryData, boundary_data, rough_places
 
 NO_BOUND = "no guaranteed bound is known"
 BESIDE_VERTICES = (0.1, 0.9)  # places beside vertices, where pressures have resultants near to them
 LIFTING_DEGREES = 3  # degrees by which w is above u_h
+NEGLIGIBLE_LOADS = 0.1  # of |s - sigma_h|^2: cells are not divided for less
+FORCED_DEGREE = 3  # least degree of stresses with forces that are no numbers
 # Part of modulus times displacement over size of an element: equilibrium is measured beside the
 # round-off of such stresses.
 NOTICEABLE_STRAIN = 1e-4
@@ -64,21 +68,17 @@ class DualProblem:
     given: BoundaryData
     prescribed: list[Prescribed]  # u_D - u_h
     elements: list[Element]
-    rules: ForceQuadrature  # how forces are integrated
     moments: Array  # (d,) of the given tractions with the multipliers
     program: DualProgram
 
     def admissible(
         self,
-        displacement: ng.GridFunction,
         found: Balanced,
         least: float = 0.0,
-        degree: int | None = None,
     ) -> AdmissibleStress:
         """The stress `found` as an admissible one, with its distance from C e of u_h.
 
-        Residuals are relative to the largest stress, which counts as `least` at the least. Where s
-        misses much of the data, stresses of more than a `degree` are balanced again.
+        Residuals are relative to the largest stress, which counts as `least` at the least.
 
         Raises
         ------
@@ -86,7 +86,6 @@ class DualProblem:
             It is not in equilibrium.
         """
         cells, elements, lines = self.cells, self.elements, self.program.lines
-        given = self.given.with_pressure(lines, found.pressure)
         distance, largest = found.s.norms()
         scale = max(largest, least)
         residual = float(residuals(cells, self.program.multipliers, found.unbalanced, scale).max())
@@ -95,20 +94,16 @@ class DualProblem:
                 f"no equilibrated stress was found: the residual relative to the largest stress is "
                 f"{residual:.1e}"
             )
-        rule = side_rule(cells, given.breaks, np.flatnonzero(~cells.inner))
-        at = cells.owner[rule.side]
-        have = found.s.tractions(at, rule.x, rule.normal)
-        missed = rule.missed(cells, given.tractions(cells, rule, have) - have, scale)
-        loads = oscillation_norms(cells, elements, missed)
-        if degree is not None:
-            level = BalancedCells(cells, found.s, self.rules, distance, loads)
-            distance, loads = balanced_again(displacement, given, level, degree, scale)
-        if not np.isfinite(loads).all():
-            raise ValueError(
-                "no guaranteed bound is known for loads that are no polynomials beside the axis; "
-                "use error_estimate"
-            )
-        work = sum(rule.work(have, one.side, one.direction, one.amount) for one in self.prescribed)
+        have = self.given.tractions_of(found.s)
+        missed = self.given.missed(have, lines, found.pressure, scale)
+        forces, moduli = (
+            by_triangle(elements, [getattr(e, name) for e in elements])
+            for name in ("missed", "modulus")
+        )
+        loads = oscillation_norms(cells, forces, moduli, missed)
+        work = sum(
+            self.given.work(have, one.side, one.direction, one.amount) for one in self.prescribed
+        )
         for line, p in zip(lines, found.pressure, strict=True):
             work -= float((line.force(p) * line.gap).sum())
         return AdmissibleStress(
@@ -127,6 +122,7 @@ class DualProblem:
 class Proof:
     """Everything that a bound was computed from."""
 
+    problem: Problem
     dual: DualProblem
     stress: AdmissibleStress  # the nearest one, and p* >= 0
     lifting: Array  # (n,) norms of w
@@ -162,9 +158,14 @@ def error_bound(
     for one in unresolved(problem, trace.mesh, in_bounds=True):
         raise ValueError(f"{NO_BOUND} where {one}; refine the mesh there")
     try:
-        return _bound(problem, trace, displacement, pairs, ())
+        found = _bound(problem, trace, displacement, pairs, ())
     except ContactError:  # resultants that no polynomial pressure has, as of a body about to tilt
-        return _bound(problem, trace, displacement, pairs, BESIDE_VERTICES)
+        found = _bound(problem, trace, displacement, pairs, BESIDE_VERTICES)
+    if not np.isfinite(found.bound):
+        raise ValueError(
+            f"{NO_BOUND} for loads that are no polynomials beside the axis; use error_estimate"
+        )
+    return found
 
 
 def _bound(
@@ -175,21 +176,64 @@ def _bound(
     beside: Sequence[float],
 ) -> Proof:
     """The bound in the steps of docs/bounds.md; p* also has breaks `beside` ends of segments."""
-    p, extent = trace.order, trace.model.extent
-    degree, lift = max(p + 1, 2 + extent), p + LIFTING_DEGREES
-    # 1. Cells.
     guided = trace.segments(None if problem.sliding is None else str(problem.sliding))
     guided = guided[~trace.on_axis[guided]]  # the axis guides by itself: there u_r = 0
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
     loaded = np.append(trace.segments(*problem.traction, *touching), guided)
-    whole = [name for name, values in problem.displacement.items() if None not in values]
-    reaches = [pressure_support(trace, displacement, pair, lift) for pair in pairs]
-    cuts = rough_places(problem, trace) | new_vertices(trace, reaches, beside)
-    cells = cells_of(trace, cuts, loaded, trace.segments(*whole))
+    fixed = [name for name, values in problem.displacement.items() if None not in values]
+    degree = trace.order + LIFTING_DEGREES
+    reaches = [pressure_support(trace, displacement, pair, degree) for pair in pairs]
+    both = rough_places(problem, trace), new_vertices(trace, reaches, beside)
+    cuts = np.concatenate([x for x, _ in both]), np.concatenate([s for _, s in both])
+    supported = trace.segments(*fixed)
+    cells, largest_size = cells_of(trace, cuts), force_features(problem, trace)
+
+    def linked(cells: Cells) -> tuple[Index, Index, Array]:
+        return facing_middles(cells, displacement, reaches)
+
+    while (large := cells.diameters > largest_size[cells.parent]).any():
+        cells, _ = bisected(cells, large, linked)
+    parts, whole = parted(cells, dependent(cells, loaded, supported))
+    found = _proof(problem, parts, displacement, reaches, guided)
+    if found.parts["loads"] <= NEGLIGIBLE_LOADS * found.parts["constitutive"]:
+        return found
+    c, D = (np.sqrt(np.bincount(whole, x**2)) for x in (found.stress.distance, found.stress.loads))
+    cells = divided(problem, cells, (parts, found.dual.elements), (c, D), linked)
+    parts, _ = parted(cells, dependent(cells, loaded, supported))
+    try:
+        other = _proof(problem, parts, displacement, reaches, guided)
+    except ContactError:
+        return found
+    return min(found, other, key=lambda proof: proof.bound)
+
+
+def force_features(problem: Problem, trace: BoundaryTrace) -> Array:
+    """Largest sizes (ne,) of cells, by element, that show narrow features of forces; lengths."""
+    view, found = SampledElements(trace.mesh, 2), np.full(trace.mesh.ne, np.inf)
+    for one in features_of(problem, trace.mesh):
+        if one.kind == "force" and len(one.places):
+            at, feature = where_features_are(one.spots, view, np.arange(trace.mesh.ne))
+            narrow = at[view.sizes[at] > one.widths[feature] / LEAST_PART]
+            found[narrow] = view.sizes[narrow] / FINEST_PARTS
+    return found
+
+
+def _proof(
+    problem: Problem,
+    cells: Cells,
+    displacement: ng.GridFunction,
+    reaches: Sequence[PressureSupport],
+    guided: Index,
+) -> Proof:
+    """The bound on given cells; segments `guided` (k,) are those of Gamma_0."""
+    trace = cells.trace
+    p, extent = trace.order, trace.model.extent
+    degree, lift = max(p + 1, 2 + extent), p + LIFTING_DEGREES
+    if not all(map(numbers, problem.force.values())):
+        degree = max(degree, FORCED_DEGREE)
     # 2. Stresses.
     given = boundary_data(problem, cells)
-    rules = force_quadrature(problem, cells, degree, np.maximum(given.followed(), cells.curved))
-    mu, elements = elements_of(problem, cells, displacement, degree, rules)
+    mu, elements = elements_of(problem, cells, displacement, degree)
     # 3. The gap, on guides and on Gamma_K.
     prescribed = prescribed_on_supports(cells, given, displacement)
     lines, side = [], np.flatnonzero(np.isin(cells.segment, guided))
@@ -210,10 +254,10 @@ def _bound(
     # The dual problem: s and p*.
     moments, fixed = given.moments(mu)
     program = dual_program(mu, elements, fixed, rigid_motions(cells, mu, fixed), lines)
-    dual = DualProblem(cells, given, prescribed, elements, rules, moments, program)
+    dual = DualProblem(cells, given, prescribed, elements, moments, program)
     stiffest = min(np.diagonal(e.compliance, axis1=-2, axis2=-1).min() for e in elements)
     felt = NOTICEABLE_STRAIN * size / float(stiffest * cells.diameters.min())
-    stress = dual.admissible(displacement, program.nearest(elements, moments), felt, degree)
+    stress = dual.admissible(program.nearest(elements, moments), felt)
     # The identity.
     c, D = stress.distance, stress.loads
     closed = float(sum((p * x.bound).sum() for p, x in zip(stress.pressure, lines, strict=True)))
@@ -227,7 +271,7 @@ def _bound(
     idle = stress.free_force and stress.free_force * largest(elements, cells, displacement)
     below = float(c @ c / 2 + D @ (c + D / 2 + 2 * w)) - stress.work + idle
     above = float((c + D + w / 2) @ w) + stress.work + closed + idle
-    return Proof(dual, stress, lifting=w, parts=parts, below=below, above=above)
+    return Proof(problem, dual, stress, lifting=w, parts=parts, below=below, above=above)
 
 
 def largest(elements: Sequence[Element], cells: Cells, function: ng.CoefficientFunction) -> float:

@@ -2,13 +2,13 @@
 
 Its vertices are those of the mesh, and places on Gamma_K: where contact ends, and where vertices
 of one body face a side of the other. There both bodies have the same sides, so that p* is one
-polynomial on each. A triangle with such a place, or with a curved side, becomes triangles with a
-common apex, the opposite vertex or, where several sides require it, the middle.
+polynomial on each. A triangle with such a place is divided from the opposite vertex or, where
+several sides require it, first about the middle. Where data are no polynomials cells are bisected.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -29,6 +29,7 @@ WIDE_TRIANGLE = 0.1  # twice the area over the squared diameter, from which tria
 SAME_LINE = 0.5
 ONE_LINE = 1e-12
 NEARLY_ONE_LINE = 1e-5
+CURVED_LENGTH = 2.0  # times the length of curved sides, which are to be divided before others
 
 
 @dataclass(frozen=True, eq=False)
@@ -210,25 +211,31 @@ def places(cells: Cells, at: Index, order: int, along: int | None = None) -> Pla
     return Places(at, local, x, slopes, area * weight * cells.measure(x), found)
 
 
-def cells_of(trace: BoundaryTrace, cuts: Mapping[int, Array], loaded: Index, held: Index) -> Cells:
+def cells_of(trace: BoundaryTrace, cuts: tuple[Index, Array]) -> Cells:
     """Divide the mesh.
 
     Parameters
     ----------
     trace : BoundaryTrace
-    cuts : dict of int to ndarray (j,)
-        Rising parameters s of new vertices on segments of the boundary.
-    loaded, held : ndarray of int (k,)
-        Segments that carry something, and those on which the whole displacement is prescribed.
+    cuts : ndarray of int (r,), ndarray (r,)
+        Segments of the boundary with parameters s of new vertices, rising on each.
     """
     view, unit = MeshArrays(trace.mesh), np.eye(3)
     old, ne = view.elements, trace.mesh.ne
     cells = joined(trace, view.vertices, old, np.broadcast_to(unit, (ne, 3, 3)), np.arange(ne))
-    cut = np.isin(cells.segment, list(cuts))
+    segment, s = cuts
+    cut = np.isin(cells.segment, segment)
     several = (cells.bent | cut)[cells.sides].sum(axis=1) > 1
     beside = cells.curved & ((cells.segment >= 0)[cells.sides].sum(axis=1) > 1)
-    cells = _fanned(_parted(cells, np.flatnonzero(several | beside)), cuts)
-    return _parted(cells, dependent(cells, loaded, held))
+    cells, _ = parted(cells, np.flatnonzero(several | beside))
+    while len(segment):  # the middle one of each side
+        side, first, count = np.unique(
+            cells.side_at(segment, s), return_index=True, return_counts=True
+        )
+        own = first + count // 2
+        cells, _ = _split(cells, side, cells.own_parameter(side, s[own, None])[:, 0])
+        segment, s = np.delete(segment, own), np.delete(s, own)
+    return cells
 
 
 def joined(
@@ -283,53 +290,77 @@ def _lengths(corners: Array) -> Array:
     return np.linalg.norm(np.roll(corners, -2, axis=1) - np.roll(corners, -1, axis=1), axis=2)
 
 
-def _with_parts(cells: Cells, new: Array, of: Index, triangles: Index, places: Array) -> Cells:
+def _with_parts(
+    cells: Cells, new: Array, of: Index, triangles: Index, places: Array
+) -> tuple[Cells, Index]:
     """The cells with `triangles` (k, 3) in place of those that they are part `of` (k,).
 
+    And the cells (m,) that each is or is part of.
     `new` (r, 2) are added vertices, `places` (k, 3, 3) the barycentric coordinates of the corners.
     """
     rest = np.setdiff1d(np.arange(len(cells.triangles)), of)
-    return joined(
+    whole = np.append(rest, of)
+    finer = joined(
         cells.trace,
         np.concatenate([cells.vertices, new]),
         np.concatenate([cells.triangles[rest], triangles]),
         np.concatenate([cells.barycentric[rest], places]),
-        np.concatenate([cells.parent[rest], cells.parent[of]]),
+        cells.parent[whole],
     )
+    return finer, whole
 
 
-def _fanned(cells: Cells, cuts: Mapping[int, Array]) -> Cells:
-    """Cells with new vertices on one side, as of `cells_of`, divided from the opposite corner."""
-    if not cuts:
-        return cells
-    segment = np.repeat(list(cuts), [len(s) for s in cuts.values()])
-    s = np.concatenate(list(cuts.values()))
-    at = cells.side_at(segment, s)
-    side, t = np.unique(at), cells.own_parameter(at, s[:, None])[:, 0]
-    every, t = np.append(np.repeat(side, 2), at), np.append(np.tile([0.0, 1.0], len(side)), t)
-    vertex = np.append(cells.ends[side], len(cells.vertices) + np.arange(len(s)))
-    order = np.lexsort((t, every))
-    one = np.diff(every[order]) == 0
-    pieces = np.stack([order[:-1][one], order[1:][one]])
-    owner, local = (x[every[pieces[0]]] for x in (cells.owner, cells.local))
-    pair = np.where(cells.backward[owner, local], pieces[::-1], pieces)  # start and stop of parts
-    low, high = np.where(cells.backward[owner, local], [[2], [1]], [[1], [2]])
-    low, high = (cells.barycentric[owner, (local + k) % 3] for k in (low, high))
-    places = [(1 - t[k, None]) * low + t[k, None] * high for k in pair]
-    return _with_parts(
-        cells,
-        cells.trace.point(segment, s),
-        owner,
-        np.column_stack([cells.triangles[owner, local], *vertex[pair]]),
-        np.stack([cells.barycentric[owner, local], *places], axis=1),
-    )
+def _split(cells: Cells, at: Index, t: Array) -> tuple[Cells, Index]:
+    """Cells with new vertices at `t` (r,) of sides `at` (r,), divided from the opposite corners.
+
+    No triangle has two of these sides. Also returned is what `_with_parts` does.
+    """
+    order = np.argsort(at)
+    owner, local = np.nonzero(np.isin(cells.sides, at))
+    number = order[np.searchsorted(at[order], cells.sides[owner, local])]
+    corner = (local[:, None] + np.arange(3)) % 3  # from the opposite one
+    triangles, places = (x[owner[:, None], corner] for x in (cells.triangles, cells.barycentric))
+    share = np.where(cells.backward[owner, local], 1 - t[number], t[number])[:, None]
+    between = (1 - share) * places[:, 1] + share * places[:, 2]
+    triangles, places = (np.stack([x, x]) for x in (triangles, places))
+    triangles[[0, 1], :, [2, 1]] = len(cells.vertices) + number
+    places[[0, 1], :, [2, 1]] = between
+    new, of = cells.points(at, t)[0], np.tile(owner, 2)
+    return _with_parts(cells, new, of, triangles.reshape(-1, 3), places.reshape(-1, 3, 3))
 
 
-def _parted(cells: Cells, at: Index) -> Cells:
+def bisected(
+    cells: Cells, marked: Mask, linked: Callable[[Cells], tuple[Index, Index, Array]]
+) -> tuple[Cells, Index]:
+    """Cells divided in the middle of the longest sides of triangles `marked` (n,), or towards that.
+
+    And the cells (m,) that each is or is part of. A side is divided where it is the longest of all
+    triangles beside it; from a marked triangle the way there goes over the longest sides of
+    neighbours, which come first (Rivara 1984, Int. J. Numer. Meth. Eng. 20:745). Sides that face
+    each other are one: `linked` tells both, (k,) and (k,), and the places (k,) on the latter that
+    face the middles of the former.
+    """
+    side, other, there = linked(cells)
+    one, t = np.arange(len(cells.ends)), np.full(len(cells.ends), 0.5)
+    one[other], t[other] = side, there
+    length = np.linalg.norm(np.diff(cells.vertices[cells.ends], axis=1)[:, 0], axis=1)
+    length[cells.bent] *= CURVED_LENGTH
+    rank, of = np.argsort(np.argsort(length, kind="stable")), one[cells.sides]  # no two are alike
+    longest = of[np.arange(len(of)), rank[of].argmax(axis=1)]
+    wanted, count = np.isin(one, longest[marked]), 0
+    while count < (count := wanted.sum()):
+        wanted[longest[wanted[of].any(axis=1)]] = True
+    wanted[of[of != longest[:, None]]] = False
+    at = np.flatnonzero(wanted[one])
+    return _split(cells, at, t[at])
+
+
+def parted(cells: Cells, at: Index) -> tuple[Cells, Index]:
     """Cells with triangles `at` (k,) divided in three about the centres of their inscribed circles.
 
     So parts of thin triangles are not flat. Triangles with a curved side are divided about the
-    centre of gravity, which is farther from the longest side.
+    centre of gravity, which is farther from the longest side. Also returned are the cells (m,) that
+    each is or is part of.
     """
     share = np.where(cells.curved[at, None], 1.0, _lengths(cells.corners[at]))
     share = (share / share.sum(axis=1, keepdims=True))[:, None]
@@ -354,8 +385,8 @@ def dependent(cells: Cells, loaded: Index, held: Index) -> Index:
     sides at a vertex lie on two lines, the sum of these equations contains given tractions alone:
     they may contradict it on `loaded` sides. Where sides lie on two lines only nearly, as at some
     vertices of a mesh that is nearly symmetric, inner tractions would be round-off times a large
-    number. More triangles at the vertex remove this condition. `loaded` and `held` (k,) are as of
-    `cells_of`.
+    number. More triangles at the vertex remove this condition. `loaded` (k,) are segments that
+    carry something, `held` (k,) those on which the whole displacement is prescribed.
     """
     loads, supports = np.zeros((2, len(cells.vertices)), dtype=bool)
     loads[cells.ends[~cells.inner & np.isin(cells.segment, loaded)]] = True

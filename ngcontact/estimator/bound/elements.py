@@ -22,11 +22,10 @@ from numpy.polynomial import legendre
 from ...arrays import Array, Index, Mask
 from ...fem import connected_bodies, elastic_strain
 from ...lagrange import gauss
-from ...problem import MeshArrays, Problem, varies
+from ...problem import MeshArrays, Problem, numbers, varies
 from ...qp import vanishing_combinations
 from .cells import Cells, Places, places
-from .force_quadrature import ForceQuadrature, projection
-from .polynomials import CORNERS, balancing, coordinates, stresses
+from .polynomials import CORNERS, balancing, coordinates, projected, scalars, stresses
 
 TURNED_NORMAL = 1e-4  # sine of the angle between normals that are not one
 CURVED_DEGREES = 4  # degrees by which stresses on triangles with a curved side are higher
@@ -55,8 +54,6 @@ class Element:
     strain: Array  # (b, q, v) e(u_h), less initial strains, Voigt
     source: ng.CoefficientFunction | None  # the body force
     force: Array  # (b, j, 2) coefficients, as of `scalars`, of the body force that s_p balances
-    # (b,) parts of each triangle on which forces are integrated, two at least where tractions are
-    pieces: Index
     missed: Array  # (b,) L2 norm of what of the body force s_p does not balance, times the measure
     modulus: Array  # (b,) smallest eigenvalue of C in Mandel's scaling, a stress
     combined: Array  # (b, n, m) T from the n polynomials of `stresses`, orthonormal: (T, T) = 1
@@ -227,7 +224,6 @@ def elements_of(
     cells: Cells,
     displacement: ng.CoefficientFunction,
     degree: int,
-    rules: ForceQuadrature,
 ) -> tuple[Multipliers, list[Element]]:
     """The condensed triangles of a solution, in groups of one kind, and their multipliers.
 
@@ -242,7 +238,7 @@ def elements_of(
     for kind, own_degree in enumerate(kinds[:, 0]):
         every = np.flatnonzero(number.ravel() == kind)
         for at in np.array_split(every, 1 + len(every) * (own_degree + 2) ** 4 // BATCH_ENTRIES):
-            found.append(_element(problem, cells, displacement, mu, rules, at))
+            found.append(_element(problem, cells, displacement, mu, at))
     return mu, found
 
 
@@ -262,12 +258,29 @@ def compliance_at(problem: Problem, cells: Cells, points: Places) -> Array:
     return np.asarray(np.linalg.inv(C.reshape(*C.shape[:2], v, v)))
 
 
+def projection(
+    force: ng.CoefficientFunction, cells: Cells, points: Places, degree: int
+) -> tuple[Array, Array]:
+    """Polynomials (b, m, 2) of a `degree`, as of `scalars`, near to a force in b triangles.
+
+    And L2 norms (b,) of what they miss, times the measure; axially about an axis.
+    """
+    P, values = scalars(degree, cells.corners[points.at], points.x), points.evaluate(cells, force)
+    found = projected(P, points.weight, values)
+    weight = points.weight * cells.measure(points.x)
+    axial = cells.trace.model.extent
+    missed, size = (
+        np.sqrt((weight * (x[..., axial:] ** 2).sum(axis=2)).sum(axis=1))
+        for x in (values - P @ found, values)
+    )
+    return found, np.where(missed <= FORCE_ROUND_OFF * size, 0.0, missed)
+
+
 def _element(
     problem: Problem,
     cells: Cells,
     displacement: ng.CoefficientFunction,
     mu: Multipliers,
-    rules: ForceQuadrature,
     at: Index,
 ) -> Element:
     """Triangles `at` (b,) of one kind, condensed."""
@@ -278,20 +291,18 @@ def _element(
     )
     axial, curved = model.extent > 0, bool(cells.curved[at[0]])
     law = _of_body(problem.materials, cells, at)
-    rational = curved or axial or law in problem.varying.values()
-    points = places(cells, at, 2 * degree + 4 * rational)
+    source = _of_body(problem.force, cells, at)
+    varying = law in problem.varying.values() or (source is not None and not numbers(source))
+    points = places(cells, at, 2 * degree + 4 * (curved or axial or varying))
     corners = cells.corners[at]
     local = coordinates(corners, points.x) if curved else points.local
     compliance = compliance_at(problem, cells, points)
     strain = points.evaluate(cells, elastic_strain(problem, displacement))
-    source = _of_body(problem.force, cells, at)
-    n = min(max(0, degree - 1 - axial), rules.order // 2)
+    n = max(0, degree - 1 - axial)
     force, missed = np.zeros((len(at), (n + 1) * (n + 2) // 2, 2)), np.zeros(len(at))
-    pieces, hoop = np.ones(len(at), dtype=np.intp), np.zeros(points.weight.shape)
+    hoop = np.zeros(points.weight.shape)
     if source is not None:
-        threshold = dict(zip(problem.force.values(), rules.thresholds, strict=True))[source]
-        force, missed, size, pieces = projection(source, cells, at, n, rules, threshold)
-        missed = np.where(missed <= FORCE_ROUND_OFF * size, 0.0, missed)
+        force, missed = projection(source, cells, points, n)
         if axial:
             force[..., 0] = 0.0
             hoop = points.x[..., 0] * points.evaluate(cells, source)[..., 0]
@@ -322,7 +333,6 @@ def _element(
         strain=strain,
         source=source,
         force=force,
-        pieces=np.maximum(pieces, 1 + rules.followed[at]),
         missed=missed,
         modulus=np.broadcast_to(1 / largest, len(at)),
         combined=combined,

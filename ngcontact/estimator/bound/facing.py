@@ -172,8 +172,8 @@ def pressure_support(
 
 def new_vertices(
     trace: BoundaryTrace, reaches: Sequence[PressureSupport], more: Sequence[float]
-) -> dict[int, Array]:
-    """Rising parameters s, (j,), of new vertices by segment: ends of contact, opposite vertices.
+) -> tuple[Index, Array]:
+    """Segments (r,) and parameters s (r,) of new vertices: ends of contact, opposite vertices.
 
     Each segment where p* may act also gets vertices at the parameters `more`. Vertices that face
     each other up to `SAME_VERTEX` get none.
@@ -207,7 +207,7 @@ def new_vertices(
     k, s = np.unique(np.concatenate(found), axis=0).T
     k, s = (x[(s > SAME_PLACE) & (s < 1 - SAME_PLACE)] for x in (k, s))
     new = np.append(True, (np.diff(k) > 0) | (np.diff(s) > SAME_PLACE))[: len(k)]
-    return {int(i): s[new & (k == i)] for i in np.unique(k)}
+    return k[new].astype(np.intp), s[new]
 
 
 def _opposite(
@@ -232,6 +232,22 @@ def _opposite(
     exact = near[np.abs(t[near] - vertex) <= SAME_VERTEX]
     t[exact] = np.round(t[exact])
     return s, (there, t)
+
+
+def facing_middles(
+    cells: Cells, displacement: ng.CoefficientFunction, supports: Sequence[PressureSupport]
+) -> tuple[Index, Index, Array]:
+    """Sides (k,) on which p* may act, those (k,) they face, and there their middles, (k,)."""
+    found = [(np.zeros(0, dtype=np.intp), np.zeros(0, dtype=np.intp), np.zeros(0))]
+    for support in supports:
+        side = np.flatnonzero(np.isin(cells.segment, support.segments))
+        place = on_segments(cells, side, np.array([0.5]))
+        there = opposite_points(cells.trace, displacement, support.pair, *place)
+        faces = there.segment[:, 0] >= 0
+        other = cells.side_at(there.segment[faces, 0], there.s[faces, 0])
+        found.append((side[faces], other, cells.own_parameter(other, there.s[faces])[:, 0]))
+    side, other, t = (np.concatenate(x) for x in zip(*found, strict=True))
+    return side, other, t
 
 
 @dataclass(frozen=True, eq=False)

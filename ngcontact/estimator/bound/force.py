@@ -55,18 +55,19 @@ def force_bar(
         raise ValueError(
             "no bar of the force is proved where supports end contact, or an open gap is 0"
         )
-    problem = dual.given.problem
+    problem = proof.problem
     strain = model_of(problem).strain(G)
     elements = [e.of_strain(e.places.evaluate(cells, strain)) for e in dual.elements]
-    given, moments = replace(dual.given, loads={}), np.zeros_like(dual.moments)
+    given = replace(dual.given, loads=np.zeros_like(dual.given.loads))
+    moments = np.zeros_like(dual.moments)
     test = replace(dual, given=given, elements=elements, moments=moments)
     nearest, ratio = _within(test, stress.pressure, np.inf)
-    t = test.admissible(displacement, nearest)
+    t = test.admissible(nearest)
     costless = float(np.linalg.norm(t.distance + t.loads)) / B if B > 0 else 0.0
     limit = max(kappa, KAPPA_GROWTH * costless)
     if ratio > limit:
         nearest, ratio = _within(test, stress.pressure, limit, nearest)
-        t = test.admissible(displacement, nearest)
+        t = test.admissible(nearest)
     kappa = max(kappa, costless, ratio)
     # What of [G] - d.e is more than kappa times the gap after its own lifting.
     r = []

@@ -4,52 +4,46 @@ Constants of Poincare (Payne, Weinberger 1960, Arch. Rational Mech. Anal. 5:286;
 Korn (Costabel, Dauge 2015, Arch. Rational Mech. Anal. 217:873, theorem 2.3) and of traces are known
 for each triangle; docs/bounds.md has the proof. Extrema on curves are taken over points.
 
-Where F or P are no polynomials s balances projections of them. On a triangle T where that counts,
-the stress s' nearest to sigma_h with the tractions of s on inner sides and on Gamma_u, with P and
-p* on the others, and -div s' = F, is sought of a higher degree, or on parts of T, where again F and
-P are met in projections. s' may stand for s on T, with what it misses itself; both have the same
-resultants, for the rules on T are those on its parts.
+Where F or P are no polynomials s balances projections of them. Cells on which that counts are
+divided, and the bound is made again.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index
-from .cells import Cells
-from .elements import Element, Multipliers, Stress, by_triangle, elements_of
-from .force_quadrature import LEAST_DEGREE, PARTS_OF_A_SIDE, ForceQuadrature
+from ...problem import Problem, numbers
+from ...quadrature import SampledElements
+from .cells import Cells, bisected, places
+from .elements import Element, Multipliers, projection, traces
+from .facing import POINTS, WEIGHTS
 from .polynomials import edges
-from .program import dual_program
-from .tractions import BoundaryData, side_rule
+from .tractions import FINEST_PARTS, boundary_data
 
 EQUILIBRIUM_RESIDUAL = 1e-10  # residual of equilibrium, relative to the largest stress
+CURVED_RATIO = 0.125  # of D_T on half of a triangle with a curved side, at least expected
 POINTS_ON_SIDE = 17  # points on each side
 # Shares of corners in places at which the middle of both balls is sought, beside the incentre.
 BALL_CENTRES = np.array([(i, j, 8 - i - j) for i in range(1, 8) for j in range(1, 8 - i)]) / 8
-RAISED_DEGREES = 3  # degrees of stresses on whole triangles, as long as forces are smooth there
-NEGLIGIBLE_SHARE = 0.02  # of |s - sigma_h|^2: so much may be added by data not balanced again
-TRIANGLES_AT_ONCE = 200  # triangles
+NEGLIGIBLE_SHARE = 0.03  # of |s - sigma_h|: so much data may miss on cells that stay as they are
 
 
-def oscillation_norms(cells: Cells, elements: Sequence[Element], tractions: Array) -> Array:
+def oscillation_norms(cells: Cells, forces: Array, moduli: Array, tractions: Array) -> Array:
     """Norms D_T (n,) of a stress that balances what s misses of body forces and tractions.
 
-    `tractions` (n, 3) are L2 norms on the sides, orthogonal to rigid motions, times the measure.
+    `forces` (n,) and `tractions` (n, 3) are L2 norms, on the sides, orthogonal to rigid motions,
+    times the measure; `moduli` (n,) are as of `Element.modulus`.
 
     Raises
     ------
     ValueError
         Something is missed at the axis, where the measure is 0.
     """
-    forces = by_triangle(elements, [e.missed for e in elements])
-    least = by_triangle(elements, [e.modulus for e in elements])
     found = np.zeros(len(forces))
     some = (forces > 0) | (tractions > 0).any(axis=1)
     for points in (2, POINTS_ON_SIDE):  # on straight sides extrema are at ends
@@ -61,7 +55,7 @@ def oscillation_norms(cells: Cells, elements: Sequence[Element], tractions: Arra
                 "error_estimate"
             )
         total = known.poincare * forces[at] + (known.trace * tractions[at]).sum(axis=1)
-        found[at] = known.korn * total / np.sqrt(least[at] * known.measure)
+        found[at] = known.korn * total / np.sqrt(moduli[at] * known.measure)
     return found
 
 
@@ -101,65 +95,52 @@ def _constants(cells: Cells, at: Index, points: int) -> Constants:
     return Constants(poincare, np.sqrt(1 + 2 / beta**2), trace, measure)
 
 
-@dataclass(frozen=True, eq=False)
-class BalancedCells:
-    """A stress on n triangles of cells, in equilibrium with what `rules` see of forces."""
+def divided(
+    problem: Problem,
+    cells: Cells,
+    parts: tuple[Cells, Sequence[Element]],
+    norms: tuple[Array, Array],
+    linked: Callable[[Cells], tuple[Index, Index, Array]],
+) -> Cells:
+    """Cells so small that data add little to a bound; the same where they are.
 
-    cells: Cells
-    s: Stress
-    rules: ForceQuadrature
-    distance: Array  # (n,) |s - sigma_h|
-    loads: Array  # (n,) norms of what s misses of the data
-
-
-def balanced_again(
-    displacement: ng.CoefficientFunction,
-    given: BoundaryData,
-    level: BalancedCells,
-    degree: int,
-    scale: float,
-    allowed: float | None = None,
-) -> tuple[Array, Array]:
-    """Distances and loads, (n,) each as of `level`, of the better stress on each triangle.
-
-    Stresses are of a `degree` on straight triangles; residuals are relative to the largest one,
-    `scale`. Data may add what is `allowed` to B^2; by default a share of |s - sigma_h|^2.
+    `norms` (n,) are |s - sigma_h| and D_T on the `cells`, from elements on `parts` of these. On
+    smaller cells D_T is that of the loads, and on curved ones a part of the former; `linked` is as
+    of `bisected`.
     """
-    c, D, rules = level.distance.copy(), level.loads.copy(), level.rules
-    limit = NEGLIGIBLE_SHARE * float(c @ c) if allowed is None else allowed
-    pieces = by_triangle(level.s.elements, [e.pieces for e in level.s.elements])
-    for third in (None, False, True):  # whole triangles, their parts
-        lost = (c + D) ** 2 - c**2
-        order = np.argsort(lost)
-        counts = np.sort(order[np.cumsum(lost[order]) > limit])
-        smooth, divided = pieces < PARTS_OF_A_SIDE**2, (pieces > 1) & (rules.thirds == third)
-        fits = smooth if third is None else divided
-        some = counts[fits[counts]]
-        for at in np.array_split(some, -(-len(some) // TRIANGLES_AT_ONCE)) if len(some) else ():
-            parts, finer = rules.divided(level.cells, at, third)
-            own = degree + RAISED_DEGREES if third is None else max(degree, LEAST_DEGREE)
-            k = len(parts.triangles) // len(at)
-            mu, elements = elements_of(given.problem, parts, displacement, own, finer)
-            rule = side_rule(parts, given.breaks, np.flatnonzero(~parts.inner))
-            owner = parts.owner[rule.side]
-            whole = level.s.tractions(at[owner // k], rule.x, rule.normal)
-            wanted = given.tractions(parts, rule, whole)
-            moments = rule.moments(mu, wanted)
-            free, motions = np.zeros(len(moments), dtype=bool), np.zeros((len(moments), 0))
-            program = dual_program(mu, elements, free, motions, [])
-            s = program.nearest(elements, moments).s
-            left = residuals(parts, mu, moments - s.traction_moments()[0], scale)
-            have = s.tractions(owner, rule.x, rule.normal)
-            loads = oscillation_norms(parts, elements, rule.missed(parts, wanted - have, scale))
-            both = s.norms()[0], loads
-            if finer.levels and third is not None:
-                inner, share = BalancedCells(parts, s, finer, *both), len(at) / len(counts)
-                both = balanced_again(displacement, given, inner, own, scale, limit * share)
-            one, two = (np.linalg.norm(z.reshape(-1, k), axis=1) for z in both)
-            settled = left.reshape(-1, k).max(axis=1) <= EQUILIBRIUM_RESIDUAL
-            better = settled & (one + two < c[at] + D[at])
-            c[at[better]], D[at[better]] = one[better], two[better]
-    return c, D
+    distance, D = norms
+    limit, ne = (NEGLIGIBLE_SHARE * float(np.linalg.norm(distance))) ** 2, cells.trace.mesh.ne
+    finest = SampledElements(cells.trace.mesh, 2).sizes / FINEST_PARTS
+    moduli, degree = np.full(ne, np.inf), np.zeros(ne, dtype=np.intp)
+    parent = parts[0].parent
+    for e in parts[1]:
+        np.minimum.at(moduli, parent[e.places.at], e.modulus)
+        np.maximum.at(degree, parent[e.places.at], e.degree)
+    while True:
+        order = np.argsort(D)
+        marked = np.zeros(len(D), dtype=bool)
+        marked[order[np.cumsum(D[order] ** 2) > limit]] = True
+        marked &= cells.diameters > finest[cells.parent]
+        if not marked.any():
+            return cells
+        cells, whole = bisected(cells, marked, linked)
+        missed, new = np.zeros(len(whole)), np.flatnonzero(np.bincount(whole)[whole] > 1)
+        for pattern, force in problem.force.items():
+            if numbers(force):
+                continue
+            body = np.array(cells.trace.mesh.Materials(pattern).Mask())[cells.bodies[new]]
+            key = 2 * degree[cells.parent[new]] + cells.curved[new]
+            for kind in np.unique(key[body]):
+                at = new[body & (key == kind)]
+                points = places(cells, at, 2 * (kind // 2) + 4)
+                n = kind // 2 - 1 - cells.trace.model.extent
+                missed[at] = projection(force, cells, points, n)[1]
+        given, P = boundary_data(problem, cells), traces(int(degree.min()), POINTS)
+        near = P @ ((P.T * WEIGHTS) @ given.loads)
+        sides = given.missed(near, (), (), float(np.abs(near).max(initial=0.0)))
+        found = oscillation_norms(cells, missed, moduli[cells.parent], sides)
+        D = D[whole]
+        D[new] = np.maximum(found[new], CURVED_RATIO * cells.curved[new] * D[new])
 
 
 def residuals(cells: Cells, mu: Multipliers, left: Array, largest: float) -> Array:

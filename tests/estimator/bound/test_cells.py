@@ -10,7 +10,8 @@ import pytest
 
 from drivers.reference import cases
 from ngcontact import Contact, solve
-from ngcontact.estimator.bound.cells import cells_of, places
+from ngcontact.estimator.bound.cells import bisected, cells_of, dependent, parted, places
+from ngcontact.estimator.bound.facing import facing_middles, pressure_support
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import rings
 from ngcontact.mesh import curve, first_mesh
@@ -18,6 +19,7 @@ from tests.given_meshes import mesh_of, two_blocks
 from tests.scenes import unmatched_blocks
 
 NONE = np.zeros(0, dtype=np.intp)
+NO_CUTS = NONE, np.zeros(0)
 ROUND_OFF = 1e-12
 
 
@@ -32,6 +34,12 @@ def ring(order):
     case = cases.ring_in_bearing()
     mesh, _ = curve(first_mesh(case.problem, 0.3), order, "isoparametric")
     return boundary_trace(mesh, order)
+
+
+def divided(trace, loaded, held):
+    """Cells without triangles that are `dependent`."""
+    cells = cells_of(trace, NO_CUTS)
+    return parted(cells, dependent(cells, loaded, held))[0]
 
 
 def moment(cells, function, order=8):
@@ -66,7 +74,7 @@ def consistent(cells):
 
 def test_a_mesh_that_nothing_divides():
     trace = boundary_trace(square(), 1)
-    cells = cells_of(trace, {}, NONE, NONE)
+    cells = cells_of(trace, NO_CUTS)
     consistent(cells)
     assert len(cells.triangles) == trace.mesh.ne
     np.testing.assert_array_equal(np.sort(cells.parent), np.arange(trace.mesh.ne))
@@ -78,11 +86,12 @@ def test_cuts_are_vertices(cuts):
     """Of one segment: a fan of the triangle behind it, as many triangles more as there are cuts."""
     trace = boundary_trace(square(), 1)
     k = int(trace.segments("top")[0])
-    cells = cells_of(trace, {k: np.array(cuts)}, NONE, NONE)
+    cells = cells_of(trace, (np.full(len(cuts), k), np.array(cuts)))
     consistent(cells)
     assert len(cells.triangles) == trace.mesh.ne + len(cuts)
     new = cells.vertices[trace.mesh.nv :]
-    np.testing.assert_allclose(new, trace.point(np.full(len(cuts), k), np.array(cuts)))
+    places = trace.point(np.full(len(cuts), k), np.array(cuts))
+    np.testing.assert_allclose(np.sort(new, axis=0), np.sort(places, axis=0))
     parts = cells.span[cells.segment == k]
     np.testing.assert_allclose(np.unique(parts), [0.0, *cuts, 1.0])
     s = np.array([*cuts, 1.0]) - 1e-3  # each place lies on the side that ends there
@@ -99,18 +108,18 @@ def test_triangles_are_parted_where_tractions_depend_on_each_other():
     every = np.arange(len(trace.region))
     mesh = trace.mesh.ne
     # Diagonal from (0, 0) to (1, 1): one triangle each at (1, 0) and (0, 1).
-    assert len(cells_of(trace, {}, every, NONE).triangles) == mesh + 4
-    assert len(cells_of(trace, {}, trace.segments("top|left"), NONE).triangles) > mesh
-    assert len(cells_of(trace, {}, trace.segments("right|bottom"), every).triangles) == mesh
-    assert len(cells_of(trace, {}, NONE, NONE).triangles) == mesh
-    consistent(cells_of(trace, {}, every, NONE))
+    assert len(divided(trace, every, NONE).triangles) == mesh + 4
+    assert len(divided(trace, trace.segments("top|left"), NONE).triangles) > mesh
+    assert len(divided(trace, trace.segments("right|bottom"), every).triangles) == mesh
+    assert len(cells_of(trace, NO_CUTS).triangles) == mesh
+    consistent(divided(trace, every, NONE))
 
 
 @pytest.mark.parametrize("order", [1, 2, 4])
 def test_curved_triangles(order):
     """Area and moment are those of the domain of the mesh, by Green's formula on its boundary."""
     trace = ring(order)
-    cells = cells_of(trace, {}, np.arange(len(trace.region)), NONE)
+    cells = divided(trace, np.arange(len(trace.region)), NONE)
     consistent(cells)
     assert cells.curved.any() == (order > 1)
     t, w = (
@@ -162,6 +171,36 @@ def test_sides_that_face_are_one_to_one(kind):
     other = cells.points(facing.other, np.full(len(facing.side), 0.5))[0]
     lengths = np.linalg.norm(np.diff(cells.vertices[cells.ends[facing.side]], axis=1)[:, 0], axis=1)
     assert (np.linalg.norm(own - other, axis=1) <= 0.1 * lengths).all()
+
+
+@pytest.mark.parametrize("kind", ["dual rows", "rings"])
+def test_bisected_cells(kind):
+    """Sides face one to one; no angle is less than half of the smallest one (Rivara 1984)."""
+    solution = pressed(kind)
+    cells, u = solution.equilibrated.proof.dual.cells, solution.displacement
+    supports = [pressure_support(cells.trace, u, pair, 5) for pair in solution.pairs]
+    area, least = moment(cells, lambda x: np.ones(len(x))), angles(cells).min()
+    largest = cells.diameters.max() / 4
+    while (marked := cells.diameters > largest).any():
+        cells, _ = bisected(cells, marked, lambda cells: facing_middles(cells, u, supports))
+    consistent(cells)
+    assert moment(cells, lambda x: np.ones(len(x))) == pytest.approx(area, rel=ROUND_OFF)
+    assert angles(cells).min() >= least / 2 or kind == "rings"  # curves change angles
+    side, other, there = facing_middles(cells, u, supports)
+    assert len(np.unique(other)) == len(side)
+    np.testing.assert_allclose(there, 0.5, atol=0.05)
+    ends = np.sort(cells.vertices[cells.ends], axis=1)
+    length = np.linalg.norm(ends[side, 1] - ends[side, 0], axis=1)
+    away = np.linalg.norm(ends[side] - ends[other], axis=2).max(axis=1)
+    assert (away <= 0.1 * length).all()
+
+
+def angles(cells):
+    """Of all triangles, (n, 3)."""
+    x = cells.corners
+    one, two = np.roll(x, 1, axis=1) - x, np.roll(x, 2, axis=1) - x
+    product = (one * two).sum(axis=2)
+    return np.arccos(product / np.linalg.norm(one, axis=2) / np.linalg.norm(two, axis=2))
 
 
 def test_a_vertex_where_contact_ends():

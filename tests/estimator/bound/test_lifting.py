@@ -16,9 +16,8 @@ from ngcontact.estimator.bound.facing import DATA_DEGREE
 from ngcontact.estimator.bound.lifting import Prescribed, lifting_of
 from ngcontact.fem import boundary_trace
 from ngcontact.lagrange import gauss_lobatto
-from tests.estimator.bound.test_cells import square
+from tests.estimator.bound.test_cells import NO_CUTS, square
 
-NONE = np.zeros(0, dtype=np.intp)
 LAW = Elastic(E=2.5, nu=0.3)
 SIDES = ("bottom", "right", "top", "left")
 T = gauss_lobatto(DATA_DEGREE)  # where amounts are given
@@ -29,7 +28,7 @@ def on_the_square(n=2):
     mesh = square(n)
     names = "|".join(SIDES)
     problem = Problem(geometry=mesh, materials={"body": LAW}, displacement={names: (0, 0)})
-    return problem, cells_of(boundary_trace(mesh, 1), {}, NONE, NONE)
+    return problem, cells_of(boundary_trace(mesh, 1), NO_CUTS)
 
 
 def asked_of(cells, name, direction, amount):

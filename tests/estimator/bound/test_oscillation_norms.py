@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,10 +12,9 @@ from ngcontact.estimator.bound.cells import cells_of, places
 from ngcontact.estimator.bound.oscillation import oscillation_norms
 from ngcontact.fem import boundary_trace
 from ngcontact.lagrange import gauss
-from tests.estimator.bound.test_cells import ring
+from tests.estimator.bound.test_cells import NO_CUTS, ring
 from tests.given_meshes import mesh_of
 
-NONE = np.zeros(0, dtype=np.intp)
 DEGREE = 7  # of displacements among which the worst one is sought
 
 
@@ -25,9 +23,7 @@ def one_of(cells, at, force, sides):
     n = len(cells.triangles)
     forces, tractions = np.zeros(n), np.zeros((n, 3))
     forces[at], tractions[at] = force, sides
-    points = SimpleNamespace(at=np.arange(n))
-    element = SimpleNamespace(places=points, missed=forces, modulus=np.ones(n))
-    found = oscillation_norms(cells, [element], tractions)
+    found = oscillation_norms(cells, forces, np.ones(n), tractions)
     assert (np.delete(found, at) == 0).all()
     return found[at]
 
@@ -40,7 +36,7 @@ def triangles(corners):
     for vertex, (x, y) in zip(mesh.ngmesh.Points(), (points[k] for k in (0, 1, 3, 2)), strict=True):
         vertex[0], vertex[1] = x, y
     mesh.ngmesh.Update()
-    cells = cells_of(boundary_trace(mesh, 1), {}, NONE, NONE)
+    cells = cells_of(boundary_trace(mesh, 1), NO_CUTS)
     middles = cells.corners.mean(axis=1)
     at = int(np.linalg.norm(middles - (a + b + c) / 3, axis=1).argmin())
     assert np.allclose(np.sort(cells.corners[at], axis=0), np.sort([a, b, c], axis=0))
@@ -128,7 +124,7 @@ def test_they_are_above_the_largest_quotients(shape):
 @pytest.mark.parametrize("order", [2, 4])
 def test_curved_triangles_have_constants(order):
     """Measured 4.5 to 11 times the largest quotients."""
-    cells = cells_of(ring(order), {}, NONE, NONE)
+    cells = cells_of(ring(order), NO_CUTS)
     for at in np.flatnonzero(cells.curved)[:4]:
         for number, value in enumerate(worst(cells, at)):
             sides = np.zeros(3)
