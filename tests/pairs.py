@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from netgen.occ import OCCGeometry
 
+from drivers.reference.cases import LINE
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.geometries import blocks, disc_on_block, disc_on_disc, graphs, punch, rings
 
 SOFT = Elastic(E=1.0, nu=0.3)
 BLOCKS, RINGS = ("upper", "lower"), ("inner", "outer")
-LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
 MATCHED_PART = 0.86  # of a radius: the steepest part of a circle stays unmatched by design
 ROUND_OFF = 1e-12  # of coordinates of size 1; the bound of the published method's matched nodes
 

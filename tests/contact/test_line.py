@@ -6,13 +6,13 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
+from drivers.reference.cases import LINE
 from ngcontact import Contact
 from ngcontact.contact.dual import contact_line
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import blocks, disc, disc_on_block
 
 ORDERS = [1, 2, 3, 4]
-LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
 SIDES = np.diff(np.array(LINE), axis=0)
 LENGTHS = np.linalg.norm(SIDES, axis=1)
 DOWNWARD = np.column_stack([SIDES[:, 1], -SIDES[:, 0]]) / LENGTHS[:, None]

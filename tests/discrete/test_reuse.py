@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 
 from drivers.reference import cases
-from ngcontact import Contact, Elastic, Problem, Solution, solve
+from ngcontact import Contact, Elastic, Problem, solve
 from ngcontact.geometries import blocks
 from ngcontact.mesh import first_mesh
 from ngcontact.problem import MeshArrays, move_vertices
+from tests.discrete.test_linear_systems import same
 
+# Of other factorisations of one matrix, condition 1e4: two orders of round-off.
+ROUND_OFF = 1e-11
 STEEL = Elastic(E=200.0, nu=0.3)
 PAIR = Contact(secondary="upper_contact", primary="lower_contact")
 
@@ -27,14 +30,6 @@ def pressed(load: float = 1.0, **changes: object) -> Problem:
         contact=[PAIR],
     )
     return replace(problem, **changes)
-
-
-def same(one: Solution, other: Solution) -> None:
-    """Both solve the same discrete problem."""
-    np.testing.assert_array_equal(one.active, other.active)
-    u, v = (s.displacement.vec.FV().NumPy() for s in (one, other))
-    # Two orders of round-off: other factorisations of one matrix, condition 1e4.
-    np.testing.assert_allclose(u, v, rtol=0, atol=1e-11 * np.abs(v).max())
 
 
 E = ng.Parameter(200.0)
@@ -62,7 +57,7 @@ def test_what_a_solution_leaves_for_the_next(name, order):
     assert second.work["assemblies"] == assemblies
     assert factorizations in (None, second.work["factorizations"])
     assert second.work["gap_searches"] == 0
-    same(second, solve(other, first.mesh, order=order))
+    same(second, solve(other, first.mesh, order=order), ROUND_OFF)
 
 
 def test_a_mesh_whose_interior_moved_is_assembled_again():

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from ngsolve.meshes import MakeStructured2DMesh
 
+from drivers.reference.cases import LINE
 from ngcontact.fem import boundary_trace
 from ngcontact.fem.boundary import nodal_basis
 from ngcontact.geometries import blocks, disc_on_block, graphs, rings
 from tests.mesh.test_curving import glued
 
 ORDERS = [1, 2, 3, 4]
-LINE = ((-1.0, 0.0), (-0.4, 0.25), (0.3, -0.2), (1.0, 0.1))
 
 
 def meshed(geometry, order=1, maxh=0.5):

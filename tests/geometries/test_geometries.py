@@ -128,13 +128,21 @@ def ends_of(geometry, name):
     return {(round(p.x, 13) + 0.0, round(p.y, 13) + 0.0) for p in points}
 
 
+def parts_of(geometry):
+    """Bodies, and their sides."""
+    shape = geometry.shape
+    return (shape.solids, shape.faces) if shape.solids else (shape.faces, shape.edges)
+
+
+def names_of(geometry):
+    return {part.name for parts in parts_of(geometry) for part in parts}
+
+
 def test_docstrings_list_the_regions_of_every_geometry():
     assert {make.__name__ for make, *_ in CASES + SOLIDS} == set(geometries.__all__)
     found = {}
     for make, options, _ in CASES + SOLIDS:
-        mesh = mesh_of(make(**options), order=1)
-        names = {*mesh.GetMaterials(), *mesh.GetBoundaries()}
-        found.setdefault(make, set()).update(names)
+        found.setdefault(make, set()).update(names_of(make(**options)))
     for make, names in found.items():
         assert names == set(re.findall(r"^``(\w+)`` ", inspect.getdoc(make), flags=re.MULTILINE))
 
@@ -144,9 +152,10 @@ def test_sizes_bodies_and_normals(make, options, sizes):
     """Areas or volumes of the drawing; normals of curved meshes point outwards, all around."""
     geometry = make(**options)
     solid = any(make is other for other, *_ in SOLIDS)
-    bodies = geometry.shape.solids if solid else geometry.shape.faces
+    bodies, _ = parts_of(geometry)
     assert [body.mass for body in bodies] == pytest.approx(sizes, rel=1e-9 if solid else 1e-12)
     mesh = mesh_of(geometry, *((0.5 * max(sizes) ** (1 / 3), 2) if solid else ()))
+    assert {*mesh.GetMaterials(), *mesh.GetBoundaries()} == names_of(geometry)
     vertices = [
         {v.nr for element in mesh.Materials(name).Elements() for v in element.vertices}
         for name in mesh.GetMaterials()
@@ -167,14 +176,15 @@ def test_sizes_bodies_and_normals(make, options, sizes):
 
 @pytest.mark.parametrize(("make", "options", "sizes"), CASES + SOLIDS)
 def test_sides_lie_where_their_names_say(make, options, sizes):
-    shape, middle = make(**options).shape, {}
-    for side in shape.faces if shape.solids else shape.edges:
+    geometry, middle = make(**options), {}
+    _, sides = parts_of(geometry)
+    for side in sides:
         middle.setdefault(side.name, []).append(side.center)
-    for name, places in middle.items():
-        for low, high, axis in (("left", "right", "x"), ("bottom", "top", "y")):
+    up = "z" if geometry.shape.solids else "y"
+    for low, high, axis in (("left", "right", "x"), ("bottom", "top", up)):
+        for name in middle:
             other = middle.get(name.replace(low, high), []) if low in name else []
-            axis = "z" if shape.solids and axis == "y" else axis
-            assert all(getattr(a, axis) < getattr(b, axis) for a in places for b in other)
+            assert all(getattr(a, axis) < getattr(b, axis) for a in middle[name] for b in other)
 
 
 @pytest.mark.parametrize(

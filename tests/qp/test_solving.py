@@ -92,6 +92,7 @@ def test_equations_are_met():
         ({"A": [[1.0, 0.0]]}, "must be square"),
         ({"f": [1.0]}, "f has shape"),
         ({"f": [1.0, np.nan]}, "f has entries"),
+        ({"A": [[np.inf, 0.0], [0.0, 1.0]]}, "A has entries that are NaN or infinite"),
         ({"B": [[1.0]]}, "B has 1 columns"),
         ({"g": [1.0, 2.0]}, "g has shape"),
         ({"active": np.array([1])}, "active is"),

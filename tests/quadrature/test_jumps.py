@@ -8,7 +8,7 @@ import ngsolve as ng
 import numpy as np
 import pytest
 
-from drivers.reference import cases
+from drivers.reference.laws import fibres
 from ngcontact import Contact, ContactWarning, Elastic, Hooke, Problem, adapt, solve
 from ngcontact.adaptivity import refined
 from ngcontact.fem import warn_of_jumps
@@ -16,27 +16,13 @@ from ngcontact.mesh import first_mesh
 from ngcontact.quadrature import features_of, sample_data, unresolved
 from ngcontact.quadrature.cells import lattice
 from ngcontact.quadrature.features import steps_along
+from tests.fem.test_moduli import BODIES, made_of
 from tests.quadrature.test_loads import box, loaded, square
-
-BODIES = ("upper", "lower")
 
 
 @pytest.fixture(scope="module")
 def mesh():
-    return first_mesh(cases.one_transition().problem, 0.7)
-
-
-def made_of(law):
-    return replace(cases.one_transition().problem, materials=dict.fromkeys(BODIES, law))
-
-
-def rotated(angle):
-    """A law 100 times stiffer along an axis at that angle; its trace does not depend on it."""
-    c, s = np.cos(angle), np.sin(angle)
-    T = np.array(
-        [[c * c, s * s, c * s], [s * s, c * c, -c * s], [-2 * c * s, 2 * c * s, c * c - s * s]]
-    )
-    return T.T @ np.diag([100.0, 1.0, 1.0]) @ T
+    return first_mesh(made_of(Elastic(1.0, 0.3)), 0.7)
 
 
 def functions(first, second):
@@ -50,7 +36,8 @@ JUMPS = {
     "contrast 3": Elastic(ng.IfPos(ng.x - 0.37 - 0.1 * ng.y, 1.0, 3.0), 0.3),
     "contrast 1e4": Elastic(ng.IfPos(ng.x - 0.37 - 0.1 * ng.y, 1.0, 1e4), 0.3),
     "nu": Elastic(1.0, ng.IfPos(ng.x - 0.37 - 0.1 * ng.y, 0.0, 0.45)),
-    "axes": functions(rotated(0.3), rotated(-0.3)),
+    # The trace of a law does not depend on the angle of its fibres.
+    "axes": functions(*(fibres(100.0, angle, shear=1.0).C for angle in (0.3, -0.3))),
     "beside a smooth change": Elastic(
         (1 + ng.x * ng.x) * ng.IfPos(ng.x - 0.37 - 0.1 * ng.y, 1.0, 20.0), 0.3
     ),

@@ -11,6 +11,7 @@ from ngcontact import Contact, Elastic, Problem, adapt, solve
 from ngcontact.contact import with_roles
 from ngcontact.fem import boundary_trace
 from ngcontact.geometries import ball_on_block, shells
+from tests.solids.meshes import boxes
 
 # Radii 0.5, 1, 1.5, moduli 1 and 3, Poisson's ratios .3 and .2, overlap .01: c1 = .55, c2 = 7 / 19.
 PRESSURE = 0.01 / (0.55 + 7 / 19)
@@ -122,8 +123,6 @@ def test_sliding_on_a_cylinder():
 @pytest.mark.parametrize("bilateral", [False, True])
 def test_rigid_obstacle(bilateral):
     """A block on a rigid plane below it, by a gap; bilateral it is pulled as well."""
-    from tests.solids.meshes import boxes
-
     mesh = boxes(("a", (0, 0, 0), (1, 1, 1), (2, 2, 2)))
     gap = 0.01
     sign = 1.0 if bilateral else -1.0
