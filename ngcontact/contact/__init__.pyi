@@ -10,12 +10,11 @@ from .facing import GAP_ROUND_OFF as GAP_ROUND_OFF
 from .facing import WHOLE_SHARE as WHOLE_SHARE
 from .facing import FacingPieces as FacingPieces
 from .facing import divided as divided
+from .facing import facing_pieces as facing_pieces
 from .facing import interpolated_rays as interpolated_rays
 from .facing import opposite as opposite
-from .facing import opposite_segments as opposite_segments
 from .facing import partners as partners
 from .facing import rays as rays
-from .facing import zone_pieces as zone_pieces
 from .line import ContactLine as ContactLine
 from .line import by_line as by_line
 from .line import in_contact as in_contact

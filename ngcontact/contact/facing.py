@@ -208,10 +208,13 @@ def _clipped(
     return FacingPieces(faces[local], parts, facing[number], start, share)
 
 
-def opposite_segments(trace: BoundaryTrace, line: ContactLine, facing: Mask) -> Index:
+def opposite_segments(
+    trace: BoundaryTrace, line: ContactLine, facing: Mask, some: Mask | None = None
+) -> Index:
     """Segment of the primary whose vertices those of a segment face, (k,), -1 where none.
 
-    `facing` (m,) are the points that face the primary.
+    `facing` (m,) are the points that face the primary. Vertices without a point, as on Gamma_u,
+    face those at the same place, on `some` (k,) of the segments.
     """
     vertex = np.full(len(facing) + 1, -1)  # of the primary at each point
     for corner, place in zip(trace.corners, trace.vertices, strict=True):
@@ -219,7 +222,14 @@ def opposite_segments(trace: BoundaryTrace, line: ContactLine, facing: Mask) -> 
         vertex[:-1][at] = trace.nodes[line.partner[at], corner]
     corners = line.rows[:, trace.corners]
     vertices = np.where(corners < 0, -1, vertex[corners])
-    sides = trace.nodes[line.facing][:, trace.corners]
+    sides, x = trace.nodes[line.facing][:, trace.corners], trace.arrays.vertices
+    alone = (corners < 0) & (some is not None and some[:, None])
+    if alone.any():
+        local, there = alone.nonzero()[0], np.unique(sides)
+        own = trace.nodes[line.segments][:, trace.corners][alone]
+        distance, near = cKDTree(x[there]).query(x[own])
+        close = distance <= MATCHING_DISTANCE * trace.lengths(line.segments[local])
+        vertices[alone] = np.where(close, there[near], -1)
     keys, wanted = trace.arrays.keys(sides), trace.arrays.keys(vertices)
     order = np.argsort(keys)
     found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
@@ -242,33 +252,22 @@ def distances(trace: BoundaryTrace, line: ContactLine) -> Array:
     return np.where(reach < 0, apart.max(initial=0.0), reach)
 
 
-def zone_pieces(trace: BoundaryTrace, zone: ContactLine) -> FacingPieces:
-    """Parts of the facets of a zone, each of which faces one of the primary or an obstacle.
+def facing_pieces(trace: BoundaryTrace, line: ContactLine, some: Mask) -> tuple[FacingPieces, int]:
+    """Parts of `some` (k,) of the segments that face one of the primary each, or the obstacle.
 
-    Whole facets where the vertices of both are at the same places.
+    So many of them, the first ones, are whole segments whose vertices face those of one.
     """
-    k = len(zone.segments)
-    if zone.contact.primary is None:
-        own = np.flatnonzero((zone.rows >= 0).any(axis=1))
-        facing = np.full(len(own), -1)
-    else:
-        x = trace.arrays.vertices
-        ends = trace.nodes[zone.facing][:, trace.corners]
-        there = np.unique(ends)
-        own = trace.nodes[zone.segments][:, trace.corners]
-        distance, near = cKDTree(x[there]).query(x[own])
-        close = (distance <= MATCHING_DISTANCE * trace.lengths(zone.segments)[:, None]).all(axis=1)
-        keys, wanted = trace.arrays.keys(ends), trace.arrays.keys(there[near])
-        order = np.argsort(keys)
-        found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
-        own = np.flatnonzero(close & (keys[found] == wanted))
-        facing = zone.facing[found[own]]
-    corners = np.tile(np.eye(3), (len(own), 1, 1))
-    middle = np.tile(triangle.CENTRE, (len(own), 1))
-    whole = FacingPieces(own, corners, facing, middle, np.ones(len(own)))
-    rest = np.setdiff1d(np.arange(k), own)
-    if zone.contact.primary is None or not rest.size:
-        return whole
-    reach = distances(trace, zone)[rest]
-    parts = divided(trace, zone.contact, zone.segments[rest], zone.facing, reach)
-    return joined([whole, replace(parts, local=rest[parts.local])])
+    rigid = line.contact.primary is None
+    facing = np.full(len(some), -1)
+    if not rigid:
+        facing = opposite_segments(trace, line, line.partner >= 0, some)
+    whole = np.flatnonzero(some & ((facing >= 0) | rigid))
+    count, vertices = len(whole), trace.vertices
+    corners, middle = (x[None].repeat(count, axis=0) for x in (vertices, vertices.mean(axis=0)))
+    pieces = FacingPieces(whole, corners, facing[whole], middle, np.ones(count))
+    rest = np.flatnonzero(some & (facing < 0))
+    if rigid or not len(rest):
+        return pieces, count
+    reach = distances(trace, line)[rest]
+    parts = divided(trace, line.contact, line.segments[rest], line.facing, reach)
+    return joined([pieces, replace(parts, local=rest[parts.local])]), count

@@ -13,14 +13,12 @@ from ..arrays import Array, Index, Mask, across, joined, rows_of
 from ..contact import (
     FACING_COSINE,
     GAP_ROUND_OFF,
-    MATCHING_DISTANCE,
     ContactLine,
     ContactState,
     FacingPieces,
-    divided,
+    facing_pieces,
     jacobian,
     opposite,
-    opposite_segments,
     prescribed_gap,
 )
 from ..fem import BoundaryTrace
@@ -48,68 +46,6 @@ UNRESOLVED_GAP = 0.1  # distance of a gap from polynomials over its range, from 
 OPENING_ROUND_OFF = 1e-12  # ... relative to the gap, below which there is none
 PIECE_DIVISIONS = 4  # of a piece on which the gap is no polynomial
 MAX_PIECES = 100_000  # pieces looked at, from which no more are divided
-
-
-def facing_pieces(
-    boundary: BoundaryTrace, line: ContactLine, carrying: Mask
-) -> tuple[FacingPieces, int]:
-    """Parts of the secondary that face one segment of the primary each, or the obstacle.
-
-    On segments that wholly face, and on those `carrying` (k,) contact points, of any pair. So many
-    of them, the first ones, are whole segments whose ends face the ends of one.
-    """
-    if line.contact.primary is None:
-        whole, facing = np.flatnonzero(line.faces), np.full(len(line.segments), -1)
-    else:
-        facing = _opposite_segments(boundary, line, carrying)
-        whole = np.flatnonzero(facing >= 0)
-    zero = np.zeros(len(whole))
-    ends = np.stack([zero, zero + 1], axis=1)
-    pieces = FacingPieces(whole, ends, facing[whole], zero + 0.5, zero + 1)
-    rest = np.flatnonzero((facing < 0) & (line.faces | carrying))
-    if line.contact.primary is not None and len(rest):
-        parts = _divided(boundary, line, rest)
-        pieces = joined([pieces, replace(parts, local=rest[parts.local])])
-    return pieces, len(whole)
-
-
-def _opposite_segments(boundary: BoundaryTrace, line: ContactLine, carrying: Mask) -> Index:
-    """Segment of the primary whose ends the ends of each segment (k,) face, -1 where none.
-
-    Ends without a point, as on Gamma_u, face the ends at the same place; they are looked at on
-    segments `carrying` (k,) others.
-    """
-    faces = line.partner >= 0
-    local, end = np.nonzero((line.rows[:, [0, -1]] < 0) & carrying[:, None])
-    if len(local):
-        segment = line.segments[local]
-        x = boundary.curve[segment, -end]
-        ends = boundary.curve[line.facing][:, [0, -1]].reshape(-1, 2)
-        apart = np.linalg.norm(x[:, None] - ends, axis=2)
-        nearest = apart.argmin(axis=1)
-        rows = line.rows.copy()
-        rows[local, -end] = len(faces) + np.arange(len(local))
-        faces = np.append(faces, apart.min(axis=1) <= MATCHING_DISTANCE * boundary.lengths(segment))
-        partner = np.append(line.partner, line.facing[nearest // 2])
-        partner_s = np.append(line.partner_s, nearest % 2)
-        line = replace(line, rows=rows, partner=partner, partner_s=partner_s)
-    return opposite_segments(boundary, line, faces)
-
-
-def _divided(boundary: BoundaryTrace, line: ContactLine, rest: Index) -> FacingPieces:
-    """Pieces of the segments `rest` (j,), by their numbers there.
-
-    Looked for beside the partners of their points; elsewhere where those do not cover them.
-    """
-    points, segments = line.rows[rest], line.segments[rest]
-    ends = boundary.nodes[line.facing][:, [0, -1]]
-    met = boundary.nodes[line.partner[points[points >= 0]]][:, [0, -1]]
-    near = line.facing[np.isin(ends, met).any(axis=1)]
-    if len(near):
-        parts = divided(boundary, line.contact, segments, near)
-        if (parts.covered(len(rest)) > 1 - SLIVER).all():
-            return parts
-    return divided(boundary, line.contact, segments, line.facing)
 
 
 def covered_parts(
@@ -350,7 +286,8 @@ def on_contact(
     boundary, line = solution.boundary, pair.line
     nodal, active = at_nodes(boundary, pair, pairs)
     known = np.isfinite(nodal)
-    pieces, whole = facing_pieces(boundary, line, np.asarray(known.any(axis=1)))
+    carrying = known.any(axis=1) & (line.contact.primary is not None)  # points, of any pair
+    pieces, whole = facing_pieces(boundary, line, np.asarray(line.faces | carrying))
     # Without contact a boundary is free, and may face several others.
     closed = (known & (active | (nodal != 0))).any(axis=1)
     held = closed[pieces.local]

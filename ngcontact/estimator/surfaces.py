@@ -17,10 +17,10 @@ from ..arrays import Array, Index, Mask, rows_of
 from ..contact import (
     ContactState,
     FacingPieces,
+    facing_pieces,
     interpolated_rays,
     opposite,
     prescribed_gap,
-    zone_pieces,
 )
 from ..fem import BoundaryTrace, FacetTrace
 from ..reference import triangle
@@ -156,7 +156,7 @@ def on_zone(solution: ScaledSolution, pair: ContactState) -> tuple[BoundaryTerms
     if not isinstance(trace, FacetTrace):
         raise TypeError("a pair of solids is asked for")
     degree = 2 * solution.order
-    parts = zone_pieces(trace, zone)
+    parts, _ = facing_pieces(trace, zone, np.asarray((zone.rows >= 0).any(axis=1)))
     covered = parts.covered(len(zone.segments))
     alone = np.flatnonzero(covered == 0)
     met = np.isin(zone.facing, parts.facing)

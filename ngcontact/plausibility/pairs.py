@@ -26,13 +26,13 @@ from numpy.typing import NDArray
 from ..arrays import Array, Index, across, rows_of
 from ..contact import (
     ContactState,
+    facing_pieces,
     in_contact,
     interpolated_rays,
     opposite,
     partners,
     prescribed_gap,
     twins,
-    zone_pieces,
 )
 from ..fem import BoundaryTrace, FacetTrace, Moduli, moduli_of
 from ..problem import Problem
@@ -276,7 +276,8 @@ def _samples_of_surfaces(trace: BoundaryTrace, state: ContactState) -> _Samples:
     """Samples on facets of solids: corners and centres of facing parts, where a point is open."""
     zone = state.line
     assert isinstance(trace, FacetTrace)  # of solids
-    parts, places = zone_pieces(trace, zone), np.vstack([np.eye(3), triangle.CENTRE])
+    parts, _ = facing_pieces(trace, zone, np.asarray((zone.rows >= 0).any(axis=1)))
+    places = np.vstack([trace.vertices, triangle.CENTRE])
     each = rows_of(parts, np.arange(len(parts.local)).repeat(len(places)))
     opened = np.asarray(np.append(~state.active, False)[zone.rows].any(axis=1))
     some = np.flatnonzero(opened[each.local])
