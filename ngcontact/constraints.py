@@ -161,7 +161,10 @@ class BasisTransformation:
     def coordinates(self, values: Array, rows: Array) -> Array:
         """Unknowns (d * n, r) of node `values` (d * n, r), `rows` (k, r) on the kept rows."""
         n, d, _ = self.local.shape
-        y = np.einsum("nij,jnr->inr", self.local, values.reshape(d, n, -1)).reshape(d * n, -1)
+        y = values.copy()
+        at = np.flatnonzero((self.local != np.eye(d)).any(axis=(1, 2)))
+        here = at + n * np.arange(d)[:, None]
+        y[here] = np.einsum("nij,jnr->inr", self.local[at], values[here])
         y[self.unknown] = rows
         y[self.fixed] = 0.0
         return y

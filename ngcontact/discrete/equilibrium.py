@@ -177,20 +177,30 @@ def free_motions(
     free = [vanishing_combinations(resisted[at == b]) for b in range(len(bodies.names))]
     if not any(x.shape[1] for x in free):
         return None
-    combinations = block_diag(*(np.eye(len(motions))[:, rigid] @ x for x in free))
-    nodal = _node_values(space, bodies) @ combinations
-    values = space.basis @ nodal
-    terms = (space.diagonal[:, None] * np.abs(values)).max(axis=0)
-    if (np.abs(space.A @ values).max(axis=0) > STRAIN_FORCE * terms).any():
-        raise ValueError(
-            "curved superparametric elements do not contain the rotation of a body that its "
-            'supports leave free; use element="isoparametric"'
-        )
+    of_bodies = [np.eye(len(motions))[:, rigid] @ x for x in free]
+    combinations, first = block_diag(*of_bodies), 0
+    own, of_unknown = _node_values(space, bodies), body_of_unknown(space, bodies)
+    of_node = np.tile(of_unknown[: len(own) // trace.model.dim], trace.model.dim)
+    own_values = space.basis @ own
+    own_forces = space.A @ own_values
+    nodal = np.zeros((len(own), combinations.shape[1]))
+    values = np.zeros((len(own_values), combinations.shape[1]))
+    for b, combination in enumerate(of_bodies):
+        columns = slice(first, first := first + combination.shape[1])
+        at_nodes, here = np.flatnonzero(of_node == b), np.flatnonzero(of_unknown == b)
+        nodal[at_nodes, columns] = own[at_nodes] @ combination
+        values[here, columns] = moved = own_values[here] @ combination
+        terms = (space.diagonal[here, None] * np.abs(moved)).max(axis=0)
+        if (np.abs(own_forces[here] @ combination).max(axis=0) > STRAIN_FORCE * terms).any():
+            raise ValueError(
+                "curved superparametric elements do not contain the rotation of a body that its "
+                'supports leave free; use element="isoparametric"'
+            )
     return FreeMotions(space, bodies, combinations, nodal, values)
 
 
 def _node_values(space: Space, bodies: Bodies) -> Array:
-    """Translations and rotations of each body, (d * n, m * b), as values of nodes and unknowns.
+    """Translations and rotations, (d * n, m), of the body of each node or unknown, as its values.
 
     Translations are 1, rotations 1 at half the body's size.
     """
@@ -207,14 +217,11 @@ def _node_values(space: Space, bodies: Bodies) -> Array:
             place[:, axis] = field.vec.FV().NumPy()
     nodes = trace.nodes[space.nodal]
     place[nodes], one[nodes] = trace.positions(space.nodal), 1.0
-    of_node, values = body_of_unknown(space, bodies)[:n], []
-    for b, (middle, size) in enumerate(zip(bodies.middle, bodies.size, strict=True)):
-        here = (of_node == b)[:, None, None]
-        moves = one[:, None, None] * np.eye(d)
-        turns = rotations(place - one[:, None] * middle) / size
-        both = np.concatenate([moves, turns], axis=2) * here
-        values.append(both.transpose(1, 0, 2).reshape(d * n, -1))
-    return np.concatenate(values, axis=1)
+    body = body_of_unknown(space, bodies)[:n]
+    moves = one[:, None, None] * np.eye(d)
+    arm = (place - one[:, None] * bodies.middle[body]) / bodies.size[body, None]
+    both = np.concatenate([moves, rotations(arm)], axis=2)
+    return both.transpose(1, 0, 2).reshape(d * n, -1)
 
 
 @dataclass(frozen=True, eq=False)

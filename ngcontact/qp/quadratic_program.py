@@ -99,7 +99,8 @@ def pinned_null_space(
     lineal[rows] = 0.0
     held = separated(lineal, places)
     # What completes the lineal motions, less what these contribute at the held unknowns.
-    rest = motions @ np.linalg.svd(combinations, full_matrices=True)[0][:, lineal.shape[1] :]
+    every = np.arange(motions.shape[1])
+    rest = motions[:, np.setdiff1d(every, separated(combinations, every))]
     rest -= lineal @ np.linalg.solve(lineal[held], rest[held]) if held.size else 0.0
     rest[held] = 0.0
     pins = separated(rest, places)
@@ -117,6 +118,7 @@ def separated(vectors: Array, places: Index) -> Index:
     count = vectors.shape[1]
     if count == 0:
         return np.zeros(0, dtype=np.intp)
+    places = places[vectors[places].any(axis=1)]
     return places[qr(vectors[places].T, mode="r", pivoting=True)[1][:count]]
 
 
