@@ -180,23 +180,19 @@ class FacetTrace(BoundaryTrace):
         linked by angles that make no edge.
         """
         order = np.lexsort((self.region[segment], node))
-        number, count = np.full(len(node), -1), 0
         _, first, size = np.unique(node[order], return_index=True, return_counts=True)
-        for start, many in zip(first, size, strict=True):
-            at = order[start : start + many]
-            if many == 1 or not self._turned(segment[at], vector[at]):
-                number[at] = count
-                count += 1
-                continue
-            for i, each in enumerate(at):
-                for j in at[:i]:
-                    turn = np.linalg.norm(vector[[each]] - vector[[j]], axis=1)
-                    if not self._corner(segment[[j]], segment[[each]], turn)[0]:
-                        number[each] = number[j]
-                        break
-                else:
-                    number[each] = count
-                    count += 1
+        number, count = np.empty(len(node), dtype=np.intp), len(first)
+        number[order] = np.repeat(np.arange(count), size)
+        one = order[first][number]  # of the facets at the node
+        turn = np.linalg.norm(vector - vector[one], axis=1)
+        for i in np.unique(number[self._corner(segment[one], segment, turn)]):
+            at = order[first[i] : first[i] + size[i]]
+            for k in range(1, size[i]):
+                before, each = at[:k], np.repeat(at[k], k)
+                turn = np.linalg.norm(vector[each] - vector[before], axis=1)
+                linked = before[~self._corner(segment[before], segment[each], turn)]
+                number[at[k]] = number[linked[0]] if linked.size else count
+                count += not linked.size
         mean = np.zeros((count, 3))
         np.add.at(mean, number, vector * self.sizes(segment)[:, None])
         return number, mean / np.linalg.norm(mean, axis=1)[:, None]
@@ -208,11 +204,6 @@ class FacetTrace(BoundaryTrace):
         names = np.array(self.mesh.GetBoundaries())
         named = names[self.region[first]] != names[self.region[second]]
         return (turn > CORNER_WITHOUT_CAD) | (named & (turn > CORNER))
-
-    def _turned(self, segment: Index, vector: Array) -> bool:
-        """Whether one of the vectors (k, 3) of facets at a node is on another side of an edge."""
-        turn = np.linalg.norm(vector - vector[0], axis=1)
-        return bool(self._corner(segment[np.zeros(len(segment), int)], segment, turn).any())
 
     def nodal_basis(self, segments: Index) -> sp.csr_array:
         """Matrix (n, n) from unknowns at the nodes of `segments` (k,), and others, to NGSolve's."""
