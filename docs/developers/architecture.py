@@ -50,18 +50,6 @@ def imports() -> Imports:
     }
 
 
-def upwards(edges: Imports) -> list[tuple[str, str]]:
-    """Imports from the same floor or one above; none, or the house is not one of floors."""
-    level = {room: k for k, floor in enumerate(floors()) for room in floor}
-    return [(room, to) for room in edges for to in edges[room] if level[to] <= level[room]]
-
-
-def rooms_without_floor() -> set[str]:
-    """Rooms that the contract forgets; `geometries` stands beside the house."""
-    known = {f"ngcontact.{room}" for floor in floors() for room in [*floor, "geometries"]}
-    return graph_of_rooms().find_children("ngcontact") - known
-
-
 def knows_meshes() -> dict[str, bool]:
     """Whether each room loads NGSolve, itself or through others."""
     graph = graph_of_rooms()
@@ -131,8 +119,6 @@ def page(text: str, edges: Imports) -> str:
 def main() -> None:
     """Write picture and table."""
     edges = imports()
-    if against := upwards(edges):
-        raise SystemExit(f"imports upwards, which no picture of floors can show: {against}")
     PAGE.write_text(page(PAGE.read_text(), edges))
     base = ground(edges)
     figure = picture(

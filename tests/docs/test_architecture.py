@@ -22,11 +22,6 @@ def architecture(script):
     return script("architecture")
 
 
-def test_every_room_has_a_floor(architecture):
-    assert not architecture.rooms_without_floor()
-    assert architecture.upwards(architecture.imports()) == []
-
-
 def test_picture_shows_the_imports_of_today(architecture):
     drawn = Image.open(architecture.PICTURE).text["Imports"]
     assert drawn.split("\n") == architecture.as_text(architecture.imports()).split("\n"), NEW
