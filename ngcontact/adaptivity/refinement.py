@@ -9,7 +9,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask, across
-from ..contact import nodal_line
+from ..contact import faced_vertices, nodal_line
 from ..fem import BoundaryTrace, boundary_trace, unknowns_of
 from ..mesh import CadEdge, copied
 from ..problem import Contact, MeshArrays, Problem, bisect, move_vertices
@@ -35,9 +35,9 @@ def matched_vertices(trace: BoundaryTrace, contact: Contact) -> dict[int, int]:
     if contact.primary is None:
         return {}
     line, facing = nodal_line(trace, contact)
-    end = facing & np.isin(line.partner_s, (0.0, 1.0))
-    partner = trace.nodes[line.partner[end], line.partner_s[end].astype(int)]
-    return dict(zip(line.node[end].tolist(), partner.tolist(), strict=True))
+    vertex = faced_vertices(trace, line, facing)
+    met = vertex >= 0
+    return dict(zip(line.node[met].tolist(), vertex[met].tolist(), strict=True))
 
 
 def _boundary_edges(mesh: ng.Mesh) -> dict[tuple[int, int], int]:

@@ -10,6 +10,7 @@ from .facing import GAP_ROUND_OFF as GAP_ROUND_OFF
 from .facing import WHOLE_SHARE as WHOLE_SHARE
 from .facing import FacingPieces as FacingPieces
 from .facing import divided as divided
+from .facing import faced_vertices as faced_vertices
 from .facing import facing_pieces as facing_pieces
 from .facing import interpolated_rays as interpolated_rays
 from .facing import opposite as opposite

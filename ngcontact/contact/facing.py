@@ -208,6 +208,15 @@ def _clipped(
     return FacingPieces(faces[local], parts, facing[number], start, share)
 
 
+def faced_vertices(trace: BoundaryTrace, line: ContactLine, facing: Mask) -> Index:
+    """Vertices (m,) of the primary that points face, of those `facing` (m,) it; -1 where none."""
+    vertex = np.full(len(facing), -1)
+    for corner, place in zip(trace.corners, trace.vertices, strict=True):
+        at = facing & (line.partner_s == place).reshape(len(facing), place.size).all(axis=1)
+        vertex[at] = trace.nodes[line.partner[at], corner]
+    return vertex
+
+
 def opposite_segments(
     trace: BoundaryTrace, line: ContactLine, facing: Mask, some: Mask | None = None
 ) -> Index:
@@ -216,12 +225,8 @@ def opposite_segments(
     `facing` (m,) are the points that face the primary. Vertices without a point, as on Gamma_u,
     face those at the same place, on `some` (k,) of the segments.
     """
-    vertex = np.full(len(facing) + 1, -1)  # of the primary at each point
-    for corner, place in zip(trace.corners, trace.vertices, strict=True):
-        at = facing & (line.partner_s == place).reshape(len(facing), place.size).all(axis=1)
-        vertex[:-1][at] = trace.nodes[line.partner[at], corner]
     corners = line.rows[:, trace.corners]
-    vertices = np.where(corners < 0, -1, vertex[corners])
+    vertices = np.append(faced_vertices(trace, line, facing), -1)[corners]
     sides, x = trace.nodes[line.facing][:, trace.corners], trace.arrays.vertices
     alone = (corners < 0) & (some is not None and some[:, None])
     if alone.any():

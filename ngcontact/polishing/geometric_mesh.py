@@ -16,7 +16,7 @@ import ngsolve as ng
 import numpy as np
 
 from ..arrays import Array, Index, Mask
-from ..contact import ContactState, Transitions, contact_line, twins
+from ..contact import ContactState, Transitions, contact_line, faced_vertices, twins
 from ..discrete import carried_active_set
 from ..fem import boundary_trace, model_of
 from ..mesh import CadEdge, cad_edges, graded_mesh, opposite
@@ -243,9 +243,9 @@ def coarse_mesh(problem: Problem, pairs: Sequence[ContactState], extent: float) 
         new = (middle >= 0) & (pair[line.segments] < 0)  # to earlier pairs those of both
         met = line.segments[new]
         pair[met], closed[met] = number, own[middle[new]]
-        at = (line.partner >= 0) & np.isin(line.partner_s, (0.0, 1.0)) & (line.node < mesh.nv)
-        side = np.where(line.partner_s[at] == 0.0, 0, -1)
-        partner[line.node[at]] = trace.nodes[line.partner[at], side]
+        faced = faced_vertices(trace, line, line.partner >= 0)
+        at = (faced >= 0) & (line.node < mesh.nv)
+        partner[line.node[at]] = faced[at]
     return GeometricMesh(
         source=mesh,
         contacts=[line.contact for line in lines],

@@ -6,7 +6,7 @@ import ngsolve as ng
 import numpy as np
 
 from ...arrays import Array, Index, Mask
-from ...contact import ContactState, in_contact
+from ...contact import ContactState, faced_vertices, in_contact
 from ...fem import Bodies, BoundaryTrace, connected_bodies
 from ...lagrange import gauss
 from ...solved import Solved
@@ -182,11 +182,8 @@ def _faces_end(pair: ContactState, boundary: BoundaryTrace) -> Mask:
     """Which points (m,) face an end of the primary's line."""
     line, ends = pair.line, boundary.nodes[:, [0, -1]]
     vertices, count = np.unique(ends[line.facing], return_counts=True)
-    at = np.flatnonzero((line.partner >= 0) & np.isin(line.partner_s, (0.0, 1.0)))
-    vertex = ends[line.partner[at], line.partner_s[at].astype(int)]
-    result = np.zeros(len(line.partner), dtype=bool)
-    result[at] = np.isin(vertex, vertices[count == 1])
-    return result
+    faced = faced_vertices(boundary, line, line.partner >= 0)
+    return np.isin(faced, vertices[count == 1])
 
 
 def _line_element(boundary: BoundaryTrace, segment: Index, s: Array) -> Array:
