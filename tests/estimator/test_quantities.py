@@ -1,5 +1,6 @@
 """Figures with bars: of energy and force proved, the others are held against Hertz contact."""
 
+import math
 from dataclasses import replace
 
 import ngsolve as ng
@@ -217,6 +218,25 @@ def test_a_punch_in_contact_is_as_wide_as_it_is(swap):
     area = solve(problem, maxh=0.3, order=2).quantities()["contact area"]
     assert area.value == pytest.approx(1.0, rel=1e-12)
     assert area.error <= 1e-12
+
+
+@pytest.mark.parametrize("order", [1, 2, 3, 4])
+@pytest.mark.parametrize("rows", ["auto", "nodal"])
+@pytest.mark.parametrize("foot", [(-0.363, 0.637, 7), (-0.2, 0.1, 4), (-0.5, 0.5, 5)])
+def test_areas_of_segments_that_face_in_part(foot, rows, order):
+    """A foot stands on a wider secondary of other nodes, and a fixed direction sees the same."""
+    mesh, width = two_blocks(np.linspace(*foot), np.linspace(-1.5, 1.5, 14), 0.7), foot[1] - foot[0]
+    down = (math.sin(0.7), -math.cos(0.7))
+    for direction in (None, (-down[0], -down[1])):
+        problem = Problem(
+            geometry=mesh,
+            materials={"upper|lower": Elastic(E=1.0, nu=0.3)},
+            displacement={"top": (0.02 * down[0], 0.02 * down[1]), "bottom": (0, 0)},
+            contact=[Contact("lower_contact", "upper_contact", direction=direction, rows=rows)],
+        )
+        area = solve(problem, order=order).quantities()["contact area"]
+        assert abs(area.value - width) <= area.error + 1e-12
+        assert rows == "nodal" or area.error <= 1e-12
 
 
 @pytest.mark.parametrize("swap", [False, True])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import ngsolve as ng
 import numpy as np
 
-from ...arrays import Array, Index, Mask
-from ...contact import ContactState, faced_vertices, in_contact
+from ...arrays import Array, Index
+from ...contact import ContactState, in_contact
 from ...fem import Bodies, BoundaryTrace, connected_bodies
 from ...lagrange import gauss
 from ...solved import Solved
@@ -141,13 +141,15 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
     """Length of the line in contact, area about an axis, and its estimated error.
 
     Each interval between two points in contact counts, and what is left of the way to an end of
-    contact. Where a point in contact has no neighbour that faces the other body, half of the way
-    counts, with a bar of that size, unless the point faces the end of that body's line. Intervals
-    beside the open side of a corner inside the contact count, with a bar of their size: contact
-    opens there over a part of them. A curve of degree 1 is shorter than its arc by the square of
-    half of its turn over 6, others by what `ARC_LENGTH_ERRORS` tells.
+    contact. Beside points that supports hold half of the way counts, with a bar of that size.
+    Intervals beside the open side of a corner inside the contact count, with a bar of their size:
+    contact opens there over a part of them. Of segments that face the other body in part what faces
+    counts, by the weights of the points in contact; its bar is all of it where some are open, and
+    with `rows="nodal"` up to all of these segments: nodes alone do not tell what faces. A curve of
+    degree 1 is shorter than its arc by the square of half of its turn over 6, others by what
+    `ARC_LENGTH_ERRORS` tells.
     """
-    line, ends = pair.line, pair.transitions
+    line, ends, carries = pair.line, pair.transitions, pair.line.rows >= 0
     if not pair.active.any():
         return 0.0, 0.0
     active, closed = (
@@ -158,13 +160,20 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
     s = places[:, :-1, None] + width[:, :, None] * t
     ds = _line_element(boundary, np.repeat(line.segments, s[0].size), s.ravel())
     sizes = width * (ds.reshape(s.shape) @ w)
-    whole = closed[:, :-1] & closed[:, 1:]
-    # An interval beyond the end of the primary is none of contact.
-    partly = closed & ~np.append(_faces_end(pair, boundary), False)[line.rows]
-    alone = (partly[:, :-1] & (line.rows[:, 1:] < 0)) | (partly[:, 1:] & (line.rows[:, :-1] < 0))
-    half = 0.5 * float(sizes[alone].sum())
+    one, other = closed[:, :-1], closed[:, 1:]
+    whole = one & other & line.faces[:, None]
     opened = whole & ~(active[:, :-1] & active[:, 1:])
-    area, error = float(sizes[whole].sum()) + half, half + float(sizes[opened].sum())
+    held = ((one & ~carries[:, 1:]) | (other & ~carries[:, :-1])) & line.faces[:, None]
+    half = 0.5 * float(sizes[held].sum())
+    part = np.flatnonzero(closed.any(axis=1) & ~line.faces)
+    covered = line.covered[part] * (sizes[part].sum(1) / line.shares[part].sum(1))[:, None]
+    touched = covered * closed[part]
+    if line.contact.rows == "nodal":
+        missing = max(float(touched.sum()), float(sizes[part].sum() - touched.sum()))
+    else:
+        missing = float(covered[(touched < covered).any(axis=1)].sum())
+    area = float(sizes[whole].sum()) + half + float(touched.sum())
+    error = half + float(sizes[opened].sum()) + missing
     if count := len(ends.position):
         measure = boundary.model.measure(ends.position)
         errors = np.array([_error_of_end(pair, k) for k in range(count)])
@@ -176,14 +185,6 @@ def area_in_contact(pair: ContactState, boundary: BoundaryTrace) -> tuple[float,
     factor, power = ARC_LENGTH_ERRORS[known]
     bent = factor * (np.linalg.norm(normals[1] - normals[0], axis=1) / 2) ** power
     return max(area, 0.0), error + float((sizes.sum(axis=1) * bent).sum())
-
-
-def _faces_end(pair: ContactState, boundary: BoundaryTrace) -> Mask:
-    """Which points (m,) face an end of the primary's line."""
-    line, ends = pair.line, boundary.nodes[:, [0, -1]]
-    vertices, count = np.unique(ends[line.facing], return_counts=True)
-    faced = faced_vertices(boundary, line, line.partner >= 0)
-    return np.isin(faced, vertices[count == 1])
 
 
 def _line_element(boundary: BoundaryTrace, segment: Index, s: Array) -> Array:
