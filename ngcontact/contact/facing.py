@@ -204,8 +204,38 @@ def _clipped(
     outward = trace.side[facing, None, None] > 0
     other = np.where(outward, other, other[:, ::-1])  # anticlockwise from outside
     local, parts, number = clipping.pieces(corners, d[faces], other, far[faces])
-    start, share = np.tile(triangle.CENTRE, (len(local), 1)), np.abs(np.linalg.det(parts))
-    return FacingPieces(faces[local], parts, facing[number], start, share)
+    local, number, share = faces[local], facing[number], np.abs(np.linalg.det(parts))
+    seen = _seen(trace, facets[local], parts.mean(axis=1), d[local], facing, number, share)
+    start = np.tile(triangle.CENTRE, (len(seen), 1))
+    return FacingPieces(local[seen], parts[seen], number[seen], start, share[seen])
+
+
+def _seen(
+    trace: BoundaryTrace,
+    own: Index,
+    place: Array,
+    d: Array,
+    facing: Index,
+    number: Index,
+    share: Array,
+) -> Index:
+    """Numbers (j,) of pieces of facets `own` (r,) that are not behind others or the own body.
+
+    Of the pieces with middles `place` (r, 3) and shares (r,), `number` (r,) is what rays along `d`
+    (r, 3) meet of the facets `facing` (q,). Where all pieces of a facet make it up, none hides
+    another.
+    """
+    covered = np.bincount(own, share)[own]
+    middles = trace.curve[:, trace.corners].mean(axis=1)
+    ahead = ((middles[number] - middles[own]) * d).sum(axis=1) >= -SLIVER * trace.lengths(own)
+    seen = (np.abs(covered - 1) <= SLIVER) & ahead
+    asked = np.flatnonzero(~seen)
+    x = trace.point(own[asked], place[asked])
+    first = partners(trace, facing, own[asked], x, d[asked], nodes=False).segment
+    vertices = trace.nodes[:, trace.corners]
+    beside = vertices[first][:, :, None] == vertices[number[asked]][:, None]  # itself, as a rule
+    seen[asked] = (first >= 0) & beside.any(axis=(1, 2))
+    return np.flatnonzero(seen)
 
 
 def faced_vertices(trace: BoundaryTrace, line: ContactLine, facing: Mask) -> Index:

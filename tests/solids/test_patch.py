@@ -69,6 +69,33 @@ def test_uniform_pressure(order, secondary, counts, direction):
     assert solution.work["gap_searches"] == (counts != (2, 2))
 
 
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("direction", [None, (0, 0, 1)])
+def test_faces_behind_others_do_not_count(order, direction):
+    """A primary of faces that lie behind its nearest one, and behind the body of the secondary."""
+    names = ("base", "lowest", "low", "high", "highest")
+    bodies = [
+        (name, (0, 0, k), (1, 1, k + 1), (2 + k % 2, 2 + k % 2, 1)) for k, name in enumerate(names)
+    ]
+    every = "high_bottom|highest_bottom|lowest_bottom"
+    problem = Problem(
+        geometry=boxes(*bodies),
+        materials=dict.fromkeys(names, LAWS["upper"]),
+        sliding="base_bottom",
+        traction={"highest_top": 1.0},
+        contact=[
+            Contact("low_top", every, direction=direction),
+            Contact("base_top", "lowest_bottom"),
+            Contact("lowest_top", "low_bottom"),
+            Contact("high_top", "highest_bottom"),
+        ],
+    )
+    solution = solve(problem, order=order)
+    expected = np.diag([0.0, 0.0, -1.0])
+    assert np.abs(stresses(solution.mesh, solution.stress) - expected).max() < 1e-10  # as above
+    assert np.abs(solution.pressure - 1.0).max() < 1e-10
+
+
 @pytest.mark.parametrize("order", [1, 2, 3])
 def test_turned_bodies(order):
     """Nothing depends on the axes of coordinates."""
