@@ -205,8 +205,9 @@ def test_tubes_with_logarithmic_temperature(model, order):
     for level in levels:
         error = tube_error(level)
         assert 1 < level.error_estimate / error < 10
-        # Exact stresses are those of circles, which plane meshes are not.
-        assert 1 - 1e-3 * (model == "plane strain") < level.error_bound / error < 1.5
+        # Exact stresses are those of circles, which plane meshes are not: the error from a
+        # solution of order 9 on the mesh of order 2 with 332 unknowns is less by 2.2e-3.
+        assert 1 - 3e-3 * (model == "plane strain") < level.error_bound / error < 1.5
         if model == "axisymmetric":  # one domain
             low, high = level.energy_bounds
             assert low <= levels[-1].energy <= high * (1 + 1e-12)

@@ -232,9 +232,9 @@ def _small_zone(state: ContactState, zones: ContactZones) -> str:
         return ""
     worst = small[np.argmin(zones.nodes[small] / needed[small])]
     return (
-        f"a zone in contact is not resolved: it has {zones.nodes[worst]} nodes of at least "
-        f"{needed[worst]}, and the peak of its pressure may be wrong by half, of solids its force, "
-        "too; use adapt, or a smaller maxh"
+        f"a zone in contact is not resolved, by {zones.nodes[worst]} of at least {needed[worst]} "
+        "nodes: the peak of its pressure may be wrong by half, of solids its force, too; use "
+        "adapt, or a smaller maxh"
     )
 
 
