@@ -19,10 +19,10 @@ import numpy as np
 
 from ...arrays import Array, Index
 from ...contact import ContactState
-from ...errors import ContactError
+from ...errors import ContactError, warn
 from ...fem import BoundaryTrace
 from ...problem import Problem, numbers
-from ...quadrature import SampledElements, features_of, unresolved, where_features_are
+from ...quadrature import SampledElements, features_of, loads_of, unresolved, where_features_are
 from .cells import Cells, bisected, cells_of, dependent, parted
 from .elements import Element, by_triangle, elements_of, rigid_motions
 from .facing import (
@@ -159,7 +159,9 @@ def error_bound(
         raise ValueError(f"{NO_BOUND} where {one}; refine the mesh there")
     try:
         found = _bound(problem, trace, displacement, pairs, ())
-    except ContactError:  # resultants that no polynomial pressure has, as of a body about to tilt
+    except ContactError:
+        # Resultants that no polynomial pressure has, as of a body about to tilt, or rough forces of
+        # which quadrature misses too much for a body that moves freely.
         found = _bound(problem, trace, displacement, pairs, BESIDE_VERTICES)
     if not np.isfinite(found.bound):
         raise ValueError(
@@ -175,7 +177,11 @@ def _bound(
     pairs: Sequence[ContactState],
     beside: Sequence[float],
 ) -> Proof:
-    """The bound in the steps of docs/bounds.md; p* also has breaks `beside` ends of segments."""
+    """The bound in the steps of docs/bounds.md.
+
+    With `beside`, p* also has breaks there beside ends of segments, and cells are bisected where
+    forces are rough.
+    """
     guided = trace.segments(None if problem.sliding is None else str(problem.sliding))
     guided = guided[~trace.on_axis[guided]]  # the axis guides by itself: there u_r = 0
     touching = [name for pair in problem.contact for name in (pair.secondary, pair.primary)]
@@ -187,6 +193,10 @@ def _bound(
     cuts = np.concatenate([x for x, _ in both]), np.concatenate([s for _, s in both])
     supported = trace.segments(*fixed)
     cells, largest_size = cells_of(trace, cuts), force_features(problem, trace)
+    for load in loads_of(problem, trace.mesh) if beside else ():
+        if load.kind == "force" and (forces := load.where_rough(trace.order)) is not None:
+            size = np.where(forces.rough, SampledElements(trace.mesh, 2).sizes / 4, np.inf)
+            largest_size = np.minimum(size, largest_size)
 
     def linked(cells: Cells) -> tuple[Index, Index, Array]:
         return facing_middles(cells, displacement, reaches)
@@ -202,7 +212,12 @@ def _bound(
     parts, _ = parted(cells, dependent(cells, loaded, supported))
     try:
         other = _proof(problem, parts, displacement, reaches, guided)
-    except ContactError:
+    except ContactError as error:
+        warn(
+            f"the guaranteed bound is wide: {found.parts['loads'] / found.bound**2:.0%} of its "
+            "square is for loads that are no polynomials, as on smaller cells its proof failed "
+            f"({error}); refine the mesh where loads vary"
+        )
         return found
     return min(found, other, key=lambda proof: proof.bound)
 

@@ -156,12 +156,17 @@ class DualProgram:
     def _on_free_motions(self, load: Array) -> Array:
         """The part (d,) of a `load` (d,) that does work on free motions.
 
-        The condition on the mean of these motions balances it, for s as for sigma.
+        The condition on the mean of these motions balances it, for s as for sigma: by tractions
+        6 t (1 - t) = 1 - P_2(2 t - 1) on each side. They are 0 at vertices, where symmetric
+        stresses on four sides that lie on two lines allow no others.
         """
-        lineal = self.T @ self.program.null_space.lineal
+        lineal, mu = self.T @ self.program.null_space.lineal, self.multipliers
         if lineal.shape[1] == 0:
             return np.zeros_like(load)
-        return np.asarray(lineal @ np.linalg.solve(lineal.T @ lineal, lineal.T @ load))
+        mean = np.append(mu.start[:-1], mu.start[:-1] + mu.degree + 1)
+        holding = np.zeros_like(lineal)
+        holding[mean], holding[mean + 2] = lineal[mean], -lineal[mean] / 5**0.5
+        return np.asarray(holding @ np.linalg.solve(lineal.T @ holding, lineal.T @ load))
 
 
 def dual_program(
