@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import ngsolve as ng
@@ -13,14 +10,13 @@ import scipy.sparse as sp
 from pyngcore import Array_D_S, Array_I_S
 
 from ..arrays import Array, Factor, Index, Mask, Solve
+from ..threads import one_thread
 
 # Unknowns up to which one thread factorises sooner than NGSolve has started others and they have
 # found their work: that takes 25 ms of processor time, 10 000 unknowns of order 3 on one thread 33.
 ONE_THREAD = 10_000
 MULTIPLIED_ENTRIES = 60_000  # of a matrix, up to which T'AT costs no more than the change to it
 MAX_CHANGE = 0.4  # entries that contact rows change, relative to those of the matrix
-
-_COUNT = threading.Lock()  # of the threads of managers to come, one number for the whole process
 
 
 class _View:
@@ -125,22 +121,6 @@ def change_of_basis(A: sp.csr_array, T: sp.csr_array) -> sp.csr_array:
     D = T - sp.eye_array(A.shape[0], format="csr")
     part = D.T.tocsr() @ A  # D'A: as A is symmetric, AD is its transpose
     return (part @ T + part.T).tocsr()
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """NGSolve starts no threads of its own; those of a caller's ``with TaskManager():`` serve on.
-
-    Whatever the number of threads is set to, it is the same before and after.
-    """
-    with ExitStack() as managers:
-        if ng.GetNumThreads() == 1:  # of a manager that this Python thread has entered
-            with _COUNT:
-                count = ng.ngsglobals.numthreads
-                ng.SetNumThreads(1)
-                managers.enter_context(ng.TaskManager())
-                ng.SetNumThreads(count)
-        yield
 
 
 def inverse_of(matrix: ng.BaseMatrix, free: ng.BitArray) -> ng.BaseMatrix:
