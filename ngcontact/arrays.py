@@ -1,4 +1,4 @@
-"""Types of arrays, rows of records, squares in the range of numbers, normals, sparse arrays."""
+"""Types of arrays, records, squares, normals, sparse arrays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Supports and contact rows as arrays, and the basis in which each is one unknown. Arrays only.
+"""Supports and contact rows as arrays: a basis with an unknown for each. Arrays only.
 
 K_h = {B v <= g} of HH81 (2.3), (2.5), (2.10).
 

@@ -1,4 +1,4 @@
-"""Named failures and warnings; bad input is a `ValueError` or a `TypeError` instead."""
+"""Named failures and warnings; bad input is a `ValueError` or `TypeError`."""
 
 from __future__ import annotations
 

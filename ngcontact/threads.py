@@ -1,4 +1,4 @@
-"""Threads of NGSolve and Netgen."""
+"""Threads that NGSolve and Netgen start."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from netgen.occ import OCCGeometry
 
 from ngcontact import Contact, Elastic, Problem
 from ngcontact.fem import boundary_trace
-from ngcontact.geometries import blocks, disc_on_block
+from ngcontact.geometries import ball_on_block, blocks, disc_on_block
 from ngcontact.mesh import generation
 from ngcontact.mesh.curving import check_curves
 from ngcontact.mesh.generation import first_mesh, narrowest, spaced
@@ -67,6 +67,16 @@ def test_the_default_size_is_an_eighth_of_the_largest_extent():
     assert lengths(mesh, "upper_contact|lower_contact") == pytest.approx(4 / 16)
     # The user's geometry is left as it was, and a size that is given holds everywhere.
     assert lengths(first_mesh(problem, 0.5), "upper_contact|lower_contact") == pytest.approx(0.5)
+
+
+def test_a_problem_of_solids_has_one_first_mesh():
+    """Once it has a triangulation, as after meshing or drawing, the box of a ball is another."""
+    contact = Contact("ball_surface", "block_top", direction=(0, 0, -1))
+    materials = dict.fromkeys(("ball", "block"), Elastic(E=1.0, nu=0.3))
+    problem = Problem(ball_on_block(), materials, {"block_bottom": (0, 0, 0)}, contact=[contact])
+    one, other = first_mesh(problem), first_mesh(problem)
+    assert one.ne == other.ne
+    np.testing.assert_allclose(coordinates(other), coordinates(one), rtol=0, atol=ROUND_OFF)
 
 
 def test_partitions_of_the_user_are_honoured():
